@@ -29,6 +29,10 @@ class Unresolved(TransportError):
     """The mesh is too coarse for a front of the substrates."""
 
 
+class Advised(Unresolved):
+    """The same, with the refinement that resolves the state, or the statement that none does."""
+
+
 class GrowthError(StageError):
     """No equilibrium of the aggregate was found."""
 

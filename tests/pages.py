@@ -27,6 +27,8 @@ CHARTS = {
     "Effluents": {"acceptor": "effluent_acceptor_mg_per_L", "donor": "effluent_donor_mg_per_L"},
     "Inlet of the meshed part": {"acceptor": "inlet_acceptor_mg_per_L", "donor": "inlet_donor_mg_per_L"},
     "Least concentrations": {"acceptor": "acceptor_min_mg_per_L", "donor": "donor_min_mg_per_L"},
+    "Concentrations above the supply": {"acceptor": "acceptor_overshoot_mg_per_L",
+                                        "donor": "donor_overshoot_mg_per_L"},
     "Area of the aggregate": {"area": "aggregate_area_um2"},
     "Extent of the aggregate": {"thickness": "thickness_um", "upstream end": "upstream_um",
                                 "downstream end": "downstream_um"},
@@ -37,7 +39,8 @@ CHARTS = {
     "Mesh": {"nodes": "nodes", "made anew": "remeshed"},
 }
 AXES = {"Conductivity": "(m/day)", "Mean velocity": "(m/day)", "Head loss": "(cm)", "Effluents": "(mg/L)",
-         "Inlet of the meshed part": "(mg/L)", "Least concentrations": "(mg/L)", "Area of the aggregate": "(um²)",
+         "Inlet of the meshed part": "(mg/L)", "Least concentrations": "(mg/L)",
+         "Concentrations above the supply": "(mg/L)", "Area of the aggregate": "(um²)",
          "Extent of the aggregate": "(um)"}
 LEDGERS = {f"Ledger: {name}": {"supplied": f"{name}_supplied_pg_per_m", "leaving": f"{name}_out_pg_per_m",
                                "taken up": f"{name}_consumed_pg_per_m", "stored": f"{name}_stored_pg_per_m"}

@@ -1,5 +1,6 @@
 """What holds for a run of any scene: balances of substrates and biomass (2.2), kept in loops that know nothing but the
 paper; and when its steps end."""
+import math
 import re
 from dataclasses import replace
 from itertools import pairwise
@@ -10,7 +11,7 @@ from hypothesis import event, example, given
 from hypothesis import strategies as st
 
 from repro.errors import SimulationError, TransportError, Unresolved
-from repro.march import midpoint, updates
+from repro.march import balance, midpoint, updates
 from repro.march.loop import Ledger
 from repro.march.simulation import simulate
 from repro.model import pore, transport
@@ -22,6 +23,7 @@ from tests.strategies import ORDERS, between, scene, scenes, share
 from tests.test_derived import over_end, taken_up
 
 ANY_ORDER = tuple(ORDERS.values())
+EVERY_ORDER = pytest.mark.parametrize("order", ORDERS)
 
 
 def instants(made):
@@ -242,3 +244,47 @@ def test_updates_are_at_multiples_of_the_time_step_and_at_the_end(step, count, p
     inner = [time for time in whole if time < end - 1e-9 * max(1.0, step)]
     assert times == pytest.approx([*inner, end] if end else [0.0], rel=1e-12, abs=1e-12)
     assert reported == ({0.0, *wanted} if wanted else set(times))
+
+
+@EVERY_ORDER
+@pytest.mark.parametrize("name, k", [("acceptor", 0), ("donor", 1)])
+def test_a_balance_of_round_off_is_not_a_defect(order, name, k):
+    """Without flow, decay and the other substrate, this one rests at its supply: what seems supplied is round-off,
+    within eps of the sum of the sizes of the terms at the supply. The floor is the amount of which that is 1e-6, and
+    defects are relative to no less."""
+    other = ("acceptor", "donor")[1 - k]
+    elements = f"numerics.elements={ORDERS[order]}", f"numerics.refinement={0.5 / order}"
+    made = load_scene("base", [*elements, 'pore.length="200 um"', 'growth.end="12 min"',
+                               'kinetics.decay_coefficient="0 1/d"', f'substrates.{other}.supply="0 mg/L"'], ["flow"])
+    first, last = simulate(made)
+    problem, flux = first.solved.problem, first.solved.fluxes[k]
+    own = slice(k * problem.space.count, (k + 1) * problem.space.count)
+    round_off = np.finfo(float).eps * 10 * np.abs(problem.operator.toarray()[own, own]).sum()
+    assert abs(flux.supplied) <= round_off and flux.consumed == 0
+    assert balance.floor(problem, k, 10.0) == pytest.approx(round_off / 1e-6, rel=1e-12)
+    for instant in (first, last):
+        assert abs(row(made, instant)[f"{name}_balance"]) < 1e-6
+    leak = replace(flux, supplied=0.5 * round_off / 1e-6, out=0.0)
+    fluxes = tuple(leak if j == k else both for j, both in enumerate(first.solved.fluxes))
+    leaking = replace(first, solved=replace(first.solved, fluxes=fluxes))
+    assert row(made, leaking)[f"{name}_balance"] == pytest.approx(0.5, rel=1e-9)
+
+
+def test_a_demand_of_round_off_is_not_a_defect():
+    """In a closed pore that is exhausted, biomass made is zero or the round-off of the difference of two sums, which
+    exact sums bound; 1e-6 of the floor."""
+    made = load_scene("base", ["numerics.preset=paper", "numerics.refinement=0.5", "numerics.transport=gear",
+                               'pore.length="100 um"', "substrates.boundary=closed", "aggregate.radius=15 um",
+                               'growth.end="16 h"', 'growth.time_step="2 h"'], ["flow"])
+    found = list(simulate(made))
+    (ledger,) = found[-1].ledgers
+    assert ledger.consumed[0] < 1e-12 * ledger.biomass_before
+    assert abs(row(made, found[-1])["oxygen_demand_balance"]) < 1e-6
+    for old, new in pairwise(found):
+        before, after = old.pore, new.before[0]
+        parts = [*after.active.ravel(), *after.inert.ravel(), *-before.active.ravel(), *-before.inert.ravel()]
+        assert abs(after.mass - before.mass - math.fsum(parts)) <= balance.ROUND_OFF * before.mass
+    k, floor = made.kinetics, 1e-7 * ledger.biomass_before
+    for part in (0.1, 10.0):  # acceptor alone, taken up as by decay, of which nothing comes
+        leak = replace(ledger, consumed=(part * floor * k.decay_oxygen_demand, 0.0), biomass_made=0.0)
+        assert balance.oxygen_demand(k, leak) == pytest.approx(min(part, 1.0), rel=1e-9)

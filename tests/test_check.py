@@ -89,6 +89,7 @@ QUICK = (*QUIET, "kinetics.maximum_density=30 mg/L", "growth.time_step=1e-4 h", 
 FASTER = "kinetics.maximum_utilization_rate=3400 1/day"
 FORCED = (*QUIET, "growth.end=24 h")
 PERMEABLE = ("flow_only", "aggregate.radius=20 um", "flow.biomass=brinkman", "numerics.elements=quadratic")
+COARSE_PERMEABLE = (*PERMEABLE, "numerics.refinement=0.5")
 FEW = ("substrates.acceptor.half_saturation=2e-3 mg/L", "substrates.donor.half_saturation=2e-3 mg/L")
 FINE, FAST = "numerics.refinement=2", "numerics.preset=fast"
 
@@ -124,9 +125,11 @@ FINE, FAST = "numerics.refinement=2", "numerics.preset=fast"
     ("growth.time_step", [*QUIET, "growth.time_step=0.55 h"], FAST, ""),
     # contact from 31.2 h on
     ("growth.end", ["wide", "pore.length=3000 um"], "growth.end=37 h", "growth.end=38 h"),
-    # elements at the interface of a seed of 20 um are 2 um, five times the root of 1.6e-13 m2; half of it where finer
-    ("flow.permeability", PERMEABLE, "flow.permeability=1.7e-13 m^2", "flow.permeability=1.5e-13 m^2"),
-    ("flow.permeability", [*PERMEABLE, FINE], "flow.permeability=4.2e-14 m^2", "flow.permeability=3.9e-14 m^2"),
+    # elements of 4 um widen the layer to d = 2/3 um, and 3 (r - r^2 / d) / 30 um is 1 % at r = 0.12251 and 0.54415 um;
+    # it is less everywhere where elements are half as large
+    ("flow.permeability", COARSE_PERMEABLE, "flow.permeability=1.495e-14 m^2", "flow.permeability=1.505e-14 m^2"),
+    ("flow.permeability", COARSE_PERMEABLE, "flow.permeability=2.965e-13 m^2", "flow.permeability=2.955e-13 m^2"),
+    ("flow.permeability", [*PERMEABLE, "flow.permeability=1e-13 m^2"], "", "numerics.refinement=0.5"),
     # a diffusivity of Table 1 is changed, and its partner in the aggregate too or not; F = COD - Y d_c
     ("substrates.donor.diffusivity_in_aggregate", [*QUIET, "substrates.donor.diffusivity=2 cm^2/day"],
      "substrates.donor.diffusivity_in_aggregate=80 %", ""),
@@ -260,7 +263,8 @@ def test_for_machines(capsys):
     text = capsys.readouterr().out
     told = json.loads(text)
     assert text == json.dumps(told, indent=2) + "\n"
-    assert set(told) == {"scene", "modelled", "nodes", "triangles", "numbers", "warnings", "cost"}
+    assert set(told) == {"scene", "modelled", "nodes", "triangles", "numbers", "warnings", "cost",
+                         "estimated"}
     assert told["nodes"] == 783 and told["cost"]["steps"] == 0 and told["warnings"] == []
     assert told["numbers"][0]["name"] == "Reynolds" and "growth" in told["modelled"]
 

@@ -153,6 +153,8 @@ def derived_row(scene, at):
         found[f"effluent_{name}_mg_per_L"] = over_end(now.space, last, u_x, field) / flux
         found[f"inlet_{name}_mg_per_L"] = over_end(now.space, first, u_x, field) / over_end(now.space, first, u_x)
         found[f"{name}_min_mg_per_L"] = min(field.tolist())
+        above = (value - getattr(scene.substrates, name).supply for value in field.tolist())
+        found[f"{name}_overshoot_mg_per_L"] = max(0.0, *above)
         supplied = getattr(scene.substrates, name).supply * over_end(now.space, first, u_x)
         assert abs(supplied - over_end(now.space, last, u_x, field) - taken[k]) <= 1e-9 * supplied
         found[f"{name}_balance"] = 0.0
@@ -197,7 +199,7 @@ def test_every_column_is_what_its_name_says(order):
         assert row[name] == pytest.approx(value, rel=1e-12 if tight else 1e-6,
                                           abs=1e-6 if name.endswith("_balance") else 1e-12), name
     assert row["head_loss_cm"] == pytest.approx(scene.flow.head / 1e4, rel=1e-9)
-    values = [value for name, value in row.items() if not name.endswith("_balance")]
+    values = [value for name, value in row.items() if not name.endswith(("_balance", "_overshoot_mg_per_L"))]
     assert len(set(values)) == len(values) - 1, "two columns alike would hide an exchange (remeshed and contact are)"
 
 

@@ -7,8 +7,9 @@ import pytest
 from repro.cli import main
 from repro.errors import Interrupted
 from repro.march.simulation import ends_soon, steps
+from repro.results import read_table
 from repro.run.checkpoint import LAST, NEWEST, PREVIOUS
-from repro.run.running import Watch, resume
+from repro.run.running import Watch, resume, run
 from repro.scene import SceneError, load_scene
 from tests.pages import whole_of
 from tests.shell import every, files, lasting, state, stopped, told
@@ -112,3 +113,15 @@ def test_the_command(tmp_path, capsys):
     assert main(["run", "flow_only", "--out", str(tmp_path / "still")]) == 0
     assert main(["run", "--resume", str(tmp_path / "still"), "--set", "growth.end=5 h"]) == 2
     assert "its scene has no [growth]" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("preset", ["fast", "paper"])
+def test_the_ledger_has_every_step_though_the_rows_end_before(preset, tmp_path):
+    """A table with jumps, rows to 1 h, a run to 1.2 h; and so again where the run is made longer."""
+    jumps = 'substrates.donor.supply=[["0 h", "10 mg/L"], ["0.5 h", "8 mg/L"], ["0.8 h", "9 mg/L"]]'
+    times = ('output.times=["0.5 h", "1 h"]', "growth.end=1.2 h")
+    run(load_scene("base", [f"numerics.preset={preset}", jumps, *times]), tmp_path / "run")
+    assert read_table(tmp_path / "run" / "ledger.csv")["end_h"][-1] == 1.2
+    resume(tmp_path / "run", overrides=["growth.end=1.6 h"])
+    spans = read_table(tmp_path / "run" / "ledger.csv")
+    assert spans["end_h"][-1] == 1.6 and spans["start_h"][1:] == pytest.approx(spans["end_h"][:-1], abs=1e-9)

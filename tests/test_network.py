@@ -1,5 +1,8 @@
 """The law for networks: what it says, what it refuses, that velocity, head and width drop out, its bounds, and fifty
 shapes that its fit has not seen."""
+import csv
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -64,6 +67,38 @@ def test_fifty_shapes_that_the_fit_has_not_seen_are_within_the_bounds():
     assert 20 <= columns["grown"].sum() and 8 <= columns["spanned"].sum() <= 30
     assert {one.run for one in found}.isdisjoint(law.RUNS)
     assert np.median(np.abs(judged.apart)) < 0.02
+
+
+@pytest.mark.parametrize("spanned", [False, True])
+def test_in_the_table_it_is_the_table(spanned):
+    """At every row of `network.csv`, its bounds over it too, to round-off."""
+    with TABLE.open(encoding="utf-8", newline="") as lines:
+        rows = [[*map(float, row.values())] for row in csv.DictReader(lines) if row["spanned"] == str(int(spanned))]
+    assert len(rows) > 50
+    for chosen in RATIOS:
+        share, length, least, most = np.array([numbers for _, ratio, *numbers in rows if ratio == chosen]).T
+        found = np.array(repro.added_resistance(share, 1.0, spanned, chosen))
+        assert found == pytest.approx(np.array([length, least * length, most * length]), rel=1e-12)
+
+
+@pytest.mark.parametrize("thickness", [0.825, 0.84, 0.91])
+def test_between_the_rows_of_the_table_it_is_what_half_discs_add(thickness):
+    """In thickness and in lambda: within what elements err by. Straight lines between the rows are off by 2 %."""
+    now = shapes.half_disc(thickness)
+    for ratio in (330.0, 1400.0, 3300.0):
+        found = repro.added_resistance(now.boundary.area, now.mesh.width, False, ratio).length
+        assert found == pytest.approx(shapes.added_length(now.space, ratio), rel=law.NUMERICS)
+
+
+@pytest.mark.parametrize("share", [1.6, 1.86, 2.7, 4.2])
+def test_between_the_lambdas_of_the_table_a_plug_lets_pass_what_it_does_at_both(share):
+    """Its ends, as a length over W: between those at the neighbours in the table, to a hundredth."""
+    def passed(ratio):
+        return share - float(repro.added_resistance(share, 1.0, True, ratio).length) / (ratio - 1)
+
+    for low, high in pairwise(RATIOS):
+        ends = sorted((passed(low), passed(high)))
+        assert ends[0] - 0.01 <= passed((low * high) ** 0.5) <= ends[1] + 0.01
 
 
 def test_it_grows_with_area_and_lambda_and_lies_within_its_bounds():

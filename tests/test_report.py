@@ -18,6 +18,8 @@ from repro.model import growth
 from repro.report import fields, quantities, run_page
 from repro.report.reading import Run, read
 from repro.results import names, vtu
+from repro.results.arrays import ARRAYS
+from repro.results.quantities import ending
 from repro.results.vtu import Cells, Grid
 from repro.scene import load_scene, scene_tables
 from tests.pages import (
@@ -193,6 +195,32 @@ def test_every_name_has_its_unit_or_is_a_pure_number():
              "aggregate_area_um2": ("um²", "um2"), "acceptor_supplied_pg_per_m": ("pg/m", "pg m-1"),
              "donor_min_mg_per_L": ("mg/L", "mg L-1"), "nodes": ("", "1")}
     assert {name: (names.unit(name), names.udunits(name)) for name in shown} == shown
+
+
+#: What parts of a name mean; others stand in the words as they are.
+MEANING = {"out": "leaving", "effluent": "leaving", "consumed": "taken up", "min": "least", "max": "largest",
+           "fraction": "part", "balance": "relative", "t0": "t = 0", "remeshed": "made anew", "before": "start",
+           "after": "end", "region": "aggregate (1)", "oxygen": "acceptor", "demand": "donor"}
+#: Of each of these a name and its words have the same one, or none.
+CONTRASTS = [("acceptor", "donor"), ("upstream", "downstream"), ("least", "largest"), ("active", "inert"),
+             ("supplied", "leaving", "taken up", "stored"), (" xx", " yy", " zz", " xy")]
+
+
+@pytest.mark.parametrize("name", names.KNOWN)
+def test_the_long_name_of_a_quantity_says_what_its_name_says(name):
+    """Part by part: in NetCDF files, on pages and in `docs/quantities.md`."""
+    words = " " + names.words(name)
+    parts = [MEANING.get(part, part) for part in name.removesuffix(ending(name)).split("_")]
+    assert [part for part in parts if part.lower() not in words.lower()] == []
+    said = " " + " ".join(parts)
+    for contrast in CONTRASTS:
+        used, meant = ({each for each in contrast if re.search(rf"\b{each.strip()}\b", text)} for text in (words, said))
+        assert used == meant, contrast
+
+
+def test_no_two_columns_have_one_long_name():
+    for columns in (results.COLUMNS, results.LEDGER_COLUMNS, [each.name for each in ARRAYS]):
+        assert len({*map(names.words, columns)}) == len(columns)
 
 
 def test_the_table_in_docs_is_that_of_the_definitions():

@@ -169,6 +169,8 @@ def test_every_key_is_refused_what_it_does_not_take():
      'flow.biomass = "brinkman": numerics.elements = "quadratic" or "cubic" is needed'),
     ("base", ["numerics.preset=fast", "flow.biomass=brinkman", "flow.permeability=1e-15 m^2",
               "growth.fluid_forces=included"], '"neglected" is needed with flow.biomass = "brinkman"'),
+    ("base", ["numerics.preset=fast", "flow.biomass=brinkman", "flow.permeability=2.49e-20 m^2"],
+     'flow.permeability = "2.49e-20 m^2": "2.5e-20 m^2" or more is needed in a pore 50 um wide'),
     ("base", ["kinetics.donor_oxygen_demand=0.8", "kinetics.acceptor_to_donor_ratio=1.52"],
      "more than Y d_c (0.8662) is needed"),
     ("base", ["substrates.acceptor.diffusivity_in_aggregate=1e-200 %", "substrates.acceptor.diffusivity=1e-200 um^2/h"],
@@ -208,6 +210,7 @@ def test_a_file_is_refused_by_its_own_key(tmp_path, text, said):
 
 @pytest.mark.parametrize("source, overrides", [
     ("base", ["growth.end=0 h"]),
+    ("base", ["numerics.preset=fast", "flow.biomass=brinkman", "flow.permeability=2.5e-20 m^2"]),
     ("base", ["growth.end=0 h", 'output.times=["0 h"]']),
     ("base", ['output.times=["19.4 h", "1164 min"]']),
     ("flow_only", ['output.times=["0 h"]']),

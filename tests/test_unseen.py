@@ -41,6 +41,7 @@ from tests.test_derived import EVERY_ORDER, arcs, over_end, places_of
 from tests.test_gear import case, storage
 
 NOTHING = Solved(None, None, None)
+UNLIKE_OF = {"acceptor": "donor", "donor": "acceptor"}
 EVEN = Ledger(0.0, 1.0, (5.0, 3.0), (1.0, 1.5), (4.0, 1.5), (0.0, 0.0), 70.0, 10.0, 80.0)
 UNLIKE = ['substrates.acceptor.supply="9 mg/L"', 'substrates.donor.supply="4 mg/L"', "numerics.refinement=0.3"]
 
@@ -87,14 +88,30 @@ def test_each_substrates_defect_is_over_its_own_terms(k, name):
     """Of a row's own fluxes without a step, and with Gear over what the meshed part holds at the supply."""
     scene, now = base(1)
     gear, solved = base(1, "numerics.transport=gear")[0], solve(scene, now)
-    fluxes = [transport.Fluxes(5.0, 1.0, 4.0, 9.0, 8.0), transport.Fluxes(3.0, 1.5, 1.5, 4.0, 3.0)]
-    fluxes[k] = replace(fluxes[k], out=fluxes[k].out - 0.06)
+    fluxes = [transport.Fluxes(5e3, 1e3, 4e3, 9.0, 8.0), transport.Fluxes(3e3, 1.5e3, 1.5e3, 4.0, 3.0)]
+    fluxes[k] = replace(fluxes[k], out=fluxes[k].out - 60)
     own = np.eye(2)[k]
     held = getattr(scene.substrates, name).supply * np.ptp(now.mesh.ends) * scene.pore.width
-    for row, wanted in ((row_of(scene, now, replace(solved, fluxes=tuple(fluxes))), 0.06 / fluxes[k].supplied),
+    for row, wanted in ((row_of(scene, now, replace(solved, fluxes=tuple(fluxes))), 60 / fluxes[k].supplied),
                         (row_of(gear, now, solved, (replace(EVEN, stored=tuple(-7.0 * own)),)), 7.0 / held)):
         found = [row["acceptor_balance"], row["donor_balance"]]
         assert found == pytest.approx(wanted * own, rel=1e-9, abs=1e-12)
+
+
+@pytest.mark.parametrize("k, name", [(0, "acceptor"), (1, "donor")])
+def test_an_overshoot_is_over_each_substrates_own_supply(k, name):
+    """Of the present supply, with Gear of the largest of its table; zero below it, and over a supply of zero too."""
+    table = f'substrates.{name}.supply=[["0 h", "5 mg/L"], ["1 h", "9 mg/L"], ["2 h", "0 mg/L"]]'
+    both = [base(1, table, *more)[0] for more in ((), ("numerics.transport=gear",))]
+    now = replace(seeded(both[0]), time=2.0)
+    solved = solve(both[0], now)
+    for largest, over in ((0.25, (0.25, 0.0)), (9.5, (9.5, 0.5)), (-1e-6, (0.0, 0.0))):
+        fields = [np.full(now.space.count, -1e-3), np.full(now.space.count, -1e-3)]
+        fields[k][7] = largest
+        found = replace(solved, concentrations=transport.Concentrations(*fields))
+        rows_of = [row_of(scene, now, found) for scene in both]
+        assert [row[f"{name}_overshoot_mg_per_L"] for row in rows_of] == pytest.approx(over)
+        assert {row[f"{UNLIKE_OF[name]}_overshoot_mg_per_L"] for row in rows_of} == {0.0}
 
 
 @EVERY_ORDER
@@ -541,7 +558,8 @@ def test_frames_before_an_expansion_are_not_counted_as_times():
 
 THIN = {"front": ["numerics.preset=fast", 'substrates.acceptor.half_saturation="1e-3 mg/L"',
                   'flow.mean_velocity="1 m/day"'],
-        "layer of drag": ["numerics.preset=fast", "flow.biomass=brinkman", 'flow.permeability="2e-14 m^2"',
+        "layer of drag": ["numerics.preset=fast", "flow.biomass=brinkman", 'flow.permeability="4e-13 m^2"',
+                          "aggregate.radius=30 um",
                           'flow.mean_velocity="1 m/day"'],
         "cells": ["numerics.preset=paper", 'flow.mean_velocity="60 m/day"']}
 

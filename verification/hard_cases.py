@@ -1,5 +1,5 @@
-"""The matrix of the twenty-two hard cases with every preset, which ``python -m verification`` runs: `... hard` for all
-of them, `... --case hard-04-fast-flow` for one.
+"""The matrix of the twenty-three hard cases with every preset, which ``python -m verification`` runs: `... hard` for
+all of them, `... --case hard-04-fast-flow` for one.
 
 "cubic" is the preset fast with cubic elements. Each cell of the matrix, a case with a preset, is right, refused or
 wrong, see :mod:`verification.hard.common`. Refusing is accepted in the parts that a case names, and with ``paper``;

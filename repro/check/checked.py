@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 
 from repro.check import cost
 from repro.check.cost import Cost
-from repro.check.memory import require_memory
+from repro.check.memory import first_nodes, require_memory, require_outline
 from repro.check.modelled import modelled
 from repro.check.numbers import Number, judged
 from repro.check.simplifications import Warned, unmet, warnings
@@ -16,16 +16,20 @@ from repro.errors import SimulationError
 from repro.fem.linear import Method
 from repro.march.loop import stopping
 from repro.model import pore
-from repro.scene import Source, label, load_scene
+from repro.scene import Scene, Source, label, load_scene
 from repro.scene.units import SceneError
 
 WIDTH = 110
+#: Meshes of more nodes are not made for a check: their nodes are estimated.
+MOST_MESHED = 20_000
+#: Nodes per triangle, by the geometry of the triangles.
+PER_TRIANGLE = {1: 0.5, 2: 2.0}
 
 
 @dataclass(frozen=True)
 class Checked:
     """modelled: (section, words); nodes, triangles: of the first mesh, six nodes to a curved
-    triangle."""
+    triangle; estimated: are these two estimates, since the mesh is too large to be made here?"""
 
     scene: str
     modelled: list[tuple[str, str]]
@@ -34,6 +38,7 @@ class Checked:
     numbers: list[Number]
     warnings: list[Warned]
     cost: Cost
+    estimated: bool = False
 
     def __str__(self) -> str:
         return report(self)
@@ -54,20 +59,31 @@ def check(scene: Source, file: str = "") -> Checked:
     file = file or label(scene)
     scene = load_scene(scene)
     scarce: list[str] = []
+    require_outline(scene)
     require_memory(scene, scarce.append)
+    estimated = first_nodes(scene) > MOST_MESHED
     try:
         with stopping(0.0):
             Method(scene.numerics.solver, scene.numerics.ordering).checked()
-            mesh = pore.seeded(scene).mesh
-        trial = cost.tried(scene, len(mesh.points))
+            nodes, triangles = _mesh_size(scene, estimated)
+        trial = cost.tried(scene, nodes)
         flow = trial.first.solved.flow
         most, found = judged(scene, flow.mean_velocity if flow else None)
         told = [*warnings(most, found), *unmet(scene, trial.worst, " in the first steps"),
                 *(Warned("numerics.refinement", text) for text in scarce)]
-        return Checked(scene.name, modelled(scene), len(mesh.points), len(mesh.biomass), found,
-                       told, cost.expected(scene, trial, len(mesh.points)))
+        return Checked(scene.name, modelled(scene), nodes, triangles, found, told,
+                       cost.expected(scene, trial, nodes), estimated)
     except (SimulationError, ArithmeticError) as error:
         raise SceneError(f"{file}: it cannot be run: {error}") from error
+
+
+def _mesh_size(scene: Scene, estimated: bool) -> tuple[int, int]:
+    """Nodes and triangles of the first mesh."""
+    if estimated:
+        nodes = round(first_nodes(scene))
+        return nodes, round(nodes / PER_TRIANGLE[scene.numerics.geometry])
+    mesh = pore.seeded(scene).mesh
+    return len(mesh.points), len(mesh.biomass)
 
 
 def report(found: Checked) -> str:
@@ -75,7 +91,8 @@ def report(found: Checked) -> str:
     lines = [f"{found.scene}: can be run", "", "What is modelled"]
     for section, words in found.modelled:
         lines += _item(section, words)
-    lines += ["", f"Mesh at t = 0: {found.nodes} nodes, {found.triangles} triangles", ""]
+    about = "about " if found.estimated else ""
+    lines += ["", f"Mesh at t = 0: {about}{found.nodes} nodes, {found.triangles} triangles", ""]
     lines += _cost(found.cost)
     if found.numbers:
         lines += ["", *_numbers(found.numbers)]

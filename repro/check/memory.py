@@ -6,7 +6,9 @@ largest L (3.1):
 
     nodes = A / (sqrt(3)/2 L^2) + 2 l / (sqrt(3)/2) ((1/s - 1/L) / g - (L - s) / (g L^2))
 
-with the area A of the meshed part and the length l of the surface: right within a third.
+with the area A of the meshed part and the length l of the surface: right within a third. For an
+outline the second term is summed over the pieces of its edges, each with the size that it asks for:
+right within a factor of two.
 """
 
 from __future__ import annotations
@@ -17,10 +19,16 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
 
+import numpy as np
+import shapely
+
 from repro.check import numbers
-from repro.fem.sizing import ACROSS_AGGREGATE, ACROSS_PORE
-from repro.model.pore import resolution
-from repro.scene import Scene, SceneError
+from repro.errors import MeshError
+from repro.fem import sizing
+from repro.fem.outline import Outline
+from repro.fem.sizing import ACROSS_AGGREGATE, ACROSS_PORE, SPLIT
+from repro.model.pore import initial_outline, resolution, sized
+from repro.scene import Scene, SceneError, needed
 
 #: Bytes per node at the peak of a run, by the order of elements: measured at 800 to 50 000 nodes.
 PER_NODE = {1: 25e3, 2: 25e3, 3: 65e3}
@@ -28,6 +36,8 @@ PER_NODE = {1: 25e3, 2: 25e3, 3: 65e3}
 LEAST = 30e6
 #: Nodes of six-node triangles per corner.
 PER_CORNER = 4.0
+#: Pieces of an outline's edge, each with a size of its own.
+PIECES = 16
 #: Of what is free, a run that takes more than this part of it is warned of.
 WARNED = 0.5
 HEXAGON = math.sqrt(3) / 2
@@ -39,39 +49,58 @@ def expected_nodes(scene: Scene) -> float:
 
     Midside nodes count too. Nothing is meshed for it.
     """
-    if scene.aggregate is None:
-        return _nodes(scene, 0.0, 0.0)
-    sizes = [_seed(scene)]
+    expected = [first_nodes(scene)]
     if scene.growth:
         with suppress(ArithmeticError):  # then the run itself says what is wrong
             end = numbers.at_end(scene.largest)
-            sizes.append((end.thickness, end.reach))
-    return max(_nodes(scene, *size) for size in sizes)
+            expected.append(_half_disc_nodes(scene, end.thickness, end.reach))
+    return max(expected)
 
 
-def _seed(scene: Scene) -> tuple[float, float]:
-    """Thickness of the seed and half of its length (um)."""
+def first_nodes(scene: Scene) -> float:
+    """Nodes of the mesh at t = 0, roughly: around a half-disc, an outline or nothing."""
+    if scene.aggregate is None:
+        return _nodes(scene, 0.0, 3 * scene.pore.width, [])
     radius = scene.aggregate.radius
     if radius is not None:
-        return radius, radius
-    x, y = zip(*scene.aggregate.outline)
-    return max(y), (max(x) - min(x)) / 2
+        return _half_disc_nodes(scene, radius, radius)
+    outline = needed(initial_outline(scene), "an aggregate")
+    extent = outline.downstream - outline.upstream
+    return _nodes(scene, outline.thickness, extent, _edges(outline.corners, sized(scene)))
 
 
-def _nodes(scene: Scene, thickness: float, reach: float) -> float:
-    """Nodes of a mesh around an aggregate of this thickness and half length (um); 0: none."""
+def _half_disc_nodes(scene: Scene, thickness: float, reach: float) -> float:
+    """Nodes of a mesh around an aggregate of this thickness and half length (um)."""
+    size = thickness / ACROSS_AGGREGATE / resolution(scene)
+    return _nodes(scene, thickness, 2 * reach, [(size, math.pi * min(thickness, reach))])
+
+
+def _edges(outline: Outline, sizes: sizing.Sizing) -> list[tuple[float, float]]:
+    """Element size and length (um) of each piece of the interface."""
+    count = len(outline.points)
+    edge = np.repeat(np.arange(count), PIECES)
+    pieces = sizing.placed(outline, edge, np.tile(np.arange(PIECES) / PIECES, count))
+    near = np.minimum(sizing.interface_sizes(pieces, sizes), SPLIT * outline.edge_lengths()[edge])
+    at = outline.interface_edges()[edge]
+    return [*zip(near[at], pieces.edge_lengths()[at])]
+
+
+def _nodes(scene: Scene, thickness: float, extent: float,
+           surface: list[tuple[float, float]]) -> float:
+    """Nodes of a mesh around an aggregate of a thickness and length (um).
+
+    surface: element size and length (um) of each piece of it.
+    """
     pore = scene.pore
     numerics = scene.numerics
+    clear = min(10 * thickness, 1.5 * pore.width)
+    length = pore.length if numerics.extent == "full" else min(pore.length, extent + 2 * clear)
     largest = pore.width / ACROSS_PORE / resolution(scene)
-    clear = min(10 * thickness, 1.5 * pore.width) if thickness else 1.5 * pore.width
-    length = pore.length if numerics.extent == "full" else min(pore.length, 2 * (reach + clear))
-    near = thickness / ACROSS_AGGREGATE / resolution(scene)
-    near = min(near or largest, largest)
     if numerics.gradation == 0:
-        largest = near
+        largest = min([largest, *(size for size, _ in surface)])
     corners = length * pore.width / (HEXAGON * largest**2) + 2 * (length + pore.width) / largest
-    corners += _graded(math.pi * min(thickness, reach), near, largest, numerics.gradation)
-    return corners * (PER_CORNER if numerics.geometry == 2 else 1.0)
+    corners += sum(_graded(piece, near, largest, numerics.gradation) for near, piece in surface)
+    return float(corners) * (PER_CORNER if numerics.geometry == 2 else 1.0)
 
 
 def _graded(surface: float, near: float, largest: float, gradation: float) -> float:
@@ -87,18 +116,32 @@ def expected_bytes(scene: Scene) -> float:
     return LEAST + PER_NODE[scene.numerics.order] * expected_nodes(scene)
 
 
+def require_outline(scene: Scene) -> None:
+    """Raises SceneError where the curve through the points of an outline crosses itself or leaves
+    the pore; rules of the scene judge the points."""
+    try:
+        outline = initial_outline(scene)
+        curve = None if outline is None else shapely.Polygon(outline.corners.points)
+    except MeshError as error:
+        raise SceneError(f"{scene.name}: {error}") from error
+    if curve is not None and not curve.is_valid:
+        where = shapely.is_valid_reason(curve)
+        raise SceneError(f"{scene.name}: the spline through the points of aggregate.outline "
+                         f"crosses itself ({where}); give more points, or smooth = false")
+
+
 def require_memory(scene: Scene, warn: Callable[[str], None]) -> None:
     """Warn of a run that may take more than half of the free memory.
 
     Raises SceneError where it would take more than all of it.
     """
     free = free_bytes()
-    needed = expected_bytes(scene)
-    told = (f"about {needed / MB:.0f} MB of memory are needed ({expected_nodes(scene):.0f} nodes), "
-            f"{free / MB:.0f} MB are free")
-    if needed > free:
+    expected = expected_bytes(scene)
+    told = (f"about {expected / MB:.0f} MB of memory are needed ({expected_nodes(scene):.0f} "
+            f"nodes), {free / MB:.0f} MB are free")
+    if expected > free:
         raise SceneError(f"{scene.name}: {told}; a smaller numerics.refinement is needed")
-    if needed > WARNED * free:
+    if expected > WARNED * free:
         warn(f"{scene.name}: {told}")
 
 

@@ -76,7 +76,7 @@ def at_end(scene: Scene) -> Sizes:
     if scene.growth is None:
         return now
     aside = max(0.0, now.reach - sizes(scene, now.area).reach)
-    rate = fastest_growth(scene)
+    rate = max(0.0, fastest_growth(scene))  # what decays is no larger than at the start
     layer = depth(scene)
     step = scene.growth.end / STEPS
     full = scene.pore.width * scene.pore.length

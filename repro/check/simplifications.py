@@ -10,6 +10,7 @@ from repro.check import numbers
 from repro.check.numbers import Number
 from repro.fem import sizing
 from repro.march.stepping import SHORTEST
+from repro.model.brinkman import ACROSS
 from repro.model.pore import film, resolution
 from repro.model.remeshing import MOST_REFINED
 from repro.scene import Kinetics, Scene
@@ -36,9 +37,11 @@ AFTER_CONTACT = 1.2
 #: Distances between nodes across a film, under which its flow (the cube of its thickness) is a
 #: matter of the mesh.
 ACROSS_FILM = 4.0
-#: The flow into a permeable body, exp(-y / k^1/2), turns back at nodes of elements more than 6.3
-#: (quadratic) or 5.1 (cubic) times k^1/2 across.
-DRAG_LAYER = 5.0
+#: The narrowest film may let through less by this share, where the layer in which a permeable
+#: aggregate slows the water is thinner than its elements resolve. Water slides on that layer: a
+#: film of thickness h beside a layer l lets through at most 1 + 3 l / h times as much as one beside
+#: a wall.
+FILM_LOSS = 0.01
 
 
 @dataclass(frozen=True)
@@ -77,7 +80,7 @@ def _cells(scene: Scene, value: dict[str, float]) -> Iterator[Warned]:
         wanted = scene.numerics.refinement * cell / CELL_PECLET
         yield Warned("numerics.refinement", f"the cell Peclet number is {cell:.2g}, above "
                      f"{CELL_PECLET:g}: linear elements may overshoot where concentrations are "
-                     f"steep; {wanted:.2g} would do, and the presets fast and accurate refine by "
+                     f"steep{_resolving(wanted)}; the presets fast and accurate refine by "
                      "themselves")
 
 
@@ -110,7 +113,7 @@ def _lag(scene: Scene, value: dict[str, float]) -> Iterator[Warned]:
     if scene.numerics.transport == "quasi_steady" and lag > LAG:
         yield Warned("numerics.transport", f"transport takes {lag:.2g} of the time of growth, "
                      f"above {LAG:g}: quasi-steady substrates are off by about this share; "
-                     '"gear" (preset paper) follows them in time')
+                     '"gear" with numerics.time = "updates" follows them in time')
 
 
 def _transit(value: dict[str, float]) -> Iterator[Warned]:
@@ -129,7 +132,16 @@ def _forces(scene: Scene, found: list[Number]) -> Iterator[Warned]:
     if scene.growth.fluid_forces == "neglected" and strain > STRAIN:
         yield Warned("growth.fluid_forces", f"the fluid's stress comes to {strain:.2g} of mu_L, "
                      f"above {STRAIN:g}: neglected (2.3.3), it would strain the aggregate by about "
-                     'this much; "included" takes it in (preset paper)')
+                     f"this much; {_included(scene)}")
+
+
+def _included(scene: Scene) -> str:
+    """The setting that takes fluid forces in, in words, where one is accepted."""
+    if scene.flow and scene.flow.biomass == "brinkman":
+        return 'no setting takes it in with flow.biomass = "brinkman"'
+    if scene.growth.new_biomass == "stress_free":
+        return '"included" with growth.new_biomass = "stressed" takes it in'
+    return '"included" takes it in'
 
 
 def _fronts(scene: Scene) -> Iterator[Warned]:
@@ -157,21 +169,28 @@ def _interface_size(scene: Scene) -> float:
 
 def _drag_layer(scene: Scene) -> Iterator[Warned]:
     permeability = scene.flow.permeability if scene.flow else None
-    layer = math.inf if permeability is None else math.sqrt(permeability)
+    if permeability is None:
+        return
+    root = math.sqrt(permeability)
     size = _interface_size(scene)
-    if size > DRAG_LAYER * layer:
-        wanted = resolution(scene) * size / (DRAG_LAYER * layer)
-        yield Warned("flow.permeability", f"the flow into the aggregate fades over its root, "
-                     f"{layer:.2g} um, thinner than a fifth of the elements at the interface, "
-                     f"{size:.2g} um: velocities in the aggregate wiggle within a few elements of "
-                     "it, while conductivity, head and flow are those of finer meshes"
-                     + _resolving(wanted))
+    thickness = size / ACROSS[scene.numerics.order]
+    gap = max(scene.pore.width - numbers.at_end(scene).thickness, film(scene))
+    loss = 3 * (root - permeability / thickness) / gap
+    if loss > FILM_LOSS:
+        accepted = root / (1 - FILM_LOSS * gap / (3 * root))
+        yield Warned("flow.permeability", f"the flow along the aggregate fades in it over its "
+                     f"root, {root:.2g} um, which elements of {size:.2g} um widen to "
+                     f"{thickness:.2g} um: the narrowest film, {gap:.2g} um, may let through "
+                     f"{100 * loss:.2g} % less" + _resolving(resolution(scene) * thickness
+                                                             / accepted))
 
 
 def _resolving(refinement: float) -> str:
-    """What resolves a thin layer, in words."""
-    if refinement <= MOST_REFINED:
-        return f"; numerics.refinement = {refinement:.2g} would resolve it"
+    """What resolves a thin layer, in words; three digits, rounded up."""
+    unit = 10.0 ** (math.floor(math.log10(refinement)) - 2)
+    enough = unit * math.ceil(refinement / unit)
+    if enough <= MOST_REFINED:
+        return f"; numerics.refinement = {enough:.3g} would resolve it"
     return f"; no refinement up to {MOST_REFINED:g} resolves it"
 
 

@@ -129,6 +129,17 @@ def edge_table(order: int) -> tuple[np.ndarray, np.ndarray]:
     return along[:, ON_EDGE[order]], weights
 
 
+@cache
+def side_table(order: int, geometry: int, side: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(p, k) shape functions of a triangle at the quadrature points of its side 01, 12 or 20, the
+    weights (p,), and (p, g) the derivatives along the side of those that map the triangle."""
+    (s,), weights = get_quadrature_line(EDGE_DEGREES[order])
+    corners = nodes(1)
+    direction = corners[NEXT[side]] - corners[side]
+    where = corners[side] + s[:, None] * direction
+    return values(order, where), weights, derivatives(geometry, where) @ direction
+
+
 def by_component(tensor: np.ndarray) -> np.ndarray:
     """(T, q, 2, 2) of (2, 2, T, q), each component contiguous in memory, for faster arithmetic."""
     return np.ascontiguousarray(tensor).transpose(2, 3, 0, 1)

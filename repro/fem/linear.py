@@ -174,8 +174,7 @@ class Solver:
                 return solution
         raise LinearError(f"a linear system of {len(right)} unknowns "
                           + ("is singular" if self.factor is None else
-                             f"leaves a residual of {defect:.2g}, above {RESIDUAL:g}")
-                          + "; try a finer numerics.refinement")
+                             f"leaves a residual of {defect:.2g}, above {RESIDUAL:g}"))
 
 
 @timed(FLOOR)

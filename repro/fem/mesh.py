@@ -357,6 +357,12 @@ class Mesh:
         """The triangles between the corners for scikit-fem, corners in the same order."""
         return MeshTri(self.points[: self.corners].T.copy(), self.triangles.T.copy(), sort_t=False)
 
+    def on_wall(self, side: int) -> np.ndarray:
+        """(T,) True where the side 01, 12 or 20 of a triangle lies on a wall."""
+        ends = self.triangles[:, [side, elements.NEXT[side]]]
+        rise = np.ptp(self.points[ends, 1], axis=1)
+        return np.isin(ends, self.topology.walls).all(axis=1) & (rise < self.width / 2)
+
     def area(self) -> float:
         """Of the aggregate, um2."""
         of = elements.table(1, self.geometry, elements.DEGREES[self.geometry])

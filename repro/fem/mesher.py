@@ -108,7 +108,9 @@ def check_outline(outline: Outline, ends: tuple[float, float], width: float) -> 
     polygon = shapely.Polygon(outline.points)
     if not polygon.is_valid:
         raise MeshError("the outline of the aggregate crosses itself: "
-                        f"{shapely.is_valid_reason(polygon)}; try a shorter growth.time_step")
+                        f"{shapely.is_valid_reason(polygon)}; a shorter growth.time_step or a "
+                        "larger numerics.refinement helps a coarse outline; nothing helps where "
+                        "two parts of the surface meet: contact is modelled with the walls alone")
     inside = ends[0] < outline.upstream and outline.downstream < ends[1]
     if not inside or outline.points[:, 1].min() < 0 or outline.points[:, 1].max() > width:
         raise MeshError(f"the aggregate, x from {outline.upstream:.4g} to "

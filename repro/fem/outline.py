@@ -184,8 +184,9 @@ def polygon(corners: np.ndarray, width: float, geometry: int = 1, smooth: bool =
     return Outline(points, wall, fixed, points.copy(), geometry)
 
 
-#: Points of a spline between two of the points that it goes through.
+#: Points of a spline for each of the points that it goes through, and at most for all of them.
 BETWEEN = 8
+MOST_SPLINED = 1000
 
 
 def _splined(rim: np.ndarray, width: float) -> np.ndarray:
@@ -195,10 +196,11 @@ def _splined(rim: np.ndarray, width: float) -> np.ndarray:
     length = np.sqrt(np.linalg.norm(np.diff(rim, axis=0), axis=1))
     knots = np.concatenate([[0.0], np.cumsum(length)])
     curve = CubicSpline(knots, rim, bc_type="natural")
+    between = min(BETWEEN, max(1, MOST_SPLINED // len(rim)))
     pieces = []
     for k, (start, end) in enumerate(zip(rim, rim[1:])):
         flat = start[1] == width and end[1] == width
-        t = np.linspace(knots[k], knots[k + 1], BETWEEN + 1)[:-1]
+        t = np.linspace(knots[k], knots[k + 1], between + 1)[:-1]
         pieces.append(start[None] if flat else np.vstack([start, curve(t[1:])]))
     return np.vstack([*pieces, rim[-1]])
 

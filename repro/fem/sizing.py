@@ -17,11 +17,17 @@ from repro.fem.outline import FREE, TOP, Outline, parabola, slopes
 ACROSS_PORE = 14.0
 ACROSS_AGGREGATE = 10.0
 ACROSS_FILM = 10.0
+#: Elements along the interface that the aggregate's thickness may ask for, at refinement 1. A
+#: half-disc asks for 31; a body more than 60 times longer than thick asks for more. With 200 or 400
+#: slivers fail at their first new mesh, with 4000 a step takes minutes.
+ALONG_INTERFACE = 600.0
 #: Growth of the element size with the distance from where it is prescribed; zero: one size
 #: everywhere.
 GRADATION = 0.25
 #: An interface edge is split when it is this much longer than the wanted size.
 SPLIT = 1.4
+#: Distances between points and sources that are in memory at once.
+DISTANCES = 2**20
 
 
 @dataclass(frozen=True)
@@ -77,10 +83,13 @@ def extent_too_short(outline: Outline, ends: tuple[float, float], width: float,
 def interface_sizes(outline: Outline, sizing: Sizing) -> np.ndarray:
     """(M,) wanted element size (um) at each node of the outline.
 
-    A tenth of the aggregate's thickness, a fourteenth of the pore's width, for free nodes the
-    film's size, and what is asked for beside the contact lines with the opposite wall.
+    A tenth of the aggregate's thickness (or, if that is larger, the interface's length over
+    ``ALONG_INTERFACE``), a fourteenth of the pore's width, for free nodes the film's size, and what
+    is asked for beside the contact lines with the opposite wall.
     """
-    across = min(outline.thickness / ACROSS_AGGREGATE / sizing.refinement, sizing.largest)
+    length = outline.edge_lengths()[outline.interface_edges()].sum()
+    size = max(outline.thickness / ACROSS_AGGREGATE, length / ALONG_INTERFACE)
+    across = min(size / sizing.refinement, sizing.largest)
     size = np.full(len(outline.points), across / sizing.front)
     size = np.minimum(size, _contact_sizes(outline, sizing))
     return np.where(outline.wall == FREE, np.minimum(size, film_sizes(outline, sizing)), size)
@@ -138,9 +147,17 @@ def graded_size(where: np.ndarray, sources: np.ndarray, sizes: np.ndarray,
     up to the largest."""
     if len(sources) == 0:
         return np.full(len(where), sizing.largest)
+    parts = max(1, len(where) * len(sources) // DISTANCES)
+    wanted = [_nearest_size(part, sources, sizes, sizing) for part in np.array_split(where, parts)]
+    return np.minimum(sizing.largest, np.concatenate(wanted))
+
+
+def _nearest_size(where: np.ndarray, sources: np.ndarray, sizes: np.ndarray,
+                  sizing: Sizing) -> np.ndarray:
+    """(N,) um: the smallest of the sizes that grow from the sources."""
     x, y = where.T
     distance = np.hypot(x[:, None] - sources[:, 0], y[:, None] - sources[:, 1])
-    return np.minimum(sizing.largest, (sizes + sizing.gradation * distance).min(axis=1))
+    return (sizes + sizing.gradation * distance).min(axis=1)
 
 
 def split(outline: Outline, sizing: Sizing) -> Outline:

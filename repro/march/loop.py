@@ -155,8 +155,8 @@ def steps(scene: Scene, scheme: Scheme,
     now = replace(state.pore, concentrations=solved.concentrations)
     if first:
         yield state, Instant(now, solved, None, (), 0, newton_counts(solved))
-    elif now.time > 0:
-        refuse_end(scene, now)
+    if scene.growth:
+        refuse_end(scene, now, 1.0 if now.time > 0 else 0.1)
     rows = row_times(scene, scheme)
     largest = scene.largest
     end = scene.growth.end if scene.growth else 0.0
@@ -185,7 +185,7 @@ def steps(scene: Scene, scheme: Scheme,
             state = reported(state, now.time)
         else:
             yield state, None
-        refuse_end(scene, now)
+        refuse_end(scene, now, 1.0)
 
 
 def row_times(scene: Scene, scheme: Scheme) -> tuple[float, ...]:
@@ -281,7 +281,8 @@ def pore_end(scene: Scene, now: Pore, elements: float) -> str:
     return ""
 
 
-def refuse_end(scene: Scene, now: Pore) -> None:
-    """Raises PoreEnd where the aggregate has reached an end of the pore."""
-    if over := pore_end(scene, now, 1.0):
+def refuse_end(scene: Scene, now: Pore, elements: float) -> None:
+    """Raises PoreEnd where the aggregate has reached an end of the pore, to within so many
+    elements of the fluid."""
+    if over := pore_end(scene, now, elements):
         raise PoreEnd(f"{over} at t = {now.time:g} h")

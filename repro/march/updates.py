@@ -14,6 +14,7 @@ from functools import partial
 
 import numpy as np
 
+from repro.errors import Unresolved
 from repro.march.loop import (
     SAME_TIME,
     Ledger,
@@ -70,14 +71,23 @@ def _advance(scene: Scene, now: Pore, solved: Solved, pace: Pace) -> tuple[Step,
     done = step(scene, now, solved, time - now.time)
     after = laid_out(replace(done.pore, time=time))
     within = partial(_within, scene, now, solved)
-    return replace(done, pore=after, within=within), pore.solve(scene, after), pace
+    return replace(done, pore=after, within=within), _solved(scene, after), pace
+
+
+def _solved(scene: Scene, after: Pore) -> Solved:
+    """Flow and substrates. Raises Unresolved, with a refinement that was tried, where the mesh is
+    too coarse."""
+    try:
+        return pore.solve(scene, after)
+    except Unresolved as error:
+        raise remeshing.advised(scene, after, error) from None
 
 
 def _within(scene: Scene, now: Pore, solved: Solved, time: float) -> Moment:
     """A time (h) within a step, by a shorter step that nothing goes on from."""
     done = step(scene, now, solved, time - now.time)
     after = replace(done.pore, time=time)
-    return Moment(after, pore.solve(scene, after), done.before)
+    return Moment(after, _solved(scene, after), done.before)
 
 
 def step(scene: Scene, now: Pore, solved: Solved, duration: float) -> Step:
@@ -128,12 +138,16 @@ def make_biomass(scene: Scene, now: Pore, solved: Solved,
         return replace(now, active=done.active, inert=done.inert), done.concentrations, done.flows
     first = rates_of(scene, now, start)
     guess = grown(now, first, duration)
-    end = transport.steady(problem, Sink(guess.active), start)
+    try:
+        end = transport.steady(problem, Sink(guess.active), start)
+    except Unresolved as error:
+        ahead = replace(guess, time=before(now, duration))
+        raise remeshing.advised(scene, ahead, error) from None
     second = rates_of(scene, now, end)
     mean = Rates((first.growth + second.growth) / 2, (first.remains + second.remains) / 2)
-    before = transport.fluxes(problem, Sink(now.active), start)
-    after = transport.fluxes(problem, Sink(guess.active), end)
-    return grown(now, mean, duration), end, _mean_flows(before, after, duration)
+    at_start = transport.fluxes(problem, Sink(now.active), start)
+    at_end = transport.fluxes(problem, Sink(guess.active), end)
+    return grown(now, mean, duration), end, _mean_flows(at_start, at_end, duration)
 
 
 def _mean_flows(before: Sequence[Fluxes], after: Sequence[Fluxes], duration: float) -> Flows:

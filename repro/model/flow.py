@@ -11,12 +11,11 @@ phi g / nu_water,
     a(u, v) = (nu_r grad u, grad v)                 "laplacian" [E2]
            or (nu_r (grad u + grad u^T), grad v)    "traction"
 
-with nu_r = 1 or lambda; or, for a permeable body instead of a viscous one (Brinkman), with nu_r = 1
-in both and (u / k, v) besides, over the biomass, of permeability k. Velocities of order 2 or 3 with
-a pressure of one order less (Taylor-Hood) need no tau. Linear ones with a linear pressure do: tau =
-h_tau^2 / (c nu_r). The paper prints no constant c [E13]; ``reference/ERRATA.md`` reports what it
-does. The second line says that
-``w = u - tau grad p`` is divergence-free for every linear q: w is what carries the substrates.
+with nu_r = 1 or lambda; :mod:`repro.model.brinkman` adds the drag of a permeable aggregate.
+Velocities of order 2 or 3 with a pressure of one order less (Taylor-Hood) need no tau. Linear ones
+with a linear pressure do: tau = h_tau^2 / (c nu_r). The paper prints no constant c [E13];
+``reference/ERRATA.md`` reports what it does. The second line says that ``w = u - tau grad p`` is
+divergence-free for every linear q: w is what carries the substrates.
 
 Linear velocities with a bubble b = 27 L1 L2 L3 in each triangle (MINI: Arnold, Brezzi and Fortin
 1984) need no stabilisation. A linear function has a constant gradient, and the integral of grad b
@@ -40,6 +39,7 @@ from repro.fem.assembly import ElementSystem, each, saddle_blocks, saddle_system
 from repro.fem.brief import brief
 from repro.fem.mesh import Mesh
 from repro.fem.space import Space
+from repro.model.brinkman import Permeable
 from repro.scene import Flow as Drive
 from repro.scene import needed
 from repro.timing import timed
@@ -120,14 +120,10 @@ def divergence(velocity: Space) -> np.ndarray:
     return values.T @ (at.dx[:, :, None] * slopes)
 
 
-def viscous(velocity: Space, viscosity: np.ndarray, interface: str,
-            drag: np.ndarray | None = None) -> np.ndarray:
+def viscous(velocity: Space, viscosity: np.ndarray, interface: str) -> np.ndarray:
     """(T, 2k, 2k) element matrices of a(u, v): test functions of x, then y, by trial functions
-    alike; (T, k, k) of each component where they are not coupled. viscosity: (T,) nu_r; drag: (T,)
-    1/um2, of a permeable body."""
+    alike; (T, k, k) of each component where they are not coupled. viscosity: (T,) nu_r."""
     laplace = each(viscosity, velocity.stiffness)
-    if drag is not None:
-        laplace = laplace + velocity.mass(drag[:, None] * velocity.at.dx)
     if interface == "laplacian":
         return laplace
     at = velocity.gradients_at
@@ -150,16 +146,21 @@ def unit_flow(velocity: Space, viscosity_ratio: float = 1.0, *, interface: str =
     """Stokes flow of mean velocity one through the meshed part, (1)-(5).
 
     velocity: its space; interface: "laplacian" or "traction" [E2]; element: what stabilises linear
-    velocities; permeability: of the biomass (um2), which slows the water by its drag, None: it does
-    not; for velocities of order 2 and 3. Raises LinearError where the system cannot be solved.
+    velocities; permeability: of the biomass (um2), which slows the water by its drag instead of a
+    viscosity, for velocities of order 2 and 3. Raises LinearError where the system cannot be
+    solved.
     """
     mesh = velocity.mesh
     viscosity = np.where(mesh.biomass, viscosity_ratio, 1.0)
     mobility = element.mobility(mesh, viscosity, interface) if velocity.order == 1 else None
-    drag = None if permeability is None else mesh.biomass / permeability
-    blocks = stokes(velocity, viscosity, interface, mobility, drag)
     system = mesh.topology.system(("flow", interface, velocity.order),
                                   lambda: _system(velocity, interface))
+    if permeability is None:
+        blocks = stokes(velocity, viscosity, interface, mobility)
+    else:
+        body = Permeable(velocity, permeability)
+        system = system.holding(body.held(system.held))
+        blocks = stokes(velocity, body.viscosity, interface, None, body.matrices())
     value = prescribed(velocity)
     load = system.product(blocks, value)
     found = value + system.solve(blocks, -load)
@@ -174,16 +175,20 @@ def unit_flow(velocity: Space, viscosity_ratio: float = 1.0, *, interface: str =
 
 
 def stokes(velocity: Space, viscosity: np.ndarray, interface: str,
-           mobility: np.ndarray | None, drag: np.ndarray | None = None) -> np.ndarray:
+           mobility: np.ndarray | None, more: np.ndarray | None = None) -> np.ndarray:
     """(T, 2k + m, 2k + m) element matrices of the whole system.
 
-    viscosity: (T,) nu_r; mobility: (T, 2, 2) um2, tau; drag: (T,) 1/um2.
+    viscosity: (T,) nu_r; mobility: (T, 2, 2) um2, tau; more: (T, 2k, 2k) added to a(u, v).
     """
     lower = None
     if mobility is not None:
         slopes = velocity.mesh.gradients
         lower = each(velocity.mesh.areas, slopes @ mobility @ np.swapaxes(slopes, 1, 2))
-    return saddle_blocks(viscous(velocity, viscosity, interface, drag), divergence(velocity), lower)
+    blocks = saddle_blocks(viscous(velocity, viscosity, interface), divergence(velocity), lower)
+    if more is not None:
+        size = more.shape[1]
+        blocks[:, :size, :size] += more
+    return blocks
 
 
 def _system(velocity: Space, interface: str) -> ElementSystem:

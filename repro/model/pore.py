@@ -21,13 +21,16 @@ from repro.model.flow import Bubble, Flow, Stabilised
 from repro.model.transport import Concentrations, Fluxes, Problem
 from repro.scene import Scene, needed
 
+#: A permeable aggregate that spans the pore draws the water in at its upper contact lines: elements
+#: beside them are no larger than the least film over this.
+CONTACT_ELEMENTS = 2.0
 #: The thinnest film to resolve where no [growth] says when it closes (Table 1), um.
 MINIMUM_FILM = 2.0
 #: Under this Peclet number u W / D the inlet supplies nothing that could be told from round-off.
 SLOWEST = 1e-9
 #: With order 2 and 3 elements are made no larger than this asks for: the concentration boundary
-#: layer is W Pe^(-1/3) thick (Leveque), and with four elements across the pore and this factor an
-#: overshoot upstream of an aggregate stays under 1 %.
+#: layer is W Pe^(-1/3) thick (Leveque), and with four elements across the pore and this factor
+#: concentrations upstream of an aggregate exceed the supply by less than 0.01 %.
 BOUNDARY_LAYER = 0.15
 
 
@@ -146,6 +149,8 @@ def sized(scene: Scene, front: float = 1.0) -> Sizing:
     middle = seed.position if seed and seed.outline is None else None
     least = film(scene)
     across = scene.numerics.contact_elements
+    if scene.flow and scene.flow.permeability is not None:
+        across = max(across, CONTACT_ELEMENTS)
     return Sizing(scene.pore.width, resolution(scene), least, scene.numerics.gradation, front,
                   least / across if across else inf, middle)
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from repro.errors import StageError, Unresolved
+from repro.errors import Advised, StageError, Unresolved
 from repro.fem import sizing, transfer
 from repro.fem.mesh import Mesh
 from repro.fem.space import Space
@@ -65,12 +65,16 @@ def graded(scene: Scene, now: Pore) -> Pore | None:
     return remesh(scene, now, replace(now, front=front), 0.0)[0]
 
 
-def advised(scene: Scene, now: Pore, error: Unresolved) -> Unresolved:
-    """The error with a numerics.refinement that resolves the present state, found by trying."""
-    for factor in TRIED:
-        wanted = round(factor * pore.resolution(scene), 2)
-        if wanted > MOST_REFINED:
-            break
+def advised(scene: Scene, now: Pore, error: Unresolved) -> Advised:
+    """The error with a numerics.refinement that resolves the present state, by trial.
+
+    An error that carries advice already stays as it is.
+    """
+    if isinstance(error, Advised):
+        return error
+    tried = [round(factor * pore.resolution(scene), 2) for factor in TRIED]
+    tried = [wanted for wanted in tried if wanted <= MOST_REFINED]
+    for wanted in tried:
         finer = replace(scene, numerics=replace(scene.numerics, refinement=wanted))
         try:
             if now.time == 0:
@@ -81,8 +85,11 @@ def advised(scene: Scene, now: Pore, error: Unresolved) -> Unresolved:
         except StageError:
             continue
         if _with_room(scene, now, solved):
-            return Unresolved(f"{error}; numerics.refinement = {wanted:g} resolves this state")
-    return Unresolved(f"{error}; no numerics.refinement up to {wanted:g} was found to resolve it")
+            return Advised(f"{error}; numerics.refinement = {wanted:g} resolves this state")
+    if not tried:
+        return Advised(f"{error}; no numerics.refinement that is accepted (up to "
+                       f"{MOST_REFINED:g}) is much larger")
+    return Advised(f"{error}; numerics.refinement up to {tried[-1]:g} does not resolve it")
 
 
 def _with_room(scene: Scene, now: Pore, solved: Solved) -> bool:

@@ -2,16 +2,18 @@
 
 For one substrate and every nodal function N_i, with order 2 or 3 in the form that conserves,
 
-    (D grad C, grad N_i) - (C u, grad N_i) + <u_x C, N_i>_outlet + (q(C) X_A, N_i)_biomass
+    (D grad C, grad N_i) - (C w, grad N_i) + <u_x C, N_i>_outlet + (q(C) X_A, N_i)_biomass
         = <u_x C_supply, N_i>_inlet
 
-and with linear functions, the reaction lumped at the nodes,
+where w = u - grad psi has (w, grad N_i) = <u_x, N_i>_outlet - <u_x, N_i>_inlet for every N_i, so
+that C = C_supply is a solution where nothing is taken up; and with linear functions, the reaction
+lumped at the nodes,
 
     (D grad C, grad N_i) + (w . grad C, N_i) + <u_x (C - C_supply), N_i>_inlet + m_i q(C_i) X_i = 0
 
-where w = u - tau grad p is the divergence-free velocity of :mod:`repro.model.flow`. Summed over i
-either is the balance: supply in = out + consumed, to round-off. Without flow the supply is held at
-both ends, or nothing passes them ("closed"). With u_ave for the inlet's u_x, (11) reads as printed
+where w = u - tau grad p is that velocity by :mod:`repro.model.flow`. Summed over i either is the
+balance: supply in = out + consumed, to round-off. Without flow the supply is held at both ends, or
+nothing passes them ("closed"). With u_ave for the inlet's u_x, (11) reads as printed
 [E4], and what is supplied, u_ave W C_supply, is not quite what enters.
 """
 
@@ -23,7 +25,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
-from repro.errors import TransportError, Unresolved
+from repro.errors import LinearError, TransportError, Unresolved
 from repro.fem import elements
 from repro.fem.assembly import ElementSystem, Factored, each, mass
 from repro.fem.brief import brief
@@ -43,6 +45,8 @@ ROUND_OFF = 1e-12
 MOST_ITERATIONS = 60
 #: No fraction m is larger than this in an iterate, so that C = K m / (1 - m) is finite.
 SATURATED = 0.9
+#: C = K m / (1 - m) is taken at this fraction where round-off makes m = C / (C + K) one.
+LARGEST_FRACTION = 1 - np.finfo(float).eps
 #: Above this fraction uptake is linearised about the concentration itself.
 SWITCH = 0.5
 #: A concentration below zero by more than this part of its supply is not resolved.
@@ -158,18 +162,55 @@ def advection(space: Space, flow: Flow, enters: np.ndarray) -> np.ndarray:
 
 
 def _conserving(space: Space, velocity: np.ndarray, enters: np.ndarray) -> np.ndarray:
-    """-(C u, grad v), u_x C v over the outlet, and (u_ave - u_x) C v over the inlet where (11)
-    takes u_ave [E4]."""
+    """-(C w, grad v) with w of :func:`divergence_free`, u_x C v over the outlet, and (u_ave - u_x)
+    C v over the inlet where (11) takes u_ave [E4]."""
     at = space.at
     dofs = space.dofs
-    u_x, u_y = space.at_points(velocity.T) * -at.dx
-    along = u_x[..., None] * at.slopes[:, :, 0]
-    along += u_y[..., None] * at.slopes[:, :, 1]
+    w_x, w_y = divergence_free(space, velocity) * -at.dx
+    along = w_x[..., None] * at.slopes[:, :, 0]
+    along += w_y[..., None] * at.slopes[:, :, 1]
     found = space.load(np.swapaxes(along, 1, 2))
     _add_at(found, dofs.beside_outlet, space.end_masses(dofs.outlet, velocity[:, 0]))
     if enters is not velocity[:, 0] and np.any(enters[dofs.inlet] != velocity[dofs.inlet, 0]):
         _add_at(found, dofs.beside_inlet, space.end_masses(dofs.inlet, enters - velocity[:, 0]))
     return found
+
+
+def divergence_free(space: Space, velocity: np.ndarray) -> np.ndarray:
+    """(2, T, q) um/h of w = u - grad psi at the quadrature points, with psi of the space and
+
+        (grad psi, grad v) = (u, grad v) + <u_x, v>_inlet - <u_x, v>_outlet    for all v of it.
+
+    So (w, grad v) is the flux through the ends for every v. The divergence of Taylor-Hood
+    velocities is zero against functions of one order less only: carried by u, a constant is not a
+    solution. The exact velocity has psi = 0, and grad psi is no larger than the error of u.
+    """
+    rows = space.at.rows
+    dofs = space.dofs
+    u = space.at_points(velocity.T)
+    speed = velocity[:, 0]
+    u_by_row = np.moveaxis(u * space.at.dx, 0, 2).reshape(len(rows), 1, -1)
+    load = np.bincount(space.cells.ravel(), (u_by_row @ rows).ravel(), space.count)
+    load += space.summed(dofs.inlet, space.end_loads(dofs.inlet, speed))
+    load -= space.summed(dofs.outlet, space.end_loads(dofs.outlet, speed))
+    system = space.mesh.topology.system(("potential", space.order), lambda: _potential(space))
+    psi = system.solve(space.stiffness, load)
+    gradient = (rows @ psi[space.cells][:, :, None]).reshape(len(rows), -1, 2)
+    return u - np.moveaxis(gradient, 2, 0)
+
+
+def _potential(space: Space) -> ElementSystem:
+    """One function of the space, zero in one node of the outlet."""
+    held = np.zeros(space.count, bool)
+    held[space.dofs.outlet[0, 0]] = True
+    return ElementSystem(space.cells, _places(space), held, space.mesh.topology.method)
+
+
+def _places(space: Space) -> np.ndarray:
+    """(n,) place of each node in elimination order."""
+    places = np.empty(space.count)
+    places[space.dofs.elimination] = np.arange(space.count)
+    return places
 
 
 def _by_divergence_free(space: Space, velocity: np.ndarray, correction: np.ndarray,
@@ -203,8 +244,7 @@ def _apart(space: Space) -> ElementSystem:
 def _system(space: Space, held_ends: bool) -> ElementSystem:
     """Acceptor and donor of a node side by side, nodes in elimination order: their own triangles,
     then both together on the pieces of biomass, where the uptake couples them."""
-    place = np.empty(space.count)
-    place[space.dofs.elimination] = np.arange(space.count)
+    place = _places(space)
     held = np.zeros(space.count, bool)
     held[both_ends(space)] = held_ends
     pieces = space.reaction.cells
@@ -377,7 +417,7 @@ class Balance:
 
     def _predicted(self, iterate: Iterate, state: np.ndarray) -> np.ndarray:
         """(2, r, q) fractions at other concentrations by the linearisation."""
-        m = iterate.fractions
+        m = np.minimum(iterate.fractions, LARGEST_FRACTION)
         return m + self._slopes(iterate.state, m) * (self.at(state) - self._half * m / (1 - m))
 
     def _followed(self, iterate: Iterate, new: Iterate, there: np.ndarray,
@@ -423,14 +463,20 @@ def steady(problem: Problem, sink: Sink | None,
 def _found(balance: Balance, state: np.ndarray) -> tuple[np.ndarray, int]:
     """(2n,) the solution from a start, and Newton's iterations."""
     newton = Newton(NEWTON, ROUND_OFF, MOST_ITERATIONS, balance.problem.reused)
-    last, count, converged = newton.solve(balance, balance.begun(state))
+    try:
+        last, count, converged = newton.solve(balance, balance.begun(state))
+    except LinearError:
+        if balance.sink is None:
+            raise
+        raise _front("Newton's method for the substrates meets a singular matrix") from None
     if not converged:
-        stands = ("Newton's method for the substrates stands at a defect of "
-                  f"{last.defect:.2g} after {count} iterations")
-        if balance.sink is not None and balance.problem.space.order > 1:
-            raise Unresolved(f"{stands}; the mesh is too coarse for the front in the aggregate")
-        raise TransportError(f"{stands}; try a larger numerics.refinement")
+        raise _front("Newton's method for the substrates stands at a defect of "
+                     f"{last.defect:.2g} after {count} iterations")
     return last.state, count
+
+
+def _front(failure: str) -> Unresolved:
+    return Unresolved(f"{failure}; the mesh is too coarse for the front in the aggregate")
 
 
 def _eased(problem: Problem, sink: Sink | None, state: np.ndarray) -> tuple[np.ndarray, int]:
@@ -467,9 +513,8 @@ def _refuse_unresolved(problem: Problem, sink: Sink, state: Concentrations) -> N
     """Raises Unresolved where two quadratures of the uptake differ by more than APART."""
     apart = quadrature_error(problem, sink, state)
     if apart > APART:
-        raise Unresolved(f"two quadratures of the uptake differ by {100 * apart:.2g} % (up to "
-                         f"{100 * APART:g} % is accepted); the mesh is too coarse for the front in "
-                         "the aggregate")
+        raise _front(f"two quadratures of the uptake differ by {100 * apart:.2g} % (up to "
+                     f"{100 * APART:g} % is accepted)")
 
 
 def quadrature_error(problem: Problem, sink: Sink, state: Concentrations) -> float:

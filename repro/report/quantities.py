@@ -87,6 +87,7 @@ KINDS = (
     Kind("Effluents", "concentration", _pair("effluent_{}_mg_per_L")),
     Kind("Inlet of the meshed part", "concentration", _pair("inlet_{}_mg_per_L")),
     Kind("Least concentrations", "concentration", _pair("{}_min_mg_per_L")),
+    Kind("Concentrations above the supply", "concentration", _pair("{}_overshoot_mg_per_L")),
     Kind("Area of the aggregate", "area", ("aggregate_area_um2",)),
     Kind("Extent of the aggregate", "length", ("thickness_um", "upstream_um", "downstream_um")),
     Kind("Inert part of the biomass", "inert over all", ("inert_fraction",)),

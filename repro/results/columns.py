@@ -31,6 +31,14 @@ def _least(k: int, scene: Scene, at: Instant) -> float:
     return float(getattr(at.solved.concentrations, SUBSTRATES[k]).min())
 
 
+def _overshoot(k: int, scene: Scene, at: Instant) -> float:
+    """mg/L; with Gear, where water of earlier supplies is in the pore, over the largest supply."""
+    supply = at.solved.problem.both[k].supply
+    if scene.numerics.transport == "gear":
+        supply = getattr(scene.largest.substrates, SUBSTRATES[k]).supply
+    return max(0.0, float(getattr(at.solved.concentrations, SUBSTRATES[k]).max()) - supply)
+
+
 def _worst(defects: list[float]) -> float:
     """The one that is farthest from zero, with its sign; zero of none."""
     return max(defects, key=abs, default=0.0)
@@ -41,11 +49,14 @@ def _substrate_balance(k: int, scene: Scene, at: Instant) -> float:
     gear = scene.numerics.transport == "gear"
     problem = at.solved.problem
     room = problem.both[k].supply * float(problem.space.at.dx.sum()) if gear else 0.0
-    found = [balance.substrate(ledger, k, room) for ledger in at.ledgers]
+    largest = getattr(scene.largest.substrates, SUBSTRATES[k]).supply
+    floor = balance.floor(problem, k, largest)
+    defects = [balance.substrate(ledger, k, max(room, floor * (ledger.end - ledger.start)))
+               for ledger in at.ledgers]
     if not gear:
         flux = at.solved.fluxes[k]
-        found.append(balance.defect(flux.supplied, flux.out, flux.consumed))
-    return _worst(found)
+        defects.append(balance.defect(flux.supplied, flux.out, flux.consumed, room=floor))
+    return _worst(defects)
 
 
 def _of_steps(defect: Callable[[Ledger], float], at: Instant) -> float:
@@ -57,9 +68,10 @@ def _composition(which: int, scene: Scene, at: Instant) -> float:
     return at.pore.composition(scene.kinetics.maximum_density)[which]
 
 
-_BALANCE = ("(supplied - leaving - consumed - stored) / the largest of supplied, consumed and, "
-            "with Gear, what the meshed part holds at the supply; the worst of the steps since the "
-            "last row and, but for Gear, of the row's own fluxes")
+_BALANCE = ("(supplied - leaving - consumed - stored) / the largest of supplied, consumed, the "
+            "amount of which round-off is 1e-6 and, with Gear, the content of the meshed part at "
+            "the supply; the worst of the steps since the last row and, except with Gear, of the "
+            "row's own fluxes")
 
 #: Of ``timeseries.csv``: value takes the scene and an Instant.
 SERIES = (
@@ -99,14 +111,18 @@ SERIES = (
              "largest (X_A + X_I) / X_m where growth is integrated",
              partial(_composition, 2), "largest", "biomass"),
     *_both("{}_min_mg_per_L", "least {} concentration", "least C at the nodes", _least),
+    *_both("{}_overshoot_mg_per_L", "{} concentration above the supply",
+           "largest C at the nodes - C_supply (with Gear: the largest of the table), at least zero",
+           _overshoot),
     *_both("{}_balance", "relative defect of the {}'s balance", _BALANCE, _substrate_balance),
     Quantity("biomass_balance", "relative defect of the biomass's balance",
              "(after - before - made) / after, the worst of the steps since the last row",
              lambda scene, at: _of_steps(balance.biomass, at), "biomass", "growth"),
     Quantity("oxygen_demand_balance",
              "biomass made less Y donor - (acceptor - F donor) / d_c, relative",
-             "(made - Y donor + (acceptor - F donor) / d_c) / the larger of the two terms, of what "
-             "a step consumes (7)-(10); the worst of the steps since the last row",
+             "(made - Y donor + (acceptor - F donor) / d_c) / the largest of the two terms, of "
+             "what a step consumes (7)-(10), and 1e-7 of the biomass, of which round-off is 1e-6; "
+             "the worst of the steps since the last row",
              lambda scene, at: _of_steps(partial(balance.oxygen_demand, scene.kinetics), at),
              "oxygen demand", "growth"),
     Quantity("nodes", "nodes of the mesh", "corners, and middles of the sides of curved triangles",

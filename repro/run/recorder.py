@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from dataclasses import asdict, replace
 from pathlib import Path
 from time import perf_counter
@@ -12,7 +12,7 @@ import numpy as np
 from repro import report, results, timing
 from repro.check.simplifications import Warned, unmet
 from repro.errors import CheckpointError, Interrupted, OutputError, StageError
-from repro.march.loop import Instant, State, added
+from repro.march.loop import Instant, Ledger, State, added
 from repro.march.pace import Pace, missed
 from repro.results import netcdf, vtu
 from repro.results.files import is_file, whole
@@ -85,13 +85,15 @@ class Recorder:
             self._add_fields(instant)
             row = results.row(self.scene, instant)
             self.record.rows.append([row[name] for name in results.COLUMNS])
-            self.record.ledgers += [results.ledger_row(self.scene, ledger)
-                                    for ledger in instant.ledgers]
+            self.record.ledgers += self._ledger_rows(instant.ledgers)
             self.record.remeshes += int(instant.remeshes)
             self.record.iterations = added(self.record.iterations, instant.iterations)
         if self.state and state.pace != self.state.pace:
             self._judge(state.pace)
         self.state = state
+
+    def _ledger_rows(self, ledgers: Iterable[Ledger]) -> list[list[float]]:
+        return [results.ledger_row(self.scene, ledger) for ledger in ledgers]
 
     def _judge(self, pace: Pace) -> None:
         """Count the last step if it misses the tolerance."""
@@ -132,8 +134,9 @@ class Recorder:
             self._write_checkpoint(self.state)
         self._write("timeseries.csv", results.write_table, results.COLUMNS, now.rows)
         self._write("fields.pvd", results.write_index, now.index)
-        if now.ledgers:
-            self._write("ledger.csv", results.write_table, results.LEDGER_COLUMNS, now.ledgers)
+        ledgers = now.ledgers + self._ledger_rows(self.state.ledgers if self.state else ())
+        if ledgers:
+            self._write("ledger.csv", results.write_table, results.LEDGER_COLUMNS, ledgers)
         if now.before:
             self._write("before_expansion.pvd", results.write_index, now.before)
         self.tell(status)

@@ -16,7 +16,7 @@ from time import perf_counter
 
 from repro import results, timing
 from repro.check import simplifications
-from repro.check.memory import require_memory
+from repro.check.memory import require_memory, require_outline
 from repro.check.numbers import judged
 from repro.check.simplifications import Warned
 from repro.errors import CheckpointError, Interrupted, OutputError, SimulationError
@@ -132,8 +132,10 @@ def run(scene: Source, folder: str | Path, progress: Progress = unwatched, watch
 
 
 def _require(scene: Scene, watch: Watch) -> None:
-    """Raises SceneError where the machine lacks a package or the memory that a scene takes."""
+    """Raises SceneError where the machine lacks a package or the memory that a scene takes, or
+    where the spline of its outline crosses itself or leaves the pore."""
     require_packages(scene)
+    require_outline(scene)
     require_memory(scene, watch.warn)
 
 

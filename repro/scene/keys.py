@@ -130,7 +130,7 @@ class Flow:
         default=None, about="lambda, viscosity of the aggregate over that of water")
     permeability: float | None = quantity(
         "1e-15 m^2", "um^2", default=None, source=OURS,
-        about="Of the aggregate, with biomass = \"brinkman\"")
+        about="Of the aggregate, with biomass = \"brinkman\"; at least 1e-11 pore.width^2")
     kinematic_viscosity: float = quantity("0.01003 cm^2/s", "um^2/h", about="nu of water",
                                           source="(1), Table 1")
     gravity: float = quantity("9.81 m/s^2", "um/h^2", about="g, the acceleration of gravity",
@@ -325,8 +325,8 @@ class Numerics:
         about="Growth of element sizes with distance from the aggregate; 0: one size everywhere")
     contact_elements: float = number(
         0.0, FROM_0_TO_10, source=OURS,
-        about="Elements to growth.minimum_film beside the contact lines with the opposite wall; "
-              "0: as large as elsewhere on the interface")
+        about="Elements to growth.minimum_film beside the contact lines with the opposite wall, "
+              "2 at least with a permeable aggregate; 0: as large as elsewhere on the interface")
     jacobian: str = choice(
         "fresh", "reused", source=OURS,
         about="Newton's derivative: of every iterate, or one while it does enough")

@@ -13,7 +13,9 @@ _NO_STATE = "nothing is supplied, so that no state is steady"
 _UNSTEADY = f', or numerics.transport = "gear": {_NO_STATE}'
 MOST_STEPS = 100_000  # shape updates of a run
 SHORTEST_STEP = 1e-6  # h: times are told apart to 1e-9 h
-FINEST = 1e-3  # of the width: the smallest seed, and edge of an outline
+FINEST = 1e-3  # of the width: the smallest seed, edge of an outline, and gap between two edges
+NEAREST = 1e-4  # of the width: from a point of an outline to a wall that it does not touch
+TIGHTEST = 1e-11  # of the square of the width: the smallest permeability
 #: What only linear elements have a choice of, and what the others have.
 HIGHER_ORDER = {"transfer": "conserving", "flow_element": "stabilised"}
 
@@ -118,6 +120,9 @@ def _shape_rules(points: Outlined, pore: "Pore") -> Rules:
     yield from _spacing_rules(points, pore.width)
     wanted = "a line that neither crosses nor touches itself is needed"
     yield _crosses(points, pore.width), {"aggregate.outline": wanted}
+    for one, other in nearest_edges(points, pore.width):
+        yield True, {"aggregate.outline": f"{_least(pore.width)} is needed between the lines after "
+                                          f"points {one} and {other}"}
 
 
 def _point_rules(said: str, point: tuple[float, float], end: bool, pore: "Pore") -> Rules:
@@ -132,13 +137,26 @@ def _point_rules(said: str, point: tuple[float, float], end: bool, pore: "Pore")
         "aggregate.outline": wanted,
         "pore.width": f"y of {said} of aggregate.outline, or more, is needed",
     }
+    near = min(y, pore.width - y)
+    wanted = (f"pore.width ({pore.width!r} um) over 10000, or more, is needed between {said} and a "
+              "wall that it does not touch; y = pore.width is contact")
+    yield 0 < near < pore.width * NEAREST, {"aggregate.outline": wanted}
+    wanted = f"pore.width over 10000, or more, is needed between {said} and the pore's end"
+    yield pore.length / 2 - abs(x) < pore.width * NEAREST, {"aggregate.outline": wanted}
+
+
+def _least(width: float) -> str:
+    """The least length that an outline may ask a mesh for."""
+    return f"a thousandth of pore.width ({width:g} um) or more"
 
 
 def _spacing_rules(points: Outlined, width: float) -> Rules:
-    wanted = f"a thousandth of pore.width ({width:g} um) or more is needed from point"
     for number, (start, end) in enumerate(zip(points, points[1:]), 1):
         near = math.dist(start, end) < width * FINEST
-        yield near, {"aggregate.outline": f"{wanted} {number} to the next"}
+        wanted = f"{_least(width)} is needed from point {number} to the next"
+        yield near, {"aggregate.outline": wanted}
+    wanted = f"{_least(width)} is needed between the first and the last point"
+    yield points[-1][0] - points[0][0] < width * FINEST, {"aggregate.outline": wanted}
     above = [number for number, (_, y) in enumerate(points) if y == width]
     run = above == list(range(above[0], above[0] + len(above))) if above else True
     wanted = "two points or more in a row, or none, on the upper wall (y = pore.width) are needed"
@@ -150,6 +168,22 @@ def _crosses(points: Outlined, width: float) -> bool:
     from shapely import LineString
 
     return not LineString([(x / width, y / width) for x, y in points]).is_simple
+
+
+def nearest_edges(points: Outlined, width: float) -> list[tuple[int, int]]:
+    """The first pair of edges without a common point that are nearer to each other than
+    ``FINEST`` widths, by the numbers of the points that they begin at; empty without such a pair.
+
+    points: from the lower wall to the lower wall, (x, y) in um; width: of the pore, um.
+    """
+    import shapely
+
+    edges = shapely.linestrings([*zip(points, points[1:])])
+    tree = shapely.STRtree(edges)
+    least = (1 - 1e-9) * width * FINEST
+    first, second = tree.query(edges, predicate="dwithin", distance=least)
+    near = first + 1 < second
+    return sorted(zip((first[near] + 1).tolist(), (second[near] + 1).tolist()))[:1]
 
 
 def _flow_rules(scene: "Scene", head: Driven, velocity: Driven) -> Rules:
@@ -180,6 +214,13 @@ def _biomass_rules(scene: "Scene", drive: "Flow") -> Rules:
     yield drag and drive.viscosity_ratio is not None, {
         "flow.viscosity_ratio": 'flow.biomass = "viscous" is needed with it',
         "flow.biomass": f'"viscous" is needed with flow.viscosity_ratio = {drive.viscosity_ratio}',
+    }
+    least = TIGHTEST * scene.pore.width**2
+    yield drag and drive.permeability is not None and drive.permeability < 0.999 * least, {
+        "flow.permeability": f'"{1e-12 * least:.4g} m^2" or more is needed in a pore '
+                             f"{scene.pore.width:g} um wide: its flow is lost in round-off else",
+        "pore.width": f"{math.sqrt((drive.permeability or 0.0) / TIGHTEST):.4g} um or less is "
+                      f"needed with flow.permeability = {permeable}",
     }
     alone = scene.aggregate is None
     yield drag and alone, {"flow.biomass": '"viscous" is needed without [aggregate]'}

@@ -45,8 +45,9 @@ from repro.fem.mesh import Mesh, curved
 from repro.fem.sizing import Sizing
 from repro.fem.space import Space
 from repro.model import flow
+from repro.model.brinkman import ACROSS
 from repro.scene import Flow as Drive
-from verification.kernel.case import around, at_most, case, combined, each_at_most, refine, studies
+from verification.kernel.case import around, at_least, at_most, case, combined, each_at_most, refine, studies
 from verification.problems import meshes
 from verification.problems.channels import box_errors
 
@@ -266,6 +267,38 @@ def permeable(order: int, interface: str):
     if interface == "laplacian":
         yield at_most(f"gradient, k = {TIGHT:g} um2", _permeable_layer(third, 0, TIGHT, interface, order)["gradient"],
                       1e-2, "of a wall instead of the layer: 2.5e-3; what the elements beside it add is of that order")
+
+
+#: Half length and elements (um) of a permeable body from wall to wall, and its permeabilities (um2): layers of 3 um to
+#: 1 nm, the first of which the elements resolve.
+SPAN, SPAN_SIZE, SPAN_PERMEABILITIES = 125.0, 10.0, (9.0, 1.0, 1e-2, 1e-4, 1e-6)
+#: What elements as long as is allowed add to a layer's energy in one dimension, by order; the square of a quarter, by
+#: which neighbours differ in size and so in their layers; and what is left of the ends in the middle: exp(-pi 100 / 50)
+#: times a hundredth of the gradient.
+LAYER_EXCESS, NEIGHBOURS, FROM_THE_ENDS = {2: 0.18, 3: 0.014}, 0.25**2, 2e-5
+
+
+@case("flow-permeable-plug", kind="exact", norm="middle of a long plug: relative error of the pressure gradient; least "
+      "velocity along the pore at a node, over the mean",
+      claim="A permeable body from wall to wall lets through what Brinkman's equation says, with layers on the walls "
+            "that are resolved or are a ten thousandth of an element, and its velocity turns back nowhere",
+      mutants=("drag-halved", "drag-layer-sticks", "drag-layer-slides-freely"), over=combined(HIGHER, FORMS),
+      because="linear elements are refused with a permeable body")
+def permeable_plug(order: int, interface: str):
+    """Two layers in which the velocity falls by sqrt(k) / d of that beyond take 2 k / (d W) of the loss."""
+    space = meshes.space_on(meshes.plug((-SPAN - BEYOND, SPAN + BEYOND), WIDTH, SPAN, SPAN_SIZE, meshes.cut), order)
+    middle = middle_of(space.mesh, MIDDLE)
+    inside = np.unique(space.cells[middle])
+    for k in SPAN_PERMEABILITIES:
+        found = flow.unit_flow(space, interface=interface, permeability=k)
+        error = abs(slope(flow.pressure_space(space), found.pressure, middle)
+                    / brinkman_channel.gradient(WIDTH, WIDTH, k) - 1)
+        thickness = max(np.sqrt(k), SPAN_SIZE / ACROSS[order] / 2)
+        yield at_most(f"gradient, k = {k:g} um2", error,
+                      (LAYER_EXCESS[order] + NEIGHBOURS) * 2 * k / (WIDTH * thickness) + FROM_THE_ENDS,
+                      "the layers' share of the loss times their excess, elements half as long as the mean; the ends")
+        yield at_least(f"velocity, k = {k:g} um2", found.velocity[inside, 0].min(), -1e-2,
+                       "no node of a line of elements overshoots; a hundredth is for triangles")
 
 
 def _permeable_layer(size: float, draw: int, permeability: float, interface: str, order: int) -> dict[str, float]:

@@ -2,6 +2,8 @@
 
 from verification.kernel.mutants import changes
 
+PERMEABLE = "tests/test_flow.py::"
+
 MUTANTS = (
     *changes(
         "repro/fem/assembly.py",
@@ -95,15 +97,49 @@ MUTANTS = (
         ("bubble-block-isotropic",
          "The traction form's bubble has the Laplacian form's block.",
          "            block = block + G\n",
-         "            block = 1.0 * block\n"),
+         "            block = 1.0 * block\n")),
+    *changes(
+        "repro/model/brinkman.py",
         ("drag-in-the-water",
          "The drag of a permeable body slows the water beside it.",
-         "mesh.biomass / permeability",
-         "~mesh.biomass / permeability"),
+         "drag = velocity.mesh.biomass / self.permeability",
+         "drag = ~velocity.mesh.biomass / self.permeability"),
         ("drag-halved",
          "The drag of a permeable body is half as strong.",
-         "laplace = laplace + velocity.mass(drag[:, None] * velocity.at.dx)",
-         "laplace = laplace + velocity.mass(drag[:, None] / 2 * velocity.at.dx)")),
+         "drag = velocity.mesh.biomass / self.permeability",
+         "drag = velocity.mesh.biomass / self.permeability / 2"),
+        ("drag-layer-as-thin-as-it-is",
+         "A layer thinner than its element is not widened.",
+         "self.thickness**2 / self.permeability, 1.0)",
+         "1.0, 1.0)",
+         f"{PERMEABLE}test_velocities_in_a_permeable_body_do_not_turn_back_however_thin_its_layers[1e-14]"),
+        ("drag-layer-sticks",
+         "The velocity in a widened layer is zero on the walls.",
+         "return held & ~slides",
+         "return held"),
+        ("drag-layer-slides-freely",
+         "The walls under a widened layer have no friction.",
+         "factor = d / (root * (d - root))",
+         "factor = 0 * d"),
+        ("drag-divergence-free-for-all",
+         "Nothing keeps the sources small where water must pass a permeable body.",
+         "DIVERGENCE * self.viscosity * where",
+         "0 * self.viscosity * where",
+         f"{PERMEABLE}test_water_that_must_pass_a_permeable_body_leaves_concentrations_within_their_bounds[5.67e-17]")),
+    *changes(
+        "repro/model/pore.py",
+        ("drag-contact-lines-coarse",
+         "Elements beside the upper contact lines of a permeable body are as large as elsewhere.",
+         "across = max(across, CONTACT_ELEMENTS)",
+         "across = max(across, 0.0)",
+         f"{PERMEABLE}test_elements_beside_upper_contact_lines_of_a_permeable_body_are_half_the_least_film_or_less")),
+    *changes(
+        "repro/scene/rules.py",
+        ("tightest-permeability-accepted",
+         "A permeability whose flow is lost in round-off is accepted.",
+         "drive.permeability < 0.999 * least",
+         "drive.permeability < 0.0 * least",
+         "tests/test_scene_refusals.py::test_refused_by_what_else_the_scene_says")),
     *changes(
         "repro/fem/mesh.py",
         ("cubic-edge-crossed",

@@ -85,7 +85,7 @@ class Run(Note):
 
 @dataclass(frozen=True)
 class HardCase:
-    """One of the twenty-two: ``parts`` name -> function of the preset, which gives Checks and Runs, or lists of them.
+    """One of the twenty-three: ``parts`` name -> function of the preset, which gives Checks and Runs, or lists of them.
 
     refusable: names of the parts that may be refused with ``fast`` and ``accurate``, and with ``paper`` all may;
     mutants: ids of wrong changes that it catches.

@@ -227,6 +227,28 @@ TIGHT = HardCase(
     mutants=("hard-film-without-elements",))
 
 
+def forced(preset: str, seed: int) -> Iterator:
+    """Through contact under the fluid's forces: width and flow are drawn; the film of 3 um closes at 2 um."""
+    random = np.random.default_rng(seed)
+    width = random.uniform(25.0, 100.0)
+    changes = (f'pore.width="{width} um"', f'aggregate.radius="{width - 3} um"', 'growth.end="0.4 h"',
+               f'flow.mean_velocity="{random.uniform(0.5, 5.0)} m/day"', 'output.times=["0.4 h"]')
+    pushed, free = (common.run("wide", preset, *changes, f'growth.fluid_forces="{word}"', density=CLOSING)
+                    for word in ("included", "neglected"))
+    yield pushed, contact_rests(pushed)
+    yield common.close(pushed, free, preset, "aggregate_area_um2", *EFFLUENTS)
+    shift = sum(pushed.last[tip] - free.last[tip] for tip in SHAPE[2:]) / 2
+    yield at_least("shift of the aggregate downstream by the forces, um", shift, 0.0, "the flow pushes it downstream")
+
+
+FORCED = HardCase(
+    23, "forced", "Contact under the fluid's forces",
+    "Contact that rests, the area and effluents of a run without forces, an aggregate pushed downstream",
+    "Forces of a mesh that has not followed contact, or a shape and forces that do not agree",
+    {f"draw {seed}": partial(forced, seed=seed) for seed in range(2)},
+    mutants=("hard-forces-upstream",))
+
+
 def to_the_end(preset: str) -> list:
     """A pore that is 90 um long, 30 um wide: the aggregate grows to its upstream end."""
     changes = ('pore.width="30 um"', 'pore.length="90 um"', 'aggregate.radius="25 um"', 'growth.end="60 h"')
@@ -400,4 +422,4 @@ DECAY = HardCase(
      "theta 0.05 to 0.5": partial(uneven, inner=0.05, outer=0.5)},
     mutants=("hard-inert-forgotten",))
 
-CASES = (CONTACT, ANGLE, TIGHT, END, LARGE, UNEVEN, LONG, DECAY)
+CASES = (CONTACT, ANGLE, TIGHT, FORCED, END, LARGE, UNEVEN, LONG, DECAY)

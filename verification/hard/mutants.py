@@ -50,6 +50,12 @@ MUTANTS = (
          "film, np.tan(angle))",
          "film, np.tan(angle / 2))")),
     *changes(
+        "repro/model/traction.py",
+        ("hard-forces-upstream",
+         "The flow pulls the aggregate upstream.",
+         "modulus * total",
+         "modulus * -total")),
+    *changes(
         "repro/model/growth.py",
         ("hard-theta-clipped",
          "theta is silently held under 50.",

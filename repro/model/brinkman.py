@@ -1,0 +1,114 @@
+"""A permeable aggregate instead of a viscous one: Brinkman's drag, for velocities of order 2 and 3.
+
+The biomass, of permeability k, adds its drag ``(u / k, v)`` to a(u, v) of :mod:`repro.model.flow`.
+Along the interface and the walls the velocity changes within layers of thickness sqrt(k). A
+triangle of biomass resolves its layer where its longest edge h is at most ``ACROSS`` sqrt(k). This
+module solves Brinkman's equation unchanged there. In every larger triangle it widens the layer:
+
+- **Thickness.** The viscosity over that of water becomes nu_r = d^2 / k, so that the layer is
+  d = h / ``ACROSS`` thick. Darcy's flow u = -k grad p has no part in this: div u = 0 makes every
+  component harmonic, and nu_r lap u = 0. Head loss and flux through the aggregate stay those of k.
+- **Walls.** A layer on a wall takes sqrt(k) U from the flow along the wall, with U the flow beyond
+  the layer; the widened one would take d U. So the velocity may slide on the wall, against a
+  friction (b u_x, v_x) with b = d / (sqrt(k) (d - sqrt(k))), which takes sqrt(k) U again. On a
+  contact line, which belongs to the fluid too, u = 0.
+- **Divergence.** Taylor-Hood elements conserve mass in the mean over several elements. Near a
+  contact line the pressure of the drag drives large local sources, which carry concentrations out
+  of their bounds. The term (g nu_r div u, div v), g = ``DIVERGENCE``, is zero for the exact flow
+  and keeps them small: in widened triangles and, where these span the pore, in the fluid.
+
+Both limits are exact: where h falls, every triangle resolves its layer; where k falls, the velocity
+tends to one that does not depend on k.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from repro.fem import elements
+from repro.fem.space import Space
+
+#: Longest edge over the thickness of the layer, by order. In one dimension a node overshoots where
+#: an element is more than 6.3 (quadratic) or 5.1 (cubic) times as long as the layer is thick.
+ACROSS = {2: 6.0, 3: 5.0}
+#: Weight g of the divergence, over the viscosity.
+DIVERGENCE = 10.0
+
+
+@dataclass(frozen=True, eq=False)
+class Permeable:
+    """What the drag of biomass of a permeability (um2) adds to the flow's system."""
+
+    velocity: Space
+    permeability: float
+
+    @cached_property
+    def thickness(self) -> np.ndarray:
+        """(T,) um, d: of the layer as each triangle represents it, at least sqrt(k)."""
+        longest = np.linalg.norm(self.velocity.mesh.sides, axis=2).max(axis=1)
+        return np.maximum(np.sqrt(self.permeability), longest / ACROSS[self.velocity.order])
+
+    @cached_property
+    def widened(self) -> np.ndarray:
+        """(T,) True in biomass where the layer is thicker than sqrt(k)."""
+        return self.velocity.mesh.biomass & (self.thickness > np.sqrt(self.permeability))
+
+    @property
+    def viscosity(self) -> np.ndarray:
+        """(T,) nu_r."""
+        return np.where(self.widened, self.thickness**2 / self.permeability, 1.0)
+
+    @property
+    def spans(self) -> bool:
+        """Do widened triangles touch both walls?"""
+        y = self.velocity.mesh.points[self.velocity.mesh.triangles[self.widened], 1]
+        return bool(y.min(initial=np.inf) <= 0 and y.max(initial=0.0) >= self.velocity.mesh.width)
+
+    def held(self, held: np.ndarray) -> np.ndarray:
+        """(2n + m,) constrained unknowns: those that are ``held`` with u = 0 on all walls, without
+        u_x at nodes of walls that touch widened triangles alone."""
+        dofs = self.velocity.dofs
+        slides = np.zeros(len(held), bool)
+        slides[dofs.walls] = True
+        slides[self.velocity.cells[~self.widened]] = False
+        slides[dofs.inlet] = False
+        return held & ~slides
+
+    def matrices(self) -> np.ndarray:
+        """(T, 2k, 2k) element matrices of drag, friction on the walls and divergence."""
+        velocity = self.velocity
+        k = velocity.cells.shape[1]
+        drag = velocity.mesh.biomass / self.permeability
+        blocks = self._divergence()
+        along = velocity.mass(drag[:, None] * velocity.at.dx)
+        blocks[:, :k, :k] += along + self._friction()
+        blocks[:, k:, k:] += along
+        return blocks
+
+    def _divergence(self) -> np.ndarray:
+        """(T, 2k, 2k) of (g nu_r div u, div v)."""
+        where = self.widened | (self.spans & ~self.velocity.mesh.biomass)
+        weight = DIVERGENCE * self.viscosity * where
+        at = self.velocity.gradients_at
+        slopes = at.slopes.reshape(*at.dx.shape, -1)
+        weighted = (weight[:, None] * at.dx)[:, :, None] * slopes
+        return np.swapaxes(slopes, 1, 2) @ weighted
+
+    def _friction(self) -> np.ndarray:
+        """(T, k, k) of (b u_x, v_x) over the walls under widened triangles."""
+        velocity = self.velocity
+        mesh = velocity.mesh
+        blocks = np.zeros((len(mesh.cells), *2 * velocity.cells.shape[1:]))
+        root = np.sqrt(self.permeability)
+        for side in range(3):
+            which = np.flatnonzero(self.widened & mesh.on_wall(side))
+            d = self.thickness[which]
+            values, weights, along = elements.side_table(velocity.order, mesh.geometry, side)
+            dx = np.abs(mesh.points[mesh.cells[which], 0] @ along.T) * weights
+            products = values[:, :, None] * values[:, None, :]
+            factor = d / (root * (d - root))
+            blocks[which] += np.tensordot(factor[:, None] * dx, products, 1)
+        return blocks

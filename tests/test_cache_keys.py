@@ -1,0 +1,216 @@
+"""The key of every cache contains every input of the cached value: another input, another key."""
+import shutil
+from dataclasses import fields, is_dataclass, replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import repro
+from repro.check import numbers
+from repro.fem.space import Space
+from repro.model import flow, gear, mesh_motion, transport
+from repro.model.kinetics import Sink
+from repro.run import cache, machine
+from repro.scene import load_scene, scene_hash
+from tests.strategies import meshed, seed
+from verification.claims import levels
+from verification.claims.levels import CONVERGED, Level, at_level
+from verification.sensitivity import rounding
+
+WIDE = load_scene("wide", ["numerics.preset=accurate", 'output.times=["1 h", "2 h"]', "growth.end=2 h"])
+BASE = load_scene("base")
+
+
+def leaves(node, path=()):
+    """The paths to all values of a scene but its name."""
+    for field in fields(node):
+        value = getattr(node, field.name)
+        if is_dataclass(value):
+            yield from leaves(value, (*path, field.name))
+        elif (*path, field.name) != ("name",):
+            yield (*path, field.name)
+
+
+def other(value):
+    """Another value of the same kind."""
+    match value:
+        case bool():
+            return not value
+        case float() | int():
+            return 1.5 * value + 1
+        case str():
+            return value + "_other"
+        case tuple():
+            return (*value, 3.0)
+    return None
+
+
+def changed(node, path):
+    """A scene with another value at a path; None where there is no other of its kind."""
+    first, *rest = path
+    value = getattr(node, first)
+    another = changed(value, rest) if rest else other(value)
+    return None if another is None else replace(node, **{first: another})
+
+
+def test_every_value_of_a_scene_counts_in_its_hash():
+    others = [changed(WIDE, path) for path in leaves(WIDE)]
+    scenes = [WIDE, *(scene for scene in others if scene is not None)]
+    assert len(scenes) > 40 and len({*map(scene_hash, scenes)}) == len(scenes)
+
+
+def test_every_section_of_a_scene_counts_in_its_hash():
+    scenes = [BASE, *(replace(BASE, **{name: None}) for name in ("flow", "growth", "kinetics", "substrates"))]
+    assert len({*map(scene_hash, scenes)}) == 5
+
+
+def altered(package, change):
+    """The hash of a package's source after a change of a copy of it."""
+    root = shutil.copytree(Path(repro.__file__).parent, package, ignore=shutil.ignore_patterns("__pycache__"))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(machine, "__file__", str(root / "run" / "machine.py"))
+        change(root)
+        return machine.source_hash.__wrapped__()
+
+
+def longer(name):
+    """A change that adds a line to a module."""
+    def change(root):
+        path = root / name
+        path.write_text(path.read_text(encoding="utf-8") + "#\n", encoding="utf-8")
+    return change
+
+
+def renamed(name, new):
+    """A change that moves a module."""
+    return lambda root: (root / name).rename(root / new)
+
+
+SOURCES = {
+    "nothing": lambda root: None, "a module of a package": longer("fem/linear.py"), "a module": longer("errors.py"),
+    "the module that hashes": longer("run/machine.py"), "the first": longer("__init__.py"),
+    "another name": renamed("fem/linear.py", "fem/linear2.py"), "another folder": renamed("fem/linear.py", "linear.py"),
+    "one more": lambda root: (root / "more.py").touch()}
+
+
+def test_every_module_counts_in_the_hash_of_the_source(tmp_path):
+    hashes = {name: altered(tmp_path / str(k), change) for k, (name, change) in enumerate(SOURCES.items())}
+    assert hashes["nothing"] == machine.source_hash() and len({*hashes.values()}) == len(SOURCES)
+
+
+def test_a_cached_run_is_that_of_its_scene_and_source_under_its_name(tmp_path, monkeypatch):
+    """Another value, name or source is another run; each run is computed once."""
+    computed = []
+
+    def run(scene, folder):
+        computed.append(scene.name)
+        folder.mkdir()
+        (folder / "run.json").write_text(f'{{"number": {len(computed)}}}')
+
+    monkeypatch.setattr(cache, "run", run)
+    scenes = [BASE, replace(BASE, name="other"), changed(BASE, ("pore", "width")), changed(BASE, ("growth", "end"))]
+    for source in ("one", "two", "one"):
+        monkeypatch.setattr(cache, "source_hash", lambda text=source: text)
+        numbers_of_runs = [cache.provenance(cache.cached_run(scene, tmp_path))["number"] for scene in scenes]
+        assert numbers_of_runs == ([1, 2, 3, 4] if source == "one" else [5, 6, 7, 8])
+    assert len(computed) == 8
+
+
+def test_the_runs_of_the_sensitivities_are_kept_by_scene_name_and_source(tmp_path, monkeypatch):
+    """The numbers of a run depend on the scene's name: two names of one scene are two runs."""
+    computed = []
+
+    def counted(scene):
+        computed.append(scene.name)
+        return {"number": len(computed)}
+
+    for name in ("base", "wide"):
+        monkeypatch.setitem(rounding.OF, name, counted)
+    scenes = [BASE, replace(BASE, name="wide"), changed(BASE, ("flow", "head")), changed(BASE, ("numerics", "inlet"))]
+    for source in ("12345678", "87654321", "12345678"):
+        monkeypatch.setattr(rounding, "source_hash", lambda text=source: text)
+        numbers_of_runs = [rounding.Runs(tmp_path / "runs.jsonl").numbers(scene)["number"] for scene in scenes]
+        assert numbers_of_runs == ([1, 2, 3, 4] if source == "12345678" else [5, 6, 7, 8])
+
+
+def test_what_claims_keep_is_kept_by_function_arguments_and_level():
+    """Every field of a level counts."""
+    def one(*arguments):
+        return "one", arguments, levels.current()
+
+    def two(*arguments):
+        return "two", arguments, levels.current()
+
+    all_levels = [Level(), Level(CONVERGED), Level(size=2.0), Level(step=2.0), Level(wide=("pore.width=90 um",))]
+    for _ in range(2):
+        for level in all_levels:
+            with at_level(level):
+                for function in (one, two):
+                    kept = levels.cached(function)
+                    assert all(kept(*arguments) == function(*arguments) for arguments in ((), (1,), (1, "a"), ("a", 1)))
+    for level in all_levels[1:]:
+        levels.forget(level)
+
+
+def test_bounds_of_one_scene_are_not_those_of_another():
+    """In turns, whatever differs."""
+    paths = [("aggregate", "radius"), ("growth", "end"), ("kinetics", "yield_coefficient")]
+    short = load_scene("base", ["growth.end=5 h"])
+    scenes = [short, *(changed(short, path) for path in paths)]
+    alone = [numbers.at_end.__wrapped__(scene) for scene in scenes]
+    assert len({*alone}) == len(scenes)
+    assert [numbers.at_end(scene) for scene in (*scenes, *scenes[::-1])] == [*alone, *alone[::-1]]
+
+
+def disc():
+    """A coarse curved mesh around a half-disc, nothing of it kept yet."""
+    return meshed(seed(20.0, 0.3, 2), refinement=0.3)[0]
+
+
+def velocity(order, interface, mesh):
+    """Of the flow."""
+    return flow.unit_flow(Space(mesh, order), 10.0, interface=interface).velocity
+
+
+def concentrations(order, boundary, flowing, mesh):
+    """Of both substrates."""
+    space = Space(mesh, order)
+    carried = flow.solve(space, WIDE.flow, 600.0) if flowing else None
+    substrates = replace(BASE.substrates, boundary=boundary)
+    problem = transport.problem(space, carried, substrates, BASE.kinetics)
+    sink = Sink(1e-3 * BASE.kinetics.maximum_density * space.reaction.dx)
+    if boundary == "closed":
+        start = transport.supplied_everywhere(problem)
+        end = gear.advance(problem, sink.active, sink.active, start, 0.01).concentrations
+        return np.concatenate([end.acceptor, end.donor])
+    steady = transport.steady(problem, sink)
+    settled = gear.settle(problem, sink, steady)
+    return np.concatenate([steady.acceptor, steady.donor, settled.acceptor])
+
+
+def motion(mesh):
+    """Of the mesh."""
+    return mesh_motion.move(mesh, 1.001 * mesh.points[mesh.body], 1e-3, 100.0)
+
+
+#: Computations on one mesh that need different sparse systems.
+SOLVES = {"flow, Laplacian": partial(velocity, 2, "laplacian"), "flow, traction": partial(velocity, 2, "traction"),
+          "flow, cubic": partial(velocity, 3, "laplacian"), "held ends": partial(concentrations, 2, "open", False),
+          "flow through": partial(concentrations, 2, "open", True), "cubic": partial(concentrations, 3, "open", True),
+          "closed": partial(concentrations, 2, "closed", False), "motion": motion}
+
+
+@pytest.fixture(scope="module")
+def alone():
+    """The result of each of SOLVES on a new mesh."""
+    return {name: solve(disc()) for name, solve in SOLVES.items()}
+
+
+@pytest.mark.parametrize("names", [[*SOLVES], [*SOLVES][::-1]], ids=["forwards", "backwards"])
+def test_sparse_systems_of_one_mesh_are_kept_apart(names, alone):
+    """Computations that share a mesh give the same bits as on meshes of their own."""
+    mesh = disc()
+    wrong = [name for name in names if not np.array_equal(SOLVES[name](mesh), alone[name])]
+    assert wrong == []

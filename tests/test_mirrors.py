@@ -1,0 +1,192 @@
+"""Mirror symmetry of rules about ends, reaches, signs and intervals.
+
+The mirror of a pore is x -> -x: areas, numbers and warnings stay the same, the two ends change places. The mirror of a
+number is its negative: the ends of its interval change places and signs.
+"""
+import html
+import re
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from repro import PoreEnd, load_scene, simulate
+from repro.check import numbers, simplifications
+from repro.errors import MeshError
+from repro.fem import sizing
+from repro.fem.outline import polygon
+from repro.report import comparison
+from repro.report.reading import Run
+from tests.strategies import outlines, share
+from verification import claims, sensitivity, uncertainty
+from verification.network import law
+
+SIDES = pytest.mark.parametrize("sign, side", [(-1, "upstream"), (1, "downstream")])
+#: Four steps of an hour and a half in a short pore.
+HASTY = ["numerics.refinement=0.5", "pore.length=200 um", "growth.end=6 h", "growth.time_step=1.5 h",
+         'output.times=["6 h"]']
+
+
+@SIDES
+@pytest.mark.parametrize("time", ["updates", "midpoint"])
+@pytest.mark.parametrize("from_end, when", [(8.7, "at t = "), (5.3, "in the step from t = 0 h")])
+def test_a_run_ends_at_either_end_of_the_pore_and_names_it(time, from_end, when, sign, side):
+    """A seed of 5 um grows towards an end. With its middle 8.7 um from the end, a step ends within an element of the
+    end. With its middle at 5.3 um, the first step itself passes the end."""
+    changes = [*HASTY, f"numerics.time={time}", f"aggregate.position={sign * (100 - from_end)} um"]
+    with pytest.raises(PoreEnd, match=f"^the aggregate reaches the pore's {side} end {when}"):
+        list(simulate(load_scene("base", changes)))
+
+
+@st.composite
+def leaning(draw, width=50.0):
+    """Points of an aggregate.outline that leans to either side, upstream end first."""
+    count = draw(st.integers(3, 6))
+    angle = np.linspace(np.pi, 0.0, count + 2)
+    radius = np.array(draw(st.lists(st.floats(8.0, 30.0), min_size=count + 2, max_size=count + 2)))
+    x, y = radius * np.cos(angle), radius * np.sin(angle)
+    y[[0, -1]] = 0.0
+    return np.column_stack([x + draw(st.floats(-60.0, 60.0)), y])
+
+
+def outlined(name, points, *changes):
+    """A scene with an outline."""
+    text = ", ".join(f'["{x!r} um", "{y!r} um"]' for x, y in points.tolist())
+    return load_scene(name, [f"aggregate.outline=[{text}]", *changes], ["aggregate.radius"])
+
+
+def judgement(scene, speed):
+    """The numbers and warnings of `repro check`, without a solution."""
+    judged = numbers.numbers(scene, speed)
+    values = {each.name: [each.start, each.end or 0.0] for each in judged}
+    return values, {each.key: each.text for each in simplifications.warnings(scene, judged)}
+
+
+def assert_alike(one, other):
+    """The same judgement, to round-off."""
+    assert one[0].keys() == other[0].keys() and one[1] == other[1]
+    assert [*one[0].values()] == [pytest.approx(pair, rel=1e-9) for pair in other[0].values()]
+
+
+@share(0.5)
+@given(leaning(), st.sampled_from([None, 1e5]))
+def test_an_outline_and_its_mirror_image_are_judged_alike(points, speed):
+    """Numbers and warnings, with flow and without, however far to one side the aggregate reaches."""
+    changes = ["pore.length=260 um", "growth.shear_modulus=1e-6 MPa", "numerics.extent=central"]
+    both = [outlined("wide", each, *changes) for each in (points, points[::-1] * [-1, 1])]
+    one, other = (judgement(scene, speed) for scene in both)
+    assert_alike(one, other)
+    reach = np.abs(points[:, 0]).max()
+    assert ("pore.length" in one[1]) or reach < 130
+
+
+@SIDES
+def test_how_far_an_outline_reaches_is_told_on_either_side(sign, side):
+    """The farther end counts: 100 um of 130 um."""
+    points = np.array([[-20.0, 0.0], [-10.0, 12.0], [60.0, 20.0], [100.0, 0.0]])
+    points = points if sign > 0 else points[::-1] * [-1, 1]
+    _, warned = judgement(outlined("base", points, "pore.length=260 um", "growth.end=0 h"), 1e5)
+    assert "(reach 100 of 130 um)" in warned.get("pore.length", "")
+
+
+@given(st.floats(0.0, 200.0))
+def test_a_seed_and_its_mirror_image_are_judged_alike(position):
+    one, other = (judgement(load_scene("base", [f"aggregate.position={sign * position} um"]), 1e5) for sign in (1, -1))
+    assert_alike(one, other)
+
+
+def read(points, geometry, smooth):
+    """An outline; None where it is refused."""
+    try:
+        return polygon(points, 50.0, geometry, smooth)
+    except MeshError:
+        return None
+
+
+@given(leaning(), st.sampled_from([1, 2]), st.booleans())
+def test_an_outline_of_a_scene_and_its_mirror_image(points, geometry, smooth):
+    """Extremes exchanged, area and fixed points kept; refused alike where a spline leaves the pore."""
+    one, other = (read(each, geometry, smooth) for each in (points, points[::-1] * [-1, 1]))
+    if None in (one, other):
+        assert one is other and smooth
+        return
+    assert (one.upstream, one.downstream) == pytest.approx((-other.downstream, -other.upstream), rel=1e-9, abs=1e-9)
+    assert (one.area, one.thickness) == pytest.approx((other.area, other.thickness), rel=1e-9)
+    assert np.sort(one.points[one.fixed, 0]) == pytest.approx(np.sort(-other.points[other.fixed, 0]), abs=1e-9)
+
+
+def image(outline):
+    """The mirror image of a polygon that need not begin with its first corner."""
+    return type(outline)(outline.points[::-1] * [-1, 1], outline.wall[::-1], outline.fixed[::-1],
+                         outline.origin[::-1] * [-1, 1])
+
+
+@given(outlines(), st.sampled_from([np.inf, 0.3]), st.floats(0.05, 2.0))
+def test_sizes_at_an_outline_and_its_mirror_image(drawn, contact, refinement):
+    """Node by node, with small elements beside contact lines and without; and of the fluid around it."""
+    outline, width = drawn
+    asked = sizing.Sizing(width, refinement, 2.0, contact=contact)
+    one, other = (sizing.interface_sizes(each, asked) for each in (outline, image(outline)))
+    assert one == pytest.approx(other[::-1], rel=1e-9)
+    (places, one), (images, other) = (sizing.size_sources(each, asked) for each in (outline, image(outline)))
+    order, exchanged = (np.lexsort(each.T.round(9)) for each in (places, images * [-1, 1]))
+    assert one[order] == pytest.approx(other[exchanged], rel=1e-9)
+    assert sizing.too_coarse(outline, asked) == sizing.too_coarse(image(outline), asked)
+
+
+# Numbers and their negatives.
+@given(st.floats(0.01, 50.0), st.sampled_from([*sensitivity.record()["elasticities"]]))
+def test_the_interval_of_a_negative_number_is_that_of_its_mirror(value, quantity):
+    low, high = sensitivity.interval(quantity, value)
+    assert low <= value <= high
+    assert sensitivity.interval(quantity, -value) == (-high, -low)
+
+
+@given(*3 * [st.tuples(st.floats(-5.0, 5.0), st.floats(0.0, 0.5))])
+def test_the_interval_of_a_closed_form_is_that_of_its_mirror(a, b, c):
+    low, high = sensitivity.in_closed_form(lambda x, y, z: x - y * z, a, b, c)
+    assert low <= a[0] - b[0] * c[0] <= high
+    assert sensitivity.in_closed_form(float, a) == (a[0] - a[1], a[0] + a[1])
+    negative = sensitivity.in_closed_form(lambda x, y, z: y * z - x, a, b, c)
+    assert negative == pytest.approx((-high, -low), rel=1e-12, abs=1e-12)
+
+
+@given(*2 * [st.lists(st.floats(-10.0, 10.0), min_size=2, max_size=2).map(sorted)])
+def test_an_outcome_is_that_of_its_mirror(bar, bounds):
+    """Of a bar and the bounds of what is accepted."""
+    (low, high), (least, most) = bar, bounds
+    judged = claims.outcome_of((low, high), (least, most))
+    assert judged == claims.outcome_of((-high, -low), (-most, -least))
+    assert (judged == claims.HOLDS) == (least <= low and high <= most)
+    assert (judged == claims.FAILS) == (high < least or most < low)
+
+
+@given(st.lists(st.floats(-1e3, 1e3), min_size=3, max_size=5))
+def test_a_bar_of_levels_is_that_of_its_mirror(values):
+    one, other = (uncertainty.spread(sign * np.array(values)) for sign in (1, -1))
+    assert (one.low, one.high) == (-other.high, -other.low) == (min(values), max(values))
+
+
+@pytest.mark.parametrize("side", [0, 1])
+@pytest.mark.parametrize("part, inside", [(0.99, 1), (1.01, 0)])
+@pytest.mark.parametrize("spanned, area", [(0, 0.5), (1, 2.0)])
+def test_a_shape_is_judged_by_the_bound_of_the_law_on_its_side(spanned, area, part, inside, side):
+    """A shape lies part of the way, in logarithms, from the law to its lower or upper bound."""
+    length, *bounds = law.added_resistance(area, 1.0, bool(spanned), 2000.0)
+    shape = length * (bounds[side] / length) ** part
+    row = dict(zip(law.COLUMNS, np.array([[1], [1], [spanned], [2000.0], [area], [shape]], float)))
+    judged = law.judged(row)
+    assert judged.inside == inside and judged.beyond == pytest.approx(part, rel=1e-9)
+
+
+@pytest.mark.parametrize("first, second, expected", [
+    (2.0, 3.0, "+50 %"), (3.0, 1.5, "-50 %"), (-2.0, -3.0, "-50 %"), (-2.0, -1.0, "+50 %"), (-2.0, 1.0, "+150 %"),
+    (2.0, -1.0, "-150 %")])
+def test_a_difference_is_up_or_down_whatever_the_signs(tmp_path, first, second, expected):
+    """The page that compares two runs writes + if the second value is larger."""
+    series = [{"time_h": np.array([0.0]), "upstream_um": np.array([value])} for value in (first, second)]
+    runs = [Run(tmp_path / str(k), {"scene": "drawn"}, columns, {}) for k, columns in enumerate(series)]
+    row = re.search(r"<tr><t[hd][^>]*>upstream end of the aggregate \(um\)</t[hd]>(.*?)</tr>", comparison.build(runs))
+    cells = re.findall(r"<td[^>]*>(.*?)</td>", row[1])
+    assert html.unescape(cells[-1]) == expected

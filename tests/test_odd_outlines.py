@@ -1,0 +1,200 @@
+"""Hostile outlines, drawn by seed: each runs in bounded time and memory, or is refused before anything is written."""
+import json
+import math
+import random
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from repro.check import memory
+from repro.check.checked import check
+from repro.errors import SimulationError
+from repro.fem import mesher, sizing
+from repro.march.loop import PoreEnd
+from repro.march.simulation import simulate
+from repro.model import pore
+from repro.scene import SceneError, load_scene, packaged_scenes, parse_scene
+from tests.shell import refused
+
+#: What an outline of at most 1000 points may ask for in the preset fast, whatever its features are.
+MOST_NODES = 30_000
+WIDTH = 100.0
+
+
+def log_between(draw, least, most):
+    return math.exp(draw.uniform(math.log(least), math.log(most)))
+
+
+def sliver(draw):
+    height, half = log_between(draw, 0.02, 2), draw.uniform(20, 200)
+    return [(-half, 0), (-half * draw.uniform(0.5, 0.99), height), (half * draw.uniform(0.5, 0.99), height), (half, 0)]
+
+
+def wedge(draw):
+    half = draw.uniform(10, 100)
+    return [(-half, 0), (-half + log_between(draw, 0.2, 10), log_between(draw, 0.05, 2)), (half, 0)]
+
+
+def needle(draw):
+    thickness = log_between(draw, 0.11, 5)
+    return [(-20, 0), (-20, 5), (-thickness / 2, 5), (0, draw.uniform(20, 95)), (thickness / 2, 5), (20, 5), (20, 0)]
+
+
+def below_the_wall(draw):
+    gap, half = log_between(draw, 1e-10, 2), draw.uniform(10, 100)
+    return [(-half, 0), (-half / 2, WIDTH - gap), (half / 2, WIDTH - gap * draw.uniform(0.5, 1)), (half, 0)]
+
+
+def overhang(draw):
+    gap, half = log_between(draw, 1e-8, 5), draw.uniform(10, 50)
+    if draw.random() < 0.5:
+        return [(-half, 0), (-half, 30), (half + 10, 30), (half + 10, gap), (half, 20), (half, 0)]
+    return [(-half, 0), (-half, WIDTH), (half, WIDTH), (half + 50, WIDTH - gap), (half + 1, 50), (half, 0)]
+
+
+def fold(draw):
+    gap, deep = log_between(draw, 1e-4, 2), log_between(draw, 0.5, 20)
+    return [(-30, 0), (-30, 40), (-gap, 40), (-gap / 2, deep), (gap / 2, deep), (gap, 40), (30, 40), (30, 0)]
+
+
+def many_points(draw):
+    count, radius, waves = draw.randint(300, 999), draw.uniform(32, 60), draw.randint(1, 20)
+    angles = [math.pi * (1 - k / count) for k in range(count + 1)]
+    curve = [(radius * (1 + 0.02 * math.sin(waves * a)) * math.cos(a), radius * math.sin(a)) for a in angles]
+    return [(-radius, 0), *curve[1:-1], (radius, 0)]
+
+
+def tiny_and_huge_edges(draw):
+    edge, half = log_between(draw, 0.1, 0.5), draw.uniform(20, 150)
+    return [(-half, 0), (-half + edge, edge), (-half + 2 * edge, edge), (-half + 3 * edge, 2 * edge),
+            (0, draw.uniform(5, 90)), (half, 0)]
+
+
+def at_the_end(draw):
+    return [(-300 + log_between(draw, 1e-13, 10), 0), (-280, 20), (-260, 0)]
+
+
+def narrow_foot(draw):
+    return [(0, 0), (-40, 50), (-40, WIDTH), (40, WIDTH), (log_between(draw, 1e-9, 1), 0)]
+
+
+FAMILIES = [sliver, wedge, needle, below_the_wall, overhang, fold, many_points, tiny_and_huge_edges, at_the_end,
+            narrow_foot]
+
+
+def scene(points, preset="fast"):
+    outline = [[f"{float(x)!r} um", f"{float(y)!r} um"] for x, y in points]
+    return parse_scene({
+        "pore": {"width": f"{WIDTH} um"}, "aggregate": {"outline": outline}, "flow": {"mean_velocity": "2.9 m/day"},
+        "substrates": {"acceptor": {"supply": "10 mg/L"}, "donor": {"supply": "10 mg/L"}}, "kinetics": {},
+        "growth": {"end": "0.2 h"}, "numerics": {"preset": preset}}, "odd", "odd.toml")
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("family", FAMILIES)
+def test_a_hostile_outline_has_a_first_row_or_is_refused_by_its_scene(family, seed):
+    """The refusal is one line with what is needed. The nodes are within a factor of two of those that are expected,
+    and not more than any outline may ask for. If the mesh is too coarse for the first state, the advised refinement
+    resolves it."""
+    points = family(random.Random(seed))
+    try:
+        accepted = scene(points)
+    except SceneError as refusal:
+        assert "aggregate.outline" in str(refusal) and " is needed" in str(refusal) and "\n" not in str(refusal)
+        return
+    expected = memory.first_nodes(accepted)
+    assert expected < MOST_NODES
+    nodes = len(pore.seeded(accepted).mesh.points)
+    assert expected / 2 < nodes < 2 * expected
+    if nodes < 3000:
+        assert first_row(accepted).pore.time == 0
+
+
+def first_row(accepted):
+    """Of a run, with the refinement that it advises where it advises one."""
+    try:
+        return next(simulate(accepted))
+    except SimulationError as error:
+        advised = re.search(r"numerics\.refinement = ([\d.]+) resolves this state$", str(error))
+        numerics = replace(accepted.numerics, refinement=float(advised[1]))
+        return next(simulate(replace(accepted, numerics=numerics)))
+
+
+@pytest.mark.parametrize("preset, nodes", [("fast", 6000), ("accurate", 12_000), ("paper", 12_000)])
+def test_a_sliver_asks_for_no_more_elements_than_its_length(preset, nodes):
+    """A body 0.1 um thick and 400 um long: a tenth of its thickness all along is 40 000 edges in paper."""
+    thin = scene([(-200, 0), (-199, 0.1), (199, 0.1), (200, 0)], preset)
+    assert memory.first_nodes(thin) < 2 * nodes
+    assert len(pore.seeded(thin).mesh.points) < nodes
+
+
+@pytest.mark.parametrize("name", packaged_scenes())
+def test_the_bound_on_elements_leaves_half_discs_as_they_are(name, monkeypatch):
+    mesh = pore.seeded(load_scene(name)).mesh
+    monkeypatch.setattr(sizing, "ALONG_INTERFACE", 1e9)
+    assert np.array_equal(mesh.points, pore.seeded(load_scene(name)).mesh.points)
+
+
+@pytest.mark.parametrize("points, needed", [
+    ([(-30, 0), (-20, 99.9999), (20, 90), (30, 0)], "between point 2 (-20 um, 99.9999 um) and a wall"),
+    ([(-30, 0), (-20, 0.0099), (20, 90), (30, 0)], "between point 2 (-20 um, 0.0099 um) and a wall"),
+    ([(-299.9999, 0), (-20, 30), (30, 0)], "between point 1 (-300 um, 0 um) and the pore's end"),
+    ([(-30, 0), (-20, 30), (299.9999, 20), (30, 0)], "between point 3 (300 um, 20 um) and the pore's end"),
+    ([(-0.04, 0), (-20, 30), (20, 30), (0.04, 0)], "between the first and the last point"),
+    ([(-30, 0), (-30, 30), (-0.06, 30), (0, 10), (0.06, 30), (30, 30), (30, 0)], ""),
+    ([(-30, 0), (-30, 30), (-0.04, 30), (-0.04, 10), (0.04, 10.5), (0.04, 30), (30, 30), (30, 0)],
+     "between the lines after points 2 and 5"),
+])
+def test_what_no_mesh_resolves_is_refused(points, needed):
+    """A thousandth of the width between edges, a ten-thousandth to a wall or an end; and no more than that."""
+    if not needed:
+        assert scene(points)
+        return
+    with pytest.raises(SceneError, match="aggregate.outline = ") as refusal:
+        scene(points)
+    assert needed in str(refusal.value)
+
+
+@pytest.mark.parametrize("command", ["check", "run"])
+@pytest.mark.parametrize("points, needed", [
+    ([(-20, 0), (-20, 99), (0, 99), (1, 99), (20, 0)], "leaves the pore"),
+    ([(-30, 0), (-20, 50), (-19, 1), (-18, 50), (0, 99), (30, 0)], "crosses itself"),
+])
+def test_a_spline_that_is_no_outline_is_refused_before_anything_is_written(tmp_path, capsys, command, points, needed):
+    path = tmp_path / "odd.toml"
+    outline = [[f"{x} um", f"{y} um"] for x, y in points]
+    path.write_text(f'[pore]\nwidth = "100 um"\n[aggregate]\nsmooth = true\noutline = {json.dumps(outline)}\n')
+    out = ["--out", tmp_path / "run"] if command == "run" else []
+    message = refused(tmp_path, capsys, command, path, *out)
+    assert needed in message and "give more points, or smooth = false" in message
+
+
+def test_check_makes_no_mesh_that_is_much_larger_than_what_it_tries(monkeypatch):
+    """Above 20 000 nodes it estimates them, and its report says so."""
+    counts = []
+    generate = mesher.generate
+
+    def counted(*told):
+        mesh, outline = generate(*told)
+        counts.append(len(mesh.points))
+        return mesh, outline
+
+    monkeypatch.setattr(mesher, "generate", counted)
+    fine = load_scene("base", ['numerics.preset="paper"', "numerics.refinement=8", "growth.end=0.2 h"])
+    found = check(fine)
+    assert found.estimated and f"about {found.nodes} nodes" in str(found)
+    assert max(counts) < 6000 < found.nodes
+    assert not check("initial_mesh").estimated
+    mesh = pore.seeded(fine).mesh
+    assert found.nodes == pytest.approx(len(mesh.points), rel=0.5)
+    assert found.triangles == pytest.approx(len(mesh.biomass), rel=0.5)
+
+
+def test_an_aggregate_at_the_end_of_its_pore_is_no_failure():
+    """The run is over at once, with its first row."""
+    steps = simulate(scene([(-299.98, 0), (-280, 20), (-260, 0)]))
+    assert next(steps).pore.time == 0
+    with pytest.raises(PoreEnd, match="reaches the pore's upstream end at t = 0 h"):
+        next(steps)

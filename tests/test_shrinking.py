@@ -1,0 +1,122 @@
+"""Trends the other way: an aggregate that decays, through a run, a sweep, the report and a comparison."""
+import html
+import re
+
+import numpy as np
+import pytest
+
+from repro import load_scene, simulate
+from repro.check import numbers
+from repro.cli import main
+from repro.report import comparison, quantities
+from repro.report.reading import read
+from repro.results import picture, read_table
+from repro.sweep import pool, table
+from repro.sweep.design import grid, parse, points
+from repro.sweep.state import Sweep
+from tests.shell import rows
+from tests.test_sweep import in_this_process
+
+#: A day without food: without a donor the aggregate of 40 um of a 50 um pore decays.
+HUNGRY = ["numerics.preset=fast", "aggregate.radius=40 um", "substrates.donor.supply=0 mg/L",
+          "growth.end=24 h", 'output.times=["0 h", "8 h", "16 h", "24 h"]']
+VARIED = "kinetics.decay_coefficient=0.5 1/day, 1 1/day"
+
+
+@pytest.fixture(scope="module")
+def decayed(tmp_path_factory):
+    """The folder of a sweep of two runs that decay, slowly and fast."""
+    out = tmp_path_factory.mktemp("decayed") / "sweep"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(pool, "ready", in_this_process)
+        assert main(["sweep", "base", "--out", str(out), "--vary", VARIED, "--quiet",
+                     *(part for change in HUNGRY for part in ("--set", change))]) == 0
+    return out
+
+
+def folders(sweep):
+    """Of its runs."""
+    return [sweep / row["folder"] for row in rows(sweep / "runs.csv")]
+
+
+def test_what_decays_shrinks_and_conducts_more(decayed):
+    """Row by row, as the masses of its ledger say; the faster the decay, the more."""
+    series = [read_table(folder / "timeseries.csv") for folder in folders(decayed)]
+    for one, folder in zip(series, folders(decayed)):
+        ledger = read_table(folder / "ledger.csv")
+        assert (np.diff(one["aggregate_area_um2"]) < 0).all() and (np.diff(one["thickness_um"]) < 0).all()
+        assert (np.diff(one["conductivity_m_per_d"]) > 0).all() and (np.diff(one["inert_fraction"]) > 0).all()
+        assert (ledger["biomass_made_pg_per_m"] < 0).all() and not one["contact"].any()
+        left = ledger["biomass_after_pg_per_m"][-1] / ledger["biomass_before_pg_per_m"][0]
+        assert one["aggregate_area_um2"][-1] / one["aggregate_area_um2"][0] == pytest.approx(left, rel=1e-6)
+    slow, fast = (one["aggregate_area_um2"][-1] / one["aggregate_area_um2"][0] for one in series)
+    assert fast < 0.9 * slow
+
+
+def courses(decayed):
+    """What the sweep tells of its runs, by the functions that make its files."""
+    factors = [parse(VARIED)]
+    asked = points("base", HUNGRY, factors, grid(factors))
+    sweep = Sweep(decayed, "base", factors, asked)
+    return sweep, table.tell(sweep, {}, 0.1)
+
+
+def test_conductivity_is_relative_to_that_of_the_start(decayed):
+    """One at t = 0 and more after it; nothing clogs and nothing touches."""
+    sweep, summaries = courses(decayed)
+    for one, folder in zip(summaries, folders(decayed)):
+        series = read_table(folder / "timeseries.csv")
+        assert one.relative[0] == 1 and (np.diff(one.relative) > 0).all()
+        expected = series["conductivity_m_per_d"] / series["conductivity_m_per_d"][0]
+        assert one.relative == pytest.approx(expected, rel=1e-12)
+        assert one.biomass == pytest.approx(series["aggregate_area_um2"] / (50 * 600), rel=1e-12)
+        assert {name for name, value in one.numbers.items() if value is not None} == {"end_h", "wall_time_s"}
+    for row in rows(decayed / "runs.csv"):
+        assert row["clogging_time_h"] == row["contact_time_h"] == ""
+
+
+def test_lines_of_the_page_of_the_sweep_go_up_to_the_left(decayed):
+    """Conductivity rises as biomass falls, and all of it is in the frame."""
+    text = (decayed / "summary.html").read_text(encoding="utf-8")
+    lines = re.findall('<polyline class="line level[0-9]" points="([^"]*)"><title>run', text)
+    frame = re.search('<rect class="frame" x="(.*?)" y="(.*?)" width="(.*?)" height="(.*?)"', text)
+    x, y, width, height = map(float, frame.groups())
+    assert len(lines) == 2
+    for line in lines:
+        places = np.array([pair.split(",") for pair in line.split()], float)
+        assert (np.diff(places[:, 0]) < 0).all() and (np.diff(places[:, 1]) < 0).all()
+        assert ((places >= [x, y]) & (places <= [x + width, y + height])).all()
+
+
+def test_a_comparison_and_the_key_figures_tell_what_is_less(decayed):
+    """The faster decay against the slower one: less area, more conductivity, with their signs; first and last values
+    in their order."""
+    runs = [read(folder) for folder in folders(decayed)]
+    page = html.unescape(comparison.build(runs))
+    for name, sign in (("area of the aggregate (um²)", "-"), ("hydraulic conductivity of the pore (m/day)", "+")):
+        cells = re.findall("<td[^>]*>(.*?)</td>", re.search(rf"{re.escape(name)}</t[hd]>(.*?)</tr>", page)[1])
+        assert re.fullmatch(rf"\{sign}[\d.]+ %", cells[-1]), name
+    for run in runs:
+        first, last = run.series["thickness_um"][[0, -1]]
+        assert f"thickness of the aggregate {first:.4g} → {last:.4g} um" in picture.key_figures(run.series)
+        produced = quantities.series(run)["biomass_made_ug_per_m"][1]
+        assert (produced < 0).all() and (np.diff(produced) < 0).all()
+
+
+@pytest.mark.parametrize("relative, expected", [
+    ([1.0, 1.4, 1.2, 0.9, 0.45, 0.2], 3 + np.log(0.9 / 0.5) / np.log(2)), ([1.0, 2.0, 3.0], np.nan),
+    ([1.0, 0.8, 1.5, 0.75, 0.375, 3.0], 3 + np.log(0.75 / 0.5) / np.log(2))])
+def test_a_pore_clogs_when_it_first_conducts_so_little_after_a_rise(relative, expected):
+    """A half of what it conducts at first, not of the most."""
+    times = np.arange(float(len(relative)))
+    clogged = table.clogging(times, np.array(relative), 10 - times, 0.5)
+    assert clogged == pytest.approx((expected, 10 - expected), rel=1e-12, nan_ok=True)
+
+
+@pytest.mark.parametrize("supply", ["0 mg/L", "0.1 mg/L"])
+def test_the_bound_at_the_end_holds_for_what_decays(supply):
+    """`repro check` says how large the aggregate is at most: a part of what decays stays as inert biomass."""
+    scene = load_scene("base", ["numerics.preset=fast", f"substrates.donor.supply={supply}", "growth.end=48 h",
+                                "kinetics.decay_coefficient=1 1/day", 'output.times=["48 h"]'])
+    first, *_, last = (instant.pore.boundary.area for instant in simulate(scene))
+    assert last < 0.7 * first and numbers.at_end(scene).area >= last
