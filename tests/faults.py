@@ -1,5 +1,7 @@
 """Faults that tests inject, by their names: what is absent or stands in for something else, put back afterwards."""
 import sys
+import tracemalloc
+from contextlib import contextmanager
 from types import SimpleNamespace
 
 import numpy as np
@@ -8,6 +10,15 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 from scipy.sparse.linalg import splu
 
 from repro import results
+
+
+@contextmanager
+def little_memory(most):
+    """Fails where it takes more bytes than so many."""
+    tracemalloc.start()
+    yield
+    assert tracemalloc.get_traced_memory()[1] < most
+    tracemalloc.stop()
 
 
 def absent_package(monkeypatch, name):

@@ -12,6 +12,7 @@ import numpy as np
 
 from repro import results
 from repro.cli import main
+from repro.results.files import read_sealed
 from repro.run import running
 from repro.scene import scene_hash
 
@@ -142,13 +143,13 @@ def numbers(text, kind):
 
 def hostile(out):
     """A run whose files say what nobody should believe."""
-    record = json.loads((out / "run.json").read_text())
+    record = read_sealed(out / "run.json")
     record |= {"scene": HOSTILE, "status": "failed: </script><script>pwned=1</script>", "extra": {HOSTILE: [HOSTILE]}}
     record["tables"][HOSTILE] = {HOSTILE: HOSTILE}
     record["versions"][HOSTILE] = record["warnings"] = HOSTILE
     record["wall_time_by_stage_s"][HOSTILE] = 0.1
     record["newton_iterations"][HOSTILE] = HOSTILE
-    results.write_json(out / "run.json", record)
+    results.write_sealed(out / "run.json", record | {"sha256": {}})
     lines = (out / "timeseries.csv").read_text().splitlines()
     columns = [lines[0] + ',"' + HOSTILE.replace('"', '""') + '"', *(line + ",1" for line in lines[1:])]
     results.write_text(out / "timeseries.csv", "\n".join(columns) + "\n")

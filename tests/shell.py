@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import json
 import os
 import signal
 import subprocess
@@ -13,8 +12,10 @@ from pathlib import Path
 
 import pytest
 
+from repro import results
 from repro.cli import main
 from repro.errors import Interrupted
+from repro.results.files import read_sealed
 from repro.run.checkpoint import LAST
 from repro.run.running import Watch, run
 from tests.pages import whole_of
@@ -58,8 +59,20 @@ def files(folder: Path) -> dict[str, bytes]:
 
 
 def told(folder: Path) -> dict:
-    """What run.json says."""
-    return json.loads((folder / "run.json").read_text(encoding="utf-8"))
+    """What run.json says, but for its own checksum."""
+    return read_sealed(folder / "run.json")
+
+
+def rewrite(folder: Path, **changes) -> None:
+    """Change what run.json says, under a right checksum."""
+    results.write_sealed(folder / "run.json", told(folder) | changes)
+
+
+def flip(path: Path, place: int = -2) -> None:
+    """Change the lowest bit of a byte of a file."""
+    content = bytearray(path.read_bytes())
+    content[place] ^= 1
+    path.write_bytes(content)
 
 
 def rows(table: Path) -> list[dict[str, str]]:
@@ -68,8 +81,10 @@ def rows(table: Path) -> list[dict[str, str]]:
 
 
 def lasting(folder: Path) -> dict:
-    """What run.json says but for times and counts of resumes."""
-    return {key: value for key, value in told(folder).items() if not key.startswith("wall_time") and key != "resumes"}
+    """What run.json says but for times and counts of resumes, and the SHA-256 of files that tell them."""
+    record = told(folder)
+    record["sha256"] = {name: digest for name, digest in record["sha256"].items() if name not in ("report.html", LAST)}
+    return {key: value for key, value in record.items() if not key.startswith("wall_time") and key != "resumes"}
 
 
 def flags(*entries) -> list[str]:

@@ -165,7 +165,7 @@ def test_fields_that_are_lost_are_told_and_none_is_taken_for_another(found, tmp_
     with pytest.raises(OutputError, match=r"fields\.pvd: no fields of 0.6 h are listed"):
         repro.load_run(tmp_path).fields(0.6)
     (tmp_path / "fields.pvd").write_text("<VTKFile>")
-    with pytest.raises(OutputError, match=r"fields\.pvd: it cannot be read"):
+    with pytest.raises(OutputError, match=r"fields\.pvd cannot be read: it is not as it was written"):
         repro.load_run(tmp_path)
 
 

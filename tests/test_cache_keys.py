@@ -1,18 +1,15 @@
 """The key of every cache contains every input of the cached value: another input, another key."""
-import shutil
 from dataclasses import fields, is_dataclass, replace
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-import repro
 from repro.check import numbers
 from repro.fem.space import Space
 from repro.model import flow, gear, mesh_motion, transport
 from repro.model.kinetics import Sink
-from repro.run import cache, machine
+from repro.run import cache
 from repro.scene import load_scene, scene_hash
 from tests.strategies import meshed, seed
 from verification.claims import levels
@@ -64,40 +61,6 @@ def test_every_value_of_a_scene_counts_in_its_hash():
 def test_every_section_of_a_scene_counts_in_its_hash():
     scenes = [BASE, *(replace(BASE, **{name: None}) for name in ("flow", "growth", "kinetics", "substrates"))]
     assert len({*map(scene_hash, scenes)}) == 5
-
-
-def altered(package, change):
-    """The hash of a package's source after a change of a copy of it."""
-    root = shutil.copytree(Path(repro.__file__).parent, package, ignore=shutil.ignore_patterns("__pycache__"))
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(machine, "__file__", str(root / "run" / "machine.py"))
-        change(root)
-        return machine.source_hash.__wrapped__()
-
-
-def longer(name):
-    """A change that adds a line to a module."""
-    def change(root):
-        path = root / name
-        path.write_text(path.read_text(encoding="utf-8") + "#\n", encoding="utf-8")
-    return change
-
-
-def renamed(name, new):
-    """A change that moves a module."""
-    return lambda root: (root / name).rename(root / new)
-
-
-SOURCES = {
-    "nothing": lambda root: None, "a module of a package": longer("fem/linear.py"), "a module": longer("errors.py"),
-    "the module that hashes": longer("run/machine.py"), "the first": longer("__init__.py"),
-    "another name": renamed("fem/linear.py", "fem/linear2.py"), "another folder": renamed("fem/linear.py", "linear.py"),
-    "one more": lambda root: (root / "more.py").touch()}
-
-
-def test_every_module_counts_in_the_hash_of_the_source(tmp_path):
-    hashes = {name: altered(tmp_path / str(k), change) for k, (name, change) in enumerate(SOURCES.items())}
-    assert hashes["nothing"] == machine.source_hash() and len({*hashes.values()}) == len(SOURCES)
 
 
 def test_a_cached_run_is_that_of_its_scene_and_source_under_its_name(tmp_path, monkeypatch):

@@ -2,18 +2,21 @@
 
 import html
 import json
+import os
 import re
 import shutil
 
 import numpy as np
 import pytest
 
+import repro
 from repro import results
 from repro.cli import main
 from repro.report import comparison, quantities
 from repro.report.reading import read
+from tests.faults import little_memory
 from tests.pages import Page
-from tests.shell import refused, told
+from tests.shell import flip, refused, rewrite, told
 
 
 @pytest.fixture
@@ -83,6 +86,22 @@ def test_what_cannot_be_compared_is_refused(fast, tmp_path, capsys):
         assert said in refused(target.parent, capsys, "compare", *folders, "--out", target)
 
 
+@pytest.mark.parametrize("name", ["run.json", "timeseries.csv", "ledger.csv"])
+@pytest.mark.parametrize("spoil, why", [
+    (flip, "it is not as it was written|its checksum is wrong|Expecting"), (lambda path: path.unlink(), "is missing"),
+    (lambda path: (path.unlink(), os.mkfifo(path)), "it is not a regular file"),
+    (lambda path: os.truncate(path, 3 * 2**30), r"it is longer than \d+ bytes")], ids=["bit", "gone", "pipe", "long"])
+def test_a_damaged_run_is_refused_without_being_read(fast, tmp_path, capsys, name, spoil, why):
+    """A bit that is not as it was, a pipe, 3 GB: in one line, at once, and without the memory of its size."""
+    copy = shutil.copytree(fast, tmp_path / "run")
+    spoil(copy / name)
+    with little_memory(2**28):
+        line = refused(tmp_path / "out.html", capsys, "compare", fast, copy, "--out", tmp_path / "out.html")
+    assert str(copy) in line and name in line and re.search(why, line)
+    with pytest.raises(repro.OutputError, match=f"{name} .*({why})|{name} is missing"):
+        repro.load_run(copy)
+
+
 @pytest.mark.parametrize("name, content", [
     ("run.json", b"[]"), ("run.json", b"[" * 100_000), ("run.json", b"\xff"), ("timeseries.csv", b"time_h,b\n1,2\n"),
     ("ledger.csv", b"start_h\n1\n")])
@@ -91,6 +110,13 @@ def test_a_broken_run_is_refused_by_the_name_of_its_file(fast, tmp_path, capsys,
     (copy / name).write_bytes(content)
     line = refused(tmp_path, capsys, "compare", fast, copy, "--out", tmp_path / "out.html")
     assert str(copy) in line and name in line
+
+
+def at_work(run, tmp_path):
+    """A copy of a run that says that it is at work."""
+    copy = shutil.copytree(run, tmp_path / "run")
+    rewrite(copy, status="running", sha256={})
+    return copy
 
 
 def with_field(value):
@@ -106,8 +132,8 @@ def with_field(value):
     (lambda text: text + text.splitlines(keepends=True)[-1], "its times do not ascend"),
     (lambda text: text[:text.rindex("\n", 0, -1) + 1], " rows, and run.json tells of ")])
 def test_a_time_series_has_the_rows_of_its_run_in_their_order(fast, tmp_path, capsys, change, said):
-    """All of each: what is wrong is told."""
-    copy = shutil.copytree(fast, tmp_path / "run")
+    """Of a run at work, whose tables have no SHA-256: what is wrong is told."""
+    copy = at_work(fast, tmp_path)
     (copy / "timeseries.csv").write_text(change((copy / "timeseries.csv").read_text()))
     line = refused(tmp_path, capsys, "compare", copy, fast, "--out", tmp_path / "out.html")
     assert f"{copy}: timeseries.csv cannot be read: " in line and said in line
@@ -115,6 +141,6 @@ def test_a_time_series_has_the_rows_of_its_run_in_their_order(fast, tmp_path, ca
 
 def test_a_run_at_work_may_have_more_rows_than_its_record_tells_of(fast, tmp_path):
     """That is written after the table."""
-    copy = shutil.copytree(fast, tmp_path / "run")
-    results.write_json(copy / "run.json", told(copy) | {"rows": told(copy)["rows"] - 1, "status": "running"})
+    copy = at_work(fast, tmp_path)
+    rewrite(copy, rows=told(copy)["rows"] - 1)
     assert len(read(copy).times) == told(fast)["rows"]

@@ -22,7 +22,7 @@ from repro.run.loading import load_run
 from repro.run.running import Watch, resume, run
 from repro.scene import load_scene, parse_scene, scene_tables
 from tests.pages import whole_of
-from tests.shell import BRIEF, as_whole, files, refused, resumed, started, stopped, told, wait_for
+from tests.shell import BRIEF, as_whole, files, refused, resumed, rewrite, started, stopped, told, wait_for
 
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="for Linux alone")
 
@@ -34,7 +34,7 @@ def test_a_killed_run_leaves_no_lock_that_counts(tmp_path, capsys):
     process = started("base", "--out", out, "--checkpoint", "0")
     wait_for((out / NEWEST).exists, process)
     for asked in (["--resume", out], ["flow_only", "--out", out]):
-        assert "another run is writing there" in refused(tmp_path / "none", capsys, "run", *asked)
+        assert "another process is writing there" in refused(tmp_path / "none", capsys, "run", *asked)
     process.kill()
     process.communicate()
     assert process.returncode == -signal.SIGKILL and (out / LOCK).exists()
@@ -136,9 +136,14 @@ def test_a_run_killed_at_its_very_end_is_tidied(tmp_path, capsys):
     wanted, right = page.read_bytes(), fields.read_bytes()
     page.unlink()
     (tmp_path / PREVIOUS).write_bytes(b"left")
+    sums, record = (tmp_path / SUMS).read_bytes(), told(tmp_path)
     fields.write_text("<VTKFile")
+    results.write_text(tmp_path / SUMS, f"{sha256(fields.read_bytes()).hexdigest()}  fields/{fields.name}\n")
+    rewrite(tmp_path, sha256={**record["sha256"], SUMS: sha256((tmp_path / SUMS).read_bytes()).hexdigest()})
     assert "report.html: it cannot be made" in refused(fields, capsys, "run", "--resume", tmp_path, "--quiet")
     fields.write_bytes(right)
+    (tmp_path / SUMS).write_bytes(sums)
+    rewrite(tmp_path, **record)
     assert resume(tmp_path) == "completed" and page.read_bytes() == wanted and not (tmp_path / PREVIOUS).exists()
     for force in (False, True):
         (tmp_path / PREVIOUS).write_bytes(b"left")

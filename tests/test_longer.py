@@ -37,7 +37,7 @@ def scene(name, end=None):
 
 def same(one, other):
     """Have two runs the same tables, fields and indices, and the same to say of themselves?"""
-    left, right = (lasting(folder) | {"origin": None, "files": None} for folder in (one, other))
+    left, right = (lasting(folder) | {"origin": None, "files": None, "sha256": None} for folder in (one, other))
     return files(one) == files(other) and left == right
 
 

@@ -1,13 +1,16 @@
 """What a run needs of the machine that it is on: packages, memory; and what a command imports, told by the names of
 modules and never by the clock."""
 
+import ast
 import json
 import re
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
+import repro
 from repro.check import memory
 from repro.check.checked import check
 from repro.cli import main
@@ -141,19 +144,50 @@ def test_a_limit_of_address_space_leaves_what_is_not_taken_of_it(tmp_path, monke
     assert memory.free_bytes(tmp_path) == most / 2
 
 
-def test_the_source_is_every_module_of_every_room(tmp_path, monkeypatch):
-    """What runs of other code are told apart by; a module of another room is another."""
-    found = set()
-    for name in ("run/machine.py", "timing.py", "model/flow.py", "model/more/deep.py"):
-        module = tmp_path / name
-        module.parent.mkdir(parents=True, exist_ok=True)
-        for text in ("before", "after"):
-            module.write_text(text)
-            monkeypatch.setattr(machine, "__file__", str(tmp_path / "run" / "machine.py"))
-            found.add(machine.source_hash.__wrapped__())
-    (tmp_path / "model").rename(tmp_path / "motel")
-    found.add(machine.source_hash.__wrapped__())
-    assert len(found) == 9
+def hashes_of(folder, monkeypatch, texts):
+    """The hash of a source of these modules' texts, by name, one after the other."""
+    monkeypatch.setattr(machine, "__file__", str(folder / "run" / "machine.py"))
+    for name, text in texts:
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(text)
+        yield machine.source_hash.__wrapped__()
+
+
+def test_the_source_is_every_statement_of_the_rooms_that_compute_numbers(tmp_path, monkeypatch):
+    """What runs of other code are told apart by; a module of another name is another."""
+    names = ("scene/keys.py", "fem/mesh.py", "model/flow.py", "model/more/deep.py", "results/columns.py")
+    texts = [(name, text) for name in names for text in ("a = 1", "a = 2", "a = '# 2'", 'a = """\n# 2"""')]
+    assert len({*hashes_of(tmp_path, monkeypatch, texts)}) == len(texts)
+    (tmp_path / "model/flow.py").rename(tmp_path / "model/glow.py")
+    assert len({*hashes_of(tmp_path, monkeypatch, [*texts[-1:], *texts[8:9]])}) == 2
+
+
+def test_remarks_and_rooms_without_numbers_leave_the_hash(tmp_path, monkeypatch):
+    """Docstrings, comments and empty lines; pages, the command line, and how runs are kept."""
+    bare = 'def f():\n    """Return a."""\n    return "#a"\n'
+    other = '# of f\ndef f():  # here\n    """Return "a", the letter.\n\n    Of a text.\n    """\n\n    return "#a"\n'
+    texts = [("fem/mesh.py", bare), ("fem/mesh.py", other)]
+    texts += [(name, "a = 1") for name in ("report/charts.py", "cli/run.py", "run/folder.py", "sweep/pool.py")]
+    assert len({*hashes_of(tmp_path, monkeypatch, texts)}) == 1
+
+
+def without_docstrings(source):
+    """The syntax tree of a source, with ... for each docstring."""
+    tree = ast.parse(source)
+    for node in ast.walk(tree):
+        if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef)) and ast.get_docstring(node) is not None:
+            node.body[0] = ast.Expr(ast.Constant(...))
+    return ast.dump(tree)
+
+
+def test_the_statements_of_the_source_are_all_of_it():
+    """In every module that counts: as Python reads it."""
+    package = Path(repro.__file__).parent
+    paths = [path for room in machine.ROOMS for path in (package / room).rglob("*.py")]
+    for path in paths:
+        source = path.read_text(encoding="utf-8")
+        assert without_docstrings(source) == without_docstrings(machine.statements(source)), path
+    assert len(paths) > 40
 
 
 def limited(kind, most, *arguments):

@@ -13,7 +13,7 @@ KNOWN = mutants.everything()
 OF_CASES, OF_TESTS = map(mutants.of, mutants.CATCHERS)
 #: One of each of five stages, caught by a case or two of less than a second, and one that a test catches.
 TRIED = ("inlet-not-scaled", "yield-dropped", "stress-transposed", "lumped-mass", "interface-slips",
-         "columns-kept-for-rows")
+         "pickles-read")
 PLUG, OTHER = "flow-plug", "flow-poiseuille"
 
 

@@ -1,5 +1,7 @@
 """Runs that are interrupted, killed or have failed go on as if nothing had happened, to the last bit."""
 
+import json
+import os
 import random
 import re
 import signal
@@ -13,18 +15,19 @@ from unittest.mock import Mock
 
 import pytest
 
-from repro import results
 from repro.cli import main
 from repro.errors import Interrupted, SimulationError
 from repro.march import loop
 from repro.march.simulation import steps
 from repro.model import growth
+from repro.results.files import sealed
 from repro.run import running
 from repro.run.checkpoint import NEWEST, PREVIOUS
 from repro.run.running import Watch, resume, run
 from repro.run.whole import lacking
 from repro.scene import load_scene
 from tests import faults
+from tests.faults import little_memory
 from tests.pages import whole_of
 from tests.shell import (
     BRIEF,
@@ -33,9 +36,11 @@ from tests.shell import (
     every,
     files,
     flags,
+    flip,
     lasting,
     refused,
     resumed,
+    rewrite,
     rows,
     shell,
     started,
@@ -119,16 +124,16 @@ def test_strided_arrays_are_copied():
         assert place(found).flags.c_contiguous and (place(found) == place(now)).all()
 
 
-RECORD = '{"scene": "x", "hash": "x", "tables": {}, "files": ["thesis.tex"], "status": '
+RECORD = {"scene": "x", "hash": "x", "tables": {}, "files": ["thesis.tex"], "status": "sunning"}
 
 
 @pytest.mark.parametrize("arguments", [["run", "--resume"], ["run", "base", *flags(*BRIEF), "--force", "--out"]],
                          ids=["go on", "anew"])
 @pytest.mark.parametrize("content, why", [
     (None, "there is no run.json|it holds 'thesis.tex', which is not of a run; a new or empty folder"),
-    ("[" * 100_000, "run.json: cannot be read"), ("null", "run.json: it has no scene or no status"),
-    ('{"scene": "x", "files": ["thesis.tex"]}', "run.json: it has no scene or no status"),
-    (RECORD + '"sunning"}', "run.json: its status 'sunning' is none that a run writes")])
+    ("[" * 100_000, "run.json: cannot be read"), ("null", "run.json: cannot be read .it is not a JSON object"),
+    (sealed({"scene": "x", "files": ["thesis.tex"]}), "run.json: it has no scene or no status"),
+    (sealed(RECORD), "run.json: its status 'sunning' is none that a run writes")])
 def test_a_folder_without_a_run_is_refused(tmp_path, capsys, content, why, arguments):
     """With status 2 and one line that says what is there and what to do, and nothing is changed."""
     (tmp_path / "thesis.tex").write_text("years of work")
@@ -143,35 +148,81 @@ def test_a_folder_without_a_run_is_refused(tmp_path, capsys, content, why, argum
 def test_a_status_that_no_run_writes_is_none(tmp_path, capsys, status):
     """Neither finished nor to be gone on with."""
     run(load_scene("flow_only"), tmp_path)
-    results.write_json(tmp_path / "run.json", told(tmp_path) | {"status": status})
+    rewrite(tmp_path, status=status)
     message = refused(tmp_path, capsys, "run", "--resume", tmp_path)
     assert f"its status {status!r} is none that a run writes" in message
     assert "run.json tells of a run of another scene, or has no status" in lacking(tmp_path, load_scene("flow_only"))
 
 
-@pytest.mark.parametrize("status", ["completed", PORE_END, PORE_END.replace("at t", "in the step from t")])
-def test_a_run_said_to_be_over_that_has_not_come_so_far_is_gone_on_with(tmp_path, capsys, status):
-    """Its checkpoints are kept for that, and it is told."""
+def test_a_run_that_is_over_and_damaged_goes_on_from_a_checkpoint_that_is_left(tmp_path, capsys):
+    """And says so."""
     out = tmp_path / "run"
     stopped(SCENE, out)
-    results.write_json(out / "run.json", told(out) | {"status": status})
+    rewrite(out, status="completed")
+    flip(out / "timeseries.csv")
     assert resumed(out) == 0
-    found = capsys.readouterr().err
-    assert f"run.json says {status!r}, but the last row of timeseries.csv is of t = " in found
-    assert "goes on from its checkpoint" in found
+    message = capsys.readouterr().err
+    assert "timeseries.csv is not as it was written" in message and "goes on from its checkpoint" in message
     assert as_whole(SCENE, out) and told(out)["status"] == "completed"
 
 
-def test_a_run_that_is_over_and_damaged_is_neither_whole_nor_begun_anew_unasked(tmp_path, capsys):
-    """Nor gone on with: there is no checkpoint any more. What is left of it stays until --force."""
+def test_every_bit_of_a_run_that_is_over_counts(tmp_path, capsys):
+    """A bit of any of its files, or a file exchanged for another one or gone: `check` and --resume say which, with
+    status 2. The page is made again where it is gone."""
+    whole, anew = whole_of(SCENE), ["base", *flags(*BRIEF), "--out"]
+    assert main(["check", str(whole)]) == 0
+    assert "completed; its files are as they were written" in capsys.readouterr().out
+    names = [str(path.relative_to(whole)) for path in whole.rglob("*") if path.is_file()]
+    changes = [(name, flip) for name in names]
+    changes += [(name, lambda path: path.unlink()) for name in names if name not in ("report.html", "run.json")]
+    other = (whole / "fields" / "fields_0001.vtu").read_bytes()
+    changes += [("fields/fields_0002.vtu", lambda path: path.write_bytes(other))]
+    changes += [("run.json", lambda path: flip(path, path.read_bytes().index(b'"rows": ') + 8))]
+    for number, (name, change) in enumerate(changes):
+        out = Path(copytree(whole, tmp_path / str(number)))
+        change(out / name)
+        for arguments in (["check"], ["run", "--resume"], *([["run", *anew]] if number < 3 else [])):
+            message = refused(out, capsys, *arguments, out)
+            assert name in message and str(out) in message, message
+    assert len(changes) > 2 * 10
+    flip(out / "run.json", (out / "run.json").read_bytes().index(b'"rows": ') + 8)
+    (out / "report.html").unlink()
+    assert resumed(out) == main(["check", str(out)]) == 0 and (out / "report.html").exists()
+
+
+def test_a_damaged_run_is_made_anew_by_force_alone(tmp_path, capsys):
     out, anew = Path(copytree(whole_of(SCENE), tmp_path / "run")), ["base", *flags(*BRIEF), "--out"]
-    for content, why in ((b"time_h\n0.0\n", "it has 1 rows"), (None, "timeseries.csv is missing")):
-        (out / "timeseries.csv").write_bytes(content) if content else (out / "timeseries.csv").unlink()
-        for arguments in (["--resume"], anew):
-            message = refused(tmp_path, capsys, "run", *arguments, out)
-            assert f"{out}: " in message and why in message and "--force with its scene makes the run anew" in message
+    flip(out / "timeseries.csv")
+    for arguments in (["--resume"], anew):
+        message = refused(tmp_path, capsys, "run", *arguments, out)
+        assert "--force with its scene makes the run anew" in message
+    flip(out / "run.json", 40)
     assert main(["run", *anew, str(out), "--force", "--quiet"]) == 0
     assert as_whole(SCENE, out)
+
+
+def test_check_says_that_a_run_is_not_over(tmp_path, capsys):
+    """And finds what is damaged of it; a scene's changes are not accepted with a run."""
+    stopped(SCENE, tmp_path / "run")
+    assert main(["check", str(tmp_path / "run"), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["status"] == "interrupted"
+    flip(tmp_path / "run" / "timeseries.csv")
+    assert "timeseries.csv is not as it was written" in refused(tmp_path, capsys, "check", tmp_path / "run")
+    with pytest.raises(SystemExit):
+        main(["check", str(tmp_path / "run"), "--set", "growth.end=5 h"])
+
+
+@pytest.mark.parametrize("spoil", [lambda path: (path.unlink(), os.mkfifo(path)),
+                                   lambda path: os.truncate(path, 3 * 2**30)])
+def test_a_record_that_is_no_file_or_too_long_is_refused_unread(tmp_path, capsys, spoil):
+    """A pipe is not waited for; 3 GB are not read."""
+    out = Path(copytree(whole_of(SCENE), tmp_path / "run"))
+    spoil(out / "run.json")
+    for arguments in (["check"], ["run", "--resume"], ["run", "base", *flags(*BRIEF), "--out"]):
+        with little_memory(2**28):
+            assert main([*arguments, str(out)]) == 2
+        message = capsys.readouterr().err
+        assert message.count("\n") == 1 and str(out) in message
 
 
 def test_an_altered_checkpoint_is_refused_and_the_one_before_is_used(tmp_path, capsys):

@@ -1,7 +1,6 @@
 """A run into a folder that holds one already: gone on with, left alone, refused, or replaced where it is asked for."""
 
 
-from repro import results
 from repro.cli import main
 from repro.run import machine
 from repro.run.running import run
@@ -9,7 +8,7 @@ from repro.run.whole import lacking
 from repro.scene import load_scene
 from tests import faults, pages
 from tests.pages import whole_of
-from tests.shell import BRIEF, as_whole, files, flags, lasting, refused, resumed, state, stopped, told
+from tests.shell import BRIEF, as_whole, files, flags, lasting, refused, resumed, rewrite, state, stopped, told
 
 SETS, SCENE = flags(*BRIEF), load_scene("base", BRIEF)
 
@@ -29,11 +28,10 @@ def test_what_a_run_lacks_of_being_over_is_told(tmp_path):
     """In a folder that is made with those above it: nothing; the scene, or a status that there is."""
     scene, folder = load_scene("flow_only"), tmp_path / "new" / "run"
     run(scene, folder)
-    early = load_scene("base", ["growth.end=0.2 h", 'output.times=["0.1 h"]', "numerics.refinement=0.3"])
-    assert lacking(folder, scene) == lacking(whole_of(early), early) == ""
+    assert lacking(folder, scene) == lacking(whole_of(SCENE), SCENE) == ""
     wrong = "run.json tells of a run of another scene, or has no status"
     assert wrong in lacking(folder, load_scene("flow_only", ["flow.viscosity_ratio=5"]))
-    results.write_json(folder / "run.json", told(folder) | {"status": None})
+    rewrite(folder, status=None)
     assert wrong in lacking(folder, scene)
 
 
@@ -78,7 +76,7 @@ def test_a_forced_run_removes_what_is_listed_and_nothing_else(tmp_path):
     for name, content in mine.items():
         (out / name).write_bytes(content)
     record = told(out)
-    results.write_json(out / "run.json", record | {"files": [*record["files"], "../victim", "link.txt", "notes.txt"]})
+    rewrite(out, files=[*record["files"], "../victim", "link.txt", "notes.txt"])
     pages.run(tmp_path, "base", *BRIEF, options=["--force"])
     assert (out / "link.txt").is_symlink() and {name: (out / name).read_bytes() for name in mine} == mine
     assert {name: content for name, content in files(out).items() if name not in mine} == files(whole)

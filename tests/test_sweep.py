@@ -3,12 +3,15 @@
 import html
 import json
 import math
+import multiprocessing
+import os
 import re
+import runpy
 import shutil
 import signal
 import subprocess
 import sys
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from unittest.mock import Mock
 
@@ -16,16 +19,17 @@ import numpy as np
 import pytest
 
 import repro
-from repro import load_scene, results
+from repro import results
 from repro.cli import main
 from repro.run.machine import THREADS
-from repro.sweep import page, pool, server, table, task
+from repro.run.whole import damage, record_of
+from repro.sweep import page, pool, table, task
 from repro.sweep.design import grid, latin, parse, points
-from repro.sweep.server import Server, ask
 from repro.sweep.state import Sweep
 from tests import shell
+from tests.faults import little_memory
 from tests.pages import HOSTILE, check_alone
-from tests.shell import rows, told
+from tests.shell import flip, rewrite, rows, told
 from tests.strategies import number
 from tests.test_sweep_cluster import until
 
@@ -89,7 +93,7 @@ def in_this_process(workers):
     """What makes runs, one after the other and without a server."""
     def each(points, folder):
         for point in points:
-            yield point, task.make(point.scene, folder / point.name, folder / f".part-{point.name}")
+            yield point, task.make(point.scene, folder / point.name)
 
     yield each
 
@@ -101,8 +105,6 @@ def test_a_run_that_is_not_whole_is_made_again(copied, capsys, monkeypatch):
     before = {path: path.read_bytes() for path in (copied / "table.csv", last / "timeseries.csv", first / "run.json")}
     there = sorted(copied.glob("runs/*"))
     (last / "timeseries.csv").write_text((last / "timeseries.csv").read_text()[:300])
-    for name in (f".part-{first.name}", f".part-{last.name}-attempt"):
-        (copied / "runs" / name).mkdir()
     assert sweep(copied, *VARY, *SHORT) == 3
     assert {path: path.read_bytes() for path in before} == before and sorted(copied.glob("runs/*")) == there
     out, err = capsys.readouterr()
@@ -159,7 +161,7 @@ def test_two_sweeps_in_one_folder_are_refused(copied, capsys):
     fcntl = pytest.importorskip("fcntl", reason="locks are held where the system has them")
     with (copied / ".lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
-        assert "another sweep is at work" in refused(copied, capsys, *VARY, *SHORT)
+        assert "another process is writing there" in refused(copied, capsys, *VARY, *SHORT)
 
 
 def test_the_page_needs_no_network_and_escapes_what_it_tells(finished):
@@ -268,11 +270,12 @@ def test_biomass_and_contact_are_read_from_the_rows(finished, tmp_path):
     factors = [parse("flow.mean_velocity=2.9 m/day")]
     sets = SHORT[1::2]
     made = Sweep(tmp_path, "base", factors, points("base", sets, factors, grid(factors)))
-    place = shutil.copytree(source, made.runs / made.points[0].name)
+    place = Path(shutil.copytree(source, made.runs / made.points[0].name))
     lines = rows(place / "timeseries.csv")
     for k, line in enumerate(lines):
         line.update(contact=int(k >= 1), conductivity_m_per_d=3 * 0.05 ** k, aggregate_area_um2=30.0 * (k + 1))
     results.write_table(place / "timeseries.csv", results.COLUMNS, [list(line.values()) for line in lines])
+    rewrite(place, sha256={})
     (found,) = table.tell(made, {}, 0.1)
     assert found.biomass.tolist() == [30 * (k + 1) / (50 * 600) for k in range(len(lines))]
     assert found.numbers["contact_time_h"] == float(lines[1]["time_h"]) and found.numbers["contact_biomass"] == 0.002
@@ -281,48 +284,156 @@ def test_biomass_and_contact_are_read_from_the_rows(finished, tmp_path):
     assert 0 < found.numbers["clogging_time_h"] < found.numbers["contact_time_h"]
 
 
-def test_a_killed_run_is_one_runs_failure(tmp_path, monkeypatch):
-    """The process that is killed is not the one that answers; where it is that one, it is started again."""
-    code = ("import os, signal, sys; from repro.sweep import server, task\n"
-            "kill = lambda: os.kill(os.getpid(), signal.SIGKILL)\n"
-            "task.make = lambda scene, *rest: kill() if scene.name == 'base' else 'well'\n"
-            "server.main()")
-    monkeypatch.setattr(server, "_process", lambda: subprocess.Popen(
-        [sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True))
-    killed, one = "failed: the process of the run was killed by SIGKILL", Server()
-    bad, good = (ask(load_scene(name), tmp_path / "run", tmp_path / "part") for name in ("base", "flow_only"))
-    process = one.process
-    assert [one.make(asked) for asked in (bad, good, bad)] == [killed, "well", killed] and one.process is process
-    process.kill()
-    process.wait()
-    assert [one.make(good), one.make(good)] == [killed, "well"]
-    one.close()
+def test_a_killed_run_is_one_runs_failure(tmp_path):
+    """The others are made; neither is it a failure of all where the process that forks them is killed."""
+    out = tmp_path / "sweep"
+    process = begun(out, "--vary", "pore.width=48 um, 50 um, 52 um", "--workers", "1", *SHORT)
+    until(lambda: list(out.glob("runs/0001*/fields/*.vtu")))
+    os.kill(max(children(process.pid, 2)), signal.SIGKILL)
+    until(lambda: list(out.glob("runs/0002*/fields/*.vtu")))
+    [os.kill(each, signal.SIGKILL) for each in children(process.pid, 1) if children(each, 1)]
+    said = process.communicate(timeout=60)
+    assert process.returncode == 3, said
+    first, *others = [row["status"] for row in rows(out / "runs.csv")]
+    assert first == "failed: the process of the run was killed by SIGKILL" and others == ["completed"] * 2
 
 
-def test_a_scene_comes_to_the_other_process_bit_by_bit():
-    """With lists of all kinds: times, an outline, a table over time."""
-    scene = load_scene("wide", ['output.times=["1 h", "3 h"]', 'substrates.donor.supply=[["0 h", "3 mg/L"]]',
-                                'aggregate={outline=[["-5 um", "0 um"], ["0 um", "4 um"], ["6 um", "0 um"]]}'])
-    assert server._asked(ask(scene, Path("a"), Path("b"))) == (scene, Path("a"), Path("b"))
+def children(pid, generation):
+    """The processes that a process has started, or that those have."""
+    status = [Path(f"/proc/{each}/stat") for each in os.listdir("/proc") if each.isdigit()]
+    parents = {}
+    for path in status:
+        with suppress(FileNotFoundError, ProcessLookupError):
+            parents[int(path.parent.name)] = int(path.read_text().rpartition(")")[2].split()[1])
+    found = {pid}
+    for _ in range(generation):
+        found = {child for child, parent in parents.items() if parent in found}
+    return found
+
+
+HOSTILE_MODULE = "import os\nos.mkdir(os.path.join({!r}, f'{{__name__}}-{{os.getpid()}}'))\nraise ImportError\n"
+MODULES = ("numpy", "random", "tempfile", "socket", "repro", "scipy", "mmgpy", "distributed", "usercustomize")
+
+
+def hostile_folder(tmp_path):
+    """A working folder with modules that note who imports them, and where they note it."""
+    here, notes = tmp_path / "here", tmp_path / "notes"
+    here.mkdir()
+    notes.mkdir()
+    for name in MODULES:
+        (here / f"{name}.py").write_text(HOSTILE_MODULE.format(str(notes)))
+    return here, notes
+
+
+def test_nothing_is_imported_from_the_working_folder(tmp_path):
+    """By none of the processes of a sweep, whichever way it is started: the command, or a script elsewhere without a
+    guard, which is not run again either."""
+    here, notes = hostile_folder(tmp_path)
+    script = tmp_path / "script.py"
+    script.write_text("import repro\nprint(repro.sweep('flow_only', ['pore.width=48 um, 50 um'], 'again'))\n")
+    command = ["-c", "import sys\nsys.path.remove('')\nfrom repro.cli import main\nsys.exit(main(sys.argv[1:]))",
+               "sweep", "flow_only", "--vary", "pore.width=48 um, 50 um", "--out", "sweep"]
+    for arguments in (command, [str(script)]):
+        done = subprocess.run([sys.executable, *arguments], cwd=here, capture_output=True, text=True, timeout=120)
+        assert done.returncode == 0 and done.stdout.count("2 of 2 runs done") == 1, done.stderr
+    assert list(notes.iterdir()) == [] and len(rows(here / "sweep" / "table.csv")) == 2
+
+
+def test_what_c_code_prints_does_not_reach_the_user(tmp_path, capfd):
+    """On neither output of the process of a run, whose own failure is told in one line with its place."""
+    (tmp_path / "noisy.py").write_text(
+        "import os\nfrom repro.sweep import task\n"
+        "def made(scene, place, watch):\n    os.write(1, b'noise')\n    os.write(2, b'noise')\n    return {}['x']\n"
+        "task._made = made\n")
+    one = points("flow_only", [], [parse("pore.width=48 um")], [(48.0,)])
+    end, answer = multiprocessing.get_context("fork").Pipe()
+    child = os.fork()
+    if not child:
+        runpy.run_path(str(tmp_path / "noisy.py"))
+        task.answer(answer, one[0].scene, tmp_path / "run", 0.0)
+        os._exit(0)
+    os.waitpid(child, 0)
+    assert end.recv() == "failed: KeyError: 'x' (noisy.py, line 6)" and capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("name", ["runs/{run}/notes.txt", "runs/{run}/fields/mine.vtu", "runs/.part-{run}/notes.txt"])
+@pytest.mark.parametrize("spoil", ["failed", "damaged"])
+def test_what_others_have_put_beside_a_run_stays(copied, monkeypatch, name, spoil):
+    """Where the run is tried again since it has failed, or is made again since it is damaged."""
+    monkeypatch.setattr(pool, "ready", in_this_process)
+    run = (copied / rows(copied / "runs.csv")[2]["folder"])
+    rewrite(run, status="failed: so") if spoil == "failed" else flip(run / "timeseries.csv")
+    mine = copied / name.format(run=run.name)
+    mine.parent.mkdir(exist_ok=True)
+    mine.write_text("years of work")
+    assert sweep(copied, *VARY, *SHORT, "--quiet") == 3
+    assert mine.read_text() == "years of work"
+    assert rows(copied / "runs.csv")[2]["status"] == "completed" and not damage(run, record_of(run))
+
+
+@pytest.mark.parametrize("arrange, why", [
+    (lambda out, run: run.mkdir(parents=True) or (run / "thesis.tex").write_text("work"), "it holds 'thesis.tex'"),
+    (lambda out, run: (out / "runs").symlink_to(out.parent), "runs: it is a link, or no folder"),
+    (lambda out, run: run.parent.mkdir() or run.symlink_to(out.parent), "it is a link, or no folder"),
+    (lambda out, run: (out / "runs").write_text("mine"), "runs: it is a link, or no folder")])
+def test_places_that_are_not_of_a_sweep_are_refused(tmp_path, capsys, arrange, why):
+    """A folder of somebody's without a run, links in the place of all runs and of one: before anything is written."""
+    factors = [parse("pore.width=48 um, 50 um")]
+    (tmp_path / "sweep").mkdir()
+    arrange(tmp_path / "sweep", tmp_path / "sweep" / "runs" / points("base", [], factors, grid(factors))[0].name)
+    assert why in refused(tmp_path / "sweep", capsys, "--vary", "pore.width=48 um, 50 um")
+
+
+@pytest.mark.parametrize("name", ["sweep.json", "run.json", "timeseries.csv", "ledger.csv"])
+@pytest.mark.parametrize("spoil", [lambda path: (path.unlink(), os.mkfifo(path)),
+                                   lambda path: os.truncate(path, 3 * 2**30)])
+def test_pipes_and_files_of_gigabytes_do_not_stop_a_sweep(copied, capsys, monkeypatch, name, spoil):
+    """They are refused, or made again where they are the run's, and neither waited for nor read."""
+    monkeypatch.setattr(pool, "ready", in_this_process)
+    run = copied / rows(copied / "runs.csv")[2]["folder"]
+    spoil(copied / name if name == "sweep.json" else run / name)
+    with little_memory(2**28):
+        status = sweep(copied, *VARY, *SHORT, "--quiet")
+    message = capsys.readouterr().err
+    if name in ("sweep.json", "run.json"):
+        assert status == 2 and message.count("\n") == 1 and name in message
+    else:
+        assert status == 3 and (run / name).is_fifo() == (f"{run / name}: it is a link, or no regular" in message)
+
+
+def test_an_altered_cell_of_a_run_does_not_reach_the_table(copied, monkeypatch):
+    """The run is made again."""
+    monkeypatch.setattr(pool, "ready", in_this_process)
+    table_before = (copied / "table.csv").read_bytes()
+    flip(copied / rows(copied / "runs.csv")[2]["folder"] / "timeseries.csv", -20)
+    assert sweep(copied, *VARY, *SHORT, "--quiet") == 3
+    assert (copied / "table.csv").read_bytes() == table_before
+
+
+def begun(out, *arguments):
+    """`repro sweep base`, going."""
+    command = [sys.executable, "-m", "repro", "sweep", "base", "--out", str(out), *arguments]
+    return subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
 
 
 def cut_off(out, how, *arguments):
     """(exit status, what is said) of a sweep in another process that is sent a signal while a run is at work.
 
     No process of it is left: each would hold its standard error open."""
-    command = [sys.executable, "-m", "repro", "sweep", "base", "--out", str(out), *arguments]
-    process = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-    until(lambda: list(out.glob("runs/.part-*/fields/*.vtu")))
+    process = begun(out, *arguments)
+    until(lambda: list(out.glob("runs/0*/fields/*.vtu")))
     process.send_signal(how)
     said = process.communicate(timeout=20)[1]
     return process.returncode, said
 
 
-def test_sigterm_ends_a_sweep_quietly(tmp_path):
-    """Status 143, one line, tables of what there is."""
+@pytest.mark.parametrize("how, ends, word", [(signal.SIGTERM, 143, "terminated"), (signal.SIGINT, 130, "interrupted")])
+def test_a_signal_ends_a_sweep_quietly(tmp_path, how, ends, word):
+    """One line, which gives the command that continues it; tables of what there is."""
     out = tmp_path / "sweep"
-    status, said = cut_off(out, signal.SIGTERM, "--vary", "pore.width=48 um, 50 um", "--workers", "1", "--quiet")
-    assert status == 143 and said.startswith("repro: terminated") and said.count("\n") == 1, said
+    status, said = cut_off(out, how, "--vary", "pore.width=48 um, 50 um", "--workers", "1", "--quiet")
+    command = f"repro sweep base --out {out} --vary 'pore.width=48 um, 50 um' --workers 1 --quiet goes on with it"
+    assert status == ends and said.startswith(f"repro: {word}; ") and command in said and said.count("\n") == 1, said
     assert (out / "table.csv").exists() and (out / "summary.html").exists()
 
 

@@ -7,8 +7,10 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
-from unittest.mock import MagicMock, Mock
+from contextlib import contextmanager, suppress
+from unittest.mock import AsyncMock, MagicMock, Mock
 
 import pytest
 
@@ -39,15 +41,44 @@ def test_without_the_package_the_message_says_what_to_install(tmp_path, capsys, 
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("address", ["nonsense", "tcp://", "tcp://127.0.0.1:99999", "tcp://[::1",
-                                     "tcp://127.0.0.1:{closed}", "127.0.0.1:{silent}", "tcp://host.invalid:8786"])
-def test_a_bad_address_is_refused_within_five_seconds_and_nothing_is_written(tmp_path, capsys, address):
-    """Where nobody listens, where nobody answers, where there is no such host, where it is no address."""
+#: What no scheduler says: that of a shell's server, of one for the web, lengths that do not follow, and nothing.
+GREETINGS = {"shell": b"SSH-2.0-OpenSSH_9\r\n", "web": b"HTTP/1.1 400 Bad\r\n\r\n", "short": 20 * (b"\1" + bytes(7)),
+             "long": b"\x20" + bytes(7) + 100 * b"\xff", "silent": b""}
+
+
+@contextmanager
+def listening():
+    """The ports on which servers say what no scheduler does, by name, and one on which nobody listens."""
+    servers = {name: socket.create_server(("127.0.0.1", 0)) for name in GREETINGS}
+    kept = []
+
+    def serve(server, greeting):
+        with suppress(OSError):
+            while True:
+                kept.append(server.accept()[0])
+                kept[-1].sendall(greeting)
+
+    for name, server in servers.items():
+        threading.Thread(target=serve, args=(server, GREETINGS[name]), daemon=True).start()
+    yield {"closed": free_port()} | {name: server.getsockname()[1] for name, server in servers.items()}
+    for each in (*servers.values(), *kept):
+        with suppress(OSError):
+            each.shutdown(socket.SHUT_RDWR)
+        each.close()
+
+
+@pytest.mark.parametrize("address", [
+    "nonsense", "tcp://", "tcp://127.0.0.1:99999", "tcp://[::1", "tcp://127.0.0.1:{closed}", "127.0.0.1:{silent}",
+    "tcp://host.invalid:8786", "tls://127.0.0.1:{silent}", "ucx://127.0.0.1:{closed}", "ws://127.0.0.1:{web}",
+    "tcp://127.0.0.1:{shell}", "tcp://127.0.0.1:{short}", "tcp://127.0.0.1:{long}"])
+def test_a_bad_address_is_refused_within_five_seconds_and_nothing_is_written(tmp_path, capfd, address):
+    """Where nobody listens, where nobody answers, or with rubbish, where there is no such host, where it is no address:
+    in one line, without a traceback."""
     pytest.importorskip("distributed")
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        where = address.format(closed=free_port(), silent=server.getsockname()[1])
+    with listening() as ports:
+        where = address.format(**ports)
         start = time.monotonic()
-        assert "no Dask scheduler answers there" in refused(tmp_path / "sweep", where, capsys)
+        assert "no Dask scheduler answers there" in refused(tmp_path / "sweep", where, capfd)
         assert time.monotonic() - start < 5 and list(tmp_path.iterdir()) == []
 
 
@@ -68,13 +99,13 @@ def test_workers_that_cannot_be_used_are_told(tmp_path, capsys, monkeypatch, tro
     client = MagicMock(wait_for_workers=Mock(side_effect=trouble), run=run)
     client.__enter__.return_value = client
     monkeypatch.setattr(cluster, "_package", lambda address: Mock(Client=lambda *at, **options: client))
-    monkeypatch.setattr(cluster, "_is_open", lambda address: True)
+    monkeypatch.setattr(cluster, "_ask", AsyncMock())
     assert said in refused(tmp_path / "sweep", "tcp://host:8786", capsys)
 
 
 def test_a_worker_with_other_code_makes_nothing():
     """One that joins a sweep at work is not asked before."""
-    assert "failed: a worker that joined has version" in cluster.attempt("{}", "0.0.1-abc")
+    assert "failed: a worker that joined has version" in cluster.attempt(None, None, "0.0.1-abc")
 
 
 def free_port():
@@ -126,7 +157,7 @@ def test_no_run_is_lost_or_there_twice_where_a_worker_is_killed(workers, tmp_pat
     first, _ = start("one"), start("two")
     out, here = tmp_path / "sweep", tmp_path / "here"
     process = on_cluster(address, out)
-    until(lambda: list(out.glob("runs/0*")) and len(list(out.glob("runs/.part-*"))) == 2)
+    until(lambda: list(out.glob("runs/0*")) and len(list(out.glob("runs/*/.lock"))) == 2)
     first.send_signal(signal.SIGKILL)
     said = process.communicate(timeout=120)
     assert process.returncode == 0 and "6 of 6 runs done, 0 failed" in said[0], said

@@ -9,6 +9,7 @@ under ``| head -1``, is no failure.
 from __future__ import annotations
 
 import argparse
+import shlex
 import sys
 from contextlib import suppress
 
@@ -24,7 +25,9 @@ COMMANDS = (run, scene, check, compare, sweep)
 
 def main(arguments: list[str] | None = None) -> int:
     """Entry point; returns the exit status."""
-    chosen = _parser().parse_args(arguments)
+    words = sys.argv[1:] if arguments is None else arguments
+    chosen = _parser().parse_args(words)
+    chosen.command_line = shlex.join(["repro", *words])
     try:
         return chosen.call(chosen)
     except (SceneError, OutputError, OSError) as error:

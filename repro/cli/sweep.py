@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 from repro.cli.arguments import add_scene, path
 from repro.errors import Interrupted
+from repro.run.interrupts import ASKED
 from repro.run.progress import say
 
 if TYPE_CHECKING:
@@ -76,7 +77,7 @@ def call(chosen) -> int:
     """Make the sweep that was chosen."""
     from repro.sweep.making import sweep
 
-    with _ended_by_sigterm(), _telling(chosen.quiet) as tell:
+    with _ended_by_signals(chosen.command_line), _telling(chosen.quiet) as tell:
         swept = sweep(chosen.scene, chosen.vary, chosen.out, chosen.set, chosen.unset,
                       samples=chosen.samples, seed=chosen.seed, workers=chosen.workers,
                       scheduler=chosen.scheduler, clogged=chosen.clogged, tell=tell)
@@ -84,20 +85,24 @@ def call(chosen) -> int:
 
 
 @contextmanager
-def _ended_by_sigterm() -> Iterator[None]:
-    """Within, SIGTERM ends the sweep as Ctrl-C does; a second one ends the process at once."""
+def _ended_by_signals(command: str) -> Iterator[None]:
+    """Within, Ctrl-C and SIGTERM end the sweep, and the message gives the command that continues
+    it; a second one ends the process at once."""
     def end(number: int, frame) -> None:
         signal.signal(number, signal.SIG_DFL)
-        raise Interrupted("terminated; what was computed is written, and the same command goes on "
-                          "with it", number)
+        how = "interrupted" if number == signal.SIGINT else "terminated"
+        raise Interrupted(f"{how}; what was computed is written, and {command} goes on with it",
+                          number)
 
-    kept = signal.getsignal(signal.SIGTERM)
-    if kept != signal.SIG_IGN:
-        signal.signal(signal.SIGTERM, end)
+    kept = {number: signal.getsignal(number) for number in ASKED}
+    for number in kept:
+        if kept[number] != signal.SIG_IGN:
+            signal.signal(number, end)
     try:
         yield
     finally:
-        signal.signal(signal.SIGTERM, kept)
+        for number, handler in kept.items():
+            signal.signal(number, handler)
 
 
 @contextmanager

@@ -17,6 +17,7 @@ import numpy as np
 from repro.fem.transfer import located
 from repro.results import names, vtu
 from repro.results.arrays import ARRAYS
+from repro.results.files import MOST_TABLE, read
 from repro.results.vtu import Cells, Grid
 
 MOST_FRAMES = 40
@@ -47,8 +48,8 @@ def listed(folder: Path, name: str = "fields.pvd") -> list[tuple[float, Path]]:
     if not (folder / name).exists():
         return []
     try:
-        entries = ElementTree.parse(folder / name).getroot().iter("DataSet")
-    except ElementTree.ParseError as error:
+        entries = ElementTree.fromstring(read(folder / name, MOST_TABLE)).iter("DataSet")
+    except (OSError, ElementTree.ParseError) as error:
         raise ValueError(f"{folder / name}: it cannot be read: {error}") from error
     named = [(float(entry.get("timestep", "nan")), entry.get("file", "")) for entry in entries]
     return [(time, folder / name) for time, name in named if _FILE.fullmatch(name)]

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import csv
-import json
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from repro.results import COLUMNS, LEDGER_COLUMNS, read_table
+from repro.results import COLUMNS, LEDGER_COLUMNS, parse_table
+from repro.results.files import MOST_TABLE, read_sealed, sha256
+from repro.results.files import read as read_file
 
 
 class NoRun(ValueError):
@@ -32,16 +34,29 @@ class Run:
 
 
 def read(folder: Path) -> Run:
-    """The run in a folder.
+    """Read the run in a folder.
 
-    Raises NoRun where it holds none, or one whose files cannot be read.
+    The tables of a run that is not at work are those whose SHA-256 its ``run.json`` has. Raises
+    NoRun where the folder holds no run, or one whose files are not as they were written.
     """
-    record = _read(folder, "run.json", _record)
-    series = _read(folder, "timeseries.csv", lambda path: _series(path, record.get("rows")))
+    record = _read(folder, "run.json", read_sealed)
+    series = _read(folder, "timeseries.csv", lambda path: _series(_table(path, record), record))
     ledger = {}
-    if (folder / "ledger.csv").exists():
-        ledger = _read(folder, "ledger.csv", lambda path: _table(path, LEDGER_COLUMNS))
+    if "ledger.csv" in hashes(record) or (folder / "ledger.csv").exists():
+        ledger = _read(folder, "ledger.csv", lambda path: _ledger(_table(path, record)))
     return Run(folder, record, series, ledger)
+
+
+def hashes(record: dict) -> dict[str, str]:
+    """The SHA-256 of each file that a record has, by name; none of a run that is at work."""
+    found = record.get("sha256")
+    return found if isinstance(found, dict) else {}
+
+
+def require_unchanged(name: str, content: bytes, record: dict) -> None:
+    """Raise ValueError where the record has another SHA-256 for this content of a file."""
+    if name in hashes(record) and hashes(record)[name] != sha256(content):
+        raise ValueError("it is not as it was written: cut short or altered")
 
 
 def require_columns(run: Run) -> None:
@@ -51,6 +66,17 @@ def require_columns(run: Run) -> None:
                     "version is needed")
 
 
+def require_lists(run: Run) -> None:
+    """Raise NoRun where a list of fields that is there is not as the run has written it."""
+    names = {"fields.pvd", "fields.sha256"} & hashes(run.record).keys()
+    for name in (name for name in names if (run.folder / name).exists()):
+        _read(run.folder, name, partial(_require_file, record=run.record))
+
+
+def _require_file(path: Path, record: dict) -> None:
+    require_unchanged(path.name, read_file(path, MOST_TABLE), record)
+
+
 def _read(folder: Path, name: str, how):
     """One file of a run."""
     try:
@@ -58,35 +84,39 @@ def _read(folder: Path, name: str, how):
     except FileNotFoundError:
         raise NoRun(f"{folder}: it holds no run: {name} is missing; a folder that `repro run` "
                     "wrote is needed") from None
-    except (OSError, ValueError, RecursionError, csv.Error) as error:
+    except (OSError, ValueError, csv.Error) as error:
         why = getattr(error, "strerror", None) or error
         raise NoRun(f"{folder}: {name} cannot be read: {why}; a folder that `repro run` wrote is "
                     "needed") from error
 
 
-def _record(path: Path) -> dict:
-    record = json.loads(path.read_text(encoding="utf-8"))
-    if not isinstance(record, dict):
-        raise ValueError("not a JSON object")
-    return record
+def _table(path: Path, record: dict) -> dict[str, np.ndarray]:
+    """The columns of a table of the run with this record."""
+    content = read_file(path, MOST_TABLE)
+    require_unchanged(path.name, content, record)
+    return parse_table(content)
 
 
-def _series(path: Path, told: object) -> dict[str, np.ndarray]:
-    """The time series, with ascending times; of as many rows as ``run.json``, which is written
-    after it, tells of, or more."""
-    series = _table(path, ["time_h"])
+def _series(series: dict[str, np.ndarray], record: dict) -> dict[str, np.ndarray]:
+    """The time series, if its times ascend. ``run.json``, which is written after it, says how many
+    rows it has at least."""
+    _require_finite(series, ["time_h"])
     count = len(series["time_h"])
-    if not isinstance(told, int) or count < told:
-        raise ValueError(f"it has {count} rows, and run.json tells of {told}")
+    rows = record.get("rows")
+    if not isinstance(rows, int) or count < rows:
+        raise ValueError(f"it has {count} rows, and run.json tells of {rows}")
     if (np.diff(series["time_h"]) <= 0).any():
         raise ValueError("its times do not ascend")
     return series
 
 
-def _table(path: Path, needed: list[str]) -> dict[str, np.ndarray]:
-    """The columns of a table, among them the `needed` ones, which hold finite numbers alone."""
-    table = read_table(path)
-    for name in needed:
+def _ledger(ledger: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    _require_finite(ledger, LEDGER_COLUMNS)
+    return ledger
+
+
+def _require_finite(table: dict[str, np.ndarray], names: list[str]) -> None:
+    """Raise ValueError where a table lacks one of these columns of finite numbers."""
+    for name in names:
         if name not in table or not np.isfinite(table[name]).all():
             raise ValueError(f"a column {name} of finite numbers is needed")
-    return table

@@ -19,7 +19,7 @@ PHYSICS = {
     "growth": "growth of the aggregate as a neo-Hookean body (2.3)",
 }
 #: What the page tells in a place of its own.
-TOLD = {"scene", "hash", "tables", "versions", "status", "rows", "wall_time_s",
+TOLD = {"scene", "hash", "sha256", "tables", "versions", "status", "rows", "wall_time_s",
         "wall_time_by_stage_s", "newton_iterations", "remeshes", "warnings", "files", "origin"}
 
 NESTED = ("Each bar is the time within that stage, calls within calls counted in both: what is "

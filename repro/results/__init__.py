@@ -27,6 +27,7 @@ import numpy as np
 
 from repro.results.arrays import fields
 from repro.results.columns import COLUMNS, LEDGER_COLUMNS, ledger_row, row
+from repro.results.files import MOST_TABLE, read, sealed
 from repro.results.quantities import UNITS
 from repro.scene import Scene, scene_hash, scene_tables
 
@@ -73,9 +74,15 @@ def _shown(value: object) -> object:
 def read_table(path: Path) -> dict[str, np.ndarray]:
     """The columns of a CSV table that a run has written; an empty field is not-a-number.
 
-    Raises ValueError where it is not whole: a line that is cut short, or what is no finite number.
+    Raises ValueError where it is not whole: a line that is cut short, or what is no finite number;
+    OSError where it cannot be read.
     """
-    text = path.read_text(encoding="utf-8")
+    return parse_table(read(path, MOST_TABLE))
+
+
+def parse_table(content: bytes) -> dict[str, np.ndarray]:
+    """What :func:`read_table` gives, of the content of the file."""
+    text = content.decode()
     if not text.endswith("\n"):
         raise ValueError("its last line is cut short" if text else "it is empty")
     head, *rows = csv.reader(io.StringIO(text))
@@ -117,3 +124,8 @@ def version(package: str) -> str:
 def write_json(path: Path, content: dict) -> None:
     """Write a JSON file; not-a-number is refused."""
     write_text(path, json.dumps(content, indent=2, allow_nan=False) + "\n")
+
+
+def write_sealed(path: Path, content: dict) -> None:
+    """Write a JSON file that ends with its own checksum."""
+    write_text(path, sealed(content))

@@ -1,8 +1,15 @@
-"""Files that appear whole or not at all, and through no link that stands in their way."""
+"""Files: written whole or not at all, read within a limit of size, and known by their SHA-256.
+
+``run.json`` is written last. It ends with the SHA-256 of all of its text before that, and has those
+of the other files of a run that is not at work. They tell what an accident has changed; whoever
+changes a file on purpose can change them too.
+"""
 
 from __future__ import annotations
 
 import errno
+import hashlib
+import json
 import os
 import shutil
 import stat
@@ -13,6 +20,9 @@ from tempfile import mkdtemp
 
 #: How the folders are called in which files are written before they are moved to their place.
 WRITING = ".writing-"
+#: Bytes that a file may have: one of JSON, whose objects take many times its length; a table; the
+#: fields of one time, or a checkpoint. A mesh of a million nodes takes a quarter of the last.
+MOST_JSON, MOST_TABLE, MOST_DATA = 2**24, 2**27, 2**30
 
 
 @contextmanager
@@ -44,15 +54,68 @@ def is_folder(path: Path) -> bool:
     return path.is_dir() and not path.is_symlink()
 
 
-def open_lock(path: Path) -> int:
-    """The descriptor of an empty file to lock, made where it is not there.
+def read(path: Path, most: int) -> bytes:
+    """The content of a regular file of at most `most` bytes.
 
-    Raises OSError where it is a link, or no file, or has content: then it is somebody else's.
+    Raises OSError where it is none (a pipe, a device), is longer or cannot be read; it waits for
+    nothing.
     """
-    asked = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
-    number = os.open(path, asked, 0o666)
-    opened = os.fstat(number)
-    if stat.S_ISREG(opened.st_mode) and opened.st_size == 0:
-        return number
-    os.close(number)
-    raise FileExistsError(errno.EEXIST, f"{path.name} is there and is no lock")
+    flags = getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+    with open(os.open(path, os.O_RDONLY | flags), "rb") as file:
+        status = os.fstat(file.fileno())
+        if not stat.S_ISREG(status.st_mode):
+            raise OSError(errno.EINVAL, "it is not a regular file")
+        if status.st_size > most:
+            raise OSError(errno.EFBIG, f"it is longer than {most} bytes")
+        return file.read(status.st_size)
+
+
+def sha256(content: bytes) -> str:
+    """The SHA-256 of a content, in hexadecimal digits."""
+    return hashlib.sha256(content).hexdigest()
+
+
+def sha256_of(path: Path) -> str:
+    """The SHA-256 of a file, empty where it is missing or no regular file that can be read."""
+    try:
+        return sha256(read(path, MOST_DATA))
+    except OSError:
+        return ""
+
+
+def read_json(path: Path) -> dict:
+    """The object in a file of JSON. Raises OSError as :func:`read`, ValueError where it is none."""
+    return _object(read(path, MOST_JSON))
+
+
+def _object(content: bytes) -> dict:
+    try:
+        found = json.loads(content)
+    except RecursionError:
+        raise ValueError("it is nested too deeply") from None
+    if not isinstance(found, dict):
+        raise ValueError("it is not a JSON object")
+    return found
+
+
+def sealed(content: dict) -> str:
+    """The text of an object as JSON, with the SHA-256 of all before it as its last entry."""
+    return _with_checksum(json.dumps(content, indent=2, allow_nan=False).removesuffix("\n}"))
+
+
+def _with_checksum(text: str) -> str:
+    return f'{text},\n  "checksum": "{sha256(text.encode())}"\n}}\n'
+
+
+def read_sealed(path: Path) -> dict:
+    """What :func:`sealed` was given. Raises OSError as :func:`read`, and ValueError where it is not
+    as it was written."""
+    content = read(path, MOST_JSON)
+    before, separator, _ = content.rpartition(b',\n  "checksum": ')
+    if not separator or content != _with_checksum(before.decode(errors="replace")).encode():
+        _object(content)  # raises what says more
+        raise ValueError("its checksum is wrong: it was cut short or altered, or another version "
+                         "wrote it")
+    record = _object(content)
+    del record["checksum"]
+    return record

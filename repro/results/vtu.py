@@ -17,6 +17,9 @@ from xml.etree import ElementTree
 
 import numpy as np
 
+from repro.results.files import MOST_DATA
+from repro.results.files import read as read_file
+
 #: VTK's numbers of the cells that there are, and their nodes.
 TYPES = {"triangle": 5, "triangle6": 22}
 KINDS = {"<f8": "Float64", "<i8": "Int64", "<i4": "Int32", "|u1": "UInt8"}
@@ -93,16 +96,24 @@ def read(path: Path) -> Grid:
     Raises OSError where it cannot be read, and ValueError where it is none.
     """
     try:
-        return _grid(ElementTree.parse(path).getroot())
-    except (ElementTree.ParseError, LookupError, TypeError, zlib.error) as error:
-        raise ValueError(f"{path}: no unstructured grid: {error}") from error
+        return parse(read_file(path, MOST_DATA))
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from error
+
+
+def parse(content: bytes) -> Grid:
+    """The grid in the content of a file. Raises ValueError where there is none."""
+    try:
+        return _grid(ElementTree.fromstring(content))
+    except (ElementTree.ParseError, LookupError, TypeError, ValueError, zlib.error) as error:
+        raise ValueError(f"no unstructured grid: {error}") from error
 
 
 def _grid(root: ElementTree.Element) -> Grid:
     """The grid in a file's elements."""
     piece = root.find("UnstructuredGrid/Piece")
     if piece is None:
-        raise ValueError("no unstructured grid")
+        raise ValueError("there is no piece")
     parts = {name: _arrays(piece.find(name))
              for name in ("Points", "Cells", "PointData", "CellData")}
     points = parts["Points"].popitem()[1]

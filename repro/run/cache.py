@@ -7,7 +7,6 @@ shown.
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
 from collections.abc import Iterable
@@ -15,6 +14,7 @@ from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from tempfile import mkdtemp
 
+from repro.results.files import read_sealed
 from repro.run.machine import source_hash
 from repro.run.running import run
 from repro.scene import Scene, scene_hash
@@ -63,4 +63,4 @@ def cached_runs(scenes: Iterable[Scene], folder: Path) -> list[Path]:
 
 def provenance(folder: Path) -> dict:
     """The ``run.json`` of a run."""
-    return json.loads((folder / "run.json").read_text(encoding="utf-8"))
+    return read_sealed(folder / "run.json")

@@ -7,28 +7,29 @@ checkpoints.
 
 from __future__ import annotations
 
+import errno
 import os
 import re
-import sys
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from repro.errors import OutputError
-from repro.results.files import WRITING, is_file, is_folder, open_lock
+from repro.results.files import MOST_TABLE, WRITING, is_file, is_folder, read
 from repro.run.checkpoint import LAST, NEWEST, PREVIOUS, REFUSED
 
 LOCK = ".lock"
 PROVENANCE = "run.json"
+REPORT = "report.html"
 SUMS = "fields.sha256"
 #: What is removed where a run is over.
 CHECKPOINTS = (NEWEST, PREVIOUS, REFUSED)
 #: Every file that a run may write, besides its fields.
 OWN = (PROVENANCE, "timeseries.csv", "ledger.csv", "fields.pvd", "before_expansion.pvd", SUMS,
-       "timeseries.nc", "report.html", *CHECKPOINTS, LAST)
+       "timeseries.nc", REPORT, *CHECKPOINTS, LAST)
 FIELDS = re.compile(r"fields/(?:fields|before_expansion)_\d{4,}\.vtu")
 #: A line of SUMS, as sha256sum writes and checks it.
-SUM = re.compile(rf"[0-9a-f]{{64}}  ({FIELDS.pattern})")
+SUM = re.compile(rf"([0-9a-f]{{64}})  ({FIELDS.pattern})")
 #: A folder in which a run was writing a file when it was killed, and what that may hold.
 ROOM = re.compile(re.escape(WRITING) + r"\w{8}")
 PART = re.compile("|".join([FIELDS.pattern.removeprefix("fields/"), *map(re.escape, OWN)]))
@@ -42,9 +43,22 @@ def listed(folder: Path, told: dict) -> set[str]:
     found = {name for name in names if isinstance(name, str)}
     found = {name for name in found if name in OWN or FIELDS.fullmatch(name)}
     if SUMS in found and is_file(folder / SUMS):
-        lines = (folder / SUMS).read_text(encoding="utf-8", errors="replace").splitlines()
-        found |= {match[1] for match in map(SUM.fullmatch, lines) if match}
+        found |= sums(folder).keys()
     return found | {PROVENANCE, *CHECKPOINTS}
+
+
+def sum_line(name: str, digest: str) -> str:
+    """The line of a file in SUMS."""
+    return f"{digest}  {name}\n"
+
+
+def sums(folder: Path) -> dict[str, str]:
+    """The SHA-256 of each file of fields, by its name, that SUMS has; none without that file."""
+    try:
+        lines = read(folder / SUMS, MOST_TABLE).decode(errors="replace").splitlines()
+    except OSError:
+        return {}
+    return {match[2]: match[1] for match in map(SUM.fullmatch, lines) if match}
 
 
 def prepare(folder: Path, own: Collection[str] = ()) -> None:
@@ -53,14 +67,14 @@ def prepare(folder: Path, own: Collection[str] = ()) -> None:
     Raises OutputError where it holds anything else, or cannot be made.
     """
     with usable(folder):
-        strange = _strange(folder, own) if folder.exists() else []
-        if strange:
-            raise OutputError(f"--out {folder}: it holds {strange[0]!r}, which is not of a run; "
+        foreign = strange(folder, own) if folder.exists() else []
+        if foreign:
+            raise OutputError(f"--out {folder}: it holds {foreign[0]!r}, which is not of a run; "
                               "a new or empty folder, or one of an earlier run, is accepted")
         (folder / "fields").mkdir(parents=True, exist_ok=True)
 
 
-def _strange(folder: Path, own: Collection[str]) -> list[str]:
+def strange(folder: Path, own: Collection[str] = ()) -> list[str]:
     """What is neither among these files nor made by a run that was killed before it had any."""
     tidy(folder)
     names = [path.name for path in folder.iterdir() if path.name not in (LOCK, "fields")]
@@ -86,7 +100,7 @@ def refuse_links(folder: Path, own: Collection[str]) -> None:
 def refuse_others(folder: Path, own: Collection[str]) -> None:
     """Raises OutputError where a file that is not among these has a name that a run gives."""
     with usable(folder):
-        for name in _strange(folder, own):
+        for name in strange(folder, own):
             if name in OWN or FIELDS.fullmatch(name):
                 raise OutputError(f"{folder / name}: no run has written it; move it away")
 
@@ -154,48 +168,32 @@ def claimed(folder: Path, name: str, own: set[str]) -> Path:
 
 
 @contextmanager
-def held(folder: Path) -> Iterator[None]:
-    """Keep everybody else out of the folder, which is made where it is not there.
+def locked(folder: Path, patience: float = 0.0) -> Iterator[None]:
+    """Keep everybody else out of a folder, which is made where it is not there.
 
-    The lock is the kernel's and goes when the process does, however that ends. Raises OutputError
-    where another run holds it.
+    The kernel releases the lock when the process ends, however that ends. Raises OutputError where
+    another process has it for longer than `patience` seconds.
     """
+    from filelock import FileLock, Timeout  # a twentieth of a second
+
+    lock = FileLock(folder / LOCK, timeout=patience)
     with usable(folder):
         folder.mkdir(parents=True, exist_ok=True)
-        number = _locked(folder)
+        _refuse_another_lock(folder / LOCK)
+        try:
+            lock.acquire()
+        except Timeout:
+            raise OutputError(f"--out {folder}: another process is writing there; another folder "
+                              "is needed, or that process's end") from None
     try:
         yield
     finally:
         with suppress(OSError):
             (folder / LOCK).unlink(missing_ok=True)
-        os.close(number)
+        lock.release()
 
 
-def _locked(folder: Path) -> int:
-    """The descriptor of the locked file; tried again where that was removed before it was locked.
-    """
-    while True:
-        number = open_lock(folder / LOCK)
-        try:
-            _exclude(number)
-            with suppress(FileNotFoundError):
-                if os.path.samestat(os.fstat(number), os.stat(folder / LOCK)):
-                    return number
-        except BlockingIOError:
-            os.close(number)
-            raise OutputError(f"--out {folder}: another run is writing there; another folder is "
-                              "needed, or that run's end") from None
-        os.close(number)
-
-
-def _exclude(number: int) -> None:
-    """Lock an open file. Raises BlockingIOError where another process has done so."""
-    if sys.platform == "win32":
-        import msvcrt
-        try:
-            msvcrt.locking(number, msvcrt.LK_NBLCK, 1)
-        except OSError as error:
-            raise BlockingIOError from error
-    else:
-        import fcntl
-        fcntl.flock(number, fcntl.LOCK_EX | fcntl.LOCK_NB)
+def _refuse_another_lock(path: Path) -> None:
+    """Raises OSError where there is something with content, or no file, in the place of a lock."""
+    if os.path.lexists(path) and not (is_file(path) and path.stat().st_size == 0):
+        raise FileExistsError(errno.EEXIST, f"{path.name} is there and is no lock")

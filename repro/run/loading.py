@@ -10,18 +10,21 @@ import numpy as np
 from repro.errors import OutputError
 from repro.report import fields, reading
 from repro.results import vtu
+from repro.results.files import MOST_DATA, read, sha256
 from repro.results.tables import Results, arrays
+from repro.run.folder import sums
 
 
 def load_run(folder: str | Path) -> Results:
     """What a run has written in its folder, over or not: rows now, fields when they are asked for.
 
-    Raises OutputError where the folder holds no run that can be read, and, when they are asked for,
-    where the file of a time's fields is missing or cannot be read.
+    Raises OutputError where the folder holds no run, or its files are not as they were written,
+    and, when the fields of a time are asked for, where their file is missing or cannot be read.
     """
     try:
         run = reading.read(Path(folder))
         reading.require_columns(run)
+        reading.require_lists(run)
         listed = dict(fields.listed(run.folder))
     except ValueError as error:
         raise OutputError(str(error)) from None
@@ -44,6 +47,7 @@ class _Files(Sequence[dict[str, np.ndarray]]):
         self.folder = folder
         self.times = times
         self.files = files
+        self.sums = sums(folder)
 
     def __len__(self) -> int:
         return sum(path.is_file() for path in self.files.values())
@@ -55,15 +59,17 @@ class _Files(Sequence[dict[str, np.ndarray]]):
             raise OutputError(f"{self.folder / 'fields.pvd'}: no fields of {time} h are listed")
         if not path.is_file():
             raise OutputError(f"{path}: the fields of {time} h are missing")
-        return _read(path)
+        return self._read(path)
 
     def __iter__(self) -> Iterator[dict[str, np.ndarray]]:
-        return (_read(path) for path in self.files.values() if path.is_file())
+        return (self._read(path) for path in self.files.values() if path.is_file())
 
-
-def _read(path: Path) -> dict[str, np.ndarray]:
-    """The arrays of a file."""
-    try:
-        return arrays(vtu.read(path))
-    except (OSError, ValueError) as error:
-        raise OutputError(f"{path}: the fields cannot be read: {error}") from error
+    def _read(self, path: Path) -> dict[str, np.ndarray]:
+        """The arrays of a file, if it is as it was written."""
+        try:
+            content = read(path, MOST_DATA)
+            if sha256(content) != self.sums.get(f"fields/{path.name}"):
+                raise ValueError("the file is not as it was written: cut short or altered")
+            return arrays(vtu.parse(content))
+        except (OSError, ValueError) as error:
+            raise OutputError(f"{path}: the fields cannot be read: {error}") from error

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 import platform
+import re
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
@@ -17,6 +18,16 @@ import shapely
 from repro.scene import Scene, SceneError
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+#: The rooms that compute the numbers of a run.
+ROOMS = ("scene", "fem", "model", "march", "results")
+#: A docstring, which is alone on its lines, a comment, or another string, which may look like them.
+REMARK = re.compile(r"""
+    (?P<indent>^[ ]*)r?\"{3}(?:[^\\]|\\.)*?\"{3}[ ]*$
+    | [ ]*\#[^\n]*
+    | (?P<string> (?P<quote>\"{3}|'{3})(?:[^\\]|\\.)*?(?P=quote)
+                | \"(?:[^"\\\n]|\\.)*\" | '(?:[^'\\\n]|\\.)*' )
+    """, re.VERBOSE | re.MULTILINE | re.DOTALL)
+EMPTY = re.compile(r"\n\s*\n")
 #: {(key of numerics, choice): the optional package that makes it}
 OPTIONAL = {("ordering", "metis"): "pymetis", ("solver", "pardiso"): "pypardiso"}
 
@@ -31,12 +42,26 @@ def require_packages(scene: Scene) -> None:
 
 @cache
 def source_hash() -> str:
-    """8 hexadecimal digits that stand for the package's source."""
+    """8 hexadecimal digits that stand for the source of the rooms that compute numbers, without
+    its docstrings and comments."""
     digest = hashlib.sha256()
     package = Path(__file__).parents[1]
-    for path in sorted(package.rglob("*.py")):
-        digest.update(path.relative_to(package).as_posix().encode() + path.read_bytes())
+    paths = [path for room in ROOMS for path in (package / room).rglob("*.py")]
+    for path in sorted(paths):
+        name = path.relative_to(package).as_posix()
+        digest.update(name.encode() + statements(path.read_text(encoding="utf-8")).encode())
     return digest.hexdigest()[:8]
+
+
+def statements(source: str) -> str:
+    """A source without comments and empty lines, with ``...`` for each docstring."""
+    return EMPTY.sub("\n", REMARK.sub(_without_remark, source)).strip()
+
+
+def _without_remark(match: re.Match) -> str:
+    if match["indent"] is not None:
+        return f"{match['indent']}..."
+    return match["string"] or ""
 
 
 def conditions() -> dict:

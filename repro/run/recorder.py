@@ -11,22 +11,28 @@ import numpy as np
 
 from repro import report, results, timing
 from repro.check.simplifications import Warned, unmet
-from repro.errors import CheckpointError, Interrupted, OutputError, StageError
+from repro.errors import CheckpointError, Interrupted, OutputError
 from repro.march.loop import Instant, Ledger, State, added
 from repro.march.pace import Pace, missed
 from repro.results import netcdf, vtu
-from repro.results.files import is_file, whole
+from repro.results.files import is_file, sha256_of, whole
 from repro.run import checkpoint, record, stored
-from repro.run.checkpoint import Arrays
-from repro.run.folder import CHECKPOINTS, OWN, PROVENANCE, SUMS, claimed, remove, writing
+from repro.run.folder import (
+    CHECKPOINTS,
+    OWN,
+    PROVENANCE,
+    REPORT,
+    SUMS,
+    claimed,
+    remove,
+    sum_line,
+    writing,
+)
 from repro.run.machine import conditions
-from repro.run.record import PREFIX, Mark, Record
+from repro.run.record import Record
 from repro.run.status import RUNNING, done, undone
 from repro.scene import Scene
 from repro.scene.units import to_internal
-
-#: The ledgers of steps that are not reported yet: of a state, but an array in a checkpoint.
-PENDING = "pending.ledgers"
 
 
 class Recorder:
@@ -116,7 +122,7 @@ class Recorder:
         path = claimed(self.folder, name, self.own)
         with writing(path), whole(path) as beside:
             vtu.write(beside, results.fields(self.scene, pore, solved))
-            self.record.marks[name] = record.mark(beside)
+            self.record.hashes[name] = sha256_of(beside)
             self._list_fields(name)
         index.append((pore.time, name))
         self.unsynced.append(name)
@@ -125,10 +131,10 @@ class Recorder:
         """Add a file of fields to those that the run has written, before it is there."""
         path = claimed(self.folder, SUMS, self.own)
         with path.open("a", encoding="utf-8", newline="") as sums:
-            sums.write(self.record.marks[name].line(name))
+            sums.write(sum_line(name, self.record.hashes[name]))
 
-    def save(self, status: str) -> None:
-        """Write checkpoint, tables, indices and provenance as they are now."""
+    def save(self, status: str) -> dict:
+        """Write checkpoint, tables, indices and ``run.json`` as they are now; what that says."""
         now = self.record
         if self.state and undone(status):
             self._write_checkpoint(self.state)
@@ -139,25 +145,38 @@ class Recorder:
             self._write("ledger.csv", results.write_table, results.LEDGER_COLUMNS, ledgers)
         if now.before:
             self._write("before_expansion.pvd", results.write_index, now.before)
-        self.tell(status)
+        return self.tell(status)
 
-    def tell(self, status: str) -> None:
-        """Write ``run.json``."""
+    def tell(self, status: str) -> dict:
+        """Write ``run.json``, and return what it says.
+
+        It has the SHA-256 of the other files once the run is not at work any more. Those of the
+        fields are in the file SUMS, checkpoints have their own, and the page is not there yet.
+        """
         now = self._now()
         warnings = now.warnings + [asdict(each) for each in self.unmet()]
-        self._write("run.json", results.write_json, {
+        files = self._files(done(status))
+        told = {
             **results.provenance(self.scene), "conditions": self.conditions, "status": status,
-            "files": self._files(done(status)),
-            **{each.name: each.value(now) for each in record.COUNTS},
-            "resumes": now.resumes, "warnings": warnings, "origin": self.origin})
+            "files": files, **{each.name: each.value(now) for each in record.COUNTS},
+            "resumes": now.resumes, "warnings": warnings, "origin": self.origin,
+            "sha256": {} if status == RUNNING else self._hashes(files)}
+        self._write(PROVENANCE, results.write_sealed, told)
+        return told
+
+    def _hashes(self, files: list[str]) -> dict[str, str]:
+        """The SHA-256 of these files, but of fields, checkpoints, the page and ``run.json``."""
+        names = set(files) - self.record.hashes.keys() - {PROVENANCE, REPORT, *CHECKPOINTS}
+        return {name: sha256_of(self.folder / name) for name in sorted(names)
+                if is_file(self.folder / name)}
 
     def _files(self, over: bool) -> list[str]:
         """The names of the run's files: those there are, or may come while it is not over."""
         names = set(OWN) - _never(self.scene)
         if over:
             there = {name for name in names if is_file(self.folder / name)}
-            names = (there | {"report.html"}) - set(CHECKPOINTS)
-        return sorted(names | self.record.marks.keys())
+            names = (there | {REPORT}) - set(CHECKPOINTS)
+        return sorted(names | self.record.hashes.keys())
 
     @property
     def kept(self) -> bool:
@@ -186,9 +205,8 @@ class Recorder:
         """Write everything at the end of a run."""
         if self.scene.output.timeseries == "netcdf":
             self._write("timeseries.nc", netcdf.write, self.scene, self.record.rows)
-        self._write(SUMS, _write_sums, self.record.marks)
-        self.save(status)
-        settle(self.folder, done(status), self.own)
+        self._write(SUMS, _write_sums, self.record.hashes)
+        settle(self.folder, self.save(status), self.own)
 
     def _write(self, name: str, write, *content) -> None:
         path = claimed(self.folder, name, self.own)
@@ -216,17 +234,19 @@ class Recorder:
     def restore(self, path: Path) -> None:
         """Be as the recorder was that wrote a checkpoint.
 
-        Raises CheckpointError where it cannot be gone on from.
+        Raises CheckpointError where the run cannot go on from it.
         """
-        plain, arrays = checkpoint.decoded(checkpoint.read(path))
+        plain, arrays = checkpoint.read_checkpoint(path)
         try:
             with np.errstate(all="raise", under="ignore"):
-                state, before = unpacked(self.scene, plain, arrays)
+                state = stored.unpacked(self.scene, plain["state"], arrays)
+                before = record.unpacked(plain["record"], arrays)
+                record.require_fields(self.folder, before)
         except CheckpointError:
             raise
-        except (ArithmeticError, LookupError, ValueError, StageError) as error:
-            raise CheckpointError(f"it makes no sense ({error})") from error
-        record.check(self.folder, state, before)
+        except Exception as error:  # whatever a forged file may cause
+            why = " ".join(f"{type(error).__name__}: {error}".split())
+            raise CheckpointError(f"it makes no sense ({why})") from error
         self.state = state
         self.record = before
 
@@ -238,8 +258,8 @@ class Recorder:
     def drop_later(self) -> None:
         """Remove fields that were written after the state gone on from: they are made again."""
         fields = {name for name in self.own if name.startswith("fields/")}
-        remove(self.folder, fields - self.record.marks.keys())
-        self._write(SUMS, _write_sums, self.record.marks)
+        remove(self.folder, fields - self.record.hashes.keys())
+        self._write(SUMS, _write_sums, self.record.hashes)
 
     def clear(self) -> None:
         """Remove what an earlier run has written, but for ``run.json``: it lists the rest."""
@@ -259,28 +279,11 @@ class Recorder:
         return f"the last good state, t = {self.state.pore.time:g} h, is in {where}{shown}"
 
 
-def packed(scene: Scene, state: State, now: Record) -> tuple[dict, Arrays]:
+def packed(scene: Scene, state: State, now: Record) -> tuple[dict, checkpoint.Arrays]:
     """A state and a record as what a checkpoint takes."""
-    plain, arrays = stored.packed(scene, state)
-    pending = plain.pop("ledgers")
-    told, tables = record.packed(now)
-    table = np.array(pending, dtype=float).reshape(len(pending), -1 if pending else 0)
-    return {"state": plain, "record": told}, {**arrays, PENDING: table, **tables}
-
-
-def unpacked(scene: Scene, plain: dict, arrays: Arrays) -> tuple[State, Record]:
-    """What :func:`packed` was given. Raises CheckpointError where it makes no sense."""
-    tables = {name.removeprefix(PREFIX): array for name, array in arrays.items()
-              if name.startswith(PREFIX)}
-    own = {name: array for name, array in arrays.items()
-           if not name.startswith(PREFIX) and name != PENDING}
-    pending = arrays.get(PENDING)
-    told = plain.get("state")
-    right = set(plain) == {"state", "record"} and isinstance(told, dict) and pending is not None
-    if not right or pending.ndim != 2 or pending.dtype.kind != "f" or "ledgers" in told:
-        raise CheckpointError("it does not hold what it should")
-    state = stored.unpacked(scene, {**told, "ledgers": pending.tolist()}, own)
-    return state, record.unpacked(scene, plain["record"], tables)
+    of_state, arrays = stored.packed(scene, state)
+    of_record, tables = record.packed(now)
+    return {"state": of_state, "record": of_record}, arrays | tables
 
 
 def _never(scene: Scene) -> set[str]:
@@ -291,24 +294,28 @@ def _never(scene: Scene) -> set[str]:
     return {name for name, never in absent.items() if never}
 
 
-def _write_sums(path: Path, marks: dict[str, Mark]) -> None:
+def _write_sums(path: Path, hashes: dict[str, str]) -> None:
     """Write what ``sha256sum --check`` takes."""
-    lines = [marks[name].line(name) for name in sorted(marks)]
-    path.write_text("".join(lines), encoding="utf-8", newline="")
+    results.write_text(path, "".join(sum_line(name, hashes[name]) for name in sorted(hashes)))
 
 
-def settle(folder: Path, over: bool, own: set[str]) -> None:
-    """The last things of a run's end: its page, and no checkpoint where it is over.
+def settle(folder: Path, told: dict, own: set[str]) -> None:
+    """The last things of a run's end: its page, whose SHA-256 ``run.json`` gets too, and no
+    checkpoint where it is over.
 
-    own: the names of its files. Raises OutputError where the page cannot be made or written.
+    told: what ``run.json`` says; own: the names of the run's files. Raises OutputError where the
+    page cannot be made or written.
     """
-    path = claimed(folder, "report.html", own)
+    path = claimed(folder, REPORT, own)
     try:
         with writing(path):
             report.write(folder)
     except ValueError as error:
         raise OutputError(f"{path}: it cannot be made: {error}") from error
-    if over:
+    told = told | {"sha256": told["sha256"] | {REPORT: sha256_of(path)}}
+    with writing(folder / PROVENANCE), whole(folder / PROVENANCE) as beside:
+        results.write_sealed(beside, told)
+    if done(told["status"]):
         remove(folder, CHECKPOINTS)
 
 

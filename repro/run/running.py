@@ -5,7 +5,6 @@ Rows and fields are written as they come, and nothing is lost on the way.
 
 from __future__ import annotations
 
-import json
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
@@ -22,13 +21,14 @@ from repro.check.simplifications import Warned
 from repro.errors import CheckpointError, Interrupted, OutputError, SimulationError
 from repro.march.loop import Instant, PoreEnd, State
 from repro.march.simulation import ends_soon, same_rows, steps
-from repro.results.files import is_file
+from repro.results.files import is_file, read_json, read_sealed
 from repro.run import INTERVAL, checkpoint
 from repro.run.folder import (
     CHECKPOINTS,
     PROVENANCE,
-    held,
+    REPORT,
     listed,
+    locked,
     prepare,
     refuse_links,
     refuse_others,
@@ -38,7 +38,7 @@ from repro.run.folder import (
 from repro.run.machine import conditions, differences, require_packages
 from repro.run.recorder import Recorder, interrupted, settle
 from repro.run.status import COMPLETED, FAILED, INTERRUPTED, RUNNING, done, undone
-from repro.run.whole import lacking
+from repro.run.whole import damage
 from repro.scene import (
     KEYS,
     Scene,
@@ -81,12 +81,13 @@ def unwatched(time: float) -> None:
 
 @dataclass(frozen=True)
 class Watch:
-    """Who is told what happens, how often the state is written (s of wall time), and who says when
-    to stop, by a signal's number."""
+    """Who is told what happens, how often the state is written (s of wall time), who says when to
+    stop, by a signal's number, and how long (s) to wait for another process to leave the folder."""
 
     tell: Callable[[dict], None] = untold
     interval: float = INTERVAL
     stop: Callable[[], int] = lambda: 0
+    patience: float = 0.0
 
     def warn(self, message: str) -> None:
         """Tell a warning."""
@@ -115,12 +116,12 @@ def run(scene: Source, folder: str | Path, progress: Progress = unwatched, watch
     scene = load_scene(scene)
     folder = Path(folder)
     _require(scene, watch)
-    with held(folder):
+    with locked(folder, watch.patience):
         recorder = Recorder(scene, folder, origin=origin)
         if not is_file(folder / PROVENANCE):
             prepare(folder)
             return _from_the_start(recorder, progress, watch)
-        told = _told(folder / PROVENANCE, LISTED)
+        told = _told(folder / PROVENANCE, read_json if force else read_sealed, LISTED)
         recorder.own = listed(folder, told)
         refuse_links(folder, recorder.own)
         if force:
@@ -185,8 +186,8 @@ def resume(folder: str | Path, progress: Progress = unwatched, watch: Watch = AL
     folder = Path(folder)
     if not is_file(folder / PROVENANCE):
         raise OutputError(f"--resume {folder}: there is no run.json; the folder of a run is needed")
-    with held(folder):
-        told = _told(folder / PROVENANCE)
+    with locked(folder, watch.patience):
+        told = _told(folder / PROVENANCE, read_sealed, "the run.json of a run is needed")
         own = listed(folder, told)
         refuse_links(folder, own)
         scene = _scene(told, folder / PROVENANCE)
@@ -261,8 +262,8 @@ def _tell_another_file(recorder: Recorder, watch: Watch) -> None:
 
 def _continued(recorder: Recorder, told: dict, progress: Progress, watch: Watch) -> str:
     """Go on with the run that ``run.json`` tells of, unless it is over; how it ended."""
-    if done(told["status"]) and _is_whole(recorder, watch):
-        return _left_alone(recorder, told["status"], watch)
+    if done(told["status"]) and _is_unchanged(recorder, told, watch):
+        return _left_alone(recorder, told, watch)
     _require(recorder.scene, watch)
     timing.reset()
     changed = _changed(told, recorder, watch)
@@ -272,14 +273,15 @@ def _continued(recorder: Recorder, told: dict, progress: Progress, watch: Watch)
     recorder.record.resumes.append({"time_h": recorder.time, "changed": changed})
     if not restored:
         return _from_the_start(recorder, progress, watch)
+    recorder.tell(RUNNING)
     recorder.drop_later()
     return _recorded(recorder, steps(recorder.scene, recorder.state), progress, watch)
 
 
-def _is_whole(recorder: Recorder, watch: Watch) -> bool:
-    """Is all there of a run that is said to be over? Raises OutputError where not, and there is no
-    checkpoint to go on from either."""
-    lack = lacking(recorder.folder, recorder.scene)
+def _is_unchanged(recorder: Recorder, told: dict, watch: Watch) -> bool:
+    """Are all files of a run that is over as they were written? Raises OutputError where not, and
+    there is no checkpoint to go on from either."""
+    lack = damage(recorder.folder, told)
     names = (checkpoint.NEWEST, checkpoint.PREVIOUS)
     if lack and not any(is_file(recorder.folder / name) for name in names):
         raise OutputError(f"{lack}; there is no checkpoint to go on from: --force with its scene "
@@ -289,25 +291,25 @@ def _is_whole(recorder: Recorder, watch: Watch) -> bool:
     return not lack
 
 
-def _left_alone(recorder: Recorder, status: str, watch: Watch) -> str:
+def _left_alone(recorder: Recorder, told: dict, watch: Watch) -> str:
     """What is said of a run that is over; where its very end is missing, that is made."""
     folder = recorder.folder
     left = any((folder / name).exists() for name in CHECKPOINTS)
-    if left or not is_file(folder / "report.html"):
-        settle(folder, True, recorder.own)
-    watch.tell({"event": "end", "scene": recorder.scene.name, "status": status,
+    if left or REPORT not in told["sha256"] or not is_file(folder / REPORT):
+        settle(folder, told, recorder.own)
+    watch.tell({"event": "end", "scene": recorder.scene.name, "status": told["status"],
                 "folder": str(folder), "changed": False})
-    return status
+    return told["status"]
 
 
-def _told(path: Path, wanted: str = "the run.json of a run is needed") -> dict:
+def _told(path: Path, read: Callable[[Path], dict], wanted: str) -> dict:
     """What ``run.json`` says. Raises OutputError, with what is wanted, where it is none of a run.
     """
     try:
-        told = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
-        why = f"cannot be read ({error})"
-        raise OutputError(f"{path}: {why}; {wanted}") from None
+        told = read(path)
+    except (OSError, ValueError) as error:
+        why = getattr(error, "strerror", None) or error
+        raise OutputError(f"{path}: cannot be read ({why}); {wanted}") from None
     if not _is_record(told):
         raise OutputError(f"{path}: it has no scene or no status; {wanted}")
     if not (done(told["status"]) or undone(told["status"])):
@@ -355,8 +357,8 @@ def _restored(recorder: Recorder, names: Sequence[str], watch: Watch) -> bool:
                 recorder.restore(path)
                 return True
             except CheckpointError as error:
-                watch.warn(f"{path}: refused: {error}")
                 path.replace(recorder.folder / checkpoint.REFUSED)
+                watch.warn(f"{path}: refused: {error}; it is {checkpoint.REFUSED} now")
     watch.warn(f"{recorder.folder}: no checkpoint to go on from; it starts again from t = 0")
     return False
 

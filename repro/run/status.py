@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 
 COMPLETED = "completed"
@@ -12,18 +11,12 @@ INTERRUPTED = "interrupted"
 FAILED = "failed: "
 #: The status of a run that ends with its pore, and when: :class:`repro.march.loop.PoreEnd`.
 PORE_END = re.compile(r"the aggregate reaches the pore's (?:up|down)stream end "
-                      r"(?:at|in the step from) t = (\d+(?:\.\d+)?(?:e[+-]\d+)?) h")
+                      r"(?:at|in the step from) t = \d+(?:\.\d+)?(?:e[+-]\d+)? h")
 
 
 def done(status: str | None) -> bool:
     """Has the run come to its end, the scene's or the pore's?"""
-    return status is not None and (status == COMPLETED or pore_end(status) < math.inf)
-
-
-def pore_end(status: str) -> float:
-    """When (h, of six digits) the aggregate has come to an end of the pore; infinite where not."""
-    match = PORE_END.fullmatch(status)
-    return float(match[1]) if match else math.inf
+    return status is not None and (status == COMPLETED or bool(PORE_END.fullmatch(status)))
 
 
 def undone(status: str | None) -> bool:

@@ -2,8 +2,8 @@
 
     design    the runs: a grid, lists, a Latin hypercube
     state     the folder: what is wanted, what is there
-    task      one run, whole or not at all
-    server    a process that makes runs, each in a fork of its own
+    task      one run, in a process of its own
+    preload   what such processes share
     pool      runs on all cores
     cluster   runs on a Dask cluster
     table     table.csv and runs.csv

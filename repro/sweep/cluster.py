@@ -1,39 +1,31 @@
 """Runs on a Dask cluster, into a folder that its workers share.
 
-Each is made in a process of its own, beside its worker. A run whose worker dies goes to another
-one. Each attempt writes into a folder of its own, and the first that ends moves it to its place, so
-that no run is lost, and none is there twice.
+Each is made in a process of its own, beside its worker. Another worker goes on with a run whose
+worker dies: the lock of the run's folder leaves it to one process at a time.
 """
 
 from __future__ import annotations
 
-import json
+import asyncio
+import multiprocessing
 import os
-import re
-import socket
 import uuid
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from functools import partial
 from importlib import import_module
 from pathlib import Path
-from queue import Empty, SimpleQueue
-from threading import Thread
-from typing import Any
 
-from repro.sweep import task
+from repro.sweep import pool, task
 from repro.sweep.design import Point
 from repro.sweep.pool import Each
-from repro.sweep.server import Server, ask
 from repro.sweep.state import SweepError
 
 PACKAGE = "distributed"
-#: Seconds that a scheduler may take to answer, and to have workers.
-ANSWER, PATIENCE = 2, 10
-LONGEST_GREETING = 2**20  # bytes
-ADDRESS = re.compile(r"([a-z]+://)?(?:\[([^]]+)\]|([^][:/]+)):([0-9]{1,5})")
-#: The servers of a worker that no run is at work in.
-_idle: SimpleQueue[Server] = SimpleQueue()
+#: Seconds that a scheduler may take to answer, and to have workers; and that the process of a
+#: worker which has died may keep its folder.
+ANSWER, PATIENCE, LEAVING = 2, 10, 30
 
 
 @contextmanager
@@ -44,12 +36,13 @@ def ready(address: str) -> Iterator[Each]:
     the package is not installed that speaks to one.
     """
     distributed = _package(address)
-    client = _is_open(address) and _within(ANSWER, lambda: distributed.Client(
-        address, timeout=ANSWER, set_as_default=False))
-    if not client:
+    try:
+        with ThreadPoolExecutor(1) as thread:  # a notebook has a loop of its own in this one
+            thread.submit(lambda: asyncio.run(_ask(distributed, address))).result()
+    except Exception as error:  # whatever a server that is no scheduler may cause
         raise SweepError(f"--scheduler {address}: no Dask scheduler answers there; an address such "
-                         "as tcp://host:8786 is needed")
-    with client:
+                         "as tcp://host:8786 is needed") from error
+    with distributed.Client(address, timeout=PATIENCE, set_as_default=False) as client:
         yield partial(each, distributed=distributed, client=client, address=address)
 
 
@@ -61,37 +54,14 @@ def _package(address: str):
                          "pip install 'dupin2001-repro[dask]'") from None
 
 
-def _is_open(address: str) -> bool:
-    """Does a scheduler listen at an address, or something that may be one?"""
-    match = ADDRESS.fullmatch(address)
-    return bool(match and _within(1.5 * ANSWER, lambda: _greets(
-        match[2] or match[3], int(match[4]), match[1] or "tcp://")))
+async def _ask(distributed, address: str) -> None:
+    """Ask a scheduler who it is. Raises an error where none answers in time."""
+    security = distributed.Security().get_connection_args("client")
+    async with distributed.rpc(address, timeout=ANSWER, connection_args=security) as scheduler:
+        await asyncio.wait_for(scheduler.identity(), ANSWER)
 
 
-def _greets(host: str, port: int, protocol: str) -> bool:
-    """Does what listens there greet as Dask does over TCP: with the length of what follows?"""
-    with socket.create_connection((host, port), timeout=ANSWER) as connection:
-        if protocol != "tcp://":
-            return True
-        greeting = connection.recv(8, socket.MSG_WAITALL)
-        return len(greeting) == 8 and int.from_bytes(greeting, "little") < LONGEST_GREETING
-
-
-def _within(seconds: float, make: Callable[[], Any]) -> Any:
-    """What is made, None where it fails or takes longer: a name or a greeting may never come."""
-    made: list[Any] = []
-
-    def attempt() -> None:
-        with suppress(OSError, ValueError, TypeError, OverflowError):
-            made.append(make())
-
-    thread = Thread(target=attempt, daemon=True)
-    thread.start()
-    thread.join(seconds)
-    return made[0] if made else None
-
-
-def each(points: list[Point], folder: Path, distributed, client,
+def each(points: Sequence[Point], folder: Path, distributed, client,
          address: str) -> Iterator[tuple[Point, str]]:
     """Make the runs into `folder`; yields each with how it ended, as they end.
 
@@ -133,30 +103,18 @@ def look(path: str) -> tuple[str, bool]:
 
 
 def _submit(client, point: Point, folder: Path):
-    token = uuid.uuid4().hex  # two sweeps may have the same run
-    asked = ask(point.scene, folder / point.name, folder / f".part-{point.name}")
-    key = f"repro-sweep-{point.name}-{token}"
-    return client.submit(attempt, asked, task.code(), key=key, pure=False)
+    key = f"repro-sweep-{point.name}-{uuid.uuid4().hex}"  # two sweeps may have the same run
+    return client.submit(attempt, point, folder, task.code(), key=key, pure=False)
 
 
-def attempt(asked: str, wanted: str) -> str:
-    """On a worker: make a run in a process of its own; how it ended.
-
-    It is made in a folder that no other attempt has.
-    """
+def attempt(point: Point, folder: Path, wanted: str) -> str:
+    """On a worker: make a run in a process of its own; how it ended."""
     if task.code() != wanted:
         return (f"failed: a worker that joined has version {task.code()} of this package, {wanted} "
                 "is needed")
-    told = json.loads(asked)
-    told["beside"] += f"-{uuid.uuid4().hex}"
-    try:
-        server = _idle.get_nowait()
-    except Empty:
-        server = Server()
-    try:
-        return server.make(json.dumps(told))
-    finally:
-        _idle.put(server)
+    multiprocessing.current_process().daemon = False  # one under a nanny is, and may start none
+    ((_, status),) = pool.each([point], folder, 1, patience=LEAVING)
+    return status
 
 
 def _ended(future) -> str:

@@ -1,22 +1,22 @@
 """A sweep's folder: ``sweep.json`` says what is wanted, the folders of ``runs/`` what is there.
 
-A run is there when its folder is; it is moved there whole. So a sweep that was cut off, by
-whatever, is gone on with by the same command: it makes what is missing, and what has failed, again.
+Each run has its own folder, as ``repro run`` makes it. The same command continues a sweep that was
+cut off: it goes on with the runs that are not over, and makes damaged ones again.
 """
 
 from __future__ import annotations
 
-import json
 import os
-import shutil
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from repro.errors import OutputError
+from repro.report.reading import NoRun
 from repro.results import write_json
-from repro.results.files import is_folder, open_lock, whole
-from repro.run.running import OutputError
-from repro.run.whole import lacking
+from repro.results.files import is_folder, read_json, whole
+from repro.run.folder import LOCK, PROVENANCE, locked, strange
+from repro.run.whole import lacking, record_of
 from repro.sweep import task
 from repro.sweep.design import Factor, Point
 
@@ -47,7 +47,7 @@ class Sweep:
 
 @contextmanager
 def opened(sweep: Sweep):
-    """Hold the sweep's folder, made if it is not there.
+    """Lock the sweep's folder, which is made if it is not there.
 
     Raises OutputError where it holds anything else, or another sweep, where another process has it,
     and where it cannot be written.
@@ -55,16 +55,13 @@ def opened(sweep: Sweep):
     with usable(sweep.folder):
         _check(sweep.folder, _as_json(sweep))
         _refuse_others(sweep)
-        sweep.runs.mkdir(parents=True, exist_ok=True)
-        lock = os.fdopen(open_lock(sweep.folder / ".lock"), "a")
-    with lock:
-        _hold(lock, sweep.folder)
+    with locked(sweep.folder):
         with usable(sweep.folder):
             _check(sweep.folder, _as_json(sweep))  # again: another may have begun here meanwhile
+            sweep.runs.mkdir(exist_ok=True)
             with whole(sweep.folder / "sweep.json") as beside:
                 write_json(beside, _as_json(sweep))
         yield
-        _clean(sweep)
 
 
 @contextmanager
@@ -87,10 +84,10 @@ def _as_json(sweep: Sweep) -> dict:
 
 def _check(folder: Path, wanted: dict) -> None:
     """Is the folder this sweep's, or nobody's?"""
-    if folder.is_dir() and not (folder / "sweep.json").exists():
-        strange = sorted({path.name for path in folder.iterdir()} - {"runs", ".lock"})
-        if strange:
-            raise SweepError(f"--out {folder}: it holds {strange[0]!r}, which is not of a sweep; a "
+    if folder.is_dir() and not os.path.lexists(folder / "sweep.json"):
+        foreign = sorted({path.name for path in folder.iterdir()} - {"runs", LOCK})
+        if foreign:
+            raise SweepError(f"--out {folder}: it holds {foreign[0]!r}, which is not of a sweep; a "
                              "new or empty folder, or one of the same sweep, is accepted")
     elif folder.exists():
         _compare(folder, _read(folder), wanted)
@@ -98,11 +95,12 @@ def _check(folder: Path, wanted: dict) -> None:
 
 def _read(folder: Path) -> dict:
     try:
-        told = json.loads((folder / "sweep.json").read_text(encoding="utf-8"))
+        told = read_json(folder / "sweep.json")
         len(told["points"])  # raises TypeError where it is no list
         return {name: told[name] for name in ("scene", "code", "varied", "points")}
-    except (ValueError, KeyError, TypeError, RecursionError):
-        raise SweepError(f"--out {folder}: its sweep.json cannot be read; a new folder is "
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        why = f" ({error.strerror})" if isinstance(error, OSError) else ""
+        raise SweepError(f"--out {folder}: its sweep.json cannot be read{why}; a new folder is "
                          "needed") from None
 
 
@@ -117,34 +115,27 @@ def _compare(folder: Path, told: dict, wanted: dict) -> None:
 
 
 def _refuse_others(sweep: Sweep) -> None:
-    """Raises SweepError where the place of a run is a link, or no folder, or has another run."""
-    for point in sweep.points:
-        place = sweep.runs / point.name
+    """Raises SweepError where the place of a run, or of all, is a link or no folder, or holds what
+    is not of that run."""
+    for place in (sweep.runs, *(sweep.runs / point.name for point in sweep.points)):
         if os.path.lexists(place) and not is_folder(place):
             raise SweepError(f"{place}: it is a link, or no folder, and so not of this sweep; move "
                              "it away")
-        if task.ran(place) not in (None, point.hash):
-            raise SweepError(f"{place}: it holds the run of another scene; move it away")
+    for point in sweep.points:
+        if (sweep.runs / point.name).exists():
+            _refuse_another(sweep.runs / point.name, point)
 
 
-def _hold(lock, folder: Path) -> None:
-    """Hold the folder against other sweeps, until the file `lock` is closed or this process ends.
-    """
-    try:
-        import fcntl
-    except ImportError:  # Windows: two sweeps in one folder cost time there, and lose nothing
+def _refuse_another(place: Path, point: Point) -> None:
+    """Raises SweepError where a folder holds what is not of a point's run."""
+    if not os.path.lexists(place / PROVENANCE):
+        if foreign := strange(place):
+            raise SweepError(f"{place}: it holds {foreign[0]!r}, which is not of a run; move it "
+                             "away")
         return
     try:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        raise SweepError(f"--out {folder}: another sweep is at work in it") from None
-
-
-def _clean(sweep: Sweep) -> None:
-    """Remove what is left of attempts at runs that are there now."""
-    parts = list(sweep.runs.glob(".part-*"))
-    for point in sweep.points:
-        left = [part for part in parts if part.name.startswith(f".part-{point.name}")]
-        if left and not lacking(sweep.runs / point.name, point.scene):
-            for part in left:
-                shutil.rmtree(part, ignore_errors=True)
+        record = record_of(place)
+    except NoRun as error:
+        raise SweepError(f"{error}; move the folder away") from error
+    if record.get("hash") != point.hash:
+        raise SweepError(f"{place}: it holds the run of another scene; move it away")

@@ -18,7 +18,7 @@ from repro.report.reading import NoRun
 from repro.results.files import whole
 from repro.results.quantities import Quantity
 from repro.run import status
-from repro.run.whole import there
+from repro.run.whole import run_of
 from repro.sweep.design import Point
 from repro.sweep.state import Sweep
 
@@ -99,8 +99,10 @@ def tell(sweep: Sweep, ended: dict[int, str], clogged: float) -> list[Told]:
 
 def _told(point: Point, folder: Path, otherwise: str, clogged: float) -> Told:
     try:
-        run = there(folder, point.scene)
+        run = run_of(folder, point.scene)
     except NoRun:
+        return _empty(point, otherwise)
+    if run.record["status"] == status.RUNNING:  # it was killed, and its table may be cut short
         return _empty(point, otherwise)
     found = run.series
     pore = point.scene.pore

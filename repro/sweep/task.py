@@ -1,23 +1,29 @@
-"""One run of a sweep: made beside its place and moved there at its end.
+"""One run of a sweep, in its place: gone on with where it is begun, made again where it is damaged.
 
-So none is half there, or there twice.
+A sweep treats the folder of each of its runs as ``repro run`` does.
 """
 
 from __future__ import annotations
 
-import json
+import multiprocessing
 import os
-import shutil
+import signal
+import sys
+import threading
 import traceback
 from importlib.metadata import version
+from multiprocessing.connection import Connection
 from pathlib import Path
 
 from repro.errors import SimulationError
-from repro.run.checkpoint import NEWEST, PREVIOUS
+from repro.report.reading import NoRun
+from repro.results.files import is_file
+from repro.run.folder import PROVENANCE
 from repro.run.machine import source_hash
-from repro.run.running import OutputError, resume, run
-from repro.run.whole import lacking
-from repro.scene import Scene, SceneError, scene_hash
+from repro.run.running import OutputError, Watch, resume, run
+from repro.run.status import done
+from repro.run.whole import damage, record_of
+from repro.scene import Scene, SceneError
 
 
 def code() -> str:
@@ -25,55 +31,51 @@ def code() -> str:
     return f"{version('dupin2001-repro')}-{source_hash()}"
 
 
-def ran(folder: Path) -> str | None:
-    """The hash of the scene whose run is in a folder, None where there is none that tells it."""
-    try:
-        return str(json.loads((folder / "run.json").read_text(encoding="utf-8"))["hash"])
-    except (OSError, ValueError, KeyError, TypeError, RecursionError):
-        return None
+def make(scene: Scene, place: Path, patience: float = 0.0) -> str:
+    """Run a scene in a folder, or go on with its run there.
 
-
-def make(scene: Scene, folder: Path, beside: Path) -> str:
-    """Run a scene in `beside`, or go on with it there, then move it to `folder`.
-
-    Returns how it ended, in one line, whatever the trouble is.
+    patience: seconds to wait for another process to leave the folder. Returns how the run ended,
+    in one line, whatever the trouble is.
     """
-    if not _begun(scene, beside):
-        shutil.rmtree(beside, ignore_errors=True)
     try:
-        ended = _made(scene, beside)
-        _place(scene, beside, folder)
-    except OSError as error:
-        return f"failed: {folder}: {error.strerror or error}"
-    return ended
-
-
-def _begun(scene: Scene, beside: Path) -> bool:
-    """Is there a state of this scene's run to go on from?"""
-    kept = any((beside / name).is_file() for name in (NEWEST, PREVIOUS))
-    return kept and ran(beside) == scene_hash(scene)
-
-
-def _made(scene: Scene, beside: Path) -> str:
-    try:
-        return resume(beside) if beside.exists() else run(scene, beside)
-    except (SimulationError, OutputError, SceneError) as error:
+        return _made(scene, place, Watch(tell=_ignore, patience=patience))
+    except (SimulationError, OutputError, SceneError, NoRun) as error:
         return f"failed: {error}"
-    except Exception as error:  # a bug is one run's failure, and told whole
-        traceback.print_exc()
-        return f"failed: {type(error).__name__}: {error}"
+    except Exception as error:  # a bug is the failure of one run
+        last = traceback.extract_tb(error.__traceback__)[-1]
+        where = f"{Path(last.filename).name}, line {last.lineno}"
+        return f"failed: {type(error).__name__}: {' '.join(str(error).split())} ({where})"
 
 
-def _place(scene: Scene, beside: Path, folder: Path) -> None:
-    """Move a run to its place, unless another has finished it meanwhile.
+def _ignore(event: dict) -> None:
+    """Events and warnings of a run are in its ``run.json``."""
 
-    One that failed gives way.
+
+def _made(scene: Scene, place: Path, watch: Watch) -> str:
+    if not is_file(place / PROVENANCE):
+        return run(scene, place, watch=watch)
+    record = record_of(place)
+    if done(record["status"]) and damage(place, record):
+        return run(scene, place, watch=watch, force=True)
+    return resume(place, watch=watch)
+
+
+def answer(end: Connection, scene: Scene, place: Path, patience: float) -> None:
+    """Make a run in this process, which is there for it alone, and send how it ended.
+
+    Whatever libraries print is dropped. The process ends when the one that asked for it does, and
+    imports nothing from the working folder.
     """
-    if lacking(folder, scene):
-        shutil.rmtree(folder, ignore_errors=True)
-    try:
-        os.rename(beside, folder)
-    except OSError:
-        if lacking(folder, scene):
-            raise
-        shutil.rmtree(beside, ignore_errors=True)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that asked
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    here = os.getcwd()
+    sys.path[:] = [entry for entry in sys.path if os.path.abspath(entry) != here]
+    nowhere = os.open(os.devnull, os.O_RDWR)
+    os.dup2(nowhere, 1)
+    os.dup2(nowhere, 2)
+    end.send(make(scene, place, patience))
+
+
+def _end_with_parent() -> None:
+    multiprocessing.parent_process().join()
+    os._exit(1)
