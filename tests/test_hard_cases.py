@@ -9,7 +9,7 @@ import pytest
 from repro.errors import SimulationError, TransportError
 from repro.scene import load_scene
 from verification import hard, hard_cases, speed
-from verification.hard import common
+from verification.hard import common, hostile
 from verification.hard.common import PRESETS, REFUSED, RIGHT, WRONG, HardCase
 from verification.kernel import case
 from verification.kernel.case import Outcome, Result, at_most
@@ -65,7 +65,8 @@ def test_there_are_twenty_three_verification_cases_and_only_some_may_refuse():
     """All of them on record."""
     assert sorted(KNOWN) == [row["number"] for row in speed.records()["hard_cases"]["cases"]] == [*range(1, 24)]
     assert {number for number, one in KNOWN.items() if one.refusable} <= {3, 4, 5, 15, 17, 19, 22}
-    assert {one.full_id for one in KNOWN.values()} == {id for id, c in case.CASES.items() if c.stage == "hard"}
+    family = {"hard-family", "hard-family-rest"}
+    assert {one.full_id for one in KNOWN.values()} == {id for id, c in case.CASES.items() if c.stage == "hard"} - family
     for one in KNOWN.values():
         assert {*one.refusable} <= {*one.parts} and {*case.CASES[one.full_id].over} == {*PRESETS}
 
@@ -79,6 +80,25 @@ def test_the_matrix_is_written_with_verdicts_apart_from_what_this_machine_has_me
     verdicts, measured = (found["cases"][0]["cells"] for found in (kept, live))
     assert verdicts == {name: {"verdict": REFUSED, "accepted": name == "paper"} for name in PRESETS}
     assert "try another" in measured["paper"]["message"]
+
+
+@pytest.mark.parametrize("message, works, wrong", [
+    ("too coarse; numerics.refinement = 0.3 resolves this state", {"refinement": 0.3}, 0),
+    ("too coarse; numerics.refinement = 0.3 resolves this state", {}, 1), ("it stopped", {}, 1),
+    ("a defect; try a shorter growth.time_step", {"time_step": "0.05 h"}, 0),
+    ("a defect; try a shorter growth.time_step", {"time_step": "0.2 h"}, 1),
+    ("too coarse; no setting helps", {}, 0), ("two\nlines; no setting helps", {}, 1),
+    ("no setting helps; fields of t = 0 h: fields/fields_0009.vtu", {}, 1)])
+def test_a_refusal_is_right_where_its_advice_works(message, works, wrong, tmp_path, monkeypatch):
+    """Or where it says that no setting helps; it is one line, and names files that exist."""
+    def runs(tables, folder):
+        values = {**tables["growth"], **tables["numerics"]}
+        return any(values.get(key) == value for key, value in works.items())
+
+    monkeypatch.setattr(hostile, "_is_right", runs)
+    tables = {"aggregate": {}, "flow": {"head": "1e-3 cm"}, "substrates": {}, "growth": {"end": "1 h"}, "numerics": {}}
+    checks = [*hostile._checks(hostile.Outcome(None, message), tables, tmp_path)]
+    assert sum(not check.holds for check in checks) == wrong
 
 
 def test_a_wrong_run_is_seen():

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from repro.errors import GrowthError, SimulationError
+from repro.errors import GrowthError, SimulationError, Unresolved
 from repro.fem.sizing import ACROSS_PORE
 from repro.march import midpoint, pace, simulation, stepping
 from repro.march.loop import PoreEnd
@@ -202,3 +202,22 @@ def test_rows_of_runs_shorter_than_times_are_told_apart_do_not_coincide(end, ste
     made = base(f'growth.end="{end}"', f'growth.time_step="{step}"')
     rows = stepping.rows(made)
     assert bool(rows) == (made.growth.end > 1e-9) and all(np.diff((0.0, *rows)) >= 0.99e-9)
+
+
+@pytest.mark.parametrize("needed, told", [(2.0, ""), (np.inf, "numerics.refinement")])
+def test_the_step_to_the_end_is_made_on_finer_elements_where_a_front_needs_them(needed, told, monkeypatch):
+    """Half way in the step that growth.end cuts, as in any other; where no elements do, the refusal has advice."""
+    attempt = midpoint.attempt
+
+    def cut(scene, now, solved, duration, *most):
+        if duration == 0.3 and now.front < needed:
+            raise Unresolved("the mesh is too coarse")
+        return attempt(scene, now, solved, duration, *most)
+
+    monkeypatch.setattr(midpoint, "attempt", cut)
+    made = simulation.simulate(base('growth.end="0.3 h"'))
+    if told:
+        with pytest.raises(SimulationError, match=told):
+            list(made)
+    else:
+        assert [instant.pore.front for instant in made][-1] == needed

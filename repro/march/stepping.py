@@ -61,7 +61,15 @@ def _cut(scene: Scene, passing: Step) -> tuple[Step, Solved]:
     within it, times are those of the one that passes."""
     end = needed(scene.growth, "[growth]").end
     now, solved = needed(passing.before, "the start of a step")
-    found = midpoint.attempt(scene, now, solved, end - now.time)
+    while True:
+        try:
+            found = midpoint.attempt(scene, now, solved, end - now.time)
+            break
+        except Unresolved as error:
+            finer = _on_finer_elements(scene, now)
+            if finer is None:
+                raise remeshing.advised(scene, now, error) from None
+            now, solved = finer
     taken, after = _solved(scene, _ending_at(needed(found.step, "a shorter step"), end))
     return replace(taken, before=None, within=passing.within), after
 
@@ -97,19 +105,28 @@ def _accepted(scene: Scene, now: Pore, solved: Solved,
             else:
                 length = max(duration * allowed(estimate, tolerance), shortest)
         except Unresolved as error:
-            finer = remeshing.graded(scene, now)
+            finer = _on_finer_elements(scene, now)
             if finer is None and duration <= time_step:
                 raise remeshing.advised(scene, now, error) from None
             if finer is None:
                 length = duration / 2
             else:
-                now, solved = remeshing.resolved(scene, finer)
-                now = replace(now, concentrations=solved.concentrations)
+                now, solved = finer
         except (PoreEnd, StageError, FloatingPointError):
             if duration <= shortest:
                 raise
             length = duration / 2
         duration = fitted(length, left)
+
+
+def _on_finer_elements(scene: Scene, now: Pore) -> tuple[Pore, Solved] | None:
+    """The start of a step on elements half as large at the aggregate, and what is solved there;
+    None where they may not be halved again."""
+    finer = remeshing.graded(scene, now)
+    if finer is None:
+        return None
+    found, solved = remeshing.resolved(scene, finer)
+    return replace(found, concentrations=solved.concentrations), solved
 
 
 def _solved(scene: Scene, taken: Step) -> tuple[Step, Solved]:

@@ -346,7 +346,7 @@ def run_cell(case: HardCase, preset: str) -> Cell:
 def run_part(name: str, function, preset: str, limit: float = LIMIT) -> Part:
     """Run one part and judge it."""
     try:
-        with np.errstate(all="raise", under="ignore"), _limited(limit):
+        with np.errstate(all="raise", under="ignore"), limited(limit):
             items = tuple(flat(function(preset)))
             checks = tuple(item for item in items if isinstance(item, Check))
             always = tuple(check for item in items if isinstance(item, Run) for check in sound(item))
@@ -366,7 +366,7 @@ def judged(name: str, checks: tuple[Check, ...], always: tuple[Check, ...]) -> P
 
 
 @contextmanager
-def _limited(seconds: float):
+def limited(seconds: float):
     """Raises TooLong inside when the process has spent so many CPU seconds."""
     def stop(*_):
         raise TooLong(f"not done after {seconds:g} s")

@@ -95,4 +95,38 @@ MUTANTS = (
          "Places in the sparse matrix are counted in 32 bits, which end at 46 000 unknowns.",
          "np.unique(columns * len(rank) + rows, return_inverse=True)",
          "np.unique(np.minimum(columns * len(rank) + rows, 2**31 - 1), return_inverse=True)")),
+    *changes(
+        "repro/scene/course.py",
+        ("family-jump-late",
+         "A table has its old value at the time of a jump.",
+         "last = bisect_right(self.times, time) - 1",
+         "last = max(0, bisect_right(self.times, time - 1e-6) - 1)")),
+    *changes(
+        "repro/results/columns.py",
+        ("family-area-of-corners",
+         "The reported area is that of the polygon through the corners.",
+         "at.pore.outline.area,",
+         "at.pore.outline.corners.area,")),
+    *changes(
+        "repro/model/transport.py",
+        ("family-effluent-not-weighted",
+         "The effluent is the plain mean over the outlet.",
+         "both, dofs.outlet, problem.outflow)",
+         "both, dofs.outlet, 0 * problem.outflow)"),
+        ("family-half-saturation",
+         "Uptake has half saturations that are larger by a half, in all balances alike.",
+         "return np.array([s.half_saturation for s in self.problem.both])[:, None, None]",
+         "return 1.5 * np.array([s.half_saturation for s in self.problem.both])[:, None, None]")),
+    *changes(
+        "repro/model/flow.py",
+        ("family-rest-of-the-pore-forgotten",
+         "The part of the pore that is not meshed loses no head.",
+         "poiseuille_loss(length - (mesh.ends[1] - mesh.ends[0]), mesh.width)",
+         "poiseuille_loss(0 * length, mesh.width)")),
+    *changes(
+        "repro/march/stepping.py",
+        ("family-rows-end-steps",
+         "Steps end at reported times.",
+         "left = corner - now.time",
+         "left = min([corner, *(t for t in scene.output.times or () if t > now.time)]) - now.time")),
 )

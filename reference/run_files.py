@@ -1,0 +1,647 @@
+"""Judge a run by the files in its folder and by its scene, a dict of TOML tables.
+
+Nothing is shared with the code that made the files. Units, defaults of Table 1, quadrature and formulas are written
+here again. Each check is a :class:`Finding`: a number, the range that it must lie in, and where the range comes from.
+The elements are curved quadratic triangles (``triangle6``), with quadratic velocities and concentrations. Lengths are
+in um, times in h, concentrations in mg/L, amounts per depth in pg/m = um2 mg/L.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from math import inf
+from pathlib import Path
+from typing import NamedTuple
+from xml.etree import ElementTree
+
+import meshio
+import numpy as np
+
+UNITS = {"um": 1.0, "cm": 1e4, "h": 1.0, "min": 1 / 60, "mg/L": 1.0, "1/day": 1 / 24, "m/day": 1e6 / 24,
+         "cm^2/day": 1e8 / 24, "cm^2/s": 3.6e11, "m/s^2": 3600**2 * 1e6, "m^2": 1e12, "deg": np.pi / 180, "MPa": 1.0}
+#: What a scene leaves out has the value of the paper's Table 1.
+TABLE_1 = {
+    "pore": {"width": "100 um", "length": "600 um"},
+    "flow": {"kinematic_viscosity": "0.01003 cm^2/s", "gravity": "9.81 m/s^2", "viscosity_ratio": 2000.0},
+    "acceptor": {"supply": "10 mg/L", "half_saturation": "1 mg/L", "diffusivity": "2.32 cm^2/day"},
+    "donor": {"supply": "10 mg/L", "half_saturation": "1 mg/L", "diffusivity": "1.01 cm^2/day"},
+    "kinetics": {"maximum_utilization_rate": "9.3 1/day", "yield_coefficient": 0.61, "decay_coefficient": "0.12 1/day",
+                 "degradable_fraction": 0.8, "decay_oxygen_demand": 1.42, "acceptor_to_donor_ratio": 1.52,
+                 "maximum_density": "30000 mg/L"},
+}
+NAMES = ("acceptor", "donor")
+
+#: Sums over some 1e4 nodes or points, in double precision.
+SUM = 1e-11
+#: An amount that Newton's method or a linear solver conserves: 1e-12 of the terms of each row, 1e3 to 1e4 rows.
+SOLVED = 1e-8
+#: docs/design.md: a concentration may leave the range from zero to its supply by so much of the supply.
+UNDERSHOOT, OVERSHOOT = 1e-3, 0.02
+#: docs/design.md: two quadratures of the uptake differ by so much at most. The fields give the biomass at nodes, as
+#: the mean of the triangles beside them, which is taken to err by as much again.
+UPTAKE = 0.05 + 0.05
+#: With a half saturation of a smaller part of the supply the uptake is nearly a step: rules with 4, 8 and 16 points a
+#: side differ among themselves, so that no such bound can be given.
+STEP = 0.01
+#: A gradient is a rational function on a curved triangle: a tenth of the error of ``fast`` for two quadratures.
+QUADRATURE = 1e-3
+#: README.md: errors of the presets fast and accurate.
+PROMISED = 0.01 + 0.001
+
+
+class Finding(NamedTuple):
+    """A number that must lie between ``low`` and ``high``; ``origin`` is where that range comes from."""
+
+    quantity: str
+    value: float
+    low: float
+    high: float
+    origin: str
+
+    @property
+    def holds(self) -> bool:
+        """Is the number in its range? A number that is not finite never is, unless the range says so."""
+        return bool(self.low <= self.value <= self.high)
+
+
+def size(quantity: str, values, bound: float, origin: str) -> Finding:
+    """The largest of some sizes, which must not exceed ``bound``."""
+    largest = np.max(np.abs(values), initial=0.0)
+    return Finding(quantity, float(largest), 0.0, bound, origin)
+
+
+def excess(quantity: str, values, low, high, origin: str) -> Finding:
+    """How far some values lie outside of their own bounds; the bounds carry their tolerance."""
+    outside = np.maximum(np.subtract(low, values), np.subtract(values, high))
+    return Finding(f"{quantity}, beyond its bounds", float(np.max(outside, initial=-inf)), -inf, 0.0, origin)
+
+
+def number(text) -> float:
+    """A plain number, or one with its unit."""
+    if isinstance(text, str):
+        value, _, unit = text.partition(" ")
+        return float(value) * UNITS[unit]
+    return float(text)
+
+
+class Course:
+    """A quantity over time (h): a constant, or a table of times and values, each value from its time on."""
+
+    def __init__(self, entry, linear: bool = False):
+        table = entry if isinstance(entry, list) else [["0 h", entry]]
+        self.times, self.values = np.array([[number(part) for part in pair] for pair in table]).T
+        self.linear = linear
+
+    def at(self, time: float) -> float:
+        """The value at a time, after the jump that may be there."""
+        if self.linear:
+            return float(np.interp(time, self.times, self.values))
+        return float(self.values[np.searchsorted(self.times, time + 1e-9, side="right") - 1])
+
+    def largest(self, time: float) -> float:
+        """The largest value up to a time."""
+        return max(*self.values[self.times <= time + 1e-9], self.at(time))
+
+
+@dataclass(frozen=True)
+class Scene:
+    """The numbers of a scene's tables."""
+
+    tables: dict
+
+    def number(self, section: str, key: str) -> float:
+        """One number of a section, or of Table 1."""
+        return number(self.section(section).get(key, TABLE_1[section].get(key)))
+
+    def section(self, name: str) -> dict:
+        """A section, or a substrate; empty where the scene leaves it out."""
+        if name in NAMES:
+            return self.tables["substrates"].get(name, {})
+        return self.tables.get(name, {})
+
+    def course(self, section: str, key: str) -> Course:
+        """A quantity that may be a table over time."""
+        part = self.section(section)
+        return Course(part.get(key, TABLE_1[section].get(key)), part.get("interpolation") == "linear")
+
+    @property
+    def flows(self) -> bool:
+        """Does the scene have a flow?"""
+        return "flow" in self.tables
+
+    @property
+    def viscosity_ratio(self) -> float | None:
+        """Of the aggregate; None where it is permeable."""
+        permeable = self.section("flow").get("biomass") == "brinkman"
+        return None if permeable else self.number("flow", "viscosity_ratio")
+
+    @property
+    def stores(self) -> bool:
+        """Are substrates transient?"""
+        return self.section("numerics").get("transport") == "gear"
+
+    @property
+    def midpoint(self) -> bool:
+        """Are steps those of the midpoint rule?"""
+        return self.section("numerics").get("time") != "updates"
+
+    @property
+    def closed(self) -> bool:
+        """Does nothing pass the ends of the pore?"""
+        return self.tables["substrates"].get("boundary") == "closed"
+
+    @property
+    def end(self) -> float:
+        """h."""
+        return number(self.tables["growth"]["end"])
+
+
+def _triangle_rule(n: int = 4) -> tuple[np.ndarray, np.ndarray]:
+    """Points (q, 2) and weights (q,) on the unit triangle, exact to degree 2 n - 2."""
+    points, weights = np.polynomial.legendre.leggauss(n)
+    u = 0.5 * (points + 1)
+    across, up = (axis.ravel() for axis in np.meshgrid(u, u))
+    weight = np.outer(weights, weights).ravel() / 4 * (1 - up)
+    return np.column_stack([across * (1 - up), up]), weight
+
+
+def _shapes(at: np.ndarray) -> np.ndarray:
+    """(q, 6) quadratic functions of a triangle's corners, then of its sides' middles, in VTK's order."""
+    second, third = at.T
+    first = 1 - second - third
+    return np.stack([first * (2 * first - 1), second * (2 * second - 1), third * (2 * third - 1), 4 * first * second,
+                     4 * second * third, 4 * third * first], axis=1)
+
+
+def _slopes(at: np.ndarray) -> np.ndarray:
+    """(q, 6, 2) their derivatives by both coordinates of the unit triangle."""
+    second, third = at.T
+    first = 1 - second - third
+    zero = 0 * first
+    by_second = [1 - 4 * first, 4 * second - 1, zero, 4 * (first - second), 4 * third, -4 * third]
+    by_third = [1 - 4 * first, zero, 4 * third - 1, -4 * second, 4 * second, 4 * (first - third)]
+    return np.stack([np.stack(by_second, axis=1), np.stack(by_third, axis=1)], axis=2)
+
+
+POINTS, WEIGHTS = _triangle_rule()
+SHAPES, SLOPES = _shapes(POINTS), _slopes(POINTS)
+LINE, LINE_WEIGHTS = np.polynomial.legendre.leggauss(4)
+ALONG = np.stack([LINE * (LINE - 1) / 2, LINE * (LINE + 1) / 2, 1 - LINE**2], axis=1)
+SIDES = ((0, 1, 3), (1, 2, 4), (2, 0, 5))
+
+
+class Fields:
+    """One ``.vtu`` file."""
+
+    def __init__(self, path: Path):
+        mesh = meshio.read(path)
+        self.time = float(mesh.field_data["TimeValue"][0])
+        self.points = mesh.points[:, :2]
+        self.cells = mesh.cells_dict["triangle6"]
+        self.at_nodes = mesh.point_data
+        self.in_cells = {name: values[0] for name, values in mesh.cell_data.items()}
+
+    @cached_property
+    def body(self) -> np.ndarray:
+        """(T,) is a triangle of the aggregate?"""
+        return self.in_cells["region"] == 1
+
+    @cached_property
+    def dx(self) -> np.ndarray:
+        """(T, q) weights of the points of integration, um2."""
+        return self.weights(self.points)
+
+    def weights(self, points: np.ndarray) -> np.ndarray:
+        """(T, q) the same for other coordinates (N, 2) of the nodes."""
+        jacobian = np.einsum("tni,qnj->tqij", points[self.cells], SLOPES)
+        return np.linalg.det(jacobian) * WEIGHTS
+
+    def gradients(self, values: np.ndarray) -> np.ndarray:
+        """(T, q, c, 2) of nodal values (N, c) in the points of integration."""
+        jacobian = np.einsum("tni,qnj->tqij", self.points[self.cells], SLOPES)
+        slopes = np.einsum("qnj,tqji->tqni", SLOPES, np.linalg.inv(jacobian))
+        return np.einsum("tnc,tqni->tqci", values[self.cells], slopes)
+
+    @cached_property
+    def areas(self) -> np.ndarray:
+        """(T,) um2."""
+        return self.dx.sum(axis=1)
+
+    def inside(self, name: str) -> np.ndarray:
+        """(B, q) a nodal field in the points of the aggregate's triangles."""
+        return self.at_nodes[name][self.cells[self.body]] @ SHAPES.T
+
+    def wall(self, y: float) -> np.ndarray:
+        """Nodes on a wall."""
+        return np.flatnonzero(self.points[:, 1] == y)
+
+    def end(self, outlet: bool) -> tuple[np.ndarray, np.ndarray]:
+        """Sides (E, 3) at an end, corners first, and their lengths (E,) um."""
+        x = self.points[:, 0]
+        at = x == (x.max() if outlet else x.min())
+        sides = np.concatenate([self.cells[:, side] for side in SIDES])
+        sides = sides[at[sides].all(axis=1)]
+        return sides, np.abs(np.diff(self.points[sides[:, :2], 1], axis=1))[:, 0]
+
+    def over_end(self, outlet: bool, *factors: np.ndarray) -> float:
+        """Integral of the product of nodal fields (N,) over an end."""
+        sides, lengths = self.end(outlet)
+        product = np.prod([factor[sides] @ ALONG.T for factor in factors], axis=0)
+        return float((product @ LINE_WEIGHTS) @ lengths / 2)
+
+    def outline_extremes(self) -> tuple[float, float, float]:
+        """Smallest x, largest x and largest y of the parabolas along the sides of the aggregate's triangles, um."""
+        sides = np.concatenate([self.cells[self.body][:, side] for side in SIDES])
+        start, stop, middle = self.points[sides].transpose(1, 0, 2)
+        bend = start + stop - 2 * middle
+        with np.errstate(divide="ignore", invalid="ignore"):
+            t = np.clip(np.nan_to_num(-0.5 * (stop - start) / bend), -1.0, 1.0)
+        peaks = middle + 0.5 * t * (stop - start) + 0.5 * t**2 * bend
+        every = np.concatenate([start, stop, peaks])
+        return every[:, 0].min(), every[:, 0].max(), every[:, 1].max()
+
+
+def _table(path: Path) -> dict[str, np.ndarray]:
+    """{column: values}; a column without any value is left out, one missing value is not a number."""
+    with path.open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    columns = {name: [row[name] for row in rows] for name in (rows[0] if rows else ())}
+    return {name: np.array([float(text or "nan") for text in texts])
+            for name, texts in columns.items() if any(texts)}
+
+
+class Run:
+    """The files of a run, and its scene as tables."""
+
+    def __init__(self, folder: Path, tables: dict):
+        self.scene = Scene(tables)
+        self.record = json.loads((folder / "run.json").read_text())
+        self.series = _table(folder / "timeseries.csv")
+        self.ledger = _table(folder / "ledger.csv") if (folder / "ledger.csv").is_file() else {}
+        self.files = [folder / entry.get("file") for entry in ElementTree.parse(folder / "fields.pvd").iter("DataSet")]
+
+    @cached_property
+    def fields(self) -> list[Fields]:
+        """One a row."""
+        return [Fields(path) for path in self.files]
+
+    @property
+    def times(self) -> np.ndarray:
+        """(rows,) h."""
+        return self.series["time_h"]
+
+    @property
+    def completed(self) -> bool:
+        """Has the run come to growth.end?"""
+        return self.record["status"] == "completed"
+
+    @cached_property
+    def duration(self) -> np.ndarray:
+        """(steps,) h."""
+        return self.ledger["end_h"] - self.ledger["start_h"]
+
+    def at_ledger(self) -> tuple[np.ndarray, np.ndarray]:
+        """Rows, and the steps that end at their times."""
+        apart = np.abs(np.subtract.outer(self.times, self.ledger.get("end_h", np.zeros(0))))
+        return np.nonzero(apart <= 1e-9)
+
+
+def findings(run: Run) -> Iterator[Finding]:
+    """All checks of one run."""
+    yield from _numbers(run)
+    yield from _rows(run)
+    for row, fields in enumerate(run.fields):
+        here = {name: values[row] for name, values in run.series.items()}
+        for check in (_geometry, _flow, _concentrations, _uptake, _deformation):
+            yield from (finding._replace(quantity=f"{finding.quantity}, t = {fields.time:.4g} h")
+                        for finding in check(run.scene, here, fields))
+    if run.ledger:
+        yield from _steps(run)
+        yield from _substrates(run)
+        yield from _growth(run)
+
+
+def _numbers(run: Run) -> Iterator[Finding]:
+    tables = [*run.series.values(), *run.ledger.values()]
+    missing = sum(np.count_nonzero(~np.isfinite(values)) for values in tables)
+    for fields in run.fields:
+        nodes = np.unique(fields.cells[fields.body])
+        aggregate = [values[nodes] for values in fields.at_nodes.values()]
+        fluid = [fields.at_nodes[name] for name in ("velocity_m_per_d", "head_cm", "acceptor_mg_per_L",
+                                                    "donor_mg_per_L") if name in fields.at_nodes]
+        cells = [values[fields.body] for values in fields.in_cells.values()]
+        missing += sum(np.count_nonzero(~np.isfinite(values)) for values in (*aggregate, *fluid, *cells))
+    yield size("numbers that are not finite", missing, 0, "none is")
+
+
+def _rows(run: Run) -> Iterator[Finding]:
+    """Rows and fields stand at the times that were asked for, and cover the run."""
+    times = run.times
+    yield size("rows that are not later than the row before", np.count_nonzero(np.diff(times) <= 0), 0, "time passes")
+    yield size("rows without fields of their time", _unmatched(times, [f.time for f in run.fields]), 0, "one a row")
+    asked = run.scene.section("output").get("times")
+    if asked and run.completed:
+        yield size("rows that were asked for and are not there, or the reverse",
+                   _unmatched(times, {0.0, *map(number, asked)}), 0, "output.times, and the start")
+    elif run.completed:
+        yield size("time between the last row and the end", times[-1] - run.scene.end, 1e-9, "growth.end")
+    if run.scene.end and (run.completed or run.ledger):
+        covered = run.ledger["end_h"][-1] if run.ledger else 0.0
+        last = run.scene.end if run.completed else times[-1]
+        yield excess("end of the ledger, h", covered, last - 1e-9, run.scene.end + 1e-9, "every step is in the ledger")
+
+
+def _unmatched(one, other) -> int:
+    """How many times of two lists have no partner in the other."""
+    apart = np.abs(np.subtract.outer(list(one), list(other))) <= 1e-9
+    return np.count_nonzero(~apart.any(axis=1)) + np.count_nonzero(~apart.any(axis=0))
+
+
+def _geometry(scene: Scene, row: dict, fields: Fields) -> Iterator[Finding]:
+    width, length = scene.number("pore", "width"), scene.number("pore", "length")
+    x, y = fields.points.T
+    yield size("nodes of the row less those of the fields", row["nodes"] - len(fields.points), 0, "the same mesh")
+    yield size("area of the mesh over meshed length times width, less one",
+               fields.areas.sum() / (row["meshed_length_um"] * width) - 1, SUM, "triangles fill the meshed part")
+    yield excess("nodes", [x.min(), x.max(), y.min(), y.max()], [-length / 2, -inf, 0, -inf],
+                 [inf, length / 2, inf, width], "the pore")
+    area = fields.areas[fields.body].sum()
+    yield size("aggregate's area in the fields over that of the row, less one", area / row["aggregate_area_um2"] - 1,
+               SUM, "quadrature of triangles is exact")
+    shown = [row[name] for name in ("upstream_um", "downstream_um", "thickness_um")]
+    yield size("ends and thickness in the fields less those of the row, over the width",
+               np.subtract(fields.outline_extremes(), shown) / width, SUM, "extremes of parabolas")
+    touches = np.isin(np.unique(fields.cells[fields.body]), fields.wall(width)).any()
+    yield size("contact in the fields less that of the row", float(touches) - row["contact"], 0, "yes or no")
+    yield size("triangles that are turned over", np.count_nonzero(fields.dx.min(axis=1) <= 0), 0, "none is")
+
+
+def _flow(scene: Scene, row: dict, fields: Fields) -> Iterator[Finding]:
+    if not scene.flows:
+        return
+    width, length = scene.number("pore", "width"), scene.number("pore", "length")
+    speed = row["mean_velocity_m_per_d"]
+    drive = "head" if "head" in scene.section("flow") else "mean_velocity"
+    column, unit = ("head_loss_cm", "cm") if drive == "head" else ("mean_velocity_m_per_d", "m/day")
+    driven = scene.course("flow", drive).at(row["time_h"]) / UNITS[unit]
+    yield size(f"{column} over that of the scene, less one", row[column] / driven - 1, SUM, "the scene's own")
+    velocity = fields.at_nodes["velocity_m_per_d"]
+    walls = np.concatenate([fields.wall(0.0), fields.wall(width)])
+    in_fluid = walls[np.isin(walls, fields.cells[~fields.body])]
+    still = walls if scene.viscosity_ratio else in_fluid
+    yield size("velocity at the walls over the mean", velocity[still] / speed, SUM,
+               "(5): no slip; water may slide under a permeable body whose layers are thin")
+    yield size("velocity through the walls over the mean", velocity[walls, 1] / speed, SUM, "nothing passes")
+    for name, outlet, bound in (("inlet", False, SUM), ("outlet", True, SOLVED)):
+        through = fields.over_end(outlet, velocity[:, 0]) / (speed * width)
+        yield size(f"flow through the {name} over u_ave W, less one", through - 1, bound, "(2): water is kept")
+    viscosity = scene.number("flow", "kinematic_viscosity") / scene.number("flow", "gravity")
+    clean = width**2 / (12 * viscosity) / UNITS["m/day"]
+    outside = (length - row["meshed_length_um"]) * speed / clean / UNITS["cm"]
+    head = fields.at_nodes["head_cm"]
+    inside = (fields.over_end(False, head) - fields.over_end(True, head)) / width
+    yield size("mean head at inlet less outlet and the clean rest, over the head loss, less one",
+               (inside + outside) / row["head_loss_cm"] - 1, PROMISED, "(6); the preset's error")
+    if scene.viscosity_ratio:
+        spent = viscosity * _dissipation(scene, fields) / (speed * UNITS["m/day"] * width) / UNITS["cm"]
+        yield size("work that the water spends and the clean rest, over the head loss, less one",
+                   (spent + outside) / row["head_loss_cm"] - 1, QUADRATURE, "work of the head is spent on viscosity")
+    conductivity = speed * length / (row["head_loss_cm"] * UNITS["cm"])
+    yield size("u L / head loss over the conductivity, less one", conductivity / row["conductivity_m_per_d"] - 1,
+               SUM, "its definition")
+    if scene.viscosity_ratio is None or scene.viscosity_ratio >= 1:
+        yield excess("conductivity over that of the clean pore", row["conductivity_m_per_d"] / clean, 0.0,
+                     1 + PROMISED, "Stokes flow has the least dissipation; the preset's error")
+
+
+def _dissipation(scene: Scene, fields: Fields) -> float:
+    """Integral of nu_r grad u : grad u, or with traction nu_r grad u : (grad u + grad u^T), um2/h2."""
+    velocity = fields.at_nodes["velocity_m_per_d"][:, :2] * UNITS["m/day"]
+    gradient = fields.gradients(velocity)
+    square = np.sum(gradient**2, axis=(2, 3))
+    if scene.section("numerics").get("interface") == "traction":
+        square += np.einsum("tqij,tqji->tq", gradient, gradient)
+    return float(np.sum(square * fields.dx, axis=1) @ np.where(fields.body, scene.viscosity_ratio, 1.0))
+
+
+def _concentrations(scene: Scene, row: dict, fields: Fields) -> Iterator[Finding]:
+    for name in NAMES:
+        values = fields.at_nodes[f"{name}_mg_per_L"]
+        course = scene.course(name, "supply")
+        supply = course.largest(row["time_h"]) if scene.stores else course.at(row["time_h"])
+        yield excess(f"{name} in the fields, mg/L", values, -UNDERSHOOT * supply, (1 + OVERSHOOT) * supply,
+                     "the maximum principle; docs/design.md")
+        yield size(f"{name}'s least in the fields less that of the row", values.min() - row[f"{name}_min_mg_per_L"], 0,
+                   "the same number")
+        for end, outlet in (("inlet", False), ("effluent", True)):
+            weights = [fields.at_nodes["velocity_m_per_d"][:, 0]] if scene.flows else []
+            one = np.ones(len(values))
+            mean = fields.over_end(outlet, values, *weights) / fields.over_end(outlet, one, *weights)
+            yield size(f"{end} {name} of the fields less that of the row, over the supply",
+                       (mean - row[f"{end}_{name}_mg_per_L"]) / max(supply, 1e-300), SUM, "(12), flux-averaged")
+
+
+def _rates(scene: Scene, fields: Fields) -> tuple[float, float, float]:
+    """Acceptor and donor taken up, and the part of acceptor that decay takes, (7) and (8), um2 mg/L/h."""
+    k, b = scene.number("kinetics", "maximum_utilization_rate"), scene.number("kinetics", "decay_coefficient")
+    of_decay = b * scene.number("kinetics", "degradable_fraction") * scene.number("kinetics", "decay_oxygen_demand")
+    positive = [np.maximum(fields.inside(f"{name}_mg_per_L"), 0.0) for name in NAMES]
+    m_a, m_d = (c / (c + scene.number(name, "half_saturation")) for name, c in zip(NAMES, positive))
+    active = fields.inside("active_biomass") * scene.number("kinetics", "maximum_density") * fields.dx[fields.body]
+    donor = k * float(np.sum(active * m_a * m_d))
+    decay = of_decay * float(np.sum(active * m_a))
+    return scene.number("kinetics", "acceptor_to_donor_ratio") * donor + decay, donor, decay
+
+
+def _uptake(scene: Scene, row: dict, fields: Fields) -> Iterator[Finding]:
+    """In a row at rest, what the water loses between inlet and outlet is what the aggregate of its fields takes up."""
+    steep = any(scene.number(name, "half_saturation") < STEP * scene.course(name, "supply").at(row["time_h"])
+                for name in NAMES)
+    if not scene.flows or scene.stores or steep:
+        return
+    flow = row["mean_velocity_m_per_d"] * UNITS["m/day"] * scene.number("pore", "width")
+    rates = _rates(scene, fields)
+    for name, rate in zip(NAMES, rates):
+        supply = scene.course(name, "supply").at(row["time_h"])
+        lost = flow * (supply - row[f"effluent_{name}_mg_per_L"])
+        slack = UPTAKE * rate + SOLVED * (flow + scene.number(name, "diffusivity")) * supply
+        yield excess(f"{name} that the aggregate takes up, um2 mg/L/h", rate, lost - slack, lost + slack,
+                     "(7) and (8) in the fields; two quadratures of one uptake")
+
+
+def _deformation(scene: Scene, row: dict, fields: Fields) -> Iterator[Finding]:
+    """J is the ratio of areas; theta is J in the mean (24)."""
+    if scene.section("growth").get("new_biomass") == "stress_free":
+        return
+    places = np.nan_to_num(fields.at_nodes["position_t0_um"][:, :2])
+    before = fields.weights(places)[fields.body].sum(axis=1)
+    after = fields.areas[fields.body]
+    J, theta = (fields.in_cells[name][fields.body] for name in ("J", "theta"))
+    yield size("area over that at t = 0 over J, less one", after / before / J - 1, SOLVED, "J = det dx/dX")
+    yield size("integral of theta less J over that of J", np.sum((theta - J) * before) / after.sum(), SOLVED,
+               "(24) with a constant test function; Newton's tolerance")
+
+
+def _steps(run: Run) -> Iterator[Finding]:
+    ledger = run.ledger
+    gaps = np.concatenate([ledger["start_h"][:1], ledger["start_h"][1:] - ledger["end_h"][:-1]])
+    yield size("time between one step's end and the next one's start, h", gaps, SUM, "steps follow each other")
+    before, after = ledger["biomass_before_pg_per_m"], ledger["biomass_after_pg_per_m"]
+    yield size("biomass at a step's start over that at the end before, less one", before[1:] / after[:-1] - 1, SUM,
+               "nothing happens in between")
+    dense = run.scene.number("kinetics", "maximum_density")
+    area = run.series["aggregate_area_um2"]
+    yield size("biomass at t = 0 over X_m times the area, less one", before[0] / (dense * area[0]) - 1, SUM,
+               "X_A + X_I = X_m")
+    rows, steps = run.at_ledger()
+    yield size("biomass over X_m times the area of the row, less one", after[steps] / (dense * area[rows]) - 1, SOLVED,
+               "(24) and (28): biomass has the density X_m in the mean")
+    columns = [name for name in run.series if name.endswith("_balance")]
+    for name in columns:
+        if run.scene.midpoint or not name.startswith("oxygen"):
+            yield size(f"column {name}", run.series[name], 1e-6, "docs/design.md: a step closes to 1e-6")
+
+
+def _substrates(run: Run) -> Iterator[Finding]:
+    """What enters leaves, is consumed or is stored."""
+    scene = run.scene
+    width, length = scene.number("pore", "width"), scene.number("pore", "length")
+    for name in NAMES:
+        supplied, out, consumed, stored = (run.ledger[f"{name}_{part}_pg_per_m"]
+                                           for part in ("supplied", "out", "consumed", "stored"))
+        most = scene.course(name, "supply").largest(run.scene.end)
+        exchanged = scene.number(name, "diffusivity") * most * run.duration
+        content = most * width * length if scene.stores else 0.0
+        scale = np.abs(supplied) + np.abs(consumed) + exchanged + content
+        yield size(f"{name} supplied less leaving, consumed and stored, relative",
+                   (supplied - out - consumed - stored) / np.maximum(scale, 1e-300), SOLVED, "(7), (8) over the pore")
+        if not scene.stores:
+            yield size(f"{name} stored by what is at rest", stored, 0, "quasi-steady")
+        if scene.closed:
+            yield size(f"{name} that passes closed ends", [*supplied, *out], 0, "nothing passes")
+        yield excess(f"{name} consumed, pg/m", consumed, -SOLVED * scale, _most_consumed(run, name) * (1 + SOLVED),
+                     "Monod's law at the supply, with the biomass that the fastest growth would make")
+
+
+def _saturation(run: Run, name: str) -> float:
+    """The largest C / (C + K_s) of the run."""
+    most = (1 + OVERSHOOT) * run.scene.course(name, "supply").largest(run.scene.end)
+    return most / (most + run.scene.number(name, "half_saturation"))
+
+
+def _most_biomass(run: Run) -> np.ndarray:
+    """(steps,) pg/m that each step could end with."""
+    scene = run.scene
+    fastest = scene.number("kinetics", "maximum_utilization_rate") * scene.number("kinetics", "yield_coefficient")
+    return run.ledger["biomass_before_pg_per_m"] * np.exp(fastest * run.duration)
+
+
+def _most_consumed(run: Run, name: str) -> np.ndarray:
+    scene = run.scene
+    m_a, m_d = (_saturation(run, each) for each in NAMES)
+    donor = scene.number("kinetics", "maximum_utilization_rate") * m_a * m_d * run.duration * _most_biomass(run)
+    if name == "donor":
+        return donor
+    return scene.number("kinetics", "acceptor_to_donor_ratio") * donor + _most_decay(run) * scene.number(
+        "kinetics", "decay_oxygen_demand")
+
+
+def _most_decay(run: Run) -> np.ndarray:
+    """(steps,) pg/m of biomass that degrades at most."""
+    scene = run.scene
+    rate = scene.number("kinetics", "decay_coefficient") * scene.number("kinetics", "degradable_fraction")
+    return rate * _saturation(run, "acceptor") * run.duration * _most_biomass(run)
+
+
+def _growth(run: Run) -> Iterator[Finding]:
+    """Biomass is what the donor makes, less what decays."""
+    scene, ledger = run.scene, run.ledger
+    law = {key: scene.number("kinetics", key) for key in TABLE_1["kinetics"]}
+    made, after = ledger["biomass_made_pg_per_m"], ledger["biomass_after_pg_per_m"]
+    before = ledger["biomass_before_pg_per_m"]
+    yield size("biomass after less before and made, over after", (after - before - made) / after, SOLVED,
+               "(9), (10) over the aggregate")
+    acceptor, donor = (ledger[f"{name}_consumed_pg_per_m"] for name in NAMES)
+    grown = law["yield_coefficient"] * donor
+    ratio = law["acceptor_to_donor_ratio"]
+    decayed = (acceptor - ratio * donor) / law["decay_oxygen_demand"]
+    terms = acceptor / law["decay_oxygen_demand"] + ratio * donor + grown
+    slack = SUM * (before + terms) + _scheme_error(run, law, terms)
+    yield excess("biomass made less Y donor - (acceptor - F donor) / d_c, pg/m", made - grown + decayed, -slack, slack,
+                 "(7)-(10); round-off with the midpoint rule")
+    yield excess("biomass that degrades by the oxygen consumed, pg/m", decayed, -slack - SOLVED * terms,
+                 _most_decay(run) * (1 + SOLVED) + slack, "f_d b m_A X_A, from zero to that at the supply")
+    rows, steps = run.at_ledger()
+    inert = run.series["inert_fraction"][rows] * after[steps]
+    first = run.series["inert_fraction"][0] * before[0]
+    share = (1 - law["degradable_fraction"]) * law["decay_coefficient"]
+    gained = np.cumsum(share * _saturation(run, "acceptor") * run.duration * _most_biomass(run))[steps]
+    yield excess("inert biomass, pg/m", inert, first - SOLVED * after[steps], first + gained + SOLVED * after[steps],
+                 "(10): it only gains, by (1 - f_d) b m_A X_A")
+
+
+def _scheme_error(run: Run, law: dict, terms: np.ndarray) -> np.ndarray | float:
+    """(steps,) pg/m. The paper's updates take the trapezoidal rule, which errs by (rate times step)^2 / 12 of what is
+    turned over. Gear's method follows concentrations to a thousandth of the supply, where C / (C + K_s) may change by
+    that times supply / K_s; the biomass errs by as much of what it could turn over at its fastest rate."""
+    if run.scene.midpoint:
+        return 0.0
+    fastest = law["maximum_utilization_rate"] * law["yield_coefficient"] + law["decay_coefficient"]
+    part = fastest * run.duration
+    if not run.scene.stores:
+        return part**2 / 12 * terms
+    steep = sum(run.scene.course(name, "supply").largest(run.scene.end) / run.scene.number(name, "half_saturation")
+                for name in NAMES)
+    return part**2 / 12 * terms + 1e-3 * max(1.0, steep) * part * _most_biomass(run)
+
+
+#: Columns that report the steps since the row before, which depend on where that row is.
+OF_STEPS = ("acceptor_balance", "donor_balance", "biomass_balance", "oxygen_demand_balance", "remeshed")
+
+
+def same_rows(one: Run, other: Run) -> Iterator[Finding]:
+    """Two runs of a scene that differ in ``output.times`` alone, to the last bit where they have the same times."""
+    rows = [(i, k) for i, time in enumerate(one.times) for k in np.flatnonzero(other.times == time)]
+    yield Finding("rows that both runs have", len(rows), 2, inf, "else less is tested")
+    columns = [name for name in one.series if name not in OF_STEPS]
+    apart = sum(one.series[name][i] != other.series[name][k] for name in columns for i, k in rows)
+    yield size("numbers of rows that depend on other rows", apart, 0, "output.times changes no step")
+    apart = sum(_differ(one.fields[i], other.fields[k]) for i, k in rows)
+    yield size("fields that depend on other rows", apart, 0, "output.times changes no step")
+    shared = min(len(table.get("end_h", ())) for table in (one.ledger, other.ledger))
+    apart = sum(np.count_nonzero(one.ledger[name][:shared] != other.ledger[name][:shared]) for name in one.ledger)
+    yield size("numbers of the ledger that depend on rows", apart, 0, "output.times changes no step")
+
+
+def _differ(one: Fields, other: Fields) -> bool:
+    """Do two files hold different arrays?"""
+    mine, its = ({**fields.at_nodes, **fields.in_cells, "points": fields.points} for fields in (one, other))
+    return mine.keys() != its.keys() or not all(np.array_equal(mine[key], its[key], equal_nan=True) for key in mine)
+
+
+def close(coarse: Run, fine: Run) -> Iterator[Finding]:
+    """The presets fast and accurate, before contact: each column over its own size."""
+    for column, scale in _scales(coarse, fine).items():
+        if column in coarse.series and column in fine.series:
+            pairs = [(i, k) for i, time in enumerate(coarse.times) for k in np.flatnonzero(fine.times == time)
+                     if not (coarse.series["contact"][i] or fine.series["contact"][k])]
+            apart = [(coarse.series[column][i] - fine.series[column][k]) / scale(k) for i, k in pairs]
+            yield size(f"{column} in fast less that in accurate, relative", apart, PROMISED, "README.md: 1 % and 0.1 %")
+
+
+def _scales(coarse: Run, fine: Run) -> dict[str, Callable[[int], float]]:
+    """{column: what its difference in a row is relative to}."""
+    series, scene = fine.series, fine.scene
+    found: dict[str, Callable[[int], float]] = {}
+    for name in ("mean_velocity_m_per_d", "head_loss_cm", "conductivity_m_per_d", "aggregate_area_um2", "thickness_um"):
+        found[name] = lambda k, name=name: series[name][k]
+    for name in ("upstream_um", "downstream_um"):
+        found[name] = lambda k: series["downstream_um"][k] - series["upstream_um"][k]
+    for name in NAMES:
+        found[f"effluent_{name}_mg_per_L"] = lambda k, name=name: max(
+            scene.course(name, "supply").largest(fine.times[k]), 1e-300)
+    return found

@@ -1,0 +1,257 @@
+"""The judge of a run's files: a good run passes, and each of its checks is shown something bad."""
+import csv
+import json
+import shutil
+
+import meshio
+import numpy as np
+import pytest
+
+from reference import run_files
+from repro.results import vtu
+from repro.run.running import run
+from repro.scene import load_scene
+from verification.kernel.case import Check
+from verification.problems import hostile
+
+TABLES = {"pore": {"width": "50 um"}, "aggregate": {"radius": "15 um"}, "flow": {"head": "1e-3 cm"}, "substrates": {},
+          "growth": {"end": "2 h"}, "numerics": {"preset": "fast"}, "output": {"times": ["0 h", "1 h", "2 h"]}}
+
+
+@pytest.fixture(scope="module")
+def good(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("good") / "run"
+    run(load_scene(TABLES), folder)
+    return folder
+
+
+def failed(folder, tables=TABLES):
+    """Names of the checks that do not hold, without their times."""
+    return {stem(finding) for finding in run_files.findings(run_files.Run(folder, tables)) if not finding.holds}
+
+
+def stem(finding):
+    return finding.quantity.split(", t = ")[0]
+
+
+def cell(file, column, change, row=-1):
+    """A damage of one cell of a table."""
+    def damage(folder):
+        path = folder / file
+        with path.open(newline="") as opened:
+            rows = list(csv.reader(opened))
+        at = rows[0].index(column)
+        rows[row][at] = repr(float(change(float(rows[row][at]))))
+        with path.open("w", newline="") as opened:
+            csv.writer(opened).writerows(rows)
+    return damage
+
+
+def series(column, change, row=-1):
+    return cell("timeseries.csv", column, change, row)
+
+
+def ledger(column, change, row=-1):
+    return cell("ledger.csv", column, change, row)
+
+
+def field(change):
+    """A damage of the last file of fields, whose arrays change(mesh) alters."""
+    def damage(folder):
+        path = sorted((folder / "fields").glob("fields_*.vtu"))[-1]
+        mesh = meshio.read(path)
+        mesh.cells = [vtu.Cells(block.type, block.data) for block in mesh.cells]
+        change(mesh)
+        vtu.write(path, mesh)
+    return damage
+
+
+def node(name, value, at=lambda mesh: 0):
+    """A damage of one node's value."""
+    def change(mesh):
+        mesh.point_data[name][at(mesh)] = value
+    return field(change)
+
+
+def scaled(name, factor, data="point_data"):
+    """A damage of a whole array."""
+    def change(mesh):
+        arrays = getattr(mesh, data)
+        arrays[name] = [part * factor for part in arrays[name]] if data == "cell_data" else arrays[name] * factor
+    return field(change)
+
+
+def renumbered(mesh):
+    """Turn a triangle over."""
+    mesh.cells[0].data[0] = mesh.cells[0].data[0, [1, 0, 2, 3, 5, 4]]
+
+
+def inward(mesh):
+    """Move a corner of the outlet out of the pore."""
+    mesh.points[mesh.points[:, 0].argmax(), 1] -= 1.0
+    mesh.points[mesh.points[:, 1].argmin(), 1] -= 1.0
+
+
+def forgotten(folder):
+    """The index of the fields loses its last file."""
+    path = folder / "fields.pvd"
+    lines = path.read_text().splitlines()
+    lines.remove([line for line in lines if "DataSet" in line][-1])
+    path.write_text("\n".join(lines))
+
+
+def unfinished(folder):
+    """The last row of the table and its fields are lost, in a run that says it is complete."""
+    path = folder / "timeseries.csv"
+    path.write_text("".join(path.read_text().splitlines(keepends=True)[:-1]))
+    forgotten(folder)
+
+
+def at_wall(mesh):
+    return np.flatnonzero(mesh.points[:, 1] == 0)[0]
+
+
+def inside_outlet(mesh):
+    x, y = mesh.points[:, :2].T
+    return np.flatnonzero((x == x.max()) & (y > 10) & (y < 40))[0]
+
+
+def plus(amount):
+    return lambda value: value + amount
+
+
+def times(factor):
+    return lambda value: value * factor
+
+
+#: What is bad, and the check that says so.
+BAD = [
+    (series("donor_min_mg_per_L", lambda _: np.nan), "numbers that are not finite"),
+    (scaled("J", np.nan, "cell_data"), "numbers that are not finite"),
+    (series("time_h", lambda _: 1.0), "rows that are not later than the row before"),
+    (forgotten, "rows without fields of their time"),
+    (unfinished, "rows that were asked for and are not there, or the reverse"),
+    (ledger("end_h", plus(-0.01)), "end of the ledger, h, beyond its bounds"),
+    (series("nodes", plus(1)), "nodes of the row less those of the fields"),
+    (series("meshed_length_um", times(1.0001)), "area of the mesh over meshed length times width, less one"),
+    (field(inward), "nodes, beyond its bounds"),
+    (series("aggregate_area_um2", times(1.01)), "aggregate's area in the fields over that of the row, less one"),
+    (series("thickness_um", times(1.000001)), "ends and thickness in the fields less those of the row, over the width"),
+    (series("upstream_um", times(1.01)), "ends and thickness in the fields less those of the row, over the width"),
+    (series("contact", plus(1)), "contact in the fields less that of the row"),
+    (field(renumbered), "triangles that are turned over"),
+    (series("head_loss_cm", times(1.0001)), "head_loss_cm over that of the scene, less one"),
+    (node("velocity_m_per_d", [0.001, 0.0, 0.0], at_wall), "velocity at the walls over the mean"),
+    (node("velocity_m_per_d", [0.0, 0.001, 0.0], at_wall), "velocity through the walls over the mean"),
+    (series("mean_velocity_m_per_d", times(1.001)), "flow through the inlet over u_ave W, less one"),
+    (node("velocity_m_per_d", 0.0, inside_outlet), "flow through the outlet over u_ave W, less one"),
+    (scaled("head_cm", 1.1), "mean head at inlet less outlet and the clean rest, over the head loss, less one"),
+    (scaled("velocity_m_per_d", 1.05),
+     "work that the water spends and the clean rest, over the head loss, less one"),
+    (series("conductivity_m_per_d", times(1.001)), "u L / head loss over the conductivity, less one"),
+    (series("conductivity_m_per_d", times(1.5)), "conductivity over that of the clean pore, beyond its bounds"),
+    (ledger("start_h", plus(1e-6)), "time between one step's end and the next one's start, h"),
+    (ledger("biomass_before_pg_per_m", times(1.000001), 1), "biomass at t = 0 over X_m times the area, less one"),
+    (ledger("biomass_before_pg_per_m", times(1.000001)),
+     "biomass at a step's start over that at the end before, less one"),
+    (ledger("biomass_after_pg_per_m", times(1.01)), "biomass over X_m times the area of the row, less one"),
+    (ledger("biomass_made_pg_per_m", times(1.0001)), "biomass after less before and made, over after"),
+    (ledger("biomass_made_pg_per_m", times(1.0001)),
+     "biomass made less Y donor - (acceptor - F donor) / d_c, pg/m, beyond its bounds"),
+    (ledger("acceptor_consumed_pg_per_m", times(1.1)),
+     "biomass that degrades by the oxygen consumed, pg/m, beyond its bounds"),
+    (series("inert_fraction", lambda _: -0.001), "inert biomass, pg/m, beyond its bounds"),
+    (series("inert_fraction", times(3)), "inert biomass, pg/m, beyond its bounds"),
+    (scaled("theta", 1.01, "cell_data"), "integral of theta less J over that of J"),
+    (scaled("J", 1.01, "cell_data"), "area over that at t = 0 over J, less one"),
+    *((series(f"{name}_balance", lambda _: -1.0), f"column {name}_balance")
+      for name in ("acceptor", "donor", "biomass", "oxygen_demand")),
+    *(bad for name in run_files.NAMES for bad in (
+        (scaled(f"{name}_mg_per_L", 1.2), f"{name} in the fields, mg/L, beyond its bounds"),
+        (node(f"{name}_mg_per_L", -0.011), f"{name} in the fields, mg/L, beyond its bounds"),
+        (series(f"{name}_min_mg_per_L", plus(1e-9)), f"{name}'s least in the fields less that of the row"),
+        (series(f"inlet_{name}_mg_per_L", times(1.000001)),
+         f"inlet {name} of the fields less that of the row, over the supply"),
+        (series(f"effluent_{name}_mg_per_L", times(1.000001)),
+         f"effluent {name} of the fields less that of the row, over the supply"),
+        (scaled("active_biomass", 1.2), f"{name} that the aggregate takes up, um2 mg/L/h, beyond its bounds"),
+        (ledger(f"{name}_out_pg_per_m", times(1.00001)),
+         f"{name} supplied less leaving, consumed and stored, relative"),
+        (ledger(f"{name}_stored_pg_per_m", plus(1e-3)), f"{name} stored by what is at rest"),
+        (ledger(f"{name}_consumed_pg_per_m", times(-1)), f"{name} consumed, pg/m, beyond its bounds"),
+        (ledger(f"{name}_consumed_pg_per_m", times(3)), f"{name} consumed, pg/m, beyond its bounds"))),
+]
+
+
+@pytest.mark.parametrize("damage, check", BAD)
+def test_each_check_is_shown_something_bad(good, tmp_path, damage, check):
+    folder = tmp_path / "run"
+    shutil.copytree(good, folder)
+    damage(folder)
+    assert check in failed(folder)
+
+
+def test_a_good_run_passes_and_no_check_is_left_unshown(good):
+    assert failed(good) == set()
+    checks = {stem(finding) for finding in run_files.findings(run_files.Run(good, TABLES))}
+    assert checks == {check for _, check in BAD}
+
+
+@pytest.mark.parametrize("section, key, value, check", [
+    ("substrates", "boundary", "closed", "acceptor that passes closed ends"),
+    ("substrates", "boundary", "closed", "donor that passes closed ends"),
+    ("growth", "end", "2.1 h", "end of the ledger, h, beyond its bounds"),
+    ("flow", "head", "1.1e-3 cm", "head_loss_cm over that of the scene, less one"),
+    ("flow", "viscosity_ratio", 2e5, "work that the water spends and the clean rest, over the head loss, less one"),
+    ("output", "times", None, "time between the last row and the end")])
+def test_a_run_of_another_scene_is_noticed(good, section, key, value, check):
+    tables = {**TABLES, section: {**TABLES[section], key: value}}
+    tables["growth"] = {"end": "2.1 h"} if key == "times" else tables["growth"]
+    assert check in failed(good, tables)
+
+
+@pytest.mark.parametrize("file, damage, check", [
+    ("rows", series("thickness_um", lambda value: np.nextafter(value, 0)), "numbers of rows that depend on other rows"),
+    ("fields", scaled("theta", 1 + 1e-15, "cell_data"), "fields that depend on other rows"),
+    ("ledger", ledger("donor_out_pg_per_m", lambda value: np.nextafter(value, 0)),
+     "numbers of the ledger that depend on rows"),
+    ("times", series("time_h", plus(1e-6)), "")])
+def test_two_runs_that_differ_in_the_last_bit_are_told_apart(good, tmp_path, file, damage, check):
+    folder = tmp_path / "run"
+    shutil.copytree(good, folder)
+    damage(folder)
+    one, other = (run_files.Run(path, TABLES) for path in (good, folder))
+    assert all(finding.holds for finding in run_files.same_rows(one, one))
+    assert {finding.quantity for finding in run_files.same_rows(one, other) if not finding.holds} == {check} - {""}
+
+
+@pytest.mark.parametrize("column", [
+    "conductivity_m_per_d", "mean_velocity_m_per_d", "aggregate_area_um2", "thickness_um", "effluent_donor_mg_per_L"])
+def test_what_differs_by_more_than_the_presets_promise_is_not_close(good, tmp_path, column):
+    folder = tmp_path / "run"
+    shutil.copytree(good, folder)
+    series(column, times(1.02))(folder)
+    one, other = (run_files.Run(path, TABLES) for path in (good, folder))
+    assert all(finding.holds for finding in run_files.close(one, one))
+    assert {finding.quantity.split()[0] for finding in run_files.close(one, other) if not finding.holds} == {column}
+
+
+@pytest.mark.parametrize("entry, linear, time, value, largest", [
+    ("10 mg/L", False, 3.0, 10.0, 10.0), ([["0 h", "10 mg/L"], ["60 min", "4 mg/L"]], False, 1.0, 4.0, 10.0),
+    ([["0 h", "1 mg/L"], ["2 h", "5 mg/L"]], True, 1.0, 3.0, 3.0),
+    ([["0 h", "1 mg/L"], ["2 h", "5 mg/L"]], False, 1.999, 1.0, 1.0)])
+def test_a_table_over_time(entry, linear, time, value, largest):
+    course = run_files.Course(entry, linear)
+    assert course.at(time) == value and course.largest(time) == largest
+
+
+def test_a_seed_names_one_scene_of_each_kind_in_turn():
+    scenes = [hostile.scene(seed) for seed in range(10)]
+    assert [hostile.kind(seed) for seed in range(10, 20)] == [*hostile.KINDS]
+    assert scenes == [hostile.scene(seed) for seed in range(10)] and len({json.dumps(one) for one in scenes}) == 10
+
+
+def test_a_finding_is_a_check():
+    assert not Check(*run_files.size("x", [0.5, -2.0], 1.0, "")).holds
+    assert Check(*run_files.excess("x", [0.5, 1.0], 0.0, 1.0, "")).holds
+    assert not Check(*run_files.excess("x", [0.5, np.nan], 0.0, 1.0, "")).holds

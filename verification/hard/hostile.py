@@ -1,0 +1,156 @@
+"""A family of hostile scenes, drawn by seed: each is right, or is refused with advice that works.
+
+A member runs with the preset ``fast``, and a second time with other rows or with ``accurate``. ``reference.run_files``
+judges the folders. Where a run is refused, its advice is followed, and the run that follows must be right.
+``python -m verification.hard.hostile SEED ...`` runs single members and shows what is wrong.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+from collections.abc import Iterator
+from copy import deepcopy
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from reference import run_files
+from repro.errors import SimulationError
+from repro.run.running import run
+from repro.scene import SceneError, load_scene
+from verification.hard.common import TooLong, limited
+from verification.kernel.case import Check, at_most, case
+from verification.problems import hostile
+
+#: Processor time (s) of one run: a hundred times the median.
+LIMIT = 30.0
+#: Seeds of ``make test``, and those that ``make verify`` has besides.
+QUICK, REST = range(30), range(30, 150)
+NO_HELP = re.compile(r"no setting helps|no numerics\.refinement that is accepted")
+FILE = re.compile(r"\S+/\S+\.(?:state|vtu)|fields/\S+\.vtu")
+#: What a message may advise: a pattern, the key, and values to try, of the present one or of the pattern's number.
+ADVICE = (
+    (r"numerics\.refinement = ([\d.e+-]+) resolves", "numerics.refinement", lambda now, told: [float(told)]),
+    (r"larger numerics\.refinement", "numerics.refinement", lambda now, told: [1.5 * now, 2.5 * now]),
+    (r"smaller numerics\.refinement", "numerics.refinement", lambda now, told: [now / 2]),
+    (r"shorter growth\.time_step", "growth.time_step", lambda now, told: [f"{now / 4!r} h", f"{now / 20!r} h"]),
+    (r"larger growth\.shear_modulus", "growth.shear_modulus", lambda now, told: [f"{10 * now!r} MPa"]),
+    (r"flow\.permeability[^;]*? ([\d.e+-]+ (?:m|um)\^2) or more", "flow.permeability", lambda now, told: [told]),
+    (r"aggregate\.smooth = false|smooth = false", "aggregate.smooth", lambda now, told: [False]),
+)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A run's files, None where there are none, and why it stopped, "" where it did not."""
+
+    files: run_files.Run | None
+    refusal: str
+
+
+def judge(seed: int) -> list[Check]:
+    """All checks of one member."""
+    tables = hostile.scene(seed)
+    with TemporaryDirectory() as room:
+        return list(_judged(tables, seed, Path(room)))
+
+
+def _judged(tables: dict, seed: int, room: Path) -> Iterator[Check]:
+    first = _outcome(tables, room / "fast")
+    yield from _checks(first, tables, room)
+    if first.refusal:
+        return
+    rows = (seed + seed // len(hostile.KINDS)) % 2 == 0 or hostile.kind(seed) in hostile.TRANSIENT
+    second = hostile.with_other_rows(tables, seed) if rows else _changed(tables, "numerics.preset", "accurate")
+    other = _outcome(second, room / "second")
+    yield from _checks(other, second, room)
+    if not other.refusal:
+        compare = run_files.same_rows if rows else run_files.close
+        yield from (Check(*finding) for finding in compare(first.files, other.files))
+
+
+def _outcome(tables: dict, folder: Path) -> Outcome:
+    """Run a scene; one that takes too long counts as refused. Any other exception is left to the caller."""
+    refusal = ""
+    try:
+        with limited(LIMIT):
+            run(load_scene(tables), folder)
+    except (SceneError, SimulationError, TooLong) as error:
+        refusal = str(error)
+    files = run_files.Run(folder, tables) if (folder / "timeseries.csv").is_file() else None
+    return Outcome(files, refusal)
+
+
+def _checks(outcome: Outcome, tables: dict, room: Path) -> Iterator[Check]:
+    """What the files show, and whether a refusal is one that helps."""
+    if outcome.files:
+        yield from (Check(*finding) for finding in run_files.findings(outcome.files))
+    if outcome.refusal:
+        yield from _refusal(outcome.refusal, room)
+        works = bool(NO_HELP.search(outcome.refusal)) or any(
+            _is_right(advised, room / "advised") for advised in _followed(tables, outcome.refusal))
+        yield at_most(f"refusals without advice that works: {outcome.refusal}", not works, 0, "a refusal helps")
+
+
+def _refusal(message: str, room: Path) -> Iterator[Check]:
+    yield at_most("lines of a refusal beyond one", message.count("\n"), 0, "one line")
+    named = [Path(name) for name in FILE.findall(message)]
+    folders = [Path("/"), *room.iterdir()]
+    missing = [path for path in named if not any((folder / path).exists() for folder in folders)]
+    yield at_most("files that a refusal names and that are not there", len(missing), 0, "a user looks there")
+
+
+def _followed(tables: dict, message: str) -> Iterator[dict]:
+    """The scene with each piece of advice, one after the other."""
+    for pattern, key, values in ADVICE:
+        found = re.search(pattern, message)
+        if found:
+            told = found.group(1) if found.groups() else ""
+            yield from (_changed(tables, key, value) for value in values(_present(tables, key), told))
+
+
+def _present(tables: dict, key: str) -> float:
+    """The number of a key in the scene as it is read."""
+    section, name = key.split(".")
+    return float(getattr(getattr(load_scene(tables), section), name) or 0.0)
+
+
+def _changed(tables: dict, key: str, value) -> dict:
+    section, name = key.split(".")
+    changed = deepcopy(tables)
+    changed.setdefault(section, {})[name] = value
+    return changed
+
+
+def _is_right(tables: dict, folder: Path) -> bool:
+    """Does a run complete, and are its files right?"""
+    outcome = _outcome(tables, folder / str(len(list(folder.glob("*")))))
+    return not outcome.refusal and all(finding.holds for finding in run_files.findings(outcome.files))
+
+
+def member(seed: int) -> Check:
+    """How many checks of a member fail, and which."""
+    failed = [f"{check.quantity} {check.value:.3g}" for check in judge(seed) if not check.holds]
+    told = f": {'; '.join(failed)[:600]}" if failed else ""
+    return at_most(f"{hostile.kind(seed)}{told}", len(failed), 0, "reference/run_files.py; a refusal's advice works")
+
+
+CLAIM = ("Hostile scenes drawn by seed: balances, bounds, stoichiometry, area against mass and flow in the files, the "
+         "same rows with other rows, fast against accurate, or a refusal with advice that works")
+MUTANTS = ("family-jump-late", "family-area-of-corners", "family-effluent-not-weighted", "family-half-saturation",
+           "family-rest-of-the-pore-forgotten", "family-rows-end-steps")
+
+if __name__ == "__main__":
+    for argument in sys.argv[1:]:
+        print(json.dumps(hostile.scene(int(argument))))
+        for check in judge(int(argument)):
+            if not check.holds:
+                print(f"  {check.quantity}: {check.value:.3g}, expected {check.expected} ({check.origin})")
+else:
+    for id, seeds in (("hard-family", QUICK), ("hard-family-rest", REST)):
+        case(id, kind="property", claim=CLAIM, norm="checks that fail, of each member", mutants=MUTANTS,
+             slow=seeds is REST, over={f"seed {seed}": (seed,) for seed in seeds}, ways="2 fast accurate",
+             because="the judge reads quadratic triangles; hard-01 to hard-22 run orders 1 and 3, paper and exact")(
+                 member)
