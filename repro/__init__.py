@@ -20,7 +20,7 @@ Where the paper is in the code, whose modules name the equations that they solve
     section                    equations    module
     Table 1, 2.1-2.3                        repro.scene: keys with unit, default, range and source
     3.2-3.4  finite elements                repro.fem.elements, .space, .assembly, .linear, .newton
-    3.1  mesh                               repro.fem.outline, .sizing, .mesher, .mesh
+    3.1  mesh                               repro.fem.outline, .sizing, .mesher, .mesh, .division
     3.5  transfer to a new mesh             repro.fem.transfer
     2.1, 3.2  flow             (1)-(6)      repro.model.flow, .brinkman
     2.2  kinetics              (7)-(10)     repro.model.kinetics
@@ -29,7 +29,7 @@ Where the paper is in the code, whose modules name the equations that they solve
     2.3, 3.4  growth           (14)-(27)    repro.model.growth
     3.4  biomass               (28)-(34)    repro.model.biomass
     2.3.2  fluid forces        (20), (22)   repro.model.traction
-    2.3.3  contact                          repro.model.contact
+    2.3.3  contact                          repro.model.contact, .contact_lines
          limits of the surface              repro.model.surface
     3.5  mesh motion           (35)         repro.model.mesh_motion
     3.1, 3.5  remeshing                     repro.model.remeshing

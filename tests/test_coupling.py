@@ -162,7 +162,7 @@ def test_the_fixed_point_is_kept_or_chosen_anew(order):
     beside = replace(now, fixed=np.arange(len(x)) == aside)
     for word, stays, goes in (("kept", aside, middle), ("rechosen", middle, aside)):
         said = replace(made, numerics=replace(made.numerics, fixed_point=word))
-        found, _, _ = contact.expand(said, beside, 1.2 * now.theta)
+        found = contact.expand(said, beside, 1.2 * now.theta).pore
         assert np.flatnonzero(found.fixed).tolist() == [stays]
         after = found.outline.points[:, 0]
         assert after[stays] == x[stays] and abs(after[goes] - x[goes]) > 0.05

@@ -90,7 +90,7 @@ def test_a_script_is_told_too():
 def compressed(theta):
     """The plug after uniform growth by theta, and what is solved there."""
     scene = plug()
-    now, _, _ = contact.expand(scene, pore.seeded(scene), np.full_like(pore.seeded(scene).theta, theta))
+    now = contact.expand(scene, pore.seeded(scene), np.full_like(pore.seeded(scene).theta, theta)).pore
     now = replace(now, active=theta * now.active, inert=theta * now.inert, time=1.0)
     return replace(now, concentrations=pore.solve(scene, now).concentrations)
 

@@ -138,7 +138,7 @@ def test_the_method_of_a_scene_reaches_every_system(which, monkeypatch):
     scene = scenes(*OTHER_PACKAGES)[which]
     wanted = Method("pardiso", "metis")
     now = pore.seeded(scene)
-    expanded = contact.expand(scene, now, 1.05 * now.theta)[0]
+    expanded = contact.expand(scene, now, 1.05 * now.theta).pore
     assert remeshing.followed(scene, now, expanded) is not None
     then = remeshing.remesh(scene, now, expanded, 0.0)[0]
     for one in (now, then):

@@ -129,7 +129,7 @@ def test_a_step_that_fails_is_halved_until_it_is_done(monkeypatch):
     made, tried = base(), []
     now = pore.seeded(made)
 
-    def attempt(_, __, ___, duration, most):
+    def attempt(_, __, ___, duration, *____):
         tried.append(duration)
         if duration > 0.02:
             raise GrowthError("too long")
@@ -141,11 +141,20 @@ def test_a_step_that_fails_is_halved_until_it_is_done(monkeypatch):
     assert taken.pore.time == 0.0125 and after.length == pytest.approx(pace.FASTER * 0.0125)
 
 
-def test_contact_is_met_within_half_a_percent_of_the_film():
-    """2 um: a step that leaves less than 1.99 um is too long, and an even thinning from 4 to 1 um is met in between."""
-    for gap, wanted in ((1.98, True), (1.989, True), (1.991, False)):
-        assert stepping._overshoots(Attempt(None, 0.0, (4.0, gap, 2.0))) is wanted
-    assert 1.99 < 4 - 3 * stepping._to_contact((4.0, 1.0, 2.0)) < 2
+def test_contact_is_met_within_a_thousandth_of_the_film(monkeypatch):
+    """2 um: an even thinning from 4 to 1 um is met in between, and a step is told to end there."""
+    assert 1.998 < 4 - 3 * stepping._to_contact(4.0, 1.0, 2.0) < 2
+    searches, attempt = [], midpoint.attempt
+
+    def seen(*arguments):
+        searches.extend(arguments[5:])
+        return attempt(*arguments)
+
+    monkeypatch.setattr(midpoint, "attempt", seen)
+    made = base('growth.end="1 h"')
+    for _ in simulation.simulate(made):
+        pass
+    assert {search.landing for search in searches} == {0.999}
 
 
 @pytest.mark.parametrize("error, told", [(GrowthError("no way"), "in growth: no way"),
@@ -154,9 +163,9 @@ def test_what_fails_at_the_shortest_step_stops_the_run(monkeypatch, error, told)
     """With the time of the step; not before growth.time_step / 1000 has failed."""
     tried, attempt = [], midpoint.attempt
 
-    def fails_later(made, now, solved, duration, most):
+    def fails_later(made, now, solved, duration, *others):
         if now.time == 0:
-            return attempt(made, now, solved, duration, most)
+            return attempt(made, now, solved, duration, *others)
         tried.append(duration)
         raise error
 

@@ -57,6 +57,10 @@ class Outline:
         """x of the largest y (um)."""
         return self._extremes[3]
 
+    def same_contact(self, other: Outline) -> bool:
+        """Do the nodes of both outlines, one by one, touch the same walls?"""
+        return np.array_equal(self.wall, other.wall)
+
     @cached_property
     def area(self) -> float:
         """Area inside (um2): that of the corners' polygon, and two thirds of chord times height of

@@ -26,6 +26,8 @@ from repro.march.loop import Ledger, Moment, PoreEnd, Step, pore_end
 from repro.march.updates import before, enlarged, grown, rates_of
 from repro.model import biomass, contact, pore, remeshing
 from repro.model.biomass import Rates
+from repro.model.contact import Expansion
+from repro.model.contact_lines import FirstContact, SearchOptions
 from repro.model.gear import Flows
 from repro.model.pore import Pore, Solved
 from repro.model.transport import Concentrations
@@ -35,46 +37,52 @@ from repro.scene import Scene, needed
 @dataclass(frozen=True, eq=False)
 class Attempt:
     """A step of the midpoint rule that may be taken: what it makes, None where the rates change
-    more than is allowed; their mean change over its first half, 1/h; and, where it first makes
-    contact with the opposite wall, the least distance (um) to that before and after the step, and
-    the film's least thickness."""
+    more than is allowed, or where it ends long after the first contact; the mean change of the
+    rates over its first half, 1/h; and, where it makes the first contact with the opposite wall,
+    the least distance (um) to that before and after the step."""
 
     step: Step | None
     change: float
-    gaps: tuple[float, float, float] | None
+    gaps: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class Halfway:
     """What half a step has found.
 
-    duration: h, of the whole step; first: rates at its start; shape: the aggregate half way, with
-    the fluid's nodes where they were; solved: flow and substrates there; rates: there, both at the
-    points of the mesh at the start; made: growth of active and of inert biomass over the whole
-    step, um2 mg/L.
+    duration: h, of the whole step; first: rates at its start; expansion: the aggregate half way;
+    solved: flow and substrates there; rates: there, at the points of the mesh at the start; made:
+    growth of active and of inert biomass over the whole step, um2 mg/L.
     """
 
     duration: float
     first: Rates
-    shape: Pore
+    expansion: Expansion
     solved: Solved
     rates: Rates
     made: tuple[float, float]
 
 
-def attempt(scene: Scene, now: Pore, solved: Solved, duration: float,
-            most: float = np.inf) -> Attempt:
+def attempt(scene: Scene, now: Pore, solved: Solved, duration: float, most: float = np.inf,
+            search: SearchOptions = contact.PATIENT) -> Attempt:
     """A step of ``duration`` (h), if the rates change by no more than ``most`` (1/h) over its first
     half. Raises StageError where it cannot be made."""
     first = rates_of(scene, now, solved.concentrations)
-    half = halfway(scene, now, solved, first, duration)
+    gap = scene.pore.width - now.boundary.thickness
+    try:
+        half = halfway(scene, now, solved, first, duration, search)
+    except FirstContact as early:
+        return Attempt(None, 0.0, (gap, gap - 2 * (gap - early.gap)))
     change = biomass.change(first, half.rates, now.space.reaction.dx)
     if change > most:
-        return Attempt(None, change, None)
+        return Attempt(None, change)
     after = _matched(now, grown(now, half.rates, duration), half.made)
     after = replace(after, time=before(now, duration))
-    theta = enlarged(scene, now, after)
-    expanded, iterations, gap = contact.expand(scene, after, theta, _ahead(now, half.shape, 1.0))
+    try:
+        expansion = _expanded(scene, now, after, half, 1.0, search)
+    except FirstContact as early:
+        return Attempt(None, 0.0, (gap, early.gap))
+    expanded = expansion.pore
     if leaves := pore_end(scene, expanded, 0.1):
         raise PoreEnd(f"{leaves} in the step from t = {now.time:g} h")
     refuse_fold(now, expanded)
@@ -84,8 +92,18 @@ def attempt(scene: Scene, now: Pore, solved: Solved, duration: float,
     ledger = Ledger(now.time, now.time + duration, *_flows(half.solved, duration), now.mass,
                     after.mass - now.mass, new.mass)
     inner = partial(within, scene, now, solved, half)
-    return Attempt(Step(new, (now, solved), ledger, remeshed, iterations, inner), change,
-                   first_contact(scene, now, expanded, gap))
+    step = Step(new, (now, solved), ledger, remeshed, expansion.iterations, inner)
+    makes_contact = expanded.contact and not now.contact
+    return Attempt(step, change, (gap, expansion.gap) if makes_contact else None)
+
+
+def _expanded(scene: Scene, now: Pore, after: Pore, half: Halfway, part: float,
+              search: SearchOptions) -> Expansion:
+    """The aggregate in a part of the step, searched for from where half the step leads: contact
+    lines go on at their speed."""
+    advances = {key: 2 * part * arcs for key, arcs in half.expansion.advances.items()}
+    return contact.expand(scene, after, enlarged(scene, now, after),
+                          _ahead(now, half.expansion, part), replace(search, advances=advances))
 
 
 def _flows(solved: Solved, duration: float) -> Flows:
@@ -96,26 +114,29 @@ def _flows(solved: Solved, duration: float) -> Flows:
     return Flows(supplied, out, consumed, stored=(0.0, 0.0))
 
 
-def halfway(scene: Scene, now: Pore, solved: Solved, first: Rates, duration: float) -> Halfway:
+def halfway(scene: Scene, now: Pore, solved: Solved, first: Rates, duration: float,
+            search: SearchOptions) -> Halfway:
     """Solve in the shape that half of ``duration`` (h) makes with the rates of its start. Where the
     moved mesh is not acceptable a new one is made: masses go to its points, and the rates back to
     those of the material."""
     ahead = replace(grown(now, first, duration / 2), time=now.time + duration / 2)
-    shape, _, _ = contact.expand(scene, ahead, enlarged(scene, now, ahead), _scaled(now, ahead))
+    expansion = contact.expand(scene, ahead, enlarged(scene, now, ahead), _scaled(now, ahead),
+                               search)
+    shape = expansion.pore
     mesh = remeshing.followed(scene, now, shape)
     if mesh is not None:
         there = replace(now, space=Space(mesh, now.space.order), time=shape.time)
     else:
-        there, (active, inert) = remeshing.remesh(scene, now, shape, _speed(solved),
-                                                  (now.active, now.inert))
+        amounts = tuple(expansion.amounts(amount, now) for amount in (now.active, now.inert))
+        there, (active, inert) = remeshing.remesh(scene, now, shape, _speed(solved), amounts)
         there = replace(there, active=active, inert=inert)
     found = pore.solve(scene, there, duration)
     rates = rates_of(scene, there, found.concentrations)
     after = grown(there, rates, duration)
     if mesh is None:
-        rates = _carried_back(there, shape, rates)
+        rates = _carried_back(there, now, expansion, rates)
     made = float((after.active - there.active).sum()), float((after.inert - there.inert).sum())
-    return Halfway(duration, first, shape, found, rates, made)
+    return Halfway(duration, first, expansion, found, rates, made)
 
 
 def within(scene: Scene, now: Pore, solved: Solved, half: Halfway, time: float) -> Moment:
@@ -125,8 +146,7 @@ def within(scene: Scene, now: Pore, solved: Solved, half: Halfway, time: float) 
     mean = Rates((1 - part) * half.first.growth + part * half.rates.growth,
                  (1 - part) * half.first.remains + part * half.rates.remains)
     after = replace(grown(now, mean, part * half.duration), time=time)
-    expanded, _, _ = contact.expand(scene, after, enlarged(scene, now, after),
-                                    _ahead(now, half.shape, part))
+    expanded = _expanded(scene, now, after, half, part, contact.PATIENT).pore
     expanded = replace(expanded, concentrations=_extrapolated(solved, half.solved, part))
     there, _ = remeshing.new_mesh(scene, now, expanded, _speed(solved))
     return Moment(*remeshing.resolved(scene, there))
@@ -137,16 +157,16 @@ def _speed(solved: Solved) -> float:
     return solved.flow.mean_velocity if solved.flow else 0.0
 
 
-def _carried_back(there: Pore, shape: Pore, rates: Rates) -> Rates:
+def _carried_back(there: Pore, now: Pore, half: Expansion, rates: Rates) -> Rates:
     """Rates at the points of a new mesh, interpolated to those of the material's mesh before."""
     mesh = there.mesh
-    body = shape.mesh.body
+    body = now.mesh.body
     nodal = np.column_stack([biomass.at_nodes(there.space, field)
                              for field in (rates.growth, rates.remains)])
-    found = np.zeros((len(shape.mesh.points), 2))
-    found[body] = transfer.interpolate(mesh.points, mesh.cells[mesh.biomass], nodal,
-                                       shape.mesh.points[body])
-    growth, remains = (biomass.at_points(shape.space, column) for column in found.T)
+    carried = np.zeros((len(now.mesh.points), 2))
+    carried[body] = transfer.interpolate(mesh.points, mesh.cells[mesh.biomass], nodal,
+                                         half.position[body])
+    growth, remains = (biomass.at_points(now.space, column) for column in carried.T)
     return Rates(growth, remains)
 
 
@@ -183,13 +203,12 @@ def _scaled(now: Pore, after: Pore) -> Pore:
     return _placed(after, fixed + (now.mesh.points - fixed) * np.sqrt(after.mass / now.mass))
 
 
-def _ahead(now: Pore, half: Pore, part: float) -> Pore:
-    """A first guess of the shape in a part of the step: as half the step has changed it, and so on,
-    with contact as it is."""
-    if (half.wall != now.wall).any():
-        return now
-    push = now.pressure + 2 * part * (half.pressure - now.pressure)
-    points = now.mesh.points + 2 * part * (half.mesh.points - now.mesh.points)
+def _ahead(now: Pore, half: Expansion, part: float) -> Pore:
+    """A first guess of the shape in a part of the step: as half the step has changed it, and so
+    on."""
+    corners = now.mesh.corners
+    push = now.pressure + 2 * part * (half.pore.pressure[:corners] - now.pressure)
+    points = now.mesh.points + 2 * part * (half.position - now.mesh.points)
     return _placed(replace(now, pressure=push), points)
 
 
@@ -201,13 +220,3 @@ def _placed(after: Pore, points: np.ndarray) -> Pore:
     moved = after.moved(guess)
     biomass_cells = np.flatnonzero(moved.mesh.biomass)
     return after if moved.mesh.turned_over(biomass_cells).any() else moved
-
-
-def first_contact(scene: Scene, now: Pore, expanded: Pore,
-                  gap: float) -> tuple[float, float, float] | None:
-    """Least distance to the opposite wall before and after a step that makes contact, and the
-    film's least thickness; None where contact is not made, or was there before."""
-    if now.contact or not expanded.contact:
-        return None
-    film = needed(scene.growth, "[growth]").minimum_film
-    return scene.pore.width - now.boundary.thickness, gap, film

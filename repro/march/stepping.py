@@ -20,6 +20,7 @@ from repro.march import midpoint
 from repro.march.loop import SAME_TIME, Scheme, Step, laid_out
 from repro.march.pace import EXCESS, STRETCH, Pace, allowed, fitted, following
 from repro.model import remeshing
+from repro.model.contact_lines import SearchOptions
 from repro.model.pore import Pore, Solved
 from repro.scene import Scene, needed
 
@@ -31,7 +32,7 @@ SHORTEST = 1e-3
 #: Rows after t = 0 where there are no ``output.times``, at least.
 LEAST = 24
 #: Contact is met when the film is no thinner than this part of what it may be.
-LANDED = 0.995
+LANDED = 0.999
 
 
 def rows(scene: Scene) -> tuple[float, ...]:
@@ -86,9 +87,11 @@ def _accepted(scene: Scene, now: Pore, solved: Solved,
     while True:
         most = np.inf if duration <= shortest else EXCESS * tolerance / duration
         try:
-            found = midpoint.attempt(scene, now, solved, duration, most)
+            cut = duration > shortest
+            search = SearchOptions(landing=LANDED if cut else 0.0, patient=not cut)
+            found = midpoint.attempt(scene, now, solved, duration, most, search)
             estimate = found.change * duration
-            if found.step and (duration <= shortest or not _overshoots(found)):
+            if found.step:
                 end = _end_of(now, duration, corner)
                 taken, after = _solved(scene, _ending_at(found.step, end))
                 if found.gaps is not None:  # contact alone made the step short
@@ -96,8 +99,9 @@ def _accepted(scene: Scene, now: Pore, solved: Solved,
                 tried = replace(asked, length=length)
                 pace = following(tried, duration, estimate, tolerance)
                 return taken, after, replace(pace, length=max(pace.length, shortest))
-            if found.step and found.gaps:
-                length = duration * _to_contact(found.gaps)
+            if found.gaps:
+                film = needed(scene.growth, "[growth]").minimum_film
+                length = duration * _to_contact(*found.gaps, film)
             else:
                 length = max(duration * allowed(estimate, tolerance), shortest)
         except Unresolved as error:
@@ -133,14 +137,9 @@ def _solved(scene: Scene, taken: Step) -> tuple[Step, Solved]:
     return taken, solved
 
 
-def _overshoots(found: midpoint.Attempt) -> bool:
-    """Does the step end with a film much thinner than it may be, when contact is first made?"""
-    return found.gaps is not None and found.gaps[1] < LANDED * found.gaps[2]
-
-
-def _to_contact(gaps: tuple[float, float, float]) -> float:
-    """The part of the step after which the film, thinning at a constant rate, is just too thin."""
-    before, after, film = gaps
+def _to_contact(before: float, after: float, film: float) -> float:
+    """The part of a step after which the gap (um), from before to after it, is just under that of
+    the film."""
     aim = 0.5 * (1 + LANDED) * film
     part = (before - aim) / (before - after) if after < before else 0.0
     return min(0.95, max(0.02, part))

@@ -96,7 +96,8 @@ def step(scene: Scene, now: Pore, solved: Solved, duration: float) -> Step:
     solved = _midway(scene, now, solved, duration)
     grown, end, flows = make_biomass(scene, now, solved, duration)
     grown = replace(grown, time=before(now, duration))
-    expanded, iterations, _ = contact.expand(scene, grown, enlarged(scene, now, grown))
+    expansion = contact.expand(scene, grown, enlarged(scene, now, grown))
+    expanded = expansion.pore
     if leaves := pore_end(scene, expanded, 0.1):
         raise PoreEnd(f"{leaves} in the step from t = {now.time:g} h")
     refuse_fold(now, expanded)
@@ -105,7 +106,7 @@ def step(scene: Scene, now: Pore, solved: Solved, duration: float) -> Step:
     ledger = Ledger(now.time, now.time + duration, *flows, now.mass, grown.mass - now.mass,
                     after.mass)
     last = replace(grown, time=now.time + duration), replace(solved, concentrations=end)
-    return Step(after, last, ledger, remeshed, iterations)
+    return Step(after, last, ledger, remeshed, expansion.iterations)
 
 
 def before(now: Pore, duration: float) -> float:

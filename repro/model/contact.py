@@ -1,50 +1,123 @@
-"""Contact with the walls, closing films, and the grown aggregate's new shape (2.3.3, 3.4)."""
+"""Contact with the walls, closing films, and the grown aggregate's new shape (2.3.3, 3.4).
+
+A film of fluid closes where it is thinner than the least film, a wedge beside a contact surface
+where its angle is under the least angle. Both say: at the distance d from the contact line the gap
+to the wall is at least min(film, tan(angle) d). Straight edges, the paper's, test this at their
+nodes, which join the wall one by one. On arcs it holds everywhere on the free surface, and contact
+lines may lie anywhere on it: :mod:`repro.model.contact_lines` searches for them.
+"""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from repro.errors import GrowthError
+from repro.errors import GrowthError, LinearError
+from repro.fem.division import Division
 from repro.fem.outline import BOTTOM, FREE, TOP, Outline
-from repro.model import growth, traction
-from repro.model.pore import Pore
+from repro.fem.space import Space
+from repro.model import contact_lines, growth, traction
+from repro.model.contact_lines import (
+    Clearance,
+    Contact,
+    FirstContact,
+    Line,
+    SearchOptions,
+    contact_with,
+)
+from repro.model.pore import Pore, material
 from repro.scene import Growth, Scene, needed
 
 #: Rounds in which closing films may change the contact surfaces within one step.
 CONTACT_ROUNDS = 60
+#: Trials in which contact lines that went too far go back.
+RETREATS = 6
 #: Rounds of shape and fluid forces.
 FORCE_ROUNDS = 12
 #: The largest move of a node in the last of them over the aggregate's thickness.
 FORCE_REST = 1e-8
+PATIENT = SearchOptions()
 
 
-def expand(scene: Scene, grown: Pore, theta: np.ndarray,
-           guess: Pore | None = None) -> tuple[Pore, int, float]:
-    """The aggregate in its new shape under theta (t, q); Newton's iterations; and the least
-    distance (um) to the opposite wall before films closed.
+@dataclass(frozen=True, eq=False)
+class Expansion:
+    """The aggregate in its new shape.
 
-    guess: a pore with the shape and pressure from which the search starts, those of ``grown`` by
-    default. With fluid forces, shape and flow are sought in turn until both agree. The fluid's
-    nodes stay where they were. Raises GrowthError where no equilibrium is found, contact does not
-    rest, or shape and flow do not agree.
+    pore: with the fluid's nodes where they were, on the divided mesh where a contact line lies
+    within an arc; iterations: of Newton's method; gap: um, the least distance to the opposite wall
+    before films closed; division: of the mesh of the grown pore, None where it stays as it is;
+    advances: {(wall, direction): um} by which contact lines have advanced
+    along the outline of the grown pore.
+    """
+
+    pore: Pore
+    iterations: int
+    gap: float
+    division: Division | None = None
+    advances: Mapping[tuple[int, int], float] = field(default_factory=dict)
+
+    @property
+    def position(self) -> np.ndarray:
+        """(N, 2) um, places of the nodes that the grown pore has."""
+        points = self.pore.mesh.points
+        return points if self.division is None else self.division.restricted(points)
+
+    def amounts(self, amounts: np.ndarray, grown: Pore) -> np.ndarray:
+        """Amounts (r, q) at the points of the grown pore's aggregate, at those of the new shape."""
+        if self.division is None:
+            return amounts
+        return self.division.amounts(amounts, grown.space.table)
+
+
+def expand(scene: Scene, grown: Pore, theta: np.ndarray, guess: Pore | None = None,
+           search: SearchOptions = PATIENT) -> Expansion:
+    """The aggregate in its new shape under theta (t, q).
+
+    Parameters
+    ----------
+    scene : Scene
+    grown : Pore
+        Biomass as it has grown, in the old shape.
+    theta : (t, q) float
+        Expansion since t = 0.
+    guess : Pore, optional
+        A pore on the same mesh with the shape and pressure from which the search starts; ``grown``
+        by default.
+    search : SearchOptions
+        How contact lines are searched for.
+
+    Raises
+    ------
+    FirstContact
+        If the film to the opposite wall becomes thinner than ``search.landing`` times the least
+        film while there is no contact.
+    GrowthError
+        If there is no equilibrium, if contact does not come to rest, or if shape and flow do not
+        agree.
+
+    Notes
+    -----
+    With fluid forces, shape and flow are sought in turn until both agree.
     """
     start = grown if guess is None else guess
     if needed(scene.growth, "[growth]").fluid_forces == "neglected":
-        return _at_rest(scene, grown, theta, start, None)
+        return _at_rest(scene, grown, theta, start, None, search)
     around = traction.surroundings(scene, grown, grown)
-    last = grown
+    last = Expansion(grown, 0, 0.0)
     iterations = 0
-    for count in range(FORCE_ROUNDS):
-        forces = traction.forces(scene, around, last)
-        found, used, gap = _at_rest(scene, grown, theta, start, forces)
-        moved = np.abs(found.mesh.points - last.mesh.points).max()
-        iterations += used
-        if moved <= FORCE_REST * found.boundary.thickness:
-            return found, iterations, gap
-        if count == 0 or (found.wall != last.wall).any():
-            around = traction.surroundings(scene, grown, found)
+    for _ in range(FORCE_ROUNDS):
+        forces = traction.forces(scene, around, last.pore)
+        if last.division is not None:
+            forces = _gathered(last, forces)
+        found = _at_rest(scene, grown, theta, start, forces, search)
+        iterations += found.iterations
+        moved = np.abs(found.position - last.position).max()
+        if moved <= FORCE_REST * found.pore.boundary.thickness:
+            return replace(found, iterations=iterations)
+        if last.pore is grown or not found.pore.boundary.same_contact(last.pore.boundary):
+            around = traction.surroundings(scene, grown, found.pore)
         last = found
     raise GrowthError(f"the fluid's forces and the shape do not agree after {FORCE_ROUNDS} rounds, "
                       f"a node still moves by {moved:.2g} um: the aggregate is too soft for this "
@@ -52,38 +125,229 @@ def expand(scene: Scene, grown: Pore, theta: np.ndarray,
                       'growth.fluid_forces = "neglected"')
 
 
-def _at_rest(scene: Scene, grown: Pore, theta: np.ndarray, start: Pore,
-             forces: np.ndarray | None) -> tuple[Pore, int, float]:
-    """The new shape under nodal forces (n, 2) um, over mu_L, that stay as they are (None: none).
+def _gathered(shape: Expansion, loads: np.ndarray) -> np.ndarray:
+    """(n, 2) loads on the nodes of the grown pore's aggregate, from those on a divided one's."""
+    division = needed(shape.division, "a division")
+    everywhere = np.zeros_like(shape.pore.mesh.points)
+    everywhere[shape.pore.mesh.body] = loads
+    return division.gathered_loads(everywhere)[division.parent.body]
 
-    After each equilibrium, films and wedges that are too thin close, and the equilibrium is sought
-    again until none is.
-    """
+
+def _at_rest(scene: Scene, grown: Pore, theta: np.ndarray, start: Pore, forces: np.ndarray | None,
+             search: SearchOptions) -> Expansion:
+    """The new shape under nodal forces (n, 2) um, over mu_L, that stay as they are (None: none)."""
+    stressed = needed(scene.growth, "[growth]").new_biomass == "stressed"
+    last = None if stressed else grown.mesh.points[grown.mesh.body]
+    grown = replace(grown, theta=theta, fixed=_fixed_points(scene, grown), last=last)
+    if grown.boundary.geometry == 1:
+        return _close_by_nodes(scene, grown, start, forces)
+    return _close_by_lines(scene, grown, start, forces, search)
+
+
+def _close_by_nodes(scene: Scene, grown: Pore, start: Pore,
+                    forces: np.ndarray | None) -> Expansion:
+    """After each equilibrium, nodes whose film or wedge is too thin join the wall, and the
+    equilibrium is sought again until none is."""
     keys = needed(scene.growth, "[growth]")
     width = scene.pore.width
-    nodes = grown.mesh.body
-    inside = grown.mesh.topology.body_corners
-    body, target_J = _strained_from(keys, grown, theta)
-    last = None if keys.new_biomass == "stressed" else body.reference
-    found = replace(grown, space=start.space, pressure=start.pressure, theta=theta,
-                    fixed=_fixed_points(scene, grown), last=last)
+    shape = replace(grown, space=start.space, pressure=start.pressure)
     iterations = 0
     gaps: list[float] = []
     for _ in range(CONTACT_ROUNDS):
-        held, target = _constraints(found, width)
-        rest = growth.equilibrium(body, target_J, found.mesh.points[nodes], found.pressure[inside],
-                                  held, target, forces=forces,
-                                  last=None if gaps else grown.mesh.points[nodes],
-                                  reused=scene.numerics.jacobian == "reused")
-        found = _placed(grown, found, rest)
-        iterations += rest.iterations
-        gaps.append(width - found.boundary.thickness)
-        joins = closing(found.boundary, width, keys.minimum_film, keys.minimum_contact_angle)
+        last = None if gaps else grown.mesh.points[grown.mesh.body]
+        shape, used = _equilibrium(scene, grown, shape, forces, last=last)
+        iterations += used
+        gaps.append(width - shape.boundary.thickness)
+        joins = closing_nodes(shape.boundary, width, keys.minimum_film, keys.minimum_contact_angle)
         if not joins.any():
-            return replace(found, fixed=_with_new_surface(found.boundary)), iterations, gaps[0]
-        found = replace(found, wall=np.where(joins != FREE, joins, found.wall))
+            return Expansion(replace(shape, fixed=_with_new_surface(shape.boundary)), iterations,
+                             gaps[0])
+        shape = replace(shape, wall=np.where(joins != FREE, joins, shape.wall))
     raise GrowthError(f"the contact surfaces still change after {CONTACT_ROUNDS} rounds; "
                       "try a shorter growth.time_step")
+
+
+def _equilibrium(scene: Scene, grown: Pore, start: Pore, forces: np.ndarray | None, *,
+                 last: np.ndarray | None = None, patient: bool = True) -> tuple[Pore, int]:
+    """The equilibrium of a grown pore under its theta with the contact of ``start``, searched for
+    from the shape and pressure of ``start``; and Newton's iterations."""
+    body, target_J = _strained_from(needed(scene.growth, "[growth]"), grown, grown.theta)
+    nodes = grown.mesh.body
+    inside = grown.mesh.topology.body_corners
+    locked, target = _constraints(start, scene.pore.width)
+    rest = growth.equilibrium(body, target_J, start.mesh.points[nodes], start.pressure[inside],
+                              locked, target, forces=forces, last=last, patient=patient,
+                              reused=scene.numerics.jacobian == "reused")
+    return _placed(grown, start, rest), rest.iterations
+
+
+def _close_by_lines(scene: Scene, grown: Pore, start: Pore, forces: np.ndarray | None,
+                    search: SearchOptions) -> Expansion:
+    """The shape with the smallest contact surfaces that leave no film and no wedge too thin."""
+    keys = needed(scene.growth, "[growth]")
+    rule = Clearance(scene.pore.width, keys.minimum_film, keys.minimum_contact_angle)
+    trials = _Trials(scene, grown, start, forces, search.patient)
+    lines = contact_lines.lines_of(grown.boundary)
+    for line in lines:
+        length = search.advances.get(line.key, 0.0)
+        line.advance = contact_lines.to_arcs(grown.boundary, line, length)
+    shape = trials.solve(grown.wall, lines)
+    gap = rule.width - shape.pore.boundary.thickness
+    wall = grown.wall
+    if not grown.contact and gap < rule.film:
+        if gap < search.landing * rule.film:
+            raise FirstContact(gap)
+        wall = _first_contact(shape.pore.boundary)
+        lines = contact_lines.lines_of(replace(grown.boundary, wall=wall))
+        shape = trials.solve(wall, lines)
+    for _ in range(CONTACT_ROUNDS):
+        for line in lines:
+            line.record(*_clearance(rule, shape.pore.boundary, line))
+        if all(line.settled for line in lines):
+            rest = replace(shape.pore, fixed=_with_new_surface(shape.pore.boundary))
+            return replace(shape, pore=rest, iterations=trials.iterations, gap=gap)
+        for line in lines:
+            if not line.settled:
+                line.step()
+        shape = trials.solve(wall, lines)
+    raise GrowthError(f"the contact lines still move after {CONTACT_ROUNDS} trials; "
+                      "try a shorter growth.time_step")
+
+
+def _first_contact(outline: Outline) -> np.ndarray:
+    """Walls (M,) where the arc with the highest place has joined the upper one."""
+    highest = int(np.argmax(outline.arcs(outline.points)[:, :, 1].max(axis=1)))
+    wall = outline.wall.copy()
+    wall[(2 * highest + np.arange(3)) % len(wall)] = TOP
+    return wall
+
+
+def _clearance(rule: Clearance, outline: Outline, line: Line) -> tuple[float, float]:
+    """Of a line on the outline of a trial."""
+    ends = contact_lines.contact_lines(outline, line.wall)
+    node = next(node for node, direction in ends if direction == line.direction)
+    return rule.beyond(outline, node, line.direction)
+
+
+class _Trials:
+    """Equilibria of one grown pore with several places of its contact lines.
+
+    Each starts from the last one, extrapolated in the advance of the line that moves most.
+    """
+
+    def __init__(self, scene: Scene, grown: Pore, start: Pore, forces: np.ndarray | None,
+                 patient: bool):
+        self._scene = scene
+        self._grown = grown
+        self._forces = forces
+        self._patient = patient
+        self._shapes = [(np.zeros(0), start.mesh.points, start.pressure)]
+        self._divided: Division | None = None
+        self._shape: growth.Shape | None = None
+        self.iterations = 0
+
+    def solve(self, wall: np.ndarray, lines: Sequence[Line]) -> Expansion:
+        """The equilibrium with walls (M,) of the grown pore's outline and advances of the lines.
+
+        Where it fails, lines go half of the way back to a place that was too short. Raises
+        GrowthError where that does not help.
+        """
+        for _ in range(RETREATS):
+            try:
+                shape = self._solve(contact_with(wall, lines),
+                                    np.array([line.advance for line in lines]))
+                outline = replace(self._grown.boundary, wall=wall)
+                advances = {line.key: contact_lines.to_length(outline, line) for line in lines}
+                return replace(shape, advances=advances)
+            except (GrowthError, LinearError) as error:
+                failure = error
+                moving = [line for line in lines if line.retreat()]
+                if not moving:
+                    break
+        raise failure
+
+    def _division(self, contact: Contact) -> Division:
+        """Of the contact's arcs; the connections of the last one are kept where they are the
+        same."""
+        if self._divided is None or not np.array_equal(self._divided.arcs, contact.arcs):
+            self._divided = Division(self._grown.mesh, contact.arcs, contact.t)
+            self._shape = None
+        else:
+            self._divided = self._divided.at(contact.t)
+        return self._divided
+
+    def _guess(self, advances: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Places (N, 2) um and pressure from which a trial starts."""
+        last, points, pressure = self._shapes[-1]
+        if len(self._shapes) < 2 or len(self._shapes[0][0]) != len(advances):
+            return points, pressure
+        before, points_before, pressure_before = self._shapes[0]
+        line = np.argmax(np.abs(last - before))
+        if last[line] == before[line]:
+            return points, pressure
+        part = (advances[line] - last[line]) / (last[line] - before[line])
+        part = min(max(part, -1.0), 1.0)
+        ahead = points + part * (points - points_before)
+        if self._grown.body.strained(ahead[self._grown.mesh.body]).J.min() <= 0:
+            return points, pressure
+        return ahead, pressure + part * (pressure - pressure_before)
+
+    def _solve(self, contact: Contact, advances: np.ndarray) -> Expansion:
+        grown = self._grown
+        points, pressure = self._guess(advances)
+        forces = self._forces
+        division = None
+        locked = replace(grown, wall=contact.wall)
+        if len(contact.arcs):
+            division = self._division(contact)
+            locked = divided(grown, division, contact, self._shape)
+            self._shape = locked.body.shape
+            points = division.nodal(points)
+            pressure = division.at_corners(pressure)
+            forces = None if forces is None else _divided_loads(division, forces)
+        start = replace(locked.moved(points), pressure=pressure)
+        shape, iterations = _equilibrium(self._scene, locked, start, forces,
+                                         patient=self._patient)
+        self.iterations += iterations
+        expansion = Expansion(shape, iterations, 0.0, division)
+        at_rest = advances, expansion.position, shape.pressure[: grown.mesh.corners]
+        self._shapes = [*self._shapes[-1:], at_rest]
+        return expansion
+
+
+def divided(grown: Pore, division: Division, contact: Contact,
+            shape: growth.Shape | None = None) -> Pore:
+    """The pore on the divided mesh, with the walls of a contact; shape: the aggregate's connections
+    there, if they are known."""
+    space = Space(division.mesh, grown.space.order)
+    table = grown.space.table
+    reference = division.nodal(grown.origin)[space.mesh.body]
+    body = growth.Body(shape, reference) if shape else material(space, reference)
+    last = grown.last
+    if last is not None:
+        last = division.nodal(_everywhere(division, last))[space.mesh.body]
+    expanded = division.amounts(grown.theta * grown.body.at.dx, table)
+    at_line = np.where(contact.first != FREE, contact.first, contact.second)
+    wall = contact.wall.copy()
+    wall[2 * contact.arcs + 1] = contact.first
+    none = np.zeros(len(contact.arcs), bool)
+    return replace(grown, space=space, wall=division.along_loop(wall, at_line, contact.second),
+                   fixed=division.along_loop(grown.fixed, none, none), body=body,
+                   active=division.amounts(grown.active, table),
+                   inert=division.amounts(grown.inert, table), theta=expanded / body.at.dx,
+                   pressure=division.at_corners(grown.pressure), last=last)
+
+
+def _everywhere(division: Division, values: np.ndarray) -> np.ndarray:
+    """(N, 2) of the parent's nodes, from values (n, 2) on its aggregate's; zero in the fluid."""
+    everywhere = np.zeros_like(division.parent.points)
+    everywhere[division.parent.body] = values
+    return everywhere
+
+
+def _divided_loads(division: Division, loads: np.ndarray) -> np.ndarray:
+    """Loads on the nodes of the divided aggregate, from those (n, 2) on the parent's."""
+    return division.divided_loads(_everywhere(division, loads))[division.topology.body]
 
 
 def _strained_from(keys: Growth, grown: Pore, theta: np.ndarray) -> tuple[growth.Body, np.ndarray]:
@@ -97,13 +361,13 @@ def _strained_from(keys: Growth, grown: Pore, theta: np.ndarray) -> tuple[growth
     return present, theta / grown.body.strained(position).J
 
 
-def _placed(grown: Pore, found: Pore, rest: growth.Equilibrium) -> Pore:
-    """The pore with its aggregate at rest, the fluid's nodes where they were."""
+def _placed(grown: Pore, start: Pore, rest: growth.Equilibrium) -> Pore:
+    """The pore with its aggregate at rest, the fluid's nodes where they were in the grown pore."""
     points = grown.mesh.points.copy()
     points[grown.mesh.body] = rest.position
     pressure = grown.pressure.copy()
     pressure[grown.mesh.topology.body_corners] = rest.pressure
-    return replace(found.moved(points), pressure=pressure)
+    return replace(start.moved(points), pressure=pressure)
 
 
 def _constraints(now: Pore, width: float) -> tuple[np.ndarray, np.ndarray]:
@@ -156,54 +420,6 @@ def middle_of(outline: Outline, wall: int) -> np.ndarray:
     return chosen
 
 
-def closing(outline: Outline, width: float, film: float, angle: float) -> np.ndarray:
-    """(M,) wall that each node must join next, FREE where none (2.3.3): with straight edges all
-    nodes that are too near, with arcs the next one beside each contact line.
-
-    Contact of arcs with the opposite wall begins over the film's least thickness to both sides of
-    the highest place, as the paper's nodes make it: a single point could not hold the aggregate,
-    whatever is enforced there. From then on each contact line that must advance does so by one arc:
-    what joins pulls its neighbours along, and where it ends must not depend on how many are taken
-    at once. A middle joins with both corners of its arc, never alone.
-    """
-    joins = closing_nodes(outline, width, film, angle)
-    if outline.geometry == 1 or (joins == FREE).all():
-        return joins
-    if (outline.wall == TOP).any() or not (joins == TOP).any():
-        joins = _next_arcs(outline, joins)
-    else:
-        x, y = outline.points.T
-        joins[(np.abs(x - outline.highest) <= film) & (width - y < 2 * film)] = TOP
-    return _with_middles(outline, joins, width)
-
-
-def _next_arcs(outline: Outline, joins: np.ndarray) -> np.ndarray:
-    """Of the nodes that must join, the first arc beside each contact line."""
-    first = np.full(len(joins), FREE)
-    for wall in (BOTTOM, TOP):
-        for line, step in contact_lines(outline, wall):
-            beside = (line + step * np.arange(1, 3)) % len(joins)
-            if joins[beside[0]] == wall:
-                first[beside] = np.where(outline.wall[beside] == FREE, wall, FREE)
-    return first
-
-
-def _with_middles(outline: Outline, joins: np.ndarray, width: float) -> np.ndarray:
-    """Middles join where both corners of their arc are on the wall; a middle that is too near joins
-    with its nearer corner."""
-    gap = np.minimum(outline.points[:, 1], width - outline.points[:, 1])
-    for middle in np.flatnonzero(joins[1::2] != FREE) * 2 + 1:
-        ends = np.array([middle - 1, (middle + 1) % len(joins)])
-        ends = ends[outline.wall[ends] == FREE]
-        if len(ends):
-            joins[ends[np.argmin(gap[ends])]] = joins[middle]
-    joins[1::2] = FREE
-    wall = np.where(joins != FREE, joins, outline.wall)
-    both = wall[::2] == np.roll(wall, -2)[::2]
-    joins[1::2] = np.where(both & (outline.wall[1::2] == FREE), wall[::2], FREE)
-    return joins
-
-
 def closing_nodes(outline: Outline, width: float, film: float, angle: float) -> np.ndarray:
     """(M,) wall that each node must join next: FREE where none (2.3.3).
 
@@ -214,24 +430,12 @@ def closing_nodes(outline: Outline, width: float, film: float, angle: float) -> 
     """
     joins = np.full(len(outline.points), FREE)
     for wall, gap in ((BOTTOM, outline.points[:, 1]), (TOP, width - outline.points[:, 1])):
-        lines = contact_lines(outline, wall)
+        lines = contact_lines.contact_lines(outline, wall)
         if wall == TOP and not lines:
             joins[(outline.wall == FREE) & (gap < film)] = TOP
         for line, step in lines:
             joins[_closing_run(outline, gap, line, step, film, np.tan(angle))] = wall
     return joins
-
-
-def contact_lines(outline: Outline, wall: int) -> list[tuple[int, int]]:
-    """(node, direction) of each end of a contact surface: the next node in that direction is off
-    the wall."""
-    on = outline.wall == wall
-    if not on.any():
-        return []
-    last = on & ~np.append(on[1:], on[0])
-    first = on & ~np.append(on[-1], on[:-1])
-    forward = [(int(i), 1) for i in np.flatnonzero(last)]
-    return forward + [(int(i), -1) for i in np.flatnonzero(first)]
 
 
 def _closing_run(outline: Outline, gap: np.ndarray, line: int, step: int, film: float,

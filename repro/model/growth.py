@@ -51,14 +51,17 @@ ROUND_OFF = 1e-8
 MOST_ITERATIONS = 25
 #: Halvings in a line search.
 HALVINGS = 8
-#: Sub-steps of a continuation.
-CONTINUATION = (1, 8, 64)
+#: Sub-steps of a continuation: where a step may be cut instead, none.
+CONTINUATION = {True: (1, 8, 64), False: (1,)}
 #: gamma: the energy's curvature in J is -2/9 J^(-5/3) and less, so that one makes it convex with
 #: room to spare.
 GAMMA = 1.0
 #: On curved triangles theta goes to its target in parts of at most this factor: a longer step of
 #: Newton's method may end in another equilibrium, with a wrinkled surface.
 FACTOR = 1.2
+#: This part of the aggregate's points asks for no more parts than are made: beside a contact line
+#: J may be far from theta in a few.
+MOST_POINTS = 0.95
 
 
 @dataclass(frozen=True, eq=False)
@@ -388,7 +391,8 @@ class System:
 @timed("growth")
 def equilibrium(body: Body, theta: np.ndarray, position: np.ndarray, pressure: np.ndarray,
                 held: np.ndarray, prescribed: np.ndarray, *, last: np.ndarray | None = None,
-                forces: np.ndarray | None = None, reused: bool = False) -> Equilibrium:
+                forces: np.ndarray | None = None, reused: bool = False,
+                patient: bool = True) -> Equilibrium:
     """Equilibrium under the expansion theta (t, q) since the reference, from a start.
 
     position: (n, 2) um, where to start, with det F > 0; pressure: (corners,) P / mu_L there; held:
@@ -410,18 +414,20 @@ def equilibrium(body: Body, theta: np.ndarray, position: np.ndarray, pressure: n
         expansion = body.strained(known).J[:, 0]
         stabilising = gradient_stabilisation(known, body.shape.triangles, expansion)
     else:
-        parts = max(1, int(np.ceil(np.abs(np.log(theta / start)).max() / np.log(FACTOR))))
+        apart = np.quantile(np.abs(np.log(theta / start)), MOST_POINTS)
+        parts = max(1, int(np.ceil(apart / np.log(FACTOR))))
     system = System(body, held, stabilising=stabilising, forces=forces)
     first = Equilibrium(position, pressure, 0)
-    return reach(system, start, theta, first, prescribed, parts, reused)
+    return reach(system, start, theta, first, prescribed, parts, reused, patient)
 
 
 def reach(system: System, start: np.ndarray, theta: np.ndarray, first: Equilibrium,
-          prescribed: np.ndarray, parts: int = 1, reused: bool = False) -> Equilibrium:
+          prescribed: np.ndarray, parts: int = 1, reused: bool = False,
+          patient: bool = True) -> Equilibrium:
     """Equilibrium of a system under theta, from J = ``start`` (shaped alike), in ``parts`` or,
     where that fails, more; see :func:`equilibrium`."""
     failure = ""
-    for steps in CONTINUATION:
+    for steps in CONTINUATION[patient]:
         try:
             return _continued(system, start, theta, first, prescribed, parts * steps, reused)
         except (GrowthError, LinearError) as error:

@@ -106,7 +106,7 @@ def followed(scene: Scene, now: Pore, expanded: Pore) -> Mesh | None:
     outline = expanded.boundary
     mesh = now.mesh
     if (sizing.extent_too_short(outline, mesh.ends, scene.pore.width, scene.pore.length)
-            or (expanded.wall != now.wall).any()
+            or not outline.same_contact(now.boundary)
             or sizing.too_coarse(outline.corners, pore.sized(scene))):
         return None
     numerics = scene.numerics

@@ -239,7 +239,7 @@ def _moved(factor: float, *changes: str) -> tuple[pore.Pore, pore.Pore, np.ndarr
     said = _said(factor, *changes)
     now = pore.seeded(said)
     theta = _uneven(now, -0.002)
-    return now, contact.expand(said, now, theta)[0], theta
+    return now, contact.expand(said, now, theta).pore, theta
 
 
 @pytest.mark.slow

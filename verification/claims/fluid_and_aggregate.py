@@ -280,7 +280,7 @@ def pressed(found: Body) -> Body:
     """The same aggregate at rest under the fluid's forces. It is elastic, so that this does not hang on the way there,
     but for what the forces would have changed of its growth. Raises GrowthError where shape and flow do not agree."""
     forced = replace(found.scene, growth=replace(found.scene.growth, fluid_forces="included"))
-    now, _, _ = contact.expand(forced, found.pore, found.pore.theta)
+    now = contact.expand(forced, found.pore, found.pore.theta).pore
     return Body(forced, now, found.solved)
 
 

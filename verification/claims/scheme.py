@@ -261,7 +261,7 @@ def node_defect(time: float) -> float:
     """Largest relative change of a node's mass of X_A or X_I in the update of base that starts at a time (h)."""
     said, (now, solved) = scene(*BASE), solved_pore(BASE, time)
     made, _, _ = updates.make_biomass(said, now, solved, said.growth.time_step)
-    expanded, *_ = contact.expand(said, made, updates.enlarged(said, now, made))
+    expanded = contact.expand(said, made, updates.enlarged(said, now, made)).pore
     pairs = zip(node_masses(made), node_masses(expanded))
     return max(float(np.abs(after / before - 1).max()) for before, after in pairs)
 

@@ -53,17 +53,17 @@ MUTANTS = (
         "repro/model/contact.py",
         ("inverse-ratio",
          "(34) multiplies by the ratio of the areas S' / S, not by S / S'.",
-         "return replace(found.moved(points), pressure=pressure)",
-         "moved = found.moved(points)\n"
-         "    ratio = moved.space.reaction.dx / found.space.reaction.dx\n"
-         "    return replace(moved, pressure=pressure, active=found.active * ratio**2, "
-         "inert=found.inert * ratio**2)"),
+         "return replace(start.moved(points), pressure=pressure)",
+         "moved = start.moved(points)\n"
+         "    ratio = moved.space.reaction.dx / start.space.reaction.dx\n"
+         "    return replace(moved, pressure=pressure, active=start.active * ratio**2, "
+         "inert=start.inert * ratio**2)"),
         ("reprojection-left-out",
          "(34) is left out: densities stay as the aggregate expands.",
-         "return replace(found.moved(points), pressure=pressure)",
-         "moved = found.moved(points)\n"
-         "    ratio = moved.space.reaction.dx / found.space.reaction.dx\n"
-         "    return replace(moved, pressure=pressure, active=found.active * ratio, inert=found.inert * ratio)")),
+         "return replace(start.moved(points), pressure=pressure)",
+         "moved = start.moved(points)\n"
+         "    ratio = moved.space.reaction.dx / start.space.reaction.dx\n"
+         "    return replace(moved, pressure=pressure, active=start.active * ratio, inert=start.inert * ratio)")),
     *changes(
         "repro/fem/space.py",
         ("fluid-triangles-too",

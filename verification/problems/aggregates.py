@@ -61,7 +61,7 @@ def remeshed(given, now: Pore, speed: float = 0.0) -> Pore:
 def expanded(given, now: Pore, made) -> Pore:
     """The shape after X_A has grown by the factors 1 + made (r, q), (28)-(34), on the old mesh."""
     grown = replace(now, active=now.active * (1 + made))
-    return contact.expand(given, grown, updates.enlarged(given, now, grown))[0]
+    return contact.expand(given, grown, updates.enlarged(given, now, grown)).pore
 
 
 def updated(given, now: Pore, made) -> tuple[Pore, bool]:

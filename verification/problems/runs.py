@@ -82,7 +82,7 @@ def step(scene: Scene, now: Pore, solved: Solved, hours: float) -> Step:
 
 def shape_of(scene: Scene, now: Pore, grown: Pore) -> Pore:
     """The shape that biomass takes when it has grown, (28)-(34), on the mesh as it was."""
-    return contact.expand(scene, grown, updates.enlarged(scene, now, grown))[0]
+    return contact.expand(scene, grown, updates.enlarged(scene, now, grown)).pore
 
 
 def next_shape(scene: Scene, now: Pore, solved: Solved, hours: float) -> Pore:

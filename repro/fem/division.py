@@ -1,0 +1,259 @@
+"""Arcs of the aggregate's boundary, each divided at any place on it.
+
+A contact line may lie within an arc. There the arc is divided, and so are the two triangles beside
+it, along the straight line on the unit triangle from that place to the opposite corner. Each part
+keeps the map of the triangle that it belongs to, so a division changes no shape and no field.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from repro.fem import elements
+from repro.fem.elements import Table
+from repro.fem.mesh import Mesh, Topology
+from repro.fem.outline import parabola
+
+#: Corners of the unit triangle.
+CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+
+
+@dataclass(frozen=True)
+class DividedTriangle:
+    """A triangle beside a divided arc.
+
+    cell: number of the triangle; edge: which of its edges the arc is; arc: position of the arc in
+    :attr:`Division.arcs`; forward: does the edge run as the loop does; t: where the edge is
+    divided, from its first corner.
+    """
+
+    cell: int
+    edge: int
+    arc: int
+    forward: bool
+    t: float
+
+    @property
+    def corners(self) -> np.ndarray:
+        """(3, 2) start and end of the edge and the opposite corner, on the unit triangle."""
+        return CORNERS[self.rotation]
+
+    @property
+    def rotation(self) -> np.ndarray:
+        """(3,) corners of the triangle, the start of the edge first."""
+        return (np.arange(3) + self.edge) % 3
+
+    @property
+    def place(self) -> np.ndarray:
+        """(2,) where the edge is divided, on the unit triangle."""
+        start, end, _ = self.corners
+        return start + self.t * (end - start)
+
+    @property
+    def parts(self) -> tuple[np.ndarray, np.ndarray]:
+        """(3, 2) corners of both parts on the unit triangle."""
+        start, end, opposite = self.corners
+        return np.array([start, self.place, opposite]), np.array([self.place, end, opposite])
+
+
+@dataclass(frozen=True, eq=False)
+class Division:
+    """A mesh of curved triangles with some arcs of its loop divided.
+
+    Parameters
+    ----------
+    parent : Mesh
+        The mesh before the division.
+    arcs : (d,) int
+        Numbers of the divided arcs, ascending; no two of them bound one triangle.
+    t : (d,) float
+        Where each arc is divided, in (0, 1) along the loop.
+    """
+
+    parent: Mesh
+    arcs: np.ndarray
+    t: np.ndarray
+
+    @property
+    def _middles(self) -> np.ndarray:
+        """(d,) nodes of the parent in the middle of the divided arcs."""
+        return self.parent.loop[2 * self.arcs + 1]
+
+    @cached_property
+    def triangles(self) -> list[DividedTriangle]:
+        """The divided triangles, arc by arc."""
+        cells = self.parent.cells
+        divided = []
+        for arc, (middle, t) in enumerate(zip(self._middles, self.t)):
+            start = self.parent.loop[2 * self.arcs[arc]]
+            for cell, edge in np.argwhere(cells[:, 3:] == middle):
+                forward = bool(cells[cell, edge] == start)
+                divided.append(DividedTriangle(cell, edge, arc, forward, t if forward else 1 - t))
+        return divided
+
+    @property
+    def mesh(self) -> Mesh:
+        """The divided mesh."""
+        return replace(self.parent, points=self.nodal(self.parent.points), topology=self.topology)
+
+    def at(self, t: np.ndarray) -> Division:
+        """The same arcs divided elsewhere, with the same connections."""
+        moved = replace(self, t=t)
+        moved.__dict__["topology"] = self.topology
+        return moved
+
+    @cached_property
+    def topology(self) -> Topology:
+        """Connections of the divided mesh.
+
+        New corners follow the old corners, new middles follow the old middles: the second halves
+        of the arcs, then one inside each divided triangle. The first part of a divided triangle
+        takes its place, the second one follows all other triangles.
+        """
+        topology = self.parent.topology
+        count = len(self.arcs)
+        corner = topology.corners + np.arange(count)
+        half = len(self.parent.points) + count + np.arange(count)
+        cells = self._renumbered(topology.cells)
+        second_parts = []
+        for number, triangle in enumerate(self.triangles):
+            p, q, v = cells[triangle.cell, :3][triangle.rotation]
+            pq, qv, vp = cells[triangle.cell, 3:][triangle.rotation]
+            s = corner[triangle.arc]
+            sv = half[-1] + 1 + number
+            ps, sq = (pq, half[triangle.arc]) if triangle.forward else (half[triangle.arc], pq)
+            cells[triangle.cell] = p, s, v, ps, sv, vp
+            second_parts.append([s, q, v, sq, qv, sv])
+        biomass = [topology.biomass[triangle.cell] for triangle in self.triangles]
+        return replace(topology, cells=np.vstack([cells, second_parts]),
+                       corners=topology.corners + count,
+                       biomass=np.concatenate([topology.biomass, biomass]),
+                       loop=self.along_loop(self._renumbered(topology.loop), corner, half))
+
+    def _renumbered(self, nodes: np.ndarray) -> np.ndarray:
+        """Numbers of the parent's nodes in the divided mesh."""
+        return np.where(nodes >= self.parent.corners, nodes + len(self.arcs), nodes)
+
+    def along_loop(self, values: np.ndarray, corners: np.ndarray,
+                   halves: np.ndarray) -> np.ndarray:
+        """(M + 2 d,) values at the loop's nodes (M,), with those of the new corners (d,) and of the
+        middles of the second halves (d,)."""
+        added = np.column_stack([corners, halves]).ravel()
+        return np.insert(values, np.repeat(2 * self.arcs + 2, 2), added)
+
+    def nodal(self, values: np.ndarray) -> np.ndarray:
+        """The values at all nodes of a field (N, ...) at the parent's nodes."""
+        shape = (len(self.arcs), *values.shape[1:])
+        places, first_halves, second_halves = (np.empty(shape) for _ in range(3))
+        inside = []
+        for triangle in self.triangles:
+            start, end, opposite = triangle.corners
+            s = triangle.place
+            where = np.array([s, (start + s) / 2, (s + end) / 2, (s + opposite) / 2])
+            nodes = values[self.parent.cells[triangle.cell]]
+            at, near, far, inner = np.tensordot(elements.values(2, where), nodes, 1)
+            places[triangle.arc] = at
+            first_halves[triangle.arc] = near if triangle.forward else far
+            second_halves[triangle.arc] = far if triangle.forward else near
+            inside.append(inner)
+        kept = values.copy()
+        kept[self._middles] = first_halves
+        corners = self.parent.corners
+        return np.concatenate([kept[:corners], places, kept[corners:], second_halves, inside])
+
+    def at_corners(self, values: np.ndarray) -> np.ndarray:
+        """(corners + d,) of a linear field (corners,) at the parent's corners."""
+        loop = self.parent.loop
+        start = loop[2 * self.arcs]
+        end = loop[(2 * self.arcs + 2) % len(loop)]
+        return np.concatenate([values, (1 - self.t) * values[start] + self.t * values[end]])
+
+    def restricted(self, values: np.ndarray) -> np.ndarray:
+        """(N, ...) at the parent's nodes of a field at all nodes of the divided mesh."""
+        corners = self.parent.corners
+        first_middle = corners + len(self.arcs)
+        last_middle = first_middle + len(self.parent.points) - corners
+        kept = np.concatenate([values[:corners], values[first_middle:last_middle]])
+        loop = self.topology.loop
+        for number, (arc, t) in enumerate(zip(self.arcs, self.t)):
+            nodes = loop[(2 * (arc + number) + np.arange(5)) % len(loop)]
+            half, s = (nodes[:3], 0.5 / t) if t >= 0.5 else (nodes[2:], (0.5 - t) / (1 - t))
+            kept[self._middles[number]] = np.tensordot(parabola(np.array(s)), values[half], 1)
+        return kept
+
+    def divided_loads(self, loads: np.ndarray) -> np.ndarray:
+        """Nodal loads on the divided mesh, from those on the parent's nodes (N, 2).
+
+        The load of the middle of an arc counts as that of a traction which is uniform along it.
+        """
+        corners = self.parent.corners
+        loop = self.parent.loop
+        start = loop[2 * self.arcs]
+        end = loop[(2 * self.arcs + 2) % len(loop)]
+        middle = loads[self._middles]
+        t = self.t[:, None]
+        kept = loads.copy()
+        np.add.at(kept, start, -(1 - t) * middle / 4)
+        np.add.at(kept, end, -t * middle / 4)
+        kept[self._middles] = t * middle
+        inside = np.zeros((len(self.triangles), loads.shape[1]))
+        return np.concatenate([kept[:corners], middle / 4, kept[corners:], (1 - t) * middle,
+                               inside])
+
+    def gathered_loads(self, loads: np.ndarray) -> np.ndarray:
+        """(N, 2) nodal loads on the parent's nodes that do the same work as loads on all nodes of
+        the divided mesh, in every displacement of the parent."""
+        corners = self.parent.corners
+        first_middle = corners + len(self.arcs)
+        last_middle = first_middle + len(self.parent.points) - corners
+        gathered = np.concatenate([loads[:corners], loads[first_middle:last_middle]])
+        gathered[self._middles] = 0.0
+        loop = self.topology.loop
+        ends = self.parent.loop
+        for number, (arc, t) in enumerate(zip(self.arcs, self.t)):
+            nodes = loop[(2 * (arc + number) + np.arange(1, 4)) % len(loop)]
+            weights = parabola(np.array([t / 2, t, (1 + t) / 2]))
+            arc_nodes = ends[(2 * arc + np.arange(3)) % len(ends)]
+            np.add.at(gathered, arc_nodes, weights.T @ loads[nodes])
+        return gathered
+
+    def amounts(self, amounts: np.ndarray, table: Table) -> np.ndarray:
+        """(r + d, q) amounts at the quadrature points of the divided aggregate.
+
+        Within a divided triangle the amount per area of the unit triangle is the linear function
+        that fits the parent's values best, limited to their range; both parts together keep its
+        sum.
+
+        Parameters
+        ----------
+        amounts : (r, q) float
+            At the quadrature points of the parent's aggregate.
+        table : Table
+            Of the quadrature.
+        """
+        rows = np.cumsum(self.parent.biomass) - 1
+        divided = amounts.copy()
+        second_parts = []
+        for triangle in self.triangles:
+            if self.parent.biomass[triangle.cell]:
+                row = rows[triangle.cell]
+                divided[row], second = _split(amounts[row], triangle, table)
+                second_parts.append(second)
+        return np.vstack([divided, *second_parts])
+
+
+def _split(amount: np.ndarray, triangle: DividedTriangle,
+           table: Table) -> tuple[np.ndarray, np.ndarray]:
+    """(q,) amounts in both parts of a triangle with amounts (q,)."""
+    density = amount / table.weights
+    at_corners = elements.linear_fit(table) @ density
+    halves = []
+    for corners, share in zip(triangle.parts, (triangle.t, 1 - triangle.t)):
+        fitted = elements.values(1, table.linear @ corners) @ at_corners
+        halves.append(share * table.weights * np.clip(fitted, density.min(), density.max()))
+    total = halves[0].sum() + halves[1].sum()
+    scale = amount.sum() / total if total > 0 else 1.0
+    return scale * halves[0], scale * halves[1]

@@ -1,0 +1,296 @@
+"""Where contact lines lie on the aggregate's boundary (2.3.3), for curved triangles.
+
+A contact line is the end of a contact surface. Its advance counts the arcs of the boundary that
+have joined the wall beyond the place where it was; a fraction divides an arc. The clearance beyond
+a line is the least value, over the free surface at distances d from the line along the wall, of
+
+    gap / min(film, tan(angle) d) - 1
+
+No film and no wedge is too thin where it is not negative. The contact surface sought is the
+smallest one, so each line advances to the place where its clearance vanishes. All lines are
+searched for at once, by the secant method, safeguarded by bisection. Each trial is an equilibrium
+of the aggregate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from repro.errors import GrowthError
+from repro.fem.outline import BOTTOM, FREE, TOP, Outline, parabola
+
+#: A clearance of this size is zero. A line then errs by about CLOSE * film / tan(angle).
+CLOSE = 2e-3
+#: Two places this near, in arcs, are one: the clearance jumps between them.
+SAME_PLACE = 5e-3
+#: The smallest part of an arc into which it is divided; a smaller one counts as none.
+LEAST_PART = 0.02
+#: The first trial, in parts of the way to the farthest place that is too near to the wall.
+FIRST_TRIAL = 0.7
+#: The second trial where the first one went too far, in parts of the way back.
+FIRST_RETREAT = 0.2
+#: Secant steps towards a place that is far enough are this much longer.
+BEYOND = 1.05
+#: The longest of these steps where nothing beyond a line is too near, arcs.
+LEAST_REACH = 0.5
+#: Secant steps stay this part of the interval away from places that were too short or far enough.
+INSIDE = 0.03
+MEET = ("two contact lines meet, with fluid between them that has no way out; "
+        "try a shorter growth.time_step")
+#: Places on an arc at which the clearance is taken.
+PLACES = np.linspace(0.0, 1.0, 9)
+
+
+@dataclass(frozen=True)
+class SearchOptions:
+    """How contact lines are searched for.
+
+    landing: where the first contact leaves less of the least film than this part, the search ends;
+    patient: is an equilibrium that fails tried again in smaller parts; advances: {(wall,
+    direction): um} of the first trial, along the outline.
+    """
+
+    landing: float = 0.0
+    patient: bool = True
+    advances: Mapping[tuple[int, int], float] = field(default_factory=dict)
+
+
+class FirstContact(Exception):
+    """A step ends long after the film to the opposite wall has become too thin.
+
+    gap: um, the least distance to that wall.
+    """
+
+    def __init__(self, gap: float):
+        super().__init__(gap)
+        self.gap = gap
+
+
+@dataclass(frozen=True)
+class Clearance:
+    """The rule for a free surface: width (um) of the pore, least film (um), least angle (rad)."""
+
+    width: float
+    film: float
+    angle: float
+
+    def beyond(self, outline: Outline, node: int, direction: int) -> tuple[float, float]:
+        """The clearance beyond a contact line, and how far the surface is too near to the wall.
+
+        Parameters
+        ----------
+        outline : Outline
+            With arcs.
+        node : int
+            Corner of the outline at the contact line.
+        direction : int
+            1 or -1: where the free surface lies along the outline.
+
+        Returns
+        -------
+        clearance : float
+            Infinite where no free surface faces the wall.
+        reach : float
+            Arcs from the line to the farthest place with a negative clearance, zero if none.
+        """
+        arcs, last = _free_arcs(outline, node, direction)
+        outwards = np.sign(outline.points[node, 0] - outline.points[node - direction, 0])
+        place, points = self._places(arcs, outwards)
+        distance = outwards * (points[:, 0] - arcs[0, 0, 0])
+        gap = points[:, 1] if outline.wall[node] == BOTTOM else self.width - points[:, 1]
+        needs = np.minimum(self.film, np.tan(self.angle) * distance)
+        facing = place > 0
+        if outline.wall[last] == outline.wall[node]:
+            # Free surface between two lines of one wall belongs to the nearer line.
+            facing &= distance <= np.abs(points[:, 0] - outline.points[last, 0])
+        ratio = np.full(len(gap), np.inf)
+        beside = facing & (needs > 0)
+        ratio[beside] = gap[beside] / needs[beside] - 1
+        through = facing & (needs <= 0) & (gap < 0)
+        ratio[through] = gap[through] / self.film
+        return float(ratio.min()), float(place[ratio < 0].max(initial=0.0))
+
+    def _places(self, arcs: np.ndarray, outwards: float) -> tuple[np.ndarray, np.ndarray]:
+        """(K,) places, in arcs from the line, and (K, 2) um the points there: PLACES of each arc,
+        and the distance at which the film takes over from the angle."""
+        points = np.einsum("sa,kai->ksi", parabola(PLACES), arcs)
+        place = np.arange(len(arcs))[:, None] + PLACES
+        beyond = outwards * (points[..., 0] - arcs[0, 0, 0]) - self.film / np.tan(self.angle)
+        arc, k = np.nonzero(beyond[:, :-1] * beyond[:, 1:] < 0)
+        part = beyond[arc, k] / (beyond[arc, k] - beyond[arc, k + 1])
+        t = PLACES[k] + part * np.diff(PLACES)[k]
+        crossing = np.einsum("ka,kai->ki", parabola(t), arcs[arc])
+        return (np.concatenate([place.ravel(), arc + t]),
+                np.vstack([points.reshape(-1, 2), crossing]))
+
+
+def _free_arcs(outline: Outline, node: int, direction: int) -> tuple[np.ndarray, int]:
+    """(K, 3, 2) um, nodes of the free arcs beyond a contact line, from the line on; and the node
+    at their end."""
+    count = len(outline.points)
+    walk = (node + direction * np.arange(count)) % count
+    end = 1 + int(np.flatnonzero(outline.wall[walk[1:]] != FREE)[0])
+    nodes = outline.points[walk[: end + 1]]
+    return np.stack([nodes[:-2:2], nodes[1:-1:2], nodes[2::2]], axis=1), int(walk[end])
+
+
+def contact_lines(outline: Outline, wall: int) -> list[tuple[int, int]]:
+    """(node, direction) of each end of a contact surface: the next node in that direction is off
+    the wall."""
+    on = outline.wall == wall
+    if not on.any():
+        return []
+    last = on & ~np.append(on[1:], on[0])
+    first = on & ~np.append(on[-1], on[:-1])
+    forward = [(int(i), 1) for i in np.flatnonzero(last)]
+    return forward + [(int(i), -1) for i in np.flatnonzero(first)]
+
+
+@dataclass
+class Line:
+    """A contact line in a search.
+
+    wall: BOTTOM or TOP; node: of the outline, where the line was; direction: of the free surface
+    along the outline; advance: arcs, of the present trial; settled: is the present trial good
+    enough; reach: arcs beyond it where the surface is too near; short, far: largest advance that
+    is too short and smallest one that is far enough, zero and infinite at first; stalls: has the
+    last trial halved neither the way between these nor the clearance; trials: the last two, as
+    (advance, clearance).
+    """
+
+    wall: int
+    node: int
+    direction: int
+    advance: float = 0.0
+    settled: bool = False
+    reach: float = 0.0
+    short: float = 0.0
+    far: float = np.inf
+    stalls: bool = False
+    trials: list[tuple[float, float]] = field(default_factory=list)
+
+    @property
+    def key(self) -> tuple[int, int]:
+        """Wall and direction: no two lines share both."""
+        return self.wall, self.direction
+
+    def record(self, clearance: float, reach: float) -> None:
+        """Take the clearance beyond the present trial into account."""
+        self.reach = reach
+        if not self.trials or self.trials[-1][0] != self.advance:
+            self.trials = [*self.trials[-1:], (self.advance, clearance)]
+        else:
+            self.trials[-1] = self.advance, clearance
+        too_short = clearance < -CLOSE
+        before = self.far - self.short
+        worse = len(self.trials) == 2 and abs(clearance) > abs(self.trials[0][1]) / 2
+        if too_short:
+            self.short = self.advance
+            # Where another line has moved since, what was far enough may be too short now.
+            self.far = self.far if self.far > self.advance else np.inf
+        else:
+            self.far = self.advance
+            self.short = min(self.short, self.advance)
+        self.stalls = worse and self.far - self.short > before / 2
+        jumps = self.far <= max(self.short + SAME_PLACE, LEAST_PART)
+        self.settled = not too_short and (self.advance == 0 or clearance <= CLOSE or jumps)
+
+    def retreat(self) -> bool:
+        """Go half of the way back to the last place that was too short; is there a way?"""
+        way = self.advance - self.short
+        if self.settled or way < LEAST_PART:
+            return False
+        self.advance = self.short + way / 2
+        return True
+
+    def step(self) -> None:
+        """Go to the next trial."""
+        if self.far == np.inf:
+            most = self.advance + max(self.reach, LEAST_REACH)
+            least = self.advance + LEAST_PART
+            self.advance = min(max(self._secant(BEYOND), least), most)
+        elif self.stalls:
+            self.advance = (self.short + self.far) / 2
+        else:
+            margin = INSIDE * (self.far - self.short)
+            self.advance = min(max(self._secant(1.0), self.short + margin), self.far - margin)
+
+    def _secant(self, factor: float) -> float:
+        """Where the clearance vanishes on the line through the last two trials, the step to there
+        multiplied by a factor; with one trial, or on a falling line, a part of the way."""
+        advance, clearance = self.trials[-1]
+        if len(self.trials) == 2:
+            before, clearance_before = self.trials[0]
+            rise = (clearance - clearance_before) / (advance - before)
+            if rise > 0:
+                return advance - factor * clearance / rise
+        if self.far == np.inf:
+            return advance + FIRST_TRIAL * self.reach
+        return self.far - FIRST_RETREAT * (self.far - self.short)
+
+
+def arc_lengths(outline: Outline, line: Line) -> np.ndarray:
+    """(K,) um, chords of the free arcs beyond a line, one after the other."""
+    arcs, _ = _free_arcs(outline, line.node, line.direction)
+    return np.linalg.norm(arcs[:, 2] - arcs[:, 0], axis=1)
+
+
+def to_length(outline: Outline, line: Line) -> float:
+    """The advance of a line, um along the outline on which it was."""
+    ends = np.concatenate([[0.0], np.cumsum(arc_lengths(outline, line))])
+    return float(np.interp(line.advance, np.arange(len(ends)), ends))
+
+
+def to_arcs(outline: Outline, line: Line, length: float) -> float:
+    """The advance, in arcs, that is a length (um) along the outline on which a line was."""
+    ends = np.concatenate([[0.0], np.cumsum(arc_lengths(outline, line))])
+    return float(np.interp(length, ends, np.arange(len(ends))))
+
+
+def lines_of(outline: Outline) -> list[Line]:
+    """All contact lines of an outline, those of the lower wall first."""
+    return [Line(wall, node, direction) for wall in (BOTTOM, TOP)
+            for node, direction in contact_lines(outline, wall)]
+
+
+@dataclass(frozen=True, eq=False)
+class Contact:
+    """Walls of an outline's nodes with arcs that are divided at contact lines.
+
+    wall: (M,) of the outline's own nodes; arcs: (d,) numbers of the divided arcs, ascending; t:
+    (d,) where; first, second: (d,) walls of their first and second parts.
+    """
+
+    wall: np.ndarray
+    arcs: np.ndarray
+    t: np.ndarray
+    first: np.ndarray
+    second: np.ndarray
+
+
+def contact_with(wall: np.ndarray, lines: Sequence[Line]) -> Contact:
+    """The contact of walls (M,) after lines have advanced."""
+    joined = wall.copy()
+    count = len(wall)
+    cuts = {}
+    for line in lines:
+        arcs = int(np.floor(line.advance))
+        t = line.advance - arcs
+        if t > 1 - LEAST_PART:
+            arcs += 1
+        nodes = (line.node + line.direction * np.arange(1, 2 * arcs + 2)) % count
+        if (joined[nodes] != FREE).any():
+            raise GrowthError(MEET)
+        joined[nodes[:-1]] = line.wall
+        if LEAST_PART <= t <= 1 - LEAST_PART:
+            forward = line.direction == 1
+            number = (line.node // 2 + (arcs if forward else -arcs - 1)) % (count // 2)
+            if number in cuts:
+                raise GrowthError(MEET)
+            cuts[number] = ((t, line.wall, FREE) if forward else (1 - t, FREE, line.wall))
+    divided = sorted(cuts)
+    places, first, second = (np.array([cuts[number][k] for number in divided]) for k in range(3))
+    return Contact(joined, np.array(divided, int), places, first, second)
