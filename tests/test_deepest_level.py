@@ -53,7 +53,7 @@ def test_elements_are_halved_as_often_as_a_front_needs(half, level, time):
 
 @pytest.mark.parametrize("time", [0.0, 0.5])
 @pytest.mark.parametrize("least, advised", [(0.3, "= 0.3 resolves"), (0.31, "= 0.4 resolves"), (0.41, "= 0.6 resolves"),
-                                            (0.61, "no numerics.refinement up to 0.6 was")])
+                                            (0.61, "numerics.refinement up to 0.6 does not resolve it")])
 def test_a_refinement_is_advised_that_resolves_the_state(monkeypatch, least, advised, time):
     """The first of 1.5, 2 and 3 times that of the scene, 0.2, on which the front is resolved."""
     def solve(scene, *arguments):

@@ -30,7 +30,7 @@ HASTY = ["numerics.refinement=0.5", "pore.length=200 um", "growth.end=6 h", "gro
 
 @SIDES
 @pytest.mark.parametrize("time", ["updates", "midpoint"])
-@pytest.mark.parametrize("from_end, when", [(8.7, "at t = "), (5.3, "in the step from t = 0 h")])
+@pytest.mark.parametrize("from_end, when", [(8.7, "at t = "), (5.3, "at t = 0 h")])
 def test_a_run_ends_at_either_end_of_the_pore_and_names_it(time, from_end, when, sign, side):
     """A seed of 5 um grows towards an end. With its middle 8.7 um from the end, a step ends within an element of the
     end. With its middle at 5.3 um, the first step itself passes the end."""

@@ -200,7 +200,7 @@ def test_every_name_has_its_unit_or_is_a_pure_number():
 #: What parts of a name mean; others stand in the words as they are.
 MEANING = {"out": "leaving", "effluent": "leaving", "consumed": "taken up", "min": "least", "max": "largest",
            "fraction": "part", "balance": "relative", "t0": "t = 0", "remeshed": "made anew", "before": "start",
-           "after": "end", "region": "aggregate (1)", "oxygen": "acceptor", "demand": "donor"}
+           "after": "end", "region": "aggregate (1)", "oxygen": "acceptor", "demand": "donor", "overshoot": "above"}
 #: Of each of these a name and its words have the same one, or none.
 CONTRASTS = [("acceptor", "donor"), ("upstream", "downstream"), ("least", "largest"), ("active", "inert"),
              ("supplied", "leaving", "taken up", "stored"), (" xx", " yy", " zz", " xy")]

@@ -10,7 +10,7 @@ from tests.strategies import ORDERS
 
 @pytest.mark.parametrize("order", ORDERS)
 @pytest.mark.parametrize("density, rounds, error, said", [
-    ("1e9 mg/cm^3", contact.FORCE_ROUNDS, StageError, "try a"),
+    ("1e9 mg/cm^3", contact.FORCE_ROUNDS, StageError, "try a|helps a coarse"),
     ("998 mg/cm^3", 1, GrowthError, "do not agree after 1 rounds, a node still moves by .* um: .*try a shorter")])
 def test_a_shape_that_the_forces_do_not_let_rest_is_refused(monkeypatch, density, rounds, error, said, order):
     """In water whose pressure is a thousand times the stiffness, or where rounds do not end: an error that says what to

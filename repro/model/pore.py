@@ -27,7 +27,7 @@ CONTACT_ELEMENTS = 2.0
 #: The thinnest film to resolve where no [growth] says when it closes (Table 1), um.
 MINIMUM_FILM = 2.0
 #: Under this Peclet number u W / D the inlet supplies nothing that could be told from round-off.
-SLOWEST = 1e-9
+SLOWEST = 1e-8
 #: With order 2 and 3 elements are made no larger than this asks for: the concentration boundary
 #: layer is W Pe^(-1/3) thick (Leveque), and with four elements across the pore and this factor
 #: concentrations upstream of an aggregate exceed the supply by less than 0.01 %.

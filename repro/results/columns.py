@@ -130,7 +130,7 @@ SERIES = (
              f"least of {STRETCH}, on edges farther from a contact line than {100 * BESIDE:g} % of "
              f"the free surface's length; below {CREASE:g} it creases, below {BIOT:g} it folds",
              lambda scene, at: surface(at.pore).least, "least stretch", "growth"),
-    *(Quantity(f"surface_stretch_min_{axis}_um", f"place of the least stretch, {axis}",
+    *(Quantity(f"surface_stretch_min_{axis}_um", f"place of the least surface stretch, {axis}",
                "middle of the edge with the least elastic stretch along the free surface",
                lambda scene, at, k=k: surface(at.pore).place[k], f"{axis} of least stretch",
                "growth") for k, axis in enumerate("xy")),
