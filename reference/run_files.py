@@ -333,9 +333,17 @@ def _numbers(run: Run) -> Iterator[Finding]:
         aggregate = [values[nodes] for values in fields.at_nodes.values()]
         fluid = [fields.at_nodes[name] for name in ("velocity_m_per_d", "head_cm", "acceptor_mg_per_L",
                                                     "donor_mg_per_L") if name in fields.at_nodes]
-        cells = [values[fields.body] for values in fields.in_cells.values()]
+        cells = [values[_defined_in(fields, name)] for name, values in fields.in_cells.items()]
         missing += sum(np.count_nonzero(~np.isfinite(values)) for values in (*aggregate, *fluid, *cells))
     yield size("numbers that are not finite", missing, 0, "none is")
+
+
+def _defined_in(fields: Fields, name: str) -> np.ndarray:
+    """Triangles that have a value of a field: those of the aggregate, or those of them beside the fluid."""
+    if name != "surface_stretch":
+        return fields.body
+    middles = fields.cells[:, 3:]
+    return fields.body & np.isin(middles, middles[~fields.body]).any(axis=1)
 
 
 def _rows(run: Run) -> Iterator[Finding]:

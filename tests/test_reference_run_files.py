@@ -128,6 +128,7 @@ def times(factor):
 BAD = [
     (series("donor_min_mg_per_L", lambda _: np.nan), "numbers that are not finite"),
     (scaled("J", np.nan, "cell_data"), "numbers that are not finite"),
+    (scaled("surface_stretch", np.nan, "cell_data"), "numbers that are not finite"),
     (series("time_h", lambda _: 1.0), "rows that are not later than the row before"),
     (forgotten, "rows without fields of their time"),
     (unfinished, "rows that were asked for and are not there, or the reverse"),
