@@ -19,7 +19,8 @@ def test_flow_only_is_one_row_without_substrates(tmp_path):
     assert list(row) == results.COLUMNS
     empty = {name for name in results.COLUMNS if "acceptor" in name or "donor" in name}
     assert {name for name, value in row.items() if value == ""} == empty | {
-        "biomass_balance", "oxygen_demand_balance", "inert_fraction", "biomass_density_min", "biomass_density_max"}
+        "surface_stretch_min", "surface_stretch_min_x_um", "surface_stretch_min_y_um",
+            "biomass_balance", "oxygen_demand_balance", "inert_fraction", "biomass_density_min", "biomass_density_max"}
 
 
 def test_ledger_closes_and_adds_up(tmp_path):

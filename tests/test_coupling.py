@@ -44,7 +44,10 @@ def touching(request):
     numerics = elements(order)
     if time == "midpoint":
         numerics |= {"preset": "fast", "refinement": 0.5 if order == 1 else 0.2}
-    made = scene("17.9 um", "20 um", velocity="2.9 m/day", growth={"end": "1 h"}, numerics=numerics)
+    radius, growth = "17.9 um", {"end": "1 h"}
+    if (time, order) == ("midpoint", 1):  # a film of 2 um would thin out the straight triangles beside it
+        radius, growth = "18.9 um", {"end": "1 h", "minimum_film": "1 um"}
+    made = scene(radius, "20 um", velocity="2.9 m/day", growth=growth, numerics=numerics)
     return made, [instant for instant in run(made) if instant.ledgers or instant.pore.time == 0]
 
 
@@ -80,7 +83,7 @@ def test_contact_closes_the_film_and_the_run_goes_on(touching):
         assert outline.fixed[top].sum() == 1 and not instant.pore.mesh.turned_over().any()
         assert instant.solved.concentrations.acceptor.min() > 0
         if made.numerics.time == "updates":
-            assert instant.solved.flow.conductivity < 0.3 * found[0].solved.flow.conductivity
+            assert instant.solved.flow.conductivity < 0.5 * found[0].solved.flow.conductivity
         if outline.geometry == 2:
             middles = np.flatnonzero(top[1::2]) * 2 + 1
             assert not outline.fixed[1::2].any()

@@ -9,6 +9,7 @@ from repro.fem.outline import TOP
 from repro.march import midpoint, simulation
 from repro.model import pore, remeshing
 from repro.model.biomass import Rates
+from repro.model.contact import Expansion
 from repro.model.pore import Solved
 from repro.model.transport import Concentrations
 from repro.scene import PRESETS, Numerics, load_scene, parse_scene
@@ -74,7 +75,7 @@ def test_rates_are_carried_back_from_a_new_mesh(order, straight):
     accepted = 1e-6 if straight or order == 1 else 0.01 * 88
     for given, wanted, bound in ((Rates(2 * x + y, 3 - y), (2 * u + v, 3 - v), accepted),
                                  (Rates(0 * x + 1, 0 * x + 2), (1, 2), 1e-12)):
-        back = midpoint._carried_back(there, half, given)
+        back = midpoint._carried_back(there, now, Expansion(half, 0, 0.0), given)
         assert max(np.abs(back.growth - wanted[0]).max(), np.abs(back.remains - wanted[1]).max()) < bound
 
 

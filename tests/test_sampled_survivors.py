@@ -18,7 +18,7 @@ import repro
 from repro import results, timing
 from repro.check import cost, numbers, simplifications
 from repro.cli import sweep
-from repro.errors import CheckpointError, Unresolved
+from repro.errors import Unresolved
 from repro.fem import linear, sizing
 from repro.fem.brief import brief
 from repro.fem.mesh import Mesh, triangle_areas
@@ -26,11 +26,11 @@ from repro.fem.mesher import unlocked
 from repro.fem.outline import BOTTOM, TOP
 from repro.march.simulation import rows_within, simulate, steps
 from repro.model import remeshing
-from repro.model.contact import contact_lines
+from repro.model.contact_lines import surface_ends
 from repro.model.pore import initial_outline, seeded, solve
 from repro.report import charts, fields, run_page
 from repro.results import netcdf, vtu
-from repro.run import checkpoint, running, stored
+from repro.run import running, stored
 from repro.scene import load_scene
 from repro.sweep import page, table
 from repro.sweep.design import Point, parse
@@ -45,7 +45,8 @@ def test_states_are_made_and_not_changed():
     names = [found.name for found in pkgutil.walk_packages(repro.__path__, "repro.") if "__main__" not in found.name]
     every = {each for name in names for each in vars(importlib.import_module(name)).values()
              if "__dataclass_params__" in getattr(each, "__dict__", ()) and each.__module__.startswith("repro.")}
-    assert {each.__name__ for each in every if not each.__dataclass_params__.frozen} == {"Record"} and len(every) > 50
+    assert {each.__name__ for each in every if not each.__dataclass_params__.frozen} == {"Line", "Record"}
+    assert len(every) > 50
     compared = [part for each in every if each.__dataclass_params__.eq for part in dataclasses.fields(each)]
     assert not [part for part in compared if "ndarray" in str(part.type)]
 
@@ -96,11 +97,11 @@ def test_the_name_of_what_is_drawn_stands_in_the_middle_of_its_axis():
 def test_contact_lines_are_where_they_are_whatever_node_is_the_first():
     """Nodes of a ring: with the numbers shifted, the same places are found."""
     outline = initial_outline(load_scene("base"))
-    known = set(contact_lines(outline, BOTTOM))
+    known = set(surface_ends(outline, BOTTOM))
     assert {step for _, step in known} == {-1, 1} and len(known) == 2
     for shift in range(1, len(outline.wall)):
         parts = {name: np.roll(getattr(outline, name), shift, axis=0) for name in ("points", "wall", "fixed")}
-        moved = contact_lines(dataclasses.replace(outline, **parts), BOTTOM)
+        moved = surface_ends(dataclasses.replace(outline, **parts), BOTTOM)
         assert {((node - shift) % len(outline.wall), step) for node, step in moved} == known
 
 
@@ -190,21 +191,6 @@ def test_the_table_of_a_sweep_tells_how_a_run_ended(status, told):
     empty = table.Told(point, status, *[np.zeros(0)] * 3, dict.fromkeys(table.COLUMNS))
     row = page._row(Sweep(Path("s"), "base", (parse("pore.width=40 um, 50 um"),), (point,)), empty)
     assert re.search(r'<td class="text[ a-z]*">([^<]*)</td></tr>$', row)[1] == told
-
-
-def test_bytes_after_the_last_array_are_refused():
-    one = [["a", "<f8", [1], "C"]]
-    assert checkpoint._arrays(one, memoryview(bytes(8)))["a"] == [0.0]
-    for size in (7, 9, 16):
-        with pytest.raises(CheckpointError):
-            checkpoint._arrays(one, memoryview(bytes(size)))
-
-
-@pytest.mark.parametrize("cells, loop", [([0, 1, 2, 4, 5, 6], [0, 4, 1, 5, 2, 6]), ([0, 1, 2, 3, 4, 5], [0, 3, 1])])
-def test_corners_come_first_and_a_boundary_has_as_many_middles(cells, loop):
-    stored._check_order(np.array([[0, 1, 2, 3, 4, 5]]), np.array([0, 3, 1, 4, 2, 5]))
-    with pytest.raises(CheckpointError, match="order"):
-        stored._check_order(np.array([cells]), np.array(loop))
 
 
 def test_a_pore_without_an_aggregate_is_kept_and_read():

@@ -45,15 +45,15 @@ class Scattered:
     def __init__(self, law):
         self.law = law
 
-    def numbers(self, scene):
+    def get(self, scene):
         packaged = load_scene(scene.name)
         factors = {each.name: value_of(scene, each.paths[0]) / value_of(packaged, each.paths[0])
                    for each in INPUTS if each.only in ("", scene.name)}
         return self.law(factors, load_scene("base", rounding.converged(1.0)).numerics.refinement
                         / scene.numerics.refinement)
 
-    def rows(self, scenes):
-        return [*map(self.numbers, scenes)]
+    def get_all(self, scenes):
+        return [*map(self.get, scenes)]
 
 
 def numbers(effluent):

@@ -360,7 +360,7 @@ def test_a_step_makes_as_much_where_the_mesh_half_way_is_a_new_one():
     solved = solve(scene, now)
     first = updates.rates_of(scene, now, solved.concentrations)
     kept, new = (midpoint.halfway(replace(scene, numerics=replace(scene.numerics, refinement=part)), now, solved, first,
-                                  4.0) for part in (0.3, 0.9))
+                                  4.0, contact.PATIENT) for part in (0.3, 0.9))
     assert new.made == pytest.approx(kept.made, rel=1e-2)
     assert len(new.solved.flow.velocity) > 2 * len(kept.solved.flow.velocity)
 

@@ -140,12 +140,12 @@ def _at_rest(scene: Scene, grown: Pore, theta: np.ndarray, start: Pore, forces: 
     last = None if stressed else grown.mesh.points[grown.mesh.body]
     grown = replace(grown, theta=theta, fixed=_fixed_points(scene, grown), last=last)
     if grown.boundary.geometry == 1:
-        return _close_by_nodes(scene, grown, start, forces)
+        return _close_by_nodes(scene, grown, start, forces, search)
     return _close_by_lines(scene, grown, start, forces, search)
 
 
-def _close_by_nodes(scene: Scene, grown: Pore, start: Pore,
-                    forces: np.ndarray | None) -> Expansion:
+def _close_by_nodes(scene: Scene, grown: Pore, start: Pore, forces: np.ndarray | None,
+                    search: SearchOptions) -> Expansion:
     """After each equilibrium, nodes whose film or wedge is too thin join the wall, and the
     equilibrium is sought again until none is."""
     keys = needed(scene.growth, "[growth]")
@@ -158,6 +158,8 @@ def _close_by_nodes(scene: Scene, grown: Pore, start: Pore,
         shape, used = _equilibrium(scene, grown, shape, forces, last=last)
         iterations += used
         gaps.append(width - shape.boundary.thickness)
+        if not shape.contact:
+            _refuse_late(gaps[-1], keys.minimum_film, search)
         joins = closing_nodes(shape.boundary, width, keys.minimum_film, keys.minimum_contact_angle)
         if not joins.any():
             return Expansion(replace(shape, fixed=_with_new_surface(shape.boundary)), iterations,
@@ -195,8 +197,7 @@ def _close_by_lines(scene: Scene, grown: Pore, start: Pore, forces: np.ndarray |
     gap = rule.width - shape.pore.boundary.thickness
     wall = grown.wall
     if not grown.contact and gap < rule.film:
-        if gap < search.landing * rule.film:
-            raise FirstContact(gap)
+        _refuse_late(gap, rule.film, search)
         wall = _first_contact(shape.pore.boundary)
         lines = contact_lines.lines_of(replace(grown.boundary, wall=wall))
         shape = trials.solve(wall, lines)
@@ -214,6 +215,12 @@ def _close_by_lines(scene: Scene, grown: Pore, start: Pore, forces: np.ndarray |
                       "try a shorter growth.time_step")
 
 
+def _refuse_late(gap: float, film: float, search: SearchOptions) -> None:
+    """Raises FirstContact where a gap (um) that closes is much thinner than the least film."""
+    if gap < search.landing * film:
+        raise FirstContact(gap)
+
+
 def _first_contact(outline: Outline) -> np.ndarray:
     """Walls (M,) where the arc with the highest place has joined the upper one."""
     highest = int(np.argmax(outline.arcs(outline.points)[:, :, 1].max(axis=1)))
@@ -224,7 +231,7 @@ def _first_contact(outline: Outline) -> np.ndarray:
 
 def _clearance(rule: Clearance, outline: Outline, line: Line) -> tuple[float, float]:
     """Of a line on the outline of a trial."""
-    ends = contact_lines.contact_lines(outline, line.wall)
+    ends = contact_lines.surface_ends(outline, line.wall)
     node = next(node for node, direction in ends if direction == line.direction)
     return rule.beyond(outline, node, line.direction)
 
@@ -430,7 +437,7 @@ def closing_nodes(outline: Outline, width: float, film: float, angle: float) -> 
     """
     joins = np.full(len(outline.points), FREE)
     for wall, gap in ((BOTTOM, outline.points[:, 1]), (TOP, width - outline.points[:, 1])):
-        lines = contact_lines.contact_lines(outline, wall)
+        lines = contact_lines.surface_ends(outline, wall)
         if wall == TOP and not lines:
             joins[(outline.wall == FREE) & (gap < film)] = TOP
         for line, step in lines:

@@ -137,7 +137,7 @@ def _free_arcs(outline: Outline, node: int, direction: int) -> tuple[np.ndarray,
     return np.stack([nodes[:-2:2], nodes[1:-1:2], nodes[2::2]], axis=1), int(walk[end])
 
 
-def contact_lines(outline: Outline, wall: int) -> list[tuple[int, int]]:
+def surface_ends(outline: Outline, wall: int) -> list[tuple[int, int]]:
     """(node, direction) of each end of a contact surface: the next node in that direction is off
     the wall."""
     on = outline.wall == wall
@@ -253,7 +253,7 @@ def to_arcs(outline: Outline, line: Line, length: float) -> float:
 def lines_of(outline: Outline) -> list[Line]:
     """All contact lines of an outline, those of the lower wall first."""
     return [Line(wall, node, direction) for wall in (BOTTOM, TOP)
-            for node, direction in contact_lines(outline, wall)]
+            for node, direction in surface_ends(outline, wall)]
 
 
 @dataclass(frozen=True, eq=False)

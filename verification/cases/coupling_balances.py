@@ -62,10 +62,12 @@ def test_ledger(area, density, remeshes, changes, record):
            at_least("remeshes", last.remeshes, remeshes, "else they are not tested"))
 
 
-def _steps(rows: list[Ledger]) -> list[Check]:
-    """The worst of both substrates; of the biomass, and of one step's end against the next one's start."""
+def _steps(rows: list[Ledger], equations: float = 1000) -> list[Check]:
+    """The worst of both substrates and of the biomass; and of one step's end against the next one's start.
+
+    equations: of each substrate, times the largest term of a row over what is supplied."""
     parted = [abs(two.biomass_before / one.biomass_after - 1) for one, two in pairwise(rows)]
-    return [at_most("substrates", runs.substrate_defect(rows), 1e-10,
+    return [at_most("substrates", runs.substrate_defect(rows), 1e-13 * equations,
                     "Newton's tolerance, 1e-13 of the largest term of each row, over all rows"),
             at_most("biomass, worst step", np.max([runs.biomass_defect(rows), *parted]), 1e-10, runs.ROUND_OFF)]
 
@@ -282,7 +284,7 @@ def test_contact(changes, record):
                       times=(0.2, 0.4, 0.6))
     instants = list(simulate(runs.at_velocity(scene, runs.SPEED)))
     rows, last = _ledgers(instants), instants[-1].pore
-    record(_steps(rows), _area(scene, instants[-1]),
+    record(_steps(rows, last.space.count * max(1.0, 1 / pore.peclet(scene, runs.SPEED))), _area(scene, instants[-1]),
            at_least("narrowest gap over the least allowed", _narrowest(scene, last, TOP), 1 - 1e-9,
                     "2 um, or 16.7 degrees beside contact"),
            between("parts of the fluid", _parts(last.mesh), 1.9, 2.1, "a plug"))

@@ -40,10 +40,6 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
     ("run/folder.py", '(folder / "fields").mkdir(parents=True, exist_ok=True)',
      '(folder / "fields").mkdir(parents=False, exist_ok=True)'):
         "The folder is there already: it is made with those above it for its lock.",
-    ("run/stored.py", '_refuse(not all(in_range(plain[key], 0.0, end) for key in ("time_h", "row_h")), "its time")',
-     '_refuse(not all(in_range(plain[key], -1.0, end) for key in ("time_h", "row_h")), "its time")'):
-        "A time below zero is refused all the same, by the steps and rows that stand beside it: -0.001 and -0.5 h of "
-        "both were, in three presets.",
     ("report/run_page.py", 'several=hidden[packed["of"] > 1])', 'several=hidden[packed["of"] != 1])'):
         "There is one frame or more: without any, nothing is packed, and nothing shown.",
 }
