@@ -204,10 +204,23 @@ def test_loads_do_the_same_work_on_a_divided_mesh(division):
     assert divided.T @ division.nodal(along) == pytest.approx(loads.T @ along, rel=1e-12)
 
 
+def test_contact_begins_to_both_sides_of_the_highest_place(plugged):
+    """Over the least film, along the free surface: a single point could not hold an elastic body."""
+    _, pore = plugged
+    free = pore.boundary
+    wall, lines = contact._first_contact(replace(free, wall=np.where(free.wall == TOP, FREE, free.wall)), FILM)
+    (corner,) = np.flatnonzero(wall == TOP)
+    upper = [line for line in lines if line.wall == TOP]
+    lengths = {line.direction: contact_lines.to_length(replace(free, wall=wall), line) for line in upper}
+    apart = free.highest - free.points[corner, 0]
+    assert sorted(lengths.values()) == pytest.approx(sorted([FILM - apart, FILM + apart]), abs=1e-9)
+    assert all(line.advance == line.least == line.short > 0 for line in upper)
+
+
 @pytest.mark.parametrize("preset", ["fast", "accurate"])
 def test_the_contact_surface_is_the_smallest_that_leaves_enough_fluid(preset):
     """After every step no clearance is negative, and a line that has advanced in it has none to spare."""
-    scene = load_scene("wide", [f"numerics.preset={preset}", 'pore.width="25 um"', 'growth.end="17 h"'])
+    scene = load_scene("wide", [f"numerics.preset={preset}", 'pore.width="25 um"', 'growth.end="18.5 h"'])
     keys = scene.growth
     rule = Clearance(scene.pore.width, keys.minimum_film, keys.minimum_contact_angle)
     expansions = []

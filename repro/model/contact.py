@@ -198,8 +198,7 @@ def _close_by_lines(scene: Scene, grown: Pore, start: Pore, forces: np.ndarray |
     wall = grown.wall
     if not grown.contact and gap < rule.film:
         _refuse_late(gap, rule.film, search)
-        wall = _first_contact(shape.pore.boundary)
-        lines = contact_lines.lines_of(replace(grown.boundary, wall=wall))
+        wall, lines = _first_contact(shape.pore.boundary, rule.film)
         shape = trials.solve(wall, lines)
     for _ in range(CONTACT_ROUNDS):
         for line in lines:
@@ -221,12 +220,27 @@ def _refuse_late(gap: float, film: float, search: SearchOptions) -> None:
         raise FirstContact(gap)
 
 
-def _first_contact(outline: Outline) -> np.ndarray:
-    """Walls (M,) where the arc with the highest place has joined the upper one."""
-    highest = int(np.argmax(outline.arcs(outline.points)[:, :, 1].max(axis=1)))
+def _first_contact(outline: Outline, film: float) -> tuple[np.ndarray, list[Line]]:
+    """Walls (M,) where the corner next to the highest place has joined the upper one, and the
+    contact lines.
+
+    Contact covers the least film's thickness to both sides of the highest place, at least: a
+    single point could not hold an elastic body.
+    """
+    x = outline.points[:, 0]
+    arc = int(np.argmax(outline.arcs(outline.points)[:, :, 1].max(axis=1)))
+    ends = np.array([2 * arc, (2 * arc + 2) % len(x)])
+    corner = int(ends[np.argmin(np.abs(x[ends] - outline.highest))])
     wall = outline.wall.copy()
-    wall[(2 * highest + np.arange(3)) % len(wall)] = TOP
-    return wall
+    wall[corner] = TOP
+    touching = replace(outline, wall=wall)
+    lines = contact_lines.lines_of(touching)
+    for line in lines:
+        if line.wall == TOP:
+            outwards = np.sign(x[(corner + line.direction) % len(x)] - x[corner])
+            length = film + outwards * (outline.highest - x[corner])
+            line.start_from(contact_lines.to_arcs(touching, line, max(length, 0.0)))
+    return wall, lines
 
 
 def _clearance(rule: Clearance, outline: Outline, line: Line) -> tuple[float, float]:

@@ -24,6 +24,8 @@ from repro.fem.outline import BOTTOM, FREE, TOP, Outline, parabola
 
 #: A clearance of this size is zero. A line then errs by about CLOSE * film / tan(angle).
 CLOSE = 2e-3
+#: The largest clearance: where no free surface faces the wall, or the gap is this much larger.
+AMPLE = 10.0
 #: Two places this near, in arcs, are one: the clearance jumps between them.
 SAME_PLACE = 5e-3
 #: The smallest part of an arc into which it is divided; a smaller one counts as none.
@@ -92,7 +94,7 @@ class Clearance:
         Returns
         -------
         clearance : float
-            Infinite where no free surface faces the wall.
+            At most AMPLE, which it is where no free surface faces the wall.
         reach : float
             Arcs from the line to the farthest place with a negative clearance, zero if none.
         """
@@ -106,9 +108,9 @@ class Clearance:
         if outline.wall[last] == outline.wall[node]:
             # Free surface between two lines of one wall belongs to the nearer line.
             facing &= distance <= np.abs(points[:, 0] - outline.points[last, 0])
-        ratio = np.full(len(gap), np.inf)
+        ratio = np.full(len(gap), AMPLE)
         beside = facing & (needs > 0)
-        ratio[beside] = gap[beside] / needs[beside] - 1
+        ratio[beside] = np.minimum(gap[beside] / needs[beside] - 1, AMPLE)
         through = facing & (needs <= 0) & (gap < 0)
         ratio[through] = gap[through] / self.film
         return float(ratio.min()), float(place[ratio < 0].max(initial=0.0))
@@ -155,7 +157,7 @@ class Line:
 
     wall: BOTTOM or TOP; node: of the outline, where the line was; direction: of the free surface
     along the outline; advance: arcs, of the present trial; settled: is the present trial good
-    enough; reach: arcs beyond it where the surface is too near; short, far: largest advance that
+    enough; reach: arcs beyond it where the surface is too near; least: the smallest advance; short, far: largest advance that
     is too short and smallest one that is far enough, zero and infinite at first; stalls: has the
     last trial halved neither the way between these nor the clearance; trials: the last two, as
     (advance, clearance).
@@ -167,6 +169,7 @@ class Line:
     advance: float = 0.0
     settled: bool = False
     reach: float = 0.0
+    least: float = 0.0
     short: float = 0.0
     far: float = np.inf
     stalls: bool = False
@@ -195,8 +198,15 @@ class Line:
             self.far = self.advance
             self.short = min(self.short, self.advance)
         self.stalls = worse and self.far - self.short > before / 2
-        jumps = self.far <= max(self.short + SAME_PLACE, LEAST_PART)
-        self.settled = not too_short and (self.advance == 0 or clearance <= CLOSE or jumps)
+        jumps = self.far <= max(self.short + SAME_PLACE, self.least + LEAST_PART)
+        smallest = self.advance <= self.least
+        self.settled = not too_short and (smallest or clearance <= CLOSE or jumps)
+
+    def start_from(self, advance: float) -> None:
+        """Take an advance, in arcs, as the smallest one and as the first trial."""
+        self.least = advance
+        self.short = advance
+        self.advance = advance
 
     def retreat(self) -> bool:
         """Go half of the way back to the last place that was too short; is there a way?"""
