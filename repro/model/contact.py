@@ -112,6 +112,7 @@ def expand(scene: Scene, grown: Pore, theta: np.ndarray, guess: Pore | None = No
         if last.division is not None:
             forces = _gathered(last, forces)
         found = _at_rest(scene, grown, theta, start, forces, search)
+        search = replace(search, advances=found.advances)
         iterations += found.iterations
         moved = np.abs(found.position - last.position).max()
         if moved <= FORCE_REST * found.pore.boundary.thickness:
@@ -199,6 +200,10 @@ def _close_by_lines(scene: Scene, grown: Pore, start: Pore, forces: np.ndarray |
     if not grown.contact and gap < rule.film:
         _refuse_late(gap, rule.film, search)
         wall, lines = _first_contact(shape.pore.boundary, rule.film)
+        for line in lines:
+            length = search.advances.get(line.key, 0.0)
+            known = contact_lines.to_arcs(replace(grown.boundary, wall=wall), line, length)
+            line.advance = max(line.least, known)
         shape = trials.solve(wall, lines)
     for _ in range(CONTACT_ROUNDS):
         for line in lines:

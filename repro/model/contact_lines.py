@@ -157,9 +157,9 @@ class Line:
 
     wall: BOTTOM or TOP; node: of the outline, where the line was; direction: of the free surface
     along the outline; advance: arcs, of the present trial; settled: is the present trial good
-    enough; reach: arcs beyond it where the surface is too near; least: the smallest advance; short, far: largest advance that
-    is too short and smallest one that is far enough, zero and infinite at first; stalls: has the
-    last trial halved neither the way between these nor the clearance; trials: the last two, as
+    enough; reach: arcs beyond it where the surface is too near; least: the smallest advance;
+    short, far: largest advance that is too short and smallest one that is far enough; stalls: has
+    the last trial halved neither the way between these nor the clearance; trials: the last two, as
     (advance, clearance).
     """
 

@@ -26,8 +26,8 @@ from verification.problems import bodies, hard, runs
 from verification.problems.bodies import RADIUS, HalfCylinder, Supported
 from verification.problems.hard import DRIVE, EFFLUENTS, FIXED, SHAPE, TOLERANCE, HardCase, Run
 
-#: A film that closes at once takes a seventh of the elements' height under it, and their biomass aside. The bound was 0.3
-#: while whole arcs joined the wall. A divided arc has smaller elements beside the contact line: 0.32 was measured there.
+#: A film that closes at once takes a seventh of the elements' height under it, and their biomass aside. The bound was
+#: 0.3 while whole arcs joined the wall. A divided arc has smaller elements beside the contact line: 0.32 was measured.
 CLOSING = 0.4
 FILM = ('pore.width="20 um"', 'aggregate.radius="17.6 um"', 'growth.end="1 h"')
 
@@ -125,7 +125,8 @@ def _closing(shape: Outline, width: float, film: float, angle: float) -> int:
     """Nodes of a polygon that should join a wall, or contact lines of arcs with too little fluid beyond them."""
     if shape.geometry == 1:
         return np.count_nonzero(contact.closing_nodes(shape, width, film, angle))
-    return sum(clearance < -CLOSE for clearance in _clearances(shape, width, film, angle).values())
+    # The rows' arcs are shorter than those of the search, so the clearance is taken at other places.
+    return sum(clearance < -2 * CLOSE for clearance in _clearances(shape, width, film, angle).values())
 
 
 def _clearances(shape: Outline, width: float, film: float, angle: float) -> dict[tuple[int, int], float]:

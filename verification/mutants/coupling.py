@@ -145,7 +145,7 @@ MUTANTS = (
          f"{CONTACT_TESTS}a_surface_through_the_wall_has_a_negative_clearance"),
         ("contact-larger-than-needed",
          "A contact line stops at the first place that is far enough.",
-         "self.settled = not too_short and (self.advance == 0 or clearance <= CLOSE or jumps)",
+         "self.settled = not too_short and (smallest or clearance <= CLOSE or jumps)",
          "self.settled = not too_short",
          SMALLEST_CONTACT),
         ("contact-of-whole-arcs",
