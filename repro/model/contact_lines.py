@@ -42,8 +42,8 @@ LEAST_REACH = 0.5
 INSIDE = 0.03
 MEET = ("two contact lines meet, with fluid between them that has no way out; "
         "try a shorter growth.time_step")
-#: Places on an arc at which the clearance is taken.
-PLACES = np.linspace(0.0, 1.0, 9)
+#: Places on an arc at which the clearance is taken: the second one shows the angle at the line.
+PLACES = np.append([0.0, 1e-3], np.linspace(0.0, 1.0, 9)[1:])
 
 
 @dataclass(frozen=True)
