@@ -2,8 +2,8 @@
 from repro.report.quantities import DERIVED
 from repro.results.arrays import ARRAYS
 from repro.results.columns import LEDGER, SERIES
-from repro.run.record import COUNTS
-from repro.sweep.table import NUMBERS
+from repro.runs.record import COUNTS
+from repro.sweeps.table import NUMBERS
 
 TABLES = {
     "Columns of `timeseries.csv`, `timeseries.nc` and `table.csv`": SERIES,
@@ -16,7 +16,7 @@ TABLES = {
 INTRODUCTION = """# What is reported
 
 Made by `python docs/quantities.py > docs/quantities.md` from the definitions in `repro/results/columns.py`,
-`repro/results/arrays.py`, `repro/report/quantities.py`, `repro/run/record.py` and `repro/sweep/table.py`. Symbols are
+`repro/results/arrays.py`, `repro/report/quantities.py`, `repro/runs/record.py` and `repro/sweeps/table.py`. Symbols are
 the paper's. A column is empty where its part is not modelled. An array is given at nodes or in triangles, in the whole
 pore or in the aggregate alone, with NaN in the fluid; nodes of the interface have the aggregate's value. The time (h)
 is `TimeValue` in the field data of a `.vtu` file."""

@@ -19,7 +19,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from paper_figures import FIGURES, manifest
-from repro.run.machine import source_hash
+from repro.runs.machine import source_hash
 
 ROOT = Path(__file__).parents[1]
 METADATA = "ro-crate-metadata.json"

@@ -28,7 +28,7 @@ from matplotlib.figure import Figure
 
 from paper_figures import FIGURES, runs, states
 from repro.results import PACKAGES
-from repro.run.machine import source_hash
+from repro.runs.machine import source_hash
 from verification.bench.record import processor
 from verification.store import provenance
 

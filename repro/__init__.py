@@ -7,10 +7,10 @@ Ten lines of use; ``docs/tutorial.md`` of the repository has more:
     scene = repro.load_scene("base", ['growth.end="5 h"'])  # a packaged scene, a file or a dict
     print(scene)                                            # its TOML, every key with its unit
     print(repro.check(scene))                               # what a run of it will be
-    found = repro.solve(scene)                              # rows of timeseries.csv, as arrays
-    print(found["conductivity_m_per_d"], found.units["conductivity_m_per_d"], found.fields(5.0))
+    results = repro.solve(scene)                            # rows of timeseries.csv, as arrays
+    print(results["conductivity_m_per_d"], results.units["conductivity_m_per_d"])
     repro.run(scene, "runs/base")                           # the same as files, and a page
-    found = repro.load_run("runs/base")                     # ... and back; found.to_pandas()
+    results = repro.load_run("runs/base")                   # ... and back; results.to_pandas()
     repro.sweep(scene, ["pore.width=50 um, 60 um"], "sweep")
 
 ``simulate(scene)`` yields the state step by step, with all that is known, in um, h, mg/L.
@@ -47,10 +47,10 @@ Where data enters, and what it passes:
     repro.model.pore  the Scene becomes a Pore at t = 0: outline, mesh, masses
     repro.march       a Pore goes through steps, and gives Instants: pore, flow, substrates, ledgers
     repro.results     an Instant becomes rows and fields in the units that their names end in
-    repro.check       what a run of a scene will be: numbers, doubts, cost (repro check)
+    repro.preflight   what a run of a scene will be: numbers, doubts, cost (repro check)
     repro.report      pages that show and compare runs (repro compare)
-    repro.run         a run on the disk: folder, recorder, checkpoints, provenance (repro run)
-    repro.sweep       many scenes at once (repro sweep)
+    repro.runs        a run on the disk: folder, recorder, checkpoints, provenance (repro run)
+    repro.sweeps      many scenes at once (repro sweep)
     repro.cli         the command line
 
 A room imports only from rooms further up in this list, repro.fem before repro.model; repro.errors
@@ -59,23 +59,21 @@ and repro.timing serve all of them.
 
 from __future__ import annotations
 
-import sys
 from importlib import import_module
-from types import ModuleType
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from repro.check.checked import check
     from repro.errors import OutputError, SimulationError
     from repro.march.folding import Fold
     from repro.march.loop import PoreEnd
     from repro.march.simulation import simulate
+    from repro.preflight.checked import check
     from repro.results.network import added_resistance
     from repro.results.tables import Results, solve
-    from repro.run.loading import load_run
-    from repro.run.running import resume, run
+    from repro.runs.loading import load_run
+    from repro.runs.running import resume, run
     from repro.scene import Scene, SceneError, load_scene
-    from repro.sweep.making import sweep
+    from repro.sweeps.making import sweep
 
     __version__: str
 else:
@@ -84,10 +82,10 @@ else:
     _MODULES = {"Fold": "march.folding", "OutputError": "errors",
                 "PoreEnd": "march.loop", "Results": "results.tables",
                 "Scene": "scene", "SceneError": "scene", "SimulationError": "errors",
-                "added_resistance": "results.network", "check": "check.checked",
-                "load_run": "run.loading", "load_scene": "scene", "resume": "run.running",
-                "run": "run.running", "simulate": "march.simulation", "solve": "results.tables",
-                "sweep": "sweep.making"}
+                "added_resistance": "results.network", "check": "preflight.checked",
+                "load_run": "runs.loading", "load_scene": "scene", "resume": "runs.running",
+                "run": "runs.running", "simulate": "march.simulation", "solve": "results.tables",
+                "sweep": "sweeps.making"}
 
     def __getattr__(name: str):
         if name == "__version__":
@@ -98,16 +96,6 @@ else:
 
     def __dir__() -> list[str]:
         return sorted(__all__)
-
-    class _Package(ModuleType):
-        """``repro.run``, ``check`` and ``sweep`` are the functions, though packages have these
-        names: importing those does not take their place."""
-
-        def __setattr__(self, name, value):
-            if not (name in _MODULES and isinstance(value, ModuleType)):
-                super().__setattr__(name, value)
-
-    sys.modules[__name__].__class__ = _Package
 
 __all__ = ["Fold", "OutputError", "PoreEnd", "Results", "Scene", "SceneError", "SimulationError",
            "added_resistance", "check", "load_run", "load_scene", "resume", "run", "simulate",

@@ -13,7 +13,7 @@ import numpy as np
 from repro import results
 from repro.cli import main
 from repro.results.files import read_sealed
-from repro.run import running
+from repro.runs import running
 from repro.scene import scene_hash
 
 VOID = {"meta", "input", "br", "link", "img", "hr"}

@@ -16,8 +16,8 @@ from repro import results
 from repro.cli import main
 from repro.errors import Interrupted
 from repro.results.files import read_sealed
-from repro.run.checkpoint import LAST
-from repro.run.running import Watch, run
+from repro.runs.checkpoint import LAST
+from repro.runs.running import Watch, run
 from tests.pages import whole_of
 
 #: A scene of a second or so, with remeshes, and one of several seconds.

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from repro.check import numbers, simplifications
 from repro.errors import Advised, LinearError, SimulationError, Unresolved
 from repro.fem.linear import factorised
 from repro.march.simulation import simulate
 from repro.model import pore, remeshing
+from repro.preflight import numbers, simplifications
 from repro.scene import load_scene, parse_scene
 
 #: Settings that a warning names, by the pattern of its text.

@@ -16,7 +16,7 @@ MADE = {"__pycache__", "out", "cache", "live", "pictures", "runs", "build", "dis
 FORBIDDEN = {"repro": {"reference", "verification", "paper_figures", "tests", "pickle"},
              "reference": {"repro", "pickle"}, **dict.fromkeys(FOLDERS[2:], {"pickle"})}
 #: The rooms of `repro`, in the one order in which they may import each other: each those before it.
-ROOMS = ("errors", "timing", "scene", "fem", "model", "march", "results", "check", "report", "run", "sweep", "cli",
+ROOMS = ("errors", "timing", "scene", "fem", "model", "march", "results", "preflight", "report", "runs", "sweeps", "cli",
          "__main__")
 #: Of the rooms before it, those that a room may not import: finite elements know sizes and solvers, not scenes.
 CLOSED = {"fem": {"scene"}}
@@ -138,7 +138,7 @@ def test_no_module_imports_itself_by_way_of_others():
     ("repro.fem.mesh", "from ..scene import keys"),
     ("repro.scene.keys", "def f():\n    from repro.fem.mesh import Mesh"),
     ("repro.results.__init__", "from ..check import numbers"),
-    ("repro.run.folder", "from repro import solve"),
+    ("repro.runs.folder", "from repro import solve"),
     ("repro.utils", "from repro import errors"),
 ])
 def test_the_rules_see_a_trespass(module, source):

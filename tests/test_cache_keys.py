@@ -5,10 +5,10 @@ from functools import partial
 import numpy as np
 import pytest
 
-from repro.check import numbers
 from repro.fem.space import Space
 from repro.model import flow, gear, mesh_motion, transport
 from repro.model.kinetics import Sink
+from repro.preflight import numbers
 from repro.results.files import sealed
 from repro.scene import load_scene, scene_hash
 from tests.strategies import meshed, seed

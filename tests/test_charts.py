@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from repro.report import charts
-from repro.sweep.picture import Axis
+from repro.sweeps.picture import Axis
 from tests.pages import first
 
 ROUNDED = 0.11  # of a difference of two places, each rounded to 0.1

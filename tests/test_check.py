@@ -8,11 +8,11 @@ import time
 import numpy as np
 import pytest
 
-from repro.check import checked, cost, numbers, simplifications
-from repro.check.checked import check
-from repro.check.modelled import modelled
 from repro.cli import main
 from repro.march.simulation import simulate
+from repro.preflight import checked, cost, numbers, simplifications
+from repro.preflight.checked import check
+from repro.preflight.modelled import modelled
 from repro.scene import load_scene, packaged_scenes
 from tests import faults
 from tests.shell import refused

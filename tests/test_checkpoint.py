@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 from repro.errors import CheckpointError
 from repro.march.loop import SAME_TIME
 from repro.march.simulation import steps
-from repro.run import checkpoint, stored
-from repro.run.checkpoint import NEWEST, PREVIOUS, decoded, encoded
-from repro.run.recorder import Recorder
-from repro.run.running import Watch, run
+from repro.runs import checkpoint, stored
+from repro.runs.checkpoint import NEWEST, PREVIOUS, decoded, encoded
+from repro.runs.recorder import Recorder
+from repro.runs.running import Watch, run
 from repro.scene import load_scene
 from tests.faults import little_memory
 

@@ -16,7 +16,7 @@ from repro.march.simulation import simulate
 from repro.model import remeshing
 from repro.report import quantities
 from repro.report.reading import Run
-from repro.run.running import run
+from repro.runs.running import run
 from repro.scene import load_scene
 from tests import oracles
 from tests.pages import AXES, CHARTS, LEDGERS

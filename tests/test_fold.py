@@ -9,8 +9,6 @@ import numpy as np
 import pytest
 
 import repro
-from repro.check.numbers import judged
-from repro.check.simplifications import warnings
 from repro.cli import main
 from repro.errors import GrowthError, LinearError, MeshError, SimulationError
 from repro.march import loop
@@ -18,9 +16,11 @@ from repro.march.loop import Ledger, Moment, Scheme, State, Step
 from repro.march.pace import Pace
 from repro.model import contact, pore
 from repro.model.surface import BIOT, CREASE, surface
+from repro.preflight.numbers import judged
+from repro.preflight.simplifications import warnings
 from repro.results import read_table
-from repro.run.running import run
-from repro.run.status import done
+from repro.runs.running import run
+from repro.runs.status import done
 from repro.scene import load_scene
 from tests.shell import files, lasting, state, told
 from tests.test_resume import in_parts

@@ -15,11 +15,11 @@ from repro.cli import main
 from repro.errors import OutputError
 from repro.results import files as written
 from repro.results import vtu
-from repro.run import checkpoint
-from repro.run.checkpoint import LAST, NEWEST, PREVIOUS
-from repro.run.folder import LOCK, SUMS
-from repro.run.loading import load_run
-from repro.run.running import Watch, resume, run
+from repro.runs import checkpoint
+from repro.runs.checkpoint import LAST, NEWEST, PREVIOUS
+from repro.runs.folder import LOCK, SUMS
+from repro.runs.loading import load_run
+from repro.runs.running import Watch, resume, run
 from repro.scene import load_scene, parse_scene, scene_tables
 from tests.pages import whole_of
 from tests.shell import BRIEF, as_whole, files, refused, resumed, rewrite, started, stopped, told, wait_for

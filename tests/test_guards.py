@@ -13,7 +13,7 @@ from repro.march.loop import Ledger
 from repro.march.simulation import steps
 from repro.model import transport
 from repro.model.pore import seeded, solve
-from repro.run.running import Recorder
+from repro.runs.running import Recorder
 from tests.shell import told as read_record
 from tests.strategies import ORDERS
 

@@ -8,8 +8,8 @@ from repro.cli import main
 from repro.errors import Interrupted
 from repro.march.simulation import ends_soon, steps
 from repro.results import read_table
-from repro.run.checkpoint import LAST, NEWEST, PREVIOUS
-from repro.run.running import Watch, resume, run
+from repro.runs.checkpoint import LAST, NEWEST, PREVIOUS
+from repro.runs.running import Watch, resume, run
 from repro.scene import SceneError, load_scene
 from tests.pages import whole_of
 from tests.shell import every, files, lasting, state, stopped, told

@@ -11,12 +11,12 @@ from pathlib import Path
 import pytest
 
 import repro
-from repro.check import memory
-from repro.check.checked import check
 from repro.cli import main
 from repro.march.simulation import simulate
-from repro.run import machine, running
-from repro.run.running import resume
+from repro.preflight import memory
+from repro.preflight.checked import check
+from repro.runs import machine, running
+from repro.runs.running import resume
 from repro.scene import SceneError, load_scene
 from tests import faults
 from tests.pages import run

@@ -12,10 +12,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from repro import PoreEnd, load_scene, simulate
-from repro.check import numbers, simplifications
 from repro.errors import MeshError
 from repro.fem import sizing
 from repro.fem.outline import polygon
+from repro.preflight import numbers, simplifications
 from repro.report import comparison
 from repro.report.reading import Run
 from tests.strategies import outlines, share

@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from repro.check import memory
-from repro.check.checked import check
 from repro.errors import SimulationError
 from repro.fem import mesher, sizing
 from repro.march.loop import PoreEnd
 from repro.march.simulation import simulate
 from repro.model import pore
+from repro.preflight import memory
+from repro.preflight.checked import check
 from repro.scene import SceneError, load_scene, packaged_scenes, parse_scene
 from tests.shell import refused
 

@@ -15,8 +15,8 @@ import pytest
 
 from repro.cli import main
 from repro.model import growth
-from repro.run import progress
-from repro.run.interrupts import noted
+from repro.runs import progress
+from repro.runs.interrupts import noted
 from tests.pages import run
 from tests.shell import flags, started, told
 

@@ -9,7 +9,7 @@ import pytest
 
 from reference import run_files
 from repro.results import vtu
-from repro.run.running import run
+from repro.runs.running import run
 from repro.scene import load_scene
 from verification.evidence.checks import Check
 from verification.problems import hostile

@@ -21,10 +21,10 @@ from repro.march import loop
 from repro.march.simulation import steps
 from repro.model import growth
 from repro.results.files import sealed
-from repro.run import running
-from repro.run.checkpoint import NEWEST, PREVIOUS
-from repro.run.running import Watch, resume, run
-from repro.run.whole import lacking
+from repro.runs import running
+from repro.runs.checkpoint import NEWEST, PREVIOUS
+from repro.runs.running import Watch, resume, run
+from repro.runs.whole import lacking
 from repro.scene import load_scene
 from tests import faults
 from tests.faults import little_memory

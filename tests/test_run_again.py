@@ -2,9 +2,9 @@
 
 
 from repro.cli import main
-from repro.run import machine
-from repro.run.running import run
-from repro.run.whole import lacking
+from repro.runs import machine
+from repro.runs.running import run
+from repro.runs.whole import lacking
 from repro.scene import load_scene
 from tests import faults, pages
 from tests.pages import whole_of

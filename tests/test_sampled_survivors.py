@@ -16,7 +16,6 @@ import xarray
 
 import repro
 from repro import results, timing
-from repro.check import cost, numbers, simplifications
 from repro.cli import sweep
 from repro.errors import Unresolved
 from repro.fem import linear, sizing
@@ -28,14 +27,15 @@ from repro.march.simulation import rows_within, simulate, steps
 from repro.model import remeshing
 from repro.model.contact_lines import surface_ends
 from repro.model.pore import initial_outline, seeded, solve
+from repro.preflight import cost, numbers, simplifications
 from repro.report import charts, fields, run_page
 from repro.results import netcdf, vtu
-from repro.run import running, stored
+from repro.runs import running, stored
 from repro.scene import load_scene
-from repro.sweep import page, table
-from repro.sweep.design import Point, parse
-from repro.sweep.picture import Axis
-from repro.sweep.state import Sweep
+from repro.sweeps import page, table
+from repro.sweeps.design import Point, parse
+from repro.sweeps.picture import Axis
+from repro.sweeps.state import Sweep
 from tests import strategies
 
 
@@ -161,7 +161,7 @@ def test_a_refinement_that_is_advised_resolves_and_smaller_ones_do_not():
 
 def test_a_second_signal_ends_the_process_with_the_signal_s_status():
     """128 and its number, as shells tell it."""
-    code = ("import os, signal, time\nfrom repro.run.interrupts import SAME, noted\n"
+    code = ("import os, signal, time\nfrom repro.runs.interrupts import SAME, noted\n"
             "with noted():\n    for _ in range(2):\n        os.kill(os.getpid(), signal.SIGTERM)\n"
             "        time.sleep(SAME + 0.2)")
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 128 + signal.SIGTERM

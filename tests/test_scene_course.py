@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from repro.check.checked import check
-from repro.check.numbers import judged
 from repro.march import updates
 from repro.march.simulation import simulate
 from repro.model import pore
+from repro.preflight.checked import check
+from repro.preflight.numbers import judged
 from repro.results import read_table
 from repro.scene import Scene, load_scene, parse_scene, scene_tables
 from repro.scene.course import Course

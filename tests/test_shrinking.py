@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from repro import load_scene, simulate
-from repro.check import numbers
 from repro.cli import main
+from repro.preflight import numbers
 from repro.report import comparison, quantities
 from repro.report.reading import read
 from repro.results import picture, read_table
-from repro.sweep import pool, table
-from repro.sweep.design import grid, parse, points
-from repro.sweep.state import Sweep
+from repro.sweeps import pool, table
+from repro.sweeps.design import grid, parse, points
+from repro.sweeps.state import Sweep
 from tests.shell import rows
 from tests.test_sweep import in_this_process
 

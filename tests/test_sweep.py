@@ -21,11 +21,11 @@ import pytest
 import repro
 from repro import results
 from repro.cli import main
-from repro.run.machine import THREADS
-from repro.run.whole import damage, record_of
-from repro.sweep import page, pool, table, task
-from repro.sweep.design import grid, latin, parse, points
-from repro.sweep.state import Sweep
+from repro.runs.machine import THREADS
+from repro.runs.whole import damage, record_of
+from repro.sweeps import page, pool, table, task
+from repro.sweeps.design import grid, latin, parse, points
+from repro.sweeps.state import Sweep
 from tests import shell
 from tests.faults import little_memory
 from tests.pages import HOSTILE, check_alone
@@ -342,7 +342,7 @@ def test_nothing_is_imported_from_the_working_folder(tmp_path):
 def test_what_c_code_prints_does_not_reach_the_user(tmp_path, capfd):
     """On neither output of the process of a run, whose own failure is told in one line with its place."""
     (tmp_path / "noisy.py").write_text(
-        "import os\nfrom repro.sweep import task\n"
+        "import os\nfrom repro.sweeps import task\n"
         "def made(scene, place, watch):\n    os.write(1, b'noise')\n    os.write(2, b'noise')\n    return {}['x']\n"
         "task._made = made\n")
     one = points("flow_only", [], [parse("pore.width=48 um")], [(48.0,)])

@@ -15,7 +15,7 @@ from unittest.mock import AsyncMock, MagicMock, Mock
 import pytest
 
 from repro.cli import main
-from repro.sweep import cluster, task
+from repro.sweeps import cluster, task
 from tests.shell import rows
 
 VARY = ["--vary", "pore.width=48:52 um:linear:6", "--set", "numerics.preset=fast"]

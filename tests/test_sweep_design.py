@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from repro.scene import SceneError, scene_tables
-from repro.sweep.design import MOST_POINTS, Factor, grid, latin, levels, parse, points
+from repro.sweeps.design import MOST_POINTS, Factor, grid, latin, levels, parse, points
 
 RANGES = st.tuples(st.floats(1e-6, 1e6), st.floats(1.001, 1e6)).map(lambda pair: (pair[0], pair[0] * pair[1]))
 SPACINGS = st.sampled_from(["linear", "log"])

@@ -16,7 +16,6 @@ from tqdm import tqdm as Bar
 
 import repro
 from repro import results, timing
-from repro.check import modelled, numbers, simplifications
 from repro.errors import BalanceError, TransportError, Unresolved
 from repro.fem.outline import FREE, half_disc
 from repro.fem.sizing import Sizing, split
@@ -25,15 +24,16 @@ from repro.march.loop import Instant, Ledger, PoreEnd
 from repro.march.pace import EXCESS, Pace, missed
 from repro.model import biomass, contact, gear, mesh_motion, remeshing, traction, transport
 from repro.model.pore import Solved, resolution, seeded, solve
+from repro.preflight import modelled, numbers, simplifications
 from repro.report import charts, comparison, fields, quantities, run_page
 from repro.report.reading import Run
 from repro.results import picture, vtu
 from repro.results.tables import Results
-from repro.run import progress, running
+from repro.runs import progress, running
 from repro.scene import load_scene
-from repro.sweep import making, page, table
-from repro.sweep.design import grid, parse, points
-from repro.sweep.state import Sweep
+from repro.sweeps import making, page, table
+from repro.sweeps.design import grid, parse, points
+from repro.sweeps.state import Sweep
 from tests import oracles
 from tests.shell import rows, told
 from tests.strategies import ORDERS, constants

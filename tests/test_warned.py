@@ -7,12 +7,12 @@ from unittest.mock import Mock
 
 import pytest
 
-from repro.check import simplifications
 from repro.cli import main
 from repro.march.simulation import steps
+from repro.preflight import simplifications
 from repro.results import read_table
-from repro.run import running
-from repro.run.running import resume, run
+from repro.runs import running
+from repro.runs.running import resume, run
 from repro.scene import load_scene
 from tests import pages
 from tests.pages import Page, text_of, whole_of

@@ -20,7 +20,7 @@ from time import perf_counter
 from timeit import repeat
 
 from repro import load_scene, run, sweep
-from repro.sweep.pool import cores
+from repro.sweeps.pool import cores
 
 WANTED = 0.95
 #: Presets: of the sweep, and of the commands.

@@ -15,7 +15,7 @@ from contextlib import suppress
 
 from repro.cli import check, compare, run, scene, sweep
 from repro.errors import Interrupted, OutputError, SimulationError
-from repro.run.progress import in_json, printable, say
+from repro.runs.progress import in_json, printable, say
 from repro.scene import SceneError
 
 #: The commands, one a module. Each has ``add(commands)``, which adds its parser with

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from repro.cli.arguments import add_scene
 from repro.errors import OutputError
-from repro.run.progress import say
+from repro.runs.progress import say
 from repro.scene import load_scene, packaged_scenes
 
 
@@ -33,7 +33,7 @@ def call(chosen) -> int:
     if chosen.scene not in packaged_scenes() and folder.is_dir():
         return _check_run(chosen, folder)
     scene = load_scene(chosen.scene, chosen.set, chosen.unset)
-    from repro.check.checked import check, report
+    from repro.preflight.checked import check, report
 
     found = check(scene, chosen.scene)
     say(json.dumps(found.tables(), indent=2) if chosen.json else report(found))
@@ -43,8 +43,8 @@ def call(chosen) -> int:
 def _check_run(chosen, folder: Path) -> int:
     """Say whether the files of a run are as they were written. Raises OutputError where not."""
     from repro.report.reading import NoRun
-    from repro.run.status import done
-    from repro.run.whole import state_of
+    from repro.runs.status import done
+    from repro.runs.whole import state_of
 
     if chosen.set or chosen.unset:
         chosen.refuse("no --set or --unset is accepted with the folder of a run")

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from repro.cli.arguments import path
 from repro.errors import OutputError
-from repro.run.progress import say
+from repro.runs.progress import say
 
 
 def add(commands) -> None:

@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING
 
 from repro.cli.arguments import add_scene, path
 from repro.errors import SimulationError
-from repro.run import INTERVAL, interrupts, progress
+from repro.runs import INTERVAL, interrupts, progress
 from repro.scene import Scene, load_scene, packaged_scenes
 from repro.scene.files import key_of
 
 if TYPE_CHECKING:
-    from repro.run.running import Watch
+    from repro.runs.running import Watch
 
 DESCRIPTION = """\
 Run a scene and write its results, or go on with a run that was interrupted or killed: the result is
@@ -73,7 +73,7 @@ def call(chosen) -> int:
     if not chosen.resume and not (chosen.scene and chosen.out):
         chosen.refuse("SCENE and --out DIR are needed, or --resume DIR")
     scene = None if chosen.resume else load_scene(chosen.scene, chosen.set, chosen.unset)
-    from repro.run.running import Watch
+    from repro.runs.running import Watch
 
     with interrupts.noted() as stop, progress.told(chosen.quiet, chosen.json) as tell:
         try:
@@ -86,7 +86,7 @@ def call(chosen) -> int:
 
 def _run(chosen, scene: Scene | None, watch: Watch) -> None:
     """Run the scene, or go on with the run where there is none."""
-    from repro.run.running import resume, run
+    from repro.runs.running import resume, run
 
     if scene is None:
         resume(chosen.resume, watch=watch, overrides=chosen.set)

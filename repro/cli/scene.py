@@ -6,7 +6,7 @@ Without a scene, the list of packaged ones.
 from __future__ import annotations
 
 from repro.cli.arguments import add_changes
-from repro.run.progress import say
+from repro.runs.progress import say
 from repro.scene.text import scene_text, titles
 
 

@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING
 
 from repro.cli.arguments import add_scene, path
 from repro.errors import Interrupted
-from repro.run.interrupts import ASKED
-from repro.run.progress import say
+from repro.runs.interrupts import ASKED
+from repro.runs.progress import say
 
 if TYPE_CHECKING:
-    from repro.sweep.making import Swept, Tell
+    from repro.sweeps.making import Swept, Tell
 
 #: Exit status where some runs have failed.
 SOME_FAILED = 3
@@ -75,7 +75,7 @@ def _part(text: str) -> float:
 
 def call(chosen) -> int:
     """Make the sweep that was chosen."""
-    from repro.sweep.making import sweep
+    from repro.sweeps.making import sweep
 
     with _ended_by_signals(chosen.command_line), _telling(chosen.quiet) as tell:
         swept = sweep(chosen.scene, chosen.vary, chosen.out, chosen.set, chosen.unset,

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from reference import surface_stability, surface_stretch
-from repro.check import numbers
 from repro.errors import RunEnd
 from repro.march.folding import Fold
 from repro.march.loop import Instant
@@ -18,6 +17,7 @@ from repro.march.simulation import simulate
 from repro.march.stepping import SHORTEST
 from repro.model import contact, growth, pore
 from repro.model.surface import BIOT, CREASE, surface
+from repro.preflight import numbers
 from repro.scene import Scene, load_scene
 from verification.evidence.checks import around, at_most, between, refine, studies
 from verification.problems import bodies

@@ -20,7 +20,7 @@ import pytest
 
 from reference import run_files
 from repro.errors import SimulationError
-from repro.run.running import run
+from repro.runs.running import run
 from repro.scene import SceneError, load_scene
 from verification.evidence.checks import Check, at_most
 from verification.problems import hostile

@@ -61,21 +61,21 @@ MUTANTS = (
          "pass",
          f"{FOLD}no_row_has_a_density_that_is_out_of_bounds[2.5-1.5-SimulationError]")),
     *changes(
-        "repro/run/recorder.py",
+        "repro/runs/recorder.py",
         ("crease-warned-again",
          "Every step on a creased surface is warned of.",
          'if any(warned["key"] == CREASED for warned in self.record.warnings):',
          "if False:",
          OVER)),
     *changes(
-        "repro/run/stored.py",
+        "repro/runs/stored.py",
         ("last-shape-dropped",
          "A checkpoint holds no last shape.",
          "if pore.last is not None:",
          "if False:",
          f"{FOLD}a_run_stopped_after_every_step_is_the_whole_run[stress_free]")),
     *changes(
-        "repro/check/simplifications.py",
+        "repro/preflight/simplifications.py",
         ("fold-expected-early",
          "check expects a fold however little the rim has outgrown the core.",
          "and excess > FOLD_EXCESS)",
@@ -234,7 +234,7 @@ MUTANTS = (
          "after.mass - now.mass,",
          f"{LOSS}[updates]")),
     *changes(
-        "repro/sweep/table.py",
+        "repro/sweeps/table.py",
         ("sweep-values-reversed",
          "A row of table.csv has its run's varied values in the reverse order.",
          "yield [one.point.index, *one.point.values,",
@@ -307,7 +307,7 @@ MUTANTS = (
          '"units": name',
          "tests/test_netcdf.py::test_it_says_what_it_is")),
     *changes(
-        "repro/sweep/design.py",
+        "repro/sweeps/design.py",
         ("levels-always-linear",
          "A logarithmic range has equal steps.",
          'np.geomspace if factor.spacing == "log" else np.linspace',
@@ -324,7 +324,7 @@ MUTANTS = (
          "tables[section].clear()",
          "tests/test_sweep_design.py::test_varying_one_of_the_pair_replaces_the_other_and_keeps_the_rest")),
     *changes(
-        "repro/run/checkpoint.py",
+        "repro/runs/checkpoint.py",
         ("checksum-not-looked-at",
          "A checkpoint that was altered is read.",
          "if first != MAGIC + sha256(body).encode():",
@@ -365,21 +365,21 @@ MUTANTS = (
          "if name in hashes(record) and not sha256(content):",
          "tests/test_compare.py::test_a_damaged_run_is_refused_without_being_read[bit-timeseries.csv]")),
     *changes(
-        "repro/run/whole.py",
+        "repro/runs/whole.py",
         ("fields-not-looked-at",
          "Fields of a run that is over are not compared with their SHA-256.",
          "expected = hashes(record) | sums(folder)",
          "expected = dict(hashes(record))",
          "tests/test_resume.py::test_every_bit_of_a_run_that_is_over_counts")),
     *changes(
-        "repro/run/machine.py",
+        "repro/runs/machine.py",
         ("hash-of-remarks",
          "A comment changes the hash of the source.",
          "EMPTY.sub(\"\\n\", REMARK.sub(_without_remark, source))",
          "source",
          "tests/test_machine.py::test_remarks_and_rooms_without_numbers_leave_the_hash")),
     *changes(
-        "repro/sweep/pool.py",
+        "repro/sweeps/pool.py",
         ("working-folder-first",
          "The server of a sweep imports from the working folder.",
          '"PYTHONSAFEPATH": "1"',
@@ -391,14 +391,14 @@ MUTANTS = (
          "pass",
          "tests/test_sweep.py::test_nothing_is_imported_from_the_working_folder")),
     *changes(
-        "repro/sweep/task.py",
+        "repro/sweeps/task.py",
         ("libraries-print",
          "What libraries print in a run of a sweep reaches the user.",
          "os.dup2(nowhere, 2)",
          "pass",
          "tests/test_sweep.py::test_what_c_code_prints_does_not_reach_the_user")),
     *changes(
-        "repro/run/status.py",
+        "repro/runs/status.py",
         ("over-by-its-first-words",
          "A status that begins like that of a run at the end of its pore is one.",
          "end.fullmatch(status)",
@@ -410,14 +410,14 @@ MUTANTS = (
          ".*",
          f"{FOLD}the_whole_sentence_is_needed[the aggregate's surface folds in the step from t = 5.24 h-False]")),
     *changes(
-        "repro/run/record.py",
+        "repro/runs/record.py",
         ("fields-that-changed",
          "A checkpoint is gone on from though a file of fields was altered.",
          "if not is_file(folder / name) or sha256_of(folder / name) != expected:",
          "if not is_file(folder / name):",
          "tests/test_checkpoint.py::test_fields_that_are_not_as_they_were_written_are_refused")),
     *changes(
-        "repro/run/folder.py",
+        "repro/runs/folder.py",
         ("whole-folder-own",
          "A folder with other files in it is taken for a run's.",
          "return sorted(name for name in names if name not in own or not is_file(folder / name))",
@@ -434,7 +434,7 @@ MUTANTS = (
          "found = {name for name in found if name}",
          "tests/test_run_again.py::test_a_forced_run_removes_what_is_listed_and_nothing_else")),
     *changes(
-        "repro/run/running.py",
+        "repro/runs/running.py",
         ("another-scene-goes-on",
          "A run is gone on with by another scene.",
          'if there["hash"] == now["hash"] else ("tables",)',
@@ -466,7 +466,7 @@ MUTANTS = (
          "if left:",
          "tests/test_machine.py::test_a_limit_of_file_sizes_ends_a_run_in_one_line[100000-report.html: ]")),
     *changes(
-        "repro/run/recorder.py",
+        "repro/runs/recorder.py",
         ("origin-forgotten",
          "run.json does not say what was set beside the scene's file.",
          '"origin": self.origin,',
@@ -539,7 +539,7 @@ MUTANTS = (
          "(value - first) / first",
          f"{UNSEEN}runs_are_compared_under_their_own_names_with_signs")),
     *changes(
-        "repro/check/cost.py",
+        "repro/preflight/cost.py",
         ("steps-never-doubled",
          "Steps are expected to be as long as the tolerance allows from the start.",
          "ramp = math.ceil(math.log2(longest / first))",
@@ -596,7 +596,7 @@ MUTANTS = (
          "1000 * tolerance",
          f"{NOT_MET}[options0]")),
     *changes(
-        "repro/check/simplifications.py",
+        "repro/preflight/simplifications.py",
         ("thin-drag-layers-untold",
          "The layer in which a permeable body slows the water is warned of where its film loses ten times as much.",
          "if loss > FILM_LOSS",
@@ -806,14 +806,14 @@ MUTANTS = (
          "tell",
          "tests/test_sweep.py::test_every_option_of_the_command_is_heeded")),
     *changes(
-        "repro/sweep/making.py",
+        "repro/sweeps/making.py",
         ("sweep-ignores-unset",
          "A sweep ignores --unset.",
          "factors, found, unset)",
          "factors, found)",
          "tests/test_sweep.py::test_every_option_of_the_command_is_heeded")),
     *changes(
-        "repro/sweep/table.py",
+        "repro/sweeps/table.py",
         ("rows-of-failed",
          "table.csv has no row of a run that failed on its way.",
          "if len(one.times):",
@@ -835,7 +835,7 @@ MUTANTS = (
          'lambda run: run.times[0], "end")',
          "tests/test_sweep.py::test_biomass_and_contact_are_read_from_the_rows")),
     *changes(
-        "repro/sweep/page.py",
+        "repro/sweeps/page.py",
         ("triangle-of-failed",
          "A run that failed is drawn as one that was not clogged at its end.",
          'if _time(one) > 0 and (one.done or one.numbers["clogging_time_h"])]',
@@ -847,7 +847,7 @@ MUTANTS = (
          '"time to 0.1 of the conductivity (h)"',
          f"{UNSEEN}marks_of_the_page_have_the_colour_that_the_key_below_them_names")),
     *changes(
-        "repro/sweep/design.py",
+        "repro/sweeps/design.py",
         ("text-of-value",
          "A scene of a sweep has six digits of what its table tells in full.",
          "number = value if isinstance(value, str) else repr(value)",
@@ -949,7 +949,7 @@ MUTANTS = (
          "np.abs(values[:, 0]) if values.ndim == 2 else values",
          f"{UNSEEN}a_picture_says_which_values_are_dark")),
     *changes(
-        "repro/run/recorder.py",
+        "repro/runs/recorder.py",
         ("remeshes-of-rows",
          "Meshes made anew are told with the next row, not with their step.",
          "return self.record.remeshes + (self.state.remeshes if self.state else 0)",
@@ -981,7 +981,7 @@ MUTANTS = (
          "return self.state is None or self.state.pore.contact",
          f"{UNSEEN}the_worst_of_the_steps_that_miss_the_tolerance_is_told")),
     *changes(
-        "repro/check/modelled.py",
+        "repro/preflight/modelled.py",
         ("velocity-said",
          "check tells the mean velocity in um/h as m/day.",
          "_over_time(flow.mean_velocity, 24e-6, 'm/day')",
@@ -1018,7 +1018,7 @@ MUTANTS = (
          'f"midpoint steps, tolerance {numerics.refinement:g}"',
          "tests/test_check.py::test_what_is_modelled_over_time_is_told")),
     *changes(
-        "repro/check/checked.py",
+        "repro/preflight/checked.py",
         ("end-is-start",
          "check tells the numbers of the start as those of the end.",
          'end = "" if number.end is None else f"{number.end:.2g}"',
@@ -1030,7 +1030,7 @@ MUTANTS = (
          'f"{expected.seconds:.0f} MB besides',
          "tests/test_check.py::test_what_a_run_takes_is_told_in_a_unit_that_suits[45.3-45 s]")),
     *changes(
-        "repro/check/simplifications.py",
+        "repro/preflight/simplifications.py",
         ("ends-when",
          "check says that the aggregate is near the ends from the start, where it grows to them.",
          'when = "by growth.end" if end.reach > numbers.at_start(scene).reach else "from the start"',
@@ -1071,14 +1071,14 @@ MUTANTS = (
          "f\"dupin2001-repro {found['versions']['python']}\"",
          "tests/test_netcdf.py::test_it_says_what_it_is")),
     *changes(
-        "repro/run/running.py",
+        "repro/runs/running.py",
         ("origin-of-before",
          "run.json of a run made longer from t = 0 says that its shorter end was set.",
          'recorder.origin["set"] = changes',
          "pass",
          "tests/test_longer.py::test_a_run_that_is_over_keeps_one_checkpoint")),
     *changes(
-        "repro/check/numbers.py",
+        "repro/preflight/numbers.py",
         ("thiele-end",
          "The Thiele number at the end is that of the start.",
          "end.thickness * per if later else None",
@@ -1109,7 +1109,7 @@ MUTANTS = (
          "near = first > first",
          f"{ODD}what_no_mesh_resolves_is_refused")),
     *changes(
-        "repro/check/checked.py",
+        "repro/preflight/checked.py",
         ("check-meshes-all",
          "check makes the first mesh however large it is.",
          "estimated = first_nodes(scene) > MOST_MESHED",
@@ -1124,7 +1124,7 @@ MUTANTS = (
          f"{ADVICE}no_refinement_is_named_that_is_not_accepted_or_not_tried[0.2-; numerics.refinement up to 0.6 does "
          "not resolve it]")),
     *changes(
-        "repro/check/simplifications.py",
+        "repro/preflight/simplifications.py",
         ("refinement-beyond-the-largest",
          "check advises refinements that no scene accepts.",
          "if enough <= MOST_REFINED:",
@@ -1143,7 +1143,7 @@ MUTANTS = (
          'side = "upstream"',
          f"{MIRRORS}a_run_ends_at_either_end_of_the_pore_and_names_it")),
     *changes(
-        "repro/check/numbers.py",
+        "repro/preflight/numbers.py",
         ("reach-downstream-alone",
          "An outline reaches as far as its downstream end, however far the other one is.",
          "reach = max(-outline.upstream, outline.downstream)",
@@ -1290,7 +1290,7 @@ MUTANTS = (
          'if numerics.transfer != "linear" and numerics.inlet != "mean":',
          f"{GUARDS}a_stated_defect_lets_no_other_one_pass")),
     *changes(
-        "repro/run/recorder.py",
+        "repro/runs/recorder.py",
         ("one-new-mesh-a-row",
          "run.json counts one new mesh a row, however many there were.",
          "int(instant.remeshes)",
@@ -1368,7 +1368,7 @@ MUTANTS = (
          "pore.generate(scene, expanded.boundary, min(expanded.front, 2.0))",
          DEEPEST)),
     *changes(
-        "repro/sweep/table.py",
+        "repro/sweeps/table.py",
         ("relative-to-the-most",
          "Conductivity is relative to the largest, not to that of the start.",
          '/ found["conductivity_m_per_d"][0]',
@@ -1380,7 +1380,7 @@ MUTANTS = (
          "low = np.flatnonzero(relative <= part * relative.max())",
          f"{SHRINKING}a_pore_clogs_when_it_first_conducts_so_little_after_a_rise")),
     *changes(
-        "repro/sweep/page.py",
+        "repro/sweeps/page.py",
         ("axis-of-first-values",
          "The axis of the conductivity ends where the runs begin.",
          "np.concatenate([one.relative for one in shown])",
@@ -1414,7 +1414,7 @@ MUTANTS = (
          f"{CACHE_KEYS}a_cached_run_is_that_of_its_scene_and_source_under_its_name",
          f"{CACHE_KEYS}the_runs_of_the_sensitivities_are_kept_by_scene_name_and_source")),
     *changes(
-        "repro/run/machine.py",
+        "repro/runs/machine.py",
         ("source-of-the-top",
          "The hash of the source leaves out a room that computes numbers.",
          "for room in ROOMS for path",

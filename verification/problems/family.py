@@ -21,10 +21,10 @@ import meshio
 import numpy as np
 
 from reference import surface_stretch
-from repro.check import numbers
 from repro.march.folding import CREASING
+from repro.preflight import numbers
 from repro.results import read_table
-from repro.run.status import COMPLETED
+from repro.runs.status import COMPLETED
 from repro.scene import load_scene
 from verification.evidence.writing import REPORT
 

@@ -8,7 +8,7 @@ import importlib.util
 import os
 import sys
 
-from repro.run.machine import source_hash
+from repro.runs.machine import source_hash
 from verification.evidence.writing import REPORT
 from verification.mutants import runner
 from verification.mutants.machine import reach, record, sample

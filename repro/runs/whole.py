@@ -6,8 +6,8 @@ from pathlib import Path
 
 from repro.report.reading import NoRun, Run, hashes, read, require_columns
 from repro.results.files import is_file, read_sealed, sha256_of
-from repro.run.folder import PROVENANCE, REPORT, sums
-from repro.run.status import RUNNING, done, undone
+from repro.runs.folder import PROVENANCE, REPORT, sums
+from repro.runs.status import RUNNING, done, undone
 from repro.scene import Scene, scene_hash
 
 

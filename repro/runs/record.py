@@ -12,7 +12,7 @@ from repro import results
 from repro.errors import CheckpointError
 from repro.results.files import is_file, sha256_of
 from repro.results.quantities import Quantity
-from repro.run.checkpoint import Arrays
+from repro.runs.checkpoint import Arrays
 
 #: Rows of a table, each a list of numbers, None where there is none.
 Table = list[list]

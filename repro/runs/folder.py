@@ -16,7 +16,7 @@ from pathlib import Path
 
 from repro.errors import OutputError
 from repro.results.files import MOST_TABLE, WRITING, is_file, is_folder, read
-from repro.run.checkpoint import LAST, NEWEST, PREVIOUS, REFUSED
+from repro.runs.checkpoint import LAST, NEWEST, PREVIOUS, REFUSED
 
 LOCK = ".lock"
 PROVENANCE = "run.json"

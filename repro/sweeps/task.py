@@ -18,11 +18,11 @@ from pathlib import Path
 from repro.errors import SimulationError
 from repro.report.reading import NoRun
 from repro.results.files import is_file
-from repro.run.folder import PROVENANCE
-from repro.run.machine import source_hash
-from repro.run.running import OutputError, Watch, resume, run
-from repro.run.status import done
-from repro.run.whole import damage, record_of
+from repro.runs.folder import PROVENANCE
+from repro.runs.machine import source_hash
+from repro.runs.running import OutputError, Watch, resume, run
+from repro.runs.status import done
+from repro.runs.whole import damage, record_of
 from repro.scene import Scene, SceneError
 
 

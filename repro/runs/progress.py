@@ -1,7 +1,7 @@
 """What a run says while it runs.
 
 A bar on a terminal, lines elsewhere, JSON for machines, or nothing.
-Each is a context that yields what :class:`repro.run.running.Watch` calls ``tell``.
+Each is a context that yields what :class:`repro.runs.running.Watch` calls ``tell``.
 Warnings go to standard error always.
 """
 

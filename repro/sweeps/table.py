@@ -17,10 +17,10 @@ from repro import results
 from repro.report.reading import NoRun
 from repro.results.files import whole
 from repro.results.quantities import Quantity
-from repro.run import status
-from repro.run.whole import run_of
-from repro.sweep.design import Point
-from repro.sweep.state import Sweep
+from repro.runs import status
+from repro.runs.whole import run_of
+from repro.sweeps.design import Point
+from repro.sweeps.state import Sweep
 
 
 @dataclass(frozen=True, eq=False)

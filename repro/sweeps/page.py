@@ -13,11 +13,11 @@ from repro.report.page import policy
 from repro.results import write_text
 from repro.results.files import whole
 from repro.results.quantities import Quantity
-from repro.sweep import picture
-from repro.sweep.design import Factor, label
-from repro.sweep.picture import Axis, at
-from repro.sweep.state import Sweep
-from repro.sweep.table import NUMBERS, Told
+from repro.sweeps import picture
+from repro.sweeps.design import Factor, label
+from repro.sweeps.picture import Axis, at
+from repro.sweeps.state import Sweep
+from repro.sweeps.table import NUMBERS, Told
 
 #: From here on the values of a list are shown on a logarithmic scale.
 WIDE = 20

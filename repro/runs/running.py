@@ -14,16 +14,16 @@ from pathlib import Path
 from time import perf_counter
 
 from repro import results, timing
-from repro.check import simplifications
-from repro.check.memory import require_memory, require_outline
-from repro.check.numbers import judged
-from repro.check.simplifications import Warned
+from repro.preflight import simplifications
+from repro.preflight.memory import require_memory, require_outline
+from repro.preflight.numbers import judged
+from repro.preflight.simplifications import Warned
 from repro.errors import CheckpointError, Interrupted, OutputError, RunEnd, SimulationError
 from repro.march.loop import Instant, State
 from repro.march.simulation import ends_soon, same_rows, steps
 from repro.results.files import is_file, read_json, read_sealed
-from repro.run import INTERVAL, checkpoint
-from repro.run.folder import (
+from repro.runs import INTERVAL, checkpoint
+from repro.runs.folder import (
     CHECKPOINTS,
     PROVENANCE,
     REPORT,
@@ -35,10 +35,10 @@ from repro.run.folder import (
     tidy,
     usable,
 )
-from repro.run.machine import conditions, differences, require_packages
-from repro.run.recorder import Recorder, interrupted, settle
-from repro.run.status import COMPLETED, FAILED, INTERRUPTED, RUNNING, done, undone
-from repro.run.whole import damage
+from repro.runs.machine import conditions, differences, require_packages
+from repro.runs.recorder import Recorder, interrupted, settle
+from repro.runs.status import COMPLETED, FAILED, INTERRUPTED, RUNNING, done, undone
+from repro.runs.whole import damage
 from repro.scene import (
     KEYS,
     Scene,

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from repro.run.machine import require_packages
+from repro.runs.machine import require_packages
 from repro.scene import Source, label
-from repro.sweep import cluster, design, page, pool, table
-from repro.sweep.state import Sweep, opened, usable
+from repro.sweeps import cluster, design, page, pool, table
+from repro.sweeps.state import Sweep, opened, usable
 
 #: Of the first conductivity, at which a pore counts as clogged.
 CLOGGED = 0.1

@@ -18,7 +18,7 @@ from repro.march.loop import Ledger, State
 from repro.march.pace import Pace
 from repro.model.pore import Pore, material
 from repro.model.transport import Concentrations
-from repro.run.checkpoint import Arrays
+from repro.runs.checkpoint import Arrays
 from repro.scene import Scene, scene_hash
 
 #: Arrays of the mesh, and of the pore, by the names of its fields.

@@ -6,16 +6,16 @@ import textwrap
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 
-from repro.check import cost
-from repro.check.cost import Cost
-from repro.check.memory import first_nodes, require_memory, require_outline
-from repro.check.modelled import modelled
-from repro.check.numbers import Number, judged
-from repro.check.simplifications import Warned, unmet, warnings
 from repro.errors import SimulationError
 from repro.fem.linear import Method
 from repro.march.loop import stopping
 from repro.model import pore
+from repro.preflight import cost
+from repro.preflight.cost import Cost
+from repro.preflight.memory import first_nodes, require_memory, require_outline
+from repro.preflight.modelled import modelled
+from repro.preflight.numbers import Number, judged
+from repro.preflight.simplifications import Warned, unmet, warnings
 from repro.scene import Scene, Source, label, load_scene
 from repro.scene.units import SceneError
 

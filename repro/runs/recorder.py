@@ -10,14 +10,14 @@ from time import perf_counter
 import numpy as np
 
 from repro import report, results, timing
-from repro.check.simplifications import CREASED, Warned, creased, unmet
+from repro.preflight.simplifications import CREASED, Warned, creased, unmet
 from repro.errors import CheckpointError, Interrupted, OutputError
 from repro.march.loop import Instant, Ledger, State, added
 from repro.march.pace import Pace, missed
 from repro.results import netcdf, vtu
 from repro.results.files import is_file, sha256_of, whole
-from repro.run import checkpoint, record, stored
-from repro.run.folder import (
+from repro.runs import checkpoint, record, stored
+from repro.runs.folder import (
     CHECKPOINTS,
     OWN,
     PROVENANCE,
@@ -28,9 +28,9 @@ from repro.run.folder import (
     sum_line,
     writing,
 )
-from repro.run.machine import conditions
-from repro.run.record import Record
-from repro.run.status import RUNNING, done, undone
+from repro.runs.machine import conditions
+from repro.runs.record import Record
+from repro.runs.status import RUNNING, done, undone
 from repro.scene import Scene
 from repro.scene.units import to_internal
 

@@ -22,12 +22,12 @@ from pathlib import Path
 import numpy as np
 import shapely
 
-from repro.check import numbers
 from repro.errors import MeshError
 from repro.fem import sizing
 from repro.fem.outline import Outline
 from repro.fem.sizing import ACROSS_AGGREGATE, ACROSS_PORE, SPLIT
 from repro.model.pore import initial_outline, resolution, sized
+from repro.preflight import numbers
 from repro.scene import Scene, SceneError, needed
 
 #: Bytes per node at the peak of a run, by the order of elements: measured at 800 to 50 000 nodes.

@@ -19,8 +19,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from repro.sweep import task
-from repro.sweep.design import Point
+from repro.sweeps import task
+from repro.sweeps.design import Point
 
 Each = Callable[[Sequence[Point], Path], Iterator[tuple[Point, str]]]
 _METHODS = multiprocessing.get_all_start_methods()
@@ -53,7 +53,7 @@ def _serve() -> None:
     from multiprocessing import forkserver, resource_tracker
 
     with _apart():
-        CONTEXT.set_forkserver_preload(["repro.sweep.preload"])
+        CONTEXT.set_forkserver_preload(["repro.sweeps.preload"])
         resource_tracker.ensure_running()  # which unblocks the signal
         kept = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
         try:

@@ -4,9 +4,9 @@ disk."""
 import gc
 
 from repro import results
-from repro.run.machine import conditions
+from repro.runs.machine import conditions
 from repro.scene import load_scene
-from repro.sweep import task
+from repro.sweeps import task
 
 results.provenance(load_scene("flow_only"))
 conditions()

@@ -12,7 +12,7 @@ from repro.report import fields, reading
 from repro.results import vtu
 from repro.results.files import MOST_DATA, read, sha256
 from repro.results.tables import Results, arrays
-from repro.run.folder import sums
+from repro.runs.folder import sums
 
 
 def load_run(folder: str | Path) -> Results:

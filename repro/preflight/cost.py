@@ -18,14 +18,14 @@ from itertools import islice
 from time import perf_counter
 from typing import TypeAlias
 
-from repro.check import numbers
-from repro.check.memory import MB, expected_bytes
 from repro.errors import RunEnd
 from repro.march.loop import Instant, State
 from repro.march.pace import missed
 from repro.march.simulation import rows_within
 from repro.march.simulation import steps as steps_of
 from repro.march.stepping import SHORTEST
+from repro.preflight import numbers
+from repro.preflight.memory import MB, expected_bytes
 from repro.scene import Scene, needed
 
 #: What a step leaves.

@@ -15,10 +15,10 @@ from repro.errors import OutputError
 from repro.report.reading import NoRun
 from repro.results import write_json
 from repro.results.files import is_folder, read_json, whole
-from repro.run.folder import LOCK, PROVENANCE, locked, strange
-from repro.run.whole import lacking, record_of
-from repro.sweep import task
-from repro.sweep.design import Factor, Point
+from repro.runs.folder import LOCK, PROVENANCE, locked, strange
+from repro.runs.whole import lacking, record_of
+from repro.sweeps import task
+from repro.sweeps.design import Factor, Point
 
 
 class SweepError(OutputError):

@@ -6,14 +6,14 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from repro.check import numbers
-from repro.check.numbers import Number
 from repro.fem import sizing
 from repro.march.stepping import SHORTEST
 from repro.model.brinkman import ACROSS
 from repro.model.pore import Pore, film, resolution
 from repro.model.remeshing import MOST_REFINED
 from repro.model.surface import CREASE, surface
+from repro.preflight import numbers
+from repro.preflight.numbers import Number
 from repro.scene import Kinetics, Scene
 from repro.scene.keys import RATIO
 

@@ -17,10 +17,10 @@ from functools import partial
 from importlib import import_module
 from pathlib import Path
 
-from repro.sweep import pool, task
-from repro.sweep.design import Point
-from repro.sweep.pool import Each
-from repro.sweep.state import SweepError
+from repro.sweeps import pool, task
+from repro.sweeps.design import Point
+from repro.sweeps.pool import Each
+from repro.sweeps.state import SweepError
 
 PACKAGE = "distributed"
 #: Seconds that a scheduler may take to answer, and to have workers; and that the process of a
