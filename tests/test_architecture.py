@@ -16,8 +16,8 @@ MADE = {"__pycache__", "out", "cache", "live", "pictures", "runs", "build", "dis
 FORBIDDEN = {"repro": {"reference", "verification", "paper_figures", "tests", "pickle"},
              "reference": {"repro", "pickle"}, **dict.fromkeys(FOLDERS[2:], {"pickle"})}
 #: The rooms of `repro`, in the one order in which they may import each other: each those before it.
-ROOMS = ("errors", "timing", "scene", "fem", "model", "march", "results", "preflight", "report", "runs", "sweeps", "cli",
-         "__main__")
+ROOMS = ("errors", "timing", "scene", "fem", "model", "march", "results", "preflight", "report", "runs",
+         "sweeps", "cli", "__main__")
 #: Of the rooms before it, those that a room may not import: finite elements know sizes and solvers, not scenes.
 CLOSED = {"fem": {"scene"}}
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
