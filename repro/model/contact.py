@@ -9,7 +9,7 @@ lines may lie anywhere on it: :mod:`repro.model.contact_lines` searches for them
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -267,7 +267,8 @@ class _Trials:
         self._grown = grown
         self._forces = forces
         self._patient = patient
-        self._shapes = [(np.zeros(0), start.mesh.points, start.pressure)]
+        self._start = start.mesh.points, start.pressure
+        self._shapes = [(np.zeros(0), *self._start)]
         self._divided: Division | None = None
         self._shape: growth.Shape | None = None
         self.iterations = 0
@@ -302,25 +303,30 @@ class _Trials:
             self._divided = self._divided.at(contact.t)
         return self._divided
 
-    def _guess(self, advances: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Places (N, 2) um and pressure from which a trial starts."""
+    def _guesses(self, advances: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """Places (N, 2) um and pressure from which a trial may start, the best ones first."""
+        ahead = self._ahead(advances)
+        if ahead is not None:
+            yield ahead
+        yield self._shapes[-1][1:]
+        yield self._start
+
+    def _ahead(self, advances: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+        """The last two shapes, extrapolated in the advance of the line that moves most."""
         last, points, pressure = self._shapes[-1]
-        if len(self._shapes) < 2 or len(self._shapes[0][0]) != len(advances):
-            return points, pressure
         before, points_before, pressure_before = self._shapes[0]
+        if len(self._shapes) < 2 or len(before) != len(advances):
+            return None
         line = np.argmax(np.abs(last - before))
         if last[line] == before[line]:
-            return points, pressure
+            return None
         part = (advances[line] - last[line]) / (last[line] - before[line])
         part = min(max(part, -1.0), 1.0)
-        ahead = points + part * (points - points_before)
-        if self._grown.body.strained(ahead[self._grown.mesh.body]).J.min() <= 0:
-            return points, pressure
-        return ahead, pressure + part * (pressure - pressure_before)
+        return (points + part * (points - points_before),
+                pressure + part * (pressure - pressure_before))
 
     def _solve(self, contact: Contact, advances: np.ndarray) -> Expansion:
         grown = self._grown
-        points, pressure = self._guess(advances)
         forces = self._forces
         division = None
         locked = replace(grown, wall=contact.wall)
@@ -328,17 +334,29 @@ class _Trials:
             division = self._division(contact)
             locked = divided(grown, division, contact, self._shape)
             self._shape = locked.body.shape
-            points = division.nodal(points)
-            pressure = division.at_corners(pressure)
             forces = None if forces is None else _divided_loads(division, forces)
-        start = replace(locked.moved(points), pressure=pressure)
-        shape, iterations = _equilibrium(self._scene, locked, start, forces,
+        shape, iterations = _equilibrium(self._scene, locked, self._first(locked, advances), forces,
                                          patient=self._patient)
         self.iterations += iterations
         expansion = Expansion(shape, iterations, 0.0, division)
         at_rest = advances, expansion.position, shape.pressure[: grown.mesh.corners]
         self._shapes = [*self._shapes[-1:], at_rest]
         return expansion
+
+    def _first(self, locked: Pore, advances: np.ndarray) -> Pore:
+        """The pore from which a trial starts: the best guess in which no triangle is turned over.
+
+        A divided arc may have a kink where its contact begins. The undivided arc rounds it off,
+        which can turn a triangle over.
+        """
+        division = self._divided
+        for points, pressure in self._guesses(advances):
+            if len(points) < len(locked.mesh.points):
+                points = division.nodal(points)
+                pressure = division.at_corners(pressure)
+            if locked.body.strained(points[locked.mesh.body]).J.min() > 0:
+                break
+        return replace(locked.moved(points), pressure=pressure)
 
 
 def divided(grown: Pore, division: Division, contact: Contact,
