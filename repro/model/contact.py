@@ -39,6 +39,8 @@ FORCE_ROUNDS = 12
 #: The largest move of a node in the last of them over the aggregate's thickness.
 FORCE_REST = 1e-8
 PATIENT = SearchOptions()
+#: Lengths of the first contact to both sides of the highest place, over the least film.
+FIRST_LENGTHS = np.array([1.0, 0.5, 0.25])
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,12 +201,7 @@ def _close_by_lines(scene: Scene, grown: Pore, start: Pore, forces: np.ndarray |
     wall = grown.wall
     if not grown.contact and gap < rule.film:
         _refuse_late(gap, rule.film, search)
-        wall, lines = _first_contact(shape.pore.boundary, rule.film)
-        for line in lines:
-            length = search.advances.get(line.key, 0.0)
-            known = contact_lines.to_arcs(replace(grown.boundary, wall=wall), line, length)
-            line.advance = max(line.least, known)
-        shape = trials.solve(wall, lines)
+        wall, lines, shape = _touch(grown, shape, rule, trials, search)
     for _ in range(CONTACT_ROUNDS):
         for line in lines:
             line.record(*_clearance(rule, shape.pore.boundary, line))
@@ -225,13 +222,31 @@ def _refuse_late(gap: float, film: float, search: SearchOptions) -> None:
         raise FirstContact(gap)
 
 
-def _first_contact(outline: Outline, film: float) -> tuple[np.ndarray, list[Line]]:
-    """Walls (M,) where the corner next to the highest place has joined the upper one, and the
-    contact lines.
+def _touch(grown: Pore, shape: Expansion, rule: Clearance, trials: _Trials,
+           search: SearchOptions) -> tuple[np.ndarray, list[Line], Expansion]:
+    """The first contact of a shape: walls (M,), contact lines, and the equilibrium with them.
 
     Contact covers the least film's thickness to both sides of the highest place, at least: a
-    single point could not hold an elastic body.
+    single point could not hold an elastic body. The tip of a pointed body cannot be pressed flat
+    over this length; contact then covers half of it, or a quarter.
     """
+    for length in rule.film * FIRST_LENGTHS:
+        wall, lines = _first_contact(shape.pore.boundary, length)
+        touching = replace(grown.boundary, wall=wall)
+        for line in lines:
+            advance = search.advances.get(line.key, 0.0)
+            known = contact_lines.to_arcs(touching, line, advance)
+            line.advance = max(line.least, known)
+        try:
+            return wall, lines, trials.solve(wall, lines)
+        except (GrowthError, LinearError) as error:
+            failure = error
+    raise failure
+
+
+def _first_contact(outline: Outline, length: float) -> tuple[np.ndarray, list[Line]]:
+    """Walls (M,) where the corner next to the highest place has joined the upper one, and the
+    contact lines at a length (um) to both sides of that place."""
     x = outline.points[:, 0]
     arc = int(np.argmax(outline.arcs(outline.points)[:, :, 1].max(axis=1)))
     ends = np.array([2 * arc, (2 * arc + 2) % len(x)])
@@ -243,8 +258,8 @@ def _first_contact(outline: Outline, film: float) -> tuple[np.ndarray, list[Line
     for line in lines:
         if line.wall == TOP:
             outwards = np.sign(x[(corner + line.direction) % len(x)] - x[corner])
-            length = film + outwards * (outline.highest - x[corner])
-            line.start_from(contact_lines.to_arcs(touching, line, max(length, 0.0)))
+            advance = length + outwards * (outline.highest - x[corner])
+            line.start_from(contact_lines.to_arcs(touching, line, max(advance, 0.0)))
     return wall, lines
 
 

@@ -6,9 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from repro.errors import Advised, StageError, Unresolved
+from repro.errors import Advised, StageError, TransferError, Unresolved
 from repro.fem import sizing, transfer
 from repro.fem.mesh import Mesh
+from repro.fem.outline import Outline
 from repro.fem.space import Space
 from repro.fem.transfer import Located
 from repro.model import biomass, mesh_motion, pore
@@ -20,6 +21,8 @@ from repro.scene import Scene, Substrate, needed
 
 #: What element sizes at the aggregate are divided by at most, for a front of the substrates.
 MOST_GRADED = 4.0
+#: What element sizes at the aggregate are divided by, in turn, while places at t = 0 fold.
+UNFOLDING = (1.0, 2.0, 4.0)
 #: Factors of the refinement that are tried where that is not enough.
 TRIED = (1.5, 2.0, 3.0)
 #: The largest refinement that scenes accept.
@@ -126,12 +129,9 @@ def remesh(scene: Scene, now: Pore, expanded: Pore, speed: float,
     X_m, so that the error of the constraint is worked off at the next update and does not
     accumulate [E7].
     """
-    mesh, generated = pore.generate(scene, expanded.boundary, expanded.front)
-    outline = needed(generated, "an aggregate")
+    outline, new, at, body = _new_material(scene, expanded)
+    mesh = new.mesh
     old = expanded.mesh
-    new = Space(mesh, now.space.order)
-    at = transfer.located(old.points, old.cells[old.biomass], mesh.points[mesh.body])
-    body = _material(new, expanded, outline.origin, at)
     active, inert, *rest = biomass.carried(scene.numerics.transfer, expanded.space, new, at,
                                            (expanded.active, expanded.inert, *others),
                                            needed(scene.kinetics, "[kinetics]").maximum_density)
@@ -143,6 +143,25 @@ def remesh(scene: Scene, now: Pore, expanded: Pore, speed: float,
     found = Pore(expanded.time, new, outline.wall, outline.fixed, active, inert, np.empty(0), body,
                  _pressure(mesh, expanded, at), substrates, expanded.front, last)
     return replace(found, theta=expansion(scene, found)), tuple(rest)
+
+
+def _new_material(scene: Scene, expanded: Pore) -> tuple[Outline, Space, Located, Body]:
+    """The outline and the space of a new mesh, its nodes in the old one, and the aggregate at
+    t = 0.
+
+    Where the places at t = 0 fold, element sizes at the aggregate are halved, twice at most.
+    """
+    for factor in UNFOLDING:
+        mesh, generated = pore.generate(scene, expanded.boundary, factor * expanded.front)
+        outline = needed(generated, "an aggregate")
+        new = Space(mesh, expanded.space.order)
+        old = expanded.mesh
+        at = transfer.located(old.points, old.cells[old.biomass], mesh.points[mesh.body])
+        try:
+            return outline, new, at, _material(new, expanded, outline.origin, at)
+        except TransferError as error:
+            folded = error
+    raise folded
 
 
 def _pressure(mesh: Mesh, expanded: Pore, at: Located) -> np.ndarray:
