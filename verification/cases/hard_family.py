@@ -105,7 +105,9 @@ def _refusal(message: str, room: Path) -> Iterator[Check]:
 
 
 def _followed(tables: dict, message: str) -> Iterator[dict]:
-    """The scene with each piece of advice, one after the other."""
+    """The scene with each piece of advice, one after the other; linear elements come with their refinement."""
+    if 'numerics.elements = "linear" with' in message:
+        tables = _changed(tables, "numerics.elements", "linear")
     for pattern, key, values in ADVICE:
         found = re.search(pattern, message)
         if found:
