@@ -50,9 +50,9 @@ UPTAKE = 0.05 + 0.05
 STEP = 0.01
 #: A gradient is a rational function on a curved triangle: a tenth of the error of ``fast`` for two quadratures.
 QUADRATURE = 1e-3
-#: Straight triangles have linear velocities with a stabilisation that spends work itself: they were measured 1 to 4 % off
-#: in the head loss. Their biomass counts at nodes, and a remesh leaves an error of the area that the next update works
-#: off. Both bounds are those of the hard cases with the preset paper.
+#: Straight triangles have linear velocities, whose stabilisation spends work: they were measured 1 to 4 % off in the
+#: head loss. Their biomass counts at nodes, and a remesh leaves an error of the area that the next update works off.
+#: Both bounds are those of the hard cases with linear elements.
 STRAIGHT_LOSS, STRAIGHT_AREA = 0.04, 1e-4
 #: README.md: errors of the presets fast and accurate.
 PROMISED = 0.01 + 0.001

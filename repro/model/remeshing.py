@@ -114,8 +114,8 @@ def _with_linear(scene: Scene) -> Scene | None:
     """The scene with linear elements, of the paper's refinement at least; None where it has them,
     or may not have them.
 
-    Their uptake is lumped at the nodes, so that concentrations stay above zero behind a front that
-    is thinner than an element.
+    Their uptake is lumped at the nodes: behind a front that is thinner than an element they fall
+    far less below zero than higher orders.
     """
     if scene.numerics.order == 1:
         return None

@@ -150,7 +150,8 @@ COMMON = {
     "mutants": ("family-jump-late", "family-area-of-corners", "family-effluent-not-weighted", "family-half-saturation",
                 "family-rest-of-the-pore-forgotten", "family-rows-end-steps"),
     "references": ("run_files",), "runs_with": "2 fast accurate",
-    "omitted": "the judge reads quadratic triangles; hard-01 to hard-23 run orders 1 and 3, paper and exact"}
+    "omitted": "members have quadratic triangles, straight ones run where advice names them; hard-01 to hard-23 run "
+               "orders 1 and 3, paper and exact"}
 MARKS = {QUICK: (pytest.mark.case("hard-family", **COMMON),),
          REST: (pytest.mark.case("hard-family-rest", **COMMON), pytest.mark.slow)}
 
