@@ -34,7 +34,6 @@ from repro.runs import running, stored
 from repro.scene import load_scene
 from repro.sweeps import page, table
 from repro.sweeps.design import Point, parse
-from repro.sweeps.picture import Axis
 from repro.sweeps.state import Sweep
 from tests import strategies
 
@@ -133,8 +132,10 @@ def test_an_axis_begins_at_zero_where_that_is_near(low, begins):
 def test_words_stand_in_the_middle_of_equal_parts_of_an_axis():
     factor = parse('numerics.preset="fast", "accurate", "exact"')
     axis = page._across(factor, [])
-    assert [axis.part(place) for place in axis.ticks()] == pytest.approx([1 / 6, 3 / 6, 5 / 6])
-    assert Axis("x", 0.31, 0.58).ticks() == pytest.approx([0.4, 0.5])
+    ticks = charts.ticks(axis)
+    assert [text for _, text in ticks] == ["fast", "accurate", "exact"]
+    parts = [(axis(value) - charts.LEFT) / (charts.WIDTH - charts.LEFT - charts.RIGHT) for value, _ in ticks]
+    assert parts == pytest.approx([1 / 6, 3 / 6, 5 / 6])
 
 
 def test_time_has_no_value_for_what_is_missing_in_a_file_and_columns_have(tmp_path):

@@ -618,8 +618,8 @@ def test_marks_of_the_page_have_the_colour_that_the_key_below_them_names(tmp_pat
     times = page.page(Sweep(tmp_path, "flow_only", factors, found), runs, 0.3).split("<h2>Clogging time")[1]
     figures = re.findall("<figure>.*?</figure>", times, re.S)
     for figure, key in zip(figures, ("flow.viscosity_ratio", "pore.width"), strict=True):
-        named = dict(re.findall(r'class="line level(.)"/></svg>([^<]*)</li>', figure))
-        mark = rf'<(\w+) class="\w+ level(.)"[^>]*><title>run (.)[^<]*?{key} = ([^,:]*)[^<]*?: ([^:<]*)</title>'
+        named = dict(re.findall(r'class="line(.)" points="0,5 24,5"/></svg>([^<]*)</li>', figure))
+        mark = rf'<(\w+) class="[a-z]+(.)"[^>]*><title>run (.)[^<]*?{key} = ([^,:]*)[^<]*?: ([^:<]*)</title>'
         marks = re.findall(mark, figure)
         assert len(marks) == 5 and "time to 0.3 of the conductivity (h)" in figure
         assert {named[level] == value for _, level, _, value, _ in marks} == {True}
