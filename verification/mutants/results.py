@@ -261,6 +261,13 @@ MUTANTS = (
          "pore.width**2",
          "tests/test_sweep.py::test_biomass_and_contact_are_read_from_the_rows")),
     *changes(
+        "repro/model/advice.py",
+        ("no-advice",
+         "Errors of the finite elements stop a run without the keys that help.",
+         "{ADVICE.get(type(error), '')}",
+         "",
+         "tests/test_errors_of_elements.py::test_an_error_of_the_elements_stops_a_run_with_the_keys_that_help")),
+    *changes(
         "repro/results/field_files.py",
         ("fields-in-32-bits",
          "Values at points are rounded to 32 bits in the files of fields.",
