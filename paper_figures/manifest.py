@@ -22,12 +22,11 @@ from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
 
-import meshio
 import numpy as np
 from matplotlib.figure import Figure
 
 from paper_figures import FIGURES, runs, states
-from repro.results import PACKAGES
+from repro.results import PACKAGES, field_files
 from repro.runs.machine import source_hash
 from verification.bench.record import processor
 from verification.store import provenance
@@ -66,10 +65,10 @@ def file_hash(path: Path) -> str:
     """SHA-256 of a file's data: of the arrays of a `.vtu`, of the text of any other."""
     if path.suffix != ".vtu":
         return hashlib.sha256(path.read_bytes()).hexdigest()
-    content = meshio.read(path)
-    named = {"points": content.points, **{f"cells {b.type}": b.data for b in content.cells},
-             **content.point_data, **{name: values[0] for name, values in content.cell_data.items()}}
-    return data_hash((name, np.asarray(named[name])) for name in sorted(named))
+    grid = field_files.read(path)
+    kind = field_files.CELL_TYPES[grid.cells.shape[1]]
+    named = {"points": grid.points, f"cells {kind}": grid.cells, **grid.point_data, **grid.cell_data}
+    return data_hash((name, named[name]) for name in sorted(named))
 
 
 def data_hash(parts: Iterable[tuple[str, np.ndarray]]) -> str:

@@ -7,15 +7,14 @@ from functools import cached_property
 from pathlib import Path
 from xml.etree import ElementTree
 
-import meshio
 import numpy as np
 from matplotlib.tri import Triangulation
 
 from repro.fem.transfer import interpolate
-from repro.results import read_table
+from repro.results import field_files, read_table
 
-#: Straight triangles of which one of a type is drawn: a curved one in four, by the middles of its arcs.
-QUARTERS = {"triangle": np.array([[0, 1, 2]]), "triangle6": np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])}
+#: The straight triangles that are drawn for one triangle of so many nodes; a curved one is cut into four.
+PARTS = {3: np.array([[0, 1, 2]]), 6: np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])}
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,11 +91,11 @@ def times(folder: Path, kind: str = "fields") -> list[tuple[float, Path]]:
 
 def read(time: float, path: Path) -> State:
     """One file of fields."""
-    content = meshio.read(path)
-    block, parts = content.cells[0], QUARTERS[content.cells[0].type]
-    cells = {name: np.repeat(values[0], len(parts), axis=0) for name, values in content.cell_data.items()}
-    return State(time, content.points[:, :2], block.data[:, parts].reshape(-1, 3), cells["region"] > 0.5,
-                 dict(content.point_data), cells)
+    grid = field_files.read(path)
+    parts = PARTS[grid.cells.shape[1]]
+    cells = {name: np.repeat(values, len(parts), axis=0) for name, values in grid.cell_data.items()}
+    return State(time, grid.points[:, :2], grid.cells[:, parts].reshape(-1, 3), cells["region"] > 0.5,
+                 grid.point_data, cells)
 
 
 def first(folder: Path) -> State:

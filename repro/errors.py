@@ -1,4 +1,8 @@
-"""Numerical failures, each named by its stage; :func:`repro.march.loop.stopping` adds the time."""
+"""Numerical failures, each named by its stage.
+
+:func:`repro.march.loop.stopping` adds the time, and :mod:`repro.model.advice` the keys of a scene
+that help.
+"""
 
 
 class StageError(RuntimeError):
@@ -13,10 +17,26 @@ class MeshError(StageError):
     stage = "meshing"
 
 
+class TurnedOver(MeshError):
+    """A triangle of a mesh is turned over."""
+
+
+class SelfCrossing(MeshError):
+    """An outline of the aggregate crosses itself."""
+
+
+class OutsidePore(MeshError):
+    """The curve through the points of an outline leaves the pore."""
+
+
 class LinearError(StageError):
     """A linear system is singular or too ill-conditioned."""
 
     stage = "a linear system"
+
+
+class PackageMissing(LinearError):
+    """An optional package for linear systems is not installed."""
 
 
 class TransportError(StageError):
@@ -43,6 +63,14 @@ class TransferError(StageError):
     """Fields cannot be carried from one mesh to the other."""
 
     stage = "transfer between meshes"
+
+
+class NotCovered(TransferError):
+    """Two meshes do not cover the same area."""
+
+
+class OriginFolded(TransferError):
+    """The coordinates at t = 0 fold on a new mesh."""
 
 
 class BalanceError(StageError):

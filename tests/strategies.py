@@ -232,9 +232,8 @@ def same_arrays(one, other):
 
 
 def arrays_of(grid):
-    """{name: array} of a grid as this package or meshio has it: places, cells and what is known of them."""
-    celled = {name: values for name, (values,) in grid.cell_data.items()}
-    return {"points": grid.points, "cells": grid.cells[0].data, **grid.point_data, **celled}
+    """{name: array} of a grid: points, cells, and the values at points and in cells."""
+    return {"points": grid.points, "cells": grid.cells, **grid.point_data, **grid.cell_data}
 
 
 def scene(radius="5 um", width="50 um", acceptor="10 mg/L", donor="10 mg/L", velocity=None, head=None, growth=None,

@@ -4,13 +4,13 @@ import json
 import re
 import time
 
-import meshio
 import numpy as np
 import pytest
 
 from repro import report, results
 from repro.cli import main
 from repro.report import fields
+from repro.results import field_files
 from tests import browser
 from tests.pages import FAST, hostile, run, stored
 
@@ -64,7 +64,7 @@ def test_the_picture_is_the_field(window, runs, name):
     out = runs[name]
     show(window, out, "#field=acceptor_mg_per_L", width=1400)
     _, path = fields.index(out)[-1]
-    grid = meshio.vtu.read(path)
+    grid = field_files.read(path)
     x, y = grid.points[:, :2].T
     inside = (np.abs(x) < 40) & (y > 1) & (y < y.max() - 1)
     value = "(x, y) => shown.all[Math.floor((shown.tall - (y - shown.box[2]) * shown.scale) * shown.ratio) * " \

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from repro.report import charts
-from repro.sweeps.picture import Axis
 from tests.pages import first
 
 ROUNDED = 0.11  # of a difference of two places, each rounded to 0.1
@@ -52,13 +51,28 @@ def test_a_line_is_where_its_numbers_and_the_ticks_say(values, log):
 @pytest.mark.parametrize("low, high", [(123400, 123460), (99950, 100050), (2.0001e-4, 2.0004e-4), (0, 3e6), (-7, 0),
                                        (1000.2, 1000.9), (0, 2e-9)])
 def test_labels_of_ticks_are_the_ticks(low, high):
-    """To round-off, far from zero and from one; on the axes of a sweep's page too."""
+    """To round-off, far from zero and from one."""
     told = charts.ticks(charts.Scale(low, high, 0, 100), 4)
     values, texts = zip(*told)
     assert len(told) >= 3 and [float(text) for text in texts] == pytest.approx(values, rel=1e-12)
-    axis = Axis("", low, high)
-    assert [float(axis.said(value)) for value in axis.ticks()] == pytest.approx(axis.ticks(), rel=1e-12, abs=1e-20)
-    assert Axis("", 0, 1).said(1 / 3) == "0.3333"
+
+
+@pytest.mark.parametrize("low, high, expected", [
+    (2, 60, "2 5 10 20 50"), (0.1, 99, "0.1 0.2 0.5 1 2 5 10 20 50"), (1, 1e3, "1 10 100 1000"),
+    (1e-7, 1e7, "1e-7 0.0001 0.1 100 1e5"), (3, 4, "3 4")])
+def test_a_logarithmic_axis_has_powers_of_ten_and_few_ticks(low, high, expected):
+    """With 2 and 5 times these powers over less than three decades; an axis without two of them shows its ends."""
+    ticks = charts.ticks(charts.Scale(low, high, 0, 100, log=True))
+    assert " ".join(text for _, text in ticks) == expected
+    assert [value for value, _ in ticks] == pytest.approx([float(text) for text in expected.split()], rel=1e-12)
+
+
+@pytest.mark.parametrize("values, log", [([40.0, 60.0], False), ([-2.0, -1.0], False), ([7.0], False), ([0.0], False),
+                                         ([0.3, 30.0], True), ([5.0], True)])
+def test_no_value_is_at_the_end_of_a_padded_axis(values, log):
+    scale = charts.across(*charts.padded(values, log), log)
+    places = [float(scale(value)) for value in values]
+    assert charts.LEFT + 10 < min(places) <= max(places) < charts.WIDTH - charts.RIGHT - 10
 
 
 def test_a_legend_names_each_line_by_its_colour():

@@ -13,8 +13,8 @@ import pytest
 from repro import results
 from repro.cli import main
 from repro.errors import OutputError
+from repro.results import field_files
 from repro.results import files as written
-from repro.results import vtu
 from repro.runs import checkpoint
 from repro.runs.checkpoint import LAST, NEWEST, PREVIOUS
 from repro.runs.folder import LOCK, SUMS
@@ -198,7 +198,7 @@ def full(*_):
     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
-@pytest.mark.parametrize("module, name, file", [(vtu, "write", r"fields/fields_\d{4}\.vtu"),
+@pytest.mark.parametrize("module, name, file", [(field_files, "write", r"fields/fields_\d{4}\.vtu"),
                                                 (results, "write_table", "timeseries.csv"),
                                                 (written.os, "replace", r"fields/fields_\d{4}\.vtu"),
                                                 (checkpoint.os, "fsync", r"fields/fields_\d{4}\.vtu"),

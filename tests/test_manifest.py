@@ -3,13 +3,13 @@ import copy
 import json
 from importlib import import_module
 
-import meshio
 import pytest
 from matplotlib.figure import Figure
 
 import paper_figures
 from paper_figures import manifest, runs
 from repro import load_scene, run
+from repro.results import field_files
 from repro.scene import scene_hash
 
 NAME = "initial_mesh"
@@ -40,13 +40,14 @@ def test_a_run_again_has_the_same_hashes(folder, told, tmp_path):
     assert found == told["runs"][NAME]["files"] and {*found} == files - {*manifest.NOT_DATA}
 
 
-@pytest.mark.parametrize("packed, more", [(None, 0.0), ("zlib", 1e-12)])
-def test_fields_are_hashed_as_arrays(folder, tmp_path, packed, more):
-    """Unpacked it is the same data; with one value of a cell changed it is not."""
+@pytest.mark.parametrize("more", [0.0, 1e-12])
+def test_fields_are_hashed_as_arrays(folder, tmp_path, more):
+    """Another line end leaves the hash; another value in a cell does not."""
     original, copied = folder / "fields" / "fields_0000.vtu", tmp_path / "copy.vtu"
-    content = meshio.read(original)
-    content.cell_data["region"][0][0] += more
-    content.write(copied, file_format="vtu", compression=packed)
+    grid = field_files.read(original)
+    grid.cell_data["region"][0] += more
+    field_files.write(copied, grid)
+    copied.write_text(copied.read_text() + "\n")
     assert (manifest.file_hash(copied) == manifest.file_hash(original)) is (more == 0)
 
 

@@ -3,12 +3,11 @@ import csv
 import json
 import shutil
 
-import meshio
 import numpy as np
 import pytest
 
 from reference import run_files
-from repro.results import vtu
+from repro.results import field_files
 from repro.runs.running import run
 from repro.scene import load_scene
 from verification.evidence.checks import Check
@@ -56,13 +55,12 @@ def ledger(column, change, row=-1):
 
 
 def field(change):
-    """A damage of the last file of fields, whose arrays change(mesh) alters."""
+    """A damage of the last file of fields, whose arrays change(grid) alters."""
     def damage(folder):
         path = sorted((folder / "fields").glob("fields_*.vtu"))[-1]
-        mesh = meshio.read(path)
-        mesh.cells = [vtu.Cells(block.type, block.data) for block in mesh.cells]
-        change(mesh)
-        vtu.write(path, mesh)
+        grid = field_files.read(path)
+        change(grid)
+        field_files.write(path, grid)
     return damage
 
 
@@ -77,13 +75,13 @@ def scaled(name, factor, data="point_data"):
     """A damage of a whole array."""
     def change(mesh):
         arrays = getattr(mesh, data)
-        arrays[name] = [part * factor for part in arrays[name]] if data == "cell_data" else arrays[name] * factor
+        arrays[name] = arrays[name] * factor
     return field(change)
 
 
 def renumbered(mesh):
     """Turn a triangle over."""
-    mesh.cells[0].data[0] = mesh.cells[0].data[0, [1, 0, 2, 3, 5, 4]]
+    mesh.cells[0] = mesh.cells[0, [1, 0, 2, 3, 5, 4]]
 
 
 def inward(mesh):

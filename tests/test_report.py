@@ -8,7 +8,6 @@ import shutil
 from pathlib import Path
 from unittest.mock import Mock
 
-import meshio
 import numpy as np
 import pytest
 
@@ -17,10 +16,10 @@ from repro.fem.mesh import Mesh, curved
 from repro.model import growth
 from repro.report import fields, quantities, run_page
 from repro.report.reading import Run, read
-from repro.results import names, vtu
+from repro.results import field_files, names
 from repro.results.arrays import ARRAYS
+from repro.results.field_files import Grid
 from repro.results.quantities import ending
-from repro.results.vtu import Cells, Grid
 from repro.scene import load_scene, scene_tables
 from tests.pages import (
     FAST,
@@ -115,12 +114,12 @@ def test_fields_of_the_page_are_those_of_the_files(request, name):
     packed, entries = stored(out), fields.index(out)
     assert packed["of"] == len(entries) == len(packed["frames"])
     for frame, (time, path) in zip(packed["frames"], entries):
-        grid, mesh = meshio.vtu.read(path), packed["meshes"][frame["mesh"]]
-        cells = grid.cells[0].data
+        grid, mesh = field_files.read(path), packed["meshes"][frame["mesh"]]
+        cells = grid.cells
         assert frame["time"] == time and mesh["per"] == cells.shape[1] == {"fast": 6, "paper": 3}[name]
         assert (numbers(mesh["cells"], "<u4").reshape(cells.shape) == cells).all()
         region = numbers(mesh["body"], "<u1") == 1
-        assert (region == grid.cell_data["region"][0]).all() and region.any() and not region.all()
+        assert (region == grid.cell_data["region"]).all() and region.any() and not region.all()
         points, box = places(packed, frame)
         assert np.abs(points - grid.points[:, :2]).max() <= 0.51 / 65534 * box.max()
         nodes = np.unique(cells[region])
@@ -128,7 +127,7 @@ def test_fields_of_the_page_are_those_of_the_files(request, name):
             told = frame["values"][field["name"]]
             low, high = told[:2]
             node = field["at"] == "node"
-            value = grid.point_data[field["name"]] if node else grid.cell_data[field["name"]][0]
+            value = grid.point_data[field["name"]] if node else grid.cell_data[field["name"]]
             value = np.linalg.norm(value, axis=1) if value.ndim == 2 else value
             value = value[nodes if node else region] if field["body"] else value
             assert (low, high) == (value.min(), value.max())
@@ -251,9 +250,8 @@ def regular(monkeypatch, most):
 
 def write(path, points, cells, nodal, region):
     """A file of fields, those of the triangles the same as the region."""
-    kind = "triangle" if cells.shape[1] == 3 else "triangle6"
-    celled = dict.fromkeys(("region", "theta", "J", "largest_principal_stress_MPa", "stress_xx_MPa"), [region])
-    vtu.write(path, Grid(np.pad(points, ((0, 0), (0, 1))), [Cells(kind, cells)], nodal, celled))
+    celled = dict.fromkeys(("region", "theta", "J", "largest_principal_stress_MPa", "stress_xx_MPa"), region)
+    field_files.write(path, Grid(np.pad(points, ((0, 0), (0, 1))), cells, nodal, celled))
 
 
 @pytest.mark.parametrize("kind, count", [("triangle", 101_000), ("triangle6", 26_000)])

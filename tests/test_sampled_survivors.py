@@ -29,12 +29,11 @@ from repro.model.contact_lines import surface_ends
 from repro.model.pore import initial_outline, seeded, solve
 from repro.preflight import cost, numbers, simplifications
 from repro.report import charts, fields, run_page
-from repro.results import netcdf, vtu
+from repro.results import field_files, netcdf
 from repro.runs import running, stored
 from repro.scene import load_scene
 from repro.sweeps import page, table
 from repro.sweeps.design import Point, parse
-from repro.sweeps.picture import Axis
 from repro.sweeps.state import Sweep
 from tests import strategies
 
@@ -133,8 +132,10 @@ def test_an_axis_begins_at_zero_where_that_is_near(low, begins):
 def test_words_stand_in_the_middle_of_equal_parts_of_an_axis():
     factor = parse('numerics.preset="fast", "accurate", "exact"')
     axis = page._across(factor, [])
-    assert [axis.part(place) for place in axis.ticks()] == pytest.approx([1 / 6, 3 / 6, 5 / 6])
-    assert Axis("x", 0.31, 0.58).ticks() == pytest.approx([0.4, 0.5])
+    ticks = charts.ticks(axis)
+    assert [text for _, text in ticks] == ["fast", "accurate", "exact"]
+    parts = [(axis(value) - charts.LEFT) / (charts.WIDTH - charts.LEFT - charts.RIGHT) for value, _ in ticks]
+    assert parts == pytest.approx([1 / 6, 3 / 6, 5 / 6])
 
 
 def test_time_has_no_value_for_what_is_missing_in_a_file_and_columns_have(tmp_path):
@@ -174,11 +175,11 @@ def test_what_is_modelled_is_told():
 
 def test_fields_of_the_aggregate_alone_are_those_that_the_fluid_has_not(fast):
     """Read from a file of a run: NaN in every node or triangle of the fluid, and biomass, of which it has none."""
-    grid = vtu.read(fields.index(fast)[-1][1])
-    region = grid.cell_data["region"][0] > 0.5
-    outside = np.setdiff1d(np.arange(len(grid.points)), grid.cells[0].data[region])
+    grid = field_files.read(fields.index(fast)[-1][1])
+    region = grid.cell_data["region"] > 0.5
+    outside = np.setdiff1d(np.arange(len(grid.points)), grid.cells[region])
     absent = {name for name, values in grid.point_data.items() if np.isnan(values[outside]).all()}
-    absent |= {name for name, (values,) in grid.cell_data.items() if np.isnan(values[~region]).all()}
+    absent |= {name for name, values in grid.cell_data.items() if np.isnan(values[~region]).all()}
     shown = set(fields.SHOWN) & {*grid.point_data, *grid.cell_data}
     assert len(absent) > 5 and fields.OF_AGGREGATE & shown == absent & shown | {"active_biomass", "inert_biomass"}
 

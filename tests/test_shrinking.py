@@ -8,7 +8,7 @@ import pytest
 from repro import load_scene, simulate
 from repro.cli import main
 from repro.preflight import numbers
-from repro.report import comparison, quantities
+from repro.report import charts, comparison, quantities
 from repro.report.reading import read
 from repro.results import picture, read_table
 from repro.sweeps import pool, table
@@ -78,14 +78,14 @@ def test_conductivity_is_relative_to_that_of_the_start(decayed):
 def test_lines_of_the_page_of_the_sweep_go_up_to_the_left(decayed):
     """Conductivity rises as biomass falls, and all of it is in the frame."""
     text = (decayed / "summary.html").read_text(encoding="utf-8")
-    lines = re.findall('<polyline class="line level[0-9]" points="([^"]*)"><title>run', text)
-    frame = re.search('<rect class="frame" x="(.*?)" y="(.*?)" width="(.*?)" height="(.*?)"', text)
-    x, y, width, height = map(float, frame.groups())
+    lines = re.findall('<polyline class="line[0-9]" points="([^"]*)"><title>run', text)
+    upper_left = charts.LEFT, charts.TOP
+    lower_right = charts.WIDTH - charts.RIGHT, charts.HEIGHT - charts.BOTTOM
     assert len(lines) == 2
     for line in lines:
         places = np.array([pair.split(",") for pair in line.split()], float)
         assert (np.diff(places[:, 0]) < 0).all() and (np.diff(places[:, 1]) < 0).all()
-        assert ((places >= [x, y]) & (places <= [x + width, y + height])).all()
+        assert ((places >= upper_left) & (places <= lower_right)).all()
 
 
 def test_a_comparison_and_the_key_figures_tell_what_is_less(decayed):

@@ -27,7 +27,7 @@ from repro.model.pore import Solved, resolution, seeded, solve
 from repro.preflight import modelled, numbers, simplifications
 from repro.report import charts, comparison, fields, quantities, run_page
 from repro.report.reading import Run
-from repro.results import picture, vtu
+from repro.results import field_files, picture
 from repro.results.tables import Results
 from repro.runs import progress, running
 from repro.scene import load_scene
@@ -124,7 +124,7 @@ def test_stress_is_told_only_of_strain_since_the_start(order):
 def test_times_of_fields_keep_every_digit(tmp_path):
     scene, now = base(1)
     results.write_index(tmp_path / "fields.pvd", [(100 / 3, "b.vtu")])
-    vtu.write(tmp_path / "b.vtu", results.fields(scene, replace(now, time=100 / 3), NOTHING))
+    field_files.write(tmp_path / "b.vtu", results.fields(scene, replace(now, time=100 / 3), NOTHING))
     index, fields_there = (ElementTree.parse(tmp_path / name) for name in ("fields.pvd", "b.vtu"))
     times = index.find(".//DataSet").get("timestep"), fields_there.findtext(".//FieldData/DataArray")
     assert [*map(float, times)] == [100 / 3, 100 / 3]
@@ -618,8 +618,8 @@ def test_marks_of_the_page_have_the_colour_that_the_key_below_them_names(tmp_pat
     times = page.page(Sweep(tmp_path, "flow_only", factors, found), runs, 0.3).split("<h2>Clogging time")[1]
     figures = re.findall("<figure>.*?</figure>", times, re.S)
     for figure, key in zip(figures, ("flow.viscosity_ratio", "pore.width"), strict=True):
-        named = dict(re.findall(r'class="line level(.)"/></svg>([^<]*)</li>', figure))
-        mark = rf'<(\w+) class="\w+ level(.)"[^>]*><title>run (.)[^<]*?{key} = ([^,:]*)[^<]*?: ([^:<]*)</title>'
+        named = dict(re.findall(r'class="line(.)" points="0,5 24,5"/></svg>([^<]*)</li>', figure))
+        mark = rf'<(\w+) class="[a-z]+(.)"[^>]*><title>run (.)[^<]*?{key} = ([^,:]*)[^<]*?: ([^:<]*)</title>'
         marks = re.findall(mark, figure)
         assert len(marks) == 5 and "time to 0.3 of the conductivity (h)" in figure
         assert {named[level] == value for _, level, _, value, _ in marks} == {True}

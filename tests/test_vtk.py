@@ -1,14 +1,13 @@
-"""The fields as ParaView, PyVista, meshio and this package read them, to the last bit. That they are what their names
+"""The fields as ParaView, PyVista and this package read them, to the last bit. That they are what their names
 say is in tests/test_derived.py."""
 
-import meshio
 import numpy as np
 import pytest
 import pyvista
 from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
 
 from repro import results
-from repro.results import vtu
+from repro.results import field_files
 from repro.scene import load_scene
 from tests.pages import whole_of
 from tests.strategies import ORDERS, arrays_of, same_arrays
@@ -22,7 +21,7 @@ def written(order, tmp_path):
     """A late pore with elements of an order, its fields, and the file that they were written to."""
     scene, at = late(order)
     content = results.fields(scene, at.pore, at.solved)
-    vtu.write(tmp_path / "fields.vtu", content)
+    field_files.write(tmp_path / "fields.vtu", content)
     return at.pore, content, tmp_path / "fields.vtu"
 
 
@@ -48,16 +47,12 @@ def contents(grid):
     return {**shape, **grid.point_data, **grid.cell_data}, grid.field_data
 
 
-def by_meshio(path):
-    grid = meshio.read(path)
-    return arrays_of(grid), grid.field_data
-
-
 def by_this_package(path):
-    return arrays_of(vtu.read(path)), by_meshio(path)[1]
+    grid = field_files.read(path)
+    return arrays_of(grid), {field_files.TIME: np.array([grid.time])}
 
 
-@pytest.mark.parametrize("read", [by_vtk, by_pyvista, by_meshio, by_this_package])
+@pytest.mark.parametrize("read", [by_vtk, by_pyvista, by_this_package])
 @EVERY_ORDER
 def test_every_reader_reads_what_was_computed(order, read, written):
     """Places, cells, the time, and each array as numbers of 64 bits."""

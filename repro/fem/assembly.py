@@ -1,8 +1,8 @@
-"""From element matrices to a sparse system; what the connections alone decide is worked out once.
+"""Assemble sparse systems from element matrices.
 
-The weak forms are scikit-fem's (:func:`local` gives their element matrices); while a mesh only
-moves, its sparsity, elimination order and the place of every element entry in the sparse matrix
-stay, and an assembly is one summation.
+The connections of a mesh alone decide the sparsity, the elimination order and the place of every
+element entry in the sparse matrix. These are computed once; while the mesh only moves, an assembly
+is one summation.
 """
 
 from __future__ import annotations
@@ -14,21 +14,12 @@ from typing import TypeAlias
 
 import numpy as np
 import scipy.sparse as sp
-from skfem import Basis, BilinearForm
 
 from repro.fem import linear
 from repro.fem.linear import DEFAULT, Method
 
 #: Of one kind of element, or of several.
 Parts: TypeAlias = np.ndarray | tuple[np.ndarray, ...]
-
-
-def local(form: BilinearForm, trial: Basis, test: Basis | None = None,
-          **parameters: np.ndarray | float) -> np.ndarray:
-    """(T, test functions, trial functions) element matrices of a scikit-fem bilinear form."""
-    test = trial if test is None else test
-    data = form.coo_data(trial, test, **parameters).data.reshape(trial.Nbfun, test.Nbfun, -1)
-    return np.moveaxis(data, (2, 1, 0), (0, 1, 2))
 
 
 def each(coefficient: np.ndarray, elements: np.ndarray) -> np.ndarray:

@@ -6,8 +6,8 @@ is two to five times faster than SciPy's default, and safe as long as pressure b
 definite; the residual is checked, refined once, and where that is not enough the system is factored
 again with partial pivoting.
 
-Optional packages do the same faster on large meshes: METIS orders nodes by nested dissection
-(`numerics.ordering`, package pymetis), PARDISO factors (`numerics.solver`, package pypardiso).
+Optional packages do the same faster on large meshes: METIS (package pymetis) orders nodes by nested
+dissection, PARDISO (package pypardiso) factors.
 Which of them is used is a :class:`Method`, which a mesh hands to all that is solved on it.
 """
 
@@ -23,7 +23,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
-from repro.errors import LinearError
+from repro.errors import LinearError, PackageMissing
 from repro.timing import timed
 
 #: Largest accepted componentwise backward error, max |A x - b|_i / (|A| (|x| + t) + |b| + t)_i.
@@ -47,7 +47,7 @@ class Method:
     ordering: str = "degree"
 
     def checked(self) -> Method:
-        """Itself. Raises LinearError where a package that it takes is not installed."""
+        """Itself. Raises PackageMissing if a package that it needs is not installed."""
         if self.solver == "pardiso":
             _package("pypardiso")
         if self.ordering == "metis":
@@ -63,8 +63,7 @@ def _package(name: str) -> ModuleType:
     try:
         return import_module(name)
     except ImportError:
-        raise LinearError(f"the package {name} is not installed; pip install {name}, or leave "
-                          "numerics.solver and numerics.ordering out") from None
+        raise PackageMissing(f"the package {name} is not installed; pip install {name}") from None
 
 
 def pairs(elements: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

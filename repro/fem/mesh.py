@@ -15,7 +15,7 @@ from functools import cache, cached_property
 import numpy as np
 from skfem import MeshTri
 
-from repro.errors import MeshError
+from repro.errors import TurnedOver
 from repro.fem import elements
 from repro.fem.assembly import ElementSystem
 from repro.fem.brief import brief
@@ -404,12 +404,11 @@ class Mesh:
         return np.isin(self.loop[1::2], self.cells[self.turned_over(), 3:])
 
     def checked(self) -> Mesh:
-        """Itself. Raises MeshError where a triangle is turned over."""
+        """Itself. Raises TurnedOver where a triangle is turned over."""
         bad = np.flatnonzero(self.turned_over())
         if len(bad):
             x, y = self.points[self.cells[bad[0]]].mean(axis=0)
-            raise MeshError(f"a triangle near x = {x:.4g}, y = {y:.4g} um is turned over; "
-                            "try a larger numerics.refinement or a shorter growth.time_step")
+            raise TurnedOver(f"a triangle near x = {x:.4g}, y = {y:.4g} um is turned over")
         return self
 
     def acceptable(self) -> bool:

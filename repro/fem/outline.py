@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from repro.errors import MeshError
+from repro.errors import OutsidePore
 from repro.fem.brief import brief
 
 FREE = 0
@@ -164,7 +164,7 @@ def polygon(corners: np.ndarray, width: float, geometry: int = 1, smooth: bool =
     The points go from the upstream to the downstream end; those on the upper wall, y = ``width``
     um, are contact. smooth: a natural cubic spline takes the place of straight lines between two
     points of which one is free. The middle of each contact surface is its fixed point. Raises
-    MeshError where the curve leaves the pore.
+    OutsidePore where the curve leaves the pore.
     """
     # Counterclockwise: from the downstream end over the top to the upstream end.
     rim = np.asarray(corners, float)[::-1]
@@ -173,8 +173,7 @@ def polygon(corners: np.ndarray, width: float, geometry: int = 1, smooth: bool =
     base = np.column_stack([np.linspace(rim[-1, 0], rim[0, 0], 3), np.zeros(3)])
     points = np.vstack([base, rim[1:-1]])
     if points[:, 1].min() < 0 or points[:, 1].max() > width:
-        raise MeshError("the spline through the points of aggregate.outline leaves the pore; give "
-                        "more points, or smooth = false")
+        raise OutsidePore("the spline through the points of the outline leaves the pore")
     wall = np.where(points[:, 1] == width, TOP, FREE)
     wall[:3] = BOTTOM
     points, wall = _with_contact_middle(points, wall)

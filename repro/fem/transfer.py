@@ -25,7 +25,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from repro.errors import TransferError
+from repro.errors import NotCovered, OriginFolded
 from repro.fem import elements, linear
 from repro.fem.assembly import ElementSystem, mass
 from repro.fem.mesh import Mesh, checked_bends, triangle_areas
@@ -78,8 +78,7 @@ def located(points: np.ndarray, cells: np.ndarray, where: np.ndarray) -> Located
     first = best[np.unique(place[best], return_index=True)[1]]
     if len(first) < len(where):
         x, y = where[np.setdiff1d(np.arange(len(where)), place)[0]]
-        raise TransferError(f"x = {x:.4g}, y = {y:.4g} um of the new mesh is not in the old one; "
-                            "try a shorter growth.time_step")
+        raise NotCovered(f"x = {x:.4g}, y = {y:.4g} um of the new mesh is not in the old one")
     return Located(cell[first], _inside(local[first]))
 
 
@@ -144,7 +143,7 @@ def interpolated(points: np.ndarray, triangles: np.ndarray, fields: np.ndarray,
 
 def unfolded(mesh: Mesh, origin: np.ndarray) -> np.ndarray:
     """Places at t = 0 (N, 2) um that no triangle of the aggregate turns over: where the
-    interpolated ones would, middles go half way between their corners. Raises TransferError where
+    interpolated ones would, middles go half way between their corners. Raises OriginFolded where
     that is not enough."""
     cells = mesh.cells[mesh.biomass]
     bends = checked_bends(mesh.geometry)
@@ -159,8 +158,8 @@ def unfolded(mesh: Mesh, origin: np.ndarray) -> np.ndarray:
         origin[bad[:, 3:]] = 0.5 * (origin[bad[:, :3]] + origin[bad[:, elements.NEXT]])
     if det.min() <= 0:
         x, y = mesh.points[bad[0]].mean(axis=0)
-        raise TransferError(f"after a remesh the places at t = 0 fold near x = {x:.4g}, "
-                            f"y = {y:.4g} um; try a larger numerics.refinement")
+        raise OriginFolded(f"after a remesh the places at t = 0 fold near x = {x:.4g}, "
+                           f"y = {y:.4g} um")
     return origin
 
 
@@ -216,7 +215,7 @@ def project(points: np.ndarray, triangles: np.ndarray, fields: np.ndarray,
             new_points: np.ndarray, new_triangles: np.ndarray) -> np.ndarray:
     """(K, m) Galerkin projection of nodal fields (N, m) onto another mesh of the same polygon.
 
-    Raises TransferError where the two meshes do not cover the same area.
+    Raises NotCovered where the two meshes do not cover the same area.
     """
     pieces = _pieces(points, triangles, new_points, new_triangles)
     right = _loads(pieces, points, triangles, fields, new_points, new_triangles)
@@ -292,16 +291,15 @@ class Pieces:
 
 def _pieces(points: np.ndarray, triangles: np.ndarray, new_points: np.ndarray,
             new_triangles: np.ndarray) -> Pieces:
-    """Raises TransferError where the two meshes do not cover the same area."""
+    """Raises NotCovered where the two meshes do not cover the same area."""
     corners, old, new = supermesh(points, triangles, new_points, new_triangles)
     edge = corners[:, 1:] - corners[:, :1]
     area = 0.5 * np.abs(edge[:, 0, 0] * edge[:, 1, 1] - edge[:, 0, 1] * edge[:, 1, 0])
     before = triangle_areas(points, triangles).sum()
     after = triangle_areas(new_points, new_triangles).sum()
     if max(abs(area.sum() / before - 1), abs(area.sum() / after - 1)) > COVER:
-        raise TransferError(f"the old mesh covers {before:.12g} um2, the new one {after:.12g} um2, "
-                            f"their common pieces {area.sum():.12g} um2; "
-                            "try a shorter growth.time_step")
+        raise NotCovered(f"the old mesh covers {before:.12g} um2, the new one {after:.12g} um2, "
+                         f"their common pieces {area.sum():.12g} um2")
     return Pieces(corners, old, new, area)
 
 

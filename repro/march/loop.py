@@ -23,6 +23,7 @@ from repro.fem.sizing import ACROSS_PORE
 from repro.march import balance
 from repro.march.folding import folding, refuse_density
 from repro.march.pace import Pace
+from repro.model.advice import advised
 from repro.model.pore import Pore, Solved, seeded
 from repro.model.remeshing import resolved
 from repro.scene import Scene, needed
@@ -251,7 +252,7 @@ def stopping(time: float) -> Iterator[None]:
         with np.errstate(all="raise", under="ignore"):
             yield
     except StageError as error:
-        raise SimulationError(f"{stopped}, in {error.stage}: {error}") from error
+        raise SimulationError(f"{stopped}, in {error.stage}: {advised(error)}") from error
     except FloatingPointError as error:
         raise SimulationError(f"{stopped} by a floating-point error ({error}); try a shorter "
                               "growth.time_step or a larger numerics.refinement") from error

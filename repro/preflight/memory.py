@@ -26,6 +26,7 @@ from repro.errors import MeshError
 from repro.fem import sizing
 from repro.fem.outline import Outline
 from repro.fem.sizing import ACROSS_AGGREGATE, ACROSS_PORE, SPLIT
+from repro.model.advice import advised
 from repro.model.pore import initial_outline, resolution, sized
 from repro.preflight import numbers
 from repro.scene import Scene, SceneError, needed
@@ -123,7 +124,7 @@ def require_outline(scene: Scene) -> None:
         outline = initial_outline(scene)
         curve = None if outline is None else shapely.Polygon(outline.corners.points)
     except MeshError as error:
-        raise SceneError(f"{scene.name}: {error}") from error
+        raise SceneError(f"{scene.name}: {advised(error)}") from error
     if curve is not None and not curve.is_valid:
         where = shapely.is_valid_reason(curve)
         raise SceneError(f"{scene.name}: the spline through the points of aggregate.outline "

@@ -1,7 +1,8 @@
-"""Line charts as inline SVG, drawn from numbers alone: the same numbers, the same bytes.
+"""Charts as inline SVG, drawn from numbers alone: the same numbers give the same bytes.
 
-Colours and fonts are the page's (classes ``line0`` ... ``line7``); what a pointer is told goes into
-``data-chart``.
+``svg`` draws lines over time for the pages of runs. The pages of sweeps draw other charts with
+``across``, ``upwards``, ``drawing`` and the marks. Colours and fonts are the page's (classes
+``line0`` ... ``line7``); the numbers that a pointer shows are in ``data-chart``.
 """
 
 from __future__ import annotations
@@ -48,13 +49,14 @@ class Chart:
 
 @dataclass(frozen=True)
 class Scale:
-    """From values to places along an axis."""
+    """From values to places along an axis; `words` stand at 0, 1, 2, ..."""
 
     low: float
     high: float
     start: float
     end: float
     log: bool = False
+    words: Sequence[str] = ()
 
     def __call__(self, value):
         low, high = self._even(self.low), self._even(self.high)
@@ -65,26 +67,41 @@ class Scale:
         return np.log10(value) if self.log else np.asarray(value, float)
 
 
+def across(low: float, high: float, log: bool = False, words: Sequence[str] = ()) -> Scale:
+    """The scale of the axis from left to right."""
+    return Scale(low, high, LEFT, WIDTH - RIGHT, log, words)
+
+
+def upwards(low: float, high: float, log: bool = False) -> Scale:
+    """The scale of the axis from below."""
+    return Scale(low, high, HEIGHT - BOTTOM, TOP, log)
+
+
 def svg(chart: Chart) -> str:
     """A figure with title, legend and drawing."""
     lines = [thinned(line) for line in chart.lines]
     x, y = _scales(lines)
-    body = _grid(x, y) + "".join(_mark(x, time) for time in chart.marks if x.low <= time <= x.high)
-    body += "".join(_drawn(line, k, x, y) for k, line in enumerate(lines))
-    body += _names(chart.axis + (" (log scale)" if y.log else ""))
-    body += (f'<line class="now" x1="0" x2="0" y1="{TOP}" y2="{HEIGHT - BOTTOM}" '
-             'visibility="hidden"/>')
-    title = escape(chart.title)
+    marks = "".join(_mark(x, time) for time in chart.marks if x.low <= time <= x.high)
+    marks += "".join(curve(x, y, line.times, line.values, k, dots=line.dots)
+                     for k, line in enumerate(lines))
+    marks += (f'<line class="now" x1="0" x2="0" y1="{TOP}" y2="{HEIGHT - BOTTOM}" '
+              'visibility="hidden"/>')
+    shown = drawing(x, y, ("time (h)", chart.axis), f"{chart.title} over time", marks)
     return (f'<figure class="chart" data-chart="{escape(_told(lines, x))}">'
-            f"<figcaption>{title}{_legend(lines)}</figcaption>"
-            f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{title} over time">{body}'
-            "</svg><output>&nbsp;</output></figure>")
+            f"<figcaption>{escape(chart.title)}{_legend(lines)}</figcaption>"
+            f"{shown}<output>&nbsp;</output></figure>")
 
 
-def _names(up: str) -> str:
-    """What the axes show: time, and upwards what is drawn."""
-    across, middle = (LEFT + WIDTH - RIGHT) / 2, (TOP + HEIGHT - BOTTOM) / 2
-    return (f'<text class="name" x="{across:g}" y="{HEIGHT - 4}">time (h)</text>'
+def drawing(x: Scale, y: Scale, axes: tuple[str, str], label: str, marks: str) -> str:
+    """The drawing alone: `axes` names what x and y show, `label` describes the drawing in words."""
+    return (f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{escape(label)}">'
+            f"{_grid(x, y)}{marks}{_names(axes[0], axes[1] + ' (log scale)' * y.log)}</svg>")
+
+
+def _names(right: str, up: str) -> str:
+    """What the axes show, below and on the left."""
+    center, middle = (LEFT + WIDTH - RIGHT) / 2, (TOP + HEIGHT - BOTTOM) / 2
+    return (f'<text class="name" x="{center:g}" y="{HEIGHT - 4}">{escape(right)}</text>'
             f'<text class="name" transform="translate(10 {middle:g}) rotate(-90)">'
             f"{escape(up)}</text>")
 
@@ -100,16 +117,33 @@ def thinned(line: Line) -> Line:
 def _scales(lines: Sequence[Line]) -> tuple[Scale, Scale]:
     times = np.concatenate([line.times for line in lines])
     values = np.concatenate([line.values[np.isfinite(line.values)] for line in lines])
-    low, high = float(values.min()), float(values.max())
-    log = low > 0 and high / LOG_FROM > low
-    if log:
-        low = 10.0 ** math.floor(math.log10(low))
-        high = 10.0 ** math.ceil(math.log10(high))
-    else:
-        low, high = _roomy(low, high)
+    log = is_wide(values)
     first, last = float(times.min()), float(times.max())
-    return (Scale(first, last if last > first else first + 1, LEFT, WIDTH - RIGHT),
-            Scale(low, high, HEIGHT - BOTTOM, TOP, log))
+    return (across(first, last if last > first else first + 1),
+            upwards(*limits(values, log), log))
+
+
+def is_wide(values: Sequence[float] | np.ndarray) -> bool:
+    """Do positive values span so much that a logarithmic scale is needed?"""
+    return bool(0 < min(values) < max(values) / LOG_FROM)
+
+
+def limits(values: Sequence[float] | np.ndarray, log: bool) -> tuple[float, float]:
+    """The round ends of an axis that shows these values."""
+    low, high = float(min(values)), float(max(values))
+    if log:
+        return 10.0 ** math.floor(math.log10(low)), 10.0 ** math.ceil(math.log10(high))
+    return _roomy(low, high)
+
+
+def padded(values: Sequence[float], log: bool) -> tuple[float, float]:
+    """The ends of an axis on which no value is at an end."""
+    low, high = min(values), max(values)
+    if log:
+        factor = (high / low) ** 0.06 if high > low else 2.0
+        return low / factor, high * factor
+    margin = 0.06 * (high - low) or 0.5 * abs(high) or 1.0
+    return low - margin, high + margin
 
 
 def _roomy(low: float, high: float) -> tuple[float, float]:
@@ -131,15 +165,27 @@ def _step(span: float, parts: int) -> float:
 
 
 def ticks(scale: Scale, parts: int = 5) -> list[tuple[float, str]]:
-    """Round values within a scale, with their texts."""
+    """Round values within a scale, with their texts; or its words."""
+    if scale.words:
+        return [(float(place), word) for place, word in enumerate(scale.words)]
     if scale.log:
-        first, last = round(math.log10(scale.low)), round(math.log10(scale.high))
-        every = -(-(last - first) // 6)
-        return [(10.0**k, number(10.0**k)) for k in range(first, last + 1, every)]
+        return [(value, number(value)) for value in _log_ticks(scale)]
     step = _step(scale.high - scale.low, parts)
     steps = range(math.ceil(scale.low / step - 1e-6), math.floor(scale.high / step + 1e-6) + 1)
     digits = -math.floor(math.log10(step) + 1e-9)
     return [(k * step, number(k * step, digits)) for k in steps]
+
+
+def _log_ticks(scale: Scale) -> list[float]:
+    """Powers of ten, some six of them; over less than three decades also 2 and 5 times these."""
+    low, high = scale.low * (1 - 1e-9), scale.high * (1 + 1e-9)
+    first = math.floor(math.log10(scale.low) + 1e-9)
+    last = math.ceil(math.log10(scale.high) - 1e-9)
+    steps = (1, 2, 5) if high < 999 * low else (1,)
+    powers = [10.0**k for k in range(first, last + 1, -(-(last - first) // 6))]
+    values = [step * power for power in powers for step in steps]
+    shown = [value for value in values if low <= value <= high]
+    return shown if len(shown) > 1 else [scale.low, scale.high]
 
 
 def number(value: float, digits: int | None = None) -> str:
@@ -155,7 +201,7 @@ def number(value: float, digits: int | None = None) -> str:
 
 
 def _grid(x: Scale, y: Scale) -> str:
-    """Lines across with their values, and the time axis with its ticks."""
+    """Lines across with their values, and the axis below with its ticks."""
     right, bottom = WIDTH - RIGHT, HEIGHT - BOTTOM
     rows = "".join(_row(y(value), text) for value, text in ticks(y, 4))
     columns = "".join(_tick(x(value), text) for value, text in ticks(x))
@@ -167,15 +213,15 @@ def _row(place: float, text: str) -> str:
     """A line across the drawing, with the value that it stands for."""
     return (f'<line class="grid" x1="{LEFT}" x2="{WIDTH - RIGHT}" '
             f'y1="{place:.1f}" y2="{place:.1f}"/>'
-            f'<text class="y" x="{LEFT - 5}" y="{place + 3.5:.1f}">{text}</text>')
+            f'<text class="y" x="{LEFT - 5}" y="{place + 3.5:.1f}">{escape(text)}</text>')
 
 
 def _tick(place: float, text: str) -> str:
-    """A tick of the time axis, with its time."""
+    """A tick of the axis below, with its value."""
     bottom = HEIGHT - BOTTOM
     return (f'<line class="tick" x1="{place:.1f}" x2="{place:.1f}" '
             f'y1="{bottom}" y2="{bottom + 4}"/>'
-            f'<text class="x" x="{place:.1f}" y="{bottom + 15}">{text}</text>')
+            f'<text class="x" x="{place:.1f}" y="{bottom + 15}">{escape(text)}</text>')
 
 
 def _mark(x: Scale, time: float) -> str:
@@ -183,21 +229,55 @@ def _mark(x: Scale, time: float) -> str:
     return f'<line class="mark" x1="{place}" x2="{place}" y1="{TOP}" y2="{HEIGHT - BOTTOM}"/>'
 
 
-def _drawn(line: Line, k: int, x: Scale, y: Scale) -> str:
-    """A line's pieces between gaps; a piece of one point is a dot."""
-    known = np.flatnonzero(np.isfinite(line.values) & ((line.values > 0) | (not y.log)))
+def curve(x: Scale, y: Scale, places: np.ndarray, values: np.ndarray, colour: int,
+          title: str = "", dots: bool = False) -> str:
+    """Values (n,) at places (n,): lines between the gaps, and dots for single points or for all."""
+    known = np.flatnonzero(_is_shown(x, places) & _is_shown(y, values))
     pieces = np.split(known, np.flatnonzero(np.diff(known) > 1) + 1)
-    return "".join(_piece(x(line.times[piece]), y(line.values[piece]), k, line.dots)
+    return "".join(_piece(list(map(point, x(places[piece]), y(values[piece]))), colour, title, dots)
                    for piece in pieces)
 
 
-def _piece(across: np.ndarray, up: np.ndarray, k: int, dots: bool) -> str:
-    points = [f"{a:.1f},{b:.1f}" for a, b in zip(across, up)]
+def _is_shown(scale: Scale, values: np.ndarray) -> np.ndarray:
+    return np.isfinite(values) & ((values > 0) | (not scale.log))
+
+
+def _piece(points: list[str], colour: int, title: str, dots: bool) -> str:
     if len(points) > 1 and not dots:
-        return f'<polyline class="line{k % COLOURS}" points="{" ".join(points)}"/>'
-    places = (point.split(",") for point in points)
-    return "".join(f'<circle class="dot{k % COLOURS}" cx="{a}" cy="{b}" r="2.6"/>'
-                   for a, b in places)
+        return polyline(points, colour, title)
+    return "".join(dot(each, colour, title) for each in points)
+
+
+def point(x: float, y: float) -> str:
+    """A point of the drawing as marks take it."""
+    return f"{x:.1f},{y:.1f}"
+
+
+def polyline(points: Sequence[str], colour: int, title: str = "") -> str:
+    """A line through points; `title` is shown at the pointer."""
+    return _element("polyline", f'class="line{colour % COLOURS}" points="{" ".join(points)}"',
+                    title)
+
+
+def dot(place: str, colour: int, title: str = "", radius: float = 2.6) -> str:
+    """A dot at a point."""
+    x, y = place.split(",")
+    return _element("circle", f'class="dot{colour % COLOURS}" cx="{x}" cy="{y}" r="{radius:g}"',
+                    title)
+
+
+def triangle(place: str, colour: int, title: str = "") -> str:
+    """A hollow triangle at a point; it points up: the value is larger than where it stands."""
+    x, y = map(float, place.split(","))
+    corners = [point(x - 5, y + 4), point(x + 5, y + 4), point(x, y - 5)]
+    return _element("polygon", f'class="line{colour % COLOURS}" points="{" ".join(corners)}"',
+                    title)
+
+
+def _element(name: str, attributes: str, title: str) -> str:
+    if not title:
+        return f"<{name} {attributes}/>"
+    return f"<{name} {attributes}><title>{escape(title)}</title></{name}>"
 
 
 def _legend(lines: Sequence[Line]) -> str:
@@ -210,8 +290,7 @@ def _legend(lines: Sequence[Line]) -> str:
 
 def swatch(k: int, dots: bool = False) -> str:
     """A sample of a line for a legend."""
-    kind = (f'<circle class="dot{k % COLOURS}" cx="12" cy="5" r="2.6"/>' if dots else
-            f'<polyline class="line{k % COLOURS}" points="0,5 24,5"/>')
+    kind = dot("12,5", k) if dots else polyline(["0,5", "24,5"], k)
     return f'<svg class="swatch" viewBox="0 0 24 10" aria-hidden="true">{kind}</svg>'
 
 

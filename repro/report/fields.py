@@ -15,10 +15,10 @@ from xml.etree import ElementTree
 import numpy as np
 
 from repro.fem.transfer import located
-from repro.results import names, vtu
+from repro.results import field_files, names
 from repro.results.arrays import ARRAYS
+from repro.results.field_files import Grid
 from repro.results.files import MOST_TABLE, read
-from repro.results.vtu import Cells, Grid
 
 MOST_FRAMES = 40
 MOST_BYTES = 2_600_000  # of all frames and charts in the page; two frames are always shown
@@ -64,9 +64,9 @@ def packed(entries: list[tuple[float, Path]],
     """
     if not entries:
         return {}
-    last = vtu.read(entries[-1][1])
+    last = field_files.read(entries[-1][1])
     chosen = _chosen(entries, dict(before or []), _shown(last), MOST_BYTES - spent)
-    grids = [_shown(vtu.read(path)) for _, path, _ in chosen]
+    grids = [_shown(field_files.read(path)) for _, path, _ in chosen]
     low = np.min([grid.points.min(0) for grid in grids], 0)
     high = np.max([grid.points.max(0) for grid in grids], 0)
     meshes: dict[bytes, dict] = {}
@@ -89,8 +89,8 @@ def _chosen(entries: list[tuple[float, Path]], before: dict[float, Path], grid: 
 
     grid: the last one, which is taken for the largest; most: bytes of all frames.
     """
-    size = 8 / 3 * (len(grid.points) * (2 + len(grid.point_data)) + 2 * grid.cells[0].data.size
-                    + len(grid.cells[0].data) * len(grid.cell_data))
+    size = 8 / 3 * (len(grid.points) * (2 + len(grid.point_data)) + 2 * grid.cells.size
+                    + len(grid.cells) * len(grid.cell_data))
     room = int(most / size)
     count = min(len(entries), MOST_FRAMES, max(2, room))
     evenly = np.linspace(0, len(entries) - 1, count).round().astype(int)
@@ -107,15 +107,14 @@ def _shown(grid: Grid) -> Grid:
     if len(grid.points) <= MOST_NODES:
         return grid
     points = grid.points[:, :2]
-    cells = grid.cells[0].data
+    cells = grid.cells
     places, triangles = _regular(points.min(axis=0), points.max(axis=0))
     at = located(points, cells, places)
     order = 1 if cells.shape[1] == 3 else 2
     nodal = {name: at.field(value, cells, order) for name, value in grid.point_data.items()}
     inside = located(points, cells, places[triangles].mean(axis=1)).triangle
-    values = {name: [value[inside]] for name, (value,) in grid.cell_data.items()}
-    return Grid(np.column_stack([places, np.zeros(len(places))]), [Cells("triangle", triangles)],
-                nodal, values)
+    values = {name: value[inside] for name, value in grid.cell_data.items()}
+    return Grid(np.column_stack([places, np.zeros(len(places))]), triangles, nodal, values)
 
 
 def _regular(low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -136,8 +135,8 @@ def _described(name: str, grid: Grid) -> dict:
 
 
 def _frame(time: float, grid: Grid, low, high, meshes: dict[bytes, dict]) -> dict:
-    cells = grid.cells[0].data
-    region = grid.cell_data["region"][0] > 0.5
+    cells = grid.cells
+    region = grid.cell_data["region"] > 0.5
     key = cells.tobytes() + region.tobytes()
     if key not in meshes:
         meshes[key] = {"per": cells.shape[1], "cells": _text(cells, "<u4"),
@@ -150,9 +149,9 @@ def _frame(time: float, grid: Grid, low, high, meshes: dict[bytes, dict]) -> dic
 
 def _values(grid: Grid, region: np.ndarray) -> dict[str, list]:
     """What there is of SHOWN, of the aggregate's fields what lies in its `region` of triangles."""
-    nodes = np.unique(grid.cells[0].data[region])
+    nodes = np.unique(grid.cells[region])
     cells = np.flatnonzero(region)
-    found = grid.point_data | {name: value[0] for name, value in grid.cell_data.items()}
+    found = grid.point_data | grid.cell_data
     values = {}
     for name in (name for name in SHOWN if name in found):
         value = np.linalg.norm(found[name], axis=1) if found[name].ndim == 2 else found[name]

@@ -11,12 +11,9 @@ import numpy as np
 from repro.model import biomass, flow, growth
 from repro.model.pore import Pore, Solved
 from repro.model.surface import STRETCH, surface
+from repro.results.field_files import Grid
 from repro.results.quantities import Quantity
-from repro.results.vtu import Cells, Grid
 from repro.scene import Scene
-
-#: The time (h) in the field data, by the name that VTK's readers know.
-TIME = "TimeValue"
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,7 +165,5 @@ def fields(scene: Scene, pore: Pore, solved: Solved) -> Grid:
     state = State(scene, pore, solved)
     known = [each for each in ARRAYS if NEEDS[each.needs](state)]
     points = {each.name: each.whole(state) for each in known if not each.cells}
-    cells = {each.name: [each.whole(state)] for each in known if each.cells}
-    kind = "triangle" if pore.mesh.geometry == 1 else "triangle6"
-    return Grid(_three(pore.mesh.points), [Cells(kind, pore.mesh.cells)], points, cells,
-                {TIME: np.array([pore.time])})
+    cells = {each.name: each.whole(state) for each in known if each.cells}
+    return Grid(_three(pore.mesh.points), pore.mesh.cells, points, cells, pore.time)

@@ -14,9 +14,9 @@ from repro.errors import RunEnd
 from repro.march.loop import SAME_TIME
 from repro.march.simulation import simulate
 from repro.results import names, picture
+from repro.results.field_files import Grid
 from repro.results.netcdf import TIME
 from repro.results.quantities import plain as unit
-from repro.results.vtu import Grid
 from repro.scene import Source, load_scene
 
 #: Times of a notebook's table at either end.
@@ -152,7 +152,5 @@ def solve(scene: Source, overrides: Sequence[str] = (), unset: Sequence[str] = (
 
 def arrays(content: Grid) -> dict[str, np.ndarray]:
     """The arrays of a grid."""
-    (cells,) = content.cells
-    by_cell = {name: values for name, (values,) in content.cell_data.items()}
-    return {"places_um": content.points[:, :2], "triangles": cells.data, **content.point_data,
-            **by_cell}
+    return {"places_um": content.points[:, :2], "triangles": content.cells, **content.point_data,
+            **content.cell_data}

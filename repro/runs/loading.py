@@ -9,8 +9,8 @@ import numpy as np
 
 from repro.errors import OutputError
 from repro.report import fields, reading
-from repro.results import vtu
-from repro.results.files import MOST_DATA, read, sha256
+from repro.results import field_files
+from repro.results.files import sha256_of
 from repro.results.tables import Results, arrays
 from repro.runs.folder import sums
 
@@ -67,9 +67,8 @@ class _Files(Sequence[dict[str, np.ndarray]]):
     def _read(self, path: Path) -> dict[str, np.ndarray]:
         """The arrays of a file, if it is as it was written."""
         try:
-            content = read(path, MOST_DATA)
-            if sha256(content) != self.sums.get(f"fields/{path.name}"):
+            if sha256_of(path) != self.sums.get(f"fields/{path.name}"):
                 raise ValueError("the file is not as it was written: cut short or altered")
-            return arrays(vtu.parse(content))
+            return arrays(field_files.read(path))
         except (OSError, ValueError) as error:
             raise OutputError(f"{path}: the fields cannot be read: {error}") from error

@@ -14,7 +14,7 @@ from repro.preflight.simplifications import CREASED, Warned, creased, unmet
 from repro.errors import CheckpointError, Interrupted, OutputError
 from repro.march.loop import Instant, Ledger, State, added
 from repro.march.pace import Pace, missed
-from repro.results import netcdf, vtu
+from repro.results import field_files, netcdf
 from repro.results.files import is_file, sha256_of, whole
 from repro.runs import checkpoint, record, stored
 from repro.runs.folder import (
@@ -129,7 +129,7 @@ class Recorder:
         name = record.fields_name(kind, len(index))
         path = claimed(self.folder, name, self.own)
         with writing(path), whole(path) as beside:
-            vtu.write(beside, results.fields(self.scene, pore, solved))
+            field_files.write(beside, results.fields(self.scene, pore, solved))
             self.record.hashes[name] = sha256_of(beside)
             self._list_fields(name)
         index.append((pore.time, name))

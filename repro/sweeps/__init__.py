@@ -7,7 +7,6 @@
     pool      runs on all cores
     cluster   runs on a Dask cluster
     table     table.csv and runs.csv
-    picture   lines and dots as SVG
     page      summary.html
     making    all of it, for scripts too
 """

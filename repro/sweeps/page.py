@@ -9,22 +9,22 @@ from html import escape
 
 import numpy as np
 
+from repro.report import charts
 from repro.report.page import policy
 from repro.results import write_text
 from repro.results.files import whole
 from repro.results.quantities import Quantity
-from repro.sweeps import picture
 from repro.sweeps.design import Factor, label
-from repro.sweeps.picture import Axis, at
 from repro.sweeps.state import Sweep
 from repro.sweeps.table import NUMBERS, Told
 
-#: From here on the values of a list are shown on a logarithmic scale.
-WIDE = 20
 #: Viridis, dark to light on a light page and without its darkest part on a dark one: told apart by
 #: the colour-blind.
 LIGHT = ("#440154", "#46327e", "#365c8d", "#277f8e", "#1fa187", "#4ab36b", "#86a51a")
 DARK = ("#8d7fe0", "#6f93dd", "#4fa5d0", "#35b7ae", "#5ac883", "#a5d84a", "#fde725")
+LEVELS = len(LIGHT)
+#: Of the dots of runs.
+RADIUS = 4
 
 
 def _levels(colours: tuple[str, ...]) -> str:
@@ -45,11 +45,11 @@ h1 { font-size: 1.5rem; line-height: 1.25; } h2 { font-size: 1.1rem; margin: 2re
 .pictures { display: grid; gap: 1.5rem;
             grid-template-columns: repeat(auto-fit, minmax(min(100%, 25rem), 1fr)); }
 figure { margin: 0; } figcaption { color: var(--soft); font-size: .9rem; }
-svg { display: block; width: 100%; max-width: 34rem; height: auto; }
-svg text { fill: var(--ink); font-size: 13px; }
-.frame { fill: none; stroke: var(--soft); } .grid { stroke: var(--line); }
-.line { fill: none; stroke-width: 2; } .later { fill: none; stroke-width: 1.8; }
-.dot { stroke: var(--page); }
+svg { display: block; width: 100%; max-width: 34rem; height: auto; overflow: visible; }
+svg text { fill: var(--ink); font-size: 10px; } text.y { text-anchor: end; }
+text.x, text.name { text-anchor: middle; }
+.grid { stroke: var(--line); } .tick { stroke: var(--soft); } circle { stroke: var(--page); }
+polyline, polygon { fill: none; stroke-width: 1.5; }
 .key { display: flex; flex-wrap: wrap; gap: .2rem 1rem; padding: 0; list-style: none;
        font-size: .9rem; }
 .key svg { display: inline-block; width: 1.6rem; height: .7rem; margin-right: .35rem; }
@@ -60,9 +60,9 @@ th, td { text-align: right; padding: .25rem .6rem; border-bottom: 1px solid var(
          overflow-wrap: normal; }
 th { vertical-align: bottom; } td.text, th.text { text-align: left; } a { color: inherit; }
 """.replace("LIGHT", _levels(LIGHT)).replace("DARK", _levels(DARK))
-LOOK += "".join(f".level{i} {{ stroke: var(--level{i}); }} "
-                f".dot.level{i} {{ fill: var(--level{i}); }}\n"
-                for i in range(picture.LEVELS))
+LOOK += "".join(f".line{i} {{ stroke: var(--level{i}); }} "
+                f".dot{i} {{ fill: var(--level{i}); }}\n"
+                for i in range(LEVELS))
 #: The numbers of a run that its row shows.
 SHOWN = """end_h clogging_time_h clogging_biomass contact_time_h contact_biomass
 wall_time_s""".split()
@@ -108,8 +108,7 @@ def _described(factor: Factor) -> str:
 def _log(factor: Factor) -> bool:
     """Is it shown on a logarithmic scale?"""
     numbers = [_number(factor, value) for value in factor.values] if factor.numeric else [1.0]
-    wide = factor.spacing == "list" and min(numbers) > 0 and max(numbers) > WIDE * min(numbers)
-    return factor.spacing == "log" or wide
+    return factor.spacing == "log" or factor.spacing == "list" and charts.is_wide(numbers)
 
 
 def _number(factor: Factor, value: float | str) -> float:
@@ -123,25 +122,24 @@ def _level(factor: Factor, value: float | str) -> int:
     low, high = min(numbers), max(numbers)
     if low == high:
         return 0
-    part = Axis("", low, high, _log(factor)).part(_number(factor, value))
-    return round((picture.LEVELS - 1) * part)
+    colours = charts.Scale(low, high, 0, LEVELS - 1, _log(factor))
+    return round(float(colours(_number(factor, value))))
 
 
 def _key(factor: Factor, told: list[Told], which: int) -> str:
     """What the colours stand for."""
     values = sorted({one.point.values[which] for one in told},
                     key=lambda value: _number(factor, value))
-    if len(values) > 2 * picture.LEVELS:
+    if len(values) > 2 * LEVELS:
         last = len(values) - 1
-        values = [values[round(i * last / (picture.LEVELS - 1))] for i in range(picture.LEVELS)]
+        values = [values[round(i * last / (LEVELS - 1))] for i in range(LEVELS)]
     entries = "".join(_entry(factor, value) for value in values)
     return f'<ul class="key"><li>{escape(factor.key)}</li>{entries}</ul>'
 
 
 def _entry(factor: Factor, value: float | str) -> str:
     """A value in the key, beside a line in its colour."""
-    return ('<li><svg viewBox="0 0 24 10" aria-hidden="true"><line x1="0" x2="24" y1="5" y2="5" '
-            f'class="line level{_level(factor, value)}"/></svg>{escape(factor.short(value))}</li>')
+    return f"<li>{charts.swatch(_level(factor, value))}{escape(factor.short(value))}</li>"
 
 
 def _said(sweep: Sweep, one: Told) -> str:
@@ -166,21 +164,23 @@ def _conductivity(sweep: Sweep, told: list[Told]) -> str:
 def _coloured(sweep: Sweep, shown: list[Told], which: int) -> str:
     """A line a run, coloured by one of the keys that are varied."""
     factor = sweep.factors[which]
-    x = _axis("biomass: aggregate area / pore area", np.concatenate([one.biomass for one in shown]))
-    y = _axis("conductivity / initial conductivity",
-              np.concatenate([one.relative for one in shown]))
-    marks = []
-    for one in shown:
-        places = [at(x, y, pair) for pair in zip(one.biomass, one.relative)]
-        level = _level(factor, one.point.values[which])
-        marks.append(picture.line(places, level, _said(sweep, one)))
-    said = f"Conductivity against biomass, coloured by {factor.key}"
-    return picture.plot(x, y, said, marks) + _key(factor, shown, which)
+    biomass = np.concatenate([one.biomass for one in shown])
+    relative = np.concatenate([one.relative for one in shown])
+    x, y = charts.across(*_ends(biomass)), charts.upwards(*_ends(relative))
+    lines = [charts.curve(x, y, one.biomass, one.relative, _level(factor, one.point.values[which]),
+                          _said(sweep, one)) for one in shown]
+    axes = "biomass: aggregate area / pore area", "conductivity / initial conductivity"
+    label = f"Conductivity against biomass, coloured by {factor.key}"
+    return charts.drawing(x, y, axes, label, "".join(lines)) + _key(factor, shown, which)
 
 
-def _axis(name: str, values) -> Axis:
-    """An axis for positive values: from zero, or logarithmic where they go far."""
-    return picture.around(name, values, max(values) > WIDE * min(values), zero=True)
+def _ends(values) -> tuple[float, float, bool]:
+    """The ends of an axis for positive values, and whether it is logarithmic: from zero, or
+    logarithmic where the values go far."""
+    known = np.array(values)[np.isfinite(values)]
+    log = charts.is_wide(known)
+    low, high = charts.limits(known if log else [0.0, *known], log)
+    return low, high, log
 
 
 def _clogging(sweep: Sweep, told: list[Told], clogged: float) -> str:
@@ -199,31 +199,39 @@ def _clogging(sweep: Sweep, told: list[Told], clogged: float) -> str:
 def _times(sweep: Sweep, shown: list[Told], which: int, clogged: float) -> str:
     factor, other = sweep.factors[which], (which + 1) % len(sweep.factors)
     x = _across(factor, [_number(factor, one.point.values[which]) for one in shown])
-    y = _axis(f"time to {clogged:g} of the conductivity (h)", [_time(one) for one in shown])
+    y = charts.upwards(*_ends([_time(one) for one in shown]))
     lines: list[str] = []
     marks: list[str] = []
     alike: dict[tuple, tuple[int, list]] = {}
     for one in sorted(shown, key=lambda one: _number(factor, one.point.values[which])):
         reached = one.numbers["clogging_time_h"] is not None
-        place = at(x, y, (_number(factor, one.point.values[which]), _time(one)))
+        place = charts.point(x(_number(factor, one.point.values[which])), y(_time(one)))
         level = _level(sweep.factors[other], one.point.values[other])
         said = f"{_said(sweep, one)}: {'' if reached else 'after '}{_time(one):.4g} h"
-        marks.append((picture.dot if reached else picture.later)(place, level, said))
+        marks.append(charts.dot(place, level, said, RADIUS) if reached else
+                     charts.triangle(place, level, said))
         rest = one.point.values[:which] + one.point.values[which + 1:]
         alike.setdefault(rest, (level, []))[1].extend([place] if reached else [])
     if len(sweep.factors) > 1:
-        lines = [picture.line(places, level, "")
+        lines = [charts.polyline(places, level)
                  for level, places in alike.values() if len(places) > 1]
     key = _key(sweep.factors[other], shown, other) if other != which else ""
-    return picture.plot(x, y, f"Clogging time against {factor.key}", lines + marks) + key
+    axes = _named(factor), f"time to {clogged:g} of the conductivity (h)"
+    label = f"Clogging time against {factor.key}"
+    return charts.drawing(x, y, axes, label, "".join(lines + marks)) + key
 
 
-def _across(factor: Factor, numbers: list[float]) -> Axis:
+def _across(factor: Factor, numbers: list[float]) -> charts.Scale:
     """The axis of a key that is varied."""
     if not factor.numeric:
-        return Axis(factor.key, -0.5, len(factor.values) - 0.5, words=factor.values)
-    name = f"{factor.key} ({factor.unit})" if factor.unit else factor.key
-    return picture.around(name, numbers, _log(factor))
+        return charts.across(-0.5, len(factor.values) - 0.5, words=factor.values)
+    log = _log(factor)
+    return charts.across(*charts.padded(numbers, log), log)
+
+
+def _named(factor: Factor) -> str:
+    """A key and its unit."""
+    return f"{factor.key} ({factor.unit})" if factor.unit else factor.key
 
 
 def _time(one: Told) -> float:

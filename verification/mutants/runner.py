@@ -35,8 +35,6 @@ from verification.evidence.writing import REPORT, ROOT, load, save
 from verification.mutants import Mutant
 
 RECORD = REPORT / "mutants.json"
-#: What catches a mutant.
-CATCHERS = ("cases", "tests")
 #: How the message of a failure begins that catches a mutant: an assertion, `pytest.fail` or `pytest.raises`, a guard.
 CATCH = ("assert", "AssertionError", "Failed: ", "repro.")
 #: How the report of a failed fixture begins.

@@ -17,13 +17,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-import meshio
 import numpy as np
 
 from reference import surface_stretch
 from repro.march.folding import CREASING
 from repro.preflight import numbers
-from repro.results import read_table
+from repro.results import field_files, read_table
 from repro.runs.status import COMPLETED
 from repro.scene import load_scene
 from verification.evidence.writing import REPORT
@@ -116,10 +115,10 @@ def _outcome(folder: Path, child: subprocess.CompletedProcess) -> dict:
 
 def confirming(folder: Path) -> float:
     """The least stretch from the last file of fields."""
-    grid = meshio.read(sorted((folder / "fields").glob("fields_*.vtu"))[-1])
+    grid = field_files.read(sorted((folder / "fields").glob("fields_*.vtu"))[-1])
     before = np.nan_to_num(grid.point_data["position_t0_um"][:, :2])
     stretch, distance, _ = surface_stretch.surface_stretch(
-        grid.points[:, :2], grid.cells[0].data, grid.cell_data["region"][0] == 1, before)
+        grid.points[:, :2], grid.cells, grid.cell_data["region"] == 1, before)
     return float(surface_stretch.least(stretch, distance))
 
 

@@ -28,15 +28,8 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
     ("report/quantities.py", 'made = run.series.get("remeshed", run.times * np.nan) == 1',
      'made = run.series.get("remeshed", run.times * np.nan) >= 1'):
         "The column is 0 or 1, and NaN is neither.",
-    ("results/arrays.py", 'kind = "triangle" if pore.mesh.geometry == 1 else "triangle6"',
-     'kind = "triangle" if pore.mesh.geometry <= 1 else "triangle6"'):
-        "A mesh has geometry 1 or 2.",
     ("model/growth.py", "MOST_ITERATIONS = 25", "MOST_ITERATIONS = 24"):
         "Identical outputs of base in the three presets, whose equilibria take 5, 5 and 3 iterations at most.",
-    ("results/vtu.py",
-     """components = f' NumberOfComponents="{values.shape[1]}"' if values.ndim == 2 else \"\"""",
-     """components = f' NumberOfComponents="{values.shape[1]}"' if values.ndim >= 2 else \"\""""):
-        "Arrays of a file have one or two axes.",
     ("run/folder.py", '(folder / "fields").mkdir(parents=True, exist_ok=True)',
      '(folder / "fields").mkdir(parents=False, exist_ok=True)'):
         "The folder is there already: it is made with those above it for its lock.",
