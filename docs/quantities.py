@@ -29,14 +29,19 @@ def text() -> str:
 
 def table(quantities) -> str:
     """A table in Markdown, a line a quantity."""
-    return "\n".join(["| name | unit | what it is | formula | given with |", "|---|---|---|---|---|",
+    return "\n".join(["| name | unit | what it is | formula | range | given with |", "|---|---|---|---|---|---|",
                       *map(line, quantities)])
 
 
 def line(one) -> str:
     """One quantity."""
-    cells = (f"`{one.name}`", one.unit.shown or "1", one.words, one.formula, given(one))
+    cells = (f"`{one.name}`", one.unit.shown or "1", one.words, one.formula, range_of(one), given(one))
     return f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |"
+
+
+def range_of(one) -> str:
+    """The values that it may have."""
+    return "0 or 1" if one.yes_no else "any" if one.signed else "0 or more"
 
 
 def given(one) -> str:

@@ -86,7 +86,7 @@ def test_the_table_of_a_notebook_escapes_and_is_short(found):
     assert html.count("<td>") == 2 * SHOWN and "<td>39</td>" in html and "<td>20</td>" not in html
     assert found._repr_html_().count("<td>") == len(found) * len(found.time)
     assert "<th>conductivity_m_per_d (m/d)</th>" in found._repr_html_()
-    assert repr(found) == f"<Results of base: {len(found.time)} rows, 30 columns, completed>"
+    assert repr(found) == f"<Results of base: {len(found.time)} rows, {len(found)} columns, completed>"
 
 
 def test_what_the_package_ships():

@@ -16,6 +16,7 @@ from repro.march.simulation import simulate
 from repro.model import remeshing
 from repro.report import quantities
 from repro.report.reading import Run
+from repro.results.names import KNOWN
 from repro.runs.running import run
 from repro.scene import load_scene
 from tests import oracles
@@ -242,6 +243,7 @@ def test_every_column_is_what_its_name_says(order):
         tight = name in ("time_h", "nodes", "remeshed", "contact", "inert_fraction", "aggregate_area_um2")
         assert row[name] == pytest.approx(value, rel=1e-12 if tight else 1e-6,
                                           abs=1e-6 if name.endswith("_balance") else 1e-12), name
+        assert KNOWN[name].signed or row[name] >= 0, name
     assert row["head_loss_cm"] == pytest.approx(scene.flow.head / 1e4, rel=1e-9)
     values = [value for name, value in row.items() if not name.endswith(("_balance", "_overshoot_mg_per_L"))]
     assert len(set(values)) == len(values) - 1, "two columns alike would hide an exchange (remeshed and contact are)"
@@ -334,6 +336,7 @@ def test_every_array_is_what_its_name_says(order):
     for name, value in wanted.items():
         size = np.nanmax(np.abs(value))
         assert told[name] == pytest.approx(value, rel=1e-9, abs=1e-9 * size, nan_ok=True), name
+        assert KNOWN[name].signed or np.nanmin(told[name]) >= 0, name
     apart = np.nanmean(np.abs(told["stress_xx_MPa"] - told["stress_yy_MPa"]))
     assert apart > 0.05 * np.nanmean(np.abs(told["stress_xx_MPa"])), "stresses alike would hide an exchange"
 

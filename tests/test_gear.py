@@ -94,7 +94,7 @@ def supplied(problem, acceptor):
     """The same problem with another supply of the acceptor, mg/L."""
     both = problem.substrates
     other = replace(both, acceptor=replace(both.acceptor, supply=acceptor))
-    return transport.problem(problem.space, None, other, problem.kinetics)
+    return transport.problem(problem.space, None, other, problem.law.constants)
 
 
 @EVERY_ORDER

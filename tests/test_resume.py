@@ -19,8 +19,10 @@ from repro.cli import main
 from repro.errors import Interrupted, SimulationError
 from repro.march import loop
 from repro.march.simulation import steps
-from repro.model import growth
+from repro.model import growth, traction
+from repro.results import columns
 from repro.results.files import sealed
+from repro.results.quantities import Quantity
 from repro.runs import running
 from repro.runs.checkpoint import NEWEST, PREVIOUS
 from repro.runs.running import Watch, resume, run
@@ -106,6 +108,42 @@ def test_a_run_stopped_after_every_step_is_the_whole_run(tmp_path, name):
     assert files(tmp_path / "parts") == files(tmp_path / "whole")
     assert lasting(tmp_path / "parts") == lasting(tmp_path / "whole")
     assert not {NEWEST, PREVIOUS, ".lock"} & files(tmp_path / "parts").keys()
+
+
+def drag(scene, at):
+    """The force of the aggregate on the water along the pore, MPa um: against the flow."""
+    drive = scene.flow
+    forces = traction.nodal(at.pore.space, at.solved.flow, drive.kinematic_viscosity / drive.gravity, "laplacian")
+    return -traction.MPA_PER_UM * drive.density * drive.gravity * forces[at.pore.mesh.body, 0].sum()
+
+
+DRAG = Quantity("drag", "force on the water", "-", drag, needs="aggregate and flow", signed=True)
+
+
+@pytest.fixture
+def a_negative_column(monkeypatch):
+    """A column of a contributor: its entry in the list of columns, and nothing else."""
+    monkeypatch.setattr(columns, "SERIES", (*columns.SERIES, DRAG))
+    columns.COLUMNS.append(DRAG.name)
+    yield
+    columns.COLUMNS.remove(DRAG.name)
+
+
+def test_a_run_with_a_negative_column_goes_on_from_its_checkpoint(tmp_path, a_negative_column):
+    """From its last step and not from t = 0; the files are those of the run without an interruption. Without
+    flow the column is empty."""
+    scene = load_scene("base", SCENES["paper, rows within steps"])
+    run(scene, tmp_path / "continuous")
+    stopped(scene, tmp_path / "parts")
+    assert resumed(tmp_path / "parts") == 0
+    (resume_record,) = told(tmp_path / "parts")["resumes"]
+    assert resume_record["time_h"] > 0
+    assert files(tmp_path / "parts") == files(tmp_path / "continuous")
+    values = [float(row["drag"]) for row in rows(tmp_path / "parts" / "timeseries.csv")]
+    assert len(values) == 5 and max(values) < 0
+    diffusion = load_scene("base", ['growth.end="0 h"'], unset=["flow"])
+    ((_, instant),) = steps(diffusion)
+    assert columns.row(diffusion, instant)["drag"] is None
 
 
 def test_strided_arrays_are_copied():

@@ -15,6 +15,7 @@ import numpy as np
 from repro.errors import BalanceError
 from repro.model.pore import Pore
 from repro.model.transport import Problem
+from repro.model.uptake_law import uptake_law
 from repro.scene import Kinetics, Scene, needed
 
 if TYPE_CHECKING:
@@ -113,7 +114,7 @@ def accepted_demand(scene: Scene, ledger: Ledger) -> float:
     The midpoint rule closes to round-off. In the paper's updates the trapezoidal rule errs by (dt
     times the fastest rate, k Y + b)^2 / 12 of what is turned over, 1e-3 in a step of base, where
     2e-4 at most is measured (of 132 random scenes the worst came to a tenth of it). Gear's method
-    controls concentrations to GEAR of the supply, and m = C / (C + K) then errs by GEAR supply / K
+    controls concentrations to GEAR of the supply, and m(C) then errs by GEAR supply / K
     at most, where a substrate runs out. The accepted defect is that part of what the biomass could
     turn over at the fastest rate, GEAR at least (measured away from exhaustion: 4e-4 at most).
     """
@@ -132,7 +133,9 @@ def accepted_demand(scene: Scene, ledger: Ledger) -> float:
 def _steepness(scene: Scene) -> float:
     """Change of m_A and m_D for a change of both concentrations by their supplies, one at least."""
     both = needed(scene.substrates, "[substrates]")
-    return max(1.0, sum(s.supply / s.half_saturation for s in (both.acceptor, both.donor)))
+    laws = uptake_law(both, needed(scene.kinetics, "[kinetics]"))
+    supplies = both.acceptor.supply, both.donor.supply
+    return max(1.0, sum(law.proportional(supply) for law, supply in zip(laws, supplies)))
 
 
 def _turned_over(kinetics: Kinetics, ledger: Ledger) -> float:

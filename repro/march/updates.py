@@ -163,9 +163,9 @@ def _mean_flows(before: Sequence[Fluxes], after: Sequence[Fluxes], duration: flo
 
 def rates_of(scene: Scene, now: Pore, state: Concentrations | None) -> Rates:
     """F3 / X_A and F4 / X_A, 1/h, at the points of the reaction."""
-    return biomass.rates(now.space, needed(state, "[substrates]"),
-                         needed(scene.substrates, "[substrates]"),
-                         needed(scene.kinetics, "[kinetics]"))
+    law = kinetics.rate_law(needed(scene.substrates, "[substrates]"),
+                            needed(scene.kinetics, "[kinetics]"))
+    return biomass.rates(now.space, needed(state, "[substrates]"), law)
 
 
 def grown(now: Pore, rates: Rates, duration: float) -> Pore:

@@ -21,10 +21,8 @@ import numpy as np
 from repro.fem import elements, transfer
 from repro.fem.space import Space
 from repro.fem.transfer import Located
-from repro.model import kinetics as law
-from repro.model.kinetics import Sink
+from repro.model.kinetics import RateLaw, Sink
 from repro.model.transport import Concentrations
-from repro.scene import Kinetics, Substrates
 
 Amounts: TypeAlias = tuple[np.ndarray, ...]
 
@@ -46,13 +44,12 @@ class Rates:
         return self.growth + self.remains
 
 
-def rates(space: Space, state: Concentrations, substrates: Substrates, kinetics: Kinetics) -> Rates:
+def rates(space: Space, state: Concentrations, law: RateLaw) -> Rates:
     """The rates (9)-(10) at the points of the reaction."""
     pieces = space.reaction
     both = np.stack([state.acceptor, state.donor])
     acceptor, donor = both[:, pieces.cells] @ pieces.values.T
-    return Rates(law.growth_rate(acceptor, donor, substrates, kinetics),
-                 law.inert_rate(acceptor, substrates, kinetics))
+    return Rates(law.growth_rate(acceptor, donor), law.inert_rate(acceptor))
 
 
 def change(first: Rates, second: Rates, weight: np.ndarray) -> float:

@@ -36,7 +36,6 @@ from repro.errors import TransportError
 from repro.fem import linear
 from repro.fem.assembly import ElementSystem, each
 from repro.fem.space import Space
-from repro.model import kinetics as law
 from repro.model.kinetics import Sink
 from repro.model.transport import (
     UNRESOLVED,
@@ -377,25 +376,22 @@ def _formula(ratio: float) -> tuple[float, float]:
 def _rates(system: System, fields: np.ndarray) -> tuple[Rate, Rate]:
     """F3 / X_A and F4 / X_A (r, q) 1/h, zero where the biomass does not live."""
     problem = system.problem
-    if not system.living or problem.kinetics is None:
+    if not system.living or problem.law is None:
         return 0.0, 0.0
     acceptor, donor = system.at(fields)
-    return (law.growth_rate(acceptor, donor, problem.substrates, problem.kinetics),
-            law.inert_rate(acceptor, problem.substrates, problem.kinetics))
+    return problem.law.growth_rate(acceptor, donor), problem.law.inert_rate(acceptor)
 
 
 def _sink(system: System, active: np.ndarray, fields: np.ndarray, s: int,
           positive: bool) -> tuple[np.ndarray, np.ndarray]:
     """Slope and offset (r, q) of the uptake of substrate s linearised at the fields, slope C +
     offset (um2 mg/L/h)."""
-    problem = system.problem
-    if problem.kinetics is None:
+    law = system.problem.law
+    if law is None:
         return np.zeros_like(active), np.zeros_like(active)
-    acceptor, donor = system.at(fields)
-    own = (acceptor, donor)[s]
-    both = problem.substrates
-    uptake = law.uptake(acceptor, donor, both, problem.kinetics, extended=True)[s]
-    slope = law.uptake_slopes(acceptor, donor, both, problem.kinetics, extended=True)[s][s]
+    concentrations = system.at(fields)
+    own = concentrations[s]
+    uptake, slope = law.own_uptake(s, *concentrations)
     if positive:
         tiny = np.finfo(float).tiny
         secant = np.where(own > tiny, uptake / np.maximum(own, tiny), slope)

@@ -1,100 +1,116 @@
-"""Dual Monod kinetics (2.2): uptake of the substrates (7)-(8), growth and decay (9)-(10).
+"""Kinetics (2.2): uptake of the substrates (7)-(8), growth and decay of biomass (9)-(10).
 
-With m_A = C_A / (C_A + K_sA) and m_D alike:
+With the fractions m_A(C_A) and m_D(C_D) of a law of uptake (:mod:`repro.model.uptake_law`):
 
     F1 = -X_A m_A (k F m_D + d_c f_d b)        F3 = X_A m_A (k Y m_D - b)
     F2 = -k X_A m_A m_D                        F4 = X_A m_A b (1 - f_d)
 
 [E3]: the demand of decay is d_c f_d b. [E1]: F is the 1.52 of Table 1 by default, not COD - Y d_c =
-1.5138. So, for whatever concentrations, F3 + F4 = -Y F2 + (F1 - F F2) / d_c: biomass is made of
-donor, and what decays takes acceptor.
+1.5138. So, for all fractions, F3 + F4 = -Y F2 + (F1 - F F2) / d_c: biomass is made of donor, and
+decay takes up acceptor.
 
-Uptake and growth are functions of max(C, 0). The transient scheme's linearisation alone asks for
-the *extended* uptake, which goes on linearly below zero in its own substrate and takes the other as
-zero: it stays monotone.
+Uptake and growth are functions of max(C, 0). Only the linearisation of the transient scheme uses
+the extension of a law below zero: the uptake of a substrate continues linearly below zero in its
+own concentration and takes the other one as zero.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeAlias, TypeVar
 
 import numpy as np
 
+from repro.model.uptake_law import UptakeLaw, Values, uptake_law
 from repro.scene import Kinetics, Substrates
 
-#: A number, or an array of them: results are shaped alike.
-Values = TypeVar("Values", np.ndarray, float)
-Slopes: TypeAlias = tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
+
+@dataclass(frozen=True, eq=False)
+class RateLaw:
+    """The rates (7)-(10) per active biomass, 1/h.
+
+    Parameters
+    ----------
+    constants : Kinetics
+        k, Y, b, f_d, d_c and F.
+    both : UptakeLaw
+        The law of uptake of acceptor and donor at once.
+    """
+
+    constants: Kinetics
+    both: UptakeLaw
+
+    def fractions(self, acceptor: Values, donor: Values) -> tuple[Values, Values]:
+        """m_A and m_D at C_A and C_D (mg/L), arrays or numbers."""
+        of_acceptor, of_donor = self.both
+        return of_acceptor.fraction(acceptor), of_donor.fraction(donor)
+
+    def uptake(self, acceptor: Values, donor: Values) -> tuple[Values, Values]:
+        """-F1 / X_A and -F2 / X_A at C_A and C_D (mg/L)."""
+        return self.uptake_at(*self.fractions(acceptor, donor))
+
+    def growth_rate(self, acceptor: Values, donor: Values) -> Values:
+        """F3 / X_A, net growth of active biomass (9), at C_A and C_D (mg/L)."""
+        m_a, m_d = self.fractions(acceptor, donor)
+        return m_a * self.growth_per_acceptor(m_d)
+
+    def inert_rate(self, acceptor: Values) -> Values:
+        """F4 / X_A, inert remains of decay (10), at C_A (mg/L)."""
+        of_acceptor, _ = self.both
+        m_a = of_acceptor.fraction(acceptor)
+        constants = self.constants
+        return m_a * constants.decay_coefficient * (1 - constants.degradable_fraction)
+
+    def uptake_at(self, m_a: Values, m_d: Values) -> tuple[Values, Values]:
+        """-F1 / X_A and -F2 / X_A at the fractions."""
+        return m_a * self.per_acceptor(m_d), self.per_donor(m_a) * m_d
+
+    def own_uptake(self, substrate: int, acceptor: Values, donor: Values) -> tuple[Values, Values]:
+        """Uptake of the acceptor (0) or the donor (1) at C_A and C_D, extended below zero of its
+        own concentration, and its derivative by that."""
+        own, other = (acceptor, donor) if substrate == 0 else (donor, acceptor)
+        laws = tuple(self.both)
+        fraction, slope = laws[substrate].extended(own)
+        of_other = laws[1 - substrate].fraction(other)
+        per_own = self.per_acceptor(of_other) if substrate == 0 else self.per_donor(of_other)
+        return fraction * per_own, slope * per_own
+
+    def uptake_slopes(self, m_a: np.ndarray, m_d: np.ndarray) -> np.ndarray:
+        """(2, 2, ...) derivatives of :meth:`uptake_at` by m_A and m_D."""
+        k = self.constants.maximum_utilization_rate
+        demand = k * self.constants.acceptor_to_donor_ratio
+        return np.stack([[self.per_acceptor(m_d), demand * m_a], [k * m_d, self.per_donor(m_a)]])
+
+    def growth_slopes(self, m_a: np.ndarray, m_d: np.ndarray) -> np.ndarray:
+        """(2, ...) derivatives of F3 / X_A by m_A and m_D."""
+        return np.stack([self.growth_per_acceptor(m_d), self.fastest_growth * m_a])
+
+    def per_acceptor(self, m_d: Values) -> Values:
+        """-F1 / X_A per m_A: k F m_D + d_c f_d b."""
+        k = self.constants.maximum_utilization_rate
+        return k * self.constants.acceptor_to_donor_ratio * m_d + decay_demand(self.constants)
+
+    def per_donor(self, m_a: Values) -> Values:
+        """-F2 / X_A per m_D: k m_A."""
+        return self.constants.maximum_utilization_rate * m_a
+
+    def growth_per_acceptor(self, m_d: Values) -> Values:
+        """F3 / X_A per m_A: k Y m_D - b."""
+        return self.fastest_growth * m_d - self.constants.decay_coefficient
+
+    @property
+    def fastest_growth(self) -> float:
+        """k Y, growth at m_A = m_D = 1 without decay."""
+        return self.constants.maximum_utilization_rate * self.constants.yield_coefficient
 
 
-def monod(concentration: Values, half_saturation: float) -> tuple[Values, Values]:
-    """m = C / (C + K) and dm/dC for C >= 0 (mg/L); below zero their tangent at zero, C / K and
-    1 / K."""
-    bounded = np.maximum(concentration, 0.0) + half_saturation
-    return concentration / bounded, half_saturation / bounded**2
+def rate_law(substrates: Substrates, kinetics: Kinetics) -> RateLaw:
+    """The rates that a scene asks for."""
+    return RateLaw(kinetics, uptake_law(substrates, kinetics))
 
 
 def decay_demand(kinetics: Kinetics) -> float:
     """d_c f_d b (1/h): the acceptor that decay takes up per active biomass at m_A = 1 [E3]."""
     return kinetics.decay_oxygen_demand * kinetics.degradable_fraction * kinetics.decay_coefficient
-
-
-def fractions(acceptor: Values, donor: Values, substrates: Substrates) -> tuple[Values, Values]:
-    """m_A and m_D of max(C, 0)."""
-    return (monod(np.maximum(acceptor, 0.0), substrates.acceptor.half_saturation)[0],
-            monod(np.maximum(donor, 0.0), substrates.donor.half_saturation)[0])
-
-
-def uptake(acceptor: Values, donor: Values, substrates: Substrates, kinetics: Kinetics,
-           extended: bool = False) -> tuple[Values, Values]:
-    """Uptake per active biomass (1/h): -F1/X_A and -F2/X_A at C_A and C_D (mg/L).
-
-    extended: goes on linearly below zero, see the module's docstring.
-    """
-    if not extended:
-        return _of_fractions(*fractions(acceptor, donor, substrates), kinetics)
-    m_a = monod(acceptor, substrates.acceptor.half_saturation)[0]
-    m_d = monod(donor, substrates.donor.half_saturation)[0]
-    k = kinetics.maximum_utilization_rate
-    demand = kinetics.acceptor_to_donor_ratio
-    per_acceptor = k * demand * np.maximum(m_d, 0.0) + decay_demand(kinetics)
-    return m_a * per_acceptor, k * np.maximum(m_a, 0.0) * m_d
-
-
-def uptake_slopes(acceptor: np.ndarray, donor: np.ndarray, substrates: Substrates,
-                  kinetics: Kinetics, extended: bool = False) -> Slopes:
-    """Derivatives of :func:`uptake`: ((dq_A/dC_A, dq_A/dC_D), (dq_D/dC_A, dq_D/dC_D)), 1/h per
-    mg/L."""
-    m_a, d_a = monod(acceptor, substrates.acceptor.half_saturation)
-    m_d, d_d = monod(donor, substrates.donor.half_saturation)
-    k = kinetics.maximum_utilization_rate
-    demand = kinetics.acceptor_to_donor_ratio
-    other_a = np.maximum(m_a, 0.0)
-    other_d = np.maximum(m_d, 0.0)
-    cross_a = np.where(acceptor > 0, d_a, 0.0)
-    cross_d = np.where(donor > 0, d_d, 0.0)
-    if not extended:
-        m_a, d_a = other_a, cross_a
-        m_d, d_d = other_d, cross_d
-    per_acceptor = k * demand * other_d + decay_demand(kinetics)
-    of_acceptor = d_a * per_acceptor, m_a * k * demand * cross_d
-    of_donor = k * cross_a * m_d, k * other_a * d_d
-    return of_acceptor, of_donor
-
-
-def growth_rate(acceptor: Values, donor: Values, substrates: Substrates,
-                kinetics: Kinetics) -> Values:
-    """F3 / X_A (1/h), net growth of active biomass (9)."""
-    m_a, m_d = fractions(acceptor, donor, substrates)
-    most = kinetics.maximum_utilization_rate * kinetics.yield_coefficient
-    return m_a * (most * m_d - kinetics.decay_coefficient)
-
-
-def inert_rate(acceptor: Values, substrates: Substrates, kinetics: Kinetics) -> Values:
-    """F4 / X_A (1/h), inert remains left by decay (10)."""
-    m_a = monod(np.maximum(acceptor, 0.0), substrates.acceptor.half_saturation)[0]
-    return m_a * kinetics.decay_coefficient * (1 - kinetics.degradable_fraction)
 
 
 def mean_growth(exponent: np.ndarray) -> np.ndarray:
@@ -136,41 +152,27 @@ class Sink:
     active: np.ndarray
     duration: float = 0.0
 
-    def _exponent(self, fractions: np.ndarray, kinetics: Kinetics) -> np.ndarray:
+    def _exponent(self, fractions: np.ndarray, law: RateLaw) -> np.ndarray:
         """(r, q) growth of ln X_A over the time."""
         m_a, m_d = fractions
-        most = kinetics.maximum_utilization_rate * kinetics.yield_coefficient
-        return self.duration * m_a * (most * m_d - kinetics.decay_coefficient)
+        return self.duration * m_a * law.growth_per_acceptor(m_d)
 
-    def uptake(self, fractions: np.ndarray, kinetics: Kinetics) -> np.ndarray:
-        """(r, 2, q) um2 mg/L/h, taken up of the acceptor and of the donor."""
-        m_a, m_d = fractions
+    def uptake(self, fractions: np.ndarray, law: RateLaw) -> np.ndarray:
+        """(r, 2, q) um2 mg/L/h, uptake of the acceptor and of the donor."""
         mass = self.active
         if self.duration > 0:
-            mass = self.active * mean_growth(self._exponent(fractions, kinetics))
-        return mass[:, None] * np.stack(_of_fractions(m_a, m_d, kinetics), axis=1)
+            mass = self.active * mean_growth(self._exponent(fractions, law))
+        return mass[:, None] * np.stack(law.uptake_at(*fractions), axis=1)
 
-    def slopes(self, fractions: np.ndarray, kinetics: Kinetics) -> np.ndarray:
+    def slopes(self, fractions: np.ndarray, law: RateLaw) -> np.ndarray:
         """(2, 2, r, q) um2 mg/L/h, derivatives of :meth:`uptake`, of acceptor and donor, by m_A and
         m_D."""
-        m_a, m_d = fractions
-        k = kinetics.maximum_utilization_rate
-        demand = kinetics.acceptor_to_donor_ratio
-        of_acceptor = [k * demand * m_d + decay_demand(kinetics), k * demand * m_a]
-        by = np.stack([of_acceptor, [k * m_d, k * m_a]])
+        by = law.uptake_slopes(*fractions)
         if self.duration == 0:
             return self.active * by
-        most = k * kinetics.yield_coefficient
-        exponent = self._exponent(fractions, kinetics)
+        exponent = self._exponent(fractions, law)
         mean = mean_growth(exponent)
         rise = mean_growth_slope(exponent, mean)
-        growth = self.duration * np.stack([most * m_d - kinetics.decay_coefficient, most * m_a])
-        rates = np.stack(_of_fractions(m_a, m_d, kinetics))
+        growth = self.duration * law.growth_slopes(*fractions)
+        rates = np.stack(law.uptake_at(*fractions))
         return self.active * (mean * by + rise * rates[:, None] * growth[None])
-
-
-def _of_fractions(m_a: Values, m_d: Values, kinetics: Kinetics) -> tuple[Values, Values]:
-    """Uptake of acceptor and donor per active biomass (1/h)."""
-    k = kinetics.maximum_utilization_rate
-    per_acceptor = k * kinetics.acceptor_to_donor_ratio * m_d + decay_demand(kinetics)
-    return m_a * per_acceptor, k * m_a * m_d

@@ -32,9 +32,9 @@ from repro.fem.brief import brief
 from repro.fem.mesh import Mesh
 from repro.fem.newton import Newton, relative
 from repro.fem.space import Space
-from repro.model import kinetics as kinetics_law
 from repro.model.flow import Flow
-from repro.model.kinetics import Sink
+from repro.model.kinetics import RateLaw, Sink, rate_law
+from repro.model.uptake_law import LARGEST_SATURATION, UptakeLaw
 from repro.scene import Kinetics, Substrate, Substrates, needed
 from repro.timing import timed
 
@@ -43,11 +43,9 @@ NEWTON = 1e-13
 #: Or at this one, where round-off keeps it from falling.
 ROUND_OFF = 1e-12
 MOST_ITERATIONS = 60
-#: No fraction m is larger than this in an iterate, so that C = K m / (1 - m) is finite.
+#: No predicted saturation s is larger than this, so that C = K s / (1 - s) is finite.
 SATURATED = 0.9
-#: C = K m / (1 - m) is taken at this fraction where round-off makes m = C / (C + K) one.
-LARGEST_FRACTION = 1 - np.finfo(float).eps
-#: Above this fraction uptake is linearised about the concentration itself.
+#: Above this saturation uptake is linearised about the concentration itself.
 SWITCH = 0.5
 #: A concentration below zero by more than this part of its supply is not resolved.
 UNRESOLVED = 1e-3
@@ -68,8 +66,8 @@ class Problem:
 
     matrices: (T, k, k) um2/h of each, without uptake; operator: (2n, 2n) of both, not coupled, and
     magnitude: the same of its entries; source: (2n,) um2 mg/L/h; inflow, outflow: (n,) um2/h,
-    integrals of u_x N_i over an end; system: of both, coupled where there is biomass; kinetics:
-    None without biomass; reused: does Newton's method keep its derivative while that does enough?
+    integrals of u_x N_i over an end; system: of both, coupled where there is biomass; law: None
+    without biomass; reused: does Newton's method keep its derivative while that does enough?
     """
 
     space: Space
@@ -81,7 +79,7 @@ class Problem:
     outflow: np.ndarray
     system: ElementSystem
     substrates: Substrates
-    kinetics: Kinetics | None
+    law: RateLaw | None
     reused: bool
 
     @property
@@ -128,8 +126,9 @@ def problem(space: Space, flow: Flow | None, substrates: Substrates, kinetics: K
     magnitude = copy(operator)
     magnitude.data = np.abs(operator.data)
     sources = np.concatenate([kind.supply * source for kind in kinds])
+    law = None if kinetics is None else rate_law(substrates, kinetics)
     return Problem(space, (acceptor, donor), operator, magnitude, sources, inflow, outflow, system,
-                   substrates, kinetics, reused)
+                   substrates, law, reused)
 
 
 def diffusion(space: Space, kind: Substrate) -> np.ndarray:
@@ -267,12 +266,12 @@ def supplied_everywhere(problem: Problem) -> Concentrations:
 
 @dataclass(frozen=True, eq=False)
 class Iterate:
-    """Both concentrations (2n,); the fractions m_A and m_D (2, r, q) about which the uptake is
-    linearised; the residual at the concentrations and the size of its terms, um2 mg/L/h; own: are
-    the fractions those of the concentrations?"""
+    """Both concentrations (2n,); the saturations (2, r, q) about which the uptake is linearised;
+    the residual at the concentrations and the size of its terms, um2 mg/L/h; own: are the
+    saturations those of the concentrations?"""
 
     state: np.ndarray
-    fractions: np.ndarray
+    saturations: np.ndarray
     residual: np.ndarray
     size: np.ndarray
     free: np.ndarray | slice
@@ -291,13 +290,13 @@ class Iterate:
 class Balance:
     """The equations of a problem with a sink, as Newton's method asks for them.
 
-    Without a sink nothing is taken up. Uptake is a function of max(C, 0) through the fractions m =
-    C / (C + K). Where half saturations are far below the supply that is nearly a step, and Newton's
-    method in C goes from one side of it to the other. So every point of the reaction has a fraction
-    m of its own, about which C = K m / (1 - m) is linearised: slope dm/dC = (1 - m)^2 / K. Where m
-    is over one half it is C's own, which is Newton's method in C; below that it follows the
-    linearisation from 0 up, as in primal-dual active-set methods (Hintermueller, Ito and Kunisch
-    2002).
+    Without a sink nothing is taken up. Uptake is a function of max(C, 0) through the fractions m(C)
+    of the law. Where half saturations K are far below the supply that is nearly a step, and
+    Newton's method in C goes from one side of it to the other. So each point of the reaction has a
+    saturation s of its own, and the uptake is linearised about C = K s / (1 - s). Where s is over
+    one half it is that of the concentration, C / (C + K), which is Newton's method in C. Below, s
+    follows the linearisation from 0 up, as in primal-dual active-set methods (Hintermueller, Ito
+    and Kunisch 2002).
     """
 
     problem: Problem
@@ -309,18 +308,13 @@ class Balance:
         return state.reshape(2, -1)[:, pieces.cells] @ pieces.values.T
 
     @property
-    def _half(self) -> np.ndarray:
-        """(2, 1, 1) mg/L, K_sA and K_sD."""
-        return np.array([s.half_saturation for s in self.problem.both])[:, None, None]
-
-    def fractions(self, concentrations: np.ndarray) -> np.ndarray:
-        """m of max(C, 0), shaped as C."""
-        positive = np.maximum(concentrations, 0.0)
-        return positive / (positive + self._half)
+    def _law(self) -> RateLaw:
+        return needed(self.problem.law, "[kinetics]")
 
     @property
-    def _law(self) -> Kinetics:
-        return needed(self.problem.kinetics, "[kinetics]")
+    def _both(self) -> UptakeLaw:
+        """The law of uptake of both substrates."""
+        return self._law.both
 
     def _taken(self, loads: np.ndarray) -> np.ndarray:
         """(2n,) sum of loads (r, 2, q) times the nodal functions."""
@@ -335,7 +329,8 @@ class Balance:
 
     def uptake(self, state: np.ndarray) -> np.ndarray:
         """(r, 2, q) um2 mg/L/h."""
-        return needed(self.sink, "a sink").uptake(self.fractions(self.at(state)), self._law)
+        fractions = self._both.fraction(self.at(state))
+        return needed(self.sink, "a sink").uptake(fractions, self._law)
 
     def residual(self, state: np.ndarray, loads: np.ndarray | None = None) -> np.ndarray:
         """(2n,) um2 mg/L/h for C_A, then C_D, of all nodes (2n,), mg/L; loads: the uptake, if it is
@@ -354,19 +349,25 @@ class Balance:
         loads = self.uptake(state) if loads is None else loads
         return found + self._summed(np.abs(loads) @ np.abs(self.problem.space.reaction.values))
 
-    def _slopes(self, state: np.ndarray, fractions: np.ndarray) -> np.ndarray:
-        """(2, r, q) dm/dC at the fractions; zero where nothing is there to be taken up."""
-        empty = (fractions <= 0) & (self.at(state) <= 0)
-        return np.where(empty, 0.0, (1 - fractions) ** 2 / self._half)
+    def _slopes(self, state: np.ndarray, saturations: np.ndarray) -> np.ndarray:
+        """(2, r, q) ds/dC at the saturations; zero where there is no substrate."""
+        empty = (saturations <= 0) & (self.at(state) <= 0)
+        return np.where(empty, 0.0, self._both.saturation_slope(saturations))
+
+    def _uptake_slopes(self, saturations: np.ndarray) -> np.ndarray:
+        """(2, 2, r, q) derivatives of the uptake by the saturations."""
+        fractions, slopes = self._both.at_saturation(saturations)
+        return needed(self.sink, "a sink").slopes(fractions, self._law) * slopes
 
     def tangent(self, state: np.ndarray,
-                fractions: np.ndarray | None = None) -> tuple[np.ndarray, ...]:
+                saturations: np.ndarray | None = None) -> tuple[np.ndarray, ...]:
         """Element matrices, um2/h, of the residual's derivative: both substrates, then uptake."""
         if self.sink is None:
             return *self.problem.matrices, self._coupled(None)
-        about = self.fractions(self.at(state)) if fractions is None else fractions
-        by = self.sink.slopes(about, self._law)
-        return *self.problem.matrices, self._coupled(by * self._slopes(state, about))
+        if saturations is None:
+            saturations = self._both.saturation(self.at(state))
+        by = self._uptake_slopes(saturations) * self._slopes(state, saturations)
+        return *self.problem.matrices, self._coupled(by)
 
     def _coupled(self, slopes: np.ndarray | None) -> np.ndarray:
         """(r, 2k, 2k) um2/h from the derivatives (2, 2, r, q) of uptake i by concentration j."""
@@ -383,13 +384,15 @@ class Balance:
 
     def begun(self, state: np.ndarray) -> Iterate:
         """The first iterate."""
-        fractions = np.zeros((2, 1, 1)) if self.sink is None else self.fractions(self.at(state))
-        return Iterate(state, fractions, self.residual(state), self.sizes(state),
+        saturations = np.zeros((2, 1, 1))
+        if self.sink is not None:
+            saturations = self._both.saturation(self.at(state))
+        return Iterate(state, saturations, self.residual(state), self.sizes(state),
                        self.problem.system.free)
 
     def factored(self, iterate: Iterate) -> Factored:
         """The derivative, factorised."""
-        return self.problem.system.factored(self.tangent(iterate.state, iterate.fractions))
+        return self.problem.system.factored(self.tangent(iterate.state, iterate.saturations))
 
     def advanced(self, iterate: Iterate, factors: Factored, fresh: bool) -> Iterate:
         """A step of Newton's method; sizes of the terms are those of the first guess, then those
@@ -398,39 +401,40 @@ class Balance:
         if self.sink is None:
             size = self.sizes(state) if fresh else iterate.size
             return replace(iterate, state=state, residual=self.residual(state), size=size)
-        there = self.at(state)
-        own = self.fractions(there)
-        loads = self.sink.uptake(own, self._law)
+        concentrations = self.at(state)
+        loads = self.sink.uptake(self._both.fraction(concentrations), self._law)
         size = self.sizes(state, loads) if fresh else iterate.size
         new = replace(iterate, state=state, residual=self.residual(state, loads), size=size)
-        return self._followed(iterate, new, there, own)
+        return self._followed(iterate, new, concentrations)
 
     def _linearised(self, iterate: Iterate) -> np.ndarray:
-        """(2n,) the residual with the uptake that the linearisation about the fractions gives."""
+        """(2n,) the residual with the uptake that the linearisation about the saturations gives."""
         if self.sink is None or iterate.own:
             return iterate.residual
-        m = iterate.fractions
-        apart = self._predicted(iterate, iterate.state) - m
-        rise = np.einsum("ijrq,jrq->riq", self.sink.slopes(m, self._law), apart)
-        loads = self.sink.uptake(m, self._law) + rise
+        about = iterate.saturations
+        apart = self._predicted(iterate, iterate.state) - about
+        rise = np.einsum("ijrq,jrq->riq", self._uptake_slopes(about), apart)
+        loads = self.sink.uptake(self._both.at_saturation(about)[0], self._law) + rise
         return self.problem.operator @ iterate.state - self.problem.source + self._taken(loads)
 
     def _predicted(self, iterate: Iterate, state: np.ndarray) -> np.ndarray:
-        """(2, r, q) fractions at other concentrations by the linearisation."""
-        m = np.minimum(iterate.fractions, LARGEST_FRACTION)
-        return m + self._slopes(iterate.state, m) * (self.at(state) - self._half * m / (1 - m))
+        """(2, r, q) saturations at other concentrations by the linearisation."""
+        about = np.minimum(iterate.saturations, LARGEST_SATURATION)
+        apart = self.at(state) - self._both.concentration(about)
+        return about + self._slopes(iterate.state, about) * apart
 
-    def _followed(self, iterate: Iterate, new: Iterate, there: np.ndarray,
-                  own: np.ndarray) -> Iterate:
-        """The new iterate with the fractions about which to linearise next; there: its
-        concentrations in the points of the reaction, own: their fractions."""
-        if iterate.own and there.min() > 0:
-            return replace(new, fractions=own)
+    def _followed(self, iterate: Iterate, new: Iterate, concentrations: np.ndarray) -> Iterate:
+        """The new iterate with the saturations about which to linearise next; concentrations: its
+        own in the points of the reaction."""
+        own = self._both.saturation(concentrations)
+        if iterate.own and concentrations.min() > 0:
+            return replace(new, saturations=own)
         predicted = np.clip(self._predicted(iterate, new.state), 0.0, SATURATED)
-        woken = (iterate.fractions <= 0) & (predicted <= 0) & (there > 0)
-        predicted = np.where(woken, np.minimum(there / self._half, SWITCH), predicted)
-        fractions = np.where((predicted > SWITCH) & (there > 0), own, predicted)
-        return replace(new, fractions=fractions, own=bool((fractions == own).all()))
+        woken = (iterate.saturations <= 0) & (predicted <= 0) & (concentrations > 0)
+        rising = np.minimum(self._both.proportional(concentrations), SWITCH)
+        predicted = np.where(woken, rising, predicted)
+        saturations = np.where((predicted > SWITCH) & (concentrations > 0), own, predicted)
+        return replace(new, saturations=saturations, own=bool((saturations == own).all()))
 
 
 @timed("transport")
@@ -445,7 +449,7 @@ def steady(problem: Problem, sink: Sink | None,
     outside of zero to the supply by more than UNRESOLVED and OVERSHOOT say, or where uptake is not
     resolved: the mesh is too coarse for its front.
     """
-    if problem.kinetics is None:
+    if problem.law is None:
         sink = None
     supply = problem.supply
     state = supply.copy() if guess is None else np.concatenate([guess.acceptor, guess.donor])
@@ -480,22 +484,17 @@ def _front(failure: str) -> Unresolved:
 
 
 def _eased(problem: Problem, sink: Sink | None, state: np.ndarray) -> tuple[np.ndarray, int]:
-    """Newton's method with half saturations that fall from the supply to what they are."""
-    least = min(s.half_saturation / max(s.supply, s.half_saturation) for s in problem.both)
+    """Newton's method with half saturations that fall from the supply to their own values."""
+    law = needed(problem.law, "[kinetics]")
+    supply = np.array([s.supply for s in problem.both])[:, None, None]
+    sharpest = law.both.sharpness(supply).min()
     total = 0
-    for factor in 10.0 ** np.arange(np.ceil(-np.log10(least)), -1, -1):
-        acceptor, donor = (_softened(substrate, factor) for substrate in problem.both)
-        softened = replace(problem.substrates, acceptor=acceptor, donor=donor)
-        eased = replace(problem, substrates=softened, reused=False)
+    for factor in 10.0 ** np.arange(np.ceil(-np.log10(sharpest)), -1, -1):
+        softened = replace(law, both=law.both.softened(factor, supply))
+        eased = replace(problem, law=softened, reused=False)
         state, iterations = _found(Balance(eased, sink), state)
         total += iterations
     return state, total
-
-
-def _softened(substrate: Substrate, factor: float) -> Substrate:
-    """With a half saturation larger by a factor, but for one above the supply."""
-    half = max(substrate.half_saturation, min(factor * substrate.half_saturation, substrate.supply))
-    return replace(substrate, half_saturation=half)
 
 
 def _checked(problem: Problem, state: np.ndarray, iterations: int) -> Concentrations:
@@ -528,8 +527,7 @@ def quadrature_error(problem: Problem, sink: Sink, state: Concentrations) -> flo
     densities = sink.active / space.reaction.dx @ fitted
     both = np.stack([state.acceptor, state.donor])
     acceptor, donor = both[:, space.cells[mesh.biomass]] @ of.values.T
-    kinetics = needed(problem.kinetics, "[kinetics]")
-    rate = kinetics_law.uptake(acceptor, donor, problem.substrates, kinetics)[1]
+    rate = needed(problem.law, "[kinetics]").uptake(acceptor, donor)[1]
     finer = float(np.vdot(densities * elements.weights(corners, of), rate))
     own = float(Balance(problem, Sink(sink.active)).uptake(both.ravel())[:, 1].sum())
     return abs(finer - own) / own if own else 0.0
@@ -562,7 +560,7 @@ def fluxes(problem: Problem, sink: Sink | None, state: Concentrations) -> tuple[
     both = np.stack([state.acceptor, state.donor])
     out = both @ problem.outflow
     consumed = np.zeros(2)
-    if sink is not None and problem.kinetics is not None:
+    if sink is not None and problem.law is not None:
         consumed = Balance(problem, sink).uptake(both.ravel()).sum(axis=(0, 2))
     supplied = problem.source.reshape(2, -1).sum(axis=1)
     if problem.system.held.any():

@@ -92,7 +92,7 @@ def _over_time(value: float | Course, factor: float, unit: str) -> str:
 
 
 def _kinetics(scene: Scene) -> Iterator[str]:
-    yield "dual Monod uptake by the aggregate, (7)-(8)"
+    yield f"{scene.kinetics.law} uptake by the aggregate, (7)-(8)"
     if scene.growth:
         yield "growth and decay of active, gain of inert biomass, (9)-(10)"
 

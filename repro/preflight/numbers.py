@@ -14,9 +14,10 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 from repro.fem.sizing import meshed_extent
-from repro.model import kinetics
+from repro.model.kinetics import rate_law
 from repro.model.pore import film, initial_outline, sized
 from repro.model.traction import MPA_PER_UM
+from repro.model.uptake_law import UptakeLaw
 from repro.scene import Scene, Substrate, needed
 
 #: Steps in which the bound on the growth is followed.
@@ -92,23 +93,57 @@ def at_end(scene: Scene) -> Sizes:
 def fastest_growth(scene: Scene) -> float:
     """F3 / X_A (1/h) at the concentrations of the supply (9)."""
     supply = (scene.substrates.acceptor.supply, scene.substrates.donor.supply)
-    return float(kinetics.growth_rate(*supply, scene.substrates, scene.kinetics))
+    return float(rate_law(scene.substrates, scene.kinetics).growth_rate(*supply))
 
 
-def uptakes(scene: Scene) -> Iterator[tuple[str, Substrate, float]]:
-    """Name, substrate and largest uptake q X_m (mg/L/h) of each, the other in excess: (7)-(8)."""
-    law = scene.kinetics
-    k = law.maximum_utilization_rate
-    of_acceptor = k * law.acceptor_to_donor_ratio + kinetics.decay_demand(law)
-    yield "acceptor", scene.substrates.acceptor, of_acceptor * law.maximum_density
-    yield "donor", scene.substrates.donor, k * law.maximum_density
+@dataclass(frozen=True)
+class Uptake:
+    """Uptake of one substrate: its name, its description, its law, and q X_m (mg/L/h), the uptake
+    per its own fraction m where the other substrate is in excess."""
+
+    name: str
+    substrate: Substrate
+    law: UptakeLaw
+    rate: float
+
+    @property
+    def per_layer(self) -> float:
+        """(q X_m / (K_s D))^1/2 (1/um), one over the thickness of a layer of first-order uptake."""
+        inside = self.substrate.diffusivity_in_aggregate
+        return math.sqrt(self.rate / (self.law.half_saturation * inside))
+
+    @property
+    def layer(self) -> float:
+        """(D K_s / (q X_m))^1/2 (um); infinite without uptake or supply."""
+        if not (self.rate and self.substrate.supply):
+            return math.inf
+        inside = self.substrate.diffusivity_in_aggregate
+        return math.sqrt(inside * self.law.half_saturation / self.rate)
+
+    @property
+    def depth(self) -> float:
+        """Depth (um) that the supply reaches at the largest uptake; infinite without uptake."""
+        supply = self.substrate.supply
+        largest = self.rate * self.law.largest(supply)
+        inside = self.substrate.diffusivity_in_aggregate
+        return math.sqrt(2 * inside * supply / largest) if largest else math.inf
+
+
+def uptakes(scene: Scene) -> Iterator[Uptake]:
+    """Uptake of acceptor and donor, (7)-(8)."""
+    both = scene.substrates
+    rates = rate_law(both, scene.kinetics)
+    of_acceptor, of_donor = rates.both
+    density = scene.kinetics.maximum_density
+    most_a = of_acceptor.largest(both.acceptor.supply)
+    most_d = of_donor.largest(both.donor.supply)
+    yield Uptake("acceptor", both.acceptor, of_acceptor, rates.per_acceptor(most_d) * density)
+    yield Uptake("donor", both.donor, of_donor, rates.per_donor(most_a) * density)
 
 
 def depth(scene: Scene) -> float:
     """Depth (um) that the scarcer substrate reaches in biomass that takes it up at full rate."""
-    depths = [math.sqrt(2 * s.diffusivity_in_aggregate * s.supply / rate)
-              for _, s, rate in uptakes(scene) if rate]
-    return min(depths, default=math.inf)
+    return min(uptake.depth for uptake in uptakes(scene))
 
 
 def numbers(scene: Scene, speed: float | None) -> list[Number]:
@@ -159,16 +194,18 @@ def _taken_up(scene: Scene, speed: float | None) -> Iterator[Number]:
     start = at_start(scene)
     end = at_end(scene)
     later = scene.growth is not None
-    for name, s, rate in uptakes(scene):
-        per = math.sqrt(rate / (s.half_saturation * s.diffusivity_in_aggregate))
-        yield Number(f"Thiele, {name}", start.thickness * per,
+    for uptake in uptakes(scene):
+        per = uptake.per_layer
+        yield Number(f"Thiele, {uptake.name}", start.thickness * per,
                      end.thickness * per if later else None,
                      "R (q X_m / (K_s D))^1/2, R thickness, q largest uptake, D in the aggregate")
-    for name, s, rate in uptakes(scene):
-        if speed and s.supply:
-            taken = rate * kinetics.monod(s.supply, s.half_saturation)[0]
-            per = taken / (speed * scene.pore.width * s.supply)
-            yield Number(f"Damkoehler, {name}", start.area * per, end.area * per if later else None,
+    for uptake in uptakes(scene):
+        supply = uptake.substrate.supply
+        if speed and supply:
+            taken_up = uptake.rate * uptake.law.fraction(supply)
+            per = taken_up / (speed * scene.pore.width * supply)
+            at_end_of_growth = end.area * per if later else None
+            yield Number(f"Damkoehler, {uptake.name}", start.area * per, at_end_of_growth,
                          "q X_m m A / (u W C), uptake of the area A at the supply over what flows "
                          "in")
 

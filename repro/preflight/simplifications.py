@@ -157,14 +157,12 @@ def _included(scene: Scene) -> str:
 def _fronts(scene: Scene) -> Iterator[Warned]:
     thickness = numbers.at_end(scene).thickness
     nodes = _interface_size(scene) / scene.numerics.order
-    for name, s, rate in numbers.uptakes(scene):
-        layer = math.inf
-        if rate and s.supply:
-            layer = math.sqrt(s.diffusivity_in_aggregate * s.half_saturation / rate)
+    for uptake in numbers.uptakes(scene):
+        layer = uptake.layer
         if layer < min(nodes, thickness):
-            zero_order = s.supply > s.half_saturation
+            zero_order = uptake.law.saturates(uptake.substrate.supply)
             kind = "zero-order front" if zero_order else "layer of first-order uptake"
-            yield Warned("numerics.refinement", f"the {name} is used up in a {kind} "
+            yield Warned("numerics.refinement", f"the {uptake.name} is used up in a {kind} "
                          f"(D K_s / (q X_m))^1/2 = {layer:.2g} um thick, thinner than the "
                          f"{nodes:.2g} um between nodes in the aggregate (a run judges its front "
                          "by what it solves)" + _resolving(resolution(scene) * nodes / layer))

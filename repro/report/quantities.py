@@ -46,7 +46,7 @@ def _rate(name: str, part: str) -> Quantity:
 
     return Quantity(f"{name}_{part}_ug_per_m_per_h", f"{name} {PARTS[part][0]} in an hour",
                     f"{column} / (end_h - start_h), at the middle of the step", value,
-                    PARTS[part][0])
+                    PARTS[part][0], signed=True)
 
 
 def _anew(run: Run) -> Course:
@@ -62,7 +62,7 @@ DERIVED = (
     Quantity("biomass_made_ug_per_m", "biomass made since t = 0",
              "sum of biomass_made_pg_per_m up to the step's end",
              lambda run: (run.ledger["end_h"], np.cumsum(run.ledger["biomass_made_pg_per_m"])),
-             "made since t = 0"),
+             "made since t = 0", signed=True),
     Quantity("remeshed_nodes", "nodes of a mesh made anew", "nodes, where remeshed is 1", _anew,
              "made anew"),
 )

@@ -15,7 +15,7 @@ PHYSICS = {
     "flow": "Stokes flow through pore and aggregate (2.1)",
     "substrates": "two substrates, an electron acceptor and a donor (2.2)",
     "aggregate": "an aggregate of biomass on the lower wall",
-    "kinetics": "dual Monod uptake, growth and decay (2.2)",
+    "kinetics": "uptake, growth and decay (2.2)",
     "growth": "growth of the aggregate as a neo-Hookean body (2.3)",
 }
 #: What the page tells in a place of its own.

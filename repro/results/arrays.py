@@ -12,7 +12,7 @@ from repro.model import biomass, flow, growth
 from repro.model.pore import Pore, Solved
 from repro.model.surface import STRETCH, surface
 from repro.results.field_files import Grid
-from repro.results.quantities import Quantity
+from repro.results.quantities import Quantity, is_modelled
 from repro.scene import Scene
 
 
@@ -44,9 +44,8 @@ class State:
         return (value * dx).sum(axis=1) / dx.sum(axis=1)
 
 
-#: What an array may need, and how a state tells that it is there.
+#: Words for what an array may need, and whether a state has it.
 NEEDS: dict[str, Callable[[State], bool]] = {
-    "": lambda state: True,
     "flow": lambda state: state.solved.flow is not None,
     "substrates": lambda state: state.solved.concentrations is not None,
     "biomass": lambda state: state.scene.kinetics is not None,
@@ -121,21 +120,22 @@ _CAUCHY = "of mu_L (J^(-5/3) (F F^T - tr C / 3) + P / mu_L), the mean over the t
 
 ARRAYS = (
     Array("velocity_m_per_d", "velocity", "u (1)-(5)",
-          lambda state: state.pore.space.to_mesh(state.solved.flow.velocity), needs="flow"),
+          lambda state: state.pore.space.to_mesh(state.solved.flow.velocity), needs="flow",
+          signed=True),
     Array("head_cm", "head", "phi (1)-(5), zero in the mean over the outlet of the meshed part",
-          _head, needs="flow"),
+          _head, needs="flow", signed=True),
     *(Array(f"{name}_mg_per_L", name, "C (7)-(13)", partial(_concentration, name),
-            needs="substrates") for name in ("acceptor", "donor")),
+            needs="substrates", signed=True) for name in ("acceptor", "donor")),
     Array("active_biomass", "active biomass over X_m", f"X_A / X_m: {_FITTED}; zero in the fluid",
-          partial(_density, "active"), needs="biomass"),
+          partial(_density, "active"), needs="biomass", signed=True),
     Array("inert_biomass", "inert biomass over X_m", f"X_I / X_m: {_FITTED}; zero in the fluid",
-          partial(_density, "inert"), needs="biomass"),
+          partial(_density, "inert"), needs="biomass", signed=True),
     Array("displacement_um", "displacement since t = 0", "x - X", _displacement, needs="growth",
-          body=True),
+          body=True, signed=True),
     Array("position_t0_um", "position at t = 0", "X, where the material was",
-          lambda state: state.pore.body.reference, needs="growth", body=True),
+          lambda state: state.pore.body.reference, needs="growth", body=True, signed=True),
     Array("pressure_MPa", "pressure P of the aggregate", "P (21), linear between the corners",
-          _pressure, needs="stress", body=True),
+          _pressure, needs="stress", body=True, signed=True),
     Array("region", "aggregate (1) or fluid (0)", "1 in the aggregate's triangles",
           lambda state: state.pore.mesh.biomass.astype(float), cells=True),
     Array("theta", "expansion theta", "(28)-(29), the mean over the triangle at t = 0",
@@ -146,12 +146,12 @@ ARRAYS = (
           f"{STRETCH}; in the triangles at the free surface, of two edges the lesser", _stretch,
           needs="growth", cells=True, body=True),
     *(Array(f"stress_{axes}_MPa", f"stress {axes}", f"Cauchy stress {axes}, {_CAUCHY}",
-            partial(_stress, k), needs="stress", cells=True, body=True)
+            partial(_stress, k), needs="stress", cells=True, body=True, signed=True)
       for k, axes in enumerate(("xx", "yy", "zz", "xy"))),
     Array("largest_principal_stress_MPa", "largest principal stress",
           "largest eigenvalue of the Cauchy stress, the mean over the triangle at t = 0",
           lambda state: state.mean(growth.largest_principal(state.stress)), needs="stress",
-          cells=True, body=True),
+          cells=True, body=True, signed=True),
 )
 
 
@@ -163,7 +163,7 @@ def fields(scene: Scene, pore: Pore, solved: Solved) -> Grid:
     strain since t = 0: a scene whose new biomass is born stress-free has none to tell.
     """
     state = State(scene, pore, solved)
-    known = [each for each in ARRAYS if NEEDS[each.needs](state)]
+    known = [each for each in ARRAYS if is_modelled(each, NEEDS, state)]
     points = {each.name: each.whole(state) for each in known if not each.cells}
     cells = {each.name: each.whole(state) for each in known if each.cells}
     return Grid(_three(pore.mesh.points), pore.mesh.cells, points, cells, pore.time)

@@ -8,13 +8,12 @@ from functools import partial
 from repro.march import balance
 from repro.march.loop import Instant, Ledger
 from repro.model.surface import BESIDE, BIOT, CREASE, STRETCH, surface
-from repro.results.quantities import Quantity
+from repro.results.quantities import Quantity, is_modelled
 from repro.scene import Scene
 
 SUBSTRATES = ("acceptor", "donor")
-#: What a quantity may need, and how an instant tells that it is there.
+#: Words for what a quantity may need, and whether an instant has it.
 NEEDS: dict[str, Callable[[Scene, Instant], bool]] = {
-    "": lambda scene, at: True,
     "flow": lambda scene, at: at.solved.flow is not None,
     "substrates": lambda scene, at: at.solved.concentrations is not None,
     "aggregate": lambda scene, at: at.pore.outline is not None,
@@ -22,10 +21,11 @@ NEEDS: dict[str, Callable[[Scene, Instant], bool]] = {
     "growth": lambda scene, at: at.pore.outline is not None and scene.growth is not None}
 
 
-def _both(pattern: str, words: str, formula: str, value: Callable) -> list[Quantity]:
-    """A quantity of the acceptor and of the donor, whose names stand in the texts for {}."""
+def _both(pattern: str, words: str, formula: str, value: Callable,
+          signed: bool = True) -> list[Quantity]:
+    """A quantity of the acceptor and of the donor, whose names replace {} in the texts."""
     return [Quantity(pattern.format(name), words.format(name), formula, partial(value, k), name,
-                     "substrates") for k, name in enumerate(SUBSTRATES)]
+                     "substrates", signed=signed) for k, name in enumerate(SUBSTRATES)]
 
 
 def _least(k: int, scene: Scene, at: Instant) -> float:
@@ -97,9 +97,11 @@ SERIES = (
     Quantity("thickness_um", "thickness of the aggregate", "largest y of its boundary",
              lambda scene, at: at.pore.outline.thickness, "thickness", "aggregate"),
     Quantity("upstream_um", "upstream end of the aggregate", "smallest x of its boundary",
-             lambda scene, at: at.pore.outline.upstream, "upstream end", "aggregate"),
+             lambda scene, at: at.pore.outline.upstream, "upstream end", "aggregate",
+             signed=True),
     Quantity("downstream_um", "downstream end of the aggregate", "largest x of its boundary",
-             lambda scene, at: at.pore.outline.downstream, "downstream end", "aggregate"),
+             lambda scene, at: at.pore.outline.downstream, "downstream end", "aggregate",
+             signed=True),
     Quantity("meshed_length_um", "length of the meshed part", "x of its outlet - x of its inlet",
              lambda scene, at: at.pore.mesh.ends[1] - at.pore.mesh.ends[0], "length"),
     Quantity("inert_fraction", "inert part of the biomass",
@@ -114,18 +116,19 @@ SERIES = (
     *_both("{}_min_mg_per_L", "least {} concentration", "least C at the nodes", _least),
     *_both("{}_overshoot_mg_per_L", "{} concentration above the supply",
            "largest C at the nodes - C_supply (with Gear: the largest of the table), at least zero",
-           _overshoot),
+           _overshoot, signed=False),
     *_both("{}_balance", "relative defect of the {}'s balance", _BALANCE, _substrate_balance),
     Quantity("biomass_balance", "relative defect of the biomass's balance",
              "(after - before - made) / after, the worst of the steps since the last row",
-             lambda scene, at: _of_steps(balance.biomass, at), "biomass", "growth"),
+             lambda scene, at: _of_steps(balance.biomass, at), "biomass", "growth",
+             signed=True),
     Quantity("oxygen_demand_balance",
              "biomass made less Y donor - (acceptor - F donor) / d_c, relative",
              "(made - Y donor + (acceptor - F donor) / d_c) / the largest of the two terms, of "
              "what a step consumes (7)-(10), and 1e-7 of the biomass, of which round-off is 1e-6; "
              "the worst of the steps since the last row",
              lambda scene, at: _of_steps(partial(balance.oxygen_demand, scene.kinetics), at),
-             "oxygen demand", "growth"),
+             "oxygen demand", "growth", signed=True),
     Quantity("surface_stretch_min", "least elastic stretch along the aggregate's free surface",
              f"least of {STRETCH}, on edges farther from a contact line than {100 * BESIDE:g} % of "
              f"the free surface's length; below {CREASE:g} it creases, below {BIOT:g} it folds",
@@ -133,7 +136,7 @@ SERIES = (
     *(Quantity(f"surface_stretch_min_{axis}_um", f"place of the least surface stretch, {axis}",
                "middle of the edge with the least elastic stretch along the free surface",
                lambda scene, at, k=k: surface(at.pore).place[k], f"{axis} of least stretch",
-               "growth") for k, axis in enumerate("xy")),
+               "growth", signed=True) for k, axis in enumerate("xy")),
     Quantity("nodes", "nodes of the mesh", "corners, and middles of the sides of curved triangles",
              lambda scene, at: len(at.pore.mesh.points), "nodes"),
     Quantity("remeshed", "mesh made anew", "1 where a step since the last row made a new mesh",
@@ -155,20 +158,22 @@ LEDGER = (
     Quantity("start_h", "start of the step", "t", lambda scene, step: step.start),
     Quantity("end_h", "end of the step", "t", lambda scene, step: step.end),
     *(Quantity(f"{name}_{part}_pg_per_m", f"{name} {label}", formula,
-               lambda scene, step, part=part, k=k: getattr(step, part)[k], label)
+               lambda scene, step, part=part, k=k: getattr(step, part)[k], label,
+               signed=True)
       for k, name in enumerate(SUBSTRATES) for part, (label, formula) in PARTS.items()),
     Quantity("biomass_before_pg_per_m", "biomass at the step's start",
              "integral of X_A + X_I over the aggregate",
              lambda scene, step: step.biomass_before, "before"),
     Quantity("biomass_made_pg_per_m", "biomass made", "integral of (9) + (10) over the step",
-             lambda scene, step: step.biomass_made, "made"),
+             lambda scene, step: step.biomass_made, "made", signed=True),
     Quantity("biomass_after_pg_per_m", "biomass at the step's end",
              "integral of X_A + X_I over the aggregate, in its new shape and on its new mesh",
              lambda scene, step: step.biomass_after, "held"),
     Quantity("oxygen_demand_balance",
              "biomass made less Y donor - (acceptor - F donor) / d_c, relative",
              "as in timeseries.csv, of the step",
-             lambda scene, step: balance.oxygen_demand(scene.kinetics, step), "oxygen demand"),
+             lambda scene, step: balance.oxygen_demand(scene.kinetics, step), "oxygen demand",
+             signed=True),
 )
 
 COLUMNS = [each.name for each in SERIES]
@@ -177,8 +182,8 @@ LEDGER_COLUMNS = [each.name for each in LEDGER]
 
 def row(scene: Scene, instant: Instant) -> dict[str, float | None]:
     """One row of ``timeseries.csv``: the geometry at its time, and flow and substrates in it."""
-    return {each.name: each.reported(scene, instant) if NEEDS[each.needs](scene, instant) else None
-            for each in SERIES}
+    return {each.name: each.reported(scene, instant)
+            if is_modelled(each, NEEDS, scene, instant) else None for each in SERIES}
 
 
 def ledger_row(scene: Scene, ledger: Ledger) -> list[float]:

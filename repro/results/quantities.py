@@ -37,8 +37,9 @@ class Quantity:
 
     words: what it is called; formula: how it is made, for people to read, and value: the same for
     the computer, in the package's own units; label: a short name, in legends and above columns;
-    needs: what must be modelled, everything by default (a word that :mod:`columns` explains);
-    yes_no: does it stand for yes (1) and no (0)?
+    needs: what must be modelled, such as "aggregate and flow" (words that :mod:`columns` or
+    :mod:`arrays` explains; empty: nothing); yes_no: does it stand for yes (1) and no (0)? signed:
+    may it be negative?
     """
 
     name: str
@@ -48,6 +49,7 @@ class Quantity:
     label: str = ""
     needs: str = ""
     yes_no: bool = False
+    signed: bool = False
 
     @property
     def unit(self) -> Unit:
@@ -58,6 +60,12 @@ class Quantity:
         """The value in the unit of the name."""
         value = self.value(*of)
         return value if self.unit.factor == 1 else self.unit.factor * value
+
+
+def is_modelled(quantity: Quantity, conditions: dict[str, Callable[..., bool]], *of: Any) -> bool:
+    """Does everything hold that the quantity needs?"""
+    needed = quantity.needs.split(" and ") if quantity.needs else []
+    return all(conditions[word](*of) for word in needed)
 
 
 def ending(name: str) -> str:

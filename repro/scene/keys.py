@@ -17,6 +17,7 @@ from fractions import Fraction
 from functools import cached_property
 from math import inf
 from pathlib import Path
+from typing import ClassVar
 
 from repro.scene.course import Course, constant, courses
 from repro.scene.files import key_of, leave_out, override, packaged_scenes, read_tables
@@ -212,10 +213,12 @@ class Substrates:
 
 @dataclass(frozen=True)
 class Kinetics:
-    """Dual Monod kinetics, (7)-(10), with Table 1's symbols.
+    """Kinetics, (7)-(10), with Table 1's symbols.
 
-    Rates are in 1/h, the density in mg/L, the others in mg/mg.
+    Rates are in 1/h, the density in mg/L, the others in mg/mg. `law` names the law of uptake.
     """
+
+    law: ClassVar[str] = "dual Monod"
 
     maximum_utilization_rate: float = quantity(
         "9.3 1/day", "1/h", NON_NEGATIVE, source="(7)-(9), Table 1",
@@ -401,7 +404,7 @@ class Scene:
         source="2.2, (7)-(13), and 3.3")
     kinetics: Kinetics | None = section(
         Kinetics, default=None,
-        about="Dual Monod uptake, growth and decay; comes with [aggregate] and [substrates]",
+        about="Uptake, growth and decay; comes with [aggregate] and [substrates]",
         source="2.2, (7)-(10)")
     growth: Growth | None = section(
         Growth, default=None, source="2.3, 3.4, (14)-(35)",

@@ -531,8 +531,9 @@ def test_well_mixed_higher(order, record):
 def _constant_supply() -> float:
     """X_A and X_I as the quasi-steady scheme integrates them, over five days of 12 min updates."""
     acceptor, donor = 400.0, 900.0
-    growth = kinetics.growth_rate(acceptor, donor, CLOSED, SLOW_LAW)
-    remains = kinetics.inert_rate(acceptor, CLOSED, SLOW_LAW)
+    law = kinetics.rate_law(CLOSED, SLOW_LAW)
+    growth = law.growth_rate(acceptor, donor)
+    remains = law.inert_rate(acceptor)
     active, inert = 3e4, 0.0
     for _ in range(600):
         active, inert = kinetics.grow(active, inert, growth, remains, 0.2)

@@ -307,7 +307,7 @@ def _balanced(problem: transport.Problem, hours: float) -> Check:
     sink = Sink(active, hours)
     state = transport.steady(problem, sink)
     acceptor, donor = (hours * flux.consumed for flux in transport.fluxes(problem, sink, state))
-    found = biomass.rates(problem.space, state, OPEN, law)
+    found = biomass.rates(problem.space, state, problem.law)
     grown = np.sum(kinetics.grow(active, 0 * active, found.growth, found.remains, hours)) - active.sum()
     F, d_c = law.acceptor_to_donor_ratio, law.decay_oxygen_demand
     asked = law.yield_coefficient * donor - (acceptor - F * donor) / d_c

@@ -16,7 +16,7 @@ from math import log
 
 import numpy as np
 
-from repro.model.kinetics import growth_rate
+from repro.model.kinetics import rate_law
 from repro.model.pore import Pore, Solved
 from verification import sensitivity
 from verification.claims import (
@@ -269,7 +269,7 @@ def doubling() -> Finding:
 
 def _doubling_time(said, concentration: float) -> float:
     """ln 2 / (F3 / X_A), h, with so much of both substrates (mg/L)."""
-    return log(2) / float(growth_rate(concentration, concentration, said.substrates, said.kinetics))
+    return log(2) / float(rate_law(said.substrates, said.kinetics).growth_rate(concentration, concentration))
 
 
 @claim("C18", "1", "within a 600 um pore: flow << 1 s, advection a few seconds, diffusion of the order of minutes, "

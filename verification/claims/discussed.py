@@ -24,8 +24,8 @@ import numpy as np
 from reference import channel_bvp, layered_channel
 from repro.fem.mesh import Mesh, curved
 from repro.fem.mesher import unlocked
-from repro.model.kinetics import Values
 from repro.model.pore import sized
+from repro.model.uptake_law import Values
 from repro.results.network import added_resistance, known
 from repro.scene import Scene
 from verification.claims import FEW, FEW_WORDS, LATER, Finding, at_least, at_most, between, claim

@@ -15,7 +15,7 @@ from repro.fem import elements
 from repro.fem.mesh import Mesh
 from repro.fem.outline import BOTTOM, FREE, TOP, Outline
 from repro.model import biomass
-from repro.model.kinetics import fractions
+from repro.model.kinetics import rate_law
 from verification.claims import FEW, FEW_WORDS, LATER, Finding, at_least, at_most, between, claim, without_limit
 from verification.claims.levels import ABOUT_WIDE, BESIDE_OWN, COMPARED
 from verification.claims.rheology import STRESS_FREE, conductivity_change
@@ -50,8 +50,8 @@ LAST_HOURS = 5.0
 def growth_rates(found: Body) -> np.ndarray:
     """(N,) (F3 + F4) / X_m, 1/h, at the mesh's nodes, zero in the fluid: how fast each place makes biomass."""
     space, problem = found.pore.space, found.solved.problem
-    rates = biomass.rates(space, found.solved.concentrations, problem.substrates, problem.kinetics)
-    density = found.pore.active / space.reaction.dx / problem.kinetics.maximum_density
+    rates = biomass.rates(space, found.solved.concentrations, problem.law)
+    density = found.pore.active / space.reaction.dx / problem.law.constants.maximum_density
     return biomass.at_nodes(space, density * rates.total)
 
 
@@ -262,7 +262,8 @@ def penetrated() -> Finding:
 
 def evenness(found: Body) -> float:
     """Smallest over largest m_A m_D in the aggregate."""
-    m_a, m_d = fractions(found.concentration("acceptor"), found.concentration("donor"), found.scene.substrates)
+    law = rate_law(found.scene.substrates, found.scene.kinetics)
+    m_a, m_d = law.fractions(found.concentration("acceptor"), found.concentration("donor"))
     rate = (m_a * m_d)[found.grid.body]
     return float(rate.min() / rate.max())
 

@@ -142,7 +142,7 @@ def specific_growth(rows: Columns) -> np.ndarray:
 def decay_share(found: Body) -> float:
     """Decay over synthesis of active biomass, both terms of (9) over the whole aggregate."""
     now, solved = found.pore, found.solved
-    kinetics = solved.problem.kinetics
-    rates = biomass.rates(now.space, solved.concentrations, solved.problem.substrates, kinetics)
-    decay = float((now.active * rates.remains).sum()) / (1 - kinetics.degradable_fraction)
+    law = solved.problem.law
+    rates = biomass.rates(now.space, solved.concentrations, law)
+    decay = float((now.active * rates.remains).sum()) / (1 - law.constants.degradable_fraction)
     return decay / (float((now.active * rates.growth).sum()) + decay)

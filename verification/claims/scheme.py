@@ -18,7 +18,7 @@ import numpy as np
 from repro.fem.mesh import POOR, POOR_ALLOWED
 from repro.march import updates
 from repro.model import biomass, contact, gear, pore
-from repro.model.kinetics import Sink, fractions
+from repro.model.kinetics import Sink, rate_law
 from repro.model.pore import Pore
 from repro.model.transport import Concentrations
 from verification.claims import (
@@ -235,7 +235,8 @@ def richer_supply() -> Finding:
     checks += [at_most(f"share of the {name} consumed, 20 K_s over 10 K_s", "smaller", less, 1, "the words")
                for name, less in zip(SUBSTRATES, shares)]
     row = at(BASE, PLOTTED)
-    m_a, m_d = fractions(row["acceptor_min_mg_per_L"], row["donor_min_mg_per_L"], said.substrates)
+    law = rate_law(said.substrates, said.kinetics)
+    m_a, m_d = law.fractions(row["acceptor_min_mg_per_L"], row["donor_min_mg_per_L"])
     reason = (f"base is not in the zero-order range at 19.2 h (C33): m_A = {m_a:.2f} and m_D = {m_d:.2f} at its lowest "
               f"concentrations, so that uptake there stands at {100 * m_a * m_d:.0f} % of its most and can rise")
     return Finding(tuple(checks), reason=reason)
@@ -342,8 +343,9 @@ def growth_of_a_disturbance(simultaneous: bool) -> float:
     """Factor a step of 12 min by which a disturbance of the acceptor in base at 19.2 h changes, biomass neither growing
     nor decaying; simultaneous: both substrates see the other's prediction."""
     now, solved = solved_pore(BASE, PLOTTED)
-    still = replace(solved.problem.kinetics, yield_coefficient=1e-12, decay_coefficient=1e-15)
-    problem = replace(solved.problem, kinetics=still)
+    law = solved.problem.law
+    still = replace(law.constants, yield_coefficient=1e-12, decay_coefficient=1e-15)
+    problem = replace(solved.problem, law=replace(law, constants=still))
     rest = gear.settle(problem, Sink(now.active), solved.concentrations)
     start = replace(rest, acceptor=(1 - DISTURBED) * rest.acceptor)
     ends = [gear.advance(problem, now.active, now.inert, start, count * UPDATE, fixed_step=UPDATE,

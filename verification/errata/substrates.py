@@ -9,7 +9,7 @@ from math import atan, cbrt, degrees, exp, log
 import numpy as np
 from scipy.optimize import brentq
 
-from repro.model import kinetics
+from repro.model.kinetics import rate_law
 from verification.claims.base_run import upstream_means
 from verification.claims.levels import CONVERGED, Level, at_level
 from verification.claims.runs import BASE, PLATES, at, grown, grown_anew, scene, series, solved_pore
@@ -92,7 +92,7 @@ def plotted_biomass():
 def taken_up(law) -> np.ndarray:
     """(2,) oxygen and donor, over the aggregate."""
     weight, *both = plotted_biomass()
-    return np.array(kinetics.uptake(*both, scene(*BASE).substrates, law)) @ weight
+    return np.array(rate_law(scene(*BASE).substrates, law).uptake(*both)) @ weight
 
 
 def electron_defect(law) -> float:
@@ -100,8 +100,8 @@ def electron_defect(law) -> float:
     oxygen taken up."""
     said = scene(*BASE)
     weight, acceptor, donor = plotted_biomass()
-    rates = (kinetics.growth_rate(acceptor, donor, said.substrates, said.kinetics)
-             + kinetics.inert_rate(acceptor, said.substrates, said.kinetics))
+    present = rate_law(said.substrates, said.kinetics)
+    rates = present.growth_rate(acceptor, donor) + present.inert_rate(acceptor)
     oxygen, spent = taken_up(law)
     return 1 + (said.kinetics.decay_oxygen_demand * weight @ rates - COD * spent) / oxygen
 
@@ -301,5 +301,6 @@ def oxygen_supplied() -> Numbers:
 def doubling_time() -> Numbers:
     """At saturation and at the supply."""
     said = scene("base")
-    rates = [float(kinetics.growth_rate(value, value, said.substrates, said.kinetics)) for value in (1e12, 10.0)]
+    law = rate_law(said.substrates, said.kinetics)
+    rates = [float(law.growth_rate(value, value)) for value in (1e12, 10.0)]
     return dict(zip(("saturated", "supplied"), (f"{log(2) / rate:.2f}" for rate in rates)))

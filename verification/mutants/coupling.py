@@ -82,8 +82,8 @@ MUTANTS = (
         "repro/model/kinetics.py",
         ("decay-leaves-all",
          "all that decays is left as X_I (10)",
-         "return m_a * kinetics.decay_coefficient * (1 - kinetics.degradable_fraction)",
-         "return m_a * kinetics.decay_coefficient")),
+         "return m_a * constants.decay_coefficient * (1 - constants.degradable_fraction)",
+         "return m_a * constants.decay_coefficient")),
     *changes(
         "repro/model/contact.py",
         ("films-stay-open",

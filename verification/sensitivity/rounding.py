@@ -40,7 +40,8 @@ from scipy.stats import sobol_indices, uniform
 
 from repro.march import simulation, updates
 from repro.march.loop import State
-from repro.model import kinetics, pore
+from repro.model import pore
+from repro.model.kinetics import rate_law
 from repro.results import M_PER_D
 from repro.scene import Scene, load_scene, needed
 from verification.claims import interval
@@ -143,7 +144,7 @@ def of_base(said: Scene) -> Row:
     halves = [each.half_saturation for each in found.problem.both]
     acceptor, donor = (flux.effluent / half for flux, half in zip(found.fluxes, halves))
     supply = [each.supply for each in found.problem.both]
-    rate = float(kinetics.growth_rate(*supply, said.substrates, said.kinetics))
+    rate = float(rate_law(said.substrates, said.kinetics).growth_rate(*supply))
     return {"velocity_0": M_PER_D * first.solved.flow.mean_velocity,
             "velocity": M_PER_D * shaped.solved.flow.mean_velocity,
             "effluent_acceptor": acceptor, "effluent_donor": donor,

@@ -42,8 +42,8 @@ LEFT: dict[tuple[str, str, str], tuple[str, str]] = {
     ("run/__init__.py", "INTERVAL = 60.0", "INTERVAL = 59.0"):
         ("Checkpoints are written every 59 s, and the help says so.",
          "It is a choice; what a run makes does not depend on it."),
-    ("model/transport.py", "woken = (iterate.fractions <= 0) & (predicted <= 0) & (there > 0)",
-     "woken = (iterate.fractions <= 0) & (predicted != 0) & (there > 0)"):
+    ("model/transport.py", "woken = (iterate.saturations <= 0) & (predicted <= 0) & (concentrations > 0)",
+     "woken = (iterate.saturations <= 0) & (predicted != 0) & (concentrations > 0)"):
         ("Newton's method goes on from another fraction where one was zero and another is predicted; what it ends at "
          "is the same to its tolerance.", "It takes more or fewer iterations in starved pores, which nothing bounds."),
 }
