@@ -199,8 +199,13 @@ def _fill(points: np.ndarray, polygons: list[Polygon],
     rim = np.vstack([np.column_stack([nodes, np.roll(nodes, -1)]) for nodes, _ in polygons])
     rim = np.unique(np.sort(rim, axis=1), axis=0)
     sizes = FIRST_PASS * size_at(points)
-    coarse, found = _mmg(points, np.vstack(triangles), region, rim, points, sizes)
-    return _mmg(*coarse, found[rim], points, size_at(coarse[0]))
+    try:
+        coarse, found = _mmg(points, np.vstack(triangles), region, rim, points, sizes)
+        return _mmg(*coarse, found[rim], points, size_at(coarse[0]))
+    except MeshError:
+        raise
+    except RuntimeError as error:
+        raise MeshError(f"no mesh could be made: {error}") from error
 
 
 def _mmg(points: np.ndarray, triangles: np.ndarray, region: np.ndarray, rim: np.ndarray,

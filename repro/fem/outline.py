@@ -201,14 +201,16 @@ def _graded_to_corners(rim: np.ndarray, width: float, least: float) -> np.ndarra
 
     At a sharp tip the water's velocity gradient grows as the distance to the power of -1/2, and the
     error of the head loss falls with the first power of the elements there. In a notch the biomass
-    deforms alike. Where the aggregate spans the pore the water passes through it, and its ends on
-    the lower wall count as tips.
+    deforms alike. Where the aggregate spans the pore the water passes through it, and its contact
+    lines count as tips.
     """
     way = np.diff(rim, axis=0)
     angle = np.arctan2(way[:, 1], way[:, 0])
     turn = (np.diff(angle, prepend=angle[0], append=angle[-1]) + np.pi) % (2 * np.pi) - np.pi
     near = np.where(turn > CORNER, least, np.where(turn < -CORNER, AT_NOTCH * least, inf))
-    if (rim[:, 1] == width).any():
+    top = rim[:, 1] == width
+    if top.any():
+        near[top] = least
         near[[0, -1]] = least
     shares = [_shares(length, *near[k: k + 2])
               for k, length in enumerate(np.linalg.norm(way, axis=1))]
