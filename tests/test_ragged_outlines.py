@@ -1,6 +1,5 @@
 """Ragged outlines, drawn by seed: sharp tips and notches, necks and films. The presets agree, or a warning says by how
 much they do not."""
-import math
 import random
 import re
 
@@ -65,7 +64,7 @@ def test_presets_agree_on_a_ragged_outline_or_a_warning_names_what_resolves_it(s
     if not warned:
         assert head_loss(fast) == pytest.approx(head_loss(scene(width, points, "accurate")), rel=FAST)
         return
-    advised = re.search(r"numerics\.refinement = ([\d.]+) resolves", warned[0])
+    advised = re.search(r"numerics\.refinement = ([\d.]+) resolves", warned[0].text)
     assert not list(unresolved(scene(width, points, "fast", float(advised[1]))))
 
 
@@ -77,11 +76,11 @@ def thin_spike():
 def test_a_flow_that_is_not_resolved_is_warned_of_with_what_is_to_be_expected():
     warned = list(unresolved(scene(116.0, thin_spike())))
     assert len(warned) == 1
-    given = re.match(r"the head loss at t = 0 is ([\d.e-]+) cm, and about ([\d.e-]+) cm \(", warned[0])
+    given = re.match(r"the head loss at t = 0 is ([\d.e-]+) cm, and about ([\d.e-]+) cm \(", warned[0].text)
     first, expected = (1e4 * float(number) for number in given.groups())
     assert first == pytest.approx(head_loss(scene(116.0, thin_spike())), rel=1e-3)
     assert expected == pytest.approx(head_loss(scene(116.0, thin_spike(), "exact")), rel=0.01)
-    advised = float(re.search(r"numerics\.refinement = ([\d.]+) resolves", warned[0])[1])
+    advised = float(re.search(r"numerics\.refinement = ([\d.]+) resolves", warned[0].text)[1])
     assert not list(unresolved(scene(116.0, thin_spike(), "fast", advised)))
 
 
@@ -106,11 +105,8 @@ def test_edges_grow_from_a_tip_a_notch_and_no_other_corner():
 
 
 def test_no_triangle_has_its_nodes_on_one_line():
-    """Three of the nodes on a straight flank, of which the middle one is 1e-15 outside, would be one: Mmg refuses it."""
-    down = np.array([-0.3, -1.0]) / math.hypot(0.3, 1.0)
-    flank = 30 * np.linspace(0, 1, 5)[1:-1, None] ** 2 * down
-    nudge = np.array([-1e-15, 0])
-    points = np.vstack([(0.0, 30.0), flank + (0, 30) + nudge, (-9.0, 0.0), (40.0, -3.0)])
-    triangles = mesher._constrained_delaunay(points, np.arange(len(points)))
-    assert triangle_areas(points, triangles).sum() == pytest.approx(abs(shapely.Polygon(points).area))
-    assert triangle_areas(points, triangles).min() > 1e-6
+    """Round-off may put the middle one of three nodes of a straight edge beside it; Mmg refuses their triangle."""
+    points = np.array([(0, 0), (1, 0), (3, 0), (2, 2)], float)
+    triangles = np.array([[0, 1, 2], [0, 2, 3]])
+    mended = mesher._without_slivers(points, triangles)
+    assert triangle_areas(points, mended) == pytest.approx([1, 2])

@@ -9,6 +9,7 @@ from repro.errors import StageError
 from repro.model import pore
 from repro.model.remeshing import MOST_REFINED
 from repro.preflight.memory import first_nodes
+from repro.preflight.simplifications import Warned
 from repro.scene import Scene
 
 #: The head loss of a resolved flow changes by no more than this share on a mesh twice as fine. Where
@@ -19,9 +20,11 @@ DOUBLINGS = 3
 MOST_COMPARED = 30_000
 
 
-def unresolved(scene: Scene) -> Iterator[str]:
-    """What the head loss at t = 0 is, what is to be expected, and a refinement that resolves it;
-    nothing where the flow is resolved or no outline is drawn."""
+def unresolved(scene: Scene) -> Iterator[Warned]:
+    """What the head loss at t = 0 is, what is to be expected, and a refinement that resolves it.
+
+    Nothing where the flow is resolved or no outline is drawn.
+    """
     if scene.flow is None or scene.aggregate is None or scene.aggregate.outline is None:
         return
     tried = _losses(scene)
@@ -29,8 +32,9 @@ def unresolved(scene: Scene) -> Iterator[str]:
         return
     first = tried[0][1]
     expected = 2 * tried[-1][1] - tried[-2][1]
-    yield (f"the head loss at t = 0 is {1e-4 * first:.4g} cm, and about {1e-4 * expected:.4g} cm "
-           f"({100 * (expected / first - 1):+.2g} %) are expected of finer meshes; {_advice(tried)}")
+    yield Warned("numerics.refinement", f"the head loss at t = 0 is {1e-4 * first:.4g} cm, and about "
+                 f"{1e-4 * expected:.4g} cm ({100 * (expected / first - 1):+.2g} %) are expected of "
+                 f"finer meshes; {_advice(tried)}")
 
 
 def _advice(tried: list[tuple[float, float]]) -> str:

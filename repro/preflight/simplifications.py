@@ -14,7 +14,6 @@ from repro.model.remeshing import MOST_REFINED
 from repro.model.surface import CREASE, surface
 from repro.preflight import numbers
 from repro.preflight.numbers import Number
-from repro.preflight.resolved import unresolved
 from repro.scene import Kinetics, Scene
 from repro.scene.keys import RATIO
 
@@ -68,7 +67,7 @@ def warnings(scene: Scene, found: list[Number]) -> list[Warned]:
     value = {number.name: number.start for number in found}
     checks = [_inertia(value), _cells(scene, value), _diffusivities(scene)]
     if scene.aggregate:
-        checks += [_seed_film(scene), _ends(scene), _drag_layer(scene), _flow_mesh(scene)]
+        checks += [_seed_film(scene), _ends(scene), _drag_layer(scene)]
     if scene.kinetics:
         checks += [_fronts(scene), _demand(scene.kinetics)]
     if scene.growth:
@@ -93,12 +92,6 @@ def _cells(scene: Scene, value: dict[str, float]) -> Iterator[Warned]:
                      f"{CELL_PECLET:g}: linear elements may overshoot where concentrations are "
                      f"steep{_resolving(wanted)}; the presets fast and accurate refine by "
                      "themselves")
-
-
-def _flow_mesh(scene: Scene) -> Iterator[Warned]:
-    """Where the mesh does not resolve the flow around an outline."""
-    for text in unresolved(scene):
-        yield Warned("numerics.refinement", text)
 
 
 def _diffusivities(scene: Scene) -> Iterator[Warned]:
