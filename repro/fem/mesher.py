@@ -29,7 +29,7 @@ from repro.timing import timed
 FIRST_PASS = 2.0
 #: Mmg's own limit on the ratio of adjacent edges.
 HGRAD = 1.5
-#: A triangle with an area under this, times the square of its longest edge, has all nodes on a line.
+#: A triangle has its nodes on a line where its area is under this, times its longest edge squared.
 SLIVER = 1e-12
 #: Rounds in which arcs that bend too much for the triangles beside them are halved.
 HALVINGS = 6

@@ -12,8 +12,9 @@ from repro.preflight.memory import first_nodes
 from repro.preflight.simplifications import Warned
 from repro.scene import Scene
 
-#: The head loss of a resolved flow changes by no more than this share on a mesh twice as fine. Where
-#: corners are not resolved, the error falls with the first power of the elements: it is twice that.
+#: The head loss of a resolved flow changes by no more than this share on a mesh twice as fine.
+#: Where corners are not resolved, the error falls with the first power of the elements: it is twice
+#: that.
 CHANGE = 0.005
 #: Meshes twice, four and eight times as fine are tried, up to so many nodes.
 DOUBLINGS = 3
@@ -32,9 +33,9 @@ def unresolved(scene: Scene) -> Iterator[Warned]:
         return
     first = tried[0][1]
     expected = 2 * tried[-1][1] - tried[-2][1]
-    yield Warned("numerics.refinement", f"the head loss at t = 0 is {1e-4 * first:.4g} cm, and about "
-                 f"{1e-4 * expected:.4g} cm ({100 * (expected / first - 1):+.2g} %) are expected of "
-                 f"finer meshes; {_advice(tried)}")
+    yield Warned("numerics.refinement", f"the head loss at t = 0 is {1e-4 * first:.4g} cm, and "
+                 f"about {1e-4 * expected:.4g} cm ({100 * (expected / first - 1):+.2g} %) are "
+                 f"expected of finer meshes; {_advice(tried)}")
 
 
 def _advice(tried: list[tuple[float, float]]) -> str:
