@@ -29,6 +29,8 @@ from repro.timing import timed
 FIRST_PASS = 2.0
 #: Mmg's own limit on the ratio of adjacent edges.
 HGRAD = 1.5
+#: A triangle has its nodes on a line where its area is under this, times its longest edge squared.
+SLIVER = 1e-12
 #: Rounds in which arcs that bend too much for the triangles beside them are halved.
 HALVINGS = 6
 
@@ -196,8 +198,13 @@ def _fill(points: np.ndarray, polygons: list[Polygon],
     rim = np.vstack([np.column_stack([nodes, np.roll(nodes, -1)]) for nodes, _ in polygons])
     rim = np.unique(np.sort(rim, axis=1), axis=0)
     sizes = FIRST_PASS * size_at(points)
-    coarse, found = _mmg(points, np.vstack(triangles), region, rim, points, sizes)
-    return _mmg(*coarse, found[rim], points, size_at(coarse[0]))
+    try:
+        coarse, found = _mmg(points, np.vstack(triangles), region, rim, points, sizes)
+        return _mmg(*coarse, found[rim], points, size_at(coarse[0]))
+    except MeshError:
+        raise
+    except RuntimeError as error:
+        raise MeshError(f"no mesh could be made: {error}") from error
 
 
 def _mmg(points: np.ndarray, triangles: np.ndarray, region: np.ndarray, rim: np.ndarray,
@@ -243,6 +250,19 @@ def _constrained_delaunay(points: np.ndarray, nodes: np.ndarray) -> np.ndarray:
     triangles = nodes[local].reshape(-1, 3)
     turned = triangle_areas(points, triangles) < 0
     triangles[turned] = triangles[turned][:, ::-1]
+    return _without_slivers(points, triangles)
+
+
+def _without_slivers(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """The same triangles (K, 3), without those whose nodes lie on one line: Mmg refuses them.
+
+    The longest edge of such a triangle is exchanged for the other diagonal.
+    """
+    corners = points[triangles]
+    lengths = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
+    flat = triangle_areas(points, triangles) < SLIVER * lengths.max(axis=1) ** 2
+    for one in np.flatnonzero(flat):
+        _exchange(points, triangles, int(one), int(lengths[one].argmax()))
     return triangles
 
 
@@ -290,13 +310,17 @@ def _flip(points: np.ndarray, triangles: np.ndarray, biomass: np.ndarray, corner
     """Exchange, in place, the inner edge of a cornered triangle for the other diagonal of the
     quadrilateral that it forms with its neighbour."""
     outer = _region_edges(triangles, biomass)[corner]
-    if outer.sum() != 2:
-        return
-    c, a, b = np.roll(triangles[corner], -int(np.flatnonzero(~outer)[0]))
-    sharing = (triangles == a).any(axis=1) & (triangles == c).any(axis=1)
-    inside = np.flatnonzero(sharing & (biomass == biomass[corner]))
-    beside = int(inside[inside != corner][0])
+    if outer.sum() == 2:
+        _exchange(points, triangles, corner, int(np.flatnonzero(~outer)[0]))
+
+
+def _exchange(points: np.ndarray, triangles: np.ndarray, one: int, edge: int) -> None:
+    """Exchange, in place, an edge of a triangle for the other diagonal of the quadrilateral that
+    the triangle forms with its neighbour; not where a new triangle would be turned over."""
+    c, a, b = np.roll(triangles[one], -edge)
+    sharing = np.flatnonzero((triangles == a).any(axis=1) & (triangles == c).any(axis=1))
+    beside = int(sharing[sharing != one][0])
     d = int(triangles[beside][(triangles[beside] != a) & (triangles[beside] != c)][0])
     pair = np.array([[a, b, d], [b, c, d]])
     if triangle_areas(points, pair).min() > 0:
-        triangles[corner], triangles[beside] = pair
+        triangles[one], triangles[beside] = pair

@@ -32,6 +32,11 @@ SLOWEST = 1e-8
 #: layer is W Pe^(-1/3) thick (Leveque), and with four elements across the pore and this factor
 #: concentrations upstream of an aggregate exceed the supply by less than 0.01 %.
 BOUNDARY_LAYER = 0.15
+#: By order of the elements: edges at the tips of an outline are the pore's width over this and over
+#: the square of the refinement (W / 200 in the presets paper and fast), but no shorter than W over
+#: ``MOST_AT_TIPS``.
+AT_TIPS = {1: 200.0, 2: 5000.0, 3: 5000.0}
+MOST_AT_TIPS = 20_000.0
 
 
 @brief
@@ -181,9 +186,17 @@ def initial_outline(scene: Scene, front: float = 1.0) -> Outline | None:
         return None
     geometry = scene.numerics.geometry
     if seed.outline is not None:
-        return polygon(np.array(seed.outline), scene.pore.width, geometry, seed.smooth)
+        return polygon(np.array(seed.outline), scene.pore.width, geometry, seed.smooth,
+                       size_at_tips(scene))
     across = sizing.ACROSS_AGGREGATE * resolution(scene) * front
     return half_disc(needed(seed.radius, "aggregate.radius"), across, geometry, seed.position)
+
+
+def size_at_tips(scene: Scene) -> float:
+    """Length (um) of the edges at an outline's tips."""
+    numerics = scene.numerics
+    finest = min(AT_TIPS[numerics.order] * numerics.refinement**2, MOST_AT_TIPS)
+    return scene.pore.width / finest
 
 
 def seeded(scene: Scene, front: float = 1.0, outline: Outline | None = None) -> Pore:

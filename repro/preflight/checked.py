@@ -15,6 +15,7 @@ from repro.preflight.cost import Cost
 from repro.preflight.memory import first_nodes, require_memory, require_outline
 from repro.preflight.modelled import modelled
 from repro.preflight.numbers import Number, judged
+from repro.preflight.resolved import unresolved
 from repro.preflight.simplifications import Warned, unmet, warnings
 from repro.scene import Scene, Source, label, load_scene
 from repro.scene.units import SceneError
@@ -69,7 +70,8 @@ def check(scene: Source, file: str = "") -> Checked:
         trial = cost.tried(scene, nodes)
         flow = trial.first.solved.flow
         most, found = judged(scene, flow.mean_velocity if flow else None)
-        told = [*warnings(most, found), *unmet(scene, trial.worst, " in the first steps"),
+        told = [*warnings(most, found), *unresolved(scene),
+                *unmet(scene, trial.worst, " in the first steps"),
                 *(Warned("numerics.refinement", text) for text in scarce)]
         return Checked(scene.name, modelled(scene), nodes, triangles, found, told,
                        cost.expected(scene, trial, nodes), estimated)

@@ -82,6 +82,8 @@ def _edges(outline: Outline, sizes: sizing.Sizing) -> list[tuple[float, float]]:
     edge = np.repeat(np.arange(count), PIECES)
     pieces = sizing.placed(outline, edge, np.tile(np.arange(PIECES) / PIECES, count))
     near = np.minimum(sizing.interface_sizes(pieces, sizes), SPLIT * outline.edge_lengths()[edge])
+    graded = sizing.graded_size(pieces.points, *sizing.size_sources(outline, sizes), sizes)
+    near = np.minimum(near, graded)
     at = outline.interface_edges()[edge]
     return [*zip(near[at], pieces.edge_lengths()[at])]
 

@@ -17,6 +17,7 @@ from repro import results, timing
 from repro.preflight import simplifications
 from repro.preflight.memory import require_memory, require_outline
 from repro.preflight.numbers import judged
+from repro.preflight.resolved import unresolved
 from repro.preflight.simplifications import Warned
 from repro.errors import CheckpointError, Interrupted, OutputError, RunEnd, SimulationError
 from repro.march.loop import Instant, State
@@ -459,7 +460,7 @@ def warned(scene: Scene, velocity: float | None) -> list[Warned]:
     """The simplifications of a scene that do not hold; velocity: mean, um/h, at t = 0, if there is
     flow."""
     try:
-        return simplifications.warnings(*judged(scene, velocity))
+        return [*simplifications.warnings(*judged(scene, velocity)), *unresolved(scene)]
     except ArithmeticError as error:
         return [Warned("scene", f"its dimensionless numbers cannot be worked out ({error})")]
 

@@ -133,4 +133,18 @@ MUTANTS = (
          "Steps end at reported times.",
          "left = corner - now.time",
          "left = min([corner, *(t for t in scene.output.times or () if t > now.time)]) - now.time")),
+    *changes(
+        "repro/fem/outline.py",
+        ("outline-tips-ungraded",
+         "Tips of a drawn outline have no smaller edges.",
+         "np.where(turn > CORNER, least,",
+         "np.where(turn > CORNER, inf,",
+         "tests/test_ragged_outlines.py::test_a_spiked_outline_is_the_same_in_every_preset")),
+    *changes(
+        "repro/fem/mesher.py",
+        ("mesher-slivers-kept",
+         "Triangles whose nodes lie on a line reach the mesher.",
+         "for one in np.flatnonzero(flat):",
+         "for one in np.flatnonzero(flat)[:0]:",
+         "tests/test_ragged_outlines.py::test_no_triangle_has_its_nodes_on_one_line")),
 )
