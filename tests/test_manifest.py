@@ -103,23 +103,6 @@ def test_other_bits_within_what_is_promised_are_as_committed_and_numbers_beyond_
     assert len(said) == bool(words) and all(words in line and "source: b" not in line for line in said)
 
 
-def test_an_altered_file_is_told_as_altered_and_the_exit_status_follows(told, tmp_path, monkeypatch, capsys):
-    """By name; no environment is blamed; without figures it is said what is missing, and nothing is written."""
-    now = changed(told)
-    for name, value in (("OUT", tmp_path), ("COMMITTED", tmp_path / "committed.json"), ("present", lambda: now)):
-        monkeypatch.setattr(manifest, name, value)
-    assert manifest.main() == 1 and str(tmp_path) in capsys.readouterr().err and not list(tmp_path.iterdir())
-    for path in (tmp_path / manifest.NAME, manifest.COMMITTED):
-        path.write_text(json.dumps(told), encoding="utf-8")
-    assert manifest.main() == 0 and "as committed" in capsys.readouterr().out
-    now["runs"][NAME]["files"]["timeseries.csv"] = "0" * 64
-    del now["runs"][NAME]["files"]["fields.pvd"]
-    assert manifest.main() == 1
-    missing, other = capsys.readouterr().out.splitlines()
-    assert missing.startswith("altered since make figures wrote it") and "fields.pvd: missing" in missing
-    assert "timeseries.csv: 000000000000... instead of" in other
-
-
 def test_the_committed_manifest_is_of_the_present_figures():
     kept = json.loads(manifest.COMMITTED.read_text(encoding="utf-8"))
     assert list(kept["figures"]) == list(paper_figures.FIGURES)

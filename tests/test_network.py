@@ -56,6 +56,17 @@ def test_the_table_has_half_discs_of_the_present_code(thickness):
         assert found == pytest.approx(shapes.added_length(now.space, ratio), rel=law.NUMERICS / 4)
 
 
+def test_the_recorded_shapes_that_the_fit_has_not_seen_are_those_of_the_present_code():
+    """The first of each kind that no run makes; the page tells that all fifty lie within the bounds."""
+    drawn = [law.HALF_DISCS * 0, law.HALF_DISCS, law.HALF_DISCS + law.DRAWN_BODIES]
+    shapes_now = list(islice(law.new_shapes(), drawn[-1] + 1))
+    columns = law.read(unseen=True)
+    for row in drawn:
+        recorded = [columns[name][row] for name in law.COLUMNS]
+        assert law.shape_row(shapes_now[row], 1) == pytest.approx(recorded, rel=law.NUMERICS)
+
+
+@pytest.mark.thorough
 def test_fifty_shapes_that_the_fit_has_not_seen_are_within_the_bounds():
     """Half-discs, drawn bodies and plugs, and what three runs make, each at a lambda of its own."""
     found = list(law.new_shapes())
