@@ -260,9 +260,9 @@ def differing(python=sys.executable, factor=1.0, threads="1", **environment):
             if not report.inside(value, one["low"], one["high"]) or holds != (one["outcome"] == HOLDS)]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("kernel, feature, threads, factor", [
-    KERNELS[0], *(pytest.param(*row, marks=pytest.mark.thorough) for row in KERNELS[1:])],
-    ids=[row[0] for row in KERNELS])
+    *KERNELS], ids=[row[0] for row in KERNELS])
 def test_other_kernels_threads_and_coordinates_change_no_verdict(kernel, feature, threads, factor):
     """The seed's radius, and with it every node, times a factor."""
     if not features.get(feature):

@@ -1,7 +1,7 @@
 """The law for networks: what it says, what it refuses, that velocity, head and width drop out, its bounds, and fifty
 shapes that its fit has not seen."""
 import csv
-from itertools import pairwise
+from itertools import islice, pairwise
 
 import numpy as np
 import pytest
@@ -58,12 +58,12 @@ def test_the_table_has_half_discs_of_the_present_code(thickness):
 
 def test_the_recorded_shapes_that_the_fit_has_not_seen_are_those_of_the_present_code():
     """The first of each kind that no run makes; the page tells that all fifty lie within the bounds."""
-    drawn = [law.HALF_DISCS * 0, law.HALF_DISCS, law.HALF_DISCS + law.DRAWN_BODIES]
-    shapes_now = list(islice(law.new_shapes(), drawn[-1] + 1))
+    drawn = [0, law.HALF_DISCS, law.HALF_DISCS + law.DRAWN_BODIES]
+    present = list(islice(law.new_shapes(), drawn[-1] + 1))
     columns = law.read(unseen=True)
     for row in drawn:
         recorded = [columns[name][row] for name in law.COLUMNS]
-        assert law.shape_row(shapes_now[row], 1) == pytest.approx(recorded, rel=law.NUMERICS)
+        assert law.shape_row(present[row], 1) == pytest.approx(recorded, rel=law.NUMERICS)
 
 
 @pytest.mark.thorough
