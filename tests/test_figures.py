@@ -95,21 +95,6 @@ def test_the_shape_that_is_drawn_is_that_before_the_expansion(short, name, panel
     assert sum(np.array_equal(one, wanted) for one in drawn) == panels
 
 
-def test_the_colours_of_plate_1_are_in_the_units_of_their_labels(short):
-    """From the least to the largest value of what is drawn: of biomass what has grown in 12 min from the density of
-    before, X_A (e^(F3 t)), even to the growth's own differences, and not what reprojection has left."""
-    plate_1, state = MODULES["plate_1"], states.last(short["base"], "before_expansion")
-    bars = {axes.get_xlabel(): axes.get_xlim() for axes in plate_1.draw(short["base"]).axes}
-    inert, active = (plate_1.since(short["base"], f"{kind}_biomass")[state.body] for kind in ("inert", "active"))
-    wanted = {"$C_A$ (mg/L)": state.nodes["acceptor_mg_per_L"], "$C_D$ (mg/L)": state.nodes["donor_mg_per_L"],
-              "$X_A / X_m$ (–)": active, "$X_I / X_m$ (10$^{-3}$)": 1000 * inert}
-    for label, values in wanted.items():
-        assert bars[label] == pytest.approx((values.min(), values.max()), rel=1e-9), label
-    assert np.ptp(np.log(state.nodes["active_biomass"][state.body])) > np.ptp(np.log(active))
-    rates = np.log(active + inert) / 0.2
-    assert 0.18 < rates.min() and rates.max() < 0.195 and np.ptp(rates) < 1e-3
-
-
 @pytest.fixture
 def unlike(monkeypatch):
     """Tables of runs that differ in every number, the first of which touch the opposite wall in their second row."""

@@ -208,36 +208,6 @@ def test_rows_have_the_values_that_their_runs_were_made_with(tmp_path):
     assert len({(row["pore.width_um"], row["flow.mean_velocity_m_per_day"]) for row in table_rows}) == 6
 
 
-def test_lines_of_the_page_are_courses_of_runs_or_join_runs_that_differ_in_one_key(tmp_path):
-    """What is drawn, read off the ticks of the axes, is conductivity against biomass of the run that a line's title
-    names. Of clogging times, in the order of that key: a line for each value of the other one."""
-    factors = [parse("pore.width=60 um, 40 um, 50 um"), parse("flow.viscosity_ratio=100, 400")]
-    found = points("flow_only", [], factors, grid(factors))
-    biomass, relative = np.array([0.2, 0.3, 0.4]), np.array([1.0, 0.6, 0.3])
-    ended = [table.Told(one, "completed", np.arange(3.0), relative**(1 / one.index), one.index * biomass,
-                        dict.fromkeys(table.COLUMNS) | {"clogging_time_h": 7.0 + one.index**2}) for one in found]
-    made = page.page(Sweep(tmp_path, "flow_only", factors, found), ended, 0.1)
-    picture, _, first, second = re.findall("<figure>.*?</figure>", made, re.S)
-    assert [label in picture for label in ("biomass: aggregate area", "conductivity / initial")] == [True, True]
-    across = re.findall(r'<text x="([\d.]+)" y="[\d.]+" text-anchor="middle">([\d.]+)</text>', picture)
-    upward = re.findall(r'<text x="[\d.]+" y="([\d.]+)" text-anchor="end">([\d.]+)</text>', picture)
-    (x, x0), (y, y0) = (np.polyfit(*np.array(ticks, float).T, 1) for ticks in (across, upward))
-    lines = re.findall('<polyline [^>]*points="([^"]*)"><title>run (.)', picture)
-    assert [number for _, number in lines] == list("123456")
-    for (drawn, _), one in zip(lines, ended):
-        places = np.array([pair.split(",") for pair in drawn.split()], float)
-        assert x * places[:, 0] + x0 == pytest.approx(one.biomass, abs=0.006)
-        assert y * (places[:, 1] + 4) + y0 == pytest.approx(one.relative, abs=0.005)
-    for which, figure in enumerate((first, second)):
-        dots = re.findall(r'<circle [^>]*cx="([^"]*)" cy="([^"]*)"[^>]*><title>run (.)', figure)
-        run_at = {f"{x},{y}": found[int(index) - 1].values for x, y, index in dots}
-        lines = [line.split() for line in re.findall('<polyline.*?points="(.*?)"', figure)]
-        assert len(run_at) == 6 and [len(line) for line in lines] == ([3, 3], [2, 2, 2])[which]
-        for places in lines:
-            line = [run_at[place] for place in places]
-            assert len({values[1 - which] for values in line}) == 1 and line == sorted(line)
-
-
 def test_every_option_of_the_command_is_heeded(tmp_path, monkeypatch):
     """Each width of a hypercube to its last digit, in the tables and in the scenes."""
     monkeypatch.setattr(pool, "ready", in_this_process)

@@ -112,21 +112,6 @@ def test_the_divergence_of_u_is_what_leaves_the_bounds(monkeypatch, order):
         at_start(thick("290 m/day", order, 0.2))
 
 
-@pytest.mark.parametrize("order", [2, 3])
-def test_the_velocity_that_carries_is_free_of_divergence_and_as_good_as_u(order):
-    """Against every function of the space: what it lacks is what comes in or leaves at the ends. Its gradient part is
-    orthogonal to what remains, so that it is no farther from the exact velocity than u."""
-    now, found = solved("30 um", "10 mg/L", "2.9 m/day", order)
-    space, velocity = now.space, found.flow.velocity
-    u, w = space.at_points(velocity.T), transport.divergence_free(space, velocity)
-    loads = np.einsum("tq,itq,tqik->tk", space.at.dx, w, space.at.slopes)
-    ends = np.bincount(space.cells.ravel(), loads.ravel(), space.count)
-    wanted = found.problem.outflow - found.problem.inflow
-    assert ends == pytest.approx(wanted, abs=1e-12 * np.abs(loads).max())
-    apart = np.einsum("tq,itq,itq", space.at.dx, u - w, u - w) / np.einsum("tq,itq,itq", space.at.dx, u, u)
-    assert 1e-12 < apart < 1e-4
-
-
 def starved(half, order):
     """A seed that the acceptor reaches in part only, with a half saturation that no mesh resolves."""
     made = scene("30 um", "100 um", "1 mg/L", "10 mg/L", "0.5 m/day", numerics={
