@@ -194,7 +194,7 @@ def test_contact_begins_to_both_sides_of_the_highest_place(plugged):
     assert all(line.advance == line.least == line.short > 0 for line in upper)
 
 
-@pytest.mark.parametrize("preset", ["fast", "accurate"])
+@pytest.mark.parametrize("preset", ["fast", pytest.param("accurate", marks=pytest.mark.thorough)])
 def test_the_contact_surface_is_the_smallest_that_leaves_enough_fluid(preset):
     """After every step no clearance is negative, and a line that has advanced in it has none to spare."""
     scene = load_scene("wide", [f"numerics.preset={preset}", 'pore.width="25 um"', 'growth.end="18.5 h"'])

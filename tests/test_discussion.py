@@ -1,13 +1,11 @@
 """What the paper discusses and does not compute: the claims C38-C46 and their figures, piece by piece. What the claims
 come to is compared with `claims.json` by `make claims`."""
-from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from verification.claims import discussed, fluid_and_aggregate, levels, rheology
+from verification.claims import discussed, fluid_and_aggregate, levels
 from verification.claims.levels import CONVERGED, Level, at_level
 from verification.claims.runs import bodies, scene
 
@@ -42,25 +40,6 @@ def test_layers_in_the_model_take_up_what_the_reference_says():
     part = 0.066
     left = [1 - discussed.in_the_model(part, walls) / discussed.layers_share(scene("wide"), part) for walls in (1, 2)]
     assert 0 < 3 * left[1] < left[0] < 0.03
-
-
-def test_nothing_left_at_the_surface_is_the_limit_of_ever_faster_uptake():
-    """The uptake of Table 1 times a hundred is a good way from it."""
-    with at_level(Level(CONVERGED, 2.0)):
-        rates = [discussed.sherwood(discussed.in_one_shape(supply=1.0, faster=more))[0] for more in (1.0, 100.0, 1e3)]
-        limit = discussed.sherwood(discussed.at_the_surface(discussed.in_one_shape(supply=1.0)))[0]
-    assert rates[0] > rates[1] > 1.01 * limit and abs(rates[2] / limit - 1) < 0.5 * (rates[1] / limit - 1)
-
-
-def test_an_outline_that_has_slid_is_moved_back(monkeypatch):
-    """By 8 um downstream: what is judged is what is left, the area that only one covers."""
-    here = bodies(HOUR)[-1].outline
-    slid, larger = replace(here, points=here.points + [8.0, 0.0]), replace(here, points=1.01 * here.points)
-    for there, (moved, left) in ((here, (0, 0)), (slid, (8, 0)), (larger, (0, 2.01))):
-        outlines = {rheology.WHOLE: here, HOUR: there}
-        monkeypatch.setattr(rheology, "body", lambda run, time, all=outlines: SimpleNamespace(outline=all[run]))
-        found = rheology.slid(HOUR)
-        assert (found[0], found[2]) == pytest.approx((moved, left), abs=0.01)
 
 
 def test_forces_put_on_at_the_end_are_those_of_a_run_with_them():

@@ -327,7 +327,7 @@ def test_what_c_code_prints_does_not_reach_the_user(tmp_path, capfd):
 
 
 @pytest.mark.parametrize("name", ["runs/{run}/notes.txt", "runs/{run}/fields/mine.vtu", "runs/.part-{run}/notes.txt"])
-@pytest.mark.parametrize("spoil", ["failed", "damaged"])
+@pytest.mark.parametrize("spoil", ["failed", pytest.param("damaged", marks=pytest.mark.thorough)])
 def test_what_others_have_put_beside_a_run_stays(copied, monkeypatch, name, spoil):
     """Where the run is tried again since it has failed, or is made again since it is damaged."""
     monkeypatch.setattr(pool, "ready", in_this_process)
@@ -354,7 +354,8 @@ def test_places_that_are_not_of_a_sweep_are_refused(tmp_path, capsys, arrange, w
     assert why in refused(tmp_path / "sweep", capsys, "--vary", "pore.width=48 um, 50 um")
 
 
-@pytest.mark.parametrize("name", ["sweep.json", "run.json", "timeseries.csv", "ledger.csv"])
+@pytest.mark.parametrize("name", ["sweep.json", "run.json", "timeseries.csv",
+                                  pytest.param("ledger.csv", marks=pytest.mark.thorough)])
 @pytest.mark.parametrize("spoil", [lambda path: (path.unlink(), os.mkfifo(path)),
                                    lambda path: os.truncate(path, 3 * 2**30)])
 def test_pipes_and_files_of_gigabytes_do_not_stop_a_sweep(copied, capsys, monkeypatch, name, spoil):

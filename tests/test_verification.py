@@ -65,16 +65,6 @@ def test_exact_has_the_elements_and_the_order_of_accurate():
     assert apart == {"refinement", "tolerance", "contact_elements"}
 
 
-def test_round_off_and_times_are_not_committed():
-    quantities = at_most("x", 3e-13, 1e-9, ""), at_most("x", 0.012345, 0.1, ""), study("error", SIZES, SIZES**2, 2, "")
-    assert [one.reproducible for one in quantities] == ["", "0.01", "order 2.0, 2.0, 2.0"]
-    assert between("x", 1.0, 0.123456, 2.0, "").interval(3) == "0.123 to 2"
-    short = Result("flow-plug", {"": [BAD]}, seconds=1.0)
-    text = writing.markdown(pages.article(cases.cases()["flow-plug"], pages.entry(short)), 2)
-    assert "FALLS SHORT" in text and "| quantity A (2) | at most 1 | theory | NO |" in text
-    assert "seconds" not in text and "1.0 s" not in text
-
-
 def test_pages_are_those_of_the_records_and_short_enough_for_a_browser():
     """The records of mutants become stale with the code, so their pages are not compared."""
     texts = pages.texts(pages.recorded())
