@@ -41,25 +41,6 @@ def test_one_step_of_growth_takes_few_iterations(geometry):
 
 
 @GEOMETRIES
-@pytest.mark.parametrize("radius, lowest, height, theta", [(17.9, 17.0, 20.0, 1.04), (10.0, 8.0, 2.0, 1.0)])
-def test_prescribed_coordinates_are_reached_to_the_last_bit(geometry, radius, lowest, height, theta):
-    """Nodes lifted onto a wall lie on it exactly, y == W, in one step or many; a wall pushed 80 % into the body at once
-    is reached alike, or refused: no triangle is left turned over."""
-    body, held, rim, outline = half_disc(radius, 1 / geometry, width=20.0, geometry=geometry)
-    top = rim[(outline.wall == 0) & (outline.points[:, 1] > lowest)]
-    held[top, 1], target = True, body.reference.copy()
-    target[top, 1] = height
-    try:
-        found = at_rest(body, held, constant(body, theta), target)
-    except GrowthError as error:
-        assert height < lowest and "try" in str(error)
-        return
-    assert len(top) > 3 and (found.position[held] == target[held]).all()
-    assert body.strained(found.position).J.min() > 0
-    assert area(body, found.position) == pytest.approx(theta * body.at.dx.sum(), rel=1e-10)
-
-
-@GEOMETRIES
 def test_a_start_that_is_turned_over_is_refused(geometry):
     """det F < 0, or 0, which is told before anything is divided by it; or theta <= 0."""
     body, held, rim, _ = half_disc(5.0, geometry=geometry)

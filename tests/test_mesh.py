@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import shapely
 from hypothesis import given, settings
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
@@ -70,21 +69,3 @@ def test_only_triangles_at_the_aggregate_are_bent():
     assert not made.moved(points).acceptable()
     with pytest.raises(MeshError, match="a triangle near .* is turned over"):
         made.moved(points).checked()
-
-
-@pytest.mark.parametrize("film", [25.0, 10.0, 5.0, 2.0])
-def test_at_least_six_elements_lie_across_the_film(film):
-    """Lines across the film cross 11 to 16 triangles (measured), about two in each layer of nodes; none spans a
-    fourth of it."""
-    grid, _ = meshed(seed(50.0 - film))
-    for x in (-0.11, -0.05, 0.0137, 0.07, 0.13):
-        pieces = chords(grid, x)
-        assert pieces.sum() == pytest.approx(film, rel=1e-2)
-        assert len(pieces) >= 10 and pieces.max() <= film / 4
-
-
-def chords(grid, x):
-    """Lengths of the pieces that the triangles of the fluid hold of the vertical line at x."""
-    fluid = shapely.polygons(grid.points[grid.triangles[~grid.biomass]])
-    pieces = shapely.length(shapely.intersection(fluid, shapely.LineString([(x, 0.0), (x, grid.width)])))
-    return pieces[pieces > 0]

@@ -51,17 +51,6 @@ def test_a_constant_supply_stays_constant_without_biomass(inlet, order):
     assert alone.donor == pytest.approx(np.full(len(alone.donor), 10.0), abs=1e-10)
 
 
-@EVERY_ORDER
-def test_newton_does_not_fall_into_a_negative_root(order):
-    """From less than nothing. Undamped, with C / (C + K) below zero too, Newton's method "converges" to -70 mg/L
-    (measured): uptake is a function of max(C, 0)."""
-    now, found = solved("42 um", "0.15 mg/L", "0.35 m/day", order)
-    again = transport.steady(found.problem, Sink(now.active), everywhere(now, -10.0))
-    assert again.acceptor == pytest.approx(found.concentrations.acceptor, rel=1e-7)
-    assert again.donor == pytest.approx(found.concentrations.donor, rel=1e-7)
-    assert again.acceptor.min() > 0
-
-
 def right_triangles():
     """A structured mesh of 40 x 20 um, biomass from x = 10 to 20 um."""
     fem = MeshTri.init_tensor(np.linspace(0.0, 40.0, 9), np.linspace(0.0, 20.0, 5))

@@ -37,8 +37,8 @@ def test_an_unreasonable_order_and_oscillation_get_three_and_the_formal_order(va
     assert estimate(SIZES, values, formal).bar == pytest.approx(FORMAL * np.ptp(values) / (2**0.5 - 0.5))
 
 
-@pytest.mark.parametrize("noise", [0.02, 0.1, 0.5])
-@pytest.mark.parametrize("order", [1.0, 1.5, 2.0])
+@pytest.mark.parametrize("noise", [0.02, 0.5])
+@pytest.mark.parametrize("order", [1.0, 2.0])
 def test_the_bar_covers_the_error_of_noisy_values(noise, order):
     """At least 19 of 20, Roache's aim, for noise of a part of the error."""
     generator = np.random.default_rng(2001)

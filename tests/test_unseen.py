@@ -17,10 +17,8 @@ from tqdm import tqdm as Bar
 import repro
 from repro import results, timing
 from repro.errors import TransportError, Unresolved
-from repro.fem.outline import FREE, half_disc
-from repro.fem.sizing import Sizing, split
 from repro.march import midpoint, simulation, stepping, updates
-from repro.march.loop import Instant, Ledger, PoreEnd
+from repro.march.loop import Instant, Ledger
 from repro.march.pace import EXCESS, Pace, missed
 from repro.model import biomass, contact, gear, mesh_motion, remeshing, transport
 from repro.model.pore import Solved, resolution, seeded, solve
@@ -137,6 +135,12 @@ def test_a_picture_has_upstream_on_the_left_and_the_upper_wall_above():
     shown = {"places_um": places, "triangles": cells, "region": np.zeros(len(cells), bool)}
     pixels = plt.imread(io.BytesIO(picture.png(shown, places @ [1, 3])))[..., :3]
     assert (np.diff(pixels[[-1, -1, 0, 0], [0, -1, 0, -1]].sum(axis=1)) > 0).all()
+
+
+def test_key_figures_tell_first_and_last_values_and_the_first_contact():
+    columns = np.array([[0.0, 1.5, 2.5, 7.0], [5.0, 19.0, 20.0, 21.0], [0, 0, 1, 1]])
+    said = picture.key_figures(dict(zip(("time_h", "thickness_um", "contact"), columns)))
+    assert "thickness of the aggregate 5 → 21 um" in said and "wall from t = 2.5 h on" in said
 
 
 @EVERY_ORDER
@@ -412,29 +416,6 @@ def test_gears_method_takes_less_than_nothing_by_each_substrates_own_supply(orde
         gear.advance(drained, nothing, nothing, start, 10.05e-6)
 
 
-@pytest.mark.parametrize("seed", [0.0, -30.0])
-def test_a_seed_anywhere_was_round_at_its_start(seed):
-    """New nodes on straight edges remember places on the seed's own arc, to round-off."""
-    outline = half_disc(8.0, 4.0, 1, seed)
-    finer = split(outline, Sizing(50.0, 1.0, 2.0, seed=seed))
-    free = finer.wall == FREE
-    assert free.sum() > 1.5 * (outline.wall == FREE).sum()
-    assert np.hypot(*(finer.origin[free] - [seed, 0]).T) == pytest.approx(8.0, rel=1e-12)
-    assert np.hypot(*(finer.points[free] - [seed, 0]).T).min() < 7.99
-
-
-@EVERY_ORDER
-def test_half_saturations_that_come_down_end_where_they_are(order):
-    """From the supply and by way of larger half saturations the state is the same, one of them over its supply."""
-    scene, now = base(order, 'substrates.acceptor.half_saturation="1e-3 mg/L"',
-                      'substrates.donor.half_saturation="30 mg/L"')
-    made = solve(scene, now).problem
-    sink = biomass.sink(now.active)
-    found, _ = transport._found(transport.Balance(made, sink), made.supply)
-    eased, _ = transport._eased(made, sink, made.supply)
-    assert eased == pytest.approx(found, rel=1e-9)
-
-
 @pytest.mark.parametrize("order", [2, 3])
 def test_a_front_between_the_points_of_a_quadrature_is_refused(order, monkeypatch):
     """Where two of them differ by more than is accepted, a twentieth, behind a front 4e-2 um thick of an acceptor of
@@ -454,21 +435,6 @@ def test_a_front_between_the_points_of_a_quadrature_is_refused(order, monkeypatc
         monkeypatch.setattr(transport, "quadrature_error", lambda *_, apart=apart: apart)
         with nullcontext() if apart < 0.05 else pytest.raises(Unresolved, match="by 5.1 % .up to 5 % is accepted"):
             transport.steady(made, sink)
-
-
-@pytest.mark.parametrize("step, preset", [("2 h", "paper"), ("3 h", "paper"), ("12 min", "fast")])
-def test_the_pores_end_has_a_row_with_every_step_since_the_last_one(step, preset):
-    """Though no time was asked for there: after a step to within an element of it, and where the next one passes it."""
-    changes = ['pore.length="100 um"', 'pore.width="100 um"', 'aggregate.radius="30 um"', 'growth.end="19 h"',
-               'output.times=["1 h", "19 h"]', f"numerics.preset={preset}", "numerics.transport=quasi_steady",
-               f'growth.time_step="{step}"', "numerics.refinement=0.3"]
-    found = []
-    with pytest.raises(PoreEnd) as told_there:
-        found.extend(simulation.simulate(load_scene("base", changes)))
-    last = found[-1]
-    starts = [each.start for each in last.ledgers]
-    assert len(found) == 3 and [0.0, *(each.end for each in last.ledgers)] == [*starts, last.pore.time]
-    assert f"t = {last.pore.time:g} h" in str(told_there.value)
 
 
 def test_a_step_misses_the_tolerance_by_more_than_is_accepted_alone():
