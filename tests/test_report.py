@@ -6,6 +6,7 @@ import re
 import runpy
 import shutil
 from pathlib import Path
+from unittest.mock import Mock
 
 import meshio
 import numpy as np
@@ -290,6 +291,22 @@ def test_each_frame_has_the_aggregate_of_its_own_time(tmp_path, monkeypatch):
     packed = fields.packed(entries)
     for k, frame in enumerate(packed["frames"]):
         assert (numbers(packed["meshes"][frame["mesh"]]["body"], "<u1") == np.roll(region, k)).all()
+
+
+def test_pages_of_many_meshes_keep_to_their_size(fast, tmp_path, monkeypatch):
+    """Forty, each told in full: what is left of the page's bytes is used to more than a half, and never more of it is
+    taken. What charts take is left out."""
+    points, cells = regular(monkeypatch, 2500)
+    region = (points[cells[:, 0], 0] > 50).astype(float)
+    entries = [(float(k), tmp_path / f"{k}.vtu") for k in range(40)]
+    for k, (_, path) in enumerate(entries):
+        write(path, points, np.roll(cells, k, axis=0), {"head_cm": points[:, 0]}, np.roll(region, k))
+    for spent in (0, 1_000_000):
+        left = fields.MOST_BYTES - spent
+        assert 0.5 * left < len(json.dumps(fields.packed(entries, spent=spent))) <= left < 3e6 - 200e3
+    monkeypatch.setattr(fields, "packed", Mock(wraps=fields.packed))
+    text = run_page.build(read(fast))
+    assert fields.packed.call_args.args[2] > 0.9 * sum(map(len, re.findall("<figure.*?</figure>", text, re.S))) > 1e4
 
 
 def test_a_value_that_is_not_finite_has_no_level():

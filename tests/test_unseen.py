@@ -17,6 +17,8 @@ from tqdm import tqdm as Bar
 import repro
 from repro import results, timing
 from repro.errors import TransportError, Unresolved
+from repro.fem.outline import FREE, half_disc
+from repro.fem.sizing import Sizing, split
 from repro.march import midpoint, simulation, stepping, updates
 from repro.march.loop import Instant, Ledger
 from repro.march.pace import EXCESS, Pace, missed
@@ -414,6 +416,29 @@ def test_gears_method_takes_less_than_nothing_by_each_substrates_own_supply(orde
     assert [taken.min(), taken.max()] == pytest.approx([-5e-3, -5e-3], rel=1e-6)
     with pytest.raises(TransportError, match="the acceptor becomes negative"):
         gear.advance(drained, nothing, nothing, start, 10.05e-6)
+
+
+@pytest.mark.parametrize("seed", [0.0, -30.0])
+def test_a_seed_anywhere_was_round_at_its_start(seed):
+    """New nodes on straight edges remember places on the seed's own arc, to round-off."""
+    outline = half_disc(8.0, 4.0, 1, seed)
+    finer = split(outline, Sizing(50.0, 1.0, 2.0, seed=seed))
+    free = finer.wall == FREE
+    assert free.sum() > 1.5 * (outline.wall == FREE).sum()
+    assert np.hypot(*(finer.origin[free] - [seed, 0]).T) == pytest.approx(8.0, rel=1e-12)
+    assert np.hypot(*(finer.points[free] - [seed, 0]).T).min() < 7.99
+
+
+@EVERY_ORDER
+def test_half_saturations_that_come_down_end_where_they_are(order):
+    """From the supply and by way of larger half saturations the state is the same, one of them over its supply."""
+    scene, now = base(order, 'substrates.acceptor.half_saturation="1e-3 mg/L"',
+                      'substrates.donor.half_saturation="30 mg/L"')
+    made = solve(scene, now).problem
+    sink = biomass.sink(now.active)
+    found, _ = transport._found(transport.Balance(made, sink), made.supply)
+    eased, _ = transport._eased(made, sink, made.supply)
+    assert eased == pytest.approx(found, rel=1e-9)
 
 
 @pytest.mark.parametrize("order", [2, 3])
