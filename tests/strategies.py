@@ -169,16 +169,6 @@ def seed(radius, refinement=1.0, geometry=1):
     return half_disc_outline(radius, sizing.ACROSS_AGGREGATE * refinement, geometry)
 
 
-def with_arcs(polygon):
-    """The same outline with straight arcs for its edges: a middle half way along each."""
-    def between(values, middles):
-        return np.stack([values, middles], axis=1).reshape(-1, *values.shape[1:])
-
-    points = between(polygon.points, polygon.arcs(polygon.points)[:, 1])
-    fixed = between(polygon.fixed, np.zeros(len(polygon.fixed), bool))
-    return Outline(points, between(polygon.wall, polygon.edge_wall), fixed, points.copy(), 2)
-
-
 def meshed(around, width=50.0, refinement=1.0, ends=None, film=2.0):
     """(Mesh, refined outline) with the extent of 3.1, straight or curved as the outline is."""
     ends = sizing.meshed_extent(around, width, LENGTH) if ends is None else ends
@@ -219,11 +209,6 @@ def half_disc(radius, refinement=1.0, width=50.0, geometry=1):
     """(growth.Body, held, its rim, outline) of a half-disc on the lower wall."""
     grid, around = meshed(seed(radius, refinement, geometry), width, refinement)
     return *body_of(grid, around), around
-
-
-def fitted_order(sizes, errors):
-    """Slope of log(error) over log(size)."""
-    return np.polyfit(np.log(sizes), np.log(errors), 1)[0]
 
 
 def same_arrays(one, other):

@@ -12,7 +12,7 @@ import pytest
 ROOT = pathlib.Path(__file__).parents[1]
 FOLDERS = ("repro", "reference", "verification", "paper_figures", "tests")
 #: Names of folders that commands make: what is in them may be a copy of all this, or of an earlier state.
-MADE = {"__pycache__", "out", "cache", "live", "pictures", "runs", "build", "dist", ".venv", ".git", ".hypothesis"}
+MADE = {"__pycache__", "out", "cache", "live", "pictures", "build", "dist", ".venv", ".git", ".hypothesis"}
 FORBIDDEN = {"repro": {"reference", "verification", "paper_figures", "tests", "pickle"},
              "reference": {"repro", "pickle"}, **dict.fromkeys(FOLDERS[2:], {"pickle"})}
 #: The rooms of `repro`, in the one order in which they may import each other: each those before it.

@@ -11,7 +11,7 @@ from repro.fem.outline import BOTTOM, FREE, TOP, Outline, polygon
 from repro.fem.space import Space
 from repro.march.simulation import simulate
 from repro.model import contact, contact_lines
-from repro.model.contact_lines import Clearance, Contact, Line
+from repro.model.contact_lines import Clearance, Contact
 from repro.scene import load_scene
 from tests.strategies import attached_aggregates, mirrored, plug
 
@@ -120,29 +120,6 @@ def test_a_surface_through_the_wall_has_a_negative_clearance():
     assert min(clearances(replace(outline, points=points)).values()) < -0.1
 
 
-@pytest.mark.parametrize("clearance, root", [
-    (lambda a: a - 0.4, 0.4), (lambda a: np.expm1(4 * (a - 2.6)), 2.6), (lambda a: np.sqrt(a) - 1.2, 1.44),
-    (lambda a: -1.0 if a < 1.7 else 0.5, 1.7), (lambda a: min(10 * (a - 0.93), 0.01 * (a - 0.93)), 0.93)])
-@pytest.mark.parametrize("first", [0.0, 0.2, 3.0])
-def test_a_line_stops_where_its_clearance_vanishes(clearance, root, first):
-    """Or just beyond a jump, and never short of it; 16 trials suffice from five arcs away."""
-    line = Line(TOP, 0, 1, advance=first)
-    for _ in range(16):
-        line.record(clearance(line.advance), 5.0 if clearance(line.advance) < 0 else 0.0)
-        if line.settled:
-            break
-        line.step()
-    assert line.settled and clearance(line.advance) >= -contact_lines.CLOSE
-    smooth = abs(clearance(line.advance)) <= contact_lines.CLOSE
-    assert smooth or 0 <= line.advance - root <= contact_lines.SAME_PLACE
-
-
-def test_a_line_that_need_not_move_stays():
-    line = Line(TOP, 0, 1)
-    line.record(0.3, 0.0)
-    assert line.settled and line.advance == 0
-
-
 @pytest.fixture(scope="module")
 def plugged():
     """A pore whose aggregate has touched the upper wall for two hours."""
@@ -217,7 +194,7 @@ def test_contact_begins_to_both_sides_of_the_highest_place(plugged):
     assert all(line.advance == line.least == line.short > 0 for line in upper)
 
 
-@pytest.mark.parametrize("preset", ["fast", "accurate"])
+@pytest.mark.parametrize("preset", ["fast", pytest.param("accurate", marks=pytest.mark.thorough)])
 def test_the_contact_surface_is_the_smallest_that_leaves_enough_fluid(preset):
     """After every step no clearance is negative, and a line that has advanced in it has none to spare."""
     scene = load_scene("wide", [f"numerics.preset={preset}", 'pore.width="25 um"', 'growth.end="18.5 h"'])

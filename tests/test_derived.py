@@ -1,7 +1,6 @@
 """Every column and array derived anew from the raw state, by formulas and quadratures that `repro.results` has no part
 in: at a late, uneven pore that the aggregate has plugged, where no two quantities are alike."""
 import math
-from collections import Counter
 from dataclasses import replace
 from functools import cache
 
@@ -11,19 +10,14 @@ from skfem.quadrature import get_quadrature
 from skfem.refdom import RefTri
 
 from repro import results
-from repro.fem.newton import Newton
 from repro.march.simulation import simulate
-from repro.model import remeshing
 from repro.report import quantities
 from repro.report.reading import Run
 from repro.results.names import KNOWN
-from repro.runs.running import run
 from repro.scene import load_scene
 from tests import oracles
 from tests.pages import AXES, CHARTS, LEDGERS
-from tests.shell import told
 from tests.strategies import ORDERS, arrays_of, constants
-from tests.test_resume import CONTACT, in_parts
 
 EVERY_ORDER = pytest.mark.parametrize("order", ORDERS)
 #: Leans upstream, and touches the upper wall of a pore of 20 um after some minutes.
@@ -447,30 +441,3 @@ def test_every_line_of_every_chart_is_the_column_that_it_names():
     assert (held.label, made.label) == ("held", "made since t = 0") and held.times.tolist() == [1.0, 3.0]
     assert held.values == pytest.approx(1e-6 * run.ledger["biomass_after_pg_per_m"], rel=1e-12)
     assert made.values == pytest.approx(1e-6 * np.cumsum(run.ledger["biomass_made_pg_per_m"]), rel=1e-12)
-
-
-def test_counts_are_of_every_step_with_several_a_row_and_over_resumes(tmp_path, monkeypatch):
-    """Newton's iterations (of solves that converge) and new meshes, counted where they are made, against run.json of
-    the same run in one piece and of one that is stopped after every step."""
-    scene = load_scene("base", ["numerics.refinement=0.5", *CONTACT, 'output.times=["0.6 h"]'])
-    made = Counter()
-    solve, remesh = Newton.solve, remeshing.remesh
-
-    def counted(self, system, first):
-        found = solve(self, system, first)
-        made[{"System": "growth", "Balance": "transport"}[type(system).__name__]] += found[1] * found[2]
-        return found
-
-    def noted(*arguments):
-        made["remeshes"] += 1
-        return remesh(*arguments)
-
-    monkeypatch.setattr(Newton, "solve", counted)
-    monkeypatch.setattr(remeshing, "remesh", noted)
-    run(scene, tmp_path / "whole")
-    wanted = {"remeshes": made.pop("remeshes"), "newton_iterations": dict(made)}
-    assert wanted["remeshes"] > 0 and in_parts(scene, tmp_path / "parts", 1) >= 3
-    for name in ("whole", "parts"):
-        assert {key: told(tmp_path / name)[key] for key in wanted} == wanted
-    table, ledger = (results.read_table(tmp_path / "parts" / name) for name in ("timeseries.csv", "ledger.csv"))
-    assert table["remeshed"].tolist() == [0, 1] and len(ledger["end_h"]) == 3

@@ -84,23 +84,3 @@ def test_one_state_tells_two_scenes_apart_on_one_mesh():
     assert fluid["velocity"] == fluid["acceptor leaving"] == 0 and 0 < abs(fluid["upstream"]) < 1e-4
     exact = switches.one_state(found, runs.scene(*SHORT, "kinetics.acceptor_to_donor_ratio=1.5138"))
     assert 1e-5 < exact["acceptor leaving"] < 1e-2 and exact["velocity"] == 0
-
-
-def test_the_effect_of_a_whole_run_is_hardly_that_of_its_mesh():
-    """Another shape is solved in on the default's mesh, brought to it: a larger aggregate of the same shape too."""
-    default, finer = short(), short("numerics.refinement=0.52")
-    one, two = (each(default, finer) for each in (switches.whole_run, switches.effect))
-    assert abs(one["velocity"]) < 0.3 * abs(two["velocity"]) and one["area"] == two["area"]
-    wide = short('aggregate.radius="15.15 um"')
-    before, after = default.pore.outline, switches.reshaped(default.pore, wide.pore.outline).outline
-    assert after.area / before.area == pytest.approx((wide.pore.outline.thickness / before.thickness) ** 2, rel=1e-4)
-    assert switches.whole_run(default, wide)["velocity"] < -1e-3
-
-
-def test_marching_is_the_run():
-    """Our own loop and the package's make the same steps, and tell the same of them."""
-    found, rows = switches.course(SHORT, switches.as_it_is), switches.told(SHORT)
-    assert {len(column) for column in found.columns.values()} == {3} and found.columns["drift"].max() < 0.01
-    assert switches.quantities(found.plotted) == switches.quantities(short())
-    for name, column in found.columns.items():
-        assert rows[name] == pytest.approx(column, rel=1e-12, abs=1e-12)

@@ -8,15 +8,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from reference import poiseuille
-from repro.fem import elements, mesher
-from repro.fem.sizing import Sizing
-from repro.fem.space import Space
+from repro.fem import elements
 from repro.march.simulation import simulate
 from repro.model import flow, pore
-from repro.results import row
 from repro.scene import load_scene
-from tests.strategies import ORDERS, between, meshes, seed, share, space_of
+from tests.strategies import ORDERS, between, meshes, share, space_of
 
 
 @share(0.4)
@@ -35,28 +31,6 @@ def test_every_section_carries_the_flux_of_the_inlet(grid, ratio, interface, see
         w = w - unit.correction
     slopes = np.einsum("tai,ta->ti", grid.gradients, section[grid.triangles])
     assert -grid.areas @ np.sum(w * slopes, axis=1) == pytest.approx(grid.width, rel=1e-11)
-
-
-@pytest.mark.parametrize("left", [-1 / 3 * 100, -47.123456789012345, -0.1 * 487])
-@pytest.mark.parametrize("order", ORDERS)
-def test_nothing_slips_and_the_inlet_is_the_scaled_parabola(order, left):
-    """(3), (5), at all nodes, also at ends that are no round numbers: the discrete flux at the inlet is u_ave W to
-    round-off, the parabola's own where that is one of the functions, and leaves at the outlet."""
-    geometry, refinement = min(order, 2), 1.0 if order == 1 else 0.3
-    sizing = Sizing(7.123456, refinement, 2.0)
-    grid, _ = mesher.generate(seed(1.0, refinement, geometry), (left, 0.7 - left / 7), sizing, geometry)
-    space, W = Space(grid, order), grid.width
-    unit, inlet = flow.unit_flow(space, 2000.0), space.end_nodes(space.dofs.inlet)
-    on_walls = np.abs(space.points[:, [1]] - [0.0, W]).min(axis=1) < 1e-12 * W
-    assert set(space.dofs.walls) == set(np.flatnonzero(on_walls))
-    assert (unit.velocity[space.dofs.walls] == 0).all() and (unit.velocity[inlet, 1] == 0).all()
-    y, u = space.points[inlet, 1], unit.velocity[inlet, 0]
-    assert y[0] == 0.0 and y[-1] == W and (np.diff(y) > 0).all()
-    for edges, bound in ((space.dofs.inlet, 1e-13), (space.dofs.outlet, 1e-10)):
-        assert space.end_loads(edges, unit.velocity[:, 0]).sum() == pytest.approx(W, rel=bound)
-    ratio = u[1:-1] / poiseuille.velocity(y[1:-1], W)
-    assert ratio == pytest.approx(np.full(len(ratio), ratio[0]), rel=1e-12)
-    assert order == 1 or ratio[0] == pytest.approx(1.0, rel=1e-13)
 
 
 def in_a_permeable_body(permeability, refinement):
@@ -110,46 +84,6 @@ def test_water_that_must_pass_a_permeable_body_leaves_concentrations_within_thei
     (["flow.biomass=brinkman", "flow.permeability=1e-15 m^2", "numerics.contact_elements=4"], 0.5)])
 def test_elements_beside_upper_contact_lines_of_a_permeable_body_are_half_the_least_film_or_less(overrides, expected):
     assert pore.sized(load_scene("base", ["numerics.preset=fast", *overrides])).contact == expected
-
-
-@pytest.mark.parametrize("interface", ["laplacian", "traction"])
-@pytest.mark.parametrize("order", [2, 3])
-def test_the_flow_through_a_permeable_body_converges_as_its_permeability_falls(order, interface):
-    """Darcy's law: loss times k, and velocities, tend to limits. Layers on the walls and the water's slip along the
-    surface go as the layers' thickness, a tenth for a hundredth of k; the last k is the tightest that is accepted."""
-    space = Space(spanning(1e-15, [0.0, 1.0], [1.0, 0.0]).pore.mesh, order)
-    tight = (1e-3, 1e-5, 1e-7)
-    flows = [flow.unit_flow(space, interface=interface, permeability=k) for k in tight]
-    apart = [max(np.abs(b.velocity - a.velocity).max() / np.abs(b.velocity).max(), abs(b.loss * kb / (a.loss * ka) - 1))
-             for a, b, ka, kb in zip(flows, flows[1:], tight, tight[1:])]
-    assert apart[1] < apart[0] / 5 and apart[1] < 2e-2
-    inside = np.unique(space.cells[space.mesh.biomass])
-    for each in flows:
-        assert each.velocity[inside, 0].min() > -0.01 * each.velocity[inside, 0].max()
-
-
-def test_a_run_with_a_permeable_body():
-    """A tight body is nearly a wall, as one of 2000 times the viscosity is: the same growth to a few parts in a
-    thousand, and every balance closes."""
-    said = ["numerics.preset=fast", "growth.end=15 h", 'output.times=["15 h"]']
-    viscous, drag = (list(simulate(load_scene("base", [*said, *more])))[-1] for more in (
-        [], ["flow.biomass=brinkman", "flow.permeability=1e-15 m^2"]))
-    assert drag.pore.boundary.area == pytest.approx(viscous.pore.boundary.area, rel=2e-3)
-    assert drag.solved.flow.conductivity == pytest.approx(viscous.solved.flow.conductivity, rel=1e-2)
-    for step in drag.ledgers:
-        assert step.supplied == pytest.approx(np.add(step.out, step.consumed), rel=1e-9)
-
-
-def test_a_run_with_bubbles_balances_and_stays_near_the_stabilised_one():
-    """The scene's word reaches the flow (the runs differ); substrates balance since w is divergence-free."""
-    rows = {}
-    for element in ("stabilised", "bubble"):
-        said = load_scene("base", ['numerics.preset="paper"', 'growth.end="1 h"', f"numerics.flow_element={element}"])
-        *_, last = simulate(said)
-        rows[element] = row(said, last)
-    assert abs(rows["bubble"]["donor_balance"]) < 1e-10
-    speeds = [rows[name]["mean_velocity_m_per_d"] for name in rows]
-    assert 0 < abs(speeds[1] / speeds[0] - 1) < 1e-4
 
 
 @pytest.mark.parametrize("element, said", [

@@ -64,7 +64,7 @@ def test_a_run_ends_as_a_fold_and_is_over(tmp_path, capsys):
     assert main(command) == 0 and main(["run", "--resume", str(folder)]) == 0 and state(folder) == before
 
 
-@pytest.mark.parametrize("rheology", ["stressed", "stress_free"])
+@pytest.mark.parametrize("rheology", [pytest.param("stressed", marks=pytest.mark.thorough), "stress_free"])
 def test_a_run_stopped_after_every_step_is_the_whole_run(tmp_path, rheology):
     """Also the last shape, from which strain counts without stress at birth, and the warning, are in a checkpoint; and
     such a run has come to its end, its least stretch that of the last step."""

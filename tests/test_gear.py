@@ -2,22 +2,19 @@
 Its values and its balances are cases of the stage transport."""
 from dataclasses import replace
 from functools import cache
-from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from repro.errors import TransportError
 from repro.march.simulation import simulate
-from repro.model import gear, pore, remeshing, transport
+from repro.model import gear, pore, transport
 from repro.model.kinetics import Sink
 from repro.model.transport import Concentrations
 from repro.scene import load_scene
-from tests.strategies import ORDERS, fitted_order, scene
+from tests.strategies import ORDERS, scene
 
 SECOND = 1 / 3600
-#: A thousand times faster metabolism in a thousand times less biomass: the same uptake, and growth within seconds.
-HASTY = {"maximum_utilization_rate": "9300 1/day", "decay_coefficient": "120 1/day", "maximum_density": "30 mg/L"}
 
 EVERY_ORDER = pytest.mark.parametrize("order", ORDERS)
 
@@ -44,37 +41,6 @@ def storage(problem):
     if space.order == 1:
         return space.lumped()
     return np.bincount(space.cells.ravel(), space.load(space.at.dx).ravel(), space.count)
-
-
-@pytest.mark.parametrize("simultaneous", [False, True])
-def test_second_order_in_the_step(simultaneous):
-    """What halving a fixed step changes of C_A, C_D, X_A and X_I, two seconds after the start from C_supply, when the
-    fastest modes have died out. What they come to is in the cases transport-gear-in-time and transport-well-mixed."""
-    now, problem = case.__wrapped__(kinetics=HASTY)
-    start = gear.advance(problem, now.active, now.inert, transport.supplied_everywhere(problem), 2 * SECOND)
-    ends, counts = [], (16, 32, 64, 128)
-    for count in counts:
-        done = gear.advance(problem, start.active, start.inert, start.concentrations, 4 * SECOND,
-                            fixed_step=4 * SECOND / count, simultaneous=simultaneous)
-        ends.append((done.concentrations.acceptor, done.concentrations.donor, done.active, done.inert))
-    for values in zip(*ends):
-        changes = [np.abs(one - other).max() for one, other in pairwise(values)]
-        assert 1.9 < fitted_order(1 / np.array(counts[:-1]), changes) < 2.2
-
-
-@EVERY_ORDER
-@pytest.mark.parametrize("radius, velocity", [("5 um", "2.9 m/day"), ("40 um", "0.01 m/day"), ("30 um", None)])
-def test_settled_profiles_are_steady(radius, velocity, order):
-    """F3 = F4 = 0 until nothing changes gives Newton's profiles, well fed, starved, and with the supply held at the
-    ends (velocity None); SETTLED is 1e-9 of the supply, 1e-7 is asked.
-    """
-    now, problem = case(radius, velocity, order=order)
-    sink = Sink(now.active)
-    found, steady = gear.settle(problem, sink, None), transport.steady(problem, sink)
-    assert found.acceptor == pytest.approx(steady.acceptor, abs=1e-6)
-    assert found.donor == pytest.approx(steady.donor, abs=1e-6)
-    again = gear.settle(problem, sink, found)
-    assert again.iterations <= 3 and again.acceptor == pytest.approx(found.acceptor, abs=1e-7)
 
 
 @EVERY_ORDER
@@ -170,30 +136,6 @@ def test_only_the_aggregate_controls_the_step(order):
     settled = gear.settle(problem, Sink(now.active), None)
     settled.acceptor[now.space.end_nodes(now.space.dofs.inlet)] = 0.0
     assert len(gear.advance(problem, now.active, now.inert, settled, 0.01 * SECOND).steps) == 1
-
-
-@pytest.mark.parametrize("order, part", [(1, 1e-5), (2, 2e-8), (3, 2e-9)])
-def test_substrate_without_flow_falls_by_what_is_consumed(order, part):
-    """Mean velocity zero: nothing enters, C goes on from step to step; and moving the mesh under it makes no more
-    than 1e-4 of what was consumed (measured 1e-6 to 1e-5), a new mesh no more than a part of it (1e-6, 2e-9 and
-    2e-10)."""
-    still = scene(velocity="0 m/day", growth={"end": "0.6 h"}, numerics=coarse(order))
-    instants = list(simulate(still))
-    for before, after in pairwise(instants):
-        (ledger,) = after.ledgers
-        assert ledger.supplied == ledger.out == (0.0, 0.0)
-        assert ledger.stored == pytest.approx(-np.array(ledger.consumed), rel=1e-9)
-        change = contents(after.pore) - contents(before.pore)
-        assert change == pytest.approx(-np.array(ledger.consumed), rel=1e-4)
-    now, finer = after.pore, replace(still.numerics, refinement=1.3 * still.numerics.refinement)
-    new, _ = remeshing.remesh(replace(still, numerics=finer), now, now, 0.0)
-    assert np.abs((contents(new) - contents(now)) / ledger.consumed).max() < part
-
-
-def contents(now):
-    """Acceptor and donor in a pore, um2 mg/L."""
-    both = np.stack([now.concentrations.acceptor, now.concentrations.donor])
-    return (now.space.at_points(both) * now.space.at.dx).sum(axis=(1, 2))
 
 
 @pytest.mark.parametrize("preset", ["fast", "accurate", "paper"])

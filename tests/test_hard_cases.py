@@ -1,5 +1,4 @@
 """Hard cases: a cell is right, refused or wrong for the right reason, and a few of the real ones are right."""
-import json
 import math
 from itertools import count
 
@@ -8,18 +7,13 @@ import pytest
 
 from repro.errors import SimulationError, TransportError
 from repro.scene import load_scene
-from verification import speed
-from verification.cases import hard_family, hard_mechanics, hard_runs, hard_stages
-from verification.evidence import hard_cases
-from verification.evidence.cases import cases
+from verification.cases import hard_family
 from verification.evidence.checks import at_most
 from verification.evidence.results import Result
 from verification.problems import hard
 from verification.problems.hard import PRESETS, REFUSED, RIGHT, WRONG, HardCase
 
 GOOD, BAD = at_most("good", 0.5, 1.0, ""), at_most("bad", 2.0, 1.0, "")
-KNOWN = {case.number: case for module in (hard_mechanics, hard_runs, hard_stages) for case in vars(module).values()
-         if isinstance(case, HardCase)}
 
 
 def stopped(error):
@@ -65,33 +59,6 @@ def test_what_is_accepted(verdict, preset, refusable, fine):
     assert Result("hard-99", evidence).holds is all(accepted.values())
 
 
-def test_there_are_twenty_three_verification_cases_and_only_some_may_refuse():
-    """All of them on record."""
-    assert sorted(KNOWN) == [row["number"] for row in speed.records()["hard_cases"]["cases"]] == [*range(1, 24)]
-    assert {number for number, one in KNOWN.items() if one.refusable} <= {3, 4, 5, 15, 17, 19, 22}
-    family = {"hard-family", "hard-family-rest"}
-    assert {one.full_id for one in KNOWN.values()} == {
-        id for id, case in cases().items() if case.stage == "hard"} - family
-    for one in KNOWN.values():
-        assert {*one.refusable} <= {*one.parts} and {*cases()[one.full_id].variants} == {*PRESETS}
-
-
-def test_the_matrix_replaces_the_rows_of_the_cases_that_ran(tmp_path, monkeypatch):
-    """Verdicts without the messages, which have numbers of this machine."""
-    cells = {preset: hard.run_cell(a_case(RIGHT, REFUSED), preset) for preset in PRESETS}
-    rows = {preset: json.loads(json.dumps(cell.as_row())) for preset, cell in cells.items()}
-    monkeypatch.setattr(hard_cases, "RECORD", tmp_path / "report" / "hard_cases.json")
-    other = {"number": 3, "cells": {}}
-    hard_cases.save({"cases": [other, {"number": 99}]}, hard_cases.RECORD)
-    hard_cases.record([Result("hard-99", cells=rows), Result("other")])
-    kept, row = json.loads(hard_cases.RECORD.read_text())["cases"]
-    assert kept == other and row["may_refuse"] == [] and row["number"] == 99
-    assert row["cells"] == {name: {"verdict": REFUSED, "accepted": name == "paper"} for name in PRESETS}
-    assert "try another" in rows["paper"]["message"]
-    verdicts = [line for line in hard_cases.lines(rows.values()) if line[0].startswith("verdict")]
-    assert verdicts[1] == (f"verdict of {REFUSED}", ", ".join([REFUSED] * 4), ", ".join(PRESETS), False)
-
-
 @pytest.mark.parametrize("message, works, wrong", [
     ("too coarse; numerics.refinement = 0.3 resolves this state", {"refinement": 0.3}, 0),
     ("too coarse; numerics.refinement = 0.3 resolves this state", {}, 1), ("it stopped", {}, 1),
@@ -123,11 +90,3 @@ def test_a_wrong_run_is_seen():
         assert not all(check.holds for check in hard.sound(spoilt)), column
     found.instants[0].solved.concentrations.donor[3] = 10.5
     assert not all(check.holds for check in hard.sound(found))
-
-
-@pytest.mark.parametrize("number, preset", [
-    (1, "fast"), (2, "fast"), (5, "fast"), (6, "fast"), (9, "paper"), (10, "fast"), (12, "accurate"), (18, "paper"),
-    (19, "fast")])
-def test_a_cheap_cell_is_what_it_must_be(number, preset):
-    cell = hard.run_cell(KNOWN[number], preset)
-    assert not cell.unaccepted, cell.message

@@ -6,7 +6,6 @@ import scipy.sparse as sp
 
 from repro.errors import LinearError
 from repro.fem import linear
-from repro.fem.assembly import ElementSystem
 from repro.fem.linear import DEFAULT, Method
 from tests import faults
 from tests.strategies import meshed
@@ -24,32 +23,6 @@ def dense():
         for unknowns, element in zip(kind, elements):
             found[np.ix_(unknowns, unknowns)] += element
     return found
-
-
-@pytest.mark.parametrize("held", [[], [0, 9], [4]])
-def test_kinds_of_elements_make_one_system(held):
-    """Its product, its matrix between free unknowns in elimination order, also filled from entries of each kind, and
-    its solutions, of one factorisation, are those of the dense matrix; the same of a system made for other prescribed
-    unknowns, which is left as it was."""
-    rank, prescribed = np.random.default_rng(len(held)).permutation(10).astype(float), np.isin(np.arange(10), held)
-    fresh, first = (ElementSystem(KINDS, rank, some) for some in (prescribed, np.arange(10) == 2))
-    K = dense()
-    before = first.matrix(ELEMENTS).toarray()
-    order = [i for i in np.argsort(rank) if i not in held]
-    for system in (fresh, first.holding(prescribed)):
-        entries = [system.entries(which, part) for which, part in enumerate(ELEMENTS)]
-        for matrix in (system.matrix(ELEMENTS), system.filled(sum(entries))):
-            assert np.allclose(matrix.toarray(), K[np.ix_(order, order)], rtol=1e-13, atol=0)
-        alone = system.matrix((ELEMENTS[0], 0 * ELEMENTS[1])).toarray()
-        assert np.allclose(system.filled(entries[0]).toarray(), alone, rtol=1e-14)
-        factors = system.factored(ELEMENTS)
-        for right, value in np.random.default_rng(1).standard_normal((2, 2, 10)):
-            found = factors.solve(right, value)
-            assert np.allclose(system.product(ELEMENTS, right), K @ right, rtol=1e-13)
-            assert np.array_equal(found[held], value[held]) and np.allclose((K @ found - right)[order], 0, atol=1e-11)
-            assert np.array_equal(system.solve(ELEMENTS, right, value), found)
-            assert np.array_equal(system.solve(ELEMENTS, right), factors.solve(right, 0 * value))
-    assert np.array_equal(first.matrix(ELEMENTS).toarray(), before)
 
 
 def solve(matrix, right, method=DEFAULT):

@@ -18,7 +18,7 @@ from tests.shell import every, files, lasting, state, stopped, told
 SCENES = {
     "paper": ((0.1, 1.4, 2.1), ["growth.end=2.2 h"]),
     "paper, an end within a step": ((1.0,), ["growth.end=2.2 h", "growth.time_step=21 min"]),
-    "fast": ((0.3, 5.0, 8.9), ["numerics.preset=fast", "numerics.tolerance=0.001", "growth.end=9 h"]),
+    "fast": ((0.3, 2.0, 2.9), ["numerics.preset=fast", "numerics.tolerance=0.001", "growth.end=3 h"]),
     "fast, rows at times": ((4.0,), ["numerics.preset=fast", "growth.end=9 h", 'output.times=["0 h", "2 h", "3 h"]']),
     "fast, contact": ((0.5,), ["numerics.preset=fast", "growth.end=0.6 h", "aggregate.radius=17.8 um",
                                "pore.width=20 um", "flow.head=1 mm", "numerics.tolerance=0.001",
@@ -41,7 +41,13 @@ def same(one, other):
     return files(one) == files(other) and left == right
 
 
-@pytest.mark.parametrize("name, end", [(name, end) for name, (ends, _) in SCENES.items() for end in ends])
+#: Of the paper's scheme, of the midpoint rule and of Gear's scheme; the rest is for make test-thorough.
+QUICK = {("paper", 1.4), ("fast", 2.0), ("gear", 0.5), ("to the pore's end", 8.0)}
+
+
+@pytest.mark.parametrize("name, end", [
+    pytest.param(name, end, marks=[] if (name, end) in QUICK else pytest.mark.thorough)
+    for name, (ends, _) in SCENES.items() for end in ends])
 def test_a_longer_run_is_as_if_that_had_been_asked_for_at_first(tmp_path, name, end):
     """Bit for bit, twice in a row."""
     whole = scene(name)
@@ -69,26 +75,26 @@ def test_a_run_that_is_not_over_is_made_longer(tmp_path, after):
 
 def test_a_run_that_is_over_keeps_one_checkpoint(tmp_path):
     """And lists it. Without it a longer one starts again, and says so."""
-    grown, still = copytree(whole_of(scene("fast", 5.0)), tmp_path / "run"), whole_of(load_scene("flow_only"))
+    grown, still = copytree(whole_of(scene("fast", 2.0)), tmp_path / "run"), whole_of(load_scene("flow_only"))
     assert (grown / LAST).exists() and LAST in told(grown)["files"]
     assert not any((grown / name).exists() for name in (NEWEST, PREVIOUS))
     assert not (still / LAST).exists() and LAST not in told(still)["files"]
     (grown / LAST).unlink()
     with pytest.warns(UserWarning, match="no checkpoint to go on from; it starts again from t = 0"):
-        resume(grown, overrides=["growth.end=9 h"])
-    assert told(grown)["origin"].get("set") == ["growth.end=9 h"]
+        resume(grown, overrides=["growth.end=3 h"])
+    assert told(grown)["origin"].get("set") == ["growth.end=3 h"]
     assert same(grown, whole_of(scene("fast")))
 
 
 @pytest.mark.parametrize("entry, wanted", [
-    ("growth.end=2 h", "growth.end = 2 h: 5 h were asked for before; a later time is needed"),
+    ("growth.end=1 h", "growth.end = 1 h: 2 h were asked for before; a later time is needed"),
     ("growth.end=2 um", "growth.end = \"2 um\": a time"),
     ("growth.end=1e9 h", "growth.end = \"1e9 h\": at most 100000 times growth.time_step"),
     ("pore.width=3 um", "growth.end alone can be changed of a run that has begun"),
 ])
 def test_what_is_no_later_end_is_refused(entry, wanted):
     """And nothing is changed."""
-    shorter = whole_of(scene("fast", 5.0))
+    shorter = whole_of(scene("fast", 2.0))
     before = state(shorter)
     with pytest.raises(SceneError) as refused:
         resume(shorter, overrides=[entry])

@@ -61,17 +61,8 @@ def test_the_nodes_that_are_expected_are_those_of_the_mesh(name, sets):
     assert found / 1.5 < memory.expected_nodes(scene) < 1.5 * found
 
 
-def test_more_memory_is_expected_of_larger_meshes():
-    """Of those at the end too."""
-    base = [memory.expected_nodes(load_scene("base", [f"growth.end={end} h"])) for end in (0, 10, 19.4)]
-    assert base == sorted(base) and base[2] > 1.3 * base[0]
-    kinds = [load_scene("base", ["numerics.preset=fast", f"numerics.elements={kind}"])
-             for kind in ("linear", "quadratic", "cubic")]
-    linear, quadratic, cubic = map(memory.expected_bytes, kinds)
-    assert linear < quadratic < cubic
-
-
 @LINUX
+@pytest.mark.thorough
 def test_the_memory_that_is_told_is_what_a_run_takes():
     """Over that of a run on a coarse mesh, within a half: the peak of a process of its own (kB)."""
     code = ("import sys; from pathlib import Path; from repro import load_scene, simulate; "

@@ -5,18 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import shapely
 from hypothesis import given, settings
-from hypothesis import strategies as st
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from repro.errors import MeshError
-from repro.fem import mesh
-from repro.fem.mesh import curved, triangle_areas
-from repro.fem.outline import TOP
-from repro.model import mesh_motion, pore
-from tests.strategies import LENGTH, attached_aggregates, meshed, meshes, plug, scene, seed, widths
+from repro.model import pore
+from tests.strategies import LENGTH, attached_aggregates, meshed, scene, seed, widths
 
 both = pytest.mark.parametrize("geometry", [1, 2])
 
@@ -43,13 +38,6 @@ def test_any_outline_keeps_its_nodes_to_the_last_bit_and_its_edges(drawn):
     assert grid.areas.sum() == pytest.approx(np.ptp(grid.ends) * width, rel=1e-12)
     assert grid.area() == pytest.approx(outline.area, rel=1e-12)
     assert fluid_regions(grid) == 1 and len(np.unique(grid.cells)) == len(grid.points) and grid.acceptable()
-
-
-def test_contact_splits_the_fluid_in_two():
-    grid, outline = meshed(plug(50.0, -20.0, 15.0, 5.0))
-    assert fluid_regions(grid) == 2
-    assert grid.areas[grid.biomass].sum() == pytest.approx(35 * 50, rel=1e-12)
-    assert (outline.wall == TOP).sum() > 2 and grid.quality.min() >= mesh.POOR
 
 
 @both
@@ -81,44 +69,3 @@ def test_only_triangles_at_the_aggregate_are_bent():
     assert not made.moved(points).acceptable()
     with pytest.raises(MeshError, match="a triangle near .* is turned over"):
         made.moved(points).checked()
-
-
-#: Straight triangles, or curved ones with middles half way.
-with_aggregate = st.builds(lambda grid, bend: curved(grid, None) if bend else grid, meshes(clean=False), st.booleans())
-
-
-@given(with_aggregate, st.floats(0.95, 1.05), st.floats(0.95, 1.05))
-def test_walls_inlet_and_outlet_keep_their_lines_and_the_body_its_place(grid, along, across):
-    """On any mesh, under any linear motion of the aggregate by up to 5 % (a step makes 4 %): to the last bit; triangles
-    stay upright, and their areas add up to the pore's."""
-    body = grid.points[grid.body]
-    middle = [body[:, 0].mean(), 0.0]
-    film = (body[:, 1] < grid.width).all()
-    body = (body - middle) * [along, across if film else 1.0] + middle
-    points = mesh_motion.move(grid, body, 1.0, 100.0)
-    assert (points[grid.body] == body).all()
-    dofs = grid.topology.dofs(grid.geometry)
-    ends = np.concatenate([dofs.inlet.ravel(), dofs.outlet.ravel()])
-    for nodes, axis in ((dofs.walls, 1), (ends, 0)):
-        assert (points[nodes, axis] == grid.points[nodes, axis]).all()
-    after = triangle_areas(points, grid.triangles)
-    assert after.min() > 0 and after.sum() == pytest.approx(grid.areas.sum(), rel=1e-12)
-    assert not grid.moved(points).turned_over().any()
-
-
-@pytest.mark.parametrize("film", [25.0, 10.0, 5.0, 2.0])
-def test_at_least_six_elements_lie_across_the_film(film):
-    """Lines across the film cross 11 to 16 triangles (measured), about two in each layer of nodes; none spans a
-    fourth of it."""
-    grid, _ = meshed(seed(50.0 - film))
-    for x in (-0.11, -0.05, 0.0137, 0.07, 0.13):
-        pieces = chords(grid, x)
-        assert pieces.sum() == pytest.approx(film, rel=1e-2)
-        assert len(pieces) >= 10 and pieces.max() <= film / 4
-
-
-def chords(grid, x):
-    """Lengths of the pieces that the triangles of the fluid hold of the vertical line at x."""
-    fluid = shapely.polygons(grid.points[grid.triangles[~grid.biomass]])
-    pieces = shapely.length(shapely.intersection(fluid, shapely.LineString([(x, 0.0), (x, grid.width)])))
-    return pieces[pieces > 0]

@@ -90,7 +90,7 @@ def test_a_long_step_is_not_silent(capsys, monkeypatch):
 
 
 @pytest.mark.parametrize("columns, pattern", [
-    (60, r"base 0\.6/0\.6 h \d\d:\d\d<\d\d:\d\d, step \d+, mesh \d, contact *"),
+    pytest.param(60, r"base 0\.6/0\.6 h \d\d:\d\d<\d\d:\d\d, step \d+, mesh \d, contact *", marks=pytest.mark.thorough),
     (120, r".*base 100%\|.*\| 0\.6 of 0\.6 h \[\d\d:\d\d < \d\d:\d\d, step \d+, remeshes \d, contact\].*"),
 ])
 def test_on_a_terminal_a_bar(tmp_path, columns, pattern):

@@ -1,6 +1,5 @@
 """What a publication needs is there, agrees with itself and works as it stands: the replication note says what was
 computed, what README and tutorial show is executed, and texts speak of nothing that the repository does not hold."""
-import copy
 import re
 import subprocess
 import sys
@@ -41,14 +40,6 @@ def test_the_note_tells_what_was_computed(record):
     assert replication.filled(template, record) == replication.NOTE.read_text(encoding="utf-8")
 
 
-def test_a_number_of_the_record_is_a_number_of_the_note(record):
-    changed = copy.deepcopy(record)
-    check = next(c for claim in changed["claims"] for c in claim["checks"] if c["paper"] == "2.9")
-    check["value"] = 2.9 * 1.0987
-    assert replication.filled("{{C01 | mean velocity at t = 0 (m/d) | off}}", changed) == "9.9 %"
-    assert "| 3.186 |" in replication.filled("{{table.values}}", changed)
-
-
 def test_the_template_has_no_number_that_a_run_computes():
     """Decimals outside of references, of the paper's own scenes and of identifiers."""
     body = replication.TEMPLATE.read_text(encoding="utf-8").partition("## References")[0]
@@ -77,14 +68,6 @@ def test_every_claim_and_erratum_is_in_the_note(record):
         assert all(int(count) == len(named[kind]) for count, kind in counts), name
     listed = re.findall(r"^- \*\*(E\d+)\*\*", replication.filled("{{list.errata}}", record), re.M)
     assert listed == ERRATA and len(ERRATA) >= 20
-
-
-def test_what_needs_no_solution_is_not_counted_as_a_value_reproduced(record):
-    printed = [check for claim in record["claims"] for check in claim["checks"] if check["paper_low"] is not None]
-    outcomes = [check["outcome"] for check in printed if check["rests_on"] == "a solution"]
-    counts = replication.filled("{{paper.total}} {{paper.within}} {{paper.outside}}", record).split()
-    assert list(map(int, counts)) == [len(outcomes), outcomes.count("holds"), outcomes.count("fails")]
-    assert 0 < len(outcomes) < len(printed)
 
 
 def test_version_licence_and_name_agree():

@@ -254,7 +254,8 @@ def write(path, points, cells, nodal, region):
     field_files.write(path, Grid(np.pad(points, ((0, 0), (0, 1))), cells, nodal, celled))
 
 
-@pytest.mark.parametrize("kind, count", [("triangle", 101_000), ("triangle6", 26_000)])
+@pytest.mark.parametrize("kind, count", [
+    pytest.param("triangle", 101_000, marks=pytest.mark.thorough), ("triangle6", 26_000)])
 def test_a_page_of_a_fine_mesh_is_small_and_true(tmp_path, monkeypatch, kind, count):
     """1e5 nodes in several times take 3 MB at most; values on the grid are those of the mesh."""
     points, cells = regular(monkeypatch, count)

@@ -56,7 +56,6 @@ SCENES = {
     "paper, unreported steps": ('growth.end="1 h"', 'output.times=["0.3 h", "1 h"]'),
     "fast": ('numerics.preset="fast"', "numerics.tolerance=0.0005", 'aggregate.radius="25 um"', 'growth.end="3 h"',
              'output.times=["0.1 h", "0.7 h", "0.8 h", "2 h"]'),
-    "fast, rows within steps": ('numerics.preset="fast"', 'growth.end="9.7 h"'),
     "fast, jumps": ('numerics.preset="fast"', 'growth.end="0.8 h"', 'substrates.donor.supply='
                     '[["0 h", "10 mg/L"], ["0.3 h", "0 mg/L"], ["0.5 h", "20 mg/L"]]',
                     'output.times=["0.1 h", "0.3 h", "0.4 h", "0.7 h"]'),
@@ -66,10 +65,11 @@ SCENES = {
     "gear": ('numerics.transport="gear"', 'growth.end="0.4 h"'),
     "to the pore's end": ("aggregate.radius=40 um", "pore.length=90 um", "growth.time_step=1 h", "growth.end=9 h",
                           "numerics.refinement=0.5"),
-    "cubic, contact": ('numerics.preset="fast"', 'numerics.elements="cubic"', "numerics.tolerance=0.0005", *CONTACT,
-                       'output.times=["0.05 h", "0.3 h", "0.6 h"]'),
 }
 MORE = {
+    "fast, rows within steps": ('numerics.preset="fast"', 'growth.end="9.7 h"'),
+    "cubic, contact": ('numerics.preset="fast"', 'numerics.elements="cubic"', "numerics.tolerance=0.0005", *CONTACT,
+                       'output.times=["0.05 h", "0.3 h", "0.6 h"]'),
     "paper": ('growth.end="6 h"',),
     "accurate": ('numerics.preset="accurate"', 'growth.end="4 h"'),
     "linear midpoint": ('numerics.time="midpoint"', "numerics.tolerance=0.0001", 'numerics.transfer="linear"',
@@ -98,7 +98,8 @@ def in_parts(scene, folder, count):
     return resumes
 
 
-@pytest.mark.parametrize("name", [*SCENES, *(pytest.param(name, marks=pytest.mark.thorough) for name in MORE)])
+@pytest.mark.parametrize("name", [
+    *SCENES, *(pytest.param(name, marks=pytest.mark.thorough) for name in MORE)])
 def test_a_run_stopped_after_every_step_is_the_whole_run(tmp_path, name):
     """Tables, fields, indices, status and counts, and no warning."""
     scene = load_scene("base", {**SCENES, **MORE}[name])

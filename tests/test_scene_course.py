@@ -1,6 +1,5 @@
 """Supplies, head and mean velocity as tables over time: how they are read, written, and what runs make of them."""
 import json
-from dataclasses import replace
 from math import inf
 from operator import attrgetter
 
@@ -104,20 +103,6 @@ def test_a_time_of_a_table_at_a_multiple_of_the_time_step_ends_one_update(step):
     made = scene(acceptor=[["0 h", "1 mg/L"], [step, "2 mg/L"]], growth={"end": "40 min", "time_step": step})
     first, second = updates.schedule(made)[0][1:3]
     assert first == made.substrates.acceptor.supply.times[1] and second == pytest.approx(2 * first)
-
-
-def test_an_even_change_is_of_second_order():
-    """Biomass of base with a supply that falls evenly to a tenth, in steps of 12 to 3 min of the paper's: the mean
-    of the supply counts."""
-    table = [["0 h", "10 mg/L"], ["0.8 h", "1 mg/L"]]
-    made = load_scene("base", [f"{DONOR}={json.dumps(table)}", "substrates.donor.interpolation=linear",
-                               'growth.end="0.8 h"', 'output.times=["0.8 h"]', "numerics.refinement=0.5"])
-    found = []
-    for step in (0.2, 0.1, 0.05):
-        (_, last) = simulate(replace(made, growth=replace(made.growth, time_step=step)))
-        found.append(last.pore.mass)
-    apart = np.diff(found)
-    assert (np.abs(np.log2(apart[:-1] / apart[1:]) - 2) < 0.3).all()
 
 
 @pytest.mark.parametrize("preset", ["fast", "paper"])

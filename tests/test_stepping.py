@@ -5,6 +5,7 @@ how long they are in `test_pace.py`, and that contact ends one the case hard-07-
 """
 import json
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -20,7 +21,7 @@ from tests.strategies import ORDERS, scene
 from tests.test_state import alike
 
 FAST = 'numerics.preset="fast"'
-EVERY_ORDER = pytest.mark.parametrize("order", ORDERS)
+THOROUGH = partial(pytest.param, marks=pytest.mark.thorough)
 
 
 def base(*changes):
@@ -62,7 +63,7 @@ def same(one, other):
     return alike(one.pore, other.pore) and one.pace == other.pace
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("name", ["fast", "paper", *map(THOROUGH, ("contact", "gear", "stress-free"))])
 def test_steps_depend_on_no_row(name):
     """The last state and the ledger of every step, to the last bit, with 1 and 7 rows, and without times, where the end
     of every step is a row."""
@@ -77,8 +78,8 @@ def test_steps_depend_on_no_row(name):
         assert not rows[0].pore.contact and rows[-1].pore.contact and sum(instant.remeshes for instant in rows) > 1
 
 
-@pytest.mark.parametrize("part", [0.55, 0.97])
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("part", [0.55, THOROUGH(0.97)])
+@pytest.mark.parametrize("name", ["fast", "gear", *map(THOROUGH, ("contact", "paper", "stress-free"))])
 def test_steps_and_rows_before_the_end_do_not_depend_on_it(name, part):
     """All states and rows of a run that ends earlier are those of the longer run, to the last bit, but for the last
     state and the row that it ends with, whose step ends there."""
@@ -175,7 +176,7 @@ def test_what_fails_at_the_shortest_step_stops_the_run(monkeypatch, error, told)
     assert 2.5e-5 < tried[-1] <= 5e-5 and len(tried) < 20  # to the end, then 2 h 2^-16
 
 
-@EVERY_ORDER
+@pytest.mark.parametrize("order", [1, 2, THOROUGH(3)])
 def test_a_run_ends_where_the_aggregate_reaches_an_end_of_the_pore(order):
     """The last instant is reported, then PoreEnd."""
     made = base('pore.length="90 um"', 'growth.end="19 h"', *sets(order))
@@ -187,7 +188,7 @@ def test_a_run_ends_where_the_aggregate_reaches_an_end_of_the_pore(order):
     assert 0.1 * near - 45 <= found[-1].pore.outline.upstream < near - 45 <= found[-2].pore.outline.upstream
 
 
-@EVERY_ORDER
+@pytest.mark.parametrize("order", [1, 2, THOROUGH(3)])
 def test_a_film_too_thin_from_the_start_closes(order):
     """Though nothing grows: without a supply the aggregate neither grows nor decays."""
     numerics = {"preset": "fast", "elements": ORDERS[order], "refinement": 0.6 if order == 1 else 0.2}

@@ -208,36 +208,6 @@ def test_rows_have_the_values_that_their_runs_were_made_with(tmp_path):
     assert len({(row["pore.width_um"], row["flow.mean_velocity_m_per_day"]) for row in table_rows}) == 6
 
 
-def test_lines_of_the_page_are_courses_of_runs_or_join_runs_that_differ_in_one_key(tmp_path):
-    """What is drawn, read off the ticks of the axes, is conductivity against biomass of the run that a line's title
-    names. Of clogging times, in the order of that key: a line for each value of the other one."""
-    factors = [parse("pore.width=60 um, 40 um, 50 um"), parse("flow.viscosity_ratio=100, 400")]
-    found = points("flow_only", [], factors, grid(factors))
-    biomass, relative = np.array([0.2, 0.3, 0.4]), np.array([1.0, 0.6, 0.3])
-    ended = [table.Told(one, "completed", np.arange(3.0), relative**(1 / one.index), one.index * biomass,
-                        dict.fromkeys(table.COLUMNS) | {"clogging_time_h": 7.0 + one.index**2}) for one in found]
-    made = page.page(Sweep(tmp_path, "flow_only", factors, found), ended, 0.1)
-    picture, _, first, second = re.findall("<figure>.*?</figure>", made, re.S)
-    assert [label in picture for label in ("biomass: aggregate area", "conductivity / initial")] == [True, True]
-    across = re.findall(r'<text class="x" x="([\d.]+)" y="[\d.]+">([\d.]+)</text>', picture)
-    upward = re.findall(r'<text class="y" x="[\d.]+" y="([\d.]+)">([\d.]+)</text>', picture)
-    (x, x0), (y, y0) = (np.polyfit(*np.array(ticks, float).T, 1) for ticks in (across, upward))
-    lines = re.findall('<polyline [^>]*points="([^"]*)"><title>run (.)', picture)
-    assert [number for _, number in lines] == list("123456")
-    for (drawn, _), one in zip(lines, ended):
-        places = np.array([pair.split(",") for pair in drawn.split()], float)
-        assert x * places[:, 0] + x0 == pytest.approx(one.biomass, abs=0.006)
-        assert y * (places[:, 1] + 3.5) + y0 == pytest.approx(one.relative, abs=0.005)
-    for which, figure in enumerate((first, second)):
-        dots = re.findall(r'<circle [^>]*cx="([^"]*)" cy="([^"]*)"[^>]*><title>run (.)', figure)
-        run_at = {f"{x},{y}": found[int(index) - 1].values for x, y, index in dots}
-        lines = [line.split() for line in re.findall('<polyline.*?points="(.*?)"', figure.split("<ul")[0])]
-        assert len(run_at) == 6 and [len(line) for line in lines] == ([3, 3], [2, 2, 2])[which]
-        for places in lines:
-            line = [run_at[place] for place in places]
-            assert len({values[1 - which] for values in line}) == 1 and line == sorted(line)
-
-
 def test_every_option_of_the_command_is_heeded(tmp_path, monkeypatch):
     """Each width of a hypercube to its last digit, in the tables and in the scenes."""
     monkeypatch.setattr(pool, "ready", in_this_process)
@@ -357,7 +327,7 @@ def test_what_c_code_prints_does_not_reach_the_user(tmp_path, capfd):
 
 
 @pytest.mark.parametrize("name", ["runs/{run}/notes.txt", "runs/{run}/fields/mine.vtu", "runs/.part-{run}/notes.txt"])
-@pytest.mark.parametrize("spoil", ["failed", "damaged"])
+@pytest.mark.parametrize("spoil", ["failed", pytest.param("damaged", marks=pytest.mark.thorough)])
 def test_what_others_have_put_beside_a_run_stays(copied, monkeypatch, name, spoil):
     """Where the run is tried again since it has failed, or is made again since it is damaged."""
     monkeypatch.setattr(pool, "ready", in_this_process)
@@ -384,7 +354,8 @@ def test_places_that_are_not_of_a_sweep_are_refused(tmp_path, capsys, arrange, w
     assert why in refused(tmp_path / "sweep", capsys, "--vary", "pore.width=48 um, 50 um")
 
 
-@pytest.mark.parametrize("name", ["sweep.json", "run.json", "timeseries.csv", "ledger.csv"])
+@pytest.mark.parametrize("name", ["sweep.json", "run.json", "timeseries.csv",
+                                  pytest.param("ledger.csv", marks=pytest.mark.thorough)])
 @pytest.mark.parametrize("spoil", [lambda path: (path.unlink(), os.mkfifo(path)),
                                    lambda path: os.truncate(path, 3 * 2**30)])
 def test_pipes_and_files_of_gigabytes_do_not_stop_a_sweep(copied, capsys, monkeypatch, name, spoil):

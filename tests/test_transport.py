@@ -51,17 +51,6 @@ def test_a_constant_supply_stays_constant_without_biomass(inlet, order):
     assert alone.donor == pytest.approx(np.full(len(alone.donor), 10.0), abs=1e-10)
 
 
-@EVERY_ORDER
-def test_newton_does_not_fall_into_a_negative_root(order):
-    """From less than nothing. Undamped, with C / (C + K) below zero too, Newton's method "converges" to -70 mg/L
-    (measured): uptake is a function of max(C, 0)."""
-    now, found = solved("42 um", "0.15 mg/L", "0.35 m/day", order)
-    again = transport.steady(found.problem, Sink(now.active), everywhere(now, -10.0))
-    assert again.acceptor == pytest.approx(found.concentrations.acceptor, rel=1e-7)
-    assert again.donor == pytest.approx(found.concentrations.donor, rel=1e-7)
-    assert again.acceptor.min() > 0
-
-
 def right_triangles():
     """A structured mesh of 40 x 20 um, biomass from x = 10 to 20 um."""
     fem = MeshTri.init_tensor(np.linspace(0.0, 40.0, 9), np.linspace(0.0, 20.0, 5))
@@ -110,21 +99,6 @@ def test_the_divergence_of_u_is_what_leaves_the_bounds(monkeypatch, order):
     monkeypatch.setattr(transport, "divergence_free", lambda space, velocity: space.at_points(velocity.T))
     with pytest.raises(Unresolved, match=SAID):
         at_start(thick("290 m/day", order, 0.2))
-
-
-@pytest.mark.parametrize("order", [2, 3])
-def test_the_velocity_that_carries_is_free_of_divergence_and_as_good_as_u(order):
-    """Against every function of the space: what it lacks is what comes in or leaves at the ends. Its gradient part is
-    orthogonal to what remains, so that it is no farther from the exact velocity than u."""
-    now, found = solved("30 um", "10 mg/L", "2.9 m/day", order)
-    space, velocity = now.space, found.flow.velocity
-    u, w = space.at_points(velocity.T), transport.divergence_free(space, velocity)
-    loads = np.einsum("tq,itq,tqik->tk", space.at.dx, w, space.at.slopes)
-    ends = np.bincount(space.cells.ravel(), loads.ravel(), space.count)
-    wanted = found.problem.outflow - found.problem.inflow
-    assert ends == pytest.approx(wanted, abs=1e-12 * np.abs(loads).max())
-    apart = np.einsum("tq,itq,itq", space.at.dx, u - w, u - w) / np.einsum("tq,itq,itq", space.at.dx, u, u)
-    assert 1e-12 < apart < 1e-4
 
 
 def starved(half, order):

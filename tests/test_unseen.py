@@ -16,16 +16,16 @@ from tqdm import tqdm as Bar
 
 import repro
 from repro import results, timing
-from repro.errors import BalanceError, TransportError, Unresolved
+from repro.errors import TransportError, Unresolved
 from repro.fem.outline import FREE, half_disc
 from repro.fem.sizing import Sizing, split
-from repro.march import balance, midpoint, simulation, stepping, updates
-from repro.march.loop import Instant, Ledger, PoreEnd
+from repro.march import midpoint, simulation, stepping, updates
+from repro.march.loop import Instant, Ledger
 from repro.march.pace import EXCESS, Pace, missed
-from repro.model import biomass, contact, gear, mesh_motion, remeshing, traction, transport
+from repro.model import biomass, contact, gear, mesh_motion, remeshing, transport
 from repro.model.pore import Solved, resolution, seeded, solve
 from repro.preflight import modelled, numbers, simplifications
-from repro.report import charts, comparison, fields, quantities, run_page
+from repro.report import comparison, quantities, run_page
 from repro.report.reading import Run
 from repro.results import field_files, picture
 from repro.results.tables import Results
@@ -130,17 +130,6 @@ def test_times_of_fields_keep_every_digit(tmp_path):
     assert [*map(float, times)] == [100 / 3, 100 / 3]
 
 
-@pytest.mark.parametrize("transfer", ["conserving", "bounded"])
-def test_a_step_that_loses_two_millionths_of_its_biomass_stops_the_run(transfer):
-    """Whichever transfer conserves; the linear one's loss is stated [E8]."""
-    scene, now = base(1, f"numerics.transfer={transfer}")
-    made = np.subtract(*balance.demand_terms(scene.kinetics, EVEN))
-    even = replace(EVEN, biomass_made=made, biomass_after=EVEN.biomass_before + made)
-    balance.refuse(scene, now, even)
-    with pytest.raises(BalanceError, match="of the biomass"):
-        balance.refuse(scene, now, replace(even, biomass_after=even.biomass_after * (1 - 2e-6)))
-
-
 def test_a_picture_has_upstream_on_the_left_and_the_upper_wall_above():
     """A field that rises along x and y: dark below upstream, light above downstream."""
     places = np.array(list(product(np.linspace(-10, 30, 9), np.linspace(0, 20, 5))))
@@ -230,22 +219,6 @@ def test_an_update_takes_the_mean_of_the_rates_at_its_ends(order):
 
 
 @EVERY_ORDER
-def test_the_expansion_grows_with_the_mass_there_is(order):
-    """Over X_m, in the mean of a straight triangle's corners (28)-(29); on curved ones over what each point has."""
-    scene, now, _ = uneven(order)
-    grown = replace(now, active=1.3 * now.active, inert=now.inert + 0.1 * now.active)
-    found = updates.enlarged(scene, now, grown)
-    before = now.active + now.inert
-    more = grown.active + grown.inert - before
-    wanted = 1.5 * (1 + more / before)
-    if order == 1:
-        of_node = np.full(len(now.mesh.points), np.nan)
-        of_node[now.space.reaction.cells] = more / now.space.reaction.dx / scene.kinetics.maximum_density
-        wanted = 1.5 * (1 + of_node[now.mesh.triangles[now.mesh.biomass]].mean(axis=1, keepdims=True))
-    assert found == pytest.approx(wanted, rel=1e-12)
-
-
-@EVERY_ORDER
 @pytest.mark.parametrize("speed", [0.0, 2e5])
 def test_beyond_the_old_mesh_there_is_what_flows_or_diffuses_there(speed, order):
     """Upstream (26) with each substrate's own diffusivity, downstream what leaves; without flow the supply."""
@@ -326,16 +299,6 @@ def test_a_mesh_follows_by_the_scenes_constants_or_is_left_where_it_is_too_coars
     wanted = mesh_motion.move(now.mesh, places[now.mesh.body], compressibility=3.0, stabilisation=40.0)
     assert np.array_equal(remeshing.followed(coarse, now, now.moved(places)).points, wanted)
     assert remeshing.followed(replace(coarse, numerics=replace(coarse.numerics, refinement=1.8)), now, now) is None
-
-
-@EVERY_ORDER
-def test_the_fluid_pushes_as_its_drive_does_at_the_time(order):
-    course = '[["0 h", "1e-3 cm"], ["1 h", "4e-3 cm"], ["3 h", "2e-3 cm"]]'
-    scene, now = base(order, f"flow.head={course}", "flow.interpolation=linear")
-    around = traction.surroundings(scene, now, now)
-    first, *later = (traction.forces(scene, around, replace(now, time=time)) for time in (0.0, 1.0, 2.0, 5.0))
-    for push, factor in zip(later, (4.0, 3.0, 2.0)):
-        assert push == pytest.approx(factor * first, rel=1e-9, abs=1e-12 * np.abs(first).max())
 
 
 @pytest.mark.parametrize("time", ["updates", "midpoint"])
@@ -499,27 +462,6 @@ def test_a_front_between_the_points_of_a_quadrature_is_refused(order, monkeypatc
             transport.steady(made, sink)
 
 
-@pytest.mark.parametrize("step, preset", [("2 h", "paper"), ("3 h", "paper"), ("12 min", "fast")])
-def test_the_pores_end_has_a_row_with_every_step_since_the_last_one(step, preset):
-    """Though no time was asked for there: after a step to within an element of it, and where the next one passes it."""
-    changes = ['pore.length="100 um"', 'pore.width="100 um"', 'aggregate.radius="30 um"', 'growth.end="19 h"',
-               'output.times=["1 h", "19 h"]', f"numerics.preset={preset}", "numerics.transport=quasi_steady",
-               f'growth.time_step="{step}"', "numerics.refinement=0.3"]
-    found = []
-    with pytest.raises(PoreEnd) as told_there:
-        found.extend(simulation.simulate(load_scene("base", changes)))
-    last = found[-1]
-    starts = [each.start for each in last.ledgers]
-    assert len(found) == 3 and [0.0, *(each.end for each in last.ledgers)] == [*starts, last.pore.time]
-    assert f"t = {last.pore.time:g} h" in str(told_there.value)
-
-
-def test_no_step_goes_over_a_jump_shortly_before_the_end():
-    scene, _ = base(2, "numerics.preset=fast", 'substrates.donor.supply=[["0 h", "4 mg/L"], ["0.6 h", "9 mg/L"]]',
-                    'growth.end="1 h"')
-    assert 0.6 in [each.end for instant in simulation.simulate(scene) for each in instant.ledgers]
-
-
 def test_a_step_misses_the_tolerance_by_more_than_is_accepted_alone():
     for part, wanted in ((0.0, False), (1.0, False), (EXCESS, False), (1.01 * EXCESS, True)):
         assert missed(Pace(1.0, 1.0, 0.3 * part), 0.3) is wanted
@@ -542,18 +484,6 @@ def test_a_picture_says_which_values_are_dark():
     assert said.count("acceptor (mg/L), 1.5 (dark) to 7 (light), at t = 2.5 h") == 2
     said = picture.figure(shown | {"velocity_m_per_d": np.array([[-3.0, 4, 0], [0, 1, 0], [0, 2, 0]])}, 2.5)
     assert "velocity (m/day), 1 (dark) to 5 (light)" in said
-
-
-@pytest.mark.parametrize("low, high", [(0.0, 2.1), (0.0, 1.0), (-0.7, 0.9), (0.0, 0.012), (0.0, 9000.0)])
-def test_a_tick_has_the_number_of_its_place(low, high):
-    places, texts = zip(*charts.ticks(charts.Scale(low, high, 0.0, 100.0), 4), strict=True)
-    assert [float(text) for text in texts] == pytest.approx(places, rel=1e-12, abs=1e-12) and len(texts) > 1
-
-
-def test_frames_before_an_expansion_are_not_counted_as_times():
-    frames = [{"note": fields.BEFORE}, {}] * 40
-    said = run_page._field_note({"meshes": [{"per": 3}], "nodes": 3, "frames": frames, "of": 50, "fields": []})
-    assert "; 40 of 50 times shown, those grown and not yet expanded besides." in said
 
 
 THIN = {"front": ["numerics.preset=fast", 'substrates.acceptor.half_saturation="1e-3 mg/L"',

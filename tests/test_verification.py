@@ -12,15 +12,13 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from repro.fem.space import Space
 from repro.scene.keys import PRESETS
 from verification.evidence import cases, matrix, pages, results, writing
-from verification.evidence.cases import STAGES, parametrize
-from verification.evidence.checks import at_least, at_most, between, flat, refine, study
+from verification.evidence.cases import STAGES
+from verification.evidence.checks import at_least, at_most, between, study
 from verification.evidence.results import Result
 from verification.mutants import runner
 
-IMPORT = re.compile(r"^from ((?:verification|reference)[.\w]*) import ([^#\n(]+)", re.M)
 SIZES = 0.5 ** np.arange(4)
 GOOD, BAD = (at_most("quantity A", value, 1.0, "theory") for value in (0.5, 2.0))
 
@@ -52,42 +50,6 @@ def test_a_wrong_order_is_caught_on_both_sides(errors, ceiling, holds):
         study("error", SIZES[:3], errors[:3], 2, "")
 
 
-def test_evidence_is_the_same_after_its_way_through_a_report():
-    """The label of the variant ends its name; nested evidence is recorded one by one."""
-    bound, errors = at_least("x", 2, 1.0, "o"), study("e", SIZES, SIZES**2, 2, "o", ceiling=1.0)
-    rows = json.loads(json.dumps([results.as_row(part) for part in flat([bound, [errors]])]))
-    copies = [results.from_row(row, "fast") for row in rows]
-    assert copies[0] == replace(bound, quantity="x, fast") and copies[1].quantity == "e, fast"
-    assert (copies[1].measured, copies[1].interval()) == (errors.measured, errors.interval())
-
-
-def test_errors_of_unrelated_meshes_are_averaged_and_studied_by_their_own_size():
-    """Root mean squares of what every mesh of a size gives."""
-    errors = refine(lambda size, mesh: {"size": size + mesh, "error": size * (1 + 6 * mesh)}, {4.0: 1, 1.0: 2})
-    assert errors["size"] == pytest.approx([4.0, np.sqrt(2.5)]) and errors["error"] == pytest.approx([4.0, 5.0])
-
-
-@pytest.mark.parametrize("id", ["flow-sections", "transport-mean-biomass", "growth-homogeneous"])
-def test_a_case_runs_with_the_orders_that_it_says(id, monkeypatch):
-    case = cases.cases()[id]
-    orders, initialise = set(), Space.__init__
-
-    def watched(self, *arguments):
-        initialise(self, *arguments)
-        orders.add(str(self.order))
-
-    monkeypatch.setattr(Space, "__init__", watched)
-    rooms = [module for name, module in sys.modules.items() if name.startswith("verification.")]
-    for cached in [value for room in rooms for value in vars(room).values() if hasattr(value, "cache_clear")]:
-        cached.cache_clear()
-    module = next(module for module in rooms if getattr(module, "__file__", "") == str(case.file))
-    function = getattr(module, next(iter(case.variants.values())).partition("::")[2].partition("[")[0])
-    sets = next(mark for mark in function.pytestmark if mark.name == "parametrize").args[1]
-    for values in sets:
-        function(*values.values, lambda *evidence: [*flat(evidence)])
-    assert orders == {name for name in case.numerics if name in matrix.ORDERS}
-
-
 def test_the_matrix_has_no_orphan_and_is_written(monkeypatch):
     """Every case, mutant, reference and claim stands in a line of the modules, and no line is without cases. One that
     stands nowhere is reported."""
@@ -97,38 +59,10 @@ def test_the_matrix_has_no_orphan_and_is_written(monkeypatch):
     assert matrix.orphans() == ["case flow-plug"] and matrix.unexplained() == ["flow-plug"]
 
 
-def test_a_case_names_references_that_its_module_can_reach():
-    for case in cases.cases().values():
-        reached = {path.stem for path in imports(case.file) if path.parent.name == "reference"}
-        assert {*case.references} <= reached, case.id
-
-
-def imports(file, seen=None):
-    """A file of verification or reference, and all of these that it imports."""
-    seen = {file} if seen is None else seen
-    for package, names in IMPORT.findall(file.read_text(encoding="utf-8")):
-        folder = writing.ROOT.joinpath(*package.split("."))
-        for path in (folder.with_suffix(".py"), *(folder / f"{name.split()[0]}.py" for name in names.split(", "))):
-            if path.exists() and path not in seen:
-                seen.add(path)
-                imports(path, seen)
-    return seen
-
-
 def test_exact_has_the_elements_and_the_order_of_accurate():
     """What is said of stages that run with accurate alone: what else differs are sizes and steps."""
     apart = {key for key, value in PRESETS["exact"].items() if value != PRESETS["accurate"].get(key)}
     assert apart == {"refinement", "tolerance", "contact_elements"}
-
-
-def test_round_off_and_times_are_not_committed():
-    quantities = at_most("x", 3e-13, 1e-9, ""), at_most("x", 0.012345, 0.1, ""), study("error", SIZES, SIZES**2, 2, "")
-    assert [one.reproducible for one in quantities] == ["", "0.01", "order 2.0, 2.0, 2.0"]
-    assert between("x", 1.0, 0.123456, 2.0, "").interval(3) == "0.123 to 2"
-    short = Result("flow-plug", {"": [BAD]}, seconds=1.0)
-    text = writing.markdown(pages.article(cases.cases()["flow-plug"], pages.entry(short)), 2)
-    assert "FALLS SHORT" in text and "| quantity A (2) | at most 1 | theory | NO |" in text
-    assert "seconds" not in text and "1.0 s" not in text
 
 
 def test_pages_are_those_of_the_records_and_short_enough_for_a_browser():
@@ -196,18 +130,6 @@ def test_a_session_runs_in_parallel_and_records_what_ran():
     assert made["flow-made-stopped"]["errors"][0].startswith("0: FloatingPointError")
     assert "| q, three (5) | at most 4 | theory | NO |" in page and "Stopped by an error: 0: FloatingPointError" in page
     assert measured["cases"]["flow-made-good"]["measured"]["r, v = 3"] == "2"
-
-
-def test_the_registry_has_the_tests_that_pytest_collects():
-    command = [sys.executable, "-m", "pytest", "verification", "--collect-only", "-q", "-o", "addopts="]
-    done = subprocess.run(command, cwd=writing.ROOT, capture_output=True, text=True)
-    collected = {line for line in done.stdout.splitlines() if "::" in line}
-    assert collected == {test for case in cases.cases().values() for test in case.variants.values()}, done.stdout[-500:]
-
-
-def test_a_star_takes_the_remaining_values():
-    mark = parametrize("value, *rest", {"a": (1, 2, 3), "b": (4,)}).mark
-    assert [(one.id, one.values) for one in mark.args[1]] == [("a", (1, (2, 3))), ("b", (4, ()))]
 
 
 def test_rows_that_were_appended_are_read_but_for_one_that_was_cut(tmp_path):

@@ -366,7 +366,7 @@ class _Trials:
         """
         division = self._divided
         for points, pressure in self._guesses(advances):
-            if len(points) < len(locked.mesh.points):
+            if division is not None and len(points) < len(locked.mesh.points):
                 points = division.nodal(points)
                 pressure = division.at_corners(pressure)
             if locked.body.strained(points[locked.mesh.body]).J.min() > 0:

@@ -10,10 +10,10 @@ from time import perf_counter
 import numpy as np
 
 from repro import report, results, timing
-from repro.preflight.simplifications import CREASED, Warned, creased, unmet
 from repro.errors import CheckpointError, Interrupted, OutputError
 from repro.march.loop import Instant, Ledger, State, added
 from repro.march.pace import Pace, missed
+from repro.preflight.simplifications import CREASED, Warned, creased, unmet
 from repro.results import field_files, netcdf
 from repro.results.files import is_file, sha256_of, whole
 from repro.runs import checkpoint, record, stored

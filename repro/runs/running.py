@@ -14,14 +14,14 @@ from pathlib import Path
 from time import perf_counter
 
 from repro import results, timing
+from repro.errors import CheckpointError, Interrupted, OutputError, RunEnd, SimulationError
+from repro.march.loop import Instant, State
+from repro.march.simulation import ends_soon, same_rows, steps
 from repro.preflight import simplifications
 from repro.preflight.memory import require_memory, require_outline
 from repro.preflight.numbers import judged
 from repro.preflight.resolved import unresolved
 from repro.preflight.simplifications import Warned
-from repro.errors import CheckpointError, Interrupted, OutputError, RunEnd, SimulationError
-from repro.march.loop import Instant, State
-from repro.march.simulation import ends_soon, same_rows, steps
 from repro.results.files import is_file, read_json, read_sealed
 from repro.runs import INTERVAL, checkpoint
 from repro.runs.folder import (

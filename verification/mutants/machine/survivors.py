@@ -30,7 +30,7 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
         "The column is 0 or 1, and NaN is neither.",
     ("model/growth.py", "MOST_ITERATIONS = 25", "MOST_ITERATIONS = 24"):
         "Identical outputs of base in the three presets, whose equilibria take 5, 5 and 3 iterations at most.",
-    ("run/folder.py", '(folder / "fields").mkdir(parents=True, exist_ok=True)',
+    ("runs/folder.py", '(folder / "fields").mkdir(parents=True, exist_ok=True)',
      '(folder / "fields").mkdir(parents=False, exist_ok=True)'):
         "The folder is there already: it is made with those above it for its lock.",
     ("report/run_page.py", 'several=hidden[packed["of"] > 1])', 'several=hidden[packed["of"] != 1])'):
