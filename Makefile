@@ -1,4 +1,4 @@
-# `make` alone lists the targets. Everything runs in .venv, which is made from requirements.lock when it is not there.
+# `make` without a target lists the targets. Everything runs in .venv; if it is missing, it is created from requirements.lock.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin/python
@@ -7,7 +7,7 @@ CRATE := build/crate/.installed
 PIP := $(BIN) -m pip install -q --disable-pip-version-check
 
 export MPLBACKEND := Agg
-# The linear algebra is sparse: threads inside the dense kernels only cost time.
+# The linear algebra is sparse: threads in the dense kernels only slow it down.
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
@@ -17,46 +17,46 @@ export OPENBLAS_NUM_THREADS ?= 1
 help:
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/\1|\2/p' Makefile | awk -F'|' '{ printf "  make %-16s %s\n", $$1, $$2 }'
 
-env: $(STAMP) ## make .venv from requirements.lock, with this package in it (PYTHON=python3.12 ...)
+env: $(STAMP) ## create .venv from requirements.lock and install this package in it (PYTHON=python3.12 ...)
 
 figures: $(STAMP) ## run the paper's simulations and draw its figures into paper_figures/out
 	@$(BIN) -m paper_figures
 
-check-manifest: $(STAMP) ## compare the data of what make figures has made with what is committed
+check-manifest: $(STAMP) ## compare the data behind the figures with the committed manifest
 	@$(BIN) -m paper_figures.manifest
 
-claims: $(STAMP) ## judge every claim of the paper by a computed number, and write the replication note
+claims: $(STAMP) ## judge the paper's claims by computed numbers, and write the replication note
 	@$(BIN) -m verification.claims
 	@$(BIN) -m paper_figures.replication
 
-sensitivity: $(STAMP) ## what the rounding of Table 1 allows: elasticities, one set of inputs; goes on where it was stopped
+sensitivity: $(STAMP) ## effects of the rounding of Table 1: elasticities, one set of inputs; continues an interrupted study
 	@$(BIN) -m verification.sensitivity
 
-verify: $(STAMP) ## run the verification cases against references that do not use repro, and write their pages
+verify: $(STAMP) ## run the verification cases against independent references, and write their pages
 	@$(BIN) -m pytest verification -n logical --dist worksteal --pages
 
-verify-fast: $(STAMP) ## the quick ones of these cases, which make test runs too
+verify-fast: $(STAMP) ## run the quick verification cases, which are part of make test
 	@$(BIN) -m pytest verification -n logical --dist worksteal -m "not slow"
 
-mutants: $(STAMP) ## run wrong changes of the code against the cases and tests, each of which must be caught
+mutants: $(STAMP) ## check that the cases and tests detect every registered wrong change of the code
 	@$(BIN) -m verification.mutants
 
-mutants-sampled: $(STAMP) ## mutants made by machine, a sample of them from all of repro/, against the tests; goes on where it was stopped
+mutants-sampled: $(STAMP) ## run a sample of machine-made mutants of repro/ against the tests; continues an interrupted session
 	@$(PIP) --require-hashes --no-deps --only-binary :all: -r verification/mutants/machine/requirements.lock
 	@$(BIN) -m verification.mutants.machine
 
-test: $(STAMP) ## run the tests and the quick verification cases, a process a core
+test: $(STAMP) ## run the tests and the quick verification cases on all cores
 	@$(BIN) -m pytest tests verification -n logical --dist worksteal -m "not slow"
 
-test-thorough: $(STAMP) ## the same with many more random examples, and what takes long
+test-thorough: $(STAMP) ## the same with more random examples, and the slow tests
 	@HYPOTHESIS_PROFILE=thorough $(BIN) -m pytest tests verification -n logical --dist worksteal -m "not slow"
 
-lint: $(STAMP) ## style and types: ruff and mypy
+lint: $(STAMP) ## check style and types with ruff and mypy
 	@$(BIN) -m ruff check .
 	@$(BIN) -m ruff check --select E501 --config line-length=100 repro
 	@$(BIN) -m mypy
 
-bench: $(STAMP) ## time against error, cost against size, and what each assumption costs and changes
+bench: $(STAMP) ## measure time against error, cost against size, and cost and effect of each assumption
 	@$(BIN) -m verification.bench
 	@$(BIN) -m verification.throughput
 	@$(BIN) -m verification.audit
@@ -67,11 +67,11 @@ crate: $(STAMP) $(CRATE) ## pack scenes, code, environment, figures and claims a
 	@$(BIN) -m paper_figures.crate
 	@$(dir $(CRATE))bin/python .ci/crate_check.py paper_figures/out/crate
 
-clean: ## remove .venv and everything generated; nothing that is committed
+clean: ## remove .venv and all generated files
 	@rm -rf $(VENV) paper_figures/out paper_figures/cache build dist *.egg-info .pytest_cache .ruff_cache .mypy_cache .hypothesis
 	@find . -name .git -prune -o -type d -name __pycache__ -prune -exec rm -rf {} +
 
-# The stamp is the last thing written: an install that was interrupted, or failed, leaves none and is done again from nothing.
+# The stamp is written last: an interrupted or failed install leaves none, and the next make starts from scratch.
 $(STAMP): requirements.lock pyproject.toml
 	@rm -f $@
 	@command -v "$(PYTHON)" >/dev/null || { echo "error: there is no '$(PYTHON)'; name a Python 3.11 or newer: make PYTHON=/path/to/python3 ..." >&2; exit 1; }
@@ -83,7 +83,7 @@ $(STAMP): requirements.lock pyproject.toml
 	@$(PIP) --no-deps --no-build-isolation -e .
 	@touch $@
 
-# The validator's packages stand apart from the package's own, and are installed for `make crate` alone.
+# `make crate` installs the validator's packages in a separate environment.
 $(CRATE): .ci/crate.lock
 	@rm -f $@
 	@"$(PYTHON)" -m venv --clear $(@D)

@@ -1,4 +1,4 @@
-"""The paper's claims that a figure bears on, in a few words, and their verdicts, which `make claims` has recorded."""
+"""The paper's claims that figures relate to, in a few words, and their verdicts as recorded by `make claims`."""
 
 from __future__ import annotations
 
@@ -44,8 +44,8 @@ STATEMENTS = {
 
 @cache
 def verdicts() -> dict[str, str]:
-    """Verdict of each claim in the committed record."""
-    return {each["id"]: each["verdict"] for each in report.read()}
+    """The verdict of each claim in the committed record."""
+    return {claim["id"]: claim["verdict"] for claim in report.read()}
 
 
 def judged(ids: tuple[str, ...]) -> str:

@@ -1,8 +1,8 @@
 """`make crate`: scenes, code, environment, figures and claims as a Workflow Run RO-Crate, in `paper_figures/out/crate`.
 
-A copy of the checkout with the figures of `make figures`, and `ro-crate-metadata.json`, which tells every file with its
-size and SHA-256, the workflow (`python -m paper_figures`) with its inputs (scenes) and outputs (figures), the action
-that has made these, and the one that has judged the claims. The profiles are those of PROFILES.
+The crate is a copy of the checkout with the figures of `make figures` and `ro-crate-metadata.json`. The metadata list
+every file with its size and SHA-256, the workflow (`python -m paper_figures`) with its inputs (scenes) and outputs
+(figures), the action that produced them, and the action that judged the claims. PROFILES lists the profiles.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from repro.runs.machine import source_hash
 
 ROOT = Path(__file__).parents[1]
 METADATA = "ro-crate-metadata.json"
-#: What is in the crate besides the figures: folders without what is generated in them, and files.
+#: Contents of the crate besides the figures: folders, without generated files, and files.
 FOLDERS = ("docs", "paper_figures", "reference", "repro", "tests", "verification")
 FILES = ("CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md", "LICENSE", "MANIFEST.in", "Makefile", "README.md",
          "codecheck.author.yml", "pyproject.toml", "requirements.lock")
@@ -47,7 +47,7 @@ Entity = dict[str, object]
 
 
 def main() -> int:
-    """Write the crate; 2 where there are no figures of the present source."""
+    """Write the crate; return 2 if there are no figures of the present source."""
     try:
         written = write(manifest.OUT, manifest.OUT / "crate")
     except FileNotFoundError as error:
@@ -58,58 +58,59 @@ def main() -> int:
 
 
 def write(out: Path, crate: Path) -> Path:
-    """Make the crate anew from the checkout and the figures in `out`. Raises FileNotFoundError where `make figures` has
-    made none with the present source."""
-    made = figures(out)
-    part = crate.with_name(f".part-{crate.name}")
-    shutil.rmtree(part, ignore_errors=True)
-    inside = {path.relative_to(ROOT).as_posix(): path for path in checkout()}
-    inside |= {_drawn(path): path for path in [*sum(made.values(), []), out / manifest.NAME]}
-    for name, path in inside.items():
-        (part / name).parent.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(path, part / name)
+    """Write the crate from the checkout and the figures in `out`. Raises FileNotFoundError if they are missing or are
+    those of another source."""
+    pictures = figures(out)
+    temporary = crate.with_name(f".part-{crate.name}")
+    shutil.rmtree(temporary, ignore_errors=True)
+    contents = {path.relative_to(ROOT).as_posix(): path for path in checkout()}
+    contents |= {_path_in_crate(path): path for path in [*sum(pictures.values(), []), out / manifest.NAME]}
+    for name, path in contents.items():
+        (temporary / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(path, temporary / name)
     ended = datetime.fromtimestamp((out / manifest.NAME).stat().st_mtime, UTC)
-    told = {name: list(map(_drawn, paths)) for name, paths in made.items()}
-    content = {"@context": CONTEXT, "@graph": graph(part, sorted(inside), told, ended.isoformat(timespec="seconds"))}
-    (part / METADATA).write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+    pictures_in_crate = {name: list(map(_path_in_crate, paths)) for name, paths in pictures.items()}
+    entities = graph(temporary, sorted(contents), pictures_in_crate, ended.isoformat(timespec="seconds"))
+    metadata = {"@context": CONTEXT, "@graph": entities}
+    (temporary / METADATA).write_text(json.dumps(metadata, indent=1) + "\n", encoding="utf-8")
     shutil.rmtree(crate, ignore_errors=True)
-    part.rename(crate)
+    temporary.rename(crate)
     return crate
 
 
-def _drawn(path: Path) -> str:
-    """Where what `make figures` has made is in the crate."""
+def _path_in_crate(path: Path) -> str:
+    """Path in the crate of an output of `make figures`."""
     return f"paper_figures/out/{path.name}"
 
 
 def checkout() -> list[Path]:
     """The files of the checkout that are not generated."""
     inner = [path for folder in FOLDERS for path in (ROOT / folder).rglob("*")]
-    kept = [path for path in inner if path.is_file() and not GENERATED.intersection(path.relative_to(ROOT).parts)
+    files = [path for path in inner if path.is_file() and not GENERATED.intersection(path.relative_to(ROOT).parts)
             and path.suffix != ".html"]
-    return [*kept, *(ROOT / name for name in FILES)]
+    return [*files, *(ROOT / name for name in FILES)]
 
 
 def figures(out: Path) -> dict[str, list[Path]]:
-    """The pictures of each figure. Raises FileNotFoundError as :func:`write`."""
-    asked = "`make figures` makes them"
+    """The pictures of each figure. Raises FileNotFoundError like :func:`write`."""
+    hint = "`make figures` makes them"
     if not (out / manifest.NAME).is_file():
-        raise FileNotFoundError(f"{out / manifest.NAME}: there are no figures; {asked}")
-    told = json.loads((out / manifest.NAME).read_text(encoding="utf-8"))
-    if told["environment"]["source"] != source_hash():
-        raise FileNotFoundError(f"{out / manifest.NAME}: the figures are those of another source; {asked} anew")
-    found = {name: list(map(out.joinpath, sorted(told["figures"][name]["pictures"]))) for name in FIGURES}
-    for path in sum(found.values(), []):
+        raise FileNotFoundError(f"{out / manifest.NAME}: there are no figures; {hint}")
+    record = json.loads((out / manifest.NAME).read_text(encoding="utf-8"))
+    if record["environment"]["source"] != source_hash():
+        raise FileNotFoundError(f"{out / manifest.NAME}: the figures are those of another source; {hint} anew")
+    pictures = {name: list(map(out.joinpath, sorted(record["figures"][name]["pictures"]))) for name in FIGURES}
+    for path in sum(pictures.values(), []):
         if not path.is_file():
-            raise FileNotFoundError(f"{path}: a figure is missing; {asked} anew")
-    return found
+            raise FileNotFoundError(f"{path}: a figure is missing; {hint} anew")
+    return pictures
 
 
 def graph(crate: Path, names: list[str], pictures: dict[str, list[str]], ended: str) -> list[Entity]:
-    """Every entity of the crate; `names` are the files that it holds, `pictures` those of each figure."""
+    """Every entity of the crate; `names` are its files, `pictures` those of each figure."""
     modules = {name: import_module(f"paper_figures.{name}") for name in FIGURES}
-    asked = {request.scene for module in modules.values() for request in module.RUNS}
-    scenes = [f"repro/scene/packaged/{name}.toml" for name in sorted(asked)]
+    scene_names = {request.scene for module in modules.values() for request in module.RUNS}
+    scenes = [f"repro/scene/packaged/{name}.toml" for name in sorted(scene_names)]
     inputs = {_id("input", Path(name).stem): [name] for name in scenes}
     outputs = {_id("output", name): paths for name, paths in pictures.items()}
     files = {name: _file(crate, name) for name in names}
@@ -120,7 +121,7 @@ def graph(crate: Path, names: list[str], pictures: dict[str, list[str]], ended: 
         "input": _refer(inputs), "output": _refer(outputs),
         "conformsTo": {"@id": f"{BIOSCHEMAS}/ComputationalWorkflow/1.0-RELEASE"}}
     files[JUDGE] |= _program("The paper's statements, judged")
-    drawn = [*sum(pictures.values(), []), _drawn(manifest.OUT / manifest.NAME)]
+    drawn = [*sum(pictures.values(), []), _path_in_crate(manifest.OUT / manifest.NAME)]
     actions = [_action("#figures", "make figures", "Run the scenes and draw the figures of the paper", WORKFLOW,
                        [*scenes, *ENVIRONMENT], drawn) | {"endTime": ended},
                _action("#claims", "make claims", "Judge the statements of the paper by computed numbers", JUDGE,
@@ -134,9 +135,9 @@ def _id(kind: str, name: str) -> str:
 
 
 def _refer(names: Iterable[str]) -> Entity | list[Entity]:
-    """References, of which a single one stands alone."""
-    found: list[Entity] = [{"@id": name} for name in names]
-    return found[0] if len(found) == 1 else found
+    """A list of references, or a single reference without a list."""
+    references: list[Entity] = [{"@id": name} for name in names]
+    return references[0] if len(references) == 1 else references
 
 
 def _metadata() -> Entity:
@@ -156,15 +157,15 @@ def _root(names: list[str], published: str) -> Entity:
 
 
 def _folders(names: list[str]) -> list[Entity]:
-    about = {"docs": "Documentation", "paper_figures": "What draws the figures, and these",
+    about = {"docs": "Documentation", "paper_figures": "The figures and their code",
              "reference": "References that do not use the solver", "repro": "The solver", "tests": "The tests",
              "verification": "Verification cases, claims and benchmarks"}
-    found: list[Entity] = []
+    entities: list[Entity] = []
     for folder in FOLDERS:
         inside = _refer(name for name in names if name.startswith(f"{folder}/"))
-        found.append({"@id": f"{folder}/", "@type": "Dataset", "name": folder, "description": about[folder],
+        entities.append({"@id": f"{folder}/", "@type": "Dataset", "name": folder, "description": about[folder],
                       "hasPart": inside})
-    return found
+    return entities
 
 
 def _file(crate: Path, name: str) -> Entity:
@@ -179,11 +180,11 @@ def _program(name: str, *kinds: str) -> Entity:
             "programmingLanguage": {"@id": "#python"}, "license": {"@id": LICENSE}, "creator": {"@id": "#authors"}}
 
 
-def _action(name: str, words: str, description: str, instrument: str, used: Iterable[str],
-            made: Iterable[str]) -> Entity:
+def _action(name: str, words: str, description: str, instrument: str, inputs: Iterable[str],
+            outputs: Iterable[str]) -> Entity:
     return {"@id": name, "@type": "CreateAction", "name": words, "description": description,
-            "instrument": {"@id": instrument}, "agent": {"@id": "#authors"}, "object": _refer(used),
-            "result": _refer(made), "actionStatus": "http://schema.org/CompletedActionStatus"}
+            "instrument": {"@id": instrument}, "agent": {"@id": "#authors"}, "object": _refer(inputs),
+            "result": _refer(outputs), "actionStatus": "http://schema.org/CompletedActionStatus"}
 
 
 def _parameter(name: str, examples: list[str]) -> Entity:
@@ -194,7 +195,7 @@ def _parameter(name: str, examples: list[str]) -> Entity:
 
 
 def _context() -> list[Entity]:
-    """What the others refer to that is not in the crate."""
+    """Entities outside the crate to which the others refer."""
     profiles = [{"@id": address, "@type": "CreativeWork", "name": words, "version": address.rpartition("/")[2]}
                 for address, words in PROFILES.items()]
     shapes = [{"@id": f"{BIOSCHEMAS}/{kind}/1.0-RELEASE", "@type": "CreativeWork", "name": f"Bioschemas {kind}",

@@ -1,4 +1,4 @@
-"""Base under its constant head, through contact, beside Wide at constant velocity. Not in the paper."""
+"""Base under its constant head, beyond contact, and Wide at constant velocity. Not in the paper."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ EVERY = 10.0
 
 @style.styled
 def draw(closing: Path, wide: Path) -> Figure:
-    """Outlines, conductivities of both runs, and flow, uptake and growth of base over their largest."""
-    made = style.figure(5.0)
-    panels = made.subplot_mosaic([["outlines", "outlines"], ["fall", "restricted"]], height_ratios=[1, 1.1])
+    """Outlines, conductivities of both runs, and flow, uptake and growth of Base over their largest values."""
+    figure = style.figure(5.0)
+    panels = figure.subplot_mosaic([["outlines", "outlines"], ["fall", "restricted"]], height_ratios=[1, 1.1])
     _outlines(panels["outlines"], closing)
     _fall(panels["fall"], closing, wide)
     _restricted(panels["restricted"], closing)
@@ -32,53 +32,54 @@ def draw(closing: Path, wide: Path) -> Figure:
         style.grid(panels[name])
         panels[name].legend(loc="upper right", bbox_to_anchor=(0.93, 1.0))
     style.number_panels(*panels.values())
-    return made
+    return figure
 
 
 def _outlines(axes: Axes, closing: Path) -> None:
-    """As in Figure 6, and the first in contact with the opposite wall."""
+    """Outlines as in Figure 6, and the first one in contact with the opposite wall."""
     figure_6.outlines(axes, closing, EVERY)
     axes.set_title("outlines of Base")
-    meets = contact(closing)
-    if np.isfinite(meets):
-        state = states.near(closing, meets)
+    contact_time = contact(closing)
+    if np.isfinite(contact_time):
+        state = states.near(closing, contact_time)
         style.aggregate(axes, figure_6.smooth(state.rim, state.width), filled=False, edgecolor=style.RED, zorder=5,
-                        linestyle="--", label=f"in contact, {meets:g} h")
+                        linestyle="--", label=f"in contact, {contact_time:g} h")
         axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
 
 
 def _fall(axes: Axes, closing: Path, wide: Path) -> None:
-    named = ((closing, "Base (head)", style.BLUE), (wide, "Wide (velocity)", style.RED))
-    for folder, name, colour in named:
-        table, meets = states.series(folder), contact(folder)
+    curves = ((closing, "Base (head)", style.BLUE), (wide, "Wide (velocity)", style.RED))
+    for folder, name, colour in curves:
+        table, contact_time = states.series(folder), contact(folder)
         axes.plot(table["time_h"], table["conductivity_m_per_d"] / table["conductivity_m_per_d"][0], color=colour,
                   label=name)
-        if np.isfinite(meets):
-            axes.axvline(meets, color=colour, linewidth=0.8, linestyle=":")
-    axes.set(title="conductivity over the first", xlabel="time (h)", yscale="log", xlim=(0, None))
+        if np.isfinite(contact_time):
+            axes.axvline(contact_time, color=colour, linewidth=0.8, linestyle=":")
+    axes.set(title="conductivity over its first value", xlabel="time (h)", yscale="log", xlim=(0, None))
 
 
 def _restricted(axes: Axes, closing: Path) -> None:
     table = states.series(closing)
-    taken, rate = consumed(table), specific_growth(table)
+    uptake, rate = consumed(table), specific_growth(table)
     middles = 0.5 * (table["time_h"][1:] + table["time_h"][:-1])
     axes.plot(table["time_h"], table["mean_velocity_m_per_d"] / table["mean_velocity_m_per_d"].max(), color=style.BLUE,
               label="velocity")
-    axes.plot(table["time_h"], taken / taken.max(), color=style.RED, label="acceptor taken up")
+    axes.plot(table["time_h"], uptake / uptake.max(), color=style.RED, label="acceptor taken up")
     axes.plot(middles, rate / rate.max(), color=style.BLACK, label="growth rate of the area")
-    axes.set(title="Base, over the largest", xlabel="time (h)", yscale="log", xlim=(0, None))
+    axes.set(title="Base, over the largest value", xlabel="time (h)", yscale="log", xlim=(0, None))
 
 
 def caption(closing: Path, wide: Path) -> str:
-    """What is seen, with the velocities and the time of contact."""
-    table, meets = states.series(closing), contact(closing)
+    """Caption, with the velocities and the time of contact."""
+    table, contact_time = states.series(closing), contact(closing)
     velocity = table["mean_velocity_m_per_d"]
     rate = specific_growth(table)
-    touched = (f"The first row in contact with the opposite wall is that of {meets:g} h" if np.isfinite(meets)
-               else "The opposite wall is not touched")
-    return (f"Base carried on to {table['time_h'][-1]:g} h (preset `fast`). {touched}; the velocity falls from "
-            f"{velocity[0]:.3g} to {velocity[-1]:.2g} m/d. (a) Outlines every {EVERY:g} h, and dashed the first in "
-            "contact; (b) conductivity, beside "
-            "that of Wide, whose velocity is kept up, with the times of contact dotted; (c) velocity, acceptor taken "
-            f"up, and growth rate of the area, which falls from {rate[0]:.2g} to {rate[-1]:.2g} 1/h: the head drives "
-            "ever less water through, so that the aggregate starves before it plugs the pore.")
+    contact_sentence = "The aggregate does not touch the opposite wall"
+    if np.isfinite(contact_time):
+        contact_sentence = f"The first row in contact with the opposite wall is that of {contact_time:g} h"
+    return (f"Base, continued to {table['time_h'][-1]:g} h (preset `fast`). {contact_sentence}; the velocity falls "
+            f"from {velocity[0]:.3g} to {velocity[-1]:.2g} m/d. (a) Outlines every {EVERY:g} h; the first one in "
+            "contact is dashed. (b) Conductivity of Base and of Wide, whose mean velocity is constant; dotted lines "
+            f"mark contact. (c) Velocity, uptake of the acceptor, and growth rate of the area, which falls from "
+            f"{rate[0]:.2g} to {rate[-1]:.2g} 1/h. The constant head drives less and less water through the pore, so "
+            "that the aggregate starves before it plugs the pore.")

@@ -1,4 +1,4 @@
-"""Wide with one choice of its rheology, or of its contact with the walls, changed at a time. Not in the paper."""
+"""Wide with one change of its rheology or of its contact with the walls at a time. Not in the paper."""
 
 from __future__ import annotations
 
@@ -17,30 +17,30 @@ CLAIMS = ("C41",)
 
 COLOURS = ("#000000", "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 LABELS = ("as in the paper", *runs.VARIANTS)
-#: The curves are drawn this many hours to both sides of the first contact.
+#: The curves cover this many hours before and after the first contact.
 AROUND = 4.0
 
 
 @style.styled
 def draw(*folders: Path) -> Figure:
-    """The last outlines, and the conductivity around contact, a colour a run."""
-    made = style.figure(4.9)
-    panels = made.subplot_mosaic([["outlines"], ["conductivity"]], height_ratios=[1, 1.1])
+    """The last outlines, and the conductivity around contact; each run has a colour."""
+    figure = style.figure(4.9)
+    panels = figure.subplot_mosaic([["outlines"], ["conductivity"]], height_ratios=[1, 1.1])
     _outlines(panels["outlines"], folders)
     _conductivity(panels["conductivity"], folders)
     panels["conductivity"].legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
     style.number_panels(*panels.values())
-    return made
+    return figure
 
 
 def _outlines(axes: Axes, folders: tuple[Path, ...]) -> None:
-    shown = [states.last(folder) for folder in folders]
-    first, last = min(s.rim[:, 0].min() for s in shown), max(s.rim[:, 0].max() for s in shown)
-    style.pore(axes, (first - figure_6.MARGIN, last + figure_6.MARGIN), shown[0].width, 2.5)
-    for number, (state, colour) in enumerate(zip(shown, COLOURS)):
+    last_states = [states.last(folder) for folder in folders]
+    first, last = min(s.rim[:, 0].min() for s in last_states), max(s.rim[:, 0].max() for s in last_states)
+    style.pore(axes, (first - figure_6.MARGIN, last + figure_6.MARGIN), last_states[0].width, 2.5)
+    for number, (state, colour) in enumerate(zip(last_states, COLOURS)):
         style.aggregate(axes, figure_6.smooth(state.rim, state.width), filled=number == 0, edgecolor=colour,
                         linewidth=1.0, zorder=2 + 0.1 * number)
-    axes.set_title(f"outlines at {shown[0].time:g} h")
+    axes.set_title(f"outlines at {last_states[0].time:g} h")
 
 
 def _conductivity(axes: Axes, folders: tuple[Path, ...]) -> None:
@@ -49,19 +49,20 @@ def _conductivity(axes: Axes, folders: tuple[Path, ...]) -> None:
         axes.plot(table["time_h"], table["conductivity_m_per_d"], "-" if number == 0 else "--", color=colour,
                   label=label, linewidth=2.0 if number == 0 else 1.1, zorder=1 if number == 0 else 2)
     table = states.series(folders[0])
-    meets = min(contact(folders[0]), float(table["time_h"][-1]))
-    shown = table["conductivity_m_per_d"][np.abs(table["time_h"] - meets) <= AROUND]
+    contact_time = min(contact(folders[0]), float(table["time_h"][-1]))
+    conductivity = table["conductivity_m_per_d"][np.abs(table["time_h"] - contact_time) <= AROUND]
     axes.set(title="hydraulic conductivity of the pore", xlabel="time (h)", ylabel="m/d", yscale="log",
-             xlim=(meets - AROUND, meets + AROUND), ylim=(0.7 * shown.min(), 1.4 * shown.max()))
+             xlim=(contact_time - AROUND, contact_time + AROUND),
+             ylim=(0.7 * conductivity.min(), 1.4 * conductivity.max()))
     style.grid(axes)
 
 
 def caption(*folders: Path) -> str:
-    """What is seen, with the first rows in contact and the last conductivities."""
+    """Caption, with the first rows in contact and the last conductivities."""
     tables = [states.series(folder) for folder in folders]
-    told = "; ".join(f"{label}: {contact(folder):g} h and {table['conductivity_m_per_d'][-1]:.3g} m/d"
+    results = "; ".join(f"{label}: {contact(folder):g} h and {table['conductivity_m_per_d'][-1]:.3g} m/d"
                      for label, folder, table in zip(LABELS, folders, tables))
-    return (f"Wide to {tables[0]['time_h'][-1]:g} h with one choice changed at a time: new biomass born stress-free "
-            "(section 5), the fixed middles of the contact surfaces rechosen at every update, and the least film and "
-            "contact angle of 2.3.3 halved and doubled. (a) The last outlines; (b) the conductivity around contact. "
-            f"First row in contact, and conductivity at the end: {told}.")
+    return (f"Wide to {tables[0]['time_h'][-1]:g} h with one change at a time: new biomass is stress-free (section 5), "
+            "the fixed midpoints of the contact surfaces are chosen anew at every update, or the least film or contact "
+            "angle of 2.3.3 is halved or doubled. (a) The last outlines; (b) the conductivity around contact. "
+            f"First row in contact, and conductivity at the end: {results}.")

@@ -1,5 +1,5 @@
-"""Where the aggregate would tear: the largest principal stress over time, its place, and the fluid. Not in the
-paper."""
+"""Where the aggregate would tear: the largest principal stress over time, its location, and the effect of the fluid.
+Not in the paper."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from paper_figures import figure_6, style
 from repro.errors import GrowthError
 from verification.claims.fluid_and_aggregate import peak, pressed, tension
 from verification.claims.levels import CONVERGED, PAIRED, Level, at_level, cached
-from verification.claims.runs import BASE, WIDE, Body, bodies, scene
+from verification.claims.runs import BASE, WIDE, Body, bodies, load_packaged
 
 TITLE = "Addition. Where the aggregate would tear"
 RUNS = ()
@@ -24,20 +24,20 @@ COMPUTED = CLAIMS
 
 LEVEL = Level(CONVERGED, PAIRED[1])
 NAMES, COLOURS = ("Base", "Wide"), (style.BLUE, style.RED)
-COURSES = (BASE, WIDE)
-#: Hours between the outlines, and the rows whose places are drawn.
+RUN_OVERRIDES = (BASE, WIDE)
+#: Hours between the outlines.
 EVERY = 5.0
 PASCAL = 1e6  # in a MPa
 
 
 @cached
-def course(run: tuple[str, ...], forced: bool) -> np.ndarray:
-    """(n, 4) largest principal stress (Pa), its place (um) and time (h) of every row but that of t = 0, with or without
-    the fluid's forces, as far as shape and flow agree."""
+def stress_history(run: tuple[str, ...], forced: bool) -> np.ndarray:
+    """Largest principal stress (Pa), its location (um) and the time (h) of every row after t = 0, (n, 4), with or
+    without the fluid's forces. The history ends where shape and flow do not converge."""
     rows = []
-    for found in bodies(run)[1:]:
+    for body in bodies(run)[1:]:
         try:
-            value, x, y, hours = tension(pressed(found) if forced else found)
+            value, x, y, hours = tension(pressed(body) if forced else body)
         except GrowthError:
             break
         rows.append((PASCAL * value, x, y, hours))
@@ -46,67 +46,68 @@ def course(run: tuple[str, ...], forced: bool) -> np.ndarray:
 
 @style.styled
 def draw() -> Figure:
-    """Size over time of both runs, and the places in Wide without and with the fluid's forces."""
-    made = style.figure(5.6)
-    panels = made.subplot_mosaic([["size"], ["without"], ["with"]], height_ratios=[1.2, 1, 1])
+    """Stress over time in both runs, and its location in Wide without and with the fluid's forces."""
+    figure = style.figure(5.6)
+    panels = figure.subplot_mosaic([["size"], ["without"], ["with"]], height_ratios=[1.2, 1, 1])
     with at_level(LEVEL):
         _sizes(panels["size"])
-        norm = Normalize(0, bodies(COURSES[1])[-1].pore.time)
+        norm = Normalize(0, bodies(RUN_OVERRIDES[1])[-1].pore.time)
         colours = ScalarMappable(norm, matplotlib.colormaps["viridis_r"])
         for name, forced in (("without", False), ("with", True)):
             _places(panels[name], colours, forced)
-    panels["without"].set(title="places in Wide, growth alone", xlabel="")
-    panels["with"].set_title("places in Wide, with the fluid's forces")
-    made.colorbar(colours, ax=[panels["without"], panels["with"]], label="time (h)", aspect=30)
+    panels["without"].set(title="locations in Wide, growth only", xlabel="")
+    panels["with"].set_title("locations in Wide, with the fluid's forces")
+    figure.colorbar(colours, ax=[panels["without"], panels["with"]], label="time (h)", aspect=30)
     style.number_panels(*panels.values())
-    return made
+    return figure
 
 
 def _sizes(axes: Axes) -> None:
-    for run, colour in zip(COURSES, COLOURS):
-        for forced, look in ((False, "-"), (True, "--")):
-            size, _, _, hours = course(run, forced).T
-            axes.plot(hours, size, look, color=colour)
+    for run, colour in zip(RUN_OVERRIDES, COLOURS):
+        for forced, line in ((False, "-"), (True, "--")):
+            size, _, _, hours = stress_history(run, forced).T
+            axes.plot(hours, size, line, color=colour)
     handles = [Line2D([], [], color=colour, label=name) for name, colour in zip(NAMES, COLOURS)]
-    handles += [Line2D([], [], color=style.BLACK, linestyle=look, label=label)
-                for look, label in (("-", "growth alone"), ("--", "with the fluid's forces"))]
+    handles += [Line2D([], [], color=style.BLACK, linestyle=line, label=label)
+                for line, label in (("-", "growth only"), ("--", "with the fluid's forces"))]
     axes.legend(handles=handles, loc="upper left")
     axes.set(title="largest principal stress", xlabel="time (h)", ylabel="Pa", yscale="log", xlim=(0, None))
     style.grid(axes)
 
 
 def _places(axes: Axes, colours: ScalarMappable, forced: bool) -> None:
-    """Outlines every EVERY hours, and where the stress is largest in every row."""
-    shown = [found for found in bodies(COURSES[1]) if found.pore.time % EVERY == 0]
-    reach = np.concatenate([found.outline.points[:, 0] for found in shown])
-    ends, width = (reach.min() - figure_6.MARGIN, reach.max() + figure_6.MARGIN), shown[0].grid.width
+    """Outlines every EVERY hours, and the location of the largest stress in every row."""
+    outlined = [body for body in bodies(RUN_OVERRIDES[1]) if body.pore.time % EVERY == 0]
+    reach = np.concatenate([body.outline.points[:, 0] for body in outlined])
+    ends, width = (reach.min() - figure_6.MARGIN, reach.max() + figure_6.MARGIN), outlined[0].grid.width
     style.pore(axes, ends, width, 2.5)
     axes.set_anchor("W")
-    for found in shown:
-        style.aggregate(axes, _rim(found), filled=False, edgecolor=colours.to_rgba(found.pore.time), linewidth=0.7)
-    _, x, y, hours = course(COURSES[1], forced).T
+    for body in outlined:
+        style.aggregate(axes, _rim(body), filled=False, edgecolor=colours.to_rgba(body.pore.time), linewidth=0.7)
+    _, x, y, hours = stress_history(RUN_OVERRIDES[1], forced).T
     axes.scatter(x, y, c=colours.to_rgba(hours), s=16, edgecolors="black", linewidths=0.4, zorder=5)
 
 
-def _rim(found: Body) -> np.ndarray:
-    return figure_6.smooth(found.outline.corners.points, found.grid.width)
+def _rim(body: Body) -> np.ndarray:
+    return figure_6.smooth(body.outline.corners.points, body.grid.width)
 
 
 def caption() -> str:
-    """What is seen: size and place at the end of both runs, and how far the fluid's forces go."""
+    """Caption, with stress and location at the end of both runs, and the effect of the fluid's forces."""
     with at_level(LEVEL):
-        ends = [(bodies(run)[-1].pore.time, peak(bodies(run)[-1])) for run in COURSES]
-        forced = course(COURSES[1], True)
-        without = course(COURSES[1], False)[len(forced) - 1]
-        modulus, last = PASCAL * scene(*COURSES[0]).growth.shear_modulus, bodies(COURSES[1])[-1].pore.time
-    told = "; ".join(f"{name} {modulus * most.value:.3g} Pa at ({most.x:.0f}, {most.y:.0f}) µm and {hours:g} h"
-                     for name, (hours, most) in zip(NAMES, ends))
+        ends = [(bodies(run)[-1].pore.time, peak(bodies(run)[-1])) for run in RUN_OVERRIDES]
+        forced = stress_history(RUN_OVERRIDES[1], True)
+        without = stress_history(RUN_OVERRIDES[1], False)[len(forced) - 1]
+        modulus = PASCAL * load_packaged(*RUN_OVERRIDES[0]).growth.shear_modulus
+        last = bodies(RUN_OVERRIDES[1])[-1].pore.time
+    peaks = "; ".join(f"{name} {modulus * stress.value:.3g} Pa at ({stress.x:.0f}, {stress.y:.0f}) µm and {hours:g} h"
+                     for name, (hours, stress) in zip(NAMES, ends))
     size, x, y, hours = forced[-1]
-    until = ("" if hours == last else " Later the head that drives the constant velocity through the plug bends it so "
-                                      "far that shape and flow do not agree.")
-    return (f"(a) Largest principal stress of a triangle of the aggregate, of a modulus of {modulus:g} Pa. In the mean "
-            f"over a tenth of the pore's width, on this mesh: {told}; C40 tells how far the place hangs on the mesh. "
-            f"(b) Where it is in Wide, between outlines every {EVERY:g} h: in the middle first, then near the lower "
-            f"wall. (c) The same aggregates at rest under the fluid's forces: {size:.3g} Pa instead of "
+    note = ("" if hours == last else " Later the head that drives the constant velocity bends the plug so far that "
+                                     "shape and flow do not converge.")
+    return (f"(a) Largest principal stress of a triangle of the aggregate, whose modulus is {modulus:g} Pa. Means over "
+            f"a tenth of the pore's width on this mesh: {peaks}; C40 reports how the location depends on the mesh. "
+            f"(b) Its location in Wide, with outlines every {EVERY:g} h: first in the middle, then near the lower "
+            f"wall. (c) The same aggregates in equilibrium with the fluid's forces: {size:.3g} Pa instead of "
             f"{without[0]:.3g} Pa at {hours:g} h, at ({x:.0f}, {y:.0f}) µm instead of ({without[1]:.0f}, "
-            f"{without[2]:.0f}) µm.{until}")
+            f"{without[2]:.0f}) µm.{note}")

@@ -16,7 +16,7 @@ TITLE = "Figure 2. The pore, its domains and boundaries"
 RUNS = ()
 CLAIMS = ("C29", "C31")
 
-#: The schematic aggregate is this thick, over the pore's width; real ones grow from the seed to all of it.
+#: Thickness of the schematic aggregate over the pore's width. In runs it grows from that of the seed up to one.
 THICKNESS = 0.6
 
 
@@ -24,19 +24,19 @@ THICKNESS = 0.6
 def draw() -> Figure:
     """The pore to scale, the aggregate closer, and how a thin layer of fluid closes."""
     scene = runs.BASE.load()
-    made = style.figure(4.1)
-    panels = made.subplot_mosaic([["pore", "pore"], ["domains", "closing"]], height_ratios=[1, 2.4],
+    figure = style.figure(4.1)
+    panels = figure.subplot_mosaic([["pore", "pore"], ["domains", "closing"]], height_ratios=[1, 2.4],
                                  width_ratios=[1.45, 1])
     outline = half_disc(THICKNESS * scene.pore.width, 3 * ACROSS_AGGREGATE)
     _pore(panels["pore"], scene, outline)
     _domains(panels["domains"], scene, outline)
     _closing(panels["closing"], scene)
     style.number_panels(*panels.values())
-    return made
+    return figure
 
 
 def _pore(axes: Axes, scene: Scene, outline: Outline) -> None:
-    """The whole pore."""
+    """The pore to scale."""
     width, end = scene.pore.width, scene.pore.length / 2
     style.pore(axes, (-end, end), width, 4)
     style.aggregate(axes, outline.points)
@@ -51,14 +51,14 @@ def _pore(axes: Axes, scene: Scene, outline: Outline) -> None:
 
 
 def inflow(axes: Axes, ends: tuple[float, float], width: float, length: float) -> None:
-    """Arrows of the parabolic velocity at the inlet, the longest one `length` um."""
+    """Arrows of the parabolic velocity at the inlet; the longest has `length` um."""
     for y in np.linspace(0, width, 7)[1:-1]:
         tip = ends[0] + 4 * length * y * (width - y) / width**2
         style.arrow(axes, (ends[0], y), (tip, y))
 
 
 def _domains(axes: Axes, scene: Scene, outline: Outline) -> None:
-    """Domains and boundaries around the aggregate, with the point that stays in place."""
+    """Domains and boundaries around the aggregate, with its fixed point."""
     width, reach = scene.pore.width, 1.5 * outline.thickness
     style.pore(axes, (-reach, reach), width, 2)
     style.aggregate(axes, outline.points)
@@ -74,7 +74,7 @@ def _domains(axes: Axes, scene: Scene, outline: Outline) -> None:
 
 
 def _closing(axes: Axes, scene: Scene) -> None:
-    """An aggregate on the opposite wall: the nodes that `closing_nodes` joins to it, and the least gap allowed."""
+    """An aggregate at the opposite wall: the nodes that `closing_nodes` joins to it, and the least allowed gap."""
     width = scene.pore.width
     film, angle = scene.growth.minimum_film, scene.growth.minimum_contact_angle
     outline = flattened(width)
@@ -97,21 +97,21 @@ def _closing(axes: Axes, scene: Scene) -> None:
 
 
 def flattened(width: float) -> Outline:
-    """A half-disc a little thicker than the pore is wide, cut off by the opposite wall."""
-    whole = half_disc(1.02 * width, 4 * ACROSS_AGGREGATE)
-    beyond = whole.points[:, 1] >= width
-    points = np.column_stack([whole.points[:, 0], np.minimum(whole.points[:, 1], width)])
-    return Outline(points, np.where(beyond, TOP, whole.wall), whole.fixed, points)
+    """A half-disc slightly thicker than the pore's width, truncated by the opposite wall."""
+    disc = half_disc(1.02 * width, 4 * ACROSS_AGGREGATE)
+    beyond = disc.points[:, 1] >= width
+    points = np.column_stack([disc.points[:, 0], np.minimum(disc.points[:, 1], width)])
+    return Outline(points, np.where(beyond, TOP, disc.wall), disc.fixed, points)
 
 
 def caption() -> str:
-    """What is seen, with the model's dimensions."""
+    """Caption, with the model's dimensions."""
     scene = runs.BASE.load()
     film, angle = scene.growth.minimum_film, np.degrees(scene.growth.minimum_contact_angle)
     return (f"Drawn by the code that the model uses. (a) A pore {scene.pore.length:g} µm long and "
             f"{scene.pore.width:g} µm wide (Base) with an aggregate on its lower wall; water enters on the left with a "
             "parabolic velocity. (b) Fluid Ω_F and biomass Ω_B, their interface Γ_B-F, the walls Γ_w, and the contact "
-            "surface Γ_B-w (red), on which the aggregate slides; its middle, the origin, stays in place. The half-disc "
-            f"shown is {THICKNESS * scene.pore.width:g} µm thick, the seed of the runs {scene.aggregate.radius:g} µm. "
-            f"(c) On the opposite wall: fluid thinner than {film:g} µm, or than a wedge of {angle:.1f}° beside the "
-            "contact (dashed), closes; the nodes in red join the wall next.")
+            "surface Γ_B-w (red), on which the aggregate slides; its midpoint, the origin, is fixed. The half-disc is "
+            f"{THICKNESS * scene.pore.width:g} µm thick, the seed of the runs {scene.aggregate.radius:g} µm. "
+            f"(c) At the opposite wall, fluid thinner than {film:g} µm, or than a wedge of {angle:.1f}° beside the "
+            "contact (dashed), closes. The nodes in red join the wall next.")

@@ -1,4 +1,4 @@
-"""Figure 3: what is meshed of the pore and the conditions on each boundary, drawn with the model's own geometry."""
+"""Figure 3: the meshed part of the pore and the conditions on each boundary, drawn with the model's own geometry."""
 
 from __future__ import annotations
 
@@ -21,20 +21,20 @@ Ends = tuple[float, float]
 
 @style.styled
 def draw(scene: Scene | None = None) -> Figure:
-    """The pore of a scene, Base by default, with its meshed part, and that part closer."""
+    """The pore of a scene, Base by default, with its meshed part, and a close-up of that part."""
     scene = scene or runs.BASE.load()
     outline = half_disc(THICKNESS * scene.pore.width, 3 * ACROSS_AGGREGATE)
     ends = meshed_extent(outline, scene.pore.width, scene.pore.length)
-    made = style.figure(4.0)
-    whole, part = made.subplots(2, 1, height_ratios=[1, 2.6])
-    _whole(whole, scene, outline, ends)
+    figure = style.figure(4.0)
+    pore, part = figure.subplots(2, 1, height_ratios=[1, 2.6])
+    _pore(pore, scene, outline, ends)
     _part(part, scene, outline, ends)
-    style.number_panels(whole, part)
-    return made
+    style.number_panels(pore, part)
+    return figure
 
 
-def _whole(axes: Axes, scene: Scene, outline: Outline, ends: Ends) -> None:
-    """The whole pore: what is known in closed form outside the meshed part."""
+def _pore(axes: Axes, scene: Scene, outline: Outline, ends: Ends) -> None:
+    """The pore with the closed forms that apply outside the meshed part."""
     width, end = scene.pore.width, scene.pore.length / 2
     style.channel(axes, (-end, end), width, 4)
     style.aggregate(axes, outline.points, zorder=2)
@@ -68,20 +68,20 @@ def _conditions(axes: Axes, ends: Ends, width: float, radius: float) -> None:
     axes.text(0.98 * ends[1], 0.83 * width, outlet, ha="right", va="center")
     axes.text(0, 1.1 * width, "walls: $u = 0$, $\\partial C/\\partial y = 0$  (13)", ha="center", va="bottom")
     axes.text(0, 0.55 * radius, "biomass:\n$J = \\theta$  (24)", ha="center", va="center")
-    axes.text(0, -0.1 * width, "contact with the wall: slides without friction, never leaves it, its middle stays",
+    axes.text(0, -0.1 * width, "contact with the wall: permanent, frictionless sliding, fixed midpoint",
               ha="center", va="top", color=style.RED)
     axes.text(0, 0.66 * width, "interface: no forces on the biomass", ha="center", va="center", color=style.RIM)
 
 
 def caption(scene: Scene | None = None) -> str:
-    """What is seen, with the extents that the model chooses."""
+    """Caption, with the extents that the model chooses."""
     scene = scene or runs.BASE.load()
     width, length = scene.pore.width, scene.pore.length
     grown, seed = (meshed_extent(half_disc(radius, ACROSS_AGGREGATE), width, length)
                    for radius in (THICKNESS * width, scene.aggregate.radius))
-    return (f"Drawn by the code that the model uses. (a) Of the pore's {length:g} µm only the part around the "
-            "aggregate is meshed: outside it the flow is that between two plates, substrate upstream follows (26) and "
-            "does not change downstream. (b) The conditions on the boundaries of that part; inlet and outlet take over "
-            "those of the pore. A new mesh reaches ten times the aggregate's thickness or 1.5 pore widths from it, "
-            f"whichever is less: {grown[1] - grown[0]:g} µm in all around the half-disc shown, {THICKNESS * width:g} "
-            f"µm thick, and {seed[1] - seed[0]:g} µm around the seed.")
+    return (f"Drawn by the code that the model uses. (a) Only the part of the {length:g} µm long pore around the "
+            "aggregate is meshed. Outside it the flow is that between two plates; concentrations follow (26) upstream "
+            "and are constant downstream. (b) The conditions on the boundaries of that part; inlet and outlet have "
+            "those of the pore's ends. A new mesh extends ten times the aggregate's thickness or 1.5 pore widths from "
+            f"it, whichever is less. Its length is {grown[1] - grown[0]:g} µm around this half-disc, which is "
+            f"{THICKNESS * width:g} µm thick, and {seed[1] - seed[0]:g} µm around the seed.")

@@ -18,19 +18,19 @@ CLAIMS = ("C07", "C19")
 def draw(folder: Path) -> Figure:
     """Fluid and aggregate with every triangle."""
     state = states.first(folder)
-    made = style.figure(3.5)
-    axes = made.subplots()
+    figure = style.figure(3.5)
+    axes = figure.subplots()
     style.pore(axes, state.ends, state.width, 0.8)
     style.aggregate(axes, state.rim, linewidth=1.0, zorder=3, alpha=0.8)
-    axes.triplot(state.whole, color=style.BLACK, linewidth=0.35, zorder=4)
-    return made
+    axes.triplot(state.triangulation, color=style.BLACK, linewidth=0.35, zorder=4)
+    return figure
 
 
 def caption(folder: Path) -> str:
-    """What is seen, with the mesh's own numbers."""
+    """Caption, with the numbers of the mesh."""
     state = states.first(folder)
     across = state.rim[:, 0].max() - state.rim[:, 0].min()
-    return (f"The part of the pore that is meshed at t = 0: {np.ptp(state.ends):.0f} µm of it around a seed "
-            f"{across:.0f} µm across (amber), between the two walls. The mesh has {len(state.points)} nodes and "
+    return (f"The meshed part of the pore at t = 0: {np.ptp(state.ends):.0f} µm between the two walls, around a seed "
+            f"of {across:.0f} µm (amber). The mesh has {len(state.points)} nodes and "
             f"{len(state.triangles)} triangles, {np.count_nonzero(state.biomass)} of them in the aggregate; one mesh "
             "serves flow, substrates and growth.")

@@ -23,22 +23,22 @@ SPACING = 5.0
 def draw(folder: Path) -> Figure:
     """Speed in colour, velocity as arrows."""
     state = states.last(folder, "before_expansion")
-    made = style.figure(2.65)
-    axes = made.subplots()
+    figure = style.figure(2.65)
+    axes = figure.subplots()
     style.channel(axes, state.ends, state.width, 1.2)
     speed = np.linalg.norm(state.nodes["velocity_m_per_d"], axis=1)
-    colours = axes.tricontourf(state.whole, speed, levels=np.linspace(0, speed.max(), 21), cmap="Blues",
+    colours = axes.tricontourf(state.triangulation, speed, levels=np.linspace(0, speed.max(), 21), cmap="Blues",
                                vmax=1.5 * speed.max())
     style.aggregate(axes, state.rim, alpha=0.8)
-    where = _grid(state)
-    axes.quiver(*where.T, *state.at("velocity_m_per_d", where).T, color=style.BLACK, angles="xy", scale_units="xy",
+    points = _grid(state)
+    axes.quiver(*points.T, *state.at("velocity_m_per_d", points).T, color=style.BLACK, angles="xy", scale_units="xy",
                 scale=speed.max() / (1.25 * SPACING), width=0.0013, headwidth=4, headlength=5)
     style.colour_bar(colours, axes, "speed (m/d)", ticks=np.arange(0, speed.max(), 0.5))
-    return made
+    return figure
 
 
 def _grid(state: State) -> np.ndarray:
-    """(K, 2) places of the arrows: symmetric about x = 0, clear of walls and ends."""
+    """Positions of the arrows (K, 2), symmetric about x = 0 and away from walls and ends."""
     reach = SPACING * np.floor(min(-state.ends[0], state.ends[1]) / SPACING - 0.5)
     x = np.arange(-reach, reach + SPACING / 2, SPACING)
     y = np.arange(SPACING / 2, state.width, SPACING)
@@ -46,21 +46,21 @@ def _grid(state: State) -> np.ndarray:
 
 
 def share_through(state: State) -> float:
-    """Share of the flow that crosses x = 0 inside the aggregate."""
+    """Share of the flow at x = 0 that passes through the aggregate."""
     y = (np.arange(2000) + 0.5) * state.width / 2000
-    where = np.column_stack([0 * y, y])
-    inside = state.biomass[located(state.points, state.triangles, where).triangle]
-    u = state.at("velocity_m_per_d", where)[:, 0]
+    points = np.column_stack([0 * y, y])
+    inside = state.biomass[located(state.points, state.triangles, points).triangle]
+    u = state.at("velocity_m_per_d", points)[:, 0]
     return float(u[inside].sum() / u.sum())
 
 
 def caption(folder: Path) -> str:
-    """What is seen, with the velocities of the run."""
+    """Caption, with the velocities of the run."""
     shaped, end = states.last_step(folder)
-    begin, seen, later = (states.row(folder, t)["mean_velocity_m_per_d"] for t in (0.0, shaped, end))
+    initial, velocity, final = (states.row(folder, t)["mean_velocity_m_per_d"] for t in (0.0, shaped, end))
     through = share_through(states.last(folder, "before_expansion"))
-    return (f"Velocity in Base at t = {end:g} h before the aggregate expands, that is in the shape it was given at "
-            f"{shaped:g} h: speed in colour, arrows in proportion to the velocity, the aggregate in amber. The "
+    return (f"Velocity in Base at t = {end:g} h before the aggregate expands, in the shape of {shaped:g} h: speed in "
+            f"colour, arrows in proportion to the velocity, the aggregate in amber. The "
             f"water in the aggregate is 2000 times more viscous and {100 * through:.2g} % of the flow crosses it at "
-            f"x = 0. Under a constant head the mean velocity has fallen from {begin:.2f} m/d to {seen:.2f} m/d in the "
-            f"shape shown, and falls to {later:.2f} m/d in the next one.")
+            f"x = 0. Under a constant head the mean velocity has fallen from {initial:.2f} m/d to {velocity:.2f} m/d "
+            f"in this shape, and falls to {final:.2f} m/d in the next one.")

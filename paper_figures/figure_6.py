@@ -23,7 +23,7 @@ CLAIMS = ("C12", "C25", "C29", "C31")
 
 #: Hours between outlines.
 EVERY = 5.0
-#: Channel shown on both sides of the widest one, um.
+#: Length of channel drawn on both sides of the widest outline, um.
 MARGIN = 15.0
 #: Points of the drawn line for each edge of the outline.
 PER_EDGE = 8
@@ -31,33 +31,33 @@ PER_EDGE = 8
 
 @style.styled
 def draw(folder: Path) -> Figure:
-    """One outline every EVERY hours, coloured by its time."""
-    made = style.figure(2.75)
-    outlines(made.subplots(), folder)
-    return made
+    """Outlines every EVERY hours, coloured by time."""
+    figure = style.figure(2.75)
+    outlines(figure.subplots(), folder)
+    return figure
 
 
 def outlines(axes: Axes, folder: Path, hours: float | None = None) -> None:
-    """The channel with the outlines of a run every so many hours, EVERY by default, the latest at the back, and a scale
-    of their times."""
+    """The channel with the outlines of a run every ``hours`` hours, EVERY by default, the latest at the back, and a
+    colour scale of their times."""
     hours = hours or EVERY
-    shown = states.every(folder, hours)
-    first, last = min(s.rim[:, 0].min() for s in shown), max(s.rim[:, 0].max() for s in shown)
-    style.pore(axes, (first - MARGIN, last + MARGIN), shown[0].width, 2.5)
-    norm = BoundaryNorm(hours * (np.arange(len(shown) + 1) - 0.5), 256)
+    states_drawn = states.every(folder, hours)
+    first, last = min(s.rim[:, 0].min() for s in states_drawn), max(s.rim[:, 0].max() for s in states_drawn)
+    style.pore(axes, (first - MARGIN, last + MARGIN), states_drawn[0].width, 2.5)
+    norm = BoundaryNorm(hours * (np.arange(len(states_drawn) + 1) - 0.5), 256)
     colours = ScalarMappable(norm, matplotlib.colormaps["viridis_r"])
-    for state in reversed(shown):
+    for state in reversed(states_drawn):
         style.aggregate(axes, smooth(state.rim, state.width), facecolor=colours.to_rgba(state.time), edgecolor="white",
                         linewidth=0.9)
-    high = 0.5 * shown[0].width
+    high = 0.5 * states_drawn[0].width
     style.arrow(axes, (first - 0.95 * MARGIN, high), (first - 0.2 * MARGIN, high), 8, 1.4)
     axes.text(first - 0.9 * MARGIN, high + 4, "flow", color=style.BLUE, ha="left", va="bottom", fontsize=7)
-    style.colour_bar(colours, axes, "time (h)", ticks=[s.time for s in shown])
+    style.colour_bar(colours, axes, "time (h)", ticks=[s.time for s in states_drawn])
 
 
 def smooth(rim: np.ndarray, width: float) -> np.ndarray:
-    """(K, 2) the closed outline (M, 2) with a cubic spline through the nodes of each stretch between the walls, which
-    meets the walls at the corners that the outline has there."""
+    """Smooth a closed outline (M, 2): a cubic spline (K, 2) through the nodes of each stretch between the walls, which
+    meets the walls at the outline's corners."""
     wall = np.where(rim[:, 1] <= 0, 1, np.where(rim[:, 1] >= width, 2, 0))
     start = int(np.flatnonzero((wall > 0) & (np.roll(wall, -1) == 0))[0])
     points, wall = (np.roll(values, -start, axis=0) for values in (rim, wall))
@@ -68,27 +68,28 @@ def smooth(rim: np.ndarray, width: float) -> np.ndarray:
 
 
 def _curve(points: np.ndarray) -> np.ndarray:
-    """A spline through points (m, 2) by the length of the line between them, the last point left out."""
+    """A spline through points (m, 2), parametrized by length, without the last point."""
     along = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
     finer = np.interp(np.linspace(0, len(points) - 1, PER_EDGE * (len(points) - 1) + 1), np.arange(len(points)), along)
     return CubicSpline(along, points)(finer)[:-1]
 
 
 def upstream_share(folder: Path) -> float:
-    """Share of the area covered anew between the last two outlines that lies upstream of the seed's centre."""
+    """Share of the area newly covered between the last two outlines that lies upstream of the seed's centre."""
     return upstream_part(*(Polygon(state.rim) for state in states.every(folder, EVERY)[-2:]))
 
 
 def caption(folder: Path) -> str:
-    """What is seen, when contact came, and how the run ended."""
-    table, shown = states.series(folder), states.every(folder, EVERY)
-    hours, meets = table["time_h"], states.contact(folder)
-    contact = (f"It comes to touch the opposite wall between {hours[hours < meets][-1]:g} and {meets:g} h"
-               if np.isfinite(meets) else "It does not reach the opposite wall")
-    return (f"The aggregate of Wide every {EVERY:g} h from 0 to {shown[-1].time:g} h, between the walls of a pore "
-            f"{shown[0].width:.0f} µm wide at a constant mean velocity of {table['mean_velocity_m_per_d'][0]:.1f} m/d, "
-            f"from left to right. {contact} and spans x from {table['upstream_um'][-1]:.0f} to "
-            f"{table['downstream_um'][-1]:.0f} µm at the end. Of the area covered between the last two outlines, "
-            f"{100 * upstream_share(folder):.1f} % lies upstream of the first centre. Drawn is the converged "
-            f"solution by which the claims are judged (preset `accurate`), not the paper's scheme; between the walls a "
+    """Caption, with the time of contact and the end of the run."""
+    table, states_drawn = states.series(folder), states.every(folder, EVERY)
+    hours, contact_time = table["time_h"], states.contact(folder)
+    contact = (f"It touches the opposite wall between {hours[hours < contact_time][-1]:g} and {contact_time:g} h"
+               if np.isfinite(contact_time) else "It does not reach the opposite wall")
+    velocity = table["mean_velocity_m_per_d"][0]
+    return (f"The aggregate of Wide every {EVERY:g} h from 0 to {states_drawn[-1].time:g} h, between the walls of a "
+            f"pore {states_drawn[0].width:.0f} µm wide at a constant mean velocity of {velocity:.1f} m/d, from left to "
+            f"right. {contact} and spans x from {table['upstream_um'][-1]:.0f} to "
+            f"{table['downstream_um'][-1]:.0f} µm at the end. Of the area newly covered between the last two outlines, "
+            f"{100 * upstream_share(folder):.1f} % lies upstream of the seed's centre. The figure shows the converged "
+            f"solution by which the claims are judged (preset `accurate`), not the paper's scheme. Between the walls a "
             f"spline joins the outline's nodes. The run ended at {hours[-1]:g} h: {provenance(folder)['status']}.")

@@ -1,7 +1,7 @@
-"""The picture of the README: Base near its end and the outlines of Wide.
+"""The picture in the README: Base near its end and the outlines of Wide.
 
-`python -m paper_figures.overview` writes `paper_figures/overview.png`, which is committed; `make figures` leaves it
-alone.
+`python -m paper_figures.overview` writes `paper_figures/overview.png`, which is committed. `make figures` does not
+change it.
 """
 
 from __future__ import annotations
@@ -24,21 +24,21 @@ STREAMLINES = 10
 
 @style.styled
 def draw(base: Path, wide: Path) -> Figure:
-    """Substrate and streamlines around the aggregate of Base, and how the aggregate of Wide fills its pore."""
-    made = style.figure(5.5)
-    above, below = made.subplots(2, 1, height_ratios=[1, 1.08])
+    """Substrate and streamlines around the aggregate of Base, and the outlines of Wide."""
+    figure = style.figure(5.5)
+    above, below = figure.subplots(2, 1, height_ratios=[1, 1.08])
     state, (shaped, _) = states.last(base, "before_expansion"), states.last_step(base)
     _substrate(above, state)
     above.set_title(f"Base: electron acceptor and streamlines around the aggregate shaped at {shaped:g} h")
     figure_6.outlines(below, wide)
     below.set_title(f"Wide: outlines every {figure_6.EVERY:g} h")
-    return made
+    return figure
 
 
 def _substrate(axes: Axes, state: State) -> None:
-    """C_A in colour with streamlines that part the flow equally."""
+    """C_A in colour, with streamlines at equal increments of the flow."""
     style.channel(axes, state.ends, state.width, 1.2)
-    colours = axes.tricontourf(state.whole, state.nodes["acceptor_mg_per_L"], levels=20, cmap=style.MAP)
+    colours = axes.tricontourf(state.triangulation, state.nodes["acceptor_mg_per_L"], levels=20, cmap=style.MAP)
     axes.contour(*stream(state), levels=np.linspace(0, 1, STREAMLINES + 1)[1:-1], colors="white", linewidths=0.7)
     style.aggregate(axes, state.rim)
     style.colour_bar(colours, axes, "electron acceptor (mg/L)")
@@ -55,12 +55,12 @@ def stream(state: State) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 @style.styled
 def main() -> None:
-    """Draw and write it, its colours rounded: that halves the file."""
-    made = draw(*runs.folders([runs.BASE, *figure_6.RUNS]))
-    made.set_dpi(PIXELS_WIDE / style.PAGE)
-    style.lay_out(made)
-    made.canvas.draw()
-    shades = np.asarray(made.canvas.buffer_rgba()) / 255
+    """Draw and write the picture. Its colours are rounded, which halves the file."""
+    figure = draw(*runs.folders([runs.BASE, *figure_6.RUNS]))
+    figure.set_dpi(PIXELS_WIDE / style.PAGE)
+    style.lay_out(figure)
+    figure.canvas.draw()
+    shades = np.asarray(figure.canvas.buffer_rgba()) / 255
     imsave(TARGET, np.round(shades * SHADES) / SHADES, metadata={"Software": None})
 
 

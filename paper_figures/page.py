@@ -1,4 +1,4 @@
-"""`index.html`: every figure with its caption, what was run and the claims it bears on. Needs no network."""
+"""`index.html`: every figure with its caption, the commands of its runs and its claims. It needs no network."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ nav a { margin-right: .9rem; white-space: nowrap; } a { color: #0072B2; } .note 
 
 @dataclass(frozen=True)
 class Entry:
-    """One figure as the page tells it; `commands` are what to type for the runs behind it."""
+    """One figure of the page; `commands` reproduce its runs."""
 
     name: str
     title: str
@@ -35,12 +35,12 @@ class Entry:
 
 
 def write(entries: Iterable[Entry], endings: Iterable[str], folder: Path) -> None:
-    """Write `index.html` beside the pictures; `endings` say how each run ended."""
+    """Write `index.html` beside the pictures; `endings` describe how each run ended."""
     write_text(folder / "index.html", page(list(entries), endings))
 
 
 def page(entries: list[Entry], endings: Iterable[str]) -> str:
-    """The whole page; it is well-formed XML too."""
+    """The page as HTML that is well-formed XML."""
     links = "".join(f'<a href="#{escape(e.name)}">{escape(_short(e))}</a> ' for e in entries)
     return f"""<!DOCTYPE html>
 <html lang="en">
@@ -60,18 +60,18 @@ with verdicts as recorded in <code>verification/claims/claims.json</code>.</p>
 
 
 def also(module) -> tuple[str, ...]:
-    """What to type for the numbers that a figure computes with the functions of its claims, COMPUTED of them."""
+    """Commands for the numbers that a figure computes with the functions of the claims in COMPUTED."""
     return tuple(f"python -m verification.claims {id}" for id in getattr(module, "COMPUTED", ()))
 
 
 def _short(entry: Entry) -> str:
-    """Number of a figure of the paper, or what an addition shows."""
+    """The number of a figure of the paper, or the title of an addition."""
     kind, _, title = entry.title.partition(". ")
     return title if kind == "Addition" else kind
 
 
 def _section(entry: Entry) -> str:
-    """One figure."""
+    """The section of one figure."""
     name = escape(entry.name)
     run = "\n".join(entry.commands) or "# drawn from the geometry alone"
     claims = "".join(f"<li><b>{escape(key)}</b> {escape(STATEMENTS[key])}: "
@@ -80,9 +80,9 @@ def _section(entry: Entry) -> str:
 <h2>{escape(entry.title)}</h2>
 <img src="{name}.png" alt="{escape(entry.title)}"/>
 <p>{escape(entry.caption)} {escape(judged(entry.claims))} <a href="{name}.pdf">PDF</a></p>
-<h3>What was run</h3>
+<h3>Commands</h3>
 <pre>{escape(run)}</pre>
-<h3>Claims it bears on</h3>
+<h3>Claims</h3>
 <ul>{claims}</ul>
 </section>
 """

@@ -21,14 +21,14 @@ CONTOURS = 20
 
 @style.styled
 def draw(folder: Path) -> Figure:
-    """C_A and C_D in the meshed part, X_A and X_I over what there was 12 min before; a colour scale each."""
+    """C_A and C_D in the meshed part, X_A and X_I over the density of 12 min before; each with a colour scale."""
     state = states.last(folder, "before_expansion")
-    grown = {name: since(folder, f"{name}_biomass") for name in ("active", "inert")}
-    made = style.figure(4.35)
-    panels = made.subplot_mosaic([["acceptor", "donor"], ["active", "inert"]], height_ratios=[1, 1.7])
+    grown = {name: grown_since(folder, f"{name}_biomass") for name in ("active", "inert")}
+    figure = style.figure(4.35)
+    panels = figure.subplot_mosaic([["acceptor", "donor"], ["active", "inert"]], height_ratios=[1, 1.7])
     for name, symbol in (("acceptor", "$C_A$"), ("donor", "$C_D$")):
         style.channel(panels[name], state.ends, state.width, 1.5)
-        _shade(panels[name], state.whole, state.nodes[f"{name}_mg_per_L"], f"{symbol} (mg/L)")
+        _shade(panels[name], state.triangulation, state.nodes[f"{name}_mg_per_L"], f"{symbol} (mg/L)")
         style.aggregate(panels[name], state.rim, filled=False, edgecolor="white")
         panels[name].set_title(f"electron {name}")
     for name, label, scale in (("active", "$X_A / X_m$ (–)", 1), ("inert", "$X_I / X_m$ (10$^{-3}$)", 1e3)):
@@ -39,14 +39,15 @@ def draw(folder: Path) -> Figure:
         style.aggregate(panels[name], state.rim, filled=False)
         panels[name].set_title(f"{name} biomass")
     style.number_panels(*panels.values())
-    return made
+    return figure
 
 
-def since(folder: Path, name: str) -> np.ndarray:
-    """(N,) a biomass before the last expansion over the density X_A + X_I of 12 min before, at the same nodes.
+def grown_since(folder: Path, name: str) -> np.ndarray:
+    """A biomass before the last expansion over the density X_A + X_I of 12 min before at the same nodes, (N,).
 
-    That density is X_m but for what (34) leaves at the interface, where the constraint J = theta holds on the average
-    of the triangles around a node: 0.1 %, which would take half of the colours and is not growth. In the fluid zero.
+    That density differs from X_m by 0.1 % at the interface, where (34) satisfies J = theta on the average of the
+    triangles around a node. This difference is not growth and would take half of the colours. In the fluid the ratio
+    is zero.
     """
     shaped, _ = states.last_step(folder)
     before, after = states.near(folder, shaped), states.last(folder, "before_expansion")
@@ -55,9 +56,9 @@ def since(folder: Path, name: str) -> np.ndarray:
 
 
 def _shade(axes: Axes, triangulation: Triangulation, values: np.ndarray, label: str) -> None:
-    """Colours with CONTOURS equally spaced lines between the extremes of the values in the triangles."""
-    seen = values[triangulation.triangles]
-    levels = np.linspace(seen.min(), seen.max(), CONTOURS + 2)
+    """Colours, with CONTOURS equally spaced lines between the extremes of the values in the triangles."""
+    inside = values[triangulation.triangles]
+    levels = np.linspace(inside.min(), inside.max(), CONTOURS + 2)
     colours = axes.tricontourf(triangulation, values, levels=levels, cmap=style.MAP)
     axes.tricontour(triangulation, values, levels=levels[1:-1], colors=style.BLACK, linewidths=0.4)
     bar = axes.figure.colorbar(colours, ax=axes, location="bottom", label=label, aspect=30, pad=0.02)
@@ -66,23 +67,24 @@ def _shade(axes: Axes, triangulation: Triangulation, values: np.ndarray, label: 
 
 
 def caption(folder: Path) -> str:
-    """What is seen, with the extremes and what enters and leaves."""
+    """Caption, with the extremes and the concentrations at inlet and outlet."""
     shaped, end = states.last_step(folder)
     state = states.last(folder, "before_expansion")
     acceptor = [state.carried("acceptor_mg_per_L", side) for side in (0, 1)]
     donor = [state.carried("donor_mg_per_L", side) for side in (0, 1)]
-    active, inert = (since(folder, f"{name}_biomass")[state.body] for name in ("active", "inert"))
-    return (f"Base at t = {end:g} h before the aggregate expands: the shape is that of {shaped:g} h and carries what "
-            "has grown since. (a, b) The substrates in the meshed part, flow from left to right; flow-weighted, the "
-            f"acceptor falls from {acceptor[0]:.2f} mg/L at the meshed inlet to {acceptor[1]:.2f} mg/L at the outlet, "
+    active, inert = (grown_since(folder, f"{name}_biomass")[state.body] for name in ("active", "inert"))
+    return (f"Base at t = {end:g} h before the aggregate expands: the shape is that of {shaped:g} h and contains the "
+            "biomass grown since. (a, b) The substrates in the meshed part; the flow is from left to right. The "
+            f"flow-weighted mean of the acceptor falls from {acceptor[0]:.2f} mg/L at the inlet of the meshed part to "
+            f"{acceptor[1]:.2f} mg/L at the outlet, "
             f"the donor from {donor[0]:.2f} to {donor[1]:.2f} mg/L (1 mg/L is 1 K_s){_start(folder, shaped)}. (c, d) "
-            f"Active and inert biomass over the density of {shaped:g} h, which is X_m to 0.1 %, so that what is seen "
+            f"Active and inert biomass over the density of {shaped:g} h, which is X_m to 0.1 %, so that the variation "
             f"has grown since: X_A from {active.min():.4f} to {active.max():.4f}, X_I from {inert.min():.5f} to "
-            f"{inert.max():.5f}. {CONTOURS} equally spaced contour lines and an own colour scale in each panel.")
+            f"{inert.max():.5f}. Each panel has {CONTOURS} equally spaced contour lines and a separate colour scale.")
 
 
 def _start(folder: Path, shaped: float) -> str:
-    """The effluents in the same shape before anything has grown in it."""
+    """The effluents in the same shape before biomass has grown in it."""
     row = states.row(folder, shaped)
     return (f"; at {shaped:g} h, with less biomass in the same shape, {row['effluent_acceptor_mg_per_L']:.2f} and "
             f"{row['effluent_donor_mg_per_L']:.2f} mg/L left")

@@ -1,9 +1,9 @@
-"""The replication note, `replication.md`: `replication_template.md` with the numbers that the runs have left.
+"""The replication note, `replication.md`: `replication_template.md` with the numbers of the committed records.
 
-`python -m paper_figures.replication` takes the committed record of `make claims` (`verification/claims/claims.json`),
-those of `make verify`, `make bench` and `make sensitivity`, the errata and the citation, and fills in the template's
-`{{...}}`. A number is named by its claim and what is counted, `{{C01 | mean velocity at t = 0 (m/d) | .2f}}`, or "off"
-for its difference from the printed one; `{{C15 | contradicted}}` says C15 and is refused where that is not the verdict.
+`python -m paper_figures.replication` fills in the fields `{{...}}` of the template from the committed records of
+`make claims` (`verification/claims/claims.json`), `make verify`, `make bench` and `make sensitivity`, the errata and
+the citation. A field names a claim and its quantity, `{{C01 | mean velocity at t = 0 (m/d) | .2f}}`; the format "off"
+gives the difference from the printed number. `{{C15 | contradicted}}` gives C15 and fails if the verdict is another.
 """
 
 from __future__ import annotations
@@ -38,26 +38,26 @@ from verification.claims import report as claims_record
 from verification.evidence.writing import markdown_row
 from verification.sensitivity.wide import LEFT_OUT, verdicts
 
-HERE = Path(__file__).parent
-ROOT = HERE.parent
-NOTE, TEMPLATE = (HERE / name for name in ("replication.md", "replication_template.md"))
+FOLDER = Path(__file__).parent
+ROOT = FOLDER.parent
+NOTE, TEMPLATE = (FOLDER / name for name in ("replication.md", "replication_template.md"))
 REPORT = ROOT / "verification" / "report"
 FIELD = re.compile(r"\{\{(.+?)\}\}")
-#: What verdicts are called in the template; and what is told of a claim that has one.
+#: Names of the verdicts in the template, and the explanations that the note gives for each verdict.
 NAMES = dict(zip(VERDICTS, ("reproduced", "rounding", "changed", "contradicted", "undecided")))
 WHY = {WITHIN_ROUNDING: (("As printed", "reason"), ("Inputs", "rounding")), CHANGED: (("Changed", "change"),),
        CONTRADICTED: (("Why not", "reason"),), UNDECIDED: (("Why", "reason"),)}
 WIDTH = 120
 
 
-def told() -> dict:
-    """What the note is made of: the committed claims, and the environment of the committed figures."""
+def read_records() -> dict:
+    """Read the committed claims, and the environment of the committed figures."""
     environment = json.loads(manifest.COMMITTED.read_text(encoding="utf-8"))["environment"]
     return {"environment": environment, "claims": claims_record.read()}
 
 
 def fields(known: dict) -> dict[str, Callable[[], str]]:
-    """What each name of the template without a claim stands for."""
+    """The text of each field of the template that names no claim."""
     claims = known["claims"]
     return {**_about(), **_verdicts(claims), **_bench(), **_errata(),
             "verify": _verified, "audit.defaults": _of_defaults, **_supplies(),
@@ -72,53 +72,53 @@ def fields(known: dict) -> dict[str, Callable[[], str]]:
 
 
 def _supplies() -> dict[str, Callable[[], str]]:
-    """What other supplies make of Figure 6."""
-    found = sensitivity.record()["supplies"]
-    supplies, times = list(map(float, found)), [known["contact_time"] for known in found.values()]
-    every, some, none = verdicts(found)
+    """Fields on Figure 6 with other supplies."""
+    supplies_record = sensitivity.record()["supplies"]
+    supplies, times = list(map(float, supplies_record)), [known["contact_time"] for known in supplies_record.values()]
+    every, some, none = verdicts(supplies_record)
     return {"supplies.range": lambda: f"{min(supplies):g} to {max(supplies):g}",
             "supplies.contact": lambda: f"{max(times):.0f} to {min(times):.0f}",
             "supplies.total": lambda: str(len(every + some + none)), "supplies.all": lambda: str(len(every)),
             "supplies.some": lambda: str(len(some)), "supplies.none": lambda: str(len(none)),
             "supplies.left_out": lambda: "; ".join(f"{id}, which {why}" for id, why in LEFT_OUT.items()),
-            "list.supplies": lambda: _which(every, some, none)}
+            "list.supplies": lambda: _list_supplies(every, some, none)}
 
 
-def _which(every: list[str], some: list[str], none: list[str]) -> str:
-    return "\n".join(f"- with {what}: {', '.join(ids) or 'none'}." for what, ids in
+def _list_supplies(every: list[str], some: list[str], none: list[str]) -> str:
+    return "\n".join(f"- with {label}: {', '.join(ids) or 'none'}." for label, ids in
                      (("all of these supplies", every), ("some", some), ("none, as with 10 K_s", none)))
 
 
 def _flips(claims: list[dict]) -> str:
-    """Verdicts that a bound moved by its bar changes."""
-    found = [(claim, flip) for claim in claims for flip in claims_record.flips(claim)]
+    """Verdicts that change if a bound moves by the bar of its number."""
+    changed = [(claim, flip) for claim in claims for flip in claims_record.flips(claim)]
     return "\n".join(f"- **{flip.id}**, {flip.quantity}: {claim['verdict']}, and {flip.verdict} with a bound moved."
-                     for claim, flip in found) or "None."
+                     for claim, flip in changed) or "None."
 
 
 def _after_contact(claims: list[dict]) -> str:
-    """How well numbers after contact are known."""
+    """Sentence on the accuracy of numbers after contact."""
     means = [known for known in sensitivity.record()["after_contact"] if known["quantity"].startswith("mean")]
-    told = "; ".join(f"{known['quantity'].partition(' (')[0]} to {known['bar_percent']:.2g} % "
-                     f"({known['asked_percent']:g} % asked)" for known in means)
-    found = after_contact.known(claims)
-    over = [each for each in found if each.percent > after_contact.WIDE_BAR]
-    listed = "; ".join(f"{each.id}, {each.quantity}, {each.percent:.2g} %" for each in over)
-    return (f"After contact wide is known, from contact to its end: {told}. Of the {len(found)} numbers after contact "
-            f"that claims are judged by, the bars of {len(over)} exceed {after_contact.WIDE_BAR:g} % of the number: "
+    precision = "; ".join(f"{known['quantity'].partition(' (')[0]} to {known['bar_percent']:.2g} % "
+                     f"({known['asked_percent']:g} % required)" for known in means)
+    numbers = after_contact.known(claims)
+    wide = [number for number in numbers if number.percent > after_contact.WIDE_BAR]
+    listed = "; ".join(f"{number.id}, {number.quantity}, {number.percent:.2g} %" for number in wide)
+    return (f"The accuracy of Wide, from contact to its end, is: {precision}. Claims are judged by {len(numbers)} "
+            f"numbers after contact. The bars of {len(wide)} exceed {after_contact.WIDE_BAR:g} % of the number: "
             f"{listed}.")
 
 
 def _bars_of_base(claims: list[dict]) -> str:
-    """Which numbers of base are known less well than its velocities and effluents, and why."""
+    """Sentence on the numbers of Base that are less accurate than its velocities and effluents."""
     kinds = "; ".join(f"{why} ({_ids(those)})" for why, those in after_contact.wide_bars_of_base(claims).items())
     return (f"Velocities, effluents, uptake and concentrations of Base are known to {after_contact.BASE_BAR:g} % or "
-            f"better. Wider are the bars of numbers of other kinds: {kinds}.")
+            f"better. Numbers of other kinds have wider bars: {kinds}.")
 
 
-def _ids(of: list) -> str:
-    """Those of the claims, each once."""
-    return ", ".join(dict.fromkeys(each.id for each in of))
+def _ids(numbers: list) -> str:
+    """The distinct ids of the claims."""
+    return ", ".join(dict.fromkeys(number.id for number in numbers))
 
 
 def _about() -> dict[str, Callable[[], str]]:
@@ -131,7 +131,7 @@ def _about() -> dict[str, Callable[[], str]]:
 
 
 def _with(claims: list[dict], verdict: str) -> list[dict]:
-    """Claims of a verdict."""
+    """The claims with a given verdict."""
     return [claim for claim in claims if claim["verdict"] == verdict]
 
 
@@ -147,12 +147,12 @@ def _verdicts(claims: list[dict]) -> dict[str, Callable[[], str]]:
 
 
 def _printed(claims: list[dict]) -> list[tuple[dict, dict]]:
-    """(claim, check) of every number that the paper prints a value of."""
+    """(claim, check) of every number whose value the paper prints."""
     return [(claim, check) for claim in claims for check in claim["checks"] if check["paper_low"] is not None]
 
 
 def _predicted(claims: list[dict]) -> list[tuple[dict, dict]]:
-    """Those of them that take a solution to know."""
+    """(claim, check) of every printed number that a solution predicts."""
     return [(claim, check) for claim, check in _printed(claims) if check["rests_on"] == PREDICTED]
 
 
@@ -171,7 +171,7 @@ def _span(low: float | None, high: float | None) -> str:
 
 
 def _entry(claim: dict) -> str:
-    """A claim in the list of its verdict, with what is told of that."""
+    """A claim in the list of its verdict, with the explanation."""
     check = claim["checks"][0]
     words = ([f"Here: {check['quantity']}, {check['value']:.4g}"] if claim["verdict"] == REPRODUCED else
              [f"*{word}:* {claim[key].rstrip('.')}" for word, key in WHY[claim["verdict"]]])
@@ -179,49 +179,50 @@ def _entry(claim: dict) -> str:
 
 
 def _figure(name: str) -> str:
-    """A row of the table of figures; what is no claim of the paper's is its caption's to say."""
+    """A row of the table of figures, with the paper's claims."""
     module = import_module(f"paper_figures.{name}")
     kind, _, title = module.TITLE.partition(". ")
-    what = "; ".join(f"{STATEMENTS[claim]} ({claim})" for claim in module.CLAIMS)
+    statements = "; ".join(f"{STATEMENTS[claim]} ({claim})" for claim in module.CLAIMS)
     printed = "not in the paper" if kind == "Addition" else kind
-    return markdown_row((f"{printed}: {title}", f"`out/{name}.pdf`", what))
+    return markdown_row((f"{printed}: {title}", f"`out/{name}.pdf`", statements))
 
 
-def _kept(name: str) -> dict:
+def _read_record(name: str) -> dict:
     return json.loads((REPORT / name).read_text(encoding="utf-8"))
 
 
 def _verified() -> str:
-    """How many cases pass, as the report says it."""
+    """The number of cases that pass, from the report."""
     report = (REPORT / "REPORT.md").read_text(encoding="utf-8")
     return re.search(r"^\*\*(\d+ of \d+ cases pass; \d+ numbers judged)", report, re.M)[1]
 
 
 def _of_defaults() -> str:
-    """The largest change (%) that the defaults which are not the paper's make over the base run."""
-    ours = (("transport in time", "transient (Gear)"), ("transfer at a remesh", "linear"))
-    changes = [abs(value) for row in _kept("audit.json")["rows"] if (row["choice"], row["alternative"]) in ours
-               for value in row["effect"].values()]
+    """The largest change (%) over the base run by the defaults that differ from the paper."""
+    switches = (("transport in time", "transient (Gear)"), ("transfer at a remesh", "linear"))
+    rows = [row for row in _read_record("audit.json")["rows"] if (row["choice"], row["alternative"]) in switches]
+    changes = [abs(value) for row in rows for value in row["effect"].values()]
     return f"{100 * max(changes):.1g}"
 
 
 def _bench() -> dict[str, Callable[[], str]]:
-    bench = _kept("bench.json")
-    failed = [one for one in bench["verdicts"] if one["holds"] is not True]
+    bench = _read_record("bench.json")
+    failed = [verdict for verdict in bench["verdicts"] if verdict["holds"] is not True]
     part = bench["parts"]["base"]
-    fast, slow = points(part, runs.FAST)[0], speed.as_it_is(part)
+    fast, slow = points(part, runs.FAST)[0], speed.paper_point(part)
     return {"bench.processor": lambda: f"one core ({bench['machine']['processor']})",
             "bench.paper": lambda: f"{slow['seconds']:.1f}", "bench.fast": lambda: f"{fast['seconds']:.1f}",
             "bench.error": lambda: f"{100 * fast['error']:.1f}", "bench.total": lambda: str(len(bench["verdicts"])),
             "bench.failed": lambda: str(len(failed)), "bench.verb": lambda: "does" if len(failed) == 1 else "do",
-            "list.bench": lambda: "\n".join(f"- {one['claim']}: wanted {one['wanted']}, measured {one['measured']}."
-                                            for one in failed)}
+            "list.bench": lambda: "\n".join(
+                f"- {verdict['claim']}: expected {verdict['wanted']}, measured {verdict['measured']}."
+                for verdict in failed)}
 
 
 def _errata() -> dict[str, Callable[[], str]]:
-    found = re.findall(r"^## (E\d+)\. (.+)$", (ROOT / "reference" / "ERRATA.md").read_text(encoding="utf-8"), re.M)
-    return {"errata.count": lambda: str(len(found)),
-            "list.errata": lambda: "\n".join(f"- **{key}**: {title}." for key, title in found)}
+    errata = re.findall(r"^## (E\d+)\. (.+)$", (ROOT / "reference" / "ERRATA.md").read_text(encoding="utf-8"), re.M)
+    return {"errata.count": lambda: str(len(errata)),
+            "list.errata": lambda: "\n".join(f"- **{key}**: {title}." for key, title in errata)}
 
 
 def _environment(about: dict[str, str]) -> str:
@@ -230,20 +231,20 @@ def _environment(about: dict[str, str]) -> str:
             f"{about['system']} ({about['processor']})")
 
 
-def filled(template: str, known: dict) -> str:
-    """The note. Raises LookupError for a name, a claim or a quantity that there is not, or another verdict."""
+def fill_template(template: str, known: dict) -> str:
+    """Fill in the template. Raises LookupError for an unknown name, claim or quantity, or for another verdict."""
     simple, claims = fields(known), {claim["id"]: claim for claim in known["claims"]}
 
-    def value(found: re.Match) -> str:
-        parts = [part.strip() for part in found[1].split("|")]
+    def value(match: re.Match) -> str:
+        parts = [part.strip() for part in match[1].split("|")]
         if len(parts) > 1:
             return _of_claim(claims, *parts)
         return simple[parts[0]]()
-    return "\n\n".join(map(_wrapped, FIELD.sub(value, template).split("\n\n")))
+    return "\n\n".join(map(_wrap, FIELD.sub(value, template).split("\n\n")))
 
 
-def _wrapped(block: str) -> str:
-    """A paragraph, or each point of a list, in lines of WIDTH; headings, tables and the rest as they are."""
+def _wrap(block: str) -> str:
+    """Wrap a paragraph, or each item of a list, to WIDTH; headings, tables and comments stay unchanged."""
     if re.match(r"[#|!<]", block):
         return block
     points = re.split(r"\n(?=- |\d+\. )", block.strip("\n"))
@@ -253,21 +254,21 @@ def _wrapped(block: str) -> str:
                      for point in points) + end
 
 
-def _of_claim(claims: dict[str, dict], id: str, what: str, form: str = "") -> str:
+def _of_claim(claims: dict[str, dict], id: str, quantity: str, form: str = "") -> str:
     claim = claims[id]
     if not form:
-        if claim["verdict"] != what:
-            raise LookupError(f"{id} is {claim['verdict']}, not {what}")
+        if claim["verdict"] != quantity:
+            raise LookupError(f"{id} is {claim['verdict']}, not {quantity}")
         return id
-    check = {check["quantity"]: check for check in claim["checks"]}[what]
+    check = {check["quantity"]: check for check in claim["checks"]}[quantity]
     if form == "off":
         return f"{100 * abs(check['value'] / float(check['paper']) - 1):.2g} %"
     return format(check["value"], form)
 
 
 def main() -> None:
-    """Write the note."""
-    write_text(NOTE, filled(TEMPLATE.read_text(encoding="utf-8"), told()))
+    """Write the replication note."""
+    write_text(NOTE, fill_template(TEMPLATE.read_text(encoding="utf-8"), read_records()))
     print(f"{NOTE}: written")
 
 

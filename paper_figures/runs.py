@@ -1,4 +1,4 @@
-"""The runs that the figures are drawn from: what is asked for, in one place, and where the results are."""
+"""The runs behind the figures: their scenes and options, and their folders."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ STORE = Folders(Path(__file__).parent / "cache")
 
 @dataclass(frozen=True)
 class Request:
-    """A packaged scene with what `--set` changes in it; `label`: what it is called where one scene is run in several
-    ways, the scene's name by default."""
+    """A packaged scene with its `--set` options; `label` is its name if a scene has several runs, by default that of
+    the scene."""
 
     scene: str
     overrides: tuple[str, ...] = ()
@@ -30,32 +30,32 @@ class Request:
 
     @property
     def name(self) -> str:
-        """Which run it is."""
+        """The name of the run."""
         return self.label or self.scene
 
     def load(self) -> Scene:
-        """The scene, read and checked."""
+        """Read and check the scene."""
         return load_scene(self.scene, self.overrides)
 
     def command(self) -> str:
-        """What to type for the same run."""
+        """The command that computes the same run."""
         changes = [part for change in self.overrides for part in ("--set", change)]
         return shlex.join(["repro", "run", self.scene, "--out", f"runs/{self.name}", *changes])
 
 
-#: Section 4; with times given, a run also writes its fields as they are before each of them's expansion (Plate 1).
+#: Section 4. With output times, a run also writes its fields before the expansion at each time (Plate 1).
 BASE = Request("base", (rows_at(*range(1, 20), 19.2, 19.4),))
-#: Figure 6, every shape update.
+#: Figure 6, with every shape update.
 WIDE = Request("wide")
-#: The same in the converged solution of the claims: its outlines are curves, while those of the paper's scheme come to
-#: contact with whole edges, on nodes that a spline does not run through smoothly.
+#: The same in the converged solution of the claims. Its outlines are curves. In the paper's scheme whole edges come
+#: into contact, and a spline through their nodes is not smooth.
 WIDE_CONVERGED = Request("wide", (*converged(1.0), rows_at(*range(1, 35), *(34 + 0.1 * k for k in range(1, 10)),
                                                            *range(35, 46))), "wide_converged")
-#: Figure 4, geometry and mesh only.
+#: Figure 4: only geometry and mesh.
 INITIAL_MESH = Request("initial_mesh")
 
-#: What the discussion speaks of, in the preset "fast". Base carried on through contact; wide, and wide with one choice
-#: of the rheology changed, or with a permeable body.
+#: Runs for the discussion, in the preset "fast": Base continued beyond contact; Wide; Wide with one change of its
+#: rheology, or with a permeable body.
 FAST = 'numerics.preset="fast"'
 CLOSING = Request("base", (FAST, *until(*range(1, 73), *np.arange(72.5, 76.25, 0.25))), "base_closing")
 _UNTIL = (FAST, *until(*range(1, 33), *np.arange(32.5, 37, 0.25), *range(37, rheology.END + 1)))
@@ -68,5 +68,5 @@ PERMEABLE = tuple(Request("wide", (*_UNTIL, 'flow.biomass="brinkman"', f'flow.pe
 
 
 def folders(requests: Iterable[Request]) -> list[Path]:
-    """Results folders of several requests, the missing ones computed side by side."""
+    """Folders of several runs; missing runs are computed in parallel."""
     return STORE.get_all(request.load() for request in requests)

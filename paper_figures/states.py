@@ -1,4 +1,4 @@
-"""What a run has left, read back: fields of one time, time series, and the last step. Lengths in um, times in h."""
+"""Read the files of a run: fields at one time, time series, and the last step. Lengths in um, times in h."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from matplotlib.tri import Triangulation
 from repro.fem.transfer import interpolate
 from repro.results import field_files, read_table
 
-#: The straight triangles that are drawn for one triangle of so many nodes; a curved one is cut into four.
+#: Straight triangles drawn for a triangle with 3 or 6 nodes; a curved triangle is divided into four.
 PARTS = {3: np.array([[0, 1, 2]]), 6: np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])}
 
 
@@ -29,18 +29,18 @@ class State:
     cells: dict[str, np.ndarray]
 
     @cached_property
-    def whole(self) -> Triangulation:
+    def triangulation(self) -> Triangulation:
         """Fluid and aggregate for matplotlib."""
         return Triangulation(*self.points.T, self.triangles)
 
     @cached_property
     def aggregate(self) -> Triangulation:
-        """The aggregate alone for matplotlib, in the same numbering of nodes."""
+        """The aggregate for matplotlib, with the same numbering of nodes."""
         return Triangulation(*self.points.T, self.triangles[self.biomass])
 
     @cached_property
     def body(self) -> np.ndarray:
-        """Nodes of the aggregate, its boundary included."""
+        """Nodes of the aggregate, including its boundary."""
         return np.unique(self.triangles[self.biomass])
 
     @cached_property
@@ -58,9 +58,9 @@ class State:
         """Distance between the walls."""
         return float(self.points[:, 1].max())
 
-    def at(self, name: str, where: np.ndarray) -> np.ndarray:
+    def at(self, name: str, points: np.ndarray) -> np.ndarray:
         """A nodal vector field, its first two components (K, 2), at points (K, 2) of the mesh."""
-        return interpolate(self.points, self.triangles, self.nodes[name][:, :2], where)
+        return interpolate(self.points, self.triangles, self.nodes[name][:, :2], points)
 
     def carried(self, name: str, end: int) -> float:
         """Flow-weighted mean of a nodal field over the inlet (end 0) or the outlet (1), both linear between nodes."""
@@ -77,10 +77,10 @@ def loop(triangles: np.ndarray) -> np.ndarray:
     edges = [(int(t[i]), int(t[(i + 1) % 3])) for t in triangles for i in range(3)]
     inner = set(edges)
     after = {a: b for a, b in edges if (b, a) not in inner}
-    found = [min(after)]
-    while after[found[-1]] != found[0]:
-        found.append(after[found[-1]])
-    return np.array(found)
+    nodes = [min(after)]
+    while after[nodes[-1]] != nodes[0]:
+        nodes.append(after[nodes[-1]])
+    return np.array(nodes)
 
 
 def times(folder: Path, kind: str = "fields") -> list[tuple[float, Path]]:
@@ -109,7 +109,7 @@ def last(folder: Path, kind: str = "fields") -> State:
 
 
 def near(folder: Path, time: float) -> State:
-    """The fields at a time (h). Raises LookupError where there are none."""
+    """The fields at a time (h). Raises LookupError if there are none."""
     for written, path in times(folder):
         if abs(written - time) < 1e-6:
             return read(written, path)
@@ -117,32 +117,32 @@ def near(folder: Path, time: float) -> State:
 
 
 def every(folder: Path, hours: float) -> list[State]:
-    """The fields at the multiples of some hours, t = 0 first."""
+    """The fields at the multiples of ``hours``, from t = 0 on."""
     return [read(time, path) for time, path in times(folder) if abs(time / hours - round(time / hours)) < 1e-9]
 
 
 def series(folder: Path) -> dict[str, np.ndarray]:
-    """Columns of `timeseries.csv`, not-a-number where a field is empty."""
+    """Columns of `timeseries.csv`; empty fields are NaN."""
     return read_table(folder / "timeseries.csv")
 
 
 def row(folder: Path, time: float) -> dict[str, float]:
-    """The row of `timeseries.csv` at a time. Raises LookupError where there is none."""
+    """The row of `timeseries.csv` at a time. Raises LookupError if there is none."""
     table = series(folder)
-    found = np.flatnonzero(np.abs(table["time_h"] - time) < 1e-6)
-    if len(found) == 0:
+    rows = np.flatnonzero(np.abs(table["time_h"] - time) < 1e-6)
+    if len(rows) == 0:
         raise LookupError(f"{folder}: timeseries.csv has no row at t = {time:g} h")
-    return {name: float(column[found[0]]) for name, column in table.items()}
+    return {name: float(column[rows[0]]) for name, column in table.items()}
 
 
 def contact(folder: Path) -> float:
-    """Time (h) of the first row in contact with the opposite wall; infinite where there is none."""
+    """Time (h) of the first row in contact with the opposite wall; infinite if there is none."""
     table = series(folder)
     touching = table["time_h"][table["contact"] > 0]
     return float(touching[0]) if len(touching) else float("inf")
 
 
 def last_step(folder: Path) -> tuple[float, float]:
-    """Start and end of the last shape update: the geometry before it was shaped at the start."""
+    """Start and end of the last shape update; the preceding geometry is that of the start."""
     table = read_table(folder / "ledger.csv")
     return float(table["start_h"][-1]), float(table["end_h"][-1])

@@ -1,4 +1,4 @@
-"""How the figures look: sizes of a printed page, one font, colours that the colour-blind can tell apart, units."""
+"""Style of the figures: sizes of a printed page, one font, colours for colour-blind readers, units."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ PAGE = 6.9
 RESOLUTION = 250
 LAYOUT_PASSES = 2
 
-#: Okabe and Ito's colours by what they stand for.
+#: Okabe and Ito's colours, named by their use.
 BLUE, RED = "#0072B2", "#D55E00"
 SKY, BLACK = "#56B4E9", "#000000"
 FLUID, WALL = "#E6F1F9", "#555555"
@@ -38,7 +38,7 @@ RULES = {
 
 
 def styled(draw: Callable) -> Callable:
-    """Draw, or save, by these rules and leave matplotlib's own settings as they were."""
+    """Decorator: draw or save with RULES, without a change of matplotlib's settings outside."""
     @wraps(draw)
     def within(*arguments, **keywords):
         with matplotlib.rc_context(RULES):
@@ -47,26 +47,26 @@ def styled(draw: Callable) -> Callable:
 
 
 def figure(height: float, width: float = PAGE) -> Figure:
-    """An empty figure (in) whose parts are laid out not to overlap."""
-    made = Figure(figsize=(width, height), layout="constrained")
-    FigureCanvasAgg(made)
-    return made
+    """An empty figure (in) whose parts do not overlap."""
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
 
 
-def lay_out(made: Figure) -> None:
-    """Place the parts for good; one pass does not yet see what equal axes leave free."""
+def lay_out(figure: Figure) -> None:
+    """Fix the positions of the parts. One pass does not account for the space that equal axes leave free."""
     for _ in range(LAYOUT_PASSES):
-        made.get_layout_engine().execute(made)
-    made.set_layout_engine("none")
+        figure.get_layout_engine().execute(figure)
+    figure.set_layout_engine("none")
 
 
 @styled
-def save(made: Figure, folder: Path, name: str) -> None:
-    """Write `name`.pdf and `name`.png, the same bytes each time; laid out once for both."""
+def save(figure: Figure, folder: Path, name: str) -> None:
+    """Write `name`.pdf and `name`.png with one layout; repeated calls write the same bytes."""
     folder.mkdir(parents=True, exist_ok=True)
-    lay_out(made)
-    made.savefig(folder / f"{name}.pdf", metadata={"CreationDate": None})
-    made.savefig(folder / f"{name}.png", metadata={"Software": None})
+    lay_out(figure)
+    figure.savefig(folder / f"{name}.pdf", metadata={"CreationDate": None})
+    figure.savefig(folder / f"{name}.png", metadata={"Software": None})
 
 
 def plane(axes: Axes, x: tuple[float, float], y: tuple[float, float]) -> None:
@@ -82,7 +82,7 @@ def channel(axes: Axes, ends: tuple[float, float], width: float, margin: float) 
 
 
 def pore(axes: Axes, ends: tuple[float, float], width: float, margin: float) -> None:
-    """A channel with fluid in it."""
+    """A channel filled with fluid."""
     channel(axes, ends, width, margin)
     fluid(axes, ends, width)
 
@@ -92,9 +92,9 @@ def fluid(axes: Axes, ends: tuple[float, float], width: float) -> None:
     axes.add_patch(Rectangle((ends[0], 0), ends[1] - ends[0], width, facecolor=FLUID, linewidth=0, zorder=0))
 
 
-def aggregate(axes: Axes, points: np.ndarray, filled: bool = True, **look) -> None:
-    """The outline of an aggregate (M, 2), filled with its colour or not."""
-    chosen = {"edgecolor": RIM, "linewidth": 1.2, "facecolor": BIOMASS if filled else "none", **look}
+def aggregate(axes: Axes, points: np.ndarray, filled: bool = True, **style) -> None:
+    """The outline of an aggregate (M, 2), optionally filled."""
+    chosen = {"edgecolor": RIM, "linewidth": 1.2, "facecolor": BIOMASS if filled else "none", **style}
     axes.add_patch(Polygon(points, closed=True, **chosen))
 
 
@@ -103,14 +103,14 @@ def grid(axes: Axes) -> None:
     axes.grid(alpha=0.25, linewidth=0.4)
 
 
-def colour_bar(colours: ScalarMappable, axes: Axes, label: str, **more) -> None:
-    """What colours mean, below."""
-    axes.figure.colorbar(colours, ax=axes, location="bottom", label=label, aspect=50, shrink=0.8, **more)
+def colour_bar(colours: ScalarMappable, axes: Axes, label: str, **options) -> None:
+    """A colour bar below the axes."""
+    axes.figure.colorbar(colours, ax=axes, location="bottom", label=label, aspect=50, shrink=0.8, **options)
 
 
 def arrow(axes: Axes, start: tuple[float, float], end: tuple[float, float], head: float = 5, width: float = 0.7,
           look: str = "-|>", color: str = BLUE) -> None:
-    """A straight arrow, as long as its ends are apart."""
+    """A straight arrow between two points."""
     axes.annotate("", end, start, arrowprops={"arrowstyle": look, "color": color, "shrinkA": 0, "shrinkB": 0,
                                               "mutation_scale": head, "linewidth": width})
 
@@ -122,7 +122,7 @@ def number_panels(*panels: Axes) -> None:
 
 
 def dimension(axes: Axes, start: tuple[float, float], end: tuple[float, float], text: str) -> None:
-    """A double arrow with its length said: above a horizontal one, to the right of a vertical one."""
+    """A double arrow with its length: above a horizontal arrow, to the right of a vertical one."""
     arrow(axes, start, end, 6, look="<|-|>", color=BLACK)
     upright = start[0] == end[0]
     middle = (0.5 * (start[0] + end[0]), 0.5 * (start[1] + end[1]))

@@ -25,10 +25,10 @@ CURVES = (("conductivity_m_per_d", "hydraulic conductivity of the pore", "m/d", 
 
 @style.styled
 def draw(base: Path, wide: Path) -> Figure:
-    """Four panels over one axis of time, a colour a run."""
+    """Four panels over time; each run has a colour."""
     tables = [states.series(folder) for folder in (base, wide)]
-    made = style.figure(4.6)
-    panels = made.subplots(2, 2, sharex=True).ravel()
+    figure = style.figure(4.6)
+    panels = figure.subplots(2, 2, sharex=True).ravel()
     for axes, (column, title, unit, log) in zip(panels, CURVES):
         for table, colour in reversed(list(zip(tables, COLOURS))):
             axes.plot(table["time_h"], table[column.format("acceptor")], color=colour)
@@ -46,16 +46,16 @@ def draw(base: Path, wide: Path) -> Figure:
     panels[2].legend(handles=[Line2D([], [], color=style.BLACK, linestyle=line, label=name) for name, line in
                               (("acceptor", "-"), ("donor", "--"))], loc="upper right")
     style.number_panels(*panels)
-    return made
+    return figure
 
 
 def _contact_times(*folders: Path) -> list[float]:
-    """When each run touches the opposite wall, of those that do."""
+    """Times of contact of the runs that touch the opposite wall."""
     return [time for time in map(states.contact, folders) if np.isfinite(time)]
 
 
 def caption(base: Path, wide: Path) -> str:
-    """What is seen, with first and last values."""
+    """Caption, with first and last values."""
     tables = [states.series(folder) for folder in (base, wide)]
     falls = [t["conductivity_m_per_d"][0] / t["conductivity_m_per_d"][-1] for t in tables]
     contact = " and ".join(f"{time:g} h" for time in _contact_times(base, wide))

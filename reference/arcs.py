@@ -2,25 +2,26 @@
 import numpy as np
 from skfem import Basis, ElementTriP2, MeshTri, MeshTri2
 
-#: The largest distance of a node from a place that it is at, over the radius.
+#: Tolerance, relative to the radius, for a node to coincide with a point.
 NEAR = 1e-9
 
 
 def inside(mesh, radius):
-    """(T,) is the triangle in the half-disc?"""
+    """Whether each triangle lies in the half-disc, (T,)."""
     return np.hypot(*mesh.p[:, mesh.t].mean(axis=1)) < radius
 
 
 def arc(mesh, radius=np.inf):
-    """Facets of the arc: those off the wall with a triangle of the half-disc, by default all triangles, on one side
-    alone."""
+    """Facets of the arc: they lie off the wall and have a triangle of the half-disc on exactly one side. By default,
+    every triangle belongs to the half-disc."""
     first, second = np.append(inside(mesh, radius), False)[mesh.f2t]
     return np.flatnonzero((first != second) & (mesh.p[1, mesh.facets].max(axis=0) > 0))
 
 
 def rounded(mesh, radius):
-    """The mesh with the nodes of the arc put onto it."""
-    points, nodes = mesh.p.copy(), np.unique(mesh.facets[:, arc(mesh, radius)])
+    """The mesh with the nodes of the arc moved onto the circle."""
+    points = mesh.p.copy()
+    nodes = np.unique(mesh.facets[:, arc(mesh, radius)])
     points[:, nodes] *= radius / np.hypot(*points[:, nodes])
     return MeshTri(points, mesh.t)
 
@@ -34,8 +35,9 @@ def refined(mesh, radius, places, times):
 
 
 def curved(mesh, radius):
-    """Quadratic triangles, the middles of the arc's edges on it."""
+    """Quadratic triangles; the midpoints of the arc's edges lie on the circle."""
     basis = Basis(mesh, ElementTriP2())
-    places, middles = basis.doflocs.copy(), basis.facet_dofs[0, arc(mesh, radius)]
+    places = basis.doflocs.copy()
+    middles = basis.facet_dofs[0, arc(mesh, radius)]
     places[:, middles] *= radius / np.hypot(*places[:, middles])
     return MeshTri2(places, mesh.t)

@@ -1,8 +1,8 @@
 """A pore averaged over its cross-sections: flow, substrates and growth in one dimension, by FiPy and scipy.
 
-An aggregate of height h(x) lies on the lower wall of the channel 0 < y < W, -L/2 < x < L/2. What follows is the limit
-of an aggregate that is long against W and takes up little over its height; the next terms are as the squares of its
-slope and of its transverse Thiele number h sqrt(X q / (D C)).
+An aggregate of height h(x) lies on the lower wall of the channel 0 < y < W, -L/2 < x < L/2. The model is the limit of
+an aggregate that is long compared with W and takes up little over its height. The next terms scale with the squares of
+its slope and of its transverse Thiele number h sqrt(X q / (D C)).
 
 *Flow* is fully developed in each section, between two layers (:mod:`reference.layered_channel`): with the mean velocity
 u of the open channel, the flux u W is the same everywhere and the loss is the integral of G(h) dx (lubrication).
@@ -12,12 +12,12 @@ u of the open channel, the flux u W is the same everywhere and the loss is the i
     (u W C)' = ((D (W - h) + D_B h) C')' - X h q(C_A, C_D),   u W C - D W C' = u W C_s at -L/2,   C' = 0 at L/2
 
 in FiPy's finite volumes, as in :mod:`reference.channel_fipy` (FiPy's outlet passes nothing unless the gradient is
-constrained there); the uptake is added cell by cell and the whole solved by Newton's method.
+constrained there). The uptake is added cell by cell, and Newton's method solves the equations.
 
 *Growth.* a and i are X_A and X_I in the material of a cell, over X_m and per volume at t = 0: a' = a r_A(C),
 i' = a r_I(C), (9)-(10); its area grows by theta = a + i. A thin strip that slides on its wall bears no stress,
-sigma_xx = sigma_yy = 0, so that both its stretches are sqrt(theta), cell by cell, and x = 0 stays. An aggregate that
-keeps its shape, as a half-disc nearly does, stretches by the root of the mean theta, its biomass spread evenly.
+sigma_xx = sigma_yy = 0, so that both stretches of each cell are sqrt(theta); x = 0 stays in place. An aggregate that
+keeps its shape, as a half-disc nearly does, stretches by the root of the mean theta; its biomass is uniform.
 
 Units: any that agree. Pairs are of the acceptor and the donor.
 """
@@ -34,11 +34,12 @@ from scipy.sparse.linalg import spsolve
 
 from reference import layered_channel
 from reference.channel_fipy import diffusion, matrix
-from reference.monod import derivatives, slopes, uptake
+from reference.monod import derivatives, sink_derivative, uptake
 
-RESTS, MOST = 1e-13, 50
-#: Parts of a step of Newton's method that are tried; the whole one where none lowers the defect: it is round-off then.
-PARTS = 0.5 ** np.arange(10)
+TOLERANCE, MAX_ITERATIONS = 1e-13, 50
+#: Fractions of a Newton step that are tried. If none reduces the defect, the defect is round-off and the full step is
+#: taken.
+STEP_FRACTIONS = 0.5 ** np.arange(10)
 
 
 @dataclass(frozen=True)
@@ -59,9 +60,9 @@ class Pore:
 
 
 @dataclass(frozen=True)
-class Moment:
-    """The pore at one time: x (n,) middles of the cells, fields (2, n) C_A and C_D; velocity; area of the aggregate and
-    x of its ends."""
+class AveragedState:
+    """The pore at one time: x (n,) midpoints of the cells, fields (2, n) C_A and C_D, velocity, and the area of the
+    aggregate and x of its ends."""
 
     time: float
     x: np.ndarray
@@ -72,15 +73,15 @@ class Moment:
 
 
 def half_ellipse(half_length, thickness, cells):
-    """(lengths (n,), heights (n,)) of equal cells of a half-ellipse around x = 0, mean heights: the area is exact."""
+    """(lengths (n,), mean heights (n,)) of equal cells of a half-ellipse around x = 0. The area is exact."""
     s = np.linspace(-1.0, 1.0, cells + 1)
     below = 0.5 * (s * np.sqrt(1 - s**2) + np.arcsin(s))
     return half_length * np.diff(s), thickness * np.diff(below) / np.diff(s)
 
 
 class Section:
-    """One geometry: an aggregate of cells ``lengths`` and ``heights`` (n,) from x = left on, and ``fluid`` equal cells
-    before and behind it."""
+    """One geometry: an aggregate of cells ``lengths`` and ``heights`` (n,) that starts at x = left, and ``fluid`` equal
+    cells upstream and downstream of it."""
 
     def __init__(self, pore, left, lengths, heights, fluid):
         self.pore, self.inside = pore, slice(fluid, fluid + len(lengths))
@@ -92,36 +93,37 @@ class Section:
         self.velocity = pore.speed(loss, (self.ends[1] - self.ends[0]) / 2)
         self.mesh = Grid1D(dx=self.lengths)
         self.x = np.array(self.mesh.cellCenters.value[0]) - pore.length / 2
-        carried = self.velocity * pore.width * _unit_flux(len(self.lengths))
-        spreads = [self._spread(*pair) for pair in zip(pore.diffusivity, pore.in_biomass)]
-        self.transport = sp.block_diag([carried + spread for spread in spreads], "csr")
+        advection = self.velocity * pore.width * _unit_flux(len(self.lengths))
+        diffusion_matrices = [self._diffusion_matrix(*pair) for pair in zip(pore.diffusivity, pore.in_biomass)]
+        self.transport = sp.block_diag([advection + diffusion for diffusion in diffusion_matrices], "csr")
         self.source = np.zeros((2, len(self.lengths)))
         self.source[:, 0] = self.velocity * pore.width * np.array(pore.supply)
 
-    def _spread(self, water, biomass):
+    def _diffusion_matrix(self, water, biomass):
         """FiPy's matrix of diffusion."""
         section = water * (self.pore.width - self.heights) + biomass * self.heights
         return matrix(-diffusion(self.mesh, section), self.mesh)
 
     def steady(self, active, start=None):
-        """(2, n) concentrations at rest; active: X_A of the aggregate's cells (K,); start: a first iterate."""
+        """Steady concentrations (2, n); active: X_A of the aggregate's cells (K,); start: the first iterate."""
         weight = np.zeros(len(self.lengths))
         weight[self.inside] = (self.lengths * self.heights)[self.inside] * active
         fields = np.repeat(self.pore.supply, len(weight)).reshape(2, -1) if start is None else start
-        for _ in range(MOST):
+        for _ in range(MAX_ITERATIONS):
             defect, size = self._defect(weight, fields)
-            if (np.abs(defect) <= RESTS * size).all():
+            if (np.abs(defect) <= TOLERANCE * size).all():
                 return fields
-            derivative = self.transport + slopes(fields, weight, self.pore.rates)
+            derivative = self.transport + sink_derivative(fields, weight, self.pore.rates)
             step = spsolve(sp.csc_array(derivative), defect).reshape(2, -1)
-            fields = fields + step * next((part for part in PARTS if self._falls(weight, fields, part * step)), 1.0)
-        raise RuntimeError(f"the finite volumes do not come to rest: {(np.abs(defect) / size).max():.2g} are left")
+            reducing = (part for part in STEP_FRACTIONS if self._reduces_defect(weight, fields, part * step))
+            fields = fields + step * next(reducing, 1.0)
+        raise RuntimeError(f"the finite volumes did not converge: residual {(np.abs(defect) / size).max():.2g}")
 
-    def _falls(self, weight, fields, step):
+    def _reduces_defect(self, weight, fields, step):
         return np.abs(self._defect(weight, fields + step)[0]).sum() < np.abs(self._defect(weight, fields)[0]).sum()
 
     def _defect(self, weight, fields):
-        """What the cells still lack of rest, and the size of its terms: of one not supplied against the other's."""
+        """The residual of the cells' balances, and the size of its terms, at least that of the larger supply."""
         sinks = weight * np.stack(uptake(*fields, self.pore.rates))
         size = (self.source + np.abs(sinks)).ravel() + abs(self.transport) @ np.abs(fields.ravel())
         size = size + self.source.max()
@@ -130,13 +132,13 @@ class Section:
 
 @cache
 def _unit_flux(cells):
-    """FiPy's matrix of advection by a flux of one; central differences know nothing of the cells' lengths."""
+    """FiPy's matrix of advection by a flux of one. Central differences do not use the cells' lengths."""
     return matrix(CentralDifferenceConvectionTerm(coeff=(1.0,)), Grid1D(nx=cells, dx=1.0))
 
 
 class Averaged:
-    """The run of a seed, cells ``lengths`` and ``heights`` (n,); fluid: cells on each side of it; keeps_shape: is it no
-    strip?"""
+    """The run of a seed of cells ``lengths`` and ``heights`` (n,); fluid: cells on each side of it; keeps_shape: the
+    seed keeps its shape instead of deforming as a strip."""
 
     def __init__(self, pore, lengths, heights, fluid, keeps_shape):
         self.pore = pore
@@ -149,41 +151,42 @@ class Averaged:
         self.supply = lambda _: pore.supply
 
     def seed(self):
-        """The moment at t = 0."""
-        return self._moment(0.0, self._start())
+        """The state at t = 0."""
+        return self._state_at(0.0, self._start())
 
     def run(self, times, accuracy=1e-6):
-        """The moments at ``times``, ascending, the last of them after t = 0."""
-        found = solve_ivp(self._rise, (0.0, times[-1]), self._start(), method="DOP853", t_eval=times,
+        """The states at ``times``, which are ascending; the last one is after t = 0."""
+        solution = solve_ivp(self._growth_rates, (0.0, times[-1]), self._start(), method="DOP853", t_eval=times,
                           rtol=accuracy, atol=accuracy)
-        return [self._moment(time, state) for time, state in zip(found.t, found.y.T)]
+        return [self._state_at(time, state) for time, state in zip(solution.t, solution.y.T)]
 
     def run_through(self, pieces, times, accuracy):
-        """The moments at ``times``, ascending, while the supply changes: pieces (end, supply at the piece's start and
-        at its end), ascending, evenly in between; the last ends with the last time. A moment at a piece's end is one
-        of the next piece's start."""
+        """The states at ``times``, which are ascending, while the supply changes linearly within each piece.
+
+        pieces: (end, supply at the piece's start, supply at its end), ascending; the last piece ends at the last time.
+        A state at the end of a piece has the supply of the next piece's start."""
         state = self._start()
         begin = 0.0
-        found = []
+        states = []
         for number, (end, first, last) in enumerate(pieces, 1):
             self.fields = None
-            self.supply = partial(_evenly, begin, end, np.array(first), np.array(last))
-            inside = [time for time in times if begin <= time < end or (number == len(pieces) and time == end)]
-            piece = solve_ivp(self._rise, (begin, end), state, method="DOP853", dense_output=True,
+            self.supply = partial(_interpolate, begin, end, np.array(first), np.array(last))
+            times_in_piece = [time for time in times if begin <= time < end or (number == len(pieces) and time == end)]
+            piece = solve_ivp(self._growth_rates, (begin, end), state, method="DOP853", dense_output=True,
                               rtol=accuracy, atol=accuracy)
-            found += [self._moment(time, piece.sol(time)) for time in inside]
+            states += [self._state_at(time, piece.sol(time)) for time in times_in_piece]
             state, begin = piece.y[:, -1], end
-        return found
+        return states
 
     def _start(self):
         return np.concatenate([np.ones_like(self.areas), np.zeros_like(self.areas)])
 
-    def _alike(self, values):
-        """Of each cell; or the mean over the aggregate, if it keeps its shape."""
+    def _local_or_mean(self, values):
+        """The values of the cells or, if the aggregate keeps its shape, their mean over it."""
         return np.full_like(values, self.areas @ values / self.areas.sum()) if self.keeps_shape else values
 
-    def _solved(self, time, state):
-        """The section, with the concentrations kept in ``fields``, and theta."""
+    def _solve_section(self, time, state):
+        """The section and theta; the concentrations are stored in ``fields``."""
         pore = replace(self.pore, supply=tuple(self.supply(time)))
         active, inert = state.reshape(2, -1)
         theta = active + inert
@@ -192,29 +195,29 @@ class Averaged:
         self.fields = section.steady(self.pore.density * active / theta, self.fields)
         return section, theta
 
-    def _rise(self, time, state):
-        section, _ = self._solved(time, state)
+    def _growth_rates(self, time, state):
+        section, _ = self._solve_section(time, state)
         rates, active = self.pore.rates, state[: len(self.areas)]
         m_a, m_d = (c[section.inside] / (c[section.inside] + rates[key]) for c, key in zip(self.fields, ("K_A", "K_D")))
         growth, remains = m_a * (rates["k"] * rates["Y"] * m_d - rates["b"]), m_a * rates["remains"]
-        return np.concatenate([self._alike(active * growth), self._alike(active * remains)])
+        return np.concatenate([self._local_or_mean(active * growth), self._local_or_mean(active * remains)])
 
-    def _moment(self, time, state):
-        section, theta = self._solved(time, state)
-        return Moment(time, section.x, self.fields, section.velocity, float(self.areas @ theta), section.ends)
+    def _state_at(self, time, state):
+        section, theta = self._solve_section(time, state)
+        return AveragedState(time, section.x, self.fields, section.velocity, float(self.areas @ theta), section.ends)
 
 
-def _evenly(begin, end, first, last, time):
-    """What changes evenly from ``first`` to ``last``."""
+def _interpolate(begin, end, first, last, time):
+    """Linear interpolation from ``first`` to ``last``."""
     return first + (last - first) * (time - begin) / (end - begin)
 
 
 def constriction(radius, width, modes=80, points=400):
-    """K: what a half-disc that takes up evenly lacks, in the mean over it, against its section's means.
+    """K: the mean deficit in a half-disc of uniform uptake, relative to the means over its sections.
 
-    Green's function of -lap in the strip, less that of the mean over the section, is the sum over n >= 1 of
-    cos(n pi y/W) cos(n pi y'/W) exp(-n pi |x - x'|/W) / (n pi); K A is its integral over the half-disc, twice, and for
-    an uptake X q in biomass of the fluid's diffusivity the lack is K X q / D.
+    Green's function of -lap in the strip, minus that of the mean over the section, is the sum over n >= 1 of
+    cos(n pi y/W) cos(n pi y'/W) exp(-n pi |x - x'|/W) / (n pi). K A is its double integral over the half-disc. For an
+    uptake X q in biomass with the fluid's diffusivity, the deficit is K X q / D.
     """
     s, weight = np.polynomial.legendre.leggauss(points)
     x, height = radius * np.sin(np.pi / 2 * s), radius * np.cos(np.pi / 2 * s)
@@ -226,10 +229,10 @@ def constriction(radius, width, modes=80, points=400):
 
 
 def excess(pore, radius, velocity):
-    """(2,) what the effluents of a half-disc exceed those of its averaged pore by, in first order in 1 / D.
+    """Effluents of a half-disc minus those of its averaged pore, (2,), to first order in 1 / D.
 
-    Mixed to c, both models have u W (C_s - c) = X A q(c). The uptake of the true pore is that at c - K X q / D; the
-    balance, linear around c, gives (u W + X A q') excess = X A q' (K X q / D).
+    In a mixed pore of concentrations c, both models have u W (C_s - c) = X A q(c). The uptake of the two-dimensional
+    pore is that at c - K X q / D. The balance, linear around c, gives (u W + X A q') excess = X A q' (K X q / D).
     """
     supply, uptaken = np.array(pore.supply), pore.density * np.pi / 2 * radius**2
     carried = velocity * pore.width

@@ -1,11 +1,11 @@
 """Fully developed flow in a channel with a permeable layer along the lower wall (Brinkman 1949).
 
 In the layer, 0 < y < h, of permeability k, u'' - u / k = -G; above it, h < y < W, u'' = -G, with G = -dphi/dx (times
-g / nu_water). u and u' go on through y = h, u(0) = u(W) = 0. With d = sqrt(k)
+g / nu_water). u and u' are continuous at y = h, and u(0) = u(W) = 0. With d = sqrt(k)
 
     layer: u = G k + A exp(-y / d) + B exp((y - h) / d),     above: u = -G (y - h)^2 / 2 + a (y - h) + b,
 
-whose four constants the four conditions give; both exponentials are at most one.
+The four conditions determine the four constants; both exponentials are at most one.
 """
 import numpy as np
 

@@ -12,28 +12,28 @@ from scipy.integrate import solve_bvp
 from reference.monod import uptake
 
 
-def solution(velocity, supply, diffusivity, in_strip, density, rates, length, tolerance=1e-8):
-    """The function x (...,) -> (C_A, C_D) (2, ...). supply, diffusivity, in_strip: pairs, acceptor first; density: X;
-    tolerance: relative, of the residual of the collocation. Raises RuntimeError where scipy does not converge."""
+def solve(velocity, supply, diffusivity, in_strip, density, rates, length, tolerance=1e-8):
+    """Return the function x (...,) -> (C_A, C_D) (2, ...). supply, diffusivity, in_strip: pairs, acceptor first;
+    density: X; tolerance: relative residual of the collocation. Raises RuntimeError if scipy does not converge."""
     supply, in_strip = np.array(supply, float), np.array(in_strip, float)
 
-    def right(_, y):
+    def derivative(_, y):
         sink = density * np.stack(uptake(y[0], y[1], rates))
         return np.vstack([y[2:], (velocity * y[2:] + sink) / in_strip[:, None]])
 
-    def ends(a, b):
+    def boundary_residual(a, b):
         return np.concatenate([(velocity * (a[:2] - supply) - in_strip * a[2:]) / velocity, b[2:]])
 
     grid = np.linspace(0.0, length, 401)
     start = np.vstack([np.outer(supply, np.ones_like(grid)), np.zeros((2, len(grid)))])
-    found = solve_bvp(right, ends, grid, start, tol=tolerance, max_nodes=200_000)
-    if not found.success:
-        raise RuntimeError(f"solve_bvp: {found.message}")
-    return lambda x: _continued(np.asarray(x, float), found.sol, velocity, supply, diffusivity, length)
+    collocation = solve_bvp(derivative, boundary_residual, grid, start, tol=tolerance, max_nodes=200_000)
+    if not collocation.success:
+        raise RuntimeError(f"solve_bvp: {collocation.message}")
+    return lambda x: _extend(np.asarray(x, float), collocation.sol, velocity, supply, diffusivity, length)
 
 
-def _continued(x, inside, velocity, supply, diffusivity, length):
-    """The strip's C, (26) upstream of it and C(l) downstream."""
+def _extend(x, inside, velocity, supply, diffusivity, length):
+    """The strip's C, extended by (26) upstream and by C(l) downstream."""
     strip = inside(np.clip(x, 0.0, length).ravel())[:2].reshape(2, *x.shape)
     behind = np.minimum(x, 0.0)
     upstream = [s - (s - first) * np.exp(velocity * behind / d)

@@ -6,9 +6,9 @@ source in the first cell. The uptake is added cell by cell, and the equations
 
     V dC/dt = b - M C - V X q(C_A, C_D)
 
-are solved by scipy: FiPy's own solvers stop at a residual of 1e-5 unless told otherwise, which leaves 2e-4 of what is
-taken up unaccounted for on every grid, and its sweeps take minutes. In time they are integrated twice: without an error
-of their own, by scipy, and by backward Euler, which is FiPy's TransientTerm and of first order.
+are solved by scipy. FiPy's own solvers stop at a residual of 1e-5 by default, which leaves 2e-4 of the uptake
+unaccounted for on every grid, and its sweeps take minutes. Time is integrated in two ways: by scipy, with a negligible
+error, and by backward Euler, which is FiPy's TransientTerm and of first order.
 """
 import numpy as np
 import scipy.sparse as sp
@@ -16,13 +16,13 @@ from fipy import CellVariable, CentralDifferenceConvectionTerm, DiffusionTerm, G
 from scipy.integrate import solve_ivp
 from scipy.sparse.linalg import spsolve
 
-from reference.monod import at_rest, sink, slopes
+from reference.monod import sink, sink_derivative, solve_steady
 
-RESTS = 1e-10
+TOLERANCE = 1e-10
 
 
 def matrix(term, mesh):
-    """FiPy's matrix of a term, the gradient at the outlet being zero."""
+    """FiPy's matrix of a term; the gradient at the outlet is zero."""
     field = CellVariable(mesh=mesh, value=1.0)
     field.faceGrad.constrain([0.0], where=mesh.facesRight)
     term.cacheMatrix()
@@ -30,14 +30,14 @@ def matrix(term, mesh):
     return sp.csr_matrix(term.matrix.matrix)
 
 
-def diffusion(mesh, spread):
-    """FiPy's term, of a diffusivity in each cell."""
-    return DiffusionTerm(coeff=CellVariable(mesh=mesh, value=spread).harmonicFaceValue)
+def diffusion(mesh, diffusivity):
+    """FiPy's diffusion term with one diffusivity a cell."""
+    return DiffusionTerm(coeff=CellVariable(mesh=mesh, value=diffusivity).harmonicFaceValue)
 
 
 class Channel:
-    """Equal cells over ends, of which 0 < x < length are biomass of density X; supply, diffusivity, in_strip: pairs,
-    acceptor first. Raises ValueError where no face lies on an end of the strip."""
+    """Equal cells between two ends; those at 0 < x < length are biomass of density X. supply, diffusivity, in_strip:
+    pairs, acceptor first. Raises ValueError if no face lies on an end of the strip."""
 
     def __init__(self, cells, ends, velocity, supply, diffusivity, in_strip, density, rates, length):
         self.mesh = Grid1D(nx=cells, dx=(ends[1] - ends[0]) / cells) + (ends[0],)
@@ -55,45 +55,45 @@ class Channel:
         self.transport = sp.block_diag(matrices, "csc")
 
     def _transport(self, velocity, supply, spread):
-        """(M, b) of one substrate, the first cell's inflow taken out of FiPy's hands."""
+        """(M, b) of one substrate; b holds the inflow of the first cell."""
         source = np.zeros(len(self.x))
         source[0] = velocity * supply
-        carried = CentralDifferenceConvectionTerm(coeff=(float(velocity),))
-        return matrix(carried - diffusion(self.mesh, spread), self.mesh), source
+        advection = CentralDifferenceConvectionTerm(coeff=(float(velocity),))
+        return matrix(advection - diffusion(self.mesh, spread), self.mesh), source
 
-    def _rise(self, fields):
+    def _balance(self, fields):
         """V dC/dt (2n,) of all C_A and then all C_D."""
         return np.concatenate(self.sources) - self.transport @ fields - sink(fields, self.load, self.rates)
 
-    def _slopes(self, fields):
+    def _derivative(self, fields):
         """Its derivative."""
-        return sp.csc_array(-self.transport - slopes(fields, self.load, self.rates))
+        return sp.csc_array(-self.transport - sink_derivative(fields, self.load, self.rates))
 
     def steady(self):
-        """(C_A, C_D) (2, n) at the cells' centres ``x``, at rest. Raises RuntimeError where Newton's method fails."""
-        return self._solved(self._rise, self._slopes, np.repeat(self.supply, len(self.x))).reshape(2, -1)
+        """Steady (C_A, C_D) (2, n) at the cells' centres ``x``. Raises RuntimeError if Newton's method fails."""
+        return self._solve(self._balance, self._derivative, np.repeat(self.supply, len(self.x))).reshape(2, -1)
 
-    def _solved(self, defect, derivative, fields):
+    def _solve(self, defect, derivative, fields):
         """The zero of ``defect``."""
-        return at_rest(defect, derivative, fields, RESTS * self.sources[0][0], spsolve)
+        return solve_steady(defect, derivative, fields, TOLERANCE * self.sources[0][0], spsolve)
 
     def transient(self, times):
-        """(times, 2, n): C_A and C_D at each of the times, from the supply everywhere; exact in time to 1e-8."""
-        found = solve_ivp(lambda t, y: self._rise(y) / self.volume, (0.0, times[-1]),
-                          np.repeat(self.supply, len(self.x)), jac=lambda t, y: self._slopes(y) / self.volume,
+        """C_A and C_D at each time, (times, 2, n). They start at the supply; the tolerance in time is 1e-8."""
+        history = solve_ivp(lambda t, y: self._balance(y) / self.volume, (0.0, times[-1]),
+                          np.repeat(self.supply, len(self.x)), jac=lambda t, y: self._derivative(y) / self.volume,
                           method="BDF", t_eval=times, rtol=1e-8, atol=1e-8)
-        return found.y.T.reshape(len(times), 2, -1)
+        return history.y.T.reshape(len(times), 2, -1)
 
     def backward_euler(self, times, steps):
-        """(times, 2, n) by FiPy's scheme, V (C - C_old) / dt = rise, each interval in so many equal steps."""
+        """The same by FiPy's scheme, V (C - C_old) / dt = V dC/dt, with ``steps`` equal steps in each interval."""
         fields, states = np.repeat(self.supply, len(self.x)), []
         for interval in np.diff([0.0, *times]):
             for _ in range(steps):
-                fields = self._stepped(fields, self.volume * steps / interval)
+                fields = self._implicit_step(fields, self.volume * steps / interval)
             states.append(fields.reshape(2, -1))
         return np.array(states)
 
-    def _stepped(self, old, storage):
+    def _implicit_step(self, old, storage):
         """One step of backward Euler, V / dt = storage."""
-        return self._solved(lambda new: self._rise(new) - storage * (new - old),
-                            lambda new: self._slopes(new) - storage * sp.eye_array(len(new), format="csc"), old)
+        return self._solve(lambda new: self._balance(new) - storage * (new - old),
+                            lambda new: self._derivative(new) - storage * sp.eye_array(len(new), format="csc"), old)

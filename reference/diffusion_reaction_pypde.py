@@ -2,23 +2,23 @@
 
     D lap C = X q(C_A, C_D),   C = supply at x = -a and x = a,   no flux through y = 0 and y = W
 
-on a Cartesian grid of square cells, each of which takes up as much as the part of it that is biomass. D is the same in
-fluid and biomass, so that py-pde's Laplacian applies. That is L C + g, and its matrix is read off by applying it to
-nothing and to five patterns, in each of which no two cells are neighbours of the same one; Newton's method solves for
-both substrates with it. Nothing is compiled.
+on a Cartesian grid of square cells. The uptake of a cell is proportional to its fraction of biomass. D is the same in
+fluid and biomass, so that py-pde's Laplacian L C + g applies. Its matrix follows from applying it to zero and to five
+patterns; no two cells of a pattern are neighbours of the same cell. Newton's method solves for both substrates with
+this matrix. Nothing is compiled.
 
-Where the biomass's sides follow the cells the scheme is of second order. A curved side cuts them: by the part of each
-cell the amount taken up stays right, and its place is wrong by a part of a cell, now to one side, now to the other.
+The scheme is of second order if the biomass's sides follow the cells. A curved side cuts cells: the fractions keep the
+amount of uptake correct, and its location errs by a fraction of a cell, to either side.
 """
 import numpy as np
 import scipy.sparse as sp
 from pde import CartesianGrid, ScalarField
 from scipy.sparse.linalg import splu
 
-from reference.monod import at_rest, sink, slopes
+from reference.monod import sink, sink_derivative, solve_steady
 
-RESTS = 1e-11
-#: How SuperLU factors: the diagonal dominates, and pivots would spoil the ordering.
+TOLERANCE = 1e-11
+#: Options of SuperLU: the diagonal dominates, and pivoting would destroy the ordering.
 NO_PIVOTS = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
 #: No two of the five cells of the stencil have the same x + 2 y modulo five.
 PATTERNS = 5
@@ -42,37 +42,38 @@ class Box:
         """(L, g) of py-pde's Laplacian L C + g with C = supply at both ends."""
         ends = {"x": {"value": float(supply)}, "y": {"derivative": 0.0}}
 
-        def applied(field):
+        def apply(field):
             return ScalarField(self.grid, field.reshape(self.grid.shape)).laplace(ends, backend="scipy").data.ravel()
 
         x, y = np.divmod(np.arange(len(self.points)), self.grid.shape[1])
         colour = (x + 2 * y) % PATTERNS
-        constant = applied(np.zeros(len(colour)))
-        answers = np.stack([applied((colour == c).astype(float)) - constant for c in range(PATTERNS)])
-        return self._collected(answers, colour), constant
+        constant = apply(np.zeros(len(colour)))
+        responses = np.stack([apply((colour == c).astype(float)) - constant for c in range(PATTERNS)])
+        return self._assemble(responses, colour), constant
 
-    def _collected(self, answers, colour):
-        """The matrix, from what the cells of each colour do to themselves and to their four neighbours."""
+    def _assemble(self, responses, colour):
+        """The matrix, from the responses of the cells of each colour and of their four neighbours."""
         index = np.arange(len(colour)).reshape(self.grid.shape)
         pairs = [(index, index), (index[1:], index[:-1]), (index[:-1], index[1:]), (index[:, 1:], index[:, :-1]),
                  (index[:, :-1], index[:, 1:])]
         rows, columns = (np.concatenate([*map(np.ravel, side)]) for side in zip(*pairs))
-        return sp.csc_array((answers[colour[columns], rows], (rows, columns)), shape=(len(colour),) * 2)
+        return sp.csc_array((responses[colour[columns], rows], (rows, columns)), shape=(len(colour),) * 2)
 
     def steady(self, diffusivity, supply, density, rates):
-        """C (2, n) at the cells' centres; diffusivity, supply: pairs, acceptor first; density: X; rates: as
-        :mod:`reference.monod` takes them. Raises RuntimeError where Newton's method fails."""
+        """C (2, n) at the cells' centres; diffusivity, supply: pairs, acceptor first; density: X; rates: those of
+        :mod:`reference.monod`. Raises RuntimeError if Newton's method fails."""
         pairs = [self._laplacian(s) for s in supply]
         matrix = sp.block_diag([d * pair[0] for d, pair in zip(diffusivity, pairs)], "csc")
         constant = np.concatenate([d * pair[1] for d, pair in zip(diffusivity, pairs)])
         load = density * self.part
 
-        def rise(fields):
+        def balance(fields):
             return matrix @ fields + constant - sink(fields, load, rates)
 
         start = np.repeat(np.array(supply, float), len(self.points))
-        return at_rest(rise, lambda fields: matrix - slopes(fields, load, rates), start, RESTS * np.abs(constant).max(),
-                       lambda system, right: splu(system, **NO_PIVOTS).solve(right)).reshape(2, -1)
+        return solve_steady(balance, lambda fields: matrix - sink_derivative(fields, load, rates), start,
+                            TOLERANCE * np.abs(constant).max(),
+                            lambda system, right: splu(system, **NO_PIVOTS).solve(right)).reshape(2, -1)
 
 
 def half_disc(radius, parts=16):

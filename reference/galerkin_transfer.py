@@ -4,20 +4,20 @@
 
 shapely cuts every old triangle with every new one; on the pieces both fields are linear, and the product of two linear
 functions f, g over a triangle of area A is A / 12 (sum f sum g + sum f g), sums over its corners. The mass matrix is
-dense. Without quadrature points, clipping of our own, or a sparse solver.
+dense. The code uses no quadrature points, no clipping algorithm and no sparse solver.
 """
 import numpy as np
 import shapely
 
 
 def overlaps(points, triangles, new_points, new_triangles):
-    """(T, S) area that each old triangle (T, 3) has in common with each new one (S, 3)."""
-    return shapely.area(_cut(points, triangles, new_points, new_triangles))
+    """Area of the intersection of each old triangle (T, 3) with each new one (S, 3), (T, S)."""
+    return shapely.area(_intersections(points, triangles, new_points, new_triangles))
 
 
 def project(points, triangles, fields, new_points, new_triangles):
     """(K, m) nodal values on the new mesh of nodal fields (N, m) on the old one."""
-    pieces = _cut(points, triangles, new_points, new_triangles)
+    pieces = _intersections(points, triangles, new_points, new_triangles)
     right = np.zeros((len(new_points), fields.shape[1]))
     for old, new in np.argwhere(shapely.area(pieces) > 0):
         for corners in _fan(pieces[old, new]):
@@ -29,16 +29,16 @@ def project(points, triangles, fields, new_points, new_triangles):
 
 def mass(points, triangles):
     """(N, N) integrals of products of the nodal functions."""
-    found = np.zeros((len(points), len(points)))
+    matrix = np.zeros((len(points), len(points)))
     for nodes in triangles:
-        found[np.ix_(nodes, nodes)] += product(points[nodes], np.eye(3), np.eye(3))
-    return found
+        matrix[np.ix_(nodes, nodes)] += product(points[nodes], np.eye(3), np.eye(3))
+    return matrix
 
 
-def linear(corners, values, where):
+def linear(corners, values, places):
     """Values (k, m) at points (k, 2) of the linear functions that take ``values`` (3, m) at ``corners`` (3, 2)."""
-    slopes = np.linalg.solve(np.column_stack([np.ones(3), corners - corners[0]]), values)
-    return np.column_stack([np.ones(len(where)), where - corners[0]]) @ slopes
+    coefficients = np.linalg.solve(np.column_stack([np.ones(3), corners - corners[0]]), values)
+    return np.column_stack([np.ones(len(places)), places - corners[0]]) @ coefficients
 
 
 def product(corners, f, g):
@@ -47,8 +47,8 @@ def product(corners, f, g):
     return area / 12 * (np.outer(f.sum(axis=0), g.sum(axis=0)) + f.T @ g)
 
 
-def _cut(points, triangles, new_points, new_triangles):
-    """(T, S) common pieces, convex polygons or less."""
+def _intersections(points, triangles, new_points, new_triangles):
+    """(T, S) intersections: convex polygons, or lines, points or nothing."""
     old, new = shapely.polygons(points[triangles]), shapely.polygons(new_points[new_triangles])
     return shapely.intersection(old[:, None], new[None])
 

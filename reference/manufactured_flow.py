@@ -1,19 +1,19 @@
-"""Manufactured Stokes flow through an interface where the viscosity jumps: any field will do, the force pays for it.
+"""Manufactured Stokes flow through an interface where the viscosity jumps. The force balances the chosen field.
 
-s runs across the straight interface s = 0 and t along it, turned by ANGLE against x and y so that no axis is special.
+s runs across the straight interface s = 0 and t along it. Both are rotated by ANGLE, so that no axis is special.
 On either side u = (psi_y, -psi_x), which is divergence-free, from
 
     psi = A(t) + B s + C(t) s^2 + D(t) s^3
 
 with the same A and B on both sides: u is continuous. On the interface du/ds is 0 across and -2 C along it, and the
-shear of grad u + grad u^T is A'' - 2 C. With the same shear stress T(t) and the same pressure on both sides (its slope
-is another), what each form makes continuous is, if
+shear of grad u + grad u^T is A'' - 2 C. Both sides have the same shear stress T(t) and the same pressure, with another
+slope. The stress that each form makes continuous is continuous if
 
     nu du/dn - p n:                     C = -T / (2 nu)              "laplacian" [E2]
     nu (grad u + grad u^T) n - p n:     C = (A'' - T / nu) / 2       "traction"
 
-D, and what bends A, are small as 1 / nu, so that stresses are of order one. The force is what the strong form of each
-phase lacks, f = -div(nu grad u) + grad p or -div(nu (grad u + grad u^T)) + grad p, worked out by sympy.
+D and the curvature of A scale with 1 / nu, so that stresses are of order one. The force is the residual of the strong
+form of each phase, f = -div(nu grad u) + grad p or -div(nu (grad u + grad u^T)) + grad p, derived by sympy.
 """
 from dataclasses import dataclass
 from operator import attrgetter
@@ -48,7 +48,7 @@ def phases(ratio, interface):
 
 
 def _phase(viscosity, ratio, interface, slope):
-    """One side; ``slope`` is the part of dp/ds that is its own."""
+    """One side; ``slope`` is the part of dp/ds that differs between the sides."""
     t = sp.Symbol("t")
     A = t + t**2 / 2 + sp.sin(3 * t) / (9 * ratio)
     shear = sp.cos(2 * t)
@@ -61,10 +61,10 @@ def _phase(viscosity, ratio, interface, slope):
     return Phase(viscosity, velocity, pressure, viscosity * viscous - pressure * sp.eye(2))
 
 
-def evaluated(ratio, interface):
+def evaluate(ratio, interface):
     """(velocity, pressure, force), functions of places (x, y): arrays (..., 2), (...) and (..., 2)."""
     pair = phases(ratio, interface)
-    velocity, force = (_at([*map(attrgetter(what), pair)]) for what in ("velocity", "force"))
+    velocity, force = (_at([*map(attrgetter(field), pair)]) for field in ("velocity", "force"))
     pressure = _at([sp.Matrix([phase.pressure]) for phase in pair])
     return velocity, lambda x, y: pressure(x, y)[..., 0], force
 

@@ -1,4 +1,4 @@
-"""A growth that is made up: place, pressure and theta chosen, the loads that hold them worked out by sympy.
+"""A manufactured growth: position, pressure and theta are chosen, and sympy derives the loads in equilibrium with them.
 
 The unit square goes to
 
@@ -52,11 +52,11 @@ def _stress(gradient, P):
 
 
 def _function(matrix):
-    """(m, n) expressions as one function of arrays; a column gives (..., m), a single one (...)."""
-    parts = [sp.lambdify((X, Y), part, "numpy", cse=True) for part in matrix]
+    """One function of arrays for (m, n) expressions; a column gives (..., m), a single expression (...)."""
+    components = [sp.lambdify((X, Y), component, "numpy", cse=True) for component in matrix]
     shape = tuple(size for size in matrix.shape if size > 1)
 
     def function(x, y):
-        found = np.stack([np.broadcast_to(part(x, y), np.shape(x)) for part in parts], axis=-1)
-        return found.reshape((*np.shape(x), *shape))
+        values = np.stack([np.broadcast_to(component(x, y), np.shape(x)) for component in components], axis=-1)
+        return values.reshape((*np.shape(x), *shape))
     return function

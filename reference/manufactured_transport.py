@@ -1,18 +1,18 @@
-"""Concentrations chosen beforehand around a half-disc of biomass, and the forcing that makes them solutions of (7)-(8).
+"""Manufactured concentrations around a half-disc of biomass, and the forcing that makes them solutions of (7)-(8).
 
-Carried by the stream function psi = u_ave W (3 e^2 - 2 e^3 + 3/2 sin(2 pi x / W) e^2 (1 - e)^2), e = y / W: a parabola
-that bends up and down, free of divergence, with no flow through the walls. With s = (x^2 + y^2) / R^2 - 1, zero on the
+The stream function psi = u_ave W (3 e^2 - 2 e^3 + 3/2 sin(2 pi x / W) e^2 (1 - e)^2), e = y / W, gives a parabola that
+bends up and down, is divergence-free and has no flow through the walls. With s = (x^2 + y^2) / R^2 - 1, zero on the
 interface, and any smooth g,
 
     C = c + g s D_B / D
 
-goes on through the interface, and so does its flux D dC/dn = D_B g ds/dn, though D does not. The forcing follows from
-the strong form by sympy, on either side of the interface:
+is continuous at the interface, and so is its flux D dC/dn = D_B g ds/dn, although D is not. sympy derives the forcing
+from the strong form on either side of the interface:
 
     f = -div(D grad C) + u . grad C + X q(C_A, C_D)
 
-with q of :mod:`reference.monod` written down anew, X = X_0 (1 + x / (3 R)) in the biomass and no uptake in the fluid. A
-solver adds f, and the flux through every side.
+with an independent q as in :mod:`reference.monod`, X = X_0 (1 + x / (3 R)) in the biomass and no uptake in the fluid. A
+solver adds f and the flux through every side.
 """
 from dataclasses import dataclass
 
@@ -60,20 +60,20 @@ def uptake(acceptor, donor, rates):
 
 
 def fields(width, radius, mean, diffusivity, in_biomass, largest, rates):
-    """{side: (acceptor, donor)} of :class:`Field`; mean: u_ave; largest: X_0; rates: as reference.monod takes them."""
-    return {side: _side(side, width, radius, mean, diffusivity, in_biomass, largest, rates)
+    """{side: (acceptor, donor)} of :class:`Field`; mean: u_ave; largest: X_0; rates: those of reference.monod."""
+    return {side: _fields_on(side, width, radius, mean, diffusivity, in_biomass, largest, rates)
             for side in ("fluid", "biomass")}
 
 
-def _side(side, width, radius, mean, diffusivity, in_biomass, largest, rates):
-    found = concentrations(width, radius, diffusivity, in_biomass, side)
-    sinks = uptake(*found, rates) if side == "biomass" else (0, 0)
-    spreads = in_biomass if side == "biomass" else diffusivity
+def _fields_on(side, width, radius, mean, diffusivity, in_biomass, largest, rates):
+    substrates = concentrations(width, radius, diffusivity, in_biomass, side)
+    sinks = uptake(*substrates, rates) if side == "biomass" else (0, 0)
+    diffusivities = in_biomass if side == "biomass" else diffusivity
     u, v = velocity(width, mean)
     forcing = [-d * (sy.diff(c, X, 2) + sy.diff(c, Y, 2)) + u * sy.diff(c, X) + v * sy.diff(c, Y)
-               + density(radius, largest) * q for c, d, q in zip(found, spreads, sinks)]
+               + density(radius, largest) * q for c, d, q in zip(substrates, diffusivities, sinks)]
     return tuple(Field(function(c), function((d * sy.diff(c, X), d * sy.diff(c, Y))), function(f))
-                 for c, d, f in zip(found, spreads, forcing))
+                 for c, d, f in zip(substrates, diffusivities, forcing))
 
 
 def function(expression):

@@ -2,15 +2,15 @@
 
     q_A = m_A (k F m_D + d_c f_d b),      q_D = k m_A m_D,      m = C / (C + K_s)
 
-Below zero, where only an iterate can be, C / (C + K_s) goes on as C / K_s, and the other substrate counts as zero.
+Iterates can be negative. There C / K_s replaces C / (C + K_s), and the factor of the other substrate counts as zero.
 """
 import numpy as np
 import scipy.sparse as sp
 
-#: mg/L, of the differences.
-NUDGE = 1e-6
-#: Newton's method is given up after so many steps.
-MOST = 100
+#: Step of the differences, mg/L.
+DIFFERENCE_STEP = 1e-6
+#: Newton's method stops with an error after this number of steps.
+MAX_ITERATIONS = 100
 
 
 def uptake(acceptor, donor, rates):
@@ -26,27 +26,29 @@ def sink(fields, load, rates):
 
 
 def derivatives(fields, rates):
-    """(2, 2, ...) derivatives of (q_A, q_D), the rows, by (C_A, C_D), fields (2, ...), by central differences."""
-    shifts = NUDGE * np.eye(2).reshape(2, 2, *[1] * (fields.ndim - 1))
+    """Derivatives of (q_A, q_D), the rows, by (C_A, C_D), (2, 2, ...), from central differences; fields (2, ...)."""
+    shifts = DIFFERENCE_STEP * np.eye(2).reshape(2, 2, *[1] * (fields.ndim - 1))
     columns = [np.stack(uptake(*(fields + d), rates)) - np.stack(uptake(*(fields - d), rates)) for d in shifts]
-    return np.stack(columns, axis=1) / (2 * NUDGE)
+    return np.stack(columns, axis=1) / (2 * DIFFERENCE_STEP)
 
 
-def slopes(fields, load, rates):
-    """(2n, 2n) derivative of :func:`sink`, place by place."""
+def sink_derivative(fields, load, rates):
+    """Derivative of :func:`sink`, (2n, 2n), point by point."""
     rows = load * derivatives(fields.reshape(2, -1), rates)
     return sp.block_array([[*map(sp.diags_array, row)] for row in rows], format="csc")
 
 
-def at_rest(rise, derivative, fields, small, solved):
-    """The zero (n,) of ``rise``, smaller than ``small``, by Newton's method with halved steps from ``fields`` (n,);
-    solved(matrix, right): its linear solver. Raises RuntimeError where it does not converge."""
-    for _ in range(MOST):
-        now = rise(fields)
-        if np.abs(now).max() < small:
+def solve_steady(balance, derivative, fields, tolerance, solve_linear):
+    """Find the zero (n,) of ``balance`` by Newton's method with halved steps from ``fields`` (n,).
+
+    solve_linear(matrix, right) solves the linear systems. Raises RuntimeError if Newton's method does not converge."""
+    for _ in range(MAX_ITERATIONS):
+        defect = balance(fields)
+        if np.abs(defect).max() < tolerance:
             return fields
-        step, length = solved(derivative(fields), -now), 1.0
-        while np.linalg.norm(rise(fields + length * step)) > np.linalg.norm(now) and length > 1e-3:
+        step = solve_linear(derivative(fields), -defect)
+        length = 1.0
+        while np.linalg.norm(balance(fields + length * step)) > np.linalg.norm(defect) and length > 1e-3:
             length /= 2
         fields = fields + length * step
-    raise RuntimeError(f"the concentrations do not come to rest: {np.abs(now).max():.2g}")
+    raise RuntimeError(f"the steady concentrations did not converge: residual {np.abs(defect).max():.2g}")

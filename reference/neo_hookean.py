@@ -27,10 +27,10 @@ import numpy as np
 
 def cauchy(F, P):
     """Cauchy stress (3, 3) of a homogeneous plane deformation F (2, 2), F33 = 1, at pressure P."""
-    whole = np.eye(3)
-    whole[:2, :2] = F
-    left = whole @ whole.T
-    return np.linalg.det(whole) ** (-5 / 3) * (left - np.trace(left) / 3 * np.eye(3)) + P * np.eye(3)
+    gradient = np.eye(3)
+    gradient[:2, :2] = F
+    left = gradient @ gradient.T
+    return np.linalg.det(gradient) ** (-5 / 3) * (left - np.trace(left) / 3 * np.eye(3)) + P * np.eye(3)
 
 
 def free_growth_pressure(theta):
@@ -39,7 +39,7 @@ def free_growth_pressure(theta):
 
 
 def confined_growth_pressure(theta):
-    """P of a body that grows uniformly by theta in one direction alone."""
+    """P of a body that grows uniformly by theta in one direction."""
     return -2 * theta ** (-5 / 3) * (theta**2 - 1) / 3
 
 

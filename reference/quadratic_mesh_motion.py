@@ -1,22 +1,22 @@
-"""Mesh motion (35) without its pressure, by quadratic elements on curved triangles, on meshes of its own.
+"""Mesh motion (35) without its pressure, by quadratic elements on independent meshes of curved triangles.
 
-The second equation of (35), gamma P = -div d, put into the first leaves the displacement d alone:
+The second equation of (35), gamma P = -div d, eliminates the pressure from the first:
 
     (grad d, grad v) + 1/gamma (div d, div v) = 0   for all v,
 
 which needs no stabilisation. d is given on the aggregate; d_y = 0 on the walls and d_x = 0 at inlet and outlet, the
 other component free. This is Navier's equation with (lambda + mu) / mu = 1/gamma: Kolosov's kappa is 1 + 2 gamma.
 
-**Corners.** At inlet and outlet, and where the aggregate meets the wall at a right angle, mirror images in the lines on
-which the displacement slides continue it smoothly. Where the fluid has another angle w at the wall, the mirror image
-makes a wedge of angle 2 w held on both sides; its displacements r^z, even along the wall, are those of
+**Corners.** At inlet and outlet, and where the aggregate meets the wall at a right angle, reflections in the lines on
+which the displacement slides extend it smoothly. Where the fluid has another angle w at the wall, the reflection gives
+a wedge of angle 2 w clamped on both sides. Its displacements r^z, even along the wall, satisfy
 
     sin(2 w z) = z / kappa sin(2 w),
 
 by u = kappa A s^z - z A s conj(s)^(z-1) - B conj(s)^z = 0 on s = r exp(i w), A and B real (Muskhelishvili).
 
-**Meshes.** The fluid around an arc that stands on the lower wall is a grid of lines from the arc to the other sides of
-the channel, parts x parts to each of the three, its squares halved, middles of edges on the same map.
+**Meshes.** The fluid around an arc on the lower wall is a grid of lines from the arc to the other three sides of the
+channel, parts x parts squares to each side. Each square is halved; the same map places the midpoints of edges.
 """
 from dataclasses import dataclass
 
@@ -25,7 +25,7 @@ from scipy.optimize import brentq
 from skfem import Basis, BilinearForm, ElementTriP2, ElementVector, MeshTri, MeshTri2, condense, solve
 from skfem.helpers import ddot, div, grad
 
-#: Powers by which the grid is drawn towards the aggregate, and towards the two points where it meets the wall.
+#: Powers that grade the grid towards the aggregate, and towards the two points where it meets the wall.
 TOWARDS_ARC, TOWARDS_WALL = 2.0, 3.0
 
 
@@ -39,18 +39,18 @@ class Motion:
 
 
 def follow(radius, angle, width, end, parts, gamma, motion):
-    """:class:`Motion` of the fluid of -end < x < end, 0 < y < width around an arc of ``radius`` that meets the lower
-    wall at the contact ``angle`` (radians; pi/2: a half-disc), when the arc moves by motion(x, y), (2, n)."""
+    """Compute the :class:`Motion` of the fluid in -end < x < end, 0 < y < width around an arc of ``radius`` that meets
+    the lower wall at the contact ``angle`` (radians; pi/2: a half-disc). The arc moves by motion(x, y), (2, n)."""
     basis = Basis(_mesh(radius, angle, width, end, parts), ElementVector(ElementTriP2()), intorder=5)
     A = BilinearForm(lambda u, v, w: ddot(grad(u), grad(v)) + div(u) * div(v) / gamma).assemble(basis)
-    held, value = _boundary(basis, radius, angle, width, end, motion)
-    found = solve(*condense(A, x=value, D=held))
-    points, field = (np.asarray(f).reshape(2, -1).T for f in (basis.global_coordinates(), basis.interpolate(found)))
+    constrained, value = _boundary(basis, radius, angle, width, end, motion)
+    solution = solve(*condense(A, x=value, D=constrained))
+    points, field = (np.asarray(f).reshape(2, -1).T for f in (basis.global_coordinates(), basis.interpolate(solution)))
     return Motion(points, field, basis.dx.ravel())
 
 
 def exponent(fluid_angle, gamma):
-    """z of the displacement r^z at a wall that the fluid meets at an angle (radians) between pi/2 and pi: 1/2 to 1."""
+    """Exponent z, 1/2 to 1, of the displacement r^z at a wall; the fluid's angle (radians) is between pi/2 and pi."""
     opening, kappa = 2 * fluid_angle, 1 + 2 * gamma
     return brentq(lambda z: np.sin(opening * z) - z / kappa * np.sin(opening), np.pi / opening, 1 - 1e-9)
 
@@ -60,11 +60,11 @@ def _mesh(radius, angle, width, end, parts):
     side = np.linspace(0, 1, parts + 1)
     along = np.concatenate([side**TOWARDS_WALL, 1 + side[1:-1], 3 - side[::-1] ** TOWARDS_WALL])
     flat = MeshTri.init_tensor(along, side**TOWARDS_ARC)
-    where = _placed(*Basis(flat, ElementTriP2()).doflocs, radius, angle, width, end)
-    return MeshTri2(where, flat.t)
+    nodes = _map_strip(*Basis(flat, ElementTriP2()).doflocs, radius, angle, width, end)
+    return MeshTri2(nodes, flat.t)
 
 
-def _placed(t, s, radius, angle, width, end):
+def _map_strip(t, s, radius, angle, width, end):
     """(2, n) places: s = 0 on the arc, s = 1 on the channel's sides, of which t from 0 to 1 is the right one, from 1 to
     2 the upper, from 2 to 3 the left one, and linear in s between."""
     turn = np.pi / 2 + angle * np.interp(t, [0, 1, 2, 3], [-1, -0.5, 0.5, 1])
@@ -82,6 +82,6 @@ def _boundary(basis, radius, angle, width, end, motion):
     component[np.concatenate([basis.nodal_dofs[1], basis.facet_dofs[1]])] = 1
     arc = np.abs(np.hypot(x, y + radius * np.cos(angle)) - radius) < near
     wall, ends = (y < near) | (y > width - near), np.abs(x) > end - near
-    held = arc | np.where(component == 1, wall, ends)
+    constrained = arc | np.where(component == 1, wall, ends)
     value = np.where(arc, np.choose(component, motion(x, y)), 0.0)
-    return np.flatnonzero(held), value
+    return np.flatnonzero(constrained), value

@@ -1,10 +1,10 @@
 """Judge a run by the files in its folder and by its scene, a dict of TOML tables.
 
-Nothing is shared with the code that made the files. Units, defaults of Table 1, quadrature and formulas are written
-here again. Each check is a :class:`Finding`: a number, the range that it must lie in, and where the range comes from.
-The elements are curved quadratic triangles (``triangle6``), with quadratic velocities and concentrations. Straight
-ones (``triangle``) get nodes in the middles of their sides. Lengths are in um, times in h, concentrations in mg/L,
-amounts per depth in pg/m = um2 mg/L.
+The module shares nothing with the code that writes the files. It repeats units, defaults of Table 1, quadrature and
+formulas. Each check is a :class:`Finding`: a number, its range, and the origin of the range. The elements are curved
+quadratic triangles (``triangle6``) with quadratic velocities and concentrations. Straight triangles (``triangle``) get
+nodes at the midpoints of their sides. Lengths are in um, times in h, concentrations in mg/L, amounts per depth in
+pg/m = um2 mg/L.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ import numpy as np
 
 UNITS = {"um": 1.0, "cm": 1e4, "h": 1.0, "min": 1 / 60, "mg/L": 1.0, "1/day": 1 / 24, "m/day": 1e6 / 24,
          "cm^2/day": 1e8 / 24, "cm^2/s": 3.6e11, "m/s^2": 3600**2 * 1e6, "m^2": 1e12, "deg": np.pi / 180, "MPa": 1.0}
-#: What a scene leaves out has the value of the paper's Table 1.
+#: Defaults of the scene's keys: the values of the paper's Table 1.
 TABLE_1 = {
     "pore": {"width": "100 um", "length": "600 um"},
     "flow": {"kinematic_viscosity": "0.01003 cm^2/s", "gravity": "9.81 m/s^2", "viscosity_ratio": 2000.0},
@@ -36,30 +36,30 @@ TABLE_1 = {
 }
 NAMES = ("acceptor", "donor")
 
-#: Sums over some 1e4 nodes or points, in double precision.
+#: Round-off of sums over about 1e4 nodes or points.
 SUM = 1e-11
-#: An amount that Newton's method or a linear solver conserves: 1e-12 of the terms of each row, 1e3 to 1e4 rows.
+#: Error of an amount conserved by Newton's method or a linear solver: 1e-12 of the terms of each of 1e3 to 1e4 rows.
 SOLVED = 1e-8
-#: docs/design.md: a concentration may leave the range from zero to its supply by so much of the supply.
+#: docs/design.md: a concentration may leave the range from zero to its supply by these fractions of the supply.
 UNDERSHOOT, OVERSHOOT = 1e-3, 0.02
-#: docs/design.md: two quadratures of the uptake differ by so much at most. The fields give the biomass at nodes, as
-#: the mean of the triangles beside them, which is taken to err by as much again.
+#: docs/design.md: largest difference between two quadratures of the uptake. The fields give the biomass at nodes, as
+#: the mean over the adjacent triangles; the same bound is assumed for its error.
 UPTAKE = 0.05 + 0.05
-#: With a half saturation of a smaller part of the supply the uptake is nearly a step: rules with 4, 8 and 16 points a
-#: side differ among themselves, so that no such bound can be given.
+#: With a half saturation below this fraction of the supply, the uptake is nearly a step function. Rules with 4, 8 and
+#: 16 points a side disagree, so that this bound does not apply.
 STEP = 0.01
-#: A gradient is a rational function on a curved triangle: a tenth of the error of ``fast`` for two quadratures.
+#: Difference of two quadratures of gradients, rational functions on curved triangles: a tenth of the error of ``fast``.
 QUADRATURE = 1e-3
-#: Straight triangles have linear velocities, whose stabilisation spends work: they were measured 1 to 4 % off in the
-#: head loss. Their biomass counts at nodes, and a remesh leaves an error of the area that the next update works off.
-#: Both bounds are those of the hard cases with linear elements.
+#: Straight triangles have linear velocities, whose stabilisation dissipates work: the measured error of the head loss
+#: is 1 to 4 %. Their biomass is nodal, and a remesh leaves an error of the area that the next update reduces. Both
+#: bounds are those of the hard cases with linear elements.
 STRAIGHT_LOSS, STRAIGHT_AREA = 0.04, 1e-4
 #: README.md: errors of the presets fast and accurate.
 PROMISED = 0.01 + 0.001
 
 
 class Finding(NamedTuple):
-    """A number that must lie between ``low`` and ``high``; ``origin`` is where that range comes from."""
+    """A number that must lie between ``low`` and ``high``; ``origin`` is the origin of this range."""
 
     quantity: str
     value: float
@@ -69,32 +69,32 @@ class Finding(NamedTuple):
 
     @property
     def holds(self) -> bool:
-        """Is the number in its range? A number that is not finite never is, unless the range says so."""
+        """Whether the number is in its range. NaN never is; infinity is if the range includes it."""
         return bool(self.low <= self.value <= self.high)
 
 
 def size(quantity: str, values, bound: float, origin: str) -> Finding:
-    """The largest of some sizes, which must not exceed ``bound``."""
+    """Check that no absolute value exceeds ``bound``."""
     largest = np.max(np.abs(values), initial=0.0)
     return Finding(quantity, float(largest), 0.0, bound, origin)
 
 
 def excess(quantity: str, values, low, high, origin: str) -> Finding:
-    """How far some values lie outside of their own bounds; the bounds carry their tolerance."""
+    """Check that each value lies within its own bounds, which include the tolerance."""
     outside = np.maximum(np.subtract(low, values), np.subtract(values, high))
     return Finding(f"{quantity}, beyond its bounds", float(np.max(outside, initial=-inf)), -inf, 0.0, origin)
 
 
 def number(text) -> float:
-    """A plain number, or one with its unit."""
+    """Convert a plain number, or a number with its unit."""
     if isinstance(text, str):
         value, _, unit = text.partition(" ")
         return float(value) * UNITS[unit]
     return float(text)
 
 
-class Course:
-    """A quantity over time (h): a constant, or a table of times and values, each value from its time on."""
+class TimeCourse:
+    """A quantity over time (h): a constant, or a table of times and values. A value applies from its time on."""
 
     def __init__(self, entry, linear: bool = False):
         table = entry if isinstance(entry, list) else [["0 h", entry]]
@@ -102,13 +102,13 @@ class Course:
         self.linear = linear
 
     def at(self, time: float) -> float:
-        """The value at a time, after the jump that may be there."""
+        """The value at a time; at a jump, the value after it."""
         if self.linear:
             return float(np.interp(time, self.times, self.values))
         return float(self.values[np.searchsorted(self.times, time + 1e-9, side="right") - 1])
 
     def largest(self, time: float) -> float:
-        """The largest value up to a time."""
+        """The largest value up to and including a time."""
         return max(*self.values[self.times <= time + 1e-9], self.at(time))
 
 
@@ -119,49 +119,49 @@ class Scene:
     tables: dict
 
     def number(self, section: str, key: str) -> float:
-        """One number of a section, or of Table 1."""
+        """A number of a section, by default that of Table 1."""
         return number(self.section(section).get(key, TABLE_1[section].get(key)))
 
     def section(self, name: str) -> dict:
-        """A section, or a substrate; empty where the scene leaves it out."""
+        """A section, or a substrate; empty if the scene omits it."""
         if name in NAMES:
             return self.tables["substrates"].get(name, {})
         return self.tables.get(name, {})
 
-    def course(self, section: str, key: str) -> Course:
-        """A quantity that may be a table over time."""
+    def course(self, section: str, key: str) -> TimeCourse:
+        """A quantity, which may be a table over time."""
         part = self.section(section)
-        return Course(part.get(key, TABLE_1[section].get(key)), part.get("interpolation") == "linear")
+        return TimeCourse(part.get(key, TABLE_1[section].get(key)), part.get("interpolation") == "linear")
 
     @property
     def flows(self) -> bool:
-        """Does the scene have a flow?"""
+        """Whether the scene has a flow."""
         return "flow" in self.tables
 
     @property
     def viscosity_ratio(self) -> float | None:
-        """Of the aggregate; None where it is permeable."""
+        """Viscosity ratio of the aggregate; None if it is permeable."""
         permeable = self.section("flow").get("biomass") == "brinkman"
         return None if permeable else self.number("flow", "viscosity_ratio")
 
     @property
     def stores(self) -> bool:
-        """Are substrates transient?"""
+        """Whether substrates are transient."""
         return self.section("numerics").get("transport") == "gear"
 
     @property
     def midpoint(self) -> bool:
-        """Are steps those of the midpoint rule?"""
+        """Whether the steps are those of the midpoint rule."""
         return self.section("numerics").get("time") != "updates"
 
     @property
     def closed(self) -> bool:
-        """Does nothing pass the ends of the pore?"""
+        """Whether the ends of the pore are closed to substrates."""
         return self.tables["substrates"].get("boundary") == "closed"
 
     @property
     def end(self) -> float:
-        """h."""
+        """End of the growth, h."""
         return number(self.tables["growth"]["end"])
 
 
@@ -175,15 +175,15 @@ def _triangle_rule(n: int = 4) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _shapes(at: np.ndarray) -> np.ndarray:
-    """(q, 6) quadratic functions of a triangle's corners, then of its sides' middles, in VTK's order."""
+    """Quadratic shape functions (q, 6): corners, then midpoints of sides, in VTK's order."""
     second, third = at.T
     first = 1 - second - third
     return np.stack([first * (2 * first - 1), second * (2 * second - 1), third * (2 * third - 1), 4 * first * second,
                      4 * second * third, 4 * third * first], axis=1)
 
 
-def _slopes(at: np.ndarray) -> np.ndarray:
-    """(q, 6, 2) their derivatives by both coordinates of the unit triangle."""
+def _shape_gradients(at: np.ndarray) -> np.ndarray:
+    """Their derivatives (q, 6, 2) by the two coordinates of the unit triangle."""
     second, third = at.T
     first = 1 - second - third
     zero = 0 * first
@@ -193,14 +193,14 @@ def _slopes(at: np.ndarray) -> np.ndarray:
 
 
 POINTS, WEIGHTS = _triangle_rule()
-SHAPES, SLOPES = _shapes(POINTS), _slopes(POINTS)
+SHAPES, SHAPE_GRADIENTS = _shapes(POINTS), _shape_gradients(POINTS)
 LINE, LINE_WEIGHTS = np.polynomial.legendre.leggauss(4)
 ALONG = np.stack([LINE * (LINE - 1) / 2, LINE * (LINE + 1) / 2, 1 - LINE**2], axis=1)
 SIDES = ((0, 1, 3), (1, 2, 4), (2, 0, 5))
 
 
 def _with_middles(mesh: meshio.Mesh) -> meshio.Mesh:
-    """Straight triangles with nodes in the middles of their sides, where a field is the mean of that at the ends."""
+    """Add nodes at the midpoints of straight triangles' sides; a field is the mean of its values at the side's ends."""
     triangles = mesh.cells_dict["triangle"]
     sides = np.sort([triangles[:, side[:2]] for side in SIDES], axis=2)
     ends, place = np.unique(sides.reshape(-1, 2), axis=0, return_inverse=True)
@@ -226,32 +226,32 @@ class Fields:
 
     @cached_property
     def body(self) -> np.ndarray:
-        """(T,) is a triangle of the aggregate?"""
+        """Whether each triangle belongs to the aggregate, (T,)."""
         return self.in_cells["region"] == 1
 
     @cached_property
     def dx(self) -> np.ndarray:
-        """(T, q) weights of the points of integration, um2."""
+        """Weights (T, q) of the quadrature points, um2."""
         return self.weights(self.points)
 
     def weights(self, points: np.ndarray) -> np.ndarray:
-        """(T, q) the same for other coordinates (N, 2) of the nodes."""
-        jacobian = np.einsum("tni,qnj->tqij", points[self.cells], SLOPES)
+        """Weights (T, q) of the quadrature points for given coordinates (N, 2) of the nodes, um2."""
+        jacobian = np.einsum("tni,qnj->tqij", points[self.cells], SHAPE_GRADIENTS)
         return np.linalg.det(jacobian) * WEIGHTS
 
     def gradients(self, values: np.ndarray) -> np.ndarray:
-        """(T, q, c, 2) of nodal values (N, c) in the points of integration."""
-        jacobian = np.einsum("tni,qnj->tqij", self.points[self.cells], SLOPES)
-        slopes = np.einsum("qnj,tqji->tqni", SLOPES, np.linalg.inv(jacobian))
-        return np.einsum("tnc,tqni->tqci", values[self.cells], slopes)
+        """Gradients (T, q, c, 2) of nodal values (N, c) at the quadrature points."""
+        jacobian = np.einsum("tni,qnj->tqij", self.points[self.cells], SHAPE_GRADIENTS)
+        gradients = np.einsum("qnj,tqji->tqni", SHAPE_GRADIENTS, np.linalg.inv(jacobian))
+        return np.einsum("tnc,tqni->tqci", values[self.cells], gradients)
 
     @cached_property
     def areas(self) -> np.ndarray:
-        """(T,) um2."""
+        """Areas of the triangles (T,), um2."""
         return self.dx.sum(axis=1)
 
     def inside(self, name: str) -> np.ndarray:
-        """(B, q) a nodal field in the points of the aggregate's triangles."""
+        """A nodal field at the quadrature points of the aggregate's triangles, (B, q)."""
         return self.at_nodes[name][self.cells[self.body]] @ SHAPES.T
 
     def wall(self, y: float) -> np.ndarray:
@@ -259,7 +259,7 @@ class Fields:
         return np.flatnonzero(self.points[:, 1] == y)
 
     def end(self, outlet: bool) -> tuple[np.ndarray, np.ndarray]:
-        """Sides (E, 3) at an end, corners first, and their lengths (E,) um."""
+        """Sides (E, 3) at an end of the mesh, corners first, and their lengths (E,), um."""
         x = self.points[:, 0]
         at = x == (x.max() if outlet else x.min())
         sides = np.concatenate([self.cells[:, side] for side in SIDES])
@@ -267,7 +267,7 @@ class Fields:
         return sides, np.abs(np.diff(self.points[sides[:, :2], 1], axis=1))[:, 0]
 
     def over_end(self, outlet: bool, *factors: np.ndarray) -> float:
-        """Integral of the product of nodal fields (N,) over an end."""
+        """Integral of the product of nodal fields (N,) over an end of the mesh."""
         sides, lengths = self.end(outlet)
         product = np.prod([factor[sides] @ ALONG.T for factor in factors], axis=0)
         return float((product @ LINE_WEIGHTS) @ lengths / 2)
@@ -280,12 +280,12 @@ class Fields:
         with np.errstate(divide="ignore", invalid="ignore"):
             t = np.clip(np.nan_to_num(-0.5 * (stop - start) / bend), -1.0, 1.0)
         peaks = middle + 0.5 * t * (stop - start) + 0.5 * t**2 * bend
-        every = np.concatenate([start, stop, peaks])
-        return every[:, 0].min(), every[:, 0].max(), every[:, 1].max()
+        candidates = np.concatenate([start, stop, peaks])
+        return candidates[:, 0].min(), candidates[:, 0].max(), candidates[:, 1].max()
 
 
-def _table(path: Path) -> dict[str, np.ndarray]:
-    """{column: values}; a column without any value is left out, one missing value is not a number."""
+def _read_table(path: Path) -> dict[str, np.ndarray]:
+    """Read {column: values}. A column without any value is omitted; a single missing value is NaN."""
     with path.open(newline="") as file:
         rows = list(csv.DictReader(file))
     columns = {name: [row[name] for row in rows] for name in (rows[0] if rows else ())}
@@ -294,50 +294,50 @@ def _table(path: Path) -> dict[str, np.ndarray]:
 
 
 class Run:
-    """The files of a run, and its scene as tables."""
+    """The files of a run, and its scene."""
 
     def __init__(self, folder: Path, tables: dict):
         self.scene = Scene(tables)
         self.record = json.loads((folder / "run.json").read_text())
-        self.series = _table(folder / "timeseries.csv")
-        self.ledger = _table(folder / "ledger.csv") if (folder / "ledger.csv").is_file() else {}
+        self.series = _read_table(folder / "timeseries.csv")
+        self.ledger = _read_table(folder / "ledger.csv") if (folder / "ledger.csv").is_file() else {}
         self.files = [folder / entry.get("file") for entry in ElementTree.parse(folder / "fields.pvd").iter("DataSet")]
 
     @cached_property
     def fields(self) -> list[Fields]:
-        """One a row."""
+        """The fields of each row."""
         return [Fields(path) for path in self.files]
 
     @property
     def times(self) -> np.ndarray:
-        """(rows,) h."""
+        """Times of the rows (rows,), h."""
         return self.series["time_h"]
 
     @property
     def completed(self) -> bool:
-        """Has the run come to growth.end?"""
+        """Whether the run has reached growth.end."""
         return self.record["status"] == "completed"
 
     @cached_property
     def duration(self) -> np.ndarray:
-        """(steps,) h."""
+        """Durations of the steps (steps,), h."""
         return self.ledger["end_h"] - self.ledger["start_h"]
 
     def at_ledger(self) -> tuple[np.ndarray, np.ndarray]:
-        """Rows, and the steps that end at their times."""
+        """Indices of the rows at which a step ends, and of these steps."""
         apart = np.abs(np.subtract.outer(self.times, self.ledger.get("end_h", np.zeros(0))))
         return np.nonzero(apart <= 1e-9)
 
 
 def findings(run: Run) -> Iterator[Finding]:
-    """All checks of one run."""
+    """Yield all checks of one run."""
     yield from _numbers(run)
     yield from _rows(run)
-    for row, fields in enumerate(run.fields):
-        here = {name: values[row] for name, values in run.series.items()}
+    for index, fields in enumerate(run.fields):
+        row = {name: values[index] for name, values in run.series.items()}
         for check in (_geometry, _flow, _concentrations, _uptake, _deformation):
             yield from (finding._replace(quantity=f"{finding.quantity}, t = {fields.time:.4g} h")
-                        for finding in check(run.scene, here, fields))
+                        for finding in check(run.scene, row, fields))
     if run.ledger:
         yield from _steps(run)
         yield from _substrates(run)
@@ -358,7 +358,7 @@ def _numbers(run: Run) -> Iterator[Finding]:
 
 
 def _defined_in(fields: Fields, name: str) -> np.ndarray:
-    """Triangles that have a value of a field: those of the aggregate, or those of them beside the fluid."""
+    """Triangles in which a field is defined: the aggregate or, for the surface stretch, its triangles at the fluid."""
     if name != "surface_stretch":
         return fields.body
     middles = fields.cells[:, 3:]
@@ -366,14 +366,14 @@ def _defined_in(fields: Fields, name: str) -> np.ndarray:
 
 
 def _rows(run: Run) -> Iterator[Finding]:
-    """Rows and fields stand at the times that were asked for, and cover the run."""
+    """Rows and fields are at the requested times, and cover the run."""
     times = run.times
     yield size("rows that are not later than the row before", np.count_nonzero(np.diff(times) <= 0), 0, "time passes")
     yield size("rows without fields of their time", _unmatched(times, [f.time for f in run.fields]), 0, "one a row")
-    asked = run.scene.section("output").get("times")
-    if asked and run.completed:
+    requested = run.scene.section("output").get("times")
+    if requested and run.completed:
         yield size("rows that were asked for and are not there, or the reverse",
-                   _unmatched(times, {0.0, *map(number, asked)}), 0, "output.times, and the start")
+                   _unmatched(times, {0.0, *map(number, requested)}), 0, "output.times, and the start")
     elif run.completed:
         yield size("time between the last row and the end", times[-1] - run.scene.end, 1e-9, "growth.end")
     if run.scene.end and (run.completed or run.ledger):
@@ -383,7 +383,7 @@ def _rows(run: Run) -> Iterator[Finding]:
 
 
 def _unmatched(one, other) -> int:
-    """How many times of two lists have no partner in the other."""
+    """Number of times in two lists without an equal time in the other list."""
     apart = np.abs(np.subtract.outer(list(one), list(other))) <= 1e-9
     return np.count_nonzero(~apart.any(axis=1)) + np.count_nonzero(~apart.any(axis=0))
 
@@ -399,9 +399,9 @@ def _geometry(scene: Scene, row: dict, fields: Fields) -> Iterator[Finding]:
     area = fields.areas[fields.body].sum()
     yield size("aggregate's area in the fields over that of the row, less one", area / row["aggregate_area_um2"] - 1,
                SUM, "quadrature of triangles is exact")
-    shown = [row[name] for name in ("upstream_um", "downstream_um", "thickness_um")]
+    reported = [row[name] for name in ("upstream_um", "downstream_um", "thickness_um")]
     yield size("ends and thickness in the fields less those of the row, over the width",
-               np.subtract(fields.outline_extremes(), shown) / width, SUM, "extremes of parabolas")
+               np.subtract(fields.outline_extremes(), reported) / width, SUM, "extremes of parabolas")
     touches = np.isin(np.unique(fields.cells[fields.body]), fields.wall(width)).any()
     yield size("contact in the fields less that of the row", float(touches) - row["contact"], 0, "yes or no")
     yield size("triangles that are turned over", np.count_nonzero(fields.dx.min(axis=1) <= 0), 0, "none is")
@@ -447,7 +447,7 @@ def _flow(scene: Scene, row: dict, fields: Fields) -> Iterator[Finding]:
 
 
 def _dissipation(scene: Scene, fields: Fields) -> float:
-    """Integral of nu_r grad u : grad u, or with traction nu_r grad u : (grad u + grad u^T), um2/h2."""
+    """Integral of nu_r grad u : grad u or, for traction, of nu_r grad u : (grad u + grad u^T), um2/h2."""
     velocity = fields.at_nodes["velocity_m_per_d"][:, :2] * UNITS["m/day"]
     gradient = fields.gradients(velocity)
     square = np.sum(gradient**2, axis=(2, 3))
@@ -474,7 +474,7 @@ def _concentrations(scene: Scene, row: dict, fields: Fields) -> Iterator[Finding
 
 
 def _rates(scene: Scene, fields: Fields) -> tuple[float, float, float]:
-    """Acceptor and donor taken up, and the part of acceptor that decay takes, (7) and (8), um2 mg/L/h."""
+    """Uptake of acceptor and donor, and the acceptor consumed by decay, (7) and (8), um2 mg/L/h."""
     k, b = scene.number("kinetics", "maximum_utilization_rate"), scene.number("kinetics", "decay_coefficient")
     of_decay = b * scene.number("kinetics", "degradable_fraction") * scene.number("kinetics", "decay_oxygen_demand")
     positive = [np.maximum(fields.inside(f"{name}_mg_per_L"), 0.0) for name in NAMES]
@@ -486,7 +486,7 @@ def _rates(scene: Scene, fields: Fields) -> tuple[float, float, float]:
 
 
 def _uptake(scene: Scene, row: dict, fields: Fields) -> Iterator[Finding]:
-    """In a row at rest, what the water loses between inlet and outlet is what the aggregate of its fields takes up."""
+    """In a steady row, the loss between inlet and outlet equals the uptake by the aggregate."""
     steep = any(scene.number(name, "half_saturation") < STEP * scene.course(name, "supply").at(row["time_h"])
                 for name in NAMES)
     if not scene.flows or scene.stores or steep:
@@ -502,7 +502,7 @@ def _uptake(scene: Scene, row: dict, fields: Fields) -> Iterator[Finding]:
 
 
 def _deformation(scene: Scene, row: dict, fields: Fields) -> Iterator[Finding]:
-    """J is the ratio of areas; theta is J in the mean (24)."""
+    """J is the ratio of areas, and theta equals J in the mean (24)."""
     if scene.section("growth").get("new_biomass") == "stress_free":
         return
     places = np.nan_to_num(fields.at_nodes["position_t0_um"][:, :2])
@@ -536,7 +536,7 @@ def _steps(run: Run) -> Iterator[Finding]:
 
 
 def _substrates(run: Run) -> Iterator[Finding]:
-    """What enters leaves, is consumed or is stored."""
+    """The supplied amount leaves, is consumed or is stored."""
     scene = run.scene
     width, length = scene.number("pore", "width"), scene.number("pore", "length")
     for name in NAMES:
@@ -552,7 +552,7 @@ def _substrates(run: Run) -> Iterator[Finding]:
             yield size(f"{name} stored by what is at rest", stored, 0, "quasi-steady")
         if scene.closed:
             yield size(f"{name} that passes closed ends", [*supplied, *out], 0, "nothing passes")
-        yield excess(f"{name} consumed, pg/m", consumed, -SOLVED * scale, _most_consumed(run, name) * (1 + SOLVED),
+        yield excess(f"{name} consumed, pg/m", consumed, -SOLVED * scale, _max_consumed(run, name) * (1 + SOLVED),
                      "Monod's law at the supply, with the biomass that the fastest growth would make")
 
 
@@ -562,37 +562,37 @@ def _saturation(run: Run, name: str) -> float:
     return most / (most + run.scene.number(name, "half_saturation"))
 
 
-def _most_biomass(run: Run) -> np.ndarray:
-    """(steps,) pg/m that each step could end with."""
+def _max_biomass(run: Run) -> np.ndarray:
+    """Upper bound of the biomass at the end of each step (steps,), pg/m."""
     scene = run.scene
     fastest = scene.number("kinetics", "maximum_utilization_rate") * scene.number("kinetics", "yield_coefficient")
     return run.ledger["biomass_before_pg_per_m"] * np.exp(fastest * run.duration)
 
 
-def _most_consumed(run: Run, name: str) -> np.ndarray:
+def _max_consumed(run: Run, name: str) -> np.ndarray:
     scene = run.scene
     m_a, m_d = (_saturation(run, each) for each in NAMES)
-    donor = scene.number("kinetics", "maximum_utilization_rate") * m_a * m_d * run.duration * _most_biomass(run)
+    donor = scene.number("kinetics", "maximum_utilization_rate") * m_a * m_d * run.duration * _max_biomass(run)
     if name == "donor":
         return donor
-    return scene.number("kinetics", "acceptor_to_donor_ratio") * donor + _most_decay(run) * scene.number(
+    return scene.number("kinetics", "acceptor_to_donor_ratio") * donor + _max_decay(run) * scene.number(
         "kinetics", "decay_oxygen_demand")
 
 
-def _most_decay(run: Run) -> np.ndarray:
-    """(steps,) pg/m of biomass that degrades at most."""
+def _max_decay(run: Run) -> np.ndarray:
+    """Upper bound of the biomass that degrades in each step (steps,), pg/m."""
     scene = run.scene
     rate = scene.number("kinetics", "decay_coefficient") * scene.number("kinetics", "degradable_fraction")
-    return rate * _saturation(run, "acceptor") * run.duration * _most_biomass(run)
+    return rate * _saturation(run, "acceptor") * run.duration * _max_biomass(run)
 
 
 def _growth(run: Run) -> Iterator[Finding]:
-    """Biomass is what the donor makes, less what decays."""
+    """New biomass is the yield on the donor minus the decay."""
     scene, ledger = run.scene, run.ledger
     law = {key: scene.number("kinetics", key) for key in TABLE_1["kinetics"]}
-    made, after = ledger["biomass_made_pg_per_m"], ledger["biomass_after_pg_per_m"]
+    produced, after = ledger["biomass_made_pg_per_m"], ledger["biomass_after_pg_per_m"]
     before = ledger["biomass_before_pg_per_m"]
-    yield size("biomass after less before and made, over after", (after - before - made) / after, SOLVED,
+    yield size("biomass after less before and made, over after", (after - before - produced) / after, SOLVED,
                "(9), (10) over the aggregate")
     acceptor, donor = (ledger[f"{name}_consumed_pg_per_m"] for name in NAMES)
     grown = law["yield_coefficient"] * donor
@@ -600,23 +600,25 @@ def _growth(run: Run) -> Iterator[Finding]:
     decayed = (acceptor - ratio * donor) / law["decay_oxygen_demand"]
     terms = acceptor / law["decay_oxygen_demand"] + ratio * donor + grown
     slack = SUM * (before + terms) + _scheme_error(run, law, terms)
-    yield excess("biomass made less Y donor - (acceptor - F donor) / d_c, pg/m", made - grown + decayed, -slack, slack,
-                 "(7)-(10); round-off with the midpoint rule")
+    yield excess("biomass made less Y donor - (acceptor - F donor) / d_c, pg/m", produced - grown + decayed,
+                 -slack, slack, "(7)-(10); round-off with the midpoint rule")
     yield excess("biomass that degrades by the oxygen consumed, pg/m", decayed, -slack - SOLVED * terms,
-                 _most_decay(run) * (1 + SOLVED) + slack, "f_d b m_A X_A, from zero to that at the supply")
+                 _max_decay(run) * (1 + SOLVED) + slack, "f_d b m_A X_A, from zero to that at the supply")
     rows, steps = run.at_ledger()
     inert = run.series["inert_fraction"][rows] * after[steps]
     first = run.series["inert_fraction"][0] * before[0]
     share = (1 - law["degradable_fraction"]) * law["decay_coefficient"]
-    gained = np.cumsum(share * _saturation(run, "acceptor") * run.duration * _most_biomass(run))[steps]
+    gained = np.cumsum(share * _saturation(run, "acceptor") * run.duration * _max_biomass(run))[steps]
     yield excess("inert biomass, pg/m", inert, first - SOLVED * after[steps], first + gained + SOLVED * after[steps],
                  "(10): it only gains, by (1 - f_d) b m_A X_A")
 
 
 def _scheme_error(run: Run, law: dict, terms: np.ndarray) -> np.ndarray | float:
-    """(steps,) pg/m. The paper's updates take the trapezoidal rule, which errs by (rate times step)^2 / 12 of what is
-    turned over. Gear's method follows concentrations to a thousandth of the supply, where C / (C + K_s) may change by
-    that times supply / K_s; the biomass errs by as much of what it could turn over at its fastest rate."""
+    """Bound of the scheme's error in each step (steps,), pg/m.
+
+    The paper's updates use the trapezoidal rule, whose error is (rate times step)^2 / 12 of the turnover. Gear's method
+    computes concentrations to a thousandth of the supply, which changes C / (C + K_s) by at most a thousandth of
+    supply / K_s. The error of the biomass is this fraction of its turnover at the fastest rate."""
     if run.scene.midpoint:
         return 0.0
     fastest = law["maximum_utilization_rate"] * law["yield_coefficient"] + law["decay_coefficient"]
@@ -625,15 +627,15 @@ def _scheme_error(run: Run, law: dict, terms: np.ndarray) -> np.ndarray | float:
         return part**2 / 12 * terms
     steep = sum(run.scene.course(name, "supply").largest(run.scene.end) / run.scene.number(name, "half_saturation")
                 for name in NAMES)
-    return part**2 / 12 * terms + 1e-3 * max(1.0, steep) * part * _most_biomass(run)
+    return part**2 / 12 * terms + 1e-3 * max(1.0, steep) * part * _max_biomass(run)
 
 
-#: Columns that report the steps since the row before, which depend on where that row is.
+#: Columns that report the steps since the previous row, and therefore depend on its time.
 OF_STEPS = ("acceptor_balance", "donor_balance", "biomass_balance", "oxygen_demand_balance", "remeshed")
 
 
 def same_rows(one: Run, other: Run) -> Iterator[Finding]:
-    """Two runs of a scene that differ in ``output.times`` alone, to the last bit where they have the same times."""
+    """Check that two runs that differ only in ``output.times`` have identical rows at the same times."""
     rows = [(i, k) for i, time in enumerate(one.times) for k in np.flatnonzero(other.times == time)]
     yield Finding("rows that both runs have", len(rows), 2, inf, "else less is tested")
     columns = [name for name in one.series if name not in OF_STEPS]
@@ -647,13 +649,15 @@ def same_rows(one: Run, other: Run) -> Iterator[Finding]:
 
 
 def _differ(one: Fields, other: Fields) -> bool:
-    """Do two files hold different arrays?"""
-    mine, its = ({**fields.at_nodes, **fields.in_cells, "points": fields.points} for fields in (one, other))
-    return mine.keys() != its.keys() or not all(np.array_equal(mine[key], its[key], equal_nan=True) for key in mine)
+    """Whether two files contain different arrays."""
+    first, second = ({**fields.at_nodes, **fields.in_cells, "points": fields.points} for fields in (one, other))
+    if first.keys() != second.keys():
+        return True
+    return not all(np.array_equal(first[key], second[key], equal_nan=True) for key in first)
 
 
 def close(coarse: Run, fine: Run) -> Iterator[Finding]:
-    """The presets fast and accurate, before contact: each column over its own size."""
+    """Compare the presets fast and accurate before contact: differences of each column over its scale."""
     for column, scale in _scales(coarse, fine).items():
         if column in coarse.series and column in fine.series:
             pairs = [(i, k) for i, time in enumerate(coarse.times) for k in np.flatnonzero(fine.times == time)
@@ -663,14 +667,14 @@ def close(coarse: Run, fine: Run) -> Iterator[Finding]:
 
 
 def _scales(coarse: Run, fine: Run) -> dict[str, Callable[[int], float]]:
-    """{column: what its difference in a row is relative to}."""
+    """{column: function from the row to the scale of the column's differences}."""
     series, scene = fine.series, fine.scene
-    found: dict[str, Callable[[int], float]] = {}
+    scales: dict[str, Callable[[int], float]] = {}
     for name in ("mean_velocity_m_per_d", "head_loss_cm", "conductivity_m_per_d", "aggregate_area_um2", "thickness_um"):
-        found[name] = lambda k, name=name: series[name][k]
+        scales[name] = lambda k, name=name: series[name][k]
     for name in ("upstream_um", "downstream_um"):
-        found[name] = lambda k: series["downstream_um"][k] - series["upstream_um"][k]
+        scales[name] = lambda k: series["downstream_um"][k] - series["upstream_um"][k]
     for name in NAMES:
-        found[f"effluent_{name}_mg_per_L"] = lambda k, name=name: max(
+        scales[f"effluent_{name}_mg_per_L"] = lambda k, name=name: max(
             scene.course(name, "supply").largest(fine.times[k]), 1e-300)
-    return found
+    return scales

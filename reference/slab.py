@@ -1,28 +1,29 @@
-"""Diffusion into a slab of biomass at rest that takes up one substrate: (7) in one dimension, in closed form.
+"""Steady diffusion into a slab of biomass that takes up one substrate: (7) in one dimension, in closed form.
 
-The slab |x| < l, with D_B inside, lies between two films of fluid of thickness a and diffusivity D, on whose far sides
-the supply C_s is held. With C_0 at its surface and N what enters through one side, D (C_s - C_0) / a = N. Inside,
+The slab |x| < l, with D_B inside, lies between two films of fluid of thickness a and diffusivity D. The concentration
+on their far sides is C_s. With C_0 at the surface and N the flux through one side, D (C_s - C_0) / a = N. Inside,
 D_B C'' = kappa C (first order, C << K_s), = s where C > 0 (zero order, C >> K_s), or = s C / (C + K_s) (Monod).
 
 First order: C = C_0 cosh(phi x / l) / cosh(phi) with Thiele's modulus phi = l sqrt(kappa / D_B), hence N = C_0 D_B / l
-phi tanh(phi). What is taken up over what the supply everywhere would be, kappa C_s l, is tanh(phi) / phi without films.
+phi tanh(phi). The uptake relative to that at the supply, kappa C_s l, is tanh(phi) / phi without films.
 
-Zero order: C = s (|x| - l + p)^2 / (2 D_B) down to the depth p, and zero further in; N = s p. With C_0 = s p^2 /
+Zero order: C = s (|x| - l + p)^2 / (2 D_B) down to the depth p, and zero below it; N = s p. With C_0 = s p^2 /
 (2 D_B) the film gives p^2 + 2 b p = 2 D_B C_s / s, b = a D_B / D: without films p = sqrt(2 D_B C_s / s). It must be
 p < l.
 
-Monod, used up before the middle: times C' and integrated from where C = C' = 0, D_B C'^2 / 2 = s G(C) with
+Monod, exhausted before the middle: multiplied by C' and integrated from C = C' = 0, D_B C'^2 / 2 = s G(C) with
 
     G(C) = C - K ln(1 + C / K),      N = sqrt(2 s D_B G(C_0)),
 
-and one more integration gives C. As C_0 / K grows N goes to zero order's; it lacks K / (2 C_0) ln(1 + C_0 / K) of it.
+and a second integration gives C. As C_0 / K grows, N tends to that of zero order from below; the relative difference
+is K / (2 C_0) ln(1 + C_0 / K).
 """
 import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 
-def _through(x, half, film, supply, surface, inside):
+def _with_films(x, half, film, supply, surface, inside):
     """``inside`` at |x| < half, linear in the films."""
     beyond = np.abs(x) - half
     slope = (supply - surface) / film if film else 0.0
@@ -34,7 +35,7 @@ def first_order(x, supply, uptake, half, in_slab, film=0.0, diffusivity=1.0):
     phi = half * np.sqrt(uptake / in_slab)
     surface = supply / (1 + film * in_slab / (half * diffusivity) * phi * np.tanh(phi))
     inside = surface * np.cosh(phi * np.clip(x / half, -1, 1)) / np.cosh(phi)
-    return _through(x, half, film, supply, surface, inside), surface / supply * np.tanh(phi) / phi
+    return _with_films(x, half, film, supply, surface, inside), surface / supply * np.tanh(phi) / phi
 
 
 def penetration(supply, sink, in_slab, film=0.0, diffusivity=1.0):
@@ -47,11 +48,11 @@ def zero_order(x, supply, sink, half, in_slab, film=0.0, diffusivity=1.0):
     """C(x); p = N / s is :func:`penetration`."""
     depth = penetration(supply, sink, in_slab, film, diffusivity)
     inside = sink * np.maximum(np.abs(x) - half + depth, 0.0) ** 2 / (2 * in_slab)
-    return _through(x, half, film, supply, sink * depth**2 / (2 * in_slab), inside)
+    return _with_films(x, half, film, supply, sink * depth**2 / (2 * in_slab), inside)
 
 
 def _share(ratio):
-    """G(C) / C^2 times K, of C / K: goes to 1/2 as C / K does to 0, where the logarithm would cancel."""
+    """K G(C) / C^2 as a function of C / K. It tends to 1/2 at C / K = 0, where the logarithm would cancel."""
     small = np.minimum(ratio, 1e-3)
     large = np.maximum(ratio, 1e-3)
     series = 1 / 2 - small / 3 + small**2 / 4 - small**3 / 5
@@ -66,8 +67,8 @@ def monod(x, supply, sink, half_saturation, half, in_slab, film=0.0, diffusivity
     surface = supply
     if film:
         surface = brentq(lambda c: diffusivity * (supply - c) / film - entering(c), 0.0, supply, xtol=1e-14 * supply)
-    found = solve_ivp(lambda _, y: -entering(np.exp(y)) / np.exp(y) / in_slab, (0.0, half), [np.log(surface)],
+    profile = solve_ivp(lambda _, y: -entering(np.exp(y)) / np.exp(y) / in_slab, (0.0, half), [np.log(surface)],
                       method="DOP853", rtol=1e-9, atol=1e-9, dense_output=True)
     depth = np.clip(half - np.abs(x), 0.0, half)
-    inside = np.exp(found.sol(np.ravel(depth))[0]).reshape(np.shape(depth))
-    return _through(x, half, film, supply, surface, inside), float(entering(surface)) / sink
+    inside = np.exp(profile.sol(np.ravel(depth))[0]).reshape(np.shape(depth))
+    return _with_films(x, half, film, supply, surface, inside), float(entering(surface)) / sink

@@ -5,8 +5,8 @@ that P = -div d / gamma = 2 psi_s solves both equations of (35). With
 
     psi = sinh(k s) cos(k y),   k = pi / W,
 
-d_y and the slope of d_x across the walls y = 0 and y = W vanish, and so do d_x and the slope of d_y across the end
-s = 0: walls and end are free to slide along, as in 3.5.
+d_y and the normal derivative of d_x vanish on the walls y = 0 and y = W. d_x and the normal derivative of d_y vanish
+on the end s = 0. The mesh slides along walls and end, as in 3.5.
 """
 import numpy as np
 

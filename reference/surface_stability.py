@@ -1,4 +1,4 @@
-"""When a block that grows between side walls loses its stability, by an exactly divergence-free element.
+"""Stability of a block that grows between side walls, by an exactly divergence-free element.
 
 The block 0 < x < L, 0 < y < H slides on its bottom and on its sides, and its top is free. It grows by theta into
 F = diag(1, theta), whose top has the elastic stretch theta^(-1/2). Its energy is, with the pressure P of
@@ -6,9 +6,9 @@ F = diag(1, theta), whose top has the elastic stretch theta^(-1/2). Its energy i
 
     1/2 integral of J^(-2/3) (G : G - 4/3 (c : G / J) F : G + 5/9 tr C (c : G / J)^2 - 2/3 tr C det G / J) + 2 P det G,
 
-under the constraint c : G = 0. The state is stable while this is positive for every u that is not zero. In plane strain
-the terms with c : G vanish where the constraint holds exactly: for quartic places and discontinuous cubic pressures on
-triangles (Scott and Vogelius, RAIRO Modél. Math. Anal. Numér. 19, 1985) it does, in every point.
+under the constraint c : G = 0. The state is stable if this is positive for every u except zero. In plane strain the
+terms with c : G vanish where the constraint holds exactly. It holds at every point for quartic positions and
+discontinuous cubic pressures on triangles (Scott and Vogelius, RAIRO Modél. Math. Anal. Numér. 19, 1985).
 
 A half-space is stable down to Biot's stretch, the root of (1 + l^4)^2 = 4 l^2 below one.
 """
@@ -35,8 +35,8 @@ def _energy(u, v, w):
     j, k = (theta * A[0, 0] + A[1, 1] for A in (G, D))
     f, g = (A[0, 0] + theta * A[1, 1] for A in (G, D))
     mixed = G[0, 0] * D[1, 1] + G[1, 1] * D[0, 0] - G[0, 1] * D[1, 0] - G[1, 0] * D[0, 1]
-    found = ddot(G, D) - 2 / 3 * (j * g + k * f) / theta + 5 / 9 * trace * j * k / theta**2
-    return theta ** (-2 / 3) * (found - trace / 3 * mixed / theta) + P * mixed
+    integrand = ddot(G, D) - 2 / 3 * (j * g + k * f) / theta + 5 / 9 * trace * j * k / theta**2
+    return theta ** (-2 / 3) * (integrand - trace / 3 * mixed / theta) + P * mixed
 
 
 @BilinearForm
@@ -51,7 +51,7 @@ def mesh(across, up, length=1.0, height=1.0):
 
 
 def divergence_free(block):
-    """(energy, constraint): functions of theta, dense matrices of the free unknowns, of the quartic element."""
+    """(energy, constraint) of the quartic element: functions of theta that give dense matrices of the free unknowns."""
     basis = Basis(block, ElementVector(ElementTriP4()), intorder=8)
     lower = basis.with_element(ElementDG(ElementTriP3()))
     x, y = basis.doflocs
@@ -68,7 +68,7 @@ def divergence_free(block):
 
 
 def critical_stretch(energy, constraint, low=1.05, high=6.0, accuracy=1e-4):
-    """theta^(-1/2) where the least eigenvalue of energy(theta) on the kernel of constraint(theta) falls to zero, by
+    """theta^(-1/2) at which the least eigenvalue of energy(theta) on the kernel of constraint(theta) is zero, by
     bisection between the expansions ``low`` and ``high``."""
     if least(energy(low), constraint(low)) <= 0 or least(energy(high), constraint(high)) >= 0:
         raise ValueError(f"the stability does not change between theta = {low:g} and {high:g}")
@@ -82,6 +82,6 @@ def critical_stretch(energy, constraint, low=1.05, high=6.0, accuracy=1e-4):
 
 
 def least(energy, constraint):
-    """The least eigenvalue of a dense symmetric matrix on the kernel of another one."""
+    """The least eigenvalue of the symmetric matrix ``energy`` on the kernel of ``constraint``; both are dense."""
     kernel = null_space(constraint)
     return eigh(kernel.T @ energy @ kernel, eigvals_only=True, subset_by_index=[0, 0])[0]

@@ -1,8 +1,8 @@
 """The elastic stretch along an aggregate's free surface, from the fields of a ``.vtu`` file alone.
 
-With the place X(x) of t = 0 as a field on the present triangles, straight or curved, a surface with the unit tangent s
-has been stretched by 1 / |grad X s| and the material by J = 1 / det(grad X), so that the elastic stretch is
-det(grad X)^(1/2) / |grad X s|. It is taken in the three Gauss points of each edge between the aggregate and the fluid,
+The position X(x) at t = 0 is a field on the present triangles, straight or curved. A surface with the unit tangent s
+has the stretch 1 / |grad X s|, and the material the volume ratio J = 1 / det(grad X). The elastic stretch is
+det(grad X)^(1/2) / |grad X s|. It is evaluated at three Gauss points of each edge between the aggregate and the fluid,
 and averaged over the edge.
 """
 import numpy as np
@@ -14,23 +14,23 @@ GAUSS, WEIGHTS = np.polynomial.legendre.leggauss(3)
 
 
 def surface_stretch(points, cells, aggregate, before):
-    """(stretch, distance, middles) of the free edges: (e,), (e,) from the nearer end of their free surface along it,
-    over its length, and (e, 2).
+    """Compute (stretch, distance, midpoints) of the free edges, (e,), (e,) and (e, 2).
 
-    points: (N, 2); cells: (T, 3 or 6), corners counterclockwise, then the middles of the edges 01, 12 and 20;
-    aggregate: (T,) True there; before: (N, 2) places at t = 0.
+    The distance is that to the nearer end of the free surface, along it and relative to its length. points: (N, 2);
+    cells: (T, 3 or 6), corners counterclockwise, then the midpoints of the edges 01, 12 and 20; aggregate: (T,) True
+    in the aggregate; before: (N, 2) positions at t = 0.
     """
     ends = np.sort(cells[:, EDGES[:, :2]], axis=2)
-    dry = {tuple(pair) for pair in ends[~aggregate].reshape(-1, 2).tolist()}
+    fluid_edges = {tuple(pair) for pair in ends[~aggregate].reshape(-1, 2).tolist()}
     free = {}
     for cell in np.flatnonzero(aggregate):
         for local in range(3):
-            if tuple(ends[cell, local].tolist()) in dry:
+            if tuple(ends[cell, local].tolist()) in fluid_edges:
                 free[int(cells[cell, EDGES[local, 0]])] = (cell, local)
-    found = []
+    edges = []
     for start in free.keys() - {int(cells[cell, EDGES[local, 1]]) for cell, local in free.values()}:
-        found += _along(start, free, points, cells, before)
-    stretch, distance, x, y = np.array(found).T
+        edges += _along(start, free, points, cells, before)
+    stretch, distance, x, y = np.array(edges).T
     return stretch, distance, np.column_stack([x, y])
 
 
@@ -50,12 +50,13 @@ def _along(start, free, points, cells, before):
 def _edge(present, before, local):
     """(mean elastic stretch, length, middle) of an edge of a triangle with nodes (3 or 6, 2) now and at t = 0."""
     first, last = CORNERS[EDGES[local, :2]]
-    where = first + (GAUSS[:, None] + 1) / 2 * (last - first)
-    slopes = _slopes(len(present), where)
-    now, then = np.einsum("ai,qak->qik", present, slopes), np.einsum("ai,qak->qik", before, slopes)
-    tangent = now @ (last - first)
+    places = first + (GAUSS[:, None] + 1) / 2 * (last - first)
+    shape_gradients = _shape_gradients(len(present), places)
+    present_jacobian = np.einsum("ai,qak->qik", present, shape_gradients)
+    initial_jacobian = np.einsum("ai,qak->qik", before, shape_gradients)
+    tangent = present_jacobian @ (last - first)
     speed = np.linalg.norm(tangent, axis=1)
-    gradient = then @ np.linalg.inv(now)
+    gradient = initial_jacobian @ np.linalg.inv(present_jacobian)
     stretched = np.linalg.norm(np.einsum("qij,qj->qi", gradient, tangent / speed[:, None]), axis=1)
     stretch = np.sqrt(np.linalg.det(gradient)) / stretched
     weight = WEIGHTS / 2 * speed
@@ -63,15 +64,16 @@ def _edge(present, before, local):
     return weight @ stretch / weight.sum(), weight.sum(), middle
 
 
-def _slopes(count, where):
+def _shape_gradients(count, places):
     """(q, 3 or 6, 2) derivatives of the shape functions at places (q, 2) of the unit triangle."""
-    s, t = where.T
+    s, t = places.T
     linear = np.array([1 - s - t, s, t])
-    of = np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]])
+    linear_gradients = np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]])
     if count == 3:
-        return np.broadcast_to(of, (len(where), 3, 2))
-    corners = [(4 * linear[a] - 1)[:, None] * of[a] for a in range(3)]
-    middles = [4 * (linear[a][:, None] * of[b] + linear[b][:, None] * of[a]) for a, b in EDGES[:, :2]]
+        return np.broadcast_to(linear_gradients, (len(places), 3, 2))
+    corners = [(4 * linear[a] - 1)[:, None] * linear_gradients[a] for a in range(3)]
+    middles = [4 * (linear[a][:, None] * linear_gradients[b] + linear[b][:, None] * linear_gradients[a])
+               for a, b in EDGES[:, :2]]
     return np.stack([*corners, *middles], axis=1)
 
 

@@ -1,13 +1,13 @@
-"""Stokes flow with a viscosity jump by scikit-fem: Taylor-Hood elements on curved triangles, meshes of its own.
+"""Stokes flow with a viscosity jump by scikit-fem: Taylor-Hood elements on independent meshes of curved triangles.
 
     (nu grad u, grad v) - (p, div v) = 0,   (q, div u) = 0         "laplacian" [E2]
     (2 nu e(u), e(v)) - (p, div v) = 0,     e = sym grad           "traction", with u_y = 0 at the outlet [E10]
 
 nu = 1 in the fluid and lambda in the biomass, u = the parabola of mean one at the inlet, 0 on the walls. Quadratic
-velocity and linear pressure need no stabilisation, and the pressure may jump at the interface, as it does: a continuous
-one leaves the head loss with an error of first order (6e-4 for a half-disc, lambda = 10, 600 triangles). Meshes are
-rings around a half-disc, edges of the arc bent onto it, refined towards the two corners where fluid, biomass and wall
-meet, and once more in the film between a thick half-disc and the upper wall.
+velocity and linear pressure need no stabilisation. The pressure may jump at the interface, as the exact one does; a
+continuous pressure gives the head loss an error of first order (6e-4 for a half-disc, lambda = 10, 600 triangles).
+Meshes are rings around a half-disc with curved edges on its arc. They are refined towards the two corners where fluid,
+biomass and wall meet, and once more in the film between a thick half-disc and the upper wall.
 """
 from dataclasses import dataclass
 
@@ -33,13 +33,13 @@ from skfem.helpers import ddot, div, grad, sym_grad
 
 from reference.arcs import curved, inside, refined, rounded
 
-#: Thickest aggregate, over the width, around which the rings fit; a mesh for a thicker one is stretched.
+#: Largest thickness over the width for which the rings fit; the mesh of a thicker aggregate is stretched.
 THICKEST = 0.8
 
 
 @dataclass(frozen=True, eq=False)
 class Channel:
-    """A curved mesh of ends x [0, width] and which triangles are biomass."""
+    """A curved mesh of ends x [0, width]; biomass (T,) is True in the aggregate."""
 
     mesh: MeshTri2
     biomass: np.ndarray
@@ -49,7 +49,7 @@ class Channel:
 
 @dataclass(frozen=True, eq=False)
 class Pressure:
-    """Pressure (K,) of one region at the middles of its triangles' edges, points (K, 2), with their weights (K,)."""
+    """Pressure (K,) of one region at the midpoints of edges, points (K, 2), with their weights (K,)."""
 
     biomass: bool
     points: np.ndarray
@@ -59,9 +59,9 @@ class Pressure:
 
 @dataclass(frozen=True, eq=False)
 class Stokes:
-    """Solution of mean velocity one: loss of p over the mesh; velocity (K, 2) at the middles of edges, points (K, 2),
-    and their weights (K,), a third of the triangles' areas: exact for integrals of quadratic functions; the pressure of
-    each region, which jumps at the interface."""
+    """Solution for a mean velocity of one: loss of p over the mesh; velocity (K, 2) at the midpoints of edges, points
+    (K, 2), with weights (K,) of a third of the triangles' areas, which integrate quadratic functions exactly; and the
+    pressure of each region, which jumps at the interface."""
 
     loss: float
     points: np.ndarray
@@ -86,7 +86,7 @@ def half_disc(width, ends, radius, refinements, corner=6):
 
 
 def _rings(width, radius):
-    """Rings around the origin, closer than the wall where it can be."""
+    """Rings around the origin; rings larger than the aggregate stay off the upper wall."""
     radii = radius * np.array([0.4, 0.7, 1.0, 1.35, 1.8, 2.5, 3.5, 5.0, 7.0])
     angle = np.linspace(0.0, np.pi, 11)
     rings = [r * np.column_stack([np.cos(angle), np.sin(angle)]) for r in radii if r < 0.8 * width or r == radius]
@@ -95,7 +95,7 @@ def _rings(width, radius):
 
 
 def _box(width, ends, radius):
-    """Nodes of the channel beyond the rings, and of its rim."""
+    """Nodes of the channel outside the rings, and on its walls."""
     reach = radius * max(r for r in (1.0, 1.35, 1.8, 2.5, 3.5, 5.0, 7.0) if r == 1 or r * radius < 0.8 * width)
     step = width / 6
     x, y = np.meshgrid(np.linspace(*ends, round((ends[1] - ends[0]) / step) + 1), np.linspace(0.0, width, 7))
@@ -104,7 +104,7 @@ def _box(width, ends, radius):
 
 
 def _stretched(points, width, ends, first, radius):
-    """Points moved along their rays from the origin, the arc from radius ``first`` to ``radius``, the rim kept."""
+    """Move points along rays from the origin: the arc from radius ``first`` to ``radius``; the rim stays in place."""
     (x, y), tiny = points.T, 1e-9 * width
     r = np.maximum(np.hypot(x, y), tiny)
     side = np.where(x > 0, ends[1], -ends[0])
@@ -114,21 +114,21 @@ def _stretched(points, width, ends, first, radius):
 
 
 def _film(mesh, radius):
-    """Triangles between the upper part of the half-disc and the wall, and a layer inside."""
+    """Triangles between the upper part of the half-disc and the wall, and a layer within the half-disc."""
     x, y = mesh.p[:, mesh.t].mean(axis=1)
     return np.flatnonzero((np.abs(x) < 0.75 * radius) & (np.hypot(x, y) > 0.8 * radius))
 
 
 def stokes(channel, ratio, interface="laplacian"):
-    """Solve; returns :class:`Stokes`. The pressure of each region is its own: it jumps at the interface."""
+    """Solve for the flow, :class:`Stokes`. Each region has its own pressure, which jumps at the interface."""
     basis = Basis(channel.mesh, ElementVector(ElementTriP2()), intorder=5)
-    regions = [_region(channel, where) for where in (channel.biomass, ~channel.biomass) if where.any()]
-    viscosity = np.where(channel.biomass, float(ratio), 1.0)[:, None] * np.ones(basis.dx.shape[1])
+    regions = [_region(channel, triangles) for triangles in (channel.biomass, ~channel.biomass) if triangles.any()]
+    viscosity = np.triangles(channel.biomass, float(ratio), 1.0)[:, None] * np.ones(basis.dx.shape[1])
     A = asm(viscous(interface), basis, nu=viscosity)
     B = sp.vstack([asm(divergence, velocity, lower)[used] for velocity, lower, used in regions])
-    value, held = _boundary(basis, channel, interface)
+    value, constrained = _boundary(basis, channel, interface)
     x = np.concatenate([value, np.zeros(B.shape[0])])
-    solution = solve(*condense(bmat([[A, -B.T], [-B, None]], "csr"), np.zeros(len(x)), x=x, D=held))
+    solution = solve(*condense(bmat([[A, -B.T], [-B, None]], "csr"), np.zeros(len(x)), x=x, D=constrained))
     parts = np.split(solution[basis.N:], np.cumsum([len(used) for *_, used in regions])[:-1])
     pressures = tuple(_pressure(channel, region, part) for region, part in zip(regions, parts))
     loss = sum(_loss(channel, lower, used, part) for (_, lower, used), part in zip(regions, parts))
@@ -139,29 +139,31 @@ def stokes(channel, ratio, interface="laplacian"):
 def _pressure(channel, region, values):
     """:class:`Pressure` of a region from its unknowns."""
     velocity, lower, used = region
-    pressure, weights = np.zeros(lower.N), _weights(channel, velocity)
-    pressure[used], there = values, weights > 0
-    middles = pressure[channel.mesh.facets[:, there]].mean(axis=0)
-    return Pressure(bool(channel.biomass[velocity.tind[0]]), velocity.doflocs[:, velocity.facet_dofs[0, there]].T,
-                    middles, weights[there])
+    pressure = np.zeros(lower.N)
+    pressure[used] = values
+    weights = _weights(channel, velocity)
+    in_region = weights > 0
+    middles = pressure[channel.mesh.facets[:, in_region]].mean(axis=0)
+    return Pressure(bool(channel.biomass[velocity.tind[0]]), velocity.doflocs[:, velocity.facet_dofs[0, in_region]].T,
+                    middles, weights[in_region])
 
 
 def _loss(channel, lower, used, values):
-    """What a region adds to the mean pressure at the inlet less that at the outlet."""
+    """Contribution of a region to the mean pressure at the inlet minus that at the outlet."""
     pressure = np.zeros(lower.N)
     pressure[used] = values
     return _end_mean(channel, pressure, lower, 0) - _end_mean(channel, pressure, lower, 1)
 
 
-def _region(channel, where):
-    """Velocity and pressure bases over some triangles, and the pressure's unknowns there."""
-    velocity = Basis(channel.mesh, ElementVector(ElementTriP2()), elements=np.flatnonzero(where), intorder=5)
+def _region(channel, triangles):
+    """Velocity and pressure bases over some triangles, and the unknowns of the pressure."""
+    velocity = Basis(channel.mesh, ElementVector(ElementTriP2()), elements=np.flatnonzero(triangles), intorder=5)
     lower = velocity.with_element(ElementTriP1())
     return velocity, lower, np.unique(lower.element_dofs)
 
 
 def _weights(channel, basis):
-    """A third of the areas of a basis's triangles on both sides of each edge."""
+    """A third of the area of the triangles beside each edge, as far as they belong to the basis."""
     mesh, elements = channel.mesh, slice(None) if basis.tind is None else basis.tind
     share = np.repeat(basis.dx.sum(axis=1)[None] / 3, 3, axis=0)
     return np.bincount(mesh.t2f[:, elements].ravel(), share.ravel(), mesh.nfacets)
@@ -194,12 +196,12 @@ def _boundary(basis, channel, interface):
     wall = (y < near) | (y > channel.width - near)
     inlet, outlet = x < channel.ends[0] + near, x > channel.ends[1] - near
     value = np.where(inlet & (component == 0), 6 * y / channel.width * (1 - y / channel.width), 0.0)
-    held = wall | inlet | (outlet & (component == 1) if interface == "traction" else False)
-    return value, np.flatnonzero(held)
+    constrained = wall | inlet | (outlet & (component == 1) if interface == "traction" else False)
+    return value, np.flatnonzero(constrained)
 
 
 def _end_mean(channel, pressure, lower, end):
-    """Mean over the inlet (0) or the outlet (1) of a pressure, as far as its region reaches."""
+    """Mean of a region's pressure over the inlet (0) or the outlet (1); zero if the region does not touch it."""
     at_end = np.abs(channel.mesh.p[0] - channel.ends[end]) < 1e-9 * channel.width
     facets = channel.mesh.boundary_facets()
     facets = facets[at_end[channel.mesh.facets[:, facets]].all(axis=0)]

@@ -23,7 +23,7 @@ def _strength(ratio, interface):
 
 
 def outside(x, y, radius, ratio, interface, angle):
-    """(velocity (..., 2), pressure) of the fluid's solution at points on the circle or beyond it."""
+    """(velocity (..., 2), pressure) of the fluid at points on or outside the circle."""
     z = np.asarray(x) + 1j * np.asarray(y)
     E = np.exp(2j * angle)
     A = _strength(ratio, interface)
@@ -33,7 +33,7 @@ def outside(x, y, radius, ratio, interface, angle):
 
 
 def inside(x, y, ratio, interface, angle):
-    """(velocity (..., 2), pressure) of the inclusion: uniform strain, no pressure."""
+    """(velocity (..., 2), pressure) of the inclusion: uniform strain and zero pressure."""
     z = np.asarray(x) + 1j * np.asarray(y)
     E = np.exp(2j * angle)
     A = _strength(ratio, interface)

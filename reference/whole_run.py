@@ -1,15 +1,15 @@
 """The whole base run (section 4), continuous in time, by scikit-fem's quadratic elements on curved triangles.
 
-Material that was at X at t = 0 holds M_A and M_I, X_A and X_I per volume of t = 0, over X_m. Its mass grows as
+Material at X at t = 0 has M_A and M_I, which are X_A and X_I per volume of t = 0, over X_m. Its mass grows as
 
     d log(M_A)/dt = m_A (k Y m_D - b),      dM_I/dt = M_A m_A b (1 - f_d),      theta = M_A + M_I
 
-(9)-(10), M_A = 1 and M_I = 0 at t = 0. At every time the aggregate has the shape that theta gives it
-(:mod:`reference.whole_run_body`), with X_A = X_m M_A / J, and the fluid around it is meshed anew
-(:mod:`reference.whole_run_grid`) for the flow and the substrates, quasi-steady (:mod:`reference.whole_run_pore`). M_A
-and M_I live at the points of quadrature, which move with the aggregate: nothing is ever interpolated. The meshed part
-ends min(10 thickness, 1.5 W) from the aggregate (3.1); beyond it flow is Poiseuille's. Time is integrated by the
-classical Runge-Kutta method of fourth order: the paper's shape updates of 12 min are gone.
+(9)-(10), M_A = 1 and M_I = 0 at t = 0. At every time the aggregate is in equilibrium under theta
+(:mod:`reference.whole_run_body`), with X_A = X_m M_A / J. The fluid around it has a new mesh at every time
+(:mod:`reference.whole_run_grid`) for the flow and the quasi-steady substrates (:mod:`reference.whole_run_pore`). M_A
+and M_I are values at the quadrature points, which move with the aggregate, so that nothing is interpolated. The meshed
+part ends min(10 thickness, 1.5 W) from the aggregate (3.1); outside it the flow is Poiseuille's. The classical
+Runge-Kutta method of fourth order integrates in time, without the paper's shape updates of 12 min.
 """
 from dataclasses import dataclass
 
@@ -20,10 +20,10 @@ from reference.whole_run_grid import grid
 from reference.whole_run_pore import ORDER, Flow, Section
 
 M_PER_D = 24e-6
-#: The numbers of a moment: m/d, m/d, um2, um, um, um, mg/L, mg/L.
+#: The numbers of a solution: m/d, m/d, um2, um, um, um, mg/L, mg/L.
 NAMES = ("velocity", "conductivity", "area", "thickness", "upstream", "downstream", "acceptor", "donor")
-#: Orders in space and in time by which :func:`converged` extrapolates: the least one observed on 8 to 16 rings, and
-#: the method's.
+#: Orders in space and in time for the extrapolation in :func:`converged`: the least order observed on 8 to 16 rings,
+#: and that of the method.
 SPACE, TIME = 3, 4
 
 
@@ -56,7 +56,7 @@ class Pore:
 
     @property
     def rates(self):
-        """What :mod:`reference.monod` needs."""
+        """Rates for :mod:`reference.monod`."""
         return {"k": self.k, "F": self.F, "decay": self.d_c * self.f_d * self.b,
                 "K_A": self.half_saturation[0], "K_D": self.half_saturation[1]}
 
@@ -67,9 +67,10 @@ class Pore:
 
 
 @dataclass(frozen=True, eq=False)
-class Solved:
-    """One moment: outline a -> (x, y) (um); section and flow; loss over the whole pore and mean velocity one (1/um);
-    speed: mean velocity (um/h); active: X_A at the aggregate's points (mg/L); fields (2, K): C_A, C_D (mg/L)."""
+class CoupledSolution:
+    """The solution at one time: outline a -> (x, y) (um); section and flow; loss (1/um) over the pore for a mean
+    velocity of one; speed: mean velocity (um/h); active: X_A at the aggregate's points (mg/L); fields (2, K): C_A,
+    C_D (mg/L)."""
 
     outline: object
     section: Section
@@ -81,7 +82,7 @@ class Solved:
 
 
 class Run:
-    """The run of a pore on a grid of so many ``rings``; its state is log(M_A) and M_I, (2, t, Q)."""
+    """The run of a pore on a grid of ``rings`` rings; its state is log(M_A) and M_I, (2, t, Q)."""
 
     def __init__(self, pore, rings):
         self.pore, self.grid = pore, grid(rings)
@@ -93,7 +94,7 @@ class Run:
     def solve(self, state):
         """:class:`Solved` at a state; the last shape and concentrations are where Newton's methods start."""
         theta, pore = np.exp(state[0]) + state[1], self.pore
-        places = self._grown(theta)
+        places = self._deform(theta)
         outline = self.grid.outline(places)
         ends = _ends(pore, outline)
         section = Section(self.grid, self.grid.around(places, pore.width, ends), pore.width, ends)
@@ -102,46 +103,47 @@ class Run:
         speed = pore.head / (pore.viscosity * loss)
         active = pore.density * np.exp(state[0]) * self.body.dx / section.body.dx
         self.fields = section.steady(section.operators(pore, speed, flow), active, pore.rates, self.fields)
-        return Solved(outline, section, flow, loss, speed, active, self.fields)
+        return CoupledSolution(outline, section, flow, loss, speed, active, self.fields)
 
-    def _grown(self, theta):
-        """Places of the nodes under theta, from the last ones stretched as the mean theta has grown."""
+    def _deform(self, theta):
+        """Positions of the nodes under theta. The start is the previous shape, scaled with the mean theta."""
         places, pressure, before = self.shape
         mean = float(np.sum(theta * self.body.dx) / self.body.dx.sum())
-        found = self.body.grown(theta, places * np.sqrt(mean / before), pressure * (mean / before) ** (-2 / 3))
-        self.shape = *found, mean
-        return found[0]
+        deformed = self.body.grown(theta, places * np.sqrt(mean / before), pressure * (mean / before) ** (-2 / 3))
+        self.shape = *deformed, mean
+        return deformed[0]
 
     def rate(self, state):
         """d state / dt (1/h)."""
-        solved = self.solve(state)
-        growth, remains = self.pore.growth(*solved.section.inside(solved.fields))
+        solution = self.solve(state)
+        growth, remains = self.pore.growth(*solution.section.inside(solution.fields))
         return np.array([growth, np.exp(state[0]) * remains])
 
     def step(self, state, length):
-        """The state a time ``length`` (h) later, by one step of Runge's and Kutta's method."""
+        """The state after a Runge-Kutta step of ``length`` (h)."""
         a = self.rate(state)
         b = self.rate(state + length / 2 * a)
         c = self.rate(state + length / 2 * b)
         d = self.rate(state + length * c)
         return state + length / 6 * (a + 2 * b + 2 * c + d)
 
-    def moments(self, times, steps):
+    def solutions(self, times, steps):
         """Yields :class:`Solved` at ``times`` (h), ascending; ``steps`` to the first, and none longer from there on."""
-        state, now = self.seed, 0.0
+        state, previous_time = self.seed, 0.0
         for time in times:
-            count = int(np.ceil(round((time - now) / times[0] * steps, 6)))
+            count = int(np.ceil(round((time - previous_time) / times[0] * steps, 6)))
             for _ in range(count):
-                state = self.step(state, (time - now) / count)
-            now = time
+                state = self.step(state, (time - previous_time) / count)
+            previous_time = time
             yield self.solve(state)
 
-    def numbers(self, solved):
-        """(8,) what NAMES lists."""
-        conductivity = self.pore.length / (self.pore.viscosity * solved.loss)
-        line = solved.outline(np.linspace(0.0, np.pi, 2001))
-        return np.array([M_PER_D * solved.speed, M_PER_D * conductivity, solved.section.body.dx.sum(), line[:, 1].max(),
-                         line[-1, 0], line[0, 0], *solved.section.effluents(solved.flow, solved.fields)])
+    def numbers(self, solution):
+        """The numbers in NAMES, (8,)."""
+        conductivity = self.pore.length / (self.pore.viscosity * solution.loss)
+        line = solution.outline(np.linspace(0.0, np.pi, 2001))
+        return np.array([M_PER_D * solution.speed, M_PER_D * conductivity, solution.section.body.dx.sum(),
+                         line[:, 1].max(), line[-1, 0], line[0, 0],
+                         *solution.section.effluents(solution.flow, solution.fields)])
 
 
 def _ends(pore, outline):
@@ -152,14 +154,14 @@ def _ends(pore, outline):
 
 
 def numbers(pore, rings, steps, times):
-    """(times, 8) NAMES of the run of a pore at ``times`` (h); steps: to the first of them."""
+    """The numbers in NAMES of the run of a pore at ``times`` (h), (times, 8); steps: up to the first time."""
     run = Run(pore, rings)
-    return np.array([run.numbers(solved) for solved in run.moments(times, steps)])
+    return np.array([run.numbers(solution) for solution in run.solutions(times, steps)])
 
 
 @dataclass(frozen=True, eq=False)
 class Converged:
-    """values (times, 8), of NAMES; space, time: what extrapolation adds to the finest ones, estimates of the errors."""
+    """values (times, 8), of NAMES; space, time: corrections by extrapolation, which estimate the errors."""
 
     values: np.ndarray
     space: np.ndarray
@@ -168,8 +170,8 @@ class Converged:
 
 def converged(pore, times, rings=(8, 12), steps=(8, 16)):
     """:class:`Converged` from three runs: a coarse one, one with more rings, one with more steps. The errors in space
-    and in time add up, to first order; each is extrapolated. Base is so known to 2e-5 at 19.2 and 19.4 h, relative,
-    its effluents over the supply."""
+    and in time add up, to first order; each is extrapolated. The relative error of Base at 19.2 and 19.4 h is 2e-5; the
+    errors of effluents are relative to the supply."""
     coarse, fine, many = (numbers(pore, *size, times) for size in zip((rings[0], rings[1], rings[0]),
                                                                      (steps[0], steps[0], steps[1])))
     space = (fine - coarse) / ((rings[1] / rings[0]) ** SPACE - 1)

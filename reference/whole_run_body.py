@@ -1,4 +1,4 @@
-"""Shape of an aggregate that grows: an incompressible neo-Hookean body in plane strain, by quadratic curved triangles.
+"""Shape of a growing aggregate: an incompressible neo-Hookean body in plane strain on quadratic curved triangles.
 
 (21) over the shear modulus, per volume of t = 0, with a term that is zero where J = theta:
 
@@ -8,21 +8,21 @@ With c = dJ/dF and p = P + kappa (J - theta), the equilibrium is
 
     (J^(-2/3) F + (p - J^(-5/3) tr C / 3) c, grad v) = 0,     (J - theta, q) = 0
 
-for quadratic places and linear P. J^(1/3) + J^(-2/3) / 2 is concave in J: kappa = 3 theta^(-5/3) outweighs that where
-J = theta holds in the mean only. The flat side slides on its wall (v_y = 0), and the origin stays. Newton's steps are
-those of :mod:`reference.quadratic_growth`.
+for quadratic positions and linear P. J^(1/3) + J^(-2/3) / 2 is concave in J. Since J = theta holds in the mean only,
+kappa = 3 theta^(-5/3) compensates this. The flat side slides on its wall (v_y = 0), and the origin stays in place.
+:mod:`reference.quadratic_growth` computes the Newton steps.
 """
 import numpy as np
 from skfem import Basis, ElementTriP1, ElementTriP2, ElementVector
 
 from reference.quadratic_growth import newton_step
 
-#: Newton stops at a step this small over the body's size, and is given up after that many.
-SMALL, MOST = 1e-11, 12
+#: Newton's method converges when its step over the body's size is this small, and fails after this number of steps.
+TOLERANCE, MAX_ITERATIONS = 1e-11, 12
 
 
 class Body:
-    """The half-disc of ``radius`` at t = 0 on a grid; dx (T, Q) its volumes at the points of quadrature."""
+    """The half-disc of ``radius`` at t = 0 on a grid; dx (T, Q): volumes of its quadrature points."""
 
     def __init__(self, grid, radius, order):
         self.start = radius * grid.seed
@@ -34,23 +34,23 @@ class Body:
         self.free = self._free()
 
     def _free(self):
-        """Numbers of the unknowns: x and y of the aggregate's nodes but for what the wall and the origin hold; P."""
+        """Numbers of the unknowns: P, and x and y of the aggregate's nodes without those fixed by wall and origin."""
         (x, y), tiny = self.start, 1e-9 * np.abs(self.start).max()
-        held = [self.numbers[1, np.abs(y) < tiny], self.numbers[0, np.hypot(x, y) < tiny]]
-        moved = np.setdiff1d(np.unique(self.basis.element_dofs), np.concatenate(held))
-        return np.concatenate([moved, self.basis.N + np.unique(self.lower.element_dofs)])
+        constrained = [self.numbers[1, np.abs(y) < tiny], self.numbers[0, np.hypot(x, y) < tiny]]
+        free_nodes = np.setdiff1d(np.unique(self.basis.element_dofs), np.concatenate(constrained))
+        return np.concatenate([free_nodes, self.basis.N + np.unique(self.lower.element_dofs)])
 
     def grown(self, theta, places, pressure):
-        """(places (2, K), P) in equilibrium under theta (T, Q), from a start.
+        """(places (2, K), P) in equilibrium under theta (T, Q); Newton's method starts from the arguments.
 
-        Raises RuntimeError where Newton's method does not converge.
+        Raises RuntimeError if Newton's method does not converge.
         """
         place = np.zeros(self.basis.N)
         place[self.numbers] = places
-        for _ in range(MOST):
+        for _ in range(MAX_ITERATIONS):
             step = newton_step(self.basis, self.lower, theta, 1.0, place, pressure, I=self.free)
             place, pressure = place + step[: self.basis.N], pressure + step[self.basis.N:]
-            if np.abs(step[: self.basis.N]).max() < SMALL * np.abs(place).max():
+            if np.abs(step[: self.basis.N]).max() < TOLERANCE * np.abs(place).max():
                 return place[self.numbers], pressure
         last = np.abs(step[: self.basis.N]).max()
-        raise RuntimeError(f"the aggregate still moves by {last:.2g} um after {MOST} iterations")
+        raise RuntimeError(f"the aggregate still moves by {last:.2g} um after {MAX_ITERATIONS} iterations")

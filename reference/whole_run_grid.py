@@ -1,13 +1,13 @@
-"""One structured topology of triangles for a whole run: a half-disc that grows on the lower wall of a channel.
+"""One structured mesh topology for a whole run: a half-disc that grows on the lower wall of a channel.
 
 In the plane of polar coordinates (r, a) the aggregate at t = 0 is r < 1, 0 < a < pi, in rings of 4 k edges. The fluid
 is the layers 1 < r < 2, from the aggregate's outline to a box around it over the channel's whole height, and, on both
 sides of the box, the layers 2 < r < 3 to the ends of the mesh. Triangles at the two corners where fluid, aggregate and
-wall meet, (1, 0) and (1, pi), are divided CORNER times more. The places of the fluid's nodes follow from the outline:
+wall meet, (1, 0) and (1, pi), are refined CORNER times. The outline determines the positions of the fluid's nodes:
 
     (1 - w) A(a) + w B(a),    w = (g^(r - 1) - 1) / (g - 1),    g = 1 + W / (2 thickness)         for 1 < r < 2
 
-where A is the outline, a spline in a, and B the box: triangles near a small aggregate are small.
+where A is the outline, a spline in a, and B the box. Triangles near a small aggregate are small.
 """
 from dataclasses import dataclass
 
@@ -17,14 +17,14 @@ from skfem import MeshTri, MeshTri2
 
 from reference import arcs
 
-CORNER, NEAR = 2, 1e-9
+CORNER, TOLERANCE = 2, 1e-9
 
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """triangles (3, T); body (T,): is it the aggregate; polar (2, K): r and a of the quadratic nodes, corners first;
-    seed (2, K): their places at t = 0 over the seed's radius (meaningful in the aggregate); rim: nodes of the outline
-    from a = 0 to pi."""
+    """triangles (3, T); body (T,): True in the aggregate; polar (2, K): r and a of the quadratic nodes, corners first;
+    seed (2, K): their positions at t = 0 over the seed's radius (meaningful in the aggregate); rim: nodes of the
+    outline from a = 0 to pi."""
 
     triangles: np.ndarray
     body: np.ndarray
@@ -41,29 +41,29 @@ class Grid:
         return CubicSpline(self.polar[1, self.rim], places[:, self.rim].T)
 
     def around(self, places, width, ends):
-        """``places`` (2, K) um of the aggregate's nodes, and with them those of the fluid's in a channel of that width
-        (um) between two ends (um)."""
+        """Complete ``places`` (2, K) um of the aggregate's nodes by those of the fluid's nodes, in a channel of the
+        given width (um) between two ends (um)."""
         r, a = self.polar
-        line = self.outline(places)
+        spline = self.outline(places)
         thickness = places[1, self.rim].max()
         beyond = (width + thickness) / 2
-        right, left = line(0.0)[0] + beyond, line(np.pi)[0] - beyond
+        right, left = spline(0.0)[0] + beyond, spline(np.pi)[0] - beyond
         stretch = np.log1p(width / (2 * thickness))
         w = np.expm1(stretch * np.clip(r - 1, 0, 1)) / np.expm1(stretch)
-        found = (1 - w) * line(a).T + w * _box(a, width, right, left)
-        found[0] += np.clip(r - 2, 0, 1) * np.where(a < np.pi / 2, ends[1] - right, ends[0] - left)
-        return np.where(r < 1 + NEAR, places, found)
+        positions = (1 - w) * spline(a).T + w * _box(a, width, right, left)
+        positions[0] += np.clip(r - 2, 0, 1) * np.where(a < np.pi / 2, ends[1] - right, ends[0] - left)
+        return np.where(r < 1 + TOLERANCE, places, positions)
 
 
 def _box(a, width, right, left):
-    """(2, K) the box's sides and top by angle; its corners are at 45 and 135 degrees."""
+    """Points (2, K) on the box's sides and top, by angle; its corners are at 45 and 135 degrees."""
     part = a / (np.pi / 4)
     x = right + (left - right) * np.clip((part - 1) / 2, 0, 1)
     return np.array([x, width * np.clip(np.minimum(part, 4 - part), 0, 1)])
 
 
 def grid(rings):
-    """:class:`Grid` of two or more rings in the aggregate, as many layers on to the box, as many on to the ends."""
+    """:class:`Grid` of two or more rings in the aggregate, and as many layers to the box and from there to the ends."""
     (nodes, body), (outer, fluid) = _disc(rings), _layers(rings)
     shared = 4 * rings + 1
     mesh = MeshTri(np.hstack([nodes, outer[:, shared:]]), np.hstack([body, fluid + nodes.shape[1] - shared]))
@@ -73,13 +73,13 @@ def grid(rings):
 def _disc(rings):
     """Nodes (2, n) and triangles (3, t) of the rings: four sectors of k edges each on the k-th."""
     first = np.concatenate([[0], np.cumsum(4 * np.arange(rings + 1) + 1)])
-    found = []
+    triangles = []
     for k in range(rings):
         for sector in range(4):
             inner, outer = first[k] + sector * k, first[k + 1] + sector * (k + 1)
-            found += [(inner + i, outer + i, outer + i + 1) for i in range(k + 1)]
-            found += [(inner + i, outer + i + 1, inner + i + 1) for i in range(k)]
-    return np.hstack([_half_circle(k / rings, 4 * k) for k in range(rings + 1)]), np.array(found).T
+            triangles += [(inner + i, outer + i, outer + i + 1) for i in range(k + 1)]
+            triangles += [(inner + i, outer + i + 1, inner + i + 1) for i in range(k)]
+    return np.hstack([_half_circle(k / rings, 4 * k) for k in range(rings + 1)]), np.array(triangles).T
 
 
 def _half_circle(r, edges):
@@ -97,9 +97,9 @@ def _layers(rings):
     a, b = number[j, i], number[j + 1, i]
     c, d = number[j + 1, i + 1], number[j, i + 1]
     right = i < 2 * rings  # the two halves are mirror images
-    found = np.hstack([np.where(right, [a, b, c], [a, b, d]), np.where(right, [a, c, d], [b, c, d])])
-    kept, triangles = np.unique(found, return_inverse=True)
-    return points[:, kept], triangles.reshape(3, -1)
+    numbered = np.hstack([np.where(right, [a, b, c], [a, b, d]), np.where(right, [a, c, d], [b, c, d])])
+    used, triangles = np.unique(numbered, return_inverse=True)
+    return points[:, used], triangles.reshape(3, -1)
 
 
 def _quadratic(mesh):

@@ -35,7 +35,7 @@ Where the paper is in the code, whose modules name the equations that they solve
     3.1, 3.5  remeshing                     repro.model.remeshing
     2    state of the pore                  repro.model.pore
     2    coupling, 3.3                      repro.march.updates (the paper's shape updates)
-         steps by their error               repro.march.midpoint, .stepping, .pace (not the paper's)
+         steps by their error               repro.march.midpoint, .stepping, .step_control (not the paper's)
          the end as a fold                  repro.march.folding
          the loop of both                   repro.march.loop, .simulation
     4, 5  results, a law for networks       repro.results, .columns, .arrays, .tables, .network
@@ -45,8 +45,8 @@ Where data enters, and what it passes:
     repro.scene       a .toml file is read, checked and converted to um, h, mg/L: a Scene, or one
                       line that says what is wrong (.files, .reading, .units, .rules; .text)
     repro.model.pore  the Scene becomes a Pore at t = 0: outline, mesh, masses
-    repro.march       a Pore goes through steps, and gives Instants: pore, flow, substrates, ledgers
-    repro.results     an Instant becomes rows and fields in the units that their names end in
+    repro.march       a Pore goes through steps, and gives Reports: pore, flow, substrates, ledgers
+    repro.results     a Report becomes  rows and fields in the units that their names end in
     repro.preflight   what a run of a scene will be: numbers, doubts, cost (repro check)
     repro.report      pages that show and compare runs (repro compare)
     repro.runs        a run on the disk: folder, recorder, checkpoints, provenance (repro run)
@@ -70,10 +70,10 @@ if TYPE_CHECKING:
     from repro.preflight.checked import check
     from repro.results.network import added_resistance
     from repro.results.tables import Results, solve
+    from repro.runs.execution import resume, run
     from repro.runs.loading import load_run
-    from repro.runs.running import resume, run
     from repro.scene import Scene, SceneError, load_scene
-    from repro.sweeps.making import sweep
+    from repro.sweeps.driver import sweep
 
     __version__: str
 else:
@@ -83,9 +83,9 @@ else:
                 "PoreEnd": "march.loop", "Results": "results.tables",
                 "Scene": "scene", "SceneError": "scene", "SimulationError": "errors",
                 "added_resistance": "results.network", "check": "preflight.checked",
-                "load_run": "runs.loading", "load_scene": "scene", "resume": "runs.running",
-                "run": "runs.running", "simulate": "march.simulation", "solve": "results.tables",
-                "sweep": "sweeps.making"}
+                "load_run": "runs.loading", "load_scene": "scene", "resume": "runs.execution",
+                "run": "runs.execution", "simulate": "march.simulation", "solve": "results.tables",
+                "sweep": "sweeps.driver"}
 
     def __getattr__(name: str):
         if name == "__version__":

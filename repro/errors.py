@@ -1,18 +1,18 @@
-"""Numerical failures, each named by its stage.
+"""Errors of the package: numerical failures by stage, ends of a run, and failures of files.
 
-:func:`repro.march.loop.stopping` adds the time, and :mod:`repro.model.advice` the keys of a scene
-that help.
+:func:`repro.march.loop.stopping` adds the time to a failure, and :mod:`repro.model.advice` the keys
+of a scene that help.
 """
 
 
 class StageError(RuntimeError):
-    """A stage has no trustworthy result; the message says where, why, and what to try."""
+    """A stage has no reliable result; the message says where, why, and what to try."""
 
     stage = "a stage"
 
 
 class MeshError(StageError):
-    """A mesh cannot be made, or has turned inside out."""
+    """A mesh cannot be generated, or is turned inside out."""
 
     stage = "meshing"
 
@@ -40,27 +40,27 @@ class PackageMissing(LinearError):
 
 
 class TransportError(StageError):
-    """The substrates cannot be solved for."""
+    """The equations of the substrates cannot be solved."""
 
     stage = "transport"
 
 
 class Unresolved(TransportError):
-    """The mesh is too coarse for a front of the substrates."""
+    """The mesh is too coarse for a sharp front of the substrates."""
 
 
-class Advised(Unresolved):
-    """The same, with the refinement that resolves the state, or the statement that none does."""
+class UnresolvedWithAdvice(Unresolved):
+    """The same, with a refinement that resolves the front, or the statement that none does."""
 
 
 class GrowthError(StageError):
-    """No equilibrium of the aggregate was found."""
+    """The solver finds no equilibrium of the aggregate."""
 
     stage = "growth"
 
 
 class TransferError(StageError):
-    """Fields cannot be carried from one mesh to the other."""
+    """Fields cannot be transferred from one mesh to another."""
 
     stage = "transfer between meshes"
 
@@ -70,33 +70,56 @@ class NotCovered(TransferError):
 
 
 class OriginFolded(TransferError):
-    """The coordinates at t = 0 fold on a new mesh."""
+    """The reference coordinates (t = 0) fold on a new mesh."""
 
 
 class BalanceError(StageError):
-    """A step does not conserve what it should."""
+    """A step violates a mass balance."""
 
     stage = "its balance"
 
 
 class RunEnd(Exception):
-    """The model itself ends before ``growth.end``; nothing has failed."""
+    """The model ends before ``growth.end``, without a failure: Fold or PoreEnd."""
 
 
 class SimulationError(RuntimeError):
-    """A run has stopped: at what simulated time, in which stage, why, and what to try."""
+    """A numerical failure stops a simulation.
+
+    The message names the simulated time (h), the stage, the reason and what to try. The original
+    error is its ``__cause__``.
+
+    Examples
+    --------
+    >>> import repro
+    >>> try:
+    ...     results = repro.solve("base", ["flow.head=1e-300 um", 'growth.end="1 h"'])
+    ... except repro.SimulationError as error:
+    ...     print(str(error).partition(":")[0])
+    stopped in the step from t = 0 h, in transport
+    """
 
 
 class OutputError(RuntimeError):
-    """A folder or a file of the results cannot be used; says which and why."""
+    """A folder or a file of results cannot be read or written; the message says which and why.
+
+    Examples
+    --------
+    >>> import repro
+    >>> try:
+    ...     repro.load_run("no/such/folder")
+    ... except repro.OutputError:
+    ...     print("not a run")
+    not a run
+    """
 
 
 class CheckpointError(ValueError):
-    """A checkpoint that cannot be gone on from; says why."""
+    """A run cannot resume from a checkpoint; the message says why."""
 
 
 class Interrupted(Exception):
-    """A run was asked to stop by a signal, and has written what it goes on from."""
+    """A signal stopped a run, after it wrote the checkpoint from which it can resume."""
 
     def __init__(self, message: str, signal: int):
         super().__init__(message)

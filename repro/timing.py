@@ -1,4 +1,4 @@
-"""Wall time by stage, for ``run.json`` and the benchmarks: seconds spent in each timed function."""
+"""Wall time by stage, for ``run.json`` and the benchmarks."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
 Function = Callable[Arguments, Result]
 
-#: Seconds by stage since the last :func:`reset`, calls within calls counted in both.
+#: Seconds by stage since the last :func:`reset`; nested calls count in both stages.
 seconds: defaultdict[str, float] = defaultdict(float)
 
 
 def reset() -> None:
-    """Start counting anew."""
+    """Reset all times to zero."""
     seconds.clear()
 
 
 def timed(stage: str) -> Callable[[Function[Arguments, Result]], Function[Arguments, Result]]:
-    """Add the time that each call of the decorated function takes to a stage."""
+    """Decorator: add the time of each call of a function to ``stage``."""
     def decorate(function: Function[Arguments, Result]) -> Function[Arguments, Result]:
         @wraps(function)
         def wrapper(*args: Arguments.args, **kwargs: Arguments.kwargs) -> Result:

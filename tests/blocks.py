@@ -1,4 +1,4 @@
-"""The blocks of a Markdown page, and what it takes to execute them as they stand."""
+"""Code blocks of a Markdown page, and functions that execute them unchanged."""
 
 import re
 import shlex
@@ -15,35 +15,35 @@ SHELL = {"console", "sh", "bash"}
 
 @dataclass(frozen=True)
 class Block:
-    """A language ("" for an indented block: commands) and a text."""
+    """A language ("" for an indented block, which holds commands) and a text."""
 
     language: str
     text: str
 
     @property
     def commands(self) -> list[list[str]]:
-        """The words of each command of a block for a shell, comments left out."""
+        """The words of each command of a shell block, without comments."""
         if self.language not in SHELL | {""}:
             return []
         return [words for line in self.text.splitlines() if (words := shlex.split(line, comments=True))]
 
 
 def blocks(page: Path) -> list[Block]:
-    """In the order of the page."""
+    """Return the blocks of a page in their order."""
     text = page.read_text(encoding="utf-8")
-    fenced = [(found.start(), Block(found[1], found[2])) for found in FENCED.finditer(text)]
-    rest = FENCED.sub(lambda found: "\n" * len(found[0]), text)  # of the same length: places stay
-    indented = [(found.start(), Block("", found[0])) for found in INDENTED.finditer(rest)]
+    fenced = [(match.start(), Block(match[1], match[2])) for match in FENCED.finditer(text)]
+    rest = FENCED.sub(lambda match: "\n" * len(match[0]), text)  # same length: positions stay
+    indented = [(match.start(), Block("", match[0])) for match in INDENTED.finditer(rest)]
     return [block for _, block in sorted(fenced + indented, key=lambda pair: pair[0])]
 
 
-def told(block: Block) -> list[str]:
-    """What a block for a shell says that its commands print: its comments."""
+def printed_lines(block: Block) -> list[str]:
+    """Return the comments of a shell block: the lines that its commands print."""
     return [line[2:] for line in block.text.splitlines() if line.startswith("# ")]
 
 
 def execute(words: list[str], capsys) -> tuple[int, str, str]:
-    """Exit status, output and errors of one `repro` command, in the present folder; "> FILE" writes its output."""
+    """Return status, stdout and stderr of one `repro` command in the current folder; "> FILE" writes its output."""
     target = words[words.index(">") + 1] if ">" in words else None
     arguments = words[1:words.index(">")] if target else words[1:]
     capsys.readouterr()
@@ -55,11 +55,11 @@ def execute(words: list[str], capsys) -> tuple[int, str, str]:
 
 
 def is_repro(words: list[str]) -> bool:
-    """Is it the command of this package?"""
+    """Return whether a command is `repro`."""
     return words[0] in ("repro", ".venv/bin/repro")
 
 
 def is_target(words: list[str]) -> bool:
-    """Is it a target of the Makefile?"""
+    """Return whether a command is `make` with targets of the Makefile."""
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
     return words[0] == "make" and all(re.search(rf"^{word}:", makefile, re.M) for word in words[1:])

@@ -1,4 +1,4 @@
-"""A headless Chromium, driven over its debugging pipe with the standard library alone."""
+"""A headless Chromium, driven over its debugging pipe with the standard library only."""
 
 from __future__ import annotations
 
@@ -17,16 +17,18 @@ PATIENCE = 60.0  # s for an answer
 
 
 class Browser:
-    """One page: ``show`` a file, ``run`` scripts in it, press keys; ``requests``: what it asked for."""
+    """One page that shows files, runs scripts and takes keys; ``requests`` are the addresses that it loads."""
 
     def __enter__(self):
         self.home = tempfile.mkdtemp()
-        wired = 'exec "$0" "$@" 3<&0 4>&1 > /dev/null'  # the browser reads from 3 and writes to 4
-        command = ["bash", "-c", wired, str(CHROMIUM), *OPTIONS, f"--user-data-dir={self.home}", "about:blank"]
+        redirected = 'exec "$0" "$@" 3<&0 4>&1 > /dev/null'  # the browser reads from 3 and writes to 4
+        command = ["bash", "-c", redirected, str(CHROMIUM), *OPTIONS, f"--user-data-dir={self.home}", "about:blank"]
         self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, bufsize=0,
                                         stderr=subprocess.DEVNULL)
-        self.pending, self.requests = b"", []
-        self.count, self.session = 0, None
+        self.pending = b""
+        self.requests = []
+        self.count = 0
+        self.session = None
         target = self.call("Target.createTarget", url="about:blank")["targetId"]
         self.session = self.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
         for domain in ("Page", "Network", "Runtime"):
@@ -39,32 +41,32 @@ class Browser:
         shutil.rmtree(self.home, ignore_errors=True)
 
     def call(self, method: str, **parameters) -> dict:
-        """One command of the protocol, and its result."""
+        """Send one command of the protocol and return its result."""
         self.count += 1
         message = {"id": self.count, "method": method, "params": parameters}
         message |= {"sessionId": self.session} if self.session else {}
         self.process.stdin.write(json.dumps(message).encode() + b"\0")
         while True:
-            found = self._next()
-            if found.get("id") == self.count:
-                assert "error" not in found, found
-                return found["result"]
+            reply = self._next()
+            if reply.get("id") == self.count:
+                assert "error" not in reply, reply
+                return reply["result"]
 
     def _next(self) -> dict:
-        """The next message; requests are noted."""
+        """Return the next message; record the address if it is a request."""
         end = time.monotonic() + PATIENCE
         while b"\0" not in self.pending:
             ready = select.select([self.process.stdout], [], [], max(0.0, end - time.monotonic()))[0]
             assert ready, "the browser is silent"
             self.pending += self.process.stdout.read(1 << 20)
         text, _, self.pending = self.pending.partition(b"\0")
-        found = json.loads(text)
-        if found.get("method") == "Network.requestWillBeSent":
-            self.requests.append(found["params"]["request"]["url"])
-        return found
+        message = json.loads(text)
+        if message.get("method") == "Network.requestWillBeSent":
+            self.requests.append(message["params"]["request"]["url"])
+        return message
 
     def show(self, path: Path, fragment: str = "", width: int = 1200, height: int = 900, dark: bool = False) -> None:
-        """Open a file in a window of this size, and wait until it is loaded."""
+        """Open a file in a window of this size and wait until it is loaded."""
         self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1,
                   mobile=width < 500)
         scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
@@ -78,35 +80,35 @@ class Browser:
             time.sleep(0.05)
 
     def run(self, script: str):
-        """The value of a JavaScript expression in the page."""
-        found = self.call("Runtime.evaluate", expression=script, returnByValue=True, awaitPromise=True)
-        assert "exceptionDetails" not in found, found["exceptionDetails"]
-        return found["result"].get("value")
+        """Return the value of a JavaScript expression in the page."""
+        reply = self.call("Runtime.evaluate", expression=script, returnByValue=True, awaitPromise=True)
+        assert "exceptionDetails" not in reply, reply["exceptionDetails"]
+        return reply["result"].get("value")
 
     def press(self, key: str) -> None:
-        """A key, pressed and released, as ArrowLeft."""
+        """Press and release a key, such as ArrowLeft."""
         codes = {"ArrowLeft": 37, "Home": 36, "Tab": 9}
         for kind in ("rawKeyDown", "keyUp"):
             self.call("Input.dispatchKeyEvent", type=kind, key=key, code=key, windowsVirtualKeyCode=codes[key])
 
     def box(self, selector: str) -> dict:
-        """{x, y, width, height} of an element in the window (CSS pixels), which is scrolled into view."""
-        found = f"document.querySelector({json.dumps(selector)})"
-        self.run(f"{found}.scrollIntoView({{block: 'center', behavior: 'instant'}})")
-        return json.loads(self.run(f"JSON.stringify({found}.getBoundingClientRect())"))
+        """Scroll an element into view and return its {x, y, width, height} in the window (CSS pixels)."""
+        element = f"document.querySelector({json.dumps(selector)})"
+        self.run(f"{element}.scrollIntoView({{block: 'center', behavior: 'instant'}})")
+        return json.loads(self.run(f"JSON.stringify({element}.getBoundingClientRect())"))
 
     def click(self, selector: str) -> None:
-        """The middle of an element, with the mouse."""
+        """Click the middle of an element."""
         self.drag(selector, 0.5, 0.5)
 
     def drag(self, selector: str, start: float, end: float) -> None:
-        """The mouse, pressed at a part of an element's width and let go at another one."""
+        """Drag the mouse between two fractions of an element's width."""
         box = self.box(selector)
         y = box["y"] + box["height"] / 2
-        for kind, part in (("mousePressed", start), ("mouseMoved", end), ("mouseReleased", end)):
-            self.call("Input.dispatchMouseEvent", type=kind, x=box["x"] + part * box["width"], y=y, button="left",
+        for kind, fraction in (("mousePressed", start), ("mouseMoved", end), ("mouseReleased", end)):
+            self.call("Input.dispatchMouseEvent", type=kind, x=box["x"] + fraction * box["width"], y=y, button="left",
                       buttons=int(kind != "mouseReleased"), clickCount=1)
 
     def point(self, x: float, y: float) -> None:
-        """The pointer at a place of the window (CSS pixels)."""
+        """Move the pointer to a position in the window (CSS pixels)."""
         self.call("Input.dispatchMouseEvent", type="mouseMoved", x=x, y=y, button="none")

@@ -1,4 +1,4 @@
-"""Hostile numerics for every test: floating-point errors raise, figures need no screen, examples are repeatable."""
+"""Settings of all tests: floating-point errors raise, figures need no screen, examples are repeatable."""
 import os
 import signal
 
@@ -13,34 +13,34 @@ matplotlib.use("Agg")
 SLOW_MACHINES_MAY = {"deadline": None, "suppress_health_check": [HealthCheck.too_slow]}
 settings.register_profile("ci", derandomize=True, max_examples=20, **SLOW_MACHINES_MAY)
 settings.register_profile("thorough", print_blob=True, max_examples=200, **SLOW_MACHINES_MAY)
-signal.signal(signal.SIGINT, signal.default_int_handler)  # in the background it is ignored, by children too
+signal.signal(signal.SIGINT, signal.default_int_handler)  # processes in the background ignore it
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))
 
 
-def run_of(name, *given):
-    """A fixture: the folder of a run, for pages; whoever changes it copies it."""
+def run_fixture(name, *arguments):
+    """Make a fixture: the folder of a run for pages. Tests that change the folder copy it."""
     @pytest.fixture(scope="session", name=name)
-    def made(tmp_path_factory):
-        return pages.run(tmp_path_factory.mktemp(name), *given)
-    return made
+    def folder(tmp_path_factory):
+        return pages.run(tmp_path_factory.mktemp(name), *arguments)
+    return folder
 
 
-fast = run_of("fast", "base", pages.FAST, 'growth.end="3 h"')
-paper = run_of("paper", "base", 'growth.end="1 h"')
-flow_only = run_of("flow_only", "flow_only")
+fast = run_fixture("fast", "base", pages.FAST, 'growth.end="3 h"')
+paper = run_fixture("paper", "base", 'growth.end="1 h"')
+flow_only = run_fixture("flow_only", "flow_only")
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_setup():
-    """Overflow, division by zero and invalid operations raise.
+    """Make overflow, division by zero and invalid operations raise.
 
-    A hook and not an autouse fixture: it also covers fixtures of a wider scope, which are set up before any function's.
+    An autouse fixture would be too late: pytest sets up fixtures of a wider scope before those of a function.
     """
     numpy.seterr(all="raise", under="ignore")
 
 
 def pytest_collection_modifyitems(items):
-    """What is marked thorough runs in make test-thorough alone."""
+    """Skip tests marked thorough, except in make test-thorough."""
     if os.environ.get("HYPOTHESIS_PROFILE") != "thorough":
         for item in items:
             if item.get_closest_marker("thorough"):

@@ -1,4 +1,4 @@
-"""Faults that tests inject, by their names: what is absent or stands in for something else, put back afterwards."""
+"""Faults that tests inject by name: absent or replaced packages, and a limit on memory."""
 import sys
 import tracemalloc
 from contextlib import contextmanager
@@ -13,31 +13,31 @@ from repro import results
 
 
 @contextmanager
-def little_memory(most):
-    """Fails where it takes more bytes than so many."""
+def limit_memory(most):
+    """Fail if the peak memory of the block exceeds ``most`` bytes."""
     tracemalloc.start()
     yield
     assert tracemalloc.get_traced_memory()[1] < most
     tracemalloc.stop()
 
 
-def absent_package(monkeypatch, name):
-    """Importing a package fails as where it is not installed."""
+def remove_package(monkeypatch, name):
+    """Make the import of a package fail as if it were not installed."""
     monkeypatch.setitem(sys.modules, name, None)
 
 
-def another_version(monkeypatch, name):
-    """A package says that it is of version 0.0."""
-    known = results.version
-    monkeypatch.setattr(results, "version", lambda asked: "0.0" if asked == name else known(asked))
+def replace_version(monkeypatch, name):
+    """Make a package report version 0.0."""
+    installed = results.version
+    monkeypatch.setattr(results, "version", lambda package: "0.0" if package == name else installed(package))
 
 
-def stand_in_package(monkeypatch, name):
-    """A package's few functions that are used, made of what is installed: "pymetis", which orders nodes, by reverse
-    Cuthill-McKee; "pypardiso", which factors, with columns ordered anew and partial pivoting."""
-    made = {"pymetis": _ordering, "pypardiso": _factoring}[name]()
-    monkeypatch.setitem(sys.modules, name, made)
-    return made
+def replace_package(monkeypatch, name):
+    """Replace an optional package by SciPy: "pymetis" orders nodes by reverse Cuthill-McKee; "pypardiso" factors with
+    reordered columns and partial pivoting."""
+    module = {"pymetis": _ordering, "pypardiso": _factoring}[name]()
+    monkeypatch.setitem(sys.modules, name, module)
+    return module
 
 
 def _ordering():
@@ -57,11 +57,11 @@ def _ordering():
 
 
 def _factoring():
-    made = []
+    matrix_types = []
 
     class PyPardisoSolver:
         def __init__(self, mtype):
-            made.append(mtype)
+            matrix_types.append(mtype)
             self.factor = None
 
         def factorize(self, matrix):
@@ -73,4 +73,4 @@ def _factoring():
         def free_memory(self, everything):
             self.factor = None
 
-    return SimpleNamespace(PyPardisoSolver=PyPardisoSolver, calls=made)
+    return SimpleNamespace(PyPardisoSolver=PyPardisoSolver, calls=matrix_types)

@@ -1,6 +1,6 @@
-"""Slow answers that can be read off the paper: one triangle, one node, one difference at a time, nothing from `repro`.
+"""Slow formulas straight from the paper: one triangle, node or difference at a time, without imports from `repro`.
 
-Meshes are (points, triangles): (N, 2) um and (T, 3) nodes. Nothing here is vectorised, cached or clever.
+Meshes are (points, triangles): (N, 2) um and (T, 3) nodes. Nothing is vectorised or cached.
 """
 import math
 
@@ -8,13 +8,13 @@ import numpy as np
 
 
 def area(corners):
-    """Area of a triangle, by the shoelace formula; positive counterclockwise."""
+    """Area of a triangle by the shoelace formula, positive if counterclockwise."""
     (ax, ay), (bx, by), (cx, cy) = corners
     return 0.5 * ((bx - ax) * (cy - ay) - (by - ay) * (cx - ax))
 
 
 def diameter(corners):
-    """Of the circumscribed circle: a / sin(alpha), with the angle opposite to the first side."""
+    """Diameter of the circumscribed circle: a / sin(alpha), with the angle alpha opposite to the side a."""
     a, b, c = (math.dist(corners[i], corners[j]) for i, j in ((1, 2), (2, 0), (0, 1)))
     return a / math.sin(math.acos((b * b + c * c - a * a) / (2 * b * c)))
 
@@ -27,7 +27,7 @@ def mass(points, triangles, field):
 def derivative(function, place, step):
     """Derivative of ``function(array) -> number or array`` by each entry of the array: central differences of order 4.
 
-    Error about step^4 times the fifth derivative over 30, and 1e-16 / step of the function's size.
+    The error is about step^4 / 30 times the fifth derivative, plus 1e-16 / step of the function's size.
     """
     rows = []
     for index in np.ndindex(place.shape):
@@ -39,14 +39,14 @@ def derivative(function, place, step):
 
 
 def rates(acceptor, donor, half_a, half_d, k, Y, b, f_d, d_c, F):
-    """(F1, F2, F3, F4) / X_A as (7)-(10) print them, with d_c f_d b for d_f d_b [E3]."""
+    """(F1, F2, F3, F4) / X_A as printed in (7)-(10), with d_c f_d b for d_f d_b [E3]."""
     m_a, m_d = acceptor / (acceptor + half_a), donor / (donor + half_d)
     return (-m_a * (k * F * m_d + d_c * f_d * b), -k * m_a * m_d, m_a * (k * Y * m_d - b), m_a * b * (1 - f_d))
 
 
 def extent(places, width, length):
-    """3.1 in words: as far as ten thicknesses or one and a half widths, whichever is less, before the first place and
-    behind the last one, and never past the pore's ends, at half its length on both sides of the origin."""
+    """Extent of the meshed part (3.1): ten thicknesses or one and a half widths, whichever is less, beyond the first
+    and the last point, and never past the pore's ends, which lie half its length from the origin."""
     thickness = max(y for _, y in places)
     reach = 10 * thickness if 10 * thickness < 1.5 * width else 1.5 * width
     left, right = min(x for x, _ in places) - reach, max(x for x, _ in places) + reach

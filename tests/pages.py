@@ -1,4 +1,4 @@
-"""Runs into folders, and their pages as a strict parser sees them."""
+"""Runs in folders, and a strict parser for their pages."""
 
 import base64
 import hashlib
@@ -13,14 +13,14 @@ import numpy as np
 from repro import results
 from repro.cli import main
 from repro.results.files import read_sealed
-from repro.runs import running
+from repro.runs import execution
 from repro.scene import scene_hash
 
 VOID = {"meta", "input", "br", "link", "img", "hr"}
 FAST = 'numerics.preset="fast"'
 HOSTILE = "<script>pwned=1<!--\"'&<img src=x onerror=pwned=1>.toml"
 
-#: {chart: {label of a line: column}}, as a reader understands them.
+#: {chart: {label of a line: column}}, from the labels that a reader sees.
 CHARTS = {
     "Conductivity": {"conductivity": "conductivity_m_per_d"},
     "Mean velocity": {"mean velocity": "mean_velocity_m_per_d"},
@@ -54,26 +54,28 @@ acceptor_balance donor_balance biomass_balance oxygen_demand_balance nodes remes
 active_biomass inert_biomass""".split()
 
 
-#: Whole runs of scenes that several tests ask for.
-WHOLE = TemporaryDirectory(prefix="whole-")
+#: Finished runs of scenes that several tests use.
+CACHED_RUNS = TemporaryDirectory(prefix="whole-")
 
 
-def whole_of(scene):
-    """The folder of a scene's run, made once: whoever changes it copies it."""
-    folder = Path(WHOLE.name) / f"{scene.name}-{scene_hash(scene)}"
+def cached_run(scene):
+    """Return the folder of a scene's run, which is computed once. Tests that change the folder copy it."""
+    folder = Path(CACHED_RUNS.name) / f"{scene.name}-{scene_hash(scene)}"
     if not folder.exists():
-        running.run(scene, folder)
+        execution.run(scene, folder)
     return folder
 
 
 class Page(HTMLParser):
-    """Parses strictly: every tag is closed in its turn. `outside` are addresses; `texts` what a reader sees."""
+    """A strict parser: every tag is closed in its turn. `outside` are addresses, `texts` the visible text."""
 
     def __init__(self, text):
         super().__init__()
         self.open: list[str] = []
-        self.outside, self.tags = [], []
-        self.texts, self.scripts = [], []
+        self.outside = []
+        self.tags = []
+        self.texts = []
+        self.scripts = []
         self.feed(text)
         self.close()
         assert self.open == []
@@ -97,27 +99,27 @@ class Page(HTMLParser):
             self.scripts.append((self.open[-1], self.tags[-1][1], data))
 
     def attribute(self, tag, name):
-        return [given[name] for each, given in self.tags if each == tag and name in given]
+        return [attributes[name] for tag_name, attributes in self.tags if tag_name == tag and name in attributes]
 
 
 def check_alone(text):
-    """The Page of a text that asks for nothing else, and whose policy lets in what is in it alone."""
-    found = Page(text)
+    """Parse a page; check that it loads nothing else and that its policy allows only its own scripts and styles."""
+    page = Page(text)
     assert not re.search(r"@import|url\(|://", text)
-    policy = next(each for each in found.attribute("meta", "content") if "-src" in each)
+    policy = next(rules for rules in page.attribute("meta", "content") if "-src" in rules)
     assert policy.startswith("default-src 'none'; ") and "unsafe" not in policy
     assert policy.endswith("; base-uri 'none'; form-action 'none'")
-    for kind, given, content in found.scripts:
+    for kind, attributes, content in page.scripts:
         digest = base64.b64encode(hashlib.sha256(content.encode()).digest()).decode()
         (allowed,) = re.findall(f"{kind}-src ([^;]*)", policy)
-        assert given.get("type") == "application/json" or f"'sha256-{digest}'" in allowed.split()
-    return found
+        assert attributes.get("type") == "application/json" or f"'sha256-{digest}'" in allowed.split()
+    return page
 
 
 def run(tmp_path, scene, *sets, status=0, options=()):
-    """The folder of `repro run SCENE` with --set of each and further options, which ends with a status."""
+    """Execute `repro run SCENE --set ...` with further options, check its exit status, and return its folder."""
     out = tmp_path / "run"
-    assert main(["run", str(scene), "--out", str(out), *(part for one in sets for part in ("--set", one)),
+    assert main(["run", str(scene), "--out", str(out), *(part for entry in sets for part in ("--set", entry)),
                  *options]) == status
     return out
 
@@ -126,24 +128,24 @@ def text_of(out):
     return (out / "report.html").read_text(encoding="utf-8")
 
 
-def first(pattern, text):
-    """What the pattern's group is where it is first found."""
-    found = re.search(pattern, text)
-    assert found, pattern
-    return found[1]
+def first_group(pattern, text):
+    """Return the group of the first match of a pattern."""
+    match = re.search(pattern, text)
+    assert match, pattern
+    return match[1]
 
 
-def stored(out):
-    """What the page gives its script."""
-    return json.loads(first('<script type="application/json" id="fields">(.*?)</script>', text_of(out)))
+def page_data(out):
+    """Return the data of the page's script."""
+    return json.loads(first_group('<script type="application/json" id="fields">(.*?)</script>', text_of(out)))
 
 
-def numbers(text, kind):
+def decode_numbers(text, kind):
     return np.frombuffer(base64.b64decode(text), kind)
 
 
-def hostile(out):
-    """A run whose files say what nobody should believe."""
+def make_hostile(out):
+    """Put markup and scripts into the files of a run."""
     record = read_sealed(out / "run.json")
     record |= {"scene": HOSTILE, "status": "failed: </script><script>pwned=1</script>", "extra": {HOSTILE: [HOSTILE]}}
     record["tables"][HOSTILE] = {HOSTILE: HOSTILE}

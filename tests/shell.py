@@ -1,4 +1,4 @@
-"""`repro` as a process of its own, and what is in the folder of a run."""
+"""`repro` as a separate process, and the contents of a run's folder."""
 
 from __future__ import annotations
 
@@ -17,91 +17,88 @@ from repro.cli import main
 from repro.errors import Interrupted
 from repro.results.files import read_sealed
 from repro.runs.checkpoint import LAST
-from repro.runs.running import Watch, run
-from tests.pages import whole_of
+from repro.runs.execution import Watch, run
+from tests.pages import cached_run
 
-#: A scene of a second or so, with remeshes, and one of several seconds.
+#: A scene that runs for about a second, with remeshes, and one that runs for several seconds.
 SHORT = ("base", "--set", 'numerics.preset="fast"')
 LONG = ("base", "--set", 'growth.end="4 h"')
-#: What makes base a run of two steps with six rows, most of them within steps.
+#: Changes that make base a run of two steps and six rows, most of them within steps.
 BRIEF = ('numerics.preset="fast"', 'growth.end="3 h"',
          'output.times=["0 h", "0.25 h", "0.5 h", "1 h", "2 h", "3 h"]')
 
 
-def started(*arguments, threads="1", **options) -> subprocess.Popen:
-    """`repro run ARGUMENTS`, going; signals as in a shell of one's own."""
+def start_run(*arguments, threads="1", **options) -> subprocess.Popen:
+    """Start `repro run ARGUMENTS` with the signal handlers of an interactive shell."""
     code = ("import signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler); "
             "from repro.cli import main; sys.exit(main(sys.argv[1:]))")
     names = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), threads)
-    given = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, **options}
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, **options}
     command = [sys.executable, "-c", code, "run", *map(str, arguments)]
-    return subprocess.Popen(command, env={**os.environ, **names}, **given)
+    return subprocess.Popen(command, env={**os.environ, **names}, **pipes)
 
 
-def shell(*arguments, **options) -> tuple[int, str, str]:
-    """Exit status, standard output and standard error of `repro run ARGUMENTS`."""
-    process = started(*arguments, **options)
+def run_and_wait(*arguments, **options) -> tuple[int, str, str]:
+    """Return exit status, stdout and stderr of `repro run ARGUMENTS`."""
+    process = start_run(*arguments, **options)
     out, err = process.communicate(timeout=120)
     return process.returncode, out, err
 
 
-def wait_for(there, process: subprocess.Popen) -> None:
-    """Until something is there, or the process has ended."""
-    while not there() and process.poll() is None:
+def wait_for(condition, process: subprocess.Popen) -> None:
+    """Wait until a condition is true or the process has ended."""
+    while not condition() and process.poll() is None:
         time.sleep(0.01)
 
 
 def files(folder: Path) -> dict[str, bytes]:
-    """Every file of a folder by its name there, but those that tell times: run.json, the page and what a longer run
-    goes on from."""
+    """Return {name: content} of a folder, without the files that hold times: run.json, the page and the last state."""
     return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*"))
             if path.is_file() and path.name not in ("run.json", "report.html", LAST)}
 
 
-def told(folder: Path) -> dict:
-    """What run.json says, but for its own checksum."""
+def read_record(folder: Path) -> dict:
+    """Return the content of run.json without its checksum."""
     return read_sealed(folder / "run.json")
 
 
 def rewrite(folder: Path, **changes) -> None:
-    """Change what run.json says, under a right checksum."""
-    results.write_sealed(folder / "run.json", told(folder) | changes)
+    """Change entries of run.json and its checksum."""
+    results.write_sealed(folder / "run.json", read_record(folder) | changes)
 
 
 def flip(path: Path, place: int = -2) -> None:
-    """Change the lowest bit of a byte of a file."""
+    """Flip the lowest bit of one byte of a file."""
     content = bytearray(path.read_bytes())
     content[place] ^= 1
     path.write_bytes(content)
 
 
 def rows(table: Path) -> list[dict[str, str]]:
-    """The rows of a table as they are written."""
+    """Return the rows of a table as text."""
     return list(csv.DictReader(table.read_text(encoding="utf-8").splitlines()))
 
 
-def lasting(folder: Path) -> dict:
-    """What run.json says but for times and counts of resumes, and the SHA-256 of files that tell them."""
-    record = told(folder)
+def lasting_record(folder: Path) -> dict:
+    """Return run.json without wall times and resumes, and without the SHA-256 of files that hold them."""
+    record = read_record(folder)
     record["sha256"] = {name: digest for name, digest in record["sha256"].items() if name not in ("report.html", LAST)}
     return {key: value for key, value in record.items() if not key.startswith("wall_time") and key != "resumes"}
 
 
 def flags(*entries) -> list[str]:
-    """Each entry as the command line has it: --set ENTRY."""
+    """Return the command-line arguments --set ENTRY of all entries."""
     return [part for entry in entries for part in ("--set", entry)]
 
 
 def state(folder: Path) -> dict[Path, object]:
-    """A folder, if it is there, and all that is in it; of each file the time at which it was written and its content.
-    """
-    there = [folder, *folder.rglob("*")] if folder.exists() else []
-    return {path: path.is_file() and (path.stat().st_mtime_ns, path.read_bytes()) for path in there}
+    """Return the paths of a folder, if it exists, with the modification time and the content of each file."""
+    paths = [folder, *folder.rglob("*")] if folder.exists() else []
+    return {path: path.is_file() and (path.stat().st_mtime_ns, path.read_bytes()) for path in paths}
 
 
-def refused(folder: Path, capsys, *arguments) -> str:
-    """What is said of `repro ARGUMENTS` that is refused, with status 2 and one line, and changes nothing in a folder.
-    """
+def refusal(folder: Path, capsys, *arguments) -> str:
+    """Return the message of `repro ARGUMENTS`, which ends with status 2 and one line and leaves a folder unchanged."""
     before = state(folder)
     capsys.readouterr()
     assert main([*map(str, arguments)]) == 2
@@ -110,13 +107,13 @@ def refused(folder: Path, capsys, *arguments) -> str:
     return message
 
 
-def resumed(folder: Path, *options: str) -> int:
-    """The exit status of `repro run --resume FOLDER --quiet`."""
+def resume_run(folder: Path, *options: str) -> int:
+    """Return the exit status of `repro run --resume FOLDER --quiet`."""
     return main(["run", "--resume", str(folder), "--quiet", *options])
 
 
-def every(count: int):
-    """Says stop at each so-manieth step."""
+def stop_every(count: int):
+    """Return a function that asks for a stop at every ``count``-th call."""
     calls = 0
 
     def stop():
@@ -126,12 +123,12 @@ def every(count: int):
     return stop
 
 
-def stopped(scene, folder: Path, after: int = 3) -> None:
-    """A run that was stopped after so many steps, with a checkpoint of every one."""
+def interrupt_run(scene, folder: Path, after: int = 3) -> None:
+    """Interrupt a run after some steps, with a checkpoint at every step."""
     with pytest.raises(Interrupted):
-        run(scene, folder, watch=Watch(stop=every(after), interval=0.0))
+        run(scene, folder, watch=Watch(stop=stop_every(after), interval=0.0))
 
 
-def as_whole(scene, folder: Path) -> bool:
-    """Are the files of a folder those of the scene's run without an interruption?"""
-    return files(folder) == files(whole_of(scene))
+def matches_uninterrupted(scene, folder: Path) -> bool:
+    """Return whether a folder has the files of the scene's uninterrupted run."""
+    return files(folder) == files(cached_run(scene))

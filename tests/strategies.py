@@ -1,4 +1,4 @@
-"""Shapes and scenes that tests share: hypothesis strategies named after what they are, and a few fixed examples."""
+"""Shapes and scenes that tests share: hypothesis strategies and a few fixed examples."""
 import math
 
 import numpy as np
@@ -21,17 +21,17 @@ widths = st.floats(10.0, 200.0)
 standard = st.just(50.0)  # the width of section 4
 lengths = st.floats(300.0, 1000.0)
 refinements = st.floats(0.4, 2.0)
-#: Orders of velocity and concentrations, and what scenes call them.
+#: Orders of velocity and concentrations, and their names in scenes.
 ORDERS = {1: "linear", 2: "quadratic", 3: "cubic"}
 
 
 def share(part):
-    """Settings of a property that costs more than most: this part of the profile's examples."""
+    """Settings of an expensive property: this fraction of the profile's examples."""
     return settings(max_examples=math.ceil(part * settings.default.max_examples))
 
 
 def between(least, most):
-    """Numbers of any magnitude from least to most, both greater than zero."""
+    """Numbers with uniform logarithms from least to most; both are positive."""
     return st.floats(math.log(least), math.log(most)).map(math.exp)
 
 
@@ -40,8 +40,8 @@ concentrations = st.sampled_from([0.0, 1.0, 10.0]) | between(1e-9, 1e-2) | st.fl
 
 @st.composite
 def attached_aggregates(draw, width=standard, thinnest=0.05, thickest=0.9, uneven=0.45, geometry=1):
-    """(Outline, width): an aggregate on the lower wall, star-shaped about the origin, that leaves a film above it; its
-    edges straight (geometry 1) or arcs (2)."""
+    """(Outline, width): an aggregate on the lower wall with a film above it, star-shaped about the origin. Its edges
+    are straight (geometry 1) or arcs (2)."""
     width = draw(width)
     shares = draw(st.lists(st.floats(-1.0, 1.0), min_size=3, max_size=3))
     weight = uneven / max(1.0, sum(abs(s) for s in shares))
@@ -65,19 +65,19 @@ def _on_the_wall(radius, angle, geometry):
 
 @st.composite
 def outlines(draw, width=standard):
-    """(Outline, width): an aggregate on the lower wall, or one that reaches from wall to wall, anywhere in the pore."""
+    """(Outline, width): an aggregate on the lower wall, or one from wall to wall, anywhere in the pore."""
     width = draw(width)
     left, right, lean = (draw(st.floats(*bounds)) * width for bounds in ((-1.0, -0.1), (0.1, 1.0), (-0.4, 0.4)))
     across = st.just(plug(width, left, right, lean))
-    found = draw(across | attached_aggregates(st.just(width)).map(lambda pair: pair[0]))
-    room = max(0.0, 0.49 * LENGTH - np.abs(found.points[:, 0]).max())
-    points = found.points + [draw(st.floats(-1.0, 1.0)) * room, 0.0]
-    return Outline(points, found.wall, found.fixed, points), width
+    outline = draw(across | attached_aggregates(st.just(width)).map(lambda pair: pair[0]))
+    room = max(0.0, 0.49 * LENGTH - np.abs(outline.points[:, 0]).max())
+    points = outline.points + [draw(st.floats(-1.0, 1.0)) * room, 0.0]
+    return Outline(points, outline.wall, outline.fixed, points), width
 
 
 @st.composite
 def meshes(draw, width=standard, finest=0.6, clean=True):
-    """Coarse straight Mesh: around an aggregate on the wall, a plug, or, where ``clean``, of an empty channel."""
+    """Coarse straight Mesh around an aggregate on the wall or a plug or, if ``clean``, of an empty channel."""
     kinds = [attached_aggregates(width), outlines(width)] + [st.tuples(st.none(), width)] * clean
     outline, width = draw(st.one_of(kinds))
     return meshed(outline, width, draw(st.floats(0.35, finest)), film=0.1 * width)[0]
@@ -85,26 +85,26 @@ def meshes(draw, width=standard, finest=0.6, clean=True):
 
 @st.composite
 def scenes(draw, drives=("none", "head", "mean_velocity"), peclet=3.0, thiele=30.0, steps=2, elements=("linear",)):
-    """A small scene of any kind: narrow or wide, a seed or nearly a plug, fed, starved or with nothing at all, driven
-    by a head, by a velocity or not; it grows for a step or up to ``steps``, on elements of one of the kinds named.
+    """A small scene: a narrow or wide pore, a seed or nearly a plug, any supply including none, driven by a head, by a
+    velocity or not. It grows for 1 to ``steps`` steps on one of the given kinds of elements.
 
-    peclet: the largest u_ave W / D of a clean pore and the slower substrate; the paper's are 0.6 and 1.4, and at 3 no
-    element of these meshes (the largest have W / 6) sees more than u h / D = 1. thiele: the largest Thiele number of
-    either, (k X_m R^2 / (D_D K_sD))^1/2 and ((F k + d_c b) X_m R^2 / (D_A K_sA))^1/2, D in the aggregate; the paper's
-    seed has 0.3, one of 42 um 2.5. Beyond 30 these meshes are too coarse, and a run says so.
+    peclet: the largest u_ave W / D of a clean pore and the slower substrate. The paper has 0.6 and 1.4; at 3, u h / D
+    is at most 1 in every element of these meshes (the largest have W / 6). thiele: the largest Thiele number of both
+    substrates, (k X_m R^2 / (D_D K_sD))^1/2 and ((F k + d_c b) X_m R^2 / (D_A K_sA))^1/2, with D in the aggregate. The
+    paper's seed has 0.3, one of 42 um has 2.5. Beyond 30 these meshes are too coarse, and a run refuses them.
     """
     width, step = draw(between(10.0, 150.0)), draw(st.floats(3.0, 20.0))
     length, radius = width * draw(st.floats(4.0, 12.0)), width * draw(st.floats(0.05, 0.95))
     slowest = draw(between(0.1, 1.0))
     rate, decay = draw(between(0.5, 15.0)), draw(between(0.01, 1.0))
-    both = draw(substrates(slowest)), draw(substrates(slowest))
-    slower = min(number(one["diffusivity_in_aggregate"]) * number(one["half_saturation"]) / fastest
-                 for one, fastest in zip(both, (1.52 * rate + 1.42 * decay, rate)))
+    tables_of_substrates = draw(substrates(slowest)), draw(substrates(slowest))
+    slower = min(number(table["diffusivity_in_aggregate"]) * number(table["half_saturation"]) / fastest
+                 for table, fastest in zip(tables_of_substrates, (1.52 * rate + 1.42 * decay, rate)))
     density = draw(between(0.1, thiele)) ** 2 * slower / (radius * 1e-4) ** 2
     tables = {
         "pore": {"width": f"{width!r} um", "length": f"{length!r} um"},
         "aggregate": {"radius": f"{radius!r} um"},
-        "substrates": dict(zip(("acceptor", "donor"), both)),
+        "substrates": dict(zip(("acceptor", "donor"), tables_of_substrates)),
         "kinetics": {"maximum_utilization_rate": f"{rate!r} 1/day",
                      "decay_coefficient": f"{decay!r} 1/day",
                      "degradable_fraction": draw(st.floats(0.0, 1.0)),
@@ -126,28 +126,28 @@ def scenes(draw, drives=("none", "head", "mean_velocity"), peclet=3.0, thiele=30
 
 @st.composite
 def substrates(draw, slowest):
-    """The table of a substrate: supply, K_s, D in water (``slowest`` cm2/d or more) and in the aggregate."""
+    """Table of a substrate: supply, K_s, D in water (at least ``slowest`` cm2/d) and in the aggregate."""
     water = slowest * draw(st.floats(1.0, 5.0))
     return {"supply": f"{draw(st.just(0.0) | between(1e-3, 50.0))!r} mg/L",
             "half_saturation": f"{draw(between(0.05, 20.0))!r} mg/L", "diffusivity": f"{water!r} cm^2/day",
             "diffusivity_in_aggregate": f"{water * draw(st.floats(0.1, 1.0))!r} cm^2/day"}
 
 
-def constants(made):
-    """The arguments of ``oracles.rates`` that a scene says (1/h, mg/L, mg/mg)."""
-    k, s = made.kinetics, made.substrates
+def rate_constants(scene):
+    """Arguments of ``oracles.rates`` from a scene (1/h, mg/L, mg/mg)."""
+    k, s = scene.kinetics, scene.substrates
     return {"half_a": s.acceptor.half_saturation, "half_d": s.donor.half_saturation, "k": k.maximum_utilization_rate,
             "Y": k.yield_coefficient, "b": k.decay_coefficient, "f_d": k.degradable_fraction,
             "d_c": k.decay_oxygen_demand, "F": k.acceptor_to_donor_ratio}
 
 
 def number(text):
-    """That of a text such as "50 um"."""
+    """The number of a text such as "50 um"."""
     return float(text.split()[0])
 
 
 def plug(width, left, right, lean=0.0):
-    """A parallelogram from wall to wall, its upper side ``lean`` further downstream than its lower one."""
+    """A parallelogram from wall to wall. Its upper side lies ``lean`` downstream of its lower side."""
     middle = 0.5 * (left + right)
     points = np.array([[left, 0.0], [middle, 0.0], [right, 0.0],
                        [right + lean, width], [middle + lean, width], [left + lean, width]])
@@ -156,7 +156,7 @@ def plug(width, left, right, lean=0.0):
 
 
 def mirrored(outline):
-    """The image of an outline in x -> -x, still counterclockwise, a corner first."""
+    """Mirror an outline in x -> -x. The result is counterclockwise and begins with a corner."""
     def back(values):
         return np.roll(values[::-1], 1 - outline.geometry, axis=0)
 
@@ -165,23 +165,23 @@ def mirrored(outline):
 
 
 def seed(radius, refinement=1.0, geometry=1):
-    """Outline of a half-disc with as many elements across as a scene's."""
+    """Outline of a half-disc with as many elements across as in a scene."""
     return half_disc_outline(radius, sizing.ACROSS_AGGREGATE * refinement, geometry)
 
 
 def meshed(around, width=50.0, refinement=1.0, ends=None, film=2.0):
-    """(Mesh, refined outline) with the extent of 3.1, straight or curved as the outline is."""
+    """(Mesh, refined outline) with the extent of 3.1; straight or curved like the outline."""
     ends = sizing.meshed_extent(around, width, LENGTH) if ends is None else ends
     return mesher.generate(around, ends, Sizing(width, refinement, film), around.geometry if around else 1)
 
 
 def space_of(grid, order):
-    """Functions of an order on a straight mesh, or on the curved one with its middles half way along straight edges."""
+    """Space of an order on a mesh. Orders above 1 curve a straight mesh; the mid-edge nodes stay on its edges."""
     return Space(grid if order == 1 or grid.geometry == 2 else curved(grid, None), order)
 
 
 def bent_inside(grid, by=0.2):
-    """A curved mesh with the middles of its inner edges pushed aside by up to so many um, none turned over."""
+    """Move the mid-edge nodes of inner edges of a curved mesh by up to ``by`` um; no element turns over."""
     points, random = grid.points.copy(), np.random.default_rng(1)
     dofs = grid.topology.dofs(2)
     outer = np.concatenate([dofs.inlet.ravel(), dofs.outlet.ravel(), dofs.walls, grid.loop])
@@ -190,40 +190,40 @@ def bent_inside(grid, by=0.2):
     return grid.moved(points).checked()
 
 
-def on_the_boundary(triangles):
-    """Of each triangle, how many of its edges no other one has, sorted."""
+def boundary_edge_counts(triangles):
+    """Number of boundary edges of each triangle, sorted."""
     edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2))
-    _, which, count = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
-    return sorted((count[which] == 1).reshape(-1, 3).sum(axis=1))
+    _, edge_index, count = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
+    return sorted((count[edge_index] == 1).reshape(-1, 3).sum(axis=1))
 
 
 def body_of(grid, around, order=None):
-    """(growth.Body, held (n, 2), rim (M,)): the aggregate at rest, what 2.3.3 prescribes of it, y on the walls and x at
-    fixed points, and its boundary in its own numbering. order: that of the concentrations, the mesh's by default."""
+    """(growth.Body, constrained (n, 2), rim (M,)): the unstrained aggregate, its constrained dofs (2.3.3: y on the
+    walls and x at fixed points) and its boundary nodes. order: that of the concentrations, by default the mesh's."""
     body = pore.material(Space(grid, order or grid.geometry), grid.points[grid.body])
     rim = grid.topology.body_loop
     return body, contact.constrained(len(grid.body), rim, around.wall, around.fixed), rim
 
 
 def half_disc(radius, refinement=1.0, width=50.0, geometry=1):
-    """(growth.Body, held, its rim, outline) of a half-disc on the lower wall."""
+    """(growth.Body, constrained, rim, outline) of a half-disc on the lower wall."""
     grid, around = meshed(seed(radius, refinement, geometry), width, refinement)
     return *body_of(grid, around), around
 
 
 def same_arrays(one, other):
-    """Have two tables of arrays the same names, shapes and numbers, to the last bit?"""
+    """Return whether two tables have the same names and bitwise equal arrays."""
     return one.keys() == other.keys() and all(np.array_equal(one[name], other[name], equal_nan=True) for name in one)
 
 
 def arrays_of(grid):
-    """{name: array} of a grid: points, cells, and the values at points and in cells."""
+    """{name: array} of a grid: points, cells, point data and cell data."""
     return {"points": grid.points, "cells": grid.cells, **grid.point_data, **grid.cell_data}
 
 
 def scene(radius="5 um", width="50 um", acceptor="10 mg/L", donor="10 mg/L", velocity=None, head=None, growth=None,
           **more):
-    """A scene of [pore], [aggregate], [substrates] and, where asked for, [flow] and [growth]."""
+    """A scene with [pore], [aggregate], [substrates] and, optionally, [flow] and [growth]."""
     tables = {"pore": {"width": width}, "aggregate": {"radius": radius},
               "substrates": {"acceptor": {"supply": acceptor}, "donor": {"supply": donor}}, **more}
     if velocity or head:

@@ -1,4 +1,4 @@
-"""Advice: it is given once, the value that it names is accepted, and it helps; or it says that no setting does."""
+"""Advice appears once, names a value that is accepted and helps, or says that no setting helps."""
 import math
 import random
 import re
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from repro.errors import Advised, LinearError, SimulationError, Unresolved
+from repro.errors import LinearError, SimulationError, Unresolved, UnresolvedWithAdvice
 from repro.fem.linear import factorised
 from repro.march.simulation import simulate
 from repro.model import pore, remeshing
@@ -16,7 +16,7 @@ from repro.model.transport import Concentrations
 from repro.preflight import numbers, simplifications
 from repro.scene import load_scene, parse_scene
 
-#: Settings that a warning names, by the pattern of its text.
+#: {pattern of a warning: the settings that it advises}.
 ADVICE = {
     r"numerics\.refinement = ([\d.e+]+) would resolve it": "numerics.refinement={}",
     r'"gear" with numerics\.time = "updates" follows': ("numerics.time=updates", "numerics.transport=gear"),
@@ -30,7 +30,7 @@ NO_SETTING = ("no refinement up to 20", "no setting takes it in")
 
 
 def drawn(seed):
-    """What a user may change of base, by orders of magnitude."""
+    """Draw changes of base that span orders of magnitude."""
     draw = random.Random(seed)
 
     def between(least, most):
@@ -54,39 +54,39 @@ def drawn(seed):
 
 def warnings(changes):
     scene = load_scene("base", changes, ["flow.head"])
-    return simplifications.warnings(*numbers.judged(scene, pore.fastest(scene)))
+    return simplifications.find_warnings(*numbers.evaluate_at_largest(scene, pore.fastest(scene)))
 
 
 def setting(warned):
-    """The overrides that a warning advises, none where it advises nothing."""
-    for pattern, advised in ADVICE.items():
+    """Return the overrides that a warning advises, or none."""
+    for pattern, templates in ADVICE.items():
         if match := re.search(pattern, warned.text):
-            entries = (advised,) if isinstance(advised, str) else advised
+            entries = (templates,) if isinstance(templates, str) else templates
             key = warned.key.removeprefix("substrates.")
             return [entry.format(*match.groups(), key=key) for entry in entries]
     return []
 
 
 def test_the_advice_of_check_is_accepted_and_helps():
-    """200 scenes: what a warning advises silences it; each kind of advice is met, and so is its absence."""
-    met = set()
+    """In 200 scenes the advice of a warning silences it; every kind of advice occurs, and so does its absence."""
+    kinds = set()
     for seed in range(200):
         changes = drawn(seed)
         for warned in warnings(changes):
             more = setting(warned)
             if not more:
-                met |= {text for text in NO_SETTING if text in warned.text}
+                kinds |= {text for text in NO_SETTING if text in warned.text}
                 continue
-            met.add(more[-1].partition("=")[0])
+            kinds.add(more[-1].partition("=")[0])
             start = warned.text[:40]
             assert not any(again.key == warned.key and again.text.startswith(start)
                            for again in warnings([*changes, *more])), (seed, warned)
-    assert met >= {*NO_SETTING, "numerics.refinement", "numerics.transport", "growth.fluid_forces"}
+    assert kinds >= {*NO_SETTING, "numerics.refinement", "numerics.transport", "growth.fluid_forces"}
 
 
 @pytest.mark.parametrize("radius, start", [(20, "t = 0 h"), (12, r"t = 2\.\d+ h")])
-def test_an_unresolved_front_is_advised_of_once(radius, start):
-    """Within a step too, whose end is tried first on the mesh of its start."""
+def test_an_unresolved_front_gets_advice_once(radius, start):
+    """This includes a front within a step, which first tries the mesh of its start."""
     substrate = {"supply": "0.28 mg/L", "half_saturation": "3e-5 mg/L"}
     scene = parse_scene({
         "pore": {"width": "100 um", "length": "600 um"}, "aggregate": {"radius": f"{radius} um"},
@@ -97,25 +97,25 @@ def test_an_unresolved_front_is_advised_of_once(radius, start):
     assert str(stopped.value).count("numerics.refinement") == 1
 
 
-@pytest.mark.parametrize("refinement, said", [
+@pytest.mark.parametrize("refinement, ending", [
     (0.2, "; numerics.refinement up to 0.6 does not resolve it"),
     (10, "; numerics.refinement up to 20 does not resolve it"),
     (15, "; no numerics.refinement that is accepted (up to 20) is much larger")])
-def test_no_refinement_is_named_that_is_not_accepted_or_not_tried(refinement, said, monkeypatch):
-    """Nor is one named for an error that carries advice already."""
+def test_advice_names_only_accepted_and_tried_refinements(refinement, ending, monkeypatch):
+    """An error that already carries advice gets no more."""
     def refuses(*_):
         raise Unresolved("too coarse")
 
     scene = load_scene("base", ["numerics.preset=paper", f"numerics.refinement={refinement}"])
-    monkeypatch.setattr(pore, "seeded", refuses)
+    monkeypatch.setattr(remeshing, "seeded", refuses)
     at_start = type("AtStart", (), {"time": 0.0, "front": 1.0})()
-    advised = remeshing.advised(scene, at_start, Unresolved("too coarse"))
-    assert isinstance(advised, Advised) and str(advised) == f"too coarse{said}"
-    assert remeshing.advised(scene, at_start, advised) is advised
+    error = remeshing.advise(scene, at_start, Unresolved("too coarse"))
+    assert isinstance(error, UnresolvedWithAdvice) and str(error) == f"too coarse{ending}"
+    assert remeshing.advise(scene, at_start, error) is error
 
 
-#: Starved of both substrates, whose half saturations are a thousandth of the supply and less: concentrations in
-#: quadratic elements fall below zero behind the front.
+#: An aggregate starved of both substrates, with half saturations of a thousandth of the supply or less. Concentrations
+#: in quadratic elements are negative behind the front.
 STARVED = {
     "pore": {"width": "102.4 um", "length": "659 um"}, "aggregate": {"radius": "38.5 um"},
     "flow": {"mean_velocity": "1 m/day"},
@@ -124,9 +124,9 @@ STARVED = {
     "kinetics": {}, "growth": {"end": "0 h"}, "numerics": {"preset": "fast"}}
 
 
-def test_where_no_refinement_resolves_a_front_linear_elements_are_advised_and_do(monkeypatch):
-    """Concentrations are no further below zero than half of what is accepted, and effluents are within 1 % of the
-    supply of those of finer elements. Quadratic ones are tried on two meshes alone."""
+def test_linear_elements_are_advised_and_help_if_no_refinement_resolves_a_front(monkeypatch):
+    """Negative concentrations stay within half of the accepted bound, and effluents differ from those of finer elements
+    by less than 1 % of the supply. Only two meshes of quadratic elements are tried."""
     monkeypatch.setattr(remeshing, "TRIED", (1.1,))
     monkeypatch.setattr(remeshing, "MOST_GRADED", 1.0)
     with pytest.raises(SimulationError) as stopped:
@@ -134,45 +134,46 @@ def test_where_no_refinement_resolves_a_front_linear_elements_are_advised_and_do
     assert str(stopped.value).endswith("; numerics.refinement up to 0.22 does not resolve it; "
                                        'numerics.elements = "linear" with numerics.refinement = 1 resolves this state')
     linear = load_scene(STARVED, ["numerics.elements=linear", "numerics.refinement=1"])
-    advised, finer = (next(simulate(scene)) for scene in (linear, load_scene(linear, ["numerics.refinement=1.5"])))
-    assert advised.solved.concentrations.donor.min() > -5e-4 * 0.067
-    for coarse, fine, supply in zip(advised.solved.fluxes, finer.solved.fluxes, (0.65, 0.067)):
+    recommended, finer = (next(simulate(scene)) for scene in (linear, load_scene(linear, ["numerics.refinement=1.5"])))
+    assert recommended.solved.concentrations.donor.min() > -5e-4 * 0.067
+    for coarse, fine, supply in zip(recommended.solved.fluxes, finer.solved.fluxes, (0.65, 0.067)):
         assert coarse.effluent == pytest.approx(fine.effluent, abs=0.01 * supply)
 
 
 def test_linear_elements_are_tried_on_the_present_outline_and_concentrations(monkeypatch):
-    """Where every quadratic element fails. A refinement over the paper's stays as it is."""
-    def solve(scene, now):
+    """All quadratic elements fail. A refinement above the paper's does not change."""
+    def solve(scene, current):
         if scene.numerics.order > 1:
             raise Unresolved("too coarse")
-        tried.append((scene.numerics.refinement, now.time, now.boundary.area, now.concentrations.acceptor.mean()))
-        return exact(scene, now)
+        acceptor = current.concentrations.acceptor.mean()
+        tried.append((scene.numerics.refinement, current.time, current.boundary.area, acceptor))
+        return exact(scene, current)
 
     tried = []
     exact = pore.solve
     scene = load_scene("base", ["numerics.preset=fast", "numerics.refinement=1.2", "aggregate.radius=5 um"])
     grown = pore.seeded(load_scene(scene, ["aggregate.radius=20 um", "numerics.refinement=0.4"]))
     state = Concentrations(*np.full((2, grown.space.count), 4.0))
-    monkeypatch.setattr(pore, "solve", solve)
-    error = remeshing.advised(scene, replace(grown, time=0.5, concentrations=state), Unresolved("too coarse"))
+    monkeypatch.setattr(remeshing, "solve", solve)
+    error = remeshing.advise(scene, replace(grown, time=0.5, concentrations=state), Unresolved("too coarse"))
     assert str(error).endswith('numerics.elements = "linear" with numerics.refinement = 1.2 resolves this state')
     assert tried == [(1.2, 0.5, pytest.approx(grown.boundary.area, rel=0.02), pytest.approx(4.0, rel=0.5))]
 
 
 @pytest.mark.parametrize("changes", [["flow.biomass=brinkman", "flow.permeability=1e-13 m^2"], []])
-def test_linear_elements_are_not_advised_where_they_are_not_accepted_or_do_not_help(changes, monkeypatch):
+def test_linear_elements_are_not_advised_if_refused_or_useless(changes, monkeypatch):
     """A permeable aggregate needs higher orders."""
     def refuses(scene, _):
         assert not (changes and scene.numerics.order == 1)
         raise Unresolved("too coarse")
 
     scene = load_scene("base", ["numerics.preset=fast", *changes])
-    monkeypatch.setattr(pore, "solve", refuses)
-    error = remeshing.advised(scene, pore.seeded(scene), Unresolved("too coarse"))
+    monkeypatch.setattr(remeshing, "solve", refuses)
+    error = remeshing.advise(scene, pore.seeded(scene), Unresolved("too coarse"))
     assert str(error) == "too coarse; numerics.refinement up to 0.6 does not resolve it"
 
 
 def test_a_singular_system_gives_no_advice_of_its_own():
-    """Growth adds what to try to it, and what was here too was then there twice."""
+    """Growth appends its own advice, which would otherwise appear twice."""
     with pytest.raises(LinearError, match="is singular$"):
         factorised(sp.csc_matrix(np.ones((3, 3)))).solve(np.arange(3.0))

@@ -1,4 +1,4 @@
-"""The pages in a real browser: the scripts run, the slider and its keys change the picture, nothing is asked for."""
+"""Pages in a real browser: scripts run, the slider and its keys change the picture, and nothing else is loaded."""
 
 import json
 import re
@@ -12,16 +12,16 @@ from repro.cli import main
 from repro.report import fields
 from repro.results import field_files
 from tests import browser
-from tests.pages import FAST, hostile, run, stored
+from tests.pages import FAST, make_hostile, page_data, run
 
 pytestmark = [pytest.mark.thorough,
-              pytest.mark.skipif(browser.CHROMIUM is None, reason="there is no Chromium here to look at pages with")]
+              pytest.mark.skipif(browser.CHROMIUM is None, reason="Chromium is not installed")]
 
 
 @pytest.fixture(scope="module")
 def window():
-    with browser.Browser() as found:
-        yield found
+    with browser.Browser() as chromium:
+        yield chromium
 
 
 @pytest.fixture(scope="module")
@@ -29,11 +29,11 @@ def runs(tmp_path_factory):
     """{name: folder} of runs of every kind."""
     kinds = {"fast": ("base", FAST, 'growth.end="19.4 h"'), "paper": ("base", 'growth.end="1 h"'),
              "flow": ("flow_only",), "mesh": ("initial_mesh",)}
-    return {name: run(tmp_path_factory.mktemp(name), *given) for name, given in kinds.items()}
+    return {name: run(tmp_path_factory.mktemp(name), *arguments) for name, arguments in kinds.items()}
 
 
 def show(window, out, fragment="", **look):
-    """Open a run's page; what its script says of the picture. No error, no request but for the page itself."""
+    """Open a run's page without an error or further requests; return the script's data of the picture."""
     page = out if out.suffix else out / "report.html"
     window.show(page, fragment, **look)
     assert window.run("document.getElementById('errors').textContent") == ""
@@ -48,9 +48,9 @@ def picture(window):
 @pytest.mark.parametrize("width, dark", [(1200, False), (375, True)])
 @pytest.mark.parametrize("name", ["fast", "paper", "flow", "mesh"])
 def test_pages_open_from_disk_without_error(window, runs, name, width, dark):
-    """At a phone's width nothing is cut off."""
-    found = show(window, runs[name], width=width, dark=dark)
-    assert found["frame"] == str(len(stored(runs[name])["frames"]) - 1) and float(found["filled"]) > 0.9
+    """Nothing is cut off at a phone's width."""
+    state = show(window, runs[name], width=width, dark=dark)
+    assert state["frame"] == str(len(page_data(runs[name])["frames"]) - 1) and float(state["filled"]) > 0.9
     charts = int(window.run("document.documentElement.dataset.charts"))
     assert (charts > 10) == (name in ("fast", "paper"))
     assert window.run("document.documentElement.scrollWidth") <= width
@@ -60,7 +60,7 @@ def test_pages_open_from_disk_without_error(window, runs, name, width, dark):
 
 @pytest.mark.parametrize("name", ["fast", "paper"])
 def test_the_picture_is_the_field(window, runs, name):
-    """Pixels at the nodes, and the area that is coloured for the aggregate: on curved triangles too."""
+    """Pixels at the nodes and the coloured area of the aggregate agree with the field, also on curved triangles."""
     out = runs[name]
     show(window, out, "#field=acceptor_mg_per_L", width=1400)
     _, path = fields.index(out)[-1]
@@ -71,26 +71,26 @@ def test_the_picture_is_the_field(window, runs, name):
             "shown.size[0] + Math.floor((x - shown.box[0]) * shown.scale * shown.ratio)]"
     places = grid.points[inside, :2].tolist()
     drawn = np.array(window.run(f"{json.dumps(places)}.map(([x, y]) => ({value})(x, y))"))
-    wanted = grid.point_data["acceptor_mg_per_L"][inside]
-    assert np.abs(drawn - wanted).max() < 0.02 * np.ptp(wanted)
+    expected = grid.point_data["acceptor_mg_per_L"][inside]
+    assert np.abs(drawn - expected).max() < 0.02 * np.ptp(expected)
     show(window, out, "#field=theta", width=1400)
-    share, box = float(picture(window)["filled"]), stored(out)["box"]
+    share, box = float(picture(window)["filled"]), page_data(out)["box"]
     area = results.read_table(out / "timeseries.csv")["aggregate_area_um2"][-1]
     assert share * (box[1] - box[0]) * (box[3] - box[2]) == pytest.approx(area, rel=0.004 if name == "fast" else 0.02)
 
 
-def test_a_pointer_is_told_values(window, runs):
+def test_a_pointer_shows_values(window, runs):
     show(window, runs["fast"])
     box = window.box("#picture")
     window.point(box["x"] + box["width"] / 2, box["y"] + 40)
-    told = window.run("document.getElementById('probe').textContent")
-    assert re.fullmatch(r"x = -?[\d.]+ um, y = [\d.]+ um: Velocity \(magnitude\) [\d.]+ m/day", told)
+    text = window.run("document.getElementById('probe').textContent")
+    assert re.fullmatch(r"x = -?[\d.]+ um, y = [\d.]+ um: Velocity \(magnitude\) [\d.]+ m/day", text)
     box = window.box("figure > svg")
     series = results.read_table(runs["fast"] / "timeseries.csv")
     for part, row in ((0.205, 0), (0.97, -1)):
         window.point(box["x"] + part * box["width"], box["y"] + 80)
-        told = window.run("document.querySelector('figure output').textContent")
-        assert told == f"{series['time_h'][row]:g} h: {series['conductivity_m_per_d'][row]:.5g}"
+        text = window.run("document.querySelector('figure output').textContent")
+        assert text == f"{series['time_h'][row]:g} h: {series['conductivity_m_per_d'][row]:.5g}"
 
 
 def test_the_mouse_moves_every_control(window, runs):
@@ -101,10 +101,10 @@ def test_the_mouse_moves_every_control(window, runs):
     assert 0 < int(picture(window)["frame"]) < int(last["frame"])
     image = "document.getElementById('picture').toDataURL()"
     for switch in ("lines", "outline", "fixed", "whole"):
-        before, told = window.run(image), picture(window)
+        before, state = window.run(image), picture(window)
         window.click(f"label:has(#{switch})")
         assert window.run(image) != before, switch
-        assert (float(picture(window)["high"]) < float(told["high"])) == (switch == "fixed")
+        assert (float(picture(window)["high"]) < float(state["high"])) == (switch == "fixed")
         window.click(f"#{switch}")
         assert window.run(image) == before, switch
     start, deadline = picture(window)["frame"], time.monotonic() + 20
@@ -118,7 +118,7 @@ def test_the_mouse_moves_every_control(window, runs):
 
 
 def test_the_keyboard_alone_is_enough(window, runs):
-    """Tab comes to every control, each the browser's own, and shows where it is; the slider has its keys."""
+    """Tab reaches every control, which is native and shows its focus. The slider has its keys."""
     last = show(window, runs["fast"])
     controls = ["field", "lines", "outline", "fixed", "whole", "play", "frame", "summary"]
     assert window.run("document.querySelectorAll('select, input, button, summary').length") == len(controls)
@@ -136,8 +136,8 @@ def test_the_keyboard_alone_is_enough(window, runs):
 
 
 def test_hostile_names_run_nothing(window, tmp_path):
-    """Neither from a scene and its status, nor through the policy."""
-    out = hostile(run(tmp_path, "base", FAST, 'growth.end="1 h"'))
+    """Neither a scene and its status nor an added script runs."""
+    out = make_hostile(run(tmp_path, "base", FAST, 'growth.end="1 h"'))
     report.write(out)
     report.compare([out, out], tmp_path / "both.html")
     for page in (out, tmp_path / "both.html"):
@@ -159,8 +159,8 @@ def test_a_comparison_opens(window, runs, tmp_path, width):
     series = [results.read_table(runs[name] / "timeseries.csv") for name in ("fast", "paper")]
     labels = window.run("[...document.querySelectorAll('.runs b')].map(each => each.textContent).join()").split(",")
     end = series[0]["time_h"][-1]
-    time = min(np.concatenate([each["time_h"] for each in series]), key=lambda own: abs(own - 0.6))
+    time = min(np.concatenate([each["time_h"] for each in series]), key=lambda hour: abs(hour - 0.6))
     window.point(box["x"] + (0.2 + 0.7722 * time / end) * box["width"], box["y"] + 80)
-    shown = [f"{label} {np.interp(time, each['time_h'], each['conductivity_m_per_d']):.5g}"
+    expected = [f"{label} {np.interp(time, each['time_h'], each['conductivity_m_per_d']):.5g}"
              for label, each in zip(labels, series)]
-    assert window.run("document.querySelector('figure output').textContent") == f"{time:.5g} h: {', '.join(shown)}"
+    assert window.run("document.querySelector('figure output').textContent") == f"{time:.5g} h: {', '.join(expected)}"

@@ -1,4 +1,4 @@
-"""The key of every cache contains every input of the cached value: another input, another key."""
+"""The key of every cache contains every input of the cached value."""
 from dataclasses import fields, is_dataclass, replace
 from functools import partial
 
@@ -22,7 +22,7 @@ BASE = load_scene("base")
 
 
 def leaves(node, path=()):
-    """The paths to all values of a scene but its name."""
+    """Yield the paths to all values of a scene except its name."""
     for field in fields(node):
         value = getattr(node, field.name)
         if is_dataclass(value):
@@ -32,7 +32,7 @@ def leaves(node, path=()):
 
 
 def other(value):
-    """Another value of the same kind."""
+    """Return another value of the same kind."""
     match value:
         case bool():
             return not value
@@ -46,7 +46,7 @@ def other(value):
 
 
 def changed(node, path):
-    """A scene with another value at a path; None where there is no other of its kind."""
+    """Return a scene with another value at a path, or None if its kind has no other value."""
     first, *rest = path
     value = getattr(node, first)
     another = changed(value, rest) if rest else other(value)
@@ -54,8 +54,8 @@ def changed(node, path):
 
 
 def test_every_value_of_a_scene_counts_in_its_hash():
-    others = [changed(WIDE, path) for path in leaves(WIDE)]
-    scenes = [WIDE, *(scene for scene in others if scene is not None)]
+    variants = [changed(WIDE, path) for path in leaves(WIDE)]
+    scenes = [WIDE, *(scene for scene in variants if scene is not None)]
     assert len(scenes) > 40 and len({*map(scene_hash, scenes)}) == len(scenes)
 
 
@@ -64,8 +64,8 @@ def test_every_section_of_a_scene_counts_in_its_hash():
     assert len({*map(scene_hash, scenes)}) == 5
 
 
-def test_a_cached_run_is_that_of_its_scene_and_source_under_its_name(tmp_path, monkeypatch):
-    """Another value, name or source is another run; each run is computed once."""
+def test_a_cached_run_belongs_to_its_scene_name_and_source(tmp_path, monkeypatch):
+    """Another value, name or source makes another run; each run is computed once."""
     computed = []
 
     def run(scene, folder):
@@ -82,8 +82,8 @@ def test_a_cached_run_is_that_of_its_scene_and_source_under_its_name(tmp_path, m
     assert len(computed) == 8
 
 
-def test_the_runs_of_the_sensitivities_are_kept_by_scene_name_and_source(tmp_path, monkeypatch):
-    """The numbers of a run depend on the scene's name: two names of one scene are two runs."""
+def test_the_runs_of_the_sensitivities_are_cached_by_scene_name_and_source(tmp_path, monkeypatch):
+    """The numbers of a run depend on the scene's name, so two names of one scene are two runs."""
     computed = []
 
     def counted(scene):
@@ -99,7 +99,7 @@ def test_the_runs_of_the_sensitivities_are_kept_by_scene_name_and_source(tmp_pat
         assert numbers_of_runs == ([1, 2, 3, 4] if source == "12345678" else [5, 6, 7, 8])
 
 
-def test_what_claims_keep_is_kept_by_function_arguments_and_level():
+def test_cached_values_of_claims_depend_on_function_arguments_and_level():
     """Every field of a level counts."""
     def one(*arguments):
         return "one", arguments, levels.current()
@@ -112,14 +112,15 @@ def test_what_claims_keep_is_kept_by_function_arguments_and_level():
         for level in all_levels:
             with at_level(level):
                 for function in (one, two):
-                    kept = levels.cached(function)
-                    assert all(kept(*arguments) == function(*arguments) for arguments in ((), (1,), (1, "a"), ("a", 1)))
+                    cached_function = levels.cached(function)
+                    for arguments in ((), (1,), (1, "a"), ("a", 1)):
+                        assert cached_function(*arguments) == function(*arguments)
     for level in all_levels[1:]:
         levels.forget(level)
 
 
 def test_bounds_of_one_scene_are_not_those_of_another():
-    """In turns, whatever differs."""
+    """This holds for every differing input and in any order of calls."""
     paths = [("aggregate", "radius"), ("growth", "end"), ("kinetics", "yield_coefficient")]
     short = load_scene("base", ["growth.end=5 h"])
     scenes = [short, *(changed(short, path) for path in paths)]
@@ -129,17 +130,17 @@ def test_bounds_of_one_scene_are_not_those_of_another():
 
 
 def disc():
-    """A coarse curved mesh around a half-disc, nothing of it kept yet."""
+    """A new coarse curved mesh around a half-disc, with empty caches."""
     return meshed(seed(20.0, 0.3, 2), refinement=0.3)[0]
 
 
 def velocity(order, interface, mesh):
-    """Of the flow."""
+    """Velocity of the flow on a mesh."""
     return flow.unit_flow(Space(mesh, order), 10.0, interface=interface).velocity
 
 
 def concentrations(order, boundary, flowing, mesh):
-    """Of both substrates."""
+    """Concentrations of both substrates on a mesh."""
     space = Space(mesh, order)
     carried = flow.solve(space, WIDE.flow, 600.0) if flowing else None
     substrates = replace(BASE.substrates, boundary=boundary)
@@ -150,12 +151,12 @@ def concentrations(order, boundary, flowing, mesh):
         end = gear.advance(problem, sink.active, sink.active, start, 0.01).concentrations
         return np.concatenate([end.acceptor, end.donor])
     steady = transport.steady(problem, sink)
-    settled = gear.settle(problem, sink, steady)
-    return np.concatenate([steady.acceptor, steady.donor, settled.acceptor])
+    gear_steady = gear.settle(problem, sink, steady)
+    return np.concatenate([steady.acceptor, steady.donor, gear_steady.acceptor])
 
 
 def motion(mesh):
-    """Of the mesh."""
+    """Motion of a mesh."""
     return mesh_motion.move(mesh, 1.001 * mesh.points[mesh.body], 1e-3, 100.0)
 
 
@@ -168,13 +169,13 @@ SOLVES = {"flow, Laplacian": partial(velocity, 2, "laplacian"), "flow, traction"
 
 @pytest.fixture(scope="module")
 def alone():
-    """The result of each of SOLVES on a new mesh."""
+    """Results of SOLVES, each on a new mesh."""
     return {name: solve(disc()) for name, solve in SOLVES.items()}
 
 
 @pytest.mark.parametrize("names", [[*SOLVES], [*SOLVES][::-1]], ids=["forwards", "backwards"])
-def test_sparse_systems_of_one_mesh_are_kept_apart(names, alone):
-    """Computations that share a mesh give the same bits as on meshes of their own."""
+def test_sparse_systems_of_one_mesh_are_independent(names, alone):
+    """Computations on one shared mesh agree to the last bit with those on separate meshes."""
     mesh = disc()
     wrong = [name for name in names if not np.array_equal(SOLVES[name](mesh), alone[name])]
     assert wrong == []

@@ -1,4 +1,4 @@
-"""Line charts: where their lines are, their scales, and their gaps."""
+"""Line charts: positions of lines, scales and gaps."""
 
 import html
 import json
@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from repro.report import charts
-from tests.pages import first
+from tests.pages import first_group
 
-ROUNDED = 0.11  # of a difference of two places, each rounded to 0.1
+ROUNDED = 0.11  # largest error of a difference of two positions, each rounded to 0.1
 
 
 def drawn(chart):
-    """Points (n, 2) of the first polyline, in the drawing's units."""
-    text = first('<polyline class="line0" points="([^"]*)"', charts.svg(chart).split("</figcaption>")[1])
+    """Points (n, 2) of the first polyline in the drawing's units."""
+    text = first_group('<polyline class="line0" points="([^"]*)"', charts.svg(chart).split("</figcaption>")[1])
     return np.array([pair.split(",") for pair in text.split()], float)
 
 
@@ -27,41 +27,42 @@ def chart(values, times=None, **more):
 
 @pytest.mark.parametrize("values, log", [([2.0, 5.0, 3.5, 9.0], False), ([0.0, 10.0, 500.0, 1000.0], False),
                                          ([1.0, 10.0, 50.0, 1000.0], True)])
-def test_a_line_is_where_its_numbers_and_the_ticks_say(values, log):
-    """Places between two labelled ticks are linear in the value, or in its logarithm where the range is wide."""
+def test_positions_of_a_line_follow_its_values_and_the_ticks(values, log):
+    """Positions between two labelled ticks are linear in the value, or in its logarithm if the range is wide."""
     values, times = np.array(values), np.array([0.0, 1.0, 4.0, 10.0])
-    made = replace(chart(values, times), marks=[4.0])
-    text, even = charts.svg(made), np.log if log else np.array
+    marked = replace(chart(values, times), marks=[4.0])
+    text, even = charts.svg(marked), np.log if log else np.array
     ticks = re.findall('<text class="y" x="[^"]*" y="([^"]*)">([^<]*)<', text)
-    heights, told = np.array([float(y) - 3.5 for y, _ in ticks]), np.array([float(text) for _, text in ticks])
-    assert len(told) >= 3 and told.min() <= values.min() and told.max() >= values.max() - np.diff(told)[0]
+    heights, labels = np.array([float(y) - 3.5 for y, _ in ticks]), np.array([float(text) for _, text in ticks])
+    assert len(labels) >= 3 and labels.min() <= values.min() and labels.max() >= values.max() - np.diff(labels)[0]
     assert ("axis (log scale)" in text) == log and ("log" in text) == log
-    order = np.argsort(told)
+    order = np.argsort(labels)
     assert (np.diff(heights[order]) < 0).all()  # a drawing's y grows downwards
-    assert np.allclose(drawn(made)[:, 1], np.interp(even(values), even(told[order]), heights[order]), atol=ROUNDED)
-    across = drawn(made)[:, 0]
+    assert np.allclose(drawn(marked)[:, 1], np.interp(even(values), even(labels[order]), heights[order]), atol=ROUNDED)
+    across = drawn(marked)[:, 0]
     assert np.allclose((across - across[0]) / (across[-1] - across[0]), times / 10, atol=1e-3)
     hours = [(float(x), float(time)) for x, time in re.findall('<text class="x" x="([^"]*)" y="[^"]*">([^<]*)<', text)]
     assert np.allclose(across, np.interp(times, *np.array(hours).T[::-1]), atol=ROUNDED) and len(hours) >= 3
-    axis = json.loads(html.unescape(first('data-chart="([^"]*)"', text)))["axis"]
+    axis = json.loads(html.unescape(first_group('data-chart="([^"]*)"', text)))["axis"]
     assert np.allclose(across, np.interp(times, axis[:2], axis[2:]), atol=ROUNDED)
-    assert float(first('class="mark" x1="([^"]*)"', text)) == across[2]
+    assert float(first_group('class="mark" x1="([^"]*)"', text)) == across[2]
 
 
 @pytest.mark.parametrize("low, high", [(123400, 123460), (99950, 100050), (2.0001e-4, 2.0004e-4), (0, 3e6), (-7, 0),
                                        (1000.2, 1000.9), (0, 2e-9)])
-def test_labels_of_ticks_are_the_ticks(low, high):
-    """To round-off, far from zero and from one."""
-    told = charts.ticks(charts.Scale(low, high, 0, 100), 4)
-    values, texts = zip(*told)
-    assert len(told) >= 3 and [float(text) for text in texts] == pytest.approx(values, rel=1e-12)
+def test_labels_of_ticks_equal_their_values(low, high):
+    """They are equal to round-off, also far from zero and from one."""
+    ticks = charts.ticks(charts.Scale(low, high, 0, 100), 4)
+    values, texts = zip(*ticks)
+    assert len(ticks) >= 3 and [float(text) for text in texts] == pytest.approx(values, rel=1e-12)
 
 
 @pytest.mark.parametrize("low, high, expected", [
     (2, 60, "2 5 10 20 50"), (0.1, 99, "0.1 0.2 0.5 1 2 5 10 20 50"), (1, 1e3, "1 10 100 1000"),
     (1e-7, 1e7, "1e-7 0.0001 0.1 100 1e5"), (3, 4, "3 4")])
 def test_a_logarithmic_axis_has_powers_of_ten_and_few_ticks(low, high, expected):
-    """With 2 and 5 times these powers over less than three decades; an axis without two of them shows its ends."""
+    """Axes of less than three decades also have 2 and 5 times these powers. An axis with fewer than two ticks shows its
+    ends."""
     ticks = charts.ticks(charts.Scale(low, high, 0, 100, log=True))
     assert " ".join(text for _, text in ticks) == expected
     assert [value for value, _ in ticks] == pytest.approx([float(text) for text in expected.split()], rel=1e-12)
@@ -83,7 +84,7 @@ def test_a_legend_names_each_line_by_its_colour():
     assert float(low) > float(high)  # a drawing's y grows downwards
 
 
-def test_gaps_constants_and_single_points():
+def test_charts_draw_gaps_constants_and_single_points():
     text = charts.svg(chart([1.0, 2.0, np.nan, 3.0, 4.0, np.nan, 5.0]))
     assert text.count("<polyline") == 2 and text.count("<circle") == 1 and "nan" not in text
     for constant in (0.0, 2.9, -3.0, 1e-30, 1e30):

@@ -1,4 +1,4 @@
-"""`repro check`: the mesh of the run, numbers worked out by hand, and warnings exactly where a simplification fails."""
+"""`repro check`: the mesh of the run, numbers computed by hand, and warnings exactly where a simplification fails."""
 
 import json
 import math
@@ -12,22 +12,22 @@ from repro.cli import main
 from repro.march.simulation import simulate
 from repro.preflight import checked, cost, numbers, simplifications
 from repro.preflight.checked import check
-from repro.preflight.modelled import modelled
+from repro.preflight.modelled import describe_model
 from repro.scene import load_scene, packaged_scenes
 from tests import faults
-from tests.shell import refused
+from tests.shell import refusal
 
 #: Mean velocity of the clean channel of base: (1e-3 cm / 600 um) g W^2 / (12 nu), um/h.
 CLEAN = 1e-5 / 600e-6 * 9.81 * (50e-6) ** 2 / (12 * 1.003e-6) * 3600e6
 
 
-def looked_at(name, *overrides, speed=None):
-    """(numbers by name, keys warned of) of a scene; nothing is solved."""
+def examine(name, *overrides, speed=None):
+    """Return the numbers of a scene by name and the keys of its warnings, without solving anything."""
     scene = load_scene(name, overrides)
     if scene.flow and speed is None:
         speed = scene.flow.mean_velocity or CLEAN
-    found = numbers.numbers(scene, speed)
-    return {number.name: number for number in found}, [w.key for w in simplifications.warnings(scene, found)]
+    computed = numbers.numbers(scene, speed)
+    return {number.name: number for number in computed}, [w.key for w in simplifications.find_warnings(scene, computed)]
 
 
 @pytest.mark.parametrize("name, overrides", [*((name, ()) for name in packaged_scenes()),
@@ -35,13 +35,13 @@ def looked_at(name, *overrides, speed=None):
                                              ("wide", ("numerics.preset=accurate",))])
 def test_the_mesh_is_that_of_the_run(name, overrides):
     scene = load_scene(name, overrides)
-    found, grid = check(scene, name), next(simulate(scene)).pore.mesh
-    assert (found.nodes, found.triangles) == (len(grid.points), len(grid.biomass))
+    report, grid = check(scene, name), next(simulate(scene)).pore.mesh
+    assert (report.nodes, report.triangles) == (len(grid.points), len(grid.biomass))
 
 
 def test_the_numbers_of_base_are_those_of_table_1():
-    """In SI units, by hand."""
-    found, _ = looked_at("base")
+    """The expected numbers are computed by hand in SI units."""
+    computed, _ = examine("base")
     R, W = 5e-6, 50e-6
     day, u = 86400.0, CLEAN / 3600e6
     D_A, D_D = 2.32e-4 / day, 1.01e-4 / day
@@ -62,16 +62,16 @@ def test_the_numbers_of_base_are_those_of_table_1():
         "transit over growth time": 600e-6 / u * 10 / 11 * (q_D * 0.61 * 10 / 11 - 0.12 / day),
         "fluid stress over modulus": 6 * 998 * 1.003e-6 * u / W / 1e4,
     }
-    assert set(found) == set(by_hand)
+    assert set(computed) == set(by_hand)
     for name, value in by_hand.items():
-        assert found[name].start == pytest.approx(value, rel=1e-12), name
-    assert found["fluid stress over modulus"].end == pytest.approx(998 * 9.81 * 1e-5 / 1e4, rel=1e-12)
+        assert computed[name].start == pytest.approx(value, rel=1e-12), name
+    assert computed["fluid stress over modulus"].end == pytest.approx(998 * 9.81 * 1e-5 / 1e4, rel=1e-12)
 
 
-def test_contact_is_expected_before_it_is_made():
-    """Wide meets the opposite wall at 34.3 h, with an upstream tip at 250 um at 45 h."""
-    found = numbers.at_end(load_scene("wide"))
-    assert 30 < found.contact < 34.3 and 250 < found.reach <= 300 and found.thickness == 100
+def test_contact_is_expected_before_it_occurs():
+    """Wide touches the opposite wall at 34.3 h; its upstream tip is at 250 um at 45 h."""
+    sizes = numbers.at_end(load_scene("wide"))
+    assert 30 < sizes.contact < 34.3 and 250 < sizes.reach <= 300 and sizes.thickness == 100
 
 
 @pytest.mark.parametrize("name, overrides, keys", [
@@ -79,8 +79,8 @@ def test_contact_is_expected_before_it_is_made():
     ("flow_only", (), []), ("initial_mesh", (), []), ("wide", (), ["pore.length", "growth.end"]),
     ("wide", ("growth.end=30 h",), []),
 ])
-def test_what_is_warned_of_in_the_packaged_scenes(name, overrides, keys):
-    assert looked_at(name, *overrides)[1] == keys
+def test_packaged_scenes_have_these_warnings(name, overrides, keys):
+    assert examine(name, *overrides)[1] == keys
 
 
 QUIET = ("base", "numerics.preset=paper", "growth.end=5 h", "pore.length=2000 um")
@@ -97,7 +97,7 @@ FINE, FAST = "numerics.refinement=2", "numerics.preset=fast"
 @pytest.mark.parametrize("key, common, inside, outside", [
     # u W / nu = 0.1 at 173 m/day in 50 um
     ("flow", ["flow_only"], "flow.mean_velocity=170 m/day", "flow.mean_velocity=176 m/day"),
-    # 1.5 u (W / 14) / D = 2 at 15 m/day in 100 um; twice that where elements are half as large; never if quadratic
+    # 1.5 u (W / 14) / D = 2 at 15 m/day in 100 um, at twice that on elements half as large; never if quadratic
     ("numerics.refinement", QUIET_WIDE, "flow.mean_velocity=15 m/day", "flow.mean_velocity=15.5 m/day"),
     ("numerics.refinement", [*QUIET_WIDE, FINE], "flow.mean_velocity=30 m/day", "flow.mean_velocity=31 m/day"),
     ("numerics.refinement", [*QUIET_WIDE, "flow.mean_velocity=60 m/day"], FAST, ""),
@@ -107,30 +107,30 @@ FINE, FAST = "numerics.refinement=2", "numerics.preset=fast"
     # W^2 / D over the time of growth is 1.4e-4 in 50 um
     ("numerics.transport", QUICK, "kinetics.maximum_utilization_rate=3200 1/day", FASTER),
     ("numerics.transport", [*QUICK, FASTER], "numerics.transport=gear", ""),
-    # L / u over the time of growth, 5.24 h, is 0.05 at 0.183 m/day in 2000 um, and half of it at half the length
+    # L / u over the time of growth, 5.24 h, is 0.05 at 0.183 m/day in 2000 um, and less in a shorter pore
     ("flow", QUIET_WIDE, "flow.mean_velocity=0.185 m/day", "flow.mean_velocity=0.181 m/day"),
     ("flow", [*QUIET_WIDE, "flow.mean_velocity=0.181 m/day"], "pore.length=1950 um", ""),
     ("flow", [*QUIET_WIDE, "numerics.transport=gear"], "", "flow.mean_velocity=0.181 m/day"),
-    # the head's pressure over mu_L: 0.01 at 0.0979 Pa / 9.79 Pa, all of it lost over the aggregate in contact
+    # the head's pressure over mu_L is 0.01 at 0.0979 Pa / 9.79 Pa; the aggregate in contact bears all of it
     ("growth.fluid_forces", FORCED, "growth.shear_modulus=9.9 Pa", "growth.shear_modulus=9.6 Pa"),
     ("growth.fluid_forces", [*FORCED, "growth.shear_modulus=4 Pa"], "growth.fluid_forces=included", ""),
-    # a film of 1 um has five intervals; a coarse mesh of a film of 2 um has three
+    # a film of 1 um has five intervals; in a coarse mesh a film of 2 um has three
     ("aggregate.radius", ["flow_only"], "aggregate.radius=49.1 um", "aggregate.radius=49.3 um"),
     ("aggregate.radius", ["flow_only", "aggregate.radius=40 um"], "numerics.refinement=0.41",
      "numerics.refinement=0.39"),
-    # a seed of 40 um is to be meshed with 75 um to either side
+    # the mesh of a seed of 40 um extends 75 um to either side
     ("pore.length", ["flow_only", "aggregate.radius=40 um"], "pore.length=231 um", "pore.length=229 um"),
     # the growth rate is 0.19 1/h
     ("growth.time_step", QUIET, "growth.time_step=0.5 h", "growth.time_step=0.55 h"),
     ("growth.time_step", [*QUIET, "growth.time_step=0.55 h"], FAST, ""),
-    # contact from 31.2 h on
+    # contact begins at 31.2 h
     ("growth.end", ["wide", "pore.length=3000 um"], "growth.end=37 h", "growth.end=38 h"),
     # elements of 4 um widen the layer to d = 2/3 um, and 3 (r - r^2 / d) / 30 um is 1 % at r = 0.12251 and 0.54415 um;
-    # it is less everywhere where elements are half as large
+    # on elements half as large it is less everywhere
     ("flow.permeability", COARSE_PERMEABLE, "flow.permeability=1.495e-14 m^2", "flow.permeability=1.505e-14 m^2"),
     ("flow.permeability", COARSE_PERMEABLE, "flow.permeability=2.965e-13 m^2", "flow.permeability=2.955e-13 m^2"),
     ("flow.permeability", [*PERMEABLE, "flow.permeability=1e-13 m^2"], "", "numerics.refinement=0.5"),
-    # a diffusivity of Table 1 is changed, and its partner in the aggregate too or not; F = COD - Y d_c
+    # a diffusivity of Table 1 changes, with or without its partner in the aggregate; F = COD - Y d_c
     ("substrates.donor.diffusivity_in_aggregate", [*QUIET, "substrates.donor.diffusivity=2 cm^2/day"],
      "substrates.donor.diffusivity_in_aggregate=80 %", ""),
     ("substrates.acceptor.diffusivity_in_aggregate", QUIET,
@@ -141,13 +141,13 @@ FINE, FAST = "numerics.refinement=2", "numerics.preset=fast"
      "kinetics.acceptor_to_donor_ratio=1.7", ""),
 ])
 def test_warnings_are_exactly_where_a_simplification_fails(key, common, inside, outside):
-    """Either side of the threshold, worked out by hand; nothing else is warned of. "": as it is in common."""
-    without, told = (set(looked_at(*common, *filter(None, [change]))[1]) for change in (inside, outside))
-    assert key not in without and told - without == {key}
+    """Thresholds are computed by hand, and no other warning occurs. "" makes no change to ``common``."""
+    inside_keys, outside_keys = (set(examine(*common, *filter(None, [change]))[1]) for change in (inside, outside))
+    assert key not in inside_keys and outside_keys - inside_keys == {key}
 
 
-def test_a_seed_off_the_middle_reaches_as_much_farther():
-    """At the start and at the end: pore.length is warned of by both."""
+def test_an_offset_of_the_seed_adds_to_its_reach():
+    """Both the reach at the start and that at the end decide the warning of pore.length."""
     middle, aside = (load_scene("base", [f"aggregate.position={x} um"]) for x in (0.0, -90.0))
     for sizes in (numbers.at_start, numbers.at_end):
         assert sizes(aside).reach == pytest.approx(sizes(middle).reach + 90.0, rel=1e-12)
@@ -156,10 +156,10 @@ def test_a_seed_off_the_middle_reaches_as_much_farther():
 
 
 @pytest.mark.parametrize("preset, least, most", [("paper", 1.0, 1.0), ("fast", 0.5, 2.0)])
-def test_the_steps_that_are_expected(preset, least, most):
+def test_the_expected_number_of_steps_is_close(preset, least, most):
     scene = load_scene("base", [f"numerics.preset={preset}", *(['growth.end="2 h"'] if preset == "paper" else [])])
-    taken = sum(len(instant.ledgers) for instant in simulate(scene))
-    assert least * taken <= sum(cost.steps(scene)) <= most * taken
+    count = sum(len(instant.ledgers) for instant in simulate(scene))
+    assert least * count <= sum(cost.steps(scene)) <= most * count
 
 
 @pytest.mark.parametrize("first, longest, duration, count", [(0.1, 0.8, 1.5, 4), (0.1, 0.8, 3.1, 6), (0.1, 0.8, 0.3, 2),
@@ -168,7 +168,7 @@ def test_the_first_steps_double_until_they_are_the_longest(first, longest, durat
     assert cost._count(first, longest, duration) == count
 
 
-def test_steps_in_contact_and_none():
+def test_steps_are_expected_in_contact_but_not_without_growth():
     assert cost.steps(load_scene("wide")) == (156, 69)
     assert cost.steps(load_scene("flow_only")) == cost.steps(load_scene("base", ["growth.end=0 h"])) == (0, 0)
     few, many = (sum(cost.steps(load_scene("base", ["numerics.preset=fast", f"numerics.tolerance={tolerance}"])))
@@ -179,17 +179,17 @@ def test_steps_in_contact_and_none():
 
 
 def test_a_trial_takes_few_steps_however_short_they_are(monkeypatch):
-    """A tolerance that asks for thousands of steps does not make `repro check` slow."""
-    made, steps = [], cost.steps_of
-    monkeypatch.setattr(cost, "steps_of", lambda scene: (made.append(one) or one for one in steps(scene)))
-    trial = cost.tried(load_scene("base", ["numerics.preset=fast", "numerics.tolerance=1e-7"]), 458)
-    assert len(made) == 1 + cost.MOST_STEPS and 0 < trial.step < np.inf
+    """A tolerance that requires thousands of steps does not slow `repro check` down."""
+    yielded, steps = [], cost.iterate_steps
+    monkeypatch.setattr(cost, "iterate_steps", lambda scene: (yielded.append(one) or one for one in steps(scene)))
+    trial = cost.run_trial(load_scene("base", ["numerics.preset=fast", "numerics.tolerance=1e-7"]), 458)
+    assert len(yielded) == 1 + cost.MOST_STEPS and 0 < trial.step < np.inf
 
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("name, preset", [("base", "fast"), ("base", "accurate"), ("base", "paper"), ("wide", "paper")])
 def test_the_estimate_is_right_within_a_factor_of_three(name, preset):
-    """Against the run itself, right after it, in the best of three looks: other work on the machine comes and goes."""
+    """The best of three estimates counts, because other work disturbs the machine. The run follows right after them."""
     scene = load_scene(name, [f"numerics.preset={preset}"])
     estimates = [check(scene, name).cost.seconds for _ in range(3)]
     start = time.perf_counter()
@@ -199,86 +199,88 @@ def test_the_estimate_is_right_within_a_factor_of_three(name, preset):
     assert np.abs(np.log(ratio)).min() < math.log(3), ratio
 
 
-def test_what_is_modelled_follows_the_sections():
-    """With the numbers of the scene, in the units that they are told in."""
-    words = dict(modelled(load_scene("base", ["pore.width=44 um", "aggregate.radius=7 um", "aggregate.position=-40 um",
-                                              "aggregate.inert_fraction=0.3", "growth.time_step=0.35 h"])))
+def test_the_modelled_physics_follow_the_sections():
+    """The text has the numbers of the scene in its own units."""
+    changes = ["pore.width=44 um", "aggregate.radius=7 um", "aggregate.position=-40 um", "aggregate.inert_fraction=0.3",
+               "growth.time_step=0.35 h"]
+    words = dict(describe_model(load_scene("base", changes)))
     assert "(1)-(6)" in words["flow"] and "head of 0.001 cm" in words["flow"] and "(14)-(29)" in words["growth"]
     assert words["pore"].startswith("a channel 44 um wide and 600 um long")
     assert "radius 7 um on the lower wall at x = -40 um; 30 % of it inert at t = 0" in words["aggregate"]
     assert "a shape update every 21 min" in words["numerics"]
-    bare = dict(modelled(load_scene("initial_mesh", ["substrates={}", "growth.end=1 h", "numerics.extent=full"])))
+    bare = dict(describe_model(load_scene("initial_mesh", ["substrates={}", "growth.end=1 h", "numerics.extent=full"])))
     assert bare["flow"] == "no flow: pure diffusion" and "supply held at both ends" in bare["substrates"]
     assert "as a whole" in bare["pore"] and "(9)-(10)" in bare["kinetics"]
     outline = 'aggregate={outline=[["-5 um", "0 um"], ["1 um", "9 um"], ["6 um", "0 um"]], smooth=true}'
-    gear = dict(modelled(load_scene("base", ["numerics.transport=gear", "growth.new_biomass=stress_free", outline])))
+    transient = load_scene("base", ["numerics.transport=gear", "growth.new_biomass=stress_free", outline])
+    gear = dict(describe_model(transient))
     assert "Gear" in gear["substrates"] and "without stress" in gear["growth"]
     assert gear["aggregate"].startswith("biomass inside a spline through 3 points")
 
 
-def test_what_is_modelled_over_time_is_told():
-    """In the order of the substrates, with the largest value and with the last time."""
+def test_check_describes_values_over_time():
+    """The text keeps the order of the substrates and has the range of values and the last time."""
     steps = [["0 h", "3 mg/L"], ["1 h", "9 mg/L"], ["4 h", "5 mg/L"]]
-    words = dict(modelled(load_scene("wide", [f"substrates.donor.supply={json.dumps(steps)}", FAST])))
+    words = dict(describe_model(load_scene("wide", [f"substrates.donor.supply={json.dumps(steps)}", FAST])))
     assert "acceptor (10 mg/L) and donor (3 to 9 mg/L, in steps, the last from 4 h)" in words["substrates"]
     assert "mean velocity of 2.9 m/day" in words["flow"] and words["output"].endswith(", and every 1.6 h")
     assert words["growth"].startswith("to 45 h: ") and "tolerance 0.0075" in words["numerics"]
     head = ['flow.head=[["0 h", "1 cm"], ["2 h", "4 cm"]]', "flow.interpolation=linear"]
-    words = dict(modelled(load_scene("base", head)))
+    words = dict(describe_model(load_scene("base", head)))
     assert "a head of 1 to 4 cm, linear in time, the last from 2 h over" in words["flow"]
 
 
-@pytest.mark.parametrize("key, name, changes, said", [
+@pytest.mark.parametrize("key, name, changes, excerpt", [
     ("pore.length", "wide", [], "ends by growth.end (reach 298 of 300 um)"),
     ("pore.length", "flow_only", ["aggregate.radius=40 um", "pore.length=200 um"], "from the start (reach 40 of 100"),
     ("numerics.refinement", "base", FEW[1:], "= 0.76 um thick, thinner than"),
     ("growth.end", "wide", [], "is expected from 31.2 h on, long before 45 h"),
     ("growth.time_step", "base", ["growth.time_step=0.6 h"], "grows by 11 % in a shape update, above 10 %"),
     ("substrates.donor.diffusivity_in_aggregate", "base", ["substrates.donor.diffusivity=2 cm^2/day"], "40.5 % of")])
-def test_a_warning_tells_the_numbers_that_it_rests_on(key, name, changes, said):
+def test_a_warning_states_its_numbers(key, name, changes, excerpt):
     scene = load_scene(name, changes)
-    found = simplifications.warnings(scene, numbers.numbers(scene, CLEAN))
-    assert [each.key for each in found if said in each.text] == [key]
+    warnings = simplifications.find_warnings(scene, numbers.numbers(scene, CLEAN))
+    assert [warning.key for warning in warnings if excerpt in warning.text] == [key]
 
 
-@pytest.mark.parametrize("seconds, said", [(0.123, "0.12 s"), (45.3, "45 s"), (119.0, "119 s"), (130.0, "2 min"),
+@pytest.mark.parametrize("seconds, duration", [(0.123, "0.12 s"), (45.3, "45 s"), (119.0, "119 s"), (130.0, "2 min"),
                                            (7100.0, "118 min"), (7300.0, "2 h"), (9000.0, "2 h"), (90000.0, "25 h")])
-def test_what_a_run_takes_is_told_in_a_unit_that_suits(seconds, said):
+def test_the_duration_of_a_run_has_a_suitable_unit(seconds, duration):
     first, *_ = checked._cost(cost.Cost(7, seconds, 256.0))
-    assert first == f"Cost, roughly: {said} (7 steps), writing not counted; 256 MB besides the program"
+    assert first == f"Cost, roughly: {duration} (7 steps), writing not counted; 256 MB besides the program"
 
 
-def test_the_report_and_its_exit_status(capsys):
-    """Warnings do not change it. In 1 h the area grows by exp(0.19), the radius by the root of that."""
+def test_check_prints_a_report_and_exits_with_zero(capsys):
+    """Warnings leave the status at 0. In 1 h the area grows by exp(0.19) and the radius by the root of that."""
     assert main(["check", "wide", "--set", "growth.end=1 h", "--set", "growth.time_step=0.6 h"]) == 0
-    said = capsys.readouterr()
-    assert said.err == "" and "wide: can be run" in said.out and "WARNING growth.time_step: " in said.out
-    assert re.search(r"Thiele, donor +0\.29 +0\.32\n  Damkoehler, acceptor +0\.0053 +0\.0064\n", said.out)
-    assert "Mesh at t = 0: 594 nodes, 1104 triangles" in said.out
-    assert all(len(line) <= 120 for line in said.out.splitlines())
+    output = capsys.readouterr()
+    assert output.err == "" and "wide: can be run" in output.out and "WARNING growth.time_step: " in output.out
+    assert re.search(r"Thiele, donor +0\.29 +0\.32\n  Damkoehler, acceptor +0\.0053 +0\.0064\n", output.out)
+    assert "Mesh at t = 0: 594 nodes, 1104 triangles" in output.out
+    assert all(len(line) <= 120 for line in output.out.splitlines())
 
 
-def test_for_machines(capsys):
+def test_check_prints_json(capsys):
     assert main(["check", "flow_only", "--json"]) == 0
     text = capsys.readouterr().out
-    told = json.loads(text)
-    assert text == json.dumps(told, indent=2) + "\n"
-    assert set(told) == {"scene", "modelled", "nodes", "triangles", "numbers", "warnings", "cost",
+    report = json.loads(text)
+    assert text == json.dumps(report, indent=2) + "\n"
+    assert set(report) == {"scene", "modelled", "nodes", "triangles", "numbers", "warnings", "cost",
                          "estimated"}
-    assert told["nodes"] == 783 and told["cost"]["steps"] == 0 and told["warnings"] == []
-    assert told["numbers"][0]["name"] == "Reynolds" and "growth" in told["modelled"]
+    assert report["nodes"] == 783 and report["cost"]["steps"] == 0 and report["warnings"] == []
+    assert report["numbers"][0]["name"] == "Reynolds" and "growth" in report["modelled"]
 
 
-@pytest.mark.parametrize("override, said", [
+@pytest.mark.parametrize("override, excerpt", [
     ("pore.widht=5 um", "did you mean width?"),
     ("flow.head=1e-300 um", "base: it cannot be run: stopped in the step from t = 0 h, in transport"),
     ("numerics.solver=pardiso", "pypardiso"),
 ])
-def test_what_cannot_be_run_is_refused(tmp_path, override, said, capsys, monkeypatch):
-    faults.absent_package(monkeypatch, "pypardiso")
-    assert said in refused(tmp_path, capsys, "check", "base", "--set", override)
+def test_a_scene_that_cannot_run_is_refused(tmp_path, override, excerpt, capsys, monkeypatch):
+    faults.remove_package(monkeypatch, "pypardiso")
+    assert excerpt in refusal(tmp_path, capsys, "check", "base", "--set", override)
 
 
-def test_time_is_expected_to_grow_with_the_mesh():
-    found = cost.expected(load_scene("flow_only"), cost.Trial(None, 2.0, 0.5, 1000), 4000)
-    assert found.seconds == pytest.approx(2 * 4**1.2, rel=1e-12)
+def test_the_expected_time_grows_with_the_mesh():
+    estimate = cost.estimate_cost(load_scene("flow_only"), cost.Trial(None, 2.0, 0.5, 1000), 4000)
+    assert estimate.seconds == pytest.approx(2 * 4**1.2, rel=1e-12)

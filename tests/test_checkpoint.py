@@ -1,4 +1,4 @@
-"""Checkpoints: what is written is read, and whatever else is read is refused."""
+"""Checkpoints are read back as written, and every other file is refused."""
 
 import io
 import os
@@ -13,12 +13,12 @@ from hypothesis import strategies as st
 from repro.errors import CheckpointError
 from repro.march.loop import SAME_TIME
 from repro.march.simulation import steps
-from repro.runs import checkpoint, stored
-from repro.runs.checkpoint import NEWEST, PREVIOUS, decoded, encoded
+from repro.runs import checkpoint, state_arrays
+from repro.runs.checkpoint import NEWEST, PREVIOUS, decode, encode
+from repro.runs.execution import Watch, run
 from repro.runs.recorder import Recorder
-from repro.runs.running import Watch, run
 from repro.scene import load_scene
-from tests.faults import little_memory
+from tests.faults import limit_memory
 
 TIMES = ('growth.end="0.6 h"', 'output.times=["0.2 h", "0.6 h"]')
 LATER = ('growth.end="14 h"', 'output.times=["2 h", "14 h"]')
@@ -27,24 +27,24 @@ PRESETS = {"paper": ('numerics.preset="paper"', *TIMES), "fast": ('numerics.pres
 
 
 @pytest.fixture(scope="module", params=PRESETS)
-def kept(request, tmp_path_factory):
-    """Scene, folder and bytes of a checkpoint with steps that are reported and one that is not."""
+def saved(request, tmp_path_factory):
+    """Scene, folder and bytes of a checkpoint that holds reported steps and an unreported one."""
     scene, folder = load_scene("base", PRESETS[request.param]), tmp_path_factory.mktemp("kept") / "run"
-    found = []
+    contents = []
 
     def keep(event):
         if event["event"] == "checkpoint":
             content = (folder / NEWEST).read_bytes()
-            arrays = decoded(content)[1]
-            found.extend([content] * bool(len(arrays["pending"]) and len(arrays["ledgers"])))
+            arrays = decode(content)[1]
+            contents.extend([content] * bool(len(arrays["pending"]) and len(arrays["ledgers"])))
 
     run(scene, folder, watch=Watch(tell=keep, interval=0.0))
-    return scene, folder, found[0]
+    return scene, folder, contents[0]
 
 
-def restored(kept, content, path):
-    """A recorder that goes on from these bytes."""
-    scene, folder, _ = kept
+def restored(saved, content, path):
+    """Return a recorder restored from these bytes."""
+    scene, folder, _ = saved
     path.write_bytes(content)
     recorder = Recorder(scene, folder)
     recorder.restore(path)
@@ -52,35 +52,39 @@ def restored(kept, content, path):
 
 
 def test_an_array_keeps_its_layout():
-    """By rows or by columns, its type, and its numbers in either; what is read may be written to."""
+    """The order by rows or columns, the type and the numbers stay. Arrays that are read can be written to."""
     numbers = np.arange(6).reshape(2, 3)
     arrays = {"rows": numbers.astype(float), "columns": np.asfortranarray(numbers), "none": np.zeros(0),
               "flags": np.array([True, False]), "short": np.arange(3, dtype=np.int32), "edge": np.array([-0.0, 5e-324])}
-    _, found = decoded(encoded({}, arrays))
+    _, decoded_arrays = decode(encode({}, arrays))
     for name, array in arrays.items():
-        assert found[name].tobytes() == array.tobytes() and found[name].dtype == array.dtype
-        assert found[name].flags.c_contiguous == array.flags.c_contiguous and found[name].flags.writeable
+        computed = decoded_arrays[name]
+        assert computed.tobytes() == array.tobytes() and computed.dtype == array.dtype
+        assert computed.flags.c_contiguous == array.flags.c_contiguous and computed.flags.writeable
 
 
-def test_the_one_before_is_kept(tmp_path):
+def test_the_previous_checkpoint_is_kept(tmp_path):
     for content in (b"one", b"two", b"three"):
         checkpoint.write(tmp_path, content)
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == {NEWEST: b"three", PREVIOUS: b"two"}
 
 
-def test_one_bit_of_a_number_is_told(kept, tmp_path):
-    """The last of the first array's first number: all else is as a run's."""
-    content = bytearray(kept[2])
+def test_one_changed_bit_is_refused(saved, tmp_path):
+    """The test changes the last bit of the first number of the first array."""
+    content = bytearray(saved[2])
     content[content.index(b"points.npy") + 200] ^= 1
     with pytest.raises(CheckpointError, match="^.*checksum.*$"):
-        restored(kept, bytes(content), tmp_path / "altered")
+        restored(saved, bytes(content), tmp_path / "altered")
 
 
-@pytest.mark.parametrize("kept", ["fast"], indirect=True)
-def test_a_forged_checkpoint_is_refused_in_one_line_or_harmless(kept, tmp_path):
-    """Under a right checksum: parts that are missing, of another kind or of another size, in every array and entry."""
-    plain, arrays = decoded(kept[2])
-    forged = [(plain, {key: value for key, value in arrays.items() if key != name}) for name in arrays]
+@pytest.mark.parametrize("saved", ["fast"], indirect=True)
+def test_a_forged_checkpoint_is_refused_in_one_line_or_harmless(saved, tmp_path):
+    """Every array and entry in turn is missing, of another type or of another size. The checksum is right."""
+    plain, arrays = decode(saved[2])
+    forged = []
+    for name in arrays:
+        remaining = {key: array for key, array in arrays.items() if key != name}
+        forged.append((plain, remaining))
     forged += [(plain, arrays | {name: array[:-1]}) for name, array in arrays.items() if array.size]
     forged += [(plain, arrays | {name: np.full(3, "x")}) for name in arrays]
     for section in plain:
@@ -91,19 +95,19 @@ def test_a_forged_checkpoint_is_refused_in_one_line_or_harmless(kept, tmp_path):
     refusals = 0
     for one in forged:
         try:
-            restored(kept, encoded(*one), tmp_path / "x")
+            restored(saved, encode(*one), tmp_path / "x")
         except CheckpointError as error:
             refusals += 1
             assert str(error) and "\n" not in str(error)
-    assert refusals >= len(arrays) + 5 * len(plain), "at least each that lacks an array or a section"
+    assert refusals >= len(arrays) + 5 * len(plain), "at least one refusal for each missing array or section"
 
 
 @pytest.mark.parametrize("spoil", [lambda path: path.write_bytes(path.read_bytes()[:-9]), os.unlink,
                                    lambda path: path.write_bytes(path.read_bytes().replace(b"0", b"1", 1)),
                                    lambda path: path.rename(path.with_name("x")) and path.symlink_to("x")])
-def test_fields_that_are_not_as_they_were_written_are_refused(kept, tmp_path, spoil):
-    """Cut short, gone, altered with the same length, or moved and linked to."""
-    scene, folder, content = kept
+def test_altered_fields_are_refused(saved, tmp_path, spoil):
+    """They are cut short, missing, altered at the same length, or moved and linked to."""
+    scene, folder, content = saved
     (tmp_path / "x").write_bytes(content)
     copied = shutil.copytree(folder, tmp_path / "run")
     Recorder(scene, copied).restore(tmp_path / "x")
@@ -113,12 +117,12 @@ def test_fields_that_are_not_as_they_were_written_are_refused(kept, tmp_path, sp
 
 
 def signed(body: bytes) -> bytes:
-    """A checkpoint with this content under a right checksum."""
+    """Return a checkpoint with this content and a right checksum."""
     return checkpoint.MAGIC + sha256(body).hexdigest().encode() + b"\n" + body
 
 
 class Harm:
-    """What would make a file, were it unpickled."""
+    """An object that makes a file when it is unpickled."""
 
     def __init__(self, path):
         self.path = path
@@ -128,22 +132,22 @@ class Harm:
 
 
 def test_nothing_in_a_forged_checkpoint_is_executed(tmp_path):
-    """Pickles as arrays of objects in an .npz file, refused under a right checksum."""
+    """Pickled arrays of objects in an .npz file with a right checksum are refused."""
     harm, file = Harm(tmp_path / "harm"), io.BytesIO()
     np.savez(file, plain=np.array([harm], dtype=object))
     for body in (file.getvalue(), b"", b"[]", file.getvalue()[:-30]):
         with pytest.raises(CheckpointError):
-            decoded(signed(body))
+            decode(signed(body))
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_file_that_is_too_long_or_none_is_not_read(kept, tmp_path):
+def test_a_file_that_is_too_long_or_not_regular_is_not_read(saved, tmp_path):
     with (tmp_path / "x").open("wb") as file:
         file.truncate(2**31)
     os.mkfifo(tmp_path / "pipe")
-    recorder = Recorder(*kept[:2])
+    recorder = Recorder(*saved[:2])
     for name, why in (("x", "longer than"), ("pipe", "no regular file")):
-        with little_memory(2**20), pytest.raises(CheckpointError, match=why):
+        with limit_memory(2**20), pytest.raises(CheckpointError, match=why):
             recorder.restore(tmp_path / name)
 
 
@@ -153,22 +157,22 @@ def test_a_file_that_is_too_long_or_none_is_not_read(kept, tmp_path):
 @given(st.binary(max_size=300))
 def test_other_files_are_refused(content):
     with pytest.raises(CheckpointError, match="does not begin as|checksum|format is not"):
-        decoded(content)
+        decode(content)
 
 
-def test_a_checkpoint_of_another_format_or_scene_is_refused_in_one_line(kept, tmp_path):
-    old = checkpoint.KIND + b"2 " + kept[2].removeprefix(checkpoint.MAGIC)
+def test_a_checkpoint_of_another_format_or_scene_is_refused_in_one_line(saved, tmp_path):
+    old = checkpoint.KIND + b"2 " + saved[2].removeprefix(checkpoint.MAGIC)
     with pytest.raises(CheckpointError, match="^its format is not 5: another version wrote it$"):
-        restored(kept, old, tmp_path / "x")
+        restored(saved, old, tmp_path / "x")
     with pytest.raises(CheckpointError, match="another scene"):
-        restored((load_scene("flow_only"), *kept[1:]), kept[2], tmp_path / "x")
+        restored((load_scene("flow_only"), *saved[1:]), saved[2], tmp_path / "x")
 
 
-def test_a_state_that_is_the_runs_end_to_round_off_is_kept():
-    """A step that ends less than SAME_TIME after growth.end is not cut there."""
+def test_a_state_at_the_end_to_round_off_is_kept():
+    """A step that ends less than SAME_TIME after growth.end is not cut at growth.end."""
     long = load_scene("base", ["numerics.preset=fast", "growth.end=5 h"])
     time = next(state.pore.time for state, _ in steps(long) if state.pore.time > 0)
     short = load_scene("base", ["numerics.preset=fast", f"growth.end={time - 0.5 * SAME_TIME!r} h"])
     *_, (last, _) = steps(short)
     assert 0 < last.pore.time - short.growth.end < SAME_TIME
-    assert stored.unpacked(short, *stored.packed(short, last)).pore.time == last.pore.time
+    assert state_arrays.unpack_state(short, *state_arrays.pack_state(short, last)).pore.time == last.pore.time

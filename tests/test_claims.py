@@ -1,5 +1,4 @@
-"""The verdicts of `verification.claims`: each can be reached, none without a number and a bar, and none by a wide
-range."""
+"""Verdicts of `verification.claims`: each is reachable, and none lacks a number, an error bar and a narrow range."""
 import math
 from dataclasses import replace
 
@@ -26,54 +25,53 @@ from verification.claims import (
     scheme,
 )
 from verification.claims import __main__ as driver
-from verification.sensitivity.rounding import BY_NAME, PRINTED, misfit, of_base
-from verification.sensitivity.rounding import scene as scene_of
+from verification.sensitivity.rounding import BY_NAME, PRINTED, load_varied, misfit, of_base
 from verification.uncertainty import Bar
 
 
 def sure(check, half=0.0):
-    """A check with a bar of half a width."""
+    """Return a check with an error bar of half-width ``half``."""
     return replace(check, bar=Bar(check.value - half, check.value + half))
 
 
 GOOD = claims.near("speed (m/d)", "2.9", 2.91, 2.9, 0.029, "1 %")
 BAD = claims.at_most("share (%)", "<0.5", 0.7, 0.5, "the paper's bound")
-HELD, DOUBTED = sure(GOOD), sure(GOOD, 0.02)
+SATISFIED, DOUBTED = sure(GOOD), sure(GOOD, 0.02)
 FAILED, DOUBTED_FAILURE = sure(BAD, 0.1), sure(BAD, 0.3)
 
 
 @pytest.mark.parametrize("checks, words, verdict", [
-    ((HELD,), {"rounding": "k 9.31"}, REPRODUCED),
-    ((HELD, DOUBTED), {"change": "at saturation"}, UNDECIDED),
-    ((HELD, HELD), {"change": "at saturation"}, CHANGED),
-    ((FAILED, DOUBTED_FAILURE, HELD), {"change": "at saturation"}, CONTRADICTED),
-    ((HELD, DOUBTED_FAILURE), {"rounding": "k 9.31"}, UNDECIDED),
-    ((HELD, FAILED), {"rounding": "k 9.31"}, WITHIN_ROUNDING),
+    ((SATISFIED,), {"rounding": "k 9.31"}, REPRODUCED),
+    ((SATISFIED, DOUBTED), {"change": "at saturation"}, UNDECIDED),
+    ((SATISFIED, SATISFIED), {"change": "at saturation"}, CHANGED),
+    ((FAILED, DOUBTED_FAILURE, SATISFIED), {"change": "at saturation"}, CONTRADICTED),
+    ((SATISFIED, DOUBTED_FAILURE), {"rounding": "k 9.31"}, UNDECIDED),
+    ((SATISFIED, FAILED), {"rounding": "k 9.31"}, WITHIN_ROUNDING),
 ])
 def test_each_verdict_follows_from_the_checks_and_their_bars(checks, words, verdict):
     assert Finding(checks, reason="it leaks", **words).verdict == verdict
     assert verdict in VERDICTS and len(VERDICTS) == 5
 
 
-@pytest.mark.parametrize("finding, said", [
-    (Finding((HELD, FAILED)), "no reason"),
+@pytest.mark.parametrize("finding, excerpt", [
+    (Finding((SATISFIED, FAILED)), "no reason"),
     (Finding((DOUBTED_FAILURE,)), "no reason"),
     (Finding(()), "nothing is checked"),
-    (Finding((replace(HELD, value=math.nan),), reason="why"), "not a number"),
-    (Finding((HELD, GOOD)), "no error bar"),
+    (Finding((replace(SATISFIED, value=math.nan),), reason="why"), "not a number"),
+    (Finding((SATISFIED, GOOD)), "no error bar"),
 ])
-def test_no_verdict_without_numbers_or_bars_or_without_a_reason(finding, said):
-    with pytest.raises(ClaimError, match=said):
+def test_a_verdict_needs_numbers_bars_and_a_reason(finding, excerpt):
+    with pytest.raises(ClaimError, match=excerpt):
         print(finding.verdict)
 
 
-@pytest.mark.parametrize("ours, half, outcome", [
+@pytest.mark.parametrize("computed, half, outcome", [
     (2.0, 0.2, HOLDS), (2.0, 0.21, REACHES_OVER), (2.3, 0.15, REACHES_OVER), (2.3, 0.05, FAILS), (1.5, 0.2, FAILS),
     (1.5, 0.9, REACHES_OVER),
 ])
-def test_a_check_is_judged_with_the_whole_of_its_bar(ours, half, outcome):
-    """Accepted is 1.8 to 2.2."""
-    assert sure(claims.between("q", "2", ours, 1.8, 2.2 + 1e-12, ""), half).outcome == outcome
+def test_a_check_is_judged_by_its_full_bar(computed, half, outcome):
+    """The accepted interval is 1.8 to 2.2."""
+    assert sure(claims.between("q", "2", computed, 1.8, 2.2 + 1e-12, ""), half).outcome == outcome
 
 
 @pytest.mark.parametrize("text, printed", [
@@ -86,12 +84,12 @@ def test_a_printed_number_is_an_interval_and_words_are_none(text, printed):
 # The command.
 @pytest.fixture
 def registry(monkeypatch, tmp_path):
-    """An empty registry and record, and a driver that registers nothing on its own, in one process."""
+    """An empty registry and record, and a driver that registers no claims and works in one process."""
     monkeypatch.setattr(claims, "CLAIMS", {})
     for module in (driver, evaluate):
         monkeypatch.setattr(module, "CLAIMS", claims.CLAIMS)
     monkeypatch.setattr(evaluate, "register_all", lambda: None)
-    monkeypatch.setattr(evaluate, "side_by_side", lambda function, *given: list(map(function, *given)))
+    monkeypatch.setattr(evaluate, "side_by_side", lambda function, *arguments: list(map(function, *arguments)))
     monkeypatch.setattr(report, "COMMITTED", tmp_path / "claims.json")
 
 
@@ -112,7 +110,7 @@ def failing_with_double_steps():
     (None, 1, ["NO VERDICT", "no module computes it"]),
 ])
 def test_a_claim_without_a_verdict_is_a_failure_and_the_others_are_judged(registry, capsys, judge, status, told):
-    """A contradicted claim is none."""
+    """A contradicted claim is no failure."""
     if judge:
         registered("C01", judge, about=claims.OF_SCHEME)
     registered("C02", lambda: Finding((GOOD,)))
@@ -124,71 +122,72 @@ def test_a_claim_without_a_verdict_is_a_failure_and_the_others_are_judged(regist
 
 # The committed record.
 @pytest.fixture(scope="module")
-def kept():
+def record():
     return report.read()
 
 
-def ends_of(told):
-    """The interval of an entry of the record, in which an open end is null."""
-    return tuple(math.inf * sign if told[end] is None else told[end] for end, sign in (("low", -1), ("high", 1)))
+def bounds_of(entry):
+    """Return the interval of an entry of the record, where null marks an open end."""
+    return tuple(math.inf * sign if entry[end] is None else entry[end] for end, sign in (("low", -1), ("high", 1)))
 
 
-def test_the_recorded_verdicts_follow_from_the_recorded_numbers(kept):
-    """Computed again from intervals and tolerances alone: every outcome, and the verdict. A printed number holds where
-    its interval has the bar: what has another tolerance is words."""
-    for each in kept:
-        for check in each["checks"]:
-            bounds, printed = ends_of(check["tolerance"]), claims.interval(check["paper"])
-            assert claims.outcome_of(ends_of(check), bounds) == check["outcome"], (each["id"], check["quantity"])
-            assert (check["paper_low"], check["paper_high"]) == (printed or (None, None)), each["id"]
-            assert printed in (None, bounds), (each["id"], check["quantity"])
-        outcomes = {check["outcome"] for check in each["checks"]}
-        assert each["verdict"] == claims.verdict_of(outcomes, bool(each["change"]), bool(each["rounding"])), each["id"]
+def test_the_recorded_verdicts_follow_from_the_recorded_numbers(record):
+    """The test computes every outcome and verdict from intervals and tolerances alone. A printed number holds if its
+    interval contains the bar; only statements in words have other tolerances."""
+    for entry in record:
+        for check in entry["checks"]:
+            bounds, printed = bounds_of(check["tolerance"]), claims.interval(check["paper"])
+            assert claims.outcome_of(bounds_of(check), bounds) == check["outcome"], (entry["id"], check["quantity"])
+            assert (check["paper_low"], check["paper_high"]) == (printed or (None, None)), entry["id"]
+            assert printed in (None, bounds), (entry["id"], check["quantity"])
+        outcomes = {check["outcome"] for check in entry["checks"]}
+        verdict = claims.verdict_of(outcomes, bool(entry["change"]), bool(entry["rounding"]))
+        assert entry["verdict"] == verdict, entry["id"]
 
 
-def test_no_recorded_verdict_flips_to_its_opposite(kept):
-    """With a bound moved by the bar of its number a verdict comes to be open at most, or an open one decided; of the
-    decided ones no more than a tenth comes to be open."""
-    verdicts = {each["id"]: each["verdict"] for each in kept}
-    found = [flip for each in kept for flip in report.flips(each)]
-    assert all(UNDECIDED in (flip.verdict, verdicts[flip.id]) for flip in found), found
-    assert len({flip.id for flip in found if verdicts[flip.id] != UNDECIDED}) <= len(kept) // 10
+def test_no_recorded_verdict_flips_to_its_opposite(record):
+    """If a bound moves by the bar of its number, a decided verdict becomes undecided at most, or an undecided one
+    decided. At most a tenth of the decided verdicts become undecided."""
+    verdicts = {entry["id"]: entry["verdict"] for entry in record}
+    flips = [flip for entry in record for flip in report.flips(entry)]
+    assert all(UNDECIDED in (flip.verdict, verdicts[flip.id]) for flip in flips), flips
+    assert len({flip.id for flip in flips if verdicts[flip.id] != UNDECIDED}) <= len(record) // 10
 
 
-def test_bars_are_as_narrow_as_asked(kept):
-    """0.2 % on velocities, effluents, uptake and concentrations of section 4; of base all wider ones have a reason;
-    after contact 1 % for conductivity and tips and 2 % for its length."""
-    for each in kept:
-        for check in each["checks"]:
-            width = check["high"] - check["low"] if each["id"] <= "C05" else 0.0
-            assert width <= 2 * 0.002 * abs(check["value"]), (each["id"], check["quantity"])
-    assert "" not in after_contact.wide_bars_of_base(kept)
+def test_bars_are_as_narrow_as_required(record):
+    """The limit is 0.2 % for velocities, effluents, uptake and concentrations of section 4. All wider bars of base have
+    a reason. After contact it is 1 % for conductivity and tips and 2 % for the length of contact."""
+    for entry in record:
+        for check in entry["checks"]:
+            width = check["high"] - check["low"] if entry["id"] <= "C05" else 0.0
+            assert width <= 2 * 0.002 * abs(check["value"]), (entry["id"], check["quantity"])
+    assert "" not in after_contact.wide_bars_of_base(record)
     rows = sensitivity.record()["after_contact"]
     wider = [row["quantity"] for row in rows if row["bar_percent"] > 1 + ("length" in row["quantity"])]
     assert wider == [] and len(rows) == 12
 
 
 def test_one_set_of_inputs_gives_all_printed_numbers_of_base():
-    """With the whole of their bars, every input within its rounding; and so does a real run of the preset."""
-    found = sensitivity.record()["one_set"]
-    factors = {name: value / BY_NAME[name].value for name, value in found["inputs"].items()}
+    """The full bars lie in the printed intervals, every input is within its rounding, and a real run agrees."""
+    one_set = sensitivity.record()["one_set"]
+    factors = {name: value / BY_NAME[name].value for name, value in one_set["inputs"].items()}
     rounding = sensitivity.record()["rounding"]
     assert all(abs(factor - 1) <= rounding[name] + 1e-12 for name, factor in factors.items())
     for name, printed in PRINTED.items():
-        number, bar = found["numbers"][name], found["bars"][name]
+        number, bar = one_set["numbers"][name], one_set["bars"][name]
         low, high = claims.interval(printed)
         assert low <= number - bar and number + bar <= high, name
-    assert misfit(of_base(scene_of("base", factors))) <= 1
+    assert misfit(of_base(load_varied("base", factors))) <= 1
 
 
-# The balance that the paper keeps of its own run.
+# The balance that the paper reports of its own run.
 def test_the_papers_bookkeeping_is_exact_for_a_steady_consumption_and_sees_a_growing_one():
     """Consumption that doubles within the step, booked at its end, is 4/3 of its mean over the step."""
     supply, volume = np.array([[10.0], [10.0]]), np.array([100.0, 100.0])
-    made = np.array([30.0, 30.0])
+    produced = np.array([30.0, 30.0])
     consumed = np.array([[60.0, 60.0], [40.0, 40.0]])
     effluent = supply - consumed / volume * np.array([1.0, 4 / 3])
-    book = scheme.Bookkeeping(np.array([0.2, 0.4]), volume, made, consumed, made, effluent, supply)
+    book = scheme.Bookkeeping(np.array([0.2, 0.4]), volume, produced, consumed, produced, effluent, supply)
     assert book.ratio_errors()[:, 0] == pytest.approx(0, abs=1e-14)
     assert book.ratio_errors()[:, 1] == pytest.approx([-0.25, -0.25, 0])
     assert volume * (supply - book.corrections() * effluent) == pytest.approx(consumed)

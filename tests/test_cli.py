@@ -1,4 +1,4 @@
-"""The command line: what it writes, and what it refuses."""
+"""The command line: its output and its refusals."""
 
 import os
 import subprocess
@@ -11,7 +11,7 @@ import pytest
 from repro import results
 from repro.cli import main
 from tests.pages import run
-from tests.shell import refused, rows, told
+from tests.shell import read_record, refusal, rows
 
 
 def test_flow_only_is_one_row_without_substrates(tmp_path):
@@ -24,20 +24,20 @@ def test_flow_only_is_one_row_without_substrates(tmp_path):
 
 
 def test_ledger_closes_and_adds_up(tmp_path):
-    """Each step's biomass follows the last one's, and in = out + consumed + stored."""
+    """Each step starts with the biomass of the previous one, and in = out + consumed + stored."""
     out = run(tmp_path, "base", 'growth.end="1 h"', 'output.times=["1 h"]')
     ledger = results.read_table(out / "ledger.csv")
     assert len(ledger["end_h"]) == 5
     for name in ("acceptor", "donor"):
         supplied, *parts = (ledger[f"{name}_{part}_pg_per_m"] for part in ("supplied", "out", "consumed", "stored"))
         assert (np.abs(supplied - sum(parts)) < 1e-8 * supplied).all()
-    before, made, after = (ledger[f"biomass_{part}_pg_per_m"] for part in ("before", "made", "after"))
-    assert before + made == pytest.approx(after, rel=1e-10, abs=0)
+    before, produced, after = (ledger[f"biomass_{part}_pg_per_m"] for part in ("before", "made", "after"))
+    assert before + produced == pytest.approx(after, rel=1e-10, abs=0)
     assert (after[:-1] == before[1:]).all() and (ledger["end_h"][:-1] == ledger["start_h"][1:]).all()
 
 
-def test_provenance(tmp_path):
-    record = told(run(tmp_path, "flow_only", "flow.viscosity_ratio=500"))
+def test_run_json_states_the_provenance(tmp_path):
+    record = read_record(run(tmp_path, "flow_only", "flow.viscosity_ratio=500"))
     assert record["status"] == "completed" and record["tables"]["flow"]["viscosity_ratio"] == 500
     assert record["origin"].get("set") == ["flow.viscosity_ratio=500"] and record["remeshes"] == 0
     assert record["versions"]["scikit-fem"] and record["wall_time_by_stage_s"]["flow"] > 0
@@ -46,43 +46,43 @@ def test_provenance(tmp_path):
 @pytest.mark.parametrize("before, name", [((), "thesis.tex"), ((), "timeseries.csv"),
                                           (["flow_only"], "fields/mine.vtu")])
 def test_a_folder_with_other_files_is_left_alone(tmp_path, capsys, before, name):
-    """Also where they have the name of a run's, or stand among a run's own."""
+    """The files may have names of a run's files or stand among them."""
     for scene in before:
         run(tmp_path, scene)
     mine = tmp_path / "run" / name
     mine.parent.mkdir(exist_ok=True)
     mine.write_text("years of work")
-    assert mine.name in refused(tmp_path, capsys, "run", "flow_only", "--out", tmp_path / "run")
+    assert mine.name in refusal(tmp_path, capsys, "run", "flow_only", "--out", tmp_path / "run")
 
 
-def test_unset_beside_set(tmp_path, capsys):
-    """In the commands that look at a scene."""
+def test_unset_and_set_combine(tmp_path, capsys):
+    """This holds for the commands that show or check a scene."""
     changes = ["--unset", "flow.head", "--unset", "growth", "--set", "flow.mean_velocity=1 m/day"]
     assert main(["scene", "base", *changes]) == 0
     text = capsys.readouterr().out
     assert '\n#head = "1e-3 cm"\n' in text and '\nmean_velocity = "1 m/day"\n' in text and "\n#[growth]\n" in text
     shut = ["--set", "substrates.boundary=shut"]
-    assert "substrates.boundary" in refused(tmp_path, capsys, "check", "base", *changes, *shut)
+    assert "substrates.boundary" in refusal(tmp_path, capsys, "check", "base", *changes, *shut)
     assert main(["check", "initial_mesh", "--unset", "aggregate"]) == 0
     assert "no aggregate: a clean channel" in capsys.readouterr().out
-    said = refused(tmp_path, capsys, "check", "initial_mesh", "--unset", "flow")
-    assert said == 'repro: initial_mesh: --unset "flow": the scene does not set it\n'
+    message = refusal(tmp_path, capsys, "check", "initial_mesh", "--unset", "flow")
+    assert message == 'repro: initial_mesh: --unset "flow": the scene does not set it\n'
 
 
-#: What writes text of its own to standard output: long, in lines, for machines.
+#: Commands that write to standard output: a long text, lines, JSON.
 WRITERS = [["scene", "base"], ["scene"], ["check", "base"], ["check", "base", "--json"]]
 
 
 def process_of(arguments, out):
-    """`repro ARGUMENTS` in a process of its own, with a file as its standard output."""
+    """Run `repro ARGUMENTS` in a separate process with a file as its standard output."""
     code = "import sys; from repro.cli import main; sys.exit(main(sys.argv[1:]))"
     command = [sys.executable, "-c", code, *arguments]
     return subprocess.run(command, stdout=out, stderr=subprocess.PIPE, text=True, timeout=60)
 
 
 @pytest.mark.parametrize("arguments", [*WRITERS, ["sweep", "initial_mesh", "--vary", "pore.width=40 um, 50 um"]])
-def test_nobody_reads_what_is_written(tmp_path, arguments):
-    """As under `| head -0`; a sweep goes on to its end."""
+def test_a_closed_output_is_no_failure(tmp_path, arguments):
+    """The output is closed as by `| head -0`. A sweep continues to its end."""
     end, pipe = os.pipe()
     os.close(end)
     process = process_of([*arguments, "--out", str(tmp_path)] if "sweep" in arguments else arguments, pipe)
@@ -96,7 +96,7 @@ def test_nobody_reads_what_is_written(tmp_path, arguments):
     *((arguments, "standard output: No space left on device") for arguments in WRITERS),
     (["run", "nowhere", "--out", "x", "--json"], "nowhere: neither a file nor a packaged scene"),
 ])
-def test_what_cannot_be_written_is_told_in_a_line(arguments, message):
+def test_a_failed_write_is_reported_in_one_line(arguments, message):
     """A full disk is a failure."""
     with open("/dev/full", "w") as full:
         process = process_of(arguments, full)
@@ -104,8 +104,8 @@ def test_what_cannot_be_written_is_told_in_a_line(arguments, message):
     assert process.stderr.startswith(f"repro: {message}")
 
 
-def test_closed_ends_with_gears_method_are_a_table_of_numbers(tmp_path):
-    """Every field is a number of Python's or empty."""
+def test_tables_of_gears_method_in_a_closed_pore_hold_only_numbers(tmp_path):
+    """Every field of the table is a Python number or empty."""
     out = run(tmp_path, "base", "substrates.boundary=closed", "numerics.transport=gear", "growth.end=0.4 h",
               "numerics.refinement=0.5", options=["--unset", "flow"])
     assert len([float(value) for row in rows(out / "timeseries.csv") for value in row.values() if value]) > 50

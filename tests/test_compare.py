@@ -1,4 +1,4 @@
-"""Runs laid over each other: what is drawn, what is told to differ, and what is refused."""
+"""Comparisons of runs: their charts, the reported differences, and refusals."""
 
 import html
 import json
@@ -14,76 +14,76 @@ from repro import results
 from repro.cli import main
 from repro.report import comparison, quantities
 from repro.report.reading import read
-from tests.faults import little_memory
+from tests.faults import limit_memory
 from tests.pages import Page
-from tests.shell import flip, refused, rewrite, told
+from tests.shell import flip, read_record, refusal, rewrite
 
 
 @pytest.fixture
-def two(fast, paper, tmp_path):
+def page(fast, paper, tmp_path):
     target = tmp_path / "both.html"
     assert main(["compare", str(fast), str(paper), "--out", str(target)]) == 0
     return target.read_text(encoding="utf-8")
 
 
-def test_a_comparison_has_a_line_a_run(two, fast, paper):
-    """In a chart of each quantity: the lines of their own pages by the runs' names, to the six digits that a pointer is
-    told."""
-    wanted, alone = {}, {kind.title for kind in quantities.KINDS if len(kind.drawn) == 1}
+def test_a_comparison_has_one_line_per_run(page, fast, paper):
+    """The chart of each quantity has the lines of the runs' pages, labelled by run, to the six digits that a pointer
+    shows."""
+    expected, alone = {}, {kind.title for kind in quantities.KINDS if len(kind.drawn) == 1}
     for out in (fast, paper):
         for chart in quantities.charts_of(read(out)):
             for line in chart.lines:
                 title = chart.title if chart.title in alone else f"{chart.title}: {line.label}"
                 known = np.isfinite(line.values)
-                wanted.setdefault(title, []).append((str(out), line.times[known], line.values[known]))
-    assert re.findall("<figcaption>(.*?)<", two) == list(wanted) and Page(two).outside == []
-    drawn = [json.loads(html.unescape(one))["lines"] for one in re.findall('data-chart="([^"]*)"', two)]
-    for lines, own in zip(drawn, wanted.values(), strict=True):
-        for line, (label, times, values) in zip(lines, own, strict=True):
+                expected.setdefault(title, []).append((str(out), line.times[known], line.values[known]))
+    assert re.findall("<figcaption>(.*?)<", page) == list(expected) and Page(page).outside == []
+    drawn = [json.loads(html.unescape(data))["lines"] for data in re.findall('data-chart="([^"]*)"', page)]
+    for lines, curves in zip(drawn, expected.values(), strict=True):
+        for line, (label, times, values) in zip(lines, curves, strict=True):
             assert line["label"] == label
             assert line["t"] == pytest.approx(times, rel=1e-5) and line["y"] == pytest.approx(values, rel=1e-5)
 
 
-def test_differences_of_scenes_are_told_key_by_key(fast, paper, flow_only):
-    found = dict((key, values) for key, *values in comparison.differences([read(fast), read(paper)]))
-    assert found == {"growth.end": ["3 h", "1 h"], "numerics.preset": ["fast", "paper"],
+def test_differences_of_scenes_are_listed_key_by_key(fast, paper, flow_only):
+    differences = dict((key, values) for key, *values in comparison.differences([read(fast), read(paper)]))
+    assert differences == {"growth.end": ["3 h", "1 h"], "numerics.preset": ["fast", "paper"],
                      "numerics.elements": ["quadratic", "linear"], "numerics.time": ["midpoint", "updates"],
                      "numerics.refinement": ["0.2", "1"], "numerics.tolerance": ["0.0075", "0.01"],
                      "numerics.jacobian": ["reused", "fresh"]}
-    found = dict((key, values) for key, *values in comparison.differences([read(paper), read(flow_only)]))
-    assert {"growth.end": ["1 h", "-"], "flow.mean_velocity": ["-", "120833 um/h"]}.items() <= found.items()
+    differences = dict((key, values) for key, *values in comparison.differences([read(paper), read(flow_only)]))
+    assert {"growth.end": ["1 h", "-"], "flow.mean_velocity": ["-", "120833 um/h"]}.items() <= differences.items()
     assert comparison.differences([read(fast), read(fast)]) == []
 
 
-def test_values_at_the_common_last_time(fast, paper, flow_only, two):
-    """Linear between rows, relative to the first."""
+def test_a_comparison_states_values_at_the_common_last_time(fast, paper, flow_only, page):
+    """Values are linear between rows and relative to the first run."""
     runs = [read(fast), read(paper)]
     assert comparison.common_time(runs) == 1.0
-    found = comparison.values(runs, 1.0)["aggregate_area_um2"]
+    values = comparison.values(runs, 1.0)["aggregate_area_um2"]
     series = results.read_table(fast / "timeseries.csv")
     after = np.flatnonzero(series["time_h"] >= 1)[0]
     (t0, t1), (a0, a1) = series["time_h"][after - 1: after + 1], series["aggregate_area_um2"][after - 1: after + 1]
-    assert found[0] == pytest.approx(a0 + (a1 - a0) * (1 - t0) / (t1 - t0), rel=1e-12)
-    assert found[1] == results.read_table(paper / "timeseries.csv")["aggregate_area_um2"][-1]
-    mine, other = (float(value or 0) for value in found)
-    assert f"{100 * (other - mine) / mine:+.3g} %" in two and "At t = 1 h, the last time" in two
+    assert values[0] == pytest.approx(a0 + (a1 - a0) * (1 - t0) / (t1 - t0), rel=1e-12)
+    assert values[1] == results.read_table(paper / "timeseries.csv")["aggregate_area_um2"][-1]
+    mine, other = (float(value or 0) for value in values)
+    assert f"{100 * (other - mine) / mine:+.3g} %" in page and "At t = 1 h, the last time" in page
     assert comparison.values([read(paper), read(flow_only)], 0.0)["donor_min_mg_per_L"][1] is None
 
 
-def test_runs_of_the_same_folder_name_are_told_by_their_paths(fast, paper):
+def test_runs_of_the_same_folder_name_are_named_by_their_paths(fast, paper):
     assert comparison.short([fast, paper]) == [str(fast), str(paper)]
     assert comparison.short([fast, fast.parent]) == ["run", fast.parent.name]
 
 
-def test_what_cannot_be_compared_is_refused(fast, tmp_path, capsys):
-    """In one line that says which folder and why, and nothing is written."""
+def test_runs_that_cannot_be_compared_are_refused(fast, tmp_path, capsys):
+    """One line names the folder and the reason, and nothing is written."""
     out, none = tmp_path / "out.html", tmp_path / "none"
-    for folders, target, said in (((fast, tmp_path), out, f"{tmp_path}: it holds no run: run.json is missing"),
+    for folders, target, excerpt in (((fast, tmp_path), out, f"{tmp_path}: it holds no run: run.json is missing"),
                                   ((fast, none), out, "run.json is missing"), ((fast,), out, "two runs or more"),
                                   ((fast, fast), tmp_path / "out.csv", "ends in .html"),
                                   ((fast, fast), fast / "other.html", "is the folder of a run"),
                                   ((fast, fast), none / "out.html", "No such file")):
-        assert said in refused(target.parent, capsys, "compare", *folders, "--out", target)
+        assert excerpt in refusal(target.parent, capsys, "compare", *folders, "--out", target)
 
 
 @pytest.mark.parametrize("name", ["run.json", "timeseries.csv", "ledger.csv"])
@@ -92,11 +92,11 @@ def test_what_cannot_be_compared_is_refused(fast, tmp_path, capsys):
     (lambda path: (path.unlink(), os.mkfifo(path)), "it is not a regular file"),
     (lambda path: os.truncate(path, 3 * 2**30), r"it is longer than \d+ bytes")], ids=["bit", "gone", "pipe", "long"])
 def test_a_damaged_run_is_refused_without_being_read(fast, tmp_path, capsys, name, spoil, why):
-    """A bit that is not as it was, a pipe, 3 GB: in one line, at once, and without the memory of its size."""
+    """A changed bit, a missing file, a pipe or 3 GB is refused in one line, without reading the file into memory."""
     copy = shutil.copytree(fast, tmp_path / "run")
     spoil(copy / name)
-    with little_memory(2**28):
-        line = refused(tmp_path / "out.html", capsys, "compare", fast, copy, "--out", tmp_path / "out.html")
+    with limit_memory(2**28):
+        line = refusal(tmp_path / "out.html", capsys, "compare", fast, copy, "--out", tmp_path / "out.html")
     assert str(copy) in line and name in line and re.search(why, line)
     with pytest.raises(repro.OutputError, match=f"{name} .*({why})|{name} is missing"):
         repro.load_run(copy)
@@ -108,39 +108,39 @@ def test_a_damaged_run_is_refused_without_being_read(fast, tmp_path, capsys, nam
 def test_a_broken_run_is_refused_by_the_name_of_its_file(fast, tmp_path, capsys, name, content):
     copy = shutil.copytree(fast, tmp_path / "run")
     (copy / name).write_bytes(content)
-    line = refused(tmp_path, capsys, "compare", fast, copy, "--out", tmp_path / "out.html")
+    line = refusal(tmp_path, capsys, "compare", fast, copy, "--out", tmp_path / "out.html")
     assert str(copy) in line and name in line
 
 
 def at_work(run, tmp_path):
-    """A copy of a run that says that it is at work."""
+    """Copy a run and mark it as running."""
     copy = shutil.copytree(run, tmp_path / "run")
     rewrite(copy, status="running", sha256={})
     return copy
 
 
 def with_field(value):
-    """A table with another field, the second one of its third line."""
+    """Return a function that replaces the second field of the third line of a table."""
     return lambda text: re.sub(r"((?:.*\n){2}[^,]*),[^,]*", rf"\1,{value}", text, count=1)
 
 
-@pytest.mark.parametrize("change, said", [
+@pytest.mark.parametrize("change, excerpt", [
     (lambda text: "", "it is empty"), (lambda text: text[:-2], "its last line is cut short"),
     (lambda text: text + "1,2\n", "has 2 fields, where"),
     (with_field("nan"), "line 3 has 'nan', where a finite number is needed"),
     (with_field("soon"), "line 3 has 'soon', where a finite number is needed"),
     (lambda text: text + text.splitlines(keepends=True)[-1], "its times do not ascend"),
     (lambda text: text[:text.rindex("\n", 0, -1) + 1], " rows, and run.json tells of ")])
-def test_a_time_series_has_the_rows_of_its_run_in_their_order(fast, tmp_path, capsys, change, said):
-    """Of a run at work, whose tables have no SHA-256: what is wrong is told."""
+def test_a_time_series_has_the_rows_of_its_run_in_their_order(fast, tmp_path, capsys, change, excerpt):
+    """The message names the defect also for a run at work, whose tables have no SHA-256."""
     copy = at_work(fast, tmp_path)
     (copy / "timeseries.csv").write_text(change((copy / "timeseries.csv").read_text()))
-    line = refused(tmp_path, capsys, "compare", copy, fast, "--out", tmp_path / "out.html")
-    assert f"{copy}: timeseries.csv cannot be read: " in line and said in line
+    line = refusal(tmp_path, capsys, "compare", copy, fast, "--out", tmp_path / "out.html")
+    assert f"{copy}: timeseries.csv cannot be read: " in line and excerpt in line
 
 
-def test_a_run_at_work_may_have_more_rows_than_its_record_tells_of(fast, tmp_path):
-    """That is written after the table."""
+def test_a_run_at_work_may_have_more_rows_than_its_record(fast, tmp_path):
+    """The record is written after the table."""
     copy = at_work(fast, tmp_path)
-    rewrite(copy, rows=told(copy)["rows"] - 1)
-    assert len(read(copy).times) == told(fast)["rows"]
+    rewrite(copy, rows=read_record(copy)["rows"] - 1)
+    assert len(read(copy).times) == read_record(fast)["rows"]

@@ -6,28 +6,30 @@ import numpy as np
 import pytest
 from hypothesis import given
 
+from repro.errors import SimulationError
 from repro.fem.division import Division
 from repro.fem.outline import BOTTOM, FREE, TOP, Outline, polygon
 from repro.fem.space import Space
 from repro.march.simulation import simulate
 from repro.model import contact, contact_lines
 from repro.model.contact_lines import Clearance, Contact
+from repro.model.pore import seeded
 from repro.scene import load_scene
 from tests.strategies import attached_aggregates, mirrored, plug
 
 FILM, ANGLE = 2.0, np.radians(16.7)
 
 
-def beside_contact(along, gap, then=(30.0, 20.0), width=100.0):
-    """Lower contact from x = -40 to 10 um; the next node is ``gap`` over the wall, ``along`` beyond the contact
+def beside_contact(along, gap, second_node=(30.0, 20.0), width=100.0):
+    """Lower contact from x = -40 to 10 um; the next node is ``gap`` above the wall and ``along`` beyond the contact
     line."""
-    points = np.array([[-40.0, 0.0], [0.0, 0.0], [10.0, 0.0], [10.0 + along, gap], then, (-30.0, 30.0)])
+    points = np.array([[-40.0, 0.0], [0.0, 0.0], [10.0, 0.0], [10.0 + along, gap], second_node, (-30.0, 30.0)])
     wall = np.array([BOTTOM] * 3 + [FREE] * 3)
     return Outline(points, wall, np.arange(6) == 1, points.copy())
 
 
 def beside_upper_contact(gap):
-    """A plug of 20 um; 2 um downstream of its upper contact line the next node is ``gap`` under the wall."""
+    """A plug of 20 um. The node 2 um downstream of its upper contact line is ``gap`` below the wall."""
     outline = plug(100.0, -10.0, 10.0)
     points = np.insert(outline.points, 3, [[12.0, 100.0 - gap]], axis=0)
     return Outline(points, np.insert(outline.wall, 3, FREE), np.insert(outline.fixed, 3, False), points)
@@ -56,15 +58,15 @@ NONE = [FREE] * 6
     ("a wedge under the upper wall closes", beside_upper_contact(0.2), [0, 0, 0, TOP, 0, 0, 0]),
     ("a wide one stays, though a film of 1.2 um", beside_upper_contact(1.2), [FREE] * 7),
 ])
-def test_what_closes_beside_a_contact_surface(name, outline, wanted):
-    """Minimum angle 16.7 degrees, minimum film 2 um (Table 1)."""
+def test_nodes_close_beside_a_contact_surface(name, outline, wanted):
+    """The minimum angle is 16.7 degrees, and the minimum film is 2 um (Table 1)."""
     assert joins(outline) == wanted
     assert joins(mirrored(outline)) == wanted[::-1]
 
 
 @given(attached_aggregates(thickest=1.02))
 def test_closing_is_the_same_in_a_mirror(drawn):
-    """Nothing that is on a wall joins again; under the upper wall all that is nearer than the film does."""
+    """No node on a wall joins again. Every free node nearer to the upper wall than the film joins."""
     outline, width = drawn
     joined, image = (contact.closing_nodes(each, width, FILM, ANGLE) for each in (outline, mirrored(outline)))
     assert image.tolist() == joined[::-1].tolist()
@@ -77,12 +79,12 @@ RULE = Clearance(20.0, FILM, ANGLE)
 
 
 def clearances(outline, rule=RULE):
-    """{(wall, direction): clearance} of all contact lines of an outline with arcs."""
+    """{(wall, direction): clearance} for all contact lines of an outline with arcs."""
     return {line.key: rule.beyond(outline, line.node, line.direction)[0] for line in contact_lines.lines_of(outline)}
 
 
 def wedge(degrees, height=20.0, arcs=6):
-    """A plug whose sides leave the upper wall at an angle in the fluid."""
+    """A plug whose sides make an angle with the upper wall in the fluid."""
     side = np.linspace(0, 1, arcs + 1)[:, None]
     left = [-30.0, 0.0] + np.hstack([(side - 1) / np.tan(np.radians(degrees)), side]) * height
     return polygon(np.vstack([left, left[::-1] * [-1, 1]]), height, 2)
@@ -91,7 +93,7 @@ def wedge(degrees, height=20.0, arcs=6):
 @pytest.mark.parametrize("degrees, clearance", [(16.6, np.tan(np.radians(16.6)) / np.tan(ANGLE) - 1), (16.7, 0.0),
                                                 (30.0, np.tan(np.radians(30.0)) / np.tan(ANGLE) - 1)])
 def test_clearance_of_a_straight_wedge_is_that_of_its_angle(degrees, clearance):
-    """Both upper lines, to both sides alike; the lower ones lie under a surface that leans over the fluid."""
+    """Both upper contact lines have the same clearance. The surface leans over the fluid at the lower lines."""
     values = clearances(wedge(degrees))
     assert values[TOP, 1] == pytest.approx(clearance, abs=1e-9)
     assert values[TOP, -1] == pytest.approx(clearance, abs=1e-9)
@@ -101,7 +103,7 @@ def test_clearance_of_a_straight_wedge_is_that_of_its_angle(degrees, clearance):
 @pytest.mark.parametrize("gap, clearance", [(1.9, -0.05), (2.0, 0.0), (2.1, 0.05)])
 @pytest.mark.parametrize("mirror", [False, True])
 def test_clearance_sees_a_film_that_runs_along_the_wall(gap, clearance, mirror):
-    """The surface leaves the wall steeply, then runs beside it at one distance, and leaves it for good."""
+    """The surface leaves the wall steeply, runs along it at a constant distance, and then departs."""
     under = 20.0 - gap
     rim = [[-60.0, 0.0], [-50.0, under], [-5.4, under], [-5.0, 20.0], [5.0, 20.0], [30.0, 0.0]]
     outline = polygon(np.array(rim), 20.0, 2)
@@ -112,7 +114,7 @@ def test_clearance_sees_a_film_that_runs_along_the_wall(gap, clearance, mirror):
 
 
 def test_a_surface_through_the_wall_has_a_negative_clearance():
-    """A middle that lies beyond the wall, though it leans back over the contact surface."""
+    """A mid-edge node lies beyond the wall, although it leans back over the contact surface."""
     outline = wedge(30.0)
     points = outline.points.copy()
     middle = np.flatnonzero(outline.wall == TOP)[-1] + 1
@@ -122,7 +124,7 @@ def test_a_surface_through_the_wall_has_a_negative_clearance():
 
 @pytest.fixture(scope="module")
 def plugged():
-    """A pore whose aggregate has touched the upper wall for two hours."""
+    """Scene and pore of an aggregate in contact with the upper wall for two hours."""
     scene = load_scene("wide", ["numerics.preset=fast", 'pore.width="25 um"', 'output.times=["17 h"]',
                                 'growth.end="17 h"'])
     return scene, [*simulate(scene)][-1].pore
@@ -130,7 +132,7 @@ def plugged():
 
 @pytest.fixture(scope="module")
 def division(plugged):
-    """Its mesh with one arc divided on either side of the upper contact surface."""
+    """The plugged mesh with one divided arc on either side of the upper contact surface."""
     wall = plugged[1].boundary.edge_wall
     arcs = np.flatnonzero((wall == FREE) & ((np.roll(wall, 1) == TOP) | (np.roll(wall, -1) == TOP)))
     assert len(arcs) == 2
@@ -154,7 +156,7 @@ def test_a_division_changes_no_shape_and_no_field(plugged, division):
     assert before.min() * 0.99 < density.min() and density.max() < before.max() * 1.01
 
 
-def test_the_shape_that_strain_counts_from_is_divided_too(plugged, division):
+def test_a_division_also_divides_the_reference_of_strain(plugged, division):
     pore = plugged[1]
     last = 1.01 * pore.mesh.points[pore.mesh.body]
     free = np.full(2, FREE)
@@ -164,7 +166,7 @@ def test_the_shape_that_strain_counts_from_is_divided_too(plugged, division):
 
 
 def test_loads_do_the_same_work_on_a_divided_mesh(division):
-    """Gathered loads of the boundary in every displacement of the parent; divided loads in even and linear ones."""
+    """Gathered boundary loads agree in every displacement of the parent, divided loads in constant and linear ones."""
     draw = np.random.default_rng(1)
     parent = division.parent
     loads = draw.normal(size=division.mesh.points.shape)
@@ -181,8 +183,8 @@ def test_loads_do_the_same_work_on_a_divided_mesh(division):
     assert divided.T @ division.nodal(along) == pytest.approx(loads.T @ along, rel=1e-12)
 
 
-def test_contact_begins_to_both_sides_of_the_highest_place(plugged):
-    """Over the least film, along the free surface: a single point could not hold an elastic body."""
+def test_contact_begins_on_both_sides_of_the_highest_point(plugged):
+    """It extends by the minimum film along the free surface, because a single point cannot hold an elastic body."""
     _, pore = plugged
     free = pore.boundary
     wall, lines = contact._first_contact(replace(free, wall=np.where(free.wall == TOP, FREE, free.wall)), FILM)
@@ -196,19 +198,19 @@ def test_contact_begins_to_both_sides_of_the_highest_place(plugged):
 
 @pytest.mark.parametrize("preset", ["fast", pytest.param("accurate", marks=pytest.mark.thorough)])
 def test_the_contact_surface_is_the_smallest_that_leaves_enough_fluid(preset):
-    """After every step no clearance is negative, and a line that has advanced in it has none to spare."""
+    """After every step no clearance is negative, and lines that have advanced have zero clearance."""
     scene = load_scene("wide", [f"numerics.preset={preset}", 'pore.width="25 um"', 'growth.end="18.5 h"'])
     keys = scene.growth
     rule = Clearance(scene.pore.width, keys.minimum_film, keys.minimum_contact_angle)
     expansions = []
 
-    def kept(*arguments):
+    def record_expansion(*arguments):
         expansions.append(expand(*arguments))
         return expansions[-1]
 
     expand = contact.expand
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(contact, "expand", kept)
+        patch.setattr(contact, "expand", record_expansion)
         for _ in simulate(scene):
             pass
     touching = [expansion for expansion in expansions if expansion.pore.contact]
@@ -220,3 +222,26 @@ def test_the_contact_surface_is_the_smallest_that_leaves_enough_fluid(preset):
             if length > 1.0:
                 advanced += values[key] <= contact_lines.CLOSE
     assert advanced >= 5
+
+
+@pytest.mark.parametrize("left, refused", [("11.9 um", True), ("11.5 um", False)])
+def test_a_tip_comes_into_contact_unless_it_is_much_thinner_than_the_film(left, refused):
+    """A needle has no room for a contact of half of the least film. A tip that is somewhat wider takes a shorter first
+    contact than usual."""
+    outline = f'[["0 um", "0 um"], ["{left}", "29.9 um"], ["12 um", "29.9 um"], ["12 um", "0 um"]]'
+    scene = load_scene("base", [f"aggregate.outline={outline}", "pore.width=32 um", "growth.end=4 h",
+                                'numerics.preset="fast"', 'output.times=["4 h"]'], unset=["aggregate.radius"])
+    if refused:
+        with pytest.raises(SimulationError, match="tip comes into contact that is .* wide .* no setting helps"):
+            list(simulate(scene))
+    else:
+        assert list(simulate(scene))[-1].pore.contact
+
+
+def test_a_trial_starts_from_a_shape_in_which_no_triangle_is_turned_over():
+    """The last trial's shape is the first guess; a mirrored shape cannot be the start."""
+    scene = load_scene("base", ['numerics.preset="fast"'])
+    seed = seeded(scene)
+    trials = contact._Trials(scene, seed, seed, None, True)
+    trials._shapes = [(np.zeros(2), seed.mesh.points * [-1.0, 1.0], seed.pressure)]
+    assert np.array_equal(trials._first(seed, np.zeros(2)).mesh.points, seed.mesh.points)

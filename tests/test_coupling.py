@@ -9,30 +9,31 @@ import pytest
 
 from repro.fem.outline import BOTTOM, TOP
 from repro.march.simulation import simulate
-from repro.model import contact, pore
-from tests.strategies import ORDERS, scene
+from repro.model import contact
+from repro.model.pore import seeded
+from tests import strategies
+from tests.strategies import ORDERS
 
 EVERY_ORDER = pytest.mark.parametrize("order", ORDERS)
 
 
 def elements(order):
-    """The paper's scheme with elements of an order, fewer of them the higher it is."""
+    """The paper's scheme with elements of an order; higher orders have fewer elements."""
     return {"elements": ORDERS[order], "refinement": {1: 1.0, 2: 0.4, 3: 0.3}[order]}
 
 
-def run(made):
-    """All instants of a scene."""
-    return list(simulate(made))
+def run(scene):
+    """Return all instants of a scene's run."""
+    return list(simulate(scene))
 
 
-#: Schemes and orders of elements, the midpoint rule with those of the size of preset fast.
+#: (scheme, order of elements); the midpoint rule has elements as large as those of preset fast.
 WAYS = [("updates", 1), ("updates", 2), ("midpoint", 1), ("midpoint", 2)]
 
 
 @pytest.fixture(scope="module", params=WAYS, ids=lambda way: f"{way[0]}-{way[1]}")
 def touching(request):
-    """An aggregate 0.1 um short of the film that closes, under a constant velocity: the scene, and its steps through
-    contact."""
+    """Scene and instants of an aggregate that is 0.1 um short of contact, under a constant velocity."""
     time, order = request.param
     numerics = elements(order)
     if time == "midpoint":
@@ -40,17 +41,17 @@ def touching(request):
     radius, growth = "17.9 um", {"end": "1 h"}
     if (time, order) == ("midpoint", 1):  # a film of 2 um would thin out the straight triangles beside it
         radius, growth = "18.9 um", {"end": "1 h", "minimum_film": "1 um"}
-    made = scene(radius, "20 um", velocity="2.9 m/day", growth=growth, numerics=numerics)
-    return made, [instant for instant in run(made) if instant.ledgers or instant.pore.time == 0]
+    scene = strategies.scene(radius, "20 um", velocity="2.9 m/day", growth=growth, numerics=numerics)
+    return scene, [instant for instant in run(scene) if instant.ledgers or instant.pore.time == 0]
 
 
 @EVERY_ORDER
 def test_decay_alone_follows_its_exponential(order):
-    """No donor: X_A + X_I = X_m (0.2 + 0.8 exp(-b m_A t)), m_A between its least and largest value (1e-5 apart), and
-    the aggregate shrinks with it."""
-    made = scene(head="1e-3 cm", donor="0 mg/L", growth={"end": "6 h", "time_step": "1.5 h"}, output={"times": ["6 h"]},
-                 numerics=elements(order))
-    first, last = run(made)
+    """Without donor, X_A + X_I = X_m (0.2 + 0.8 exp(-b m_A t)) with m_A between its least and largest value (1e-5
+    apart), and the area shrinks in proportion."""
+    scene = strategies.scene(head="1e-3 cm", donor="0 mg/L", growth={"end": "6 h", "time_step": "1.5 h"},
+                            output={"times": ["6 h"]}, numerics=elements(order))
+    first, last = run(scene)
     pieces = last.pore.space.reaction
     acceptor = last.solved.concentrations.acceptor[pieces.cells] @ pieces.values.T
     bounds = acceptor.min() - 1e-4, acceptor.max() + 1e-4
@@ -61,13 +62,13 @@ def test_decay_alone_follows_its_exponential(order):
     assert last.pore.inert.sum() / first.pore.mass == pytest.approx((1 - left) / 4, rel=1e-6)
 
 
-def test_contact_closes_the_film_and_the_run_goes_on(touching):
-    """Nodes of contact lie on the walls to the last bit, middles with their corners; one of them is fixed at the top;
-    flow is forced through the plug. That ledgers close and the fluid splits is the case coupling-contact."""
-    made, found = touching
-    states = [instant.pore.contact for instant in found]
+def test_contact_closes_the_film_and_the_run_continues(touching):
+    """Nodes in contact lie on the walls to the last bit, mid-edge nodes with their corners. One upper node is fixed.
+    The flow passes the plug. The case coupling-contact covers ledgers and the split fluid."""
+    scene, instants = touching
+    states = [instant.pore.contact for instant in instants]
     assert states == sorted(states) and not states[0] and sum(states) >= 2
-    for instant in found[states.index(True):]:
+    for instant in instants[states.index(True):]:
         outline = instant.pore.outline
         top = outline.wall == TOP
         assert (outline.points[top, 1] == 20.0).all()
@@ -75,27 +76,27 @@ def test_contact_closes_the_film_and_the_run_goes_on(touching):
         assert outline.thickness == pytest.approx(20.0, rel=1e-15 if outline.geometry == 1 else 1e-14)
         assert outline.fixed[top].sum() == 1 and not instant.pore.mesh.turned_over().any()
         assert instant.solved.concentrations.acceptor.min() > 0
-        if made.numerics.time == "updates":
-            assert instant.solved.flow.conductivity < 0.5 * found[0].solved.flow.conductivity
+        if scene.numerics.time == "updates":
+            assert instant.solved.flow.conductivity < 0.5 * instants[0].solved.flow.conductivity
         if outline.geometry == 2:
             middles = np.flatnonzero(top[1::2]) * 2 + 1
             assert not outline.fixed[1::2].any()
             assert (top[middles - 1] & top[(middles + 1) % len(top)]).all()
-    assert found[states.index(True)].remeshes >= 1
+    assert instants[states.index(True)].remeshes >= 1
 
 
 @EVERY_ORDER
-def test_the_fixed_point_is_kept_or_chosen_anew(order):
-    """Of an aggregate whose fixed point is beside the middle: "kept" it keeps its x to the last bit, "rechosen" the
-    middle does [E20]."""
-    made = scene("10 um", velocity="2.9 m/day", growth={"end": "1 h"}, numerics=elements(order))
-    now = pore.seeded(made)
-    x, middle = now.outline.points[:, 0], int(np.flatnonzero(now.fixed)[0])
-    aside = middle + 2 * now.mesh.geometry
-    beside = replace(now, fixed=np.arange(len(x)) == aside)
-    for word, stays, goes in (("kept", aside, middle), ("rechosen", middle, aside)):
-        said = replace(made, numerics=replace(made.numerics, fixed_point=word))
-        found = contact.expand(said, beside, 1.2 * now.theta).pore
-        assert np.flatnonzero(found.fixed).tolist() == [stays]
-        after = found.outline.points[:, 0]
+def test_the_fixed_point_is_kept_or_rechosen(order):
+    """The fixed point starts beside the middle. With "kept" it keeps its x to the last bit, with "rechosen" the middle
+    does [E20]."""
+    scene = strategies.scene("10 um", velocity="2.9 m/day", growth={"end": "1 h"}, numerics=elements(order))
+    pore = seeded(scene)
+    x, middle = pore.outline.points[:, 0], int(np.flatnonzero(pore.fixed)[0])
+    aside = middle + 2 * pore.mesh.geometry
+    shifted = replace(pore, fixed=np.arange(len(x)) == aside)
+    for option, stays, goes in (("kept", aside, middle), ("rechosen", middle, aside)):
+        variant = replace(scene, numerics=replace(scene.numerics, fixed_point=option))
+        expanded = contact.expand(variant, shifted, 1.2 * pore.theta).pore
+        assert np.flatnonzero(expanded.fixed).tolist() == [stays]
+        after = expanded.outline.points[:, 0]
         assert after[stays] == x[stays] and abs(after[goes] - x[goes]) > 0.05

@@ -1,5 +1,5 @@
-"""Every column and array derived anew from the raw state, by formulas and quadratures that `repro.results` has no part
-in: at a late, uneven pore that the aggregate has plugged, where no two quantities are alike."""
+"""Every column and array, derived from the raw state by formulas and quadratures independent of `repro.results`. The
+pore is asymmetric and plugged by the aggregate, so no two quantities are alike."""
 import math
 from dataclasses import replace
 from functools import cache
@@ -17,10 +17,10 @@ from repro.results.names import KNOWN
 from repro.scene import load_scene
 from tests import oracles
 from tests.pages import AXES, CHARTS, LEDGERS
-from tests.strategies import ORDERS, arrays_of, constants
+from tests.strategies import ORDERS, arrays_of, rate_constants
 
 EVERY_ORDER = pytest.mark.parametrize("order", ORDERS)
-#: Leans upstream, and touches the upper wall of a pore of 20 um after some minutes.
+#: An outline that leans upstream and touches the upper wall of a pore of 20 um after some minutes.
 SHAPE = [(-21, 0), (-19, 9), (-12, 17), (-4, 19.2), (3, 18.6), (12, 12), (16, 5), (17, 0)]
 SETS = ['numerics.time="midpoint"', 'pore.width="20 um"', 'pore.length="400 um"', 'growth.end="1.2 h"',
         'output.times=["0 h", "1.2 h"]', 'substrates.acceptor.supply="9 mg/L"', 'substrates.donor.supply="4 mg/L"',
@@ -28,16 +28,16 @@ SETS = ['numerics.time="midpoint"', 'pore.width="20 um"', 'pore.length="400 um"'
 
 
 @cache
-def late(order):
-    """(scene, Instant) of some steps, a new mesh and contact later."""
+def late_instant(order):
+    """(scene, Report) after several steps, a new mesh and contact."""
     scene = load_scene("base", [f"numerics.elements={ORDERS[order]}",
                                 f"numerics.refinement={0.7 if order == 1 else 0.3}", *SETS])
     *_, last = simulate(scene, SHAPE)
-    assert last.pore.contact and last.remeshes and len(last.ledgers) > 1, "else little is tested"
+    assert last.pore.contact and last.remeshes and len(last.ledgers) > 1, "otherwise the tests would show little"
     return scene, last
 
 
-# Lagrange's functions, from their nodes alone.
+# Lagrange's functions from their nodes alone.
 THIRDS = [(1, 0), (2, 0), (2, 1), (1, 2), (0, 1), (0, 2), (1, 1)]
 CORNERS = [(0, 0), (1, 0), (0, 1)]
 NODES = {1: np.array(CORNERS, float), 2: np.array([*CORNERS, (0.5, 0), (0.5, 0.5), (0, 0.5)]),
@@ -49,7 +49,7 @@ def powers(order):
 
 
 def functions(order, places):
-    """(q, k) values, and (q, k, 2) derivatives, at places (q, 2) of the unit triangle."""
+    """(q, k) values and (q, k, 2) derivatives at points (q, 2) of the unit triangle."""
     x, y = np.asarray(places, float).T
     vandermonde = np.column_stack([NODES[order][:, 0] ** i * NODES[order][:, 1] ** j for i, j in powers(order)])
     coefficients = np.linalg.inv(vandermonde)
@@ -60,134 +60,137 @@ def functions(order, places):
 
 
 def jacobians(points, cells, places):
-    """(t, q, 2, 2) derivatives of x by the unit triangle's places."""
+    """(t, q, 2, 2) derivatives of x by the coordinates of the unit triangle."""
     return np.einsum("tai,qaj->tqij", points[cells], functions({3: 1, 6: 2}[cells.shape[1]], places)[1])
 
 
 def rule(degree):
-    """(q, 2) places and (q,) weights of scikit-fem's quadrature."""
+    """(q, 2) points and (q,) weights of scikit-fem's quadrature."""
     places, weights = get_quadrature(RefTri, degree)
     return places.T, weights
 
 
-def places_of(space):
-    """(n, 2) um, where the nodes of a space are."""
-    found = np.empty((space.cells.max() + 1, 2))
+def node_coordinates(space):
+    """(n, 2) coordinates (um) of the nodes of a space."""
+    coordinates = np.empty((space.cells.max() + 1, 2))
     values = functions(space.mesh.geometry, NODES[space.order])[0]
-    found[space.cells] = np.einsum("ka,tai->tki", values, space.mesh.points[space.mesh.cells])
-    return found
+    coordinates[space.cells] = np.einsum("ka,tai->tki", values, space.mesh.points[space.mesh.cells])
+    return coordinates
 
 
-def over_end(space, x, *fields):
-    """Integral over an end of the meshed part of the product of fields at the nodes, edge by edge."""
-    place = places_of(space)
+def integrate_over_end(space, x, *fields):
+    """Integrate the product of nodal fields over an end of the meshed part, edge by edge."""
+    place = node_coordinates(space)
     nodes = np.flatnonzero(np.abs(place[:, 0] - x) < 1e-9)
     nodes = nodes[np.argsort(place[nodes, 1])]
-    at, weights = np.polynomial.legendre.leggauss(6)
+    points, weights = np.polynomial.legendre.leggauss(6)
     knots, total = np.linspace(-1, 1, space.order + 1), 0.0
     for k in range(0, len(nodes) - 1, space.order):
         edge = nodes[k: k + space.order + 1]
-        product = math.prod(np.polyval(np.polyfit(knots, field[edge], space.order), at) for field in fields)
+        product = math.prod(np.polyval(np.polyfit(knots, field[edge], space.order), points) for field in fields)
         total += (place[edge[-1], 1] - place[edge[0], 1]) / 2 * weights @ product
     return total
 
 
-def pressure_drop(scene, now, flow):
-    """Loss (um) over the meshed part: of linear elements the difference of the ends' mean heads, else the work of
-    viscosity, nu / g times the integral of nu_r |grad u|^2 over the flow."""
-    space = now.space
+def pressure_drop(scene, pore, flow):
+    """Head loss (um) over the meshed part. Linear elements: the difference of the ends' mean heads. Higher orders: the
+    viscous work, nu / g times the integral of nu_r |grad u|^2, over the flow."""
+    space = pore.space
     if space.order == 1:
-        first, last = (over_end(space, x, flow.head) / scene.pore.width for x in now.mesh.ends)
+        first, last = (integrate_over_end(space, x, flow.head) / scene.pore.width for x in pore.mesh.ends)
         return first - last
-    at, weights = rule(space.gradient_degree)
-    J = jacobians(now.mesh.points, now.mesh.cells, at)
-    slopes = np.einsum("qkj,tqji->tqki", functions(space.order, at)[1], np.linalg.inv(J))
+    places, weights = rule(space.gradient_degree)
+    J = jacobians(pore.mesh.points, pore.mesh.cells, places)
+    slopes = np.einsum("qkj,tqji->tqki", functions(space.order, places)[1], np.linalg.inv(J))
     gradient = np.einsum("tkc,tqki->tqci", flow.velocity[space.cells], slopes)
-    thick = np.where(now.mesh.biomass, scene.flow.viscosity_ratio, 1.0)
+    thick = np.where(pore.mesh.biomass, scene.flow.viscosity_ratio, 1.0)
     work = np.einsum("t,tq,q,tqci->", thick, np.linalg.det(J), weights, gradient**2)
-    through = over_end(space, now.mesh.ends[0], flow.velocity[:, 0])
+    through = integrate_over_end(space, pore.mesh.ends[0], flow.velocity[:, 0])
     return scene.flow.kinematic_viscosity / scene.flow.gravity * work / through
 
 
-def arcs(now):
-    """(k, 2) places along the aggregate's boundary, so many on each arc that its extremes are met to 1e-6."""
-    loop = now.mesh.loop
-    if now.mesh.geometry == 1:
-        return now.mesh.points[loop]
+def arcs(pore):
+    """(k, 2) points along the aggregate's boundary, dense enough on each arc to find its extremes to 1e-6."""
+    loop = pore.mesh.loop
+    if pore.mesh.geometry == 1:
+        return pore.mesh.points[loop]
     t = np.linspace(0, 1, 2001)
     along = np.column_stack([(1 - t) * (1 - 2 * t), 4 * t * (1 - t), t * (2 * t - 1)])
     ends_and_middles = np.column_stack([loop[::2], loop[1::2], np.roll(loop[::2], -1)])
-    return (along @ now.mesh.points[ends_and_middles]).reshape(-1, 2)
+    return (along @ pore.mesh.points[ends_and_middles]).reshape(-1, 2)
 
 
-def taken_up(scene, now, state):
-    """(2,) um2 mg/L/h, of acceptor and donor, by (7) and (8) as they are printed."""
-    pieces, total = now.space.reaction, np.zeros(2)
-    for nodes, masses in zip(pieces.cells, now.active):
+def total_uptake(scene, pore, state):
+    """(2,) uptake of acceptor and donor (um2 mg/L/h) from (7) and (8) as printed."""
+    pieces, total = pore.space.reaction, np.zeros(2)
+    for nodes, masses in zip(pieces.cells, pore.active):
         for N, X in zip(pieces.values, masses):
             known = (max(N @ field[nodes], 0.0) for field in (state.acceptor, state.donor))
-            rates = oracles.rates(*known, **constants(scene))
+            rates = oracles.rates(*known, **rate_constants(scene))
             total -= X * np.array(rates[:2])
     return total
 
 
-def derived_row(scene, at):
-    """{column: value} of an instant."""
-    now, flow = at.pore, at.solved.flow
-    state = at.solved.concentrations
+def derived_row(scene, instant):
+    """{column: value} for an instant."""
+    pore, flow = instant.pore, instant.solved.flow
+    state = instant.solved.concentrations
     W, L = scene.pore.width, scene.pore.length
-    (first, last), u_x = now.mesh.ends, flow.velocity[:, 0]
-    flux = over_end(now.space, last, u_x)
+    (first, last), u_x = pore.mesh.ends, flow.velocity[:, 0]
+    flux = integrate_over_end(pore.space, last, u_x)
     nu = scene.flow.kinematic_viscosity / scene.flow.gravity
-    loss = pressure_drop(scene, now, flow) + 12 * nu * flux / W**3 * (L - (last - first))
-    found = {"time_h": now.time, "mean_velocity_m_per_d": flux / W * 24 / 1e6, "head_loss_cm": loss / 1e4,
+    loss = pressure_drop(scene, pore, flow) + 12 * nu * flux / W**3 * (L - (last - first))
+    derived = {"time_h": pore.time, "mean_velocity_m_per_d": flux / W * 24 / 1e6, "head_loss_cm": loss / 1e4,
              "conductivity_m_per_d": flux / W * L / loss * 24 / 1e6, "meshed_length_um": last - first,
-             "nodes": len(set(now.mesh.cells.ravel().tolist())), "remeshed": 1, "contact": 1}
-    taken = taken_up(scene, now, state)
+             "nodes": len(set(pore.mesh.cells.ravel().tolist())), "remeshed": 1, "contact": 1}
+    uptake = total_uptake(scene, pore, state)
     for k, (name, field) in enumerate((("acceptor", state.acceptor), ("donor", state.donor))):
-        found[f"effluent_{name}_mg_per_L"] = over_end(now.space, last, u_x, field) / flux
-        found[f"inlet_{name}_mg_per_L"] = over_end(now.space, first, u_x, field) / over_end(now.space, first, u_x)
-        found[f"{name}_min_mg_per_L"] = min(field.tolist())
+        derived[f"effluent_{name}_mg_per_L"] = integrate_over_end(pore.space, last, u_x, field) / flux
+        inflow = integrate_over_end(pore.space, first, u_x)
+        derived[f"inlet_{name}_mg_per_L"] = integrate_over_end(pore.space, first, u_x, field) / inflow
+        derived[f"{name}_min_mg_per_L"] = min(field.tolist())
         above = (value - getattr(scene.substrates, name).supply for value in field.tolist())
-        found[f"{name}_overshoot_mg_per_L"] = max(0.0, *above)
-        supplied = getattr(scene.substrates, name).supply * over_end(now.space, first, u_x)
-        assert abs(supplied - over_end(now.space, last, u_x, field) - taken[k]) <= 1e-9 * supplied
-        found[f"{name}_balance"] = 0.0
-    x, y = arcs(now).T
+        derived[f"{name}_overshoot_mg_per_L"] = max(0.0, *above)
+        supplied = getattr(scene.substrates, name).supply * inflow
+        assert abs(supplied - integrate_over_end(pore.space, last, u_x, field) - uptake[k]) <= 1e-9 * supplied
+        derived[f"{name}_balance"] = 0.0
+    x, y = arcs(pore).T
     at_points, weights = rule(8)
-    body = now.mesh.cells[now.mesh.biomass]
-    found["aggregate_area_um2"] = (np.linalg.det(jacobians(now.mesh.points, body, at_points)) @ weights).sum()
-    found |= {"thickness_um": y.max(), "upstream_um": x.min(), "downstream_um": x.max()}
-    density = (now.active + now.inert) / areas_at_points(now) / scene.kinetics.maximum_density
-    found |= {"inert_fraction": now.inert.sum() / (now.active.sum() + now.inert.sum()),
+    body = pore.mesh.cells[pore.mesh.biomass]
+    derived["aggregate_area_um2"] = (np.linalg.det(jacobians(pore.mesh.points, body, at_points)) @ weights).sum()
+    derived |= {"thickness_um": y.max(), "upstream_um": x.min(), "downstream_um": x.max()}
+    density = (pore.active + pore.inert) / areas_at_points(pore) / scene.kinetics.maximum_density
+    derived |= {"inert_fraction": pore.inert.sum() / (pore.active.sum() + pore.inert.sum()),
               "biomass_density_min": density.min(), "biomass_density_max": density.max(),
               "biomass_balance": 0.0, "oxygen_demand_balance": 0.0}
     away = []
-    for part in free_surfaces(now):
-        walked = np.cumsum([0.0, *(chord(now, *edge) for edge in part)])
+    for part in free_surfaces(pore):
+        walked = np.cumsum([0.0, *(chord(pore, *edge) for edge in part)])
         middles = (walked[1:] + walked[:-1]) / 2
         far = np.minimum(middles, walked[-1] - middles) > 0.05 * walked[-1]
-        away += [along_edge(now, *edge)[:2] for edge, counts in zip(part, far) if counts]
+        away += [along_edge(pore, *edge)[:2] for edge, counts in zip(part, far) if counts]
     stretch, place = zip(*away)
     x, y = place[int(np.argmin(stretch))]
-    found |= {"surface_stretch_min": min(stretch), "surface_stretch_min_x_um": x, "surface_stretch_min_y_um": y}
-    return found
+    derived |= {"surface_stretch_min": min(stretch), "surface_stretch_min_x_um": x, "surface_stretch_min_y_um": y}
+    return derived
 
 
-def chord(now, a, b):
-    return math.dist(now.mesh.points[a], now.mesh.points[b])
+def chord(pore, a, b):
+    return math.dist(pore.mesh.points[a], pore.mesh.points[b])
 
 
-def free_surfaces(now):
-    """Lists of edges (corner, corner), each from a contact line to the next; an edge with both ends on one wall and, of
-    arcs, its middle too is contact."""
-    nodes = now.mesh.loop.tolist()
-    step = now.mesh.geometry
-    edges = [[nodes[(k + i) % len(nodes)] for i in range(step + 1)] for k in range(0, len(nodes), step)]
-    held = [any((now.mesh.points[edge, 1] == wall).all() for wall in (0.0, now.mesh.width)) for edge in edges]
-    first = held.index(True)
+def free_surfaces(pore):
+    """Lists of edges (corner, corner) from one contact line to the next. An edge is in contact if all of its nodes lie
+    on one wall."""
+    nodes = pore.mesh.loop.tolist()
+    step = pore.mesh.geometry
+    closed = [*nodes, nodes[0]]
+    edges = [closed[k: k + step + 1] for k in range(0, len(nodes), step)]
+    heights = [pore.mesh.points[edge, 1] for edge in edges]
+    in_contact = [bool((y == 0.0).all() or (y == pore.mesh.width).all()) for y in heights]
+    first = in_contact.index(True)
     parts = [[]]
-    for edge, on in zip(edges[first:] + edges[:first], held[first:] + held[:first]):
+    for edge, on in zip(edges[first:] + edges[:first], in_contact[first:] + in_contact[:first]):
         if on:
             parts.append([])
         else:
@@ -195,45 +198,45 @@ def free_surfaces(now):
     return [part for part in parts if part]
 
 
-def along_edge(now, a, b):
-    """|F T| / J^(1/2) for the tangent T of t = 0 in the middle of the edge from a to b, that place, its triangle."""
-    (which,) = [k for k in np.flatnonzero(now.mesh.biomass) if {a, b} <= set(now.mesh.cells[k, :3].tolist())]
-    nodes = now.mesh.cells[which]
+def along_edge(pore, a, b):
+    """|F T| / J^(1/2) at the middle of the edge a-b, with its tangent T at t = 0; the point and its triangle."""
+    (triangle,) = [k for k in np.flatnonzero(pore.mesh.biomass) if {a, b} <= set(pore.mesh.cells[k, :3].tolist())]
+    nodes = pore.mesh.cells[triangle]
     ends = [NODES[1][nodes.tolist().index(node)] for node in (a, b)]
     middle = np.mean(ends, axis=0)[None]
-    inside = np.searchsorted(now.mesh.body, nodes)[None]
-    before = jacobians(now.body.reference, inside, middle)[0, 0]
-    F = jacobians(now.mesh.points, nodes[None], middle)[0, 0] @ np.linalg.inv(before)
+    inside = np.searchsorted(pore.mesh.body, nodes)[None]
+    before = jacobians(pore.body.reference, inside, middle)[0, 0]
+    F = jacobians(pore.mesh.points, nodes[None], middle)[0, 0] @ np.linalg.inv(before)
     T = before @ (ends[1] - ends[0])
-    place = (functions(now.mesh.geometry, middle)[0] @ now.mesh.points[nodes])[0]
-    return np.linalg.norm(F @ T) / np.linalg.norm(T) / math.sqrt(np.linalg.det(F)), place, which
+    place = (functions(pore.mesh.geometry, middle)[0] @ pore.mesh.points[nodes])[0]
+    return np.linalg.norm(F @ T) / np.linalg.norm(T) / math.sqrt(np.linalg.det(F)), place, triangle
 
 
-def areas_at_points(now):
-    """(r, q) um2 that a point of the reaction stands for: a third of the triangles around a node, or its weight."""
-    body = now.mesh.cells[now.mesh.biomass]
-    if now.space.order == 1:
-        third = np.repeat(np.linalg.det(jacobians(now.mesh.points, body, [(0, 0)]))[:, 0] / 6, 3)
+def areas_at_points(pore):
+    """(r, q) areas (um2) of the reaction points: a third of the triangles around a node, or the quadrature weight."""
+    body = pore.mesh.cells[pore.mesh.biomass]
+    if pore.space.order == 1:
+        third = np.repeat(np.linalg.det(jacobians(pore.mesh.points, body, [(0, 0)]))[:, 0] / 6, 3)
         return np.bincount(body.ravel(), third)[np.unique(body), None]
-    at, weights = rule_with(now.active.shape[1])
-    return np.linalg.det(jacobians(now.mesh.points, body, at)) * weights
+    places, weights = rule_with(pore.active.shape[1])
+    return np.linalg.det(jacobians(pore.mesh.points, body, places)) * weights
 
 
 def rule_with(points):
-    """The quadrature with so many points."""
+    """Return the quadrature with this number of points."""
     if points == 1:
         return np.array([[1 / 3, 1 / 3]]), np.array([0.5])
-    return next(found for found in map(rule, range(20)) if len(found[1]) == points)
+    return next(candidate for candidate in map(rule, range(20)) if len(candidate[1]) == points)
 
 
 @EVERY_ORDER
 def test_every_column_is_what_its_name_says(order):
-    """Flow-weighted concentrations and places to 1e-6 (arcs are sampled), balances to 1e-6, which is what stops a
-    run, all else to round-off: heads hang on the linear system, whose defect is 1e-10."""
-    scene, at = late(order)
-    row, wanted = results.row(scene, at), derived_row(scene, at)
-    assert row.keys() == wanted.keys()
-    for name, value in wanted.items():
+    """Flow-weighted concentrations and coordinates agree to 1e-6 (arcs are sampled), balances to 1e-6, the tolerance of
+    a run, and the rest to round-off. Heads depend on the linear system, whose defect is 1e-10."""
+    scene, instant = late_instant(order)
+    row, expected = results.row(scene, instant), derived_row(scene, instant)
+    assert row.keys() == expected.keys()
+    for name, value in expected.items():
         tight = name in ("time_h", "nodes", "remeshed", "contact", "inert_fraction", "aggregate_area_um2")
         assert row[name] == pytest.approx(value, rel=1e-12 if tight else 1e-6,
                                           abs=1e-6 if name.endswith("_balance") else 1e-12), name
@@ -243,170 +246,169 @@ def test_every_column_is_what_its_name_says(order):
     assert len(set(values)) == len(values) - 1, "two columns alike would hide an exchange (remeshed and contact are)"
 
 
-def derived_arrays(scene, at):
-    """{array: values} of an instant."""
-    now, flow = at.pore, at.solved.flow
-    state = at.solved.concentrations
-    mesh, body = now.mesh, now.body
-    own = mesh.cells[mesh.biomass]
-    inside = sorted(set(own.ravel().tolist()))
+def derived_arrays(scene, instant):
+    """{array: values} for an instant."""
+    pore, flow = instant.pore, instant.solved.flow
+    state = instant.solved.concentrations
+    mesh, body = pore.mesh, pore.body
+    body_cells = mesh.cells[mesh.biomass]
+    inside = sorted(set(body_cells.ravel().tolist()))
 
-    def at_nodes(field, order=now.space.order, cells=now.space.cells):
-        values, of = np.empty((len(mesh.points), *field.shape[1:])), functions(order, NODES[mesh.geometry])[0]
-        values[mesh.cells] = np.einsum("ak,tk...->ta...", of, field[cells])
+    def at_nodes(field, order=pore.space.order, cells=pore.space.cells):
+        values, basis = np.empty((len(mesh.points), *field.shape[1:])), functions(order, NODES[mesh.geometry])[0]
+        values[mesh.cells] = np.einsum("ak,tk...->ta...", basis, field[cells])
         return values
 
     def only(values, where, count):
-        found = np.full((count, *values.shape[1:]), np.nan)
-        found[where] = values
-        return found
+        compute_theta = np.full((count, *values.shape[1:]), np.nan)
+        compute_theta[where] = values
+        return compute_theta
 
     def plane(vectors):
         return np.column_stack([vectors, np.where(np.isnan(vectors[:, 0]), np.nan, 0.0)])
 
-    head_order = max(1, now.space.order - 1)  # the nodes of which are the mesh's own corners, or all of its nodes
-    found = {"velocity_m_per_d": plane(at_nodes(flow.velocity)) * 24 / 1e6,
+    head_order = max(1, pore.space.order - 1)  # its nodes are the corners or all nodes of the mesh
+    derived = {"velocity_m_per_d": plane(at_nodes(flow.velocity)) * 24 / 1e6,
              "head_cm": at_nodes(flow.head, head_order, mesh.cells[:, : len(NODES[head_order])]) / 1e4,
              "acceptor_mg_per_L": at_nodes(state.acceptor), "donor_mg_per_L": at_nodes(state.donor),
              "displacement_um": plane(only(mesh.points[inside] - body.reference, inside, len(mesh.points))),
              "position_t0_um": plane(only(body.reference, inside, len(mesh.points))),
              "region": mesh.biomass.astype(float)}
     for name in ("active", "inert"):
-        found[f"{name}_biomass"] = density_at_nodes(now, getattr(now, name)) / scene.kinetics.maximum_density
-    places, weights = rule_with(now.theta.shape[1])
-    local = np.searchsorted(inside, own)
-    before, after = jacobians(body.reference, local, places), jacobians(mesh.points, own, places)
-    whole = np.linalg.det(before) * weights
-    F = np.zeros((*whole.shape, 3, 3))
+        derived[f"{name}_biomass"] = density_at_nodes(pore, getattr(pore, name)) / scene.kinetics.maximum_density
+    places, weights = rule_with(pore.theta.shape[1])
+    local = np.searchsorted(inside, body_cells)
+    before, after = jacobians(body.reference, local, places), jacobians(mesh.points, body_cells, places)
+    reference_areas = np.linalg.det(before) * weights
+    F = np.zeros((*reference_areas.shape, 3, 3))
     F[..., :2, :2], F[..., 2, 2] = after @ np.linalg.inv(before), 1.0
-    P = now.pressure[own[:, :3]] @ functions(1, places)[0].T
+    P = pore.pressure[body_cells[:, :3]] @ functions(1, places)[0].T
     modulus = scene.growth.shear_modulus
-    pressure = modulus * at_nodes(now.pressure, 1, mesh.cells[:, :3])
-    found["pressure_MPa"] = only(pressure[inside], inside, len(mesh.points))
+    pressure = modulus * at_nodes(pore.pressure, 1, mesh.cells[:, :3])
+    derived["pressure_MPa"] = only(pressure[inside], inside, len(mesh.points))
     sigma = modulus * cauchy(F, P)
-    means = {"theta": now.theta, "J": np.linalg.det(F),
+    means = {"theta": pore.theta, "J": np.linalg.det(F),
              "largest_principal_stress_MPa": np.linalg.eigvalsh(sigma)[..., -1]}
     for name, (i, j) in {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1)}.items():
         means[f"stress_{name}_MPa"] = sigma[..., i, j]
     for name, values in means.items():
-        found[name] = only((values * whole).sum(1) / whole.sum(1), mesh.biomass, len(mesh.cells))
-    found["surface_stretch"] = np.full(len(mesh.cells), np.nan)
-    for edge in (edge for part in free_surfaces(now) for edge in part):
-        value, _, which = along_edge(now, *edge)
-        found["surface_stretch"][which] = np.fmin(found["surface_stretch"][which], value)
-    return found
+        derived[name] = only((values * reference_areas).sum(1) / reference_areas.sum(1), mesh.biomass, len(mesh.cells))
+    derived["surface_stretch"] = np.full(len(mesh.cells), np.nan)
+    for edge in (edge for part in free_surfaces(pore) for edge in part):
+        value, _, triangle = along_edge(pore, *edge)
+        derived["surface_stretch"][triangle] = np.fmin(derived["surface_stretch"][triangle], value)
+    return derived
 
 
 def cauchy(F, P):
-    """(..., 3, 3) over mu_L: J^(-5/3) (F F^T - tr(F F^T) / 3) + P, the stress of (17) and (21)."""
+    """(..., 3, 3) stress of (17) and (21) over mu_L: J^(-5/3) (F F^T - tr(F F^T) / 3) + P."""
     B, J = F @ np.swapaxes(F, -1, -2), np.linalg.det(F)
     isotropic = P - np.trace(B, axis1=-2, axis2=-1) / 3 * J ** (-5 / 3)
     return J[..., None, None] ** (-5 / 3) * B + isotropic[..., None, None] * np.eye(3)
 
 
-def density_at_nodes(now, mass):
-    """(N,) a density at the nodes of the mesh: mass over area, or the mean of what least squares make linear of the
-    points in each triangle around."""
-    found, own = np.zeros(len(now.mesh.points)), now.mesh.cells[now.mesh.biomass]
-    density = mass / areas_at_points(now)
-    if now.space.order == 1:
-        found[np.unique(own)] = density[:, 0]
-        return found
-    at, _ = rule_with(density.shape[1])
-    fitted = np.linalg.lstsq(np.column_stack([np.ones(len(at)), at]), density.T, rcond=None)[0]
-    told = (np.column_stack([np.ones(6), NODES[2]]) @ fitted).T
-    for node in np.unique(own):
-        found[node] = told[own == node].mean()
-    return found
+def density_at_nodes(pore, mass):
+    """(N,) density at the nodes of the mesh: mass over area, or the mean of the linear least-squares fits to the points
+    of the adjacent triangles."""
+    nodal, body_cells = np.zeros(len(pore.mesh.points)), pore.mesh.cells[pore.mesh.biomass]
+    density = mass / areas_at_points(pore)
+    if pore.space.order == 1:
+        nodal[np.unique(body_cells)] = density[:, 0]
+        return nodal
+    places, _ = rule_with(density.shape[1])
+    fitted = np.linalg.lstsq(np.column_stack([np.ones(len(places)), places]), density.T, rcond=None)[0]
+    node_values = (np.column_stack([np.ones(6), NODES[2]]) @ fitted).T
+    for node in np.unique(body_cells):
+        nodal[node] = node_values[body_cells == node].mean()
+    return nodal
 
 
 @EVERY_ORDER
 def test_every_array_is_what_its_name_says(order):
-    """To round-off: all of it is a rearrangement, or sums of few terms, of numbers of size one."""
-    scene, at = late(order)
-    content, wanted = results.fields(scene, at.pore, at.solved), derived_arrays(scene, at)
-    told = arrays_of(content)
-    assert told.keys() == {"points", "cells", *wanted}
-    for name, value in wanted.items():
+    """They agree to round-off, because arrays are rearrangements or short sums of numbers of size one."""
+    scene, instant = late_instant(order)
+    content, expected = results.fields(scene, instant.pore, instant.solved), derived_arrays(scene, instant)
+    computed = arrays_of(content)
+    assert computed.keys() == {"points", "cells", *expected}
+    for name, value in expected.items():
         size = np.nanmax(np.abs(value))
-        assert told[name] == pytest.approx(value, rel=1e-9, abs=1e-9 * size, nan_ok=True), name
-        assert KNOWN[name].signed or np.nanmin(told[name]) >= 0, name
-    apart = np.nanmean(np.abs(told["stress_xx_MPa"] - told["stress_yy_MPa"]))
-    assert apart > 0.05 * np.nanmean(np.abs(told["stress_xx_MPa"])), "stresses alike would hide an exchange"
+        assert computed[name] == pytest.approx(value, rel=1e-9, abs=1e-9 * size, nan_ok=True), name
+        assert KNOWN[name].signed or np.nanmin(computed[name]) >= 0, name
+    apart = np.nanmean(np.abs(computed["stress_xx_MPa"] - computed["stress_yy_MPa"]))
+    assert apart > 0.05 * np.nanmean(np.abs(computed["stress_xx_MPa"])), "stresses alike would hide an exchange"
 
 
-def test_a_density_over_the_largest_reads_as_it_is():
-    scene, at = late(2)
-    full = scene.kinetics.maximum_density * areas_at_points(at.pore)
-    at = replace(at, pore=replace(at.pore, active=1.2 * full, inert=0 * full))
-    assert results.row(scene, at)["biomass_density_max"] == pytest.approx(1.2, rel=1e-12)
-    shown = results.fields(scene, at.pore, at.solved).point_data["active_biomass"]
-    assert shown.max() == pytest.approx(1.2, rel=1e-12)
+def test_a_density_above_the_maximum_is_reported_unchanged():
+    scene, instant = late_instant(2)
+    full = scene.kinetics.maximum_density * areas_at_points(instant.pore)
+    instant = replace(instant, pore=replace(instant.pore, active=1.2 * full, inert=0 * full))
+    assert results.row(scene, instant)["biomass_density_max"] == pytest.approx(1.2, rel=1e-12)
+    density = results.fields(scene, instant.pore, instant.solved).point_data["active_biomass"]
+    assert density.max() == pytest.approx(1.2, rel=1e-12)
 
 
 BALANCES = [f"{name}_balance" for name in ("acceptor", "donor", "biomass", "oxygen_demand")]
 
 
 def leaky(column, leak):
-    """(scene, Instant) after three steps of which the middle one supplies, holds, or makes, so much too much."""
-    scene, at = late(2)
+    """(scene, Report) after three steps. The balance of ``column`` has a relative leak in the middle one."""
+    scene, instant = late_instant(2)
     k = scene.kinetics
     grown, decayed = 2 * k.yield_coefficient, (4 - 2 * k.acceptor_to_donor_ratio) / k.decay_oxygen_demand
-    even = replace(at.ledgers[0], supplied=(5.0, 3.0), out=(1.0, 1.0), consumed=(4.0, 2.0), stored=(0.0, 0.0),
+    even = replace(instant.ledgers[0], supplied=(5.0, 3.0), out=(1.0, 1.0), consumed=(4.0, 2.0), stored=(0.0, 0.0),
                    biomass_before=70.0, biomass_made=grown - decayed, biomass_after=70.0 + grown - decayed)
-    more = leak * max(abs(grown), abs(decayed))  # over the larger of what grows and what decays
-    # Of a defect over what is supplied: x = (s - s0) / s, so s = s0 / (1 - x).
+    more = leak * max(abs(grown), abs(decayed))  # over the larger of growth and decay
+    # Relative to the supply: x = (s - s0) / s, so s = s0 / (1 - x).
     changes = [{"supplied": (5.0 / (1 - leak), 3.0)}, {"supplied": (5.0, 3.0 / (1 - leak))},
                {"biomass_after": even.biomass_after / (1 - leak)},
                {"biomass_made": even.biomass_made + more, "biomass_after": even.biomass_after + more}]
     middle = replace(even, **changes[BALANCES.index(column)])
-    return scene, replace(at, ledgers=(even, middle, even))
+    return scene, replace(instant, ledgers=(even, middle, even))
 
 
 @pytest.mark.parametrize("leak", [0.01, -0.01])
 @pytest.mark.parametrize("column", BALANCES)
-def test_a_leak_in_the_middle_of_three_steps_is_read_with_its_sign(column, leak):
-    """In timeseries.csv and on the page, and of the oxygen demand in ledger.csv."""
-    scene, at = leaky(column, leak)
-    row = results.row(scene, at)
+def test_a_leak_in_the_middle_of_three_steps_is_reported_with_its_sign(column, leak):
+    """timeseries.csv and the page report it; ledger.csv also reports the oxygen demand."""
+    scene, instant = leaky(column, leak)
+    row = results.row(scene, instant)
     assert row[column] == pytest.approx(leak, rel=1e-9)
     assert max(abs(row[name]) for name in BALANCES if name != column) < 1e-6
-    steps = [dict(zip(results.LEDGER_COLUMNS, results.ledger_row(scene, ledger))) for ledger in at.ledgers]
-    wanted = [0.0, leak if column == "oxygen_demand_balance" else 0.0, 0.0]
-    assert [step["oxygen_demand_balance"] for step in steps] == pytest.approx(wanted, rel=1e-9, abs=1e-12)
+    steps = [dict(zip(results.LEDGER_COLUMNS, results.ledger_row(scene, ledger))) for ledger in instant.ledgers]
+    expected = [0.0, leak if column == "oxygen_demand_balance" else 0.0, 0.0]
+    assert [step["oxygen_demand_balance"] for step in steps] == pytest.approx(expected, rel=1e-9, abs=1e-12)
     table = {name: np.array([0.0, value]) for name, value in row.items()}
-    (chart,) = [one for one in quantities.charts_of(Run(None, {}, table, {})) if "balances" in one.title]
+    (chart,) = [chart for chart in quantities.charts_of(Run(None, {}, table, {})) if "balances" in chart.title]
     label = column.removesuffix("_balance").replace("_", " ")
-    (line,) = [one for one in chart.lines if one.label == label]
+    (line,) = [line for line in chart.lines if line.label == label]
     assert line.values[-1] == pytest.approx(leak, rel=1e-9) and "relative defect" in chart.axis
 
 
 @pytest.mark.parametrize("time", ["updates", "midpoint"])
-def test_what_a_new_mesh_loses_is_not_taken_for_made(time):
-    """What an interpolation loses is a defect of the biomass, and nothing that was made: the oxygen demand says so.
-
-    Of linear elements, whose masses are interpolated [E8]."""
+def test_mass_lost_by_a_new_mesh_is_not_production(time):
+    """The mass that interpolation loses is a defect of the biomass and no negative production, as the oxygen demand
+    shows. Linear elements interpolate masses [E8]."""
     scene = load_scene("base", ["numerics.refinement=0.5", "numerics.transfer=linear", f"numerics.time={time}",
                                 'pore.width="20 um"', 'growth.end="0.4 h"', "flow.head=1e-2 cm"])
-    found = list(simulate(scene, SHAPE))
-    assert any(instant.remeshes for instant in found)
-    for instant in found:
+    instants = list(simulate(scene, SHAPE))
+    assert any(instant.remeshes for instant in instants)
+    for instant in instants:
         if instant.remeshes:
             (ledger,) = instant.ledgers
             lost = ledger.biomass_after - ledger.biomass_before - ledger.biomass_made
             assert abs(lost) > 1e-6 * ledger.biomass_after
             assert results.row(scene, instant)["biomass_balance"] == lost / ledger.biomass_after
     k = scene.kinetics
-    for ledger in (ledger for instant in found for ledger in instant.ledgers):
+    for ledger in (ledger for instant in instants for ledger in instant.ledgers):
         acceptor, donor = ledger.consumed
         grown, spent = k.yield_coefficient * donor, acceptor - k.acceptor_to_donor_ratio * donor
         assert abs(ledger.biomass_made - grown + spent / k.decay_oxygen_demand) <= 2e-4 * grown
 
 
 def test_every_column_of_the_ledger_is_its_own():
-    """Each column of a step's row is its own part."""
-    scene, at = late(1)
-    step = replace(at.ledgers[0], start=1.0, end=2.0, supplied=(3.0, 4.0), out=(5.0, 6.0), consumed=(7.0, 8.0),
+    """Each column of a step's row is its own part of the ledger."""
+    scene, instant = late_instant(1)
+    step = replace(instant.ledgers[0], start=1.0, end=2.0, supplied=(3.0, 4.0), out=(5.0, 6.0), consumed=(7.0, 8.0),
                    stored=(9.0, 10.0), biomass_before=11.0, biomass_made=12.0, biomass_after=13.0)
     row = dict(zip(results.LEDGER_COLUMNS, results.ledger_row(scene, step)))
     row.pop("oxygen_demand_balance")  # tests/test_balances.py
@@ -415,8 +417,8 @@ def test_every_column_of_the_ledger_is_its_own():
     assert row == {"start_h": 1, "end_h": 2} | {f"{name}_pg_per_m": k for k, name in enumerate(names, 3)}
 
 
-def apart():
-    """A run of three rows and two steps in which every number is another one."""
+def distinct_run():
+    """A run of three rows and two steps in which all numbers differ."""
     series = {name: 1.0 + k + np.array([0.1, 0.2, 0.4]) for k, name in enumerate(results.COLUMNS)}
     series |= {"time_h": np.array([0.0, 1.0, 3.0]), "remeshed": np.array([0.0, 1.0, 0.0])}
     ledger = {name: 50.0 + k + np.array([0.0, 0.5]) for k, name in enumerate(results.LEDGER_COLUMNS)}
@@ -425,19 +427,19 @@ def apart():
 
 
 def test_every_line_of_every_chart_is_the_column_that_it_names():
-    run = apart()
-    found = {chart.title: chart for chart in quantities.charts_of(run)}
-    assert found.keys() == {*CHARTS, *LEDGERS, "Ledger: biomass"}
-    made_anew = {"remeshed": np.where(run.series["remeshed"] == 1, run.series["nodes"], np.nan)}
-    known = {name: 1e-6 * values / [1, 2] for name, values in run.ledger.items()} | run.series | made_anew
+    run = distinct_run()
+    charts = {chart.title: chart for chart in quantities.charts_of(run)}
+    assert charts.keys() == {*CHARTS, *LEDGERS, "Ledger: biomass"}
+    new_meshes = {"remeshed": np.where(run.series["remeshed"] == 1, run.series["nodes"], np.nan)}
+    known = {name: 1e-6 * values / [1, 2] for name, values in run.ledger.items()} | run.series | new_meshes
     for title, columns in (CHARTS | LEDGERS).items():
-        chart, of_steps = found[title], title in LEDGERS
+        chart, of_steps = charts[title], title in LEDGERS
         assert chart.axis.endswith("(ug/m/h)" if of_steps else AXES.get(title, "")), title
         assert [line.label for line in chart.lines] == [*columns], title
         for line, column in zip(chart.lines, columns.values()):
             assert line.times.tolist() == ([0.5, 2.0] if of_steps else run.times.tolist())
             assert line.values == pytest.approx(known[column], rel=1e-12, nan_ok=True), title
-    held, made = found["Ledger: biomass"].lines
-    assert (held.label, made.label) == ("held", "made since t = 0") and held.times.tolist() == [1.0, 3.0]
-    assert held.values == pytest.approx(1e-6 * run.ledger["biomass_after_pg_per_m"], rel=1e-12)
-    assert made.values == pytest.approx(1e-6 * np.cumsum(run.ledger["biomass_made_pg_per_m"]), rel=1e-12)
+    present, produced = charts["Ledger: biomass"].lines
+    assert (present.label, produced.label) == ("held", "made since t = 0") and present.times.tolist() == [1.0, 3.0]
+    assert present.values == pytest.approx(1e-6 * run.ledger["biomass_after_pg_per_m"], rel=1e-12)
+    assert produced.values == pytest.approx(1e-6 * np.cumsum(run.ledger["biomass_made_pg_per_m"]), rel=1e-12)

@@ -1,4 +1,4 @@
-"""Errors of the finite elements name no keys of scenes; what stops a run names those that help."""
+"""Errors of the finite elements name no keys of scenes; the error that stops a run names the keys that help."""
 import re
 from pathlib import Path
 
@@ -22,7 +22,7 @@ def test_finite_elements_name_no_keys_of_scenes():
 
 @pytest.mark.parametrize("kind", [*ADVICE, MeshError])
 def test_an_error_of_the_elements_stops_a_run_with_the_keys_that_help(kind):
-    """They are keys of scenes; where nothing helps the message ends with the cause."""
+    """They are keys of scenes. If no key helps, the message ends with the cause."""
     with pytest.raises(SimulationError) as stopped, stopping(1.5):
         raise kind("the cause")
     start, advice = str(stopped.value).split("the cause")

@@ -1,4 +1,4 @@
-"""Files of fields: what is written is read back, and a file that holds no fields is refused."""
+"""Field files are read back as written, and a file without fields is refused."""
 
 import numpy as np
 import pytest
@@ -9,8 +9,8 @@ from tests.strategies import arrays_of, same_arrays
 
 
 @pytest.mark.parametrize("nodes", [3, 6])
-def test_what_is_written_is_read(tmp_path, nodes):
-    """To the last bit: not-a-number, arrays of any layout, more than one of the writer's blocks of 32 kB."""
+def test_fields_are_read_as_written(tmp_path, nodes):
+    """They agree to the last bit, with NaN, arrays of any layout and more than one of the writer's blocks of 32 kB."""
     rng = np.random.default_rng(3)
     nodal = {"plain": rng.normal(size=5000), "vector": rng.normal(size=(5000, 3)), "empty": np.full(5000, np.nan)}
     nodal["strided"] = np.asfortranarray(rng.normal(size=(5000, 3)))

@@ -1,4 +1,4 @@
-"""The paper's figures: they draw what a run holds, say its numbers, and the page about them is complete."""
+"""The paper's figures show the data and numbers of a run, and their page is complete."""
 import shlex
 from importlib import import_module
 from pathlib import Path
@@ -21,7 +21,7 @@ MODULES = {name: import_module(f"paper_figures.{name}") for name in paper_figure
 REQUESTS = list(dict.fromkeys(request for module in MODULES.values() for request in module.RUNS))
 SHORT = {"base": ['growth.end="0.6 h"', 'output.times=["0.4 h", "0.6 h"]'], "wide": ['growth.end="0.4 h"'],
          "initial_mesh": []}
-#: Runs of the figures that compute numbers of their own.
+#: Short runs for the figures that compute further numbers.
 BRIEF = [(name, 'growth.end="0.4 h"', 'output.times=["0.4 h"]') for name in ("base", "wide")]
 
 
@@ -42,36 +42,36 @@ def quick(short, monkeypatch, tmp_path):
                (figure_6, "EVERY", 0.2), (figures, "OUT", tmp_path / "out"), (style, "save", _coarse),
                (runs, "folders", lambda requests: [short[request.scene] for request in requests])]
     changed += [(module, points, getattr(module, points)[[0, -1]]) for module, points in (
-        (layers, "TAKEN_UP"), (transfer, "HEADS"), (transfer, "SUPPLIES"), (transfer, "RADII"))]
+        (layers, "UPTAKE_SHARES"), (transfer, "HEADS"), (transfer, "SUPPLIES"), (transfer, "RADII"))]
     for module, name, value in changed:
         monkeypatch.setattr(module, name, value)
     return tmp_path / "out"
 
 
-def _coarse(made, folder, name):
-    """A small PNG in place of what is printed."""
+def _coarse(figure, folder, name):
+    """Save a small PNG instead of the printed files."""
     folder.mkdir(exist_ok=True)
-    made.savefig(folder / f"{name}.png", dpi=40)
+    figure.savefig(folder / f"{name}.png", dpi=40)
 
 
 @pytest.mark.parametrize("request_", REQUESTS, ids=lambda request: request.name)
-def test_the_command_told_is_the_run_that_is_drawn(request_):
+def test_the_printed_command_makes_the_drawn_run(request_):
     chosen = cli._parser().parse_args(shlex.split(request_.command())[1:])
     assert scene_hash(load_scene(chosen.scene, chosen.set)) == scene_hash(request_.load())
 
 
-def test_everything_is_drawn_and_told(quick):
-    """With the recorded verdicts beside the claims; a run has a name of its own; nothing is asked of the network."""
+def test_every_figure_is_drawn_and_described(quick):
+    """The page has the recorded verdicts beside the claims, every run has its own name, and no link leaves the page."""
     figures.main()
     assert {p.name for p in quick.iterdir()} == {f"{n}.png" for n in MODULES} | {"index.html", "manifest.json"}
     root = ElementTree.fromstring((quick / "index.html").read_text(encoding="utf-8"))
     text = " ".join(" ".join(root.itertext()).split())
-    verdicts = {each["id"]: each["verdict"] for each in report.read()}
+    verdicts = {claim["id"]: claim["verdict"] for claim in report.read()}
     for module in MODULES.values():
-        wanted = [module.TITLE, *(request.command() for request in module.RUNS)]
+        expected = [module.TITLE, *(request.command() for request in module.RUNS)]
         for id in module.CLAIMS:
-            wanted += [f"{id} {verdicts[id]}", f"{id} {claims.STATEMENTS[id]}: {verdicts[id]}"]
-        assert [words for words in wanted if words not in text] == []
+            expected += [f"{id} {verdicts[id]}", f"{id} {claims.STATEMENTS[id]}: {verdicts[id]}"]
+        assert [words for words in expected if words not in text] == []
     assert len({request.name for request in REQUESTS}) == len(REQUESTS)
     links = [element.get(key, "") for element in root.iter() for key in ("src", "href")]
     assert not [link for link in links if link.startswith("http")]
@@ -87,17 +87,17 @@ def test_a_state_agrees_with_the_time_series(short):
 
 
 @pytest.mark.parametrize("name, panels", [("figure_5", 1), ("plate_1", 4)])
-def test_the_shape_that_is_drawn_is_that_before_the_expansion(short, name, panels):
-    """As the caption says, in every panel."""
-    wanted = states.last(short["base"], "before_expansion").rim
+def test_the_drawn_shape_precedes_the_expansion(short, name, panels):
+    """This holds in every panel, as the caption says."""
+    expected = states.last(short["base"], "before_expansion").rim
     patches = [patch for axes in MODULES[name].draw(short["base"]).axes for patch in axes.patches]
     drawn = [patch.get_xy()[:-1] for patch in patches if isinstance(patch, Polygon)]
-    assert sum(np.array_equal(one, wanted) for one in drawn) == panels
+    assert sum(np.array_equal(shape, expected) for shape in drawn) == panels
 
 
 @pytest.fixture
 def unlike(monkeypatch):
-    """Tables of runs that differ in every number, the first of which touch the opposite wall in their second row."""
+    """Tables of runs that differ in every number. The first two touch the opposite wall in their second row."""
     tables = {}
     for k in range(7):
         hours = np.linspace(0.0, 50.0 + k, 5 + k)
@@ -107,29 +107,29 @@ def unlike(monkeypatch):
     return tables
 
 
-def test_a_curve_is_what_the_legends_call_it(unlike):
-    """By the colour of its run and the line of its substrate."""
+def test_a_curve_matches_its_legends(unlike):
+    """The colour marks the run, and the line style marks the substrate."""
     module, folders = MODULES["time_series"], dict(zip(("Base", "Wide"), unlike))
     panels = module.draw(*folders.values()).axes
-    told = [(line, text.get_text()) for k in (0, 2) for legend in [panels[k].get_legend()]
+    entries = [(line, text.get_text()) for k in (0, 2) for legend in [panels[k].get_legend()]
             for line, text in zip(legend.get_lines(), legend.get_texts())]
-    tables = {line.get_color(): unlike[folders[name]] for line, name in told[:2]}
-    kinds = {line.get_linestyle(): name for line, name in told[2:]}
+    tables = {line.get_color(): unlike[folders[name]] for line, name in entries[:2]}
+    kinds = {line.get_linestyle(): name for line, name in entries[2:]}
     for axes, (column, *_) in zip(panels, module.CURVES, strict=True):
         lines = [line for line in axes.lines if line.get_linestyle() != ":"]
         assert len(lines) == (4 if "{}" in column else 2)
         for line in lines:
             table = tables[line.get_color()]
-            wanted = table["time_h"], table[column.format(kinds[line.get_linestyle()])]
-            assert np.array_equal(line.get_xydata().T, wanted)
+            expected = table["time_h"], table[column.format(kinds[line.get_linestyle()])]
+            assert np.array_equal(line.get_xydata().T, expected)
 
 
 def test_the_outlines_of_figure_6_are_those_of_the_converged_solution(short, monkeypatch):
-    """In the elements and steps by which the claims are judged; a row every tenth of an hour around contact; of the
-    area covered anew half lies upstream at first."""
-    said = figure_6.RUNS[0].load()
-    assert said.numerics == load_scene("wide", converged(1.0)).numerics and said.growth.end == 45.0
-    assert set(np.arange(5.0, 46.0, 5.0)) <= set(said.output.times)
-    assert np.diff([time for time in said.output.times if 34 <= time <= 35]) == pytest.approx(0.1)
+    """They use the elements and steps that judge the claims, with a row every tenth of an hour around contact. At first
+    half of the newly covered area lies upstream."""
+    scene = figure_6.RUNS[0].load()
+    assert scene.numerics == load_scene("wide", converged(1.0)).numerics and scene.growth.end == 45.0
+    assert set(np.arange(5.0, 46.0, 5.0)) <= set(scene.output.times)
+    assert np.diff([time for time in scene.output.times if 34 <= time <= 35]) == pytest.approx(0.1)
     monkeypatch.setattr(figure_6, "EVERY", 0.2)
     assert figure_6.upstream_share(short["wide"]) == pytest.approx(0.5, abs=0.01)

@@ -1,7 +1,7 @@
-"""Stokes flow (1)-(6): the flux that every section of any mesh carries, conditions, and biomass that water passes.
+"""Stokes flow (1)-(6): equal flux through every section of any mesh, and permeable biomass.
 
-Closed forms, other codes, energy, obstacles and mirrors are cases of the stage flow, units of length the cases
-coupling-units and hard-17-units; what is told of the whole pore is in `test_derived.py`.
+The cases of the stage flow cover closed forms, other codes, energy, obstacles and mirrors. The cases coupling-units and
+hard-17-units cover units of length. `test_derived.py` covers the reported quantities of the pore.
 """
 import numpy as np
 import pytest
@@ -19,13 +19,13 @@ from tests.strategies import ORDERS, between, meshes, share, space_of
 @given(meshes(), between(1.0, 1e4), st.sampled_from(["laplacian", "traction"]), st.integers(0, 2**32 - 1),
        st.sampled_from(list(ORDERS)))
 def test_every_section_carries_the_flux_of_the_inlet(grid, ratio, interface, seed, order):
-    """Any field that is one at the inlet and zero at the outlet is a section smeared out, and what carries the
-    substrates, w = u - tau grad p or u itself, carries down it u_ave W."""
+    """Any field that is one at the inlet and zero at the outlet is a smeared section. The velocity that carries the
+    substrates, w = u - tau grad p or u itself, carries u_ave W through it."""
     space = space_of(grid, order)
     unit = flow.unit_flow(space, ratio, interface=interface)
     section = np.random.default_rng(seed).uniform(-1.0, 2.0, len(grid.points))
     section[grid.topology.inlet], section[grid.topology.outlet] = 1.0, 0.0
-    mean = space.gradient_table.weights @ elements.values_on(order, space.gradient_table) * 2  # of each function
+    mean = space.gradient_table.weights @ elements.values_on(order, space.gradient_table) * 2  # mean of each function
     w = np.einsum("a,tai->ti", mean, unit.velocity[space.cells])
     if unit.correction is not None:
         w = w - unit.correction
@@ -34,7 +34,7 @@ def test_every_section_carries_the_flux_of_the_inlet(grid, ratio, interface, see
 
 
 def in_a_permeable_body(permeability, refinement):
-    """Conductivity, and the least velocity along the pore in a half-disc of 20 um over the largest in it."""
+    """Return the conductivity, and the ratio of the smallest to the largest velocity u_x in a half-disc of 20 um."""
     overrides = ["numerics.preset=fast", "aggregate.radius=20 um", "flow.biomass=brinkman", "growth.end=0 h",
                  f"flow.permeability={permeability} m^2", f"numerics.refinement={refinement}"]
     first = next(simulate(load_scene("base", overrides)))
@@ -44,16 +44,16 @@ def in_a_permeable_body(permeability, refinement):
 
 @pytest.mark.parametrize("permeability", [4e-12, 1e-12, 1e-14, 1e-16, 2.5e-20])
 def test_velocities_in_a_permeable_body_do_not_turn_back_however_thin_its_layers(permeability):
-    """In one dimension no node overshoots where a quadratic element is at most 6.3 times as long as the layer is thick;
-    1 % is for triangles. Conductivity is that of elements half as large, to 1 %, the bound on what a film loses."""
+    """In one dimension no node overshoots if a quadratic element is at most 6.3 times as long as the layer is thick;
+    1 % allows for triangles. Elements half as large give the same conductivity to 1 %, the bound on a film's loss."""
     conductivity, backward = in_a_permeable_body(permeability, 0.45)
     assert backward > -0.01
     assert conductivity == pytest.approx(in_a_permeable_body(permeability, 0.9)[0], rel=1e-2)
 
 
 def spanning(permeability, out, height):
-    """The first instant of a scene with a body from wall to wall of a pore of 100 um: 16 um of contact in the middle,
-    and on either side 92 um times ``out`` at a ``height`` over 100 um."""
+    """Return the first instant of a pore of 100 um with a body from wall to wall. It has 16 um of contact in the middle
+    and, on either side, points at 92 um times ``out`` and 100 um times ``height``."""
     right = [(f"{8 + 92 * x:.6g} um", f"{100 * y:.6g} um") for x, y in zip(out, height)]
     left = [(f"-{x}", y) for x, y in right[::-1]]
     outline = str([list(point) for point in left + right]).replace("'", '"')
@@ -64,7 +64,7 @@ def spanning(permeability, out, height):
 
 
 def dome(permeability):
-    """Spanned by a body that has just touched the upper wall: a quarter of an ellipse on either side."""
+    """A body that has just touched the upper wall: a quarter of an ellipse on either side."""
     out = np.linspace(0.0, 1.0, 12)
     return spanning(permeability, out, np.sqrt(1 - out**2))
 
@@ -72,8 +72,8 @@ def dome(permeability):
 
 @pytest.mark.parametrize("permeability", [1e-15, 5.67e-17])
 def test_water_that_must_pass_a_permeable_body_leaves_concentrations_within_their_bounds(permeability):
-    """The flow enters beside the upper contact line, where a velocity with sources carries the donor to 11 to 17 of 10
-    mg/L; a hundredth is half of what a solution may overshoot by before it is refused."""
+    """The flow enters beside the upper contact line. There a velocity with sources raises the donor from 10 mg/L to 11
+    to 17. A hundredth is half of the accepted overshoot."""
     solved = dome(permeability).solved.concentrations
     for field in (solved.acceptor, solved.donor):
         assert 0 < field.min() and field.max() < 10.1
@@ -86,11 +86,11 @@ def test_elements_beside_upper_contact_lines_of_a_permeable_body_are_half_the_le
     assert pore.sized(load_scene("base", ["numerics.preset=fast", *overrides])).contact == expected
 
 
-@pytest.mark.parametrize("element, said", [
+@pytest.mark.parametrize("element, setting", [
     (flow.Stabilised(12.0), "numerics.flow_stabilisation=12"), (flow.Bubble(), "numerics.flow_element=bubble")])
-def test_what_a_scene_says_of_its_elements_reaches_the_flow(element, said):
-    made = load_scene("base", ["numerics.preset=paper", "numerics.refinement=0.4", said])
-    space = pore.seeded(made).space
-    unit = flow.unit_flow(space, made.flow.viscosity_ratio, element=element)
-    wanted = flow.scaled(unit, space.mesh, made.pore.length, made.flow)
-    assert np.array_equal(pore.solve_flow(made, space).head, wanted.head)
+def test_the_elements_of_a_scene_reach_the_flow(element, setting):
+    scene = load_scene("base", ["numerics.preset=paper", "numerics.refinement=0.4", setting])
+    space = pore.seeded(scene).space
+    unit = flow.unit_flow(space, scene.flow.viscosity_ratio, element=element)
+    expected = flow.scaled(unit, space.mesh, scene.pore.length, scene.flow)
+    assert np.array_equal(pore.solve_flow(scene, space).head, expected.head)

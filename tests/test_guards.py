@@ -1,5 +1,5 @@
-"""Guards and counts get bad input: a leak just below the tolerance passes, a leak just above it is refused. The counts
-in run.json include every step."""
+"""Guards accept a leak just below the tolerance and refuse one just above it. The counts in run.json include every
+step."""
 from contextlib import nullcontext
 from dataclasses import replace
 from functools import cache
@@ -13,11 +13,11 @@ from repro.march.loop import Ledger
 from repro.march.simulation import steps
 from repro.model import transport
 from repro.model.pore import seeded, solve
-from repro.runs.running import Recorder
-from tests.shell import told as read_record
+from repro.runs.execution import Recorder
+from tests.shell import read_record
 from tests.strategies import ORDERS
 
-#: Of a step of 12 min in which very much is supplied, so that what diffuses is nothing beside it, um2 mg/L.
+#: Supply and uptake (um2 mg/L) of a step of 12 min, so large that diffusion is negligible.
 SUPPLIED, CONSUMED = (5e12, 3e12), (4e12, 2e12)
 WAYS = {"midpoint": ["numerics.time=midpoint"], "updates": ["numerics.time=updates"],
         "gear": ["numerics.time=updates", "numerics.transport=gear"]}
@@ -25,13 +25,13 @@ WAYS = {"midpoint": ["numerics.time=midpoint"], "updates": ["numerics.time=updat
 
 @cache
 def base(way, *changes):
-    """(scene, its seed) with coarse elements."""
+    """(scene, seed) with coarse elements."""
     scene = load_scene("base", ["numerics.refinement=0.4", *WAYS[way], *changes])
     return scene, seeded(scene)
 
 
 def terms(scene, consumed=CONSUMED):
-    """What the donor makes and what decays, um2 mg/L, (7)-(10)."""
+    """Growth on the donor and decay (um2 mg/L) from (7)-(10)."""
     k = scene.kinetics
     acceptor, donor = consumed
     return k.yield_coefficient * donor, (acceptor - k.acceptor_to_donor_ratio * donor) / k.decay_oxygen_demand
@@ -47,8 +47,8 @@ def ledger(scene, before=1e12, demand=0.0, biomass=0.0, acceptor=0.0, donor=0.0)
 
 
 def accepted_demand(scene, way, before=1e12):
-    """The tolerance that the docstrings state: 1e-6 and the round-off of the mass. Updates add (dt (k Y + b))^2 / 12 of
-    the turnover, Gear's method adds 1e-3 of the largest possible turnover, times the supplies over their half
+    """The tolerance in the docstrings: 1e-6 and the round-off of the mass. Updates add (dt (k Y + b))^2 / 12 of the
+    turnover. Gear's method adds 1e-3 of the largest possible turnover times the supplies over their half
     saturations."""
     k = scene.kinetics
     grown, decayed = terms(scene)
@@ -56,7 +56,8 @@ def accepted_demand(scene, way, before=1e12):
     fastest = 0.2 * (k.maximum_utilization_rate * k.yield_coefficient + k.decay_coefficient)
     turned = (CONSUMED[0] / k.decay_oxygen_demand + abs(grown - decayed)
               + (k.acceptor_to_donor_ratio / k.decay_oxygen_demand + k.yield_coefficient) * CONSUMED[1])
-    steepness = sum(each.supply / each.half_saturation for each in (scene.substrates.acceptor, scene.substrates.donor))
+    substrates = scene.substrates.acceptor, scene.substrates.donor
+    steepness = sum(substrate.supply / substrate.half_saturation for substrate in substrates)
     of_way = {"midpoint": 0.0, "updates": fastest**2 / 12 * turned, "gear": 1e-3 * steepness * fastest * before}[way]
     return 1e-6 + (1e-13 * before + of_way) / scale
 
@@ -66,8 +67,8 @@ LEAKS = [(kind, way) for kind in ("acceptor", "donor", "biomass", "demand") for 
 
 @pytest.mark.parametrize("sign", [1, -1])
 @pytest.mark.parametrize("kind, way", LEAKS)
-def test_a_leak_of_what_is_stated_passes_and_a_larger_one_is_refused(kind, way, sign):
-    """Two percent on either side of the tolerance, for gains and losses of each balance alone."""
+def test_a_leak_below_the_tolerance_passes_and_a_larger_one_is_refused(kind, way, sign):
+    """The leaks are 2 % below and above the tolerance, with gains and losses in one balance at a time."""
     scene, pore = base(way)
     limit = sign * (accepted_demand(scene, way) if kind == "demand" else 1e-6)
     balance.refuse(scene, pore, ledger(scene))
@@ -79,7 +80,7 @@ def test_a_leak_of_what_is_stated_passes_and_a_larger_one_is_refused(kind, way, 
 
 
 def test_the_demand_of_a_longer_update_may_be_off_by_its_square():
-    """Twice as long, four times as much."""
+    """A step twice as long may err four times as much."""
     scene, _ = base("updates")
     one, two = (balance.accepted_demand(scene, replace(ledger(scene), end=end)) - 1.1e-6 for end in (0.2, 0.4))
     assert two == pytest.approx(4 * one, rel=0.01)
@@ -99,13 +100,13 @@ def test_a_stated_defect_lets_no_other_one_pass(changes, kind):
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), -float("inf")])
 @pytest.mark.parametrize("field", ["biomass_made", "biomass_after"])
-def test_what_is_no_number_is_refused(field, value):
+def test_a_non_finite_ledger_is_refused(field, value):
     scene, pore = base("midpoint")
     with pytest.raises(BalanceError):
         balance.refuse(scene, pore, replace(ledger(scene), **{field: value}))
 
 
-def test_counts_in_the_record_are_of_every_step_whatever_rows_there_are(tmp_path):
+def test_counts_in_the_record_include_every_step(tmp_path):
     """A row may report several new meshes, Newton iterations and steps."""
     scene = load_scene("base", ["numerics.refinement=0.4", "growth.end=0.6 h"])
     recorder = Recorder(scene, tmp_path)
@@ -127,7 +128,7 @@ def test_counts_in_the_record_are_of_every_step_whatever_rows_there_are(tmp_path
 @pytest.mark.parametrize("order, error, accepted", [(2, 0.049, True), (2, 0.051, False), (3, 0.049, True),
                                                     (3, 0.051, False), (1, 0.5, True)])
 def test_two_quadratures_of_the_uptake_may_differ_by_five_percent(monkeypatch, order, error, accepted):
-    """With curved elements; linear ones lump the uptake at their nodes."""
+    """This concerns curved elements; linear ones lump the uptake at their nodes."""
     scene = load_scene("base", ["numerics.refinement=0.2", f"numerics.elements={ORDERS[order]}"])
     monkeypatch.setattr(transport, "quadrature_error", lambda *arguments: error)
     with nullcontext() if accepted else pytest.raises(Unresolved, match="differ by 5.1 % .up to 5 % is accepted"):

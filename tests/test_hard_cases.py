@@ -1,4 +1,4 @@
-"""Hard cases: a cell is right, refused or wrong for the right reason, and a few of the real ones are right."""
+"""Hard cases: a cell is right, refused or wrong, and for the right reason."""
 import math
 from itertools import count
 
@@ -16,41 +16,41 @@ from verification.problems.hard import PRESETS, REFUSED, RIGHT, WRONG, HardCase
 GOOD, BAD = at_most("good", 0.5, 1.0, ""), at_most("bad", 2.0, 1.0, "")
 
 
-def stopped(error):
-    """A part that an error stops."""
+def raising(error):
+    """Return a part that an error stops."""
     def function(preset):
         raise error
     return function
 
 
-MADE = {RIGHT: lambda preset: [GOOD], WRONG: lambda preset: [BAD], REFUSED: stopped(SimulationError("try another"))}
+PARTS = {RIGHT: lambda preset: [GOOD], WRONG: lambda preset: [BAD], REFUSED: raising(SimulationError("try another"))}
 
 
 def a_case(*verdicts, refusable=()):
-    """A case whose parts have these verdicts with every preset."""
-    parts = {verdict: MADE[verdict] for verdict in verdicts}
+    """Return a case whose parts have these verdicts with every preset."""
+    parts = {verdict: PARTS[verdict] for verdict in verdicts}
     return HardCase(99, "made-up", "Made up", "Right", "Wrong", parts, refusable, ("m",))
 
 
-@pytest.mark.parametrize("function, verdict, told", [
-    (MADE[RIGHT], RIGHT, ""), (lambda preset: [GOOD, BAD], WRONG, "bad 2 (expected at most 1)"),
+@pytest.mark.parametrize("function, verdict, excerpt", [
+    (PARTS[RIGHT], RIGHT, ""), (lambda preset: [GOOD, BAD], WRONG, "bad 2 (expected at most 1)"),
     (lambda preset: [], WRONG, "nothing was measured"),
     (lambda preset: [at_most("q", math.nan, 1.0, "")], WRONG, "q nan"),
-    (MADE[REFUSED], REFUSED, "try another"), (stopped(SimulationError("stopped")), WRONG, "without a reason: stopped"),
-    (stopped(TransportError("the Peclet number is 1e-12, under 1e-9")), REFUSED, "under 1e-9"),
-    (stopped(ValueError("try again")), WRONG, "ValueError"),
+    (PARTS[REFUSED], REFUSED, "try another"), (raising(SimulationError("stopped")), WRONG, "without a reason: stopped"),
+    (raising(TransportError("the Peclet number is 1e-12, under 1e-9")), REFUSED, "under 1e-9"),
+    (raising(ValueError("try again")), WRONG, "ValueError"),
     (lambda preset: [at_most("q", np.zeros(1) / 0, 1.0, "")], WRONG, "FloatingPointError"),
     (lambda preset: sum(1 for _ in count()), WRONG, "not done after 0.2 s")])
-def test_a_part_is_right_refused_or_wrong(function, verdict, told):
-    found = hard.run_part("a part", function, "fast", 0.2)
-    assert found.verdict == verdict and told in found.message
+def test_a_part_is_right_refused_or_wrong(function, verdict, excerpt):
+    cell = hard.run_part("a part", function, "fast", 0.2)
+    assert cell.verdict == verdict and excerpt in cell.message
 
 
 @pytest.mark.parametrize("verdict, preset, refusable, fine", [
     (RIGHT, "fast", (), True), (REFUSED, "fast", (), False), (REFUSED, "paper", (), True), (WRONG, "paper", (), False),
     (WRONG, "fast", (WRONG,), False), (REFUSED, "fast", (REFUSED,), True), (REFUSED, "fast", (RIGHT,), False)])
-def test_what_is_accepted(verdict, preset, refusable, fine):
-    """A cell is as its worst part; a verification case holds if it is so with all presets."""
+def test_a_cell_is_accepted_according_to_its_verdicts(verdict, preset, refusable, fine):
+    """A cell has the verdict of its worst part. A verification case holds if its cells of all presets are accepted."""
     chosen = a_case(RIGHT, verdict, refusable=refusable)
     cells = {name: hard.run_cell(chosen, name) for name in PRESETS}
     accepted = {name: not cell.unaccepted for name, cell in cells.items()}
@@ -68,7 +68,7 @@ def test_what_is_accepted(verdict, preset, refusable, fine):
     ("too coarse; no setting helps", {}, 0), ("two\nlines; no setting helps", {}, 1),
     ("no setting helps; fields of t = 0 h: fields/fields_0009.vtu", {}, 1)])
 def test_a_refusal_is_right_where_its_advice_works(message, works, wrong, tmp_path, monkeypatch):
-    """Or where it says that no setting helps; it is one line, and names files that exist."""
+    """It is also right if it says that no setting helps. It is one line and names existing files."""
     def runs(tables, folder):
         values = {**tables["growth"], **tables["numerics"]}
         return any(values.get(key) == value for key, value in works.items())
@@ -79,14 +79,14 @@ def test_a_refusal_is_right_where_its_advice_works(message, works, wrong, tmp_pa
     assert sum(not check.holds for check in checks) == wrong
 
 
-def test_a_wrong_run_is_seen():
-    """Numbers that are not finite, balances, concentrations and densities out of bounds."""
-    made = load_scene("wide", ("numerics.preset=fast", 'growth.end="0 h"', 'aggregate.radius="40 um"'))
-    found = hard.ran(made)
-    assert all(check.holds for check in hard.sound(found))
+def test_a_wrong_run_is_detected():
+    """Its numbers are not finite, or its balances, concentrations or densities are out of bounds."""
+    scene = load_scene("wide", ("numerics.preset=fast", 'growth.end="0 h"', 'aggregate.radius="40 um"'))
+    run = hard.run_scene(scene)
+    assert all(check.holds for check in hard.sound(run))
     for column, value in (("acceptor_balance", 1e-6), ("biomass_density_min", 0.5), ("inert_fraction", -0.1),
                           ("head_loss_cm", math.nan), ("biomass_balance", 1e-3)):
-        spoilt = hard.Run(made, found.instants * 2, [{**found.rows[0], column: value}, found.rows[0]])
+        spoilt = hard.Run(scene, run.instants * 2, [{**run.rows[0], column: value}, run.rows[0]])
         assert not all(check.holds for check in hard.sound(spoilt)), column
-    found.instants[0].solved.concentrations.donor[3] = 10.5
-    assert not all(check.holds for check in hard.sound(found))
+    run.instants[0].solved.concentrations.donor[3] = 10.5
+    assert not all(check.holds for check in hard.sound(run))

@@ -1,5 +1,5 @@
-"""Sparse systems: from element matrices of one kind or several, some unknowns prescribed; right answers, a known order,
-and an error where there is no answer."""
+"""Sparse systems from element matrices of one kind or several, with prescribed unknowns: solutions, node order, and
+errors for singular systems."""
 import numpy as np
 import pytest
 import scipy.sparse as sp
@@ -11,18 +11,18 @@ from tests import faults
 from tests.strategies import meshed
 
 LINE = np.column_stack([np.arange(9), np.arange(1, 10)])
-#: Of the first kind all pieces of a line, of the second one piece with another far away.
+#: The first kind is every segment of a line; the second couples a segment with a distant one.
 KINDS = LINE, np.column_stack([LINE[:4], LINE[5:]])
 _ROUGH = [np.random.default_rng(3).standard_normal((*kind.shape, kind.shape[1])) for kind in KINDS]
 ELEMENTS = tuple(part @ np.swapaxes(part, 1, 2) + np.eye(part.shape[1]) for part in _ROUGH)
 
 
 def dense():
-    found = np.zeros((10, 10))
+    matrix = np.zeros((10, 10))
     for kind, elements in zip(KINDS, ELEMENTS):
         for unknowns, element in zip(kind, elements):
-            found[np.ix_(unknowns, unknowns)] += element
-    return found
+            matrix[np.ix_(unknowns, unknowns)] += element
+    return matrix
 
 
 def solve(matrix, right, method=DEFAULT):
@@ -31,7 +31,7 @@ def solve(matrix, right, method=DEFAULT):
 
 
 def test_tiny_pivots_do_not_spoil_the_answer():
-    """Elimination in order loses all digits, beyond repair by refinement; the residual says so."""
+    """Elimination without pivoting loses all digits, and refinement cannot repair it; the residual reveals it."""
     rng = np.random.default_rng(3)
     dense = rng.normal(size=(60, 60))
     np.fill_diagonal(dense, 1e-17)
@@ -44,7 +44,7 @@ def test_tiny_pivots_do_not_spoil_the_answer():
 @pytest.mark.parametrize("matrix", [[[1.0, 1.0], [1.0, 1.0]], [[0.0, 0.0], [0.0, 1.0]],
                                     [[2.0, -1.0, -1.0], [-1.0, 2.0, -1.0], [-1.0, -1.0, 2.0]]])
 def test_a_singular_system_is_refused(matrix):
-    """Pure Neumann problems among them, whose factors are not exactly singular."""
+    """The factors of a pure Neumann problem are not exactly singular."""
     with pytest.raises(LinearError, match="singular|residual"):
         solve(sp.csc_array(np.array(matrix)), np.arange(1.0, len(matrix) + 1))
 
@@ -53,18 +53,18 @@ def test_a_singular_system_is_refused(matrix):
 STEEP = 3e7 * sp.diags_array([-1.0, 2.5, -1.0], offsets=[-1, 0, 1], shape=(60, 60), format="csc")
 
 
-def test_a_solution_that_underflows_is_one():
-    """A substrate that is used up: unknowns of 2^-1063 to 2^-1062 have the last ten of their 53 bits left, and each
-    comes out to the eps t that any sum of such numbers errs by, times |A^-1| |A|, which is 9."""
+def test_a_solution_that_underflows_is_accepted():
+    """The substrate is used up: unknowns of 2^-1063 to 2^-1062 have ten of their 53 bits left. The error of each is at
+    most the rounding error of a sum of these numbers times |A^-1| |A|, which is 9."""
     exact = np.random.default_rng(5).uniform(1, 2, 60)
-    found = solve(STEEP, np.ldexp(STEEP @ exact, -1063))
-    assert np.abs(found - np.ldexp(exact, -1063)).max() <= 9 * 2.0**-1074
+    computed = solve(STEEP, np.ldexp(STEEP @ exact, -1063))
+    assert np.abs(computed - np.ldexp(exact, -1063)).max() <= 9 * 2.0**-1074
     assert not solve(STEEP, np.zeros(60)).any()
 
 
 @pytest.mark.parametrize("size", [1.0, 1e-290, 1e-300, 1e-313])
-def test_a_wrong_solution_is_told_however_small_it_is(size):
-    """Of factors that give twice what they should: 1e-313 of unknown is 5e-6 of the smallest with all its digits."""
+def test_a_wrong_solution_is_refused_at_any_size(size):
+    """The factors double the solution. 1e-313 is 5e-6 of the smallest number with all its digits."""
     solver, right = linear.factorised(STEEP), np.full(60, 3e7 * size)
     assert solver.solve(right).max() == pytest.approx(2 * size, rel=1e-8)
     solver.factor, solver.pivoted = linear.factorised(STEEP / 2).factor, True
@@ -74,9 +74,9 @@ def test_a_wrong_solution_is_told_however_small_it_is(size):
 
 @pytest.mark.parametrize("installed", [False, True])
 def test_other_packages_order_and_solve(installed, monkeypatch):
-    """Stand-ins that do what the packages say, and the packages where they are installed."""
+    """Tested with stand-ins for the packages, and with the packages if they are installed."""
     for package in ("pypardiso", "pymetis"):
-        pytest.importorskip(package) if installed else faults.stand_in_package(monkeypatch, package)
+        pytest.importorskip(package) if installed else faults.replace_package(monkeypatch, package)
     method, right = Method("pardiso", "metis"), np.arange(60.0)
     grid, _ = meshed(None)
     assert method.checked() is method

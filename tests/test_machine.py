@@ -1,5 +1,5 @@
-"""What a run needs of the machine that it is on: packages, memory; and what a command imports, told by the names of
-modules and never by the clock."""
+"""What a run needs of its machine: packages and memory; and the modules that a command imports, by name and not by
+time."""
 
 import ast
 import json
@@ -15,12 +15,12 @@ from repro.cli import main
 from repro.march.simulation import simulate
 from repro.preflight import memory
 from repro.preflight.checked import check
-from repro.runs import machine, running
-from repro.runs.running import resume
+from repro.runs import execution, machine
+from repro.runs.execution import resume
 from repro.scene import SceneError, load_scene
 from tests import faults
 from tests.pages import run
-from tests.shell import SHORT, files, refused, shell, stopped, told
+from tests.shell import SHORT, files, interrupt_run, read_record, refusal, run_and_wait
 
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="for Linux alone")
 CHOICES = [("numerics.solver=pardiso", "pypardiso"), ("numerics.ordering=metis", "pymetis")]
@@ -28,22 +28,22 @@ CHOICES = [("numerics.solver=pardiso", "pypardiso"), ("numerics.ordering=metis",
 
 @pytest.mark.parametrize("entry, package", CHOICES)
 @pytest.mark.parametrize("command", [["run", "base"], ["sweep", "base", "--vary", "pore.width=50 um, 60 um"]])
-def test_a_package_that_is_not_there_is_told_before_anything_is_written(tmp_path, capsys, monkeypatch, command, entry,
+def test_an_absent_package_is_reported_before_anything_is_written(tmp_path, capsys, monkeypatch, command, entry,
                                                                         package):
-    """One line, status 2, no folder."""
-    faults.absent_package(monkeypatch, package)
+    """The command prints one line, exits with status 2 and makes no folder."""
+    faults.remove_package(monkeypatch, package)
     key, _, choice = entry.partition("=")
-    said = f'base: {key} = "{choice}": the package {package} is not installed; pip install {package}'
-    assert said in refused(tmp_path, capsys, *command, "--set", entry, "--out", tmp_path / "out")
+    message = f'base: {key} = "{choice}": the package {package} is not installed; pip install {package}'
+    assert message in refusal(tmp_path, capsys, *command, "--set", entry, "--out", tmp_path / "out")
 
 
-def test_a_package_that_went_is_told_at_a_resume(tmp_path, monkeypatch):
+def test_a_package_uninstalled_since_is_reported_at_a_resume(tmp_path, monkeypatch):
     scene = load_scene("base", ("numerics.preset=fast", "numerics.ordering=metis"))
-    with monkeypatch.context() as there:
-        there.setattr(machine, "find_spec", lambda name: name)
-        faults.stand_in_package(there, "pymetis")
-        stopped(scene, tmp_path, after=1)
-    faults.absent_package(monkeypatch, "pymetis")
+    with monkeypatch.context() as patch:
+        patch.setattr(machine, "find_spec", lambda name: name)
+        faults.replace_package(patch, "pymetis")
+        interrupt_run(scene, tmp_path, after=1)
+    faults.remove_package(monkeypatch, "pymetis")
     with pytest.raises(SceneError, match="pymetis is not installed"):
         resume(tmp_path)
 
@@ -53,33 +53,33 @@ def test_a_package_that_went_is_told_at_a_resume(tmp_path, monkeypatch):
     ("base", ["preset=fast", "refinement=1"]), ("base", ["preset=accurate", "elements=cubic"]),
     ("base", ["preset=paper", "gradation=0", "refinement=0.4"]), ("base", ["preset=paper", "extent=full"]),
     ("flow_only", ["preset=paper", "refinement=2"]), ("wide", ["preset=accurate"])])
-def test_the_nodes_that_are_expected_are_those_of_the_mesh(name, sets):
-    """At t = 0, within a half."""
+def test_the_estimated_nodes_are_those_of_the_mesh(name, sets):
+    """At t = 0, within a factor of 1.5."""
     end = [] if name == "flow_only" else ["growth.end=0 h"]
     scene = load_scene(name, [*(f"numerics.{entry}" for entry in sets), *end])
-    found = len(next(simulate(scene)).pore.mesh.points)
-    assert found / 1.5 < memory.expected_nodes(scene) < 1.5 * found
+    nodes = len(next(simulate(scene)).pore.mesh.points)
+    assert nodes / 1.5 < memory.expected_nodes(scene) < 1.5 * nodes
 
 
 @LINUX
 @pytest.mark.thorough
-def test_the_memory_that_is_told_is_what_a_run_takes():
-    """Over that of a run on a coarse mesh, within a half: the peak of a process of its own (kB)."""
+def test_the_estimated_memory_is_what_a_run_uses():
+    """The increase from a coarse to a fine mesh agrees within a factor of 1.5 with that of a process's peak (kB)."""
     code = ("import sys; from pathlib import Path; from repro import load_scene, simulate; "
             "list(simulate(load_scene('base', sys.argv[1:]))); "
             "print(Path('/proc/self/status').read_text().partition('VmHWM:')[2].split()[0])")
-    told, taken = [], []
+    estimated, measured = [], []
     for refinement in (1, 4):
         changes = [f"numerics.refinement={refinement}", "growth.end=12 min"]
-        told.append(check(load_scene("base", changes)).cost.memory)
-        taken.append(int(subprocess.run([sys.executable, "-c", code, *changes], capture_output=True, text=True,
+        estimated.append(check(load_scene("base", changes)).cost.memory)
+        measured.append(int(subprocess.run([sys.executable, "-c", code, *changes], capture_output=True, text=True,
                                         check=True).stdout) * 1024 / 1e6)
-    more = told[1] - told[0]
-    assert (taken[1] - taken[0]) / 1.5 < more < 1.5 * (taken[1] - taken[0])
+    difference = estimated[1] - estimated[0]
+    assert (measured[1] - measured[0]) / 1.5 < difference < 1.5 * (measured[1] - measured[0])
 
 
-def test_a_run_that_may_take_more_than_half_of_the_memory_is_warned_of(tmp_path, capsys, monkeypatch):
-    """Under --quiet and --json too, and runs."""
+def test_a_run_that_may_use_over_half_of_the_memory_gives_a_warning(tmp_path, capsys, monkeypatch):
+    """--quiet and --json show the warning as well, and the run goes on."""
     needed = memory.expected_bytes(load_scene("flow_only"))
     for factor, warned in ((2.1, False), (1.9, True)):
         monkeypatch.setattr(memory, "free_bytes", lambda factor=factor: factor * needed)
@@ -87,46 +87,46 @@ def test_a_run_that_may_take_more_than_half_of_the_memory_is_warned_of(tmp_path,
         out, err = capsys.readouterr()
         events = [json.loads(line) for line in out.splitlines()]
         assert (err.startswith("repro: warning: flow_only: about ")) == warned == (events[0]["event"] == "warning")
-        assert [one.key for one in check("flow_only").warnings] == ["numerics.refinement"] * warned
+        assert [warning.key for warning in check("flow_only").warnings] == ["numerics.refinement"] * warned
 
 
 @pytest.mark.parametrize("command", ["check", "run"])
-def test_what_takes_more_memory_than_there_is_is_refused_by_check_as_by_run(tmp_path, capsys, monkeypatch, command):
+def test_check_and_run_refuse_a_scene_that_needs_too_much_memory(tmp_path, capsys, monkeypatch, command):
     monkeypatch.setattr(memory, "free_bytes", lambda: 0.9 * memory.expected_bytes(load_scene("flow_only")))
     out = ["--out", tmp_path / "run"] if command == "run" else []
-    assert " MB are free; a smaller numerics.refinement is needed" in refused(
+    assert " MB are free; a smaller numerics.refinement is needed" in refusal(
         tmp_path, capsys, command, "flow_only", *out)
 
 
-def group(root, path, **content):
+def write_group(root, path, **content):
     (root / path).mkdir(parents=True, exist_ok=True)
     for name, text in content.items():
         (root / path / name.replace("_", ".", 1)).write_text(f"{text}\n")
 
 
-def test_what_is_free_is_the_least_that_anything_leaves(tmp_path):
-    """Of the system, of the process's control group and of those above it, in both versions, with files in memory that
-    give way."""
+def test_free_memory_is_the_least_that_any_limit_leaves(tmp_path):
+    """Counted are the system, the process's control group and its parents, in both versions. Memory of cached files is
+    free."""
     (tmp_path / "proc/self").mkdir(parents=True)
     assert memory.free_bytes(tmp_path) > 1e15
     (tmp_path / "proc/meminfo").write_text("MemTotal: 9 kB\nMemAvailable:   2000000 kB\n")
     assert memory.free_bytes(tmp_path) == 2000000 * 1024
     (tmp_path / "proc/self/cgroup").write_text("4:memory:/jobs/one\n3:cpu:/\n0::/user/two\n")
-    group(tmp_path, "sys/fs/cgroup/user/two", memory_max="max", memory_current=10)
+    write_group(tmp_path, "sys/fs/cgroup/user/two", memory_max="max", memory_current=10)
     assert memory.free_bytes(tmp_path) == 2000000 * 1024
-    group(tmp_path, "sys/fs/cgroup/user", memory_max=1_000_000_000, memory_current=300_000_000,
+    write_group(tmp_path, "sys/fs/cgroup/user", memory_max=1_000_000_000, memory_current=300_000_000,
           memory_stat="anon 1\ninactive_file 100000000")
     assert memory.free_bytes(tmp_path) == 800_000_000
-    group(tmp_path, "sys/fs/cgroup/memory/jobs/one", memory_limit_in_bytes=500_000_000,
+    write_group(tmp_path, "sys/fs/cgroup/memory/jobs/one", memory_limit_in_bytes=500_000_000,
           memory_usage_in_bytes=100_000_000, memory_stat="total_inactive_file 50000000")
     assert memory.free_bytes(tmp_path) == 450_000_000
-    group(tmp_path, "sys/fs/cgroup/memory", memory_limit_in_bytes=50, memory_usage_in_bytes=100)
+    write_group(tmp_path, "sys/fs/cgroup/memory", memory_limit_in_bytes=50, memory_usage_in_bytes=100)
     assert memory.free_bytes(tmp_path) == 0
 
 
 @LINUX
-def test_a_limit_of_address_space_leaves_what_is_not_taken_of_it(tmp_path, monkeypatch):
-    """Of the whole address space, the first number, and not of what is resident."""
+def test_a_limit_of_address_space_leaves_its_unused_part(tmp_path, monkeypatch):
+    """The first number of statm, the size of the address space, counts; the resident size does not."""
     resource = pytest.importorskip("resource")
     (tmp_path / "proc/self").mkdir(parents=True)
     (tmp_path / "proc/self/statm").write_text("5000 300 200 1 0 700 0\n")
@@ -136,7 +136,7 @@ def test_a_limit_of_address_space_leaves_what_is_not_taken_of_it(tmp_path, monke
 
 
 def hashes_of(folder, monkeypatch, texts):
-    """The hash of a source of these modules' texts, by name, one after the other."""
+    """Yield the hash of the source after each of these modules is written."""
     monkeypatch.setattr(machine, "__file__", str(folder / "run" / "machine.py"))
     for name, text in texts:
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
@@ -144,8 +144,8 @@ def hashes_of(folder, monkeypatch, texts):
         yield machine.source_hash.__wrapped__()
 
 
-def test_the_source_is_every_statement_of_the_rooms_that_compute_numbers(tmp_path, monkeypatch):
-    """What runs of other code are told apart by; a module of another name is another."""
+def test_the_hash_covers_every_statement_that_computes_numbers(tmp_path, monkeypatch):
+    """Each text of a module has its own hash, and so has a module of another name."""
     names = ("scene/keys.py", "fem/mesh.py", "model/flow.py", "model/more/deep.py", "results/columns.py")
     texts = [(name, text) for name in names for text in ("a = 1", "a = 2", "a = '# 2'", 'a = """\n# 2"""')]
     assert len({*hashes_of(tmp_path, monkeypatch, texts)}) == len(texts)
@@ -153,11 +153,11 @@ def test_the_source_is_every_statement_of_the_rooms_that_compute_numbers(tmp_pat
     assert len({*hashes_of(tmp_path, monkeypatch, [*texts[-1:], *texts[8:9]])}) == 2
 
 
-def test_remarks_and_rooms_without_numbers_leave_the_hash(tmp_path, monkeypatch):
-    """Docstrings, comments and empty lines; pages, the command line, and how runs are kept."""
-    bare = 'def f():\n    """Return a."""\n    return "#a"\n'
-    other = '# of f\ndef f():  # here\n    """Return "a", the letter.\n\n    Of a text.\n    """\n\n    return "#a"\n'
-    texts = [("fem/mesh.py", bare), ("fem/mesh.py", other)]
+def test_comments_and_rooms_without_numbers_do_not_change_the_hash(tmp_path, monkeypatch):
+    """Docstrings, comments and empty lines; pages, the command line, and the files of runs."""
+    plain = 'def f():\n    """Return a."""\n    return "#a"\n'
+    revised = '# of f\ndef f():  # here\n    """Return "a", the letter.\n\n    Of a text.\n    """\n\n    return "#a"\n'
+    texts = [("fem/mesh.py", plain), ("fem/mesh.py", revised)]
     texts += [(name, "a = 1") for name in ("report/charts.py", "cli/run.py", "run/folder.py", "sweep/pool.py")]
     assert len({*hashes_of(tmp_path, monkeypatch, texts)}) == 1
 
@@ -171,8 +171,8 @@ def without_docstrings(source):
     return ast.dump(tree)
 
 
-def test_the_statements_of_the_source_are_all_of_it():
-    """In every module that counts: as Python reads it."""
+def test_no_statement_of_the_source_is_lost():
+    """The syntax tree is the same in every module that is hashed."""
     package = Path(repro.__file__).parent
     paths = [path for room in machine.ROOMS for path in (package / room).rglob("*.py")]
     for path in paths:
@@ -182,16 +182,16 @@ def test_the_statements_of_the_source_are_all_of_it():
 
 
 def limited(kind, most, *arguments):
-    """Exit status and standard error of `repro run ARGUMENTS` where the system allows so much."""
+    """Exit status and standard error of `repro run ARGUMENTS` under a resource limit."""
     resource = pytest.importorskip("resource", reason="a system with limits is needed")
     limit = lambda: resource.setrlimit(getattr(resource, kind), (most, most))  # noqa: E731
-    status, _, message = shell(*arguments, preexec_fn=limit)
+    status, _, message = run_and_wait(*arguments, preexec_fn=limit)
     return status, message
 
 
 @LINUX
 def test_a_limit_of_address_space_ends_a_run_in_one_line(tmp_path):
-    """As if there were no more memory: before anything is written, with both numbers."""
+    """The run is refused with both numbers before it writes a file."""
     status, message = limited("RLIMIT_AS", 1000 << 20, "base", "--set", "numerics.refinement=10", "--out",
                               tmp_path / "run")
     assert status == 2 and message.count("\n") == 1 and list(tmp_path.iterdir()) == []
@@ -205,35 +205,35 @@ MORE = [pytest.param(size, "", marks=pytest.mark.thorough) for size in (0, 8_000
 @pytest.mark.parametrize("most, which", [(500, ""), (20_000, "fields_0000.vtu: "),
                                          (100_000, "report.html: "), *MORE])
 def test_a_limit_of_file_sizes_ends_a_run_in_one_line(tmp_path, most, which):
-    """Whichever file it is that may not grow, the first to be longer than 20 kB fields, the last the page of a run that
-    is over; with more room the run goes on, which is asked for in either way, until all is there that it lists."""
-    asked = [*SHORT, "--set", 'growth.end="0.4 h"', "--out", str(tmp_path / "run"), "--quiet"]
-    status, message = limited("RLIMIT_FSIZE", most, *asked)
+    """Any file may be the one that cannot grow: fields are the first above 20 kB, the page of a finished run the last.
+    Without the limit the run goes on to its end, by either command, and has all files that it lists."""
+    arguments = [*SHORT, "--set", 'growth.end="0.4 h"', "--out", str(tmp_path / "run"), "--quiet"]
+    status, message = limited("RLIMIT_FSIZE", most, *arguments)
     assert status == 2 and f"{which}File too large" in message and message.count("\n") == 1, message
     assert message.endswith("and go on with --resume\n" if (tmp_path / "run" / "run.json").exists() else
                             "and give the same command again\n")
-    left = files(tmp_path / "run")
-    assert not [name for name in left if "writing" in name or "part" in name or "fields" in which and "vtu" in name]
-    assert main(["run", *(["--resume", str(tmp_path / "run"), "--quiet"] if which else asked)]) == 0
-    assert all((tmp_path / "run" / name).is_file() for name in told(tmp_path / "run")["files"])
+    unfinished = ("writing", "part", "vtu") if "fields" in which else ("writing", "part")
+    assert not [name for name in files(tmp_path / "run") if any(word in name for word in unfinished)]
+    assert main(["run", *(["--resume", str(tmp_path / "run"), "--quiet"] if which else arguments)]) == 0
+    assert all((tmp_path / "run" / name).is_file() for name in read_record(tmp_path / "run")["files"])
 
 
-def test_want_of_memory_outside_of_the_steps_is_told_in_one_line(tmp_path, capsys, monkeypatch):
-    def none_left(*_):
+def test_lack_of_memory_outside_of_the_steps_is_reported_in_one_line(tmp_path, capsys, monkeypatch):
+    def raise_memory_error(*_):
         raise MemoryError("Unable to allocate 1 GiB")
 
-    monkeypatch.setattr(running, "run", lambda *_, **__: none_left())
+    monkeypatch.setattr(execution, "run", lambda *_, **__: raise_memory_error())
     run(tmp_path, "flow_only", status=1)
     assert capsys.readouterr().err == ("repro: out of memory (Unable to allocate 1 GiB); try a smaller "
                                        "numerics.refinement\n")
 
 
-#: What no command and no run needs, whatever is installed; each takes from a twentieth to half a second.
+#: Modules that no command and no run imports, although they are installed; each takes 0.05 to 0.5 s.
 NEVER = {"matplotlib", "pandas", "xarray", "h5py", "scipy.interpolate", "scipy.optimize", "scipy.special",
          "scipy.spatial", "scipy.integrate", "scipy.stats", "pint", "skfem.visuals", "sympy", "distributed"}
-#: What a run needs, and a command that runs nothing does not.
+#: Modules that only runs and checks import.
 SOLVER = {"numpy", "scipy", "skfem", "mmgpy", "shapely"}
-#: What a run needs from its first file of fields on; meshio imports rich.
+#: Modules that a run imports for its first file of fields; meshio imports rich.
 FILES = {"meshio", "rich"}
 COMMAND = """
 import sys
@@ -250,10 +250,11 @@ print(*sys.modules, file=sys.stderr)
     (["--help"], set()), (["sweep", "--help"], set()), (["scene", "base"], set()),
     (["run", "base", "--set", "pore.width=3"], set()), (["check", *SHORT], SOLVER),
     (["run", *SHORT, "--set", 'growth.end="3 h"'], SOLVER | FILES)])
-def test_a_command_imports_what_it_needs_alone(tmp_path, arguments, needed):
-    """A command that runs nothing needs no solver, and one that writes no fields no meshio; a run has remeshes, fields
-    and a page."""
+def test_a_command_imports_only_the_modules_that_it_needs(tmp_path, arguments, needed):
+    """A command without a run imports no solver, and one without fields no meshio. The run has remeshes, fields and a
+    page."""
     out = ["--out", str(tmp_path / "run")] if arguments[0] == "run" else []
-    done = subprocess.run([sys.executable, "-c", COMMAND, *arguments, *out], capture_output=True, text=True, check=True)
-    assert {*done.stderr.split()} & (NEVER | SOLVER | FILES) == needed
+    command = [sys.executable, "-c", COMMAND, *arguments, *out]
+    modules = subprocess.run(command, capture_output=True, text=True, check=True).stderr.split()
+    assert {*modules} & (NEVER | SOLVER | FILES) == needed
     assert (tmp_path / "run" / "report.html").exists() is (FILES <= needed)

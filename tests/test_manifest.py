@@ -1,4 +1,4 @@
-"""The manifest of `make figures`: hashes follow the data and nothing else, and a difference is told with its reason."""
+"""The manifest of `make figures`: hashes follow the data alone, and a difference is reported with its reason."""
 import copy
 import json
 from importlib import import_module
@@ -16,14 +16,14 @@ NAME = "initial_mesh"
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """A run of 0.1 s."""
-    made = tmp_path_factory.mktemp("runs") / NAME
-    run(load_scene(NAME), made)
-    return made
+    """The folder of a run that takes 0.1 s."""
+    path = tmp_path_factory.mktemp("runs") / NAME
+    run(load_scene(NAME), path)
+    return path
 
 
 @pytest.fixture
-def told(folder):
+def committed(folder):
     """A manifest of that run and a made-up figure."""
     figure = {"title": "T", "runs": [NAME], "data": "f" * 64, "wall_time_s": 1.0, "pictures": {"f.pdf": 9}}
     computed = manifest.of_run(runs.INITIAL_MESH, folder)
@@ -31,37 +31,37 @@ def told(folder):
     return {"environment": {"numpy": "1", "source": "a"}, "figures": {"figure_9": figure}, "runs": {NAME: computed}}
 
 
-def test_a_run_again_has_the_same_hashes(folder, told, tmp_path):
-    """Of every file with data."""
+def test_a_repeated_run_has_the_same_hashes(folder, committed, tmp_path):
+    """Every file with data is hashed."""
     run(load_scene(NAME), tmp_path / "again")
-    found = manifest.of_run(runs.INITIAL_MESH, tmp_path / "again")["files"]
+    files = manifest.of_run(runs.INITIAL_MESH, tmp_path / "again")["files"]
     files = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
-    assert found == told["runs"][NAME]["files"] and {*found} == files - {*manifest.NOT_DATA}
+    assert files == committed["runs"][NAME]["files"] and {*files} == files - {*manifest.NOT_DATA}
 
 
-def test_a_figure_is_hashed_by_what_it_draws_and_says():
-    def hashed(x=1.0, label="h", many=1.0, caption="c"):
-        made = Figure()
-        axes = made.subplots()
+def test_a_figure_is_hashed_by_its_data_and_texts():
+    def hashed(x=1.0, label="h", ordinate=1.0, caption="c"):
+        figure = Figure()
+        axes = figure.subplots()
         axes.plot([0.0, x], [0.0, 1.0])
-        axes.scatter([0.0, 1.0], [0.0, many])
+        axes.scatter([0.0, 1.0], [0.0, ordinate])
         axes.set(xlabel=label, xlim=(0, 5), ylim=(0, 5))
-        return manifest.figure_hash(made, caption)
+        return manifest.figure_hash(figure, caption)
 
-    others = hashed(x=1.0 + 1e-15), hashed(label="s"), hashed(many=2.0), hashed(caption="d")
-    assert hashed() == hashed() and len({hashed(), *others}) == 5
+    variants = hashed(x=1.0 + 1e-15), hashed(label="s"), hashed(ordinate=2.0), hashed(caption="d")
+    assert hashed() == hashed() and len({hashed(), *variants}) == 5
 
 
-def changed(told, factor=None, scene="", data="", **environment):
-    """The manifest of another computation; factor: another table, a number of its last row times this, and another
-    balance, which is round-off."""
-    other = copy.deepcopy(told)
-    one = other["runs"][NAME]
+def changed(committed, factor=None, scene="", data="", **environment):
+    """The manifest of another computation. A factor scales a number of the last row, and changes the table's hash and
+    a balance, which is round-off."""
+    other = copy.deepcopy(committed)
+    entry = other["runs"][NAME]
     if factor:
-        one["files"]["timeseries.csv"] = "0" * 64
-        one["last_row"]["thickness_um"] *= factor
-        one["last_row"]["acceptor_balance"] = -3e-15
-    one["scene"] = scene or one["scene"]
+        entry["files"]["timeseries.csv"] = "0" * 64
+        entry["last_row"]["thickness_um"] *= factor
+        entry["last_row"]["acceptor_balance"] = -3e-15
+    entry["scene"] = scene or entry["scene"]
     other["figures"]["figure_9"] |= {"data": data or "f" * 64, "wall_time_s": 99.0}
     other["environment"] |= environment
     return other
@@ -80,22 +80,22 @@ THICK = "initial_mesh, thickness_um: 5.05 instead of 5, more than 0.2 %"
     ({"factor": 1.01, "source": "b"}, (THICK, SOURCE), ""),
     ({"factor": 1.01}, (THICK, "source and environment are the committed ones"), ""),
     ({"factor": 1.0, "scene": "f" * 16, "source": "b"},
-     ("initial_mesh (scene)", "other scenes or outputs were asked for"), ""),
+     ("initial_mesh (scene)", "scenes or outputs are not those"), ""),
     ({"data": "0" * 64}, ("drawn otherwise from the same data: figure_9 (drawn)", "has changed"), ""),
     ({"numpy": "2"}, (), "")])
-def test_other_bits_within_what_is_promised_are_as_committed_and_numbers_beyond_have_their_cause(
-        told, changes, wrong, words):
-    """And the source is not blamed where a version, or a scene, explains it."""
-    other = changed(told, **changes)
-    found, said = manifest.check(other, other, told)
-    assert len(found) == len(wrong) and all(part in line for part, line in zip(wrong, found))
-    assert len(said) == bool(words) and all(words in line and "source: b" not in line for line in said)
+def test_round_off_passes_and_larger_differences_are_reported_with_their_cause(
+        committed, changes, wrong, words):
+    """The source is not named as the cause if a version or a scene explains the difference."""
+    other = changed(committed, **changes)
+    errors, notes = manifest.check(other, other, committed)
+    assert len(errors) == len(wrong) and all(part in line for part, line in zip(wrong, errors))
+    assert len(notes) == bool(words) and all(words in line and "source: b" not in line for line in notes)
 
 
 def test_the_committed_manifest_is_of_the_present_figures():
-    kept = json.loads(manifest.COMMITTED.read_text(encoding="utf-8"))
-    assert list(kept["figures"]) == list(paper_figures.FIGURES)
+    committed = json.loads(manifest.COMMITTED.read_text(encoding="utf-8"))
+    assert list(committed["figures"]) == list(paper_figures.FIGURES)
     requests = {request for name in paper_figures.FIGURES for request in import_module(f"paper_figures.{name}").RUNS}
     scenes = {request.name: scene_hash(request.load()) for request in requests}
-    assert {name: run["scene"] for name, run in kept["runs"].items()} == scenes
-    assert {"python", "numpy", "scipy", "mmgpy", "blas", "processor"} <= set(kept["environment"])
+    assert {name: run["scene"] for name, run in committed["runs"].items()} == scenes
+    assert {"python", "numpy", "scipy", "mmgpy", "blas", "processor"} <= set(committed["environment"])

@@ -1,6 +1,5 @@
-"""The triangulation (3.1): what it covers, that prescribed nodes stay, and what is bent; and the motion of its nodes
-(3.5), (35), whatever the mesh. When a mesh is acceptable is the case mesh_motion-criterion, how fine it is in
-`test_sizing.py`, where moved nodes go in the cases of the stage mesh_motion."""
+"""The triangulation (3.1): coverage, prescribed nodes and bent triangles. The case mesh_motion-criterion tests when a
+mesh is acceptable, `test_sizing.py` its element sizes, and the cases of the stage mesh_motion where moved nodes go."""
 from dataclasses import replace
 
 import numpy as np
@@ -17,7 +16,7 @@ both = pytest.mark.parametrize("geometry", [1, 2])
 
 
 def fluid_regions(grid):
-    """Number of pieces of fluid that hang together through edges."""
+    """Number of pieces of the fluid that are connected through edges."""
     edge = grid.topology.cell_edges[~grid.biomass]
     owner = np.repeat(np.arange(len(edge)), 3)
     link = coo_array((np.ones(edge.size), (owner, edge.ravel()))).tocsr()
@@ -26,9 +25,9 @@ def fluid_regions(grid):
 
 @settings(max_examples=20)
 @given(attached_aggregates(width=widths) | attached_aggregates(width=widths, geometry=2))
-def test_any_outline_keeps_its_nodes_to_the_last_bit_and_its_edges(drawn):
-    """The loop is the refined outline, bit for bit; every edge of it is an edge of the mesh, biomass on its left; the
-    fluid is one piece, no node is to spare, and no triangle is poor."""
+def test_the_mesh_of_any_outline_keeps_its_nodes_and_edges_exactly(drawn):
+    """The loop is the refined outline, bit for bit. Each of its edges is an edge of the mesh with biomass on its left.
+    The fluid is one piece, every node belongs to a triangle, and no triangle is poor."""
     outline, width = drawn
     grid, fine = meshed(outline, width)
     assert (grid.points[grid.loop] == fine.points).all()
@@ -54,18 +53,18 @@ def test_an_impossible_outline_is_refused_with_its_place(geometry):
 
 
 def test_only_triangles_at_the_aggregate_are_bent():
-    """In a mesh that was made, the others are straight, which ``acceptable`` stands on; and a bent one that is turned
-    over is found, and refused."""
-    made = pore.seeded(scene("20 um", numerics={"preset": "fast"})).mesh
-    straight, others = made.moved(made.with_middles(made.points[: made.corners])), np.ones(len(made.cells), bool)
-    bent = made.topology.bent
-    others[bent] = False
-    assert np.allclose(made.points[made.cells[others]], straight.points[made.cells[others]], rtol=0, atol=1e-12)
-    apart = np.abs(made.points[made.cells] - straight.points[made.cells]).max(axis=(1, 2))
-    assert not made.biomass[bent[apart[bent] > 0.01]].all() and made.acceptable()
-    points = made.points.copy()
-    middle = made.loop[np.flatnonzero(points[made.loop, 1] > 10)[0] // 2 * 2 + 1]
+    """The others are straight in a new mesh, as ``acceptable`` assumes. A bent triangle that is turned over is
+    refused."""
+    grid = pore.seeded(scene("20 um", numerics={"preset": "fast"})).mesh
+    straight, unbent = grid.moved(grid.with_middles(grid.points[: grid.corners])), np.ones(len(grid.cells), bool)
+    bent = grid.topology.bent
+    unbent[bent] = False
+    assert np.allclose(grid.points[grid.cells[unbent]], straight.points[grid.cells[unbent]], rtol=0, atol=1e-12)
+    distance = np.abs(grid.points[grid.cells] - straight.points[grid.cells]).max(axis=(1, 2))
+    assert not grid.biomass[bent[distance[bent] > 0.01]].all() and grid.acceptable()
+    points = grid.points.copy()
+    middle = grid.loop[np.flatnonzero(points[grid.loop, 1] > 10)[0] // 2 * 2 + 1]
     points[middle, 1] += 10.0
-    assert not made.moved(points).acceptable()
+    assert not grid.moved(points).acceptable()
     with pytest.raises(MeshError, match="a triangle near .* is turned over"):
-        made.moved(points).checked()
+        grid.moved(points).checked()

@@ -30,18 +30,18 @@ HASTY = ["numerics.refinement=0.5", "pore.length=200 um", "growth.end=6 h", "gro
 
 @SIDES
 @pytest.mark.parametrize("time", ["updates", "midpoint"])
-@pytest.mark.parametrize("from_end, when", [(8.7, "at t = "), (5.3, "at t = 0 h")])
-def test_a_run_ends_at_either_end_of_the_pore_and_names_it(time, from_end, when, sign, side):
+@pytest.mark.parametrize("from_end, moment", [(8.7, "at t = "), (5.3, "at t = 0 h")])
+def test_a_run_ends_at_either_end_of_the_pore_and_names_it(time, from_end, moment, sign, side):
     """A seed of 5 um grows towards an end. With its middle 8.7 um from the end, a step ends within an element of the
     end. With its middle at 5.3 um, the first step itself passes the end."""
     changes = [*HASTY, f"numerics.time={time}", f"aggregate.position={sign * (100 - from_end)} um"]
-    with pytest.raises(PoreEnd, match=f"^the aggregate reaches the pore's {side} end {when}"):
+    with pytest.raises(PoreEnd, match=f"^the aggregate reaches the pore's {side} end {moment}"):
         list(simulate(load_scene("base", changes)))
 
 
 @st.composite
 def leaning(draw, width=50.0):
-    """Points of an aggregate.outline that leans to either side, upstream end first."""
+    """Points of an aggregate.outline that leans upstream or downstream, upstream end first."""
     count = draw(st.integers(3, 6))
     angle = np.linspace(np.pi, 0.0, count + 2)
     radius = np.array(draw(st.lists(st.floats(8.0, 30.0), min_size=count + 2, max_size=count + 2)))
@@ -50,17 +50,17 @@ def leaning(draw, width=50.0):
     return np.column_stack([x + draw(st.floats(-60.0, 60.0)), y])
 
 
-def outlined(name, points, *changes):
+def scene_with_outline(name, points, *changes):
     """A scene with an outline."""
     text = ", ".join(f'["{x!r} um", "{y!r} um"]' for x, y in points.tolist())
     return load_scene(name, [f"aggregate.outline=[{text}]", *changes], ["aggregate.radius"])
 
 
-def judgement(scene, speed):
+def judge(scene, speed):
     """The numbers and warnings of `repro check`, without a solution."""
-    judged = numbers.numbers(scene, speed)
-    values = {each.name: [each.start, each.end or 0.0] for each in judged}
-    return values, {each.key: each.text for each in simplifications.warnings(scene, judged)}
+    results = numbers.numbers(scene, speed)
+    values = {result.name: [result.start, result.end or 0.0] for result in results}
+    return values, {result.key: result.text for result in simplifications.find_warnings(scene, results)}
 
 
 def assert_alike(one, other):
@@ -72,32 +72,32 @@ def assert_alike(one, other):
 @share(0.5)
 @given(leaning(), st.sampled_from([None, 1e5]))
 def test_an_outline_and_its_mirror_image_are_judged_alike(points, speed):
-    """Numbers and warnings, with flow and without, however far to one side the aggregate reaches."""
+    """Numbers and warnings agree with and without flow, however far the aggregate reaches to one side."""
     changes = ["pore.length=260 um", "growth.shear_modulus=1e-6 MPa", "numerics.extent=central"]
-    both = [outlined("wide", each, *changes) for each in (points, points[::-1] * [-1, 1])]
-    one, other = (judgement(scene, speed) for scene in both)
+    both = [scene_with_outline("wide", each, *changes) for each in (points, points[::-1] * [-1, 1])]
+    one, other = (judge(scene, speed) for scene in both)
     assert_alike(one, other)
     reach = np.abs(points[:, 0]).max()
     assert ("pore.length" in one[1]) or reach < 130
 
 
 @SIDES
-def test_how_far_an_outline_reaches_is_told_on_either_side(sign, side):
+def test_the_reach_of_an_outline_is_reported_on_either_side(sign, side):
     """The farther end counts: 100 um of 130 um."""
     points = np.array([[-20.0, 0.0], [-10.0, 12.0], [60.0, 20.0], [100.0, 0.0]])
     points = points if sign > 0 else points[::-1] * [-1, 1]
-    _, warned = judgement(outlined("base", points, "pore.length=260 um", "growth.end=0 h"), 1e5)
-    assert "(reach 100 of 130 um)" in warned.get("pore.length", "")
+    _, warnings = judge(scene_with_outline("base", points, "pore.length=260 um", "growth.end=0 h"), 1e5)
+    assert "(reach 100 of 130 um)" in warnings.get("pore.length", "")
 
 
 @given(st.floats(0.0, 200.0))
 def test_a_seed_and_its_mirror_image_are_judged_alike(position):
-    one, other = (judgement(load_scene("base", [f"aggregate.position={sign * position} um"]), 1e5) for sign in (1, -1))
+    one, other = (judge(load_scene("base", [f"aggregate.position={sign * position} um"]), 1e5) for sign in (1, -1))
     assert_alike(one, other)
 
 
-def read(points, geometry, smooth):
-    """An outline; None where it is refused."""
+def build_outline(points, geometry, smooth):
+    """An outline, or None if it is refused."""
     try:
         return polygon(points, 50.0, geometry, smooth)
     except MeshError:
@@ -106,8 +106,8 @@ def read(points, geometry, smooth):
 
 @given(leaning(), st.sampled_from([1, 2]), st.booleans())
 def test_an_outline_of_a_scene_and_its_mirror_image(points, geometry, smooth):
-    """Extremes exchanged, area and fixed points kept; refused alike where a spline leaves the pore."""
-    one, other = (read(each, geometry, smooth) for each in (points, points[::-1] * [-1, 1]))
+    """Extremes change places; area and fixed points stay. Both are refused if a spline leaves the pore."""
+    one, other = (build_outline(each, geometry, smooth) for each in (points, points[::-1] * [-1, 1]))
     if None in (one, other):
         assert one is other and smooth
         return
@@ -116,23 +116,23 @@ def test_an_outline_of_a_scene_and_its_mirror_image(points, geometry, smooth):
     assert np.sort(one.points[one.fixed, 0]) == pytest.approx(np.sort(-other.points[other.fixed, 0]), abs=1e-9)
 
 
-def image(outline):
-    """The mirror image of a polygon that need not begin with its first corner."""
+def mirror_image(outline):
+    """The mirror image of a polygon that may begin at any corner."""
     return type(outline)(outline.points[::-1] * [-1, 1], outline.wall[::-1], outline.fixed[::-1],
                          outline.origin[::-1] * [-1, 1])
 
 
 @given(outlines(), st.sampled_from([np.inf, 0.3]), st.floats(0.05, 2.0))
 def test_sizes_at_an_outline_and_its_mirror_image(drawn, contact, refinement):
-    """Node by node, with small elements beside contact lines and without; and of the fluid around it."""
+    """Sizes agree node by node and in the fluid, with and without small elements beside contact lines."""
     outline, width = drawn
-    asked = sizing.Sizing(width, refinement, 2.0, contact=contact)
-    one, other = (sizing.interface_sizes(each, asked) for each in (outline, image(outline)))
+    sizes = sizing.Sizing(width, refinement, 2.0, contact=contact)
+    one, other = (sizing.interface_sizes(each, sizes) for each in (outline, mirror_image(outline)))
     assert one == pytest.approx(other[::-1], rel=1e-9)
-    (places, one), (images, other) = (sizing.size_sources(each, asked) for each in (outline, image(outline)))
-    order, exchanged = (np.lexsort(each.T.round(9)) for each in (places, images * [-1, 1]))
+    (sources, one), (mirrored, other) = (sizing.size_sources(each, sizes) for each in (outline, mirror_image(outline)))
+    order, exchanged = (np.lexsort(each.T.round(9)) for each in (sources, mirrored * [-1, 1]))
     assert one[order] == pytest.approx(other[exchanged], rel=1e-9)
-    assert sizing.too_coarse(outline, asked) == sizing.too_coarse(image(outline), asked)
+    assert sizing.too_coarse(outline, sizes) == sizing.too_coarse(mirror_image(outline), sizes)
 
 
 # Numbers and their negatives.
@@ -154,12 +154,12 @@ def test_the_interval_of_a_closed_form_is_that_of_its_mirror(a, b, c):
 
 @given(*2 * [st.lists(st.floats(-10.0, 10.0), min_size=2, max_size=2).map(sorted)])
 def test_an_outcome_is_that_of_its_mirror(bar, bounds):
-    """Of a bar and the bounds of what is accepted."""
+    """The outcome follows from an error bar and the accepted bounds."""
     (low, high), (least, most) = bar, bounds
-    judged = claims.outcome_of((low, high), (least, most))
-    assert judged == claims.outcome_of((-high, -low), (-most, -least))
-    assert (judged == claims.HOLDS) == (least <= low and high <= most)
-    assert (judged == claims.FAILS) == (high < least or most < low)
+    outcome = claims.outcome_of((low, high), (least, most))
+    assert outcome == claims.outcome_of((-high, -low), (-most, -least))
+    assert (outcome == claims.HOLDS) == (least <= low and high <= most)
+    assert (outcome == claims.FAILS) == (high < least or most < low)
 
 
 @given(st.lists(st.floats(-1e3, 1e3), min_size=3, max_size=5))
@@ -176,8 +176,8 @@ def test_a_shape_is_judged_by_the_bound_of_the_law_on_its_side(spanned, area, pa
     length, *bounds = law.added_resistance(area, 1.0, bool(spanned), 2000.0)
     shape = length * (bounds[side] / length) ** part
     row = dict(zip(law.COLUMNS, np.array([[1], [1], [spanned], [2000.0], [area], [shape]], float)))
-    judged = law.judged(row)
-    assert judged.inside == inside and judged.beyond == pytest.approx(part, rel=1e-9)
+    verdict = law.judged(row)
+    assert verdict.inside == inside and verdict.beyond == pytest.approx(part, rel=1e-9)
 
 
 @pytest.mark.parametrize("first, second, expected", [

@@ -1,5 +1,5 @@
-"""The verification can fail: mutants apply to the code as it is, and five of them are caught by the cases that name
-them, one by the test that it names."""
+"""The verification can fail: mutants apply to the present code. The cases that name them catch five of them, and the
+test that it names catches one."""
 import ast
 
 import pytest
@@ -12,7 +12,7 @@ from verification.mutants.runner import Outcome, Trial
 
 KNOWN = runner.everything()
 OF_CASES, OF_TESTS = map(runner.caught_by, ("cases", "tests"))
-#: One of each of five stages, caught by a case or two of less than a second, and one that a test catches.
+#: One mutant from each of five stages, caught by cases of less than a second, and one caught by a test.
 TRIED = ("inlet-not-scaled", "yield-dropped", "stress-transposed", "lumped-mass", "interface-slips",
          "pickles-read")
 PLUG, OTHER = "flow-plug", "flow-poiseuille"
@@ -20,10 +20,10 @@ PLUG, OTHER = "flow-plug", "flow-poiseuille"
 
 @pytest.mark.parametrize("id", KNOWN)
 def test_a_mutant_applies_to_the_code_in_one_place_says_what_is_wrong_and_is_still_python(id):
-    chosen = KNOWN[id]
-    assert (ROOT / chosen.file).read_text(encoding="utf-8").count(chosen.old) == 1 and chosen.old != chosen.new
-    compile(runner.mutated(chosen), chosen.file, "exec")
-    assert chosen.file.startswith(("repro/", "verification/")) and len(chosen.says.split()) > 2
+    mutant = KNOWN[id]
+    assert (ROOT / mutant.file).read_text(encoding="utf-8").count(mutant.old) == 1 and mutant.old != mutant.new
+    compile(runner.mutated(mutant), mutant.file, "exec")
+    assert mutant.file.startswith(("repro/", "verification/")) and len(mutant.says.split()) > 2
 
 
 def test_every_case_names_mutants_that_exist_and_every_mutant_is_named_or_names_tests():
@@ -39,32 +39,32 @@ def test_the_tests_that_a_mutant_names_are_there(id):
         assert name.partition("[")[0] in {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}, test
 
 
-@pytest.mark.parametrize("body, caught, how", [
+@pytest.mark.parametrize("body, caught, message", [
     ("assert 1 == 2", True, "assert 1 == 2"), ("raise MeshError('no')", True, "repro.errors.MeshError: no"),
     ("pytest.fail('q: 2; expected', pytrace=False)", True, "Failed: q: 2; expected"),
     ("assert value if value else wrong", False, "broken: NameError"), ("wrong", False, "broken: NameError"),
     ("assert not value and wrong", True, "assert (not"), ("pass", False, "passes"),
     ("pass\ndel test_b", False, "broken: there is no"), ("import os; os.abort()", False, "broken: the process ended")])
-def test_an_assertion_or_a_guard_catches_and_a_broken_or_absent_test_does_not(tmp_path, body, caught, how):
-    """In any of its variants."""
+def test_an_assertion_or_a_guard_catches_and_a_broken_or_absent_test_does_not(tmp_path, body, caught, message):
+    """Each variant of the test can catch the mutant."""
     folder = tmp_path / "project"
     folder.mkdir()
     (folder / "test_a.py").write_text("import pytest\nfrom repro.errors import MeshError\n"
                                       f"@pytest.mark.parametrize('value', [0, 1])\ndef test_b(value):\n    {body}\n")
     trial = runner.trial(folder, "b", ["test_a.py::test_b"])
-    assert trial.caught is caught and trial.message.startswith(how), trial
+    assert trial.caught is caught and trial.message.startswith(message), trial
 
 
-@pytest.mark.parametrize("trials, fine", [
+@pytest.mark.parametrize("trials, passes", [
     ({PLUG: True}, True), ({PLUG: False}, False), ({OTHER: True}, True), ({}, False),
     ({OTHER: True, PLUG: False}, False)])
-def test_a_survivor_or_a_case_that_passes_with_its_mutant_is_a_failure(trials, fine):
+def test_a_survivor_or_a_case_that_passes_with_its_mutant_is_a_failure(trials, passes):
     outcome = Outcome(cases()[PLUG].mutants[0], tuple(Trial(name, caught, "") for name, caught in trials.items()))
-    assert runner.judge([outcome]) is fine and not runner.judge([])
+    assert runner.judge([outcome]) is passes and not runner.judge([])
 
 
 def test_a_record_is_stale_after_a_change_of_the_mutated_file_or_of_a_module_that_caught_it(tmp_path, monkeypatch):
-    """And the records of other mutants stay fresh."""
+    """The records of other mutants stay fresh."""
     files = {"repro/a.py": "old\n", "repro/b.py": "old\n", "tests/test_a.py": "a\n", "tests/test_b.py": "b\n"}
     for name, text in files.items():
         (tmp_path / name).parent.mkdir(exist_ok=True)
@@ -78,15 +78,15 @@ def test_a_record_is_stale_after_a_change_of_the_mutated_file_or_of_a_module_tha
         runner.record(Outcome(id, (Trial(mutant.tests[0], True, "q: 2"),)))
     assert runner.fresh() == {"a", "b"}
     assert pages.mutant_state() == "2 of 2 mutants caught by `make mutants`, run on this code."
-    for name, left in (("repro/a.py", {"b"}), ("tests/test_b.py", {"a"})):
+    for name, fresh in (("repro/a.py", {"b"}), ("tests/test_b.py", {"a"})):
         (tmp_path / name).write_text("old and more\n")
-        assert runner.fresh() == left and "1 of them run BEFORE THE LAST CHANGE" in pages.mutant_state()
+        assert runner.fresh() == fresh and "1 of them run BEFORE THE LAST CHANGE" in pages.mutant_state()
         (tmp_path / name).write_text(files[name])
 
 
 @pytest.mark.parametrize("id", TRIED)
 def test_a_mutant_is_caught_by_every_case_that_names_it(id):
-    """In a copy of the code, in a process of its own, as `make mutants` does it for all; or by every test it names."""
+    """The cases, or the tests that it names, run in a process on a copy of the code, as in `make mutants`."""
     outcome = runner.run(KNOWN[id], every=True)
     assert outcome.caught_by and not outcome.missed_by, outcome
 

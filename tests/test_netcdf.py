@@ -1,4 +1,4 @@
-"""The time series as NetCDF: equal to the CSV table, with CF's conventions, whole or not at all."""
+"""The time series as NetCDF: equal to the CSV table, with CF's conventions, complete or absent."""
 import json
 
 import numpy as np
@@ -9,52 +9,52 @@ import repro
 from repro import results
 from repro.scene import load_scene, rules, scene_hash, scene_tables
 from tests.pages import run
-from tests.shell import flags, refused, stopped
+from tests.shell import flags, interrupt_run, refusal
 
 SETS = ['numerics.preset="fast"', 'growth.end="1 h"', 'growth.time_step="1 min"', 'output.timeseries="netcdf"']
 UNITS = {"m d-1", "mg L-1", "um2", "um", "cm", "h", "1"}
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory):
+def folder(tmp_path_factory):
     return run(tmp_path_factory.mktemp("netcdf"), "base", *SETS)
 
 
 def content(out):
-    with xarray.open_dataset(out / "timeseries.nc", engine="scipy") as found:
-        return found.load()
+    with xarray.open_dataset(out / "timeseries.nc", engine="scipy") as dataset:
+        return dataset.load()
 
 
-def test_it_is_the_table(made):
-    """Every column to the last bit."""
-    found, table = content(made), results.read_table(made / "timeseries.csv")
-    assert set(found.variables) == set(table) == set(results.COLUMNS) and len(table["time_h"]) > 2
+def test_the_dataset_equals_the_table(folder):
+    """Every column agrees to the last bit."""
+    dataset, table = content(folder), results.read_table(folder / "timeseries.csv")
+    assert set(dataset.variables) == set(table) == set(results.COLUMNS) and len(table["time_h"]) > 2
     for name, column in table.items():
-        assert found[name].dims == ("time_h",) and found[name].dtype == np.float64
-        assert np.array_equal(found[name].to_numpy(), column, equal_nan=True), name
+        assert dataset[name].dims == ("time_h",) and dataset[name].dtype == np.float64
+        assert np.array_equal(dataset[name].to_numpy(), column, equal_nan=True), name
 
 
-def test_it_says_what_it_is(made):
-    found, loaded = content(made), load_scene("base", SETS)
-    assert found.attrs["Conventions"] == "CF-1.11" and found.attrs["scene"] == "base" and found.attrs["title"]
-    assert found.attrs["scene_hash"] == scene_hash(loaded)
-    assert found.attrs["source"] == f"dupin2001-repro {repro.__version__}"
-    assert json.loads(found.attrs["scene_tables"]) == scene_tables(loaded)
-    assert json.loads(found.attrs["versions"])["numpy"] == np.__version__
-    assert {variable.attrs["units"] for variable in found.variables.values()} == UNITS
-    assert all(variable.attrs["long_name"] for variable in found.variables.values())
-    assert found.mean_velocity_m_per_d.attrs == {"long_name": "mean velocity", "units": "m d-1"}
-    assert found.time_h.attrs["units"] == "h" and "time_h" in found.coords
+def test_the_dataset_names_scene_source_and_units(folder):
+    dataset, scene = content(folder), load_scene("base", SETS)
+    assert dataset.attrs["Conventions"] == "CF-1.11" and dataset.attrs["scene"] == "base" and dataset.attrs["title"]
+    assert dataset.attrs["scene_hash"] == scene_hash(scene)
+    assert dataset.attrs["source"] == f"dupin2001-repro {repro.__version__}"
+    assert json.loads(dataset.attrs["scene_tables"]) == scene_tables(scene)
+    assert json.loads(dataset.attrs["versions"])["numpy"] == np.__version__
+    assert {variable.attrs["units"] for variable in dataset.variables.values()} == UNITS
+    assert all(variable.attrs["long_name"] for variable in dataset.variables.values())
+    assert dataset.mean_velocity_m_per_d.attrs == {"long_name": "mean velocity", "units": "m d-1"}
+    assert dataset.time_h.attrs["units"] == "h" and "time_h" in dataset.coords
 
 
-def test_that_of_a_run_that_was_stopped_is_its_table(tmp_path):
-    stopped(load_scene("base", SETS), tmp_path, after=2)
+def test_the_dataset_of_a_stopped_run_equals_its_table(tmp_path):
+    interrupt_run(load_scene("base", SETS), tmp_path, after=2)
     assert (tmp_path / "timeseries.nc").exists()
     assert np.array_equal(content(tmp_path).time_h, results.read_table(tmp_path / "timeseries.csv")["time_h"])
 
 
-def test_without_xarray_it_is_refused_before_the_run(tmp_path, monkeypatch, capsys):
+def test_netcdf_without_xarray_is_refused_before_the_run(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(rules, "find_spec", lambda name: None)
-    line = refused(tmp_path, capsys, "run", "base", *flags(*SETS), "--out", tmp_path / "run")
+    line = refusal(tmp_path, capsys, "run", "base", *flags(*SETS), "--out", tmp_path / "run")
     assert 'output.timeseries = "netcdf"' in line and "pip install xarray" in line
     assert not (run(tmp_path, "flow_only") / "timeseries.nc").exists()

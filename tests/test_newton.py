@@ -3,14 +3,14 @@ from dataclasses import dataclass
 
 import pytest
 
-from repro.fem.newton import ENOUGH, STALLED, Newton
+from repro.fem.newton import REQUIRED_REDUCTION, STALLED, Newton
 
 TOLERANCE, ROUND_OFF = 1e-12, 1e-8
 
 
 @dataclass(frozen=True)
-class Told:
-    """An iterate of which only the defect is known; its number."""
+class FakeIterate:
+    """A Newton iterate with a prescribed defect and its number."""
 
     defect: float
     number: int
@@ -18,10 +18,10 @@ class Told:
 
 
 class Script:
-    """A system whose iterates have given defects, told one after the other; what was asked of it."""
+    """A system whose iterates have prescribed defects. It records the factorisations and the fresh derivatives."""
 
     def __init__(self, defects):
-        self.told = [Told(defect, k) for k, defect in enumerate(defects)]
+        self.iterates = [FakeIterate(defect, k) for k, defect in enumerate(defects)]
         self.factorised, self.fresh = [], []
 
     def factored(self, iterate):
@@ -31,29 +31,29 @@ class Script:
     def advanced(self, iterate, factors, fresh):
         assert factors == f"of {self.factorised[-1]}"
         self.fresh.append(fresh)
-        return self.told[iterate.number + 1]
+        return self.iterates[iterate.number + 1]
 
 
-def run(script, reused=False, most=20):
-    return Newton(TOLERANCE, ROUND_OFF, most, reused).solve(script, script.told[0])
+def run(script, modified_newton=False, most=20):
+    return Newton(TOLERANCE, ROUND_OFF, most, modified_newton).solve(script, script.iterates[0])
 
 
-def visits(reused, defects):
-    """Whether each iterate with these defects asks for a new factorisation; the last one has converged."""
+def factorisations(modified_newton, defects):
+    """Whether each iterate with these defects makes a new factorisation; the last iterate has converged."""
     script = Script([*defects, 0.0])
-    run(script, reused)
+    run(script, modified_newton)
     assert script.fresh == [k in script.factorised for k in range(len(defects))]
     return script.fresh
 
 
-def test_fresh_derivatives_are_made_for_every_iterate():
-    assert visits(False, [1.0, 1e-3, 1e-6]) == [True, True, True]
+def test_newton_factorises_a_fresh_derivative_for_every_iterate():
+    assert factorisations(False, [1.0, 1e-3, 1e-6]) == [True, True, True]
 
 
-def test_a_derivative_is_used_again_while_it_does_enough():
-    """The first is made, then one wherever the defect has fallen by less than ENOUGH."""
-    slow, quick = 2 * ENOUGH, ENOUGH / 2
-    assert visits(True, [1.0, slow, slow * quick, slow * quick**2, slow**2 * quick**2]) == [
+def test_modified_newton_keeps_a_derivative_while_the_defect_falls_enough():
+    """The first is made, then one wherever the defect has fallen by less than REQUIRED_REDUCTION."""
+    slow, quick = 2 * REQUIRED_REDUCTION, REQUIRED_REDUCTION / 2
+    assert factorisations(True, [1.0, slow, slow * quick, slow * quick**2, slow**2 * quick**2]) == [
         True, True, False, False, True]
 
 
@@ -65,8 +65,8 @@ def test_a_derivative_is_used_again_while_it_does_enough():
     ([1.0, 1e-7, 5e-8, 1e-13], 3, True),
     ([1.0, 2.0, 3.0, 4.0], 3, False),
 ])
-def test_when_it_stops(defects, count, converged):
-    """Under the tolerance; or where round-off keeps a defect that is small enough from falling."""
+def test_newton_stops_at_the_tolerance_or_at_round_off(defects, count, converged):
+    """Iteration stops below the tolerance, or once round-off keeps a small defect from falling."""
     assert STALLED == 0.1
     last, steps, done = run(Script(defects), most=4 if converged else 3)
     assert (last.number, steps, done) == (count, count, converged)

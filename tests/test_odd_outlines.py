@@ -16,9 +16,9 @@ from repro.model import pore
 from repro.preflight import memory
 from repro.preflight.checked import check
 from repro.scene import SceneError, load_scene, packaged_scenes, parse_scene
-from tests.shell import refused
+from tests.shell import refusal
 
-#: What an outline of at most 1000 points may ask for in the preset fast, whatever its features are.
+#: The most nodes that any outline of at most 1000 points may need in the preset fast.
 MOST_NODES = 30_000
 WIDTH = 100.0
 
@@ -55,8 +55,8 @@ def overhang(draw):
 
 
 def fold(draw):
-    gap, deep = log_between(draw, 1e-4, 2), log_between(draw, 0.5, 20)
-    return [(-30, 0), (-30, 40), (-gap, 40), (-gap / 2, deep), (gap / 2, deep), (gap, 40), (30, 40), (30, 0)]
+    gap, bottom = log_between(draw, 1e-4, 2), log_between(draw, 0.5, 20)
+    return [(-30, 0), (-30, 40), (-gap, 40), (-gap / 2, bottom), (gap / 2, bottom), (gap, 40), (30, 40), (30, 0)]
 
 
 def many_points(draw):
@@ -95,9 +95,9 @@ def scene(points, preset="fast"):
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("family", FAMILIES)
 def test_a_hostile_outline_has_a_first_row_or_is_refused_by_its_scene(family, seed):
-    """The refusal is one line with what is needed. The nodes are within a factor of two of those that are expected,
-    and not more than any outline may ask for. If the mesh is too coarse for the first state, the advised refinement
-    resolves it."""
+    """The refusal is one line with the requirement. The number of nodes is within a factor of two of the estimate, and
+    below the limit for any outline. If the mesh is too coarse for the first state, the advised refinement resolves
+    it."""
     points = family(random.Random(seed))
     try:
         accepted = scene(points)
@@ -113,7 +113,7 @@ def test_a_hostile_outline_has_a_first_row_or_is_refused_by_its_scene(family, se
 
 
 def first_row(accepted):
-    """Of a run, with the refinement that it advises where it advises one."""
+    """The first row of a run, with the advised refinement if the run advises one."""
     try:
         return next(simulate(accepted))
     except SimulationError as error:
@@ -123,8 +123,8 @@ def first_row(accepted):
 
 
 @pytest.mark.parametrize("preset, nodes", [("fast", 6000), ("accurate", 12_000), ("paper", 12_000)])
-def test_a_sliver_asks_for_no_more_elements_than_its_length(preset, nodes):
-    """A body 0.1 um thick and 400 um long: a tenth of its thickness all along is 40 000 edges in paper."""
+def test_a_sliver_needs_no_more_elements_than_its_length(preset, nodes):
+    """A body is 0.1 um thick and 400 um long. Edges of a tenth of its thickness would be 40 000 in paper."""
     thin = scene([(-200, 0), (-199, 0.1), (199, 0.1), (200, 0)], preset)
     assert memory.first_nodes(thin) < 2 * nodes
     assert len(pore.seeded(thin).mesh.points) < nodes
@@ -147,8 +147,8 @@ def test_the_bound_on_elements_leaves_half_discs_as_they_are(name, monkeypatch):
     ([(-30, 0), (-30, 30), (-0.04, 30), (-0.04, 10), (0.04, 10.5), (0.04, 30), (30, 30), (30, 0)],
      "between the lines after points 2 and 5"),
 ])
-def test_what_no_mesh_resolves_is_refused(points, needed):
-    """A thousandth of the width between edges, a ten-thousandth to a wall or an end; and no more than that."""
+def test_gaps_that_no_mesh_resolves_are_refused(points, needed):
+    """The least gap is a thousandth of the width between edges, and a ten-thousandth at a wall or an end."""
     if not needed:
         assert scene(points)
         return
@@ -167,33 +167,33 @@ def test_a_spline_that_is_no_outline_is_refused_before_anything_is_written(tmp_p
     outline = [[f"{x} um", f"{y} um"] for x, y in points]
     path.write_text(f'[pore]\nwidth = "100 um"\n[aggregate]\nsmooth = true\noutline = {json.dumps(outline)}\n')
     out = ["--out", tmp_path / "run"] if command == "run" else []
-    message = refused(tmp_path, capsys, command, path, *out)
+    message = refusal(tmp_path, capsys, command, path, *out)
     assert needed in message and "give more points, or smooth = false" in message
 
 
-def test_check_makes_no_mesh_that_is_much_larger_than_what_it_tries(monkeypatch):
-    """Above 20 000 nodes it estimates them, and its report says so."""
+def test_check_estimates_a_large_mesh_instead_of_making_it(monkeypatch):
+    """Above 20 000 nodes check estimates their number, and its report states this."""
     counts = []
     generate = mesher.generate
 
-    def counted(*told):
-        mesh, outline = generate(*told)
+    def counted(*arguments):
+        mesh, outline = generate(*arguments)
         counts.append(len(mesh.points))
         return mesh, outline
 
     monkeypatch.setattr(mesher, "generate", counted)
     fine = load_scene("base", ['numerics.preset="paper"', "numerics.refinement=8", "growth.end=0.2 h"])
-    found = check(fine)
-    assert found.estimated and f"about {found.nodes} nodes" in str(found)
-    assert max(counts) < 6000 < found.nodes
+    report = check(fine)
+    assert report.estimated and f"about {report.nodes} nodes" in str(report)
+    assert max(counts) < 6000 < report.nodes
     assert not check("initial_mesh").estimated
     mesh = pore.seeded(fine).mesh
-    assert found.nodes == pytest.approx(len(mesh.points), rel=0.5)
-    assert found.triangles == pytest.approx(len(mesh.biomass), rel=0.5)
+    assert report.nodes == pytest.approx(len(mesh.points), rel=0.5)
+    assert report.triangles == pytest.approx(len(mesh.biomass), rel=0.5)
 
 
 def test_an_aggregate_at_the_end_of_its_pore_is_no_failure():
-    """The run is over at once, with its first row."""
+    """The run ends at once, with its first row."""
     steps = simulate(scene([(-299.98, 0), (-280, 20), (-260, 0)]))
     assert next(steps).pore.time == 0
     with pytest.raises(PoreEnd, match="reaches the pore's upstream end at t = 0 h"):

@@ -20,13 +20,13 @@ BODIES = {"viscous": ["flow.viscosity_ratio=20", "growth.fluid_forces=included"]
           "permeable": ["flow.biomass=brinkman", "flow.permeability=40 um^2"]}
 INTERFACES = ("laplacian", "traction")
 #: Linear elements take no permeable body.
-WAYS = [way for way in product(BODIES, INTERFACES, ORDERS) if way[::2] != ("permeable", 1)]
-EVERY_WAY = pytest.mark.parametrize("body, interface, order", WAYS)
+COMBINATIONS = [each for each in product(BODIES, INTERFACES, ORDERS) if each[::2] != ("permeable", 1)]
+EVERY_COMBINATION = pytest.mark.parametrize("body, interface, order", COMBINATIONS)
 
 
 @cache
 def solved(body, interface, order, *changes):
-    """(scene, pore, what is solved in it) on a coarse mesh."""
+    """(scene, pore, its solution) on a coarse mesh."""
     scene = load_scene("base", [
         f"aggregate.outline={POINTS}", f"numerics.elements={ORDERS[order]}", f"numerics.interface={interface}",
         f"numerics.refinement={0.5 if order == 1 else 0.2}",
@@ -36,25 +36,25 @@ def solved(body, interface, order, *changes):
 
 
 def strain(space, velocity, interface):
-    """(T, q, 2, 2) 1/h, what viscosity multiplies: grad u, with its transpose in the traction form."""
-    slopes = space.gradients_at.slopes
-    gradient = np.einsum("tai,tqka->tqik", velocity[space.cells], slopes)
+    """(T, q, 2, 2) 1/h: the rate that viscosity multiplies, grad u (+ grad u^T in the traction form), and grad u."""
+    shape_gradients = space.gradients_at.slopes
+    gradient = np.einsum("tai,tqka->tqik", velocity[space.cells], shape_gradients)
     return gradient + np.swapaxes(gradient, 2, 3) * (interface == "traction"), gradient
 
 
-@pytest.mark.parametrize("body, interface, order", [way for way in WAYS if way[2] > 1])
+@pytest.mark.parametrize("body, interface, order", [each for each in COMBINATIONS if each[2] > 1])
 def test_viscosity_and_drag_dissipate_the_work_of_the_head(body, interface, order):
-    """g times head loss times flow, to round-off; elements without stabilisation."""
+    """Dissipation is g times head loss times flow, to round-off, for elements without stabilisation."""
     scene, state, solution = solved(body, interface, order)
     space, stream = state.space, solution.flow
-    both, gradient = strain(space, stream.velocity, interface)
+    symmetrised, gradient = strain(space, stream.velocity, interface)
     ratio = np.where(state.mesh.biomass & (body == "viscous"), 20.0, 1.0)
-    spent = np.einsum("t,tq,tqik,tqik->", ratio, space.gradients_at.dx, both, gradient)
+    dissipated = np.einsum("t,tq,tqik,tqik->", ratio, space.gradients_at.dx, symmetrised, gradient)
     if body == "permeable":
-        speed = space.at_points(stream.velocity.T)
-        spent += np.einsum("tq,itq,itq->", space.at.dx[state.mesh.biomass], *2 * [speed[:, state.mesh.biomass]]) / 40.0
-    done = scene.flow.gravity * stream.meshed_loss * stream.mean_velocity * scene.pore.width
-    assert done == pytest.approx(scene.flow.kinematic_viscosity * spent, rel=1e-9)
+        speed = space.at_points(stream.velocity.T)[:, state.mesh.biomass]
+        dissipated += np.einsum("tq,itq,itq->", space.at.dx[state.mesh.biomass], speed, speed) / 40.0
+    work = scene.flow.gravity * stream.meshed_loss * stream.mean_velocity * scene.pore.width
+    assert work == pytest.approx(scene.flow.kinematic_viscosity * dissipated, rel=1e-9)
 
 
 @pytest.mark.parametrize("interface, order", [*product(INTERFACES, ORDERS)])
@@ -64,29 +64,29 @@ def test_the_force_on_the_aggregate_comes_through_every_section_of_the_fluid(int
     scene, state, solution = solved("viscous", interface, order)
     space, stream, mesh = state.space, solution.flow, state.mesh
     pressure = flow.pressure_space(space)
-    both, _ = strain(space, stream.velocity, interface)
+    symmetrised, _ = strain(space, stream.velocity, interface)
     head = stream.head[pressure.cells] @ elements.values_on(pressure.order, space.gradient_table).T
     drive = scene.flow
-    stress = drive.kinematic_viscosity / drive.gravity * both - head[..., None, None] * np.eye(2)
+    stress = drive.kinematic_viscosity / drive.gravity * symmetrised - head[..., None, None] * np.eye(2)
     section = np.random.default_rng(1).uniform(-1.0, 2.0, space.count)
     dofs = space.dofs
     around = np.concatenate([dofs.walls, dofs.inlet.ravel(), dofs.outlet.ravel(), space.cells[mesh.biomass].ravel()])
     section[around] = space.of_mesh(np.isin(np.arange(len(mesh.points)), mesh.body).astype(float))[around]
     slope = np.einsum("ta,tqka->tqk", section[space.cells], space.gradients_at.slopes)
     wet = ~mesh.biomass
-    pushed = -np.einsum("tq,tqik,tqk->i", space.gradients_at.dx[wet], stress[wet], slope[wet])
+    force = -np.einsum("tq,tqik,tqk->i", space.gradients_at.dx[wet], stress[wet], slope[wet])
     pascals = (drive.density * 1e-3) * (drive.gravity * 1e-6 / 3600**2) * 1e-6
-    expected = pascals / (scene.growth.shear_modulus * 1e6) * pushed
+    expected = pascals / (scene.growth.shear_modulus * 1e6) * force
     forces = traction.forces(scene, traction.surroundings(scene, state, state), state).sum(axis=0)
     assert np.abs(forces).max() > 0 and forces == pytest.approx(expected, rel=1e-8, abs=1e-8 * np.abs(expected).max())
 
 
-@EVERY_WAY
+@EVERY_COMBINATION
 def test_substrates_are_conserved(body, interface, order):
-    """Supplied = leaving + taken up, to round-off."""
+    """Supply = outflow + uptake, to round-off."""
     _, _, solution = solved(body, interface, order)
-    for each in solution.fluxes:
-        assert each.consumed > 0 and each.out + each.consumed == pytest.approx(each.supplied, rel=1e-9)
+    for flux in solution.fluxes:
+        assert flux.consumed > 0 and flux.out + flux.consumed == pytest.approx(flux.supplied, rel=1e-9)
 
 
 def test_a_permeable_body_under_fluid_forces_is_refused():

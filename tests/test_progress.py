@@ -1,4 +1,4 @@
-"""What a run says: to a person on a terminal, elsewhere, to machines, and when it is to be quiet."""
+"""The progress of a run: on a terminal, without one, as JSON, and with --quiet."""
 
 import fcntl
 import json
@@ -16,15 +16,15 @@ import pytest
 from repro.cli import main
 from repro.model import growth
 from repro.runs import progress
-from repro.runs.interrupts import noted
+from repro.runs.interrupts import catch_signals
 from tests.pages import run
-from tests.shell import flags, started, told
+from tests.shell import flags, read_record, start_run
 
 CONTACT = ('numerics.preset="fast"', 'aggregate.radius="17.98 um"', 'pore.width="20 um"', 'growth.end="0.6 h"',
            "numerics.tolerance=0.0001")
 
 
-def test_steps_between_rows_are_told_with_what_they_made(tmp_path, capsys):
+def test_steps_between_rows_are_reported_with_their_remeshes(tmp_path, capsys):
     run(tmp_path, "base", *CONTACT, 'output.times=["0.6 h"]', options=["--json"])
     events = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     steps = [event["remeshes"] for event in events if event["event"] == "step"]
@@ -32,23 +32,23 @@ def test_steps_between_rows_are_told_with_what_they_made(tmp_path, capsys):
     assert steps[-2] > 0
 
 
-def test_json_is_an_object_a_line_and_nothing_else(tmp_path, capsys):
-    """Start, every step, remeshes, contact, checkpoints, end; warnings are in tests/test_warned.py."""
+def test_json_output_is_one_object_a_line(tmp_path, capsys):
+    """Events are start, steps, remeshes, contact, checkpoints and end. tests/test_warned.py tests warnings."""
     folder = run(tmp_path, "base", *CONTACT, options=["--json", "--checkpoint", "0"])
     events = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     names = [event["event"] for event in events]
     assert names[0] == "start" and names[-1] == "end" and names.count("contact") == 1
     steps = [event for event in events if event["event"] == "step"]
     assert [event["step"] for event in steps] == list(range(len(steps))) and steps[-1]["time_h"] == 0.6
-    assert names.count("remesh") == steps[-1]["remeshes"] == told(folder)["remeshes"] > 0
-    assert names.count("checkpoint") == events[-1]["rows"] == told(folder)["rows"] > len(steps)
+    assert names.count("remesh") == steps[-1]["remeshes"] == read_record(folder)["remeshes"] > 0
+    assert names.count("checkpoint") == events[-1]["rows"] == read_record(folder)["rows"] > len(steps)
     assert steps[-1]["contact"] and not steps[0]["contact"]
     assert events[-1]["status"] == "completed" and events[-1]["folder"] == str(folder)
 
 
 @pytest.mark.parametrize("sets, status", [(["pore.width=5 s"], 2), ([], 1)])
-def test_errors_are_objects_too(tmp_path, capsys, monkeypatch, sets, status):
-    """With the exit status and the message that people get."""
+def test_errors_are_json_objects(tmp_path, capsys, monkeypatch, sets, status):
+    """The object has the exit status and the message of the standard error."""
     monkeypatch.setattr(growth, "MOST_ITERATIONS", 1)
     run(tmp_path, "base", *sets, status=status, options=["--json"])
     out, err = capsys.readouterr()
@@ -56,13 +56,13 @@ def test_errors_are_objects_too(tmp_path, capsys, monkeypatch, sets, status):
     assert last["event"] == "error" and last["exit_status"] == status and err == f"repro: {last['message']}\n"
 
 
-def test_without_a_terminal_a_line_each_tenth_and_quiet_says_nothing_but_errors(tmp_path, capsys, monkeypatch):
-    """The end on standard output; however slow the machine is."""
+def test_lines_without_a_terminal_report_each_tenth_and_quiet_only_errors(tmp_path, capsys, monkeypatch):
+    """The last line goes to standard output. The lines do not depend on the speed of the machine."""
     for name in ("SILENCE", "LONGEST"):
         monkeypatch.setattr(progress, name, 1000.0)
     folder = run(tmp_path, "base", 'growth.end="0.6 h"')
-    said = "".join(f"{time} of 0.6 h simulated\n" for time in ("0.2", "0.4", "0.6"))
-    assert capsys.readouterr() == (f"base: completed; results in {folder}\n", said)
+    expected = "".join(f"{time} of 0.6 h simulated\n" for time in ("0.2", "0.4", "0.6"))
+    assert capsys.readouterr() == (f"base: completed; results in {folder}\n", expected)
     run(tmp_path / "quiet", "flow_only", options=["--quiet"])
     assert capsys.readouterr() == ("", "")
     run(tmp_path, "nowhere", status=2, options=["--quiet"])
@@ -73,7 +73,7 @@ STEP = {"event": "step", "time_h": 3.5, "end_h": 45.0, "step": 17, "remeshes": 2
 
 
 def test_a_long_step_is_not_silent(capsys, monkeypatch):
-    """Without a terminal lines go on coming while a step takes its time, never two seconds apart."""
+    """Without a terminal, lines during a long step are at most two seconds apart."""
     assert progress.LONGEST + progress.TICK <= 2.0
     monkeypatch.setattr(progress, "TICK", 0.01)
     monkeypatch.setattr(progress, "LONGEST", 0.02)
@@ -93,27 +93,28 @@ def test_a_long_step_is_not_silent(capsys, monkeypatch):
     pytest.param(60, r"base 0\.6/0\.6 h \d\d:\d\d<\d\d:\d\d, step \d+, mesh \d, contact *", marks=pytest.mark.thorough),
     (120, r".*base 100%\|.*\| 0\.6 of 0\.6 h \[\d\d:\d\d < \d\d:\d\d, step \d+, remeshes \d, contact\].*"),
 ])
-def test_on_a_terminal_a_bar(tmp_path, columns, pattern):
-    """Simulated time, steps, remeshes, contact and the time that is left; sixty columns are enough."""
-    here, there = pty.openpty()
-    fcntl.ioctl(there, termios.TIOCSWINSZ, struct.pack("HHHH", 40, columns, 0, 0))
-    process = started("base", *flags(*CONTACT), "--out", tmp_path / "run", stdout=there, stderr=there, text=False)
-    os.close(there)
-    seen = b""
+def test_a_terminal_shows_a_bar(tmp_path, columns, pattern):
+    """The bar has simulated time, steps, remeshes, contact and the remaining time, and fits in sixty columns."""
+    master, terminal = pty.openpty()
+    fcntl.ioctl(terminal, termios.TIOCSWINSZ, struct.pack("HHHH", 40, columns, 0, 0))
+    arguments = ("base", *flags(*CONTACT), "--out", tmp_path / "run")
+    process = start_run(*arguments, stdout=terminal, stderr=terminal, text=False)
+    os.close(terminal)
+    output = b""
     with suppress(OSError):  # the other end is closed
-        while some := os.read(here, 4096):
-            seen += some
-    os.close(here)
+        while chunk := os.read(master, 4096):
+            output += chunk
+    os.close(master)
     process.wait()
-    last = [bar for bar in re.split(r"[\r\n]+", seen.decode()) if " h " in bar and "contact" in bar][-1]
-    assert re.fullmatch(pattern, last) and len(last) <= columns and b"simulated" not in seen
+    last = [bar for bar in re.split(r"[\r\n]+", output.decode()) if " h " in bar and "contact" in bar][-1]
+    assert re.fullmatch(pattern, last) and len(last) <= columns and b"simulated" not in output
 
 
 @pytest.mark.parametrize("arguments", [[], ["base"], ["--out", "x"], ["base", "--resume", "x"], ["--checkpoint", "-1"],
                                        ["--resume", "x", "--set", "a=1"],
                                        ["--resume", "x", "--force"], ["--resume", "x", "--unset", "growth"],
                                        ["base", "--out", "x", "--checkpoint", "?"]])
-def test_arguments_that_do_not_go_together_are_refused(capsys, arguments):
+def test_conflicting_arguments_are_refused(capsys, arguments):
     with pytest.raises(SystemExit) as refused:
         main(["run", *arguments])
     assert refused.value.code == 2 and "usage: repro run" in capsys.readouterr().err
@@ -123,7 +124,7 @@ def test_arguments_that_do_not_go_together_are_refused(capsys, arguments):
                                        ["sweep", "base", "--vary", "pore.width=40 um, 50 um", "--out", ""],
                                        ["compare", "a", "", "--out", "b.html"], ["compare", "a", "b", "--out", ""]])
 def test_an_empty_path_is_not_the_present_folder(tmp_path, monkeypatch, capsys, arguments):
-    """As of a shell's variable that is not set: the results would lie among what is there."""
+    """An unset variable of the shell makes an empty path; results must not go into the present folder."""
     monkeypatch.chdir(tmp_path)
     with pytest.raises(SystemExit) as refused:
         main(arguments)
@@ -131,39 +132,39 @@ def test_an_empty_path_is_not_the_present_folder(tmp_path, monkeypatch, capsys, 
     assert list(tmp_path.iterdir()) == []
 
 
-def test_signals_are_noted_and_everything_is_as_before():
-    """One that is ignored, as under nohup, stays so."""
-    kept, before = signal.signal(signal.SIGINT, signal.SIG_IGN), signal.getsignal(signal.SIGTERM)
-    with noted() as came:
+def test_signals_are_caught_and_handlers_are_restored():
+    """A signal that is ignored, as under nohup, stays ignored."""
+    handler, before = signal.signal(signal.SIGINT, signal.SIG_IGN), signal.getsignal(signal.SIGTERM)
+    with catch_signals() as received:
         os.kill(os.getpid(), signal.SIGINT)
         time.sleep(0.05)
-        assert came() == 0
+        assert received() == 0
         for _ in range(2):  # the second one at once: the same request
             os.kill(os.getpid(), signal.SIGTERM)
             deadline = time.monotonic() + 10
-            while not came() and time.monotonic() < deadline:
+            while not received() and time.monotonic() < deadline:
                 time.sleep(0.001)
-        assert came() == signal.SIGTERM
-    assert (signal.signal(signal.SIGINT, kept), signal.getsignal(signal.SIGTERM)) == (signal.SIG_IGN, before)
+        assert received() == signal.SIGTERM
+    assert (signal.signal(signal.SIGINT, handler), signal.getsignal(signal.SIGTERM)) == (signal.SIG_IGN, before)
     assert not signal.pthread_sigmask(signal.SIG_BLOCK, ())
 
 
-@pytest.mark.parametrize("deaf, options", [("stdout", ["--json"]), ("stdout", []), ("stderr", [])])
-def test_nobody_listens(tmp_path, deaf, options):
-    """What reads the output, or what is said aside, goes away: the run goes on to its end."""
-    process = started("base", "--set", 'numerics.preset="fast"', "--out", tmp_path / "run", *options)
-    getattr(process, deaf).close()
-    heard = process.stderr if deaf == "stdout" else process.stdout
-    message = heard.read()
-    heard.close()
+@pytest.mark.parametrize("closed, options", [("stdout", ["--json"]), ("stdout", []), ("stderr", [])])
+def test_a_run_goes_on_after_its_reader_closes(tmp_path, closed, options):
+    """The reader of standard output or standard error closes its pipe; the run goes on to its end."""
+    process = start_run("base", "--set", 'numerics.preset="fast"', "--out", tmp_path / "run", *options)
+    getattr(process, closed).close()
+    stream = process.stderr if closed == "stdout" else process.stdout
+    message = stream.read()
+    stream.close()
     assert process.wait(60) == 0 and "Traceback" not in message and "BrokenPipe" not in message
-    assert deaf == "stdout" or "completed" in message
-    assert told(tmp_path / "run")["status"] == "completed"
+    assert closed == "stdout" or "completed" in message
+    assert read_record(tmp_path / "run")["status"] == "completed"
 
 
-def test_the_exit_statuses_are_told(capsys):
+def test_the_help_lists_the_exit_statuses(capsys):
     for command, statuses in (("run", ["0", "1", "2", "130", "143"]), ("sweep", ["0", "3", "2", "130", "143"])):
         with pytest.raises(SystemExit):
             main([command, "--help"])
-        said = capsys.readouterr().out.casefold().partition("exit status:")[2]
-        assert re.findall(r"\b\d+\b", said) == statuses
+        section = capsys.readouterr().out.casefold().partition("exit status:")[2]
+        assert re.findall(r"\b\d+\b", section) == statuses

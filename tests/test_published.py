@@ -1,5 +1,5 @@
-"""What a publication needs is there, agrees with itself and works as it stands: the replication note says what was
-computed, what README and tutorial show is executed, and texts speak of nothing that the repository does not hold."""
+"""The published texts are complete, consistent and correct: the replication note has the computed numbers, the commands
+of README and tutorial run, and texts refer only to files, modules and claims that exist."""
 import re
 import subprocess
 import sys
@@ -16,8 +16,8 @@ import pytest
 import paper_figures
 from paper_figures import replication
 from repro.scene import load_scene, parse_scene
-from tests.blocks import ROOT, blocks, execute, is_repro, is_target, told
-from tests.test_architecture import own
+from tests.blocks import ROOT, blocks, execute, is_repro, is_target, printed_lines
+from tests.test_architecture import source_files
 from verification.claims import EXPECTED
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
@@ -32,16 +32,16 @@ ERRATA = re.findall(r"^## (E\d+)\.", text("reference/ERRATA.md"), re.M)
 
 @pytest.fixture(scope="module")
 def record():
-    return replication.told()
+    return replication.read_records()
 
 
-def test_the_note_tells_what_was_computed(record):
+def test_the_note_has_the_computed_numbers(record):
     template = replication.TEMPLATE.read_text(encoding="utf-8")
-    assert replication.filled(template, record) == replication.NOTE.read_text(encoding="utf-8")
+    assert replication.fill_template(template, record) == replication.NOTE.read_text(encoding="utf-8")
 
 
 def test_the_template_has_no_number_that_a_run_computes():
-    """Decimals outside of references, of the paper's own scenes and of identifiers."""
+    """Its only decimals, besides references and identifiers, are those of the paper's scenes."""
     body = replication.TEMPLATE.read_text(encoding="utf-8").partition("## References")[0]
     plain = re.sub(r"\{\{.*?\}\}|`[^`]*`|\(https?://\S+\)|\[doi:.*?\]", "", body, flags=re.S)
     assert set(re.findall(r"\d+\.\d+", plain)) == {"2.9", "19.2", "19.4"}
@@ -49,24 +49,24 @@ def test_the_template_has_no_number_that_a_run_computes():
 
 @pytest.mark.parametrize("field", ["{{C99 | contradicted}}", "{{C01 | contradicted}}", "{{C01 | no such | .2f}}",
                                    "{{no.such}}"])
-def test_what_there_is_not_is_refused(record, field):
+def test_unknown_fields_of_the_template_are_refused(record, field):
     with pytest.raises(LookupError):
-        replication.filled(field, record)
+        replication.fill_template(field, record)
 
 
 def test_every_claim_and_erratum_is_in_the_note(record):
-    """Each claim once, in the list of its verdict; a contradiction, or what is undecided, with its reason. A count of
-    verdicts anywhere is the record's."""
+    """Each claim appears once, in the list of its verdict; contradicted and undecided claims have a reason. Counts of
+    verdicts agree with the record."""
     kinds = ("reproduced", "rounding", "changed", "contradicted", "undecided")
-    named = {kind: re.findall(r"^- \*\*(C\d\d)\*\*", replication.filled(f"{{{{list.{kind}}}}}", record), re.M)
+    by_kind = {kind: re.findall(r"^- \*\*(C\d\d)\*\*", replication.fill_template(f"{{{{list.{kind}}}}}", record), re.M)
              for kind in kinds}
-    assert sorted(sum(named.values(), [])) == list(EXPECTED)
-    open_or_not = {*named["contradicted"], *named["undecided"]}
-    assert all(claim["reason"] for claim in record["claims"] if claim["id"] in open_or_not)
+    assert sorted(sum(by_kind.values(), [])) == list(EXPECTED)
+    unreproduced = {*by_kind["contradicted"], *by_kind["undecided"]}
+    assert all(claim["reason"] for claim in record["claims"] if claim["id"] in unreproduced)
     for name in ("README.md", "paper_figures/replication.md", "docs/scope.md", "codecheck.author.yml"):
         counts = re.findall(r"\b(\d+) (?:claims )?(?:are )?(reproduced|contradicted|undecided)\b", text(name))
-        assert all(int(count) == len(named[kind]) for count, kind in counts), name
-    listed = re.findall(r"^- \*\*(E\d+)\*\*", replication.filled("{{list.errata}}", record), re.M)
+        assert all(int(count) == len(by_kind[kind]) for count, kind in counts), name
+    listed = re.findall(r"^- \*\*(E\d+)\*\*", replication.fill_template("{{list.errata}}", record), re.M)
     assert listed == ERRATA and len(ERRATA) >= 20
 
 
@@ -80,8 +80,8 @@ def test_version_licence_and_name_agree():
 def test_the_codecheck_lists_what_make_figures_makes():
     content = text("codecheck.author.yml")
     listed = re.findall(r"^  - file: (\S+)$", content, re.M)
-    made = [f"paper_figures/out/{name}.pdf" for name in paper_figures.FIGURES] + ["paper_figures/out/manifest.json"]
-    assert listed == made
+    expected = [f"paper_figures/out/{name}.pdf" for name in paper_figures.FIGURES] + ["paper_figures/out/manifest.json"]
+    assert listed == expected
     title = replication.NOTE.read_text(encoding="utf-8").partition("\n")[0].removeprefix("# ")
     assert f'title: "{title}"' in content
 
@@ -93,42 +93,42 @@ def test_the_commands_are_targets_of_the_makefile(page):
 
 
 @pytest.mark.thorough
-def test_wheel_and_source_distribution_hold_what_they_should(tmp_path):
-    """The wheel the solver alone with its scenes; the source distribution the checkout."""
-    copied = tmp_path / "checkout"
-    subprocess.run(["git", "checkout-index", "--all", f"--prefix={copied}/"], cwd=ROOT, check=True)
-    listed = [str(path.relative_to(copied)) for path in copied.rglob("*")]
-    subprocess.run([sys.executable, "-m", "build", "--no-isolation", "--outdir", tmp_path / "dist", copied],
+def test_wheel_and_source_distribution_are_complete(tmp_path):
+    """The wheel has the solver and its scenes alone, the source distribution the files of the checkout."""
+    checkout = tmp_path / "checkout"
+    subprocess.run(["git", "checkout-index", "--all", f"--prefix={checkout}/"], cwd=ROOT, check=True)
+    tracked = [str(path.relative_to(checkout)) for path in checkout.rglob("*")]
+    subprocess.run([sys.executable, "-m", "build", "--no-isolation", "--outdir", tmp_path / "dist", checkout],
                    capture_output=True, check=True)
     (wheel,), (source,) = ((tmp_path / "dist").glob(kind) for kind in ("*.whl", "*.tar.gz"))
-    inside = zipfile.ZipFile(wheel).namelist()
+    members = zipfile.ZipFile(wheel).namelist()
     data = {f"repro/scene/packaged/{path.name}" for path in (ROOT / "repro" / "scene" / "packaged").glob("*.toml")}
     data.add("repro/results/network.csv")
-    assert {name.partition("/")[0] for name in inside} == {"repro", f"dupin2001_repro-{PROJECT['version']}.dist-info"}
-    assert data <= set(inside) and len(data) >= 5
+    assert {name.partition("/")[0] for name in members} == {"repro", f"dupin2001_repro-{PROJECT['version']}.dist-info"}
+    assert data <= set(members) and len(data) >= 5
     with tarfile.open(source) as archive:
         packed = {name.partition("/")[2] for name in archive.getnames()}
-    wanted = {name for name in listed if name.endswith((".py", ".md", ".toml", ".json", ".lock", ".yml", ".cff"))}
-    assert wanted - packed == set()
+    required = {name for name in tracked if name.endswith((".py", ".md", ".toml", ".json", ".lock", ".yml", ".cff"))}
+    assert required - packed == set()
 
 
-# What the README and the tutorial show.
+# The examples of the README and the tutorial.
 PAGE, TUTORIAL = ROOT / "README.md", ROOT / "docs" / "tutorial.md"
 BLOCKS = blocks(PAGE)
 
 
 def test_every_block_is_of_a_kind_that_is_executed():
-    """Of the README; the other pages show none. Two commands, a picture and a pore of one's own come first."""
+    """Only the README and the tutorial have blocks. The README begins with two commands, a picture and a scene."""
     assert {block.language for block in BLOCKS} <= {"", "console", "sh", "python", "toml"}
     assert all(is_repro(words) or is_target(words) for block in BLOCKS for words in block.commands)
-    others = [page for page in (ROOT / "docs").glob("*.md") if page != TUTORIAL]
-    assert len(others) >= 3 and [page.name for page in others if "```" in page.read_text(encoding="utf-8")] == []
-    shown = PAGE.read_text(encoding="utf-8")
-    assert len(shown.encode()) < 12_000 and shown.index("overview.png") < shown.index("make env") < 2_500
+    pages = [page for page in (ROOT / "docs").glob("*.md") if page != TUTORIAL]
+    assert len(pages) >= 3 and [page.name for page in pages if "```" in page.read_text(encoding="utf-8")] == []
+    readme = PAGE.read_text(encoding="utf-8")
+    assert len(readme.encode()) < 12_000 and readme.index("overview.png") < readme.index("make env") < 2_500
 
 
-def test_the_page_works(tmp_path, capsys, monkeypatch):
-    """Its commands in their order in one folder, its scene, which is base, and its Python."""
+def test_the_examples_of_the_readme_run(tmp_path, capsys, monkeypatch):
+    """Its commands run in their order in one folder; its scene is base; its Python runs."""
     monkeypatch.chdir(tmp_path)
     for words in [words for block in BLOCKS for words in block.commands if is_repro(words)]:
         assert execute(words, capsys)[0] == 0, words
@@ -141,8 +141,8 @@ def test_the_page_works(tmp_path, capsys, monkeypatch):
     assert 160 < float(conductivity.removesuffix(" m/d")) < 175 and shape == "(783,)"
 
 
-def test_the_tutorial_works_from_its_first_line_to_its_last(tmp_path, capsys, monkeypatch):
-    """Its commands, its scene and its Python, one after the other in one folder."""
+def test_the_examples_of_the_tutorial_run(tmp_path, capsys, monkeypatch):
+    """Its commands, scene and Python run one after the other in one folder."""
     monkeypatch.chdir(tmp_path)
     printed, statuses = [], []
     names: dict = {}
@@ -156,7 +156,7 @@ def test_the_tutorial_works_from_its_first_line_to_its_last(tmp_path, capsys, mo
             status, out, err = execute(words, capsys)
             printed.append(out)
             statuses.append(status)
-            assert [err.strip()] == told(block) if status else told(block) == [], err
+            assert [err.strip()] == printed_lines(block) if status else printed_lines(block) == [], err
     plt.close("all")
     assert statuses == [0, 0, 0, 0, 0, 0, 2, 0, 0, 0, 0]
     assert load_scene("mine.toml").pore == load_scene("base").pore
@@ -165,39 +165,39 @@ def test_the_tutorial_works_from_its_first_line_to_its_last(tmp_path, capsys, mo
     assert "WARNING" not in printed[3] and "WARNING growth.end" in printed[4]
 
 
-# Texts speak of what there is: files, modules, statements, errata, no other places.
+# Texts refer to existing files, modules, statements and errata.
 FOLDERS = ("repro", "reference", "verification", "docs", "paper_figures", "tests")
 PAGES = ("README.md", "CONTRIBUTING.md", "Makefile", "codecheck.author.yml", "CITATION.cff", "MANIFEST.in")
-#: What commands make, and words that stand for any name of their kind.
-MADE = {"claims.md", "codecheck.yml", "paper_figures/out/manifest.json"}
+#: Files that commands make, and placeholders for names.
+GENERATED = {"claims.md", "codecheck.yml", "paper_figures/out/manifest.json"}
 PLACEHOLDER = re.compile(r"(?<![A-Za-z])(NAME|STAGE|N|ID)(?![A-Za-z])")
 ENDINGS = r"(?:py|md|toml|json|yml|yaml|cff|lock|css|js|svg)"
-#: A file by its place in the repository, or any page of text by its name.
+#: The path of a file in the repository, or the name of a page.
 FILE = re.compile(rf"(?<![\w./-])((?:{'|'.join(FOLDERS)})/[\w./-]+\.{ENDINGS}|(?:\w[\w./-]*/)?[\w-]+\.md)\b")
 MODULE = re.compile(rf"(?<![\w./])(?:repro|verification|paper_figures|tests)(?:\.(?!{ENDINGS}\b)[A-Za-z]\w*)+")
 STATEMENT = re.compile(r"(?<![\w-])C\d\d(?!\w)")
 ERRATUM = re.compile(r"\[(E\d+)\]")
-#: Numbered lists that are kept elsewhere, and places on somebody's machine.
+#: Numbered lists of other documents, and paths of somebody's machine.
 ELSEWHERE = re.compile(r"\b(?:traps?|issues?|tickets?|themes?|lessons?)\b[ #]*\d+"
                        r"|(?<![\w.])/(?:work|home|root|Users)/\w+", re.I)
 
 
 @cache
-def held():
+def repository_files():
     """Paths of all files."""
-    found = {str(path.relative_to(ROOT)) for folder in FOLDERS for path in own(folder, "*")}
-    return found | {path.name for path in ROOT.iterdir() if path.is_file()}
+    paths = {str(path.relative_to(ROOT)) for folder in FOLDERS for path in source_files(folder, "*")}
+    return paths | {path.name for path in ROOT.iterdir() if path.is_file()}
 
 
 def is_file(name):
-    """Is a file there, by its place or by the end of it?"""
+    """Does the repository have a file of this path, or one that ends with it?"""
     name = name.removeprefix("../")
-    return name in held() or any(path.endswith(f"/{name}") for path in held())
+    return name in repository_files() or any(path.endswith(f"/{name}") for path in repository_files())
 
 
 @cache
 def is_module(name):
-    """Is a module there, or what is asked of it?"""
+    """Does the module, or its attribute, exist?"""
     try:
         resolve_name(name)
     except (ImportError, AttributeError):
@@ -205,23 +205,24 @@ def is_module(name):
     return True
 
 
-def unheld(text):
-    """What a text speaks of that is not there."""
-    files = {name for name in FILE.findall(text) if name not in MADE and not PLACEHOLDER.search(name)}
-    found = {name for name in files if not is_file(name)}
-    found |= {name for name in MODULE.findall(text) if not is_module(name)}
-    found |= set(STATEMENT.findall(text)) - set(EXPECTED) | set(ERRATUM.findall(text)) - set(ERRATA)
-    return sorted(found | set(ELSEWHERE.findall(text)))
+def unknown_references(text):
+    """References of a text to files, modules, claims and errata that do not exist."""
+    files = {name for name in FILE.findall(text) if name not in GENERATED and not PLACEHOLDER.search(name)}
+    unknown = {name for name in files if not is_file(name)}
+    unknown |= {name for name in MODULE.findall(text) if not is_module(name)}
+    unknown |= set(STATEMENT.findall(text)) - set(EXPECTED) | set(ERRATUM.findall(text)) - set(ERRATA)
+    return sorted(unknown | set(ELSEWHERE.findall(text)))
 
 
-def test_nothing_is_spoken_of_that_is_not_there():
-    """In what people read, but for tests, whose examples are made up."""
-    read = [path for path in held() if path.endswith((".py", ".md", ".toml")) and path.startswith(FOLDERS[:-1])]
-    assert len(read) > 200
-    assert {path: found for path in (*read, *PAGES) if (found := unheld(text(path)))} == {}
+def test_texts_refer_only_to_existing_names():
+    """In all pages and sources except tests, whose examples are made up."""
+    texts = [path for path in repository_files() if path.endswith((".py", ".md", ".toml"))]
+    paths = [path for path in texts if path.startswith(FOLDERS[:-1])]
+    assert len(paths) > 200
+    assert {path: unknown for path in (*paths, *PAGES) if (unknown := unknown_references(text(path)))} == {}
 
 
-@pytest.mark.parametrize("said", ["(trap 3)", "see `docs/nowhere.md`", "`repro/curved/flow.py` is",
+@pytest.mark.parametrize("passage", ["(trap 3)", "see `docs/nowhere.md`", "`repro/curved/flow.py` is",
                                   "repro.fem.mesh.NoMesh", "by claim C97", "as said in [E99]", "in /home/notes"])
-def test_the_check_sees_one(said):
-    assert len(unheld(said)) == 1
+def test_an_unknown_reference_is_detected(passage):
+    assert len(unknown_references(passage)) == 1

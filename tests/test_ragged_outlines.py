@@ -1,5 +1,5 @@
-"""Ragged outlines, drawn by seed: sharp tips and notches, necks and films. The presets agree, or a warning says by how
-much they do not."""
+"""Ragged outlines, drawn by seed: sharp tips and notches, necks and films. The presets agree, or a warning states the
+difference."""
 import random
 import re
 
@@ -11,10 +11,10 @@ from repro.fem import mesher
 from repro.fem.mesh import triangle_areas
 from repro.fem.outline import polygon
 from repro.model import pore
-from repro.preflight.resolved import unresolved
+from repro.preflight.resolved import find_unresolved_flow
 from repro.scene import SceneError, load_scene, packaged_scenes, parse_scene
 
-#: What fast and accurate may differ by where no warning is given.
+#: Largest relative difference between fast and accurate without a warning.
 FAST = 0.015
 SPIKES = [(-14.6091, 0), (-6.88447, 11.647), (-4.89941, 26.2897), (-0.60518, 22.8188), (2.9581, 38.0181),
           (4.92759, 29.0622), (7.63545, 27.8786), (15.1722, 34.9812), (9.46785, 11.292), (11.0158, 0)]
@@ -44,8 +44,8 @@ def ragged(seed):
             continue
 
 
-def head_loss(accepted):
-    return pore.solve_flow(accepted, pore.seeded(accepted).space).head_loss
+def head_loss(scene_of_outline):
+    return pore.solve_flow(scene_of_outline, pore.seeded(scene_of_outline).space).head_loss
 
 
 def test_a_spiked_outline_is_the_same_in_every_preset():
@@ -59,12 +59,12 @@ def test_a_spiked_outline_is_the_same_in_every_preset():
 def test_presets_agree_on_a_ragged_outline_or_a_warning_names_what_resolves_it(seed):
     width, points = ragged(seed)
     fast = scene(width, points)
-    warned = list(unresolved(fast))
-    if not warned:
+    warnings = list(find_unresolved_flow(fast))
+    if not warnings:
         assert head_loss(fast) == pytest.approx(head_loss(scene(width, points, "accurate")), rel=FAST)
         return
-    advised = re.search(r"numerics\.refinement = ([\d.]+) resolves", warned[0].text)
-    assert not list(unresolved(scene(width, points, "fast", float(advised[1]))))
+    advice = re.search(r"numerics\.refinement = ([\d.]+) resolves", warnings[0].text)
+    assert not list(find_unresolved_flow(scene(width, points, "fast", float(advice[1]))))
 
 
 def thin_spike():
@@ -72,25 +72,25 @@ def thin_spike():
     return [(-20, 0), (-9, 35), (22, 81), (23, 8), (30.5, 113), (31, 23), (43, 0)]
 
 
-def test_a_flow_that_is_not_resolved_is_warned_of_with_what_is_to_be_expected():
-    warned = list(unresolved(scene(116.0, thin_spike())))
-    assert len(warned) == 1
-    given = re.match(r"the head loss at t = 0 is ([\d.e-]+) cm, and about ([\d.e-]+) cm \(", warned[0].text)
-    first, expected = (1e4 * float(number) for number in given.groups())
+def test_an_unresolved_flow_gives_a_warning_with_the_expected_head_loss():
+    warnings = list(find_unresolved_flow(scene(116.0, thin_spike())))
+    assert len(warnings) == 1
+    numbers = re.match(r"the head loss at t = 0 is ([\d.e-]+) cm, and about ([\d.e-]+) cm \(", warnings[0].text)
+    first, expected = (1e4 * float(number) for number in numbers.groups())
     assert first == pytest.approx(head_loss(scene(116.0, thin_spike())), rel=1e-3)
     assert expected == pytest.approx(head_loss(scene(116.0, thin_spike(), "exact")), rel=0.01)
-    advised = float(re.search(r"numerics\.refinement = ([\d.]+) resolves", warned[0].text)[1])
-    assert not list(unresolved(scene(116.0, thin_spike(), "fast", advised)))
+    advice = float(re.search(r"numerics\.refinement = ([\d.]+) resolves", warnings[0].text)[1])
+    assert not list(find_unresolved_flow(scene(116.0, thin_spike(), "fast", advice)))
 
 
 @pytest.mark.parametrize("name", packaged_scenes())
 def test_half_discs_are_not_compared_with_finer_meshes(name, monkeypatch):
     monkeypatch.setattr(pore, "seeded", None)
-    assert not list(unresolved(load_scene(name)))
+    assert not list(find_unresolved_flow(load_scene(name)))
 
 
 def test_edges_grow_from_a_tip_a_notch_and_no_other_corner():
-    """Tips 0.1 um, notches 0.3 um; the lines stay as they are."""
+    """Edges start at 0.1 um at tips and 0.3 um at notches; the lines do not move."""
     points = np.array([(-20, 0), (-10, 20), (0, 5), (5, 20), (9, 29), (30, 0)], float)
     outline = polygon(points, 50.0, at_tips=0.1)
     lengths = outline.edge_lengths()
@@ -104,7 +104,7 @@ def test_edges_grow_from_a_tip_a_notch_and_no_other_corner():
 
 
 def test_no_triangle_has_its_nodes_on_one_line():
-    """Round-off may put the middle one of three nodes of a straight edge beside it; Mmg refuses their triangle."""
+    """Round-off may move the middle one of three nodes off a straight edge; Mmg refuses the triangle that results."""
     points = np.array([(0, 0), (1, 0), (3, 0), (2, 2)], float)
     triangles = np.array([[0, 1, 2], [0, 2, 3]])
     mended = mesher._without_slivers(points, triangles)

@@ -1,7 +1,7 @@
-"""The references are right by themselves: closed forms and made-up fields obey their equations, by differences.
+"""Closed forms and manufactured fields of the references obey their equations, by finite differences.
 
-That the other codes (FiPy, py-pde, collocation, scikit-fem) and the dense transfer are what is said of them is judged
-by the cases that compare them with ours.
+The cases that compare them with `repro` judge the other codes (FiPy, py-pde, collocation, scikit-fem) and the dense
+transfer.
 """
 import numpy as np
 import pytest
@@ -26,18 +26,18 @@ STEP = 1e-4
 
 
 def derivatives(field, x, y, h=STEP):
-    """(gradient (n, ..., 2), Laplacian (n, ...)) of a field (n, ...) of places by central differences."""
-    here, east, west, north, south = (field(x + a, y + b) for a, b in ((0, 0), (h, 0), (-h, 0), (0, h), (0, -h)))
-    return np.stack([east - west, north - south], axis=-1) / (2 * h), (east + west + north + south - 4 * here) / h**2
+    """(gradient (n, ..., 2), Laplacian (n, ...)) of a field (n, ...) of points by central differences."""
+    centre, east, west, north, south = (field(x + a, y + b) for a, b in ((0, 0), (h, 0), (-h, 0), (0, h), (0, -h)))
+    return np.stack([east - west, north - south], axis=-1) / (2 * h), (east + west + north + south - 4 * centre) / h**2
 
 
 def divergence(field, x, y, h=STEP):
-    """Of the last index."""
+    """Divergence over the last index."""
     return np.trace(derivatives(field, x, y, h)[0], axis1=-2, axis2=-1)
 
 
-def along(function, x, step=1e-3):
-    """(first, second) derivative of a function of one place."""
+def first_and_second(function, x, step=1e-3):
+    """(first, second) derivative of a function of x."""
     gradient, laplace = derivatives(lambda x, _: function(x), x, 0.0, step)
     return gradient[..., 0], laplace
 
@@ -45,8 +45,8 @@ def along(function, x, step=1e-3):
 def assert_stokes(velocity, pressure, viscosity, x, y, force=0.0):
     """-viscosity Laplace u + grad p = f, div u = 0."""
     assert divergence(velocity, x, y) == pytest.approx(np.zeros(len(x)), abs=1e-7)
-    lacks = derivatives(pressure, x, y)[0] - viscosity * derivatives(velocity, x, y)[1] - force
-    assert np.abs(lacks).max() < 1e-6 * max(viscosity, 10)
+    residual = derivatives(pressure, x, y)[0] - viscosity * derivatives(velocity, x, y)[1] - force
+    assert np.abs(residual).max() < 1e-6 * max(viscosity, 10)
 
 
 @pytest.mark.parametrize("ratio", [1.0, 2000.0, 1e8])
@@ -61,32 +61,32 @@ def test_layers_carry_one_stress_and_a_mean_velocity_of_one(ratio):
 @FORMS
 @pytest.mark.parametrize("ratio", [0.1, 2000.0])
 def test_the_inclusion_solves_stokes_and_its_velocity_and_stress_are_continuous(interface, ratio):
-    """Of the stress what the form makes continuous."""
+    """The form of the interface selects the stress that is continuous."""
     angle, r = np.random.default_rng(1).uniform([0, 1], [6.28, 3], (40, 2)).T
-    normal, given = np.stack([np.cos(angle), np.sin(angle)], axis=-1), (ratio, interface, 0.4)
+    normal, arguments = np.stack([np.cos(angle), np.sin(angle)], axis=-1), (ratio, interface, 0.4)
     x, y = 1.3 * normal.T
 
     def outside(x, y):
-        return viscous_inclusion.outside(x, y, 1.3, *given)
+        return viscous_inclusion.outside(x, y, 1.3, *arguments)
 
     def inside(x, y):
-        return viscous_inclusion.inside(x, y, *given)
+        return viscous_inclusion.inside(x, y, *arguments)
 
-    def pushed(side, viscosity):
+    def traction(side, viscosity):
         gradient = derivatives(lambda x, y: side(x, y)[0], x, y)[0]
         viscous = gradient + np.swapaxes(gradient, 1, 2) * (interface == "traction")
         return viscosity * np.einsum("kij,kj->ki", viscous, normal) - side(x, y)[1][:, None] * normal
 
     assert_stokes(lambda x, y: outside(x, y)[0], lambda x, y: outside(x, y)[1], 1.0, r * x, r * y)
     assert outside(x, y)[0] == pytest.approx(inside(x, y)[0], abs=1e-12)
-    assert pushed(outside, 1.0) == pytest.approx(pushed(inside, ratio), abs=1e-6)
+    assert traction(outside, 1.0) == pytest.approx(traction(inside, ratio), abs=1e-6)
 
 
 @FORMS
 @pytest.mark.parametrize("across, viscosity", [(-0.2, 1.0), (0.3, 2000.0)])
-def test_the_manufactured_force_is_what_the_strong_form_lacks(interface, across, viscosity):
-    """On both sides."""
-    velocity, pressure, force = manufactured_flow.evaluated(2000.0, interface)
+def test_the_manufactured_force_is_the_residual_of_the_strong_form(interface, across, viscosity):
+    """This holds on both sides of the interface."""
+    velocity, pressure, force = manufactured_flow.evaluate(2000.0, interface)
     t, turn = np.linspace(-0.4, 0.4, 9), np.exp(1j * manufactured_flow.ANGLE)
     x, y = (turn * (across + 1j * t)).real, (turn * (across + 1j * t)).imag
     assert_stokes(velocity, pressure, viscosity, x, y, force(x, y))
@@ -104,16 +104,16 @@ def test_the_cylinder_is_in_equilibrium_and_free_on_its_rim():
 
 
 @pytest.mark.parametrize("name", manufactured_growth.PRESSURES)
-def test_the_made_up_growth_is_held_by_its_loads(name):
+def test_the_manufactured_growth_is_in_equilibrium_with_its_loads(name):
     """theta is the determinant, S the closed form's stress, f = -Div S: by differences of step h, to h^2."""
-    made, h = manufactured_growth.growth(name), 1e-5
+    case, h = manufactured_growth.growth(name), 1e-5
     X, Y = np.random.default_rng(3).uniform(0.1, 0.9, (2, 20))
-    F = derivatives(made.place, X, Y, h)[0]
+    F = derivatives(case.place, X, Y, h)[0]
     J = np.linalg.det(F)
-    sigma = np.array([neo_hookean.cauchy(f, p)[:2, :2] for f, p in zip(F, made.pressure(X, Y))])
-    assert made.theta(X, Y) == pytest.approx(J, rel=1e-9)
-    assert made.stress(X, Y) @ np.swapaxes(F, 1, 2) / J[:, None, None] == pytest.approx(sigma, abs=1e-8)
-    assert made.force(X, Y) == pytest.approx(-divergence(made.stress, X, Y, h), abs=1e-7)
+    sigma = np.array([neo_hookean.cauchy(f, p)[:2, :2] for f, p in zip(F, case.pressure(X, Y))])
+    assert case.theta(X, Y) == pytest.approx(J, rel=1e-9)
+    assert case.stress(X, Y) @ np.swapaxes(F, 1, 2) / J[:, None, None] == pytest.approx(sigma, abs=1e-8)
+    assert case.force(X, Y) == pytest.approx(-divergence(case.stress, X, Y, h), abs=1e-7)
 
 
 @GAMMAS
@@ -132,9 +132,9 @@ def test_sliding_waves_solve_35_and_slide_along_walls_and_end(gamma):
 
 
 @GAMMAS
-def test_the_corner_exponent_makes_the_displacement_vanish_on_the_held_side(gamma):
-    """kappa s^z - z s conj(s)^(z-1) = B conj(s)^z with a real B; gamma without end: the Laplace operator's pi / (2 w).
-    """
+def test_the_corner_exponent_makes_the_displacement_vanish_on_the_fixed_side(gamma):
+    """kappa s^z - z s conj(s)^(z-1) = B conj(s)^z with a real B. For a large gamma, z is the Laplace operator's
+    pi / (2 w)."""
     w = np.radians(120)
     z, s = quadratic_mesh_motion.exponent(w, gamma), np.exp(1j * w)
     B = ((1 + 2 * gamma) * s**z - z * s * np.conj(s) ** (z - 1)) / np.conj(s) ** z
@@ -148,22 +148,23 @@ HALF, SUPPLY = 40.0, 10.0
 
 
 def test_uptake_is_dual_monod():
-    """(7)-(8) written out; of what is sunk, the acceptor comes first."""
+    """(7)-(8) written out; the acceptor is the first sink."""
     q = 0.75 * (0.4 * 1.5 * 0.75 + 0.006), 0.4 * 0.75 * 0.75
     assert uptake(3.0, 6.0, RATES) == pytest.approx(q)
     assert sink(np.array([3.0, 6.0]), np.array([2.0]), RATES) == pytest.approx(2.0 * np.array(q))
 
 
 def test_the_robin_channel_obeys_its_equation_and_its_conditions():
-    """Strip, (26) upstream, flux u C_s at any inlet, flat downstream."""
+    """The strip, (26) upstream, the flux u C_s at any inlet, and a zero gradient downstream."""
     def c(x):
         return robin_channel.strip(x, 1e5, SUPPLY, WATER, BIOMASS, 2e4, HALF)
 
     inside, upstream = np.linspace(1.0, 39.0, 20), np.array([-300.0, -30.0, -1.0])
-    slope, bend = along(c, inside)
-    assert BIOMASS * bend == pytest.approx(1e5 * slope + 2e4 * c(inside), rel=1e-4)
-    assert 1e5 * c(upstream) - WATER * along(c, upstream, STEP)[0] == pytest.approx(np.full(3, 1e5 * SUPPLY), rel=1e-6)
-    before, after, last = along(c, np.array([-1e-3, 1e-3, HALF - 1e-3]), STEP)[0]
+    gradient, curvature = first_and_second(c, inside)
+    assert BIOMASS * curvature == pytest.approx(1e5 * gradient + 2e4 * c(inside), rel=1e-4)
+    inflow = 1e5 * c(upstream) - WATER * first_and_second(c, upstream, STEP)[0]
+    assert inflow == pytest.approx(np.full(3, 1e5 * SUPPLY), rel=1e-6)
+    before, after, last = first_and_second(c, np.array([-1e-3, 1e-3, HALF - 1e-3]), STEP)[0]
     assert abs(BIOMASS * last) < 1e5 and c(60.0) == c(HALF)
     assert WATER * before == pytest.approx(BIOMASS * after, rel=1e-3)
 
@@ -171,28 +172,29 @@ def test_the_robin_channel_obeys_its_equation_and_its_conditions():
 @pytest.mark.parametrize("film", [0.0, 20.0])
 @pytest.mark.parametrize("half_saturation", [0.1, 0.01])
 def test_the_monod_slab_obeys_its_equation(half_saturation, film):
-    def found(x):
+    def solution(x):
         return slab.monod(x, SUPPLY, 6e5, half_saturation, HALF, BIOMASS, film, WATER)
 
     def c(x):
-        return found(x)[0]
+        return solution(x)[0]
 
-    least, depth = found(0.0)
+    least, depth = solution(0.0)
     inside = np.linspace(HALF - 0.9 * depth, HALF - 0.1, 12)
-    used = 6e5 * c(inside) / (c(inside) + half_saturation)
-    assert BIOMASS * along(c, inside, 1e-2)[1] == pytest.approx(used, rel=1e-2)
-    assert BIOMASS * along(c, HALF - 1e-3, 5e-4)[0] == pytest.approx(6e5 * depth, rel=1e-3)
+    uptake_rate = 6e5 * c(inside) / (c(inside) + half_saturation)
+    assert BIOMASS * first_and_second(c, inside, 1e-2)[1] == pytest.approx(uptake_rate, rel=1e-2)
+    assert BIOMASS * first_and_second(c, HALF - 1e-3, 5e-4)[0] == pytest.approx(6e5 * depth, rel=1e-3)
     assert c(HALF + film) == pytest.approx(SUPPLY) and least < 1e-5
 
 
-@pytest.mark.parametrize("side, active, spreads, x, y", [
+@pytest.mark.parametrize("side, active, diffusivities, x, y", [
     ("fluid", 0.0, (1e7, 4e6), 30.0, 25.0), ("biomass", 2.7e5, (8e6, 3e6), -6.0, 9.0)])
-def test_the_forcing_is_the_strong_form(side, active, spreads, x, y):
-    """With the uptake of reference.monod, and X_0 (1 + x / (3 R)) of biomass."""
+def test_the_forcing_is_the_strong_form(side, active, diffusivities, x, y):
+    """The uptake is that of reference.monod with the biomass X_0 (1 + x / (3 R))."""
     fields = manufactured_transport.fields(50.0, 20.0, 1e5, (1e7, 4e6), (8e6, 3e6), 3e5, RATES)[side]
     speed = [float(manufactured_transport.function(part)(x, y)) for part in manufactured_transport.velocity(50.0, 1e5)]
     sinks = uptake(*(float(field.value(x, y)) for field in fields), RATES)
-    for field, spread, used in zip(fields, spreads, sinks):
-        slope, bend = derivatives(field.value, x, y)[0], derivatives(field.value, x, y, 1e-2)[1]
-        assert field.forcing(x, y) == pytest.approx(-spread * bend + slope @ speed + active * used, rel=1e-4)
-        assert field.flux(x, y)[0] == pytest.approx(spread * slope[0], rel=1e-6)
+    for field, diffusivity, uptake_rate in zip(fields, diffusivities, sinks):
+        gradient, curvature = derivatives(field.value, x, y)[0], derivatives(field.value, x, y, 1e-2)[1]
+        expected = -diffusivity * curvature + gradient @ speed + active * uptake_rate
+        assert field.forcing(x, y) == pytest.approx(expected, rel=1e-4)
+        assert field.flux(x, y)[0] == pytest.approx(diffusivity * gradient[0], rel=1e-6)

@@ -1,4 +1,4 @@
-"""The judge of a run's files: a good run passes, and each of its checks is shown something bad."""
+"""The judge of a run's files: an intact run passes, and each check detects its damage."""
 import csv
 import shutil
 
@@ -7,7 +7,7 @@ import pytest
 
 from reference import run_files
 from repro.results import field_files
-from repro.runs.running import run
+from repro.runs.execution import run
 from repro.scene import load_scene
 
 TABLES = {"pore": {"width": "50 um"}, "aggregate": {"radius": "15 um"}, "flow": {"head": "1e-3 cm"}, "substrates": {},
@@ -15,29 +15,29 @@ TABLES = {"pore": {"width": "50 um"}, "aggregate": {"radius": "15 um"}, "flow": 
 
 
 @pytest.fixture(scope="module")
-def good(tmp_path_factory):
+def intact(tmp_path_factory):
     folder = tmp_path_factory.mktemp("good") / "run"
     run(load_scene(TABLES), folder)
     return folder
 
 
 def failed(folder, tables=TABLES):
-    """Names of the checks that do not hold, without their times."""
-    return {stem(finding) for finding in run_files.findings(run_files.Run(folder, tables)) if not finding.holds}
+    """Names, without times, of the checks that fail."""
+    return {check_name(finding) for finding in run_files.findings(run_files.Run(folder, tables)) if not finding.holds}
 
 
-def stem(finding):
+def check_name(finding):
     return finding.quantity.split(", t = ")[0]
 
 
 def cell(file, column, change, row=-1):
-    """A damage of one cell of a table."""
+    """A function that damages one cell of a table."""
     def damage(folder):
         path = folder / file
         with path.open(newline="") as opened:
             rows = list(csv.reader(opened))
-        at = rows[0].index(column)
-        rows[row][at] = repr(float(change(float(rows[row][at]))))
+        k = rows[0].index(column)
+        rows[row][k] = repr(float(change(float(rows[row][k]))))
         with path.open("w", newline="") as opened:
             csv.writer(opened).writerows(rows)
     return damage
@@ -52,7 +52,7 @@ def ledger(column, change, row=-1):
 
 
 def field(change):
-    """A damage of the last file of fields, whose arrays change(grid) alters."""
+    """A function that damages the last file of fields by change(grid)."""
     def damage(folder):
         path = sorted((folder / "fields").glob("fields_*.vtu"))[-1]
         grid = field_files.read(path)
@@ -62,33 +62,33 @@ def field(change):
 
 
 def node(name, value, at=lambda mesh: 0):
-    """A damage of one node's value."""
+    """A function that damages one node's value."""
     def change(mesh):
         mesh.point_data[name][at(mesh)] = value
     return field(change)
 
 
 def scaled(name, factor, data="point_data"):
-    """A damage of a whole array."""
+    """A function that scales an array."""
     def change(mesh):
         arrays = getattr(mesh, data)
         arrays[name] = arrays[name] * factor
     return field(change)
 
 
-def renumbered(mesh):
+def turn_triangle(mesh):
     """Turn a triangle over."""
     mesh.cells[0] = mesh.cells[0, [1, 0, 2, 3, 5, 4]]
 
 
-def inward(mesh):
+def move_outlet_corner(mesh):
     """Move a corner of the outlet out of the pore."""
     mesh.points[mesh.points[:, 0].argmax(), 1] -= 1.0
     mesh.points[mesh.points[:, 1].argmin(), 1] -= 1.0
 
 
 def forgotten(folder):
-    """The index of the fields loses its last file."""
+    """Remove the last file from the index of the fields."""
     path = folder / "fields.pvd"
     lines = path.read_text().splitlines()
     lines.remove([line for line in lines if "DataSet" in line][-1])
@@ -96,7 +96,7 @@ def forgotten(folder):
 
 
 def unfinished(folder):
-    """The last row of the table and its fields are lost, in a run that says it is complete."""
+    """Remove the last row of the table and its fields; the record still states that the run is complete."""
     path = folder / "timeseries.csv"
     path.write_text("".join(path.read_text().splitlines(keepends=True)[:-1]))
     forgotten(folder)
@@ -119,8 +119,8 @@ def times(factor):
     return lambda value: value * factor
 
 
-#: What is bad, and the check that says so.
-BAD = [
+#: Damages, and the check that detects each.
+DAMAGES = [
     (series("donor_min_mg_per_L", lambda _: np.nan), "numbers that are not finite"),
     (scaled("J", np.nan, "cell_data"), "numbers that are not finite"),
     (scaled("surface_stretch", np.nan, "cell_data"), "numbers that are not finite"),
@@ -130,12 +130,12 @@ BAD = [
     (ledger("end_h", plus(-0.01)), "end of the ledger, h, beyond its bounds"),
     (series("nodes", plus(1)), "nodes of the row less those of the fields"),
     (series("meshed_length_um", times(1.0001)), "area of the mesh over meshed length times width, less one"),
-    (field(inward), "nodes, beyond its bounds"),
+    (field(move_outlet_corner), "nodes, beyond its bounds"),
     (series("aggregate_area_um2", times(1.01)), "aggregate's area in the fields over that of the row, less one"),
     (series("thickness_um", times(1.000001)), "ends and thickness in the fields less those of the row, over the width"),
     (series("upstream_um", times(1.01)), "ends and thickness in the fields less those of the row, over the width"),
     (series("contact", plus(1)), "contact in the fields less that of the row"),
-    (field(renumbered), "triangles that are turned over"),
+    (field(turn_triangle), "triangles that are turned over"),
     (series("head_loss_cm", times(1.0001)), "head_loss_cm over that of the scene, less one"),
     (node("velocity_m_per_d", [0.001, 0.0, 0.0], at_wall), "velocity at the walls over the mean"),
     (node("velocity_m_per_d", [0.0, 0.001, 0.0], at_wall), "velocity through the walls over the mean"),
@@ -179,36 +179,36 @@ BAD = [
 ]
 
 
-STRAIGHT_BAD = [
+STRAIGHT_DAMAGES = [
     (series("nodes", plus(1)), "nodes of the row less those of the fields"),
     (scaled("velocity_m_per_d", 1.05), "work that the water spends and the clean rest, over the head loss, less one"),
     (series("aggregate_area_um2", times(1.0002)), "biomass over X_m times the area of the row, less one"),
     (scaled("donor_mg_per_L", 1.001), "effluent donor of the fields less that of the row, over the supply")]
 
 
-@pytest.mark.parametrize("damage, check", BAD)
-def test_each_check_is_shown_something_bad(good, tmp_path, damage, check):
+@pytest.mark.parametrize("damage, check", DAMAGES)
+def test_each_check_detects_its_damage(intact, tmp_path, damage, check):
     folder = tmp_path / "run"
-    shutil.copytree(good, folder)
+    shutil.copytree(intact, folder)
     damage(folder)
     assert check in failed(folder)
 
 
-def test_a_good_run_passes_and_no_check_is_left_unshown(good):
-    assert failed(good) == set()
-    checks = {stem(finding) for finding in run_files.findings(run_files.Run(good, TABLES))}
-    assert checks == {check for _, check in BAD}
+def test_an_intact_run_passes_and_every_check_has_a_damage(intact):
+    assert failed(intact) == set()
+    checks = {check_name(finding) for finding in run_files.findings(run_files.Run(intact, TABLES))}
+    assert checks == {check for _, check in DAMAGES}
 
 
-def test_straight_triangles_are_judged_too(tmp_path):
-    """Work and area may err by what the hard cases allow the preset paper, all else as with curved triangles."""
+def test_checks_of_straight_triangles_detect_their_damage(tmp_path):
+    """Work and area have the tolerances of the hard cases for preset paper, the rest those of curved triangles."""
     tables = {**TABLES, "numerics": {"preset": "fast", "elements": "linear", "refinement": 0.7}}
-    good = tmp_path / "good"
-    run(load_scene(tables), good)
-    assert failed(good, tables) == set()
-    for number, (damage, check) in enumerate(STRAIGHT_BAD):
+    intact = tmp_path / "good"
+    run(load_scene(tables), intact)
+    assert failed(intact, tables) == set()
+    for number, (damage, check) in enumerate(STRAIGHT_DAMAGES):
         folder = tmp_path / str(number)
-        shutil.copytree(good, folder)
+        shutil.copytree(intact, folder)
         damage(folder)
         assert check in failed(folder, tables)
 
@@ -219,19 +219,19 @@ def test_straight_triangles_are_judged_too(tmp_path):
     ("ledger", ledger("donor_out_pg_per_m", lambda value: np.nextafter(value, 0)),
      "numbers of the ledger that depend on rows"),
     ("times", series("time_h", plus(1e-6)), "")])
-def test_two_runs_that_differ_in_the_last_bit_are_told_apart(good, tmp_path, file, damage, check):
+def test_a_difference_in_the_last_bit_is_detected(intact, tmp_path, file, damage, check):
     folder = tmp_path / "run"
-    shutil.copytree(good, folder)
+    shutil.copytree(intact, folder)
     damage(folder)
-    one, other = (run_files.Run(path, TABLES) for path in (good, folder))
-    assert all(finding.holds for finding in run_files.same_rows(one, one))
-    assert {finding.quantity for finding in run_files.same_rows(one, other) if not finding.holds} == {check} - {""}
+    first, second = (run_files.Run(path, TABLES) for path in (intact, folder))
+    assert all(finding.holds for finding in run_files.same_rows(first, first))
+    assert {finding.quantity for finding in run_files.same_rows(first, second) if not finding.holds} == {check} - {""}
 
 
 @pytest.mark.parametrize("entry, linear, time, value, largest", [
     ("10 mg/L", False, 3.0, 10.0, 10.0), ([["0 h", "10 mg/L"], ["60 min", "4 mg/L"]], False, 1.0, 4.0, 10.0),
     ([["0 h", "1 mg/L"], ["2 h", "5 mg/L"]], True, 1.0, 3.0, 3.0),
     ([["0 h", "1 mg/L"], ["2 h", "5 mg/L"]], False, 1.999, 1.0, 1.0)])
-def test_a_table_over_time(entry, linear, time, value, largest):
-    course = run_files.Course(entry, linear)
+def test_a_supply_over_time_is_evaluated(entry, linear, time, value, largest):
+    course = run_files.TimeCourse(entry, linear)
     assert course.at(time) == value and course.largest(time) == largest

@@ -1,4 +1,4 @@
-"""The pages of runs: what they say, that they need nothing else, and that nothing told by others is markup."""
+"""The pages of runs: their content, that they need no other file, and that they escape all foreign text."""
 
 import html
 import json
@@ -27,120 +27,120 @@ from tests.pages import (
     PURE,
     Page,
     check_alone,
-    first,
-    hostile,
-    numbers,
+    decode_numbers,
+    first_group,
+    make_hostile,
+    page_data,
     run,
-    stored,
     text_of,
 )
 
 
-def test_every_run_has_a_page_that_needs_nothing_else(fast, paper, flow_only):
+def test_every_run_has_a_self_contained_page(fast, paper, flow_only):
     for out in (fast, paper, flow_only):
-        found = check_alone(text_of(out))
-        assert found.outside == [] and {kind for kind, _, _ in found.scripts} == {"style", "script"}
+        page = check_alone(text_of(out))
+        assert page.outside == [] and {kind for kind, _, _ in page.scripts} == {"style", "script"}
 
 
 @pytest.mark.parametrize("name", ["fast", "paper"])
 def test_numbers_are_those_of_the_first_and_the_last_row(request, name):
-    """As the page's table has them, to four digits."""
+    """The page's table has them to four digits."""
     out = request.getfixturevalue(name)
-    panel = first("<h2>Numbers</h2>(.*?)</table>", text_of(out))
+    panel = first_group("<h2>Numbers</h2>(.*?)</table>", text_of(out))
     lines = [re.findall("<td.*?>(.*?)</td>", row) for row in re.findall("<tr>(.*?)</tr>", panel)[1:]]
-    told = {html.unescape(label): shown for label, *shown in lines}
+    cells = {html.unescape(label): first_last for label, *first_last in lines}
     series = results.read_table(out / "timeseries.csv")
     times = series.pop("time_h")
     kind = {"fast": "Quadratic triangles, drawn curved", "paper": "Linear triangles"}[name]
     record = read(out).record
-    for said in (kind, f"{record['wall_time_s']:.3g} s in all", '<td>width</td><td class="value">50 um<',
+    for expected in (kind, f"{record['wall_time_s']:.3g} s in all", '<td>width</td><td class="value">50 um<',
                  f'anew</td><td class="value">{record["remeshes"]}<', f'hash</td><td class="value">{record["hash"]}<',
                  f"{len(times)} rows, to t = {times[-1]:g} h."):
-        assert said in text_of(out)
+        assert expected in text_of(out)
     assert re.findall("t = ([^ ]*) h", panel) == [f"{times[k]:.6g}" for k in (0, -1)] and len(times) > 2
-    assert told.keys() == set(map(names.with_unit, series)) and (series["conductivity_m_per_d"] > 0).all()
+    assert cells.keys() == set(map(names.with_unit, series)) and (series["conductivity_m_per_d"] > 0).all()
     for column, values in series.items():
-        shown = told[names.with_unit(column)]
+        first_last = cells[names.with_unit(column)]
         if column in ("remeshed", "contact"):
-            assert shown == ["yes" if value else "no" for value in values[[0, -1]]]
+            assert first_last == ["yes" if value else "no" for value in values[[0, -1]]]
         else:
-            assert list(map(float, shown)) == pytest.approx(values[[0, -1]], rel=5.1e-5), column
+            assert list(map(float, first_last)) == pytest.approx(values[[0, -1]], rel=5.1e-5), column
 
 
-def test_what_is_not_modelled_is_left_out(flow_only, fast):
-    """And what is modelled says what it assumes, ahead of fields and charts."""
-    text, packed = text_of(flow_only), stored(flow_only)
+def test_the_page_leaves_out_physics_that_is_not_modelled(flow_only, fast):
+    """Assumptions about the modelled physics stand before fields and charts."""
+    text, packed = text_of(flow_only), page_data(flow_only)
     assert "Not modelled: substrates, kinetics, growth." in text and "acceptor" not in text.split("<script>")[0]
     assert [(field["name"], field["unit"]) for field in packed["fields"]] == [
         ("velocity_m_per_d", "m/day"), ("head_cm", "cm"), ("region", "")]
     assert "<figure" not in text and '<div class="time" hidden>' in text and "Assumed: a pore in the plane" in text
-    grown = text_of(fast)
-    assert "Not modelled" not in grown and '<div class="time">' in grown
-    head = grown[grown.index("Assumed: "): grown.index("Fields and mesh")]
+    page_of_growth = text_of(fast)
+    assert "Not modelled" not in page_of_growth and '<div class="time">' in page_of_growth
+    head = page_of_growth[page_of_growth.index("Assumed: "): page_of_growth.index("Fields and mesh")]
     for words in ("traction on the aggregate neglected", "quasi-steady"):
         assert words in head and words not in text
 
 
 @pytest.mark.parametrize("transport, extent, wanted", [("quasi_steady", "full", [True, False]),
                                                        ("gear", "central", [False, True])])
-def test_what_is_assumed_is_what_the_scene_has_chosen(transport, extent, wanted):
+def test_the_assumptions_follow_from_the_scene(transport, extent, wanted):
     scene = load_scene("base", [f"numerics.transport={transport}", f"numerics.extent={extent}"])
-    said = run_page._assumed(Run(Path(), {"tables": scene_tables(scene)}, {}, {}))
-    assert [words in said for words in ("substrates at rest", "a clean channel outside")] == wanted
+    sentence = run_page._assumed(Run(Path(), {"tables": scene_tables(scene)}, {}, {}))
+    assert [words in sentence for words in ("substrates at rest", "a clean channel outside")] == wanted
 
 
 def test_each_frame_is_drawn_on_its_own_mesh(fast, paper):
-    """Of a run with two meshes: triangles of six nodes, and then of three."""
+    """The first mesh has triangles of six nodes, the second of three."""
     packed = fields.packed([*fields.index(fast)[:1], *fields.index(paper)[:1]])
     assert [packed["meshes"][frame["mesh"]]["per"] for frame in packed["frames"]] == [6, 3]
 
 
 def places(packed, frame):
-    """(N, 2) um of the nodes of a frame, and the sides of the box that holds all."""
+    """(N, 2) um, the nodes of a frame, and the sides of the box around all frames."""
     low, high = np.array(packed["box"]).reshape(2, 2).T
     return low + values((0.0, 1.0, frame["points"])).reshape(-1, 2) * (high - low), high - low
 
 
-def values(told):
-    """Of the least, the largest and the levels of an array."""
-    low, high, text = told
-    return low + numbers(text, "<u2") / 65534 * (high - low)
+def values(packed_array):
+    """The values of an array that is packed as least, largest and levels."""
+    low, high, text = packed_array
+    return low + decode_numbers(text, "<u2") / 65534 * (high - low)
 
 
 @pytest.mark.parametrize("name", ["fast", "paper"])
 def test_fields_of_the_page_are_those_of_the_files(request, name):
-    """Each array to half a step of its 65534, with the mesh's own nodes."""
+    """Each array agrees to half of its 65534 levels, on the nodes of the mesh."""
     out = request.getfixturevalue(name)
-    packed, entries = stored(out), fields.index(out)
+    packed, entries = page_data(out), fields.index(out)
     assert packed["of"] == len(entries) == len(packed["frames"])
     for frame, (time, path) in zip(packed["frames"], entries):
         grid, mesh = field_files.read(path), packed["meshes"][frame["mesh"]]
         cells = grid.cells
         assert frame["time"] == time and mesh["per"] == cells.shape[1] == {"fast": 6, "paper": 3}[name]
-        assert (numbers(mesh["cells"], "<u4").reshape(cells.shape) == cells).all()
-        region = numbers(mesh["body"], "<u1") == 1
+        assert (decode_numbers(mesh["cells"], "<u4").reshape(cells.shape) == cells).all()
+        region = decode_numbers(mesh["body"], "<u1") == 1
         assert (region == grid.cell_data["region"]).all() and region.any() and not region.all()
         points, box = places(packed, frame)
         assert np.abs(points - grid.points[:, :2]).max() <= 0.51 / 65534 * box.max()
         nodes = np.unique(cells[region])
         for field in packed["fields"]:
-            told = frame["values"][field["name"]]
-            low, high = told[:2]
+            packed_array = frame["values"][field["name"]]
+            low, high = packed_array[:2]
             node = field["at"] == "node"
             value = grid.point_data[field["name"]] if node else grid.cell_data[field["name"]]
             value = np.linalg.norm(value, axis=1) if value.ndim == 2 else value
             value = value[nodes if node else region] if field["body"] else value
             assert (low, high) == (value.min(), value.max())
-            assert np.abs(values(told) - value).max() <= 0.51 / 65534 * (high - low)
+            assert np.abs(values(packed_array) - value).max() <= 0.51 / 65534 * (high - low)
 
 
 def test_many_frames_are_thinned_and_the_page_says_so(paper, tmp_path, monkeypatch):
-    """The first and the last are always shown."""
+    """The first and the last frame are always shown."""
     copy = shutil.copytree(paper, tmp_path / "run")
     for most, value, times in (("MOST_FRAMES", 3, [0, 0.4, 1.0]), ("MOST_BYTES", 1, [0, 1.0])):
         monkeypatch.setattr(fields, most, value)
         report.write(copy)
-        assert [frame["time"] for frame in stored(copy)["frames"]] == times
+        assert [frame["time"] for frame in page_data(copy)["frames"]] == times
         assert f"{len(times)} of 6 times shown" in text_of(copy)
     assert "all 6 times shown" in text_of(paper)
 
@@ -154,29 +154,30 @@ def test_fields_are_read_from_the_runs_own_files_alone(paper, tmp_path):
     assert [time for time, _ in fields.index(copy)] == [1.0]
 
 
-def test_nothing_told_by_others_is_markup(fast, tmp_path):
-    """Names, status, keys, values, columns and folders."""
-    copy = hostile(shutil.copytree(fast, tmp_path / "<b onclick=pwned=1>"))
+def test_foreign_text_is_escaped(fast, tmp_path):
+    """Names, status, keys, values, columns and folders are escaped."""
+    copy = make_hostile(shutil.copytree(fast, tmp_path / "<b onclick=pwned=1>"))
     report.write(copy)
     report.compare([copy, fast], tmp_path / "both.html")
     for text in (text_of(copy), (tmp_path / "both.html").read_text()):
-        found = Page(text)
-        assert {tag for tag, _ in found.tags} <= {tag for tag, _ in Page(text_of(fast)).tags} | {"ul", "li", "b"}
+        page = Page(text)
+        assert {tag for tag, _ in page.tags} <= {tag for tag, _ in Page(text_of(fast)).tags} | {"ul", "li", "b"}
         assert "<script>pwned" not in text and "<img" not in text and "<b onclick" not in text
-        assert any(HOSTILE in one for one in found.texts)
-        assert len(found.scripts) <= 6
+        assert any(HOSTILE in text_node for text_node in page.texts)
+        assert len(page.scripts) <= 6
 
 
-def test_storage_is_drawn_where_there_is_some(paper):
+def test_storage_is_drawn_only_if_it_is_not_zero(paper):
     assert "acceptor_stored_ug_per_m_per_h" not in quantities.series(read(paper))
 
 
 def test_contact_is_marked(tmp_path):
     out = run(tmp_path, "wide", FAST, 'pore.width="20 um"', 'aggregate.radius="17.9 um"', 'growth.end="1 h"')
     series = results.read_table(out / "timeseries.csv")
-    touching = series["time_h"][series["contact"] == 1][0]
-    assert quantities.contact(read(out)) == [touching] and 0 < touching < series["time_h"][-1]
-    assert f"contact with the opposite wall, t = {touching:.6g} h" in text_of(out) and 'class="mark"' in text_of(out)
+    contact_time = series["time_h"][series["contact"] == 1][0]
+    assert quantities.contact(read(out)) == [contact_time] and 0 < contact_time < series["time_h"][-1]
+    text = text_of(out)
+    assert f"contact with the opposite wall, t = {contact_time:.6g} h" in text and 'class="mark"' in text
 
 
 def test_a_run_that_stops_has_its_page(tmp_path, monkeypatch):
@@ -187,33 +188,35 @@ def test_a_run_that_stops_has_its_page(tmp_path, monkeypatch):
 
 
 def test_every_name_has_its_unit_or_is_a_pure_number():
-    """Names of columns, ledgers and arrays."""
-    for name, each in names.KNOWN.items():
-        assert bool(names.unit(name)) != (name in PURE) and each.formula and names.words(name) != name or name == "J"
-    shown = {"mean_velocity_m_per_d": ("m/day", "m d-1"), "thickness_um": ("um", "um"), "head_loss_cm": ("cm", "cm"),
+    """This holds for columns, ledgers and arrays."""
+    for name, quantity in names.KNOWN.items():
+        assert bool(names.unit(name)) != (name in PURE)
+        assert quantity.formula and names.words(name) != name or name == "J"
+    examples = {"mean_velocity_m_per_d": ("m/day", "m d-1"), "thickness_um": ("um", "um"), "head_loss_cm": ("cm", "cm"),
              "aggregate_area_um2": ("um²", "um2"), "acceptor_supplied_pg_per_m": ("pg/m", "pg m-1"),
              "donor_min_mg_per_L": ("mg/L", "mg L-1"), "nodes": ("", "1")}
-    assert {name: (names.unit(name), names.udunits(name)) for name in shown} == shown
+    assert {name: (names.unit(name), names.udunits(name)) for name in examples} == examples
 
 
-#: What parts of a name mean; others stand in the words as they are.
+#: The words for parts of a name; other parts occur in the long name as they are.
 MEANING = {"out": "leaving", "effluent": "leaving", "consumed": "taken up", "min": "least", "max": "largest",
            "fraction": "part", "balance": "relative", "t0": "t = 0", "remeshed": "made anew", "before": "start",
            "after": "end", "region": "aggregate (1)", "oxygen": "acceptor", "demand": "donor", "overshoot": "above"}
-#: Of each of these a name and its words have the same one, or none.
+#: A name and its long name have the same word of each tuple, or none.
 CONTRASTS = [("acceptor", "donor"), ("upstream", "downstream"), ("least", "largest"), ("active", "inert"),
              ("supplied", "leaving", "taken up", "stored"), (" xx", " yy", " zz", " xy")]
 
 
 @pytest.mark.parametrize("name", names.KNOWN)
-def test_the_long_name_of_a_quantity_says_what_its_name_says(name):
-    """Part by part: in NetCDF files, on pages and in `docs/quantities.md`."""
+def test_the_long_name_of_a_quantity_agrees_with_its_name(name):
+    """The long name, in NetCDF files, on pages and in `docs/quantities.md`, has each part of the name."""
     words = " " + names.words(name)
     parts = [MEANING.get(part, part) for part in name.removesuffix(ending(name)).split("_")]
     assert [part for part in parts if part.lower() not in words.lower()] == []
-    said = " " + " ".join(parts)
+    name_text = " " + " ".join(parts)
     for contrast in CONTRASTS:
-        used, meant = ({each for each in contrast if re.search(rf"\b{each.strip()}\b", text)} for text in (words, said))
+        pattern = r"\b(?:" + "|".join(each.strip() for each in contrast) + r")\b"
+        used, meant = (set(re.findall(pattern, text)) for text in (words, name_text))
         assert used == meant, contrast
 
 
@@ -224,84 +227,86 @@ def test_no_two_columns_have_one_long_name():
 
 def test_the_table_in_docs_is_that_of_the_definitions():
     docs = Path(__file__).parents[1] / "docs"
-    made = runpy.run_path(str(docs / "quantities.py"))["text"]()
-    assert (docs / "quantities.md").read_text(encoding="utf-8") == made
+    text = runpy.run_path(str(docs / "quantities.py"))["text"]()
+    assert (docs / "quantities.md").read_text(encoding="utf-8") == text
     for name in (*results.COLUMNS, *results.LEDGER_COLUMNS, *names.KNOWN, "clogging_time_h", "remeshed_nodes"):
-        assert f"| `{name}` |" in made
+        assert f"| `{name}` |" in text
 
 
-def test_the_state_before_an_expansion_is_shown_ahead_of_that_after_it(tmp_path):
-    """Both at the same time, and the page says which is which."""
+def test_the_state_before_an_expansion_is_shown_before_that_after_it(tmp_path):
+    """Both have the same time, and a note distinguishes them."""
     folder = run(tmp_path, "base", "growth.end=0.6 h", 'output.times=["0 h", "0.4 h", "0.6 h"]')
-    packed = stored(folder)
-    told = [(frame["time"], frame.get("note")) for frame in packed["frames"]]
-    assert told == [(0, None), (0.4, fields.BEFORE), (0.4, None), (0.6, fields.BEFORE), (0.6, None)]
+    packed = page_data(folder)
+    frames = [(frame["time"], frame.get("note")) for frame in packed["frames"]]
+    assert frames == [(0, None), (0.4, fields.BEFORE), (0.4, None), (0.6, fields.BEFORE), (0.6, None)]
     before, after = packed["frames"][1:3]
     assert before["values"]["theta"][1] > after["values"]["theta"][1] or before["points"] != after["points"]
     assert "all 3 times shown, those grown and not yet expanded besides" in text_of(folder)
 
 
-def regular(monkeypatch, most):
-    """Points and triangles of the page's own grid over 100 um by 50 um, of about so many nodes."""
+def regular_grid(monkeypatch, most):
+    """Points and triangles of the page's grid over 100 um by 50 um, of about ``most`` nodes."""
     with monkeypatch.context() as patch:
         patch.setattr(fields, "MOST_NODES", most)
         return fields._regular(np.zeros(2), np.array([100.0, 50.0]))
 
 
-def write(path, points, cells, nodal, region):
-    """A file of fields, those of the triangles the same as the region."""
+def write_fields(path, points, cells, nodal, region):
+    """Write a file of fields, in which all fields of triangles equal the region."""
     celled = dict.fromkeys(("region", "theta", "J", "largest_principal_stress_MPa", "stress_xx_MPa"), region)
     field_files.write(path, Grid(np.pad(points, ((0, 0), (0, 1))), cells, nodal, celled))
 
 
 @pytest.mark.parametrize("kind, count", [
     pytest.param("triangle", 101_000, marks=pytest.mark.thorough), ("triangle6", 26_000)])
-def test_a_page_of_a_fine_mesh_is_small_and_true(tmp_path, monkeypatch, kind, count):
-    """1e5 nodes in several times take 3 MB at most; values on the grid are those of the mesh."""
-    points, cells = regular(monkeypatch, count)
+def test_a_page_of_a_fine_mesh_is_small_and_accurate(tmp_path, monkeypatch, kind, count):
+    """1e5 nodes at several times take at most 3 MB; values on the grid are those of the mesh."""
+    points, cells = regular_grid(monkeypatch, count)
     if kind == "triangle6":
-        made = curved(Mesh.of(points, cells, np.zeros(len(cells), bool), np.empty(0, int), 50.0, (0.0, 100.0)), None)
-        points, cells = made.points, made.cells
+        straight = Mesh.of(points, cells, np.zeros(len(cells), bool), np.empty(0, int), 50.0, (0.0, 100.0))
+        mesh = curved(straight, None)
+        points, cells = mesh.points, mesh.cells
     middles = points[cells[:, :3]].mean(axis=1)
     region = (np.hypot(middles[:, 0] - 50, middles[:, 1]) < 20).astype(float)
     nodal = dict.fromkeys(("head_cm", "acceptor_mg_per_L", "donor_mg_per_L", "active_biomass", "inert_biomass",
                            "pressure_MPa"), points @ [3, -2])
-    write(tmp_path / "0.vtu", points, cells, nodal | {"velocity_m_per_d": np.pad(points, ((0, 0), (0, 1)))}, region)
+    nodal["velocity_m_per_d"] = np.pad(points, ((0, 0), (0, 1)))
+    write_fields(tmp_path / "0.vtu", points, cells, nodal, region)
     entries = [(float(k), tmp_path / "0.vtu") for k in range(5)]
     packed = fields.packed(entries, entries)
     assert len(json.dumps(packed)) < 3e6 - 200e3 and packed["nodes"] == len(points) >= 1e5
     frame, mesh = packed["frames"][-1], packed["meshes"][0]
     assert len(packed["frames"]) >= 2 and mesh["per"] == 3
-    there = places(packed, frame)[0]
-    assert np.abs(values(frame["values"]["head_cm"]) - there @ [3, -2]).max() < 0.02
-    shown = there[numbers(mesh["cells"], "<u4").reshape(-1, 3)].mean(axis=1)
-    away = np.hypot(shown[:, 0] - 50, shown[:, 1])
-    assert ((numbers(mesh["body"], "<u1") == 1) == (away < 20))[np.abs(away - 20) > 1].all()
+    nodes = places(packed, frame)[0]
+    assert np.abs(values(frame["values"]["head_cm"]) - nodes @ [3, -2]).max() < 0.02
+    centres = nodes[decode_numbers(mesh["cells"], "<u4").reshape(-1, 3)].mean(axis=1)
+    radius = np.hypot(centres[:, 0] - 50, centres[:, 1])
+    assert ((decode_numbers(mesh["body"], "<u1") == 1) == (radius < 20))[np.abs(radius - 20) > 1].all()
 
 
 def test_each_frame_has_the_aggregate_of_its_own_time(tmp_path, monkeypatch):
-    """Though all have the same triangles, as on the page's own grid."""
-    points, cells = regular(monkeypatch, 20)
+    """All frames have the same triangles, those of the page's grid."""
+    points, cells = regular_grid(monkeypatch, 20)
     region = (points[cells[:, 0], 0] > 50).astype(float)
     entries = [(float(k), tmp_path / f"{k}.vtu") for k in range(4)]
     for k, (_, path) in enumerate(entries):
-        write(path, points, cells, {}, np.roll(region, k))
+        write_fields(path, points, cells, {}, np.roll(region, k))
     packed = fields.packed(entries)
     for k, frame in enumerate(packed["frames"]):
-        assert (numbers(packed["meshes"][frame["mesh"]]["body"], "<u1") == np.roll(region, k)).all()
+        assert (decode_numbers(packed["meshes"][frame["mesh"]]["body"], "<u1") == np.roll(region, k)).all()
 
 
 def test_pages_of_many_meshes_keep_to_their_size(fast, tmp_path, monkeypatch):
-    """Forty, each told in full: what is left of the page's bytes is used to more than a half, and never more of it is
-    taken. What charts take is left out."""
-    points, cells = regular(monkeypatch, 2500)
+    """Forty meshes use more than half of the available bytes of the page, and never more than all. Bytes of charts are
+    not available."""
+    points, cells = regular_grid(monkeypatch, 2500)
     region = (points[cells[:, 0], 0] > 50).astype(float)
     entries = [(float(k), tmp_path / f"{k}.vtu") for k in range(40)]
     for k, (_, path) in enumerate(entries):
-        write(path, points, np.roll(cells, k, axis=0), {"head_cm": points[:, 0]}, np.roll(region, k))
-    for spent in (0, 1_000_000):
-        left = fields.MOST_BYTES - spent
-        assert 0.5 * left < len(json.dumps(fields.packed(entries, spent=spent))) <= left < 3e6 - 200e3
+        write_fields(path, points, np.roll(cells, k, axis=0), {"head_cm": points[:, 0]}, np.roll(region, k))
+    for used in (0, 1_000_000):
+        available = fields.MOST_BYTES - used
+        assert 0.5 * available < len(json.dumps(fields.packed(entries, spent=used))) <= available < 3e6 - 200e3
     monkeypatch.setattr(fields, "packed", Mock(wraps=fields.packed))
     text = run_page.build(read(fast))
     assert fields.packed.call_args.args[2] > 0.9 * sum(map(len, re.findall("<figure.*?</figure>", text, re.S))) > 1e4
@@ -309,11 +314,11 @@ def test_pages_of_many_meshes_keep_to_their_size(fast, tmp_path, monkeypatch):
 
 def test_a_value_that_is_not_finite_has_no_level():
     low, high, text = fields._levels(np.array([1.0, np.nan, 3.0, np.inf]))
-    assert (low, high, numbers(text, "<u2").tolist()) == (1.0, 3.0, [0, 65535, 65534, 65535])
+    assert (low, high, decode_numbers(text, "<u2").tolist()) == (1.0, 3.0, [0, 65535, 65534, 65535])
 
 
-def test_stages_are_parts_of_the_whole_time_the_longest_first():
-    """Of which those that took none are left out."""
-    made = run_page._bars({"flow": 1.0, "none": 0.0, "growth": 3.0}, 6.0)
-    shown = re.findall('<text x="0".*?>(.*?)<.*? width="(.*?)".*?>([0-9.]+) s<', made)
-    assert shown == [("growth", "75.0", "3"), ("flow", "25.0", "1")]
+def test_stages_are_shown_as_parts_of_the_time_longest_first():
+    """Stages without any time are left out."""
+    bars = run_page._bars({"flow": 1.0, "none": 0.0, "growth": 3.0}, 6.0)
+    labels = re.findall('<text x="0".*?>(.*?)<.*? width="(.*?)".*?>([0-9.]+) s<', bars)
+    assert labels == [("growth", "75.0", "3"), ("flow", "25.0", "1")]

@@ -1,4 +1,4 @@
-"""Runs that are interrupted, killed or have failed go on as if nothing had happened, to the last bit."""
+"""Runs that were interrupted, killed or have failed resume, with the same results to the last bit."""
 
 import json
 import os
@@ -23,31 +23,31 @@ from repro.model import growth, traction
 from repro.results import columns
 from repro.results.files import sealed
 from repro.results.quantities import Quantity
-from repro.runs import running
+from repro.runs import execution
 from repro.runs.checkpoint import NEWEST, PREVIOUS
-from repro.runs.running import Watch, resume, run
-from repro.runs.whole import lacking
+from repro.runs.execution import Watch, resume, run
+from repro.runs.integrity import find_defect
 from repro.scene import load_scene
 from tests import faults
-from tests.faults import little_memory
-from tests.pages import whole_of
+from tests.faults import limit_memory
+from tests.pages import cached_run
 from tests.shell import (
     BRIEF,
     LONG,
-    as_whole,
-    every,
     files,
     flags,
     flip,
-    lasting,
-    refused,
-    resumed,
+    interrupt_run,
+    lasting_record,
+    matches_uninterrupted,
+    read_record,
+    refusal,
+    resume_run,
     rewrite,
     rows,
-    shell,
-    started,
-    stopped,
-    told,
+    run_and_wait,
+    start_run,
+    stop_every,
     wait_for,
 )
 
@@ -66,7 +66,7 @@ SCENES = {
     "to the pore's end": ("aggregate.radius=40 um", "pore.length=90 um", "growth.time_step=1 h", "growth.end=9 h",
                           "numerics.refinement=0.5"),
 }
-MORE = {
+THOROUGH_SCENES = {
     "fast, rows within steps": ('numerics.preset="fast"', 'growth.end="9.7 h"'),
     "cubic, contact": ('numerics.preset="fast"', 'numerics.elements="cubic"', "numerics.tolerance=0.0005", *CONTACT,
                        'output.times=["0.05 h", "0.3 h", "0.6 h"]'),
@@ -87,11 +87,11 @@ SCENE = load_scene("base", BRIEF)
 
 
 def in_parts(scene, folder, count):
-    """Run a scene with a stop at each so-manieth step; how often it was gone on with."""
-    watch, resumes = Watch(stop=every(count)), 0
+    """Run a scene with a stop after every ``count`` steps; the number of resumes."""
+    watch, resumes = Watch(stop=stop_every(count)), 0
     with suppress(Interrupted):
         run(scene, folder, watch=watch)
-    while told(folder)["status"] == "interrupted":
+    while read_record(folder)["status"] == "interrupted":
         resumes += 1
         with suppress(Interrupted):
             resume(folder, watch=watch)
@@ -99,23 +99,24 @@ def in_parts(scene, folder, count):
 
 
 @pytest.mark.parametrize("name", [
-    *SCENES, *(pytest.param(name, marks=pytest.mark.thorough) for name in MORE)])
-def test_a_run_stopped_after_every_step_is_the_whole_run(tmp_path, name):
-    """Tables, fields, indices, status and counts, and no warning."""
-    scene = load_scene("base", {**SCENES, **MORE}[name])
+    *SCENES, *(pytest.param(name, marks=pytest.mark.thorough) for name in THOROUGH_SCENES)])
+def test_a_run_stopped_after_every_step_equals_the_uninterrupted_run(tmp_path, name):
+    """Tables, fields, indices, status and counts agree, and no warning occurs."""
+    scene = load_scene("base", {**SCENES, **THOROUGH_SCENES}[name])
     run(scene, tmp_path / "whole")
     resumes = in_parts(scene, tmp_path / "parts", 1)
-    assert resumes == len(told(tmp_path / "parts")["resumes"]) >= 3
+    assert resumes == len(read_record(tmp_path / "parts")["resumes"]) >= 3
     assert files(tmp_path / "parts") == files(tmp_path / "whole")
-    assert lasting(tmp_path / "parts") == lasting(tmp_path / "whole")
+    assert lasting_record(tmp_path / "parts") == lasting_record(tmp_path / "whole")
     assert not {NEWEST, PREVIOUS, ".lock"} & files(tmp_path / "parts").keys()
 
 
-def drag(scene, at):
-    """The force of the aggregate on the water along the pore, MPa um: against the flow."""
+def drag(scene, result):
+    """The force (MPa um) of the aggregate on the water along the pore. It is directed against the flow."""
     drive = scene.flow
-    forces = traction.nodal(at.pore.space, at.solved.flow, drive.kinematic_viscosity / drive.gravity, "laplacian")
-    return -traction.MPA_PER_UM * drive.density * drive.gravity * forces[at.pore.mesh.body, 0].sum()
+    head_per_rate = drive.kinematic_viscosity / drive.gravity
+    forces = traction.nodal(result.pore.space, result.solved.flow, head_per_rate, "laplacian")
+    return -traction.MPA_PER_UM * drive.density * drive.gravity * forces[result.pore.mesh.body, 0].sum()
 
 
 DRAG = Quantity("drag", "force on the water", "-", drag, needs="aggregate and flow", signed=True)
@@ -123,21 +124,21 @@ DRAG = Quantity("drag", "force on the water", "-", drag, needs="aggregate and fl
 
 @pytest.fixture
 def a_negative_column(monkeypatch):
-    """A column of a contributor: its entry in the list of columns, and nothing else."""
+    """A contributor's column, added by its entry in the list of columns alone."""
     monkeypatch.setattr(columns, "SERIES", (*columns.SERIES, DRAG))
     columns.COLUMNS.append(DRAG.name)
     yield
     columns.COLUMNS.remove(DRAG.name)
 
 
-def test_a_run_with_a_negative_column_goes_on_from_its_checkpoint(tmp_path, a_negative_column):
-    """From its last step and not from t = 0; the files are those of the run without an interruption. Without
-    flow the column is empty."""
+def test_a_run_with_a_negative_column_resumes_from_its_checkpoint(tmp_path, a_negative_column):
+    """It resumes after its last step and not at t = 0; its files are those of the uninterrupted run. Without flow the
+    column is empty."""
     scene = load_scene("base", SCENES["paper, rows within steps"])
     run(scene, tmp_path / "continuous")
-    stopped(scene, tmp_path / "parts")
-    assert resumed(tmp_path / "parts") == 0
-    (resume_record,) = told(tmp_path / "parts")["resumes"]
+    interrupt_run(scene, tmp_path / "parts")
+    assert resume_run(tmp_path / "parts") == 0
+    (resume_record,) = read_record(tmp_path / "parts")["resumes"]
     assert resume_record["time_h"] > 0
     assert files(tmp_path / "parts") == files(tmp_path / "continuous")
     values = [float(row["drag"]) for row in rows(tmp_path / "parts" / "timeseries.csv")]
@@ -148,19 +149,19 @@ def test_a_run_with_a_negative_column_goes_on_from_its_checkpoint(tmp_path, a_ne
 
 
 def test_strided_arrays_are_copied():
-    """Of the pore, its mesh, its body at t = 0 and its concentrations: sums over strided views may differ in the last
-    bit from those over what a checkpoint gives back."""
+    """Arrays of the pore, its mesh, its body at t = 0 and its concentrations are made contiguous, since a sum over a
+    strided view may differ in the last bit from the sum over an array that was read from a checkpoint."""
     ((_, instant),) = steps(load_scene("base", ["growth.end=0 h"]))
-    now = instant.pore
+    state = instant.pore
 
     def strided(data, name):
         return replace(data, **{name: getattr(data, name).repeat(2, axis=-1)[..., ::2]})
 
-    space = replace(now.space, mesh=strided(now.mesh, "points"))
-    found = loop.laid_out(replace(strided(now, "active"), space=space, body=strided(now.body, "reference"),
-                                  concentrations=strided(now.concentrations, "donor")))
-    for place in map(attrgetter, ("active", "mesh.points", "body.reference", "concentrations.donor")):
-        assert place(found).flags.c_contiguous and (place(found) == place(now)).all()
+    space = replace(state.space, mesh=strided(state.mesh, "points"))
+    copied = loop.contiguous(replace(strided(state, "active"), space=space, body=strided(state.body, "reference"),
+                                  concentrations=strided(state.concentrations, "donor")))
+    for attribute in map(attrgetter, ("active", "mesh.points", "body.reference", "concentrations.donor")):
+        assert attribute(copied).flags.c_contiguous and (attribute(copied) == attribute(state)).all()
 
 
 RECORD = {"scene": "x", "hash": "x", "tables": {}, "files": ["thesis.tex"], "status": "sunning"}
@@ -174,79 +175,80 @@ RECORD = {"scene": "x", "hash": "x", "tables": {}, "files": ["thesis.tex"], "sta
     (sealed({"scene": "x", "files": ["thesis.tex"]}), "run.json: it has no scene or no status"),
     (sealed(RECORD), "run.json: its status 'sunning' is none that a run writes")])
 def test_a_folder_without_a_run_is_refused(tmp_path, capsys, content, why, arguments):
-    """With status 2 and one line that says what is there and what to do, and nothing is changed."""
+    """The status is 2, one line describes the folder and the remedy, and nothing changes."""
     (tmp_path / "thesis.tex").write_text("years of work")
     if content is not None:
         (tmp_path / "run.json").write_text(content)
-    message = refused(tmp_path, capsys, *arguments, tmp_path)
+    message = refusal(tmp_path, capsys, *arguments, tmp_path)
     assert re.search(why, message)
     assert content is None or "--resume" in arguments or "move the folder away, or name another" in message
 
 
 @pytest.mark.parametrize("status", ["", "Completed", "runningly", f"{PORE_END}, or so"])
-def test_a_status_that_no_run_writes_is_none(tmp_path, capsys, status):
-    """Neither finished nor to be gone on with."""
+def test_a_status_that_no_run_writes_is_refused(tmp_path, capsys, status):
+    """The run neither counts as finished nor is resumed."""
     run(load_scene("flow_only"), tmp_path)
     rewrite(tmp_path, status=status)
-    message = refused(tmp_path, capsys, "run", "--resume", tmp_path)
+    message = refusal(tmp_path, capsys, "run", "--resume", tmp_path)
     assert f"its status {status!r} is none that a run writes" in message
-    assert "run.json tells of a run of another scene, or has no status" in lacking(tmp_path, load_scene("flow_only"))
+    defect = find_defect(tmp_path, load_scene("flow_only"))
+    assert "run.json tells of a run of another scene, or has no status" in defect
 
 
-def test_a_run_that_is_over_and_damaged_goes_on_from_a_checkpoint_that_is_left(tmp_path, capsys):
-    """And says so."""
+def test_a_damaged_finished_run_resumes_from_its_remaining_checkpoint(tmp_path, capsys):
+    """A message reports it."""
     out = tmp_path / "run"
-    stopped(SCENE, out)
+    interrupt_run(SCENE, out)
     rewrite(out, status="completed")
     flip(out / "timeseries.csv")
-    assert resumed(out) == 0
+    assert resume_run(out) == 0
     message = capsys.readouterr().err
     assert "timeseries.csv is not as it was written" in message and "goes on from its checkpoint" in message
-    assert as_whole(SCENE, out) and told(out)["status"] == "completed"
+    assert matches_uninterrupted(SCENE, out) and read_record(out)["status"] == "completed"
 
 
-def test_every_bit_of_a_run_that_is_over_counts(tmp_path, capsys):
-    """A bit of any of its files, or a file exchanged for another one or gone: `check` and --resume say which, with
-    status 2. The page is made again where it is gone."""
-    whole, anew = whole_of(SCENE), ["base", *flags(*BRIEF), "--out"]
-    assert main(["check", str(whole)]) == 0
+def test_every_bit_of_a_finished_run_is_checked(tmp_path, capsys):
+    """After a flipped bit in any file, or an exchanged or missing file, `check` and --resume name the file, with status
+    2. A missing page is made again."""
+    uninterrupted, command = cached_run(SCENE), ["base", *flags(*BRIEF), "--out"]
+    assert main(["check", str(uninterrupted)]) == 0
     assert "completed; its files are as they were written" in capsys.readouterr().out
-    names = [str(path.relative_to(whole)) for path in whole.rglob("*") if path.is_file()]
+    names = [str(path.relative_to(uninterrupted)) for path in uninterrupted.rglob("*") if path.is_file()]
     changes = [(name, flip) for name in names]
     changes += [(name, lambda path: path.unlink()) for name in names if name not in ("report.html", "run.json")]
-    other = (whole / "fields" / "fields_0001.vtu").read_bytes()
+    other = (uninterrupted / "fields" / "fields_0001.vtu").read_bytes()
     changes += [("fields/fields_0002.vtu", lambda path: path.write_bytes(other))]
     changes += [("run.json", lambda path: flip(path, path.read_bytes().index(b'"rows": ') + 8))]
     for number, (name, change) in enumerate(changes):
-        out = Path(copytree(whole, tmp_path / str(number)))
+        out = Path(copytree(uninterrupted, tmp_path / str(number)))
         change(out / name)
-        for arguments in (["check"], ["run", "--resume"], *([["run", *anew]] if number < 3 else [])):
-            message = refused(out, capsys, *arguments, out)
+        for arguments in (["check"], ["run", "--resume"], *([["run", *command]] if number < 3 else [])):
+            message = refusal(out, capsys, *arguments, out)
             assert name in message and str(out) in message, message
     assert len(changes) > 2 * 10
     flip(out / "run.json", (out / "run.json").read_bytes().index(b'"rows": ') + 8)
     (out / "report.html").unlink()
-    assert resumed(out) == main(["check", str(out)]) == 0 and (out / "report.html").exists()
+    assert resume_run(out) == main(["check", str(out)]) == 0 and (out / "report.html").exists()
 
 
-def test_a_damaged_run_is_made_anew_by_force_alone(tmp_path, capsys):
-    out, anew = Path(copytree(whole_of(SCENE), tmp_path / "run")), ["base", *flags(*BRIEF), "--out"]
+def test_only_force_repeats_a_damaged_run(tmp_path, capsys):
+    out, command = Path(copytree(cached_run(SCENE), tmp_path / "run")), ["base", *flags(*BRIEF), "--out"]
     flip(out / "timeseries.csv")
-    for arguments in (["--resume"], anew):
-        message = refused(tmp_path, capsys, "run", *arguments, out)
+    for arguments in (["--resume"], command):
+        message = refusal(tmp_path, capsys, "run", *arguments, out)
         assert "--force with its scene makes the run anew" in message
     flip(out / "run.json", 40)
-    assert main(["run", *anew, str(out), "--force", "--quiet"]) == 0
-    assert as_whole(SCENE, out)
+    assert main(["run", *command, str(out), "--force", "--quiet"]) == 0
+    assert matches_uninterrupted(SCENE, out)
 
 
-def test_check_says_that_a_run_is_not_over(tmp_path, capsys):
-    """And finds what is damaged of it; a scene's changes are not accepted with a run."""
-    stopped(SCENE, tmp_path / "run")
+def test_check_reports_an_unfinished_run(tmp_path, capsys):
+    """It also reports damaged files. Changes of a scene are not accepted with a run."""
+    interrupt_run(SCENE, tmp_path / "run")
     assert main(["check", str(tmp_path / "run"), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["status"] == "interrupted"
     flip(tmp_path / "run" / "timeseries.csv")
-    assert "timeseries.csv is not as it was written" in refused(tmp_path, capsys, "check", tmp_path / "run")
+    assert "timeseries.csv is not as it was written" in refusal(tmp_path, capsys, "check", tmp_path / "run")
     with pytest.raises(SystemExit):
         main(["check", str(tmp_path / "run"), "--set", "growth.end=5 h"])
 
@@ -254,51 +256,54 @@ def test_check_says_that_a_run_is_not_over(tmp_path, capsys):
 @pytest.mark.parametrize("spoil", [lambda path: (path.unlink(), os.mkfifo(path)),
                                    lambda path: os.truncate(path, 3 * 2**30)])
 def test_a_record_that_is_no_file_or_too_long_is_refused_unread(tmp_path, capsys, spoil):
-    """A pipe is not waited for; 3 GB are not read."""
-    out = Path(copytree(whole_of(SCENE), tmp_path / "run"))
+    """The command neither waits for a pipe nor reads 3 GB."""
+    out = Path(copytree(cached_run(SCENE), tmp_path / "run"))
     spoil(out / "run.json")
     for arguments in (["check"], ["run", "--resume"], ["run", "base", *flags(*BRIEF), "--out"]):
-        with little_memory(2**28):
+        with limit_memory(2**28):
             assert main([*arguments, str(out)]) == 2
         message = capsys.readouterr().err
         assert message.count("\n") == 1 and str(out) in message
 
 
-def test_an_altered_checkpoint_is_refused_and_the_one_before_is_used(tmp_path, capsys):
-    """And the result is the same."""
+def test_an_altered_checkpoint_is_refused_and_the_previous_one_is_used(tmp_path, capsys):
+    """The results stay the same."""
     out = tmp_path / "run"
-    stopped(SCENE, out)
-    good = (out / NEWEST).read_bytes()
-    (out / NEWEST).write_bytes(good[:-1] + bytes([good[-1] ^ 1]))
-    assert resumed(out) == 0
+    interrupt_run(SCENE, out)
+    intact = (out / NEWEST).read_bytes()
+    (out / NEWEST).write_bytes(intact[:-1] + bytes([intact[-1] ^ 1]))
+    assert resume_run(out) == 0
     message = capsys.readouterr().err
     assert f"{NEWEST}: refused: its checksum is wrong" in message and "t = 0" not in message
-    assert as_whole(SCENE, out) and told(out)["resumes"][0]["time_h"] > 0
+    assert matches_uninterrupted(SCENE, out) and read_record(out)["resumes"][0]["time_h"] > 0
 
 
-def test_a_change_of_versions_is_told_and_recorded(tmp_path, monkeypatch):
-    stopped(SCENE, tmp_path)
-    faults.another_version(monkeypatch, "scipy")
+def test_a_change_of_versions_is_reported_and_recorded(tmp_path, monkeypatch):
+    interrupt_run(SCENE, tmp_path)
+    faults.replace_version(monkeypatch, "scipy")
     with pytest.warns(UserWarning, match="versions.scipy .* now 0.0.; .* to the last bit"):
         resume(tmp_path)
-    (once,) = told(tmp_path)["resumes"]
-    assert once["changed"]["versions.scipy"][1] == "0.0" and len(once["changed"]) == 1
+    (entry,) = read_record(tmp_path)["resumes"]
+    assert entry["changed"]["versions.scipy"][1] == "0.0" and len(entry["changed"]) == 1
 
 
-def test_checkpoints_are_as_far_apart_as_is_asked(monkeypatch):
-    """Steps of 7 s, a checkpoint a minute: after the 9th, the 18th and the 27th; a checkpoint a step where zero is."""
-    for interval, wanted in ((60.0, [9, 18, 27]), (0.0, list(range(1, 31)))):
-        one, written = Mock(kept=True, contact=False, state=None, time=0.0, end=0.0, remeshes=0, steps=0), []
-        one.judge_surface.return_value = []
-        monkeypatch.setattr(running, "perf_counter", lambda one=one: 7.0 * one.add.call_count)
-        monkeypatch.setattr(running, "_checkpoint",
-                            lambda one, watch, written=written: written.append(one.add.call_count))
-        running._record_steps(one, [(None, None)] * 30, running.unwatched, Watch(interval=interval))
-        assert written == wanted
+def test_checkpoints_follow_at_the_requested_interval(monkeypatch):
+    """Steps take 7 s. A checkpoint a minute follows the 9th, 18th and 27th step; an interval of zero means every step.
+    """
+    for interval, expected in ((60.0, [9, 18, 27]), (0.0, list(range(1, 31)))):
+        writer = Mock(has_last_state=True, contact=False, state=None, time=0.0, end=0.0, remeshes=0, steps=0)
+        checkpoints = []
+        writer.find_crease.return_value = []
+        monkeypatch.setattr(execution, "perf_counter", lambda writer=writer: 7.0 * writer.add.call_count)
+        monkeypatch.setattr(execution, "_checkpoint",
+                            lambda writer, watch, checkpoints=checkpoints: checkpoints.append(writer.add.call_count))
+        execution._record_steps(writer, [(None, None)] * 30, execution.ignore_progress, Watch(interval=interval))
+        assert checkpoints == expected
 
 
-def test_a_failure_says_where_the_last_good_state_is(tmp_path, monkeypatch):
-    """Time, stage, why, what to change, and a state from which the run goes on when the cause is gone."""
+def test_a_failure_names_the_last_good_state(tmp_path, monkeypatch):
+    """The message has time, stage, reason and remedy. The run resumes from the last good state once the cause is gone.
+    """
     scene, most = load_scene("base", ('growth.end="0.8 h"',)), growth.MOST_ITERATIONS
 
     def fail_late(event):
@@ -311,64 +316,64 @@ def test_a_failure_says_where_the_last_good_state_is(tmp_path, monkeypatch):
     for part in ("step from t = 0.4 h", "in growth", "try ", f"the last good state, t = 0.4 h, is in {tmp_path}",
                  "fields/fields_0002.vtu"):
         assert part in message
-    assert told(tmp_path / "run")["status"] == f"failed: {message}"
+    assert read_record(tmp_path / "run")["status"] == f"failed: {message}"
     monkeypatch.setattr(growth, "MOST_ITERATIONS", most)
     assert resume(tmp_path / "run") == "completed"
-    assert as_whole(scene, tmp_path / "run")
+    assert matches_uninterrupted(scene, tmp_path / "run")
 
 
 def test_results_reach_the_disk_while_a_run_goes_on(tmp_path):
-    """Tables and run.json at every checkpoint."""
-    seen = []
+    """Tables and run.json are written at every checkpoint."""
+    states = []
 
-    def look(event):
+    def observe(event):
         if event["event"] == "checkpoint":
             rows = len((tmp_path / "timeseries.csv").read_text().splitlines()) - 1
-            seen.append((told(tmp_path)["status"], rows, len([*tmp_path.glob("fields/*")])))
+            states.append((read_record(tmp_path)["status"], rows, len([*tmp_path.glob("fields/*")])))
 
-    run(load_scene("base", ["growth.end=1 h"]), tmp_path, watch=Watch(tell=look, interval=0.0))
-    assert seen == [("running", count, count) for count in range(1, len(seen) + 1)] and len(seen) > 4
+    run(load_scene("base", ["growth.end=1 h"]), tmp_path, watch=Watch(tell=observe, interval=0.0))
+    assert states == [("running", count, count) for count in range(1, len(states) + 1)] and len(states) > 4
 
 
 @pytest.mark.parametrize("number, status", [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-def test_a_signal_ends_a_run_that_goes_on_later(tmp_path, number, status):
-    """One line, results so far; then to the end with the bits of the whole run."""
-    process = started("base", "--set", "growth.end=1.6 h", "--out", tmp_path)
+def test_a_run_ended_by_a_signal_resumes(tmp_path, number, status):
+    """It ends with one line and the results so far. The resumed run has the bits of the uninterrupted one."""
+    process = start_run("base", "--set", "growth.end=1.6 h", "--out", tmp_path)
     wait_for((tmp_path / "fields" / "fields_0002.vtu").exists, process)
     process.send_signal(number)
     message = process.communicate(timeout=60)[1]
     assert process.returncode == status and message.endswith("goes on from there\n")
     assert f" at t = {float(rows(tmp_path / 'timeseries.csv')[-1]['time_h']):g} h; what" in message
-    assert "Traceback" not in message and told(tmp_path)["status"] == "interrupted"
+    assert "Traceback" not in message and read_record(tmp_path)["status"] == "interrupted"
     assert len((tmp_path / "timeseries.csv").read_text().splitlines()) > 3
-    assert resume(tmp_path) == "completed" and as_whole(load_scene("base", ["growth.end=1.6 h"]), tmp_path)
+    assert resume(tmp_path) == "completed" and matches_uninterrupted(load_scene("base", ["growth.end=1.6 h"]), tmp_path)
 
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("seed", range(6))
-def test_killed_again_and_again(tmp_path, seed):
-    """SIGKILL at seeded random moments of a run with checkpoints every 0.1 s, from its start to its end, resumed each
-    time until it is done: the bits of the whole run."""
-    whole, out = whole_of(load_scene("base", ["growth.end=4 h"])), tmp_path / "run"
+def test_a_run_killed_repeatedly_equals_the_uninterrupted_run(tmp_path, seed):
+    """SIGKILL ends a run with checkpoints every 0.1 s at seeded random times, and it is resumed until it completes. It
+    has the bits of the uninterrupted run."""
+    uninterrupted, out = cached_run(load_scene("base", ["growth.end=4 h"])), tmp_path / "run"
     arguments, draw = [*LONG, "--out", out], random.Random(seed)
     status, patience = None, 0.0
     while status is None:
-        patience += 0.5 * told(whole)["wall_time_s"]
-        process = started(*arguments, "--checkpoint", "0.1")
+        patience += 0.5 * read_record(uninterrupted)["wall_time_s"]
+        process = start_run(*arguments, "--checkpoint", "0.1")
         wait_for((out / "run.json").exists, process)
         with suppress(TimeoutExpired):
-            status = process.wait(draw.uniform(0, patience))  # which a start-up may take most of
+            status = process.wait(draw.uniform(0, patience))  # the start may take most of it
         process.kill()
         process.communicate()
         arguments = ["--resume", out]
-    assert status == 0 and len(told(out)["resumes"]) > 0
-    assert files(out) == files(whole) and lasting(out) | {"origin": {}} == lasting(whole)
+    assert status == 0 and len(read_record(out)["resumes"]) > 0
+    assert files(out) == files(uninterrupted) and lasting_record(out) | {"origin": {}} == lasting_record(uninterrupted)
 
 
 @pytest.mark.thorough
-def test_one_thread_or_two(tmp_path):
-    """The same bits."""
+def test_results_do_not_depend_on_the_number_of_threads(tmp_path):
+    """Both runs have the same bits."""
     for threads in ("1", "2"):
-        assert shell(*LONG, "--out", tmp_path / threads, threads=threads)[0] == 0
+        assert run_and_wait(*LONG, "--out", tmp_path / threads, threads=threads)[0] == 0
     assert files(tmp_path / "1") == files(tmp_path / "2")
-    assert told(tmp_path / "2")["conditions"]["threads"]["OMP_NUM_THREADS"] == "2"
+    assert read_record(tmp_path / "2")["conditions"]["threads"]["OMP_NUM_THREADS"] == "2"

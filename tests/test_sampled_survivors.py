@@ -1,4 +1,4 @@
-"""Behaviour that no other test saw: what mutants made by machine changed, and nobody noticed."""
+"""Behaviour that no other test covers: changes of mutants made by machine that no test had caught."""
 import argparse
 import contextlib
 import dataclasses
@@ -30,21 +30,21 @@ from repro.model.pore import initial_outline, seeded, solve
 from repro.preflight import cost, numbers, simplifications
 from repro.report import charts, fields, run_page
 from repro.results import field_files, netcdf
-from repro.runs import running, stored
+from repro.runs import execution, state_arrays
 from repro.scene import load_scene
 from repro.sweeps import page, table
 from repro.sweeps.design import Point, parse
-from repro.sweeps.state import Sweep
+from repro.sweeps.folder import Sweep
 from tests import strategies
 
 
-def test_states_are_made_and_not_changed():
-    """What a cache derives from never changes, nor does what tells every scene what a key takes; and what holds arrays,
-    which have no one truth to compare them by, is the same where it is the same object."""
-    names = [found.name for found in pkgutil.walk_packages(repro.__path__, "repro.") if "__main__" not in found.name]
+def test_states_are_immutable():
+    """Objects with caches and the definitions of keys are frozen. Objects with arrays, whose comparison has no single
+    truth value, are equal only to themselves."""
+    names = [module.name for module in pkgutil.walk_packages(repro.__path__, "repro.") if "__main__" not in module.name]
     every = {each for name in names for each in vars(importlib.import_module(name)).values()
              if "__dataclass_params__" in getattr(each, "__dict__", ()) and each.__module__.startswith("repro.")}
-    assert {each.__name__ for each in every if not each.__dataclass_params__.frozen} == {"Line", "Record"}
+    assert {each.__name__ for each in every if not each.__dataclass_params__.frozen} == {"Line", "History"}
     assert len(every) > 50
     compared = [part for each in every if each.__dataclass_params__.eq for part in dataclasses.fields(each)]
     assert not [part for part in compared if "ndarray" in str(part.type)]
@@ -57,24 +57,24 @@ def test_a_seed_at_both_walls_is_in_contact_from_the_start():
 
 
 @pytest.mark.parametrize("half, kind", [("0.02 mg/L", "zero-order front"), ("20 mg/L", "layer of first-order uptake")])
-def test_a_layer_too_thin_is_told_by_its_kind(half, kind):
-    """Of zero order where the supply is above the half saturation."""
+def test_the_warning_of_a_thin_layer_names_its_kind(half, kind):
+    """The layer is of zero order if the supply exceeds the half saturation."""
     scene = load_scene("wide", [f'substrates.donor.half_saturation="{half}"', 'kinetics.maximum_density="3000000 mg/L"',
                                 "numerics.refinement=0.1"])
-    found = numbers.numbers(scene, scene.flow.mean_velocity or 1e4)
-    told = [w.text for w in simplifications.warnings(scene, found) if "donor is used up" in w.text]
-    assert len(told) == 1 and f"in a {kind} " in told[0]
+    values = numbers.numbers(scene, scene.flow.mean_velocity or 1e4)
+    texts = [w.text for w in simplifications.find_warnings(scene, values) if "donor is used up" in w.text]
+    assert len(texts) == 1 and f"in a {kind} " in texts[0]
 
 
-def test_a_hypercube_without_a_seed_is_that_of_seed_0():
-    """As the help says."""
+def test_the_default_seed_of_a_hypercube_is_0():
+    """The help states this."""
     parser = argparse.ArgumentParser()
     sweep.add(parser.add_subparsers())
-    chosen = parser.parse_args(["sweep", "base", "--vary", "pore.width=1:2 um:log", "--out", "x"])
-    assert chosen.seed == 0
+    options = parser.parse_args(["sweep", "base", "--vary", "pore.width=1:2 um:log", "--out", "x"])
+    assert options.seed == 0
 
 
-def test_a_brief_form_tells_what_is_public():
+def test_the_brief_form_shows_public_fields():
     @brief
     @dataclasses.dataclass(frozen=True, eq=False)
     class Field:
@@ -85,27 +85,27 @@ def test_a_brief_form_tells_what_is_public():
     assert repr(Field(2, np.zeros((3, 2)), {})) == "Field(order=2, values=float64[3, 2])"
 
 
-def test_the_name_of_what_is_drawn_stands_in_the_middle_of_its_axis():
+def test_the_label_of_an_axis_is_centred():
     line = charts.Line("area", np.array([0.0, 1.0]), np.array([1.0, 2.0]))
-    drawn = charts.svg(charts.Chart("Area", "area (um²)", [line]))
-    top, bottom = map(float, re.search(r'class="now" x1="0" x2="0" y1="([0-9.]+)" y2="([0-9.]+)"', drawn).groups())
-    named = float(re.search(r'class="name" transform="translate\(10 ([0-9.]+)\)', drawn)[1])
-    assert named == (top + bottom) / 2
+    chart = charts.svg(charts.Chart("Area", "area (um²)", [line]))
+    top, bottom = map(float, re.search(r'class="now" x1="0" x2="0" y1="([0-9.]+)" y2="([0-9.]+)"', chart).groups())
+    position = float(re.search(r'class="name" transform="translate\(10 ([0-9.]+)\)', chart)[1])
+    assert position == (top + bottom) / 2
 
 
-def test_contact_lines_are_where_they_are_whatever_node_is_the_first():
-    """Nodes of a ring: with the numbers shifted, the same places are found."""
+def test_contact_lines_do_not_depend_on_the_first_node():
+    """If the numbers of the ring's nodes are shifted, the same positions result."""
     outline = initial_outline(load_scene("base"))
-    known = set(surface_ends(outline, BOTTOM))
-    assert {step for _, step in known} == {-1, 1} and len(known) == 2
+    expected = set(surface_ends(outline, BOTTOM))
+    assert {step for _, step in expected} == {-1, 1} and len(expected) == 2
     for shift in range(1, len(outline.wall)):
         parts = {name: np.roll(getattr(outline, name), shift, axis=0) for name in ("points", "wall", "fixed")}
         moved = surface_ends(dataclasses.replace(outline, **parts), BOTTOM)
-        assert {((node - shift) % len(outline.wall), step) for node, step in moved} == known
+        assert {((node - shift) % len(outline.wall), step) for node, step in moved} == expected
 
 
 def test_every_stage_of_a_step_is_timed():
-    """What a run tells its cost by."""
+    """These times are the reported cost of a run."""
     timing.reset()
     *_, last = simulate(load_scene("base", ["growth.end=0.2 h", "numerics.refinement=0.5"]))
     assert last.pore.time == 0.2
@@ -113,8 +113,8 @@ def test_every_stage_of_a_step_is_timed():
     assert min(timing.seconds.values()) > 0
 
 
-def test_a_function_that_is_timed_is_told_by_its_own_name_and_docstring():
-    """In help and in tracebacks."""
+def test_a_timed_function_keeps_its_name_and_docstring():
+    """Help and tracebacks use them."""
     @timing.timed("stage")
     def counted(numbers):
         """How many there are."""
@@ -124,12 +124,12 @@ def test_a_function_that_is_timed_is_told_by_its_own_name_and_docstring():
 
 
 @pytest.mark.parametrize("low, begins", [(1.0, 0.0), (4.9, 0.0), (5.1, 4.0), (9.0, 9.0)])
-def test_an_axis_begins_at_zero_where_that_is_near(low, begins):
+def test_an_axis_begins_at_zero_if_zero_is_near(low, begins):
     first, last = charts._roomy(low, 10.0)
     assert first == begins and last >= 10.0
 
 
-def test_words_stand_in_the_middle_of_equal_parts_of_an_axis():
+def test_words_are_centred_in_equal_parts_of_an_axis():
     factor = parse('numerics.preset="fast", "accurate", "exact"')
     axis = page._across(factor, [])
     ticks = charts.ticks(axis)
@@ -138,109 +138,111 @@ def test_words_stand_in_the_middle_of_equal_parts_of_an_axis():
     assert parts == pytest.approx([1 / 6, 3 / 6, 5 / 6])
 
 
-def test_time_has_no_value_for_what_is_missing_in_a_file_and_columns_have(tmp_path):
-    """As CF wants it of coordinates."""
+def test_columns_have_a_fill_value_and_time_has_none(tmp_path):
+    """CF forbids missing values of coordinates."""
     scene = load_scene("flow_only")
     netcdf.write(tmp_path / "timeseries.nc", scene, [[0.0] * len(results.COLUMNS)])
-    with xarray.open_dataset(tmp_path / "timeseries.nc", engine="scipy", decode_cf=False) as found:
-        filled = {name for name in found.variables if "_FillValue" in found[name].attrs}
+    with xarray.open_dataset(tmp_path / "timeseries.nc", engine="scipy", decode_cf=False) as dataset:
+        filled = {name for name in dataset.variables if "_FillValue" in dataset[name].attrs}
     assert filled == set(results.COLUMNS) - {"time_h"}
 
 
-def test_a_refinement_that_is_advised_resolves_and_smaller_ones_do_not():
-    """A front in a seed that is fed little."""
+def test_an_advised_refinement_resolves_and_smaller_ones_do_not():
+    """The seed has a front, since its supply is small."""
     scene = load_scene("base", ["numerics.preset=fast", "aggregate.radius=20 um", "numerics.refinement=0.1", *(
         f'substrates.{name}.{key}="{value} mg/L"' for name in ("donor", "acceptor")
         for key, value in (("supply", 0.3), ("half_saturation", 1e-3)))])
-    found = str(remeshing.advised(scene, seeded(scene), Unresolved("refused")))
-    wanted = float(re.fullmatch(r"refused; numerics\.refinement = ([0-9.]+) resolves this state", found)[1])
-    for refinement, holds in ((wanted, True), (wanted / 1.4, False)):
+    message = str(remeshing.advise(scene, seeded(scene), Unresolved("refused")))
+    advised = float(re.fullmatch(r"refused; numerics\.refinement = ([0-9.]+) resolves this state", message)[1])
+    for refinement, resolves in ((advised, True), (advised / 1.4, False)):
         finer = dataclasses.replace(scene, numerics=dataclasses.replace(scene.numerics, refinement=refinement))
-        with contextlib.nullcontext() if holds else pytest.raises(Unresolved):
+        with contextlib.nullcontext() if resolves else pytest.raises(Unresolved):
             solve(finer, seeded(finer))
 
 
 def test_a_second_signal_ends_the_process_with_the_signal_s_status():
-    """128 and its number, as shells tell it."""
-    code = ("import os, signal, time\nfrom repro.runs.interrupts import SAME, noted\n"
-            "with noted():\n    for _ in range(2):\n        os.kill(os.getpid(), signal.SIGTERM)\n"
-            "        time.sleep(SAME + 0.2)")
+    """The status is 128 plus the number of the signal, as in shells."""
+    code = ("import os, signal, time\nfrom repro.runs.interrupts import DUPLICATE, catch_signals\n"
+            "with catch_signals():\n    for _ in range(2):\n        os.kill(os.getpid(), signal.SIGTERM)\n"
+            "        time.sleep(DUPLICATE + 0.2)")
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 128 + signal.SIGTERM
 
 
-def test_what_is_modelled_is_told():
+def test_the_modelled_stages_are_listed():
     assert run_page._sentence(["flow", "growth"]) == "Modelled: flow; growth."
     assert run_page._sentence([]) == "Modelled: the geometry and its mesh."
 
 
-def test_fields_of_the_aggregate_alone_are_those_that_the_fluid_has_not(fast):
-    """Read from a file of a run: NaN in every node or triangle of the fluid, and biomass, of which it has none."""
+def test_fields_of_the_aggregate_alone_are_those_without_values_in_the_fluid(fast):
+    """In the file of a run these fields are NaN at every node or triangle of the fluid, except biomass, which is zero.
+    """
     grid = field_files.read(fields.index(fast)[-1][1])
     region = grid.cell_data["region"] > 0.5
     outside = np.setdiff1d(np.arange(len(grid.points)), grid.cells[region])
     absent = {name for name, values in grid.point_data.items() if np.isnan(values[outside]).all()}
     absent |= {name for name, values in grid.cell_data.items() if np.isnan(values[~region]).all()}
-    shown = set(fields.SHOWN) & {*grid.point_data, *grid.cell_data}
+    shown = set(fields.FIELDS) & {*grid.point_data, *grid.cell_data}
     assert len(absent) > 5 and fields.OF_AGGREGATE & shown == absent & shown | {"active_biomass", "inert_biomass"}
 
 
-@pytest.mark.parametrize("status, told", [("failed: TransportError: at t = 3 h", "failed"), ("completed", "completed"),
+@pytest.mark.parametrize("status, word", [("failed: TransportError: at t = 3 h", "failed"), ("completed", "completed"),
                                           ("not run", "not run")])
-def test_the_table_of_a_sweep_tells_how_a_run_ended(status, told):
-    """In a word; the reason is in the run's own folder."""
+def test_the_table_of_a_sweep_has_the_status_of_a_run(status, word):
+    """The table has one word; the reason is in the run's folder."""
     point = Point(1, ("40 um",), load_scene("flow_only"))
-    empty = table.Told(point, status, *[np.zeros(0)] * 3, dict.fromkeys(table.COLUMNS))
+    empty = table.SweepRun(point, status, *[np.zeros(0)] * 3, dict.fromkeys(table.COLUMNS))
     row = page._row(Sweep(Path("s"), "base", (parse("pore.width=40 um, 50 um"),), (point,)), empty)
-    assert re.search(r'<td class="text[ a-z]*">([^<]*)</td></tr>$', row)[1] == told
+    assert re.search(r'<td class="text[ a-z]*">([^<]*)</td></tr>$', row)[1] == word
 
 
-def test_a_pore_without_an_aggregate_is_kept_and_read():
+def test_a_pore_without_an_aggregate_is_packed_and_unpacked():
     scene = load_scene("flow_only", unset=["aggregate"])
     state, _ = next(steps(scene))
     assert scene.aggregate is None and state.pore.outline is None
-    again = stored.unpacked(scene, *stored.packed(scene, state))
-    assert np.array_equal(again.pore.mesh.points, state.pore.mesh.points)
+    restored = state_arrays.unpack_state(scene, *state_arrays.pack_state(scene, state))
+    assert np.array_equal(restored.pore.mesh.points, state.pore.mesh.points)
 
 
 @pytest.mark.parametrize("biomass", [False, True])
 @pytest.mark.parametrize("first", [0, 1, 2])
-def test_cornered_triangles_are_freed_in_either_region_whichever_node_is_their_first(biomass, first):
-    """Two of the four corners of a square are cut off by one triangle alone."""
+def test_cornered_triangles_are_freed_in_either_region_for_any_first_node(biomass, first):
+    """Two of the four corners of a square belong to one triangle only."""
     points = np.array([[x, y] for y in range(3) for x in range(3)], float)
     corner = np.array([0, 1, 3, 4])[:, None]
     triangles = np.roll(np.vstack([corner + [0, 1, 4], corner + [0, 4, 3]]), first, axis=1)
     grid = Mesh.of(points, triangles, np.full(8, biomass), np.empty(0, int), 2.0, (0.0, 2.0))
-    assert strategies.on_the_boundary(grid.triangles) == [0, 0, 1, 1, 1, 1, 2, 2]
+    assert strategies.boundary_edge_counts(grid.triangles) == [0, 0, 1, 1, 1, 1, 2, 2]
     freed = unlocked(grid)
-    assert strategies.on_the_boundary(freed.triangles) == [1] * 8
+    assert strategies.boundary_edge_counts(freed.triangles) == [1] * 8
     assert triangle_areas(points, freed.triangles) == pytest.approx(np.full(8, 0.5))
 
 
 def test_elements_are_small_beside_the_upper_wall_s_contact_lines_alone():
-    """And grow from there."""
-    across = strategies.plug(50.0, -20.0, 15.0, 3.0)
-    sizes = sizing.interface_sizes(across, sizing.Sizing(50.0, 1.0, 1.0, contact=0.1))
-    lower, upper = across.wall == BOTTOM, across.wall == TOP
+    """They grow with the distance from the contact lines."""
+    plug_outline = strategies.plug(50.0, -20.0, 15.0, 3.0)
+    sizes = sizing.interface_sizes(plug_outline, sizing.Sizing(50.0, 1.0, 1.0, contact=0.1))
+    lower, upper = plug_outline.wall == BOTTOM, plug_outline.wall == TOP
     ends = np.array([15.0 + 3.0, -20.0 + 3.0])
-    distance = np.abs(across.points[upper, :1] - ends).min(axis=1)
+    distance = np.abs(plug_outline.points[upper, :1] - ends).min(axis=1)
     assert sizes[upper] == pytest.approx(np.minimum(50.0 / 14, 0.1 + sizing.GRADATION * distance))
     assert sizes[upper].min() == 0.1 and (sizes[lower] == 50.0 / 14).all()
 
 
 @pytest.mark.parametrize("count", [1, 7])
 def test_rows_within_steps_are_counted_as_parts_of_steps(count):
-    """What a run is expected to take grows with its rows as it does with its steps, and with the mesh."""
+    """The expected time of a run grows with its rows, its steps and its mesh."""
     times = [round(0.31 * k, 2) for k in range(count + 1)]
     scene = load_scene("base", ["numerics.preset=fast", "growth.end=3 h",
                                 "output.times=[" + ", ".join(f'"{time} h"' for time in times) + "]"])
     assert rows_within(scene) == {*times[1:]}
     free, touching = cost.steps(scene)
     parts = 1.5 * (free + 15 * touching + 0.5 * count)
-    found = cost.expected(scene, cost.Trial(None, 5.0, 2.0, 1000), 4000)
-    assert found.seconds == pytest.approx((5.0 + 2.0 * parts) * 4**1.2, rel=1e-12)
+    estimate = cost.estimate_cost(scene, cost.Trial(None, 5.0, 2.0, 1000), 4000)
+    assert estimate.seconds == pytest.approx((5.0 + 2.0 * parts) * 4**1.2, rel=1e-12)
 
 
-def test_of_what_differs_the_first_four_are_told():
-    told = running._shown({f"tables.growth.{name}": [1.0, 2.0] for name in "abcdef"})
-    assert told.count("there, now") == 4 and told.startswith("growth.a") and told.endswith(" and 2 more")
-    assert "more" not in running._shown({f"tables.growth.{name}": [1.0, 2.0] for name in "abcd"})
+def test_the_first_four_differences_are_described():
+    description = execution._describe({f"tables.growth.{name}": [1.0, 2.0] for name in "abcdef"})
+    assert description.startswith("growth.a") and description.endswith(" and 2 more")
+    assert description.count("there, now") == 4
+    assert "more" not in execution._describe({f"tables.growth.{name}": [1.0, 2.0] for name in "abcd"})

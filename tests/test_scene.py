@@ -1,5 +1,5 @@
-"""Scenes: Table 1 in internal units, packaged scenes, sections, --set; units, whose table of exact fractions says what
-pint says, and what is said by other keys: F by the oxygen demand, D in the aggregate by that in water."""
+"""Scenes: Table 1 in internal units, packaged scenes, sections and --set. Units: exact fractions agree with pint.
+Values that other keys imply: F from the oxygen demand, D in the aggregate from that in water."""
 import json
 import math
 import re
@@ -17,7 +17,7 @@ from tests.test_scene_text import parsed
 
 
 def refusal(source, *overrides, unset=()) -> str:
-    """The message of the SceneError, which is one line of bearable length."""
+    """The message of the SceneError, which is one line of limited length."""
     with pytest.raises(SceneError) as caught:
         load_scene(source, overrides, unset)
     message = str(caught.value)
@@ -25,7 +25,7 @@ def refusal(source, *overrides, unset=()) -> str:
     return message
 
 
-def written(tmp_path, text, encoding="utf-8") -> Path:
+def write_scene(tmp_path, text, encoding="utf-8") -> Path:
     path = tmp_path / "mine.toml"
     path.write_bytes(text.encode(encoding))
     return path
@@ -67,24 +67,24 @@ TABLE_1 = {  # worked out by hand: 1 m = 1e6 um, 1 cm2 = 1e8 um2, 1 day = 24 h, 
     "numerics.flow_stabilisation": 100.0,
     "numerics.mesh_compressibility": 1.0,
 }
-#: Every section, as empty as it may be.
+#: Every section with its required keys alone.
 EVERYTHING = {"aggregate": {}, "flow": {"head": "1e-3 cm"}, "substrates": {}, "growth": {"end": "1 h"}}
 
 
 def test_defaults_are_table_1():
-    made = parse_scene(EVERYTHING, "everything", "mine.toml")
+    scene = parse_scene(EVERYTHING, "everything", "mine.toml")
     for key, value in TABLE_1.items():
-        assert attrgetter(key)(made) == pytest.approx(value, rel=1e-15), key
+        assert attrgetter(key)(scene) == pytest.approx(value, rel=1e-15), key
 
 
-def test_kinetics_come_with_substrates_and_aggregate():
+def test_kinetics_need_substrates_and_an_aggregate():
     assert load_scene("flow_only", ["substrates={}"]).kinetics.yield_coefficient == 0.61
     assert parse_scene({"substrates": {}}, "clean", "mine.toml").kinetics is None
     assert "[substrates]" in refusal("flow_only", "kinetics.yield_coefficient=0.5")
 
 
-def test_a_file_is_read_with_its_stem_for_a_name(tmp_path):
-    path = written(tmp_path, '\ufeff[pore]\r\nwidth = "0.08 mm"\r\n[aggregate]\r\nradius = "20 µm"\r\n')
+def test_the_name_of_a_scene_is_the_stem_of_its_file(tmp_path):
+    path = write_scene(tmp_path, '\ufeff[pore]\r\nwidth = "0.08 mm"\r\n[aggregate]\r\nradius = "20 µm"\r\n')
     for source in (path, str(path)):
         scene = load_scene(source)
         assert (scene.name, scene.pore.width, scene.pore.length, scene.aggregate.radius) == ("mine", 80, 600, 20)
@@ -98,17 +98,17 @@ def test_set_reads_lists_and_numbers_and_the_last_one_wins():
     assert scene.flow.viscosity_ratio == 200
 
 
-def test_a_value_cannot_smuggle_in_another_key():
+def test_a_value_cannot_set_another_key():
     assert "pore.width" in refusal("base", 'pore.width="9 um"\nlength="9 um"')
 
 
-def test_unset_leaves_keys_and_sections_out():
+def test_unset_removes_keys_and_sections():
     base = load_scene("base")
     driven = load_scene("base", ["flow.mean_velocity=1 m/day"], ["flow.head"])
     assert (driven.flow.head, driven.flow.mean_velocity) == (None, pytest.approx(1e6 / 24))
     assert load_scene("base", (), ["substrates.donor.supply", " substrates . acceptor.supply "]) == base
-    still = load_scene("base", (), ["flow", "growth"])
-    assert still.flow is None and still.growth is None and still.kinetics == base.kinetics
+    at_rest = load_scene("base", (), ["flow", "growth"])
+    assert at_rest.flow is None and at_rest.growth is None and at_rest.kinetics == base.kinetics
     assert load_scene("base", ["flow.head=10 um"], ["flow.head"]) == base
     assert load_scene("base", ["flow.head=1 cm"], ["flow"]).flow.head == 10_000
 
@@ -116,7 +116,7 @@ def test_unset_leaves_keys_and_sections_out():
 # ---------------------------------------------------------------- units and pint
 
 
-def alike(unit):
+def units_of_same_kind(unit):
     """The names of units of the same kind."""
     if unit == "rad":
         return units.ANGLES
@@ -124,8 +124,8 @@ def alike(unit):
 
 
 @pytest.mark.parametrize("name", sorted(exact.UNITS))
-def test_every_unit_is_pints(name):
-    """To the last digit of an exact fraction, and with its dimensions."""
+def test_every_unit_agrees_with_pint(name):
+    """Sizes agree as exact fractions, and so do the dimensions."""
     unit = exact.UNITS[name]
     base = " ".join(f"{symbol}^{power}" for symbol, power in zip(("m", "kg", "s"), unit[1:]) if power) or "rad"
     assert units._by_pint(name, base) == unit.size and isinstance(unit.size, Fraction)
@@ -133,19 +133,19 @@ def test_every_unit_is_pints(name):
 
 @given(st.sampled_from(sorted(units.NOUNS)), st.sampled_from(["/", " / ", "/ "]),
        st.sampled_from(["", "*um/um", " / h h", " um^2 / um**2", "/h^-1 / h", " h**-1*h"]), st.data())
-def test_products_of_units_are_pints(unit, over, more, data):
-    """Bit by bit: every factor of an internal unit in another one of its kind, with factors that cancel, in all ways to
-    write a product; refused by both where they do not."""
-    product = re.sub("[A-Za-z]+", lambda name: data.draw(st.sampled_from(alike(name[0]))), unit + more)
+def test_products_of_units_agree_with_pint(unit, over, more, data):
+    """Both agree bit by bit if units of the same kind replace every factor of an internal unit, for factors that cancel
+    and all ways to write a product. Both refuse factors that do not cancel."""
+    product = re.sub("[A-Za-z]+", lambda name: data.draw(st.sampled_from(units_of_same_kind(name[0]))), unit + more)
     product = product.replace("/", over)
-    exactly = told(units._conversion, product, unit)
-    assert exactly == told(units._by_pint, product, unit) or unit == "rad" and more and exactly == "refused"
+    exactly = converted(units._conversion, product, unit)
+    assert exactly == converted(units._by_pint, product, unit) or unit == "rad" and more and exactly == "refused"
 
 
-def told(convert, given, unit):
-    """What a conversion is, or that there is none."""
+def converted(convert, text, unit):
+    """The factor of a conversion, or "refused"."""
     try:
-        return convert(given, unit)
+        return convert(text, unit)
     except ValueError:
         return "refused"
 
@@ -156,7 +156,7 @@ def test_units_that_pint_alone_knows_are_accepted(text, unit, value):
     assert units.to_internal(text, unit) == value
 
 
-# ---------------------------------------------------------------- what is said by other keys
+# ---------------------------------------------------------------- values implied by other keys
 
 COD = "kinetics.donor_oxygen_demand"
 SHARE = "substrates.donor.diffusivity_in_aggregate"
@@ -164,24 +164,27 @@ SHARE = "substrates.donor.diffusivity_in_aggregate"
 
 @given(st.floats(1e-3, 1e3), st.floats(0.01, 1), st.floats(0.01, 1))
 def test_the_ratio_follows_from_the_oxygen_demand(rest, product, part):
-    """F = COD - Y d_c, by (7); both are kept, also where F is given too, and read back from what is written."""
+    """F = COD - Y d_c, by (7). Both values are stored, even if F is set as well, and are read back."""
     overrides = [f"{COD}={rest + product * part!r}", f"kinetics.yield_coefficient={part!r}",
                  f"kinetics.decay_oxygen_demand={product!r}"]
-    made = load_scene("base", overrides)
-    law, given = made.kinetics, load_scene("base", [*overrides, "kinetics.acceptor_to_donor_ratio=1.6"]).kinetics
-    assert law.acceptor_to_donor_ratio == law.implied_ratio == given.implied_ratio == pytest.approx(rest, rel=1e-12)
-    assert given.acceptor_to_donor_ratio == 1.6 and load_scene("base").kinetics.implied_ratio is None
-    assert parse_scene(scene_tables(made), "base", "again") == parsed(scene_text("base", overrides), "base") == made
+    scene = load_scene("base", overrides)
+    law = scene.kinetics
+    law_with_ratio = load_scene("base", [*overrides, "kinetics.acceptor_to_donor_ratio=1.6"]).kinetics
+    assert law.acceptor_to_donor_ratio == law.implied_ratio == pytest.approx(rest, rel=1e-12)
+    assert law_with_ratio.implied_ratio == law.implied_ratio
+    assert law_with_ratio.acceptor_to_donor_ratio == 1.6 and load_scene("base").kinetics.implied_ratio is None
+    assert parse_scene(scene_tables(scene), "base", "again") == parsed(scene_text("base", overrides), "base") == scene
 
 
 @pytest.mark.parametrize("text, share", [("80 %", Fraction(4, 5)), ("100.0%", 1), ("1e-3 %", Fraction(1, 100_000))])
-def test_a_share_of_the_diffusivity_in_water(text, share):
-    """Rounded once, of the D that the scene says, in either order; hashed as what it comes to, written as it stands."""
+def test_the_diffusivity_in_the_aggregate_may_be_a_share(text, share):
+    """The share is one of the scene's D, rounded once, in either order of keys. The hash has the value, the text the
+    share."""
     entries = [f"{SHARE}={text}", "substrates.donor.diffusivity=3 cm^2/day"]
-    made, written_out = load_scene("base", entries), scene_text("base", entries)
-    donor = made.substrates.donor
+    scene, written_out = load_scene("base", entries), scene_text("base", entries)
+    donor = scene.substrates.donor
     assert donor.diffusivity_in_aggregate == float(share * Fraction(donor.diffusivity))
-    assert made == load_scene("base", entries[::-1]) == parse_scene(scene_tables(made), "base", "again")
-    meant = load_scene("base", [f"{SHARE}={donor.diffusivity_in_aggregate!r} um^2/h", entries[1]])
-    assert f"\ndiffusivity_in_aggregate = {json.dumps(text)}\n" in written_out and parsed(written_out, "base") == made
-    assert scene_hash(meant) == scene_hash(made)
+    assert scene == load_scene("base", entries[::-1]) == parse_scene(scene_tables(scene), "base", "again")
+    explicit = load_scene("base", [f"{SHARE}={donor.diffusivity_in_aggregate!r} um^2/h", entries[1]])
+    assert f"\ndiffusivity_in_aggregate = {json.dumps(text)}\n" in written_out and parsed(written_out, "base") == scene
+    assert scene_hash(explicit) == scene_hash(scene)

@@ -1,4 +1,4 @@
-"""[aggregate]: where the seed is and what outline it has, as data; what is no outline is refused."""
+"""[aggregate]: position and outline of the seed; points that are no outline are refused."""
 import json
 import math
 import tomllib
@@ -11,12 +11,12 @@ from hypothesis import strategies as st
 from repro.march.simulation import shaped
 from repro.scene import load_scene, packaged_scenes, parse_scene, scene_hash, scene_tables
 from repro.scene.text import scene_text
-from tests.test_scene import refusal, written
+from tests.test_scene import refusal, write_scene
 
 BUMP = [["-5 um", "0 um"], ["-4 um", "3 um"], ["6 um", "4 um"], ["5 um", "0 um"]]
-#: In a pore of 50 um by 600 um, from wall to wall.
+#: An aggregate from wall to wall, in a pore of 50 um by 600 um.
 PLUG = [["-9 um", "0 um"], ["-8 um", "50 um"], ["8 um", "0.05 mm"], ["9 um", "0 um"]]
-#: Of the packaged scenes, before [aggregate] had anything but a radius.
+#: Hashes of the packaged scenes, when [aggregate] had only a radius.
 HASHES = {"base": "201dca44f3569bf3", "flow_only": "ed81a859766f815f", "initial_mesh": "036078bb54cedcf3",
           "wide": "87b878e7ce531592"}
 
@@ -31,16 +31,16 @@ def toml(points):
 
 
 @pytest.mark.parametrize("name", packaged_scenes())
-def test_hashes_stand(name):
+def test_hashes_do_not_change(name):
     assert scene_hash(load_scene(name)) == HASHES[name]
     assert scene_hash(load_scene(name, ["aggregate.position=0 um", "aggregate.smooth=false"])) == HASHES[name]
     assert scene_hash(load_scene(name, ["aggregate.position=1 um"])) != HASHES[name]
 
 
 @pytest.mark.parametrize("points", [BUMP, PLUG])
-def test_an_outline_is_read_back_from_what_it_writes(points, tmp_path):
-    """From a file, from --set and from its text: the same scene and hash."""
-    path = written(tmp_path, toml(points))
+def test_an_outline_is_read_back_unchanged(points, tmp_path):
+    """A file, --set and the text give the same scene and hash."""
+    path = write_scene(tmp_path, toml(points))
     scene, text = load_scene(path), scene_text(str(path))
     assert f"\noutline = {json.dumps(points)}\n" in text and '\n#radius = "5 um"\n' in text
     typed = load_scene("initial_mesh", [f"aggregate={{outline={json.dumps(points)}}}", "numerics.preset=fast"])
@@ -51,15 +51,15 @@ def test_an_outline_is_read_back_from_what_it_writes(points, tmp_path):
 
 
 @pytest.mark.parametrize("aggregate", [{"radius": "4 um", "position": "3 um"}, {"outline": PLUG, "smooth": True}])
-def test_a_shape_takes_the_place_of_the_outline_alone(aggregate):
-    """All else that a scene says stands, of its seed as of the rest."""
-    found = shaped(scene_of(inert_fraction=0.3, **aggregate), [(-5.0, 0.0), (-4.0, 3.0), (6.0, 4.0), (5.0, 0.0)])
-    assert found == scene_of(outline=BUMP, inert_fraction=0.3, smooth=aggregate.get("smooth", False))
+def test_a_shape_replaces_the_outline_alone(aggregate):
+    """All other keys of the scene stay, including those of the seed."""
+    changed = shaped(scene_of(inert_fraction=0.3, **aggregate), [(-5.0, 0.0), (-4.0, 3.0), (6.0, 4.0), (5.0, 0.0)])
+    assert changed == scene_of(outline=BUMP, inert_fraction=0.3, smooth=aggregate.get("smooth", False))
 
 
 @given(st.lists(st.floats(1.1, 49.9), min_size=1, max_size=9), st.floats(-100, 100))
-def test_whatever_is_seen_from_the_wall_is_an_outline(sizes, middle):
-    """Points about a place on the wall, in the order of their angles."""
+def test_points_visible_from_the_wall_are_an_outline(sizes, middle):
+    """The points lie around a point of the wall, in the order of their angles."""
     points = [[f"{middle - 60!r} um", "0.0 um"], [f"{middle + 60!r} um", "0.0 um"]]
     for number, size in enumerate(sizes):
         angle = 0.2 + 0.3 * number
@@ -72,7 +72,7 @@ def test_whatever_is_seen_from_the_wall_is_an_outline(sizes, middle):
 LIST = "a list of 3 to 1000 points [x, y], each a pair of lengths, is needed, such as"
 
 
-@pytest.mark.parametrize("points, said", [
+@pytest.mark.parametrize("points, part", [
     *((points, LIST) for points in (
         [], BUMP[:2], [["0 um", "0 um"]] * 1001, "-5 um, 0 um", [["-5 um", "0 um", "0 um"], *BUMP[1:]],
         [[-5, 0], [0, 4], [5, 0]], [["-5 h", "0 um"], *BUMP[1:]], [["nan um", "0 um"], *BUMP[1:]])),
@@ -90,8 +90,8 @@ LIST = "a list of 3 to 1000 points [x, y], each a pair of lengths, is needed, su
     ([BUMP[0], ["0 um", "50 um"], BUMP[3]], "two points or more in a row, or none, on the upper wall"),
     ([BUMP[0], ["-4 um", "50 um"], ["0 um", "9 um"], ["4 um", "50 um"], BUMP[3]], "two points or more in a row"),
 ])
-def test_no_outline(tmp_path, points, said):
-    """In one line that names file, key, value and what is accepted."""
-    path = written(tmp_path, toml(points))
+def test_points_that_are_no_outline_are_refused(tmp_path, points, part):
+    """One line names file, key, value and the accepted values."""
+    path = write_scene(tmp_path, toml(points))
     message = refusal(path)
-    assert message.startswith(f"{path}: aggregate.outline = {json.dumps(points)[:30]}") and said in message
+    assert message.startswith(f"{path}: aggregate.outline = {json.dumps(points)[:30]}") and part in message

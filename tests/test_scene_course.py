@@ -1,4 +1,4 @@
-"""Supplies, head and mean velocity as tables over time: how they are read, written, and what runs make of them."""
+"""Supplies, head and mean velocity as tables over time: reading, writing, and runs with them."""
 import json
 from math import inf
 from operator import attrgetter
@@ -12,14 +12,14 @@ from repro.march import updates
 from repro.march.simulation import simulate
 from repro.model import pore
 from repro.preflight.checked import check
-from repro.preflight.numbers import judged
+from repro.preflight.numbers import evaluate_at_largest
 from repro.results import read_table
 from repro.scene import Scene, load_scene, parse_scene, scene_tables
-from repro.scene.course import Course
 from repro.scene.text import scene_text
+from repro.scene.time_table import TimeTable
 from repro.scene.units import Timed
 from tests.pages import run
-from tests.shell import resumed
+from tests.shell import resume_run
 from tests.strategies import scene
 from tests.test_scene_text import fields
 
@@ -31,12 +31,12 @@ SHORT = ('growth.end="0.8 h"', 'numerics.preset="fast"', f"{DONOR}={json.dumps(S
 
 
 def test_a_table_is_read_in_units_and_written_back():
-    said = json.dumps([["0 min", "10 mg/L"], ["300 min", "0.02 g/L"]])
-    changes = [f"{DONOR}={said}", "substrates.donor.interpolation=linear"]
-    made = load_scene("base", changes)
-    assert made.substrates.donor.supply == Course((0.0, 5.0), (10.0, 20.0), True)
-    assert parse_scene(json.loads(json.dumps(scene_tables(made))), "base", "file") == made
-    assert f"supply = {said}" in scene_text("base", changes)
+    table = json.dumps([["0 min", "10 mg/L"], ["300 min", "0.02 g/L"]])
+    changes = [f"{DONOR}={table}", "substrates.donor.interpolation=linear"]
+    loaded = load_scene("base", changes)
+    assert loaded.substrates.donor.supply == TimeTable((0.0, 5.0), (10.0, 20.0), True)
+    assert parse_scene(json.loads(json.dumps(scene_tables(loaded))), "base", "file") == loaded
+    assert f"supply = {table}" in scene_text("base", changes)
 
 
 @pytest.mark.parametrize("key", TIMED)
@@ -44,100 +44,101 @@ def test_every_key_that_takes_a_table_follows_its_sections_interpolation(key):
     section, _, name = key.rpartition(".")
     table = json.dumps([[time, TIMED[key].write(value)] for time, value in (("0 h", 2.0), ("1 h", 6.0), ("4 h", 3.0))])
     without = ["flow.head"] if name == "mean_velocity" else []
-    for word, wanted in (("steps", [2, 2, 6, 6, 3]), ("linear", [2, 4, 6, 5, 3])):
-        made = load_scene("base", [f"{key}={table}", f"{section}.interpolation={word}"], without)
-        assert [attrgetter(key)(made.at(time)) for time in (0, 0.5, 1, 2, 9)] == pytest.approx(wanted, rel=1e-15)
-        assert attrgetter(key)(made.largest) == 6 and [made.corner(time) for time in (0, 1, 4)] == [1, 4, inf]
+    for word, expected in (("steps", [2, 2, 6, 6, 3]), ("linear", [2, 4, 6, 5, 3])):
+        loaded = load_scene("base", [f"{key}={table}", f"{section}.interpolation={word}"], without)
+        assert [attrgetter(key)(loaded.at(time)) for time in (0, 0.5, 1, 2, 9)] == pytest.approx(expected, rel=1e-15)
+        assert attrgetter(key)(loaded.largest) == 6 and [loaded.corner(time) for time in (0, 1, 4)] == [1, 4, inf]
 
 
 @given(st.lists(st.floats(0.01, 10.0), min_size=1, max_size=5), st.lists(st.floats(0.0, 9.0), min_size=6, max_size=6),
        st.floats(0.0, 60.0))
-def test_a_table_between_its_times(gaps, values, time):
-    """Against numpy's interpolation, and the last value at or before a time."""
+def test_a_table_is_interpolated_between_its_times(gaps, values, time):
+    """It agrees with numpy's interpolation, or is the last value at or before the time."""
     times = (0.0, *np.cumsum(gaps).tolist())
-    steps, linear = (Course(times, tuple(values[: len(times)]), kind) for kind in (False, True))
+    steps, linear = (TimeTable(times, tuple(values[: len(times)]), kind) for kind in (False, True))
     assert linear.at(time) == pytest.approx(np.interp(time, times, linear.values), rel=1e-9, abs=1e-12)
     assert steps.at(time) == steps.values[np.searchsorted(times, time, side="right") - 1]
     assert steps.values == tuple(map(steps.at, times)) == tuple(map(linear.at, times))
 
 
-def test_a_scene_at_a_time_is_one_with_numbers():
-    made = load_scene("base", [*SHORT, RISING, "flow.interpolation=linear"])
-    there = made.at(0.2)
-    assert (there.substrates.donor.supply, there.flow.head) == (10.0, pytest.approx(20.0))
-    assert (made.largest.substrates.donor.supply, made.largest.flow.head) == (20.0, 30.0)
-    assert [made.corner(time) for time in (0.0, 0.3, 0.35, 0.4, 0.5)] == [0.3, 0.4, 0.4, 0.5, inf]
+def test_a_scene_at_a_time_has_numbers_for_tables():
+    loaded = load_scene("base", [*SHORT, RISING, "flow.interpolation=linear"])
+    at_time = loaded.at(0.2)
+    assert (at_time.substrates.donor.supply, at_time.flow.head) == (10.0, pytest.approx(20.0))
+    assert (loaded.largest.substrates.donor.supply, loaded.largest.flow.head) == (20.0, 30.0)
+    assert [loaded.corner(time) for time in (0.0, 0.3, 0.35, 0.4, 0.5)] == [0.3, 0.4, 0.4, 0.5, inf]
     plain = load_scene("base")
     assert plain.at(3.0) is plain and plain.largest is plain and plain.corner(0.0) == inf
 
 
 @pytest.mark.parametrize("changes", [(), ('numerics.preset="paper"',), ('numerics.preset="paper"',
                                                                        'numerics.transport="gear"')])
-def test_steps_end_at_jumps_and_rows_there_show_what_holds_from_then_on(changes):
-    """The effluent of the donor is zero from 0.3 h on and 20 mg/L or less from 0.5 h on; without donor nothing grows,
-    and the biomass between is that of decay."""
+def test_steps_end_at_jumps_and_rows_there_have_the_new_values(changes):
+    """The donor's effluent is zero from 0.3 h on and at most 20 mg/L from 0.5 h on. Without a donor nothing grows, and
+    the biomass decays."""
     times = 'output.times=["0.29 h", "0.3 h", "0.4 h", "0.5 h", "0.8 h"]'
-    made = load_scene("base", [*SHORT, times, *changes])
-    found = list(simulate(made))
-    ends = [step.end for instant in found for step in instant.ledgers]
+    loaded = load_scene("base", [*SHORT, times, *changes])
+    rows = list(simulate(loaded))
+    ends = [step.end for instant in rows for step in instant.ledgers]
     assert {0.3, 0.5} <= set(ends)
-    donor = [instant.solved.fluxes[1].effluent for instant in found]
+    donor = [instant.solved.fluxes[1].effluent for instant in rows]
     assert donor[2:4] == pytest.approx([0.0, 0.0], abs=1e-6) and min(donor[:2]) > 9.8 and 19 < min(donor[4:]) < 20
-    mass = np.log([instant.pore.mass for instant in found])
-    rise, law = np.diff(mass) / np.diff([instant.pore.time for instant in found]), made.kinetics
+    mass = np.log([instant.pore.mass for instant in rows])
+    rise, law = np.diff(mass) / np.diff([instant.pore.time for instant in rows]), loaded.kinetics
     assert rise[2] == pytest.approx(rise[3], rel=1e-3) and min(rise[0], rise[4]) > 0
     assert rise[2] == pytest.approx(-law.decay_coefficient * law.degradable_fraction * 10 / 11, rel=2e-2)
 
 
 def test_updates_end_at_every_multiple_and_at_all_times_of_all_tables():
-    """Shortly before and after the multiples of 0.2 h, and between them; none of them is left out."""
-    made = scene(acceptor=[["0 h", "1 mg/L"], ["0.07 h", "2 mg/L"], ["0.38 h", "1 mg/L"]],
+    """Times shortly before, after and between the multiples of 0.2 h all end an update."""
+    loaded = scene(acceptor=[["0 h", "1 mg/L"], ["0.07 h", "2 mg/L"], ["0.38 h", "1 mg/L"]],
                  donor=[["0 h", "1 mg/L"], ["0.13 h", "2 mg/L"], ["0.55 h", "1 mg/L"]],
                  growth={"end": "0.71 h", "time_step": "0.2 h"})
-    assert updates.schedule(made)[0] == [0, 0.07, 0.13, 0.2, 0.38, 0.4, 0.55, 0.6, 0.71]
+    assert updates.schedule(loaded)[0] == [0, 0.07, 0.13, 0.2, 0.38, 0.4, 0.55, 0.6, 0.71]
 
 
 @pytest.mark.parametrize("step", ["400 s", "20 min", "200 s"])
 def test_a_time_of_a_table_at_a_multiple_of_the_time_step_ends_one_update(step):
-    """Where the multiple is none of nine digits: no crumb of a step remains between both, and there is one row."""
-    made = scene(acceptor=[["0 h", "1 mg/L"], [step, "2 mg/L"]], growth={"end": "40 min", "time_step": step})
-    first, second = updates.schedule(made)[0][1:3]
-    assert first == made.substrates.acceptor.supply.times[1] and second == pytest.approx(2 * first)
+    """The multiple has more than nine digits. No tiny step remains between both times, and there is one row."""
+    loaded = scene(acceptor=[["0 h", "1 mg/L"], [step, "2 mg/L"]], growth={"end": "40 min", "time_step": step})
+    first, second = updates.schedule(loaded)[0][1:3]
+    assert first == loaded.substrates.acceptor.supply.times[1] and second == pytest.approx(2 * first)
 
 
 @pytest.mark.parametrize("preset", ["fast", "paper"])
 def test_a_row_within_a_step_has_the_supply_of_its_time(preset):
-    """Of which a small seed takes up less than a hundredth."""
+    """The small seed takes up less than a hundredth of it."""
     table = [["0 h", "10 mg/L"], ["1 h", "2 mg/L"]]
-    made = load_scene("base", [f"{DONOR}={json.dumps(table)}", "substrates.donor.interpolation=linear",
+    loaded = load_scene("base", [f"{DONOR}={json.dumps(table)}", "substrates.donor.interpolation=linear",
                                f"numerics.preset={preset}", 'growth.end="0.5 h"', 'output.times=["0.3 h", "0.5 h"]'])
-    _, row, _ = simulate(made)
+    _, row, _ = simulate(loaded)
     assert row.solved.fluxes[1].effluent == pytest.approx(7.6, rel=1e-2)
 
 
 @pytest.mark.parametrize("way", ["preset=fast", "preset=paper", "transport=gear"])
-def test_what_an_evenly_rising_velocity_brings_is_its_integral(way):
-    """2 m/day in the mean, in steps of any length, to round-off."""
-    made = load_scene("base", ['flow.mean_velocity=[["0 h", "1 m/day"], ["0.5 h", "3 m/day"]]', 'growth.end="0.5 h"',
+def test_the_supply_of_a_rising_velocity_is_its_integral(way):
+    """The mean is 2 m/day, to round-off, for steps of any length."""
+    loaded = load_scene("base", ['flow.mean_velocity=[["0 h", "1 m/day"], ["0.5 h", "3 m/day"]]', 'growth.end="0.5 h"',
                                "flow.interpolation=linear", f"numerics.{way}"], ["flow.head"])
-    brought = np.sum([step.supplied for instant in simulate(made) for step in instant.ledgers], axis=0)
-    assert brought == pytest.approx(np.full(2, 2e6 / 24 * 0.5 * 50 * 10), rel=1e-9)
+    total_supply = np.sum([step.supplied for instant in simulate(loaded) for step in instant.ledgers], axis=0)
+    assert total_supply == pytest.approx(np.full(2, 2e6 / 24 * 0.5 * 50 * 10), rel=1e-9)
 
 
-def test_what_is_judged_is_the_extreme():
-    """Numbers and growth of the largest supply and the fastest flow."""
-    made = load_scene("base", [*SHORT, RISING])
+def test_a_table_is_judged_by_its_extreme():
+    """The judgement uses the largest supply and the fastest flow."""
+    loaded = load_scene("base", [*SHORT, RISING])
     plain = load_scene("base", [*SHORT[:2], 'flow.head="3e-3 cm"', f"{DONOR}=20 mg/L"])
-    now = pore.seeded(made)
-    found, wanted = (judged(one, pore.solve(one, now).flow.mean_velocity) for one in (made, plain))
-    assert found[0] == plain and [number.start for number in found[1]] == pytest.approx(
-        [number.start for number in wanted[1]], rel=1e-12)
-    told = check(made, "base")
-    assert "0 to 20 mg/L, in steps, the last from 0.5 h" in dict(told.modelled)["substrates"]
+    seed = pore.seeded(loaded)
+    speeds = [pore.solve(scene, seed).flow.mean_velocity for scene in (loaded, plain)]
+    judgement, expected = map(evaluate_at_largest, (loaded, plain), speeds)
+    assert judgement[0] == plain and [number.start for number in judgement[1]] == pytest.approx(
+        [number.start for number in expected[1]], rel=1e-12)
+    report = check(loaded, "base")
+    assert "0 to 20 mg/L, in steps, the last from 0.5 h" in dict(report.modelled)["substrates"]
 
 
 def test_commands_take_tables(tmp_path):
-    """A run with its page, and a longer one; another process of a sweep is in tests/test_sweep.py."""
+    """A run with its page is made longer."""
     out = run(tmp_path, "base", *SHORT, RISING)
-    assert resumed(out, "--set", 'growth.end="1.2 h"') == 0
+    assert resume_run(out, "--set", 'growth.end="1.2 h"') == 0
     assert (out / "report.html").exists() and read_table(out / "timeseries.csv")["time_h"][-1] == 1.2

@@ -1,4 +1,4 @@
-"""Scenes that are not accepted: one clear line that names file, key, value and what is accepted."""
+"""Scenes that are refused: one line names file, key, value and the accepted values."""
 import time
 import tomllib
 from pathlib import Path
@@ -8,7 +8,7 @@ import pytest
 from repro.scene import PRESETS, Scene, files, load_scene, load_tables, packaged_scenes, parse_scene, scene_tables
 from repro.scene.reading import SCOPE, toml
 from tests.blocks import ROOT
-from tests.test_scene import refusal, written
+from tests.test_scene import refusal, write_scene
 from tests.test_scene_text import fields
 
 LENGTH = 'a length is needed, such as "100 um" (greater than zero)'
@@ -18,7 +18,7 @@ DONOR = "substrates.donor.supply"
 MOLES = "; moles need a molar mass, which is not known here: give milligrams"
 
 
-#: {what is said: what is set}.
+#: {part of the message: entries of --set}.
 REFUSED = {
     # unknown keys and sections
     'pore.widht = "50 um": there is no such key; [pore] takes width, length (did you mean': ['pore.widht="50 um"'],
@@ -140,24 +140,25 @@ REFUSED = {
 }
 
 
-@pytest.mark.parametrize("override, said", [(override, said) for said, each in REFUSED.items() for override in each])
-def test_refused(override, said):
+@pytest.mark.parametrize("override, part", [(override, part) for part, each in REFUSED.items() for override in each])
+def test_a_wrong_entry_is_refused(override, part):
     message = refusal("base", override)
-    assert message.startswith("base: ") and said in message
+    assert message.startswith("base: ") and part in message
     assert override.split("=")[0].removesuffix(".value").split(".")[-1][:40] in message  # the key that was set
 
 
-def test_every_key_is_refused_what_it_does_not_take():
-    """By its name, with what it takes; and there is no other key beside it."""
+def test_every_key_refuses_values_of_another_kind():
+    """The message has the key and the accepted values. A section has no other keys."""
     for key, entry in fields(Scene):
         if "section" in entry.metadata:
             assert "there is no such key" in refusal("base", f"{key}.xyzzy=5 um")
         for bad in ("{}", "5 um^9", "nan", "1979-05-27", "[{}]") if "kind" in entry.metadata else ():
             message = refusal("base", f"{key}={bad}")
-            assert message.startswith(f"base: {key} = ") and (bad == "[{}]" or entry.metadata["kind"].wanted in message)
+            assert message.startswith(f"base: {key} = ")
+            assert bad == "[{}]" or entry.metadata["kind"].requirement in message
 
 
-@pytest.mark.parametrize("source, overrides, said", [
+@pytest.mark.parametrize("source, overrides, part", [
     ("wide", ["flow.mean_velocity=-1 m/day"], "a velocity is needed"),
     ("wide", ['flow.mean_velocity=[["0 h", "1 m/day"], ["2 h", "0 m/day"]]'], "greater than zero is needed"),
     ("initial_mesh", ["flow.viscosity_ratio=5"], "flow.head is missing: it or flow.mean_velocity is needed"),
@@ -183,12 +184,12 @@ def test_every_key_is_refused_what_it_does_not_take():
     ("flow_only", ["substrates={}", "growth.time_step=1 h"], 'growth.end is missing: a time is needed'),
     ("flow_only", ['output.times=["1 h"]'], "none after 0 h is accepted: there is no [growth]"),
 ])
-def test_refused_by_what_else_the_scene_says(source, overrides, said):
+def test_an_entry_that_conflicts_with_the_scene_is_refused(source, overrides, part):
     message = refusal(source, *overrides)
-    assert message.startswith(f"{source}: ") and said in message
+    assert message.startswith(f"{source}: ") and part in message
 
 
-@pytest.mark.parametrize("text, said", [
+@pytest.mark.parametrize("text, part", [
     ('[flow]\nhead = "1e-3 cm"\nbiomass = "brinkman"\npermeability = "1e-15 m^2"\n[numerics]\npreset = "fast"\n',
      'flow.biomass = "brinkman": "viscous" is needed without'),
     ("[substrates.acceptor]\n", "substrates.donor is missing: it is needed beside substrates.acceptor; "),
@@ -201,11 +202,11 @@ def test_refused_by_what_else_the_scene_says(source, overrides, said):
     ('[[aggregate]]\nradius = "5 um"\n[[aggregate]]\nradius = "6 um"\n',
      "one aggregate is modelled, see docs/scope.md"),
 ])
-def test_a_file_is_refused_by_its_own_key(tmp_path, text, said):
-    """Also where a default, which is shown, does not fit what was set."""
-    path = written(tmp_path, text)
+def test_a_file_is_refused_by_its_own_key(tmp_path, text, part):
+    """This includes a shown default that conflicts with a key that is set."""
+    path = write_scene(tmp_path, text)
     message = refusal(path)
-    assert message.startswith(f"{path}: ") and said in message
+    assert message.startswith(f"{path}: ") and part in message
 
 
 @pytest.mark.parametrize("source, overrides", [
@@ -228,14 +229,14 @@ def test_a_file_is_refused_by_its_own_key(tmp_path, text, said):
     *((name, ()) for name in packaged_scenes()),
     *(("base", [f"numerics.preset={preset}", "numerics.refinement=0.77"]) for preset in PRESETS),
 ])
-def test_the_edge_of_what_is_accepted(source, overrides):
+def test_values_at_the_bounds_are_accepted(source, overrides):
     scene = load_scene(source, overrides)
     assert parse_scene(scene_tables(scene), scene.name, "again") == scene
 
 
 OUTLINED = ("initial_mesh --unset aggregate.radius",
             'aggregate.outline=[["-5 um","0 um"],["0 um","9 um"],["5 um","0 um"]]')
-#: Two keys that do not go together, set in either order in a file that is else without them: what is told of each.
+#: Two conflicting keys, each set by --set on a file that has the other, and the message about each.
 PAIRS = [
     ("initial_mesh", "aggregate.radius=30 um", "pore.width=20 um", "less than pore.width (20 um)",
      "more than aggregate.radius (30 um) is needed"),
@@ -293,13 +294,13 @@ PAIRS = [
 
 @pytest.mark.parametrize("source, first, second, of_first, of_second", PAIRS)
 def test_the_key_that_was_set_is_named(tmp_path, source, first, second, of_first, of_second):
-    """What the file says is right; what --set says beside it is wrong."""
+    """The message names the key of --set, not that of the file."""
     name, _, unset = source.partition(" --unset ")
-    for entries, last, said in ((second, first, of_first), (first, second, of_second)):
-        path = written(tmp_path, toml(load_tables(name, entries.split("; "), [unset] if unset else [])))
+    for entries, last, part in ((second, first, of_first), (first, second, of_second)):
+        path = write_scene(tmp_path, toml(load_tables(name, entries.split("; "), [unset] if unset else [])))
         message = refusal(path, *last.split("; "))
         key = message.removeprefix(f"{path}: ").partition(" = ")[0]  # or its section
-        assert said in message and any(entry.startswith(key) for entry in last.split("; "))
+        assert part in message and any(entry.startswith(key) for entry in last.split("; "))
 
 
 @pytest.mark.parametrize("override, unsaid", [
@@ -309,12 +310,12 @@ def test_the_key_that_was_set_is_named(tmp_path, source, first, second, of_first
     *((override, ("did you mean",)) for override in (
         "pore.width=-50", "pore.width=true", "pore.width={}", "numerics.preset=7", "pore.xyzzy=5 um",
         f"pore.width=0x{'f' * 9000}", "growth.detachment=1 1/day", "substrates.donor.supply=8 mM"))])
-def test_hints_are_given_where_they_help_alone(override, unsaid):
+def test_hints_are_given_only_if_they_help(override, unsaid):
     message = refusal("base", override)
     assert not [hint for hint in unsaid if hint in message]
 
 
-def test_the_page_on_scope_is_there():
+def test_the_page_on_scope_exists():
     assert (ROOT / SCOPE).is_file()
 
 
@@ -322,10 +323,10 @@ def test_the_page_on_scope_is_there():
 
 
 def test_a_missing_file_is_answered_with_the_packaged_names():
-    said = "neither a file nor a packaged scene (base, flow_only, initial_mesh, wide)"
-    assert refusal("no_such_scene.toml") == f"no_such_scene.toml: {said}"
+    expected = "neither a file nor a packaged scene (base, flow_only, initial_mesh, wide)"
+    assert refusal("no_such_scene.toml") == f"no_such_scene.toml: {expected}"
     for source in ("", "base\0", "x" * 200 + "/\n", "BASE"):
-        assert said in refusal(source)
+        assert expected in refusal(source)
     assert refusal("wid").endswith("(did you mean wide?)")
 
 
@@ -334,16 +335,16 @@ def test_a_directory_is_refused(tmp_path):
 
 
 def test_a_file_that_cannot_be_read_is_refused(tmp_path, monkeypatch):
-    path = written(tmp_path, "[pore]")
+    path = write_scene(tmp_path, "[pore]")
 
-    def denied(self, mode):
+    def deny(self, mode):
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr(Path, "open", denied)
+    monkeypatch.setattr(Path, "open", deny)
     assert "mine.toml: cannot be read (Permission denied)" in refusal(str(path))
 
 
-@pytest.mark.parametrize("text, said", [
+@pytest.mark.parametrize("text, part", [
     *((text, "not TOML: ") for text in ("a = " + "[" * 100_000, "a = " + "9" * 5000, "a = 1\na = 2")),
     ("[pore]\nwidth = 50 um\n", "line 2, column 12): width = 50 um; a value with a unit stands in quotes"),
     ('[pore]\nwidth = "50 um\n', 'line 2, column 15): width = "50 um'),
@@ -351,10 +352,10 @@ def test_a_file_that_cannot_be_read_is_refused(tmp_path, monkeypatch):
     ("a = 1\nb = " + "x" * 500, "line 2, column 5): b = xxx"),
     ("", "an empty scene: one section or more is needed of [pore], [aggregate], "), ("\ufeff# no\n", "an empty scene"),
 ])
-def test_not_toml_shows_the_line(tmp_path, text, said):
-    message = refusal(written(tmp_path, text))
-    assert "mine.toml: " in message and said in message
-    assert ("stands in quotes" in message) == ("stands in quotes" in said)
+def test_a_file_that_is_not_toml_is_refused_with_its_line(tmp_path, text, part):
+    message = refusal(write_scene(tmp_path, text))
+    assert "mine.toml: " in message and part in message
+    assert ("stands in quotes" in message) == ("stands in quotes" in part)
 
 
 POINTS = "".join(f'["{k / 10 - 4} um", "3.0 um"], ' for k in range(80))
@@ -373,21 +374,21 @@ outline = [["-5.0 um", "0.0 um"], {POINTS} ["5.0 um", "0.0 um"]]
     ("a = '''\n\"'' '''\n" + f"{DEEP} = 1", 3), (f"a = '#'\n{DEEP}", 2), (".".join("a" * 9) + " = 1", 1),
 ])
 def test_keys_of_many_parts_are_refused_before_they_are_parsed(tmp_path, monkeypatch, text, line):
-    """They take memory as the square of the parts: 1.5 GB here."""
+    """Their memory grows with the square of the number of parts: 1.5 GB here."""
     monkeypatch.setattr(tomllib, "loads", None)
-    said = f"a key of more than 8 parts (at line {line}); one of a scene has at most 3"
-    assert said in refusal(written(tmp_path, text))
+    expected = f"a key of more than 8 parts (at line {line}); one of a scene has at most 3"
+    assert expected in refusal(write_scene(tmp_path, text))
 
 
-def test_dots_that_are_no_keys_are_read(tmp_path):
-    """Dots of comments, texts and numbers; keys of 8 parts."""
-    assert len(load_scene(written(tmp_path, DOTTED)).aggregate.outline) == 82
-    assert "there is no such key" in refusal(written(tmp_path, ".".join("a" * 8) + " = 1"))
+def test_dots_outside_of_keys_are_read(tmp_path):
+    """Dots in comments, texts and numbers, and keys of 8 parts, are read."""
+    assert len(load_scene(write_scene(tmp_path, DOTTED)).aggregate.outline) == 82
+    assert "there is no such key" in refusal(write_scene(tmp_path, ".".join("a" * 8) + " = 1"))
 
 
 @pytest.mark.parametrize("piece", ["a", '"', '\\"', "'", "a.", "a .", '"a', "#", '"""', "'''", "\\", " ", '"\\'])
-def test_looking_for_deep_keys_takes_no_longer_than_reading(piece):
-    """A file as large as is accepted, made of whatever: linear in its size."""
+def test_the_search_for_deep_keys_is_linear_in_the_size(piece):
+    """The time is linear in the size, for the largest accepted file of any content."""
     text = "x = 1\n" + (piece * files.LARGEST)[:files.LARGEST]
     start = time.process_time()
     files.line_of_a_deep_key(text)
@@ -403,12 +404,12 @@ def test_a_large_file_is_refused_unread(tmp_path):
     assert "mine.toml: more than 300000 bytes; a scene has a few thousand" in refusal(path)
 
 
-def test_not_utf_8_is_refused(tmp_path):
-    assert "not UTF-8 text (at byte 3)" in refusal(written(tmp_path, "# µ", "latin-1"))
+def test_a_file_that_is_not_utf_8_is_refused(tmp_path):
+    assert "not UTF-8 text (at byte 3)" in refusal(write_scene(tmp_path, "# µ", "latin-1"))
 
 
-def test_unset_hints():
-    said = 'base: --unset "flow.haed": the scene does not set it (did you mean flow.head?)'
-    assert refusal("base", unset=["flow.haed"]) == said
+def test_a_wrong_unset_is_refused_with_a_hint():
+    expected = 'base: --unset "flow.haed": the scene does not set it (did you mean flow.head?)'
+    assert refusal("base", unset=["flow.haed"]) == expected
     for key in ("flow.mean_velocity", "", "flow.head.deep", ".", "a" * 9000):
         assert "the scene does not set it" in refusal("base", unset=[key])

@@ -1,7 +1,6 @@
-"""Scenes written and read again, in any units, and anything else that is read: the same scene, or one clear line.
+"""Scenes are written and read back unchanged, in any units; malformed scenes are refused in one printable line.
 
-Malformed scenes are refused in a printable line, and nothing is written: 2000 of them in the thorough profile, a
-third of it a kind.
+Nothing is written for a malformed scene. The thorough profile tries 2000 of them, a third of each kind.
 """
 import math
 import os
@@ -15,19 +14,19 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from repro.scene import KEYS, SceneError, load_scene, packaged_scenes, parse_scene, scene_hash, scene_tables, text
-from tests.shell import refused as refused_by_command
+from tests.shell import refusal as refused_by_command
 from tests.strategies import scenes
 from tests.test_scene_text import parsed
 
-#: How many of another unit an internal unit is, an exact decimal, worked out by hand; units one by one are in
-#: tests/test_scene.py.
+#: The size of an internal unit in another unit, an exact decimal worked out by hand. tests/test_scene.py tests units
+#: one by one.
 OTHER_UNITS = {"um": "1e-4 cm", "h": "3600 s", "um/h": "24e-6 m/day", "um^2/h": "24e-6 mm**2 / day",
                "um/h^2": "576e-6 m/day^2", "1/h": "24 day^-1", "mg/L": "1e-3 kg/m^3", "MPa": "1e3 kPa",
                "rad": "1 radian"}
 
 
 def in_other_units(value):
-    """Tables, with each number that has a unit in another one, by exact decimals."""
+    """Tables in which each number with a unit is converted to another unit, by exact decimals."""
     if isinstance(value, dict):
         return {key: in_other_units(inner) for key, inner in value.items()}
     if not isinstance(value, str) or not value[0].isdigit():
@@ -39,19 +38,19 @@ def in_other_units(value):
 
 
 @given(scenes())
-def test_a_scene_in_other_units_is_the_same_scene(made):
-    """Written out, as tables and as text, rewritten number by number in other units with exact decimals, and read back:
-    equal bit by bit, and with the same hash."""
-    tables = scene_tables(made)
-    assert parse_scene(tables, made.name, "again") == made
+def test_a_scene_in_other_units_is_the_same_scene(scene):
+    """The scene is written as tables, as text, and with each number in another unit. It is read back equal bit by bit,
+    with the same hash."""
+    tables = scene_tables(scene)
+    assert parse_scene(tables, scene.name, "again") == scene
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(text, "load_tables", lambda source, overrides, unset: scene_tables(made))
-        assert parsed(text.scene_text("drawn"), "drawn") == made
-    again = parse_scene(in_other_units(tables), made.name, "again")
-    assert again == made and scene_hash(again) == scene_hash(made)
+        patch.setattr(text, "load_tables", lambda source, overrides, unset: scene_tables(scene))
+        assert parsed(text.scene_text("drawn"), "drawn") == scene
+    again = parse_scene(in_other_units(tables), scene.name, "again")
+    assert again == scene and scene_hash(again) == scene_hash(scene)
 
 
-def test_hash_is_of_what_is_said_not_of_how():
+def test_the_hash_depends_on_values_alone():
     base, zero, below = (load_scene("base", [f"kinetics.degradable_fraction={part}"]) for part in ("0.8", "0", "-0.0"))
     assert scene_hash(base) == scene_hash(replace(base, name="another")) and scene_hash(zero) == scene_hash(below)
     assert len(scene_hash(base)) == 16 and int(scene_hash(base), 16) >= 0
@@ -77,16 +76,16 @@ values = st.recursive(plain, lambda inner: st.lists(inner, max_size=3) | st.dict
     st.text(max_size=9) | st.sampled_from(LEAVES), inner, max_size=3), max_leaves=8)
 
 
-def check_judged(load, file):
-    """It loads, to a scene that is read back from what it writes, or raises SceneError: one printable line of bearable
-    length that names the file, which is returned."""
+def check_loads_or_refuses(load, file):
+    """Check that a scene loads and is read back unchanged, or raises SceneError with one printable line of limited
+    length that names the file. Return that line, or an empty text."""
     try:
-        made = load()
+        scene = load()
     except SceneError as error:
         message = str(error)
         assert message.startswith(f"{file}: ") and message.isprintable() and len(message) < 500 + len(file), message
         return message
-    assert 0 < made.pore.width < math.inf and parse_scene(scene_tables(made), made.name, "again") == made
+    assert 0 < scene.pore.width < math.inf and parse_scene(scene_tables(scene), scene.name, "again") == scene
     return ""
 
 
@@ -97,7 +96,7 @@ def folder(tmp_path_factory):
 
 @st.composite
 def garbled(draw):
-    """The bytes of a scene that has been cut, joined, repeated, overwritten, or that never was one."""
+    """The bytes of a scene after cuts, insertions and repetitions, or random bytes."""
     content = draw(st.sampled_from(TEXTS)).encode()
     for _ in range(draw(st.integers(1, 4))):
         start = draw(st.integers(0, len(content)))
@@ -109,7 +108,7 @@ def garbled(draw):
 
 @st.composite
 def misshapen(draw):
-    """The tables of a scene in which a few keys, known ones or not, hold what they should not."""
+    """The tables of a scene in which a few keys, known or unknown, have wrong values."""
     tables = tomllib.loads(draw(st.sampled_from(TEXTS)))
     for _ in range(draw(st.integers(1, 3))):
         key = draw(st.sampled_from([*KEYS, *LEAVES]) | st.text(string.ascii_letters + "._ \n\u00e9", min_size=1))
@@ -122,11 +121,11 @@ def misshapen(draw):
 
 @FUZZ
 @given(garbled(), st.sampled_from(["run", "scene", "check"]))
-def test_a_file_of_any_bytes(capsys, folder, content, command):
-    """What is no scene is refused by the command line in the same line, and nothing is written."""
+def test_a_file_of_any_bytes_loads_or_is_refused(capsys, folder, content, command):
+    """The command line refuses a file that is no scene with the same line, and writes nothing."""
     file = folder / "mine.toml"
     file.write_bytes(content)
-    refused = check_judged(lambda: load_scene(file), str(file))
+    refused = check_loads_or_refuses(lambda: load_scene(file), str(file))
     if refused:
         target = ["--out", folder / "out"] if command == "run" else []
         assert refused_by_command(folder, capsys, command, file, *target) == f"repro: {refused}\n"
@@ -134,13 +133,13 @@ def test_a_file_of_any_bytes(capsys, folder, content, command):
 
 @FUZZ
 @given(misshapen())
-def test_tables_of_any_shape(tables):
+def test_tables_of_any_shape_load_or_are_refused(tables):
     """Wrong types, keys, units, nesting, magnitudes."""
-    check_judged(lambda: parse_scene(tables, "mine", "mine.toml"), "mine.toml")
+    check_loads_or_refuses(lambda: parse_scene(tables, "mine", "mine.toml"), "mine.toml")
 
 
 @FUZZ
 @given(st.lists(st.builds("{}{}{}".format, st.sampled_from([*KEYS, "", ".", "pore.width.deep.er", "a" * 300]) | texts,
                           st.sampled_from(["=", "=", "=", "", "=="]), values), min_size=1, max_size=3))
-def test_any_set(entries):
-    check_judged(lambda: load_scene("base", entries), "base")
+def test_any_entry_of_set_loads_or_is_refused(entries):
+    check_loads_or_refuses(lambda: load_scene("base", entries), "base")

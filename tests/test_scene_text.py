@@ -1,4 +1,4 @@
-"""`repro scene`: every key with its default, unit, range and source; what is written is the scene that was read."""
+"""`repro scene` writes every key with its default, unit, range and source; its output is the scene that was read."""
 
 import re
 import tomllib
@@ -12,7 +12,7 @@ from repro.scene.text import scene_text
 
 #: Keys that exclude another one that is set: they stay commented out.
 OTHER_DRIVE = {"head", "mean_velocity"}
-#: Keys without a default: what is shown is an example.
+#: Keys without a default: the text has an example.
 EXAMPLES = {"times", "outline", "donor_oxygen_demand", "permeability"}
 
 
@@ -38,8 +38,8 @@ def uncommented(text, but=()):
 
 @pytest.mark.parametrize("preset", PRESETS)
 @pytest.mark.parametrize("name", packaged_scenes())
-def test_what_is_printed_is_the_scene_and_nothing_else(name, preset, capsys):
-    """And so it is with all defaults made active at once, those of the sections that the scene has."""
+def test_the_output_is_the_scene_alone(name, preset, capsys):
+    """The scene stays the same if all defaults of its sections are made active."""
     change = f"numerics.preset={preset}"
     assert main(["scene", name, "--set", change]) == 0
     text, errors = capsys.readouterr()
@@ -56,22 +56,22 @@ def test_what_is_printed_is_the_scene_and_nothing_else(name, preset, capsys):
 def test_every_key_may_be_made_active_at_once(name):
     drive = load_scene(name).flow
     excluded = "head" if drive and drive.head is None else "mean_velocity"
-    made = parsed(uncommented(scene_text(name), but={excluded, "outline", "permeability"}), name)
-    assert None not in (made.aggregate, made.flow, made.substrates, made.kinetics, made.growth)
-    assert made.output.times == (5.0, 18.0)
+    scene = parsed(uncommented(scene_text(name), but={excluded, "outline", "permeability"}), name)
+    assert None not in (scene.aggregate, scene.flow, scene.substrates, scene.kinetics, scene.growth)
+    assert scene.output.times == (5.0, 18.0)
 
 
 @pytest.mark.parametrize("name", packaged_scenes())
-def test_every_key_is_there_with_what_it_takes_and_its_source(name):
+def test_every_key_is_written_with_its_range_and_source(name):
     text = re.sub(r"\n# ", " ", scene_text(name))
     for _, entry in fields(Scene):
         accepted = entry.metadata["kind"].accepted if "kind" in entry.metadata else ""
-        said = {entry.metadata["about"], entry.metadata["source"], accepted}
-        assert {words for words in said if words not in text} == set()
+        expected = {entry.metadata["about"], entry.metadata["source"], accepted}
+        assert {words for words in expected if words not in text} == set()
 
 
-def test_a_file_of_ones_own_keeps_its_words(tmp_path, capsys):
-    """Whatever its name, which adds no key."""
+def test_a_file_keeps_its_own_values(tmp_path, capsys):
+    """The name of the file adds no key."""
     path = tmp_path / 'mine\n[growth]\nend = "1 h"\u00e9.toml'
     path.write_text('# mine\n[pore]\nwidth = "0.08 mm"\n[aggregate]\n[flow]\nmean_velocity = "1 m/day"\n')
     assert main(["scene", str(path), "--set", "flow.viscosity_ratio=500"]) == 0
@@ -80,13 +80,13 @@ def test_a_file_of_ones_own_keeps_its_words(tmp_path, capsys):
     assert parsed(text, path.stem) == load_scene(path, ["flow.viscosity_ratio=500"]) and text.isascii()
 
 
-def test_presets_tell_their_defaults():
+def test_the_text_has_the_defaults_of_presets():
     text = scene_text("base", ["numerics.preset=accurate"])
     assert '#elements = "quadratic"' in text and "#refinement = 0.45" in text
     assert "0.2 (fast), 0.45 (accurate), 0.7 (exact), 1.0 (paper)" in text.replace("\n# ", " ")
 
 
-def test_alone_it_lists_the_packaged_scenes(capsys):
+def test_the_command_without_a_scene_lists_the_packaged_ones(capsys):
     assert main(["scene"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert [line.split()[0] for line in lines] == list(packaged_scenes())

@@ -1,4 +1,4 @@
-"""Trends the other way: an aggregate that decays, through a run, a sweep, the report and a comparison."""
+"""Reversed trends: a decaying aggregate in a run, a sweep, the report and a comparison."""
 import html
 import re
 
@@ -13,11 +13,11 @@ from repro.report.reading import read
 from repro.results import picture, read_table
 from repro.sweeps import pool, table
 from repro.sweeps.design import grid, parse, points
-from repro.sweeps.state import Sweep
+from repro.sweeps.folder import Sweep
 from tests.shell import rows
 from tests.test_sweep import in_this_process
 
-#: A day without food: without a donor the aggregate of 40 um of a 50 um pore decays.
+#: Without a donor, an aggregate of 40 um in a pore of 50 um decays for a day.
 HUNGRY = ["numerics.preset=fast", "aggregate.radius=40 um", "substrates.donor.supply=0 mg/L",
           "growth.end=24 h", 'output.times=["0 h", "8 h", "16 h", "24 h"]']
 VARIED = "kinetics.decay_coefficient=0.5 1/day, 1 1/day"
@@ -35,62 +35,62 @@ def decayed(tmp_path_factory):
 
 
 def folders(sweep):
-    """Of its runs."""
+    """The folders of its runs."""
     return [sweep / row["folder"] for row in rows(sweep / "runs.csv")]
 
 
-def test_what_decays_shrinks_and_conducts_more(decayed):
-    """Row by row, as the masses of its ledger say; the faster the decay, the more."""
+def test_a_decaying_aggregate_shrinks_and_the_pore_conducts_more(decayed):
+    """Rows agree with the masses of the ledger. Faster decay gives a smaller aggregate."""
     series = [read_table(folder / "timeseries.csv") for folder in folders(decayed)]
-    for one, folder in zip(series, folders(decayed)):
+    for row, folder in zip(series, folders(decayed)):
         ledger = read_table(folder / "ledger.csv")
-        assert (np.diff(one["aggregate_area_um2"]) < 0).all() and (np.diff(one["thickness_um"]) < 0).all()
-        assert (np.diff(one["conductivity_m_per_d"]) > 0).all() and (np.diff(one["inert_fraction"]) > 0).all()
-        assert (ledger["biomass_made_pg_per_m"] < 0).all() and not one["contact"].any()
-        left = ledger["biomass_after_pg_per_m"][-1] / ledger["biomass_before_pg_per_m"][0]
-        assert one["aggregate_area_um2"][-1] / one["aggregate_area_um2"][0] == pytest.approx(left, rel=1e-6)
-    slow, fast = (one["aggregate_area_um2"][-1] / one["aggregate_area_um2"][0] for one in series)
+        assert (np.diff(row["aggregate_area_um2"]) < 0).all() and (np.diff(row["thickness_um"]) < 0).all()
+        assert (np.diff(row["conductivity_m_per_d"]) > 0).all() and (np.diff(row["inert_fraction"]) > 0).all()
+        assert (ledger["biomass_made_pg_per_m"] < 0).all() and not row["contact"].any()
+        remaining = ledger["biomass_after_pg_per_m"][-1] / ledger["biomass_before_pg_per_m"][0]
+        assert row["aggregate_area_um2"][-1] / row["aggregate_area_um2"][0] == pytest.approx(remaining, rel=1e-6)
+    slow, fast = (row["aggregate_area_um2"][-1] / row["aggregate_area_um2"][0] for row in series)
     assert fast < 0.9 * slow
 
 
-def courses(decayed):
-    """What the sweep tells of its runs, by the functions that make its files."""
+def summarize(decayed):
+    """The sweep, and the summaries of its runs from the functions that write its files."""
     factors = [parse(VARIED)]
-    asked = points("base", HUNGRY, factors, grid(factors))
-    sweep = Sweep(decayed, "base", factors, asked)
-    return sweep, table.tell(sweep, {}, 0.1)
+    design = points("base", HUNGRY, factors, grid(factors))
+    sweep = Sweep(decayed, "base", factors, design)
+    return sweep, table.read_runs(sweep, {}, 0.1)
 
 
 def test_conductivity_is_relative_to_that_of_the_start(decayed):
-    """One at t = 0 and more after it; nothing clogs and nothing touches."""
-    sweep, summaries = courses(decayed)
-    for one, folder in zip(summaries, folders(decayed)):
+    """It is one at t = 0 and rises; no run clogs or reaches contact."""
+    sweep, summaries = summarize(decayed)
+    for summary, folder in zip(summaries, folders(decayed)):
         series = read_table(folder / "timeseries.csv")
-        assert one.relative[0] == 1 and (np.diff(one.relative) > 0).all()
+        assert summary.relative[0] == 1 and (np.diff(summary.relative) > 0).all()
         expected = series["conductivity_m_per_d"] / series["conductivity_m_per_d"][0]
-        assert one.relative == pytest.approx(expected, rel=1e-12)
-        assert one.biomass == pytest.approx(series["aggregate_area_um2"] / (50 * 600), rel=1e-12)
-        assert {name for name, value in one.numbers.items() if value is not None} == {"end_h", "wall_time_s"}
+        assert summary.relative == pytest.approx(expected, rel=1e-12)
+        assert summary.biomass == pytest.approx(series["aggregate_area_um2"] / (50 * 600), rel=1e-12)
+        assert {name for name, value in summary.numbers.items() if value is not None} == {"end_h", "wall_time_s"}
     for row in rows(decayed / "runs.csv"):
         assert row["clogging_time_h"] == row["contact_time_h"] == ""
 
 
 def test_lines_of_the_page_of_the_sweep_go_up_to_the_left(decayed):
-    """Conductivity rises as biomass falls, and all of it is in the frame."""
+    """Conductivity rises as biomass falls, and the lines stay in the frame."""
     text = (decayed / "summary.html").read_text(encoding="utf-8")
     lines = re.findall('<polyline class="line[0-9]" points="([^"]*)"><title>run', text)
     upper_left = charts.LEFT, charts.TOP
     lower_right = charts.WIDTH - charts.RIGHT, charts.HEIGHT - charts.BOTTOM
     assert len(lines) == 2
     for line in lines:
-        places = np.array([pair.split(",") for pair in line.split()], float)
-        assert (np.diff(places[:, 0]) < 0).all() and (np.diff(places[:, 1]) < 0).all()
-        assert ((places >= upper_left) & (places <= lower_right)).all()
+        coordinates = np.array([pair.split(",") for pair in line.split()], float)
+        assert (np.diff(coordinates[:, 0]) < 0).all() and (np.diff(coordinates[:, 1]) < 0).all()
+        assert ((coordinates >= upper_left) & (coordinates <= lower_right)).all()
 
 
-def test_a_comparison_and_the_key_figures_tell_what_is_less(decayed):
-    """The faster decay against the slower one: less area, more conductivity, with their signs; first and last values
-    in their order."""
+def test_a_comparison_and_the_key_figures_show_decreases(decayed):
+    """Faster decay has less area and more conductivity than slower decay, with their signs. First and last values are
+    in order."""
     runs = [read(folder) for folder in folders(decayed)]
     page = html.unescape(comparison.build(runs))
     for name, sign in (("area of the aggregate (um²)", "-"), ("hydraulic conductivity of the pore (m/day)", "+")):
@@ -106,16 +106,16 @@ def test_a_comparison_and_the_key_figures_tell_what_is_less(decayed):
 @pytest.mark.parametrize("relative, expected", [
     ([1.0, 1.4, 1.2, 0.9, 0.45, 0.2], 3 + np.log(0.9 / 0.5) / np.log(2)), ([1.0, 2.0, 3.0], np.nan),
     ([1.0, 0.8, 1.5, 0.75, 0.375, 3.0], 3 + np.log(0.75 / 0.5) / np.log(2))])
-def test_a_pore_clogs_when_it_first_conducts_so_little_after_a_rise(relative, expected):
-    """A half of what it conducts at first, not of the most."""
+def test_a_pore_that_first_conducts_more_clogs_at_half_of_the_start(relative, expected):
+    """The limit is half of the initial conductivity, not of the largest."""
     times = np.arange(float(len(relative)))
     clogged = table.clogging(times, np.array(relative), 10 - times, 0.5)
     assert clogged == pytest.approx((expected, 10 - expected), rel=1e-12, nan_ok=True)
 
 
 @pytest.mark.parametrize("supply", ["0 mg/L", "0.1 mg/L"])
-def test_the_bound_at_the_end_holds_for_what_decays(supply):
-    """`repro check` says how large the aggregate is at most: a part of what decays stays as inert biomass."""
+def test_the_bound_at_the_end_holds_for_a_decaying_aggregate(supply):
+    """`repro check` bounds the size of the aggregate: a part of the decaying biomass becomes inert."""
     scene = load_scene("base", ["numerics.preset=fast", f"substrates.donor.supply={supply}", "growth.end=48 h",
                                 "kinetics.decay_coefficient=1 1/day", 'output.times=["48 h"]'])
     first, *_, last = (instant.pore.boundary.area for instant in simulate(scene))

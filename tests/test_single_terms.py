@@ -10,7 +10,7 @@ from repro import load_scene
 from repro.fem import sizing
 from repro.fem.outline import TOP
 from repro.model.pore import seeded, sized
-from repro.model.remeshing import followed
+from repro.model.remeshing import moved_mesh
 from tests.test_sensitivity import value_of
 from verification.sensitivity import rounding
 from verification.sensitivity.rounding import INPUTS
@@ -19,28 +19,28 @@ from verification.uncertainty import OBSERVED, estimate
 SIZES = np.array([1.0, 2**0.5, 2**-0.5, 0.5])
 
 
-# The bar of a number on several sizes: the law's error, the scatter about the law, the number's own distance from it.
+# The bar of a number on several sizes: the law's error, the scatter about the law, and the number's distance from it.
 def parts(sizes, values, order):
     """The three terms of a bar with an order, by NumPy's least squares."""
     law = np.column_stack([np.ones(len(sizes)), sizes**order])
     coefficients = np.linalg.lstsq(law, values, rcond=None)[0]
-    apart = values - law @ coefficients
-    scatter = (apart @ apart / max(len(sizes) - 3, 1)) ** 0.5
-    return OBSERVED * abs(coefficients[1]) * sizes[0] ** order, scatter, abs(apart[0])
+    residual = values - law @ coefficients
+    scatter = (residual @ residual / max(len(sizes) - 3, 1)) ** 0.5
+    return OBSERVED * abs(coefficients[1]) * sizes[0] ** order, scatter, abs(residual[0])
 
 
 @given(st.lists(st.floats(-0.15, 0.15), min_size=4, max_size=4), st.floats(0.6, 2.0), st.sampled_from([1.0, -1.0]))
 def test_a_bar_is_the_sum_of_its_three_terms(noise, order, sign):
-    """A law with any noise, if the observed order is accepted."""
+    """This holds for a law with any noise, if the observed order is accepted."""
     values = 7.0 + sign * (SIZES**order + noise)
     result = estimate(SIZES, values, (1.0, 2.0))
     if result.factor == OBSERVED:
         assert result.bar == pytest.approx(sum(parts(SIZES, values, min(result.order, 1.0))), rel=1e-6)
 
 
-# A set of inputs is reached where it is within the rounding, and the whole bar of each number in its interval.
+# A set of inputs is reached if it is within the rounding, and the complete bar of each number is in its interval.
 class Scattered:
-    """Numbers of a law of the inputs and of the size of elements, in the place of runs."""
+    """Numbers that follow from inputs and element size by a law; they replace runs."""
 
     def __init__(self, law):
         self.law = law
@@ -57,7 +57,7 @@ class Scattered:
 
 
 def numbers(effluent):
-    """What section 4 prints, in the middle of its intervals but for one number."""
+    """The numbers of section 4 in the middle of their intervals, except the effluent."""
     middles = dict(zip(rounding.PRINTED, map(float, rounding.MIDDLE)))
     return middles | {"effluent_acceptor": effluent}
 
@@ -81,25 +81,25 @@ def straight(x, size):
 
 @pytest.mark.parametrize("law, within, fits", [
     (straight, True, True), (curved, False, True), (scattering, True, False)])
-def test_a_set_is_reached_where_it_is_within_the_rounding_and_fits_with_its_bars(law, within, fits):
+def test_a_set_is_reached_if_it_is_within_the_rounding_and_fits_with_its_bars(law, within, fits):
     """Neither condition alone suffices."""
     slope = -4.0 if law is curved else -8.0
-    known = {number: {each.name: {"elasticity": 0.0} for each in INPUTS} for number in rounding.PRINTED}
-    known["effluent_acceptor"]["k"] = {"elasticity": slope}
-    result = rounding.one_set(Scattered(law), known)
+    elasticities = {number: {each.name: {"elasticity": 0.0} for each in INPUTS} for number in rounding.PRINTED}
+    elasticities["effluent_acceptor"]["k"] = {"elasticity": slope}
+    result = rounding.one_set(Scattered(law), elasticities)
     assert (result["share_of_the_rounding"] <= 1, result["misfit_in_half_intervals"] <= 1) == (within, fits)
     assert result["reached"] is (within and fits)
 
 
-# A new mesh is due where one of the criteria of 3.1, 3.5 and 2.3.3 asks for it.
-def grown_seed(kind):
+# A new mesh is due if one of the criteria of 3.1, 3.5 and 2.3.3 requires it.
+def grown_seed(elements):
     """(scene, its seed)."""
-    scene = load_scene("base", ["aggregate.radius=20 um", "numerics.refinement=0.5", f"numerics.elements={kind}"])
+    scene = load_scene("base", ["aggregate.radius=20 um", "numerics.refinement=0.5", f"numerics.elements={elements}"])
     return scene, seeded(scene)
 
 
 def shifted(scene, pore):
-    """16 um upstream: too near to the end of the mesh, which is 75 um away at first."""
+    """The seed 16 um upstream, too near to the end of the mesh, which is 75 um away at first."""
     return scene, pore.moved(pore.mesh.points - [16.0, 0.0])
 
 
@@ -111,7 +111,7 @@ def touching(scene, pore):
 
 
 def coarse(scene, pore):
-    """A mesh of elements a third as large would be made now."""
+    """The scene requires elements a third as large."""
     return replace(scene, numerics=replace(scene.numerics, refinement=3 * scene.numerics.refinement)), pore
 
 
@@ -121,7 +121,7 @@ def inner(pore):
 
 
 def poor(scene, pore):
-    """The inside of the aggregate is pushed together: triangles at the boundary are poor, none is turned over."""
+    """The inside of the aggregate is compressed: triangles at the boundary are poor, and none is turned over."""
     points = pore.mesh.points.copy()
     points[inner(pore)] = [0.0, 8.5] + 0.75 * (points[inner(pore)] - [0.0, 8.5])
     moved = pore.mesh.with_middles(points[: pore.mesh.corners])
@@ -129,7 +129,7 @@ def poor(scene, pore):
 
 
 def turned_over(scene, pore):
-    """One inner node has left the triangles around it, which are few."""
+    """One inner node lies outside of the few triangles around it."""
     points = pore.mesh.points.copy()
     points[inner(pore)[0]] += [0.0, 14.0] if points[inner(pore)[0], 1] < 8 else [0.0, -14.0]
     return scene, pore.moved(pore.mesh.with_middles(points[: pore.mesh.corners]))
@@ -140,23 +140,23 @@ def unchanged(scene, pore):
 
 
 def criteria(scene, pore, expanded):
-    """Which of the criteria ask for a new mesh, by their words: poor are more than six triangles of a quality under
-    0.6 (3.5)."""
+    """{criterion: does it require a new mesh}. By 3.5, at most six triangles may have a quality under 0.6."""
     outline, ends, body = expanded.boundary, pore.mesh.ends, expanded.mesh
     reach = min(7 * outline.thickness, 1.3 * scene.pore.width)
-    asked = sizing.interface_sizes(outline.corners, sized(scene)).max()
+    required = sizing.interface_sizes(outline.corners, sized(scene)).max()
     return {"extent": min(outline.upstream - ends[0], ends[1] - outline.downstream) < reach,
             "contact": bool((expanded.wall != pore.wall).any()),
-            "size": outline.corners.edge_lengths()[outline.corners.interface_edges()].max() > 2.8 * asked,
+            "size": outline.corners.edge_lengths()[outline.corners.interface_edges()].max() > 2.8 * required,
             "poor": np.count_nonzero(body.quality[body.biomass] < 0.6) > 6,
             "turned": bool((body.areas <= 0).any())}
 
 
 @pytest.mark.parametrize("kind", ["linear", "quadratic"])
-@pytest.mark.parametrize("change, asking", [(unchanged, None), (shifted, "extent"), (touching, "contact"),
+@pytest.mark.parametrize("change, criterion", [(unchanged, None), (shifted, "extent"), (touching, "contact"),
                                             (coarse, "size"), (poor, "poor"), (turned_over, "turned")])
-def test_a_new_mesh_is_due_where_one_criterion_alone_asks_for_it(change, asking, kind):
+def test_a_new_mesh_is_due_if_one_criterion_requires_it(change, criterion, kind):
     first = grown_seed(kind)
     scene, expanded = change(*first)
-    assert (followed(scene, first[1], expanded) is None) == (asking is not None)
-    assert [name for name, asks in criteria(scene, first[1], expanded).items() if asks] == [*filter(None, [asking])]
+    assert (moved_mesh(scene, first[1], expanded) is None) == (criterion is not None)
+    due = [name for name, is_due in criteria(scene, first[1], expanded).items() if is_due]
+    assert due == [*filter(None, [criterion])]

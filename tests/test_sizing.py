@@ -1,4 +1,4 @@
-"""How large elements are, how far the mesh reaches (3.1), and where an outline's nodes go for a new mesh."""
+"""Element sizes, the extent of the mesh (3.1), and the nodes of an outline on a new mesh."""
 import json
 from dataclasses import replace
 
@@ -16,15 +16,15 @@ from tests import oracles
 from tests.strategies import attached_aggregates, lengths, outlines, refinements, widths
 
 FILM = 2.0
-#: Of straight edges, or of arcs.
+#: Aggregates of straight edges, or of arcs.
 either = attached_aggregates(width=widths) | attached_aggregates(width=widths, geometry=2)
 
 
 @given(either | outlines(width=widths), refinements)
 def test_refining_an_outline_keeps_its_shape_exactly(drawn, refinement):
-    """Area, extremes and places at t = 0 to round-off; interface nodes and fixed points to the last bit; nodes of
-    walls on them, where they are sought by y == W; sizes of a tenth of the thickness, or a fourteenth of the width, of
-    which no edge is too coarse."""
+    """Area, extremes and coordinates at t = 0 stay to round-off. Interface nodes, fixed points and nodes of walls
+    (sought by y == W) stay to the last bit. Sizes are at most a tenth of the thickness and a fourteenth of the width,
+    and no edge is too coarse."""
     outline, width = drawn
     outline = replace(outline, origin=outline.points * [0.5, 0.7])
     sizing = Sizing(width, refinement, FILM)
@@ -34,8 +34,8 @@ def test_refining_an_outline_keeps_its_shape_exactly(drawn, refinement):
     assert fine.area == pytest.approx(outline.area, rel=1e-13)
     assert fine.geometry == outline.geometry
     assert fine.origin == pytest.approx(fine.points * [0.5, 0.7], rel=1e-12, abs=1e-12)
-    found, wanted = ((one.upstream, one.downstream, one.thickness) for one in (fine, outline))
-    assert found == pytest.approx(wanted, rel=1e-13)
+    computed, expected = ((one.upstream, one.downstream, one.thickness) for one in (fine, outline))
+    assert computed == pytest.approx(expected, rel=1e-13)
     ends = corners.interface_edges() | np.roll(corners.interface_edges(), 1)
     assert {*map(tuple, corners.points[ends])} <= {*map(tuple, fine.corners.points)}
     assert fine.points[fine.fixed].tolist() == outline.points[outline.fixed].tolist()
@@ -50,35 +50,35 @@ def test_refining_an_outline_keeps_its_shape_exactly(drawn, refinement):
 
 @given(outlines(width=widths), lengths)
 def test_the_meshed_extent_follows_section_3_1(drawn, length):
-    """On each side min(10 R, 1.5 W) of fluid, or all that the pore has, for any aggregate anywhere in it."""
+    """Each side has min(10 R, 1.5 W) of fluid, or the rest of the pore, for any aggregate at any position."""
     outline, width = drawn
-    found = of.meshed_extent(outline, width, length)
-    assert found == pytest.approx(oracles.extent(outline.points, width, length), rel=1e-12)
-    assert -length / 2 <= found[0] and found[1] <= length / 2
-    assert of.meshed_extent(outline, width, length, whole=True) == (-length / 2, length / 2)
+    extent = of.meshed_extent(outline, width, length)
+    assert extent == pytest.approx(oracles.extent(outline.points, width, length), rel=1e-12)
+    assert -length / 2 <= extent[0] and extent[1] <= length / 2
+    assert of.meshed_extent(outline, width, length, full=True) == (-length / 2, length / 2)
     assert np.ptp(of.meshed_extent(None, width, length)) == pytest.approx(min(3 * width, length), rel=1e-15)
 
 
 @given(outlines(width=widths), lengths, st.floats(0.0, 1.2), st.booleans())
 def test_the_mesh_is_extended_once_the_aggregate_is_too_close_to_its_end(drawn, length, part, right):
-    """Too short under min(7 R, 1.3 W), never as it was made, and never where the pore has no more to mesh."""
+    """The extent is too short under min(7 R, 1.3 W), but not when new, and not at the end of the pore."""
     outline, width = drawn
     ends = list(of.meshed_extent(outline, width, length))
     assert not of.extent_too_short(outline, tuple(ends), width, length)
     least = min(7 * outline.thickness, 1.3 * width)
     ends[right] = outline.downstream + part * least if right else outline.upstream - part * least
-    more = ends[right] < length / 2 if right else ends[right] > -length / 2
+    can_extend = ends[right] < length / 2 if right else ends[right] > -length / 2
     if abs(part - 1) > 1e-9:
-        assert of.extent_too_short(outline, tuple(ends), width, length) == (part < 1 and more)
+        assert of.extent_too_short(outline, tuple(ends), width, length) == (part < 1 and can_extend)
     assert not of.extent_too_short(outline, (-length / 2, length / 2), width, length)
 
 
-def test_sizes_of_a_scene_are_the_meshers():
-    """Those that it says; an outline is no half-disc, whose new nodes would lie on its arc."""
+def test_the_mesher_gets_the_sizes_of_the_scene():
+    """The mesher gets the scene's sizes. An outline, unlike a half-disc, has no arc for new nodes."""
     assert Numerics().gradation == of.GRADATION
-    said = ["numerics.preset=paper", "pore.width=80 um", "numerics.refinement=0.7", "growth.minimum_film=0.5 um",
+    changes = ["numerics.preset=paper", "pore.width=80 um", "numerics.refinement=0.7", "growth.minimum_film=0.5 um",
             "numerics.gradation=0.2", "numerics.contact_elements=4"]
     outline = json.dumps([["-5 um", "0 um"], ["0 um", "4 um"], ["5 um", "0 um"]])
     for seed, middle in (('position="3 um"', 3.0), (f"outline={outline}", None)):
-        found = pore.sized(load_scene("base", [*said, f"aggregate={{{seed}}}"]), 2.0)
-        assert found == Sizing(80.0, 0.7, 0.5, 0.2, 2.0, 0.125, middle)
+        sizes = pore.sized(load_scene("base", [*changes, f"aggregate={{{seed}}}"]), 2.0)
+        assert sizes == Sizing(80.0, 0.7, 0.5, 0.2, 2.0, 0.125, middle)

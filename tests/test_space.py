@@ -1,5 +1,5 @@
-"""Functions of order 1, 2 and 3 on straight and on curved triangles: rules, nodes of the boundary. What is made of them
-is in the cases of flow, transport and growth."""
+"""Functions of order 1, 2 and 3 on straight and curved triangles: quadrature rules and nodes of the boundary. The cases
+of flow, transport and growth test their use."""
 import numpy as np
 import pytest
 
@@ -15,16 +15,17 @@ orders = pytest.mark.parametrize("order", [1, 2, 3])
 
 @pytest.fixture(scope="module")
 def meshes():
-    """One triangulation around a half-disc: with three nodes a triangle, as a scene makes it, with inner edges bent."""
+    """One triangulation around a half-disc: with straight edges, as a scene makes it, and with bent inner edges."""
     overrides = ["numerics.preset=accurate", "numerics.refinement=0.5", "aggregate.radius=20 um"]
-    made = pore.seeded(load_scene("base", overrides)).mesh
-    return {"straight": made.straight, "made": made, "bent": bent_inside(made)}
+    curved_mesh = pore.seeded(load_scene("base", overrides)).mesh
+    return {"straight": curved_mesh.straight, "made": curved_mesh, "bent": bent_inside(curved_mesh)}
 
 
 @orders
 @pytest.mark.parametrize("kind", ["straight", "made", "bent"])
 def test_products_of_two_functions_are_integrated_exactly(meshes, kind, order):
-    """Beside arcs too, where the determinant of the map is not constant: as by a rule of degree 14, to round-off."""
+    """They agree with a rule of degree 14 to round-off, also beside arcs, where the map's determinant is not constant.
+    """
     mesh = meshes[kind]
     space, finer = Space(mesh, order), elements.table(order, mesh.geometry, 14)
     dx = elements.points(mesh.points[mesh.cells], finer).dx
@@ -33,7 +34,7 @@ def test_products_of_two_functions_are_integrated_exactly(meshes, kind, order):
 
 
 @orders
-def test_ends_and_walls_of_one_edge_each(order):
+def test_ends_and_walls_of_a_minimal_mesh_have_their_nodes(order):
     """A channel of two triangles, whose ends join both walls and whose walls join both ends."""
     corners = np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 1.0], [0.0, 1.0]])
     none = np.zeros(2, bool)

@@ -1,5 +1,5 @@
-"""A sweep on a Dask cluster: a real scheduler and workers, in processes of their own on the loopback; where it is what
-they answer that matters, a stand-in for them."""
+"""A sweep on a Dask cluster: a real scheduler and workers in processes on the loopback, or a stand-in for their
+answers."""
 
 import json
 import os
@@ -15,7 +15,7 @@ from unittest.mock import AsyncMock, MagicMock, Mock
 import pytest
 
 from repro.cli import main
-from repro.sweeps import cluster, task
+from repro.sweeps import cluster, single_run
 from tests.shell import rows
 
 VARY = ["--vary", "pore.width=48:52 um:linear:6", "--set", "numerics.preset=fast"]
@@ -26,7 +26,7 @@ def command(out, *arguments):
 
 
 def refused(out, address, capsys):
-    """What is said, in one line and with status 2, of the scheduler at an address."""
+    """The one-line message, with status 2, about the scheduler at an address."""
     assert main(command(out, "--scheduler", address)) == 2
     message = capsys.readouterr().err
     assert message.startswith(f"repro: --scheduler {address}: ") and message.count("\n") == 1
@@ -34,34 +34,34 @@ def refused(out, address, capsys):
 
 
 @pytest.mark.parametrize("package", ["distributed", "dask"])
-def test_without_the_package_the_message_says_what_to_install(tmp_path, capsys, monkeypatch, package):
+def test_a_sweep_without_dask_is_refused_with_the_extra_to_install(tmp_path, capsys, monkeypatch, package):
     monkeypatch.delitem(sys.modules, "distributed", raising=False)
     monkeypatch.setitem(sys.modules, package, None)
     assert "pip install 'dupin2001-repro[dask]'" in refused(tmp_path / "sweep", "tcp://127.0.0.1:1", capsys)
     assert list(tmp_path.iterdir()) == []
 
 
-#: What no scheduler says: that of a shell's server, of one for the web, lengths that do not follow, and nothing.
+#: Greetings of other servers: of a shell, of the web, wrong lengths, and silence.
 GREETINGS = {"shell": b"SSH-2.0-OpenSSH_9\r\n", "web": b"HTTP/1.1 400 Bad\r\n\r\n", "short": 20 * (b"\1" + bytes(7)),
              "long": b"\x20" + bytes(7) + 100 * b"\xff", "silent": b""}
 
 
 @contextmanager
 def listening():
-    """The ports on which servers say what no scheduler does, by name, and one on which nobody listens."""
+    """Yield {name: port} of servers with the greetings above, and of a closed port."""
     servers = {name: socket.create_server(("127.0.0.1", 0)) for name in GREETINGS}
-    kept = []
+    connections = []
 
     def serve(server, greeting):
         with suppress(OSError):
             while True:
-                kept.append(server.accept()[0])
-                kept[-1].sendall(greeting)
+                connections.append(server.accept()[0])
+                connections[-1].sendall(greeting)
 
     for name, server in servers.items():
         threading.Thread(target=serve, args=(server, GREETINGS[name]), daemon=True).start()
     yield {"closed": free_port()} | {name: server.getsockname()[1] for name, server in servers.items()}
-    for each in (*servers.values(), *kept):
+    for each in (*servers.values(), *connections):
         with suppress(OSError):
             each.shutdown(socket.SHUT_RDWR)
         each.close()
@@ -73,51 +73,51 @@ def listening():
         "tcp://", "tcp://127.0.0.1:99999", "tcp://host.invalid:8786", "tls://127.0.0.1:{silent}",
         "ws://127.0.0.1:{web}", "tcp://127.0.0.1:{short}", "tcp://127.0.0.1:{long}"))])
 def test_a_bad_address_is_refused_within_five_seconds_and_nothing_is_written(tmp_path, capfd, address):
-    """Where nobody listens, where nobody answers, or with rubbish, where there is no such host, where it is no address:
-    in one line, without a traceback."""
+    """The port is closed, silent or of another server, the host does not exist, or the text is no address. The message
+    is one line without a traceback."""
     pytest.importorskip("distributed")
     with listening() as ports:
-        where = address.format(**ports)
+        scheduler = address.format(**ports)
         start = time.monotonic()
-        assert "no Dask scheduler answers there" in refused(tmp_path / "sweep", where, capfd)
+        assert "no Dask scheduler answers there" in refused(tmp_path / "sweep", scheduler, capfd)
         assert time.monotonic() - start < 5 and list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("trouble, answer, said", [
+@pytest.mark.parametrize("trouble, answer, expected", [
     (TimeoutError(), None, "it has no workers"),
     (None, ImportError("no module repro"), "a worker lacks this package (no module repro)"),
     (None, ("0.0.1-abc", True), "the worker tcp://b:1 has version 0.0.1-abc of this package, this is "),
     (None, (None, False), "the worker tcp://b:1 does not see "),
 ])
-def test_workers_that_cannot_be_used_are_told(tmp_path, capsys, monkeypatch, trouble, answer, said):
-    """By the scheduler's name: none in time, no package, another version, another file system."""
+def test_unusable_workers_are_reported(tmp_path, capsys, monkeypatch, trouble, answer, expected):
+    """The message names the scheduler: no worker in time, no package, another version, another file system."""
     def run(function, path):
         if isinstance(answer, ImportError):
             raise answer
         version, shared = answer
-        return {"tcp://a:1": function(path), "tcp://b:1": (version or task.code(), shared)}
+        return {"tcp://a:1": function(path), "tcp://b:1": (version or single_run.code(), shared)}
 
     client = MagicMock(wait_for_workers=Mock(side_effect=trouble), run=run)
     client.__enter__.return_value = client
     monkeypatch.setattr(cluster, "_package", lambda address: Mock(Client=lambda *at, **options: client))
     monkeypatch.setattr(cluster, "_ask", AsyncMock())
-    assert said in refused(tmp_path / "sweep", "tcp://host:8786", capsys)
+    assert expected in refused(tmp_path / "sweep", "tcp://host:8786", capsys)
 
 
-def test_a_worker_with_other_code_makes_nothing():
-    """One that joins a sweep at work is not asked before."""
-    assert "failed: a worker that joined has version" in cluster.attempt(None, None, "0.0.1-abc")
+def test_a_worker_with_other_code_makes_no_run():
+    """A worker that joins a running sweep has not been checked before."""
+    assert "failed: a worker that joined has version" in cluster.run_on_worker(None, None, "0.0.1-abc")
 
 
 def free_port():
-    with socket.socket() as found:
-        found.bind(("127.0.0.1", 0))
-        return found.getsockname()[1]
+    with socket.socket() as server:
+        server.bind(("127.0.0.1", 0))
+        return server.getsockname()[1]
 
 
-def until(told, seconds=60):
+def until(condition, seconds=60):
     deadline = time.monotonic() + seconds
-    while not told():
+    while not condition():
         assert time.monotonic() < deadline, "it took too long"
         time.sleep(0.05)
 
@@ -146,24 +146,24 @@ def workers(tmp_path):
 
 
 def on_cluster(address, out):
-    """A sweep in a process of its own."""
+    """Start a sweep in a separate process."""
     arguments = [sys.executable, "-m", "repro", *command(out, "--scheduler", address)]
     return subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
 @pytest.mark.thorough
-def test_no_run_is_lost_or_there_twice_where_a_worker_is_killed(workers, tmp_path):
-    """Six runs, two workers, one of them killed while it has a run at work; then as without a cluster."""
+def test_no_run_is_lost_or_repeated_after_a_worker_is_killed(workers, tmp_path):
+    """Of two workers with six runs one is killed during a run. The results equal those without a cluster."""
     address, start = workers
     first, _ = start("one"), start("two")
-    out, here = tmp_path / "sweep", tmp_path / "here"
+    out, reference = tmp_path / "sweep", tmp_path / "here"
     process = on_cluster(address, out)
     until(lambda: list(out.glob("runs/0*")) and len(list(out.glob("runs/*/.lock"))) == 2)
     first.send_signal(signal.SIGKILL)
-    said = process.communicate(timeout=120)
-    assert process.returncode == 0 and "6 of 6 runs done, 0 failed" in said[0], said
-    told = json.loads((out / "sweep.json").read_text())["points"]
-    assert sorted(os.listdir(out / "runs")) == sorted(point["folder"].removeprefix("runs/") for point in told)
-    assert main(command(here, "--quiet")) == 0
-    assert (out / "table.csv").read_bytes() == (here / "table.csv").read_bytes()
+    outputs = process.communicate(timeout=120)
+    assert process.returncode == 0 and "6 of 6 runs done, 0 failed" in outputs[0], outputs
+    point_records = json.loads((out / "sweep.json").read_text())["points"]
+    assert sorted(os.listdir(out / "runs")) == sorted(point["folder"].removeprefix("runs/") for point in point_records)
+    assert main(command(reference, "--quiet")) == 0
+    assert (out / "table.csv").read_bytes() == (reference / "table.csv").read_bytes()
     assert [row["status"] for row in rows(out / "runs.csv")] == ["completed"] * 6

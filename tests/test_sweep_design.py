@@ -1,4 +1,4 @@
-"""The points of a sweep: ranges, lists, grids, Latin hypercubes, and what is refused."""
+"""The points of a sweep: ranges, lists, grids, Latin hypercubes and refusals."""
 
 import math
 
@@ -31,7 +31,7 @@ def test_a_range_has_its_unit_spacing_and_count(text, factor):
     "pore.width=1:2 um:log:3:4", "pore.width=1:1e999 um:log:3", "pore.width=1e999 um, 2 um", "pore.width=a:b um:log:3",
     "pore.width=1:2 um:log:\N{ARABIC-INDIC DIGIT THREE}",
 ])
-def test_what_is_neither_is_refused_in_one_line(text):
+def test_a_text_that_is_no_range_or_list_is_refused_in_one_line(text):
     with pytest.raises(SceneError) as refused:
         parse(text)
     message = str(refused.value)
@@ -39,12 +39,12 @@ def test_what_is_neither_is_refused_in_one_line(text):
 
 
 @given(RANGES, SPACINGS, st.integers(2, 50))
-def test_levels_go_evenly_from_end_to_end(ends, spacing, count):
-    """But for the 12 digits that they have."""
-    found = levels(Factor("pore.width", "um", ends, spacing, count))
-    assert len(found) == count and (found[0], found[-1]) == ends
+def test_levels_are_evenly_spaced_between_the_ends(ends, spacing, count):
+    """Levels are rounded to 12 digits."""
+    computed = levels(Factor("pore.width", "um", ends, spacing, count))
+    assert len(computed) == count and (computed[0], computed[-1]) == ends
     even = np.geomspace if spacing == "log" else np.linspace
-    assert found == pytest.approx(even(*ends, count), rel=1e-11, abs=1e-11 * (ends[1] if spacing == "linear" else 0))
+    assert computed == pytest.approx(even(*ends, count), rel=1e-11, abs=1e-11 * (ends[1] if spacing == "linear" else 0))
 
 
 @given(st.lists(st.tuples(RANGES, SPACINGS), min_size=1, max_size=4), st.integers(1, 60), st.integers(0, 2**32))
@@ -55,7 +55,7 @@ def test_each_stratum_of_each_range_has_one_value(ranges, samples, seed):
         parts = [math.log(v / low) / math.log(high / low) if factor.spacing == "log" else (v - low) / (high - low)
                  for v in drawn]
         assert all(low <= v <= high for v in drawn)
-        # A value within round-off of a border is counted on the side that leaves each stratum one.
+        # A value within round-off of a border may belong to either stratum, and is not counted.
         certain = sorted(int(samples * part) for part in parts
                          if int(samples * part - 1e-6) == int(samples * part + 1e-6))
         assert len(set(certain)) == len(certain)
@@ -70,45 +70,45 @@ def test_a_list_is_drawn_evenly(words, times, seed):
     assert {word: drawn.count(word) for word in factor.values} == dict.fromkeys(factor.values, times)
 
 
-def test_a_seed_is_a_design():
+def test_a_design_follows_from_its_seed():
     factors = [parse("pore.width=40:60 um:linear"), parse("flow.mean_velocity=1:3 m/day:log")]
     assert latin(factors, 5, 1) == latin(factors, 5, 1) != latin(factors, 5, 2)
 
 
-@pytest.mark.parametrize("made, said", [
+@pytest.mark.parametrize("build, part", [
     (lambda: latin([parse("pore.width=1:2 um:log:3")], 5, 0), "leave :3 out"),
     (lambda: latin([parse("pore.width=1:2 um:log")], 0, 0), "--samples 0"),
     (lambda: latin([parse("pore.width=1:2 um:log")], MOST_POINTS + 1, 0), "--samples 10001"),
     (lambda: grid([parse("pore.width=1:2 um:log")]), "pore.width: how many values is needed"),
     (lambda: grid([parse(f"pore.{key}=1:2 um:log:101") for key in ("width", "length")]), f"at most {MOST_POINTS} run")])
-def test_what_a_hypercube_or_a_grid_cannot_be_is_refused(made, said):
-    with pytest.raises(SceneError, match=said):
-        made()
+def test_an_impossible_hypercube_or_grid_is_refused(build, part):
+    with pytest.raises(SceneError, match=part):
+        build()
 
 
-def test_a_column_tells_its_unit():
-    """And a value between the ends of a range reads well."""
-    found = [parse(f"key={text}").column for text in ("1 m/day", "1 1/day", "1 cm^2/s", "1", "fast", "1 mg / L")]
-    assert found == ["key_m_per_day", "key_1_per_day", "key_cm2_per_s", "key", "key", "key_mg_per_L"]
+def test_a_column_has_its_unit():
+    """Levels between the ends of a range have few digits."""
+    columns = [parse(f"key={text}").column for text in ("1 m/day", "1 1/day", "1 cm^2/s", "1", "fast", "1 mg / L")]
+    assert columns == ["key_m_per_day", "key_1_per_day", "key_cm2_per_s", "key", "key", "key_mg_per_L"]
     assert levels(parse("flow.mean_velocity=0.3:30 m/day:log:3")) == [0.3, 3.0, 30.0]
 
 
-def made(*varied, sets=(), source="base"):
+def make_points(*varied, sets=(), source="base"):
     factors = [parse(text) for text in varied]
     return points(source, list(sets), factors, grid(factors))
 
 
 def test_varying_one_of_the_pair_replaces_the_other_and_keeps_the_rest():
-    """base has a head."""
-    (point,) = made("flow.mean_velocity=2 m/day", sets=["flow.viscosity_ratio=7"])
-    told = scene_tables(point.scene)["flow"]
-    assert "head" not in told and told["viscosity_ratio"] == 7
+    """The scene base has a head."""
+    (point,) = make_points("flow.mean_velocity=2 m/day", sets=["flow.viscosity_ratio=7"])
+    keys = scene_tables(point.scene)["flow"]
+    assert "head" not in keys and keys["viscosity_ratio"] == 7
     assert point.scene.flow.mean_velocity == pytest.approx(2e6 / 24, rel=1e-15)
-    (point,) = made("flow.head=1 um", source="wide")
+    (point,) = make_points("flow.head=1 um", source="wide")
     assert point.scene.flow.mean_velocity is None and point.scene.flow.head == 1
 
 
-@pytest.mark.parametrize("varied, sets, said", [
+@pytest.mark.parametrize("varied, sets, part", [
     (["pore.width=50 um, 4 um"], [], "run 2 .pore.width = 4 um.: base: aggregate.radius"),
     (["pore.widht=50 um"], [], "did you mean width"),
     (["pore.width=50 s"], [], 'run 1 .pore.width = 50 s.: base: pore.width = "50.0 s": a length is needed'),
@@ -119,6 +119,6 @@ def test_varying_one_of_the_pair_replaces_the_other_and_keeps_the_rest():
     (["flow.head=1 um"], ['flow.head="2 um"'], "--set of flow.head"),
     (["flow.head=1 um"], ['flow.mean_velocity="2 m/day"'], "--set of flow.head or flow.mean_velocity"),
 ])
-def test_a_run_that_cannot_be_is_refused_before_any_is_made(varied, sets, said):
-    with pytest.raises(SceneError, match=said):
-        made(*varied, sets=sets)
+def test_an_impossible_run_is_refused_before_any_is_made(varied, sets, part):
+    with pytest.raises(SceneError, match=part):
+        make_points(*varied, sets=sets)

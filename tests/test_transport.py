@@ -1,7 +1,6 @@
-"""Substrates (7)-(13), quasi-steady, with elements of every order: what is exact without biomass, what Newton's method
-starts from, and what is refused. Closed forms, other codes, the balance, starved pores, scaling and the mean biomass of
-a step are cases of the stage transport; that uptake is what the rates make of the concentrations is in
-`test_balances.py`."""
+"""Quasi-steady substrates (7)-(13) with elements of every order: solutions without biomass, starts of Newton's method,
+and refusals. Cases of the stage transport test closed forms, other codes, the balance, starved pores, scaling and the
+mean biomass of a step; `test_balances.py` tests that uptake follows from rates and concentrations."""
 from dataclasses import replace
 
 import numpy as np
@@ -27,25 +26,25 @@ def solved(radius, supply, velocity, order, inlet="local"):
         "inlet": inlet, "elements": ORDERS[order], "refinement": 1.0 if order == 1 else 0.5}))
 
 
-def at_start(made):
+def at_start(scene):
     """(Pore, Solved) of a scene."""
-    now = pore.seeded(made)
-    return now, pore.solve(made, now)
+    start = pore.seeded(scene)
+    return start, pore.solve(scene, start)
 
 
-def everywhere(now, value):
+def everywhere(start, value):
     """Both concentrations, the same at all nodes."""
-    same = np.full(now.space.count, value)
+    same = np.full(start.space.count, value)
     return Concentrations(same, same)
 
 
 @EVERY_ORDER
 @pytest.mark.parametrize("inlet", ["local", "mean"])
 def test_a_constant_supply_stays_constant_without_biomass(inlet, order):
-    """Around an obstacle and for both forms of (11), to round-off: w is free of divergence for every order. Newton's
-    method needs a step, from nothing at all."""
-    now, found = solved("30 um", "10 mg/L", "2.9 m/day", order, inlet)
-    alone = transport.steady(found.problem, None, everywhere(now, 0.0))
+    """This holds around an obstacle and for both forms of (11), to round-off, since w is free of divergence for every
+    order. Newton's method needs one step from zero concentrations."""
+    start, solution = solved("30 um", "10 mg/L", "2.9 m/day", order, inlet)
+    alone = transport.steady(solution.problem, None, everywhere(start, 0.0))
     assert alone.iterations <= 2
     assert alone.acceptor == pytest.approx(np.full(len(alone.acceptor), 10.0), abs=1e-10)
     assert alone.donor == pytest.approx(np.full(len(alone.donor), 10.0), abs=1e-10)
@@ -62,13 +61,13 @@ def right_triangles():
 
 
 @EVERY_ORDER
-def test_couplings_that_are_exactly_zero_keep_their_place(order):
-    """Between right triangles nothing diffuses along the hypotenuse: without flow those entries are zero. The steady
+def test_couplings_that_are_exactly_zero_stay_in_the_matrix(order):
+    """In right triangles nothing diffuses along the hypotenuse, so that without flow these entries are zero. The steady
     state without biomass is the supply."""
     space = space_of(right_triangles(), order)
     problem = transport.problem(space, None, scene().substrates, scene().kinetics)
-    found = transport.steady(problem, Sink(np.zeros_like(space.reaction.dx)))
-    assert found.acceptor == pytest.approx(10.0, rel=1e-12)
+    concentrations = transport.steady(problem, Sink(np.zeros_like(space.reaction.dx)))
+    assert concentrations.acceptor == pytest.approx(10.0, rel=1e-12)
 
 
 def thick(velocity, order=2, refinement=None):
@@ -79,41 +78,42 @@ def thick(velocity, order=2, refinement=None):
 
 @EVERY_ORDER
 def test_too_slow_a_flow_is_refused(order):
-    """Under u W / D = 1e-8 the inlet's supply is lost in round-off."""
+    """Below u W / D = 1e-8 the supply at the inlet is lost in round-off."""
     with pytest.raises(TransportError, match=r"Peclet number u W / D is 1\.2e-09, under 1e-08: nothing is supplied"):
         at_start(thick("1e-9 m/day", order))
     if order > 1:
         assert np.isfinite(at_start(thick("1e-8 m/day", order))[1].fluxes[0].effluent)
 
 
-SAID = r"the (acceptor|donor) is -?[\d.]+ mg/L at x = \S+, y = \S+ um, outside of 0 to 10 mg/L; the mesh is too coarse"
+OUT_OF_BOUNDS = (r"the (acceptor|donor) is -?[\d.]+ mg/L at x = \S+, y = \S+ um, outside of 0 to 10 mg/L; "
+                 "the mesh is too coarse")
 
 
 @pytest.mark.parametrize("order", [2, 3])
-def test_the_divergence_of_u_is_what_leaves_the_bounds(monkeypatch, order):
-    """Without elements for the boundary layer, at u W / D = 4e4: carried by u the concentration oscillates upstream, by
-    more than 2 % over the supply, and is refused; carried by the divergence-free w it stays within a fourth of that."""
+def test_advection_by_u_leaves_the_bounds(monkeypatch, order):
+    """At u W / D = 4e4, without elements for the boundary layer, advection by u makes the concentration exceed the
+    supply by more than 2 % upstream, which is refused. With the divergence-free w it stays within a fourth of that."""
     monkeypatch.setattr(pore, "BOUNDARY_LAYER", 0.0)
     state = at_start(thick("290 m/day", order, 0.2))[1].concentrations
     assert max(state.acceptor.max(), state.donor.max()) < 10 * (1 + transport.OVERSHOOT / 4)
     monkeypatch.setattr(transport, "divergence_free", lambda space, velocity: space.at_points(velocity.T))
-    with pytest.raises(Unresolved, match=SAID):
+    with pytest.raises(Unresolved, match=OUT_OF_BOUNDS):
         at_start(thick("290 m/day", order, 0.2))
 
 
 def starved(half, order):
     """A seed that the acceptor reaches in part only, with a half saturation that no mesh resolves."""
-    made = scene("30 um", "100 um", "1 mg/L", "10 mg/L", "0.5 m/day", numerics={
+    model = scene("30 um", "100 um", "1 mg/L", "10 mg/L", "0.5 m/day", numerics={
         "elements": ORDERS[order], "refinement": 0.4 / order, "transfer": "conserving"})
-    acceptor = replace(made.substrates.acceptor, half_saturation=half)
-    return replace(made, substrates=replace(made.substrates, acceptor=acceptor))
+    acceptor = replace(model.substrates.acceptor, half_saturation=half)
+    return replace(model, substrates=replace(model.substrates, acceptor=acceptor))
 
 
-def outcome(made):
-    """What is solved at t = 0, or the error that says why not."""
+def outcome(scene):
+    """The solution at t = 0, or the error."""
     try:
         with np.errstate(all="raise", under="ignore"):
-            return at_start(made)[1]
+            return at_start(scene)[1]
     except (Unresolved, FloatingPointError) as error:
         return error
 
@@ -121,8 +121,8 @@ def outcome(made):
 @EVERY_ORDER
 @pytest.mark.parametrize("half", [1e-17, 1e-300])
 def test_a_half_saturation_below_round_off_is_solved_or_refused_as_a_front(order, half):
-    """Where C / (C + K) is one to the last bit and the substrate runs out: no floating-point error. What is solved
-    differs from a half saturation of 1e-15 by about that."""
+    """C / (C + K) is one to the last bit, and the substrate runs out, without a floating-point error. The solution
+    differs by about 1e-15 from that with a half saturation of 1e-15."""
     solution = outcome(starved(half, order))
     if order == 1 and half == 1e-17:
         assert isinstance(solution, pore.Solved), solution
@@ -135,9 +135,9 @@ def test_a_half_saturation_below_round_off_is_solved_or_refused_as_a_front(order
 
 
 def test_an_update_that_meets_an_unresolved_front_gives_advice_that_was_tried():
-    """After a step, at a jump of the supply, where no refinement helps."""
-    made = scene("30 um", "100 um", "1 mg/L", "10 mg/L", "0.5 m/day", growth={"end": "1 h", "time_step": "0.4 h"})
-    tables = scene_tables(made)
+    """The front follows a jump of the supply at the end of a step, and no refinement helps."""
+    model = scene("30 um", "100 um", "1 mg/L", "10 mg/L", "0.5 m/day", growth={"end": "1 h", "time_step": "0.4 h"})
+    tables = scene_tables(model)
     tables["substrates"]["acceptor"] |= {"supply": [["0 h", "1e5 mg/L"], ["0.4 h", "1 mg/L"]],
                                          "half_saturation": "1e-30 mg/L"}
     tables["numerics"] |= {"refinement": 0.2}
@@ -146,18 +146,18 @@ def test_an_update_that_meets_an_unresolved_front_gives_advice_that_was_tried():
 
 
 def test_an_update_whose_biomass_meets_an_unresolved_front_gives_advice_that_was_tried(monkeypatch):
-    """Within a step, of the biomass at its end."""
-    made = scene("5 um", velocity="1 m/day", growth={"end": "1 h", "time_step": "0.5 h"}, numerics={"refinement": 0.4})
-    plain, calls = transport.steady, []
+    """The front is that of the biomass at the end of the step."""
+    model = scene("5 um", velocity="1 m/day", growth={"end": "1 h", "time_step": "0.5 h"}, numerics={"refinement": 0.4})
+    solve_steady, calls = transport.steady, []
 
-    def failing(*arguments):
+    def fail_once(*arguments):
         calls.append(arguments)
         if len(calls) == 2:
             raise Unresolved("a front")
-        return plain(*arguments)
+        return solve_steady(*arguments)
 
-    monkeypatch.setattr(transport, "steady", failing)
+    monkeypatch.setattr(transport, "steady", fail_once)
     with pytest.raises(SimulationError, match="in transport: a front; numerics.refinement = 0.6 resolves this state"):
-        list(simulate(made))
+        list(simulate(model))
     assert calls[2][1].active.sum() == pytest.approx(calls[1][1].active.sum(), rel=1e-3)
     assert calls[2][1].active.sum() > 1.005 * calls[0][1].active.sum()

@@ -1,4 +1,4 @@
-"""Error bars from values on several sizes: exact on manufactured series, covering noise; the levels that give them."""
+"""Error bars from values on several sizes: exact for manufactured series, covering noise; and the levels for them."""
 
 import numpy as np
 import pytest
@@ -17,64 +17,64 @@ SIZES = np.array([1.0, 2**0.5, 2**-0.5, 0.5])
 @pytest.mark.parametrize("order, formal", [(0.6, BOTH), (1.0, BOTH), (1.53, (2.0, 2.0)), (2.0, (2.0, 2.0))])
 @pytest.mark.parametrize("sizes", [SIZES, (1.0, 1.5, 2.0), (0.7, 0.3, 1.1)])
 def test_a_power_law_has_its_order_and_a_bar_of_its_error_times_125(sizes, order, formal):
-    found = estimate(sizes, [7.0 - 0.3 * h**order for h in sizes], formal)
-    assert found.order == pytest.approx(order, abs=1e-5)
-    assert found.bar == pytest.approx(OBSERVED * 0.3 * sizes[0] ** order, rel=1e-4)
+    result = estimate(sizes, [7.0 - 0.3 * h**order for h in sizes], formal)
+    assert result.order == pytest.approx(order, abs=1e-5)
+    assert result.bar == pytest.approx(OBSERVED * 0.3 * sizes[0] ** order, rel=1e-4)
 
 
 def test_the_example_of_celik_et_al():
     """J. Fluids Eng. 130 (2008) 078001, Table 1: 18000, 8000 and 4500 cells, p = 1.53, GCI = 2.2 %."""
-    found = estimate([1.0, 1.5, 2.0], [6.063, 5.972, 5.863], (2.0, 2.0))
-    assert found.order == pytest.approx(1.53, abs=0.005)
-    assert 100 * found.bar / 6.063 == pytest.approx(2.2, abs=0.05)
+    result = estimate([1.0, 1.5, 2.0], [6.063, 5.972, 5.863], (2.0, 2.0))
+    assert result.order == pytest.approx(1.53, abs=0.005)
+    assert 100 * result.bar / 6.063 == pytest.approx(2.2, abs=0.05)
 
 
 @pytest.mark.parametrize("values, formal", [
     (SIZES**0.3, BOTH), (SIZES**2.8, BOTH), (SIZES**0.4, (1.0, 1.0)), (SIZES**1.8, (1.0, 1.0)),
     ((1.0, 1.1, 1.1, 1.0), (1.0, 1.0)), ((1.05, 1.1, 1.0, 1.08), (1.0, 1.0))])
 def test_an_unreasonable_order_and_oscillation_get_three_and_the_formal_order(values, formal):
-    """3 times the range over that of the sizes at the lowest formal order, one."""
+    """The bar is 3 times the range over that of the sizes at the lowest formal order, one."""
     assert estimate(SIZES, values, formal).bar == pytest.approx(FORMAL * np.ptp(values) / (2**0.5 - 0.5))
 
 
 @pytest.mark.parametrize("noise", [0.02, 0.5])
 @pytest.mark.parametrize("order", [1.0, 2.0])
 def test_the_bar_covers_the_error_of_noisy_values(noise, order):
-    """At least 19 of 20, Roache's aim, for noise of a part of the error."""
+    """It covers at least 19 of 20, Roache's aim, with noise of a part of the error."""
     generator = np.random.default_rng(2001)
     covered = 0
     for _ in range(200):
-        f = 3.0 + SIZES**order + noise * generator.uniform(-1, 1, len(SIZES))
-        covered += abs(f[0] - 3.0) <= estimate(SIZES, f, BOTH).bar
+        values = 3.0 + SIZES**order + noise * generator.uniform(-1, 1, len(SIZES))
+        covered += abs(values[0] - 3.0) <= estimate(SIZES, values, BOTH).bar
     assert covered >= 190
 
 
 # Levels.
 def test_a_scene_is_that_of_the_level():
-    """The converged solution is refined in space and time at once: half the elements, a fourth of the tolerance. A
-    supply of wide is that of wide alone."""
-    assert scene_hash(runs.scene("base")) == scene_hash(load_scene("base"))
+    """The converged solution is refined in space and time: half the element size, a fourth of the tolerance. The supply
+    of wide applies to wide alone."""
+    assert scene_hash(runs.load_packaged("base")) == scene_hash(load_scene("base"))
     with at_level(Level(size=0.5, step=3.0)):
-        said = runs.scene("base", "numerics.refinement=0.7")
-    assert said.numerics.refinement == pytest.approx(1.4) and said.growth.time_step == 0.6
+        coarse = runs.load_packaged("base", "numerics.refinement=0.7")
+    assert coarse.numerics.refinement == pytest.approx(1.4) and coarse.growth.time_step == 0.6
     with at_level(Level(CONVERGED, 0.5)):
-        fine = runs.scene("base")
+        fine = runs.load_packaged("base")
     plain = load_scene("base", ['numerics.preset="accurate"']).numerics
     assert (fine.numerics.refinement, fine.numerics.tolerance) == (2 * plain.refinement, plain.tolerance / 4)
     assert fine.numerics.elements == "quadratic" and fine.output.times[-2:] == (19.2, 19.4)
     with at_level(supplied(5.0, 59.0)):
-        base, wide = runs.scene("base"), runs.scene("wide")
+        base, wide = runs.load_packaged("base"), runs.load_packaged("wide")
     assert base.substrates.acceptor.supply == 10.0 and base.growth.end == pytest.approx(19.4)
     assert wide.substrates.donor.supply == 5.0 and wide.growth.end == wide.output.times[-1] == 59.0
 
 
-#: Sizes of the scheme of 2001 beside claims where they are fewer than three: linear elements have no permeable body
-#: (C42), and comparisons of many, or of long, runs would take minutes (C32, C41, C43); those about wide have two.
+#: Claims with fewer than three sizes of the scheme of 2001: linear elements have no permeable body (C42), and
+#: comparisons of many or long runs would take minutes (C32, C41, C43). Claims about wide have two.
 FEWER_OF_SCHEME = {"C32": 1, "C41": 1, "C42": 0, "C43": 1}
 
 
-def test_every_claim_is_computed_on_three_meshes_and_with_three_steps_or_says_why_not():
-    """And a claim about the model with the scheme beside it."""
+def test_every_claim_has_three_meshes_and_three_steps_or_a_reason():
+    """A claim about the model is also computed with the scheme."""
     evaluate.register_all()
     for claim in claims.CLAIMS.values():
         kinds = [level.kind for level in claim.levels]
@@ -89,11 +89,12 @@ def test_every_claim_is_computed_on_three_meshes_and_with_three_steps_or_says_wh
             assert claim.about == claims.CLOSED and claim.levels == (DEFAULT,), claim.id
 
 
-def judged(check, value, **fields):
+def judge_check(check, value, **fields):
     """A check with its bar, from a function of the level that gives the value."""
     claim = Claim("C01", "4", "", lambda: None, **({"about": claims.OF_SCHEME} | fields))
-    at = {level: evaluate.numbers(Finding((claims.replace(check, value=value(level)),))) for level in claim.levels}
-    return evaluate.barred(claim, Finding((check,)), at).checks[0]
+    changed = {level: claims.replace(check, value=value(level)) for level in claim.levels}
+    findings = {level: evaluate.numbers(Finding((each,))) for level, each in changed.items()}
+    return evaluate.barred(claim, Finding((check,)), findings).checks[0]
 
 
 SPEED = claims.near("speed at 34.4 h (m/d)", "2.9", 2.91, 2.9, 0.29, "")
@@ -111,21 +112,21 @@ def speed(level):
     (WIDE, {"steps": ALONE}, 0.1 + 0.0125, 0.2 + 0.0125),
 ])
 def test_a_bar_is_that_of_elements_and_steps_and_of_the_mesh_around_a_place(check, fields, below, above):
-    """1.25 times the errors; of the converged solution on its own sizes; what is not varied gives none."""
-    found = judged(check, speed, **fields)
-    assert (2.91 - found.bar.low, found.bar.high - 2.91) == pytest.approx((below, above))
+    """The bar is 1.25 times the errors, those of the converged solution on its sizes; a fixed parameter adds none."""
+    result = judge_check(check, speed, **fields)
+    assert (2.91 - result.bar.low, result.bar.high - 2.91) == pytest.approx((below, above))
 
 
-def test_the_scheme_stands_beside_the_converged_solution_whose_bar_has_nothing_of_it():
-    found = judged(SPEED, lambda level: speed(level) + (level.kind == SCHEME), about=claims.MODEL)
-    assert found.bar.high - found.value == pytest.approx(1.25 * 0.005)
-    assert found.scheme == pytest.approx((3.9 + 0.01 * 2**-0.5, 3.9 + 0.01 * 2**0.5)) and len(found.on_sizes) == 3
+def test_the_scheme_does_not_enter_the_bar_of_the_converged_solution():
+    result = judge_check(SPEED, lambda level: speed(level) + (level.kind == SCHEME), about=claims.MODEL)
+    assert result.bar.high - result.value == pytest.approx(1.25 * 0.005)
+    assert result.scheme == pytest.approx((3.9 + 0.01 * 2**-0.5, 3.9 + 0.01 * 2**0.5)) and len(result.on_sizes) == 3
 
 
 @pytest.mark.parametrize("large, outcome", [((), claims.HOLDS), ((0.5,), claims.REACHES_OVER),
                                             (levels.SIZES, claims.FAILS)])
 def test_a_number_without_a_limit_has_the_range_of_all_levels(large, outcome):
-    """It is judged at every one of them."""
+    """It is judged at every level."""
     count = claims.without_limit(claims.at_most("triangles", "6", 5, 6, ""))
-    found = judged(count, lambda level: 9 if level.size in large else 5, steps=ALONE)
-    assert found.bar.high == 5 + 4 * bool(large) and found.outcome == outcome
+    result = judge_check(count, lambda level: 9 if level.size in large else 5, steps=ALONE)
+    assert result.bar.high == 5 + 4 * bool(large) and result.outcome == outcome

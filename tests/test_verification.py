@@ -1,5 +1,5 @@
-"""The verification can fail: verdicts follow from numbers, orders are judged on both sides, and records and pages come
-together from all workers of a session."""
+"""The verification can fail: verdicts follow from numbers, orders have bounds on both sides, and records and pages are
+merged from all workers of a session."""
 import json
 import math
 import os
@@ -26,7 +26,7 @@ GOOD, BAD = (at_most("quantity A", value, 1.0, "theory") for value in (0.5, 2.0)
 @pytest.mark.parametrize("build, bounds, inside, outside", [
     (at_most, [1.0], [0.0, 1.0], [1.1, -0.1, math.inf, math.nan]), (at_least, [1.0], [1.0], [0.5, math.nan]),
     (between, [1.0, 2.0], [1.0, 2.0], [0.9, 2.5, math.nan])])
-def test_a_number_holds_in_its_range_alone(build, bounds, inside, outside):
+def test_a_number_holds_only_in_its_range(build, bounds, inside, outside):
     assert all(build("x", value, *bounds, "").holds for value in inside)
     assert not any(build("x", value, *bounds, "").holds for value in outside)
 
@@ -41,18 +41,18 @@ def test_a_case_passes_only_if_it_measures_something_and_all_of_it_holds():
 @pytest.mark.parametrize("errors, ceiling, holds", [
     (SIZES**2.2, 1, True), (SIZES**1.8, 1, True), (SIZES**1.6, 1, False), (SIZES**2.4, 1, False),
     (SIZES**2 * [1, 1, 4, 1], 1, False), (SIZES**2, 0.02, True), (SIZES**2, 0.01, False),
-    *((np.where(np.arange(4) == k, wrong, SIZES**2), 1, False)
-      for k in range(4) for wrong in (math.nan, math.inf, 0.0, -1.0))])
+    *((np.where(np.arange(4) == k, bad_error, SIZES**2), 1, False)
+      for k in range(4) for bad_error in (math.nan, math.inf, 0.0, -1.0))])
 def test_a_wrong_order_is_caught_on_both_sides(errors, ceiling, holds):
-    """One bad pair is enough, and a last error that is too large; there are four pairs or none."""
+    """One bad pair suffices, or a last error that is too large. Fewer than four sizes are refused."""
     assert study("error", SIZES, errors, 2, "", ceiling=ceiling).holds is holds
     with pytest.raises(ValueError, match="4 or more falling sizes"):
         study("error", SIZES[:3], errors[:3], 2, "")
 
 
 def test_the_matrix_has_no_orphan_and_is_written(monkeypatch):
-    """Every case, mutant, reference and claim stands in a line of the modules, and no line is without cases. One that
-    stands nowhere is reported."""
+    """Every case, mutant, reference and claim is in a line of the modules, and every line has cases. One in no line is
+    reported."""
     assert matrix.orphans() == [] and matrix.unexplained() == []
     lost = replace(cases.cases()["flow-plug"], mutants=("none",), runs_with="1", omitted="")
     monkeypatch.setitem(cases.cases(), "flow-plug", lost)
@@ -60,9 +60,9 @@ def test_the_matrix_has_no_orphan_and_is_written(monkeypatch):
 
 
 def test_exact_has_the_elements_and_the_order_of_accurate():
-    """What is said of stages that run with accurate alone: what else differs are sizes and steps."""
-    apart = {key for key, value in PRESETS["exact"].items() if value != PRESETS["accurate"].get(key)}
-    assert apart == {"refinement", "tolerance", "contact_elements"}
+    """Stages that run with accurate alone rely on this: exact has only other sizes and steps."""
+    differing = {key for key, value in PRESETS["exact"].items() if value != PRESETS["accurate"].get(key)}
+    assert differing == {"refinement", "tolerance", "contact_elements"}
 
 
 def test_pages_are_those_of_the_records_and_short_enough_for_a_browser():
@@ -106,33 +106,33 @@ def test_made_empty(record):
 '''
 
 
-def test_a_session_runs_in_parallel_and_records_what_ran():
-    """A copy of the project with four more cases: one passes, one falls short in a variant, one is stopped in a variant
-    by a floating-point error, and one measures nothing. The registry has the variants that pytest runs."""
+def test_a_parallel_session_records_all_its_cases():
+    """A copy of the project has four more cases: one passes, one fails in a variant, a floating-point error stops a
+    variant of the third, and the last measures nothing. The registry has the variants that pytest runs."""
     with runner.copied() as folder:
         (folder / "verification/cases/flow_made.py").write_text(CASES)
         before = json.loads((folder / "verification/report/evidence.json").read_text())
-        done = subprocess.run([sys.executable, "-m", "pytest", "verification/cases/flow_made.py", "-n2", "-k",
+        session = subprocess.run([sys.executable, "-m", "pytest", "verification/cases/flow_made.py", "-n2", "-k",
                                "flow-made", "--pages", "--junitxml=report.xml"], cwd=folder, capture_output=True,
                               text=True, env={**os.environ, "PYTHONPATH": str(folder)})
         report = folder / "verification" / "report"
         records, measured = (writing.load(report / name) for name in ("evidence.json", "live/measured.json"))
         page, tests = (report / "flow.md").read_text(), ElementTree.parse(folder / "report.xml").findall(".//testcase")
-    assert done.returncode == 1, done.stdout
-    assert "q: 5; expected at most 4 (theory)" in done.stdout and "nothing was measured" in done.stdout
-    assert re.match(r"3 failed, 6 passed(, \d+ warnings?)? in [\d.]+s", done.stdout.strip().splitlines()[-1])
+    assert session.returncode == 1, session.stdout
+    assert "q: 5; expected at most 4 (theory)" in session.stdout and "nothing was measured" in session.stdout
+    assert re.match(r"3 failed, 6 passed(, \d+ warnings?)? in [\d.]+s", session.stdout.strip().splitlines()[-1])
     assert len(tests) == 9 and sum(bool(test.findall("failure")) for test in tests) == 3
-    made = {id: records.pop(id) for id in [*records] if id.startswith("flow-made")}
+    new_records = {id: records.pop(id) for id in [*records] if id.startswith("flow-made")}
     assert records == before
-    assert {id: record["verdict"] == "passes" for id, record in made.items()} == {
+    assert {id: record["verdict"] == "passes" for id, record in new_records.items()} == {
         "flow-made-good": True, "flow-made-short": False, "flow-made-stopped": False, "flow-made-empty": False}
-    assert made["flow-made-good"]["numbers"] == 8 and made["flow-made-short"]["numbers"] == 2
-    assert made["flow-made-stopped"]["errors"][0].startswith("0: FloatingPointError")
+    assert new_records["flow-made-good"]["numbers"] == 8 and new_records["flow-made-short"]["numbers"] == 2
+    assert new_records["flow-made-stopped"]["errors"][0].startswith("0: FloatingPointError")
     assert "| q, three (5) | at most 4 | theory | NO |" in page and "Stopped by an error: 0: FloatingPointError" in page
     assert measured["cases"]["flow-made-good"]["measured"]["r, v = 3"] == "2"
 
 
-def test_rows_that_were_appended_are_read_but_for_one_that_was_cut(tmp_path):
+def test_appended_rows_are_read_except_a_truncated_one(tmp_path):
     file = tmp_path / "deep" / "rows.jsonl"
     assert writing.lines(file) == []
     writing.append({"a": 1}, file)

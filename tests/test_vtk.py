@@ -1,5 +1,5 @@
-"""The fields as ParaView, PyVista and this package read them, to the last bit. That they are what their names
-say is in tests/test_derived.py."""
+"""Fields as ParaView, PyVista and this package read them, to the last bit. tests/test_derived.py tests their values.
+"""
 
 import numpy as np
 import pytest
@@ -9,20 +9,20 @@ from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
 from repro import results
 from repro.results import field_files
 from repro.scene import load_scene
-from tests.pages import whole_of
+from tests.pages import cached_run
 from tests.strategies import ORDERS, arrays_of, same_arrays
-from tests.test_derived import late
+from tests.test_derived import late_instant
 
 EVERY_ORDER = pytest.mark.parametrize("order", ORDERS)
 
 
 @pytest.fixture
 def written(order, tmp_path):
-    """A late pore with elements of an order, its fields, and the file that they were written to."""
-    scene, at = late(order)
-    content = results.fields(scene, at.pore, at.solved)
+    """A late pore with elements of an order, its fields, and the file of the fields."""
+    scene, report = late_instant(order)
+    content = results.fields(scene, report.pore, report.solved)
     field_files.write(tmp_path / "fields.vtu", content)
-    return at.pore, content, tmp_path / "fields.vtu"
+    return report.pore, content, tmp_path / "fields.vtu"
 
 
 def read_by_vtk(path):
@@ -55,27 +55,27 @@ def by_this_package(path):
 @pytest.mark.parametrize("read", [by_vtk, by_pyvista, by_this_package])
 @EVERY_ORDER
 def test_every_reader_reads_what_was_computed(order, read, written):
-    """Places, cells, the time, and each array as numbers of 64 bits."""
-    now, computed, path = written
-    told, besides = read(path)
-    assert same_arrays(told, arrays_of(computed)) and besides["TimeValue"].tolist() == [now.time]
-    assert {value.dtype for name, value in told.items() if name != "cells"} == {np.dtype(np.float64)}
+    """Points, cells and the time agree, and each array has numbers of 64 bits."""
+    state, computed, path = written
+    arrays, field_data = read(path)
+    assert same_arrays(arrays, arrays_of(computed)) and field_data["TimeValue"].tolist() == [state.time]
+    assert {value.dtype for name, value in arrays.items() if name != "cells"} == {np.dtype(np.float64)}
 
 
 @EVERY_ORDER
 def test_middle_nodes_are_where_vtk_expects_them(order, written):
-    """Within a fifth of the longest side of where the triangle's straight twin has what VTK takes for that node."""
+    """Each node is within a fifth of the longest side of VTK's node in the straight triangle."""
     grid = pyvista.read(written[-1])
     assert {*grid.celltypes} == {pyvista.CellType.TRIANGLE if order == 1 else pyvista.CellType.QUADRATIC_TRIANGLE}
-    places = np.reshape(grid.GetCell(0).GetParametricCoords(), (-1, 3))[:, :2]
-    found = grid.points[by_pyvista(written[-1])[0]["cells"]]
-    straight = np.column_stack([1 - places.sum(axis=1), places]) @ found[:, :3]
-    longest = np.linalg.norm(found[:, :3] - found[:, [1, 2, 0]], axis=2).max(axis=1)
-    assert (np.linalg.norm(found - straight, axis=2) < 0.2 * longest[:, None]).all()
+    parameters = np.reshape(grid.GetCell(0).GetParametricCoords(), (-1, 3))[:, :2]
+    nodes = grid.points[by_pyvista(written[-1])[0]["cells"]]
+    straight = np.column_stack([1 - parameters.sum(axis=1), parameters]) @ nodes[:, :3]
+    longest = np.linalg.norm(nodes[:, :3] - nodes[:, [1, 2, 0]], axis=2).max(axis=1)
+    assert (np.linalg.norm(nodes - straight, axis=2) < 0.2 * longest[:, None]).all()
 
 
-def test_the_index_names_every_time_and_a_file_that_is_there():
-    folder = whole_of(load_scene("base", ["growth.end=1 h", 'output.times=["0 h", "0.5 h", "1 h"]']))
+def test_the_index_has_every_time_and_its_file():
+    folder = cached_run(load_scene("base", ["growth.end=1 h", 'output.times=["0 h", "0.5 h", "1 h"]']))
     reader = pyvista.get_reader(folder / "fields.pvd")
     assert reader.time_values == results.read_table(folder / "timeseries.csv")["time_h"].tolist() == [0.0, 0.5, 1.0]
     assert [each.path for each in reader.datasets] == [f"fields/fields_000{k}.vtu" for k in range(3)]

@@ -1,15 +1,15 @@
-"""What each choice costs and what it changes: ``python -m verification.audit`` prints the table and writes
+"""Cost and effect of each choice: ``python -m verification.audit`` prints the table and writes
 ``verification/report/audit.json``.
 
-The paper's modelling and numerical choices (:mod:`verification.switches`), one changed at a time: base in the paper's
-preset at 19.2 h against the same run with the change, at the same element size and step. ``effect`` is the difference
-of two whole runs. Two runs that remesh at different moments differ by what two meshes differ by, in velocity ten times
-more than in shape: so the other run's last shape is solved in on the default's mesh, brought to that shape. What is
-left of two meshes is the row "mesh"; ``resolved`` names the quantities that change by more than twice that. Runs of
-which each needs meshes of its own, the full pore's, are compared in the converged solution: in the paper's preset two
-meshes make -0.05 to -0.23 % of the velocity of an effect under 0.01 %.
-``one_state`` is free of it: both choices in the state of the default at 19.2 h, flow and substrates solved in it and
-the shape of one step more. ``cost_ratio`` is of processor time, the median of runs in turn, made for that alone.
+The audit changes one of the paper's choices (:mod:`verification.switches`) at a time. It compares base in the paper's
+preset at 19.2 h with the changed run, at the same element size and step. ``effect`` is the difference of two complete
+runs. Runs that remesh at different times have different meshes, which affect the velocity ten times more than the
+shape. The audit therefore moves the default's mesh to the last shape of the changed run and solves there. The row
+"mesh" gives the remaining mesh effect; ``resolved`` names the quantities that change by more than twice as much. The
+full pore needs meshes of its own, so it is compared in the converged solution: in the paper's preset two meshes change
+the velocity by -0.05 to -0.23 %, and the effect is under 0.01 %.
+``one_state`` has no mesh effect: it solves flow, substrates and the next shape with both choices in the default's
+state at 19.2 h. ``cost_ratio`` compares processor times, medians of alternating runs.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ from verification.evidence.writing import Block, plain, save, table
 from verification.switches import CHOICES, PLOTTED, Course, Switch, state
 
 RECORD = Path(__file__).parent / "report" / "audit.json"
-#: Runs in turn of which the processor times are the medians.
+#: Alternating runs, whose median processor times are compared.
 REPEATS = 3
-#: Times (h) at which the lean of an uneven seed is told.
+#: Times (h) at which the audit reports the lean of an uneven seed.
 TIMES = (0.4, 4.8, 9.6, 14.4, PLOTTED)
 METHOD = (f"base, preset paper, at {PLOTTED:g} h in steps of {60 * UPDATE:g} min; "
           "effect: difference of two whole runs, relative, effluents over the supply, flow and substrates of both last "
@@ -54,56 +54,58 @@ def main() -> int:
 
 
 def mesh() -> dict:
-    """What runs differ by on meshes of the same fineness to 2.5 %: the largest of each quantity."""
-    effects = columns([switches.whole_run(state(BASE), state(switch.run)) for switch in switches.FINENESS])
-    told = Switch("mesh", "refinement 1", "refinement 0.975 to 0.995", "", note="no choice: what runs on meshes of the "
-                  "same fineness differ by; less than twice that is not resolved")
-    return row(told, cost(switches.FINENESS[-1].run, 1),
+    """Largest effect of the mesh on each quantity, for element sizes within 2.5 %."""
+    effects = columns([switches.effect_of_runs(state(BASE), state(switch.run)) for switch in switches.FINENESS])
+    mesh_switch = Switch("mesh", "refinement 1", "refinement 0.975 to 0.995", "",
+                         note="no choice: what runs on meshes of the same fineness differ by; "
+                         "less than twice that is not resolved")
+    return row(mesh_switch, cost(switches.FINENESS[-1].run, 1),
                {name: max(column, key=abs) for name, column in effects.items()})
 
 
 def measured(switch: Switch, ratio: float) -> dict:
-    """The row of a choice that a scene can name, at a cost."""
+    """Compute the row of a choice that a scene can name; ratio: its cost."""
     print(f"{switch.choice}: {switch.alternative}", file=sys.stderr, flush=True)
     if not switch.meshes:
         effects, noise = switches.converged(switch)
         return {**row(switch, ratio, effects), "noise": noise}
     default, other = state(BASE), state(switch.run)
-    told = row(switch, ratio, switches.whole_run(default, other))
-    return {**told, "one_state": switches.one_state(default, other.scene) if switch.state else {}}
+    measured_row = row(switch, ratio, switches.effect_of_runs(default, other))
+    return {**measured_row, "one_state": switches.one_state(default, other.scene) if switch.state else {}}
 
 
 def cost(run: tuple[str, ...], repeats: int = REPEATS) -> float:
-    """The ratio of the processor times of a run and of base, medians of runs in turn."""
+    """Processor time of a run over that of base, medians of alternating runs."""
     default, other = map(median, zip(*((seconds(PLATES), seconds(run)) for _ in range(repeats))))
     return other / default
 
 
 def seconds(run: tuple[str, ...]) -> float:
     """Processor time of a run."""
-    said, start = runs.scene(*run), process_time()
-    for _ in simulate(said):
+    scene, start = runs.load_packaged(*run), process_time()
+    for _ in simulate(scene):
         pass
     return process_time() - start
 
 
 def drift() -> dict:
-    """theta restarting at a remesh as J X / X_m against J: the drift of (28) [E7]."""
+    """Compare theta = J X / X_m with theta = J after a remesh: the drift of (28) [E7]."""
     other = switches.course(BASE, switches.restarting_as_j)
-    drifts = {name: float(found["drift"].max()) for name, found in
-              (("default", switches.told(BASE)), ("alternative", other.columns))}
+    drifts = {name: float(columns["drift"].max()) for name, columns in
+              (("default", switches.run_columns(BASE)), ("alternative", other.columns))}
     note = f"drift, max |X / X_m - 1| over the run: {drifts['default']:.2g} against {drifts['alternative']:.2g} [E7]"
-    told = _marched(other, Switch("theta after a remesh (28)", "J X / X_m", "J", "", note=note))
-    return {**told, "drift": drifts}
+    drift_row = _marched(other, Switch("theta after a remesh (28)", "J X / X_m", "J", "", note=note))
+    return {**drift_row, "drift": drifts}
 
 
 def symmetry() -> list[dict]:
-    """A half-disc against one whose downstream tip, or upstream tip, reaches out by 1 %, the other tip less by that."""
+    """Compare a half-disc with seeds that have one tip 1 % further out and the other 1 % less."""
     rows = []
     for word, bulge in (("upstream", -switches.BULGE), ("downstream", switches.BULGE)):
-        other = switches.course(BASE, switches.as_it_is, bulge)
-        ours, theirs = (switches.near(found, "lean", TIMES) for found in (other.columns, switches.told(BASE)))
-        off = ", ".join(f"{100 * value:+.2f} % at {time:g} h" for value, time in zip(ours - theirs, TIMES))
+        other = switches.course(BASE, switches.step_of_paper, bulge)
+        lean = switches.near(other.columns, "lean", TIMES)
+        default = switches.near(switches.run_columns(BASE), "lean", TIMES)
+        off = ", ".join(f"{100 * value:+.2f} % at {time:g} h" for value, time in zip(lean - default, TIMES))
         rows.append(_marched(other, Switch(
             "symmetry of the seed", "half-disc", f"1 % longer {word}", "",
             note=f"R (1 + 0.01 cos 3 phi), area as before; the middle between the tips is off by {off}")))
@@ -111,7 +113,7 @@ def symmetry() -> list[dict]:
 
 
 def _marched(other: Course, switch: Switch) -> dict:
-    return row(switch, other.seconds / seconds(PLATES), switches.whole_run(state(BASE), other.plotted))
+    return row(switch, other.seconds / seconds(PLATES), switches.effect_of_runs(state(BASE), other.plotted))
 
 
 def row(switch: Switch, ratio: float, effects: dict[str, float]) -> dict:
@@ -121,17 +123,17 @@ def row(switch: Switch, ratio: float, effects: dict[str, float]) -> dict:
 
 
 def resolved(effects: dict[str, float], noise: dict[str, float]) -> list[str]:
-    """Names of the quantities that change by more than twice what meshes of the same fineness make of them."""
+    """Names of the quantities that change by more than twice the effect of the mesh."""
     return [name for name, value in effects.items() if abs(value) > 2 * abs(noise[name])]
 
 
-#: Of the table.
+#: Header of the table.
 HEAD = ("choice", "default", "alternative", "cost", "velocity", "area", "acceptor out", "largest change",
         "in one state", "note")
 
 
 def blocks(record: dict) -> Iterator[Block]:
-    """A choice a line: its cost, its effects over the runs, and the largest there and in one state."""
+    """Yield the table: per choice its cost, its effects over the runs, and the largest effects of both kinds."""
     yield Block("heading", "What the paper's choices cost and change")
     yield Block("text", f"{record['method']}.")
     yield table(HEAD, map(_choice, record["rows"]))
@@ -140,11 +142,11 @@ def blocks(record: dict) -> Iterator[Block]:
 def _choice(row: dict) -> tuple[str, ...]:
     effect = row["effect"]
     changes = (_change(effect[name]) for name in ("velocity", "area", "acceptor leaving"))
-    return (row["choice"], row["default"], row["alternative"], f"{row['cost_ratio']:.2f}", *changes, _told(effect),
-            _told(row["one_state"]), row["note"])
+    return (row["choice"], row["default"], row["alternative"], f"{row['cost_ratio']:.2f}", *changes, _largest(effect),
+            _largest(row["one_state"]), row["note"])
 
 
-def _told(effects: dict[str, float]) -> str:
+def _largest(effects: dict[str, float]) -> str:
     name = max(effects, key=lambda name: abs(effects[name]), default="")
     return f"{_change(effects[name])} ({name})" if name else ""
 

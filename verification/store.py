@@ -18,8 +18,8 @@ from tempfile import mkdtemp
 from typing import Any
 
 from repro.results.files import read_sealed
+from repro.runs.execution import run
 from repro.runs.machine import source_hash
-from repro.runs.running import run
 from repro.scene import Scene, scene_hash
 from verification.evidence.writing import append, lines
 

@@ -1,8 +1,9 @@
-"""Switches: what the paper does and what else may be done, base with one thing changed. Measured once, read by two.
+"""Switches: the paper's choices and their alternatives, each as base with one change.
 
-A switch is a run of the claims (:mod:`verification.claims.runs`), computed once in a process, at the paper's 12 min.
-The errata tell its rows, the audit how far it is from base and what it costs. What no scene can say (what (28) restarts
-from, an explicit increment, a seed that leans) is a step or a seed of its own, marched once likewise.
+A switch is a run of the claims (:mod:`verification.claims.runs`) at the paper's 12 min, computed once in a process.
+The errata report its rows; the audit reports its difference from base and its cost. Some alternatives have no key in a
+scene: the restart value of theta (28), an explicit increment, and an uneven seed. For these, :func:`course` marches a
+step or a seed of its own, also once.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from scipy.interpolate import CubicSpline
 
 from repro.fem.outline import Outline
 from repro.march import updates
-from repro.march.loop import Instant
+from repro.march.loop import Report
 from repro.model import mesh_motion, pore, remeshing
 from repro.model.pore import Pore, Solved
 from repro.results import row
@@ -50,7 +51,7 @@ class Switch:
 
 
 def changed(change: str) -> Run:
-    """Base with a change, of which the rows of t = 0 and of the last two shapes are kept."""
+    """Base with a change, with rows at t = 0 and for the last two shapes."""
     return (*BASE, change, LAST)
 
 
@@ -80,12 +81,12 @@ CHOICES = {
     "midpoint": Switch("steps in time", "updates of 12 min", "midpoint, tolerance 0.01", 'numerics.time="midpoint"',
                        False, "first order in the step against second"),
 }
-#: Numbers that are not printed [E13]: {key: (the paper's symbol or our word, ours, others)}.
+#: Numbers that the paper does not print [E13]: {key: (symbol, our value, alternatives)}.
 _NUMBERS = {"flow_stabilisation": ("c", 100, (25, 50, 200, 400)), "mesh_compressibility": ("gamma", 1, (0.1, 10)),
             "refinement": ("refinement", 1, (0.7, 1.4))}
-NUMBERS = [Switch(word, f"{ours:g}", f"{value:g}", f"numerics.{key}={value}", False)
-           for key, (word, ours, values) in _NUMBERS.items() for value in values]
-#: Element sizes of runs that differ from the default in nothing else: the seed's nodes stay as many.
+NUMBERS = [Switch(word, f"{printed_value:g}", f"{value:g}", f"numerics.{key}={value}", False)
+           for key, (word, printed_value, values) in _NUMBERS.items() for value in values]
+#: Runs that differ from the default in the element size alone; the number of the seed's nodes does not change.
 FINENESS = [Switch("mesh", "refinement 1", f"refinement {value}", f"numerics.refinement={value}", False)
             for value in (0.975, 0.98, 0.985, 0.99, 0.995)]
 
@@ -94,51 +95,53 @@ EFFLUENTS = ("acceptor leaving", "donor leaving")
 
 
 def state(run: Run, time: float = PLOTTED) -> Body:
-    """The pore of a run in its row at a time (h), and what is solved in it."""
+    """The aggregate of a run at a time (h) that has a row."""
     return runs.body(run, time)
 
 
-def quantities(found: Body) -> dict[str, float]:
-    """What is solved around an aggregate, and its shape: um/h, mg/L, um2, um."""
-    flow, shape = found.solved.flow, found.outline
+def quantities(aggregate: Body) -> dict[str, float]:
+    """Flow, effluents and shape of an aggregate: um/h, mg/L, um2, um."""
+    flow, shape = aggregate.solved.flow, aggregate.outline
     return {"velocity": flow.mean_velocity, "conductivity": flow.conductivity,
-            **{name: flux.effluent for name, flux in zip(EFFLUENTS, found.solved.fluxes)}, "area": shape.area,
+            **{name: flux.effluent for name, flux in zip(EFFLUENTS, aggregate.solved.fluxes)}, "area": shape.area,
             "thickness": shape.thickness, "upstream": shape.upstream, "downstream": shape.downstream}
 
 
 def effect(default: Body, other: Body) -> dict[str, float]:
-    """The other over the default, less 1; effluents: their difference over the supply."""
+    """Relative difference of the other from the default; for effluents, the difference over the supply."""
     supply = dict(zip(EFFLUENTS, pair("supply", other.scene.substrates)))
-    ours = quantities(other)
-    return {name: float((ours[name] - value) / supply.get(name, value)) for name, value in quantities(default).items()}
+    changed = quantities(other)
+    return {name: float((changed[name] - value) / supply.get(name, value))
+            for name, value in quantities(default).items()}
 
 
-def whole_run(default: Body, other: Body) -> dict[str, float]:
-    """The effect of two whole runs, flow and substrates of the other's shape solved on the default's mesh, so that it
-    does not tell how two meshes differ."""
-    there = reshaped(default.pore, other.outline)
-    return effect(default, replace(other, solved=pore.solve(other.scene, there)))
+def effect_of_runs(default: Body, other: Body) -> dict[str, float]:
+    """Effect between two complete runs. Flow and substrates around the other's shape are solved on the default's mesh,
+    which removes the effect of two different meshes."""
+    pore_on_mesh = reshaped(default.pore, other.outline)
+    return effect(default, replace(other, solved=pore.solve(other.scene, pore_on_mesh)))
 
 
 def converged(switch: Switch) -> tuple[dict[str, float], dict[str, float]]:
-    """The effect of two whole runs in the converged solution, on its finest size, and by how much it differs at most
-    on coarser ones: what remains of two meshes."""
-    found = []
+    """Effect between two complete runs in the converged solution on its finest size, and its largest change on the
+    coarser sizes: the effect of the mesh."""
+    effects = []
     for size in FINE:
         level = Level(CONVERGED, size)
         with at_level(level):
-            found.append(effect(state((*BASE, LAST)), state(switch.run)))
+            effects.append(effect(state((*BASE, LAST)), state(switch.run)))
         forget(level)
-    return found[0], {name: float(np.abs(sizes - sizes[0]).max()) for name, sizes in columns(found).items()}
+    return effects[0], {name: float(np.abs(sizes - sizes[0]).max()) for name, sizes in columns(effects).items()}
 
 
-def reshaped(now: Pore, outline: Outline) -> Pore:
-    """The pore with its aggregate brought to another outline ray by ray, the fluid's nodes following (both star-shaped
-    about the origin, on the lower wall alone)."""
-    places = now.mesh.points[now.mesh.body]
+def reshaped(previous: Pore, outline: Outline) -> Pore:
+    """Return the pore with its aggregate moved to another outline along rays from the origin; the fluid's nodes follow.
+
+    Both outlines are star-shaped about the origin and touch the lower wall alone."""
+    places = previous.mesh.points[previous.mesh.body]
     angle = np.arctan2(places[:, 1], places[:, 0])
-    factor = _radius(outline)(angle) / _radius(now.outline)(angle)
-    return now.moved(mesh_motion.move(now.mesh, places * factor[:, None], 1.0, 100.0))
+    factor = _radius(outline)(angle) / _radius(previous.outline)(angle)
+    return previous.moved(mesh_motion.move(previous.mesh, places * factor[:, None], 1.0, 100.0))
 
 
 def _radius(outline: Outline) -> CubicSpline:
@@ -150,31 +153,31 @@ def _radius(outline: Outline) -> CubicSpline:
     return CubicSpline(angle[order], np.hypot(x, y)[order])
 
 
-def one_state(found: Body, other: Scene) -> dict[str, float]:
-    """The effect in one state: flow and substrates solved in it, and the shape of the next step, by either scene."""
+def one_state(aggregate: Body, other: Scene) -> dict[str, float]:
+    """Effect in one state: flow, substrates and the next shape, computed with both scenes."""
     bodies = []
-    for said in (found.scene, other):
-        solved = pore.solve(said, found.pore)
-        bodies.append(Body(said, next_shape(said, found.pore, solved, UPDATE), solved))
+    for scene in (aggregate.scene, other):
+        solved = pore.solve(scene, aggregate.pore)
+        bodies.append(Body(scene, next_shape(scene, aggregate.pore, solved, UPDATE), solved))
     return effect(*bodies)
 
 
-def told(run: Run) -> Columns:
+def run_columns(run: Run) -> Columns:
     """Of a run's rows: "time" h, "velocity" m/d, "area" um2, "drift", largest |(X_A + X_I) / X_m - 1|, and "lean", the
     middle between the tips over half their distance."""
-    return _told(runs.series(*run))
+    return _row_columns(runs.series(*run))
 
 
-def _told(rows: Columns) -> Columns:
+def _row_columns(rows: Columns) -> Columns:
     upstream, downstream = rows["upstream_um"], rows["downstream_um"]
     return {"time": rows["time_h"], "velocity": rows["mean_velocity_m_per_d"], "area": rows["aggregate_area_um2"],
             "drift": np.maximum(1 - rows["biomass_density_min"], rows["biomass_density_max"] - 1),
             "lean": (upstream + downstream) / (downstream - upstream)}
 
 
-def near(found: Columns, name: str, times) -> np.ndarray:
+def near(columns: Columns, name: str, times) -> np.ndarray:
     """A column at times (h)."""
-    return found[name][np.abs(found["time"] - np.asarray(times)[..., None]).argmin(axis=-1)]
+    return columns[name][np.abs(columns["time"] - np.asarray(times)[..., None]).argmin(axis=-1)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,42 +192,43 @@ class Course:
 
 @cached
 def course(run: Run, step: Callable[[Scene, Pore, Solved, float], Pore], bulge: float = 0.0) -> Course:
-    """March a run's scene from a seed with a bulge by ``step(said, now, solved, hours)`` -> pore, in the paper's
-    updates."""
-    said, start = runs.scene(*run), process_time()
-    now = uneven(said, bulge)
-    found: list[Instant] = []
-    for time in updates.schedule(said)[0]:
-        if found:
-            now = replace(step(said, now, found[-1].solved, time - now.time), time=time)
-        solved = pore.solve(said, now)
-        now = replace(now, concentrations=solved.concentrations)
-        found.append(Instant(now, solved, None, (), 0, {}))
-    rows = columns([row(said, each) for each in found])
-    plotted = [each for each in found if each.pore.time < PLOTTED + 1e-6][-1]
-    return Course(process_time() - start, _told(rows), runs.body_of(said, plotted))
+    """March a run's scene in the paper's updates, from a seed with a bulge.
+
+    ``step(scene, pore, solved, hours)`` returns the next pore."""
+    scene, start = runs.load_packaged(*run), process_time()
+    present = uneven(scene, bulge)
+    reports: list[Report] = []
+    for time in updates.schedule(scene)[0]:
+        if reports:
+            present = replace(step(scene, present, reports[-1].solved, time - present.time), time=time)
+        solved = pore.solve(scene, present)
+        present = replace(present, concentrations=solved.concentrations)
+        reports.append(Report(present, solved, None, (), 0, {}))
+    rows = columns([row(scene, each) for each in reports])
+    plotted = [each for each in reports if each.pore.time < PLOTTED + 1e-6][-1]
+    return Course(process_time() - start, _row_columns(rows), runs.body_of(scene, plotted))
 
 
-def as_it_is(said: Scene, now: Pore, solved: Solved, hours: float) -> Pore:
+def step_of_paper(scene: Scene, previous: Pore, solved: Solved, hours: float) -> Pore:
     """The pore after one step."""
-    return updates.step(said, now, solved, hours).pore
+    return updates.step(scene, previous, solved, hours).pore
 
 
-def restarting_as_j(said: Scene, now: Pore, solved: Solved, hours: float) -> Pore:
+def restarting_as_j(scene: Scene, previous: Pore, solved: Solved, hours: float) -> Pore:
     """The pore after one step; after a remesh theta = J [E7]."""
-    done = updates.step(said, now, solved, hours)
-    after = done.pore
-    if done.remeshed:
+    update = updates.step(scene, previous, solved, hours)
+    after = update.pore
+    if update.remeshed:
         return replace(after, theta=after.body.strained(after.mesh.points[after.mesh.body]).J)
     return after
 
 
-def explicit(said: Scene, now: Pore, solved: Solved, hours: float) -> Pore:
+def explicit(scene: Scene, previous: Pore, solved: Solved, hours: float) -> Pore:
     """The pore after one step with dX_A = dt F_3 and dX_I = dt F_4 at the rates of its beginning, (28)-(29) [E16]."""
-    rates = updates.rates_of(said, now, solved.concentrations)
-    grown = replace(now, active=now.active + now.active * hours * rates.growth,
-                    inert=now.inert + now.active * hours * rates.remains)
-    return remeshing.new_mesh(said, now, shape_of(said, now, grown), solved.flow.mean_velocity)[0]
+    rates = updates.compute_rates(scene, previous, solved.concentrations)
+    grown = replace(previous, active=previous.active + previous.active * hours * rates.growth,
+                    inert=previous.inert + previous.active * hours * rates.remains)
+    return remeshing.new_mesh(scene, previous, shape_of(scene, previous, grown), solved.flow.mean_velocity)[0]
 
 
 #: The seed's radius is R (1 + BULGE cos 3 phi) or R (1 - BULGE cos 3 phi): area as before to second order, one tip
@@ -232,9 +236,9 @@ def explicit(said: Scene, now: Pore, solved: Solved, hours: float) -> Pore:
 BULGE = 0.01
 
 
-def uneven(said: Scene, bulge: float) -> Pore:
+def uneven(scene: Scene, bulge: float) -> Pore:
     """The pore at t = 0 with a seed of radius R (1 + bulge cos 3 phi), phi from downstream."""
-    seed = pore.initial_outline(said)
+    seed = pore.initial_outline(scene)
     points = seed.points * (1 + bulge * np.cos(3 * np.arctan2(*seed.points.T[::-1])))[:, None]
-    made = pore.generate(said, replace(seed, points=points, origin=points.copy()))
-    return aggregates.at_start(*made, said.numerics.order)
+    pore_parts = pore.generate(scene, replace(seed, points=points, origin=points.copy()))
+    return aggregates.seed_on(*pore_parts, scene.numerics.order)

@@ -12,14 +12,14 @@ gets the fit's standard deviation s and the number's own distance from it on top
     Fs = 1.25    bar = 1.25 |a| h^p + s + |f - fit|                         where the observed order is reasonable
     Fs = 3       bar = 3 (max f - min f) h^q / (h_max^q - h_min^q)          where it is not: q is the formal order
 
-Reasonable is an order from half an order under the lowest formal one (for a lowest of one that is 0.5, Eca &
-Hoekstra's bound) to half an order over the highest, of a law about which values scatter (s) less than they differ, on
-average, from one size to the next: on unrelated meshes an order scatters by some tenths. An order over the lowest
-formal one is not made use of, the law is fitted with that one: where the values of a first-order law scatter by a
-tenth of the error, their observed order is as often near two, and a bar with it covers three errors in four, not
-nineteen in twenty. In the second case q is the lowest formal order, and the range of all values, as in Eca &
-Hoekstra's estimator for data that do not converge monotonically, covers oscillation and noise. The factors are
-Roache's, for three and more sizes and for two.
+An observed order is reasonable under two conditions. It lies between half an order under the lowest formal order
+(0.5 if that is one, Eca & Hoekstra's bound) and half an order over the highest, because an order scatters by some
+tenths on unrelated meshes. And the values scatter about the law (s) less than they differ, on average, from one size to
+the next. If the observed order exceeds the lowest formal one, the law is fitted with the formal order: if the values of
+a first-order law scatter by a tenth of the error, the observed order is as often near two, and a bar with it covers
+three errors in four, not nineteen in twenty. In the second case q is the lowest formal order, and the range of all
+values covers oscillation and noise, as in Eca & Hoekstra's estimator for data that do not converge monotonically. The
+factors are Roache's, for three and more sizes and for two.
 
     P. J. Roache, J. Fluids Eng. 116 (1994) 405; Verification and Validation in Computational Science and Engineering,
     Hermosa, 1998. I. B. Celik et al., J. Fluids Eng. 130 (2008) 078001. L. Eca, M. Hoekstra, J. Comput. Phys. 262
@@ -39,16 +39,16 @@ BAND = 0.5
 #: Roache's factors of safety.
 OBSERVED, FORMAL = 1.25, 3.0
 FEWEST = 3
-#: Values that differ by less than this part of them are the same: round-off.
+#: Relative difference below which values are equal up to round-off.
 SAME = 1e-12
-#: Orders among which the observed one is sought; at an end of them there is none.
+#: Range of the search for the observed order; a minimum at either end counts as none.
 SOUGHT = np.linspace(0.05, 8.0, 160)
 
 
 @dataclass(frozen=True)
 class Estimate:
     """bar: half width, in the number's unit; order: the observed one, not-a-number where none fits; factor: Fs. A
-    number that is the same on all sizes has a bar, and a factor, of zero."""
+    number that is equal on all sizes has a bar and a factor of zero."""
 
     bar: float
     order: float
@@ -57,8 +57,8 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Bar:
-    """A number lies between ``low`` and ``high``. mesh, step: what its bar comes from, None where that is not varied;
-    both are None where low and high are just the extremes of all values."""
+    """Interval of a number. mesh, step: the estimates behind it, None if mesh or step is not varied; both are None if
+    low and high are the extremes of all values."""
 
     low: float
     high: float
@@ -87,7 +87,7 @@ def estimate(sizes, values, formal: tuple[float, float]) -> Estimate:
 
 
 def observed_order(h: np.ndarray, f: np.ndarray) -> float:
-    """p of the least-squares fit of f_0 + a h^p, not-a-number where none of SOUGHT fits better than the ends."""
+    """p of the least-squares fit of f_0 + a h^p; not-a-number if the best fit is at an end of SOUGHT."""
     def misfit(order: float) -> float:
         return float(np.sum((fit(h, f, order)[1] / np.ptp(f)) ** 2))
     best = int(np.argmin([misfit(order) for order in SOUGHT]))
@@ -110,11 +110,11 @@ def deviation(apart: np.ndarray) -> float:
 
 
 def combined(value: float, mesh: Estimate | None, step: Estimate | None) -> Bar:
-    """The bars of mesh and step added: nothing says that their errors are independent, or differ in sign."""
-    half = sum(found.bar for found in (mesh, step) if found)
+    """Sum of the bars of mesh and step: their errors may be dependent and have the same sign."""
+    half = sum(part.bar for part in (mesh, step) if part)
     return Bar(value - half, value + half, mesh, step)
 
 
 def spread(values) -> Bar:
-    """From the least to the largest of all values: for a count, or a number that has no limit."""
+    """Range of all values, for a count or a number without a limit."""
     return Bar(min(values), max(values))

@@ -1,6 +1,6 @@
-"""``repro check SCENE [--set KEY=VALUE] [--unset KEY] [--json]``: say what a run will be.
+"""``repro check SCENE [--set KEY=VALUE] [--unset KEY] [--json]``: describe a run before it starts.
 
-``repro check FOLDER`` says whether the run in a folder is complete and unchanged.
+``repro check FOLDER`` checks whether the run in a folder is complete and unchanged.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from repro.scene import load_scene, packaged_scenes
 
 
 def add(commands) -> None:
-    """The parser of this command."""
+    """Add the parser of this command."""
     command = commands.add_parser(
         "check", help="validate a scene and say what a run of it will be, or check a run's files",
         description="Validate a scene; say what it models, its mesh, its dimensionless numbers, "
@@ -27,34 +27,34 @@ def add(commands) -> None:
     command.set_defaults(call=call, refuse=command.error)
 
 
-def call(chosen) -> int:
-    """Check the scene, or the run, that was chosen."""
-    folder = Path(chosen.scene)
-    if chosen.scene not in packaged_scenes() and folder.is_dir():
-        return _check_run(chosen, folder)
-    scene = load_scene(chosen.scene, chosen.set, chosen.unset)
+def call(options) -> int:
+    """Check the scene or the folder of a run."""
+    folder = Path(options.scene)
+    if options.scene not in packaged_scenes() and folder.is_dir():
+        return _check_run(options, folder)
+    scene = load_scene(options.scene, options.set, options.unset)
     from repro.preflight.checked import check, report
 
-    found = check(scene, chosen.scene)
-    say(json.dumps(found.tables(), indent=2) if chosen.json else report(found))
+    checked = check(scene, options.scene)
+    say(json.dumps(checked.tables(), indent=2) if options.json else report(checked))
     return 0
 
 
-def _check_run(chosen, folder: Path) -> int:
-    """Say whether the files of a run are as they were written. Raises OutputError where not."""
+def _check_run(options, folder: Path) -> int:
+    """Report that the files of a run are unchanged. Raises OutputError if they are not."""
     from repro.report.reading import NoRun
-    from repro.runs.status import done
-    from repro.runs.whole import state_of
+    from repro.runs.integrity import read_status
+    from repro.runs.status import is_over
 
-    if chosen.set or chosen.unset:
-        chosen.refuse("no --set or --unset is accepted with the folder of a run")
+    if options.set or options.unset:
+        options.refuse("no --set or --unset is accepted with the folder of a run")
     try:
-        status = state_of(folder)
+        status = read_status(folder)
     except NoRun as error:
         raise OutputError(str(error)) from error
     files = "its files are as they were written"
-    if not done(status):
+    if not is_over(status):
         files += f", and repro run --resume {folder} goes on with it"
-    found = {"folder": str(folder), "status": status, "unchanged": True}
-    say(json.dumps(found, indent=2) if chosen.json else f"{folder}: {status}; {files}")
+    record = {"folder": str(folder), "status": status, "unchanged": True}
+    say(json.dumps(record, indent=2) if options.json else f"{folder}: {status}; {files}")
     return 0

@@ -1,4 +1,4 @@
-"""``repro compare RUN RUN ... --out FILE.html``: lay runs over each other in one page."""
+"""``repro compare RUN RUN ... --out FILE.html``: compare runs in one page."""
 
 from __future__ import annotations
 
@@ -10,38 +10,38 @@ from repro.runs.progress import say
 
 
 def add(commands) -> None:
-    """The parser of this command."""
+    """Add the parser of this command."""
     command = commands.add_parser(
-        "compare", help="lay runs over each other in one page",
-        description="Make a page with the charts of several runs, what differs in their scenes, "
-        "and last values.")
+        "compare", help="compare runs in one page",
+        description="Write a page with the charts of several runs, the differences of their "
+        "scenes, and their last values.")
     command.add_argument("runs", metavar="RUN", type=path, nargs="+",
-                         help="folder of a run; the first is what the others are compared with")
+                         help="folder of a run; the others are compared with the first")
     command.add_argument("--out", metavar="FILE.html", type=path, required=True,
                          help="the page to write")
     command.set_defaults(call=call)
 
 
-def call(chosen) -> int:
-    """Write the page of the runs that were chosen."""
+def call(options) -> int:
+    """Write the page of the runs."""
     from repro import report
 
-    if len(chosen.runs) < 2:
-        raise OutputError(f"compare {chosen.runs[0]}: two runs or more are needed")
-    _check(chosen.out)
+    if len(options.runs) < 2:
+        raise OutputError(f"compare {options.runs[0]}: two runs or more are needed")
+    _check(options.out)
     try:
-        report.compare(chosen.runs, chosen.out)
+        report.compare(options.runs, options.out)
     except report.NoRun as error:
         raise OutputError(str(error)) from error
     except OSError as error:
-        raise OutputError(f"--out {chosen.out}: {error.strerror or error}; a file that can be "
+        raise OutputError(f"--out {options.out}: {error.strerror or error}; a file that can be "
                           "written is needed") from error
-    say(f"{len(chosen.runs)} runs compared in {chosen.out}")
+    say(f"{len(options.runs)} runs compared in {options.out}")
     return 0
 
 
 def _check(out: Path) -> None:
-    """Refuse what would harm a run or another file."""
+    """Refuse a target that could overwrite a file of a run."""
     if out.suffix != ".html":
         raise OutputError(f"--out {out}: a file name that ends in .html is needed")
     if (out.parent / "run.json").exists():

@@ -1,6 +1,6 @@
 """``repro run SCENE --out DIR``: run a scene into a folder.
 
-``repro run --resume DIR`` goes on with the run in a folder.
+``repro run --resume DIR`` resumes the run in a folder.
 """
 
 from __future__ import annotations
@@ -17,17 +17,17 @@ from repro.scene import Scene, load_scene, packaged_scenes
 from repro.scene.files import key_of
 
 if TYPE_CHECKING:
-    from repro.runs.running import Watch
+    from repro.runs.execution import Watch
 
 DESCRIPTION = """\
-Run a scene and write its results, or go on with a run that was interrupted or killed: the result is
-the same to the last bit. Where DIR holds a run of the same scene, that is gone on with, or left
-alone where it is over. --resume DIR --set growth.end="30 h" makes a run longer, over or not, as if
-that had been asked for at first."""
+Run a scene and write its results, or resume a run that was interrupted or killed: the results are
+the same to the last bit. If DIR already holds a run of the same scene, that run is resumed; a
+finished run is left unchanged. --resume DIR --set growth.end="30 h" makes a run longer: it then
+equals a run that had this end from its start."""
 STATUS = """exit status:
-  0    done: the scene's end, or the pore's, is reached, now or before
-  1    a stage failed; the message says at what simulated time, in which stage, why, where the
-       last good state is, and what to change
+  0    the end of the scene, or of the model, is reached, now or before
+  1    a stage failed; the message names the simulated time, the stage, the reason, the file of the
+       last good state, and what to change
   2    wrong input, or the folder cannot be used: another run's or not a run's, not writable, disk
        full, in use
   130  interrupted (SIGINT, Ctrl-C); 143 terminated (SIGTERM): the step in hand is finished, results
@@ -36,23 +36,23 @@ STATUS = """exit status:
 
 
 def add(commands) -> None:
-    """The parser of this command."""
+    """Add the parser of this command."""
     command = commands.add_parser(
         "run", help="run a scene, or go on with a run", description=DESCRIPTION, epilog=STATUS,
         formatter_class=argparse.RawDescriptionHelpFormatter)
     add_scene(command, nargs="?")
     command.add_argument("--out", metavar="DIR", type=path, help="folder for the results")
     command.add_argument("--resume", metavar="DIR", type=path,
-                         help="go on with the run in this folder")
+                         help="resume the run in this folder")
     command.add_argument("--force", action="store_true",
                          help="remove the files of the run in DIR, as its run.json lists them, and "
-                         "begin anew")
+                         "start again")
     command.add_argument("--checkpoint", metavar="SECONDS", type=_seconds, default=INTERVAL,
-                         help="write what a run can go on from, and results so far, so often "
+                         help="interval at which a checkpoint and the results so far are written "
                          "(default: %(default)g)")
-    command.add_argument("--quiet", action="store_true", help="say nothing but warnings and errors")
+    command.add_argument("--quiet", action="store_true", help="print only warnings and errors")
     command.add_argument("--json", action="store_true",
-                         help="say what happens as one JSON object a line")
+                         help="print each event as one line of JSON")
     command.set_defaults(call=call, refuse=command.error)
 
 
@@ -63,39 +63,40 @@ def _seconds(text: str) -> float:
     return value
 
 
-def call(chosen) -> int:
-    """Run the scene that was chosen, or go on with the run."""
-    others = [chosen.scene, chosen.unset, chosen.out, chosen.force]
-    others += [entry for entry in chosen.set if key_of(entry) != "growth.end"]
-    if chosen.resume and any(others):
-        chosen.refuse("--resume takes the scene from the run's folder: no SCENE, --unset, --out or "
-                      "--force is accepted with it, and no --set but of growth.end")
-    if not chosen.resume and not (chosen.scene and chosen.out):
-        chosen.refuse("SCENE and --out DIR are needed, or --resume DIR")
-    scene = None if chosen.resume else load_scene(chosen.scene, chosen.set, chosen.unset)
-    from repro.runs.running import Watch
+def call(options) -> int:
+    """Run the scene, or resume the run."""
+    conflicting = [options.scene, options.unset, options.out, options.force]
+    conflicting += [entry for entry in options.set if key_of(entry) != "growth.end"]
+    if options.resume and any(conflicting):
+        options.refuse("--resume takes the scene from the run's folder: no SCENE, --unset, --out "
+                       "or --force is accepted with it, and no --set but of growth.end")
+    if not options.resume and not (options.scene and options.out):
+        options.refuse("SCENE and --out DIR are needed, or --resume DIR")
+    scene = None if options.resume else load_scene(options.scene, options.set, options.unset)
+    from repro.runs.execution import Watch
 
-    with interrupts.noted() as stop, progress.told(chosen.quiet, chosen.json) as tell:
+    events = progress.display_events(options.quiet, options.json)
+    with interrupts.catch_signals() as stop, events as tell:
         try:
-            _run(chosen, scene, Watch(tell, chosen.checkpoint, stop))
-        except MemoryError as error:  # outside of the steps, whose failures tell more
+            _run(options, scene, Watch(tell, options.checkpoint, stop))
+        except MemoryError as error:  # outside the steps, whose errors say more
             raise SimulationError(f"out of memory ({error}); try a smaller "
                                   "numerics.refinement") from error
     return 0
 
 
-def _run(chosen, scene: Scene | None, watch: Watch) -> None:
-    """Run the scene, or go on with the run where there is none."""
-    from repro.runs.running import resume, run
+def _run(options, scene: Scene | None, watch: Watch) -> None:
+    """Run the scene, or resume the run if there is no scene."""
+    from repro.runs.execution import resume, run
 
     if scene is None:
-        resume(chosen.resume, watch=watch, overrides=chosen.set)
+        resume(options.resume, watch=watch, overrides=options.set)
     else:
-        run(scene, chosen.out, watch=watch, force=chosen.force, origin=_origin(chosen))
+        run(scene, options.out, watch=watch, force=options.force, origin=_origin(options))
 
 
-def _origin(chosen) -> dict:
-    """Where the scene comes from, for ``run.json``: a packaged name or a path, and its changes."""
-    packaged = chosen.scene in packaged_scenes()
-    file = chosen.scene if packaged else os.path.abspath(chosen.scene)
-    return {"file": file, "set": chosen.set, "unset": chosen.unset}
+def _origin(options) -> dict:
+    """The origin of the scene for ``run.json``: a packaged name or a path, and its changes."""
+    packaged = options.scene in packaged_scenes()
+    file = options.scene if packaged else os.path.abspath(options.scene)
+    return {"file": file, "set": options.set, "unset": options.unset}

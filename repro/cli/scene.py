@@ -1,6 +1,6 @@
-"""``repro scene [SCENE] [--set KEY=VALUE] [--unset KEY]``: a scene written out with every key.
+"""``repro scene [SCENE] [--set KEY=VALUE] [--unset KEY]``: print a scene with every key.
 
-Without a scene, the list of packaged ones.
+Without a scene, list the packaged ones.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from repro.scene.text import scene_text, titles
 
 
 def add(commands) -> None:
-    """The parser of this command."""
+    """Add the parser of this command."""
     command = commands.add_parser(
         "scene", help="write a scene out with every key, commented",
         description="Write a scene to the standard output, with every key it could have: "
@@ -22,11 +22,11 @@ def add(commands) -> None:
     command.set_defaults(call=call)
 
 
-def call(chosen) -> int:
-    """Print the scene that was chosen, or what there is to choose from."""
-    if chosen.scene is None:
+def call(options) -> int:
+    """Print the scene, or list the packaged scenes."""
+    if options.scene is None:
         for name, title in titles().items():
             say(f"{name:14}{title}")
     else:
-        say(scene_text(chosen.scene, chosen.set, chosen.unset).removesuffix("\n"))
+        say(scene_text(options.scene, options.set, options.unset).removesuffix("\n"))
     return 0

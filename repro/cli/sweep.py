@@ -1,6 +1,6 @@
-"""``repro sweep SCENE --vary KEY=... --out DIR``: many runs of a scene with keys varied.
+"""``repro sweep SCENE --vary KEY=... --out DIR``: run a scene many times with varied keys.
 
-Their table and their page are written beside them.
+The tables and a page of all runs are written to the same folder.
 """
 
 from __future__ import annotations
@@ -14,102 +14,104 @@ from typing import TYPE_CHECKING
 
 from repro.cli.arguments import add_scene, path
 from repro.errors import Interrupted
-from repro.runs.interrupts import ASKED
+from repro.runs.interrupts import STOP_SIGNALS
 from repro.runs.progress import say
 
 if TYPE_CHECKING:
-    from repro.sweeps.making import Swept, Tell
+    from repro.sweeps.driver import Swept, Tell
 
 #: Exit status where some runs have failed.
 SOME_FAILED = 3
 EPILOG = """\
-Two forms of --vary: a range KEY=a:b UNIT:linear|log:N, and a list KEY=VALUE, VALUE, ...;
-several make a grid. With --samples a range is KEY=a:b UNIT:linear|log, and a Latin hypercube is
-drawn. Varying flow.head replaces flow.mean_velocity, and the other way round. The same command
-goes on with a sweep that was cut off: it makes what is missing, and what has failed, again. On a
-cluster DIR must be on a file system that all workers share. Exit status: 0 every run has come to
-its end, 3 some have failed, 2 wrong input, 130 interrupted, 143 terminated."""
+--vary has two forms: a range KEY=a:b UNIT:linear|log:N, and a list KEY=VALUE, VALUE, ...; several
+of them make a grid. With --samples, which draws a Latin hypercube, a range is KEY=a:b
+UNIT:linear|log. Varying flow.head replaces flow.mean_velocity, and vice versa. The same command
+continues a sweep that was cut off: it makes the missing runs, and repeats failed ones. On a cluster
+DIR must be on a file system that all workers share. Exit status: 0 every run is finished, 3 some
+have failed, 2 wrong input, 130 interrupted, 143 terminated."""
 
 
 def add(commands) -> None:
-    """The parser of this command."""
+    """Add the parser of this command."""
     command = commands.add_parser(
-        "sweep", help="run a scene many times with keys varied", epilog=EPILOG,
-        description="Run a scene many times with keys varied, on all cores.")
+        "sweep", help="run a scene many times with varied keys", epilog=EPILOG,
+        description="Run a scene many times with varied keys, on all cores.")
     add_scene(command)
     command.add_argument("--vary", metavar="KEY=...", action="append", required=True,
                          help='"flow.mean_velocity=0.3:30 m/day:log:8" or '
                          '"pore.width=50 um, 60 um"; may be repeated')
     command.add_argument("--samples", metavar="N", type=int,
                          help="a Latin hypercube of N runs instead of a grid")
-    command.add_argument("--seed", metavar="S", type=_whole, default=0,
-                         help="of the Latin hypercube (0)")
+    command.add_argument("--seed", metavar="S", type=_natural_number, default=0,
+                         help="seed of the Latin hypercube (0)")
     command.add_argument("--out", metavar="DIR", type=path, required=True,
-                         help="folder for runs, table and page")
-    command.add_argument("--workers", metavar="N", type=_count, help="runs at a time (all cores)")
+                         help="folder for runs, tables and page")
+    command.add_argument("--workers", metavar="N", type=_positive_number,
+                         help="parallel runs (all cores)")
     command.add_argument("--scheduler", metavar="tcp://HOST:PORT",
-                         help="a Dask scheduler, for its workers to run them")
-    command.add_argument("--clogged", metavar="PART", type=_part, default=0.1,
-                         help="of the first conductivity at which a pore counts as clogged (0.1)")
+                         help="a Dask scheduler whose workers make the runs")
+    command.add_argument("--clogged", metavar="PART", type=_fraction, default=0.1,
+                         help="part of the first conductivity at which a pore counts as clogged "
+                         "(0.1)")
     command.add_argument("--quiet", action="store_true", help="no progress")
     command.set_defaults(call=call)
 
 
-def _whole(text: str) -> int:
+def _natural_number(text: str) -> int:
     if int(text) < 0:
         raise argparse.ArgumentTypeError("zero or more is needed")
     return int(text)
 
 
-def _count(text: str) -> int:
+def _positive_number(text: str) -> int:
     if int(text) < 1:
         raise argparse.ArgumentTypeError("one or more is needed")
     return int(text)
 
 
-def _part(text: str) -> float:
+def _fraction(text: str) -> float:
     if not 0 < float(text) < 1:
         raise argparse.ArgumentTypeError("between 0 and 1 is needed")
     return float(text)
 
 
-def call(chosen) -> int:
-    """Make the sweep that was chosen."""
-    from repro.sweeps.making import sweep
+def call(options) -> int:
+    """Make the sweep."""
+    from repro.sweeps.driver import sweep
 
-    with _ended_by_signals(chosen.command_line), _telling(chosen.quiet) as tell:
-        swept = sweep(chosen.scene, chosen.vary, chosen.out, chosen.set, chosen.unset,
-                      samples=chosen.samples, seed=chosen.seed, workers=chosen.workers,
-                      scheduler=chosen.scheduler, clogged=chosen.clogged, tell=tell)
+    with _end_on_signals(options.command_line), _display_events(options.quiet) as tell:
+        swept = sweep(options.scene, options.vary, options.out, options.set, options.unset,
+                      samples=options.samples, seed=options.seed, workers=options.workers,
+                      scheduler=options.scheduler, clogged=options.clogged, tell=tell)
     return _report(swept)
 
 
 @contextmanager
-def _ended_by_signals(command: str) -> Iterator[None]:
-    """Within, Ctrl-C and SIGTERM end the sweep, and the message gives the command that continues
-    it; a second one ends the process at once."""
+def _end_on_signals(command: str) -> Iterator[None]:
+    """End the sweep on Ctrl-C or SIGTERM, with a message that gives the command to continue it. A
+    second signal ends the process at once."""
     def end(number: int, frame) -> None:
         signal.signal(number, signal.SIG_DFL)
-        how = "interrupted" if number == signal.SIGINT else "terminated"
-        raise Interrupted(f"{how}; what was computed is written, and {command} goes on with it",
+        cause = "interrupted" if number == signal.SIGINT else "terminated"
+        raise Interrupted(f"{cause}; what was computed is written, and {command} goes on with it",
                           number)
 
-    kept = {number: signal.getsignal(number) for number in ASKED}
-    for number in kept:
-        if kept[number] != signal.SIG_IGN:
+    handlers = {number: signal.getsignal(number) for number in STOP_SIGNALS}
+    for number in handlers:
+        if handlers[number] != signal.SIG_IGN:
             signal.signal(number, end)
     try:
         yield
     finally:
-        for number, handler in kept.items():
+        for number, handler in handlers.items():
             signal.signal(number, handler)
 
 
 @contextmanager
-def _telling(quiet: bool) -> Iterator[Tell]:
-    """What tells a person how far a sweep is: nothing, a bar on a terminal, a line a run."""
+def _display_events(quiet: bool) -> Iterator[Tell]:
+    """Show the progress of a sweep: nothing, a bar on a terminal, or a line for each run."""
     if quiet or not sys.stderr.isatty():
-        yield _untold if quiet else _in_lines
+        yield _ignore_event if quiet else _print_run
         return
     from tqdm import tqdm
 
@@ -124,21 +126,21 @@ def _telling(quiet: bool) -> Iterator[Tell]:
         yield tell
 
 
-def _untold(event: dict) -> None:
-    """Nothing is told of a quiet sweep."""
+def _ignore_event(event: dict) -> None:
+    """Ignore an event of a quiet sweep."""
 
 
-def _in_lines(event: dict) -> None:
+def _print_run(event: dict) -> None:
     if event["event"] == "run":
         say(f"{event['done']} of {event['total']}: run {event['run']}, {event['values']}: "
-            f"{event['status']}", aside=True)
+            f"{event['status']}", to_stderr=True)
 
 
 def _report(swept: Swept) -> int:
-    """Say what there is now; the exit status."""
-    for one in swept.failed:
-        say(f"repro: run {one.point.index} ({swept.label(one)}): {one.status}", aside=True)
-    done = len(swept.runs) - len(swept.failed)
-    say(f"{swept.source}: {done} of {len(swept.runs)} runs done, {len(swept.failed)} "
+    """Print the failures and the number of runs; return the exit status."""
+    for run in swept.failed:
+        say(f"repro: run {run.point.index} ({swept.label(run)}): {run.status}", to_stderr=True)
+    finished = len(swept.runs) - len(swept.failed)
+    say(f"{swept.source}: {finished} of {len(swept.runs)} runs done, {len(swept.failed)} "
         f"failed; results in {swept.folder}")
     return SOME_FAILED if swept.failed else 0

@@ -1,1 +1,1 @@
-"""Finite elements: meshes and their generation, assembly, solvers, transfer. No scene in here."""
+"""Finite elements: meshes and their generation, assembly, solvers, transfer. They know no scene."""

@@ -1,8 +1,8 @@
 """Assemble sparse systems from element matrices.
 
-The connections of a mesh alone decide the sparsity, the elimination order and the place of every
-element entry in the sparse matrix. These are computed once; while the mesh only moves, an assembly
-is one summation.
+The sparsity, the elimination order and the position of every element entry in the sparse matrix
+depend only on the connections of a mesh, and are computed once. While the mesh only moves, an
+assembly is one summation.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import scipy.sparse as sp
 from repro.fem import linear
 from repro.fem.linear import DEFAULT, Method
 
-#: Of one kind of element, or of several.
+#: Arrays of one kind of element, or of several.
 Parts: TypeAlias = np.ndarray | tuple[np.ndarray, ...]
 
 
@@ -36,12 +36,11 @@ class ElementSystem:
     """K x = b with some unknowns prescribed, K summed from element matrices.
 
     unknowns: (T, k) numbers of each element's unknowns, or several of these, one for each kind of
-    element; rank: (n,) sorting key of the unknowns in elimination order; held: (n,) True where the
-    unknown is prescribed. Wherever element matrices (T, k, k) are asked for, they are as many as
-    the kinds.
+    element; rank: (n,) sorting key of the unknowns in elimination order; constrained: (n,) True
+    where the unknown is prescribed. Methods take element matrices (T, k, k) for each kind.
     """
 
-    def __init__(self, unknowns: Parts, rank: np.ndarray, held: np.ndarray,
+    def __init__(self, unknowns: Parts, rank: np.ndarray, constrained: np.ndarray,
                  method: Method = DEFAULT):
         self.kinds = _several(unknowns)
         self.method = method
@@ -53,45 +52,43 @@ class ElementSystem:
         self._columns, self._rows = np.divmod(keys, len(rank))
         ends = np.cumsum([part.shape[0] * part.shape[1] ** 2 for part in self.kinds])
         self._slots = np.split(self._slot, ends[:-1])
-        self._hold(held)
+        self._constrain(constrained)
 
-    def holding(self, held: np.ndarray) -> ElementSystem:
+    def with_constrained(self, constrained: np.ndarray) -> ElementSystem:
         """The same elements with other unknowns (n,) prescribed."""
         other = copy(self)
-        other._hold(held)
+        other._constrain(constrained)
         return other
 
-    def _hold(self, held: np.ndarray) -> None:
-        free = ~held[self._ranked]
+    def _constrain(self, constrained: np.ndarray) -> None:
+        free = ~constrained[self._ranked]
         place = np.cumsum(free) - 1
-        self.held = held
+        self.constrained = constrained
         self.order = self._ranked[free]
         self.count = int(free.sum())
-        self.free = ~held if held.any() else slice(None)
-        kept = free[self._rows] & free[self._columns]
-        self._kept = np.flatnonzero(kept) if held.any() else slice(None)
-        self.indices = place[self._rows[kept]].astype(np.int32)
-        starts = np.searchsorted(place[self._columns[kept]], np.arange(self.count + 1))
+        self.free = ~constrained if constrained.any() else slice(None)
+        inner = free[self._rows] & free[self._columns]
+        self._entry_indices = np.flatnonzero(inner) if constrained.any() else slice(None)
+        self.indices = place[self._rows[inner]].astype(np.int32)
+        starts = np.searchsorted(place[self._columns[inner]], np.arange(self.count + 1))
         self.indptr = starts.astype(np.int32)
         self._pattern = sp.csc_matrix((np.zeros(len(self.indices)), self.indices, self.indptr),
                                       shape=(self.count, self.count))
-        self._pattern.has_canonical_format = True  # what is filled in is not looked through again
+        self._pattern.has_canonical_format = True  # spares a check of every filled matrix
 
     def matrix(self, elements: Parts) -> sp.csc_matrix:
         """K between the free unknowns, in elimination order."""
-        found = copy(self._pattern)
-        found.data = np.bincount(self._slot, _flat(_several(elements)), len(self._rows))[self._kept]
-        return found
+        return self.filled(np.bincount(self._slot, _flat(_several(elements)), len(self._rows)))
 
-    def entries(self, which: int, elements: np.ndarray) -> np.ndarray:
-        """Entries, column by column, of the matrix between all unknowns, of one kind of element."""
-        return np.bincount(self._slots[which], elements.ravel(), len(self._rows))
+    def entries(self, number: int, elements: np.ndarray) -> np.ndarray:
+        """Column-wise entries of the matrix between all unknowns, summed over kind ``number``."""
+        return np.bincount(self._slots[number], elements.ravel(), len(self._rows))
 
     def filled(self, entries: np.ndarray) -> sp.csc_matrix:
-        """K between the free unknowns from entries as :meth:`entries` gives them."""
-        found = copy(self._pattern)
-        found.data = entries[self._kept]
-        return found
+        """K between the free unknowns, from the result of :meth:`entries`."""
+        matrix = copy(self._pattern)
+        matrix.data = entries[self._entry_indices]
+        return matrix
 
     def product(self, elements: Parts, x: np.ndarray) -> np.ndarray:
         """(n,) K x for all unknowns x (n,)."""
@@ -100,7 +97,7 @@ class ElementSystem:
         return np.bincount(_flat(self.kinds), _flat(parts), len(x))
 
     def factored(self, elements: Parts) -> Factored:
-        """K, factorised."""
+        """Factorise K."""
         return Factored(self, elements, linear.factorised(self.matrix(elements), self.method))
 
     def solve(self, elements: Parts, right: np.ndarray,
@@ -120,21 +117,21 @@ class Factored:
     def solve(self, right: np.ndarray, value: np.ndarray | None = None) -> np.ndarray:
         """x (n,) of K x = b (n,); prescribed unknowns are as in ``value`` (n,), zero by default."""
         order = self.system.order
-        found = np.zeros(len(right))
-        if value is not None and self.system.held.any():
-            found = np.where(self.system.held, value, 0.0)
-            right = right - self.system.product(self.elements, found)
-        found[order] = self.solver.solve(right[order])
-        return found
+        x = np.zeros(len(right))
+        if value is not None and self.system.constrained.any():
+            x = np.where(self.system.constrained, value, 0.0)
+            right = right - self.system.product(self.elements, x)
+        x[order] = self.solver.solve(right[order])
+        return x
 
 
 def _several(parts: Parts) -> tuple[np.ndarray, ...]:
-    """Of each kind of element."""
+    """Arrays as a tuple, one for each kind of element."""
     return parts if isinstance(parts, tuple) else (parts,)
 
 
 def _flat(parts: Sequence[np.ndarray]) -> np.ndarray:
-    """One after the other, flattened."""
+    """Concatenate the flattened arrays."""
     return parts[0].ravel() if len(parts) == 1 else np.concatenate([part.ravel() for part in parts])
 
 
@@ -157,20 +154,20 @@ def saddle_blocks(upper: np.ndarray, divergence: np.ndarray,
     return elements
 
 
-def saddle_system(velocity: np.ndarray, pressure: np.ndarray, held: np.ndarray,
+def saddle_system(velocity: np.ndarray, pressure: np.ndarray, constrained: np.ndarray,
                   order: np.ndarray | None = None, method: Method = DEFAULT) -> ElementSystem:
     """The system of two components on the same nodes and a pressure on some of these.
 
     velocity: (T, a) nodes of each component; pressure: (T, b) nodes among the first ones of the
-    velocity's; held: (n, 2) prescribed components; order: (n,) nodes in elimination order, if
-    known. Unknowns are numbered x, then y, then pressure; each pressure is eliminated after the
+    velocity's; constrained: (n, 2) prescribed components; order: (n,) nodes in elimination order,
+    if known. Unknowns are numbered x, then y, then pressure; each pressure is eliminated after the
     components at its node.
     """
-    count = len(held)
+    count = len(constrained)
     pressures = pressure.max() + 1
     place = np.empty(count)
     place[linear.node_order(count, velocity, method) if order is None else order] = np.arange(count)
     rank = np.concatenate([place, place, place[:pressures] + 0.5])
     unknowns = np.concatenate([velocity, count + velocity, 2 * count + pressure], axis=1)
-    both = np.concatenate([held[:, 0], held[:, 1], np.zeros(pressures, bool)])
+    both = np.concatenate([constrained[:, 0], constrained[:, 1], np.zeros(pressures, bool)])
     return ElementSystem(unknowns, rank, both, method)

@@ -1,4 +1,4 @@
-"""One line for what holds arrays, in place of all their numbers."""
+"""Short ``repr`` of dataclasses with arrays: shapes in place of numbers."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ LONGEST = 40  # characters of a value
 
 
 def brief(kind: Class) -> Class:
-    """A dataclass whose ``repr`` tells plain values, shapes of arrays, and types of other parts."""
-    setattr(kind, "__repr__", _told)  # noqa: B010  a type may not be told that it has another
+    """Decorator: a ``repr`` with plain values, shapes of arrays, and types of other fields."""
+    setattr(kind, "__repr__", _short_repr)  # noqa: B010  mypy refuses the assignment
     return kind
 
 
-def _told(one: Any) -> str:
+def _short_repr(one: Any) -> str:
     parts = [f"{entry.name}={_short(getattr(one, entry.name))}" for entry in fields(one)
              if not entry.name.startswith("_")]
     return f"{type(one).__name__}({', '.join(parts)})"
@@ -26,5 +26,5 @@ def _told(one: Any) -> str:
 def _short(value: object) -> str:
     if isinstance(value, np.ndarray):
         return f"{value.dtype}{list(value.shape)}"
-    told = type(value).__name__ if hasattr(value, "__dataclass_fields__") else repr(value)
-    return told if len(told) <= LONGEST else f"{type(value).__name__} of {len(told)} characters"
+    text = type(value).__name__ if hasattr(value, "__dataclass_fields__") else repr(value)
+    return text if len(text) <= LONGEST else f"{type(value).__name__} of {len(text)} characters"

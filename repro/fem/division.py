@@ -1,4 +1,4 @@
-"""Arcs of the aggregate's boundary, each divided at any place on it.
+"""Division of arcs of the aggregate's boundary at any point.
 
 A contact line may lie within an arc. There the arc is divided, and so are the two triangles beside
 it, along the straight line on the unit triangle from that place to the opposite corner. Each part
@@ -100,7 +100,7 @@ class Division:
         return replace(self.parent, points=self.nodal(self.parent.points), topology=self.topology)
 
     def at(self, t: np.ndarray) -> Division:
-        """The same arcs divided elsewhere, with the same connections."""
+        """The same arcs divided at other ``t``, with the same connections."""
         moved = replace(self, t=t)
         moved.__dict__["topology"] = self.topology
         return moved
@@ -145,7 +145,7 @@ class Division:
         return np.insert(values, np.repeat(2 * self.arcs + 2, 2), added)
 
     def nodal(self, values: np.ndarray) -> np.ndarray:
-        """The values at all nodes of a field (N, ...) at the parent's nodes."""
+        """Values at all nodes, from those (N, ...) at the parent's nodes."""
         shape = (len(self.arcs), *values.shape[1:])
         places, first_halves, second_halves = (np.empty(shape) for _ in range(3))
         inside = []
@@ -159,10 +159,11 @@ class Division:
             first_halves[triangle.arc] = near if triangle.forward else far
             second_halves[triangle.arc] = far if triangle.forward else near
             inside.append(inner)
-        kept = values.copy()
-        kept[self._middles] = first_halves
+        old_nodes = values.copy()
+        old_nodes[self._middles] = first_halves
         corners = self.parent.corners
-        return np.concatenate([kept[:corners], places, kept[corners:], second_halves, inside])
+        return np.concatenate([old_nodes[:corners], places, old_nodes[corners:], second_halves,
+                               inside])
 
     def at_corners(self, values: np.ndarray) -> np.ndarray:
         """(corners + d,) of a linear field (corners,) at the parent's corners."""
@@ -176,13 +177,13 @@ class Division:
         corners = self.parent.corners
         first_middle = corners + len(self.arcs)
         last_middle = first_middle + len(self.parent.points) - corners
-        kept = np.concatenate([values[:corners], values[first_middle:last_middle]])
+        restricted = np.concatenate([values[:corners], values[first_middle:last_middle]])
         loop = self.topology.loop
         for number, (arc, t) in enumerate(zip(self.arcs, self.t)):
             nodes = loop[(2 * (arc + number) + np.arange(5)) % len(loop)]
             half, s = (nodes[:3], 0.5 / t) if t >= 0.5 else (nodes[2:], (0.5 - t) / (1 - t))
-            kept[self._middles[number]] = np.tensordot(parabola(np.array(s)), values[half], 1)
-        return kept
+            restricted[self._middles[number]] = np.tensordot(parabola(np.array(s)), values[half], 1)
+        return restricted
 
     def divided_loads(self, loads: np.ndarray) -> np.ndarray:
         """Nodal loads on the divided mesh, from those on the parent's nodes (N, 2).
@@ -195,13 +196,13 @@ class Division:
         end = loop[(2 * self.arcs + 2) % len(loop)]
         middle = loads[self._middles]
         t = self.t[:, None]
-        kept = loads.copy()
-        np.add.at(kept, start, -(1 - t) * middle / 4)
-        np.add.at(kept, end, -t * middle / 4)
-        kept[self._middles] = t * middle
+        old_loads = loads.copy()
+        np.add.at(old_loads, start, -(1 - t) * middle / 4)
+        np.add.at(old_loads, end, -t * middle / 4)
+        old_loads[self._middles] = t * middle
         inside = np.zeros((len(self.triangles), loads.shape[1]))
-        return np.concatenate([kept[:corners], middle / 4, kept[corners:], (1 - t) * middle,
-                               inside])
+        half = (1 - t) * middle
+        return np.concatenate([old_loads[:corners], middle / 4, old_loads[corners:], half, inside])
 
     def gathered_loads(self, loads: np.ndarray) -> np.ndarray:
         """(N, 2) nodal loads on the parent's nodes that do the same work as loads on all nodes of

@@ -20,7 +20,7 @@ ELEMENTS = {1: ElementTriP1(), 2: ElementTriP2(), 3: ElementTriP3()}
 #: two functions and a coefficient that is nearly linear.
 DEGREES = {1: 2, 2: 6, 3: 8}
 EDGE_DEGREES = {1: 2, 2: 6, 3: 9}
-#: Of gradients, the same but for linear functions on straight triangles, where they are constant.
+#: Degrees for gradients: lower for linear functions on straight triangles, where they are constant.
 GRADIENT_DEGREES = {1: 1, 2: 6, 3: 8}
 #: The corner at the other end of the edges 01, 12 and 20.
 NEXT = [1, 2, 0]
@@ -39,13 +39,13 @@ def evaluated(order: int, where: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     element = ELEMENTS[order]
     places = np.ascontiguousarray(where.T)
     count = len(element.doflocs)
-    found = np.empty((len(where), count))
+    values = np.empty((len(where), count))
     slopes = np.empty((len(where), count, 2))
     for k in range(count):
         value, gradient = element.lbasis(places, k)
-        found[:, k] = value
+        values[:, k] = value
         slopes[:, k, 0], slopes[:, k, 1] = gradient
-    return found, slopes
+    return values, slopes
 
 
 def values(order: int, where: np.ndarray) -> np.ndarray:
@@ -99,7 +99,7 @@ def table(order: int, geometry: int, degree: int) -> Table:
 
 @cache
 def vertex_table(order: int, geometry: int) -> Table:
-    """The same at the corners: what is integrated with it is lumped."""
+    """The same at the corners, which gives lumped integrals."""
     return _tabulated(order, geometry, nodes(1), np.full(3, 1 / 6))
 
 
@@ -116,8 +116,8 @@ def values_on(order: int, of: Table) -> np.ndarray:
 
 @cache
 def linear_fit(of: Table) -> np.ndarray:
-    """(3, q) from values at the points of a table to those at the corners of the linear function
-    that fits them best, by least squares."""
+    """(3, q) least-squares fit of a linear function: from values at the points of a table to those
+    at the corners."""
     return np.linalg.pinv(of.linear)
 
 
@@ -146,18 +146,18 @@ def by_component(tensor: np.ndarray) -> np.ndarray:
 
 
 def determinant(matrix: np.ndarray) -> np.ndarray:
-    """(...) of (..., 2, 2)."""
+    """(...) determinants of matrices (..., 2, 2)."""
     return matrix[..., 0, 0] * matrix[..., 1, 1] - matrix[..., 0, 1] * matrix[..., 1, 0]
 
 
 def inverse_transpose(matrix: np.ndarray, det: np.ndarray) -> np.ndarray:
-    """(..., 2, 2) of matrices with known determinants (...)."""
-    found = np.empty_like(matrix)
-    found[..., 0, 0] = matrix[..., 1, 1]
-    found[..., 1, 1] = matrix[..., 0, 0]
-    found[..., 0, 1] = -matrix[..., 1, 0]
-    found[..., 1, 0] = -matrix[..., 0, 1]
-    return found / det[..., None, None]
+    """(..., 2, 2) transposed inverses of matrices with determinants (...)."""
+    cofactors = np.empty_like(matrix)
+    cofactors[..., 0, 0] = matrix[..., 1, 1]
+    cofactors[..., 1, 1] = matrix[..., 0, 0]
+    cofactors[..., 0, 1] = -matrix[..., 1, 0]
+    cofactors[..., 1, 0] = -matrix[..., 0, 1]
+    return cofactors / det[..., None, None]
 
 
 def jacobian(corners: np.ndarray, bends: np.ndarray) -> np.ndarray:
@@ -192,8 +192,8 @@ def points(corners: np.ndarray, of: Table) -> Points:
     turned = inverse_transpose(J, det)
     # Few products of large matrices.
     by_point = np.swapaxes(turned, 0, 1).reshape(len(of.weights), -1, 2)
-    found = by_point @ np.swapaxes(of.slopes, 1, 2)
-    slopes = found.reshape(len(of.weights), len(corners), 2, -1)
+    by_function = by_point @ np.swapaxes(of.slopes, 1, 2)
+    slopes = by_function.reshape(len(of.weights), len(corners), 2, -1)
     return Points(det * of.weights, np.ascontiguousarray(np.swapaxes(slopes, 0, 1)))
 
 

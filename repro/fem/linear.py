@@ -1,14 +1,14 @@
 """Sparse linear systems: order nodes once, factor without pivoting, check the residual.
 
-Orders and factors with SuperLU: a minimum-degree ordering of the graph of *nodes*, in which the
-callers number all unknowns of a node together, in symmetric mode with pivots on the diagonal. That
-is two to five times faster than SciPy's default, and safe as long as pressure blocks are negative
-definite; the residual is checked, refined once, and where that is not enough the system is factored
-again with partial pivoting.
+SuperLU orders and factors: a minimum-degree ordering of the graph of *nodes*, whose unknowns are
+numbered together, in symmetric mode with pivots on the diagonal. This is two to five times faster
+than SciPy's default, and safe as long as pressure blocks are negative definite. The residual is
+checked and the solution refined once. If that does not suffice, the system is factored again with
+partial pivoting.
 
-Optional packages do the same faster on large meshes: METIS (package pymetis) orders nodes by nested
-dissection, PARDISO (package pypardiso) factors.
-Which of them is used is a :class:`Method`, which a mesh hands to all that is solved on it.
+Optional packages are faster on large meshes: METIS (package pymetis) orders nodes by nested
+dissection, PARDISO (package pypardiso) factors. A :class:`Method` selects them; a mesh passes it to
+all systems solved on it.
 """
 
 from __future__ import annotations
@@ -32,10 +32,10 @@ RESIDUAL = 1e-10
 #: number of that size, eps t, and a row multiplies that of its unknowns by A_ij (Demmel 1984, SIAM
 #: J. Sci. Stat. Comput. 5). Unknowns above 2 t / eps, 2e-292, are not changed in their last bit.
 UNDERFLOW = np.finfo(float).tiny
-#: The solution is refined where the error is larger than this.
+#: The solution is refined if its error is larger than this.
 REFINE = 1e-14
 
-#: The stage that factorising and solving is timed as.
+#: Name of factorisation and solution in the times by stage.
 FLOOR = "factorise and solve"
 
 
@@ -47,7 +47,7 @@ class Method:
     ordering: str = "degree"
 
     def checked(self) -> Method:
-        """Itself. Raises PackageMissing if a package that it needs is not installed."""
+        """The method itself. Raises PackageMissing if one of its packages is not installed."""
         if self.solver == "pardiso":
             _package("pypardiso")
         if self.ordering == "metis":
@@ -55,7 +55,7 @@ class Method:
         return self
 
 
-#: What needs no optional package.
+#: The method without optional packages.
 DEFAULT = Method()
 
 
@@ -83,7 +83,7 @@ def node_order(count: int, elements: np.ndarray, method: Method = DEFAULT) -> np
 
 
 def _by_degree(graph: sp.csc_array) -> np.ndarray:
-    """Minimum degree, as SuperLU orders a symmetric matrix, the diagonal of which must dominate."""
+    """SuperLU's minimum-degree order of a symmetric matrix, whose diagonal must dominate."""
     symmetric = {"SymmetricMode": True}
     factor = splu(sp.csc_matrix(graph), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
                   options=symmetric)
@@ -92,10 +92,10 @@ def _by_degree(graph: sp.csc_array) -> np.ndarray:
 
 def _dissected(graph: sp.csc_array) -> np.ndarray:
     """Nested dissection by METIS; the graph without its diagonal."""
-    found = sp.coo_array(graph)
-    away = found.row != found.col
-    places = found.row[away], found.col[away]
-    graph = sp.csr_array((found.data[away], places), shape=graph.shape)
+    matrix = sp.coo_array(graph)
+    away = matrix.row != matrix.col
+    places = matrix.row[away], matrix.col[away]
+    graph = sp.csr_array((matrix.data[away], places), shape=graph.shape)
     metis = _package("pymetis")
     return np.asarray(metis.nested_dissection(metis.CSRAdjacency(graph.indptr, graph.indices))[0])
 
@@ -126,8 +126,8 @@ class _Pardiso:
 class Solver:
     """Solves A x = b for one matrix (n, n) and any number of right-hand sides.
 
-    The unknowns are taken in the order in which they come. Raises LinearError where the residual
-    cannot be brought under RESIDUAL.
+    The unknowns are eliminated in their order. Raises LinearError if the residual stays above
+    RESIDUAL.
     """
 
     def __init__(self, matrix: sp.spmatrix, method: Method = DEFAULT):
@@ -143,7 +143,7 @@ class Solver:
         return self._factor("NATURAL", 0.0, True)
 
     def _factor(self, column_order: str, threshold: float, symmetric: bool) -> Factors | None:
-        """By SuperLU; None where the matrix is singular."""
+        """Factorise with SuperLU; None if the matrix is singular."""
         try:
             return splu(self.matrix, permc_spec=column_order, diag_pivot_thresh=threshold,
                         options={"SymmetricMode": symmetric})
@@ -178,5 +178,5 @@ class Solver:
 
 @timed(FLOOR)
 def factorised(matrix: sp.spmatrix, method: Method = DEFAULT) -> Solver:
-    """A matrix, ready for right-hand sides."""
+    """Factorise a matrix."""
     return Solver(matrix, method)

@@ -1,9 +1,9 @@
 """Triangles of the meshed part of the pore (3.1): one mesh for fluid and biomass.
 
 A curved triangle has six nodes: corners, then the middles of the edges 01, 12 and 20
-(isoparametric). What depends on the connections alone is a :class:`Topology`; it stays while the
-mesh moves. What depends on the places of the nodes too is worked out once for a :class:`Mesh`,
-whose nodes never change.
+(isoparametric). A :class:`Topology` has the properties that depend only on the connections, and
+stays while the mesh moves. A :class:`Mesh` computes those that depend on the coordinates of the
+nodes once; its nodes never change.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class Dofs:
 
     @cached_property
     def beside_outlet(self) -> tuple[np.ndarray, np.ndarray]:
-        """The same of the outlet."""
+        """The same for the outlet."""
         return _beside(self.cells, self.outlet)
 
 
@@ -100,7 +100,7 @@ class Topology:
 
     @cached_property
     def straight(self) -> Topology:
-        """Of the triangles between the corners alone."""
+        """Topology of the triangles between the corners alone."""
         if self.geometry == 1:
             return self
         return replace(self, cells=np.ascontiguousarray(self.triangles), loop=self.loop[::2].copy())
@@ -150,12 +150,12 @@ class Topology:
         ends = np.stack([self.triangles, self.triangles[:, elements.NEXT]], axis=2)
         if self.geometry == 1:
             pairs = np.sort(ends.reshape(-1, 2), axis=1)
-            edges, which = np.unique(pairs, axis=0, return_inverse=True)
-            return edges, which.reshape(-1, 3)
-        which = self.cells[:, 3:] - self.corners
-        edges = np.empty((which.max(initial=-1) + 1, 2), int)
-        edges[which] = ends
-        return edges, which
+            edges, numbers = np.unique(pairs, axis=0, return_inverse=True)
+            return edges, numbers.reshape(-1, 3)
+        numbers = self.cells[:, 3:] - self.corners
+        edges = np.empty((numbers.max(initial=-1) + 1, 2), int)
+        edges[numbers] = ends
+        return edges, numbers
 
     @property
     def edges(self) -> np.ndarray:
@@ -178,8 +178,8 @@ class Topology:
     def edge_numbers(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
         """(K,) numbers of the edges between two corners (K,) each."""
         keys, ascending = self._edge_keys
-        wanted = np.minimum(first, second) * self.corners + np.maximum(first, second)
-        return ascending[np.searchsorted(keys, wanted)]
+        edge_keys = np.minimum(first, second) * self.corners + np.maximum(first, second)
+        return ascending[np.searchsorted(keys, edge_keys)]
 
     def dofs(self, order: int) -> Dofs:
         """Nodes of functions of an order, 1, 2 or 3."""
@@ -188,16 +188,19 @@ class Topology:
         return self._dofs[order]
 
     def system(self, key: Hashable, make: Callable[[], ElementSystem]) -> ElementSystem:
-        """A sparse system on these connections, made when it is first asked for."""
+        """A sparse system on these connections, built by ``make`` on first use."""
         if key not in self._systems:
             self._systems[key] = make()
         return self._systems[key]
 
 
 def _numbered(topology: Topology, order: int) -> Dofs:
-    """An edge has order - 1 nodes; of two, the one near the corner with the lower number takes the
-    edge's own number, the other that and the count of edges. So the nodes of order 2 are among
-    those of order 3, and a curved mesh's own nodes are those of order 2."""
+    """Number the nodes of functions of an order.
+
+    An edge has order - 1 nodes. Of two, the one near the corner with the lower number has the
+    number of the edge, the other one that plus the count of edges. The nodes of order 2 are thus
+    among those of order 3, and are the nodes of a curved mesh.
+    """
     make = {1: _linear, 2: _quadratic, 3: _cubic}[order]
     cells, count = make(topology)
     inlet, outlet = (_along(topology, line, order) for line in (topology.inlet, topology.outlet))
@@ -205,29 +208,30 @@ def _numbered(topology: Topology, order: int) -> Dofs:
 
 
 def _linear(topology: Topology) -> tuple[np.ndarray, int]:
-    """(T, 3) nodes, the corners, and how many they are."""
+    """(T, 3) nodes, the corners, and their count."""
     return topology.triangles, topology.corners
 
 
 def _quadratic(topology: Topology) -> tuple[np.ndarray, int]:
-    """(T, 6) nodes, corners and edges, and how many they are."""
+    """(T, 6) nodes, corners and edges, and their count."""
     middles = topology.corners + topology.cell_edges
     return np.column_stack([topology.triangles, middles]), topology.corners + len(topology.edges)
 
 
 def _cubic(topology: Topology) -> tuple[np.ndarray, int]:
-    """(T, 10) nodes in scikit-fem's order, whose third edge runs from corner 0 to corner 2; and how
-    many they are."""
+    """(T, 10) nodes in scikit-fem's order, whose third edge runs from corner 0 to corner 2; and
+    their count."""
     first = topology.corners
     many = len(topology.edges)
     starts = topology.triangles[:, [0, 1, 0]]
     ends = topology.triangles[:, [1, 2, 2]]
-    own = first + topology.cell_edges
-    near = own + many * (starts > ends)
-    far = own + many * (starts < ends)
-    centre = first + 2 * many + np.arange(len(own))
+    edge_nodes = first + topology.cell_edges
+    near = edge_nodes + many * (starts > ends)
+    far = edge_nodes + many * (starts < ends)
+    centre = first + 2 * many + np.arange(len(edge_nodes))
     on_edges = np.stack([near, far], axis=2).reshape(-1, 6)
-    return np.column_stack([topology.triangles, on_edges, centre]), first + 2 * many + len(own)
+    count = first + 2 * many + len(edge_nodes)
+    return np.column_stack([topology.triangles, on_edges, centre]), count
 
 
 def _along(topology: Topology, line: np.ndarray, order: int) -> np.ndarray:
@@ -244,7 +248,7 @@ def _along(topology: Topology, line: np.ndarray, order: int) -> np.ndarray:
 
 
 def _on_walls(topology: Topology, order: int) -> np.ndarray:
-    """Nodes of both walls: an edge of one triangle only, between corners of one wall, is on it."""
+    """Nodes of both walls: those of edges of one triangle only, between corners of one wall."""
     if order == 1:
         return topology.walls
     on = np.zeros(topology.corners, bool)
@@ -279,8 +283,10 @@ class Mesh:
     @staticmethod
     def of(points: np.ndarray, cells: np.ndarray, biomass: np.ndarray, loop: np.ndarray,
            width: float, ends: tuple[float, float], method: Method = DEFAULT) -> Mesh:
-        """The mesh of triangles with nodes (T, 3 or 6), corners numbered first; loop: as that of a
-        :class:`Topology`."""
+        """Build the mesh of triangles with nodes (T, 3 or 6), corners numbered first.
+
+        loop: that of the :class:`Topology`.
+        """
         count = len(points) if cells.shape[1] == 3 else int(cells[:, 3:].min())
         x, y = points[:count].T
 
@@ -310,7 +316,7 @@ class Mesh:
 
     @property
     def corners(self) -> int:
-        """How many nodes are corners."""
+        """Number of nodes that are corners."""
         return self.topology.corners
 
     @property
@@ -373,12 +379,12 @@ class Mesh:
         return np.isin(ends, self.topology.walls).all(axis=1) & (rise < self.width / 2)
 
     def area(self) -> float:
-        """Of the aggregate, um2."""
+        """Area of the aggregate, um2."""
         of = elements.table(1, self.geometry, elements.DEGREES[self.geometry])
         return float(elements.weights(self.points[self.cells[self.biomass]], of).sum())
 
     def with_middles(self, field: np.ndarray) -> np.ndarray:
-        """(N, ...) a field (corners, ...) that is linear on every edge, at all nodes."""
+        """(N, ...) values at all nodes of a field (corners, ...) that is linear on every edge."""
         if self.geometry == 1:
             return field
         a, b = self.topology.edges.T
@@ -389,10 +395,12 @@ class Mesh:
         still be on their lines."""
         return replace(self, points=points)
 
-    def turned_over(self, which: np.ndarray | slice = slice(None)) -> np.ndarray:
-        """(T,) True where the map of a triangle (of those in ``which``) is not one to one at a node
-        or a quadrature point."""
-        corners = self.points[self.cells[which]]
+    def turned_over(self, selected: np.ndarray | slice = slice(None)) -> np.ndarray:
+        """(T,) True where the map of a triangle is not one to one at a node or a quadrature point.
+
+        selected: the triangles to test, all by default.
+        """
+        corners = self.points[self.cells[selected]]
         J = elements.jacobian(corners, checked_bends(self.geometry))
         return elements.determinant(J).min(axis=1) <= 0
 
@@ -404,7 +412,7 @@ class Mesh:
         return np.isin(self.loop[1::2], self.cells[self.turned_over(), 3:])
 
     def checked(self) -> Mesh:
-        """Itself. Raises TurnedOver where a triangle is turned over."""
+        """The mesh itself. Raises TurnedOver if a triangle is turned over."""
         bad = np.flatnonzero(self.turned_over())
         if len(bad):
             x, y = self.points[self.cells[bad[0]]].mean(axis=0)
@@ -421,7 +429,7 @@ class Mesh:
 
 @cache
 def checked_bends(geometry: int) -> np.ndarray:
-    """Derivatives of the maps' shape functions at a triangle's nodes and where it is integrated."""
+    """Derivatives of the maps' shape functions at a triangle's nodes and quadrature points."""
     of = elements.table(geometry, geometry, elements.GRADIENT_DEGREES[geometry])
     return np.concatenate([elements.derivatives(geometry, elements.nodes(geometry)), of.bends])
 
@@ -445,8 +453,8 @@ def gradients(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 def curved(straight: Mesh, middles: np.ndarray | None) -> Mesh:
     """The mesh with a node in the middle of every edge.
 
-    middles: (M, 2) um, those on the aggregate's boundary, each after the loop's node of the same
-    number; None: on the straight edge.
+    middles: (M, 2) um, those on the aggregate's boundary, in the order of the loop's edges; None:
+    middles of the straight edges.
     """
     topology = straight.topology
     count = straight.corners

@@ -1,7 +1,7 @@
-"""New meshes (3.1): boundary, interface and contact nodes are placed first, Mmg fills the inside.
+"""Mesh generation (3.1): nodes of boundary, interface and contact first, then Mmg fills the inside.
 
-Mmg (through mmgpy) starts from a constrained Delaunay triangulation (shapely) and keeps every edge
-that it was given.
+Mmg (through mmgpy) starts from a constrained Delaunay triangulation (shapely) and keeps all
+prescribed edges.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from repro.fem.outline import BOTTOM, TOP, Outline
 from repro.fem.sizing import Sizing
 from repro.timing import timed
 
-#: Sizes of the first of two meshing passes over the wanted ones.
+#: Element sizes in the first of two meshing passes over the final ones.
 FIRST_PASS = 2.0
 #: Mmg's own limit on the ratio of adjacent edges.
 HGRAD = 1.5
@@ -43,11 +43,11 @@ Regions: TypeAlias = tuple[np.ndarray, np.ndarray, np.ndarray]
 @timed("meshing")
 def generate(outline: Outline | None, ends: tuple[float, float], sizing: Sizing,
              geometry: int = 1, method: Method = DEFAULT) -> tuple[Mesh, Outline | None]:
-    """A new mesh around the aggregate, and the outline with the nodes that the mesh has on it.
+    """Generate a mesh around the aggregate; also returns the outline with the mesh's nodes.
 
     outline: None for a clean channel; ends: x of inlet and outlet (um); geometry: 1, straight
     triangles, 2, curved ones, as the outline's edges are; method: of the linear systems on the
-    mesh. Raises MeshError where the outline crosses itself or the channel's ends, or where a curved
+    mesh. Raises MeshError if the outline crosses itself or the channel's ends, or if a curved
     triangle is turned over.
     """
     if outline is None:
@@ -68,7 +68,7 @@ def generate(outline: Outline | None, ends: tuple[float, float], sizing: Sizing,
 
 
 @dataclass(frozen=True, eq=False)
-class Wanted:
+class ElementSizes:
     """Element sizes of a mesh, prescribed at the sources (K, 2) um: sizes (K,) um."""
 
     sources: np.ndarray
@@ -76,11 +76,11 @@ class Wanted:
     sizing: Sizing
 
     @staticmethod
-    def around(outline: Outline | None, sizing: Sizing) -> Wanted:
-        """As the outline asks for, or the largest everywhere."""
+    def around(outline: Outline | None, sizing: Sizing) -> ElementSizes:
+        """Sizes for an outline, or the largest everywhere without one."""
         if outline is None:
-            return Wanted(np.empty((0, 2)), np.empty(0), sizing)
-        return Wanted(*sizes_of.size_sources(outline, sizing), sizing)
+            return ElementSizes(np.empty((0, 2)), np.empty(0), sizing)
+        return ElementSizes(*sizes_of.size_sources(outline, sizing), sizing)
 
     def at(self, where: np.ndarray) -> np.ndarray:
         """(N,) um at points (N, 2) um."""
@@ -95,19 +95,20 @@ class Wanted:
 
 def around(outline: Outline | None, ends: tuple[float, float], sizing: Sizing,
            method: Method = DEFAULT) -> Mesh:
-    """A new straight mesh around a polygon whose nodes stay as they are; arguments: those of
-    :func:`generate`."""
-    wanted = Wanted.around(outline, sizing)
-    points, polygons = _boundaries(outline, ends, wanted)
-    (points, triangles, region), places = _fill(points, polygons, wanted.at)
+    """Generate a straight mesh around a polygon, whose nodes stay unchanged.
+
+    Arguments are those of :func:`generate`.
+    """
+    element_sizes = ElementSizes.around(outline, sizing)
+    points, polygons = _boundaries(outline, ends, element_sizes)
+    (points, triangles, region), places = _fill(points, polygons, element_sizes.at)
     # The outline's points come first among the prescribed ones.
     loop = places[: 0 if outline is None else len(outline.points)]
     return Mesh.of(points, triangles, region == 2, loop, sizing.width, ends, method)
 
 
 def check_outline(outline: Outline, ends: tuple[float, float], width: float) -> None:
-    """Raises SelfCrossing where an outline crosses itself, MeshError where it leaves the meshed
-    part."""
+    """Raise SelfCrossing if an outline crosses itself, MeshError if it leaves the meshed part."""
     polygon = shapely.Polygon(outline.points)
     if not polygon.is_valid:
         raise SelfCrossing("the outline of the aggregate crosses itself: "
@@ -120,42 +121,43 @@ def check_outline(outline: Outline, ends: tuple[float, float], width: float) -> 
 
 
 def _boundaries(outline: Outline | None, ends: tuple[float, float],
-                wanted: Wanted) -> tuple[np.ndarray, list[Polygon]]:
+                element_sizes: ElementSizes) -> tuple[np.ndarray, list[Polygon]]:
     """All prescribed points (K, 2) and the polygons that they bound."""
     left, right = ends
-    width = wanted.sizing.width
+    width = element_sizes.sizing.width
     corners = np.array([(left, 0.0), (right, 0.0), (right, width), (left, width)])
     if outline is None:
-        rim = wanted.path(*corners, corners[0])
+        rim = element_sizes.path(*corners, corners[0])
         return rim, [(np.arange(len(rim)), False)]
     store = _PointStore(outline.points)
     bounds = _both_sides if (outline.wall == TOP).any() else _over_the_top
-    fluid = bounds(outline, corners, wanted, store)
+    fluid = bounds(outline, corners, element_sizes, store)
     return store.points, [*fluid, (np.arange(len(outline.points)), True)]
 
 
-def _over_the_top(outline: Outline, corners: np.ndarray, wanted: Wanted,
+def _over_the_top(outline: Outline, corners: np.ndarray, element_sizes: ElementSizes,
                   store: _PointStore) -> list[Polygon]:
     """The fluid around an aggregate that touches the lower wall alone."""
     south_west, south_east, north_east, north_west = corners
     west, east = _contact(outline, BOTTOM)
-    start = store.add(wanted.path(south_west, outline.points[west]))
-    over = store.add(wanted.path(south_east, north_east, north_west, south_west))
-    end = store.add(wanted.path(outline.points[east], south_east)[1:])
+    start = store.add(element_sizes.path(south_west, outline.points[west]))
+    over = store.add(element_sizes.path(south_east, north_east, north_west, south_west))
+    end = store.add(element_sizes.path(outline.points[east], south_east)[1:])
     top = _backwards(west, east, len(outline.points))
     return [(np.concatenate([start, top, end, over]), False)]
 
 
-def _both_sides(outline: Outline, corners: np.ndarray, wanted: Wanted,
+def _both_sides(outline: Outline, corners: np.ndarray, element_sizes: ElementSizes,
                 store: _PointStore) -> list[Polygon]:
     """The fluid upstream and downstream of an aggregate that touches both walls."""
     south_west, south_east, north_east, north_west = corners
     west, east = _contact(outline, BOTTOM)
     upper_west, upper_east = _contact(outline, TOP)
     points = outline.points
-    start = store.add(wanted.path(south_west, points[west]))
-    close = store.add(wanted.path(points[upper_west], north_west, south_west)[1:])
-    out = store.add(wanted.path(points[east], south_east, north_east, points[upper_east])[1:])
+    start = store.add(element_sizes.path(south_west, points[west]))
+    close = store.add(element_sizes.path(points[upper_west], north_west, south_west)[1:])
+    out = element_sizes.path(points[east], south_east, north_east, points[upper_east])[1:]
+    out = store.add(out)
     upstream = [start, _backwards(west, upper_west, len(points)), close]
     downstream = [_backwards(upper_east, east, len(points)), out]
     return [(np.concatenate(upstream), False), (np.concatenate(downstream), False)]
@@ -169,7 +171,7 @@ def _contact(outline: Outline, wall: int) -> tuple[int, int]:
 
 
 class _PointStore:
-    """A growing list of points; ``add`` returns the indices of what it adds."""
+    """A growing list of points; ``add`` returns the indices of the added points."""
 
     def __init__(self, points: np.ndarray):
         self.points = points
@@ -187,11 +189,11 @@ def _backwards(first: int, last: int, count: int) -> np.ndarray:
 
 def _fill(points: np.ndarray, polygons: list[Polygon],
           size_at: Callable[[np.ndarray], np.ndarray]) -> tuple[Regions, np.ndarray]:
-    """Triangles inside the polygons, of the size (um) that ``size_at(points)`` asks for; and where
-    the prescribed points went.
+    """Triangles inside the polygons, of size (um) ``size_at(points)``, and the new indices of the
+    prescribed points.
 
-    The first pass knows the wanted size at the prescribed points alone, the second one at every
-    point of the first.
+    The first pass uses the sizes at the prescribed points, the second one those at all points of
+    the first.
     """
     triangles = [_constrained_delaunay(points, nodes) for nodes, _ in polygons]
     region = np.repeat([1 + biomass for _, biomass in polygons], [len(t) for t in triangles])
@@ -199,8 +201,8 @@ def _fill(points: np.ndarray, polygons: list[Polygon],
     rim = np.unique(np.sort(rim, axis=1), axis=0)
     sizes = FIRST_PASS * size_at(points)
     try:
-        coarse, found = _mmg(points, np.vstack(triangles), region, rim, points, sizes)
-        return _mmg(*coarse, found[rim], points, size_at(coarse[0]))
+        coarse, indices = _mmg(points, np.vstack(triangles), region, rim, points, sizes)
+        return _mmg(*coarse, indices[rim], points, size_at(coarse[0]))
     except MeshError:
         raise
     except RuntimeError as error:
@@ -209,7 +211,7 @@ def _fill(points: np.ndarray, polygons: list[Polygon],
 
 def _mmg(points: np.ndarray, triangles: np.ndarray, region: np.ndarray, rim: np.ndarray,
          prescribed: np.ndarray, sizes: np.ndarray) -> tuple[Regions, np.ndarray]:
-    """One pass of Mmg, which keeps the rim, and where the prescribed points went."""
+    """Run one pass of Mmg, which keeps the rim; also returns the indices of prescribed points."""
     mmg = MmgMesh2D()
     mmg.set_mesh_size(vertices=len(points), triangles=len(triangles), quadrilaterals=0,
                       edges=len(rim))
@@ -219,34 +221,34 @@ def _mmg(points: np.ndarray, triangles: np.ndarray, region: np.ndarray, rim: np.
     mmg.set_required_edges(np.arange(len(rim), dtype=np.int32))
     mmg.set_required_vertices(np.unique(rim).astype(np.int32))
     mmg["metric"] = sizes[:, None]
-    with _signals_kept():
+    with _restore_signals():
         mmg.remesh(verbose=-1, hgrad=HGRAD, nosurf=True)
     points = mmg.get_vertices()
     triangles, region = mmg.get_triangles_with_refs()
-    found = _find(points, prescribed)
-    points[found] = prescribed
-    return (points, triangles.astype(np.int64), region), found
+    indices = _find(points, prescribed)
+    points[indices] = prescribed
+    return (points, triangles.astype(np.int64), region), indices
 
 
 @contextmanager
-def _signals_kept() -> Iterator[None]:
-    """Mmg resets what the process does on Ctrl-C and on termination; put it back."""
-    kept = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+def _restore_signals() -> Iterator[None]:
+    """Restore the handlers of SIGINT and SIGTERM, which Mmg resets."""
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         yield
     finally:
         if threading.current_thread() is threading.main_thread():
-            for number, handler in kept.items():
+            for number, handler in handlers.items():
                 signal.signal(number, handler)
 
 
 def _constrained_delaunay(points: np.ndarray, nodes: np.ndarray) -> np.ndarray:
-    """(K, 3) counterclockwise triangles between the given nodes of one polygon."""
+    """(K, 3) counterclockwise triangles between the nodes of one polygon."""
     pieces = shapely.constrained_delaunay_triangles(shapely.Polygon(points[nodes]))
     corners = shapely.get_coordinates(pieces).reshape(-1, 4, 2)[:, :3]
-    given = _complex(points[nodes])
-    ascending = np.argsort(given)
-    local = ascending[np.searchsorted(given[ascending], _complex(corners.reshape(-1, 2)))]
+    keys = _complex(points[nodes])
+    ascending = np.argsort(keys)
+    local = ascending[np.searchsorted(keys[ascending], _complex(corners.reshape(-1, 2)))]
     triangles = nodes[local].reshape(-1, 3)
     turned = triangle_areas(points, triangles) < 0
     triangles[turned] = triangles[turned][:, ::-1]
@@ -272,21 +274,21 @@ def _complex(points: np.ndarray) -> np.ndarray:
 
 
 def _find(new_points: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Indices of the prescribed points in the new mesh. Raises MeshError where one has moved."""
+    """Indices of the prescribed points in the new mesh. Raises MeshError if one has moved."""
     tree = shapely.STRtree(shapely.points(new_points))
-    (_, found), distance = tree.query_nearest(shapely.points(points), return_distance=True,
+    (_, nearest), distance = tree.query_nearest(shapely.points(points), return_distance=True,
                                               all_matches=False)
-    if distance.max() > 1e-9 * np.ptp(points[:, 0]) or len(np.unique(found)) < len(points):
+    if distance.max() > 1e-9 * np.ptp(points[:, 0]) or len(np.unique(nearest)) < len(points):
         raise MeshError(f"the mesher moved a boundary node by {distance.max():.3g} um")
-    return found
+    return nearest
 
 
 def unlocked(straight: Mesh) -> Mesh:
     """The same nodes without triangles that have two edges on the boundary of their region.
 
     A region is the fluid or the biomass. Linear pressures in such a corner leave quadratic
-    displacements too little freedom; the corner's
-    inner edge is exchanged for the other diagonal where that is possible.
+    displacements too little freedom. If possible, the corner's inner edge is exchanged for the
+    other diagonal.
     """
     triangles = straight.triangles.copy()
     for corner in _cornered(triangles, straight.biomass):
@@ -295,11 +297,11 @@ def unlocked(straight: Mesh) -> Mesh:
 
 
 def _region_edges(triangles: np.ndarray, biomass: np.ndarray) -> np.ndarray:
-    """(T, 3) is edge i -> i + 1 on the boundary of the triangle's own region?"""
+    """(T, 3) Is edge i -> i + 1 on the boundary of the triangle's region?"""
     edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]], axis=2).reshape(-1, 2)
     keys = (edges[:, 0] * (edges.max() + 1) + edges[:, 1]) * 2 + np.repeat(biomass, 3)
-    _, which, counts = np.unique(keys, return_inverse=True, return_counts=True)
-    return (counts[which] == 1).reshape(-1, 3)
+    _, edge_numbers, counts = np.unique(keys, return_inverse=True, return_counts=True)
+    return (counts[edge_numbers] == 1).reshape(-1, 3)
 
 
 def _cornered(triangles: np.ndarray, biomass: np.ndarray) -> np.ndarray:

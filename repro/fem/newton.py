@@ -1,7 +1,7 @@
-"""Newton's method: one driver, full or modified (the derivative of an earlier iterate is kept).
+"""Newton's method, full or modified (with the derivative of an earlier iterate).
 
-With the derivative of an earlier iterate the defect falls by about the same factor in every step,
-instead of by its square: cheaper by far on a large mesh, where factorising is what a step costs.
+With the derivative of an earlier iterate the defect decreases linearly instead of quadratically.
+This is far cheaper on a large mesh, where the factorisation dominates the cost of a step.
 """
 
 from __future__ import annotations
@@ -13,49 +13,52 @@ import numpy as np
 
 from repro.fem.assembly import Factored
 
-#: Modified Newton: a factorisation is kept while each step cuts the defect to this part or less.
-ENOUGH = 0.01
-#: Where round-off keeps the defect from falling: the least fall of a step that still counts.
+#: The modified method keeps a factorisation while each step reduces the defect by this factor.
+REQUIRED_REDUCTION = 0.01
+#: The iteration stalls at round-off if a step reduces the defect by less than this factor.
 STALLED = 0.1
 
 
 class Iterate(Protocol):
-    """An iterate with what is known of it."""
+    """One Newton iterate with its residual and constraint state."""
 
     @property
     def defect(self) -> float:
-        """Largest residual of a row over the size of its terms."""
+        """Largest residual of a row, relative to the magnitude of its terms."""
 
     @property
     def complete(self) -> bool:
-        """Does it meet its constraints?"""
+        """Does the iterate satisfy its constraints?"""
 
 
-It = TypeVar("It", bound=Iterate)
+State = TypeVar("State", bound=Iterate)
 
 
-class System(Protocol[It]):
-    """What the driver asks of a system of equations."""
+class System(Protocol[State]):
+    """Interface of a system of equations."""
 
-    def factored(self, iterate: It) -> Factored:
-        """The derivative at an iterate, factorised."""
+    def factored(self, iterate: State) -> Factored:
+        """Factorise the derivative at an iterate."""
 
-    def advanced(self, iterate: It, factors: Factored, fresh: bool) -> It:
-        """The next iterate; fresh: the derivative is that of this iterate."""
+    def advanced(self, iterate: State, factors: Factored, fresh: bool) -> State:
+        """The next iterate; fresh: is the derivative that of this iterate?"""
 
 
 @dataclass(frozen=True)
 class Newton:
-    """tolerance: of the defect; round_off: a defect that is enough where it does not fall any more;
-    most: iterations; reused: is the derivative kept while it does enough?"""
+    """Newton's method.
+
+    tolerance: of the defect; round_off: accepted defect when the iteration stalls; most: largest
+    number of iterations; modified_newton: keep the derivative while it suffices?
+    """
 
     tolerance: float
     round_off: float
     most: int
-    reused: bool = False
+    modified_newton: bool = False
 
-    def solve(self, system: System[It], iterate: It) -> tuple[It, int, bool]:
-        """The last iterate, how many steps led to it, and whether it has converged."""
+    def solve(self, system: System[State], iterate: State) -> tuple[State, int, bool]:
+        """The last iterate, the number of steps, and whether it converged."""
         factors: Factored | None = None
         last = np.inf
         for count in range(self.most):
@@ -63,7 +66,7 @@ class Newton:
             stalled = STALLED * last < defect <= self.round_off
             if iterate.complete and (defect <= self.tolerance or stalled):
                 return iterate, count, True
-            if not self.reused or defect > ENOUGH * last:
+            if not self.modified_newton or defect > REQUIRED_REDUCTION * last:
                 factors = None
             fresh = factors is None
             factors = factors or system.factored(iterate)
@@ -73,5 +76,5 @@ class Newton:
 
 
 def relative(residual: np.ndarray, size: np.ndarray) -> float:
-    """Largest residual against the size of its row's terms."""
+    """Largest residual, relative to the magnitude of its row's terms."""
     return float(np.max(np.abs(residual) / np.maximum(size, np.finfo(float).tiny), initial=0.0))

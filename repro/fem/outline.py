@@ -218,7 +218,7 @@ def _graded_to_corners(rim: np.ndarray, width: float, least: float) -> np.ndarra
 
 
 def _shares(length: float, first: float, last: float) -> np.ndarray:
-    """Where on a line of a length (um) its nodes are, from 0 to 1, without 1.
+    """Positions of the nodes on a line of a length (um), from 0 to 1, without 1.
 
     first, last: lengths (um) of the edges at its ends, infinite where these are no corners.
     """
@@ -253,7 +253,7 @@ def _splined(rim: np.ndarray, width: float) -> np.ndarray:
 
 
 def _with_contact_middle(points: np.ndarray, wall: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """A node in the middle of the upper contact surface, where there is one."""
+    """Insert a node in the middle of the upper contact surface, if there is one."""
     top = np.flatnonzero(wall == TOP)
     if len(top) == 0:
         return points, wall
@@ -280,7 +280,7 @@ def _middles(points: np.ndarray, wall: np.ndarray) -> np.ndarray:
 
 def _with_arc_middles(points: np.ndarray, wall: np.ndarray,
                       fixed: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Corners and the middles of straight edges in turn."""
+    """Alternate corners and middles of straight edges."""
     after = np.roll(points, -1, axis=0)
     both = np.stack([points, 0.5 * (points + after)], axis=1).reshape(-1, 2)
     between = np.where(wall == np.roll(wall, -1), wall, FREE)

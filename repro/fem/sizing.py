@@ -21,10 +21,9 @@ ACROSS_FILM = 10.0
 #: half-disc asks for 31; a body more than 60 times longer than thick asks for more. With 200 or 400
 #: slivers fail at their first new mesh, with 4000 a step takes minutes.
 ALONG_INTERFACE = 600.0
-#: Growth of the element size with the distance from where it is prescribed; zero: one size
-#: everywhere.
+#: Growth of the element size with the distance from its source; zero: one size everywhere.
 GRADATION = 0.25
-#: An interface edge is split when it is this much longer than the wanted size.
+#: An interface edge is split if it is longer than the element size by this factor.
 SPLIT = 1.4
 #: Distances between points and sources that are in memory at once.
 DISTANCES = 2**20
@@ -32,14 +31,13 @@ DISTANCES = 2**20
 
 @dataclass(frozen=True)
 class Sizing:
-    """How large the elements of a mesh are to be.
+    """Element sizes of a mesh.
 
-    width: of the pore (um); refinement: what sizes are divided by; film: the thinnest that is
-    resolved (um); gradation: growth of the size with the distance from where it is prescribed;
-    front: what sizes at the aggregate are divided by besides, for a front of the substrates in it;
-    contact: the size beside the contact lines with the opposite wall (um), infinite if that is none
-    of its own; seed: x (um) of the middle of the half-disc that the aggregate was at t = 0, None
-    if it was none.
+    width: of the pore (um); refinement: divisor of all sizes; film: thickness of the thinnest
+    resolved film (um); gradation: growth of the size with the distance from its source; front:
+    further divisor of sizes at the aggregate, for a sharp front of the substrates; contact: size
+    beside the contact lines with the opposite wall (um), infinite for none; seed: x (um) of the
+    middle of the half-disc at t = 0, None for another shape.
     """
 
     width: float
@@ -57,13 +55,13 @@ class Sizing:
 
 
 def meshed_extent(outline: Outline | None, width: float, length: float,
-                  whole: bool = False) -> tuple[float, float]:
+                  full: bool = False) -> tuple[float, float]:
     """Ends (um) of the part to mesh when a mesh is generated (3.1).
 
     min(10 R, 1.5 W) from the aggregate on both sides, never past the pore's ends; a clean channel
     is meshed over 3 W.
     """
-    if whole:
+    if full:
         return -length / 2, length / 2
     first, last = (0.0, 0.0) if outline is None else (outline.upstream, outline.downstream)
     reach = 1.5 * width if outline is None else min(10 * outline.thickness, 1.5 * width)
@@ -81,11 +79,11 @@ def extent_too_short(outline: Outline, ends: tuple[float, float], width: float,
 
 
 def interface_sizes(outline: Outline, sizing: Sizing) -> np.ndarray:
-    """(M,) wanted element size (um) at each node of the outline.
+    """(M,) element size (um) at each node of the outline.
 
-    A tenth of the aggregate's thickness (or, if that is larger, the interface's length over
-    ``ALONG_INTERFACE``), a fourteenth of the pore's width, for free nodes the film's size, and what
-    is asked for beside the contact lines with the opposite wall.
+    It is the least of a tenth of the aggregate's thickness (or, if larger, the interface's length
+    over ``ALONG_INTERFACE``), a fourteenth of the pore's width, the film's size at free nodes, and
+    the size beside the contact lines with the opposite wall.
     """
     length = outline.edge_lengths()[outline.interface_edges()].sum()
     size = max(outline.thickness / ACROSS_AGGREGATE, length / ALONG_INTERFACE)
@@ -96,7 +94,7 @@ def interface_sizes(outline: Outline, sizing: Sizing) -> np.ndarray:
 
 
 def _contact_sizes(outline: Outline, sizing: Sizing) -> np.ndarray | float:
-    """(M,) um, growing from that of the contact lines with the opposite wall; infinite without."""
+    """(M,) size (um) that grows from the contact lines with the opposite wall; inf without them."""
     top = outline.wall == TOP
     if sizing.contact == inf or not top.any():
         return inf
@@ -108,15 +106,15 @@ def _contact_sizes(outline: Outline, sizing: Sizing) -> np.ndarray | float:
 def too_coarse(outline: Outline, sizing: Sizing) -> bool:
     """Is an interface edge twice longer than a new mesh would have it?"""
     sizes = interface_sizes(outline, sizing)
-    wanted = 0.5 * (sizes + np.roll(sizes, -1))
-    return bool((outline.interface_edges() & (outline.edge_lengths() > 2 * SPLIT * wanted)).any())
+    size = 0.5 * (sizes + np.roll(sizes, -1))
+    return bool((outline.interface_edges() & (outline.edge_lengths() > 2 * SPLIT * size)).any())
 
 
 def film_sizes(outline: Outline, sizing: Sizing) -> np.ndarray:
-    """(M,) wanted element size (um) in the fluid between each node and the opposite wall.
+    """(M,) element size (um) in the fluid between each node and the opposite wall.
 
-    A tenth of its thickness; films thinner than the thinnest that is resolved count as that: they
-    close.
+    It is a tenth of the film's thickness, and no less than that of the thinnest resolved film,
+    since thinner films close.
     """
     if (outline.wall == TOP).any():
         return np.full(len(outline.points), np.inf)
@@ -125,11 +123,11 @@ def film_sizes(outline: Outline, sizing: Sizing) -> np.ndarray:
 
 
 def size_sources(outline: Outline, sizing: Sizing) -> tuple[np.ndarray, np.ndarray]:
-    """Where element sizes are prescribed, (K, 2) um, and how large, (K,) um.
+    """Points (K, 2) um with prescribed element sizes, and the sizes (K,) um.
 
-    At the interface nodes and, across the fluid, on the opposite wall, so that a film has elements
-    of one size. Interface edges that are shorter than wanted (they are never merged) are matched by
-    what is around them.
+    The points are the interface nodes and, across the fluid, points on the opposite wall, so that a
+    film has elements of one size. Short interface edges are never merged, so the elements around
+    them are as small.
     """
     free = outline.wall == FREE
     near = interface_sizes(outline, sizing)[free]
@@ -137,19 +135,21 @@ def size_sources(outline: Outline, sizing: Sizing) -> tuple[np.ndarray, np.ndarr
     edge = outline.edge_lengths()
     near = np.minimum(near, SPLIT * np.maximum(edge, np.roll(edge, 1))[free])
     across = np.column_stack([outline.points[free, 0], np.full(len(near), sizing.width)])
-    there = np.isfinite(film)
-    return np.vstack([outline.points[free], across[there]]), np.concatenate([near, film[there]])
+    finite = np.isfinite(film)
+    return np.vstack([outline.points[free], across[finite]]), np.concatenate([near, film[finite]])
 
 
 def graded_size(where: np.ndarray, sources: np.ndarray, sizes: np.ndarray,
                 sizing: Sizing) -> np.ndarray:
-    """Wanted element size (um) at points (K, 2): it grows from the sizes (M,) at the sources (M, 2)
-    up to the largest."""
+    """Element size (um) at points (K, 2).
+
+    It grows from the sizes (M,) at the sources (M, 2) up to the largest.
+    """
     if len(sources) == 0:
         return np.full(len(where), sizing.largest)
     parts = max(1, len(where) * len(sources) // DISTANCES)
-    wanted = [_nearest_size(part, sources, sizes, sizing) for part in np.array_split(where, parts)]
-    return np.minimum(sizing.largest, np.concatenate(wanted))
+    grown = [_nearest_size(part, sources, sizes, sizing) for part in np.array_split(where, parts)]
+    return np.minimum(sizing.largest, np.concatenate(grown))
 
 
 def _nearest_size(where: np.ndarray, sources: np.ndarray, sizes: np.ndarray,
@@ -161,11 +161,11 @@ def _nearest_size(where: np.ndarray, sources: np.ndarray, sizes: np.ndarray,
 
 
 def split(outline: Outline, sizing: Sizing) -> Outline:
-    """The same curve with corners spaced as :func:`interface_sizes` asks for.
+    """The same curve with corners spaced by :func:`interface_sizes`.
 
     Interface edges are split into equal parts, which changes neither shape nor area, and never
-    merged. Contact surfaces are straight, so their nodes are placed anew, but for their ends and
-    the fixed points.
+    merged. Contact surfaces are straight, so all their nodes except ends and fixed points are
+    placed anew.
     """
     polygon = outline.corners
     sizes = interface_sizes(polygon, sizing)
@@ -182,10 +182,10 @@ def split(outline: Outline, sizing: Sizing) -> Outline:
     return placed(outline, np.concatenate(edges), np.concatenate(t), sizing.seed)
 
 
-def halved(outline: Outline, which: np.ndarray) -> Outline:
-    """The same curve with some of its arcs, ``which`` (arcs,), cut at their middles."""
-    parts = np.where(which, 4, 2)
-    arc = np.repeat(np.arange(len(which)), parts)
+def halved(outline: Outline, cut: np.ndarray) -> Outline:
+    """The same curve with some of its arcs, ``cut`` (arcs,), cut at their middles."""
+    parts = np.where(cut, 4, 2)
+    arc = np.repeat(np.arange(len(cut)), parts)
     first = np.cumsum(parts) - parts
     return placed(outline, arc, (np.arange(len(arc)) - first[arc]) / parts[arc])
 
@@ -201,10 +201,10 @@ def runs(outline: Outline) -> list[tuple[int, int]]:
 
 
 def split_count(outline: Outline, keep: np.ndarray, sizes: np.ndarray) -> int:
-    """How many parts the edge between the two nodes ``keep`` needs for sizes (M,) um."""
+    """Number of parts of the edge between the two nodes ``keep``, for sizes (M,) um."""
     length = np.linalg.norm(outline.points[keep[1]] - outline.points[keep[0]])
-    wanted = 0.5 * (sizes[keep[0]] + sizes[keep[1]])
-    return max(1, int(np.ceil(length / (SPLIT * wanted))))
+    size = 0.5 * (sizes[keep[0]] + sizes[keep[1]])
+    return max(1, int(np.ceil(length / (SPLIT * size))))
 
 
 def _on_the_wall(outline: Outline, keep: np.ndarray, sizes: np.ndarray,
@@ -240,7 +240,7 @@ def placed(outline: Outline, edge: np.ndarray, t: np.ndarray, seed: float | None
     """New nodes (K,), each at t in [0, 1) of an edge: where t is zero the edge's own first corner.
 
     seed: as that of :class:`Sizing`. Places at t = 0 between two nodes of the seed's arc lie on
-    that arc: a straight edge of today's outline was round at t = 0, and what the material remembers
+    that arc: a straight edge of the present outline was round at t = 0, and the elastic stress
     makes it round again at the next update.
     """
     first = t == 0
@@ -263,19 +263,19 @@ def _on_arc(places: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.nda
     """Places (K, 2) between two points each, moved to the arc around the origin where both points
     are equally far from it."""
     radius = np.hypot(*first.T)
-    now = np.hypot(*places.T)
+    distance = np.hypot(*places.T)
     arc = np.isclose(radius, np.hypot(*second.T), rtol=1e-9, atol=0) & (places[:, 1] > 0)
-    return places * np.where(arc, radius / np.where(arc, now, 1.0), 1.0)[:, None]
+    return places * np.where(arc, radius / np.where(arc, distance, 1.0), 1.0)[:, None]
 
 
 def graded_line(start: ArrayLike, end: ArrayLike, sources: np.ndarray, sizes: np.ndarray,
                 sizing: Sizing) -> np.ndarray:
-    """(K, 2) nodes from start to end, spaced as :func:`graded_size` asks; both ends included."""
+    """(K, 2) nodes from start to end, spaced by :func:`graded_size`; both ends included."""
     first = np.asarray(start, float)
     way = np.asarray(end, float) - first
     s = np.linspace(0.0, 1.0, 401)
-    wanted = graded_size(first + s[:, None] * way, sources, sizes, sizing)
-    density = np.linalg.norm(way) / wanted
+    size = graded_size(first + s[:, None] * way, sources, sizes, sizing)
+    density = np.linalg.norm(way) / size
     count = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(s))])
     parts = max(1, int(np.ceil(count[-1] - 0.3)))
     t = np.interp(np.linspace(0.0, count[-1], parts + 1), count, s)

@@ -2,8 +2,8 @@
 
 Every integral of a weak form is a sum over quadrature points; element matrices are those that
 scikit-fem's assembly gives with the same quadrature. The reaction of the substrates is taken in the
-points of a :class:`Reaction`: all quadrature points of the biomass, or, with linear functions, the
-nodes alone (lumped, as the paper has it).
+points of a :class:`Reaction`: all quadrature points of the biomass, or the nodes for linear
+functions (lumped, as in the paper).
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class Space:
 
     @property
     def count(self) -> int:
-        """How many nodes."""
+        """Number of nodes."""
         return self.dofs.count
 
     @cached_property
@@ -96,7 +96,7 @@ class Space:
 
     @cached_property
     def reaction(self) -> Reaction:
-        """The points of the biomass in which uptake and growth are taken."""
+        """The points of the biomass at which uptake and growth are integrated."""
         biomass = self.mesh.biomass
         if self.order > 1:
             return Reaction(self.cells[biomass], self.table.values, self.at.dx[biomass])
@@ -119,18 +119,18 @@ class Space:
         if self.order == self.mesh.geometry:
             return field
         up = elements.values(self.mesh.geometry, elements.nodes(self.order))
-        found = np.empty((self.count, *field.shape[1:]))
-        found[self.cells] = np.einsum("ab,tb...->ta...", up, field[self.mesh.cells])
-        return found
+        all_values = np.empty((self.count, *field.shape[1:]))
+        all_values[self.cells] = np.einsum("ab,tb...->ta...", up, field[self.mesh.cells])
+        return all_values
 
     def to_mesh(self, field: np.ndarray) -> np.ndarray:
         """(N, ...) at the mesh's own nodes of a field (count, ...)."""
         if self.order == self.mesh.geometry:
             return field
         down = elements.values(self.order, elements.nodes(self.mesh.geometry))
-        found = np.empty((len(self.mesh.points), *field.shape[1:]))
-        found[self.mesh.cells] = np.einsum("ab,tb...->ta...", down, field[self.cells])
-        return found
+        nodal = np.empty((len(self.mesh.points), *field.shape[1:]))
+        nodal[self.mesh.cells] = np.einsum("ab,tb...->ta...", down, field[self.cells])
+        return nodal
 
     def at_points(self, field: np.ndarray) -> np.ndarray:
         """(..., T, q) fields (..., count) at the quadrature points."""

@@ -1,8 +1,8 @@
-"""Fields from one mesh to another (3.5, [E8]).
+"""Transfer of fields from one mesh to another (3.5, [E8]).
 
-Interpolation: where a place lies in the old triangles, straight or curved, and what a field of any
-order is there. It is the paper's transfer, and drifts. The conserving transfer of linear fields is
-the Galerkin projection
+Interpolation evaluates a field of any order at points in the old triangles, straight or curved. It
+is the paper's transfer, and drifts. The conserving transfer of linear fields is the Galerkin
+projection
 
     (X_new, N_i) = (X_old, N_i)  for every new N_i,
 
@@ -40,31 +40,31 @@ OVERSHOOT = 1e-14
 NEWTON_STEPS = 12
 #: The last step of it, after which the error is the square of this, on the unit triangle.
 CLOSE = 1e-8
-#: A triangle's map to t = 0 is taken as folded where its determinant falls under this part of its
+#: A triangle's map to t = 0 counts as folded where its determinant is below this part of its
 #: largest.
 FOLD = 0.02
 
 
 @dataclass(frozen=True, eq=False)
 class Located:
-    """Places in old triangles. triangle: (K,) which; local: (K, 2) on the unit triangle."""
+    """Points in old triangles. triangle: (K,) numbers; local: (K, 2) on the unit triangle."""
 
     triangle: np.ndarray
     local: np.ndarray
 
     def field(self, values: np.ndarray, cells: np.ndarray, order: int) -> np.ndarray:
-        """(K, ...) there of values (N, ...) at the nodes (T, k) of functions of an order."""
+        """(K, ...) field at these points, from values (N, ...) at nodes (T, k) of an order."""
         weights = elements.values(order, self.local)
         return np.einsum("ka,ka...->k...", weights, values[cells[self.triangle]])
 
 
 @timed("transfer")
 def located(points: np.ndarray, cells: np.ndarray, where: np.ndarray) -> Located:
-    """Places (K, 2) um in triangles (T, 3 or 6).
+    """Locate points (K, 2) um in triangles (T, 3 or 6).
 
-    Newton's method on x(s, t) in every triangle whose box holds the place; the one in which it lies
-    deepest is taken. A place a little outside is moved to the edge of the nearest triangle. Raises
-    TransferError where a place is far from all of them.
+    Newton's method solves x(s, t) in every triangle whose box contains the point, and the triangle
+    in which the point lies deepest is chosen. A point slightly outside moves to the edge of the
+    nearest triangle. Raises TransferError if a point is far from all triangles.
     """
     geometry = 1 if cells.shape[1] == 3 else 2
     nodes = points[cells]
@@ -83,24 +83,26 @@ def located(points: np.ndarray, cells: np.ndarray, where: np.ndarray) -> Located
 
 
 def _inverted(nodes: np.ndarray, where: np.ndarray, geometry: int) -> np.ndarray:
-    """(K, 2) on the unit triangle of places (K, 2) in triangles (K, g, 2); far outside where
-    Newton's method does not converge."""
+    """(K, 2) on the unit triangle of points (K, 2) in triangles (K, g, 2).
+
+    Where Newton's method does not converge, the result is far outside.
+    """
     if geometry == 1:
         return barycentric(nodes, where)[:, 1:]
     local = np.clip(barycentric(nodes[:, :3], where)[:, 1:], -2.0, 3.0)
     rest = np.arange(len(where))
     for _ in range(NEWTON_STEPS):
-        now = local[rest]
-        there = nodes[rest]
-        values, slopes = elements.evaluated(2, now)
-        apart = (values[:, None] @ there)[:, 0] - where[rest]
-        J = np.swapaxes(there, 1, 2) @ slopes
+        guess = local[rest]
+        corners = nodes[rest]
+        values, slopes = elements.evaluated(2, guess)
+        apart = (values[:, None] @ corners)[:, 0] - where[rest]
+        J = np.swapaxes(corners, 1, 2) @ slopes
         det = elements.determinant(J)
         det = np.where(np.abs(det) > 1e-12 * np.abs(det).max(), det, np.inf)
         ds = J[:, 1, 1] * apart[:, 0] - J[:, 0, 1] * apart[:, 1]
         dt = J[:, 0, 0] * apart[:, 1] - J[:, 1, 0] * apart[:, 0]
         step = np.stack([ds, dt], axis=1) / det[:, None]
-        local[rest] = np.clip(now - step, -2.0, 3.0)
+        local[rest] = np.clip(guess - step, -2.0, 3.0)
         rest = rest[np.abs(step).max(axis=1) >= CLOSE]
         if len(rest) == 0:
             break
@@ -110,7 +112,7 @@ def _inverted(nodes: np.ndarray, where: np.ndarray, geometry: int) -> np.ndarray
 
 
 def _inside(local: np.ndarray) -> np.ndarray:
-    """Places on the unit triangle, those outside moved to its edge."""
+    """Points on the unit triangle; those outside move to its edge."""
     L = np.clip(elements.values(1, local), 0.0, None)
     s, t = (L / L.sum(axis=1, keepdims=True))[:, 1:].T
     return np.column_stack([s, np.minimum(t, 1 - s)])  # 1 - s - t is not negative to the last bit
@@ -137,14 +139,16 @@ def interpolate(points: np.ndarray, cells: np.ndarray, fields: np.ndarray,
 
 def interpolated(points: np.ndarray, triangles: np.ndarray, fields: np.ndarray,
                  new_points: np.ndarray, new_triangles: np.ndarray) -> np.ndarray:
-    """(K, m) of linear fields (N, m) at the nodes of another mesh, called as :func:`project` is."""
+    """(K, m) linear fields (N, m) at the nodes of another mesh; arguments of :func:`project`."""
     return interpolate(points, triangles, fields, new_points)
 
 
 def unfolded(mesh: Mesh, origin: np.ndarray) -> np.ndarray:
-    """Places at t = 0 (N, 2) um that no triangle of the aggregate turns over: where the
-    interpolated ones would, middles go half way between their corners. Raises OriginFolded where
-    that is not enough."""
+    """Coordinates at t = 0 (N, 2) um for which no triangle of the aggregate is turned over.
+
+    In a triangle that is turned over, middles move half way between their corners. Raises
+    OriginFolded if that does not suffice.
+    """
     cells = mesh.cells[mesh.biomass]
     bends = checked_bends(mesh.geometry)
     for _ in range(3):
@@ -197,16 +201,16 @@ def clip(polygons: np.ndarray, windows: np.ndarray) -> np.ndarray:
         part = np.where(crosses, depth, 0.0) / np.where(crosses, depth - depth_after, 1.0)
         crossing = polygons + part[..., None] * (after - polygons)
         both = np.stack([polygons, crossing], axis=2).reshape(len(polygons), -1, 2)
-        kept = np.stack([depth >= 0, crosses], axis=2).reshape(len(polygons), -1)
-        polygons = _packed(both, kept)
+        mask = np.stack([depth >= 0, crosses], axis=2).reshape(len(polygons), -1)
+        polygons = _packed(both, mask)
     return polygons
 
 
-def _packed(points: np.ndarray, kept: np.ndarray) -> np.ndarray:
-    """(p, room, 2) the kept ones of points (p, k, 2), in order, then the first of them repeated."""
-    count = kept.sum(axis=1)[:, None]
+def _packed(points: np.ndarray, mask: np.ndarray) -> np.ndarray:
+    """(p, room, 2) points (p, k, 2) selected by ``mask``, in order, padded with the first one."""
+    count = mask.sum(axis=1)[:, None]
     room = max(3, int(count.max(initial=0)))
-    front = np.argsort(~kept, axis=1, kind="stable")[:, :room]
+    front = np.argsort(~mask, axis=1, kind="stable")[:, :room]
     chosen = np.where(np.arange(room) < count, front, front[:, :1])
     return np.take_along_axis(points, chosen[..., None], axis=1)
 
@@ -224,28 +228,30 @@ def project(points: np.ndarray, triangles: np.ndarray, fields: np.ndarray,
 
 def project_bounded(points: np.ndarray, triangles: np.ndarray, fields: np.ndarray,
                     new_points: np.ndarray, new_triangles: np.ndarray) -> np.ndarray:
-    """As :func:`project`, each field limited at each node by its old values around that node."""
+    """Like :func:`project`, with each field bounded at a node by its old values around the node."""
     pieces = _pieces(points, triangles, new_points, new_triangles)
     right = _loads(pieces, points, triangles, fields, new_points, new_triangles)
-    found = _solve_mass(new_points, new_triangles, right)
+    projected = _solve_mass(new_points, new_triangles, right)
     lowest, highest = _bounds(pieces, triangles, fields, new_triangles)
     areas = triangle_areas(new_points, new_triangles)
     lumped = np.bincount(new_triangles.ravel(), np.repeat(areas / 3, 3), len(new_points))
     ends, coupling = _edges(new_triangles, areas)
     for column, (least, most) in enumerate(zip(lowest.T, highest.T)):
         room = OVERSHOOT * np.abs(fields[:, column]).max()
-        if (found[:, column] < least - room).any() or (found[:, column] > most + room).any():
-            flux = coupling * (found[ends[:, 0], column] - found[ends[:, 1], column])
-            found[:, column] = _limited(right[:, column] / lumped, lumped, ends, flux, least, most)
-        found[:, column] = np.clip(found[:, column], least, most)  # round-off
-    return found
+        values = projected[:, column]
+        if (values < least - room).any() or (values > most + room).any():
+            flux = coupling * (projected[ends[:, 0], column] - projected[ends[:, 1], column])
+            mean = right[:, column] / lumped
+            projected[:, column] = _limited(mean, lumped, ends, flux, least, most)
+        projected[:, column] = np.clip(projected[:, column], least, most)  # round-off
+    return projected
 
 
 def _edges(triangles: np.ndarray, areas: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(e, 2) nodes of every edge, and (e,) the entry of the mass matrix that couples them, um2."""
     pairs = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)
-    ends, which = np.unique(np.sort(pairs, axis=1), axis=0, return_inverse=True)
-    return ends, np.bincount(which.ravel(), np.repeat(areas / 12, 3), len(ends))
+    ends, edge_numbers = np.unique(np.sort(pairs, axis=1), axis=0, return_inverse=True)
+    return ends, np.bincount(edge_numbers.ravel(), np.repeat(areas / 12, 3), len(ends))
 
 
 def _bounds(pieces: Pieces, triangles: np.ndarray, fields: np.ndarray,
@@ -291,7 +297,7 @@ class Pieces:
 
 def _pieces(points: np.ndarray, triangles: np.ndarray, new_points: np.ndarray,
             new_triangles: np.ndarray) -> Pieces:
-    """Raises NotCovered where the two meshes do not cover the same area."""
+    """Raise NotCovered if the two meshes do not cover the same area."""
     corners, old, new = supermesh(points, triangles, new_points, new_triangles)
     edge = corners[:, 1:] - corners[:, :1]
     area = 0.5 * np.abs(edge[:, 0, 0] * edge[:, 1, 1] - edge[:, 0, 1] * edge[:, 1, 0])

@@ -1,2 +1,1 @@
-"""When steps are made: the paper's updates, the midpoint rule with error control, and the loop of
-both."""
+"""Time stepping: the paper's updates, the midpoint rule with error control, and their loop."""

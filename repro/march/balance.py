@@ -1,9 +1,9 @@
-"""Defects of the balances of a step, and which of them end the run.
+"""Defects of the mass balances of a step, and the check that ends a run.
 
-Defects are relative. A positive one means that too much was supplied or made. Where the amounts
-themselves are of the size of round-off, the defect is relative to a floor instead: the amount of
-which round-off is the part LARGEST. Apart from the stated exceptions of :func:`refuse`, a step
-closes to round-off; any other defect is an error of the code or of its use.
+Defects are relative. A positive defect means that too much was supplied or made. If the amounts
+are of the size of round-off, the defect is relative to a floor: round-off divided by LARGEST.
+Apart from the exceptions that :func:`refuse` states, a step closes to round-off; any other defect
+is an error of the code or of its use.
 """
 
 from __future__ import annotations
@@ -21,72 +21,72 @@ from repro.scene import Kinetics, Scene, needed
 if TYPE_CHECKING:
     from repro.march.loop import Ledger
 
-#: Largest defect that is accepted.
+#: Largest accepted defect.
 LARGEST = 1e-6
-#: Of the oxygen demand with Gear's method, which takes growth and uptake by formulas of their own,
-#: over what the biomass could turn over in the step.
+#: Largest accepted defect of the oxygen demand with Gear's method, which integrates growth and
+#: uptake separately, over the largest turnover of the biomass in the step.
 GEAR = 1e-3
-#: Relative to a mass, a bound of the round-off in the difference of two. Pairwise summation in
+#: Bound of the round-off in the difference of two masses, relative to a mass. Pairwise summation in
 #: blocks of 128 in 8 lanes errs by (16 + log2(n / 128)) eps at most, less than 40 eps for any mesh;
-#: a difference has two sums of X_A and two of X_I, and so up to 4e-14.
+#: a difference has two sums of X_A and two of X_I, and so errs by up to 4e-14.
 ROUND_OFF = 1e-13
 
 
 def defect(supplied: float, out: float, consumed: float, stored: float = 0.0,
            room: float = 0.0) -> float:
-    """(in - out - consumed - stored) over the largest of what comes in, what is consumed, and
-    ``room``; zero where that is zero."""
+    """(supplied - out - consumed - stored) / max(abs(supplied), consumed, room), or zero."""
     scale = max(abs(supplied), consumed, room)
     return (supplied - out - consumed - stored) / scale if scale else 0.0
 
 
 def floor(problem: Problem, k: int, supply: float) -> float:
-    """The flux (um2 mg/L/h) of which round-off is the part LARGEST, of the acceptor (k = 0) or the
-    donor (1): eps over LARGEST of the sum of the sizes of all terms of its equations, at a supply
-    (mg/L)."""
+    """Flux (um2 mg/L/h) that is round-off over LARGEST, of the acceptor (k = 0) or the donor (1).
+
+    Round-off is eps times the sum of the magnitudes of all terms of its equations at a supply
+    (mg/L).
+    """
     n = problem.space.count
-    own = problem.magnitude.data[slice(*problem.magnitude.indptr[[k * n, k * n + n]])]
-    return float(np.finfo(float).eps / LARGEST * supply * own.sum())
+    terms = problem.magnitude.data[slice(*problem.magnitude.indptr[[k * n, k * n + n]])]
+    return float(np.finfo(float).eps / LARGEST * supply * terms.sum())
 
 
 def substrate(ledger: Ledger, k: int, room: float = 0.0) -> float:
-    """Of the acceptor (k = 0) or the donor (1)."""
+    """Relative defect of the acceptor (k = 0) or the donor (1)."""
     return defect(ledger.supplied[k], ledger.out[k], ledger.consumed[k], ledger.stored[k], room)
 
 
 def biomass(ledger: Ledger) -> float:
-    """After less before less made, over after."""
-    lacking = ledger.biomass_after - ledger.biomass_before - ledger.biomass_made
-    return lacking / ledger.biomass_after
+    """Relative defect of the biomass: (after - before - made) / after."""
+    missing = ledger.biomass_after - ledger.biomass_before - ledger.biomass_made
+    return missing / ledger.biomass_after
 
 
 def demand_terms(kinetics: Kinetics, ledger: Ledger) -> tuple[float, float]:
-    """Y donor, and (acceptor - F donor) / d_c, of what was consumed (7)-(10): what the donor makes
-    and what decays, um2 mg/L."""
+    """Biomass grown and decayed, um2 mg/L, from the consumed substrates (7)-(10): Y donor, and
+    (acceptor - F donor) / d_c."""
     acceptor, donor = ledger.consumed
     return (kinetics.yield_coefficient * donor,
             (acceptor - kinetics.acceptor_to_donor_ratio * donor) / kinetics.decay_oxygen_demand)
 
 
 def demand_scale(kinetics: Kinetics, ledger: Ledger) -> float:
-    """The larger of :func:`demand_terms`, um2 mg/L; at least the amount of which the round-off of a
-    difference of two masses is the part LARGEST."""
+    """The larger of :func:`demand_terms`, um2 mg/L; at least ROUND_OFF / LARGEST of the biomass."""
     floor = ROUND_OFF / LARGEST * ledger.biomass_before
     return max(*map(abs, demand_terms(kinetics, ledger)), floor)
 
 
 def oxygen_demand(kinetics: Kinetics, ledger: Ledger) -> float:
-    """(made - grown + decayed) / :func:`demand_scale`."""
+    """Relative defect of the oxygen demand: (made - grown + decayed) / :func:`demand_scale`."""
     grown, decayed = demand_terms(kinetics, ledger)
     return (ledger.biomass_made - grown + decayed) / demand_scale(kinetics, ledger)
 
 
 def refuse(scene: Scene, after: Pore, ledger: Ledger) -> None:
-    """Raises BalanceError where a step that ends in ``after`` lacks more than LARGEST.
+    """Raise BalanceError if a defect of the step that ends in ``after`` is larger than LARGEST.
 
-    But for stated defects, which are shown as they are: substrates with numerics.inlet = "mean"
-    [E4], biomass with numerics.transfer = "linear" [E8], and the oxygen demand in the paper's
-    updates, see :func:`accepted_demand`.
+    Some options have known defects, which are reported and not refused: the substrates with
+    numerics.inlet = "mean" [E4] and the biomass with numerics.transfer = "linear" [E8]. The oxygen
+    demand has the limit of :func:`accepted_demand`.
     """
     numerics = scene.numerics
     defects = {}
@@ -101,22 +101,22 @@ def refuse(scene: Scene, after: Pore, ledger: Ledger) -> None:
     if not abs(demand) <= accepted_demand(scene, ledger):
         wrong["oxygen demand"] = demand
     if wrong:
-        told = ", ".join(f"{part:.2g} of the {name}" for name, part in wrong.items())
+        message = ", ".join(f"{part:.2g} of the {name}" for name, part in wrong.items())
         first, last = after.mesh.ends
         raise BalanceError(f"the step to t = {ledger.end:g} h does not balance between x = "
-                           f"{first:.4g} and {last:.4g} um: it lacks {told}; try a shorter "
+                           f"{first:.4g} and {last:.4g} um: it lacks {message}; try a shorter "
                            "growth.time_step or a larger numerics.refinement, and report it")
 
 
 def accepted_demand(scene: Scene, ledger: Ledger) -> float:
-    """The largest defect of the oxygen demand that is accepted of a step.
+    """Largest accepted defect of the oxygen demand in a step.
 
     The midpoint rule closes to round-off. In the paper's updates the trapezoidal rule errs by (dt
-    times the fastest rate, k Y + b)^2 / 12 of what is turned over, 1e-3 in a step of base, where
-    2e-4 at most is measured (of 132 random scenes the worst came to a tenth of it). Gear's method
-    controls concentrations to GEAR of the supply, and m(C) then errs by GEAR supply / K
-    at most, where a substrate runs out. The accepted defect is that part of what the biomass could
-    turn over at the fastest rate, GEAR at least (measured away from exhaustion: 4e-4 at most).
+    times the fastest rate, k Y + b)^2 / 12 of the turnover: 1e-3 in a step of base, where at most
+    2e-4 is measured (a tenth of the bound in the worst of 132 random scenes). Gear's method
+    controls concentrations to GEAR of the supply. Where a substrate runs out, m(C) then errs by at
+    most GEAR supply / K. The accepted defect is this part, and at least GEAR, of the turnover at
+    the fastest rate (away from exhaustion at most 4e-4 is measured).
     """
     if scene.numerics.time == "midpoint":
         return LARGEST
@@ -131,7 +131,7 @@ def accepted_demand(scene: Scene, ledger: Ledger) -> float:
 
 
 def _steepness(scene: Scene) -> float:
-    """Change of m_A and m_D for a change of both concentrations by their supplies, one at least."""
+    """Change of m_A + m_D for a change of both concentrations by their supplies; at least one."""
     both = needed(scene.substrates, "[substrates]")
     laws = uptake_law(both, needed(scene.kinetics, "[kinetics]"))
     supplies = both.acceptor.supply, both.donor.supply
@@ -139,7 +139,7 @@ def _steepness(scene: Scene) -> float:
 
 
 def _turned_over(kinetics: Kinetics, ledger: Ledger) -> float:
-    """Oxygen demand of all that is consumed and made, as biomass, um2 mg/L."""
+    """Turnover in a step, as biomass, um2 mg/L: the sum of all terms of its oxygen demand."""
     acceptor, donor = ledger.consumed
     demand = kinetics.decay_oxygen_demand
     of_donor = kinetics.acceptor_to_donor_ratio / demand + kinetics.yield_coefficient
@@ -147,8 +147,10 @@ def _turned_over(kinetics: Kinetics, ledger: Ledger) -> float:
 
 
 def _exchanged(scene: Scene, after: Pore, ledger: Ledger, k: int) -> float:
-    """What a supply brings about besides its flow, um2 mg/L: diffusion in a step, which the defect
-    is small against where the flow is slow, and with Gear's method what the meshed part holds."""
+    """Amount exchanged besides the flow, um2 mg/L, against which the defect is small.
+
+    It is the diffusion in a step, and with Gear's method at least the content of the mesh.
+    """
     both = needed(scene.substrates, "[substrates]")
     kind = (both.acceptor, both.donor)[k]
     fastest = max(kind.diffusivity, kind.diffusivity_in_aggregate)

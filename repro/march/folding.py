@@ -1,8 +1,8 @@
-"""Where the aggregate's surface folds, which is the model's own end, and no failure.
+"""Folding of the aggregate's surface: an end of the model, and no failure.
 
-See :mod:`repro.model.surface`. A step that ends below Biot's limit is not taken. A step for which
-no smooth equilibrium exists fails like any other; where the surface can crease already, that is
-what the failure means.
+See :mod:`repro.model.surface`. A step that ends below Biot's limit is rejected. A step without a
+smooth equilibrium fails like any other step. If the surface can crease already, the failure is
+reported as a fold.
 """
 
 from __future__ import annotations
@@ -15,50 +15,66 @@ from repro.model.pore import Pore
 from repro.model.surface import BIOT, CREASE, surface
 from repro.scene import Scene, needed
 
-#: Where no equilibrium exists and the last stretch is below this, the surface folds. Meshes of two
+#: The surface folds if no equilibrium exists and the last stretch is below this. Meshes of two
 #: presets and refinements stop at 0.64 to 0.66 (docs/design.md): a crease begins within a step.
 CREASING = 0.68
-#: The least and the largest density of a node over X_m in a shape that counts as smooth.
+#: Accepted range of the density at a node, over X_m.
 DENSITIES = 0.5, 2.0
 
 
 class Fold(RunEnd):
-    """The aggregate's surface folds: no smooth equilibrium is left."""
+    """The aggregate's surface folds: the model has no smooth equilibrium any more.
+
+    :func:`repro.simulate` raises it after the last Report. It is an end of the model, and no
+    failure: the message names the time (h), the coordinates (um) of the fold, and the elastic
+    stretch of the surface there. :class:`repro.PoreEnd` is the other early end of a run.
+
+    Examples
+    --------
+    >>> import repro
+    >>> reports = repro.simulate(repro.load_scene("base", ['growth.end="1 h"']))
+    >>> try:
+    ...     times = [report.pore.time for report in reports]
+    ... except (repro.Fold, repro.PoreEnd) as end:
+    ...     print(f"the run ends early: {end}")
+    """
 
 
-def refuse_fold(now: Pore, expanded: Pore) -> None:
-    """Raises Fold where a step from ``now`` ends below Biot's limit."""
+def refuse_fold(previous: Pore, expanded: Pore) -> None:
+    """Raise Fold if a step from ``previous`` ends below Biot's limit."""
     if surface(expanded).least < BIOT:
-        raise Fold(_message(expanded, now.time))
+        raise Fold(_message(expanded, previous.time))
 
 
 @contextmanager
-def folding(now: Pore, time: float) -> Iterator[None]:
-    """A step from ``now`` that has no equilibrium is a Fold where the surface can crease; time: h,
-    of the last row or step."""
+def folding(pore: Pore, time: float) -> Iterator[None]:
+    """Raise Fold if a step from ``pore`` has no equilibrium and the surface can crease.
+
+    time: h, of the last row or step.
+    """
     try:
         yield
     except (GrowthError, MeshError) as error:
-        if now.outline is None or surface(now).least >= CREASING:
+        if pore.outline is None or surface(pore).least >= CREASING:
             raise
-        raise Fold(_message(now, time)) from error
+        raise Fold(_message(pore, time)) from error
 
 
-def _message(now: Pore, time: float) -> str:
-    """How a run ends that comes as far as ``time`` (h); stretch and place are of ``now``."""
-    found = surface(now)
-    x, y = found.place
+def _message(pore: Pore, time: float) -> str:
+    """Message of the Fold in the step from ``time`` (h), with the least stretch of ``pore``."""
+    stretched = surface(pore)
+    x, y = stretched.place
     return (f"the aggregate's surface folds in the step from t = {time:g} h: near x = {x:.4g}, "
-            f"y = {y:.4g} um growth compresses it to an elastic stretch of {found.least:.3f}; it "
-            f"creases from {CREASE:g} on and is unstable to all waves below {BIOT:g}, so that the "
-            "model has no smooth shape any more; a finer mesh does not help, "
+            f"y = {y:.4g} um growth compresses it to an elastic stretch of {stretched.least:.3f}; "
+            f"it creases from {CREASE:g} on and is unstable to all waves below {BIOT:g}, so that "
+            "the model has no smooth shape any more; a finer mesh does not help, "
             'growth.new_biomass = "stress_free" does')
 
 
-def refuse_density(scene: Scene, now: Pore) -> None:
-    """Raises GrowthError where the density of a node is out of bounds: J = theta is lost there."""
+def refuse_density(scene: Scene, pore: Pore) -> None:
+    """Raise GrowthError if the density at a node is out of bounds: J = theta does not hold."""
     maximum = needed(scene.kinetics, "[kinetics]").maximum_density
-    _, least, largest = now.composition(maximum)
+    _, least, largest = pore.composition(maximum)
     low, high = DENSITIES
     if least < low or largest > high:
         raise GrowthError(f"the density of biomass comes to {least:.2g} to {largest:.2g} X_m, out "

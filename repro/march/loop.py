@@ -1,10 +1,10 @@
-"""The one loop of steps of every scheme, and the state from which it goes on bit for bit.
+"""The loop of steps of every scheme, and the state from which it restarts bit for bit.
 
-Steps, to the last bit, depend neither on which rows are asked for nor on when the run ends. A row
-between two steps is made of the step that passes it, and nothing goes on from it. Where
-``growth.end`` lies within a step, that one is cut there, rows before the end are still those of the
-whole step, and the ledger closes like the others; a run to a later end goes on from the state
-before it.
+Steps depend neither on the requested rows nor on the end of the run, to the last bit. A row between
+two steps is interpolated in the step that passes it, and no step starts from it. If ``growth.end``
+lies within a step, that step is cut there. Rows before the end still belong to the uncut step, and
+the ledger of the cut step closes like the others. A run to a later end restarts from the state
+before the cut step.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from repro.fem.brief import brief
 from repro.fem.sizing import ACROSS_PORE
 from repro.march import balance
 from repro.march.folding import folding, refuse_density
-from repro.march.pace import Pace
-from repro.model.advice import advised
+from repro.march.step_control import StepControl
+from repro.model.advice import with_advice
 from repro.model.pore import Pore, Solved, seeded
-from repro.model.remeshing import resolved
+from repro.model.remeshing import solve_graded
 from repro.scene import Scene, needed
 
 
@@ -37,13 +37,13 @@ class Dataclass(Protocol):
 
 Data = TypeVar("Data", bound=Dataclass)
 
-#: A step of the grid this close (h) to a reported time is that time.
+#: Two times (h) this close are the same time.
 SAME_TIME = 1e-9
 
 
 @dataclass(frozen=True)
 class Ledger:
-    """Mass balance of one step per depth (um2 mg/L = 1e-12 g/m): both substrates, then biomass."""
+    """Mass balance of one step per unit depth (um2 mg/L = 1e-12 g/m): substrates, then biomass."""
 
     start: float
     end: float
@@ -58,12 +58,24 @@ class Ledger:
 
 @brief
 @dataclass(frozen=True, eq=False)
-class Instant:
-    """The pore at ``pore.time`` with what is solved in its geometry, and how it came there.
+class Report:
+    """State of the pore at a reported time, for one row of results.
 
-    before: the pore and its solution at the end of the last step, grown but not yet expanded
-    (Plate 1), None at t = 0 and where the step that follows cannot be made; ledgers, remeshes,
-    iterations: of the steps that ended since the last instant.
+    Attributes
+    ----------
+    pore : Pore
+        Pore at the reported time ``pore.time`` (h).
+    solved : Solved
+        Flow and substrates in the geometry of ``pore``.
+    before : (Pore, Solved) or None
+        Pore and solution at the end of the last step, grown but not yet expanded (Plate 1). None
+        at t = 0, and if the next step fails.
+    ledgers : tuple of Ledger
+        Mass balances of the steps since the last report.
+    remeshes : int
+        Number of new meshes since the last report.
+    iterations : dict of str to int
+        Newton iterations since the last report, by stage.
     """
 
     pore: Pore
@@ -75,8 +87,8 @@ class Instant:
 
 
 @dataclass(frozen=True, eq=False)
-class Moment:
-    """The pore at a time within a step, what is solved there, and both before it expanded."""
+class InterpolatedState:
+    """Pore and solution interpolated within a step; ``before``: both, not yet expanded."""
 
     pore: Pore
     solved: Solved
@@ -84,30 +96,32 @@ class Moment:
 
 
 @dataclass(frozen=True, eq=False)
-class Step:
-    """What one step made: the new pore, the pore and its solution before it expanded, the ledger
-    and counts; and how it comes to any time (h) within it."""
+class StepResult:
+    """Result of one step: the new pore, the pore and its solution before it expanded, and ledger.
+
+    within: interpolates the state to a time (h) within the step.
+    """
 
     pore: Pore
     before: tuple[Pore, Solved] | None
     ledger: Ledger
     remeshed: bool
     iterations: int
-    within: Callable[[float], Moment] | None = None
+    within: Callable[[float], InterpolatedState] | None = None
 
 
 @brief
 @dataclass(frozen=True, eq=False)
-class State:
-    """All that a run goes on from after a step.
+class RestartState:
+    """Complete state from which a run restarts after a step.
 
-    pore: as the step left it, with the guess from which its substrates are solved; pace: of the
-    step to try next; ledgers, remeshes, iterations: of the steps since the last Instant; row: time
-    (h) of that Instant, later than the pore's where it lies within the step that follows.
+    pore: pore after the step, with the initial guess of its substrates; step_control: of the next
+    step; ledgers, remeshes, iterations: of the steps since the last Report; row: time (h) of that
+    Report, later than ``pore.time`` if it lies within the next step.
     """
 
     pore: Pore
-    pace: Pace
+    step_control: StepControl
     ledgers: tuple[Ledger, ...] = ()
     remeshes: int = 0
     iterations: dict[str, int] = field(default_factory=dict)
@@ -115,82 +129,98 @@ class State:
 
     @property
     def time(self) -> float:
-        """How far the run has come, h."""
+        """Simulated time (h) that the run has reached."""
         return max(self.pore.time, self.row)
 
 
 @dataclass(frozen=True)
 class Scheme:
-    """What the loop needs of a way to make steps.
+    """Time-stepping scheme.
 
-    advance(scene, pore, solved, pace): one step that growth.end has no part in, nor have rows, or
-    the one that is cut there, as (Step, what is solved after it, pace of the next);
-    rows(scene): times (h) of rows where there are no ``output.times``, beside the ends of steps;
-    first: length of the first step that is tried, in parts of growth.time_step; ends(scene): times
-    (h) at which steps end, those that are known beforehand.
+    advance(scene, pore, solved, step_control): makes one step, and returns its StepResult, the
+    solution after it and the step control of the next one. The length of the step does not depend
+    on ``growth.end`` or on the requested rows; a step that passes ``growth.end`` is cut there.
+    rows(scene): times (h) of rows besides the ends of steps, without ``output.times``;
+    first: length of the first attempted step, as a multiple of growth.time_step; ends(scene): times
+    (h) at which steps end, if known in advance.
     """
 
-    advance: Callable[[Scene, Pore, Solved, Pace], tuple[Step, Solved, Pace]]
+    advance: Callable[[Scene, Pore, Solved, StepControl], tuple[StepResult, Solved, StepControl]]
     rows: Callable[[Scene], tuple[float, ...]] = lambda _: ()
     first: float = 1.0
     ends: Callable[[Scene], Iterable[float]] = lambda _: ()
 
 
 class PoreEnd(RunEnd):
-    """The aggregate has reached an end of the pore."""
+    """The aggregate has reached an end of the pore.
+
+    :func:`repro.simulate` raises it after the last Report. It is an end of the model, and no
+    failure: the message names the end of the pore and the time (h).
+
+    Examples
+    --------
+    >>> import repro
+    >>> changes = ['pore.length="120 um"', 'aggregate.radius="9 um"', 'aggregate.position="-50 um"']
+    >>> try:
+    ...     for report in repro.simulate(repro.load_scene("base", changes)):
+    ...         pass
+    ... except repro.PoreEnd as end:
+    ...     print(end)
+    the aggregate reaches the pore's upstream end at t = 0.2 h
+    """
 
 
 def steps(scene: Scene, scheme: Scheme,
-          state: State | None = None) -> Iterator[tuple[State, Instant | None]]:
-    """Every step of a run from t = 0, or after ``state``, with an Instant at reported times.
+          state: RestartState | None = None) -> Iterator[tuple[RestartState, Report | None]]:
+    """Yield the state after every step from t = 0 or ``state`` on, with a Report if one is due.
 
-    Raises SimulationError where a stage fails, and, after a last Instant, PoreEnd where the
-    aggregate reaches an end of the pore, Fold where its surface folds.
+    Raises SimulationError if a stage fails. After the last Report, raises PoreEnd if the aggregate
+    reaches an end of the pore, and Fold if its surface folds.
     """
     first = state is None
     with stopping(state.pore.time if state else 0.0):
         first_step = scheme.first * scene.growth.time_step if scene.growth else 0.0
-        state = state or State(laid_out(seeded(scene)), Pace(first_step))
-        begun, solved = resolved(scene, state.pore)
-        if begun is not state.pore:
-            state = replace(state, pore=laid_out(begun))
-    now = replace(state.pore, concentrations=solved.concentrations)
+        state = state or RestartState(contiguous(seeded(scene)), StepControl(first_step))
+        refined, solved = solve_graded(scene, state.pore)
+        if refined is not state.pore:
+            state = replace(state, pore=contiguous(refined))
+    pore = replace(state.pore, concentrations=solved.concentrations)
     if first:
-        yield state, Instant(now, solved, None, (), 0, newton_counts(solved))
+        yield state, Report(pore, solved, None, (), 0, newton_counts(solved))
     if scene.growth:
-        refuse_end(scene, now, 1.0 if now.time > 0 else 0.1)
+        refuse_end(scene, pore, 1.0 if pore.time > 0 else 0.1)
     rows = row_times(scene, scheme)
     largest = scene.largest
     end = scene.growth.end if scene.growth else 0.0
-    while end - now.time > SAME_TIME:
+    while end - pore.time > SAME_TIME:
         try:
-            with stopping(now.time), folding(now, state.time):
-                taken, after, pace = scheme.advance(scene, now, solved, state.pace)
-                balance.refuse(largest, taken.pore, taken.ledger)
-                refuse_density(scene, taken.pore)
+            with stopping(pore.time), folding(pore, state.time):
+                step, after, control = scheme.advance(scene, pore, solved, state.step_control)
+                balance.refuse(largest, step.pore, step.ledger)
+                refuse_density(scene, step.pore)
             for time in rows:
-                if state.time + SAME_TIME < time < taken.pore.time - SAME_TIME:
-                    with stopping(now.time), folding(now, state.time):
-                        there = needed(taken.within, "a step's interior")(time)
-                        refuse_density(scene, there.pore)
-                    found = instant(state, there.pore, there.solved, there.before)
-                    state = reported(state, time)
-                    yield state, found
+                if state.time + SAME_TIME < time < step.pore.time - SAME_TIME:
+                    with stopping(pore.time), folding(pore, state.time):
+                        inner = needed(step.within, "a step's interior")(time)
+                        refuse_density(scene, inner.pore)
+                    report = make_report(state, inner.pore, inner.solved, inner.before)
+                    state = mark_reported(state, time)
+                    yield state, report
         except RunEnd:
             if state.ledgers:  # steps that are not reported yet
-                yield reported(state, now.time), instant(state, now, solved, None)
+                yield mark_reported(state, pore.time), make_report(state, pore, solved, None)
             raise
         solved = after
-        state = _after(state, taken, solved, pace)
-        now = replace(state.pore, concentrations=solved.concentrations)
-        asked = _asked(rows, now.time)
-        if scene.output.times is None or asked is not None or pore_end(scene, now, 1.0):
-            shown = now if asked is None else replace(now, time=asked)
-            yield reported(state, now.time), instant(state, shown, solved, taken.before)
-            state = reported(state, now.time)
+        state = _after_step(state, step, solved, control)
+        pore = replace(state.pore, concentrations=solved.concentrations)
+        row = _row_time_at(rows, pore.time)
+        if scene.output.times is None or row is not None or pore_end(scene, pore, 1.0):
+            reported = pore if row is None else replace(pore, time=row)
+            yield mark_reported(state, pore.time), make_report(state, reported, solved, step.before)
+            state = mark_reported(state, pore.time)
         else:
             yield state, None
-        refuse_end(scene, now, 1.0)
+        refuse_end(scene, pore, 1.0)
 
 
 def row_times(scene: Scene, scheme: Scheme) -> tuple[float, ...]:
@@ -200,43 +230,49 @@ def row_times(scene: Scene, scheme: Scheme) -> tuple[float, ...]:
     return scheme.rows(scene) if scene.output.times is None else scene.output.times
 
 
-def _asked(rows: tuple[float, ...], time: float) -> float | None:
-    """The row's time that a step's end is, to the last bit; None where it is none."""
+def _row_time_at(rows: tuple[float, ...], time: float) -> float | None:
+    """Exact time (h) of the row at which a step ends; None if it ends at no row."""
     return next((row for row in rows if abs(row - time) <= SAME_TIME), None)
 
 
-def _after(state: State, taken: Step, solved: Solved, pace: Pace) -> State:
-    """The state with one step more to report."""
-    before = newton_counts(taken.before[1]) if taken.before else {}
-    counts = added(state.iterations, {"growth": taken.iterations}, before, newton_counts(solved))
-    ledgers = (*state.ledgers, taken.ledger)
-    return State(taken.pore, pace, ledgers, state.remeshes + taken.remeshed, counts, state.row)
+def _after_step(state: RestartState, step: StepResult, solved: Solved,
+                control: StepControl) -> RestartState:
+    """The state after one more step, which is not reported yet."""
+    before = newton_counts(step.before[1]) if step.before else {}
+    counts = sum_counts(state.iterations, {"growth": step.iterations}, before,
+                        newton_counts(solved))
+    ledgers = (*state.ledgers, step.ledger)
+    remeshes = state.remeshes + step.remeshed
+    return RestartState(step.pore, control, ledgers, remeshes, counts, state.row)
 
 
-def instant(state: State, now: Pore, solved: Solved, before: tuple[Pore, Solved] | None) -> Instant:
-    """The Instant that reports the steps of a state."""
-    return Instant(now, solved, before, state.ledgers, state.remeshes, state.iterations)
+def make_report(state: RestartState, pore: Pore, solved: Solved,
+                before: tuple[Pore, Solved] | None) -> Report:
+    """Report the steps of a state since the last report."""
+    return Report(pore, solved, before, state.ledgers, state.remeshes, state.iterations)
 
 
-def reported(state: State, time: float) -> State:
-    """The state with nothing to report, after a row at a time (h)."""
-    return State(state.pore, state.pace, row=time)
+def mark_reported(state: RestartState, time: float) -> RestartState:
+    """The state after a row at a time (h), without steps to report."""
+    return RestartState(state.pore, state.step_control, row=time)
 
 
-def laid_out(pore: Pore) -> Pore:
-    """The same pore, none of its arrays a strided view: sums over those may differ in the last bit
-    from sums over the copies that a checkpoint gives back."""
+def contiguous(pore: Pore) -> Pore:
+    """The same pore with contiguous arrays.
+
+    A sum over a strided view may differ in the last bit from that over its copy in a checkpoint.
+    """
     state = pore.concentrations
-    mesh = _flat(pore.mesh)
-    body = _flat(pore.body)
-    found = replace(_flat(pore), concentrations=state and _flat(state))
+    mesh = _contiguous_arrays(pore.mesh)
+    body = _contiguous_arrays(pore.body)
+    copied = replace(_contiguous_arrays(pore), concentrations=state and _contiguous_arrays(state))
     if body is not pore.body:
-        found = replace(found, body=body)
-    return found if mesh is pore.mesh else replace(found, space=replace(pore.space, mesh=mesh))
+        copied = replace(copied, body=body)
+    return copied if mesh is pore.mesh else replace(copied, space=replace(pore.space, mesh=mesh))
 
 
-def _flat(data: Data) -> Data:
-    """A dataclass with its strided arrays copied; itself where there are none."""
+def _contiguous_arrays(data: Data) -> Data:
+    """A dataclass with its strided arrays copied; the same object if it has none."""
     arrays = {each.name: getattr(data, each.name) for each in fields(data) if each.init}
     strided = {name: np.ascontiguousarray(array) for name, array in arrays.items()
                if isinstance(array, np.ndarray) and not array.flags.forc}
@@ -245,14 +281,16 @@ def _flat(data: Data) -> Data:
 
 @contextmanager
 def stopping(time: float) -> Iterator[None]:
-    """Floating-point errors and lack of memory stop the run; a failure is told with the simulated
-    time of its step."""
+    """Turn the failure of a step that starts at ``time`` (h) into a SimulationError.
+
+    Stage errors, floating-point errors and lack of memory count as failures.
+    """
     stopped = f"stopped in the step from t = {time:g} h"
     try:
         with np.errstate(all="raise", under="ignore"):
             yield
     except StageError as error:
-        raise SimulationError(f"{stopped}, in {error.stage}: {advised(error)}") from error
+        raise SimulationError(f"{stopped}, in {error.stage}: {with_advice(error)}") from error
     except FloatingPointError as error:
         raise SimulationError(f"{stopped} by a floating-point error ({error}); try a shorter "
                               "growth.time_step or a larger numerics.refinement") from error
@@ -262,11 +300,11 @@ def stopping(time: float) -> Iterator[None]:
 
 
 def newton_counts(solved: Solved) -> dict[str, int]:
-    """Iterations by what they were spent on."""
+    """Newton iterations by stage."""
     return {"transport": solved.concentrations.iterations if solved.concentrations else 0}
 
 
-def added(*counts: dict[str, int]) -> dict[str, int]:
+def sum_counts(*counts: dict[str, int]) -> dict[str, int]:
     """The sum of counts, key by key."""
     total: Counter[str] = Counter()
     for count in counts:
@@ -274,10 +312,12 @@ def added(*counts: dict[str, int]) -> dict[str, int]:
     return dict(sorted(total.items()))
 
 
-def pore_end(scene: Scene, now: Pore, elements: float) -> str:
-    """Which end of the pore the aggregate has reached, to within so many elements of the fluid;
-    empty while it has reached none."""
-    outline = now.boundary
+def pore_end(scene: Scene, pore: Pore, elements: float) -> str:
+    """Say which end of the pore the aggregate has reached; empty if it has reached none.
+
+    elements: distance from an end that counts as reached, in elements of the fluid.
+    """
+    outline = pore.boundary
     end = scene.pore.length / 2
     near = elements * scene.pore.width / ACROSS_PORE
     if outline.upstream < near - end or outline.downstream > end - near:
@@ -286,8 +326,7 @@ def pore_end(scene: Scene, now: Pore, elements: float) -> str:
     return ""
 
 
-def refuse_end(scene: Scene, now: Pore, elements: float) -> None:
-    """Raises PoreEnd where the aggregate has reached an end of the pore, to within so many
-    elements of the fluid."""
-    if over := pore_end(scene, now, elements):
-        raise PoreEnd(f"{over} at t = {now.time:g} h")
+def refuse_end(scene: Scene, pore: Pore, elements: float) -> None:
+    """Raise PoreEnd if the aggregate has reached an end of the pore (see :func:`pore_end`)."""
+    if message := pore_end(scene, pore, elements):
+        raise PoreEnd(f"{message} at t = {pore.time:g} h")

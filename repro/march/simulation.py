@@ -1,4 +1,4 @@
-"""Run a scene in the way that its ``numerics.time`` names."""
+"""Run a scene with the scheme of its ``numerics.time``."""
 
 from __future__ import annotations
 
@@ -9,36 +9,66 @@ import numpy as np
 
 from repro.fem.linear import Method
 from repro.march import loop, stepping, updates
-from repro.march.loop import Instant, Scheme, State
-from repro.march.pace import STRETCH
+from repro.march.loop import Report, RestartState, Scheme
+from repro.march.step_control import STRETCH
 from repro.scene import Scene, Source, load_scene, parse_scene, scene_tables
 
 #: Points (x, y), um.
 Shape = Sequence[tuple[float, float]] | np.ndarray
 
-#: Ways to make steps, by the names that scenes have for them.
+#: Schemes by the values of ``numerics.time``.
 SCHEMES = {"updates": updates.SCHEME, "midpoint": stepping.SCHEME}
 
 
 def simulate(scene: Source, shape: Shape | None = None,
-             state: State | None = None) -> Iterator[Instant]:
-    """Yields an Instant at t = 0 and at each reported time: ``output.times``, or after every step.
+             state: RestartState | None = None) -> Iterator[Report]:
+    """Simulate a scene, and yield a Report at t = 0 and at each reported time.
 
-    scene: one that was loaded, or a file, a packaged name, a dict of tables; shape: the
-    aggregate's boundary at t = 0, (x, y) um from its upstream to its downstream end on the lower
-    wall, in place of the scene's (see ``aggregate.outline``); state: one of :func:`steps`, after
-    which to go on. Raises SceneError where scene or shape are not accepted, SimulationError where a
-    stage fails, and, after a last Instant, PoreEnd where the aggregate reaches an end of the pore,
-    Fold where its surface folds.
+    Reported times are ``output.times``, or the ends of all steps. A Report has the attributes
+    ``pore``, ``solved`` (flow and substrates), ``ledgers`` (mass balances) and counts, in um, h,
+    mg/L.
+
+    Parameters
+    ----------
+    scene : Scene, str, Path or dict
+        A loaded scene, the name of a packaged scene, a TOML file, or a dict of tables.
+    shape : (K, 2) sequence of float, optional
+        Boundary of the aggregate at t = 0, points (x, y) in um from the upstream to the downstream
+        end on the lower wall. It replaces that of the scene (see ``aggregate.outline``).
+    state : RestartState, optional
+        State of :func:`steps` after which the simulation continues; t = 0 by default.
+
+    Returns
+    -------
+    iterator of Report
+        The simulation advances as the reports are read.
+
+    Raises
+    ------
+    SceneError
+        If the scene or the shape is not accepted.
+    SimulationError
+        If a stage fails: names the time, the stage, the reason and a remedy.
+    PoreEnd
+        After the last Report, if the aggregate reaches an end of the pore.
+    Fold
+        After the last Report, if the surface of the aggregate folds.
+
+    Examples
+    --------
+    >>> import repro
+    >>> scene = repro.load_scene("base", ['growth.end="1 h"', 'output.times=["0 h", "1 h"]'])
+    >>> [report.pore.time for report in repro.simulate(scene)]
+    [0.0, 1.0]
     """
     scene = load_scene(scene)
     if shape is not None:
         scene = shaped(scene, shape)
-    return (instant for _, instant in steps(scene, state) if instant)
+    return (report for _, report in steps(scene, state) if report)
 
 
 def shaped(scene: Scene, shape: Shape) -> Scene:
-    """The scene with another boundary of the aggregate at t = 0, checked as one in its file."""
+    """The scene with another boundary of the aggregate at t = 0, checked like a scene file."""
     tables = scene_tables(scene)
     seed = dict(tables.get("aggregate", {}))
     for key in ("radius", "position"):
@@ -47,15 +77,17 @@ def shaped(scene: Scene, shape: Shape) -> Scene:
     return parse_scene({**tables, "aggregate": seed}, scene.name, f"{scene.name} with a shape")
 
 
-def ends_soon(scene: Scene, state: State) -> bool:
-    """May the step after a state be another one where growth.end is later? One that passes it is
-    cut there; it may be STRETCH times as long as its pace says."""
+def ends_soon(scene: Scene, state: RestartState) -> bool:
+    """Does the next step depend on growth.end, because it may be cut there?
+
+    A step may be STRETCH times as long as its step control proposes.
+    """
     end = scene.growth.end if scene.growth else math.inf
-    return STRETCH * state.pace.length > end - state.pore.time
+    return STRETCH * state.step_control.length > end - state.pore.time
 
 
 def same_rows(one: Scene, other: Scene, time: float) -> bool:
-    """Have runs of two scenes the same rows up to a time (h)?"""
+    """Do runs of two scenes have the same rows up to a time (h)?"""
     first = [row for row in row_times(one) if row <= time]
     return first == [row for row in row_times(other) if row <= time]
 
@@ -66,7 +98,7 @@ def row_times(scene: Scene) -> tuple[float, ...]:
 
 
 def rows_within(scene: Scene) -> set[float]:
-    """Times (h) of rows that may lie within steps, not at an end that is known beforehand."""
+    """Times (h) of rows that may lie within steps: they are not at a known end of a step."""
     return set(row_times(scene)) - {0.0, *_scheme(scene).ends(scene)}
 
 
@@ -74,8 +106,11 @@ def _scheme(scene: Scene) -> Scheme:
     return SCHEMES[scene.numerics.time]
 
 
-def steps(scene: Scene, state: State | None = None) -> Iterator[tuple[State, Instant | None]]:
-    """Every step, t = 0 first: the state from which a run goes on bit for bit, and the Instant if
-    one is due."""
+def steps(scene: Scene,
+          state: RestartState | None = None) -> Iterator[tuple[RestartState, Report | None]]:
+    """Yield the state after every step, t = 0 first, with a Report if one is due.
+
+    A run restarts from such a state bit for bit.
+    """
     Method(scene.numerics.solver, scene.numerics.ordering).checked()
     return loop.steps(scene, _scheme(scene), state)

@@ -1,11 +1,11 @@
 """Steps as long as the growth allows (``numerics.time = "midpoint"``): second order in time.
 
-The midpoint rule carries (9)-(10) over a step with the rates of the shape half way. Euler's rule
-would take those of the start: the mean over the aggregate of their difference, times the step, is
-what ``numerics.tolerance`` bounds; the error of the midpoint rule is of higher order, and what a
-tolerance makes of it is measured in ``make bench``. A step ends when the film between the aggregate
-and the opposite wall is first too thin (2.3.3), and at the times of the scene's tables; rows and
-the run's end leave all steps as they are.
+The midpoint rule integrates (9)-(10) over a step with the rates of the shape half way. Euler's rule
+would use those of the start. ``numerics.tolerance`` bounds the mean over the aggregate of their
+difference, times the step. The error of the midpoint rule is of higher order; ``make bench``
+measures it for each tolerance. A step ends when the film between the aggregate and the opposite
+wall first becomes too thin (2.3.3), and at the times of the scene's tables. Rows and the end of the
+run change no step.
 """
 
 from __future__ import annotations
@@ -17,27 +17,37 @@ import numpy as np
 
 from repro.errors import RunEnd, StageError, Unresolved
 from repro.march import midpoint
-from repro.march.loop import SAME_TIME, Scheme, Step, laid_out
-from repro.march.pace import EXCESS, STRETCH, Pace, allowed, fitted, following
+from repro.march.loop import SAME_TIME, Scheme, StepResult, contiguous
+from repro.march.step_control import (
+    EXCESS,
+    STRETCH,
+    StepControl,
+    allowed_ratio,
+    fit_to_interval,
+    next_step_size,
+)
 from repro.model import remeshing
 from repro.model.contact_lines import SearchOptions
 from repro.model.pore import Pore, Solved
 from repro.scene import Scene, needed
 
-#: The first step that is tried, in parts of growth.time_step.
+#: Length of the first attempted step over growth.time_step.
 FIRST = 8.0
-#: A step that fails or errs too much is tried again, shorter, until it is this part of it; one of
-#: this length may err by more than the tolerance, which is counted and told.
+#: Least length of a step over growth.time_step: a step that fails or errs too much is repeated,
+#: shorter, down to this. The estimate of such a step may exceed the tolerance, which is reported.
 SHORTEST = 1e-3
-#: Rows after t = 0 where there are no ``output.times``, at least.
+#: Least number of rows after t = 0 without ``output.times``.
 LEAST = 24
-#: Contact is met when the film is no thinner than this part of what it may be.
+#: A step that makes contact leaves at least this part of the minimum film.
 LANDED = 0.999
 
 
 def rows(scene: Scene) -> tuple[float, ...]:
-    """Times (h) of rows besides the ends of steps: growth.end, and multiples of growth.time_step
-    times a power of two, the largest (1/4, 1/2, 1, 2 ...) with LEAST of them or more."""
+    """Times (h) of rows besides the ends of steps: growth.end, and multiples of an interval.
+
+    The interval is growth.time_step times a power of two (1/4, 1/2, 1, 2 ...), the largest one with
+    at least LEAST rows.
+    """
     growth = needed(scene.growth, "[growth]")
     if growth.end <= SAME_TIME:
         return ()
@@ -47,113 +57,122 @@ def rows(scene: Scene) -> tuple[float, ...]:
     return (*(time for time in times if growth.end - time > SAME_TIME), growth.end)
 
 
-def _advance(scene: Scene, now: Pore, solved: Solved, asked: Pace) -> tuple[Step, Solved, Pace]:
-    """One step: the next one, whenever the run ends, or where growth.end lies within that, one to
-    growth.end."""
-    taken, after, pace = _accepted(scene, now, solved, asked)
-    if taken.pore.time - needed(scene.growth, "[growth]").end > SAME_TIME:
-        return *_cut(scene, taken), asked
-    return replace(taken, before=None), after, pace
+def _advance(scene: Scene, previous: Pore, solved: Solved,
+             planned: StepControl) -> tuple[StepResult, Solved, StepControl]:
+    """Advance one full step, or a step to growth.end if that lies within the full step.
+
+    The length of the full step does not depend on growth.end or on the requested rows.
+    """
+    step, after, control = _find_step(scene, previous, solved, planned)
+    if step.pore.time - needed(scene.growth, "[growth]").end > SAME_TIME:
+        return *_cut_step(scene, step), planned
+    return replace(step, before=None), after, control
 
 
-def _cut(scene: Scene, passing: Step) -> tuple[Step, Solved]:
-    """A step to growth.end from where a step begins that passes it, and what is solved after it;
-    within it, times are those of the one that passes."""
+def _cut_step(scene: Scene, passing: StepResult) -> tuple[StepResult, Solved]:
+    """Cut a step that passes growth.end: the step to growth.end, and the solution after it.
+
+    Times within it are still interpolated in the step that passes growth.end.
+    """
     end = needed(scene.growth, "[growth]").end
-    now, solved = needed(passing.before, "the start of a step")
+    previous, solved = needed(passing.before, "the start of a step")
     while True:
         try:
-            found = midpoint.attempt(scene, now, solved, end - now.time)
+            trial = midpoint.attempt(scene, previous, solved, end - previous.time)
             break
         except Unresolved as error:
-            finer = _on_finer_elements(scene, now)
+            finer = _halve_elements(scene, previous)
             if finer is None:
-                raise remeshing.advised(scene, now, error) from None
-            now, solved = finer
-    taken, after = _solved(scene, _ending_at(needed(found.step, "a shorter step"), end))
-    return replace(taken, before=None, within=passing.within), after
+                raise remeshing.advise(scene, previous, error) from None
+            previous, solved = finer
+    step, after = _solve_after(scene, _end_at(needed(trial.step, "a shorter step"), end))
+    return replace(step, before=None, within=passing.within), after
 
 
-def _accepted(scene: Scene, now: Pore, solved: Solved,
-              asked: Pace) -> tuple[Step, Solved, Pace]:
-    """The first step that is good enough, what is solved after it, and the pace of the next."""
+def _find_step(scene: Scene, previous: Pore, solved: Solved,
+              control: StepControl) -> tuple[StepResult, Solved, StepControl]:
+    """Shorten a step until it is accepted: the step, its solution, and the next step control."""
     tolerance = scene.numerics.tolerance
     time_step = needed(scene.growth, "[growth]").time_step
     shortest = SHORTEST * time_step
-    length = asked.length
-    corner = scene.corner(now.time)
-    left = corner - now.time
-    duration = fitted(length, left, STRETCH)
+    length = control.length
+    corner = scene.corner(previous.time)
+    remaining = corner - previous.time
+    duration = fit_to_interval(length, remaining, STRETCH)
     while True:
-        most = np.inf if duration <= shortest else EXCESS * tolerance / duration
+        largest_change = np.inf if duration <= shortest else EXCESS * tolerance / duration
         try:
             cut = duration > shortest
             search = SearchOptions(landing=LANDED if cut else 0.0, patient=not cut)
-            found = midpoint.attempt(scene, now, solved, duration, most, search)
-            estimate = found.change * duration
-            if found.step:
-                end = _end_of(now, duration, corner)
-                taken, after = _solved(scene, _ending_at(found.step, end))
-                if found.gaps is not None:  # contact alone made the step short
-                    return taken, after, asked
-                tried = replace(asked, length=length)
-                pace = following(tried, duration, estimate, tolerance)
-                return taken, after, replace(pace, length=max(pace.length, shortest))
-            if found.gaps:
+            trial = midpoint.attempt(scene, previous, solved, duration, largest_change, search)
+            estimate = trial.change * duration
+            if trial.step:
+                end = _end_of(previous, duration, corner)
+                step, after = _solve_after(scene, _end_at(trial.step, end))
+                if trial.gaps is not None:  # contact alone made the step short
+                    return step, after, control
+                attempted = replace(control, length=length)
+                following = next_step_size(attempted, duration, estimate, tolerance)
+                return step, after, replace(following, length=max(following.length, shortest))
+            if trial.gaps:
                 film = needed(scene.growth, "[growth]").minimum_film
-                length = duration * _to_contact(*found.gaps, film)
+                length = duration * _part_to_contact(*trial.gaps, film)
             else:
-                length = max(duration * allowed(estimate, tolerance), shortest)
+                length = max(duration * allowed_ratio(estimate, tolerance), shortest)
         except Unresolved as error:
-            finer = _on_finer_elements(scene, now)
+            finer = _halve_elements(scene, previous)
             if finer is None and duration <= time_step:
-                raise remeshing.advised(scene, now, error) from None
+                raise remeshing.advise(scene, previous, error) from None
             if finer is None:
                 length = duration / 2
             else:
-                now, solved = finer
+                previous, solved = finer
         except (RunEnd, StageError, FloatingPointError):
             if duration <= shortest:
                 raise
             length = duration / 2
-        duration = fitted(length, left)
+        duration = fit_to_interval(length, remaining)
 
 
-def _on_finer_elements(scene: Scene, now: Pore) -> tuple[Pore, Solved] | None:
-    """The start of a step on elements half as large at the aggregate, and what is solved there;
-    None where they may not be halved again."""
-    finer = remeshing.graded(scene, now)
+def _halve_elements(scene: Scene, previous: Pore) -> tuple[Pore, Solved] | None:
+    """Halve the elements at the aggregate at the start of a step, and solve there.
+
+    None if they have been halved as often as allowed.
+    """
+    finer = remeshing.grade(scene, previous)
     if finer is None:
         return None
-    found, solved = remeshing.resolved(scene, finer)
-    return replace(found, concentrations=solved.concentrations), solved
+    graded, solved = remeshing.solve_graded(scene, finer)
+    return replace(graded, concentrations=solved.concentrations), solved
 
 
-def _solved(scene: Scene, taken: Step) -> tuple[Step, Solved]:
-    """A step with what is solved after it, on a mesh graded to a front where that is needed."""
-    after, solved = remeshing.resolved(scene, taken.pore)
-    if after is not taken.pore:
-        taken = replace(taken, pore=laid_out(after), remeshed=True)
-    return taken, solved
+def _solve_after(scene: Scene, step: StepResult) -> tuple[StepResult, Solved]:
+    """Solve after a step, on a mesh graded to a sharp front if one needs it."""
+    after, solved = remeshing.solve_graded(scene, step.pore)
+    if after is not step.pore:
+        step = replace(step, pore=contiguous(after), remeshed=True)
+    return step, solved
 
 
-def _to_contact(before: float, after: float, film: float) -> float:
-    """The part of a step after which the gap (um), from before to after it, is just under that of
-    the film."""
+def _part_to_contact(before: float, after: float, film: float) -> float:
+    """Part of a step after which the gap (um) is just under the film (um).
+
+    before, after: gaps at the start and the end of the step.
+    """
     aim = 0.5 * (1 + LANDED) * film
     part = (before - aim) / (before - after) if after < before else 0.0
     return min(0.95, max(0.02, part))
 
 
-def _end_of(now: Pore, duration: float, corner: float) -> float:
-    """The end (h) of a step: the corner of the scene's tables that it comes to, to the last bit."""
-    end = now.time + duration
+def _end_of(previous: Pore, duration: float, corner: float) -> float:
+    """Time (h) of a step's end; exactly that of the scene's tables if the step ends there."""
+    end = previous.time + duration
     return corner if abs(corner - end) <= SAME_TIME else end
 
 
-def _ending_at(taken: Step, end: float) -> Step:
-    """The step with the time (h) of its end."""
-    return replace(taken, pore=laid_out(replace(taken.pore, time=end)))
+def _end_at(step: StepResult, end: float) -> StepResult:
+    """Set the time (h) of a step's end."""
+    return replace(step, pore=contiguous(replace(step.pore, time=end)))
 
-#: The midpoint rule; where there are no ``output.times``, every step is reported, and :func:`rows`.
+#: The midpoint rule. Without ``output.times`` it reports every step and the times of :func:`rows`.
 SCHEME = Scheme(_advance, rows, FIRST)

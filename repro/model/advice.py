@@ -24,6 +24,6 @@ ADVICE: dict[type[StageError], str] = {
 }
 
 
-def advised(error: StageError) -> str:
-    """The message of an error, and what helps against it."""
+def with_advice(error: StageError) -> str:
+    """The message of an error with the keys of a scene that help against it."""
     return f"{error}{ADVICE.get(type(error), '')}"

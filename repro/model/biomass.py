@@ -1,14 +1,14 @@
 """Active and inert biomass, X_A and X_I ((9)-(10), (28)-(34)): masses at the reaction's points.
 
-A mass stays with its material when the aggregate changes its shape: that is (34), X'_i = X_i S_i /
-S'_i with the lumped areas S of linear elements, at the nodes; and the same at every quadrature
-point with those of higher order. Densities are masses over the points' weights (um2). Uptake and
-growth see the same masses in the same points, so that
+A mass stays with its material when the aggregate changes its shape. At the nodes of linear elements
+this is (34), X'_i = X_i S_i / S'_i with the lumped areas S; elements of higher order apply it at
+every quadrature point. Densities are masses over the points' weights (um2). Uptake and growth see
+the same masses in the same points, so that
 
     biomass made = Y donor - (acceptor - F donor) / d_c
 
-of what is taken up, in every point and so in all. A new mesh gets the masses by a transfer that
-conserves their sum, or by the paper's interpolation, which does not [E8].
+holds for the uptake of every point, and of the aggregate. A new mesh gets the masses by a transfer
+that conserves their sum, or by the paper's interpolation, which does not [E8].
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from repro.model.transport import Concentrations
 
 Amounts: TypeAlias = tuple[np.ndarray, ...]
 
-#: Of densities at the nodes of straight triangles, by the names that scenes have for them.
+#: Transfers of densities at the nodes of straight triangles, by the values of numerics.transfer.
 TRANSFERS = {"conserving": transfer.project, "bounded": transfer.project_bounded,
              "linear": transfer.interpolated}
 
@@ -40,7 +40,7 @@ class Rates:
 
     @property
     def total(self) -> np.ndarray:
-        """Of both, per active biomass."""
+        """Rate of active and inert biomass together, per active biomass."""
         return self.growth + self.remains
 
 
@@ -53,30 +53,30 @@ def rates(space: Space, state: Concentrations, law: RateLaw) -> Rates:
 
 
 def change(first: Rates, second: Rates, weight: np.ndarray) -> float:
-    """Mean over the aggregate, by the points' weights (r, q), of how much two rates differ, 1/h."""
+    """Mean difference (1/h) of two rates over the aggregate; weight: (r, q) of the points."""
     return float(np.vdot(weight, np.abs(second.total - first.total)) / weight.sum())
 
 
 def sink(active: np.ndarray | None, duration: float = 0.0) -> Sink | None:
-    """What takes up substrates: active masses (r, q), None without biomass; over a duration (h)."""
+    """The sink of substrates of active masses (r, q) over a duration (h), None without biomass."""
     return None if active is None else Sink(active, duration)
 
 
 def at_nodes(space: Space, field: np.ndarray) -> np.ndarray:
-    """(N,) at the mesh's nodes of a field (r, q) in the points of the reaction, zero where there is
-    no biomass: the mean of what the triangles around a node fit to theirs, linear in each; with
-    lumping the nodal values themselves."""
+    """(N,) values at the mesh's nodes of a field (r, q) in the points of the reaction, zero in the
+    fluid. With lumping they are the field's own values; otherwise a linear function is fitted to
+    the points of each triangle, and a node has the mean over its triangles."""
     mesh = space.mesh
     pieces = space.reaction
-    found = np.zeros(len(mesh.points))
+    nodal = np.zeros(len(mesh.points))
     if space.order == 1:
-        found[pieces.cells[:, 0]] = field[:, 0]
-        return mesh.with_middles(found[: mesh.corners])
+        nodal[pieces.cells[:, 0]] = field[:, 0]
+        return mesh.with_middles(nodal[: mesh.corners])
     fitted = field @ _fit(space).T
     cells = mesh.cells[mesh.biomass]
-    count = np.bincount(cells.ravel(), minlength=len(found))
-    summed = np.bincount(cells.ravel(), fitted.ravel(), len(found))
-    return np.divide(summed, count, out=found, where=count > 0)
+    count = np.bincount(cells.ravel(), minlength=len(nodal))
+    summed = np.bincount(cells.ravel(), fitted.ravel(), len(nodal))
+    return np.divide(summed, count, out=nodal, where=count > 0)
 
 
 def at_points(space: Space, nodal: np.ndarray) -> np.ndarray:
@@ -88,23 +88,40 @@ def at_points(space: Space, nodal: np.ndarray) -> np.ndarray:
 
 
 def _fit(space: Space) -> np.ndarray:
-    """(g, q) from values at a triangle's points to those of their linear least-squares fit at its
-    nodes."""
+    """(g, q) matrix that takes values at a triangle's points to their linear least-squares fit at
+    its nodes."""
     nodes = elements.values(1, elements.nodes(space.mesh.geometry))
     return nodes @ elements.linear_fit(space.table)
 
 
-def carried(how: str, old: Space, new: Space, at: Located, amounts: Amounts,
-            density: float) -> Amounts:
-    """Amounts (r, q) on a new mesh: active and inert masses, and others of the same material.
+def transfer_amounts(method: str, old: Space, new: Space, at: Located, amounts: Amounts,
+                     density: float) -> Amounts:
+    """Transfer masses of biomass to a new mesh.
 
-    how: "conserving", "bounded" or "linear", for linear elements; at: the new mesh's aggregate in
-    the old one; density: X_m, mg/L. With higher orders the new mesh's masses are X_m all together,
-    so that what the constraint leaves of J - theta within a triangle is worked off, and each amount
-    keeps its share of them and its sum.
+    Parameters
+    ----------
+    method : {"conserving", "bounded", "linear"}
+        The transfer of linear elements.
+    old, new : Space
+    at : Located
+        The nodes of the new mesh's aggregate in the old mesh.
+    amounts : tuple of (r, q) arrays
+        Active and inert masses, and other amounts of the same material, um2 mg/L.
+    density : float
+        X_m, mg/L.
+
+    Returns
+    -------
+    tuple of (r, q) arrays
+        The amounts at the new mesh's points.
+
+    Notes
+    -----
+    With higher orders the new mesh has the density X_m everywhere, which removes the error of
+    J = theta within a triangle. Each amount keeps its share of the biomass and its sum.
     """
     if old.order == 1:
-        return _linear(how, old, new, amounts)
+        return _linear(method, old, new, amounts)
     total = amounts[0] + amounts[1]
     shares = np.column_stack([at_nodes(old, amount / total) for amount in amounts[1:]])
     nodal = np.zeros((len(new.mesh.points), shares.shape[1]))
@@ -112,30 +129,30 @@ def carried(how: str, old: Space, new: Space, at: Located, amounts: Amounts,
     inside = [np.clip(at_points(new, column), 0.0, 1.0) for column in nodal.T]
     masses = density * new.reaction.dx
     inert = _conserved(inside[0], masses, amounts[1].sum())
-    others = [_scaled(share * masses, amount.sum())
-              for share, amount in zip(inside[1:], amounts[2:])]
-    return (masses * (1 - inert), masses * inert, *others)
+    rest = [_scaled(share * masses, amount.sum()) for share, amount in zip(inside[1:], amounts[2:])]
+    return (masses * (1 - inert), masses * inert, *rest)
 
 
-def _linear(how: str, old: Space, new: Space, amounts: Amounts) -> Amounts:
-    """Densities at the nodes of straight triangles, by the chosen transfer."""
-    nodes = old.reaction.cells[:, 0]
-    there = new.reaction.cells[:, 0]
+def _linear(method: str, old: Space, new: Space, amounts: Amounts) -> Amounts:
+    """The amounts as densities at the nodes of straight triangles, by the chosen transfer."""
+    old_nodes = old.reaction.cells[:, 0]
+    new_nodes = new.reaction.cells[:, 0]
     densities = np.column_stack([amount[:, 0] / old.reaction.dx[:, 0] for amount in amounts])
-    found = TRANSFERS[how](old.mesh.points[nodes], old.mesh.straight.topology.body_cells, densities,
-                           new.mesh.points[there], new.mesh.straight.topology.body_cells)
-    return tuple(column[:, None] * new.reaction.dx for column in found.T)
+    projected = TRANSFERS[method](
+        old.mesh.points[old_nodes], old.mesh.straight.topology.body_cells, densities,
+        new.mesh.points[new_nodes], new.mesh.straight.topology.body_cells)
+    return tuple(column[:, None] * new.reaction.dx for column in projected.T)
 
 
-def _scaled(amount: np.ndarray, wanted: float) -> np.ndarray:
-    """An amount (r, q) scaled to the sum ``wanted``; what is zero everywhere stays zero."""
-    total = float(amount.sum())
-    return amount * (wanted / total) if total > 0 else amount
+def _scaled(amount: np.ndarray, total: float) -> np.ndarray:
+    """An amount (r, q) scaled to the sum ``total``; an amount of zero stays zero."""
+    present = float(amount.sum())
+    return amount * (total / present) if present > 0 else amount
 
 
-def _conserved(share: np.ndarray, weight: np.ndarray, wanted: float) -> np.ndarray:
-    """Shares (r, q) with the weighted sum ``wanted``: a multiple of share (1 - share) is added, so
+def _conserved(share: np.ndarray, weight: np.ndarray, total: float) -> np.ndarray:
+    """Shares (r, q) with the weighted sum ``total``: a multiple of share (1 - share) is added, so
     that they stay between zero and one."""
     room = float(np.vdot(weight, share * (1 - share)))
-    lacking = wanted - float(np.vdot(weight, share))
-    return share + lacking / room * share * (1 - share) if abs(lacking) < room else share
+    deficit = total - float(np.vdot(weight, share))
+    return share + deficit / room * share * (1 - share) if abs(deficit) < room else share

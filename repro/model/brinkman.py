@@ -40,14 +40,14 @@ DIVERGENCE = 10.0
 
 @dataclass(frozen=True, eq=False)
 class Permeable:
-    """What the drag of biomass of a permeability (um2) adds to the flow's system."""
+    """The terms that the drag of biomass of a permeability (um2) adds to the flow's system."""
 
     velocity: Space
     permeability: float
 
     @cached_property
     def thickness(self) -> np.ndarray:
-        """(T,) um, d: of the layer as each triangle represents it, at least sqrt(k)."""
+        """(T,) um, thickness d of the layer as each triangle represents it, at least sqrt(k)."""
         longest = np.linalg.norm(self.velocity.mesh.sides, axis=2).max(axis=1)
         return np.maximum(np.sqrt(self.permeability), longest / ACROSS[self.velocity.order])
 
@@ -67,15 +67,15 @@ class Permeable:
         y = self.velocity.mesh.points[self.velocity.mesh.triangles[self.widened], 1]
         return bool(y.min(initial=np.inf) <= 0 and y.max(initial=0.0) >= self.velocity.mesh.width)
 
-    def held(self, held: np.ndarray) -> np.ndarray:
-        """(2n + m,) constrained unknowns: those that are ``held`` with u = 0 on all walls, without
-        u_x at nodes of walls that touch widened triangles alone."""
+    def constrained(self, no_slip: np.ndarray) -> np.ndarray:
+        """(2n + m,) constrained unknowns: those of u = 0 on all walls, ``no_slip``, without u_x at
+        wall nodes that touch only widened triangles."""
         dofs = self.velocity.dofs
-        slides = np.zeros(len(held), bool)
+        slides = np.zeros(len(no_slip), bool)
         slides[dofs.walls] = True
         slides[self.velocity.cells[~self.widened]] = False
         slides[dofs.inlet] = False
-        return held & ~slides
+        return no_slip & ~slides
 
     def matrices(self) -> np.ndarray:
         """(T, 2k, 2k) element matrices of drag, friction on the walls and divergence."""
@@ -104,11 +104,11 @@ class Permeable:
         blocks = np.zeros((len(mesh.cells), *2 * velocity.cells.shape[1:]))
         root = np.sqrt(self.permeability)
         for side in range(3):
-            which = np.flatnonzero(self.widened & mesh.on_wall(side))
-            d = self.thickness[which]
+            chosen = np.flatnonzero(self.widened & mesh.on_wall(side))
+            d = self.thickness[chosen]
             values, weights, along = elements.side_table(velocity.order, mesh.geometry, side)
-            dx = np.abs(mesh.points[mesh.cells[which], 0] @ along.T) * weights
+            dx = np.abs(mesh.points[mesh.cells[chosen], 0] @ along.T) * weights
             products = values[:, :, None] * values[:, None, :]
             factor = d / (root * (d - root))
-            blocks[which] += np.tensordot(factor[:, None] * dx, products, 1)
+            blocks[chosen] += np.tensordot(factor[:, None] * dx, products, 1)
         return blocks

@@ -16,6 +16,7 @@ import numpy as np
 
 from repro.errors import GrowthError, LinearError
 from repro.fem.division import Division
+from repro.fem.mesh import Mesh
 from repro.fem.outline import BOTTOM, FREE, TOP, Outline
 from repro.fem.space import Space
 from repro.model import contact_lines, growth, traction
@@ -101,7 +102,7 @@ def expand(scene: Scene, grown: Pore, theta: np.ndarray, guess: Pore | None = No
 
     Notes
     -----
-    With fluid forces, shape and flow are sought in turn until both agree.
+    With fluid forces, shape and flow are computed in turn until both agree.
     """
     start = grown if guess is None else guess
     if needed(scene.growth, "[growth]").fluid_forces == "neglected":
@@ -113,15 +114,15 @@ def expand(scene: Scene, grown: Pore, theta: np.ndarray, guess: Pore | None = No
         forces = traction.forces(scene, around, last.pore)
         if last.division is not None:
             forces = _gathered(last, forces)
-        found = _at_rest(scene, grown, theta, start, forces, search)
-        search = replace(search, advances=found.advances)
-        iterations += found.iterations
-        moved = np.abs(found.position - last.position).max()
-        if moved <= FORCE_REST * found.pore.boundary.thickness:
-            return replace(found, iterations=iterations)
-        if last.pore is grown or not found.pore.boundary.same_contact(last.pore.boundary):
-            around = traction.surroundings(scene, grown, found.pore)
-        last = found
+        shape = _at_rest(scene, grown, theta, start, forces, search)
+        search = replace(search, advances=shape.advances)
+        iterations += shape.iterations
+        moved = np.abs(shape.position - last.position).max()
+        if moved <= FORCE_REST * shape.pore.boundary.thickness:
+            return replace(shape, iterations=iterations)
+        if last.pore is grown or not shape.pore.boundary.same_contact(last.pore.boundary):
+            around = traction.surroundings(scene, grown, shape.pore)
+        last = shape
     raise GrowthError(f"the fluid's forces and the shape do not agree after {FORCE_ROUNDS} rounds, "
                       f"a node still moves by {moved:.2g} um: the aggregate is too soft for this "
                       "flow; try a shorter growth.time_step, a larger growth.shear_modulus, or "
@@ -131,9 +132,7 @@ def expand(scene: Scene, grown: Pore, theta: np.ndarray, guess: Pore | None = No
 def _gathered(shape: Expansion, loads: np.ndarray) -> np.ndarray:
     """(n, 2) loads on the nodes of the grown pore's aggregate, from those on a divided one's."""
     division = needed(shape.division, "a division")
-    everywhere = np.zeros_like(shape.pore.mesh.points)
-    everywhere[shape.pore.mesh.body] = loads
-    return division.gathered_loads(everywhere)[division.parent.body]
+    return division.gathered_loads(_on_mesh(shape.pore.mesh, loads))[division.parent.body]
 
 
 def _at_rest(scene: Scene, grown: Pore, theta: np.ndarray, start: Pore, forces: np.ndarray | None,
@@ -149,8 +148,8 @@ def _at_rest(scene: Scene, grown: Pore, theta: np.ndarray, start: Pore, forces: 
 
 def _close_by_nodes(scene: Scene, grown: Pore, start: Pore, forces: np.ndarray | None,
                     search: SearchOptions) -> Expansion:
-    """After each equilibrium, nodes whose film or wedge is too thin join the wall, and the
-    equilibrium is sought again until none is."""
+    """The shape after all nodes whose film or wedge is too thin have joined the wall: they join
+    after each equilibrium, and the next one follows until no film or wedge is too thin."""
     keys = needed(scene.growth, "[growth]")
     width = scene.pore.width
     shape = replace(grown, space=start.space, pressure=start.pressure)
@@ -182,7 +181,7 @@ def _equilibrium(scene: Scene, grown: Pore, start: Pore, forces: np.ndarray | No
     locked, target = _constraints(start, scene.pore.width)
     rest = growth.equilibrium(body, target_J, start.mesh.points[nodes], start.pressure[inside],
                               locked, target, forces=forces, last=last, patient=patient,
-                              reused=scene.numerics.jacobian == "reused")
+                              modified_newton=scene.numerics.jacobian == "reused")
     return _placed(grown, start, rest), rest.iterations
 
 
@@ -205,11 +204,11 @@ def _close_by_lines(scene: Scene, grown: Pore, start: Pore, forces: np.ndarray |
     for _ in range(CONTACT_ROUNDS):
         for line in lines:
             line.record(*_clearance(rule, shape.pore.boundary, line))
-        if all(line.settled for line in lines):
+        if all(line.accepted for line in lines):
             rest = replace(shape.pore, fixed=_with_new_surface(shape.pore.boundary))
             return replace(shape, pore=rest, iterations=trials.iterations, gap=gap)
         for line in lines:
-            if not line.settled:
+            if not line.accepted:
                 line.step()
         shape = trials.solve(wall, lines)
     raise GrowthError(f"the contact lines still move after {CONTACT_ROUNDS} trials; "
@@ -217,7 +216,7 @@ def _close_by_lines(scene: Scene, grown: Pore, start: Pore, forces: np.ndarray |
 
 
 def _refuse_late(gap: float, film: float, search: SearchOptions) -> None:
-    """Raises FirstContact where a gap (um) that closes is much thinner than the least film."""
+    """Raises FirstContact if the gap (um) at the first contact is much less than the least film."""
     if gap < search.landing * film:
         raise FirstContact(gap)
 
@@ -230,7 +229,13 @@ def _touch(grown: Pore, shape: Expansion, rule: Clearance, trials: _Trials,
     single point could not hold an elastic body. The tip of a pointed body cannot be pressed flat
     over this length; contact then covers half of it, or a quarter.
     """
-    for length in rule.film * FIRST_LENGTHS:
+    lengths = rule.film * FIRST_LENGTHS
+    width = _tip_width(shape.pore.boundary, rule.film)
+    if width < 2 * lengths[-1]:
+        raise GrowthError(f"a tip comes into contact that is {width:.2g} um wide at a depth of "
+                          f"{rule.film:.2g} um, the least film; the rule for films (2.3.3) does "
+                          "not describe so thin a tip, and no setting helps")
+    for length in lengths:
         wall, lines = _first_contact(shape.pore.boundary, length)
         touching = replace(grown.boundary, wall=wall)
         for line in lines:
@@ -242,6 +247,19 @@ def _touch(grown: Pore, shape: Expansion, rule: Clearance, trials: _Trials,
         except (GrowthError, LinearError) as error:
             failure = error
     raise failure
+
+
+def _tip_width(outline: Outline, depth: float) -> float:
+    """The width (um) of the aggregate at a depth (um) below its highest place."""
+    x, y = outline.points.T
+    top = int(np.argmax(y))
+    sides = []
+    for direction in (1, -1):
+        walk = (top + direction * np.arange(len(y))) % len(y)
+        below = int(np.argmax(y[walk] < y[top] - depth))
+        last = walk[below - 1 : below + 1][::-1]
+        sides.append(np.interp(y[top] - depth, y[last], x[last]))
+    return float(abs(sides[0] - sides[1]))
 
 
 def _first_contact(outline: Outline, length: float) -> tuple[np.ndarray, list[Line]]:
@@ -264,7 +282,7 @@ def _first_contact(outline: Outline, length: float) -> tuple[np.ndarray, list[Li
 
 
 def _clearance(rule: Clearance, outline: Outline, line: Line) -> tuple[float, float]:
-    """Of a line on the outline of a trial."""
+    """Clearance and reach beyond a line on the outline of a trial."""
     ends = contact_lines.surface_ends(outline, line.wall)
     node = next(node for node, direction in ends if direction == line.direction)
     return rule.beyond(outline, node, line.direction)
@@ -309,8 +327,8 @@ class _Trials:
         raise failure
 
     def _division(self, contact: Contact) -> Division:
-        """Of the contact's arcs; the connections of the last one are kept where they are the
-        same."""
+        """The division of the contact's arcs; it keeps the connections of the last one if the arcs
+        are the same."""
         if self._divided is None or not np.array_equal(self._divided.arcs, contact.arcs):
             self._divided = Division(self._grown.mesh, contact.arcs, contact.t)
             self._shape = None
@@ -319,7 +337,7 @@ class _Trials:
         return self._divided
 
     def _guesses(self, advances: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Places (N, 2) um and pressure from which a trial may start, the best ones first."""
+        """Positions (N, 2) um and pressures from which a trial may start, the best ones first."""
         ahead = self._ahead(advances)
         if ahead is not None:
             yield ahead
@@ -384,7 +402,7 @@ def divided(grown: Pore, division: Division, contact: Contact,
     body = growth.Body(shape, reference) if shape else material(space, reference)
     last = grown.last
     if last is not None:
-        last = division.nodal(_everywhere(division, last))[space.mesh.body]
+        last = division.nodal(_on_mesh(division.parent, last))[space.mesh.body]
     expanded = division.amounts(grown.theta * grown.body.at.dx, table)
     at_line = np.where(contact.first != FREE, contact.first, contact.second)
     wall = contact.wall.copy()
@@ -397,22 +415,23 @@ def divided(grown: Pore, division: Division, contact: Contact,
                    pressure=division.at_corners(grown.pressure), last=last)
 
 
-def _everywhere(division: Division, values: np.ndarray) -> np.ndarray:
-    """(N, 2) of the parent's nodes, from values (n, 2) on its aggregate's; zero in the fluid."""
-    everywhere = np.zeros_like(division.parent.points)
-    everywhere[division.parent.body] = values
-    return everywhere
+def _on_mesh(mesh: Mesh, values: np.ndarray) -> np.ndarray:
+    """(N, 2) values at all nodes of a mesh, from those (n, 2) of its aggregate; zero in the fluid.
+    """
+    nodal = np.zeros_like(mesh.points)
+    nodal[mesh.body] = values
+    return nodal
 
 
 def _divided_loads(division: Division, loads: np.ndarray) -> np.ndarray:
     """Loads on the nodes of the divided aggregate, from those (n, 2) on the parent's."""
-    return division.divided_loads(_everywhere(division, loads))[division.topology.body]
+    return division.divided_loads(_on_mesh(division.parent, loads))[division.topology.body]
 
 
 def _strained_from(keys: Growth, grown: Pore, theta: np.ndarray) -> tuple[growth.Body, np.ndarray]:
     """The configuration from which strain counts, that of t = 0 or the present one (section 5), and
-    the expansion since then: over J, so that what the constraint has left of J - theta is worked
-    off, and the area does not drift away from the mass."""
+    the expansion since then. From the present one it is theta / J, which removes the error of
+    J = theta, so that the area does not drift away from the mass."""
     if keys.new_biomass == "stressed":
         return grown.body, theta
     position = grown.mesh.points[grown.mesh.body]
@@ -429,15 +448,15 @@ def _placed(grown: Pore, start: Pore, rest: growth.Equilibrium) -> Pore:
     return replace(start.moved(points), pressure=pressure)
 
 
-def _constraints(now: Pore, width: float) -> tuple[np.ndarray, np.ndarray]:
+def _constraints(shape: Pore, width: float) -> tuple[np.ndarray, np.ndarray]:
     """(n, 2) True where a coordinate is prescribed: x at fixed points, y on the walls (2.3.3); and
     (n, 2) um, its prescribed value."""
-    rim = now.mesh.topology.body_loop
-    position = now.mesh.points[now.mesh.body]
+    rim = shape.mesh.topology.body_loop
+    position = shape.mesh.points[shape.mesh.body]
     target = position.copy()
-    target[rim[now.wall == BOTTOM], 1] = 0.0
-    target[rim[now.wall == TOP], 1] = width
-    return constrained(len(position), rim, now.wall, now.fixed), target
+    target[rim[shape.wall == BOTTOM], 1] = 0.0
+    target[rim[shape.wall == TOP], 1] = width
+    return constrained(len(position), rim, shape.wall, shape.fixed), target
 
 
 def constrained(count: int, rim: np.ndarray, wall: np.ndarray, fixed: np.ndarray) -> np.ndarray:
@@ -445,21 +464,21 @@ def constrained(count: int, rim: np.ndarray, wall: np.ndarray, fixed: np.ndarray
 
     rim: (M,) the boundary's nodes among all; wall, fixed: (M,), as those of an outline.
     """
-    held = np.zeros((count, 2), bool)
-    held[rim[fixed], 0] = True
-    held[rim[wall != FREE], 1] = True
-    return held
+    prescribed = np.zeros((count, 2), bool)
+    prescribed[rim[fixed], 0] = True
+    prescribed[rim[wall != FREE], 1] = True
+    return prescribed
 
 
 def _fixed_points(scene: Scene, grown: Pore) -> np.ndarray:
-    """(M,) fixed points: those of before, or the present middles of the contact surfaces."""
+    """(M,) fixed points: the previous ones, or the present middles of the contact surfaces."""
     if scene.numerics.fixed_point == "kept":
         return grown.fixed
     return middle_of(grown.boundary, BOTTOM) | middle_of(grown.boundary, TOP)
 
 
 def _with_new_surface(outline: Outline) -> np.ndarray:
-    """Fixed points (M,), with the middle of the upper contact surface when that has just formed."""
+    """(M,) fixed points, with the middle of the upper contact surface if it has just formed."""
     top = outline.wall == TOP
     if top.any() and not outline.fixed[top].any():
         return outline.fixed | middle_of(outline, TOP)

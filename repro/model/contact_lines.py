@@ -1,15 +1,15 @@
 """Where contact lines lie on the aggregate's boundary (2.3.3), for curved triangles.
 
-A contact line is the end of a contact surface. Its advance counts the arcs of the boundary that
-have joined the wall beyond the place where it was; a fraction divides an arc. The clearance beyond
-a line is the least value, over the free surface at distances d from the line along the wall, of
+A contact line is the end of a contact surface. Its advance is the number of arcs of the boundary
+that have joined the wall beyond its previous position; a fraction divides an arc. The clearance
+beyond a line is the least value, over the free surface at distances d from the line along the wall,
+of
 
     gap / min(film, tan(angle) d) - 1
 
-No film and no wedge is too thin where it is not negative. The contact surface sought is the
-smallest one, so each line advances to the place where its clearance vanishes. All lines are
-searched for at once, by the secant method, safeguarded by bisection. Each trial is an equilibrium
-of the aggregate.
+If it is not negative no film and no wedge is too thin. The contact surface is the smallest one that
+allows this, so each line advances until its clearance vanishes. The secant method, safeguarded by
+bisection, searches for all lines at once. Each trial is an equilibrium of the aggregate.
 """
 
 from __future__ import annotations
@@ -24,25 +24,25 @@ from repro.fem.outline import BOTTOM, FREE, TOP, Outline, parabola
 
 #: A clearance of this size is zero. A line then errs by about CLOSE * film / tan(angle).
 CLOSE = 2e-3
-#: The largest clearance: where no free surface faces the wall, or the gap is this much larger.
+#: Upper bound of the clearance, and its value if no free surface faces the wall.
 AMPLE = 10.0
-#: Two places this near, in arcs, are one: the clearance jumps between them.
+#: Two advances closer than this (arcs) count as one: the clearance jumps between them.
 SAME_PLACE = 5e-3
-#: The smallest part of an arc into which it is divided; a smaller one counts as none.
+#: The smallest part of a divided arc; smaller parts are not divided off.
 LEAST_PART = 0.02
-#: The first trial, in parts of the way to the farthest place that is too near to the wall.
+#: The first trial, as a fraction of the way to the farthest point that is too near to the wall.
 FIRST_TRIAL = 0.7
-#: The second trial where the first one went too far, in parts of the way back.
+#: The second trial after a first one that went too far, as a fraction of the way back.
 FIRST_RETREAT = 0.2
-#: Secant steps towards a place that is far enough are this much longer.
+#: Factor of secant steps before any trial has gone far enough.
 BEYOND = 1.05
-#: The longest of these steps where nothing beyond a line is too near, arcs.
+#: The longest of these steps (arcs) if no surface beyond the line is too near.
 LEAST_REACH = 0.5
-#: Secant steps stay this part of the interval away from places that were too short or far enough.
+#: Secant steps keep this fraction of the interval away from its ends.
 INSIDE = 0.03
 MEET = ("two contact lines meet, with fluid between them that has no way out; "
         "try a shorter growth.time_step")
-#: Places on an arc at which the clearance is taken: the second one shows the angle at the line.
+#: Parameters of an arc at which the clearance is computed: the second shows the angle at the line.
 PLACES = np.append([0.0, 1e-3], np.linspace(0.0, 1.0, 9)[1:])
 
 
@@ -50,8 +50,8 @@ PLACES = np.append([0.0, 1e-3], np.linspace(0.0, 1.0, 9)[1:])
 class SearchOptions:
     """How contact lines are searched for.
 
-    landing: where the first contact leaves less of the least film than this part, the search ends;
-    patient: is an equilibrium that fails tried again in smaller parts; advances: {(wall,
+    landing: the search ends if the film at the first contact is thinner than this fraction of the
+    least film; patient: is a failed equilibrium tried again in smaller parts; advances: {(wall,
     direction): um} of the first trial, along the outline.
     """
 
@@ -61,7 +61,7 @@ class SearchOptions:
 
 
 class FirstContact(Exception):
-    """A step ends long after the film to the opposite wall has become too thin.
+    """The film to the opposite wall is much thinner than the least film at the end of a step.
 
     gap: um, the least distance to that wall.
     """
@@ -94,9 +94,9 @@ class Clearance:
         Returns
         -------
         clearance : float
-            At most AMPLE, which it is where no free surface faces the wall.
+            At most AMPLE; AMPLE if no free surface faces the wall.
         reach : float
-            Arcs from the line to the farthest place with a negative clearance, zero if none.
+            Arcs from the line to the farthest point with a negative clearance, zero if none.
         """
         arcs, last = _free_arcs(outline, node, direction)
         outwards = np.sign(outline.points[node, 0] - outline.points[node - direction, 0])
@@ -116,8 +116,8 @@ class Clearance:
         return float(ratio.min()), float(place[ratio < 0].max(initial=0.0))
 
     def _places(self, arcs: np.ndarray, outwards: float) -> tuple[np.ndarray, np.ndarray]:
-        """(K,) places, in arcs from the line, and (K, 2) um the points there: PLACES of each arc,
-        and the distance at which the film takes over from the angle."""
+        """(K,) arcs from the line, and (K, 2) um the points there: PLACES of each arc, and the
+        points where the rule changes from the angle to the film."""
         points = np.einsum("sa,kai->ksi", parabola(PLACES), arcs)
         place = np.arange(len(arcs))[:, None] + PLACES
         beyond = outwards * (points[..., 0] - arcs[0, 0, 0]) - self.film / np.tan(self.angle)
@@ -155,19 +155,19 @@ def surface_ends(outline: Outline, wall: int) -> list[tuple[int, int]]:
 class Line:
     """A contact line in a search.
 
-    wall: BOTTOM or TOP; node: of the outline, where the line was; direction: of the free surface
-    along the outline; advance: arcs, of the present trial; settled: is the present trial good
-    enough; reach: arcs beyond it where the surface is too near; least: the smallest advance;
-    short, far: largest advance that is too short and smallest one that is far enough; stalls: has
-    the last trial halved neither the way between these nor the clearance; trials: the last two, as
-    (advance, clearance).
+    wall: BOTTOM or TOP; node: of the outline, at the previous position of the line; direction: of
+    the free surface along the outline; advance: arcs, of the present trial; accepted: is the
+    present trial accurate enough; reach: arcs beyond it where the surface is too near; least: the
+    smallest advance; short, far: largest advance that is too short and smallest one that is far
+    enough; stalls: has the last trial halved neither the interval between these nor the clearance;
+    trials: the last two, as (advance, clearance).
     """
 
     wall: int
     node: int
     direction: int
     advance: float = 0.0
-    settled: bool = False
+    accepted: bool = False
     reach: float = 0.0
     least: float = 0.0
     short: float = 0.0
@@ -181,7 +181,7 @@ class Line:
         return self.wall, self.direction
 
     def record(self, clearance: float, reach: float) -> None:
-        """Take the clearance beyond the present trial into account."""
+        """Update the interval and the trials with the clearance beyond the present trial."""
         self.reach = reach
         if not self.trials or self.trials[-1][0] != self.advance:
             self.trials = [*self.trials[-1:], (self.advance, clearance)]
@@ -192,7 +192,7 @@ class Line:
         worse = len(self.trials) == 2 and abs(clearance) > abs(self.trials[0][1]) / 2
         if too_short:
             self.short = self.advance
-            # Where another line has moved since, what was far enough may be too short now.
+            # If another line has moved since, an advance that was far enough may be too short.
             self.far = self.far if self.far > self.advance else np.inf
         else:
             self.far = self.advance
@@ -200,20 +200,20 @@ class Line:
         self.stalls = worse and self.far - self.short > before / 2
         jumps = self.far <= max(self.short + SAME_PLACE, self.least + LEAST_PART)
         smallest = self.advance <= self.least
-        self.settled = not too_short and (smallest or clearance <= CLOSE or jumps)
+        self.accepted = not too_short and (smallest or clearance <= CLOSE or jumps)
 
     def start_from(self, advance: float) -> None:
-        """Take an advance, in arcs, as the smallest one and as the first trial."""
+        """Set the smallest advance and the first trial to an advance in arcs."""
         self.least = advance
         self.short = advance
         self.advance = advance
 
     def retreat(self) -> bool:
-        """Go half of the way back to the last place that was too short; is there a way?"""
-        way = self.advance - self.short
-        if self.settled or way < LEAST_PART:
+        """Go half of the way back to the last advance that was too short; has the line moved?"""
+        distance = self.advance - self.short
+        if self.accepted or distance < LEAST_PART:
             return False
-        self.advance = self.short + way / 2
+        self.advance = self.short + distance / 2
         return True
 
     def step(self) -> None:
@@ -229,8 +229,8 @@ class Line:
             self.advance = min(max(self._secant(1.0), self.short + margin), self.far - margin)
 
     def _secant(self, factor: float) -> float:
-        """Where the clearance vanishes on the line through the last two trials, the step to there
-        multiplied by a factor; with one trial, or on a falling line, a part of the way."""
+        """The advance at the root of the secant through the last two trials, its step multiplied
+        by a factor; with one trial, or if the secant falls, FIRST_TRIAL or FIRST_RETREAT."""
         advance, clearance = self.trials[-1]
         if len(self.trials) == 2:
             before, clearance_before = self.trials[0]
@@ -243,19 +243,19 @@ class Line:
 
 
 def arc_lengths(outline: Outline, line: Line) -> np.ndarray:
-    """(K,) um, chords of the free arcs beyond a line, one after the other."""
+    """(K,) um, chords of the free arcs beyond a line, in order."""
     arcs, _ = _free_arcs(outline, line.node, line.direction)
     return np.linalg.norm(arcs[:, 2] - arcs[:, 0], axis=1)
 
 
 def to_length(outline: Outline, line: Line) -> float:
-    """The advance of a line, um along the outline on which it was."""
+    """The advance of a line in um along its previous outline."""
     ends = np.concatenate([[0.0], np.cumsum(arc_lengths(outline, line))])
     return float(np.interp(line.advance, np.arange(len(ends)), ends))
 
 
 def to_arcs(outline: Outline, line: Line, length: float) -> float:
-    """The advance, in arcs, that is a length (um) along the outline on which a line was."""
+    """The advance, in arcs, of a length (um) along a line's previous outline."""
     ends = np.concatenate([[0.0], np.cumsum(arc_lengths(outline, line))])
     return float(np.interp(length, ends, np.arange(len(ends))))
 
@@ -271,7 +271,7 @@ class Contact:
     """Walls of an outline's nodes with arcs that are divided at contact lines.
 
     wall: (M,) of the outline's own nodes; arcs: (d,) numbers of the divided arcs, ascending; t:
-    (d,) where; first, second: (d,) walls of their first and second parts.
+    (d,) parameters of their divisions; first, second: (d,) walls of their two parts.
     """
 
     wall: np.ndarray

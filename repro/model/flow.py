@@ -14,8 +14,8 @@ phi g / nu_water,
 with nu_r = 1 or lambda; :mod:`repro.model.brinkman` adds the drag of a permeable aggregate.
 Velocities of order 2 or 3 with a pressure of one order less (Taylor-Hood) need no tau. Linear ones
 with a linear pressure do: tau = h_tau^2 / (c nu_r). The paper prints no constant c [E13];
-``reference/ERRATA.md`` reports what it does. The second line says that ``w = u - tau grad p`` is
-divergence-free for every linear q: w is what carries the substrates.
+``reference/ERRATA.md`` reports its effect. By the second line ``w = u - tau grad p`` is
+divergence-free for every linear q: w carries the substrates.
 
 Linear velocities with a bubble b = 27 L1 L2 L3 in each triangle (MINI: Arnold, Brezzi and Fortin
 1984) need no stabilisation. A linear function has a constant gradient, and the integral of grad b
@@ -48,7 +48,7 @@ from repro.timing import timed
 @brief
 @dataclass(frozen=True, eq=False)
 class Flow:
-    """Flow with the given mean velocity.
+    """Flow through the pore.
 
     mean_velocity: um/h; velocity: (n, 2) um/h at the nodes of its space; head: (m,) um at the nodes
     of the pressure's order, the mesh's corners first; correction: (T, 2) um/h, tau grad p, so that
@@ -129,26 +129,24 @@ def viscous(velocity: Space, viscosity: np.ndarray, interface: str) -> np.ndarra
     at = velocity.gradients_at
     k = velocity.cells.shape[1]
     weight = (viscosity[:, None] * at.dx)[:, None, :]
-    found = np.zeros((len(laplace), 2 * k, 2 * k))
+    matrices = np.zeros((len(laplace), 2 * k, 2 * k))
     # nu u_j,i v_i,j: rows of component i of v, columns of component j of u.
     for i, j in np.ndindex(2, 2):
         test, trial = at.slopes[:, :, j], at.slopes[:, :, i]
-        found[:, i * k: i * k + k, j * k: j * k + k] = (weight * np.swapaxes(test, 1, 2)) @ trial
+        matrices[:, i * k: i * k + k, j * k: j * k + k] = (weight * np.swapaxes(test, 1, 2)) @ trial
     for first in (0, k):
-        found[:, first: first + k, first: first + k] += laplace
-    return found
+        matrices[:, first: first + k, first: first + k] += laplace
+    return matrices
 
 
 @timed("flow")
 def unit_flow(velocity: Space, viscosity_ratio: float = 1.0, *, interface: str = "laplacian",
               element: Stabilised | Bubble = Stabilised(),
               permeability: float | None = None) -> UnitFlow:
-    """Stokes flow of mean velocity one through the meshed part, (1)-(5).
+    """Stokes flow of mean velocity one through the meshed part, (1)-(5); see :func:`solve`.
 
-    velocity: its space; interface: "laplacian" or "traction" [E2]; element: what stabilises linear
-    velocities; permeability: of the biomass (um2), which slows the water by its drag instead of a
-    viscosity, for velocities of order 2 and 3. Raises LinearError where the system cannot be
-    solved.
+    permeability: of the biomass (um2); velocities of order 2 and 3 then have its drag in place of
+    a viscosity.
     """
     mesh = velocity.mesh
     viscosity = np.where(mesh.biomass, viscosity_ratio, 1.0)
@@ -159,16 +157,16 @@ def unit_flow(velocity: Space, viscosity_ratio: float = 1.0, *, interface: str =
         blocks = stokes(velocity, viscosity, interface, mobility)
     else:
         body = Permeable(velocity, permeability)
-        system = system.holding(body.held(system.held))
+        system = system.with_constrained(body.constrained(system.constrained))
         blocks = stokes(velocity, body.viscosity, interface, None, body.matrices())
     value = prescribed(velocity)
     load = system.product(blocks, value)
-    found = value + system.solve(blocks, -load)
+    solution = value + system.solve(blocks, -load)
     n = velocity.count
-    u = found[: 2 * n].reshape(2, n).T
-    pressure = found[2 * n:]
+    u = solution[: 2 * n].reshape(2, n).T
+    pressure = solution[2 * n:]
     if mobility is None:
-        return UnitFlow(u, pressure, None, work(load, found, mesh.width))
+        return UnitFlow(u, pressure, None, work(load, solution, mesh.width))
     slope = np.einsum("tai,ta->ti", mesh.gradients, pressure[mesh.triangles])
     correction = np.einsum("tij,tj->ti", mobility, slope)
     return UnitFlow(u, pressure, correction, _drop(pressure_space(velocity), pressure))
@@ -176,7 +174,7 @@ def unit_flow(velocity: Space, viscosity_ratio: float = 1.0, *, interface: str =
 
 def stokes(velocity: Space, viscosity: np.ndarray, interface: str,
            mobility: np.ndarray | None, more: np.ndarray | None = None) -> np.ndarray:
-    """(T, 2k + m, 2k + m) element matrices of the whole system.
+    """(T, 2k + m, 2k + m) element matrices of velocity and pressure.
 
     viscosity: (T,) nu_r; mobility: (T, 2, 2) um2, tau; more: (T, 2k, 2k) added to a(u, v).
     """
@@ -192,22 +190,22 @@ def stokes(velocity: Space, viscosity: np.ndarray, interface: str,
 
 
 def _system(velocity: Space, interface: str) -> ElementSystem:
-    """u = 0 on the walls, a parabola at the inlet, u_y = 0 at the outlet in the traction form
-    [E10]."""
+    """The system with u = 0 on the walls, a parabola at the inlet, and u_y = 0 at the outlet in the
+    traction form [E10]."""
     dofs = velocity.dofs
-    held = np.zeros((velocity.count, 2), bool)
-    held[np.concatenate([dofs.walls, velocity.end_nodes(dofs.inlet)])] = True
+    constrained = np.zeros((velocity.count, 2), bool)
+    constrained[np.concatenate([dofs.walls, velocity.end_nodes(dofs.inlet)])] = True
     if interface == "traction":
-        held[velocity.end_nodes(dofs.outlet), 1] = True
+        constrained[velocity.end_nodes(dofs.outlet), 1] = True
     pressure = pressure_space(velocity).cells
-    return saddle_system(velocity.cells, pressure, held, dofs.elimination,
+    return saddle_system(velocity.cells, pressure, constrained, dofs.elimination,
                          velocity.mesh.topology.method)
 
 
 def prescribed(velocity: Space) -> np.ndarray:
-    """(2n + m,) values of the constrained unknowns: u_x at the inlet (3), the parabola scaled so
-    that the discrete flux is exactly u_ave W. Between the nodes of linear triangles the parabola is
-    cut by its chords, which lose 1 / n^2 of the flux; higher orders hold it exactly."""
+    """(2n + m,) values of the constrained unknowns: u_x at the inlet (3), scaled so that the
+    discrete flux is exactly u_ave W. Linear elements replace the parabola by its chords, which lose
+    1 / n^2 of the flux; higher orders represent it exactly."""
     dofs = velocity.dofs
     width = velocity.mesh.width
     value = np.zeros(2 * velocity.count + pressure_space(velocity).count)
@@ -219,11 +217,11 @@ def prescribed(velocity: Space) -> np.ndarray:
     return value
 
 
-def work(load: np.ndarray, found: np.ndarray, width: float) -> float:
+def work(load: np.ndarray, solution: np.ndarray, width: float) -> float:
     """Loss (1/um) as the work of the inlet per unit flux: (6) where the flow is developed, and of
     the order of the energy, twice that of the velocity's gradient. load: (2n + m,), the system's
     matrix times the prescribed values; found: (2n + m,), its solution."""
-    return float(load @ found) / width
+    return float(load @ solution) / width
 
 
 def _drop(space: Space, pressure: np.ndarray) -> float:
@@ -236,22 +234,45 @@ def scaled(unit: UnitFlow, mesh: Mesh, length: float, drive: Drive) -> Flow:
     """The flow driven by a scene's head over the whole pore, of a length (um), or of its mean
     velocity: the problem is linear (2.1). The head is zero at the outlet in the mean (4)."""
     viscosity = drive.kinematic_viscosity / drive.gravity
-    whole = unit.loss + poiseuille_loss(length - (mesh.ends[1] - mesh.ends[0]), mesh.width)
+    total_loss = unit.loss + poiseuille_loss(length - (mesh.ends[1] - mesh.ends[0]), mesh.width)
     speed = drive.mean_velocity
     if speed is None:
-        speed = needed(drive.head, "flow.head") / (viscosity * whole)
+        speed = needed(drive.head, "flow.head") / (viscosity * total_loss)
     scale = viscosity * speed
     linear = Space(mesh, 1)
     at_outlet = linear.mean_over(linear.dofs.outlet, unit.pressure[: mesh.corners])
     head = scale * (unit.pressure - at_outlet)
     correction = None if unit.correction is None else speed * unit.correction
-    return Flow(speed, speed * unit.velocity, head, correction, scale * unit.loss, scale * whole,
-                length / (viscosity * whole))
+    return Flow(speed, speed * unit.velocity, head, correction, scale * unit.loss,
+                scale * total_loss, length / (viscosity * total_loss))
 
 
 def solve(velocity: Space, drive: Drive, length: float, *, interface: str = "laplacian",
           element: Stabilised | Bubble = Stabilised()) -> Flow:
-    """Stokes flow through a pore of a length (um): :func:`unit_flow`, scaled to its drive."""
+    """Solve the Stokes flow through a pore, (1)-(6).
+
+    Parameters
+    ----------
+    velocity : Space
+        Space of the velocity, on the mesh of the pore.
+    drive : repro.scene.Flow
+        Head or mean velocity, viscosities, and the permeability of the biomass.
+    length : float
+        Length of the whole pore, um; the part without mesh is a clean channel.
+    interface : {"laplacian", "traction"}
+        Form of the viscous term [E2].
+    element : Stabilised or Bubble
+        Stabilisation of linear velocities.
+
+    Returns
+    -------
+    Flow
+
+    Raises
+    ------
+    LinearError
+        If the system cannot be solved.
+    """
     unit = unit_flow(velocity, drive.viscosity_ratio or 1.0, interface=interface, element=element,
                      permeability=drive.permeability)
     return scaled(unit, velocity.mesh, length, drive)

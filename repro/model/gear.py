@@ -60,12 +60,12 @@ SAFETY = 0.8
 FIRST = 45 / 3600
 #: A shorter step (h) fails.
 SHORTEST = 1e-6 / 3600
-#: Settled: the change over the supply that further steps of LONG (h) would sum up to.
+#: Profiles are steady if further steps of LONG (h) would sum up to this change over the supply.
 SETTLED = 1e-9
 LONG = 1e6
-#: On the way there: the largest change over the supply in a step.
+#: Until then: the largest change over the supply in a step.
 SETTLING = 0.3
-#: The factor by which steps rise and fall there, and most steps.
+#: Until then: the factor by which steps grow and shrink, and the largest number of steps.
 FASTER = 10.0
 MOST_STEPS = 1000
 
@@ -124,9 +124,9 @@ class Row:
 
 @dataclass(frozen=True, eq=False)
 class System:
-    """What the scheme needs: active: (r, q) um2 mg/L at the start; watched: (n,) nodes of the step
-    control; scale: (2, 1) of the concentrations; living: are F3 and F4 integrated; simultaneous:
-    see :func:`advance`."""
+    """A problem with data of the scheme. active: (r, q) um2 mg/L at the start; watched: (n,) nodes
+    of the step control; scale: (2, 1) of the concentrations; living: are F3 and F4 integrated;
+    simultaneous: see :func:`advance`."""
 
     problem: Problem
     active: np.ndarray
@@ -137,15 +137,15 @@ class System:
 
     @property
     def space(self) -> Space:
-        """Of the problem."""
+        """The problem's space."""
         return self.problem.space
 
     @cached_property
     def sparse(self) -> ElementSystem:
         """One substrate's unknowns: all triangles, then the pieces of biomass."""
-        held = bool(self.problem.system.held.any())
-        return self.space.mesh.topology.system(("gear", self.space.order, held),
-                                               lambda: _sparse(self.space, held))
+        constrained = bool(self.problem.system.constrained.any())
+        return self.space.mesh.topology.system(("gear", self.space.order, constrained),
+                                               lambda: _sparse(self.space, constrained))
 
     @cached_property
     def storage(self) -> np.ndarray:
@@ -157,17 +157,17 @@ class System:
 
     @cached_property
     def rows(self) -> tuple[Row, Row]:
-        """Of acceptor and donor."""
+        """The equations of acceptor and donor."""
         acceptor, donor = (self._row(s) for s in (0, 1))
         return acceptor, donor
 
     def _row(self, s: int) -> Row:
         problem = self.problem
-        own = slice(s * self.space.count, (s + 1) * self.space.count)
+        unknowns = slice(s * self.space.count, (s + 1) * self.space.count)
         operator = self.sparse.entries(0, problem.matrices[s])
         storage = self.sparse.entries(0, self.storage)
-        return Row(operator, storage, problem.operator[own, own], self.mass, problem.source[own],
-                   problem.both[s].supply)
+        return Row(operator, storage, problem.operator[unknowns, unknowns], self.mass,
+                   problem.source[unknowns], problem.both[s].supply)
 
     @cached_property
     def mass(self) -> sp.csc_matrix:
@@ -181,47 +181,65 @@ class System:
         pieces = self.space.reaction
         return fields[:, pieces.cells] @ pieces.values.T
 
-    def taken(self, loads: np.ndarray) -> np.ndarray:
+    def assembled(self, loads: np.ndarray) -> np.ndarray:
         """(n,) sum of loads (r, q) times the nodal functions."""
         pieces = self.space.reaction
         return np.bincount(pieces.cells.ravel(), (loads @ pieces.values).ravel(), self.space.count)
 
 
-def _sparse(space: Space, held_ends: bool) -> ElementSystem:
+def _sparse(space: Space, ends_constrained: bool) -> ElementSystem:
     place = np.empty(space.count)
     place[space.dofs.elimination] = np.arange(space.count)
-    held = np.zeros(space.count, bool)
-    held[both_ends(space)] = held_ends
-    return ElementSystem((space.cells, space.reaction.cells), place, held,
+    constrained = np.zeros(space.count, bool)
+    constrained[both_ends(space)] = ends_constrained
+    return ElementSystem((space.cells, space.reaction.cells), place, constrained,
                          space.mesh.topology.method)
 
 
 @timed("transport")
 def settle(problem: Problem, sink: Sink | None, guess: Concentrations | None) -> Concentrations:
-    """Profiles consistent with the biomass after a shape update: the scheme with F3 = F4 = 0, run
-    until nothing changes.
+    """Compute steady profiles after a shape update: the scheme with F3 = F4 = 0, until C is steady.
 
-    The way there does not matter (3.3.2): backward Euler in steps that rise to LONG as fast as
-    SETTLING permits. Where nothing can enter or leave the pore no profile is steady: returns the
-    guess unchanged (None: C_supply everywhere). Raises TransportError where the profiles do not
-    come to rest.
+    Parameters
+    ----------
+    problem : Problem
+    sink : Sink, optional
+        Biomass that takes up substrates; None without biomass.
+    guess : Concentrations, optional
+        Start of the scheme; C_supply everywhere by default.
+
+    Returns
+    -------
+    Concentrations
+        C_A and C_D (n,), mg/L. The guess, if nothing can enter or leave the pore: no profile is
+        steady then.
+
+    Raises
+    ------
+    TransportError
+        If the profiles do not become steady.
+
+    Notes
+    -----
+    The transient does not matter (3.3.2): the steps are backward Euler's and grow to LONG as fast
+    as SETTLING permits.
     """
     start = _nearer(problem, guess)
-    if not (problem.inflow.any() or problem.system.held.any()):
+    if not (problem.inflow.any() or problem.system.constrained.any()):
         return start
     nothing = np.zeros_like(problem.space.reaction.dx)
     active = nothing if sink is None else sink.active
-    system, now = _started(problem, active, nothing, start, living=False)
+    system, level = _started(problem, active, nothing, start, living=False)
     system = replace(system, watched=np.ones(problem.space.count, bool))
     step = LONG
     last = np.inf
     for count in range(1, MOST_STEPS + 1):
-        new, change = _accepted(system, now, step, SETTLING, "while the profiles settle",
+        new, change = _accepted(system, level, step, SETTLING, "while the profiles settle",
                                 1 / FASTER)
         if new.step >= LONG and change <= SETTLED * (1 - change / last):
             acceptor, donor = new.fields
             return Concentrations(acceptor, donor, count)
-        now = _level(new.fields, now.biomass)
+        level = _level(new.fields, level.biomass)
         step = min(FASTER * new.step, LONG)
         last = change
     raise TransportError(f"the profiles still change by {change:.2g} of the supply a step after "
@@ -229,14 +247,14 @@ def settle(problem: Problem, sink: Sink | None, guess: Concentrations | None) ->
 
 
 def _nearer(problem: Problem, guess: Concentrations | None) -> Concentrations:
-    """The guess; C_supply everywhere without one, and where constrained nodes would jump by more
-    than SETTLING: no step from there is short enough, and quadratic and cubic concentrations beside
-    a larger jump fall below zero."""
+    """The guess; or C_supply everywhere if there is no guess, or if constrained nodes would jump by
+    more than SETTLING: no step is short enough for a larger jump, and quadratic and cubic
+    concentrations beside it fall below zero."""
     supplied = supplied_everywhere(problem)
     if guess is None:
         return supplied
     change = np.abs(np.concatenate([guess.acceptor, guess.donor]) - problem.supply)
-    jumps = problem.system.held & (change > SETTLING * problem.supply)
+    jumps = problem.system.constrained & (change > SETTLING * problem.supply)
     return supplied if jumps.any() else guess
 
 
@@ -244,29 +262,51 @@ def _nearer(problem: Problem, guess: Concentrations | None) -> Concentrations:
 def advance(problem: Problem, active: np.ndarray, inert: np.ndarray, start: Concentrations,
             duration: float, *, tolerance: float = TOLERANCE, fixed_step: float | None = None,
             simultaneous: bool = False) -> Advance:
-    """Integrate (7)-(10) over a duration (h) in one geometry.
+    """Integrate (7)-(10) over a duration in one geometry.
 
-    active, inert: X_A, X_I (r, q) um2 mg/L at the start; fixed_step: steps of that size (h),
-    uncontrolled; simultaneous: both substrates see the other's prediction, as (3.3.1) may be read;
-    less accurate, and long steps may then oscillate. Raises TransportError where the step falls
-    under SHORTEST.
+    Parameters
+    ----------
+    problem : Problem
+    active, inert : (r, q) float
+        X_A and X_I at the start, um2 mg/L.
+    start : Concentrations
+        C_A and C_D (n,) at the start, mg/L.
+    duration : float
+        Hours.
+    tolerance : float
+        Largest |C - C*| in the aggregate over the supply.
+    fixed_step : float, optional
+        Size (h) of steps without error control.
+    simultaneous : bool
+        Does each substrate see the other's prediction, a possible reading of 3.3.1? It is less
+        accurate, and long steps may oscillate.
+
+    Returns
+    -------
+    Advance
+
+    Raises
+    ------
+    TransportError
+        If a step would be shorter than SHORTEST.
     """
-    system, now = _started(problem, active, inert, start, simultaneous=simultaneous)
-    before = now.fields
+    system, level = _started(problem, active, inert, start, simultaneous=simultaneous)
+    before = level.fields
     left = duration
     step = fixed_step or min(FIRST, duration)
     steps = []
     while left > 1e-12 * duration:
         step = left / np.ceil(left / step - 1e-9)
         when = f"{duration - left:.6g} h after the start"
-        now, size = _accepted(system, now, step, np.inf if fixed_step else tolerance, when, SHORTER)
-        steps.append(float(now.step))
-        left -= now.step
-        step = fixed_step or now.step * min(LONGER, _factor(tolerance, size))
-    stored = (system.mass @ (now.fields - before).T).sum(axis=0)
-    flows = Flows(*((float(a), float(d)) for a, d in (*now.flows.T, stored)))
-    growth, remains = now.biomass
-    end = Concentrations(now.fields[0], now.fields[1], len(steps))
+        level, size = _accepted(system, level, step, np.inf if fixed_step else tolerance, when,
+                                SHORTER)
+        steps.append(float(level.step))
+        left -= level.step
+        step = fixed_step or level.step * min(LONGER, _factor(tolerance, size))
+    stored = (system.mass @ (level.fields - before).T).sum(axis=0)
+    flows = Flows(*((float(a), float(d)) for a, d in (*level.flows.T, stored)))
+    growth, remains = level.biomass
+    end = Concentrations(level.fields[0], level.fields[1], len(steps))
     return Advance(active * np.exp(growth), remains, end, flows, tuple(steps))
 
 
@@ -283,20 +323,20 @@ def _started(problem: Problem, active: np.ndarray, inert: np.ndarray, start: Con
 
 
 def _level(fields: np.ndarray, biomass: np.ndarray) -> Level:
-    """A first level, without a past."""
+    """The first time level, without increments."""
     still = np.zeros_like(fields), np.zeros_like(biomass), np.zeros((2, 3))
     return Level(fields, biomass, np.zeros((2, 3)), *still)
 
 
-def _accepted(system: System, now: Level, step: float, tolerance: float, when: str,
+def _accepted(system: System, level: Level, step: float, tolerance: float, when: str,
               least: float) -> tuple[Level, float]:
-    """A step of this size, or of the first smaller one that is positive and differs little enough
-    from its prediction, and that difference over the scale; each try is shorter than the last by a
-    factor of 1/2 to ``least``."""
+    """A step of the size ``step`` or smaller that is positive and agrees with its prediction, and
+    its difference from the prediction over the scale; each trial is shorter than the previous one
+    by a factor of 1/2 to ``least``."""
     floor = _lowest(system.problem)
     shortest = min(SHORTEST, step)
     while step >= shortest:
-        new, difference = _tried(system, now, step, floor)
+        new, difference = _tried(system, level, step, floor)
         size = float(np.max(difference[:, system.watched], initial=0.0))
         if (new.fields >= floor).all() and size <= tolerance:
             return new, size
@@ -304,28 +344,27 @@ def _accepted(system: System, now: Level, step: float, tolerance: float, when: s
     raise _too_short(system, new, difference, when)
 
 
-def _tried(system: System, now: Level, step: float,
+def _tried(system: System, level: Level, step: float,
            floor: np.ndarray) -> tuple[Level, np.ndarray]:
-    """One step, and its difference from the prediction; with the positive sink where a
-    concentration would fall below zero and that prevents it, or below the least that is accepted.
-    """
-    plain = _corrected(system, now, step, positive=False)
+    """One step, and its difference from the prediction. If a concentration falls below zero and the
+    positive sink prevents it, or falls below ``floor``, the step uses the positive sink."""
+    plain = _corrected(system, level, step, positive=False)
     fields = plain[0].fields
     if fields.min() >= 0:
         return plain
-    positive = _corrected(system, now, step, positive=True)
+    positive = _corrected(system, level, step, positive=True)
     return positive if positive[0].fields.min() >= 0 or (fields < floor).any() else plain
 
 
 def _lowest(problem: Problem) -> np.ndarray:
-    """(2, 1) the least concentrations (mg/L) that are accepted: the lumped reaction of linear
-    elements keeps them positive."""
+    """(2, 1) least accepted concentrations, mg/L; zero for linear elements, whose lumped reaction
+    keeps them positive."""
     part = 0.0 if problem.space.order == 1 else UNRESOLVED
     return np.array([[-part * s.supply] for s in problem.both])
 
 
 def _factor(tolerance: float, size: float) -> float:
-    """Ratio of steps that brings a difference of second order in it just under the tolerance."""
+    """Ratio of step sizes that brings a second-order difference just under the tolerance."""
     return SAFETY * np.sqrt(tolerance / max(size, 1e-99))
 
 
@@ -341,30 +380,32 @@ def _too_short(system: System, new: Level, difference: np.ndarray, when: str) ->
                           f"of {3600 * SHORTEST:g} s; try a larger numerics.refinement")
 
 
-def _corrected(system: System, now: Level, step: float, positive: bool) -> tuple[Level, np.ndarray]:
+def _corrected(system: System, level: Level, step: float,
+               positive: bool) -> tuple[Level, np.ndarray]:
     """One step, and |C - C*| over the scale (2, n); positive: by backward Euler with the positive
     form of the sink."""
-    ratio = step / now.step
+    ratio = step / level.step
     carry, weight = (0.0, 1.0) if positive else _formula(ratio)
     interval = weight * step
-    fields = np.maximum(now.fields + ratio * now.field_rise, 0.0 if positive else -np.inf)
+    fields = np.maximum(level.fields + ratio * level.field_rise, 0.0 if positive else -np.inf)
     predicted = fields.copy()
-    field_rise = carry * now.field_rise
-    biomass_rise = carry * now.biomass_rise
+    field_rise = carry * level.field_rise
+    biomass_rise = carry * level.biomass_rise
     flux = np.empty((2, 3))
-    rise = now.biomass[0] + biomass_rise[0] + interval * _rates(system, fields)[0]
+    rise = level.biomass[0] + biomass_rise[0] + interval * _rates(system, fields)[0]
     active = system.active * np.exp(rise)
     for s in (0, 1):
-        seen = predicted if system.simultaneous else fields
-        fields[s], flux[s] = _solved(system, s, interval, now.fields[s] + field_rise[s],
-                                     *_sink(system, active, seen, s, positive))
-    field_rise = fields - now.fields
+        other_fields = predicted if system.simultaneous else fields
+        fields[s], flux[s] = _solved(system, s, interval, level.fields[s] + field_rise[s],
+                                     *_sink(system, active, other_fields, s, positive))
+    field_rise = fields - level.fields
     growth, remains = _rates(system, fields)
     biomass_rise[0] += interval * growth
-    biomass_rise[1] += interval * system.active * np.exp(now.biomass[0] + biomass_rise[0]) * remains
-    flow_rise = carry * now.flow_rise + interval * flux
-    new = Level(fields, now.biomass + biomass_rise, now.flows + flow_rise, field_rise, biomass_rise,
-                flow_rise, step)
+    rise = level.biomass[0] + biomass_rise[0]
+    biomass_rise[1] += interval * system.active * np.exp(rise) * remains
+    flow_rise = carry * level.flow_rise + interval * flux
+    new = Level(fields, level.biomass + biomass_rise, level.flows + flow_rise, field_rise,
+                biomass_rise, flow_rise, step)
     return new, np.abs(fields - predicted) / system.scale
 
 
@@ -374,7 +415,7 @@ def _formula(ratio: float) -> tuple[float, float]:
 
 
 def _rates(system: System, fields: np.ndarray) -> tuple[Rate, Rate]:
-    """F3 / X_A and F4 / X_A (r, q) 1/h, zero where the biomass does not live."""
+    """F3 / X_A and F4 / X_A (r, q) 1/h, zero where growth and decay are not integrated."""
     problem = system.problem
     if not system.living or problem.law is None:
         return 0.0, 0.0
@@ -390,19 +431,19 @@ def _sink(system: System, active: np.ndarray, fields: np.ndarray, s: int,
     if law is None:
         return np.zeros_like(active), np.zeros_like(active)
     concentrations = system.at(fields)
-    own = concentrations[s]
+    substrate = concentrations[s]
     uptake, slope = law.own_uptake(s, *concentrations)
     if positive:
         tiny = np.finfo(float).tiny
-        secant = np.where(own > tiny, uptake / np.maximum(own, tiny), slope)
+        secant = np.where(substrate > tiny, uptake / np.maximum(substrate, tiny), slope)
         return active * secant, np.zeros_like(active)
-    return active * slope, active * (uptake - slope * own)
+    return active * slope, active * (uptake - slope * substrate)
 
 
 def _solved(system: System, s: int, interval: float, past: np.ndarray, slope: np.ndarray,
             offset: np.ndarray) -> tuple[np.ndarray, tuple[float, float, float]]:
-    """C (n,) of M (C - past) / interval + L C - b + slope C + offset = 0; and what is supplied,
-    what leaves and what is consumed."""
+    """C (n,) that solves M (C - past) / interval + L C - b + slope C + offset = 0; and the supply,
+    the outflow and the consumption."""
     row = system.rows[s]
     sparse = system.sparse
     pieces = system.space.reaction
@@ -410,14 +451,14 @@ def _solved(system: System, s: int, interval: float, past: np.ndarray, slope: np
     products = pieces.values[:, :, None] * pieces.values[:, None, :]
     reaction = (slope @ products.reshape(-1, k * k)).reshape(-1, k, k)
     entries = row.operator + row.storage / interval + sparse.entries(1, reaction)
-    right = row.mass @ past / interval + row.source - system.taken(offset)
-    held = np.where(sparse.held, row.supply, 0.0)
-    known = row.matrix @ held + row.mass @ held / interval
-    field = held
+    right = row.mass @ past / interval + row.source - system.assembled(offset)
+    constrained = np.where(sparse.constrained, row.supply, 0.0)
+    known = row.matrix @ constrained + row.mass @ constrained / interval
+    field = constrained
     solver = linear.factorised(sparse.filled(entries), system.space.mesh.topology.method)
     field[sparse.order] = solver.solve((right - known)[sparse.order])
     consumed = slope * (field[pieces.cells] @ pieces.values.T) + offset
     stored = row.mass @ (field - past) / interval
-    entered = row.matrix @ field + stored - row.source + system.taken(consumed)
-    supplied = row.source.sum() + entered[sparse.held].sum()
+    entered = row.matrix @ field + stored - row.source + system.assembled(consumed)
+    supplied = row.source.sum() + entered[sparse.constrained].sum()
     return field, (supplied, float(system.problem.outflow @ field), consumed.sum())

@@ -20,9 +20,9 @@ and the modulus is the incremental one there, mu_tau = mu_L theta^(-2/3); in ref
 the stabilisation so grows as J^(5/3). It is kept fixed while an equilibrium is sought.
 
 *Curved triangles*, quadratic displacements (Taylor-Hood): no term in |grad P|^2, but P + gamma
-theta^(-5/3) (J - theta) for P in S. That (grad-div stabilisation) vanishes where J = theta. It is
+theta^(-5/3) (J - theta) for P in S. This grad-div stabilisation vanishes where J = theta. It is
 needed: at a given shape the energy of plane expansion is J^(1/3) + J^(-2/3) / 2, which is concave,
-and what the linear pressure leaves free of J would grow from nothing.
+so that modes of J that the linear pressure does not constrain would grow.
 """
 
 from __future__ import annotations
@@ -59,8 +59,8 @@ GAMMA = 1.0
 #: On curved triangles theta goes to its target in parts of at most this factor: a longer step of
 #: Newton's method may end in another equilibrium, with a wrinkled surface.
 FACTOR = 1.2
-#: This part of the aggregate's points asks for no more parts than are made: beside a contact line
-#: J may be far from theta in a few.
+#: FACTOR holds in this fraction of the aggregate's points: beside a contact line J may be far from
+#: theta in a few.
 MOST_POINTS = 0.95
 
 
@@ -93,14 +93,14 @@ class Shape:
     @cached_property
     def unconstrained(self) -> ElementSystem:
         """The sparse system of positions and pressure, nothing prescribed."""
-        held = np.zeros((int(self.cells.max()) + 1, 2), bool)
-        return saddle_system(self.cells, self.triangles, held, method=self.method)
+        constrained = np.zeros((int(self.cells.max()) + 1, 2), bool)
+        return saddle_system(self.cells, self.triangles, constrained, method=self.method)
 
     def constrained(self, rows: np.ndarray) -> ElementSystem:
-        """The system with unknowns (2n + corners,) prescribed; the last one asked for is kept."""
+        """The system with prescribed unknowns ``rows`` (2n + corners,). The last one is kept."""
         last = self._constrained.get("last")
-        if last is None or not np.array_equal(last.held, rows):
-            last = self.unconstrained.holding(rows)
+        if last is None or not np.array_equal(last.constrained, rows):
+            last = self.unconstrained.with_constrained(rows)
             self._constrained["last"] = last
         return last
 
@@ -145,8 +145,8 @@ class Equilibrium:
 
 @dataclass(frozen=True, eq=False)
 class Strained:
-    """Plane deformations F (..., 2, 2) and what the stress takes from them, each worked out once,
-    where it is asked for: J before anything is divided by it."""
+    """Plane deformations F (..., 2, 2) and their terms in the stress, each computed once, on first
+    use, so that J can be tested before a division by it."""
 
     F: np.ndarray
 
@@ -217,18 +217,18 @@ def gradient_stabilisation(position: np.ndarray, triangles: np.ndarray,
     return weight[:, None, None] * np.einsum("tai,tbi->tab", slopes, slopes)
 
 
-Found = TypeVar("Found")
+Value = TypeVar("Value")
 
 
-class Last(Generic[Found]):
-    """A function of one array that keeps its last result until it is asked for another array, which
-    must not change in place."""
+class Last(Generic[Value]):
+    """A function of one array that keeps its last result until it is called with another array.
+    Arrays must not change in place."""
 
-    def __init__(self, function: Callable[[np.ndarray], Found]):
+    def __init__(self, function: Callable[[np.ndarray], Value]):
         self._function = function
-        self._last: tuple[np.ndarray, Found] | None = None
+        self._last: tuple[np.ndarray, Value] | None = None
 
-    def __call__(self, array: np.ndarray) -> Found:
+    def __call__(self, array: np.ndarray) -> Value:
         if self._last is None or self._last[0] is not array:
             self._last = array, self._function(array)
         return self._last[1]
@@ -237,7 +237,8 @@ class Last(Generic[Found]):
 @dataclass(frozen=True, eq=False)
 class Iterate:
     """position: (n, 2) um; pressure: (corners,) P / mu_L; residual and the size of its terms; lag:
-    (n, 2) um, what prescribed coordinates still lack; free: unknowns that are not prescribed."""
+    (n, 2) um, distances of prescribed coordinates to their targets; free: unknowns that are not
+    prescribed."""
 
     position: np.ndarray
     pressure: np.ndarray
@@ -253,34 +254,37 @@ class Iterate:
 
     @property
     def complete(self) -> bool:
-        """Are prescribed coordinates where they are to be?"""
+        """Do prescribed coordinates have their values?"""
         return not self.lag.any()
 
     @property
     def length(self) -> float:
-        """Of the residual."""
+        """Length of the residual."""
         return float(np.linalg.norm(self.residual[self.free]))
 
 
 class System:
     """Residual and tangent of Pi for one body at one theta and prescribed coordinates."""
 
-    def __init__(self, body: Body, held: np.ndarray, *, stabilising: np.ndarray | None = None,
-                 forces: np.ndarray | None = None, system: ElementSystem | None = None):
-        """held: (n, 2) True where a coordinate is prescribed; stabilising: (t, 3, 3) of |grad P|^2,
-        None on curved triangles; forces: (n, 2) um, nodal forces over mu_L that do not depend on
-        the shape (the t0 of (20)), none by default; system: the sparse system with nothing
-        prescribed, if it is known."""
+    def __init__(self, body: Body, constrained: np.ndarray, *,
+                 stabilising: np.ndarray | None = None, forces: np.ndarray | None = None,
+                 system: ElementSystem | None = None):
+        """constrained: (n, 2) True where a coordinate is prescribed; stabilising: (t, 3, 3) of
+        |grad P|^2, None on curved triangles; forces: (n, 2) um, nodal forces over mu_L that do not
+        depend on the shape (the t0 of (20)), none by default; system: the sparse system without
+        constraints, if it is known."""
         self.body = body
-        self.held = held
+        self.constrained = constrained
         self.stabilising = stabilising
-        rows = np.concatenate([held[:, 0], held[:, 1], np.zeros(body.shape.corners, bool)])
-        self.sparse = body.shape.constrained(rows) if system is None else system.holding(rows)
+        none = np.zeros(body.shape.corners, bool)
+        rows = np.concatenate([constrained[:, 0], constrained[:, 1], none])
+        self.sparse = (body.shape.constrained(rows) if system is None
+                       else system.with_constrained(rows))
         self.unknowns = self.sparse.kinds[0]
         self.free = self.sparse.free
         self.pull = np.zeros(len(rows))
         if forces is not None:
-            self.pull[: held.size] = forces.T.ravel()
+            self.pull[: constrained.size] = forces.T.ravel()
         self.strained = Last(body.strained)
         self.theta = self.target = np.empty(0)
         self.sizes = np.empty(0)
@@ -294,7 +298,7 @@ class System:
         return self._iterate(position, pressure)
 
     def _iterate(self, position: np.ndarray, pressure: np.ndarray) -> Iterate:
-        lag = np.where(self.held, self.target - position, 0.0)
+        lag = np.where(self.constrained, self.target - position, 0.0)
         residual = self.residual(position, pressure)
         return Iterate(position, pressure, residual, self.sizes, lag, self.free)
 
@@ -311,8 +315,8 @@ class System:
         return at, linear + self._stiffening() * (at.J - self.theta)
 
     def residual(self, position: np.ndarray, pressure: np.ndarray) -> np.ndarray:
-        """(2n + corners,): x of all nodes, y, then P of the corners; det F > 0 is the caller's
-        business."""
+        """(2n + corners,): x of all nodes, y, then P of the corners. The caller ensures det F > 0.
+        """
         at, P = self._pressed(position, pressure)
         gap = (self.body.at.dx * (at.J - self.theta)) @ self.body.shape.table.linear
         if self.stabilising is not None:
@@ -332,7 +336,7 @@ class System:
         return np.swapaxes(stress, 1, 2).reshape(len(stress), 2, -1) @ weighted
 
     def _summed(self, force: np.ndarray, gap: np.ndarray) -> np.ndarray:
-        """Of all triangles, from (t, 2, k) and (t, 3)."""
+        """(2n + corners,) sum over all triangles of forces (t, 2, k) and gaps (t, 3)."""
         local = np.concatenate([force[:, 0], force[:, 1], gap], axis=1)
         return np.bincount(self.unknowns.ravel(), local.ravel(), len(self.pull))
 
@@ -347,10 +351,10 @@ class System:
         both = 2 / 9 * at.A * at.trace + PJ + self._stiffening() * at.J**2
         half = each(dx * both / 2, h) - each(2 / 3 * dx * at.A, f)
         swap = each(dx * (at.A * at.trace / 3 - PJ), h)
-        found = np.swapaxes(h, 1, 2) @ np.concatenate([half, swap], axis=2)
-        K = found[:, :, : 2 * k] + np.swapaxes(found[:, :, : 2 * k], 1, 2)
+        blocks = np.swapaxes(h, 1, 2) @ np.concatenate([half, swap], axis=2)
+        K = blocks[:, :, : 2 * k] + np.swapaxes(blocks[:, :, : 2 * k], 1, 2)
         exchanged = K.reshape(-1, 2, k, 2, k)  # the same memory
-        exchanged += np.swapaxes(found[:, :, 2 * k:].reshape(exchanged.shape), 1, 3)
+        exchanged += np.swapaxes(blocks[:, :, 2 * k:].reshape(exchanged.shape), 1, 3)
         weighted = np.repeat(at.A, 2, axis=1)[:, :, None] * self.body.weighted
         plain = np.swapaxes(self.body.at.rows, 1, 2) @ weighted
         exchanged[:, 0, :, 0] += plain
@@ -390,18 +394,46 @@ class System:
 
 @timed("growth")
 def equilibrium(body: Body, theta: np.ndarray, position: np.ndarray, pressure: np.ndarray,
-                held: np.ndarray, prescribed: np.ndarray, *, last: np.ndarray | None = None,
-                forces: np.ndarray | None = None, reused: bool = False,
+                constrained: np.ndarray, prescribed: np.ndarray, *, last: np.ndarray | None = None,
+                forces: np.ndarray | None = None, modified_newton: bool = False,
                 patient: bool = True) -> Equilibrium:
-    """Equilibrium under the expansion theta (t, q) since the reference, from a start.
+    """Solve for the equilibrium of an aggregate under an expansion, (14)-(27).
 
-    position: (n, 2) um, where to start, with det F > 0; pressure: (corners,) P / mu_L there; held:
-    (n, 2) True where a coordinate is prescribed, and prescribed: (n, 2) um, what it is to reach;
-    last: (n, 2) um, the last known shape, the start by default; forces: (n, 2) um, nodal forces
-    over mu_L, none by default; reused: is Newton's derivative kept while it does enough? Newton's
-    method with a line search that rejects det F <= 0; where it fails, theta and the prescribed
-    coordinates go from where they are to their targets in geometric sub-steps. Raises GrowthError
-    where that fails too.
+    Parameters
+    ----------
+    body : Body
+    theta : (t, q) float
+        Expansion since the reference configuration.
+    position : (n, 2) float
+        Positions from which to start, um, with det F > 0.
+    pressure : (corners,) float
+        P / mu_L from which to start.
+    constrained : (n, 2) bool
+        True where a coordinate is prescribed.
+    prescribed : (n, 2) float
+        Prescribed coordinates, um.
+    last : (n, 2) float, optional
+        The last known shape, um; the start by default.
+    forces : (n, 2) float, optional
+        Nodal forces over mu_L, um; none by default.
+    modified_newton : bool
+        Does Newton's method keep its derivative while the defect falls fast enough?
+    patient : bool
+        Is an equilibrium that fails tried again in more sub-steps?
+
+    Returns
+    -------
+    Equilibrium
+
+    Raises
+    ------
+    GrowthError
+        If there is no convergence.
+
+    Notes
+    -----
+    The line search of Newton's method rejects det F <= 0. Where the method fails, theta and the
+    prescribed coordinates go to their targets in geometric sub-steps.
     """
     start = body.strained(position).J
     if start.min() <= 0 or theta.min() <= 0:
@@ -416,36 +448,38 @@ def equilibrium(body: Body, theta: np.ndarray, position: np.ndarray, pressure: n
     else:
         apart = np.quantile(np.abs(np.log(theta / start)), MOST_POINTS)
         parts = max(1, int(np.ceil(apart / np.log(FACTOR))))
-    system = System(body, held, stabilising=stabilising, forces=forces)
+    system = System(body, constrained, stabilising=stabilising, forces=forces)
     first = Equilibrium(position, pressure, 0)
-    return reach(system, start, theta, first, prescribed, parts, reused, patient)
+    return reach(system, start, theta, first, prescribed, parts, modified_newton, patient)
 
 
 def reach(system: System, start: np.ndarray, theta: np.ndarray, first: Equilibrium,
-          prescribed: np.ndarray, parts: int = 1, reused: bool = False,
+          prescribed: np.ndarray, parts: int = 1, modified_newton: bool = False,
           patient: bool = True) -> Equilibrium:
-    """Equilibrium of a system under theta, from J = ``start`` (shaped alike), in ``parts`` or,
-    where that fails, more; see :func:`equilibrium`."""
+    """Equilibrium of a system under theta, from J = ``start`` (of theta's shape), in ``parts``, or
+    in more if that fails; see :func:`equilibrium`."""
     failure = ""
     for steps in CONTINUATION[patient]:
         try:
-            return _continued(system, start, theta, first, prescribed, parts * steps, reused)
+            return _continued(system, start, theta, first, prescribed, parts * steps,
+                              modified_newton)
         except (GrowthError, LinearError) as error:
             failure = str(error)
     raise GrowthError(f"{failure}; try a shorter growth.time_step or a larger numerics.refinement")
 
 
 def _continued(system: System, start: np.ndarray, theta: np.ndarray, first: Equilibrium,
-               prescribed: np.ndarray, steps: int, reused: bool) -> Equilibrium:
+               prescribed: np.ndarray, steps: int, modified_newton: bool) -> Equilibrium:
     """Newton's method at theta = start (theta / start)^s for s = 1 / steps ... 1."""
-    newton = Newton(NEWTON, ROUND_OFF, MOST_ITERATIONS, reused)
-    now = first
+    newton = Newton(NEWTON, ROUND_OFF, MOST_ITERATIONS, modified_newton)
+    solution = first
     for part in np.arange(1, steps + 1) / steps:
         target = first.position + part * (prescribed - first.position)
-        iterate = system.under(start * (theta / start) ** part, target, now.position, now.pressure)
+        iterate = system.under(start * (theta / start) ** part, target, solution.position,
+                               solution.pressure)
         last, count, converged = newton.solve(system, iterate)
         if not converged:
             raise GrowthError("Newton's method for the growth stands at a defect of "
                               f"{last.defect:.2g} after {count} iterations")
-        now = Equilibrium(last.position, last.pressure, now.iterations + count)
-    return now
+        solution = Equilibrium(last.position, last.pressure, solution.iterations + count)
+    return solution

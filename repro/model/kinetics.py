@@ -65,11 +65,11 @@ class RateLaw:
         return m_a * self.per_acceptor(m_d), self.per_donor(m_a) * m_d
 
     def own_uptake(self, substrate: int, acceptor: Values, donor: Values) -> tuple[Values, Values]:
-        """Uptake of the acceptor (0) or the donor (1) at C_A and C_D, extended below zero of its
-        own concentration, and its derivative by that."""
-        own, other = (acceptor, donor) if substrate == 0 else (donor, acceptor)
+        """Uptake of the acceptor (0) or the donor (1) at C_A and C_D, extended below zero of that
+        substrate's concentration, and its derivative by this concentration."""
+        concentration, other = (acceptor, donor) if substrate == 0 else (donor, acceptor)
         laws = tuple(self.both)
-        fraction, slope = laws[substrate].extended(own)
+        fraction, slope = laws[substrate].extended(concentration)
         of_other = laws[1 - substrate].fraction(other)
         per_own = self.per_acceptor(of_other) if substrate == 0 else self.per_donor(of_other)
         return fraction * per_own, slope * per_own
@@ -104,7 +104,7 @@ class RateLaw:
 
 
 def rate_law(substrates: Substrates, kinetics: Kinetics) -> RateLaw:
-    """The rates that a scene asks for."""
+    """The rates of a scene."""
     return RateLaw(kinetics, uptake_law(substrates, kinetics))
 
 
@@ -114,7 +114,7 @@ def decay_demand(kinetics: Kinetics) -> float:
 
 
 def mean_growth(exponent: np.ndarray) -> np.ndarray:
-    """(e^z - 1) / z, the mean over a step of what grows by e^z in it."""
+    """(e^z - 1) / z, the mean over a step of a quantity that grows by the factor e^z."""
     zero = exponent == 0
     z = np.where(zero, 1.0, exponent)
     return np.where(zero, 1.0, np.expm1(z) / z)
@@ -140,13 +140,13 @@ def grow(active: np.ndarray, inert: np.ndarray, growth: np.ndarray, remains: np.
 
 @dataclass(frozen=True, eq=False)
 class Sink:
-    """Active biomass that takes up substrates, as it is or as it grows over a time.
+    """Active biomass that takes up substrates, at an instant or while it grows over a time.
 
     active: (r, q) um2 mg/L, masses at the points of the reaction; duration: h, the time over which
-    it grows meanwhile, zero: as it is. Over a time its mean mass takes part, at the growth rate of
-    the very concentrations that are sought: what is taken up and what is made are one integral.
+    it grows, or zero. Over a time the mean mass takes up substrates. It grows at the rates of the
+    concentrations being solved for, so that uptake and growth are one integral.
 
-    All of it is a function of the fractions m_A and m_D, (2, r, q).
+    All methods are functions of the fractions m_A and m_D, (2, r, q).
     """
 
     active: np.ndarray

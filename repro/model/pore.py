@@ -1,4 +1,4 @@
-"""The state of a pore at an instant, and what is solved in its geometry."""
+"""The state of a pore at an instant, and the flow and the substrates in its geometry."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ from repro.scene import Scene, needed
 CONTACT_ELEMENTS = 2.0
 #: The thinnest film to resolve where no [growth] says when it closes (Table 1), um.
 MINIMUM_FILM = 2.0
-#: Under this Peclet number u W / D the inlet supplies nothing that could be told from round-off.
+#: Under this Peclet number u W / D the supply of the inlet is round-off.
 SLOWEST = 1e-8
-#: With order 2 and 3 elements are made no larger than this asks for: the concentration boundary
-#: layer is W Pe^(-1/3) thick (Leveque), and with four elements across the pore and this factor
-#: concentrations upstream of an aggregate exceed the supply by less than 0.01 %.
+#: Refinement of order 2 and 3 over Pe^(1/3): the concentration boundary layer is W Pe^(-1/3) thick
+#: (Leveque). With four elements across the pore and this factor, concentrations upstream of an
+#: aggregate exceed the supply by less than 0.01 %.
 BOUNDARY_LAYER = 0.15
 #: By order of the elements: edges at the tips of an outline are the pore's width over this and over
 #: the square of the refinement (W / 200 in the presets paper and fast), but no shorter than W over
@@ -48,9 +48,9 @@ class Pore:
     the mesh's loop; fixed: (M,) its x is constrained; active, inert: X_A, X_I, (r, q) um2 mg/L at
     the points of the reaction; theta: (t, q) expansion since t = 0 in the aggregate's triangles;
     body: the aggregate as it was at t = 0; pressure: (corners,) P / mu_L; concentrations: the last
-    known ones, None before the first; front: what element sizes at the aggregate are divided by,
-    for a front of the substrates in it; last: (n, 2) um, the aggregate's nodes in the shape from
-    which strain counts, None where that is the shape of t = 0.
+    known ones, None before the first; front: divisor of the element sizes at the aggregate, for a
+    front of the substrates in it; last: (n, 2) um, the aggregate's nodes in the shape from which
+    strain counts, None for the shape of t = 0.
     """
 
     time: float
@@ -73,15 +73,15 @@ class Pore:
 
     @property
     def mesh(self) -> Mesh:
-        """Of the space."""
+        """The mesh of the space."""
         return self.space.mesh
 
     @property
     def origin(self) -> np.ndarray:
-        """(N, 2) um, where the material at a node was at t = 0; in the fluid, where the node is."""
-        found = self.mesh.points.copy()
-        found[self.mesh.body] = self.body.reference
-        return found
+        """(N, 2) um, positions at t = 0 of the nodes' material; in the fluid, the present ones."""
+        origin = self.mesh.points.copy()
+        origin[self.mesh.body] = self.body.reference
+        return origin
 
     @cached_property
     def outline(self) -> Outline | None:
@@ -94,7 +94,7 @@ class Pore:
 
     @property
     def boundary(self) -> Outline:
-        """The outline of an aggregate that is there. Raises MissingError in a clean channel."""
+        """The outline of the aggregate. Raises MissingError in a clean channel."""
         return needed(self.outline, "an aggregate")
 
     @property
@@ -108,7 +108,7 @@ class Pore:
         return float(self.active.sum() + self.inert.sum())
 
     def moved(self, points: np.ndarray) -> Pore:
-        """With its mesh's nodes at ``points`` (N, 2) um."""
+        """The pore with the nodes of its mesh at ``points`` (N, 2) um."""
         return replace(self, space=Space(self.mesh.moved(points), self.space.order))
 
     def composition(self, maximum_density: float) -> tuple[float, float, float]:
@@ -121,8 +121,8 @@ class Pore:
 @brief
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """Flow and substrates in the geometry of a pore, and the ledgers of acceptor and donor; None
-    where the scene models none."""
+    """Flow and substrates in the geometry of a pore, and the fluxes of acceptor and donor; None
+    for parts that the scene does not model."""
 
     flow: Flow | None
     problem: Problem | None
@@ -136,7 +136,7 @@ def film(scene: Scene) -> float:
 
 
 def resolution(scene: Scene) -> float:
-    """What element sizes are divided by: ``numerics.refinement``, or more for boundary layers.
+    """Divisor of the element sizes: ``numerics.refinement``, or more for boundary layers.
 
     The speed is the scene's mean velocity, or that of the clean channel under its head.
     """
@@ -156,7 +156,7 @@ def fastest(scene: Scene) -> float:
 
 
 def sized(scene: Scene, front: float = 1.0) -> Sizing:
-    """How large the elements of its meshes are to be; front: as :class:`Pore`'s."""
+    """Element sizes of a scene's meshes; front: as :attr:`Pore.front`."""
     seed = scene.aggregate
     middle = seed.position if seed and seed.outline is None else None
     least = film(scene)
@@ -170,17 +170,16 @@ def sized(scene: Scene, front: float = 1.0) -> Sizing:
 def generate(scene: Scene, outline: Outline | None,
              front: float = 1.0) -> tuple[Mesh, Outline | None]:
     """A new mesh around the aggregate (None: a clean channel) with the extent of 3.1, and the
-    outline with the nodes that it has there. Raises MeshError where that cannot be."""
+    outline with its nodes on that mesh. Raises MeshError if there is no such mesh."""
     numerics = scene.numerics
-    whole = numerics.extent == "full"
-    ends = sizing.meshed_extent(outline, scene.pore.width, scene.pore.length, whole)
+    is_full = numerics.extent == "full"
+    ends = sizing.meshed_extent(outline, scene.pore.width, scene.pore.length, is_full)
     method = Method(numerics.solver, numerics.ordering)
     return mesher.generate(outline, ends, sized(scene, front), numerics.geometry, method)
 
 
 def initial_outline(scene: Scene, front: float = 1.0) -> Outline | None:
-    """The aggregate's boundary at t = 0, None in a clean channel; front: as that of a
-    :class:`Pore`."""
+    """The aggregate's boundary at t = 0, None in a clean channel; front: as :attr:`Pore.front`."""
     seed = scene.aggregate
     if seed is None:
         return None
@@ -200,8 +199,25 @@ def size_at_tips(scene: Scene) -> float:
 
 
 def seeded(scene: Scene, front: float = 1.0, outline: Outline | None = None) -> Pore:
-    """The pore at t = 0: X_A + X_I = X_m in the aggregate (Table 1), or a clean channel; front: as
-    that of a :class:`Pore`; outline: another than the scene's."""
+    """Make the pore at t = 0: X_A + X_I = X_m in the aggregate (Table 1), or a clean channel.
+
+    Parameters
+    ----------
+    scene : Scene
+    front : float
+        As :attr:`Pore.front`.
+    outline : Outline, optional
+        Replaces the scene's outline.
+
+    Returns
+    -------
+    Pore
+
+    Raises
+    ------
+    MeshError
+        If no mesh can be made around the outline.
+    """
     mesh, outline = generate(scene, outline or initial_outline(scene, front), front)
     space = Space(mesh, scene.numerics.order)
     density = scene.kinetics.maximum_density if scene.kinetics else 0.0
@@ -216,8 +232,8 @@ def seeded(scene: Scene, front: float = 1.0, outline: Outline | None = None) -> 
 
 
 def material(space: Space, reference: np.ndarray) -> growth.Body:
-    """The aggregate of a mesh with its nodes' places (n, 2) um in the reference configuration,
-    integrated where its growth is taken: in one point of a straight triangle."""
+    """The aggregate of a mesh; reference: (n, 2) um, its nodes in the reference configuration.
+    Growth on a straight triangle is integrated in one point."""
     topology = space.mesh.topology
     degree = elements.DEGREES[max(2, space.order)]
     if space.mesh.geometry == 1:
@@ -226,25 +242,40 @@ def material(space: Space, reference: np.ndarray) -> growth.Body:
     return growth.Body(shape, reference)
 
 
-def solve(scene: Scene, now: Pore, over: float = 0.0) -> Solved:
-    """Flow, then substrates, in the geometry of the pore: what the scene's sections ask for.
+def solve(scene: Scene, pore: Pore, over: float = 0.0) -> Solved:
+    """Solve the flow and the substrates that a scene models, in the geometry of a pore.
 
-    Tables of the scene count at the pore's time. over: h, in which the biomass of ``now`` grows at
-    the rates that are found meanwhile; its mean takes part.
+    Parameters
+    ----------
+    scene : Scene
+        Its tables over time are read at the pore's time.
+    pore : Pore
+    over : float
+        Time (h) in which the biomass of ``pore`` grows at the rates being solved for; its mean
+        takes up the substrates.
+
+    Returns
+    -------
+    Solved
+
+    Raises
+    ------
+    LinearError, TransportError, Unresolved
+        If the flow or the substrates cannot be solved.
     """
-    scene = scene.at(now.time)
-    carried = solve_flow(scene, now.space) if scene.flow else None
+    scene = scene.at(pore.time)
+    carried = solve_flow(scene, pore.space) if scene.flow else None
     if scene.substrates is None:
         return Solved(carried, None, None)
     numerics = scene.numerics
-    problem = transport.problem(now.space, carried, scene.substrates, scene.kinetics,
+    problem = transport.problem(pore.space, carried, scene.substrates, scene.kinetics,
                                 numerics.inlet, numerics.jacobian == "reused")
-    sink = biomass.sink(now.active if scene.kinetics else None, over)
+    sink = biomass.sink(pore.active if scene.kinetics else None, over)
     if numerics.transport == "gear":
-        state = gear.settle(problem, sink, now.concentrations)
+        state = gear.settle(problem, sink, pore.concentrations)
     else:
         refuse_no_supply(scene, carried)
-        state = transport.steady(problem, sink, now.concentrations)
+        state = transport.steady(problem, sink, pore.concentrations)
     return Solved(carried, problem, state, transport.fluxes(problem, sink, state))
 
 
@@ -257,7 +288,7 @@ def peclet(scene: Scene, speed: float) -> float:
 
 
 def refuse_no_supply(scene: Scene, carried: Flow | None) -> None:
-    """Raises TransportError where the flow is too slow to supply anything: no state is steady."""
+    """Raises TransportError if the flow is too slow to supply the pore: no state is steady."""
     if carried and peclet(scene, carried.mean_velocity) < SLOWEST:
         raise TransportError("the Peclet number u W / D is "
                              f"{peclet(scene, carried.mean_velocity):.2g}, under {SLOWEST:g}: "

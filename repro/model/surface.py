@@ -1,7 +1,7 @@
 """The elastic stretch along the aggregate's free surface, and where the model's equilibrium ends.
 
-The stretch of a material line along the surface since the configuration from which strain counts,
-over J^(1/2): what is left of it when the growth, which strains nothing by itself, is taken out. At
+It is the stretch of a material line along the surface, since the configuration from which strain
+counts, over J^(1/2): division by J^(1/2) removes the growth, which causes no stress by itself. At
 given J the energy (17) is, in the plane, that of an incompressible neo-Hookean solid, whose free
 surface creases where this stretch falls to 0.647 (Hong, Zhao and Suo, Appl. Phys. Lett. 95, 2009;
 Hohlfeld and Mahadevan, Phys. Rev. Lett. 106, 2011) and is unstable to waves of every length at
@@ -24,10 +24,10 @@ from repro.model.pore import Pore
 CREASE = 0.647
 #: Small waves of every length lower it.
 BIOT = 0.544
-#: Stretches this near to a contact line do not count, in parts of the free surface's length: the
-#: stress at the line is singular.
+#: Stretches closer to a contact line than this fraction of the free surface's length do not count:
+#: the stress at the line is singular.
 BESIDE = 0.05
-#: What the stretch is, in words.
+#: Definition of the stretch for readers.
 STRETCH = ("length along the surface over that in the configuration from which strain counts, over "
            "J^(1/2), in the middle of an edge")
 #: The middles of the edges 01, 12 and 20 of the unit triangle.
@@ -60,24 +60,24 @@ class Surface:
 
     @property
     def place(self) -> tuple[float, float]:
-        """Where that is: x, y (um)."""
+        """x, y (um) of the least stretch."""
         x, y = self.middles[self._least].tolist()
         return x, y
 
 
-def surface(now: Pore) -> Surface:
-    """The free surface of a pore's aggregate, strained since the configuration that its rheology
-    counts from."""
-    topology = now.mesh.topology
+def surface(pore: Pore) -> Surface:
+    """The free surface of a pore's aggregate, with its stretch since the configuration from which
+    strain counts."""
+    topology = pore.mesh.topology
     cells, local = topology.beside_loop
     nodes = topology.body_cells[cells]
-    present = now.mesh.points[now.mesh.body][nodes]
-    before = now.unstrained[nodes]
+    present = pore.mesh.points[pore.mesh.body][nodes]
+    before = pore.unstrained[nodes]
     J = _expansion(present, local) / _expansion(before, local)
     lengths = _lengths(present, local)
     stretch = lengths / _lengths(before, local) / np.sqrt(J)
-    free = now.boundary.edge_wall == FREE
-    arcs = now.boundary.arcs(now.boundary.points)
+    free = pore.boundary.edge_wall == FREE
+    arcs = pore.boundary.arcs(pore.boundary.points)
     return Surface(stretch[free], arcs[free, 1], _distances(lengths, free)[free], cells[free])
 
 
@@ -89,16 +89,16 @@ def _expansion(nodes: np.ndarray, local: np.ndarray) -> np.ndarray:
 
 
 def _lengths(nodes: np.ndarray, local: np.ndarray) -> np.ndarray:
-    """(edges,) um from end to end, and so, in the middle, along the edge too: a parabola's tangent
-    there is parallel to its chord."""
+    """(edges,) um, chords of the edges. They serve for the stretch in the middle of an edge: the
+    tangent of a parabola there is parallel to its chord."""
     every = np.arange(len(nodes))
     chords = nodes[every, np.take(elements.NEXT, local)] - nodes[every, local]
     return np.linalg.norm(chords, axis=1)
 
 
 def _distances(lengths: np.ndarray, free: np.ndarray) -> np.ndarray:
-    """(edges,) from the middle of a free edge to the nearer end of its free surface, along it, over
-    its length."""
+    """(edges,) distance along the free surface from the middle of a free edge to the nearer end,
+    over the length of that surface."""
     first = int(np.argmin(free))
     on = np.roll(free, -first)
     lengths = np.where(on, np.roll(lengths, -first), 0.0)

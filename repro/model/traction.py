@@ -1,19 +1,19 @@
 """The fluid's traction on the aggregate, the t0 of (20) and (22): an option, which 2.3.3 neglects.
 
-The momentum balance of the fluid's triangles alone, tested with the nodal functions of the
-interface, is what the fluid is pushed with there; the aggregate is pushed back (consistent nodal
-forces). With head phi and velocity u,
+The momentum balance of the fluid's triangles, tested with the nodal functions of the interface,
+gives the force on the fluid there; its opposite acts on the aggregate (consistent nodal forces).
+With head phi and velocity u,
 
     f_i = - integral over the fluid's triangles of sigma grad N_i
     sigma = rho nu grad u - rho g phi
 
-or rho nu (grad u + grad u^T) in the traction form [E2]: the form of the scene's flow, so that the
-forces on the aggregate, the walls and the ends add up to nothing, to round-off. Where hardly
-anything flows through the aggregate both forms are the same traction: u is about zero along the
-interface and div u = 0. At a contact line the force along the wall holds the shear of half an edge
-of wall; that across it is the wall's, as the aggregate's y is held there. The head counts from the
-mean at the outlet, which does not matter: an even pressure does nothing to an incompressible body
-that touches walls and fluid alone.
+or rho nu (grad u + grad u^T) in the traction form [E2]. It is the form of the scene's flow, so that
+the forces on the aggregate, the walls and the ends add up to zero, to round-off. If hardly any
+water flows through the aggregate both forms give the same traction: u is about zero along the
+interface and div u = 0. At a contact line the force along the wall includes the shear of half an
+edge of wall; the force across it acts on the wall, where the aggregate's y is constrained. The zero
+of the head does not matter: a uniform pressure has no effect on an incompressible body that touches
+only walls and fluid.
 """
 
 from __future__ import annotations
@@ -33,17 +33,17 @@ from repro.scene import Scene, needed
 
 #: rho g in MPa/um, for rho in mg/L and g in um/h^2.
 MPA_PER_UM = 1e-3 * 1e-6 / 3600**2 * 1e-12
-#: A shape this near to that of the mesh around it, over W, needs no other.
+#: The mesh moves with a shape that is farther from it than this, over W.
 ROUND_OFF = 1e-14
 
 
 @dataclass(frozen=True, eq=False)
 class Surroundings:
-    """The mesh in which the flow around a shape is solved; it need not be the aggregate's own.
+    """The mesh in which the flow around a shape is solved. It may differ from the pore's mesh.
 
-    mesh: it; nodes: (k, a) numbers in ``mesh.body`` of the aggregate's own mesh, and share: (k, a)
-    their weights: a node of this mesh's body is the mean of their places, and what pushes it pushes
-    them in these shares.
+    nodes: (k, a) for each aggregate node of ``mesh``, nodes in ``mesh.body`` of the pore's mesh;
+    share: (k, a) their weights. The position of the node is their weighted mean, and they share its
+    force by these weights.
     """
 
     mesh: Mesh
@@ -52,12 +52,11 @@ class Surroundings:
 
 
 def surroundings(scene: Scene, before: Pore, shaped: Pore) -> Surroundings:
-    """The mesh that has followed the aggregate from a pore with a good mesh, or a new one where one
-    is due."""
-    mesh = before.mesh if shaped is before else remeshing.followed(scene, before, shaped)
+    """The mesh of ``before``, moved with the aggregate, or a new one where one is due."""
+    mesh = before.mesh if shaped is before else remeshing.moved_mesh(scene, before, shaped)
     if mesh is not None:
-        own = np.arange(len(mesh.body))[:, None]
-        return Surroundings(mesh, own, np.ones(own.shape))
+        nodes = np.arange(len(mesh.body))[:, None]
+        return Surroundings(mesh, nodes, np.ones(nodes.shape))
     mesh, _ = pore.generate(scene, shaped.outline)
     cells = shaped.mesh.topology.body_cells
     at = transfer.located(shaped.mesh.points[shaped.mesh.body], cells, mesh.points[mesh.body])
@@ -67,8 +66,8 @@ def surroundings(scene: Scene, before: Pore, shaped: Pore) -> Surroundings:
 def forces(scene: Scene, around: Surroundings, shaped: Pore) -> np.ndarray:
     """(n, 2) um: nodal forces over mu_L on ``shaped.mesh.body`` by the flow around that shape."""
     mesh = around.mesh
-    own = shaped.mesh.points[shaped.mesh.body]
-    places = np.einsum("ka,kai->ki", around.share, own[around.nodes])
+    positions = shaped.mesh.points[shaped.mesh.body]
+    places = np.einsum("ka,kai->ki", around.share, positions[around.nodes])
     if np.abs(places - mesh.points[mesh.body]).max() > ROUND_OFF * mesh.width:
         numerics = scene.numerics
         mesh = mesh.moved(mesh_motion.move(mesh, places, numerics.mesh_compressibility,
@@ -80,15 +79,15 @@ def forces(scene: Scene, around: Surroundings, shaped: Pore) -> np.ndarray:
     drive = needed(scene.flow, "[flow]")
     modulus = needed(scene.growth, "[growth]").shear_modulus
     space = Space(mesh, shaped.space.order)
-    found = pore.solve_flow(scene.at(shaped.time), space)
+    flow_field = pore.solve_flow(scene.at(shaped.time), space)
     viscosity = drive.kinematic_viscosity / drive.gravity
-    on = nodal(space, found, viscosity, scene.numerics.interface)[mesh.body]
-    total = np.zeros_like(own)
+    on = nodal(space, flow_field, viscosity, scene.numerics.interface)[mesh.body]
+    total = np.zeros_like(positions)
     np.add.at(total, around.nodes, around.share[..., None] * on[:, None])
     return MPA_PER_UM * drive.density * drive.gravity / modulus * total
 
 
-def nodal(space: Space, found: Flow, viscosity: float, interface: str) -> np.ndarray:
+def nodal(space: Space, solution: Flow, viscosity: float, interface: str) -> np.ndarray:
     """(N, 2) um2 of head: forces of the fluid's triangles on all nodes of the mesh, over rho g.
 
     viscosity: nu_water / g, um h; interface: "laplacian" or "traction".
@@ -97,10 +96,10 @@ def nodal(space: Space, found: Flow, viscosity: float, interface: str) -> np.nda
     wet = ~mesh.biomass
     pressure = pressure_space(space)
     at = space.gradients_at
-    grad = np.einsum("tai,tqka->tqik", found.velocity[space.cells[wet]], at.slopes[wet])
+    grad = np.einsum("tai,tqka->tqik", solution.velocity[space.cells[wet]], at.slopes[wet])
     if interface == "traction":
         grad = grad + np.swapaxes(grad, 2, 3)
-    head = found.head[pressure.cells[wet]] @ pressure.values_at(space.gradient_table).T
+    head = solution.head[pressure.cells[wet]] @ pressure.values_at(space.gradient_table).T
     stress = viscosity * grad - head[..., None, None] * np.eye(2)
     of = elements.table(mesh.geometry, mesh.geometry, space.gradient_degree)
     slopes = elements.points(mesh.points[mesh.cells[wet]], of).slopes

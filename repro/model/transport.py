@@ -12,9 +12,9 @@ lumped at the nodes,
     (D grad C, grad N_i) + (w . grad C, N_i) + <u_x (C - C_supply), N_i>_inlet + m_i q(C_i) X_i = 0
 
 where w = u - tau grad p is that velocity by :mod:`repro.model.flow`. Summed over i either is the
-balance: supply in = out + consumed, to round-off. Without flow the supply is held at both ends, or
-nothing passes them ("closed"). With u_ave for the inlet's u_x, (11) reads as printed
-[E4], and what is supplied, u_ave W C_supply, is not quite what enters.
+balance: supply in = out + consumed, to round-off. Without flow both ends have the concentration
+C_supply, or nothing passes them ("closed"). With u_ave for the inlet's u_x, (11) reads as printed
+[E4], but the supply u_ave W C_supply then differs slightly from the inflow.
 """
 
 from __future__ import annotations
@@ -67,7 +67,8 @@ class Problem:
     matrices: (T, k, k) um2/h of each, without uptake; operator: (2n, 2n) of both, not coupled, and
     magnitude: the same of its entries; source: (2n,) um2 mg/L/h; inflow, outflow: (n,) um2/h,
     integrals of u_x N_i over an end; system: of both, coupled where there is biomass; law: None
-    without biomass; reused: does Newton's method keep its derivative while that does enough?
+    without biomass; modified_newton: does Newton's method keep its derivative while the defect
+    falls fast enough?
     """
 
     space: Space
@@ -80,7 +81,7 @@ class Problem:
     system: ElementSystem
     substrates: Substrates
     law: RateLaw | None
-    reused: bool
+    modified_newton: bool
 
     @property
     def mesh(self) -> Mesh:
@@ -110,25 +111,42 @@ class Concentrations:
 
 @timed("transport")
 def problem(space: Space, flow: Flow | None, substrates: Substrates, kinetics: Kinetics | None,
-            inlet: str = "local", reused: bool = False) -> Problem:
-    """Both substrates' linear parts for one geometry and a flow of the same space.
+            inlet: str = "local", modified_newton: bool = False) -> Problem:
+    """Assemble the linear parts of both substrates' equations in one geometry.
 
-    inlet: "local" or "mean", u_x or u_ave in (11); reused: as :class:`Problem`'s.
+    Parameters
+    ----------
+    space : Space
+        Space of the concentrations, and of the flow's velocity.
+    flow : Flow, optional
+        None where nothing flows.
+    substrates : Substrates
+    kinetics : Kinetics, optional
+        None without biomass.
+    inlet : {"local", "mean"}
+        u_x or u_ave in (11).
+    modified_newton : bool
+        Does Newton's method keep its derivative while the defect falls fast enough?
+
+    Returns
+    -------
+    Problem
     """
     topology = space.mesh.topology
     kinds = substrates.acceptor, substrates.donor
     carried, source, inflow, outflow = _through(space, flow, inlet)
     acceptor, donor = (diffusion(space, kind) + carried for kind in kinds)
-    held = flow is None and substrates.boundary == "open"
+    constrained = flow is None and substrates.boundary == "open"
     apart = topology.system(("both", space.order), lambda: _apart(space))
     operator = apart.matrix((acceptor, donor))
-    system = topology.system(("transport", space.order, held), lambda: _system(space, held))
+    system = topology.system(("transport", space.order, constrained),
+                             lambda: _system(space, constrained))
     magnitude = copy(operator)
     magnitude.data = np.abs(operator.data)
     sources = np.concatenate([kind.supply * source for kind in kinds])
     law = None if kinetics is None else rate_law(substrates, kinetics)
     return Problem(space, (acceptor, donor), operator, magnitude, sources, inflow, outflow, system,
-                   substrates, law, reused)
+                   substrates, law, modified_newton)
 
 
 def diffusion(space: Space, kind: Substrate) -> np.ndarray:
@@ -139,8 +157,8 @@ def diffusion(space: Space, kind: Substrate) -> np.ndarray:
 
 def _through(space: Space, flow: Flow | None,
              inlet: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """What the flow carries (T, k, k), and the loads (n,) of the supply, of what flows in and of
-    what flows out, um2/h; zero without flow."""
+    """(T, k, k) the advection, and the loads (n,) of the supply, the inflow and the outflow, um2/h;
+    zero without flow."""
     if flow is None:
         return np.zeros((1, 1, 1)), *np.zeros((3, space.count))
     ends = space.dofs
@@ -153,8 +171,8 @@ def _through(space: Space, flow: Flow | None,
 
 
 def advection(space: Space, flow: Flow, enters: np.ndarray) -> np.ndarray:
-    """(T, k, k) um2/h of what the flow carries, with the conditions at inlet and outlet; enters:
-    (n,) um/h, the speed of (11)."""
+    """(T, k, k) um2/h of advection, with the conditions at inlet and outlet; enters: (n,) um/h, the
+    speed of (11)."""
     if flow.correction is None:
         return _conserving(space, flow.velocity, enters)
     return _by_divergence_free(space, flow.velocity, flow.correction, enters)
@@ -168,11 +186,11 @@ def _conserving(space: Space, velocity: np.ndarray, enters: np.ndarray) -> np.nd
     w_x, w_y = divergence_free(space, velocity) * -at.dx
     along = w_x[..., None] * at.slopes[:, :, 0]
     along += w_y[..., None] * at.slopes[:, :, 1]
-    found = space.load(np.swapaxes(along, 1, 2))
-    _add_at(found, dofs.beside_outlet, space.end_masses(dofs.outlet, velocity[:, 0]))
+    matrices = space.load(np.swapaxes(along, 1, 2))
+    _add_at(matrices, dofs.beside_outlet, space.end_masses(dofs.outlet, velocity[:, 0]))
     if enters is not velocity[:, 0] and np.any(enters[dofs.inlet] != velocity[dofs.inlet, 0]):
-        _add_at(found, dofs.beside_inlet, space.end_masses(dofs.inlet, enters - velocity[:, 0]))
-    return found
+        _add_at(matrices, dofs.beside_inlet, space.end_masses(dofs.inlet, enters - velocity[:, 0]))
+    return matrices
 
 
 def divergence_free(space: Space, velocity: np.ndarray) -> np.ndarray:
@@ -200,9 +218,9 @@ def divergence_free(space: Space, velocity: np.ndarray) -> np.ndarray:
 
 def _potential(space: Space) -> ElementSystem:
     """One function of the space, zero in one node of the outlet."""
-    held = np.zeros(space.count, bool)
-    held[space.dofs.outlet[0, 0]] = True
-    return ElementSystem(space.cells, _places(space), held, space.mesh.topology.method)
+    constrained = np.zeros(space.count, bool)
+    constrained[space.dofs.outlet[0, 0]] = True
+    return ElementSystem(space.cells, _places(space), constrained, space.mesh.topology.method)
 
 
 def _places(space: Space) -> np.ndarray:
@@ -219,10 +237,10 @@ def _by_divergence_free(space: Space, velocity: np.ndarray, correction: np.ndarr
     mesh = space.mesh
     inlet = space.dofs.inlet
     w = velocity[mesh.triangles] - correction[:, None, :]
-    found = mass(mesh.areas) @ (w @ np.swapaxes(mesh.gradients, 1, 2))
+    matrices = mass(mesh.areas) @ (w @ np.swapaxes(mesh.gradients, 1, 2))
     loads = space.end_loads(inlet, enters)
-    _add_at(found, space.dofs.beside_inlet, loads[:, :, None] * np.eye(loads.shape[1]))
-    return found
+    _add_at(matrices, space.dofs.beside_inlet, loads[:, :, None] * np.eye(loads.shape[1]))
+    return matrices
 
 
 def _add_at(matrices: np.ndarray, beside: tuple[np.ndarray, np.ndarray],
@@ -240,16 +258,17 @@ def _apart(space: Space) -> ElementSystem:
                          np.zeros(count, bool), space.mesh.topology.method)
 
 
-def _system(space: Space, held_ends: bool) -> ElementSystem:
+def _system(space: Space, ends_constrained: bool) -> ElementSystem:
     """Acceptor and donor of a node side by side, nodes in elimination order: their own triangles,
     then both together on the pieces of biomass, where the uptake couples them."""
     place = _places(space)
-    held = np.zeros(space.count, bool)
-    held[both_ends(space)] = held_ends
+    constrained = np.zeros(space.count, bool)
+    constrained[both_ends(space)] = ends_constrained
     pieces = space.reaction.cells
     both = np.concatenate([pieces, space.count + pieces], axis=1)
     rank = np.concatenate([place, place + 0.5])
-    return ElementSystem((space.cells, space.count + space.cells, both), rank, np.tile(held, 2),
+    return ElementSystem((space.cells, space.count + space.cells, both), rank,
+                         np.tile(constrained, 2),
                          space.mesh.topology.method)
 
 
@@ -267,7 +286,7 @@ def supplied_everywhere(problem: Problem) -> Concentrations:
 @dataclass(frozen=True, eq=False)
 class Iterate:
     """Both concentrations (2n,); the saturations (2, r, q) about which the uptake is linearised;
-    the residual at the concentrations and the size of its terms, um2 mg/L/h; own: are the
+    the residual at the concentrations and the size of its terms, um2 mg/L/h; consistent: are the
     saturations those of the concentrations?"""
 
     state: np.ndarray
@@ -275,7 +294,7 @@ class Iterate:
     residual: np.ndarray
     size: np.ndarray
     free: np.ndarray | slice
-    own: bool = True
+    consistent: bool = True
 
     #: Constrained nodes have their supply from the start.
     complete = True
@@ -288,15 +307,14 @@ class Iterate:
 
 @dataclass(frozen=True, eq=False)
 class Balance:
-    """The equations of a problem with a sink, as Newton's method asks for them.
+    """The equations of a problem with a sink, in the form that Newton's method needs.
 
-    Without a sink nothing is taken up. Uptake is a function of max(C, 0) through the fractions m(C)
-    of the law. Where half saturations K are far below the supply that is nearly a step, and
-    Newton's method in C goes from one side of it to the other. So each point of the reaction has a
-    saturation s of its own, and the uptake is linearised about C = K s / (1 - s). Where s is over
-    one half it is that of the concentration, C / (C + K), which is Newton's method in C. Below, s
-    follows the linearisation from 0 up, as in primal-dual active-set methods (Hintermueller, Ito
-    and Kunisch 2002).
+    Uptake is a function of max(C, 0) through the fractions m(C) of the law. Where half saturations
+    K are far below the supply this function is nearly a step, and Newton's method in C jumps from
+    one side of it to the other. Therefore each point of the reaction has its own saturation s, and
+    the uptake is linearised about C = K s / (1 - s). Above one half, s is the saturation of the
+    concentration, C / (C + K), which gives Newton's method in C. Below, s follows the linearisation
+    from 0 up, as in primal-dual active-set methods (Hintermueller, Ito and Kunisch 2002).
     """
 
     problem: Problem
@@ -316,7 +334,7 @@ class Balance:
         """The law of uptake of both substrates."""
         return self._law.both
 
-    def _taken(self, loads: np.ndarray) -> np.ndarray:
+    def _assembled(self, loads: np.ndarray) -> np.ndarray:
         """(2n,) sum of loads (r, 2, q) times the nodal functions."""
         return self._summed(loads @ self.problem.space.reaction.values)
 
@@ -335,19 +353,19 @@ class Balance:
     def residual(self, state: np.ndarray, loads: np.ndarray | None = None) -> np.ndarray:
         """(2n,) um2 mg/L/h for C_A, then C_D, of all nodes (2n,), mg/L; loads: the uptake, if it is
         known."""
-        found = self.problem.operator @ state - self.problem.source
+        residual = self.problem.operator @ state - self.problem.source
         if self.sink is None:
-            return found
-        return found + self._taken(self.uptake(state) if loads is None else loads)
+            return residual
+        return residual + self._assembled(self.uptake(state) if loads is None else loads)
 
     def sizes(self, state: np.ndarray, loads: np.ndarray | None = None) -> np.ndarray:
         """Sizes (2n,) of the terms of the residual, all taken as positive; loads: the uptake, if it
         is known."""
-        found = self.problem.magnitude @ np.abs(state) + np.abs(self.problem.source)
+        sizes = self.problem.magnitude @ np.abs(state) + np.abs(self.problem.source)
         if self.sink is None:
-            return found
+            return sizes
         loads = self.uptake(state) if loads is None else loads
-        return found + self._summed(np.abs(loads) @ np.abs(self.problem.space.reaction.values))
+        return sizes + self._summed(np.abs(loads) @ np.abs(self.problem.space.reaction.values))
 
     def _slopes(self, state: np.ndarray, saturations: np.ndarray) -> np.ndarray:
         """(2, r, q) ds/dC at the saturations; zero where there is no substrate."""
@@ -373,14 +391,14 @@ class Balance:
         """(r, 2k, 2k) um2/h from the derivatives (2, 2, r, q) of uptake i by concentration j."""
         pieces = self.problem.space.reaction
         count, k = pieces.cells.shape
-        found = np.zeros((count, 2 * k, 2 * k))
+        matrices = np.zeros((count, 2 * k, 2 * k))
         if slopes is None:
-            return found
+            return matrices
         products = pieces.values[:, :, None] * pieces.values[:, None, :]
         for i, j in np.ndindex(2, 2):
             block = slopes[i, j] @ products.reshape(-1, k * k)
-            found[:, i * k: i * k + k, j * k: j * k + k] = block.reshape(count, k, k)
-        return found
+            matrices[:, i * k: i * k + k, j * k: j * k + k] = block.reshape(count, k, k)
+        return matrices
 
     def begun(self, state: np.ndarray) -> Iterate:
         """The first iterate."""
@@ -405,17 +423,17 @@ class Balance:
         loads = self.sink.uptake(self._both.fraction(concentrations), self._law)
         size = self.sizes(state, loads) if fresh else iterate.size
         new = replace(iterate, state=state, residual=self.residual(state, loads), size=size)
-        return self._followed(iterate, new, concentrations)
+        return self._resaturated(iterate, new, concentrations)
 
     def _linearised(self, iterate: Iterate) -> np.ndarray:
-        """(2n,) the residual with the uptake that the linearisation about the saturations gives."""
-        if self.sink is None or iterate.own:
+        """(2n,) the residual, with the uptake linearised about the saturations."""
+        if self.sink is None or iterate.consistent:
             return iterate.residual
         about = iterate.saturations
         apart = self._predicted(iterate, iterate.state) - about
         rise = np.einsum("ijrq,jrq->riq", self._uptake_slopes(about), apart)
         loads = self.sink.uptake(self._both.at_saturation(about)[0], self._law) + rise
-        return self.problem.operator @ iterate.state - self.problem.source + self._taken(loads)
+        return self.problem.operator @ iterate.state - self.problem.source + self._assembled(loads)
 
     def _predicted(self, iterate: Iterate, state: np.ndarray) -> np.ndarray:
         """(2, r, q) saturations at other concentrations by the linearisation."""
@@ -423,50 +441,71 @@ class Balance:
         apart = self.at(state) - self._both.concentration(about)
         return about + self._slopes(iterate.state, about) * apart
 
-    def _followed(self, iterate: Iterate, new: Iterate, concentrations: np.ndarray) -> Iterate:
-        """The new iterate with the saturations about which to linearise next; concentrations: its
-        own in the points of the reaction."""
-        own = self._both.saturation(concentrations)
-        if iterate.own and concentrations.min() > 0:
-            return replace(new, saturations=own)
+    def _resaturated(self, iterate: Iterate, new: Iterate, concentrations: np.ndarray) -> Iterate:
+        """The new iterate with the saturations for the next linearisation; concentrations: those
+        of ``new`` in the points of the reaction."""
+        actual = self._both.saturation(concentrations)
+        if iterate.consistent and concentrations.min() > 0:
+            return replace(new, saturations=actual)
         predicted = np.clip(self._predicted(iterate, new.state), 0.0, SATURATED)
         woken = (iterate.saturations <= 0) & (predicted <= 0) & (concentrations > 0)
         rising = np.minimum(self._both.proportional(concentrations), SWITCH)
         predicted = np.where(woken, rising, predicted)
-        saturations = np.where((predicted > SWITCH) & (concentrations > 0), own, predicted)
-        return replace(new, saturations=saturations, own=bool((saturations == own).all()))
+        saturations = np.where((predicted > SWITCH) & (concentrations > 0), actual, predicted)
+        consistent = bool((saturations == actual).all())
+        return replace(new, saturations=saturations, consistent=consistent)
 
 
 @timed("transport")
 def steady(problem: Problem, sink: Sink | None,
            guess: Concentrations | None = None) -> Concentrations:
-    """Steady concentrations by Newton's method on both substrates at once.
+    """Solve for steady concentrations, by Newton's method on both substrates at once.
 
-    sink: what takes them up, None without biomass; guess: at the problem's nodes, C_supply
-    everywhere by default. Where the method does not converge, as behind a sharp front, it starts
-    again from the supply, and half saturations come down from the supply to what they are, a tenth
-    at a time. Raises TransportError where that fails too, and Unresolved where a concentration is
-    outside of zero to the supply by more than UNRESOLVED and OVERSHOOT say, or where uptake is not
-    resolved: the mesh is too coarse for its front.
+    Parameters
+    ----------
+    problem : Problem
+    sink : Sink, optional
+        Biomass that takes up substrates; None without biomass.
+    guess : Concentrations, optional
+        Start of the iteration; C_supply everywhere by default.
+
+    Returns
+    -------
+    Concentrations
+        C_A and C_D (n,), mg/L.
+
+    Raises
+    ------
+    TransportError
+        If the method does not converge.
+    Unresolved
+        If the mesh is too coarse for a front: a concentration is below zero by more than UNRESOLVED
+        or above the supply by more than OVERSHOOT, in parts of the supply, or the uptake depends on
+        its quadrature.
+
+    Notes
+    -----
+    If the method fails, as behind a sharp front, it starts again from the supply with the half
+    saturations at the supply, and lowers them to their values by a factor of ten at a time.
     """
     if problem.law is None:
         sink = None
     supply = problem.supply
     state = supply.copy() if guess is None else np.concatenate([guess.acceptor, guess.donor])
-    state[problem.system.held] = supply[problem.system.held]
+    state[problem.system.constrained] = supply[problem.system.constrained]
     try:
-        found, count = _found(Balance(problem, sink), state)
+        state, count = _newton(Balance(problem, sink), state)
     except TransportError:
-        found, count = _eased(problem, sink, supply)
-    solution = _checked(problem, found, count)
+        state, count = _eased(problem, sink, supply)
+    solution = _checked(problem, state, count)
     if sink is not None and problem.space.order > 1:
         _refuse_unresolved(problem, sink, solution)
     return solution
 
 
-def _found(balance: Balance, state: np.ndarray) -> tuple[np.ndarray, int]:
-    """(2n,) the solution from a start, and Newton's iterations."""
-    newton = Newton(NEWTON, ROUND_OFF, MOST_ITERATIONS, balance.problem.reused)
+def _newton(balance: Balance, state: np.ndarray) -> tuple[np.ndarray, int]:
+    """(2n,) the solution by Newton's method from a start, and its number of iterations."""
+    newton = Newton(NEWTON, ROUND_OFF, MOST_ITERATIONS, balance.problem.modified_newton)
     try:
         last, count, converged = newton.solve(balance, balance.begun(state))
     except LinearError:
@@ -491,14 +530,14 @@ def _eased(problem: Problem, sink: Sink | None, state: np.ndarray) -> tuple[np.n
     total = 0
     for factor in 10.0 ** np.arange(np.ceil(-np.log10(sharpest)), -1, -1):
         softened = replace(law, both=law.both.softened(factor, supply))
-        eased = replace(problem, law=softened, reused=False)
-        state, iterations = _found(Balance(eased, sink), state)
+        eased = replace(problem, law=softened, modified_newton=False)
+        state, iterations = _newton(Balance(eased, sink), state)
         total += iterations
     return state, total
 
 
 def _checked(problem: Problem, state: np.ndarray, iterations: int) -> Concentrations:
-    """The solution, if it stays between zero and the supply as well as it has to."""
+    """The solution. Raises Unresolved where it leaves the range from zero to the supply."""
     for name, field, substrate in zip(("acceptor", "donor"), state.reshape(2, -1), problem.both):
         if field.min() < -UNRESOLVED * substrate.supply:
             raise _outside(problem, name, field, int(field.argmin()), substrate)
@@ -517,8 +556,8 @@ def _refuse_unresolved(problem: Problem, sink: Sink, state: Concentrations) -> N
 
 
 def quadrature_error(problem: Problem, sink: Sink, state: Concentrations) -> float:
-    """How much the donor taken up differs, relatively, by a finer quadrature of the same
-    concentrations; biomass as it is, its density linear in each triangle."""
+    """Relative difference of the donor's uptake between the quadrature and a finer one, at the same
+    concentrations; the density of the biomass is linear in each triangle and does not grow."""
     space = problem.space
     mesh = problem.mesh
     of = elements.table(space.order, mesh.geometry, elements.DEGREES[space.order] + FINER)
@@ -529,8 +568,8 @@ def quadrature_error(problem: Problem, sink: Sink, state: Concentrations) -> flo
     acceptor, donor = both[:, space.cells[mesh.biomass]] @ of.values.T
     rate = needed(problem.law, "[kinetics]").uptake(acceptor, donor)[1]
     finer = float(np.vdot(densities * elements.weights(corners, of), rate))
-    own = float(Balance(problem, Sink(sink.active)).uptake(both.ravel())[:, 1].sum())
-    return abs(finer - own) / own if own else 0.0
+    quadrature = float(Balance(problem, Sink(sink.active)).uptake(both.ravel())[:, 1].sum())
+    return abs(finer - quadrature) / quadrature if quadrature else 0.0
 
 
 def _outside(problem: Problem, name: str, field: np.ndarray, node: int,
@@ -542,9 +581,9 @@ def _outside(problem: Problem, name: str, field: np.ndarray, node: int,
 
 @dataclass(frozen=True)
 class Fluxes:
-    """One substrate's ledger in an instant, per um of depth (um2 mg/L/h): in, out and consumed; and
-    concentrations (mg/L): flow-weighted at the meshed inlet and at the outlet (the mean over the
-    end without flow)."""
+    """Rates of one substrate per um of depth (um2 mg/L/h): supplied, out and consumed; and its
+    flow-weighted concentrations (mg/L) at the meshed inlet and the outlet, the mean over the end
+    without flow."""
 
     supplied: float
     out: float
@@ -563,7 +602,7 @@ def fluxes(problem: Problem, sink: Sink | None, state: Concentrations) -> tuple[
     if sink is not None and problem.law is not None:
         consumed = Balance(problem, sink).uptake(both.ravel()).sum(axis=(0, 2))
     supplied = problem.source.reshape(2, -1).sum(axis=1)
-    if problem.system.held.any():
+    if problem.system.constrained.any():
         through = (problem.operator @ both.ravel()).reshape(2, -1)
         supplied = through[:, both_ends(problem.space)].sum(axis=1)
     enters = _end_means(problem.space, both, dofs.inlet, problem.inflow)

@@ -135,10 +135,10 @@ class Monod(UptakeLaw):
         return saturation, 1.0
 
 
-#: By the names that `kinetics.law` of a scene has for them.
+#: Laws by the values of `kinetics.law`.
 LAWS: dict[str, type[UptakeLaw]] = {"dual Monod": Monod}
 
 
 def uptake_law(substrates: Substrates, kinetics: Kinetics) -> UptakeLaw:
-    """The law of acceptor and donor that a scene asks for."""
+    """A scene's law of uptake of acceptor and donor."""
     return LAWS[kinetics.law].of(substrates.acceptor, substrates.donor)

@@ -1,1 +1,1 @@
-"""What a scene will be: its model, mesh and numbers, simplifications that fail, and its cost."""
+"""Checks of a scene before it is run: its model, mesh, numbers, simplifications and cost."""

@@ -1,4 +1,4 @@
-"""A scene before it is run: model, first mesh, numbers, simplifications that fail, and cost."""
+"""Check a scene before it is run: model, first mesh, numbers, simplifications, and cost."""
 
 from __future__ import annotations
 
@@ -13,31 +13,34 @@ from repro.model import pore
 from repro.preflight import cost
 from repro.preflight.cost import Cost
 from repro.preflight.memory import first_nodes, require_memory, require_outline
-from repro.preflight.modelled import modelled
-from repro.preflight.numbers import Number, judged
-from repro.preflight.resolved import unresolved
-from repro.preflight.simplifications import Warned, unmet, warnings
+from repro.preflight.modelled import describe_model
+from repro.preflight.numbers import Number, evaluate_at_largest
+from repro.preflight.resolved import find_unresolved_flow
+from repro.preflight.simplifications import Caveat, find_warnings, warn_missed_tolerance
 from repro.scene import Scene, Source, label, load_scene
 from repro.scene.units import SceneError
 
 WIDTH = 110
-#: Meshes of more nodes are not made for a check: their nodes are estimated.
+#: Larger meshes are not made for a check: their number of nodes is estimated.
 MOST_MESHED = 20_000
 #: Nodes per triangle, by the geometry of the triangles.
 PER_TRIANGLE = {1: 0.5, 2: 2.0}
 
 
 @dataclass(frozen=True)
-class Checked:
-    """modelled: (section, words); nodes, triangles: of the first mesh, six nodes to a curved
-    triangle; estimated: are these two estimates, since the mesh is too large to be made here?"""
+class SceneCheck:
+    """The result of :func:`check`; ``print`` shows it.
+
+    modelled: (section, words); nodes, triangles: of the first mesh, with six nodes for each curved
+    triangle; estimated: are these numbers estimates, because the mesh is too large for a check?
+    """
 
     scene: str
     modelled: list[tuple[str, str]]
     nodes: int
     triangles: int
     numbers: list[Number]
-    warnings: list[Warned]
+    warnings: list[Caveat]
     cost: Cost
     estimated: bool = False
 
@@ -49,32 +52,56 @@ class Checked:
                 f"{self.nodes} nodes at t = 0>")
 
     def tables(self) -> dict:
-        """For JSON."""
+        """The result as a dict for JSON."""
         return {**asdict(self), "modelled": dict(self.modelled)}
 
 
-def check(scene: Source, file: str = "") -> Checked:
-    """What is to be told of a scene before it is run; ``print`` shows it. Raises SceneError, naming
-    ``file`` or the scene, where it is not accepted, its first state or step fails, or a run of it
-    is refused for want of memory."""
+def check(scene: Source, file: str = "") -> SceneCheck:
+    """Check a scene before it is run.
+
+    Parameters
+    ----------
+    scene : Scene, str, Path or dict
+        A loaded scene, a TOML file, the name of a packaged scene, or a dict of tables.
+    file : str, optional
+        Name of the scene in error messages.
+
+    Returns
+    -------
+    SceneCheck
+        The model in words, the size of the first mesh, the dimensionless numbers, a warning for
+        each simplification that does not hold, and the cost (s, MB). ``print`` shows it.
+
+    Raises
+    ------
+    SceneError
+        If the scene is not accepted, if its first state or its first steps fail, or if a run would
+        need more than the free memory.
+
+    Examples
+    --------
+    >>> import repro
+    >>> repro.check("flow_only").warnings
+    []
+    """
     file = file or label(scene)
     scene = load_scene(scene)
-    scarce: list[str] = []
+    memory_warnings: list[str] = []
     require_outline(scene)
-    require_memory(scene, scarce.append)
+    require_memory(scene, memory_warnings.append)
     estimated = first_nodes(scene) > MOST_MESHED
     try:
         with stopping(0.0):
             Method(scene.numerics.solver, scene.numerics.ordering).checked()
             nodes, triangles = _mesh_size(scene, estimated)
-        trial = cost.tried(scene, nodes)
+        trial = cost.run_trial(scene, nodes)
         flow = trial.first.solved.flow
-        most, found = judged(scene, flow.mean_velocity if flow else None)
-        told = [*warnings(most, found), *unresolved(scene),
-                *unmet(scene, trial.worst, " in the first steps"),
-                *(Warned("numerics.refinement", text) for text in scarce)]
-        return Checked(scene.name, modelled(scene), nodes, triangles, found, told,
-                       cost.expected(scene, trial, nodes), estimated)
+        largest, computed = evaluate_at_largest(scene, flow.mean_velocity if flow else None)
+        caveats = [*find_warnings(largest, computed), *find_unresolved_flow(scene),
+                   *warn_missed_tolerance(scene, trial.worst, " in the first steps"),
+                   *(Caveat("numerics.refinement", text) for text in memory_warnings)]
+        return SceneCheck(scene.name, describe_model(scene), nodes, triangles, computed, caveats,
+                          cost.estimate_cost(scene, trial, nodes), estimated)
     except (SimulationError, ArithmeticError) as error:
         raise SceneError(f"{file}: it cannot be run: {error}") from error
 
@@ -88,17 +115,17 @@ def _mesh_size(scene: Scene, estimated: bool) -> tuple[int, int]:
     return len(mesh.points), len(mesh.biomass)
 
 
-def report(found: Checked) -> str:
-    """The whole in words."""
-    lines = [f"{found.scene}: can be run", "", "What is modelled"]
-    for section, words in found.modelled:
+def report(checked: SceneCheck) -> str:
+    """Write a check in words."""
+    lines = [f"{checked.scene}: can be run", "", "What is modelled"]
+    for section, words in checked.modelled:
         lines += _item(section, words)
-    about = "about " if found.estimated else ""
-    lines += ["", f"Mesh at t = 0: {about}{found.nodes} nodes, {found.triangles} triangles", ""]
-    lines += _cost(found.cost)
-    if found.numbers:
-        lines += ["", *_numbers(found.numbers)]
-    lines += ["", *_warnings(found.warnings)]
+    nodes = f"about {checked.nodes}" if checked.estimated else f"{checked.nodes}"
+    lines += ["", f"Mesh at t = 0: {nodes} nodes, {checked.triangles} triangles", ""]
+    lines += _cost(checked.cost)
+    if checked.numbers:
+        lines += ["", *_numbers(checked.numbers)]
+    lines += ["", *_warnings(checked.warnings)]
     return "\n".join(lines)
 
 
@@ -106,38 +133,39 @@ def _item(name: str, words: str) -> list[str]:
     return textwrap.wrap(words, WIDTH, initial_indent=f"  {name:12}", subsequent_indent=" " * 14)
 
 
-def _cost(expected: Cost) -> Iterator[str]:
-    steps = f"{expected.steps} steps" if expected.steps else "no step"
-    yield (f"Cost, roughly: {_seconds(expected.seconds)} ({steps}), writing not counted; "
-           f"{expected.memory:.0f} MB besides the program")
-    how = ("The first state and steps were made and timed just now, times the steps expected; one "
-           f"in contact with the opposite wall counts {cost.IN_CONTACT:g} times. Right within a "
-           "factor of three in the paper's pores.")
-    yield from textwrap.wrap(how, WIDTH, initial_indent="  ", subsequent_indent="  ")
+def _cost(estimate: Cost) -> Iterator[str]:
+    steps = f"{estimate.steps} steps" if estimate.steps else "no step"
+    yield (f"Cost, roughly: {_seconds(estimate.seconds)} ({steps}), writing not counted; "
+           f"{estimate.memory:.0f} MB besides the program")
+    explanation = ("The first state and steps were computed and timed, times the number of expected"
+                   " steps; a step in contact with the opposite wall counts "
+                   f"{cost.IN_CONTACT:g} times. Right within a factor of three in the paper's "
+                   "pores.")
+    yield from textwrap.wrap(explanation, WIDTH, initial_indent="  ", subsequent_indent="  ")
 
 
 def _seconds(value: float) -> str:
-    """Two digits, and three of a hundred seconds."""
+    """A time with two digits, or three from 99.5 s to 120 s."""
     if value < 120:
         return f"{value:.2g} s" if value < 99.5 else f"{value:.0f} s"
     return f"{value / 60:.0f} min" if value < 7200 else f"{value / 3600:.0f} h"
 
 
-def _numbers(found: list[Number]) -> Iterator[str]:
-    later = any(number.end is not None for number in found)
-    yield f"Numbers{'':23}{'t = 0':>9}{'at end, at most' if later else '':>17}".rstrip()
-    for number in found:
+def _numbers(computed: list[Number]) -> Iterator[str]:
+    has_end = any(number.end is not None for number in computed)
+    yield f"Numbers{'':23}{'t = 0':>9}{'at end, at most' if has_end else '':>17}".rstrip()
+    for number in computed:
         end = "" if number.end is None else f"{number.end:.2g}"
         yield f"  {number.name:28}{number.start:>9.2g}{end:>17}".rstrip()
-    definitions = {number.name.partition(",")[0]: number.definition for number in found}
+    definitions = {number.name.partition(",")[0]: number.definition for number in computed}
     for name, definition in definitions.items():
         yield from textwrap.wrap(f"{name} = {definition}", WIDTH, initial_indent="    ",
                                  subsequent_indent="      ")
 
 
-def _warnings(found: list[Warned]) -> Iterator[str]:
-    if not found:
+def _warnings(warnings: list[Caveat]) -> Iterator[str]:
+    if not warnings:
         yield "No simplification that is checked is out of its range."
-    for warned in found:
-        yield from textwrap.wrap(f"WARNING {warned.key}: {warned.text}.", WIDTH + 2,
+    for caveat in warnings:
+        yield from textwrap.wrap(f"WARNING {caveat.key}: {caveat.text}.", WIDTH + 2,
                                  subsequent_indent="  ")

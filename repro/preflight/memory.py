@@ -1,14 +1,13 @@
-"""How much memory a run will take, by arithmetic, and how much there is.
+"""Estimate the memory of a run, and read the free memory.
 
-The nodes of a mesh are the integral of the inverse area per node, (sqrt(3) / 2) h^2, over what is
-meshed; the size h grows from the aggregate's surface, at a distance d from it as s + g d, up to the
-largest L (3.1):
+The number of nodes is the integral of the inverse area per node, (sqrt(3) / 2) h^2, over the meshed
+part. At a distance d from the aggregate's surface the size h is s + g d, up to the largest L (3.1):
 
     nodes = A / (sqrt(3)/2 L^2) + 2 l / (sqrt(3)/2) ((1/s - 1/L) / g - (L - s) / (g L^2))
 
-with the area A of the meshed part and the length l of the surface: right within a third. For an
-outline the second term is summed over the pieces of its edges, each with the size that it asks for:
-right within a factor of two.
+with the area A of the meshed part and the length l of the surface; it is right within a third. For
+an outline the second term is a sum over pieces of its edges, each with its own size; it is right
+within a factor of two.
 """
 
 from __future__ import annotations
@@ -26,40 +25,40 @@ from repro.errors import MeshError
 from repro.fem import sizing
 from repro.fem.outline import Outline
 from repro.fem.sizing import ACROSS_AGGREGATE, ACROSS_PORE, SPLIT
-from repro.model.advice import advised
+from repro.model.advice import with_advice
 from repro.model.pore import initial_outline, resolution, sized
 from repro.preflight import numbers
 from repro.scene import Scene, SceneError, needed
 
 #: Bytes per node at the peak of a run, by the order of elements: measured at 800 to 50 000 nodes.
 PER_NODE = {1: 25e3, 2: 25e3, 3: 65e3}
-#: Bytes that a run takes whatever its mesh is.
+#: Bytes of a run that do not depend on its mesh.
 LEAST = 30e6
 #: Nodes of six-node triangles per corner.
 PER_CORNER = 4.0
-#: Pieces of an outline's edge, each with a size of its own.
+#: Pieces of each edge of an outline, each with its own size.
 PIECES = 16
-#: Of what is free, a run that takes more than this part of it is warned of.
+#: A run that needs more than this part of the free memory is warned of.
 WARNED = 0.5
 HEXAGON = math.sqrt(3) / 2
 MB = 1e6
 
 
 def expected_nodes(scene: Scene) -> float:
-    """Nodes of the largest mesh, roughly: of the first one, or of that at the end.
+    """Estimated nodes, midside nodes included, of the first or the last mesh if that is larger.
 
-    Midside nodes count too. Nothing is meshed for it.
+    Nothing is meshed for it.
     """
     expected = [first_nodes(scene)]
     if scene.growth:
-        with suppress(ArithmeticError):  # then the run itself says what is wrong
+        with suppress(ArithmeticError):  # the run itself reports it
             end = numbers.at_end(scene.largest)
             expected.append(_half_disc_nodes(scene, end.thickness, end.reach))
     return max(expected)
 
 
 def first_nodes(scene: Scene) -> float:
-    """Nodes of the mesh at t = 0, roughly: around a half-disc, an outline or nothing."""
+    """Estimated nodes of the mesh at t = 0: around a half-disc or an outline, or of a channel."""
     if scene.aggregate is None:
         return _nodes(scene, 0.0, 3 * scene.pore.width, [])
     radius = scene.aggregate.radius
@@ -71,7 +70,7 @@ def first_nodes(scene: Scene) -> float:
 
 
 def _half_disc_nodes(scene: Scene, thickness: float, reach: float) -> float:
-    """Nodes of a mesh around an aggregate of this thickness and half length (um)."""
+    """Nodes of a mesh around an aggregate with a thickness and a half length (um)."""
     size = thickness / ACROSS_AGGREGATE / resolution(scene)
     return _nodes(scene, thickness, 2 * reach, [(size, math.pi * min(thickness, reach))])
 
@@ -84,20 +83,20 @@ def _edges(outline: Outline, sizes: sizing.Sizing) -> list[tuple[float, float]]:
     near = np.minimum(sizing.interface_sizes(pieces, sizes), SPLIT * outline.edge_lengths()[edge])
     graded = sizing.graded_size(pieces.points, *sizing.size_sources(outline, sizes), sizes)
     near = np.minimum(near, graded)
-    at = outline.interface_edges()[edge]
-    return [*zip(near[at], pieces.edge_lengths()[at])]
+    on_interface = outline.interface_edges()[edge]
+    return [*zip(near[on_interface], pieces.edge_lengths()[on_interface])]
 
 
 def _nodes(scene: Scene, thickness: float, extent: float,
            surface: list[tuple[float, float]]) -> float:
-    """Nodes of a mesh around an aggregate of a thickness and length (um).
+    """Nodes of a mesh around an aggregate with a thickness and a length (um).
 
-    surface: element size and length (um) of each piece of it.
+    surface: element size and length (um) of each piece of its surface.
     """
     pore = scene.pore
     numerics = scene.numerics
-    clear = min(10 * thickness, 1.5 * pore.width)
-    length = pore.length if numerics.extent == "full" else min(pore.length, extent + 2 * clear)
+    margin = min(10 * thickness, 1.5 * pore.width)
+    length = pore.length if numerics.extent == "full" else min(pore.length, extent + 2 * margin)
     largest = pore.width / ACROSS_PORE / resolution(scene)
     if numerics.gradation == 0:
         largest = min([largest, *(size for size, _ in surface)])
@@ -107,56 +106,59 @@ def _nodes(scene: Scene, thickness: float, extent: float,
 
 
 def _graded(surface: float, near: float, largest: float, gradation: float) -> float:
-    """Nodes that the smaller elements on both sides of a surface (um) add."""
+    """Additional nodes due to smaller elements on both sides of a surface (um)."""
     if near >= largest:
         return 0.0
-    wide = (largest - near) / gradation
-    return 2 * surface / HEXAGON * ((1 / near - 1 / largest) / gradation - wide / largest**2)
+    thickness = (largest - near) / gradation
+    return 2 * surface / HEXAGON * ((1 / near - 1 / largest) / gradation - thickness / largest**2)
 
 
 def expected_bytes(scene: Scene) -> float:
-    """Memory that a run takes besides that of the program, roughly."""
+    """Estimated memory (bytes) of a run without the program."""
     return LEAST + PER_NODE[scene.numerics.order] * expected_nodes(scene)
 
 
 def require_outline(scene: Scene) -> None:
-    """Raises SceneError where the curve through the points of an outline crosses itself or leaves
-    the pore; rules of the scene judge the points."""
+    """Raise SceneError if the curve through the points of an outline crosses itself or leaves the
+    pore; rules of the scene check the points."""
     try:
         outline = initial_outline(scene)
         curve = None if outline is None else shapely.Polygon(outline.corners.points)
     except MeshError as error:
-        raise SceneError(f"{scene.name}: {advised(error)}") from error
+        raise SceneError(f"{scene.name}: {with_advice(error)}") from error
     if curve is not None and not curve.is_valid:
-        where = shapely.is_valid_reason(curve)
+        location = shapely.is_valid_reason(curve)
         raise SceneError(f"{scene.name}: the spline through the points of aggregate.outline "
-                         f"crosses itself ({where}); give more points, or smooth = false")
+                         f"crosses itself ({location}); give more points, or smooth = false")
 
 
 def require_memory(scene: Scene, warn: Callable[[str], None]) -> None:
-    """Warn of a run that may take more than half of the free memory.
+    """Warn of a run that may need more than half of the free memory.
 
-    Raises SceneError where it would take more than all of it.
+    Raises SceneError if it would need more than all of it.
     """
     free = free_bytes()
     expected = expected_bytes(scene)
-    told = (f"about {expected / MB:.0f} MB of memory are needed ({expected_nodes(scene):.0f} "
+    need = (f"about {expected / MB:.0f} MB of memory are needed ({expected_nodes(scene):.0f} "
             f"nodes), {free / MB:.0f} MB are free")
     if expected > free:
-        raise SceneError(f"{scene.name}: {told}; a smaller numerics.refinement is needed")
+        raise SceneError(f"{scene.name}: {need}; a smaller numerics.refinement is needed")
     if expected > WARNED * free:
-        warn(f"{scene.name}: {told}")
+        warn(f"{scene.name}: {need}")
 
 
 def free_bytes(root: Path = Path("/")) -> float:
-    """Memory that this process may still take: what the system has, its control groups and its
-    limit of address space leave; infinite where nothing tells."""
+    """Memory (bytes) that this process may still allocate.
+
+    It is the least of the free memory of the system and the remainders of the control groups and of
+    the address space of the process; infinite if unknown.
+    """
     limits = [_available(root), *_groups(root), _address_space(root)]
     return max(0.0, min(limits))
 
 
 def _available(root: Path) -> float:
-    """What the system has, without pushing anything out to the disk."""
+    """Free memory of the system, without swapping."""
     for line in _lines(root / "proc/meminfo"):
         if line.startswith("MemAvailable:"):
             return 1024.0 * int(line.split()[1])
@@ -164,42 +166,42 @@ def _available(root: Path) -> float:
 
 
 def _groups(root: Path) -> Iterator[float]:
-    """What each control group that this process is in leaves, of either version."""
+    """Remaining memory of each control group of this process, of either version."""
     for line in _lines(root / "proc/self/cgroup"):
         _, controllers, path = line.split(":", 2)
         if controllers in ("", "memory"):
             base = root / "sys/fs/cgroup" / controllers
             group = base / path.lstrip("/")
             inside = [group, *group.parents]
-            yield from map(_left, inside[: inside.index(base) + 1])
+            yield from map(_remaining, inside[: inside.index(base) + 1])
 
 
-def _left(group: Path) -> float:
-    """What a control group leaves; files that are kept in memory give way."""
-    for limit, used, given_way in (("memory.max", "memory.current", "inactive_file"),
+def _remaining(group: Path) -> float:
+    """Remaining memory of a control group; cached files can be evicted."""
+    for limit, used, reclaimable in (("memory.max", "memory.current", "inactive_file"),
                                    ("memory.limit_in_bytes", "memory.usage_in_bytes",
                                     "total_inactive_file")):
         with suppress(OSError, ValueError):
             most = float((group / limit).read_text())  # "max" is none
-            kept = dict(line.split() for line in _lines(group / "memory.stat"))
-            return most - float((group / used).read_text()) + float(kept.get(given_way, 0))
+            statistics = dict(line.split() for line in _lines(group / "memory.stat"))
+            return most - float((group / used).read_text()) + float(statistics.get(reclaimable, 0))
     return math.inf
 
 
 def _address_space(root: Path) -> float:
-    """What ``ulimit -v`` leaves."""
+    """Remaining address space under ``ulimit -v``."""
     with suppress(ImportError, OSError, ValueError, IndexError):
         import resource
 
-        most = resource.getrlimit(resource.RLIMIT_AS)[0]
-        if most != resource.RLIM_INFINITY:
+        limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+        if limit != resource.RLIM_INFINITY:
             pages = int(_lines(root / "proc/self/statm")[0].split()[0])
-            return float(most - pages * os.sysconf("SC_PAGE_SIZE"))
+            return float(limit - pages * os.sysconf("SC_PAGE_SIZE"))
     return math.inf
 
 
 def _lines(path: Path) -> list[str]:
-    """The lines of a file of the system; none where there is no such file."""
+    """The lines of a file of the system; empty if it does not exist."""
     try:
         return path.read_text().splitlines()
     except OSError:

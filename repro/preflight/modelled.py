@@ -1,4 +1,4 @@
-"""What a scene models and leaves out, in words, section by section, with the paper's equations."""
+"""Describe in words, section by section, what a scene models, with the paper's equations."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from repro.march.simulation import row_times
 from repro.scene import Flow, Scene
-from repro.scene.course import Course
+from repro.scene.time_table import TimeTable
 
 LEFT_OUT = {
     "aggregate": "no aggregate: a clean channel",
@@ -17,12 +17,12 @@ LEFT_OUT = {
 }
 
 
-def modelled(scene: Scene) -> list[tuple[str, str]]:
-    """(section, what it adds) in the order of the scene; what is left out too."""
+def describe_model(scene: Scene) -> list[tuple[str, str]]:
+    """(section, description) in the order of the scene, also of absent sections."""
     words = {"pore": _pore, "aggregate": _aggregate, "flow": _flow, "substrates": _substrates,
              "kinetics": _kinetics, "growth": _growth, "numerics": _numerics, "output": _output}
-    return [(name, "; ".join(tell(scene)) if getattr(scene, name) else LEFT_OUT[name])
-            for name, tell in words.items()]
+    return [(name, "; ".join(describe(scene)) if getattr(scene, name) else LEFT_OUT[name])
+            for name, describe in words.items()]
 
 
 def _pore(scene: Scene) -> Iterator[str]:
@@ -61,7 +61,7 @@ def _flow(scene: Scene) -> Iterator[str]:
 
 
 def _slowed_by(flow: Flow) -> str:
-    """What slows the water in it."""
+    """Describe the resistance of the aggregate to flow."""
     if flow.permeability is None:
         return f"{flow.viscosity_ratio:g} times the viscosity of water in the aggregate"
     return f"an aggregate with a permeability of {1e-12 * flow.permeability:g} m2 (Brinkman's drag)"
@@ -81,14 +81,14 @@ def _substrates(scene: Scene) -> Iterator[str]:
            "gear": "followed in time (3.3, Gear)"}[scene.numerics.transport]
 
 
-def _over_time(value: float | Course, factor: float, unit: str) -> str:
-    """A value in a unit, or what a table of it says."""
-    if not isinstance(value, Course):
+def _over_time(value: float | TimeTable, factor: float, unit: str) -> str:
+    """A value in a unit, or the range of its table."""
+    if not isinstance(value, TimeTable):
         return f"{factor * value:.4g} {unit}"
     least = factor * min(value.values)
     most = factor * value.largest
-    how = "linear in time" if value.linear else "in steps"
-    return f"{least:.4g} to {most:.4g} {unit}, {how}, the last from {value.times[-1]:g} h"
+    interpolation = "linear in time" if value.linear else "in steps"
+    return f"{least:.4g} to {most:.4g} {unit}, {interpolation}, the last from {value.times[-1]:g} h"
 
 
 def _kinetics(scene: Scene) -> Iterator[str]:
@@ -129,6 +129,6 @@ def _output(scene: Scene) -> Iterator[str]:
 
 
 def _every_step(scene: Scene) -> str:
-    """The rows of a scene without output.times."""
+    """Describe the rows of a scene without output.times."""
     rows = row_times(scene)
     return "rows and fields of every step" + (f", and every {rows[0]:g} h" if rows else "")

@@ -1,9 +1,9 @@
-"""Dimensionless numbers of a scene: what its simplifications rest on.
+"""Dimensionless numbers of a scene, which justify its simplifications.
 
-Each is told for t = 0 and, where the aggregate grows, for ``growth.end``, with bounds in place of
-what only the run knows, and tables of the scene at their largest values: the aggregate grows at the
-rate of the supply (9), in the layer that the supply reaches, so that it is no larger and touches
-the opposite wall no earlier than said here.
+Each has a value at t = 0 and, if the aggregate grows, a bound at ``growth.end``. The bound replaces
+unknowns of the run: tables of the scene have their largest values, and the aggregate grows at the
+rate of the supply (9) in the layer that the supply reaches. In the run the aggregate is no larger,
+and touches the opposite wall no earlier.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from repro.model.traction import MPA_PER_UM
 from repro.model.uptake_law import UptakeLaw
 from repro.scene import Scene, Substrate, needed
 
-#: Steps in which the bound on the growth is followed.
+#: Number of steps in which the bound on the growth is integrated.
 STEPS = 2000
-#: The largest exponent of one of them.
+#: The largest exponent of growth in a step.
 LARGEST = 50.0
 
 
@@ -39,8 +39,8 @@ class Number:
 
 @dataclass(frozen=True)
 class Sizes:
-    """What the aggregate is at a time: area (um2), thickness (um), reach (um) to either side of the
-    origin; contact: the time (h) at which it touches the opposite wall, None where it does not."""
+    """The size of the aggregate: area (um2), thickness (um), reach (um) to either side of the
+    origin; contact: the time (h) at which it touches the opposite wall, None without contact."""
 
     area: float
     thickness: float
@@ -49,7 +49,7 @@ class Sizes:
 
 
 def sizes(scene: Scene, area: float, contact: float | None = None) -> Sizes:
-    """A half-disc while that fits into the pore, wall to wall after that."""
+    """A half-disc as long as it fits into the pore, then a plug from wall to wall."""
     width = scene.pore.width
     radius = math.sqrt(2 * area / math.pi)
     if radius <= width:
@@ -58,12 +58,12 @@ def sizes(scene: Scene, area: float, contact: float | None = None) -> Sizes:
 
 
 def at_start(scene: Scene) -> Sizes:
-    """The seed."""
+    """Sizes of the seed."""
     seed = scene.aggregate
     if seed.outline is None:
         touches = scene.pore.width - seed.radius < film(scene)
-        now = sizes(scene, math.pi / 2 * seed.radius**2, 0.0 if touches else None)
-        return replace(now, reach=now.reach + abs(seed.position))
+        current = sizes(scene, math.pi / 2 * seed.radius**2, 0.0 if touches else None)
+        return replace(current, reach=current.reach + abs(seed.position))
     outline = initial_outline(scene)
     touches = scene.pore.width - outline.thickness < film(scene)
     reach = max(-outline.upstream, outline.downstream)
@@ -72,22 +72,25 @@ def at_start(scene: Scene) -> Sizes:
 
 @lru_cache(maxsize=1)
 def at_end(scene: Scene) -> Sizes:
-    """The bound at growth.end; the seed without growth."""
-    now = at_start(scene)
+    """Bound on the sizes at growth.end; those of the seed without growth."""
+    current = at_start(scene)
     if scene.growth is None:
-        return now
-    aside = max(0.0, now.reach - sizes(scene, now.area).reach)
-    rate = max(0.0, fastest_growth(scene))  # what decays is no larger than at the start
+        return current
+    offset = max(0.0, current.reach - sizes(scene, current.area).reach)
+    rate = max(0.0, fastest_growth(scene))  # a decaying aggregate is no larger than at the start
     layer = depth(scene)
     step = scene.growth.end / STEPS
     full = scene.pore.width * scene.pore.length
     for k in range(STEPS):  # as a half-disc of the same area
-        exposed = math.pi * now.thickness if now.contact is None else 2 * scene.pore.width
-        share = min(1.0, layer * exposed / now.area)
-        area = min(full, now.area * math.exp(min(LARGEST, rate * share * step)))
+        exposed = math.pi * current.thickness if current.contact is None else 2 * scene.pore.width
+        share = min(1.0, layer * exposed / current.area)
+        area = min(full, current.area * math.exp(min(LARGEST, rate * share * step)))
         touches = math.sqrt(2 * area / math.pi) >= scene.pore.width - film(scene)
-        now = sizes(scene, area, (k + 1) * step if touches and now.contact is None else now.contact)
-    return replace(now, reach=now.reach + aside)
+        contact = current.contact
+        if touches and contact is None:
+            contact = (k + 1) * step
+        current = sizes(scene, area, contact)
+    return replace(current, reach=current.reach + offset)
 
 
 def fastest_growth(scene: Scene) -> float:
@@ -135,35 +138,36 @@ def uptakes(scene: Scene) -> Iterator[Uptake]:
     rates = rate_law(both, scene.kinetics)
     of_acceptor, of_donor = rates.both
     density = scene.kinetics.maximum_density
-    most_a = of_acceptor.largest(both.acceptor.supply)
-    most_d = of_donor.largest(both.donor.supply)
-    yield Uptake("acceptor", both.acceptor, of_acceptor, rates.per_acceptor(most_d) * density)
-    yield Uptake("donor", both.donor, of_donor, rates.per_donor(most_a) * density)
+    largest_acceptor = of_acceptor.largest(both.acceptor.supply)
+    largest_donor = of_donor.largest(both.donor.supply)
+    rate = rates.per_acceptor(largest_donor) * density
+    yield Uptake("acceptor", both.acceptor, of_acceptor, rate)
+    yield Uptake("donor", both.donor, of_donor, rates.per_donor(largest_acceptor) * density)
 
 
 def depth(scene: Scene) -> float:
-    """Depth (um) that the scarcer substrate reaches in biomass that takes it up at full rate."""
+    """Depth (um) that the scarcer substrate reaches in biomass with the largest uptake."""
     return min(uptake.depth for uptake in uptakes(scene))
 
 
 def numbers(scene: Scene, speed: float | None) -> list[Number]:
-    """Those that the sections of the scene give rise to; speed: mean velocity at t = 0 (um/h)."""
-    found: list[Number] = []
+    """The numbers of all sections of the scene; speed: mean velocity at t = 0 (um/h)."""
+    computed: list[Number] = []
     if speed is not None:
         reynolds = speed * scene.pore.width / scene.flow.kinematic_viscosity
-        found.append(Number("Reynolds", reynolds, None, "u W / nu"))
+        computed.append(Number("Reynolds", reynolds, None, "u W / nu"))
     if speed is not None and scene.substrates:
-        found += _transported(scene, speed)
+        computed += _transported(scene, speed)
     if scene.kinetics:
-        found += _taken_up(scene, speed)
+        computed += _taken_up(scene, speed)
     if scene.growth:
-        found += _grown(scene, speed)
-    return found
+        computed += _grown(scene, speed)
+    return computed
 
 
-def judged(scene: Scene, velocity: float | None) -> tuple[Scene, list[Number]]:
-    """What a scene is judged by: each of its tables at its largest value, and the numbers of that;
-    velocity: mean, um/h, at t = 0, None without flow."""
+def evaluate_at_largest(scene: Scene, velocity: float | None) -> tuple[Scene, list[Number]]:
+    """Return the scene with each table at its largest value, and its numbers; velocity: mean
+    velocity (um/h) at t = 0, None without flow."""
     most = scene.largest
     if velocity is None:
         return most, numbers(most, None)
@@ -176,16 +180,16 @@ def judged(scene: Scene, velocity: float | None) -> tuple[Scene, list[Number]]:
 
 
 def _transported(scene: Scene, speed: float) -> Iterator[Number]:
-    both = {"acceptor": scene.substrates.acceptor, "donor": scene.substrates.donor}
-    for name, s in both.items():
-        value = speed * scene.pore.width / s.diffusivity
+    kinds = {"acceptor": scene.substrates.acceptor, "donor": scene.substrates.donor}
+    for name, substrate in kinds.items():
+        value = speed * scene.pore.width / substrate.diffusivity
         yield Number(f"Peclet, {name}", value, None, "u W / D, D in water")
     yield Number("cell Peclet", 1.5 * speed * sized(scene).largest / slowest(scene), None,
                  "1.5 u h / D, h of the largest elements, the smallest D")
 
 
 def slowest(scene: Scene) -> float:
-    """The smallest of all diffusivities, um2/h."""
+    """The smallest diffusivity (um2/h)."""
     kinds = (scene.substrates.acceptor, scene.substrates.donor)
     return min(min(s.diffusivity, s.diffusivity_in_aggregate) for s in kinds)
 
@@ -193,21 +197,20 @@ def slowest(scene: Scene) -> float:
 def _taken_up(scene: Scene, speed: float | None) -> Iterator[Number]:
     start = at_start(scene)
     end = at_end(scene)
-    later = scene.growth is not None
+    has_growth = scene.growth is not None
     for uptake in uptakes(scene):
         per = uptake.per_layer
         yield Number(f"Thiele, {uptake.name}", start.thickness * per,
-                     end.thickness * per if later else None,
+                     end.thickness * per if has_growth else None,
                      "R (q X_m / (K_s D))^1/2, R thickness, q largest uptake, D in the aggregate")
     for uptake in uptakes(scene):
         supply = uptake.substrate.supply
         if speed and supply:
             taken_up = uptake.rate * uptake.law.fraction(supply)
             per = taken_up / (speed * scene.pore.width * supply)
-            at_end_of_growth = end.area * per if later else None
+            at_end_of_growth = end.area * per if has_growth else None
             yield Number(f"Damkoehler, {uptake.name}", start.area * per, at_end_of_growth,
-                         "q X_m m A / (u W C), uptake of the area A at the supply over what flows "
-                         "in")
+                         "q X_m m A / (u W C), uptake of the area A at the supply over the inflow")
 
 
 def _grown(scene: Scene, speed: float | None) -> Iterator[Number]:
@@ -227,18 +230,18 @@ def _grown(scene: Scene, speed: float | None) -> Iterator[Number]:
 
 
 def half_length(scene: Scene) -> float:
-    """Half of the part that is meshed at t = 0 (um)."""
+    """Half of the length (um) that is meshed at t = 0."""
     seed = initial_outline(scene)
-    whole = scene.numerics.extent == "full"
-    first, last = meshed_extent(seed, scene.pore.width, scene.pore.length, whole)
+    is_full = scene.numerics.extent == "full"
+    first, last = meshed_extent(seed, scene.pore.width, scene.pore.length, is_full)
     return (last - first) / 2
 
 
 def stresses(scene: Scene, speed: float) -> tuple[float, float]:
-    """Shear on the wall at t = 0 and drop of pressure over the aggregate at the end, over mu_L.
+    """Wall shear at t = 0, and pressure drop over the aggregate at the end, both over mu_L.
 
-    The drop is that of a film as long as the aggregate, or of as much biomass from wall to wall;
-    never more than the scene's head.
+    The drop is the smaller one of a film as long as the aggregate and of a plug of the same
+    length. It does not exceed the head of the scene.
     """
     drive = scene.flow
     width = scene.pore.width

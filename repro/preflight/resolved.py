@@ -1,4 +1,4 @@
-"""Is the flow around a drawn outline resolved? Its head loss at t = 0 on finer and finer meshes."""
+"""Check whether the flow around a drawn outline is resolved, by its head loss on finer meshes."""
 
 from __future__ import annotations
 
@@ -9,64 +9,63 @@ from repro.errors import StageError
 from repro.model import pore
 from repro.model.remeshing import MOST_REFINED
 from repro.preflight.memory import first_nodes
-from repro.preflight.simplifications import Warned
+from repro.preflight.simplifications import Caveat
 from repro.scene import Scene
 
-#: The head loss of a resolved flow changes by no more than this share on a mesh twice as fine.
-#: Where corners are not resolved, the error falls with the first power of the elements: it is twice
-#: that.
+#: The head loss of a resolved flow changes by at most this share on a mesh twice as fine. Near
+#: unresolved corners the error falls with the first power of the size, and is twice the change.
 CHANGE = 0.005
-#: Meshes twice, four and eight times as fine are tried, up to so many nodes.
+#: The meshes are two, four and eight times as fine, with at most this many nodes.
 DOUBLINGS = 3
 MOST_COMPARED = 30_000
 
 
-def unresolved(scene: Scene) -> Iterator[Warned]:
-    """What the head loss at t = 0 is, what is to be expected, and a refinement that resolves it.
+def find_unresolved_flow(scene: Scene) -> Iterator[Caveat]:
+    """Warn of the error of the head loss at t = 0, with a refinement that resolves the flow.
 
-    Nothing where the flow is resolved or no outline is drawn.
+    Yields nothing if the flow is resolved or no outline is drawn.
     """
     if scene.flow is None or scene.aggregate is None or scene.aggregate.outline is None:
         return
-    tried = _losses(scene)
-    if len(tried) < 2 or (len(tried) == 2 and _settled(tried)):
+    losses = _compute_losses(scene)
+    if len(losses) < 2 or (len(losses) == 2 and _is_converged(losses)):
         return
-    first = tried[0][1]
-    expected = 2 * tried[-1][1] - tried[-2][1]
-    yield Warned("numerics.refinement", f"the head loss at t = 0 is {1e-4 * first:.4g} cm, and "
+    first = losses[0][1]
+    expected = 2 * losses[-1][1] - losses[-2][1]
+    yield Caveat("numerics.refinement", f"the head loss at t = 0 is {1e-4 * first:.4g} cm, and "
                  f"about {1e-4 * expected:.4g} cm ({100 * (expected / first - 1):+.2g} %) are "
-                 f"expected of finer meshes; {_advice(tried)}")
+                 f"expected of finer meshes; {_advice(losses)}")
 
 
-def _advice(tried: list[tuple[float, float]]) -> str:
+def _advice(losses: list[tuple[float, float]]) -> str:
     within = 200 * CHANGE
-    if _settled(tried):
-        return f"numerics.refinement = {tried[-2][0]:g} resolves the flow to about {within:g} %"
-    return f"numerics.refinement up to {tried[-1][0]:g} does not resolve the flow"
+    if _is_converged(losses):
+        return f"numerics.refinement = {losses[-2][0]:g} resolves the flow to about {within:g} %"
+    return f"numerics.refinement up to {losses[-1][0]:g} does not resolve the flow"
 
 
-def _settled(tried: list[tuple[float, float]]) -> bool:
-    return abs(tried[-2][1] / tried[-1][1] - 1) <= CHANGE
+def _is_converged(losses: list[tuple[float, float]]) -> bool:
+    return abs(losses[-2][1] / losses[-1][1] - 1) <= CHANGE
 
 
-def _losses(scene: Scene) -> list[tuple[float, float]]:
+def _compute_losses(scene: Scene) -> list[tuple[float, float]]:
     """(refinement, head loss in um) of meshes, each twice as fine as the one before, until the loss
-    settles or the next mesh is too large or fails."""
-    tried: list[tuple[float, float]] = []
+    converges, or the next mesh is too large or fails."""
+    losses: list[tuple[float, float]] = []
     for doubling in range(DOUBLINGS + 1):
         refinement = 2**doubling * scene.numerics.refinement
         finer = replace(scene, numerics=replace(scene.numerics, refinement=refinement))
         if refinement > MOST_REFINED or first_nodes(finer) > MOST_COMPARED:
             break
         try:
-            tried.append((refinement, _head_loss(finer)))
+            losses.append((refinement, _head_loss(finer)))
         except StageError:
             break
-        if doubling and _settled(tried):
+        if doubling and _is_converged(losses):
             break
-    return tried
+    return losses
 
 
 def _head_loss(scene: Scene) -> float:
-    """Of the whole pore at t = 0, um."""
+    """Head loss (um) of the whole pore at t = 0."""
     return pore.solve_flow(scene.at(0.0), pore.seeded(scene).space).head_loss

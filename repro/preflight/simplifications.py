@@ -1,4 +1,4 @@
-"""Where a simplification that a scene has chosen fails: thresholds, each with its reason."""
+"""Thresholds beyond which a simplification of a scene does not hold, each with its reason."""
 
 from __future__ import annotations
 
@@ -17,136 +17,135 @@ from repro.preflight.numbers import Number
 from repro.scene import Kinetics, Scene
 from repro.scene.keys import RATIO
 
-#: (1) has no inertia, whose share of the viscous forces is of the order of the Reynolds number.
+#: (1) neglects inertia, whose ratio to the viscous forces is of the order of the Reynolds number.
 REYNOLDS = 0.1
 #: Linear elements may overshoot where a concentration changes within an element of a cell Peclet
 #: number above this.
 CELL_PECLET = 2.0
-#: Quasi-steady substrates are behind the growth by about this share.
+#: Quasi-steady substrates lag behind the growth by about this share.
 LAG = 0.05
-#: Profiles come to rest in each shape, while water stays in the pore for this share of the time of
-#: growth. From a pore full of the supply, a seed of 20 um in base makes in 6 h 0.5, 2, 4, 7 and 19
-#: % less biomass than Gear's method finds where the share is 0.009, 0.027, 0.05, 0.09 and 0.28.
+#: Largest ratio of the transit time of water to the time of growth for profiles at rest in each
+#: shape. From a pore full of the supply, a seed of 20 um in base makes in 6 h 0.5, 2, 4, 7 and 19 %
+#: less biomass than with Gear's method at ratios of 0.009, 0.027, 0.05, 0.09 and 0.28.
 TRANSIT = 0.05
-#: The aggregate is strained by the neglected forces by about this much.
+#: The neglected forces strain the aggregate by about this much.
 STRAIN = 0.01
-#: A shape update with the rates of its start is off by about half of the growth in it.
+#: A shape update with the rates at its start errs by about half of its growth.
 GROWTH_IN_A_STEP = 0.1
-#: The bound on the time of contact is 10 % early in the paper's pores; later than this times it is
-#: long after.
+#: The bound on the time of contact is 10 % early in the paper's pores. An end later than this many
+#: times the bound is long after contact.
 AFTER_CONTACT = 1.2
-#: Distances between nodes across a film, under which its flow (the cube of its thickness) is a
-#: matter of the mesh.
+#: With fewer distances between nodes across a film, its flow (the cube of its thickness) depends on
+#: the mesh.
 ACROSS_FILM = 4.0
-#: The narrowest film may let through less by this share, where the layer in which a permeable
-#: aggregate slows the water is thinner than its elements resolve. Water slides on that layer: a
-#: film of thickness h beside a layer l lets through at most 1 + 3 l / h times as much as one beside
-#: a wall.
+#: The flow through the narrowest film may be too small by this share if elements do not resolve the
+#: layer in which a permeable aggregate slows the water. The water slips on this layer: the flow
+#: through a film of thickness h beside a layer l is at most 1 + 3 l / h times that beside a wall.
 FILM_LOSS = 0.01
 
-#: A fold is expected in pores of at least this width (um) whose aggregate is thicker than so many
-#: depths of the supply, and where growth at the supply exceeds that of the area by this factor's
-#: logarithm. Fitted to 22 pores of 25 to 200 um run in `fast` (docs/design.md).
+#: A fold is expected in pores of at least this width (um) if the aggregate is thicker than this
+#: many depths of the supply, and the exponent of growth at the supply exceeds that of the area by
+#: this much. Fitted to 22 pores of 25 to 200 um run in `fast` (docs/design.md).
 FOLD_WIDTH = 80.0
 FOLD_DEPTHS = 1.1
 FOLD_EXCESS = 2.0
-#: The key that a crease is warned of.
+#: The key in the warning of a crease.
 CREASED = "growth.new_biomass"
 
 
 @dataclass(frozen=True)
-class Warned:
-    """A key of the scene and what does not hold."""
+class Caveat:
+    """A simplification that does not hold: the key of the scene that chooses it, and the reason."""
 
     key: str
     text: str
 
 
-def warnings(scene: Scene, found: list[Number]) -> list[Warned]:
-    """Every simplification that does not hold; found: the numbers of the scene."""
-    value = {number.name: number.start for number in found}
+def find_warnings(scene: Scene, computed: list[Number]) -> list[Caveat]:
+    """Every simplification that does not hold; computed: the numbers of the scene."""
+    value = {number.name: number.start for number in computed}
     checks = [_inertia(value), _cells(scene, value), _diffusivities(scene)]
     if scene.aggregate:
         checks += [_seed_film(scene), _ends(scene), _drag_layer(scene)]
     if scene.kinetics:
         checks += [_fronts(scene), _demand(scene.kinetics)]
     if scene.growth:
-        checks += [_lag(scene, value), _transit(value), _forces(scene, found), _steps(scene),
+        checks += [_lag(scene, value), _transit(value), _forces(scene, computed), _steps(scene),
                    _contact(scene), _fold(scene)]
-    return [warned for check in checks for warned in check]
+    return [caveat for check in checks for caveat in check]
 
 
-def _inertia(value: dict[str, float]) -> Iterator[Warned]:
+def _inertia(value: dict[str, float]) -> Iterator[Caveat]:
     reynolds = value.get("Reynolds", 0.0)
     if reynolds > REYNOLDS:
-        yield Warned("flow", f"the Reynolds number is {reynolds:.2g}, above {REYNOLDS:g}: the "
+        yield Caveat("flow", f"the Reynolds number is {reynolds:.2g}, above {REYNOLDS:g}: the "
                      "inertia that Stokes flow (1) leaves out is of this share of the viscous "
                      "forces")
 
 
-def _cells(scene: Scene, value: dict[str, float]) -> Iterator[Warned]:
+def _cells(scene: Scene, value: dict[str, float]) -> Iterator[Caveat]:
     cell = value.get("cell Peclet", 0.0)
     if scene.numerics.elements == "linear" and cell > CELL_PECLET:
-        wanted = scene.numerics.refinement * cell / CELL_PECLET
-        yield Warned("numerics.refinement", f"the cell Peclet number is {cell:.2g}, above "
+        required = scene.numerics.refinement * cell / CELL_PECLET
+        yield Caveat("numerics.refinement", f"the cell Peclet number is {cell:.2g}, above "
                      f"{CELL_PECLET:g}: linear elements may overshoot where concentrations are "
-                     f"steep{_resolving(wanted)}; the presets fast and accurate refine by "
+                     f"steep{_resolving(required)}; the presets fast and accurate refine by "
                      "themselves")
 
 
-def _diffusivities(scene: Scene) -> Iterator[Warned]:
-    """Where one of two values of Table 1 that belong together is changed, and the other is not."""
+def _diffusivities(scene: Scene) -> Iterator[Caveat]:
+    """Warn if only one of two related values of Table 1 is changed."""
     for name in ("acceptor", "donor") if scene.substrates and scene.aggregate else ():
-        now = getattr(scene.substrates, name)
-        table = type(now)(supply=now.supply)
-        inside = now.diffusivity_in_aggregate
-        if now.diffusivity != table.diffusivity and inside == table.diffusivity_in_aggregate:
-            yield Warned(f"substrates.{name}.diffusivity_in_aggregate", "it is still that of Table "
-                         f"1, {100 * inside / now.diffusivity:.3g} % of the diffusivity in water, "
-                         'which was changed; "80 %" keeps their ratio (2.2)')
+        substrate = getattr(scene.substrates, name)
+        table = type(substrate)(supply=substrate.supply)
+        inside = substrate.diffusivity_in_aggregate
+        if substrate.diffusivity != table.diffusivity and inside == table.diffusivity_in_aggregate:
+            yield Caveat(f"substrates.{name}.diffusivity_in_aggregate", "it is still that of Table "
+                         f"1, {100 * inside / substrate.diffusivity:.3g} % of the diffusivity in "
+                         'water, which was changed; "80 %" keeps their ratio (2.2)')
 
 
-def _demand(law: Kinetics) -> Iterator[Warned]:
-    """The same of F = COD - Y d_c (7)."""
+def _demand(law: Kinetics) -> Iterator[Caveat]:
+    """Warn if Y or d_c is changed, and F = COD - Y d_c (7) is not."""
     table = Kinetics()
-    made = law.yield_coefficient * law.decay_oxygen_demand
-    before = table.yield_coefficient * table.decay_oxygen_demand
-    alone = law.donor_oxygen_demand is None and made != before
-    if alone and law.acceptor_to_donor_ratio == table.acceptor_to_donor_ratio:
-        yield Warned("kinetics.acceptor_to_donor_ratio", f"F is still {RATIO:g} of Table 1, while "
-                     f"Y d_c is {made:.3g} and no longer {before:.3g}: F = COD - Y d_c (7); with "
-                     "donor_oxygen_demand (COD) in its place it follows")
+    product = law.yield_coefficient * law.decay_oxygen_demand
+    table_product = table.yield_coefficient * table.decay_oxygen_demand
+    is_changed = law.donor_oxygen_demand is None and product != table_product
+    if is_changed and law.acceptor_to_donor_ratio == table.acceptor_to_donor_ratio:
+        yield Caveat("kinetics.acceptor_to_donor_ratio", f"F is still {RATIO:g} of Table 1, while "
+                     f"Y d_c is {product:.3g} and no longer {table_product:.3g}: F = COD - Y d_c "
+                     "(7); with donor_oxygen_demand (COD) in its place it follows")
 
 
-def _lag(scene: Scene, value: dict[str, float]) -> Iterator[Warned]:
+def _lag(scene: Scene, value: dict[str, float]) -> Iterator[Caveat]:
     lag = value["transport over growth time"]
     if scene.numerics.transport == "quasi_steady" and lag > LAG:
-        yield Warned("numerics.transport", f"transport takes {lag:.2g} of the time of growth, "
+        yield Caveat("numerics.transport", f"transport takes {lag:.2g} of the time of growth, "
                      f"above {LAG:g}: quasi-steady substrates are off by about this share; "
                      '"gear" with numerics.time = "updates" follows them in time')
 
 
-def _transit(value: dict[str, float]) -> Iterator[Warned]:
+def _transit(value: dict[str, float]) -> Iterator[Caveat]:
     transit = value.get("transit over growth time", 0.0)
     if transit > TRANSIT:
-        yield Warned("flow", f"water takes {transit:.2g} of the time of growth to pass the pore, "
+        yield Caveat("flow", f"water takes {transit:.2g} of the time of growth to pass the pore, "
                      f"above {TRANSIT:g}: profiles come to rest in each shape (3.3.2), and what "
                      "was in the pore before is lost to the biomass, which may be off by this "
                      "share")
 
 
-def _forces(scene: Scene, found: list[Number]) -> Iterator[Warned]:
-    told = [max(number.start, number.end or 0.0) for number in found
+def _forces(scene: Scene, computed: list[Number]) -> Iterator[Caveat]:
+    stresses = [max(number.start, number.end or 0.0) for number in computed
             if number.name == "fluid stress over modulus"]
-    strain = max(told, default=0.0)
+    strain = max(stresses, default=0.0)
     if scene.growth.fluid_forces == "neglected" and strain > STRAIN:
-        yield Warned("growth.fluid_forces", f"the fluid's stress comes to {strain:.2g} of mu_L, "
+        yield Caveat("growth.fluid_forces", f"the fluid's stress comes to {strain:.2g} of mu_L, "
                      f"above {STRAIN:g}: neglected (2.3.3), it would strain the aggregate by about "
                      f"this much; {_included(scene)}")
 
 
 def _included(scene: Scene) -> str:
-    """The setting that takes fluid forces in, in words, where one is accepted."""
+    """Name the setting that includes fluid forces, if there is one."""
     if scene.flow and scene.flow.biomass == "brinkman":
         return 'no setting takes it in with flow.biomass = "brinkman"'
     if scene.growth.new_biomass == "stress_free":
@@ -154,7 +153,7 @@ def _included(scene: Scene) -> str:
     return '"included" takes it in'
 
 
-def _fronts(scene: Scene) -> Iterator[Warned]:
+def _fronts(scene: Scene) -> Iterator[Caveat]:
     thickness = numbers.at_end(scene).thickness
     nodes = _interface_size(scene) / scene.numerics.order
     for uptake in numbers.uptakes(scene):
@@ -162,20 +161,20 @@ def _fronts(scene: Scene) -> Iterator[Warned]:
         if layer < min(nodes, thickness):
             zero_order = uptake.law.saturates(uptake.substrate.supply)
             kind = "zero-order front" if zero_order else "layer of first-order uptake"
-            yield Warned("numerics.refinement", f"the {uptake.name} is used up in a {kind} "
+            yield Caveat("numerics.refinement", f"the {uptake.name} is used up in a {kind} "
                          f"(D K_s / (q X_m))^1/2 = {layer:.2g} um thick, thinner than the "
                          f"{nodes:.2g} um between nodes in the aggregate (a run judges its front "
                          "by what it solves)" + _resolving(resolution(scene) * nodes / layer))
 
 
 def _interface_size(scene: Scene) -> float:
-    """The size (um) of elements at the interface, where they are largest."""
+    """The largest size (um) of elements at the interface."""
     thickness = numbers.at_end(scene).thickness
     size = min(thickness / sizing.ACROSS_AGGREGATE, scene.pore.width / sizing.ACROSS_PORE)
     return size / resolution(scene)
 
 
-def _drag_layer(scene: Scene) -> Iterator[Warned]:
+def _drag_layer(scene: Scene) -> Iterator[Caveat]:
     permeability = scene.flow.permeability if scene.flow else None
     if permeability is None:
         return
@@ -186,7 +185,7 @@ def _drag_layer(scene: Scene) -> Iterator[Warned]:
     loss = 3 * (root - permeability / thickness) / gap
     if loss > FILM_LOSS:
         accepted = root / (1 - FILM_LOSS * gap / (3 * root))
-        yield Warned("flow.permeability", f"the flow along the aggregate fades in it over its "
+        yield Caveat("flow.permeability", f"the flow along the aggregate fades in it over its "
                      f"root, {root:.2g} um, which elements of {size:.2g} um widen to "
                      f"{thickness:.2g} um: the narrowest film, {gap:.2g} um, may let through "
                      f"{100 * loss:.2g} % less" + _resolving(resolution(scene) * thickness
@@ -194,56 +193,58 @@ def _drag_layer(scene: Scene) -> Iterator[Warned]:
 
 
 def _resolving(refinement: float) -> str:
-    """What resolves a thin layer, in words; three digits, rounded up."""
+    """Name the refinement that resolves a thin layer, with three digits, rounded up."""
     unit = 10.0 ** (math.floor(math.log10(refinement)) - 2)
-    enough = unit * math.ceil(refinement / unit)
-    if enough <= MOST_REFINED:
-        return f"; numerics.refinement = {enough:.3g} would resolve it"
+    sufficient = unit * math.ceil(refinement / unit)
+    if sufficient <= MOST_REFINED:
+        return f"; numerics.refinement = {sufficient:.3g} would resolve it"
     return f"; no refinement up to {MOST_REFINED:g} resolves it"
 
 
-def _seed_film(scene: Scene) -> Iterator[Warned]:
+def _seed_film(scene: Scene) -> Iterator[Caveat]:
     gap = scene.pore.width - numbers.at_start(scene).thickness
     share = min(1.0, gap / film(scene))
     nodes = sizing.ACROSS_FILM * resolution(scene) * share * scene.numerics.order
     if nodes < ACROSS_FILM:
         key = "aggregate.radius" if scene.aggregate.outline is None else "aggregate.outline"
-        yield Warned(key, f"the film over the seed is {gap:.2g} um thin and "
+        yield Caveat(key, f"the film over the seed is {gap:.2g} um thin and "
                      f"resolved by {nodes:.2g} distances between nodes, under {ACROSS_FILM:g}: its "
                      "flow is a matter of the mesh; films are resolved as if they were "
                      f"{film(scene):g} um (2.3.3)")
 
 
-def _ends(scene: Scene) -> Iterator[Warned]:
+def _ends(scene: Scene) -> Iterator[Caveat]:
     end = numbers.at_end(scene)
     free = min(10 * end.thickness, 1.5 * scene.pore.width)
     if end.reach + free > scene.pore.length / 2:
         when = "by growth.end" if end.reach > numbers.at_start(scene).reach else "from the start"
-        yield Warned("pore.length", f"the aggregate may come within {free:.3g} um of the pore's "
+        yield Caveat("pore.length", f"the aggregate may come within {free:.3g} um of the pore's "
                      f"ends {when} (reach {end.reach:.3g} of {scene.pore.length / 2:g} um): the "
                      "inlet's and the outlet's conditions (3.1, (11)-(12)) are then too near, and "
                      "at the end itself the run is over")
 
 
-def _steps(scene: Scene) -> Iterator[Warned]:
+def _steps(scene: Scene) -> Iterator[Caveat]:
     grown = numbers.fastest_growth(scene) * scene.growth.time_step
     if scene.numerics.time == "updates" and grown > GROWTH_IN_A_STEP:
-        yield Warned("growth.time_step", f"the aggregate grows by {100 * grown:.2g} % in a shape "
+        yield Caveat("growth.time_step", f"the aggregate grows by {100 * grown:.2g} % in a shape "
                      f"update, above {100 * GROWTH_IN_A_STEP:g} %: its rates are those of the "
                      'shape before; shorten it, or take numerics.time = "midpoint"')
 
 
-def unmet(scene: Scene, worst: float, count: str = "") -> Iterator[Warned]:
-    """A tolerance that the shortest step exceeds by its estimate, ``worst``; zero where none does.
-    count: of how many steps."""
+def warn_missed_tolerance(scene: Scene, worst: float, count: str = "") -> Iterator[Caveat]:
+    """Warn if the error estimate of a shortest step exceeds the tolerance.
+
+    worst: the largest of these estimates, 0 if none exceeds it; count: number of steps in words.
+    """
     if worst:
-        yield Warned("numerics.tolerance", f"{scene.numerics.tolerance:g} was not met{count}: the "
+        yield Caveat("numerics.tolerance", f"{scene.numerics.tolerance:g} was not met{count}: the "
                      f"smallest allowed step, growth.time_step / {1 / SHORTEST:g}, errs by "
                      f"{worst:.2g} (estimate)")
 
 
-def _fold(scene: Scene) -> Iterator[Warned]:
-    """Where a rim that grows on a starved core is expected to compress itself into a fold."""
+def _fold(scene: Scene) -> Iterator[Caveat]:
+    """Warn if a rim that grows on a starved core is expected to compress itself into a fold."""
     end = numbers.at_end(scene)
     depth = numbers.depth(scene)
     increase = math.log(end.area / numbers.at_start(scene).area)
@@ -251,28 +252,29 @@ def _fold(scene: Scene) -> Iterator[Warned]:
     expected = (scene.pore.width >= FOLD_WIDTH and end.thickness > FOLD_DEPTHS * depth
                 and excess > FOLD_EXCESS)
     if expected and scene.growth.new_biomass == "stressed":
-        yield Warned("growth.end", f"the run may end before {scene.growth.end:g} h, as a fold: the "
+        yield Caveat("growth.end", f"the run may end before {scene.growth.end:g} h, as a fold: the "
                      f"supply reaches {depth:.3g} um into an aggregate of up to "
                      f"{end.thickness:.3g} um, so that its rim compresses itself until no smooth "
                      "shape is left (docs/scope.md). Of 10 pores judged so, 4 folded and 3 came "
                      "close; of 12 others none did")
 
 
-def creased(now: Pore) -> Iterator[Warned]:
-    """A surface on which creases have begun to lower the energy."""
-    if now.outline is None or surface(now).least >= CREASE:
+def warn_crease(pore: Pore) -> Iterator[Caveat]:
+    """Warn if creases begin to lower the energy of the surface."""
+    if pore.outline is None or surface(pore).least >= CREASE:
         return
-    found = surface(now)
-    x, y = found.place
-    yield Warned(CREASED, f"from t = {now.time:.4g} h on growth compresses the aggregate's surface "
-                 f"near x = {x:.4g}, y = {y:.4g} um to an elastic stretch of {found.least:.3f}, "
-                 f"below {CREASE:g}: a crease there would lower the energy, and the smooth shape "
-                 'is that of a surface without flaws; "stress_free" does not come to this')
+    crease = surface(pore)
+    x, y = crease.place
+    yield Caveat(CREASED, f"from t = {pore.time:.4g} h on growth compresses the aggregate's "
+                 f"surface near x = {x:.4g}, y = {y:.4g} um to an elastic stretch of "
+                 f"{crease.least:.3f}, below {CREASE:g}: a crease there would lower the energy, "
+                 "and the smooth shape is that of a surface without flaws; "
+                 '"stress_free" does not come to this')
 
 
-def _contact(scene: Scene) -> Iterator[Warned]:
+def _contact(scene: Scene) -> Iterator[Caveat]:
     contact = numbers.at_end(scene).contact
     if contact is not None and scene.growth.end > AFTER_CONTACT * contact:
-        yield Warned("growth.end", f"contact with the opposite wall is expected from {contact:.3g} "
+        yield Caveat("growth.end", f"contact with the opposite wall is expected from {contact:.3g} "
                      f"h on, long before {scene.growth.end:g} h: from then on which nodes join the "
                      "wall (2.3.3) is a rule, and conductivity is known to a few percent")

@@ -1,11 +1,11 @@
-"""Pages that show runs: ``report.html`` of each run, and comparisons (``repro compare``).
+"""Pages of runs: ``report.html`` of each run, and comparisons (``repro compare``).
 
     reading       a run's folder: run.json and its tables
-    quantities    what is drawn over time
+    quantities    the charts over time
     charts        line charts as SVG
     fields        the fields of the .vtu files, packed for the page's script
     run_page, comparison   the two kinds of pages
-    page          a page that is one file, needs no network and escapes what it is told
+    page          a page in one file that needs no network and escapes all text
     *.css, *.js   its style and scripts
 """
 
@@ -17,15 +17,15 @@ from pathlib import Path
 from repro.report import comparison, run_page
 from repro.report.reading import NoRun, read
 from repro.results import write_text
-from repro.results.files import whole
+from repro.results.files import atomic_path
 
 __all__ = ["NoRun", "compare", "write"]
 
 
 def write(folder: Path) -> Path:
-    """Make ``report.html`` from what a run has written in its folder; returns its path.
+    """Write ``report.html`` of the run in a folder; returns its path.
 
-    Raises NoRun where the folder holds no run, ValueError where its fields cannot be read.
+    Raises NoRun if the folder holds no run, ValueError if its fields cannot be read.
     """
     target = folder / "report.html"
     _write(target, run_page.build(read(folder)))
@@ -33,14 +33,14 @@ def write(folder: Path) -> Path:
 
 
 def compare(folders: Sequence[Path], target: Path) -> Path:
-    """Make a page of two runs or more at ``target``; returns it.
+    """Write a page that compares two or more runs; returns its path.
 
-    Raises NoRun where a folder holds no run.
+    Raises NoRun if a folder holds no run.
     """
     _write(target, comparison.build([read(folder) for folder in folders]))
     return target
 
 
 def _write(target: Path, text: str) -> None:
-    with whole(target) as beside:
+    with atomic_path(target) as beside:
         write_text(beside, text)

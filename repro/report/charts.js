@@ -1,9 +1,9 @@
-// What a chart tells: values where the pointer is, else those at the present time of the fields.
+// The values of a chart at the pointer, or at the time of the fields.
 "use strict";
 const charts = [...document.querySelectorAll("figure[data-chart]")].map(figure => {
-  const told = JSON.parse(figure.dataset.chart), [low, high, start, end] = told.axis;
+  const content = JSON.parse(figure.dataset.chart), [low, high, start, end] = content.axis;
   const within = selector => figure.querySelector(`:scope > ${selector}`);
-  return { told, drawing: within("svg"), output: within("output"), now: within("svg .now"),
+  return { content, drawing: within("svg"), output: within("output"), now: within("svg .now"),
     place: time => start + (time - low) / (high - low) * (end - start),
     time: place => low + (place - start) / (end - start) * (high - low) };
 });
@@ -42,7 +42,7 @@ function timeUnder(chart, event) {
 
 // The values at the time, of those that any line has a value for, that is nearest to this one.
 function tell(chart, time) {
-  const lines = chart.told.lines.filter(line => line.t.length && line.y.some(y => y !== null));
+  const lines = chart.content.lines.filter(line => line.t.length && line.y.some(y => y !== null));
   const times = lines.map(line => line.t[nearest(line.t, time)]), at = times[nearest(times, time)];
   chart.output.textContent = `${rounded(at)} h: ` + lines.map(line =>
     (lines.length > 1 ? line.label + " " : "") + rounded(valueAt(line, at))).join(", ");

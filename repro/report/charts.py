@@ -1,8 +1,8 @@
-"""Charts as inline SVG, drawn from numbers alone: the same numbers give the same bytes.
+"""Charts as inline SVG. The same numbers give the same bytes.
 
 ``svg`` draws lines over time for the pages of runs. The pages of sweeps draw other charts with
-``across``, ``upwards``, ``drawing`` and the marks. Colours and fonts are the page's (classes
-``line0`` ... ``line7``); the numbers that a pointer shows are in ``data-chart``.
+``across``, ``upwards``, ``drawing`` and the marks. The page sets colours and fonts (classes
+``line0`` ... ``line7``); ``data-chart`` has the numbers for the pointer.
 """
 
 from __future__ import annotations
@@ -16,20 +16,20 @@ from html import escape
 import numpy as np
 
 WIDTH, HEIGHT = 360, 224
-#: Room around the drawing for what is written.
+#: Margins around the drawing for text.
 LEFT = 72
 RIGHT = 10
 TOP = 8
 BOTTOM = 38
 COLOURS = 8
-#: A positive quantity that spans more than this factor is drawn on a logarithmic scale.
+#: A positive quantity that varies by more than this factor has a logarithmic scale.
 LOG_FROM = 30.0
 MOST_POINTS = 1000  # drawn of a line
 
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """One line of a chart: times (n,) in h and values (n,), gaps where they are not finite."""
+    """One line of a chart: times (n,) in h and values (n,), not finite in gaps."""
 
     label: str
     times: np.ndarray
@@ -39,7 +39,7 @@ class Line:
 
 @dataclass(frozen=True, eq=False)
 class Chart:
-    """Lines over time; `axis` names what is drawn and its unit; `marks` are times (h) of events."""
+    """Lines over time; `axis` is the quantity with its unit; `marks` are times (h) of events."""
 
     title: str
     axis: str
@@ -49,7 +49,7 @@ class Chart:
 
 @dataclass(frozen=True)
 class Scale:
-    """From values to places along an axis; `words` stand at 0, 1, 2, ..."""
+    """Maps values to positions along an axis; `words` label the positions 0, 1, 2, ..."""
 
     low: float
     high: float
@@ -63,7 +63,7 @@ class Scale:
         return self.start + (self._even(value) - low) / (high - low) * (self.end - self.start)
 
     def _even(self, value):
-        """The value, or its logarithm: what is spaced evenly along the axis."""
+        """The value, or its logarithm on a logarithmic axis."""
         return np.log10(value) if self.log else np.asarray(value, float)
 
 
@@ -86,20 +86,20 @@ def svg(chart: Chart) -> str:
                      for k, line in enumerate(lines))
     marks += (f'<line class="now" x1="0" x2="0" y1="{TOP}" y2="{HEIGHT - BOTTOM}" '
               'visibility="hidden"/>')
-    shown = drawing(x, y, ("time (h)", chart.axis), f"{chart.title} over time", marks)
-    return (f'<figure class="chart" data-chart="{escape(_told(lines, x))}">'
+    plot = drawing(x, y, ("time (h)", chart.axis), f"{chart.title} over time", marks)
+    return (f'<figure class="chart" data-chart="{escape(_pointer_data(lines, x))}">'
             f"<figcaption>{escape(chart.title)}{_legend(lines)}</figcaption>"
-            f"{shown}<output>&nbsp;</output></figure>")
+            f"{plot}<output>&nbsp;</output></figure>")
 
 
 def drawing(x: Scale, y: Scale, axes: tuple[str, str], label: str, marks: str) -> str:
-    """The drawing alone: `axes` names what x and y show, `label` describes the drawing in words."""
+    """The drawing without title; axes: labels of x and y; label: description in words."""
     return (f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{escape(label)}">'
             f"{_grid(x, y)}{marks}{_names(axes[0], axes[1] + ' (log scale)' * y.log)}</svg>")
 
 
 def _names(right: str, up: str) -> str:
-    """What the axes show, below and on the left."""
+    """The labels of the axes, below and on the left."""
     center, middle = (LEFT + WIDTH - RIGHT) / 2, (TOP + HEIGHT - BOTTOM) / 2
     return (f'<text class="name" x="{center:g}" y="{HEIGHT - 4}">{escape(right)}</text>'
             f'<text class="name" transform="translate(10 {middle:g}) rotate(-90)">'
@@ -107,7 +107,7 @@ def _names(right: str, up: str) -> str:
 
 
 def thinned(line: Line) -> Line:
-    """At most MOST_POINTS of a line's points, evenly chosen, the first and last among them."""
+    """A line with at most MOST_POINTS points, evenly chosen, with the first and the last."""
     if len(line.times) <= MOST_POINTS:
         return line
     chosen = np.linspace(0, len(line.times) - 1, MOST_POINTS).round().astype(int)
@@ -124,7 +124,7 @@ def _scales(lines: Sequence[Line]) -> tuple[Scale, Scale]:
 
 
 def is_wide(values: Sequence[float] | np.ndarray) -> bool:
-    """Do positive values span so much that a logarithmic scale is needed?"""
+    """Do positive values need a logarithmic scale?"""
     return bool(0 < min(values) < max(values) / LOG_FROM)
 
 
@@ -137,7 +137,7 @@ def limits(values: Sequence[float] | np.ndarray, log: bool) -> tuple[float, floa
 
 
 def padded(values: Sequence[float], log: bool) -> tuple[float, float]:
-    """The ends of an axis on which no value is at an end."""
+    """The ends of an axis with margins beside the values."""
     low, high = min(values), max(values)
     if log:
         factor = (high / low) ** 0.06 if high > low else 2.0
@@ -147,7 +147,7 @@ def padded(values: Sequence[float], log: bool) -> tuple[float, float]:
 
 
 def _roomy(low: float, high: float) -> tuple[float, float]:
-    """A range with its ticks inside: from zero where that is near, wide enough for a constant."""
+    """A range with round ends. It begins at zero if zero is near, and contains a constant."""
     span = high - low
     if span <= 1e-9 * max(abs(low), abs(high)) or span == 0:
         span = abs(high) or 1.0
@@ -159,13 +159,13 @@ def _roomy(low: float, high: float) -> tuple[float, float]:
 
 
 def _step(span: float, parts: int) -> float:
-    """1, 2 or 5 times a power of ten, so that about so many steps make the span."""
+    """1, 2 or 5 times a power of ten, of which about `parts` make the span."""
     power = 10.0 ** math.floor(math.log10(span / parts))
     return next(k * power for k in (1, 2, 5, 10) if k * power >= span / parts * (1 - 1e-9))
 
 
 def ticks(scale: Scale, parts: int = 5) -> list[tuple[float, str]]:
-    """Round values within a scale, with their texts; or its words."""
+    """Round values within a scale with their texts, or its words."""
     if scale.words:
         return [(float(place), word) for place, word in enumerate(scale.words)]
     if scale.log:
@@ -177,20 +177,22 @@ def ticks(scale: Scale, parts: int = 5) -> list[tuple[float, str]]:
 
 
 def _log_ticks(scale: Scale) -> list[float]:
-    """Powers of ten, some six of them; over less than three decades also 2 and 5 times these."""
+    """About six powers of ten; within three decades also 2 and 5 times these."""
     low, high = scale.low * (1 - 1e-9), scale.high * (1 + 1e-9)
     first = math.floor(math.log10(scale.low) + 1e-9)
     last = math.ceil(math.log10(scale.high) - 1e-9)
     steps = (1, 2, 5) if high < 999 * low else (1,)
     powers = [10.0**k for k in range(first, last + 1, -(-(last - first) // 6))]
     values = [step * power for power in powers for step in steps]
-    shown = [value for value in values if low <= value <= high]
-    return shown if len(shown) > 1 else [scale.low, scale.high]
+    visible = [value for value in values if low <= value <= high]
+    return visible if len(visible) > 1 else [scale.low, scale.high]
 
 
 def number(value: float, digits: int | None = None) -> str:
-    """A number as a reader likes it: as many decimals as `digits`, which may be negative, or six
-    significant ones; far from one with a power of ten and the same decimals, or four digits."""
+    """Format a number with `digits` decimals (may be negative), or six significant digits.
+
+    A number far from one has a power of ten, with the same decimals or four significant digits.
+    """
     if value == 0:
         return "0"
     if not 1e-3 <= abs(value) < 1e5:
@@ -201,7 +203,7 @@ def number(value: float, digits: int | None = None) -> str:
 
 
 def _grid(x: Scale, y: Scale) -> str:
-    """Lines across with their values, and the axis below with its ticks."""
+    """Horizontal lines with their values, and the axis below with its ticks."""
     right, bottom = WIDTH - RIGHT, HEIGHT - BOTTOM
     rows = "".join(_row(y(value), text) for value, text in ticks(y, 4))
     columns = "".join(_tick(x(value), text) for value, text in ticks(x))
@@ -209,36 +211,36 @@ def _grid(x: Scale, y: Scale) -> str:
     return rows + columns + axis
 
 
-def _row(place: float, text: str) -> str:
-    """A line across the drawing, with the value that it stands for."""
+def _row(position: float, text: str) -> str:
+    """A horizontal line of the grid, with its value."""
     return (f'<line class="grid" x1="{LEFT}" x2="{WIDTH - RIGHT}" '
-            f'y1="{place:.1f}" y2="{place:.1f}"/>'
-            f'<text class="y" x="{LEFT - 5}" y="{place + 3.5:.1f}">{escape(text)}</text>')
+            f'y1="{position:.1f}" y2="{position:.1f}"/>'
+            f'<text class="y" x="{LEFT - 5}" y="{position + 3.5:.1f}">{escape(text)}</text>')
 
 
-def _tick(place: float, text: str) -> str:
+def _tick(position: float, text: str) -> str:
     """A tick of the axis below, with its value."""
     bottom = HEIGHT - BOTTOM
-    return (f'<line class="tick" x1="{place:.1f}" x2="{place:.1f}" '
+    return (f'<line class="tick" x1="{position:.1f}" x2="{position:.1f}" '
             f'y1="{bottom}" y2="{bottom + 4}"/>'
-            f'<text class="x" x="{place:.1f}" y="{bottom + 15}">{escape(text)}</text>')
+            f'<text class="x" x="{position:.1f}" y="{bottom + 15}">{escape(text)}</text>')
 
 
 def _mark(x: Scale, time: float) -> str:
-    place = f"{x(time):.1f}"
-    return f'<line class="mark" x1="{place}" x2="{place}" y1="{TOP}" y2="{HEIGHT - BOTTOM}"/>'
+    position = f"{x(time):.1f}"
+    return f'<line class="mark" x1="{position}" x2="{position}" y1="{TOP}" y2="{HEIGHT - BOTTOM}"/>'
 
 
-def curve(x: Scale, y: Scale, places: np.ndarray, values: np.ndarray, colour: int,
+def curve(x: Scale, y: Scale, coordinates: np.ndarray, values: np.ndarray, colour: int,
           title: str = "", dots: bool = False) -> str:
-    """Values (n,) at places (n,): lines between the gaps, and dots for single points or for all."""
-    known = np.flatnonzero(_is_shown(x, places) & _is_shown(y, values))
+    """Values (n,) at coordinates (n,): lines between gaps; dots for single points, or for all."""
+    known = np.flatnonzero(_is_drawable(x, coordinates) & _is_drawable(y, values))
     pieces = np.split(known, np.flatnonzero(np.diff(known) > 1) + 1)
-    return "".join(_piece(list(map(point, x(places[piece]), y(values[piece]))), colour, title, dots)
-                   for piece in pieces)
+    polylines = [list(map(point, x(coordinates[piece]), y(values[piece]))) for piece in pieces]
+    return "".join(_piece(points, colour, title, dots) for points in polylines)
 
 
-def _is_shown(scale: Scale, values: np.ndarray) -> np.ndarray:
+def _is_drawable(scale: Scale, values: np.ndarray) -> np.ndarray:
     return np.isfinite(values) & ((values > 0) | (not scale.log))
 
 
@@ -249,12 +251,12 @@ def _piece(points: list[str], colour: int, title: str, dots: bool) -> str:
 
 
 def point(x: float, y: float) -> str:
-    """A point of the drawing as marks take it."""
+    """Format a point of the drawing."""
     return f"{x:.1f},{y:.1f}"
 
 
 def polyline(points: Sequence[str], colour: int, title: str = "") -> str:
-    """A line through points; `title` is shown at the pointer."""
+    """A line through points; the pointer shows `title`."""
     return _element("polyline", f'class="line{colour % COLOURS}" points="{" ".join(points)}"',
                     title)
 
@@ -267,7 +269,7 @@ def dot(place: str, colour: int, title: str = "", radius: float = 2.6) -> str:
 
 
 def triangle(place: str, colour: int, title: str = "") -> str:
-    """A hollow triangle at a point; it points up: the value is larger than where it stands."""
+    """A hollow triangle at a point. It points up: the value is larger than its position."""
     x, y = map(float, place.split(","))
     corners = [point(x - 5, y + 4), point(x + 5, y + 4), point(x, y - 5)]
     return _element("polygon", f'class="line{colour % COLOURS}" points="{" ".join(corners)}"',
@@ -294,15 +296,15 @@ def swatch(k: int, dots: bool = False) -> str:
     return f'<svg class="swatch" viewBox="0 0 24 10" aria-hidden="true">{kind}</svg>'
 
 
-def _told(lines: Sequence[Line], x: Scale) -> str:
-    """What a pointer is told, as JSON: the time axis and the lines' numbers.
+def _pointer_data(lines: Sequence[Line], x: Scale) -> str:
+    """The data for the pointer, as JSON: the time axis and the numbers of the lines.
 
-    The axis is four numbers: from which time to which, and from where to where in the drawing.
+    The axis is four numbers: its first and last time, and their positions in the drawing.
     """
     numbers = [{"label": line.label, "t": _short(line.times), "y": _short(line.values)}
                for line in lines]
-    told = {"axis": [x.low, x.high, x.start, x.end], "lines": numbers}
-    return json.dumps(told, separators=(",", ":"), allow_nan=False)
+    pointer_data = {"axis": [x.low, x.high, x.start, x.end], "lines": numbers}
+    return json.dumps(pointer_data, separators=(",", ":"), allow_nan=False)
 
 
 def _short(values: np.ndarray) -> list[float | None]:

@@ -1,4 +1,4 @@
-"""The page that lays runs over each other, and tells in what they differ."""
+"""The page that compares runs."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ NOT_COMPARED = {"time_h", "nodes", *names.DEFECTS, *names.YES_NO}
 
 
 def build(runs: Sequence[Run]) -> str:
-    """The page's text; the first run is what the others are compared with."""
+    """The text of the page; the others are compared with the first run."""
     labels = short([run.folder for run in runs])
     figures = "".join(map(charts.svg, quantities.overlaid(runs, labels)))
     body = (_head(runs, labels) + _scenes(runs, labels) + _values(runs, labels)
@@ -26,9 +26,11 @@ def build(runs: Sequence[Run]) -> str:
 
 
 def short(folders: Sequence[Path]) -> list[str]:
-    """The folders' own names, or their whole paths where two of these are the same."""
-    found = [folder.resolve().name for folder in folders]
-    return found if len(set(found)) == len(found) else [str(folder) for folder in folders]
+    """The names of the folders, or their full paths if two names are the same."""
+    folder_names = [folder.resolve().name for folder in folders]
+    if len(set(folder_names)) == len(folder_names):
+        return folder_names
+    return [str(folder) for folder in folders]
 
 
 def _head(runs: Sequence[Run], labels: Sequence[str]) -> str:
@@ -37,52 +39,49 @@ def _head(runs: Sequence[Run], labels: Sequence[str]) -> str:
 
 
 def _item(k: int, run: Run, label: str) -> str:
-    """The run of this number in the page's list of runs."""
-    return (f"<li>{charts.swatch(k)}<b>{escape(label)}</b>: {escape(_told(run))}; "
+    """Run number k in the list of runs."""
+    return (f"<li>{charts.swatch(k)}<b>{escape(label)}</b>: {escape(_describe_run(run))}; "
             f"{escape(str(run.folder))}</li>")
 
 
-def _told(run: Run) -> str:
+def _describe_run(run: Run) -> str:
     last = f" to t = {run.times[-1]:.6g} h" if len(run.times) else ", no row"
     return f"{run.record.get('scene')}, {run.record.get('status', 'status unknown')}{last}"
 
 
 def differences(runs: Sequence[Run]) -> list[tuple[str, ...]]:
-    """The scenes' keys that are not the same in all runs: (key, value in each run).
+    """(key, value in each run) of the keys of the scenes that are not the same in all runs.
 
-    "-" stands where a run has none.
+    The value is "-" if a run does not have the key.
     """
     scenes = [page.flat(run.record.get("tables", {})) for run in runs]
     keys = dict.fromkeys(key for keys in scenes for key in keys)
-    return [(key, *_shown(key, scenes)) for key in keys if _differs(key, scenes)]
+    return [(key, *_value_texts(key, scenes)) for key in keys if _differs(key, scenes)]
 
 
 def _differs(key: str, scenes: Sequence[dict[str, object]]) -> bool:
-    """Has a scene another value of a key than the first one?"""
+    """Does the value of a key in any scene differ from that in the first one?"""
     return any(keys.get(key) != scenes[0].get(key) for keys in scenes)
 
 
-def _shown(key: str, scenes: Sequence[dict[str, object]]) -> list[str]:
-    """The value of a key in each scene, for people to read."""
-    return [page.shown(keys[key]) if key in keys else "-" for keys in scenes]
+def _value_texts(key: str, scenes: Sequence[dict[str, object]]) -> list[str]:
+    """The value of a key in each scene, as text."""
+    return [page.format_value(keys[key]) if key in keys else "-" for keys in scenes]
 
 
 def _scenes(runs: Sequence[Run], labels: Sequence[str]) -> str:
-    found = page.table("", ["key", *labels], differences(runs))
+    differing = page.table("", ["key", *labels], differences(runs))
     nothing = "<p>Nothing: the scenes are the same.</p>"
-    return page.section("What differs in the scenes", found or nothing)
+    return page.section("What differs in the scenes", differing or nothing)
 
 
 def common_time(runs: Sequence[Run]) -> float | None:
-    """The last time (h) that every run with rows has reached; None without any."""
+    """The last time (h) that all runs with rows have reached; None without rows."""
     return min((float(run.times[-1]) for run in runs if len(run.times)), default=None)
 
 
 def values(runs: Sequence[Run], time: float) -> dict[str, list[float | None]]:
-    """Each column's value in each run at a time (h), linear between rows.
-
-    None where it is not known then.
-    """
+    """The value of each column in each run at a time (h), linear between rows; None if unknown."""
     columns = dict.fromkeys(name for run in runs for name in run.series if name not in NOT_COMPARED)
     return {name: _in_each(runs, name, time) for name in columns}
 
@@ -103,18 +102,19 @@ def _values(runs: Sequence[Run], labels: Sequence[str]) -> str:
     if time is None:
         return ""
     head = ["", labels[0], *(text for label in labels[1:] for text in (label, "difference"))]
-    rows = [(names.with_unit(name), *_row(found)) for name, found in values(runs, time).items()
-            if found != [None] * len(runs)]
+    rows = [(names.with_unit(name), *_row(run_values))
+            for name, run_values in values(runs, time).items()
+            if run_values != [None] * len(runs)]
     note = (f'<p class="note">At t = {time:.6g} h, the last time that every run has reached, '
             "linear between rows. Differences are relative to the first run.</p>")
     return page.section("Values at the common last time", note, page.table("", head, rows))
 
 
-def _row(found: Sequence[float | None]) -> list[str]:
-    """The first run's value, then each other's with its difference."""
-    first, *others = found
+def _row(run_values: Sequence[float | None]) -> list[str]:
+    """The value of the first run, then that of each other run with its difference."""
+    first, *other_values = run_values
     texts = [_text(first)]
-    for value in others:
+    for value in other_values:
         texts += [_text(value), _text_difference(first, value)]
     return texts
 

@@ -1,4 +1,4 @@
-// First of all scripts: what goes wrong is told in the page.
+// The first script: shows errors in the page.
 "use strict";
 window.addEventListener("error", event => {
   const place = document.getElementById("errors");

@@ -22,14 +22,14 @@ function boxOf(points) {
   return [x0, x1, y0, y1];
 }
 
-// Pixels a um: as wide as there is room, but neither taller than a window shows nor thinner than one can see.
+// Pixels per um: as wide as the page, but neither higher than the window nor too thin to see.
 function scaleOf(box, room) {
   const tallest = Math.max(200, 0.65 * window.innerHeight), least = 60;
   const scale = Math.min(room / (box[1] - box[0]), tallest / (box[3] - box[2]));
   return Math.max(scale, least / (box[3] - box[2]));
 }
 
-let shown = null; // what the probe reads
+let drawn = null; // read by the probe
 function draw() {
   const frame = data.frames[part.frame.value], field = data.fields.find(each => each.name === part.field.value);
   const mesh = meshOf(data.meshes[frame.mesh]), points = pointsOf(frame, data.box), [low, high] = rangeOf(field, frame);
@@ -58,21 +58,21 @@ function draw() {
   axes(pen, box, place, tall);
   const long = Math.min(420, room);
   bar(pen, field, low, high, edge.left + Math.max(0, across - long) / 2, edge.top + tall + 52, long);
-  shown = { all, size, ratio, edge, scale, tall, box, field };
-  told(frame, field, low, high);
+  drawn = { all, size, ratio, edge, scale, tall, box, field };
+  describe(frame, field, low, high);
 }
 
 // A colour of the page.
 function ink(name) { return getComputedStyle(document.documentElement).getPropertyValue(name).trim(); }
 
 function image(all, low, high, width, height) {
-  const found = new ImageData(width, height), colours = new Uint32Array(found.data.buffer);
+  const pixels = new ImageData(width, height), colours = new Uint32Array(pixels.data.buffer);
   const dark = matchMedia("(prefers-color-scheme: dark)").matches, none = dark ? 0xff363128 : 0xffe8e4e0;
   for (let k = 0; k < all.length; k++) {
     const share = high > low ? (all[k] - low) / (high - low) : 0.5;
     colours[k] = isNaN(share) ? none : TABLE[Math.round(Math.max(0, Math.min(1, share)) * 255)];
   }
-  return found;
+  return pixels;
 }
 
 function trace(pen, edges, places, ink, width) {
@@ -91,9 +91,9 @@ function trace(pen, edges, places, ink, width) {
 function roundTicks(low, high, parts) {
   if (!(high > low)) return [low];
   const power = 10 ** Math.floor(Math.log10((high - low) / parts));
-  const step = [1, 2, 5, 10].map(k => k * power).find(each => each >= (high - low) / parts * 0.999), found = [];
-  for (let k = Math.ceil(low / step - 1e-6); k * step <= high + 1e-6 * step; k++) found.push(k * step);
-  return found;
+  const step = [1, 2, 5, 10].map(k => k * power).find(each => each >= (high - low) / parts * 0.999), ticks = [];
+  for (let k = Math.ceil(low / step - 1e-6); k * step <= high + 1e-6 * step; k++) ticks.push(k * step);
+  return ticks;
 }
 
 function axes(pen, box, place, tall) {
@@ -126,7 +126,7 @@ function bar(pen, field, low, high, left, top, width) {
   pen.fillStyle = ink("--text");
   const text = value => rounded(Math.abs(value) < 1e-12 * (high - low) ? 0 : value);
   const wide = value => pen.measureText(text(value)).width, place = value => left + (value - low) / (high - low) * width;
-  const first = left + wide(low) + 8, last = left + width - wide(high) - 8; // the ends are told exactly
+  const first = left + wide(low) + 8, last = left + width - wide(high) - 8; // the ends are exact
   const between = roundTicks(low, high, 4).filter(value =>
     place(value) - wide(value) / 2 > first && place(value) + wide(value) / 2 < last);
   for (const value of [low, ...between, high]) {
@@ -138,8 +138,8 @@ function bar(pen, field, low, high, left, top, width) {
   pen.textAlign = "left"; pen.fillText(name, left, top + 32);
 }
 
-// What is shown, for the reader and, as data attributes, for a test.
-function told(frame, field, low, high) {
+// Describes the picture, for the reader and, in data attributes, for a test.
+function describe(frame, field, low, high) {
   const text = `t = ${rounded(frame.time)} h${frame.note ? `, ${frame.note}` : ""}`;
   part.now.textContent = `${text} (${Number(part.frame.value) + 1} of ${data.frames.length})`;
   part.frame.setAttribute("aria-valuetext", text);
@@ -148,13 +148,13 @@ function told(frame, field, low, high) {
   const share = value => high > low ? (value - low) / (high - low) : 0;
   const hashed = (sum, value) => isNaN(value) ? sum : (sum * 31 + Math.round(1e6 * share(value))) % 1000000007;
   Object.assign(part.picture.dataset, { frame: part.frame.value, field: field.name, low, high,
-    seen: shown.all.reduce(hashed, 7),
-    filled: shown.all.reduce((sum, value) => sum + !isNaN(value), 0) / shown.all.length });
+    seen: drawn.all.reduce(hashed, 7),
+    filled: drawn.all.reduce((sum, value) => sum + !isNaN(value), 0) / drawn.all.length });
   tellAll(frame.time);
 }
 
 function probe(event) {
-  const { all, size, ratio, edge, scale, tall, box, field } = shown, frame = part.picture.getBoundingClientRect();
+  const { all, size, ratio, edge, scale, tall, box, field } = drawn, frame = part.picture.getBoundingClientRect();
   const across = event.clientX - frame.left - edge.left, down = event.clientY - frame.top - edge.top;
   const inside = across >= 0 && down >= 0 && across * ratio < size[0] && down * ratio < size[1];
   const value = inside ? all[Math.floor(down * ratio) * size[0] + Math.floor(across * ratio)] : NaN;
@@ -163,11 +163,11 @@ function probe(event) {
   part.probe.textContent = inside ? `x = ${x} um, y = ${y} um: ${words}` : "\u00a0";
 }
 
-// A fragment such as #frame=3&field=theta chooses what is shown.
+// A fragment such as #frame=3&field=theta chooses the frame and the field.
 function chosen() {
-  const asked = new URLSearchParams(location.hash.slice(1));
-  if (data.frames[asked.get("frame")]) part.frame.value = asked.get("frame");
-  if (data.fields.some(field => field.name === asked.get("field"))) part.field.value = asked.get("field");
+  const requested = new URLSearchParams(location.hash.slice(1));
+  if (data.frames[requested.get("frame")]) part.frame.value = requested.get("frame");
+  if (data.fields.some(field => field.name === requested.get("field"))) part.field.value = requested.get("field");
   draw();
 }
 

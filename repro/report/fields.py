@@ -1,8 +1,8 @@
-"""The fields of a run as the page's script reads them: in 16 bits, connectivities told once.
+"""The fields of a run for the script of its page: 16 bits a value, and each mesh once.
 
-Each array is base64 of little-endian integers: places over the box of all frames, values over their
-own range, the largest integer where a value is not finite. Fields of the aggregate alone hold its
-nodes or triangles only, ascending.
+Each array is base64 of little-endian integers: coordinates over the box of all frames, values over
+their own range, the largest integer for a value that is not finite. Fields of the aggregate have
+only its nodes or triangles, in ascending order.
 """
 
 from __future__ import annotations
@@ -23,28 +23,28 @@ from repro.results.files import MOST_TABLE, read
 MOST_FRAMES = 40
 MOST_BYTES = 2_600_000  # of all frames and charts in the page; two frames are always shown
 MOST_NODES = 10_000  # of a frame; a finer mesh is shown on a regular grid of so many points
-#: What is told of a frame of the grown aggregate that has not expanded yet (Plate 1).
+#: The note on a frame of the grown aggregate before it expands (Plate 1).
 BEFORE = "before the expansion"
-LEVELS = 65534  # of a value; one more means that there is none
+LEVELS = 65534  # of a value; one more for no value
 _FILE = re.compile(r"fields/(?:fields|before_expansion)_\d{4,}\.vtu")
 
-#: What can be chosen, in this order.
-SHOWN = """velocity_m_per_d head_cm acceptor_mg_per_L donor_mg_per_L active_biomass inert_biomass
+#: The fields that a reader can choose, in this order.
+FIELDS = """velocity_m_per_d head_cm acceptor_mg_per_L donor_mg_per_L active_biomass inert_biomass
 theta J largest_principal_stress_MPa stress_xx_MPa stress_yy_MPa stress_zz_MPa stress_xy_MPa
 pressure_MPa displacement_um region""".split()
-#: Of the aggregate alone: what is not known in the fluid, and biomass, of which it has none.
+#: Fields of the aggregate alone: those unknown in the fluid, and biomass, which is zero there.
 OF_AGGREGATE = {each.name for each in ARRAYS if each.body} | {"active_biomass", "inert_biomass"}
 
 
 def index(folder: Path, name: str = "fields.pvd") -> list[tuple[float, Path]]:
-    """(time in h, file) of the fields that a run has written and that are there. Another name,
-    before_expansion.pvd, is of those before each expansion."""
-    return [(time, path) for time, path in listed(folder, name) if path.is_file()]
+    """(time in h, file) of the existing fields of a run. The list before_expansion.pvd has those
+    before each expansion."""
+    return [(time, path) for time, path in listed_files(folder, name) if path.is_file()]
 
 
-def listed(folder: Path, name: str = "fields.pvd") -> list[tuple[float, Path]]:
-    """(time in h, file) of the fields that a run has written, whether they are still there or not;
-    only its own files are told. Raises ValueError where the list cannot be read."""
+def listed_files(folder: Path, name: str = "fields.pvd") -> list[tuple[float, Path]]:
+    """(time in h, file) of the fields in a list, whether they still exist or not; only names that a
+    run uses. Raises ValueError if the list cannot be read."""
     if not (folder / name).exists():
         return []
     try:
@@ -57,64 +57,65 @@ def listed(folder: Path, name: str = "fields.pvd") -> list[tuple[float, Path]]:
 
 def packed(entries: list[tuple[float, Path]],
            before: list[tuple[float, Path]] | None = None, spent: int = 0) -> dict:
-    """What the script is given: the fields that there are, meshes, and frames; empty without any.
+    """The data for the script: fields, meshes and frames; empty without entries.
 
-    before: those of the same times before the aggregate expanded, each shown ahead of its own;
-    spent: bytes that the rest of the page takes of MOST_BYTES.
+    before: entries of the same times before the aggregate expands, each placed ahead of its time;
+    spent: bytes of MOST_BYTES that the rest of the page takes.
     """
     if not entries:
         return {}
     last = field_files.read(entries[-1][1])
-    chosen = _chosen(entries, dict(before or []), _shown(last), MOST_BYTES - spent)
-    grids = [_shown(field_files.read(path)) for _, path, _ in chosen]
+    chosen = _chosen(entries, dict(before or []), _as_drawn(last), MOST_BYTES - spent)
+    grids = [_as_drawn(field_files.read(path)) for _, path, _ in chosen]
     low = np.min([grid.points.min(0) for grid in grids], 0)
     high = np.max([grid.points.max(0) for grid in grids], 0)
     meshes: dict[bytes, dict] = {}
     frames = [_frame(time, grid, low[:2], high[:2], meshes) | ({"note": note} if note else {})
               for (time, _, note), grid in zip(chosen, grids)]
-    described = [_described(name, grids[0]) for name in SHOWN if _in_any(frames, name)]
+    described = [_described(name, grids[0]) for name in FIELDS if _in_any(frames, name)]
     return {"box": [low[0], high[0], low[1], high[1]], "of": len(entries), "frames": frames,
             "nodes": len(last.points), "meshes": list(meshes.values()), "fields": described}
 
 
 def _in_any(frames: list[dict], name: str) -> bool:
-    """Does a frame have values of this field?"""
+    """Does any frame have values of this field?"""
     return any(name in frame["values"] for frame in frames)
 
 
 def _chosen(entries: list[tuple[float, Path]], before: dict[float, Path], grid: Grid,
             most: int) -> list[tuple[float, Path, str]]:
-    """Evenly chosen frames, the first and last among them, as many as the page may hold, and what
-    is told of them; those before an expansion where there is room for all of them.
+    """(time, file, note) of evenly chosen frames, with the first and the last, up to a limit.
 
-    grid: the last one, which is taken for the largest; most: bytes of all frames.
+    Frames before an expansion are included if all of them fit. grid: the last one, assumed to be
+    the largest; most: limit on the bytes of all frames.
     """
     size = 8 / 3 * (len(grid.points) * (2 + len(grid.point_data)) + 2 * grid.cells.size
                     + len(grid.cells) * len(grid.cell_data))
     room = int(most / size)
     count = min(len(entries), MOST_FRAMES, max(2, room))
     evenly = np.linspace(0, len(entries) - 1, count).round().astype(int)
-    found: list[tuple[float, Path, str]] = []
+    frames: list[tuple[float, Path, str]] = []
     for time, path in (entries[k] for k in np.unique(evenly)):
         if time in before and 2 * count <= room:
-            found.append((time, before[time], BEFORE))
-        found.append((time, path, ""))
-    return found
+            frames.append((time, before[time], BEFORE))
+        frames.append((time, path, ""))
+    return frames
 
 
-def _shown(grid: Grid) -> Grid:
-    """The fields as they are shown: on a regular grid of triangles where the mesh is a fine one."""
+def _as_drawn(grid: Grid) -> Grid:
+    """The fields for display; those of a fine mesh on a regular grid of triangles."""
     if len(grid.points) <= MOST_NODES:
         return grid
     points = grid.points[:, :2]
     cells = grid.cells
-    places, triangles = _regular(points.min(axis=0), points.max(axis=0))
-    at = located(points, cells, places)
+    grid_points, triangles = _regular(points.min(axis=0), points.max(axis=0))
+    at = located(points, cells, grid_points)
     order = 1 if cells.shape[1] == 3 else 2
     nodal = {name: at.field(value, cells, order) for name, value in grid.point_data.items()}
-    inside = located(points, cells, places[triangles].mean(axis=1)).triangle
+    inside = located(points, cells, grid_points[triangles].mean(axis=1)).triangle
     values = {name: value[inside] for name, value in grid.cell_data.items()}
-    return Grid(np.column_stack([places, np.zeros(len(places))]), triangles, nodal, values)
+    points = np.column_stack([grid_points, np.zeros(len(grid_points))])
+    return Grid(points, triangles, nodal, values)
 
 
 def _regular(low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -148,13 +149,13 @@ def _frame(time: float, grid: Grid, low, high, meshes: dict[bytes, dict]) -> dic
 
 
 def _values(grid: Grid, region: np.ndarray) -> dict[str, list]:
-    """What there is of SHOWN, of the aggregate's fields what lies in its `region` of triangles."""
+    """The values of FIELDS; those of the aggregate alone only in its triangles (`region`)."""
     nodes = np.unique(grid.cells[region])
     cells = np.flatnonzero(region)
-    found = grid.point_data | grid.cell_data
+    arrays = grid.point_data | grid.cell_data
     values = {}
-    for name in (name for name in SHOWN if name in found):
-        value = np.linalg.norm(found[name], axis=1) if found[name].ndim == 2 else found[name]
+    for name in (name for name in FIELDS if name in arrays):
+        value = np.linalg.norm(arrays[name], axis=1) if arrays[name].ndim == 2 else arrays[name]
         if name in OF_AGGREGATE:
             value = value[nodes if name in grid.point_data else cells]
         values[name] = _levels(value)

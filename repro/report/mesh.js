@@ -1,4 +1,4 @@
-// Triangles of three or six nodes with one value a node or a triangle, and the points of a picture that they cover.
+// Triangles of three or six nodes with one value for each node or triangle, and the pixels that they cover.
 "use strict";
 const LEVELS = 65534, PIECES = 4;
 // viridis
@@ -17,7 +17,7 @@ const TABLE = Array.from({ length: 256 }, (_, k) => {
   return (255 << 24 | Math.round(b) << 16 | Math.round(g) << 8 | Math.round(r)) >>> 0;
 });
 
-// A mesh once: cells, which of them are the aggregate's, the aggregate's nodes and triangles in ascending order, and
+// A mesh: cells, which of them are of the aggregate, its nodes and triangles in ascending order, and
 // its edge with the fluid.
 function meshOf(stored) {
   if (stored.ready) return stored.ready;
@@ -39,25 +39,25 @@ function meshOf(stored) {
   return stored.ready;
 }
 
-// Places of the nodes, um.
+// Coordinates of the nodes, um.
 function pointsOf(frame, [x0, x1, y0, y1]) {
-  const raw = shorts(frame.points), found = new Float64Array(raw.length);
+  const raw = shorts(frame.points), points = new Float64Array(raw.length);
   for (let k = 0; k < raw.length; k += 2) {
-    found[k] = x0 + raw[k] / LEVELS * (x1 - x0);
-    found[k + 1] = y0 + raw[k + 1] / LEVELS * (y1 - y0);
+    points[k] = x0 + raw[k] / LEVELS * (x1 - x0);
+    points[k + 1] = y0 + raw[k + 1] / LEVELS * (y1 - y0);
   }
-  return found;
+  return points;
 }
 
-// One value a node or a triangle; NaN where there is none.
+// One value for each node or triangle; NaN for none.
 function valuesOf(frame, field, mesh, count) {
   const [low, high, text] = frame.values[field.name], raw = shorts(text);
-  const found = new Float64Array(count).fill(NaN);
+  const nodal = new Float64Array(count).fill(NaN);
   const places = field.body ? field.at === "node" ? mesh.nodes : mesh.triangles : null;
   raw.forEach((level, k) => {
-    if (level <= LEVELS) found[places ? places[k] : k] = low + level / LEVELS * (high - low);
+    if (level <= LEVELS) nodal[places ? places[k] : k] = low + level / LEVELS * (high - low);
   });
-  return found;
+  return nodal;
 }
 
 // Weights of a triangle's nodes at the corners (a, b) of its PIECES x PIECES parts.
@@ -75,7 +75,7 @@ for (const per of [3, 6]) PARTS[per] = PARTS[per].map(piece => piece.map(([a, b]
 
 // Every pixel's value (Float64Array, NaN outside); places in pixels.
 function filled(mesh, places, values, atNodes, width, height) {
-  const found = new Float64Array(width * height).fill(NaN), corner = new Float64Array(9);
+  const pixels = new Float64Array(width * height).fill(NaN), corner = new Float64Array(9);
   for (let t = 0; t < mesh.body.length; t++) for (const piece of PARTS[mesh.per]) {
     for (let v = 0; v < 3; v++) {
       let x = 0, y = 0, value = 0;
@@ -86,12 +86,12 @@ function filled(mesh, places, values, atNodes, width, height) {
       });
       corner[3 * v] = x; corner[3 * v + 1] = y; corner[3 * v + 2] = atNodes ? value : values[t];
     }
-    if (!isNaN(corner[2] + corner[5] + corner[8])) fill(found, width, height, corner);
+    if (!isNaN(corner[2] + corner[5] + corner[8])) fill(pixels, width, height, corner);
   }
-  return found;
+  return pixels;
 }
 
-function fill(found, width, height, [ax, ay, av, bx, by, bv, cx, cy, cv]) {
+function fill(pixels, width, height, [ax, ay, av, bx, by, bv, cx, cy, cv]) {
   const area = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay);
   if (!area) return;
   const slack = -1e-6, top = Math.max(0, Math.ceil(Math.min(ay, by, cy) - 0.5));
@@ -103,6 +103,6 @@ function fill(found, width, height, [ax, ay, av, bx, by, bv, cx, cy, cv]) {
     const b = ((x - ax) * (cy - ay) - (cx - ax) * (y - ay)) / area;
     const c = ((bx - ax) * (y - ay) - (x - ax) * (by - ay)) / area;
     if (b >= slack && c >= slack && 1 - b - c >= slack)
-      found[row * width + column] = av + b * (bv - av) + c * (cv - av);
+      pixels[row * width + column] = av + b * (bv - av) + c * (cv - av);
   }
 }

@@ -1,7 +1,4 @@
-"""A page that is one file: style and scripts within it, nothing from elsewhere.
-
-Everything that others tell is escaped.
-"""
+"""A page in one file, with its style and scripts. It loads nothing, and escapes all text."""
 
 from __future__ import annotations
 
@@ -14,9 +11,9 @@ from importlib import resources
 
 
 def page(title: str, body: str, scripts: Sequence[str]) -> str:
-    """A whole page with the package's scripts of these names.
+    """A page with these scripts of the package.
 
-    The browser knows what it may run by its hash.
+    The browser runs only scripts whose hash is in the policy.
     """
     style = _content("page.css")
     code = [_content(name) for name in ("errors.js", *scripts)]
@@ -29,8 +26,8 @@ def page(title: str, body: str, scripts: Sequence[str]) -> str:
 
 
 def policy(style: str, code: Sequence[str] = ()) -> str:
-    """The content security policy of a page that has this style and these scripts, and loads
-    nothing."""
+    """The content security policy of a page that has this style and these scripts, and loads no
+    other file."""
     scripts = " ".join(map(_hash, code)) or "'none'"
     return (f"default-src 'none'; style-src {_hash(style)}; script-src {scripts}; base-uri 'none'; "
             "form-action 'none'")
@@ -41,23 +38,23 @@ def _content(name: str) -> str:
 
 
 def _hash(text: str) -> str:
-    """The source expression of a policy that lets this text through."""
+    """The source expression of a policy that permits this text."""
     return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode('ascii')}'"
 
 
 def data(name: str, content: dict) -> str:
-    """A block of data for a script; nothing in it can end the block."""
+    """A block of data for a script. Its content cannot end the block."""
     text = json.dumps(content, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
     return f'<script type="application/json" id="{name}">{text}</script>'
 
 
 def section(title: str, *parts: str) -> str:
-    """A part of the page with its heading; nothing where there is nothing to show."""
+    """A section of the page with its heading; empty without parts."""
     return f"<section><h2>{escape(title)}</h2>{''.join(parts)}</section>\n" if any(parts) else ""
 
 
 def table(caption: str, head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """A table; every column after the first holds values. Nothing without rows."""
+    """A table; every column after the first has values. Empty without rows."""
     rows = list(rows)
     if not rows:
         return ""
@@ -82,28 +79,28 @@ def flat(tables: object, key: str = "") -> dict[str, object]:
     """Nested tables as {"numerics.time": value}; lists as they are."""
     if not isinstance(tables, dict):
         return {key: tables}
-    found: dict[str, object] = {}
+    flattened: dict[str, object] = {}
     for name, value in tables.items():
-        found |= flat(value, f"{key}.{name}" if key else str(name))
-    return found
+        flattened |= flat(value, f"{key}.{name}" if key else str(name))
+    return flattened
 
 
-def shown(value: object) -> str:
-    """A value of a record as text: numbers to six digits, with their units as they are."""
+def format_value(value: object) -> str:
+    """Format a value of a record: numbers have six digits, units are unchanged."""
     if isinstance(value, bool) or value is None:
         return {True: "yes", False: "no", None: "none"}[value]
     if isinstance(value, float):
         return f"{value:.6g}"
     if isinstance(value, list):
-        return ", ".join(map(shown, value)) or "none"
+        return ", ".join(map(format_value, value)) or "none"
     number, _, unit = str(value).partition(" ")
-    if unit and isinstance(value, str) and _six(number):
-        return f"{_six(number)} {unit}"
+    if unit and isinstance(value, str) and _six_digits(number):
+        return f"{_six_digits(number)} {unit}"
     return str(value)
 
 
-def _six(text: str) -> str:
-    """A number in a text to six digits; empty where it is none."""
+def _six_digits(text: str) -> str:
+    """Format a number in a text with six digits; empty if it is not a number."""
     try:
         return f"{float(text):.6g}"
     except ValueError:

@@ -1,4 +1,4 @@
-"""What is drawn over time, of one run or of several."""
+"""The charts over time of one run or of several runs."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from repro.results.columns import PARTS, SUBSTRATES
 from repro.results.quantities import Quantity
 
 #: Times (h) and values.
-Course = tuple[np.ndarray, np.ndarray]
+TimeSeries = tuple[np.ndarray, np.ndarray]
 
 
 @dataclass(frozen=True)
 class Kind:
-    """A chart: its title, what stands at its axis before the unit, and the quantities drawn."""
+    """A chart: its title, the name of its axis without the unit, and its quantities."""
 
     title: str
-    what: str
+    axis_name: str
     drawn: tuple[str, ...]
 
     @property
     def axis(self) -> str:
-        """What is drawn, with its unit."""
+        """The name of the axis with its unit."""
         unit = names.unit(self.drawn[0])
-        return f"{self.what} ({unit})" if unit else self.what
+        return f"{self.axis_name} ({unit})" if unit else self.axis_name
 
 
 def _middle(run: Run) -> np.ndarray:
@@ -37,10 +37,10 @@ def _middle(run: Run) -> np.ndarray:
 
 
 def _rate(name: str, part: str) -> Quantity:
-    """A part of a substrate's ledger over the length of the step, at its middle."""
+    """A part of a substrate's ledger over the length of the step, at the middle of the step."""
     column = f"{name}_{part}_pg_per_m"
 
-    def value(run: Run) -> Course:
+    def value(run: Run) -> TimeSeries:
         lengths = run.ledger["end_h"] - run.ledger["start_h"]
         return _middle(run), run.ledger[column] / lengths
 
@@ -49,12 +49,12 @@ def _rate(name: str, part: str) -> Quantity:
                     PARTS[part][0], signed=True)
 
 
-def _anew(run: Run) -> Course:
-    made = run.series.get("remeshed", run.times * np.nan) == 1
-    return run.times, np.where(made, run.series.get("nodes", np.nan), np.nan)
+def _remeshed_nodes(run: Run) -> TimeSeries:
+    is_new_mesh = run.series.get("remeshed", run.times * np.nan) == 1
+    return run.times, np.where(is_new_mesh, run.series.get("nodes", np.nan), np.nan)
 
 
-#: What is drawn besides the columns of the time series: value takes the run, and gives a course.
+#: Quantities besides the columns of the time series; ``value`` maps a run to a TimeSeries.
 DERIVED = (
     *(_rate(name, part) for name in SUBSTRATES for part in PARTS),
     Quantity("biomass_held_ug_per_m", "biomass held", "biomass_after_pg_per_m, at the step's end",
@@ -63,19 +63,19 @@ DERIVED = (
              "sum of biomass_made_pg_per_m up to the step's end",
              lambda run: (run.ledger["end_h"], np.cumsum(run.ledger["biomass_made_pg_per_m"])),
              "made since t = 0", signed=True),
-    Quantity("remeshed_nodes", "nodes of a mesh made anew", "nodes, where remeshed is 1", _anew,
-             "made anew"),
+    Quantity("remeshed_nodes", "nodes of a mesh made anew", "nodes, where remeshed is 1",
+             _remeshed_nodes, "made anew"),
 )
 KNOWN = names.KNOWN | {each.name: each for each in DERIVED}
 
 
 def _pair(pattern: str) -> tuple[str, ...]:
-    """A quantity of both substrates, whose names go into the pattern."""
+    """The names of a quantity of both substrates, by a pattern."""
     return tuple(pattern.format(name) for name in SUBSTRATES)
 
 
 def _ledger(name: str) -> Kind:
-    """A chart of the rates of a substrate's ledger."""
+    """The chart of the rates in the ledger of a substrate."""
     return Kind(f"Ledger: {name}", "rate",
                 tuple(f"{name}_{part}_ug_per_m_per_h" for part in PARTS))
 
@@ -100,55 +100,55 @@ KINDS = (
 )
 
 
-def series(run: Run) -> dict[str, Course]:
-    """Times (h) and values of everything that can be drawn of a run, by name.
+def series(run: Run) -> dict[str, TimeSeries]:
+    """Times (h) and values of all quantities of a run that can be drawn, by name.
 
-    What the run does not model is left out, and storage where there is none.
+    Quantities that the run does not model are left out, and so is zero storage.
     """
-    found: dict[str, Course] = {name: (run.times, values) for name, values in run.series.items()}
+    drawable: dict[str, TimeSeries] = {}
+    drawable |= {name: (run.times, values) for name, values in run.series.items()}
     steps = len(run.ledger["end_h"]) if run.ledger else 0
-    for each in DERIVED:
-        if steps or each.name == "remeshed_nodes":
-            times, values = each.value(run)
-            found[each.name] = times, each.unit.factor * values
-    return {name: (times, values) for name, (times, values) in found.items()
+    for quantity in DERIVED:
+        if steps or quantity.name == "remeshed_nodes":
+            times, values = quantity.value(run)
+            drawable[quantity.name] = times, quantity.unit.factor * values
+    return {name: (times, values) for name, (times, values) in drawable.items()
             if np.isfinite(values).any() and (values.any() or "_stored_" not in name)}
 
 
 def charts_of(run: Run) -> list[Chart]:
-    """The charts of one run; none of a run that has one row, which has nothing over time."""
+    """The charts of one run; none for a single row."""
     if len(run.times) < 2:
         return []
-    known, marks = series(run), contact(run)
-    found = []
+    drawable, marks = series(run), contact(run)
+    drawn_charts = []
     for kind in KINDS:
-        lines = [_line(KNOWN[name].label, name, known) for name in kind.drawn if name in known]
+        lines = [_line(KNOWN[name].label, name, drawable)
+                 for name in kind.drawn if name in drawable]
         if lines:
-            found.append(Chart(kind.title, kind.axis, lines, marks))
-    return found
+            drawn_charts.append(Chart(kind.title, kind.axis, lines, marks))
+    return drawn_charts
 
 
 def overlaid(runs: Sequence[Run], labels: Sequence[str]) -> list[Chart]:
-    """A chart for each quantity that changes in time in a run, a line a run."""
-    known, found = [series(run) if len(run.times) > 1 else {} for run in runs], []
+    """A chart for each quantity, with one line for each run."""
+    known, overlays = [series(run) if len(run.times) > 1 else {} for run in runs], []
     for kind in KINDS:
         for name in kind.drawn:
-            lines = [_line(one, name, each) for one, each in zip(labels, known)]
+            lines = [_line(label, name, each) for label, each in zip(labels, known)]
             title = kind.title if len(kind.drawn) == 1 else f"{kind.title}: {KNOWN[name].label}"
             if any(name in each for each in known):
-                found.append(Chart(title, kind.axis, lines))
-    return found
+                overlays.append(Chart(title, kind.axis, lines))
+    return overlays
 
 
-def _line(label: str, name: str, known: dict[str, Course]) -> Line:
-    """The line of a quantity; one without points where it is not known.
-
-    So each run keeps its colour.
+def _line(label: str, name: str, known: dict[str, TimeSeries]) -> Line:
+    """The line of a quantity; without points if it is unknown, so that each run keeps its colour.
     """
     times, values = known.get(name, (np.array([]), np.array([])))
     return Line(label, times, values, dots=name == "remeshed_nodes")
 
 
 def contact(run: Run) -> list[float]:
-    """When the aggregate is first seen to touch the opposite wall, h; empty while it does not."""
+    """Time (h) of the first row in which the aggregate touches the opposite wall; empty if none."""
     return run.times[run.series.get("contact", run.times * 0) == 1][:1].tolist()

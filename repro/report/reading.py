@@ -1,4 +1,4 @@
-"""What a run has left in its folder, read for a page."""
+"""Read the tables of a run from its folder, for a page."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from repro.results.files import read as read_file
 
 
 class NoRun(ValueError):
-    """A folder holds no run that can be read; says which and why."""
+    """A folder holds no readable run."""
 
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """A run: ``run.json``, and the columns of its tables (an empty field is not-a-number)."""
+    """A run: ``run.json``, and the columns of its tables (an empty field is NaN)."""
 
     folder: Path
     record: dict
@@ -36,8 +36,8 @@ class Run:
 def read(folder: Path) -> Run:
     """Read the run in a folder.
 
-    The tables of a run that is not at work are those whose SHA-256 its ``run.json`` has. Raises
-    NoRun where the folder holds no run, or one whose files are not as they were written.
+    The ``run.json`` of a run that is not running has the SHA-256 of its tables. Raises NoRun if the
+    folder holds no run, or its files have changed since they were written.
     """
     record = _read(folder, "run.json", read_sealed)
     series = _read(folder, "timeseries.csv", lambda path: _series(_table(path, record), record))
@@ -48,26 +48,26 @@ def read(folder: Path) -> Run:
 
 
 def hashes(record: dict) -> dict[str, str]:
-    """The SHA-256 of each file that a record has, by name; none of a run that is at work."""
-    found = record.get("sha256")
-    return found if isinstance(found, dict) else {}
+    """The SHA-256 of each file in a record, by name; empty while the run is running."""
+    digests = record.get("sha256")
+    return digests if isinstance(digests, dict) else {}
 
 
 def require_unchanged(name: str, content: bytes, record: dict) -> None:
-    """Raise ValueError where the record has another SHA-256 for this content of a file."""
+    """Raise ValueError if the record has another SHA-256 for the content of a file."""
     if name in hashes(record) and hashes(record)[name] != sha256(content):
         raise ValueError("it is not as it was written: cut short or altered")
 
 
 def require_columns(run: Run) -> None:
-    """Raise NoRun where the time series lacks a column that this version writes."""
+    """Raise NoRun if the time series lacks a column of this version."""
     if absent := set(COLUMNS) - run.series.keys():
         raise NoRun(f"{run.folder}: timeseries.csv has no column {min(absent)}; a run of this "
                     "version is needed")
 
 
 def require_lists(run: Run) -> None:
-    """Raise NoRun where a list of fields that is there is not as the run has written it."""
+    """Raise NoRun if a list of fields has changed since it was written."""
     names = {"fields.pvd", "fields.sha256"} & hashes(run.record).keys()
     for name in (name for name in names if (run.folder / name).exists()):
         _read(run.folder, name, partial(_require_file, record=run.record))
@@ -77,17 +77,17 @@ def _require_file(path: Path, record: dict) -> None:
     require_unchanged(path.name, read_file(path, MOST_TABLE), record)
 
 
-def _read(folder: Path, name: str, how):
-    """One file of a run."""
+def _read(folder: Path, name: str, parse):
+    """Read one file of a run. Raises NoRun if it is missing or cannot be read."""
     try:
-        return how(folder / name)
+        return parse(folder / name)
     except FileNotFoundError:
         raise NoRun(f"{folder}: it holds no run: {name} is missing; a folder that `repro run` "
                     "wrote is needed") from None
     except (OSError, ValueError, csv.Error) as error:
-        why = getattr(error, "strerror", None) or error
-        raise NoRun(f"{folder}: {name} cannot be read: {why}; a folder that `repro run` wrote is "
-                    "needed") from error
+        reason = getattr(error, "strerror", None) or error
+        raise NoRun(f"{folder}: {name} cannot be read: {reason}; a folder that `repro run` wrote "
+                    "is needed") from error
 
 
 def _table(path: Path, record: dict) -> dict[str, np.ndarray]:
@@ -98,8 +98,8 @@ def _table(path: Path, record: dict) -> dict[str, np.ndarray]:
 
 
 def _series(series: dict[str, np.ndarray], record: dict) -> dict[str, np.ndarray]:
-    """The time series, if its times ascend. ``run.json``, which is written after it, says how many
-    rows it has at least."""
+    """The time series. Raises ValueError if its times do not ascend, or if it has fewer rows than
+    ``run.json``, which is written later."""
     _require_finite(series, ["time_h"])
     count = len(series["time_h"])
     rows = record.get("rows")
@@ -116,7 +116,7 @@ def _ledger(ledger: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 
 def _require_finite(table: dict[str, np.ndarray], names: list[str]) -> None:
-    """Raise ValueError where a table lacks one of these columns of finite numbers."""
+    """Raise ValueError if a table lacks one of these columns, or its numbers are not finite."""
     for name in names:
         if name not in table or not np.isfinite(table[name]).all():
             raise ValueError(f"a column {name} of finite numbers is needed")

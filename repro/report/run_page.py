@@ -10,7 +10,7 @@ from repro.report import charts, fields, page, quantities
 from repro.report.reading import Run
 from repro.results import names
 
-#: What each section of a scene stands for.
+#: The physics of each section of a scene.
 PHYSICS = {
     "flow": "Stokes flow through pore and aggregate (2.1)",
     "substrates": "two substrates, an electron acceptor and a donor (2.2)",
@@ -18,14 +18,14 @@ PHYSICS = {
     "kinetics": "uptake, growth and decay (2.2)",
     "growth": "growth of the aggregate as a neo-Hookean body (2.3)",
 }
-#: What the page tells in a place of its own.
-TOLD = {"scene", "hash", "sha256", "tables", "versions", "status", "rows", "wall_time_s",
+#: Keys of ``run.json`` that have their own place in the page.
+OWN_PLACE = {"scene", "hash", "sha256", "tables", "versions", "status", "rows", "wall_time_s",
         "wall_time_by_stage_s", "newton_iterations", "remeshes", "warnings", "files", "origin"}
 
-NESTED = ("Each bar is the time within that stage, calls within calls counted in both: what is "
-          "spent on factorising and solving is also in the stage that asked for it, so that the "
-          "bars do not add up to the whole.")
-#: Choices of a scene that leave something out, in words; those of [numerics] hold where NEEDED is.
+NESTED = ("Each bar is the time within a stage. A stage includes the time of those that it calls, "
+          "such as factorising and solving, so the sum of the bars exceeds the total time.")
+#: Simplifications that a scene may choose; those of [numerics] apply if the section in NEEDED is
+#: present.
 ASSUMED = {
     ("growth", "fluid_forces", "neglected"):
         "the fluid's traction on the aggregate neglected (2.3.3)",
@@ -34,7 +34,7 @@ ASSUMED = {
     ("numerics", "extent", "central"): "a clean channel outside of the meshed part (3.1)",
 }
 NEEDED = {"transport": "substrates", "extent": "aggregate"}
-#: The numerics that the head of the page tells, and what must be modelled for them to matter.
+#: The numerics in the head of the page, and the section without which they do not matter.
 NUMERICS = {"preset": None, "elements": None, "refinement": None, "transport": "substrates",
             "time": "growth", "transfer": "growth"}
 
@@ -51,12 +51,12 @@ CONTROLS = """<div class="controls"><label>Field <select id="field"></select></l
 
 
 def build(run: Run) -> str:
-    """The page's text. Raises ValueError where a file of fields cannot be read."""
+    """The text of the page. Raises ValueError if a file of fields cannot be read."""
     drawn = _charts(run, quantities.charts_of(run))
     packed = _packed(run, len(drawn))
     body = (_head(run) + _fields(run, packed) + drawn
             + f'<div class="pair">{_numbers(run)}{_cost(run)}</div>' + _modelled(run)
-            + _others(run))
+            + _provenance(run))
     more = page.data("fields", packed) if packed else ""
     return page.page(f"{run.record.get('scene')}: a pore", body + more,
                      ["charts.js", *(["mesh.js", "fields.js"] if packed else [])])
@@ -64,8 +64,8 @@ def build(run: Run) -> str:
 
 def _packed(run: Run, spent: int) -> dict:
     try:
-        own = "before_expansion.pvd" in _list(run.record.get("files"))
-        before = fields.index(run.folder, "before_expansion.pvd") if own else []
+        has_unexpanded = "before_expansion.pvd" in _list(run.record.get("files"))
+        before = fields.index(run.folder, "before_expansion.pvd") if has_unexpanded else []
         return fields.packed(fields.index(run.folder), before, spent)
     except (ValueError, LookupError, TypeError) as error:
         raise ValueError(f"{run.folder}: the fields cannot be read: {error!r}") from error
@@ -74,34 +74,34 @@ def _packed(run: Run, spent: int) -> dict:
 def _head(run: Run) -> str:
     status = str(run.record.get("status") or "status unknown")
     stopped = "" if status == "completed" else " stopped"
-    there = [words for name, words in PHYSICS.items() if name in _tables(run)]
+    modelled = [words for name, words in PHYSICS.items() if name in _tables(run)]
     return (f"<header><h1>{html.escape(str(run.record.get('scene')))}</h1>"
             f'<p class="status{stopped}">{html.escape(status[0].upper() + status[1:])}</p>'
             f"{_rows_note(run)}"
             f"{_warnings(run)}"
-            f"<p>{html.escape(_sentence(there))} {html.escape(_assumed(run))} "
+            f"<p>{html.escape(_sentence(modelled))} {html.escape(_assumed(run))} "
             f"{html.escape(_numerics(run))}</p></header>\n")
 
 
 def _rows_note(run: Run) -> str:
-    """How many rows there are, and to what time; nothing of a single row."""
+    """The number of rows and their last time; empty for a single row."""
     if len(run.times) < 2:
         return ""
     return f'<p class="note">{len(run.times)} rows, to t = {run.times[-1]:g} h.</p>'
 
 
 def _warnings(run: Run) -> str:
-    """The list of the record's warnings; nothing without any."""
+    """The list of the warnings of a run; empty without any."""
     items = "".join(map(_warning, _list(run.record.get("warnings"))))
     return f'<ul class="warnings" aria-label="warnings">{items}</ul>' if items else ""
 
 
-def _warning(one: object) -> str:
-    """A warning of the record, which has the scene's key and a text, as an item of a list."""
-    if not isinstance(one, dict):
-        return f"<li>{html.escape(str(one))}</li>"
-    key = html.escape(str(one.get("key")))
-    return f"<li>Warning: <b>{key}</b>: {html.escape(str(one.get('text')))}</li>"
+def _warning(warning: object) -> str:
+    """A warning, with the key of the scene and a text, as an item of a list."""
+    if not isinstance(warning, dict):
+        return f"<li>{html.escape(str(warning))}</li>"
+    key = html.escape(str(warning.get("key")))
+    return f"<li>Warning: <b>{key}</b>: {html.escape(str(warning.get('text')))}</li>"
 
 
 def _tables(run: Run) -> dict:
@@ -117,21 +117,23 @@ def _sentence(parts: list[str]) -> str:
 
 
 def _assumed(run: Run) -> str:
-    """The simplifications that the scene has chosen, in words."""
+    """The simplifications of the scene in words."""
     tables = _tables(run)
-    told = [words for (part, key, value), words in ASSUMED.items()
+    assumptions = [words for (part, key, value), words in ASSUMED.items()
             if _table(tables.get(part)).get(key) == value
             and (part != "numerics" or NEEDED[key] in tables)]
-    return f"Assumed: {'; '.join(['a pore in the plane, one aggregate, no detachment', *told])}."
+    assumptions.insert(0, "a pore in the plane, one aggregate, no detachment")
+    return f"Assumed: {'; '.join(assumptions)}."
 
 
 def _numerics(run: Run) -> str:
-    """The choices that matter most, in words."""
+    """The most important numerical choices in words."""
     tables = _tables(run)
     known = _table(tables.get("numerics"))
-    told = [f"{key} {page.shown(known[key])}".replace("_", "-") for key, part in NUMERICS.items()
-            if key in known and (part is None or part in tables)]
-    return f"Numerics: {', '.join(told)}." if told else ""
+    choices = [f"{key} {page.format_value(known[key])}".replace("_", "-")
+               for key, part in NUMERICS.items()
+               if key in known and (part is None or part in tables)]
+    return f"Numerics: {', '.join(choices)}." if choices else ""
 
 
 def _fields(run: Run, packed: dict) -> str:
@@ -148,20 +150,20 @@ def _field_note(packed: dict) -> str:
     note = "Quadratic triangles, drawn curved" if quadratic else "Linear triangles"
     if packed["nodes"] > fields.MOST_NODES:
         note = f"A mesh of {packed['nodes']} nodes, shown on a regular grid of triangles"
-    noted = sum("note" in frame for frame in packed["frames"])
-    note += (f"; {_times_note(len(packed['frames']) - noted, packed['of'])}"
-             f"{', those grown and not yet expanded besides' if noted else ''}. Values are rounded "
-             "to 1/65534 of their range; the .vtu files have every time and digit.")
+    unexpanded = sum("note" in frame for frame in packed["frames"])
+    note += (f"; {_times_note(len(packed['frames']) - unexpanded, packed['of'])}"
+             f"{', those grown and not yet expanded besides' if unexpanded else ''}. Values are "
+             "rounded to 1/65534 of their range; the .vtu files have every time and digit.")
     if any(field["body"] for field in packed["fields"]):
         note += " Fields of the aggregate alone leave the fluid grey."
     return note + (" Arrow keys move the slider." if packed["of"] > 1 else "")
 
 
-def _times_note(shown: int, of: int) -> str:
-    """How many of the times with fields are shown."""
-    if shown < of:
-        return f"{shown} of {of} times shown"
-    return f"all {of} times shown" if of > 1 else "one time"
+def _times_note(count: int, total: int) -> str:
+    """The number of times whose fields are in the page."""
+    if count < total:
+        return f"{count} of {total} times shown"
+    return f"all {total} times shown" if total > 1 else "one time"
 
 
 def _charts(run: Run, drawn: list[charts.Chart]) -> str:
@@ -183,33 +185,34 @@ def _numbers(run: Run) -> str:
         return page.section("Numbers", "<p>The run has no row: it stopped before the first.</p>")
     ends = [0, -1] if len(run.times) > 1 else [0]
     head = ["", *(f"t = {time:.6g} h" for time in run.times[ends])]
-    rows = [(names.with_unit(name), *_told(name, values[ends]))
+    rows = [(names.with_unit(name), *_value_texts(name, values[ends]))
             for name, values in run.series.items()
             if name != "time_h" and np.isfinite(values[ends]).all()]
     return page.section("Numbers", page.table("", head, rows))
 
 
-def _told(name: str, values: np.ndarray) -> list[str]:
-    """The values of a column for people to read."""
+def _value_texts(name: str, values: np.ndarray) -> list[str]:
+    """The values of a column as text."""
     if name in names.YES_NO:
-        return [page.shown(value == 1) for value in values.tolist()]
+        return [page.format_value(value == 1) for value in values.tolist()]
     return [charts.number(value) for value in values.tolist()]
 
 
 def _modelled(run: Run) -> str:
-    """The scene as read, a table a section."""
+    """The scene with a table for each section."""
     tables = _tables(run)
     missing = [name for name in PHYSICS if name not in tables]
     note = f'<p class="note">Not modelled: {", ".join(missing)}.</p>' if missing else ""
-    found = "".join(page.table(f"[{name}]", [], _pairs(part)) for name, part in tables.items())
+    tables_html = "".join(page.table(f"[{name}]", [], _pairs(part))
+                          for name, part in tables.items())
     scene = ("<details><summary>The scene, every key</summary>"
-             f'<div class="tables">{found}</div></details>')
-    return page.section("What was modelled", note, scene if found else "")
+             f'<div class="tables">{tables_html}</div></details>')
+    return page.section("What was modelled", note, scene if tables_html else "")
 
 
 def _pairs(part: object) -> list[tuple[str, str]]:
-    """(key, value for people to read) of a part of the record."""
-    return [(key, page.shown(value)) for key, value in page.flat(part).items()]
+    """(key, value as text) of a part of the record."""
+    return [(key, page.format_value(value)) for key, value in page.flat(part).items()]
 
 
 def _cost(run: Run) -> str:
@@ -218,9 +221,9 @@ def _cost(run: Run) -> str:
     counts = [(f"Newton iterations, {name}", value) for name, value in iterations.items() if value]
     if "growth" in _tables(run) and "remeshes" in record:
         counts.append(("meshes made anew", record["remeshes"]))
-    whole = f"<p>{total:.3g} s in all, without this page.</p>" if total else ""
+    total_text = f"<p>{total:.3g} s in all, without this page.</p>" if total else ""
     bars = _bars(_table(record.get("wall_time_by_stage_s")), total) if total else ""
-    return page.section("Cost", whole, bars, page.table("", [], counts))
+    return page.section("Cost", total_text, bars, page.table("", [], counts))
 
 
 def _table(value: object) -> dict:
@@ -228,14 +231,12 @@ def _table(value: object) -> dict:
 
 
 def _positive(value: object) -> float:
-    """The value where it is a number of seconds that can be drawn, else zero."""
+    """The value if it is a positive, finite number of seconds, else zero."""
     return float(value) if isinstance(value, int | float) and 0 < value < 1e30 else 0.0
 
 
 def _bars(stages: dict, total: float) -> str:
-    """Seconds by stage, the longest first, as parts of the whole.
-
-    Nothing where no stage has taken any time.
+    """Seconds by stage, the longest first; the lengths are parts of the total. Empty without any.
     """
     known = [(name, value) for name, value in stages.items() if _positive(value)]
     if not known:
@@ -253,10 +254,10 @@ def _bar(top: float, name: str, seconds: float, width: float) -> str:
             f'<text x="{140 + width:.1f}" y="{top + 15}">{seconds:.3g} s</text>')
 
 
-def _others(run: Run) -> str:
-    """Versions, the hash of the scene, and whatever else the run has recorded."""
+def _provenance(run: Run) -> str:
+    """Versions, the hash of the scene, and the other keys of ``run.json``."""
     record = run.record
-    rest = {key: value for key, value in record.items() if key not in TOLD}
+    rest = {key: value for key, value in record.items() if key not in OWN_PLACE}
     versions = [("scene hash", record.get("hash", "unknown")),
                 *page.flat(_table(record.get("versions"))).items()]
     return page.section("Made with", page.table("", [], versions),

@@ -1,13 +1,14 @@
-"""What a run leaves: ``timeseries.csv``, ``ledger.csv``, ``run.json``, and fields as ``.vtu``.
+"""Results of a run: ``timeseries.csv``, ``ledger.csv``, ``run.json``, and fields as ``.vtu``.
 
-    quantities    what a reported quantity is: name with its unit, words, formula
-    columns       those of the time series and the ledger
-    arrays        those of the fields
-    names         words and units of all of them, by name
-    tables, netcdf   from Python; the time series as NetCDF
+    quantities    a reported quantity: name with its unit, words, formula
+    columns       quantities of the time series and the ledger
+    arrays        quantities of the fields
+    names         words and units of all quantities, by name
+    tables        results in Python
+    netcdf        the time series as NetCDF
 
-Who writes one has it appear whole or not at all by :func:`repro.results.files.whole`. What a scene
-does not model is an empty field.
+Writers use :func:`repro.results.files.atomic_path`, so that a file is complete or absent. An empty
+field of a table is a quantity that the scene does not model.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ from repro.scene import Scene, scene_hash, scene_tables
 
 __all__ = ["COLUMNS", "LEDGER_COLUMNS", "fields", "ledger_row", "row"]
 
-#: Of um/h.
+#: Factor from um/h to m/d.
 M_PER_D = UNITS["_m_per_d"].factor
 PACKAGES = ("numpy", "scipy", "scikit-fem", "meshio", "mmgpy", "shapely", "pint")
 
@@ -60,12 +61,12 @@ def write_table(path: Path, columns: list[str], rows: list[list]) -> None:
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(columns)
     for line in rows:
-        writer.writerow([_shown(value) for value in line])
+        writer.writerow([_csv_value(value) for value in line])
     write_text(path, text.getvalue())
 
 
-def _shown(value: object) -> object:
-    """A value as a CSV file has it."""
+def _csv_value(value: object) -> object:
+    """A value in the form of a CSV file."""
     if value is None:
         return ""
     return repr(float(value)) if isinstance(value, float) else value
@@ -74,14 +75,14 @@ def _shown(value: object) -> object:
 def read_table(path: Path) -> dict[str, np.ndarray]:
     """The columns of a CSV table that a run has written; an empty field is not-a-number.
 
-    Raises ValueError where it is not whole: a line that is cut short, or what is no finite number;
-    OSError where it cannot be read.
+    Raises ValueError if a line is cut short or a field is no finite number, and OSError if the file
+    cannot be read.
     """
     return parse_table(read(path, MOST_TABLE))
 
 
 def parse_table(content: bytes) -> dict[str, np.ndarray]:
-    """What :func:`read_table` gives, of the content of the file."""
+    """The columns of a CSV table, as :func:`read_table` returns them, from the file's content."""
     text = content.decode()
     if not text.endswith("\n"):
         raise ValueError("its last line is cut short" if text else "it is empty")
@@ -92,14 +93,14 @@ def parse_table(content: bytes) -> dict[str, np.ndarray]:
 
 
 def _numbers(row: list[str], count: int, line: int) -> list[float]:
-    """The numbers of a line of so many fields."""
+    """The numbers of a line, which must have ``count`` fields."""
     if len(row) != count:
         raise ValueError(f"line {line} has {len(row)} fields, where {count} are needed")
     return [_number(field, line) for field in row]
 
 
 def _number(field: str, line: int) -> float:
-    """A number; not-a-number of an empty field, and of that alone."""
+    """The number in a field; only an empty field is not-a-number."""
     with suppress(ValueError):
         if not field or math.isfinite(float(field)):
             return float(field or "nan")
@@ -117,12 +118,12 @@ def provenance(scene: Scene) -> dict:
 
 @cache
 def version(package: str) -> str:
-    """The version of an installed package, which is looked for on the disk once."""
+    """The version of an installed package; it is read from the disk once."""
     return metadata.version(package)
 
 
 def write_json(path: Path, content: dict) -> None:
-    """Write a JSON file; not-a-number is refused."""
+    """Write a JSON file. Raises ValueError for not-a-number."""
     write_text(path, json.dumps(content, indent=2, allow_nan=False) + "\n")
 
 

@@ -18,7 +18,7 @@ from repro.scene import Scene
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """What the arrays are made of."""
+    """A scene with the state of its pore, from which the arrays are computed."""
 
     scene: Scene
     pore: Pore
@@ -26,25 +26,26 @@ class State:
 
     @cached_property
     def strained(self) -> growth.Strained:
-        """The aggregate's deformation since t = 0, in the points (t, q) where growth is taken."""
+        """The aggregate's deformation since t = 0, in the points (t, q) of the growth's integrals.
+        """
         mesh = self.pore.mesh
         return self.pore.body.strained(mesh.points[mesh.body])
 
     @cached_property
     def stress(self) -> np.ndarray:
-        """(t, q, 4) MPa there: xx, yy, zz, xy."""
+        """(t, q, 4) MPa, components xx, yy, zz, xy in the same points."""
         mesh = self.pore.mesh
         linear = self.pore.body.shape.table.linear
         pressure = self.pore.pressure[mesh.triangles[mesh.biomass]] @ linear.T
         return self.scene.growth.shear_modulus * growth.cauchy(self.strained.F, pressure)
 
     def mean(self, value: np.ndarray) -> np.ndarray:
-        """(t,) of values (t, q), over each of the aggregate's triangles as it was at t = 0."""
+        """(t,) means of values (t, q) over each of the aggregate's triangles at t = 0."""
         dx = self.pore.body.at.dx
         return (value * dx).sum(axis=1) / dx.sum(axis=1)
 
 
-#: Words for what an array may need, and whether a state has it.
+#: Parts that an array may need: does a state have them?
 NEEDS: dict[str, Callable[[State], bool]] = {
     "flow": lambda state: state.solved.flow is not None,
     "substrates": lambda state: state.solved.concentrations is not None,
@@ -56,23 +57,26 @@ NEEDS: dict[str, Callable[[State], bool]] = {
 
 @dataclass(frozen=True)
 class Array(Quantity):
-    """cells: is it of the triangles, not of the nodes? body: is its value that of the aggregate's
-    nodes or triangles alone, and NaN in the fluid?"""
+    """An array of a ``.vtu`` file.
+
+    cells: has it a value per triangle, not per node? body: is it defined in the aggregate alone,
+    and NaN in the fluid?
+    """
 
     cells: bool = False
     body: bool = False
 
-    def whole(self, state: State) -> np.ndarray:
-        """(N,) or (T,) at all nodes or triangles of the mesh, (N, 3) of a vector."""
+    def on_mesh(self, state: State) -> np.ndarray:
+        """(N,) or (T,) values at all nodes or triangles of the mesh; (N, 3) for a vector."""
         value = self.reported(state)
         if value.ndim == 2:
             value = _three(value)
         if not self.body:
             return value
         mesh = state.pore.mesh
-        found = np.full((len(mesh.cells if self.cells else mesh.points), *value.shape[1:]), np.nan)
-        found[mesh.biomass if self.cells else mesh.body] = value
-        return found
+        values = np.full((len(mesh.cells if self.cells else mesh.points), *value.shape[1:]), np.nan)
+        values[mesh.biomass if self.cells else mesh.body] = value
+        return values
 
 
 def _three(plane: np.ndarray) -> np.ndarray:
@@ -105,9 +109,9 @@ def _pressure(state: State) -> np.ndarray:
 
 
 def _stretch(state: State) -> np.ndarray:
-    found = surface(state.pore)
+    free_surface = surface(state.pore)
     stretch = np.full(len(state.pore.theta), np.inf)
-    np.minimum.at(stretch, found.cells, found.stretch)
+    np.minimum.at(stretch, free_surface.cells, free_surface.stretch)
     return np.where(np.isinf(stretch), np.nan, stretch)
 
 
@@ -158,12 +162,12 @@ ARRAYS = (
 def fields(scene: Scene, pore: Pore, solved: Solved) -> Grid:
     """The fields of an instant, at nodes or in triangles, named with their units.
 
-    Places are in um. In the fluid there is no biomass (zero), and no displacement, theta, J, stress
-    or pressure P (NaN); nodes of the interface are the aggregate's. Stress and P are those of the
-    strain since t = 0: a scene whose new biomass is born stress-free has none to tell.
+    Positions are in um. In the fluid biomass is zero, and displacement, theta, J, stress and
+    pressure P are NaN; nodes of the interface belong to the aggregate. Stress and P follow from the
+    strain since t = 0: a scene whose new biomass is born stress-free has neither.
     """
     state = State(scene, pore, solved)
     known = [each for each in ARRAYS if is_modelled(each, NEEDS, state)]
-    points = {each.name: each.whole(state) for each in known if not each.cells}
-    cells = {each.name: each.whole(state) for each in known if each.cells}
+    points = {each.name: each.on_mesh(state) for each in known if not each.cells}
+    cells = {each.name: each.on_mesh(state) for each in known if each.cells}
     return Grid(_three(pore.mesh.points), pore.mesh.cells, points, cells, pore.time)

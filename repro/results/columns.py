@@ -6,14 +6,14 @@ from collections.abc import Callable
 from functools import partial
 
 from repro.march import balance
-from repro.march.loop import Instant, Ledger
+from repro.march.loop import Ledger, Report
 from repro.model.surface import BESIDE, BIOT, CREASE, STRETCH, surface
 from repro.results.quantities import Quantity, is_modelled
 from repro.scene import Scene
 
 SUBSTRATES = ("acceptor", "donor")
-#: Words for what a quantity may need, and whether an instant has it.
-NEEDS: dict[str, Callable[[Scene, Instant], bool]] = {
+#: Parts that a quantity may need: does a report have them?
+NEEDS: dict[str, Callable[[Scene, Report], bool]] = {
     "flow": lambda scene, at: at.solved.flow is not None,
     "substrates": lambda scene, at: at.solved.concentrations is not None,
     "aggregate": lambda scene, at: at.pore.outline is not None,
@@ -23,16 +23,16 @@ NEEDS: dict[str, Callable[[Scene, Instant], bool]] = {
 
 def _both(pattern: str, words: str, formula: str, value: Callable,
           signed: bool = True) -> list[Quantity]:
-    """A quantity of the acceptor and of the donor, whose names replace {} in the texts."""
+    """A quantity for each of acceptor and donor, whose names replace {} in the texts."""
     return [Quantity(pattern.format(name), words.format(name), formula, partial(value, k), name,
                      "substrates", signed=signed) for k, name in enumerate(SUBSTRATES)]
 
 
-def _least(k: int, scene: Scene, at: Instant) -> float:
+def _least(k: int, scene: Scene, at: Report) -> float:
     return float(getattr(at.solved.concentrations, SUBSTRATES[k]).min())
 
 
-def _overshoot(k: int, scene: Scene, at: Instant) -> float:
+def _overshoot(k: int, scene: Scene, at: Report) -> float:
     """mg/L; with Gear, where water of earlier supplies is in the pore, over the largest supply."""
     supply = at.solved.problem.both[k].supply
     if scene.numerics.transport == "gear":
@@ -41,12 +41,13 @@ def _overshoot(k: int, scene: Scene, at: Instant) -> float:
 
 
 def _worst(defects: list[float]) -> float:
-    """The one that is farthest from zero, with its sign; zero of none."""
+    """The defect farthest from zero, with its sign; zero if there are no defects."""
     return max(defects, key=abs, default=0.0)
 
 
-def _substrate_balance(k: int, scene: Scene, at: Instant) -> float:
-    """Of the steps since the last row and, where nothing is stored, of the present instant."""
+def _substrate_balance(k: int, scene: Scene, at: Report) -> float:
+    """The worst defect of the steps since the last row and, except with Gear, of the present
+    instant."""
     gear = scene.numerics.transport == "gear"
     problem = at.solved.problem
     room = problem.both[k].supply * float(problem.space.at.dx.sum()) if gear else 0.0
@@ -60,13 +61,13 @@ def _substrate_balance(k: int, scene: Scene, at: Instant) -> float:
     return _worst(defects)
 
 
-def _of_steps(defect: Callable[[Ledger], float], at: Instant) -> float:
+def _of_steps(defect: Callable[[Ledger], float], at: Report) -> float:
     """The worst defect of the steps since the last row."""
     return _worst([defect(ledger) for ledger in at.ledgers])
 
 
-def _composition(which: int, scene: Scene, at: Instant) -> float:
-    return at.pore.composition(scene.kinetics.maximum_density)[which]
+def _composition(index: int, scene: Scene, at: Report) -> float:
+    return at.pore.composition(scene.kinetics.maximum_density)[index]
 
 
 _BALANCE = ("(supplied - leaving - consumed - stored) / the largest of supplied, consumed, the "
@@ -74,7 +75,7 @@ _BALANCE = ("(supplied - leaving - consumed - stored) / the largest of supplied,
             "the supply; the worst of the steps since the last row and, except with Gear, of the "
             "row's own fluxes")
 
-#: Of ``timeseries.csv``: value takes the scene and an Instant.
+#: Columns of ``timeseries.csv``: value takes the scene and a Report.
 SERIES = (
     Quantity("time_h", "simulated time since the start of the run", "t",
              lambda scene, at: at.pore.time, "time"),
@@ -146,14 +147,15 @@ SERIES = (
              lambda scene, at: int(at.pore.contact), yes_no=True),
 )
 
-#: Parts of a substrate's ledger: what they are called, short, and what they are.
+#: Parts of a substrate's ledger: label and formula.
 PARTS = {"supplied": ("supplied", "supply times the flow through the inlet, over the step"),
          "out": ("leaving", "integral of u_x C over the outlet, over the step"),
          "consumed": ("taken up", "uptake (7)-(8) over the aggregate and the step"),
          "stored": ("stored", "what the meshed part holds more at the step's end; zero where "
                               "substrates are quasi-steady")}
 
-#: Of ``ledger.csv``: value takes the scene and a Ledger; per metre of depth, 1 um2 mg/L is 1 pg/m.
+#: Columns of ``ledger.csv``: value takes the scene and a Ledger. Per metre of depth, 1 um2 mg/L is
+#: 1 pg/m.
 LEDGER = (
     Quantity("start_h", "start of the step", "t", lambda scene, step: step.start),
     Quantity("end_h", "end of the step", "t", lambda scene, step: step.end),
@@ -180,7 +182,7 @@ COLUMNS = [each.name for each in SERIES]
 LEDGER_COLUMNS = [each.name for each in LEDGER]
 
 
-def row(scene: Scene, instant: Instant) -> dict[str, float | None]:
+def row(scene: Scene, instant: Report) -> dict[str, float | None]:
     """One row of ``timeseries.csv``: the geometry at its time, and flow and substrates in it."""
     return {each.name: each.reported(scene, instant)
             if is_modelled(each, NEEDS, scene, instant) else None for each in SERIES}

@@ -1,8 +1,8 @@
-"""Files: written whole or not at all, read within a limit of size, and known by their SHA-256.
+"""Files: written completely or not at all, read up to a limit of size, and verified by SHA-256.
 
-``run.json`` is written last. It ends with the SHA-256 of all of its text before that, and has those
-of the other files of a run that is not at work. They tell what an accident has changed; whoever
-changes a file on purpose can change them too.
+``run.json`` is written last. It ends with the SHA-256 of all of its text before that. Unless the
+run is at work, it also has the SHA-256 of the run's other files. They reveal accidental changes;
+whoever changes a file on purpose can change them too.
 """
 
 from __future__ import annotations
@@ -18,27 +18,27 @@ from contextlib import contextmanager
 from pathlib import Path
 from tempfile import mkdtemp
 
-#: How the folders are called in which files are written before they are moved to their place.
+#: Prefix of the folders in which files are written before they are moved to their final path.
 WRITING = ".writing-"
-#: Bytes that a file may have: one of JSON, whose objects take many times its length; a table; the
-#: fields of one time, or a checkpoint. A mesh of a million nodes takes a quarter of the last.
+#: Largest files in bytes: JSON, whose objects take many times its length; a table; the fields of
+#: one time, or a checkpoint. A mesh of a million nodes takes a quarter of the last limit.
 MOST_JSON, MOST_TABLE, MOST_DATA = 2**24, 2**27, 2**30
 
 
 @contextmanager
-def whole(path: Path) -> Iterator[Path]:
-    """A path to write to; what is written there is moved to ``path`` at the end of the block.
+def atomic_path(path: Path) -> Iterator[Path]:
+    """Yield a path to write to. The file moves to ``path`` at the end of the block.
 
-    The path is in a new folder beside ``path`` that no other user may enter, so that no link can
-    be in the way. A link at ``path`` itself is replaced and not followed. Raises OSError where the
-    folder cannot be written; nothing is left of it then.
+    The yielded path is in a new folder beside ``path`` that no other user may enter, so that no
+    link can redirect it. A link at ``path`` itself is replaced and not followed. Raises OSError if
+    the folder cannot be written; no file is left then.
     """
-    room = Path(mkdtemp(prefix=WRITING, dir=path.parent))
+    folder = Path(mkdtemp(prefix=WRITING, dir=path.parent))
     try:
-        yield room / path.name
-        os.replace(room / path.name, path)
+        yield folder / path.name
+        os.replace(folder / path.name, path)
     finally:
-        shutil.rmtree(room, ignore_errors=True)
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 def is_file(path: Path) -> bool:
@@ -57,8 +57,8 @@ def is_folder(path: Path) -> bool:
 def read(path: Path, most: int) -> bytes:
     """The content of a regular file of at most `most` bytes.
 
-    Raises OSError where it is none (a pipe, a device), is longer or cannot be read; it waits for
-    nothing.
+    Raises OSError if the path is no regular file (a pipe, a device), or if the file is longer or
+    cannot be read. Never waits for a writer.
     """
     flags = getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
     with open(os.open(path, os.O_RDONLY | flags), "rb") as file:
@@ -71,12 +71,12 @@ def read(path: Path, most: int) -> bytes:
 
 
 def sha256(content: bytes) -> str:
-    """The SHA-256 of a content, in hexadecimal digits."""
+    """The SHA-256 of a file's content, in hexadecimal digits."""
     return hashlib.sha256(content).hexdigest()
 
 
 def sha256_of(path: Path) -> str:
-    """The SHA-256 of a file, empty where it is missing or no regular file that can be read."""
+    """The SHA-256 of a file; empty if it is missing, unreadable or not a regular file."""
     try:
         return sha256(read(path, MOST_DATA))
     except OSError:
@@ -84,22 +84,23 @@ def sha256_of(path: Path) -> str:
 
 
 def read_json(path: Path) -> dict:
-    """The object in a file of JSON. Raises OSError as :func:`read`, ValueError where it is none."""
+    """The object in a JSON file. Raises OSError as :func:`read`, and ValueError if it is no object.
+    """
     return _object(read(path, MOST_JSON))
 
 
 def _object(content: bytes) -> dict:
     try:
-        found = json.loads(content)
+        parsed = json.loads(content)
     except RecursionError:
         raise ValueError("it is nested too deeply") from None
-    if not isinstance(found, dict):
+    if not isinstance(parsed, dict):
         raise ValueError("it is not a JSON object")
-    return found
+    return parsed
 
 
 def sealed(content: dict) -> str:
-    """The text of an object as JSON, with the SHA-256 of all before it as its last entry."""
+    """The text of an object as JSON. Its last entry is the SHA-256 of the text before."""
     return _with_checksum(json.dumps(content, indent=2, allow_nan=False).removesuffix("\n}"))
 
 
@@ -108,12 +109,12 @@ def _with_checksum(text: str) -> str:
 
 
 def read_sealed(path: Path) -> dict:
-    """What :func:`sealed` was given. Raises OSError as :func:`read`, and ValueError where it is not
-    as it was written."""
+    """The object in a file of :func:`sealed` text. Raises OSError as :func:`read`, and ValueError
+    if the file has changed since it was written."""
     content = read(path, MOST_JSON)
     before, separator, _ = content.rpartition(b',\n  "checksum": ')
     if not separator or content != _with_checksum(before.decode(errors="replace")).encode():
-        _object(content)  # raises what says more
+        _object(content)  # raises a more specific error if the JSON is broken
         raise ValueError("its checksum is wrong: it was cut short or altered, or another version "
                          "wrote it")
     record = _object(content)

@@ -1,4 +1,4 @@
-"""What the columns and arrays of a run's files are called, by name, and their units."""
+"""Words and units of the columns and arrays of a run's files, by name."""
 
 from __future__ import annotations
 
@@ -10,25 +10,25 @@ from repro.results.quantities import Quantity, ending, unit_of
 KNOWN: dict[str, Quantity] = {each.name: each for each in (*LEDGER, *SERIES, *ARRAYS)}
 #: Pure numbers that stand for yes (1) and no (0).
 YES_NO = {name for name, each in KNOWN.items() if each.yes_no}
-#: Defects, round-off but for what is stated.
+#: Relative defects of balances.
 DEFECTS = {name for name in KNOWN if name.endswith("_balance")}
 
 
 def words(name: str) -> str:
-    """A name in words, without its unit; one that nobody defines as it stands."""
+    """The words of a name, without its unit; an unknown name without underscores."""
     if name in KNOWN:
         return KNOWN[name].words
     return name.removesuffix(ending(name)).replace("_", " ")
 
 
 def udunits(name: str) -> str:
-    """Its unit as UDUNITS writes it, "1" for a pure number."""
+    """The unit of a name in the spelling of UDUNITS, "1" for a pure number."""
     return unit_of(name).udunits
 
 
 def unit(name: str) -> str:
-    """Its unit as a reader writes it, empty for a pure number."""
-    return unit_of(name).shown
+    """The unit of a name for readers, empty for a pure number."""
+    return unit_of(name).symbol
 
 
 def with_unit(name: str) -> str:

@@ -39,9 +39,9 @@ def _attributes(name: str) -> dict[str, str]:
 
 def _provenance(scene: Scene) -> dict[str, str]:
     """Attributes of the whole file; the scene's tables and the versions as JSON."""
-    found = results.provenance(scene)
+    record = results.provenance(scene)
     return {"Conventions": CONVENTIONS, "title": f"Clogging of one pore: {scene.name}",
-            "source": f"dupin2001-repro {found['versions']['dupin2001-repro']}",
-            "scene": scene.name, "scene_hash": found["hash"],
-            "scene_tables": json.dumps(found["tables"]),
-            "versions": json.dumps(found["versions"])}
+            "source": f"dupin2001-repro {record['versions']['dupin2001-repro']}",
+            "scene": scene.name, "scene_hash": record["hash"],
+            "scene_tables": json.dumps(record["tables"]),
+            "versions": json.dumps(record["versions"])}

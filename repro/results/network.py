@@ -1,20 +1,20 @@
-"""A law for networks: what an aggregate adds to the hydraulic resistance of a pore (section 5).
+"""A law for networks: the hydraulic resistance that an aggregate adds to a pore (section 5).
 
-A network model knows the area A of the aggregate in a pore of width W and asks for the pore's head
-loss. Stokes flow is linear, so the mean velocity drops out; it has no length of its own, so W does;
-and what is left of lambda and of the shape is in a table,
+A network model knows the area A of the aggregate in a pore of width W and needs the pore's head
+loss. Stokes flow is linear, so the mean velocity drops out; W is the only length, so areas count in
+W^2. The rest depends on lambda and the shape, and is in a table,
 
-    head loss = 12 nu u_ave / (g W^2) (L + r W),        r = r(A / W^2, lambda, spanned),
+    head loss = 12 nu u_ave / (g W^2) (L + r W),        r = r(A / W^2, lambda, spanned).
 
-r being the length of empty pore, over W, that resists as much as the aggregate adds. Until the pore
-is spanned the aggregate is a half-disc on one wall, and r hardly depends on lambda while the film
-is wide. Once it is spanned r is nearly (lambda - 1) (A / W^2 - 0.4): that of a plug with straight
-ends, (lambda - 1) A / W^2 exactly, less what its rounded ends let pass.
+r is a length of empty pore, over W: it resists as much as the aggregate adds. Before the aggregate
+spans the pore it is a half-disc on one wall, and r hardly depends on lambda while the film is wide.
+After that r is nearly (lambda - 1) (A / W^2 - 0.4). A plug with straight ends has exactly
+(lambda - 1) A / W^2; rounded ends let more water pass.
 
-``network.csv``, which ``python -m verification.network`` makes, has r on half-discs, and the mean
-of plugs that growth has made. Its bounds are the least and the largest r of other shapes that
-growth makes, in pores of 40 to 150 um at 0.5 to 6 m/d and W^2 / 2500 to 20 mg/L of both substrates,
-and of drawn ones alike: thinner by 1 % or thicker by 3 % than a half-disc, or leaning by 5 %.
+``python -m verification.network`` makes ``network.csv``. It has r of half-discs, and the mean r of
+plugs that have grown. Its bounds are the least and the largest r of other grown shapes, in pores of
+40 to 150 um at 0.5 to 6 m/d and W^2 / 2500 to 20 mg/L of both substrates, and of similar drawn
+shapes: 1 % thinner or 3 % thicker than a half-disc, or leaning by 5 %.
 """
 
 from __future__ import annotations
@@ -33,8 +33,11 @@ KINDS = ("a half-disc before contact (spanned=False)", "a plug (spanned=True)")
 
 
 class AddedResistance(NamedTuple):
-    """length: r, of empty pore that resists as much as the aggregate adds, over W; least, most: of
-    shapes of the same area. All are shaped as the areas."""
+    """Lengths of empty pore, over W, that resist as much as aggregates add.
+
+    length: r; least, most: bounds of r for other shapes of the same area. All have the shape of the
+    areas.
+    """
 
     length: np.ndarray
     least: np.ndarray
@@ -43,51 +46,76 @@ class AddedResistance(NamedTuple):
 
 def added_resistance(area: ArrayLike, width: ArrayLike, spanned: ArrayLike,
                      viscosity_ratio: float = 2000.0) -> AddedResistance:
-    """What aggregates add to the resistance of pores, as a length of empty pore over W.
+    """Resistance that aggregates add to pores, as a length of empty pore over W.
 
-    area: of the aggregates; width: of the pores, in the root of that unit; spanned: does the
-    aggregate touch both walls? Numbers, or arrays that broadcast. viscosity_ratio: lambda of all.
+    Parameters
+    ----------
+    area : array_like
+        Areas of the aggregates, in any unit of area.
+    width : array_like
+        Widths of the pores, in the square root of that unit.
+    spanned : array_like of bool
+        Does the aggregate touch both walls? The three arguments broadcast.
+    viscosity_ratio : float
+        lambda of all aggregates.
+
+    Returns
+    -------
+    AddedResistance
+        Arrays of the broadcast shape, without unit.
+
+    Raises
+    ------
+    ValueError
+        If a width is not positive, or area / width^2 or viscosity_ratio is outside the table: 0.004
+        to 1.5 before contact, 1.6 to 4.5 after it, lambda 100 to 10 000. An empty pore is outside.
+
+    Notes
+    -----
     The head loss of a pore is 12 nu u_ave / (g W^2) (L + length W), with the viscous aggregate of
-    2.1 and the paper's condition on its surface [E2], 1.5 W or more from the pore's ends.
+    2.1 and the paper's condition on its surface [E2], at least 1.5 W from the pore's ends.
 
-    Raises ValueError where a width is not above zero, or where area / width^2, for such an
-    aggregate, or viscosity_ratio is outside the table (0.004 to 1.5 before contact, 1.6 to 4.5
-    after it, lambda 100 to 10 000): an empty pore is not in it.
+    Examples
+    --------
+    >>> import repro
+    >>> added = repro.added_resistance(500.0, 50.0, False)
+    >>> bool(added.least <= added.length <= added.most)
+    True
     """
     width = np.asarray(width, float)
     if not (width > 0).all():
         raise ValueError("added_resistance: width is not known; more than zero is accepted")
     share = np.asarray(area, float) / width**2
     share, spanned = np.broadcast_arrays(share, np.asarray(spanned, bool))
-    found = np.empty((3, *share.shape))
+    results = np.empty((3, *share.shape))
     for kind in (False, True):
-        here = spanned == kind
-        found[:, here] = _law(kind, share[here], viscosity_ratio)
-    return AddedResistance(*found)
+        is_kind = spanned == kind
+        results[:, is_kind] = _law(kind, share[is_kind], viscosity_ratio)
+    return AddedResistance(*results)
 
 
 def known(spanned: bool) -> tuple[float, float]:
-    """The least and the largest A / W^2 that the law does not refuse."""
+    """The least and the largest A / W^2 in the table."""
     shares, _, _ = _table(spanned)
     return float(shares[0]), float(shares[-1])
 
 
 def _law(spanned: bool, share: np.ndarray, ratio: float) -> np.ndarray:
-    """(3, n) r, the least and the most for A / W^2 (n,) of one kind of aggregate: in logarithms,
-    r interpolated by monotone cubics, the bounds over r linearly."""
-    from scipy.interpolate import PchipInterpolator  # a quarter of a second
+    """(3, n) r and its bounds at A / W^2 (n,) for one kind of aggregate, interpolated in
+    logarithms: r by monotone cubics, its bounds over r linearly."""
+    from scipy.interpolate import PchipInterpolator  # its import takes a quarter of a second
 
     shares, ratios, values = _table(spanned)
     _refuse("viscosity_ratio", np.array([ratio]), ratios, "an aggregate")
     _refuse("area / width^2", share, shares, KINDS[spanned])
     length, *bounds = PchipInterpolator(np.log(ratios), values, axis=1)(np.log(ratio))
     place, nodes = np.log(share), np.log(shares)
-    found = PchipInterpolator(nodes, length)(place)
-    return np.exp([found, *(found + np.interp(place, nodes, bound) for bound in bounds)])
+    length = PchipInterpolator(nodes, length)(place)
+    return np.exp([length, *(length + np.interp(place, nodes, bound) for bound in bounds)])
 
 
 def _refuse(name: str, values: np.ndarray, known: np.ndarray, kind: str) -> None:
-    """Raises ValueError for values outside those that are known, not-a-number too."""
+    """Raises ValueError for values outside the table, and for not-a-number."""
     outside = values[~((values >= known[0]) & (values <= known[-1]))]
     if outside.size:
         raise ValueError(f"added_resistance: {name} = {outside.flat[0]:.6g} is not known for "
@@ -96,8 +124,8 @@ def _refuse(name: str, values: np.ndarray, known: np.ndarray, kind: str) -> None
 
 @cache
 def _table(spanned: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A / W^2 (m,), lambda (l,), and the logarithms of r and of its bounds over r (3, l, m) of one
-    kind of aggregate."""
+    """The table of one kind of aggregate: A / W^2 (m,), lambda (l,), and (3, l, m) the logarithms
+    of r and of its bounds over r."""
     columns = read_table(TABLE)
     rows = columns["spanned"] == spanned
     ratios = np.unique(columns["viscosity_ratio"][rows])

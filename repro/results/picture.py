@@ -15,44 +15,44 @@ from repro.results import names
 
 #: Pixels along the meshed part; across the pore at most as many.
 ALONG = 480
-#: Fields of which the first that there is is shown.
+#: Fields; the first one that the run has is shown.
 FIELDS = ("acceptor_mg_per_L", "velocity_m_per_d")
 #: Colours (red, green, blue) of the least value, of the largest, and between them: viridis.
 COLOURS = np.array([[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]])
-#: Levels of colour; one more is that of the aggregate's boundary.
+#: Levels of colour; the next one is the colour of the aggregate's boundary.
 LEVELS = 255
-#: Columns of which the first value and the last are told.
+#: Columns whose first and last values are shown.
 FIGURES = ("conductivity_m_per_d", "thickness_um", "aggregate_area_um2",
            "effluent_acceptor_mg_per_L", "effluent_donor_mg_per_L")
 
 
 def key_figures(columns: Mapping[str, np.ndarray]) -> str:
-    """First and last values of a run's columns, and when the aggregate met the opposite wall."""
+    """First and last values of a run's columns, and the time of contact with the opposite wall."""
     time = columns["time_h"]
-    told = []
+    texts = []
     for name in FIGURES:
         if name in columns:
             first, last = columns[name][[0, -1]]
             change = f" → {last:.4g}" if len(time) > 1 else ""
-            told.append(f"{names.words(name)} {first:.4g}{change} {names.unit(name)}")
+            texts.append(f"{names.words(name)} {first:.4g}{change} {names.unit(name)}")
     touching = time[columns["contact"] == 1] if "contact" in columns else time[:0]
     if len(touching):
-        told.append(f"contact with the opposite wall from t = {touching[0]:.4g} h on")
-    return f"t = {time[0]:.4g} to {time[-1]:.4g} h: {'; '.join(told)}"
+        texts.append(f"contact with the opposite wall from t = {touching[0]:.4g} h on")
+    return f"t = {time[0]:.4g} to {time[-1]:.4g} h: {'; '.join(texts)}"
 
 
 def figure(fields: Mapping[str, np.ndarray], time: float) -> str:
-    """A field at a time (h) as HTML with the picture in it; nothing where there is none to show."""
+    """A field at a time (h) as HTML with the picture in it; empty if the run has no such field."""
     name = next((name for name in FIELDS if name in fields), "")
     if not name:
         return ""
     values = fields[name]
     values = np.linalg.norm(values, axis=1) if values.ndim == 2 else values
     picture = base64.b64encode(png(fields, values)).decode("ascii")
-    told = escape(f"{names.with_unit(name)}, {values.min():.4g} (dark) to {values.max():.4g} "
+    caption = escape(f"{names.with_unit(name)}, {values.min():.4g} (dark) to {values.max():.4g} "
                   f"(light), at t = {time:.4g} h; white: boundary of the aggregate")
-    return (f'<figure><img alt="{told}" src="data:image/png;base64,{picture}">'
-            f"<figcaption>{told}</figcaption></figure>")
+    return (f'<figure><img alt="{caption}" src="data:image/png;base64,{picture}">'
+            f"<figcaption>{caption}</figcaption></figure>")
 
 
 def png(fields: Mapping[str, np.ndarray], values: np.ndarray) -> bytes:
@@ -63,8 +63,8 @@ def png(fields: Mapping[str, np.ndarray], values: np.ndarray) -> bytes:
     places = np.column_stack([np.tile(x, len(y)), np.repeat(y, len(x))])
     inside = np.zeros(len(points))
     inside[cells[fields["region"] > 0.5]] = 1.0
-    found = interpolate(points, cells, np.column_stack([values, inside]), places)
-    shades, body = found.T.reshape(2, len(y), len(x))
+    interpolated = interpolate(points, cells, np.column_stack([values, inside]), places)
+    shades, body = interpolated.T.reshape(2, len(y), len(x))
     least = values.min()
     span = values.max() - least or 1.0
     levels = np.clip((shades - least) / span * (LEVELS - 1), 0, LEVELS - 1).astype(np.uint8)
@@ -73,7 +73,7 @@ def png(fields: Mapping[str, np.ndarray], values: np.ndarray) -> bytes:
 
 
 def _pixels(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(um) x and y of the middles of square pixels over a mesh."""
+    """x and y (um) of the middles of square pixels over a mesh."""
     low, high = points.min(axis=0), points.max(axis=0)
     size = max(high - low) / ALONG
     counts = np.maximum(1, np.round((high - low) / size)).astype(int)
@@ -82,7 +82,7 @@ def _pixels(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _edges(inside: np.ndarray) -> np.ndarray:
-    """Pixels inside whose neighbour above, below or beside is not."""
+    """Pixels inside with a neighbour above, below or beside that is outside."""
     padded = np.pad(inside, 1, mode="edge")
     all_in = padded[2:, 1:-1] & padded[:-2, 1:-1] & padded[1:-1, 2:] & padded[1:-1, :-2]
     return inside & ~all_in

@@ -1,8 +1,8 @@
-"""What a reported number is: its name, with the ending of its unit, its words, its formula.
+"""Reported quantities: name, unit, words and formula.
 
-A name ends in its unit (``conductivity_m_per_d``, ``aggregate_area_um2``); one that ends in none is
-a pure number. Formulas give the package's own units (um, h, mg/L, MPa); what a unit is of these is
-told here and nowhere else.
+A name ends in its unit (``conductivity_m_per_d``, ``aggregate_area_um2``); a name without a unit is
+that of a pure number. Formulas give the package's own units (um, h, mg/L, MPa); this module alone
+converts them.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Unit:
-    """udunits: as UDUNITS (and so CF) writes it; shown: as a reader does; factor: how many there
+    """udunits: as UDUNITS (and so CF) writes it; symbol: as readers know it; factor: how many
     are in the package's own unit of the same kind."""
 
     udunits: str
-    shown: str
+    symbol: str
     factor: float = 1
 
 
@@ -35,11 +35,25 @@ PURE = Unit("1", "")
 class Quantity:
     """A reported quantity.
 
-    words: what it is called; formula: how it is made, for people to read, and value: the same for
-    the computer, in the package's own units; label: a short name, in legends and above columns;
-    needs: what must be modelled, such as "aggregate and flow" (words that :mod:`columns` or
-    :mod:`arrays` explains; empty: nothing); yes_no: does it stand for yes (1) and no (0)? signed:
-    may it be negative?
+    Parameters
+    ----------
+    name : str
+        Key in tables and files, with the unit at its end.
+    words : str
+        Name for readers.
+    formula : str
+        Definition for readers.
+    value : callable
+        The same definition in Python, in the package's own units.
+    label : str
+        Short name, for legends and heads of columns.
+    needs : str
+        Parts that the scene must model, such as "aggregate and flow": words of ``NEEDS`` in
+        :mod:`columns` or :mod:`arrays`. Empty if there are none.
+    yes_no : bool
+        Does it stand for yes (1) and no (0)?
+    signed : bool
+        May it be negative?
     """
 
     name: str
@@ -53,28 +67,29 @@ class Quantity:
 
     @property
     def unit(self) -> Unit:
-        """That its name ends in."""
+        """The unit at the end of its name."""
         return unit_of(self.name)
 
-    def reported(self, *of: Any) -> Any:
+    def reported(self, *arguments: Any) -> Any:
         """The value in the unit of the name."""
-        value = self.value(*of)
+        value = self.value(*arguments)
         return value if self.unit.factor == 1 else self.unit.factor * value
 
 
-def is_modelled(quantity: Quantity, conditions: dict[str, Callable[..., bool]], *of: Any) -> bool:
-    """Does everything hold that the quantity needs?"""
+def is_modelled(quantity: Quantity, conditions: dict[str, Callable[..., bool]],
+                *arguments: Any) -> bool:
+    """Are all parts modelled that the quantity needs?"""
     needed = quantity.needs.split(" and ") if quantity.needs else []
-    return all(conditions[word](*of) for word in needed)
+    return all(conditions[word](*arguments) for word in needed)
 
 
 def ending(name: str) -> str:
-    """The ending of a name that is a unit, the longest one; empty where there is none."""
+    """The longest ending of a name that is a unit; empty for a pure number."""
     return max((each for each in UNITS if name.endswith(each)), key=len, default="")
 
 
 def unit_of(name: str) -> Unit:
-    """The unit that a name ends in."""
+    """The unit at the end of a name."""
     return UNITS.get(ending(name), PURE)
 
 

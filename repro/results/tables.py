@@ -24,9 +24,30 @@ SHOWN = 5
 
 
 class Results(Mapping[str, np.ndarray]):
-    """Columns of a run by name, (rows,) each, a row at each reported time: those of
-    ``timeseries.csv`` that the scene models; ``status`` says how the run ended. ``to_pandas``
-    makes a data frame, ``to_xarray`` a dataset."""
+    """Rows and fields of a run: a mapping from column names to arrays, a value per reported time.
+
+    Parameters
+    ----------
+    name : str
+        Name of the scene.
+    rows : list of dict
+        Rows of ``timeseries.csv``; None where the scene does not model a column.
+    fields : sequence of mappings
+        Fields of each row, as :meth:`fields` returns them.
+    status : str
+        How the run ended.
+
+    Notes
+    -----
+    Names end in their units. Columns that the scene does not model are left out.
+
+    Examples
+    --------
+    >>> from repro import Results
+    >>> results = Results("empty", [], [], "completed")
+    >>> list(results), results.units["time_h"]
+    (['time_h'], 'h')
+    """
 
     def __init__(self, name: str, rows: list[dict[str, float | None]],
                  fields: Sequence[Mapping[str, np.ndarray]], status: str):
@@ -55,7 +76,7 @@ class Results(Mapping[str, np.ndarray]):
 
     @property
     def units(self) -> dict[str, str]:
-        """The unit of each column and field; "1" for a plain number."""
+        """Unit of each column and field; "1" for a pure number."""
         fields = next(iter(self._fields), {})
         return {name: unit(name) for name in (*self.columns, *fields)}
 
@@ -65,9 +86,24 @@ class Results(Mapping[str, np.ndarray]):
         return self.columns[TIME]
 
     def fields(self, time: float) -> Mapping[str, np.ndarray]:
-        """What is known all over the pore at a reported time (h): places_um (N, 2), triangles
-        (T, 3), or (T, 6) of quadratic ones, and values (N,), (N, 3) for vectors, or (T,) by name.
-        Raises KeyError for any other time."""
+        """Fields at a reported time.
+
+        Parameters
+        ----------
+        time : float
+            Hours.
+
+        Returns
+        -------
+        mapping of str to array
+            ``places_um`` (N, 2), ``triangles`` (T, 3), or (T, 6) if they are quadratic, and the
+            fields by name: (N,) at nodes, (N, 3) for vectors, (T,) in triangles.
+
+        Raises
+        ------
+        KeyError
+            If the time is not a reported one.
+        """
         apart = np.abs(self.time - time)
         if not (apart <= SAME_TIME).any():
             near = f"the nearest is {self.time[apart.argmin()]} h" if len(apart) else "none is"
@@ -75,19 +111,19 @@ class Results(Mapping[str, np.ndarray]):
         return self._fields[int(apart.argmin())]
 
     def to_pandas(self):
-        """A ``pandas.DataFrame`` of the columns by ``time_h``; ``attrs["units"]`` has their units.
-        Raises ImportError where pandas is not installed."""
+        """Return the columns as a ``pandas.DataFrame`` indexed by ``time_h``, with their units in
+        ``attrs["units"]``. Raises ImportError if pandas is not installed."""
         frame = _package("pandas").DataFrame(self.columns).set_index(TIME)
         frame.attrs.update(scene=self.name, status=self.status,
                            units={name: unit(name) for name in self.columns})
         return frame
 
     def to_xarray(self):
-        """An ``xarray.Dataset`` of the columns over ``time_h``, each with its ``units`` and
-        ``long_name``. Raises ImportError where xarray is not installed."""
-        told = {name: {"units": names.udunits(name), "long_name": names.words(name)}
+        """Return the columns as an ``xarray.Dataset`` over ``time_h``, each with its ``units`` and
+        ``long_name``. Raises ImportError if xarray is not installed."""
+        attributes = {name: {"units": names.udunits(name), "long_name": names.words(name)}
                 for name in self.columns}
-        columns = {name: (TIME, values, told[name]) for name, values in self.columns.items()}
+        columns = {name: (TIME, values, attributes[name]) for name, values in self.columns.items()}
         times = {TIME: columns.pop(TIME)}
         about = {"scene": self.name, "status": self.status}
         return _package("xarray").Dataset(columns, times, about)
@@ -97,23 +133,23 @@ class Results(Mapping[str, np.ndarray]):
         return f"<Results of {self.name}: {size}, {self.status}>"
 
     def _repr_html_(self) -> str:
-        """For notebooks: key figures, a picture of the last state, and a table with a line a
-        column, the first and the last times side by side."""
-        shown = list(range(len(self.time)))
-        shown = shown if len(shown) <= 2 * SHOWN else [*shown[:SHOWN], *shown[-SHOWN:]]
-        lines = [_html_row(f"{name} ({unit(name)})", column[shown])
+        """HTML for notebooks: key figures, a picture of the last state, and a table with a row per
+        column, at the first and the last times."""
+        rows = list(range(len(self.time)))
+        rows = rows if len(rows) <= 2 * SHOWN else [*rows[:SHOWN], *rows[-SHOWN:]]
+        lines = [_html_row(f"{name} ({unit(name)})", column[rows])
                  for name, column in self.items()]
-        caption = escape(f"{self.name}: {len(self.time)} rows, {len(shown)} shown; {self.status}")
+        caption = escape(f"{self.name}: {len(self.time)} rows, {len(rows)} shown; {self.status}")
         table = f"<table><caption>{caption}</caption>{''.join(lines)}</table>"
-        return f"{self._shown()}<details><summary>{caption}</summary>{table}</details>"
+        return f"{self._summary()}<details><summary>{caption}</summary>{table}</details>"
 
-    def _shown(self) -> str:
-        """Key figures and the picture of the last state; nothing of a run without rows."""
+    def _summary(self) -> str:
+        """Key figures and the picture of the last state; empty if the run has no rows."""
         if not len(self.time):
             return ""
-        known = len(self._fields) == len(self.time)
-        shown = picture.figure(self._fields[-1], self.time[-1]) if known else ""
-        return f"<p>{escape(self.name)}, {escape(picture.key_figures(self))}</p>{shown}"
+        has_fields = len(self._fields) == len(self.time)
+        image = picture.figure(self._fields[-1], self.time[-1]) if has_fields else ""
+        return f"<p>{escape(self.name)}, {escape(picture.key_figures(self))}</p>{image}"
 
 
 def _html_row(head: str, values: np.ndarray) -> str:
@@ -122,7 +158,7 @@ def _html_row(head: str, values: np.ndarray) -> str:
 
 
 def _package(name: str):
-    """An optional package. Raises ImportError, in one line, where it is not installed."""
+    """Import an optional package. Raises ImportError, in one line, if it is not installed."""
     try:
         return import_module(name)
     except ImportError:
@@ -130,12 +166,35 @@ def _package(name: str):
 
 
 def solve(scene: Source, overrides: Sequence[str] = (), unset: Sequence[str] = ()) -> Results:
-    """Run a scene, one that was loaded, or a file, a packaged name, a dict of tables, with the keys
-    of ``overrides`` ("KEY=VALUE") set and those of ``unset`` left out; keep its rows and fields, at
-    ``output.times`` or after every step.
+    """Run a scene and keep its rows and fields in memory.
 
-    Raises SceneError where it is not accepted, SimulationError where a stage fails. Memory grows
-    with the reported times.
+    Parameters
+    ----------
+    scene : Scene, str, path or dict
+        A loaded scene, a packaged name, a file, or a dict of tables.
+    overrides : sequence of str
+        "KEY=VALUE" texts that set keys of the scene.
+    unset : sequence of str
+        Keys to leave out.
+
+    Returns
+    -------
+    Results
+        Rows and fields at ``output.times``, or after every step. Memory grows with their number.
+
+    Raises
+    ------
+    SceneError
+        If the scene is not accepted.
+    SimulationError
+        If a stage fails.
+
+    Examples
+    --------
+    >>> import repro
+    >>> results = repro.solve("base", ['growth.end="0 h"'])
+    >>> results.units["conductivity_m_per_d"]
+    'm/d'
     """
     scene = load_scene(scene, overrides, unset)
     rows = []
@@ -151,6 +210,6 @@ def solve(scene: Source, overrides: Sequence[str] = (), unset: Sequence[str] = (
 
 
 def arrays(content: Grid) -> dict[str, np.ndarray]:
-    """The arrays of a grid."""
+    """The arrays of a grid by name."""
     return {"places_um": content.points[:, :2], "triangles": content.cells, **content.point_data,
             **content.cell_data}

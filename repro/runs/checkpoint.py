@@ -1,10 +1,10 @@
-"""Checkpoint files: plain data under a checksum, complete or absent, the previous one kept.
+"""Checkpoint files: plain data with a checksum. A file is complete or absent.
 
-    dupin2001-repro checkpoint 5 SHA-256 of all that follows this line
+    dupin2001-repro checkpoint 5 SHA-256 of everything after this line
     an uncompressed .npz file: the arrays, and the rest as JSON in the array "plain"
 
-Reading one executes nothing. The checksum tells what an accident has changed; it does not protect
-from somebody who forges a checkpoint together with its checksum.
+Reading a checkpoint executes nothing. The checksum detects accidental changes. It does not protect
+against a forged checkpoint with a forged checksum.
 """
 
 from __future__ import annotations
@@ -18,24 +18,24 @@ from pathlib import Path
 import numpy as np
 
 from repro.errors import CheckpointError
-from repro.results.files import MOST_DATA, is_file, read, sha256, whole
+from repro.results.files import MOST_DATA, atomic_path, is_file, read, sha256
 
-#: Where a run keeps the state that it goes on from, the one before, the last one refused, and the
-#: one from which a longer run goes on.
+#: Files of the newest checkpoint, the one before, the last refused one, and the state from which a
+#: longer run resumes.
 NEWEST = "checkpoint.state"
 PREVIOUS = "checkpoint.previous"
 REFUSED = "checkpoint.refused"
 LAST = "checkpoint.last"
 KIND, FORMAT = b"dupin2001-repro checkpoint ", b"5"
 MAGIC = KIND + FORMAT + b" "
-#: The array that has what JSON can say.
+#: The array with the JSON text.
 PLAIN = "plain"
 
 Arrays = dict[str, np.ndarray]
 
 
-def encoded(plain: dict, arrays: Arrays) -> bytes:
-    """The bytes of a checkpoint: ``plain`` is what JSON can say; the layout of arrays is kept."""
+def encode(plain: dict, arrays: Arrays) -> bytes:
+    """The bytes of a checkpoint; plain: values for JSON. The memory layout of arrays is kept."""
     text = json.dumps(plain, allow_nan=False).encode()
     file = io.BytesIO()
     np.savez(file, allow_pickle=False, **{PLAIN: np.frombuffer(text, np.uint8)}, **arrays)
@@ -43,14 +43,14 @@ def encoded(plain: dict, arrays: Arrays) -> bytes:
     return MAGIC + sha256(body).encode() + b"\n" + body
 
 
-def decoded(content: bytes) -> tuple[dict, Arrays]:
-    """What :func:`encoded` was given. Raises CheckpointError where it is not as it was written."""
-    first, _, body = content.partition(b"\n")
-    if first.startswith(KIND) and not first.startswith(MAGIC):
+def decode(content: bytes) -> tuple[dict, Arrays]:
+    """Invert :func:`encode`. Raises CheckpointError if the bytes have changed."""
+    header, _, body = content.partition(b"\n")
+    if header.startswith(KIND) and not header.startswith(MAGIC):
         raise CheckpointError(f"its format is not {FORMAT.decode()}: another version wrote it")
-    if not first.startswith(MAGIC):
+    if not header.startswith(MAGIC):
         raise CheckpointError("it does not begin as a checkpoint does")
-    if first != MAGIC + sha256(body).encode():
+    if header != MAGIC + sha256(body).encode():
         raise CheckpointError("its checksum is wrong: it was cut short or altered")
     try:
         with np.load(io.BytesIO(body), allow_pickle=False) as file:
@@ -61,28 +61,27 @@ def decoded(content: bytes) -> tuple[dict, Arrays]:
 
 
 def read_checkpoint(path: Path) -> tuple[dict, Arrays]:
-    """What :func:`encoded` was given, from a file. Raises CheckpointError where it cannot be read
-    or is not as it was written."""
+    """Decode a checkpoint file. Raises CheckpointError if it cannot be read or has changed."""
     if not is_file(path):
         raise CheckpointError("it is no regular file")
     try:
-        return decoded(read(path, MOST_DATA))
+        return decode(read(path, MOST_DATA))
     except OSError as error:
         raise CheckpointError(f"it cannot be read ({error.strerror})") from None
 
 
-def synced(path: Path) -> None:
-    """Have the system put a file on the disk."""
+def sync_to_disk(path: Path) -> None:
+    """Force the system to write a file to the disk."""
     with path.open("rb+") as file:
         os.fsync(file.fileno())
 
 
 def write(folder: Path, content: bytes) -> None:
-    """Make this the newest checkpoint of a folder, and the newest the previous one.
+    """Write the newest checkpoint of a folder; the one before becomes the previous one.
 
-    Raises OSError where the folder cannot be written.
+    Raises OSError if the folder cannot be written.
     """
-    with whole(folder / NEWEST) as beside:
+    with atomic_path(folder / NEWEST) as beside:
         with beside.open("xb") as file:
             file.write(content)
             file.flush()

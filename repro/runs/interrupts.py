@@ -1,6 +1,6 @@
 """Signals that ask a run to stop.
 
-The first one is noted, one that comes later ends the process at once.
+The first signal is recorded; a later one ends the process at once.
 """
 
 from __future__ import annotations
@@ -12,54 +12,54 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from time import monotonic
 
-ASKED = (signal.SIGINT, signal.SIGTERM)
-#: Seconds in which a signal is the first one come twice: timeout(1) and shells send it to the
-#: process and to its group.
-SAME = 1.0
+STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+#: A second signal within this time (s) is a duplicate of the first: timeout(1) and shells send one
+#: to the process and one to its group.
+DUPLICATE = 1.0
 
 
 @contextmanager
-def noted() -> Iterator[Callable[[], int]]:
-    """Within, SIGINT and SIGTERM are noted; yields what says which came first, zero while none has.
+def catch_signals() -> Iterator[Callable[[], int]]:
+    """Record SIGINT and SIGTERM; yields a function that returns the first signal's number, or 0.
 
-    A thread waits for them, so that neither a long call into compiled code nor a library that takes
-    signals for itself (Mmg) keeps them from being seen. Signals that are ignored stay so. For the
-    main thread alone.
+    A thread waits for the signals, so that neither long calls into compiled code nor a library that
+    installs its own handlers (Mmg) can delay them. Ignored signals stay ignored. Only for the main
+    thread.
     """
-    came: list[int] = []
-    when = [0.0]
+    received: list[int] = []
+    received_at = [0.0]
 
-    def note(number: int, frame=None) -> None:
-        if came and monotonic() > when[0] + SAME:
+    def handle(number: int, frame=None) -> None:
+        if received and monotonic() > received_at[0] + DUPLICATE:
             os._exit(128 + number)
-        if not came:
-            when[0] = monotonic()
-            came.append(number)
+        if not received:
+            received_at[0] = monotonic()
+            received.append(number)
 
-    kept = {number: signal.getsignal(number) or signal.SIG_DFL for number in ASKED}
-    wanted = [number for number in ASKED if kept[number] != signal.SIG_IGN]
-    for number in wanted:
-        signal.signal(number, note)
+    handlers = {number: signal.getsignal(number) or signal.SIG_DFL for number in STOP_SIGNALS}
+    signals = [number for number in STOP_SIGNALS if handlers[number] != signal.SIG_IGN]
+    for number in signals:
+        signal.signal(number, handle)
     try:
-        with _waited_for(wanted, note):
-            yield lambda: came[0] if came else 0
+        with _wait_in_thread(signals, handle):
+            yield lambda: received[0] if received else 0
     finally:
-        for number, handler in kept.items():
+        for number, handler in handlers.items():
             signal.signal(number, handler)
 
 
 @contextmanager
-def _waited_for(wanted: list[signal.Signals], note: Callable[[int], None]) -> Iterator[None]:
-    """Block the signals and wait for them in a thread, where the system can."""
-    if not wanted or not hasattr(signal, "sigwait"):
+def _wait_in_thread(signals: list[signal.Signals], handle: Callable[[int], None]) -> Iterator[None]:
+    """Block the signals and wait for them in a thread, if the system supports this."""
+    if not signals or not hasattr(signal, "sigwait"):
         yield
         return
-    awaited = [*wanted, signal.SIGUSR1]  # the last one ends the thread
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, awaited)
+    blocked = [*signals, signal.SIGUSR1]  # the last one ends the thread
+    previous_mask = signal.pthread_sigmask(signal.SIG_BLOCK, blocked)
 
     def wait() -> None:
-        while (number := signal.sigwait(awaited)) != signal.SIGUSR1:
-            note(number)
+        while (number := signal.sigwait(blocked)) != signal.SIGUSR1:
+            handle(number)
 
     thread = threading.Thread(target=wait, daemon=True)
     thread.start()
@@ -69,4 +69,4 @@ def _waited_for(wanted: list[signal.Signals], note: Callable[[int], None]) -> It
     finally:
         signal.pthread_kill(thread.ident, signal.SIGUSR1)
         thread.join()
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        signal.pthread_sigmask(signal.SIG_SETMASK, previous_mask)

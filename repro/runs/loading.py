@@ -1,4 +1,4 @@
-"""The results of a run in its folder, as :func:`repro.solve` gives them."""
+"""Load the results of a run from its folder, as :func:`repro.solve` returns them."""
 
 from __future__ import annotations
 
@@ -12,42 +12,69 @@ from repro.report import fields, reading
 from repro.results import field_files
 from repro.results.files import sha256_of
 from repro.results.tables import Results, arrays
-from repro.runs.folder import sums
+from repro.runs.folder import read_sums
 
 
 def load_run(folder: str | Path) -> Results:
-    """What a run has written in its folder, over or not: rows now, fields when they are asked for.
+    """Load the results of a run, finished or not, from its folder.
 
-    Raises OutputError where the folder holds no run, or its files are not as they were written,
-    and, when the fields of a time are asked for, where their file is missing or cannot be read.
+    Rows are read at once, the fields of a time when they are accessed.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Folder of the run.
+
+    Returns
+    -------
+    Results
+        The rows, fields and status of the run, in the units of their names.
+
+    Raises
+    ------
+    OutputError
+        If the folder holds no run, or its files have changed since they were written. Accessing the
+        fields of a time raises it if their file is missing or cannot be read.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import repro
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     _ = repro.run("flow_only", folder)
+    ...     results = repro.load_run(folder)
+    >>> results.status
+    'completed'
     """
     try:
         run = reading.read(Path(folder))
         reading.require_columns(run)
         reading.require_lists(run)
-        listed = dict(fields.listed(run.folder))
+        listed_fields = dict(fields.listed_files(run.folder))
     except ValueError as error:
         raise OutputError(str(error)) from None
-    rows = [dict(zip(run.series, map(_known, values)))
+    rows = [dict(zip(run.series, map(_none_if_nan, values)))
             for values in np.column_stack(list(run.series.values())).tolist()]
-    files = _Files(run.folder, run.times, listed)
+    files = _Files(run.folder, run.times, listed_fields)
     return Results(str(run.record.get("scene")), rows, files, str(run.record.get("status")))
 
 
-def _known(value: float) -> float | None:
-    """A value of a table; None where there is none."""
+def _none_if_nan(value: float) -> float | None:
+    """A value of a table, or None if it is NaN."""
     return None if np.isnan(value) else value
 
 
 class _Files(Sequence[dict[str, np.ndarray]]):
-    """The arrays of the fields of each row, read from its file when they are asked for; the file is
-    the one of the row's time. As many as there are; iterated over are those alone."""
+    """The arrays of the fields of each row, read from the file of its time when accessed.
+
+    The length is the number of existing files, and iteration covers only these.
+    """
 
     def __init__(self, folder: Path, times: np.ndarray, files: dict[float, Path]):
         self.folder = folder
         self.times = times
         self.files = files
-        self.sums = sums(folder)
+        self.sums = read_sums(folder)
 
     def __len__(self) -> int:
         return sum(path.is_file() for path in self.files.values())
@@ -65,7 +92,7 @@ class _Files(Sequence[dict[str, np.ndarray]]):
         return (self._read(path) for path in self.files.values() if path.is_file())
 
     def _read(self, path: Path) -> dict[str, np.ndarray]:
-        """The arrays of a file, if it is as it was written."""
+        """The arrays of a file. Raises OutputError if it has changed or cannot be read."""
         try:
             if sha256_of(path) != self.sums.get(f"fields/{path.name}"):
                 raise ValueError("the file is not as it was written: cut short or altered")

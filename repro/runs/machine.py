@@ -1,4 +1,5 @@
-"""What a run needs of a machine, and what its numbers could depend on besides its scene."""
+"""Packages that a run needs, and the conditions that its numbers may depend on besides its scene.
+"""
 
 from __future__ import annotations
 
@@ -18,9 +19,9 @@ import shapely
 from repro.scene import Scene, SceneError
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-#: The rooms that compute the numbers of a run.
+#: The packages that compute the numbers of a run.
 ROOMS = ("scene", "fem", "model", "march", "results")
-#: A docstring, which is alone on its lines, a comment, or another string, which may look like them.
+#: A docstring alone on its lines, a comment, or another string, which may look like either.
 REMARK = re.compile(r"""
     (?P<indent>^[ ]*)r?\"{3}(?:[^\\]|\\.)*?\"{3}[ ]*$
     | [ ]*\#[^\n]*
@@ -28,12 +29,12 @@ REMARK = re.compile(r"""
                 | \"(?:[^"\\\n]|\\.)*\" | '(?:[^'\\\n]|\\.)*' )
     """, re.VERBOSE | re.MULTILINE | re.DOTALL)
 EMPTY = re.compile(r"\n\s*\n")
-#: {(key of numerics, choice): the optional package that makes it}
+#: {(key of numerics, choice): the optional package that it needs}
 OPTIONAL = {("ordering", "metis"): "pymetis", ("solver", "pardiso"): "pypardiso"}
 
 
 def require_packages(scene: Scene) -> None:
-    """Raises SceneError where a scene chooses what takes a package that is not installed."""
+    """Raise SceneError if a scene needs an optional package that is not installed."""
     for (key, choice), package in OPTIONAL.items():
         if getattr(scene.numerics, key) == choice and find_spec(package) is None:
             raise SceneError(f'{scene.name}: numerics.{key} = "{choice}": the package {package} is '
@@ -42,8 +43,8 @@ def require_packages(scene: Scene) -> None:
 
 @cache
 def source_hash() -> str:
-    """8 hexadecimal digits that stand for the source of the rooms that compute numbers, without
-    its docstrings and comments."""
+    """Hash (8 hexadecimal digits) of the source that computes numbers, without docstrings and
+    comments."""
     digest = hashlib.sha256()
     package = Path(__file__).parents[1]
     paths = [path for room in ROOMS for path in (package / room).rglob("*.py")]
@@ -54,7 +55,7 @@ def source_hash() -> str:
 
 
 def statements(source: str) -> str:
-    """A source without comments and empty lines, with ``...`` for each docstring."""
+    """Source text without comments and empty lines, with ``...`` for each docstring."""
     return EMPTY.sub("\n", REMARK.sub(_without_remark, source)).strip()
 
 
@@ -65,14 +66,15 @@ def _without_remark(match: re.Match) -> str:
 
 
 def conditions() -> dict:
-    """For ``run.json``: runs under equal ones are equal bit for bit."""
+    """The conditions of a run, for ``run.json``. Runs under equal conditions are equal bit for bit.
+    """
     built: Any = np.show_config(mode="dicts")
     blas = built["Build Dependencies"]["blas"]
     return {"system": platform.system(), "machine": platform.machine(),
             "libc": " ".join(platform.libc_ver()), "blas": f"{blas['name']} {blas['version']}",
             "simd": built["SIMD Extensions"].get("found", []),
             "geos": shapely.geos_version_string, "source": source_hash(),
-            "optional": {name: found for name in OPTIONAL.values() if (found := _version(name))},
+            "optional": {name: number for name in OPTIONAL.values() if (number := _version(name))},
             "threads": {name: os.environ[name] for name in THREADS if name in os.environ}}
 
 
@@ -84,12 +86,12 @@ def _version(name: str) -> str | None:
 
 
 def differences(before: dict, after: dict) -> dict[str, list]:
-    """{key: [before, after]} of what is not the same, keys of tables within dotted."""
-    found: dict[str, list] = {}
+    """{key: [before, after]} of all values that differ; keys of nested tables are dotted."""
+    changes: dict[str, list] = {}
     for key in sorted(before.keys() | after.keys()):
-        one, two = before.get(key), after.get(key)
-        if isinstance(one, dict) and isinstance(two, dict):
-            found |= {f"{key}.{name}": pair for name, pair in differences(one, two).items()}
-        elif one != two:
-            found[key] = [one, two]
-    return found
+        old, new = before.get(key), after.get(key)
+        if isinstance(old, dict) and isinstance(new, dict):
+            changes |= {f"{key}.{nested}": pair for nested, pair in differences(old, new).items()}
+        elif old != new:
+            changes[key] = [old, new]
+    return changes

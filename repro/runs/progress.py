@@ -1,8 +1,7 @@
-"""What a run says while it runs.
+"""Messages of a run in progress: a bar on a terminal, lines elsewhere, JSON, or nothing.
 
-A bar on a terminal, lines elsewhere, JSON for machines, or nothing.
-Each is a context that yields what :class:`repro.runs.running.Watch` calls ``tell``.
-Warnings go to standard error always.
+Each is a context that yields the function ``tell`` of :class:`repro.runs.execution.Watch`. Warnings
+always go to standard error.
 """
 
 from __future__ import annotations
@@ -20,18 +19,18 @@ from typing import TextIO
 from repro.errors import OutputError
 
 Tell = Callable[[dict], None]
-#: Seconds between signs of life on a terminal, and without a word elsewhere: at first, and at most.
+#: Seconds between updates of the bar, and between lines: at first, and at most.
 TICK = 0.5
 SILENCE = 1.0
 LONGEST = 1.5
-#: The bar, and what takes its place on a terminal with fewer columns.
+#: The bar, and its replacement on a terminal with fewer columns.
 WIDE = ("{desc} {percentage:3.0f}%|{bar}| {n:.1f} of {total:.1f} h "
         "[{elapsed} < {remaining}{postfix}]")
 NARROW, NARROWEST = "{desc:.12s} {n:.1f}/{total:.1f} h {elapsed}<{remaining}{postfix}", 80
 
 
-def told(quiet: bool, machine: bool):
-    """The context that suits: for a person, unless asked for quiet or JSON."""
+def display_events(quiet: bool, machine: bool):
+    """Choose the context: JSON if machine, only warnings if quiet, else a bar or lines."""
     if machine:
         return nullcontext(in_json)
     if quiet:
@@ -40,43 +39,42 @@ def told(quiet: bool, machine: bool):
 
 
 def printable(text: str) -> str:
-    """The text on one line, without what would command a terminal."""
+    """The text on one line, without control characters."""
     return "".join(letter if letter.isprintable() else " " for letter in text)
 
 
-def say(text: str, *, aside: bool = False) -> None:
-    """A line on standard output, or aside on standard error, while anybody reads that.
+def say(text: str, *, to_stderr: bool = False) -> None:
+    """Print a line to standard output, or to standard error.
 
-    When the other end of a pipe is closed, what follows goes nowhere, at the end of the process
-    too. Raises OutputError where standard output takes nothing more, as on a full disk; what is
-    said aside is then lost.
+    After the reader of a pipe has closed it, further output is discarded. Raises OutputError if
+    standard output fails otherwise, such as on a full disk; errors of standard error are ignored.
     """
-    stream = sys.stderr if aside else sys.stdout
+    stream = sys.stderr if to_stderr else sys.stdout
     try:
         print(text, file=stream, flush=True)
     except OSError as error:
-        _lead_nowhere(stream)
-        if not aside and not isinstance(error, BrokenPipeError):
+        _discard_output(stream)
+        if not to_stderr and not isinstance(error, BrokenPipeError):
             raise OutputError(f"standard output: {error.strerror or error}") from error
 
 
-def _lead_nowhere(stream: TextIO) -> None:
-    """Have what is written to a stream from now on, and what waits to be, thrown away."""
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, stream.fileno())
-    os.close(nowhere)
+def _discard_output(stream: TextIO) -> None:
+    """Discard all buffered and further output of a stream."""
+    null_device = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(null_device, stream.fileno())
+    os.close(null_device)
 
 
 def in_json(event: dict) -> None:
-    """A line of JSON on standard output; warnings on standard error too."""
+    """Print an event as a line of JSON to standard output; warnings also to standard error."""
     say(json.dumps(event))
     only_warnings(event)
 
 
 def only_warnings(event: dict) -> None:
-    """Nothing but warnings."""
+    """Print warnings, and ignore all other events."""
     if event["event"] == "warning":
-        say(_warning(event), aside=True)
+        say(_warning(event), to_stderr=True)
 
 
 def _warning(event: dict) -> str:
@@ -85,72 +83,75 @@ def _warning(event: dict) -> str:
 
 @contextmanager
 def in_lines() -> Iterator[Tell]:
-    """A line each tenth of the simulated time, where SILENCE s have passed without one, and at the
-    end; up to LONGEST s may pass, a fiftieth of the time since the start, so that a log is short.
+    """Print a line after each tenth of the simulated time, after a silence, and at the end.
+
+    The silence is a fiftieth of the wall time, between SILENCE and LONGEST (s), so that a log is
+    short.
     """
-    begun = said = monotonic()
+    begun = printed_at = monotonic()
     reached = 0
-    now: dict = {}
+    last_step: dict = {}
 
     def line(more: str = "") -> None:
-        nonlocal said
-        said = monotonic()
-        say(f"{now['time_h']:g} of {now['end_h']:g} h simulated{more}", aside=True)
+        nonlocal printed_at
+        printed_at = monotonic()
+        say(f"{last_step['time_h']:g} of {last_step['end_h']:g} h simulated{more}", to_stderr=True)
 
     def tell(event: dict) -> None:
-        nonlocal reached, now
+        nonlocal reached, last_step
         only_warnings(event)
-        _begin_and_end(event, partial(say, aside=True))
+        _report_start_and_end(event, partial(say, to_stderr=True))
         if event["event"] == "step":
-            now = event
+            last_step = event
             tenth = int(10 * event["time_h"] / event["end_h"] + 1e-9) if event["end_h"] else 0
             if tenth > reached:
                 reached = tenth
                 line()
 
     def tick() -> None:
-        if now and monotonic() - said > min(LONGEST, max(SILENCE, (monotonic() - begun) / 50)):
-            contact = ", contact" if now["contact"] else ""
-            line(f", step {now['step']}{contact}, {monotonic() - begun:.0f} s")
+        silence = min(LONGEST, max(SILENCE, (monotonic() - begun) / 50))
+        if last_step and monotonic() - printed_at > silence:
+            contact = ", contact" if last_step["contact"] else ""
+            line(f", step {last_step['step']}{contact}, {monotonic() - begun:.0f} s")
 
-    with _ticking(tick):
+    with _call_regularly(tick):
         yield tell
 
 
 @contextmanager
-def _ticking(tick: Callable[[], None]) -> Iterator[None]:
-    """Within, have something done every TICK s, in the midst of a step too."""
-    over = Event()
+def _call_regularly(tick: Callable[[], None]) -> Iterator[None]:
+    """Call a function every TICK s, also during a step."""
+    finished = Event()
 
-    def run() -> None:
-        while not over.wait(TICK):
+    def tick_until_finished() -> None:
+        while not finished.wait(TICK):
             tick()
 
-    thread = Thread(target=run, daemon=True)
+    thread = Thread(target=tick_until_finished, daemon=True)
     thread.start()
     try:
         yield
     finally:
-        over.set()
+        finished.set()
         thread.join()
 
 
-def _begin_and_end(event: dict, aside: Callable[[str], None]) -> None:
-    """What a person is told when a run goes on, and when it is over."""
+def _report_start_and_end(event: dict, say_aside: Callable[[str], None]) -> None:
+    """Report that a run resumes, and how it ended."""
     if event["event"] == "start" and event["from_h"] > 0:
-        aside(f"{printable(event['scene'])}: goes on from t = {event['from_h']:g} h, "
+        say_aside(f"{printable(event['scene'])}: goes on from t = {event['from_h']:g} h, "
               f"step {event['step']}")
     if event["event"] == "end" and not event["status"].startswith(("failed", "interrupted")):
-        before = "" if event["changed"] else ", before this: nothing to do"
-        say(f"{printable(event['scene'])}: {event['status']}{before}; results in {event['folder']}")
+        suffix = "" if event["changed"] else ", before this: nothing to do"
+        say(f"{printable(event['scene'])}: {event['status']}{suffix}; results in {event['folder']}")
 
 
 @contextmanager
 def on_a_terminal() -> Iterator[Tell]:
-    """A bar with simulated time, steps, remeshes, contact, and the time that is left."""
+    """Show a bar with simulated time, steps, remeshes, contact, and the remaining time."""
     from tqdm import tqdm
 
-    # miniters: else the bar waits for as much simulated time as the first steps have made
+    # with another miniters the bar waits for as much simulated time as in the first steps
     with tqdm(total=1.0, bar_format=WIDE, dynamic_ncols=True, delay=1e-3, miniters=0) as bar:
         def tell(event: dict) -> None:
             if event["event"] == "start":
@@ -164,14 +165,14 @@ def on_a_terminal() -> Iterator[Tell]:
                 bar.write(_warning(event), file=sys.stderr)
             elif event["event"] == "end":
                 bar.close()
-            _begin_and_end(event, lambda line: bar.write(line, file=sys.stderr))
+            _report_start_and_end(event, lambda line: bar.write(line, file=sys.stderr))
 
-        with _ticking(bar.refresh):
+        with _call_regularly(bar.refresh):
             yield tell
 
 
 def _fit(bar, event: dict) -> None:
-    """Have steps, remeshes and contact told in as many words as the terminal has room for."""
+    """Fit the numbers of steps and remeshes, and contact, to the width of the terminal."""
     narrow = os.get_terminal_size(sys.stderr.fileno()).columns < NARROWEST
     bar.bar_format = NARROW if narrow else WIDE
     words = "mesh" if narrow else "remeshes"

@@ -1,4 +1,4 @@
-"""How a run has ended: the ``status`` in its ``run.json``, and which ones there are."""
+"""The ``status`` of a run in its ``run.json``."""
 
 from __future__ import annotations
 
@@ -7,23 +7,23 @@ import re
 COMPLETED = "completed"
 RUNNING = "running"
 INTERRUPTED = "interrupted"
-#: How a status begins that goes on with the reason.
+#: Prefix of a status that states the reason of a failure.
 FAILED = "failed: "
 TIME = r"t = \d+(?:\.\d+)?(?:e[+-]\d+)? h"
-#: The statuses of a run that the model itself ends, and when: :class:`repro.errors.RunEnd`.
+#: The statuses of a run that the model itself ends: :class:`repro.errors.RunEnd`.
 RUN_ENDS = (re.compile("the aggregate reaches the pore's (?:up|down)stream end "
                        f"(?:at|in the step from) {TIME}"),
             re.compile(f"the aggregate's surface folds in the step from {TIME}: near x = .*"))
 
 
-def done(status: str | None) -> bool:
-    """Has the run come to its end, the scene's or the model's?"""
+def is_over(status: str | None) -> bool:
+    """Has the run reached the end of its scene or of the model?"""
     if status is None:
         return False
     return status == COMPLETED or any(end.fullmatch(status) for end in RUN_ENDS)
 
 
-def undone(status: str | None) -> bool:
-    """Is there something left to run? A run at work says so too."""
+def is_unfinished(status: str | None) -> bool:
+    """Is the run still running, interrupted or failed?"""
     return status is not None and (
         status in (RUNNING, INTERRUPTED) or status.startswith(FAILED))

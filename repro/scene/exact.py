@@ -1,7 +1,7 @@
-"""The units that scenes are written in, as exact fractions of SI units, and their products.
+"""Common units of scenes as exact fractions of SI units, and their products.
 
-What is not here is left to pint (:mod:`repro.scene.units`), which knows every unit and takes half a
-second to say so. Each factor is pint's, which a test holds.
+:mod:`repro.scene.units` converts all other units with pint, whose import takes half a second. A
+test compares each factor with that of pint.
 """
 import re
 from fractions import Fraction
@@ -16,7 +16,7 @@ FACTOR = re.compile(r"(?P<sign>[*/ ]*)(?P<name>[^\W\d_]+)(?:(?:\^|\*\*)(?P<power
 
 
 class Unit(NamedTuple):
-    """`size` in m^length kg^mass s^time."""
+    """A unit of `size` m^length kg^mass s^time."""
 
     size: Fraction
     length: int = 0
@@ -48,7 +48,7 @@ LITER = Unit(Fraction(1, 1000), length=3)
 NEWTON = Unit(Fraction(1), length=1, mass=1, time=-2)
 PASCAL = Unit(Fraction(1), length=-1, mass=1, time=-2)
 DAY = SECOND._replace(size=Fraction(86_400))
-#: Every spelling known here.
+#: Every known spelling.
 UNITS: dict[str, Unit] = {
     **_prefixed("m", METER, SHORT),
     **_prefixed("meter meters metre metres", METER, LONG),
@@ -75,27 +75,27 @@ UNITS: dict[str, Unit] = {
 }
 
 
-def conversion(given: str, unit: str) -> Fraction | None:
+def conversion(from_unit: str, unit: str) -> Fraction | None:
     """How many of `unit` the unit `given` is; None where either has a unit that is not known here.
 
-    Both are products and quotients such as "mg/L", "1/day", "m^2 s^-1". Raises ValueError where
-    they are of different dimensions.
+    Both are products and quotients such as "mg/L", "1/day", "m^2 s^-1". Raises ValueError if
+    their dimensions differ.
     """
-    one = _product(given)
+    one = _product(from_unit)
     other = _product(unit)
     if one is None or other is None:
         return None
     if one[1:] != other[1:]:
-        raise ValueError(f"{given} is not convertible to {unit}")
+        raise ValueError(f"{from_unit} is not convertible to {unit}")
     return one.size / other.size
 
 
 def _product(text: str) -> Unit | None:
-    """The unit that a product of units is, from left to right; None where one is not known."""
-    made = Unit(Fraction(1))
+    """Evaluate a product of units from left to right; None if a unit is unknown."""
+    product = Unit(Fraction(1))
     for factor in FACTOR.finditer(text.removeprefix("1")):
         if factor["name"] not in UNITS:
             return None
         power = int(factor["power"] or 1)
-        made = made.by(UNITS[factor["name"]] ** (-power if "/" in factor["sign"] else power))
-    return made
+        product = product.by(UNITS[factor["name"]] ** (-power if "/" in factor["sign"] else power))
+    return product

@@ -1,21 +1,21 @@
-"""Where the tables of a scene come from: a file, or a packaged one, and --set and --unset."""
+"""Read the tables of a scene from a file or a packaged scene, and apply --set and --unset."""
 import os
 import re
 import tomllib
 from importlib import resources
 from pathlib import Path
 
-from repro.scene.reading import Place, did_you_mean, elsewhere, shown
+from repro.scene.reading import Place, did_you_mean, elsewhere, quote
 from repro.scene.units import SceneError, nearest
 
 LONGEST_LINE = 80  # characters of a line of a file in a message
-#: Bytes of a file: those of an outline and of tables, each as long as is accepted, are 245 000;
-#: tomllib takes up to 400 times as much memory.
+#: Largest size of a file (bytes). The longest accepted outline and tables take 245 000 bytes;
+#: tomllib needs up to 400 times as much memory.
 LARGEST = 300_000
 MOST_PARTS = 8  # of a dotted key; tomllib's memory grows with their square
 #: A value with a unit, without quotes.
 BARE = re.compile(r"=\s*[-+.\d][-+.\deE]*\s*[A-Za-z\u00b5\u03bc]")
-#: Pieces of TOML, without backtracking: what may be a part of a key, a dot, and all else.
+#: Tokens of TOML, without backtracking: possible parts of a key, dots, and the rest.
 TOKEN = re.compile(
     r'''(?P<blank>[ \t]++)|(?P<dot>\.)|(?P<comment>\#[^\n]*+)
     |"""(?:[^"\\]|\\.|"(?!""))*+(?:"{3,5})?|'{3}(?:[^']|'(?!''))*+(?:'{3,5})?
@@ -24,7 +24,7 @@ TOKEN = re.compile(
 
 
 def packaged_scenes() -> tuple[str, ...]:
-    """The names of the scenes that come with the package."""
+    """Names of the packaged scenes."""
     names = [path.name for path in _folder().iterdir()]
     return tuple(sorted(name.removesuffix(".toml") for name in names if name.endswith(".toml")))
 
@@ -34,7 +34,7 @@ def _folder():
 
 
 def read_text(file: str) -> str:
-    """The text of a packaged scene or of a file; SceneError if there is none."""
+    """Read the text of a packaged scene or of a file; SceneError if it cannot be read."""
     try:
         return _content(file).decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -47,9 +47,9 @@ def _content(file: str) -> bytes:
     if file in names:
         return _folder().joinpath(f"{file}.toml").read_bytes()
     if not os.path.isfile(file):
-        found = "a directory, not" if os.path.isdir(file) else "neither a file nor"
+        reason = "a directory, not" if os.path.isdir(file) else "neither a file nor"
         hint = did_you_mean(nearest(file, names))
-        raise SceneError(f"{file}: {found} a packaged scene ({', '.join(names)}){hint}")
+        raise SceneError(f"{file}: {reason} a packaged scene ({', '.join(names)}){hint}")
     try:
         with Path(file).open("rb") as opened:
             content = opened.read(LARGEST + 1)
@@ -62,7 +62,7 @@ def _content(file: str) -> bytes:
 
 
 def read_tables(file: str) -> dict:
-    """The tables of a packaged scene or of a file; SceneError if it is not TOML."""
+    """Read the tables of a packaged scene or of a file; SceneError if it is not TOML."""
     text = read_text(file)
     deep = line_of_a_deep_key(text)
     if deep:
@@ -78,7 +78,7 @@ def read_tables(file: str) -> dict:
 
 
 def line_of_a_deep_key(text: str) -> int:
-    """The number of the first line with a key of more parts than MOST_PARTS; 0 without one."""
+    """Number of the first line with a key of more than MOST_PARTS parts; 0 without one."""
     dots = 0
     for token in TOKEN.finditer(text):
         kind = token.lastgroup
@@ -91,12 +91,12 @@ def line_of_a_deep_key(text: str) -> int:
 
 
 def _line_of(text: str, message: str) -> str:
-    """The line that the parser's message speaks of, if it does of one."""
+    """The line that the parser's message names, or an empty text."""
     lines = text.replace("\r\n", "\n").split("\n")
-    found = re.search(r"\(at line (\d+)", message)
-    if found is None:
+    line_number = re.search(r"\(at line (\d+)", message)
+    if line_number is None:
         return ""
-    line = lines[int(found[1]) - 1].strip()
+    line = lines[int(line_number[1]) - 1].strip()
     quotes = '; a value with a unit stands in quotes, such as width = "50 um"'
     hint = quotes if BARE.search(line) else ""
     return f": {line if len(line) <= LONGEST_LINE else line[:LONGEST_LINE - 3] + '...'}{hint}"
@@ -108,42 +108,42 @@ def key_of(entry: str) -> str:
 
 
 def leave_out(tables: dict, key: str, file: str, known: tuple[str, ...]) -> None:
-    """Take a dotted key, or a section, out of the tables. Raises SceneError if it is not there."""
+    """Remove a dotted key or a section from the tables. Raises SceneError if it is absent."""
     *above, last = key_of(key).split(".")
     table: object = tables
     for part in above:
         table = table.get(part) if isinstance(table, dict) else None
     if not isinstance(table, dict) or last not in table:
         hint = did_you_mean("" if key_of(key) in known else elsewhere(key_of(key)[:60], known))
-        raise SceneError(f"{file}: --unset {shown(key)}: the scene does not set it{hint}")
+        raise SceneError(f"{file}: --unset {quote(key)}: the scene does not set it{hint}")
     del table[last]
 
 
 def override(tables: dict, entry: str, file: str, known: tuple[str, ...]) -> None:
-    """Set one "KEY=VALUE" in the tables; known: every dotted key."""
+    """Set one "KEY=VALUE" in the tables; known: all dotted keys."""
     equals, text = entry.partition("=")[1:]
     path = key_of(entry).split(".")
     if not equals or not all(path):
         typed = ".".join(part for part in path if part)[:60]
         near = elsewhere(typed, known)
         hint = did_you_mean("" if near == typed else near)
-        raise SceneError(f"{file}: --set {shown(entry)}: KEY=VALUE is needed, such as "
+        raise SceneError(f"{file}: --set {quote(entry)}: KEY=VALUE is needed, such as "
                          f'pore.width="50 um"{hint}')
     if len(path) > MOST_PARTS:
-        raise SceneError(f"{file}: --set {shown(entry)}: a key of at most {MOST_PARTS} parts "
+        raise SceneError(f"{file}: --set {quote(entry)}: a key of at most {MOST_PARTS} parts "
                          "is needed")
     place = Place(file)
     for part in path[:-1]:
         tables, place = tables.setdefault(part, {}), place.below(part)
         if not isinstance(tables, dict):
             hint = did_you_mean(place.key if place.key in known else "")
-            wanted = f"it takes no keys, so that --set {shown(entry)} is not accepted{hint}"
-            raise place.refuse(tables, wanted)
+            requirement = f"it takes no keys, so that --set {quote(entry)} is not accepted{hint}"
+            raise place.refuse(tables, requirement)
     tables[path[-1]] = _toml_value(text.strip())
 
 
 def _toml_value(text: str) -> object:
-    """The TOML value that a text is, or the text itself."""
+    """Parse a text as a TOML value; if that fails, return the text."""
     if line_of_a_deep_key(text):
         return text
     try:

@@ -1,11 +1,11 @@
-"""What a scene says: its sections are the physics that runs, its defaults are Table 1 of the paper.
+"""The keys of a scene: its sections are the physics that runs, its defaults Table 1 of the paper.
 
-A scene is a TOML file, or the name of a packaged one, with units in its values. The dataclasses
-below are the only place where its keys, defaults, units, accepted ranges and sources are written
-down; reading, checking, writing and `repro scene` go through them. Their floats are in the units of
-the package (`repro.scene.units`): um, h, mg/L, head in um, MPa, rad. A section that a scene leaves
-out is None and its physics is not run, but for `pore`, `numerics` and `output`, which have
-defaults, and `kinetics`, which comes with substrates and aggregate. [En] are the ambiguities of
+A scene is a TOML file or the name of a packaged scene, with units in its values. The dataclasses
+below are the only definition of its keys, defaults, units, accepted ranges and sources; reading,
+checking, writing and `repro scene` use them. Their floats are in the units of the package
+(`repro.scene.units`): um, h, mg/L, head in um, MPa, rad. A section that a scene leaves out is None,
+and its physics does not run. Exceptions are `pore`, `numerics` and `output`, which have defaults,
+and `kinetics`, which comes with substrates and aggregate. [En] are the ambiguities of
 `reference/ERRATA.md`.
 """
 import hashlib
@@ -19,10 +19,10 @@ from math import inf
 from pathlib import Path
 from typing import ClassVar
 
-from repro.scene.course import Course, constant, courses
 from repro.scene.files import key_of, leave_out, override, packaged_scenes, read_tables
 from repro.scene.reading import Place, dotted, entries, read_table, toml, write_table
 from repro.scene.rules import rules
+from repro.scene.time_table import TimeTable, constant, time_tables
 from repro.scene.units import (
     ACUTE,
     BELOW_1,
@@ -35,7 +35,6 @@ from repro.scene.units import (
     UP_TO_20,
     SceneError,
     choice,
-    course,
     flag,
     number,
     points,
@@ -43,13 +42,14 @@ from repro.scene.units import (
     required,
     section,
     share,
+    timed_quantity,
     times,
 )
 
 __all__ = ["Scene", "SceneError", "load_scene", "packaged_scenes", "parse_scene", "scene_hash",
            "scene_tables"]
 
-OURS = "Not in the paper"
+NOT_IN_PAPER = "Not in the paper"
 SEED_RADIUS = 5.0  # um, Table 1
 LAMBDA = 2000.0  # Table 1
 RATIO = 1.52  # F, mg/mg, Table 1
@@ -78,16 +78,16 @@ class Aggregate:
         about="R_0 of the seed, a half-disc on the lower wall; either this or outline",
         source="Table 1")
     position: float = quantity(
-        "0 um", "um", EITHER_SIGN, source=OURS,
+        "0 um", "um", EITHER_SIGN, source=NOT_IN_PAPER,
         about="x of the middle of the half-disc; 0 is the middle of the pore")
     outline: tuple[tuple[float, float], ...] | None = points(
         about="The seed's surface instead of a half-disc: both ends on the lower wall (y = 0), the "
         "upstream one first; points with y = pore.width are contact with the upper wall",
-        source=OURS)
+        source=NOT_IN_PAPER)
     smooth: bool = flag(about="A spline through the points of outline, or straight lines",
-                        source=OURS)
+                        source=NOT_IN_PAPER)
     inert_fraction: float = number(
-        0.0, BELOW_1, source=OURS,
+        0.0, BELOW_1, source=NOT_IN_PAPER,
         about="Share of X_I in the biomass at t = 0, where X_A + X_I = X_m")
 
     def __post_init__(self):
@@ -96,11 +96,11 @@ class Aggregate:
 
 
 def _interpolate(section: "Flow | Substrate", *keys: str) -> None:
-    """Tell the tables of a section how they are interpolated."""
+    """Set the interpolation of the tables of a section."""
     linear = section.interpolation == "linear"
     for key in keys:
         table = getattr(section, key)
-        if isinstance(table, Course):
+        if isinstance(table, TimeTable):
             object.__setattr__(section, key, replace(table, linear=linear))
 
 
@@ -113,14 +113,14 @@ class Flow:
     does not ask for is None.
     """
 
-    head: float | None = course(
+    head: float | None = timed_quantity(
         "1e-3 cm", "um", default=None, source="(6), section 4",
         about="Head lost over the whole pore; either this or mean_velocity")
-    mean_velocity: float | None = course(
+    mean_velocity: float | None = timed_quantity(
         "2.9 m/day", "um/h", NON_NEGATIVE, default=None, source="(3), section 4",
         about="u_ave, mean over the width; either this or head")
     interpolation: str = choice(
-        "steps", "linear", source=OURS,
+        "steps", "linear", source=NOT_IN_PAPER,
         about="Between the times of a table of head or mean_velocity: jumps, or an even change")
     biomass: str = choice(
         "viscous", "brinkman", source="2.1; the other one is discussed in 5",
@@ -130,7 +130,7 @@ class Flow:
         LAMBDA, source="2.1, Table 1", stated="default 2000 with biomass = \"viscous\"",
         default=None, about="lambda, viscosity of the aggregate over that of water")
     permeability: float | None = quantity(
-        "1e-15 m^2", "um^2", default=None, source=OURS,
+        "1e-15 m^2", "um^2", default=None, source=NOT_IN_PAPER,
         about="Of the aggregate, with biomass = \"brinkman\"; at least 1e-11 pore.width^2")
     kinematic_viscosity: float = quantity("0.01003 cm^2/s", "um^2/h", about="nu of water",
                                           source="(1), Table 1")
@@ -153,10 +153,11 @@ class Substrate:
     a table, a number in what `Scene.at` returns.
     """
 
-    supply: float = course("10 mg/L", "mg/L", NON_NEGATIVE, source="(11), section 4 (10 K_s)",
+    supply: float = timed_quantity("10 mg/L", "mg/L", NON_NEGATIVE,
+                                   source="(11), section 4 (10 K_s)",
                            about="C_supply of the water that comes in, and of all water at t = 0")
     interpolation: str = choice(
-        "steps", "linear", source=OURS,
+        "steps", "linear", source=NOT_IN_PAPER,
         about="Between the times of a table of supply: jumps, or an even change")
     half_saturation: float = quantity(
         "1.0 mg/L", "mg/L", about="K_s of Monod's law", source="(7)-(10), Table 1")
@@ -207,7 +208,7 @@ class Substrates:
         Acceptor, about="The electron acceptor, oxygen", source="(7), Table 1")
     donor: Substrate = section(Donor, about="The electron donor, phenol", source="(8), Table 1")
     boundary: str = choice(
-        "open", "closed", source=OURS,
+        "open", "closed", source=NOT_IN_PAPER,
         about="Without [flow] the pore's ends hold the supply, or let nothing pass")
 
 
@@ -299,7 +300,7 @@ class Numerics:
     time: str = choice(
         "updates", "midpoint", source="Section 2, 3.3 have updates",
         about="Every growth.time_step, or second-order steps as long as tolerance allows")
-    tolerance: float = number(0.01, UP_TO_1, source=OURS,
+    tolerance: float = number(0.01, UP_TO_1, source=NOT_IN_PAPER,
                               about="Of a midpoint step: change of the growth rate, times the step")
     transport: str = choice(
         "quasi_steady", "gear", source="2.2; 3.3 has gear",
@@ -317,9 +318,9 @@ class Numerics:
         "local", "mean", source="(11) [E4]", about="u_x(y) or u_ave in the inlet condition")
     fixed_point: str = choice("kept", "rechosen", source="2.3.3 [E20]",
                               about="Which point of a contact surface stays in place")
-    solver: str = choice("superlu", "pardiso", source=OURS,
+    solver: str = choice("superlu", "pardiso", source=NOT_IN_PAPER,
                          about="Of linear systems; the second needs the package pypardiso")
-    ordering: str = choice("degree", "metis", source=OURS,
+    ordering: str = choice("degree", "metis", source=NOT_IN_PAPER,
                            about="Of nodes before SuperLU; the second needs the package pymetis")
     refinement: float = number(
         1.0, UP_TO_20, source="3.1 [E13]", about="Element sizes are divided by it")
@@ -327,11 +328,11 @@ class Numerics:
         0.25, FRACTION, source="3.1 [E13]",
         about="Growth of element sizes with distance from the aggregate; 0: one size everywhere")
     contact_elements: float = number(
-        0.0, FROM_0_TO_10, source=OURS,
+        0.0, FROM_0_TO_10, source=NOT_IN_PAPER,
         about="Elements to growth.minimum_film beside the contact lines with the opposite wall, "
               "2 at least with a permeable aggregate; 0: as large as elsewhere on the interface")
     jacobian: str = choice(
-        "fresh", "reused", source=OURS,
+        "fresh", "reused", source=NOT_IN_PAPER,
         about="Newton's derivative: of every iterate, or one while it does enough")
     flow_element: str = choice(
         "stabilised", "bubble", source="3.2",
@@ -353,7 +354,7 @@ class Numerics:
         return min(self.order, 2)
 
 
-#: What each preset changes of the defaults above: errors of about 1 %, of about 0.1 %, under 0.01 %
+#: Changes of each preset to the defaults above: errors of about 1 %, of about 0.1 %, under 0.01 %
 #: until contact (see `make bench`), the paper's own scheme.
 PRESETS: dict[str, dict[str, str | float]] = {
     "fast": {"elements": "quadratic", "time": "midpoint", "refinement": 0.2, "tolerance": 0.0075,
@@ -377,15 +378,44 @@ class Output:
         "with midpoint also every 1/4, 1/2, 1, 2, 4 ... growth.time_step, so that there are 24 or "
         "more after t = 0")
     timeseries: str = choice(
-        "csv", "netcdf", source=OURS,
+        "csv", "netcdf", source=NOT_IN_PAPER,
         about="timeseries.csv alone, or timeseries.nc besides, which needs the package xarray")
 
 
 @dataclass(frozen=True)
 class Scene:
-    """A scene read and checked.
+    """A scene, read and checked: one attribute for each section of its TOML file.
 
-    `kinetics` is there if and only if there are both substrates and an aggregate.
+    :func:`load_scene` makes it. ``str(scene)`` is its TOML text with all keys and units.
+
+    Parameters
+    ----------
+    name : str
+        Name in messages and reports.
+    pore : Pore
+        The channel; lengths in um.
+    aggregate : Aggregate, optional
+        The colony on the lower wall. None: a clean channel.
+    flow : Flow, optional
+        Head (um) or mean velocity (um/h). None: pure diffusion.
+    substrates : Substrates, optional
+        Acceptor and donor; mg/L and um2/h. None: no transport.
+    kinetics : Kinetics, optional
+        Uptake, growth and decay; 1/h and mg/L. Present if and only if ``substrates`` and
+        ``aggregate`` are.
+    growth : Growth, optional
+        Duration and mechanics of growth; h, MPa, um. None: only the state at t = 0.
+    numerics : Numerics
+        Discretisation and solvers.
+    output : Output
+        Times (h) of rows and fields.
+
+    Examples
+    --------
+    >>> import repro
+    >>> scene = repro.load_scene("base", ['growth.end="1 h"'])
+    >>> scene.pore.width, scene.growth.end
+    (50.0, 1.0)
     """
 
     name: str
@@ -411,7 +441,7 @@ class Scene:
         about="The aggregate grows as a neo-Hookean body and moves; left out: the state at t = 0 "
               "alone")
     numerics: Numerics = section(Numerics, about="How it is solved", source="Section 3")
-    output: Output = section(Output, about="What is written", source=OURS)
+    output: Output = section(Output, about="What is written", source=NOT_IN_PAPER)
 
     def __post_init__(self) -> None:
         if self.numerics.extent is None:
@@ -420,41 +450,41 @@ class Scene:
 
     @property
     def stagnant(self) -> bool:
-        """Are there substrates that no flow carries, at times or ever?"""
+        """Are there substrates without flow, at any time?"""
         if self.substrates is None or self.flow is None:
             return self.substrates is not None
         velocity = self.flow.mean_velocity
-        return 0 in velocity.values if isinstance(velocity, Course) else velocity == 0
+        return 0 in velocity.values if isinstance(velocity, TimeTable) else velocity == 0
 
     @cached_property
-    def courses(self) -> list[Course]:
-        """All its tables over time."""
-        return courses(self)
+    def time_tables(self) -> list[TimeTable]:
+        """All tables over time."""
+        return time_tables(self)
 
     def at(self, time: float) -> "Scene":
-        """With what its tables say at a time (h), after the jump that may be there."""
-        return constant(self, lambda table: table.at(time)) if self.courses else self
+        """The scene with the values of its tables at a time (h), after a jump at that time."""
+        return constant(self, lambda table: table.at(time)) if self.time_tables else self
 
     @cached_property
     def largest(self) -> "Scene":
-        """With the largest value of each of its tables."""
+        """The scene with the largest value of each table."""
         return constant(self, lambda table: table.largest)
 
     def corner(self, time: float) -> float:
-        """The first time (h) of its tables after this one; infinite where there is none."""
-        later = [corner for table in self.courses for corner in table.times if corner > time]
+        """The next time (h) of its tables after ``time``; infinite if there is none."""
+        later = [corner for table in self.time_tables for corner in table.times if corner > time]
         return min(later, default=inf)
 
     def __str__(self) -> str:
-        """Its TOML, every key with its unit: a file with this text is an equal scene."""
+        """TOML text with all keys and units; it parses to an equal scene."""
         return toml(scene_tables(self))
 
     def __repr__(self) -> str:
-        there = [key for key in entries(Scene) if getattr(self, key) is not None]
-        return f"<Scene {self.name}: {', '.join(there)}; hash {scene_hash(self)}>"
+        sections = [key for key in entries(Scene) if getattr(self, key) is not None]
+        return f"<Scene {self.name}: {', '.join(sections)}; hash {scene_hash(self)}>"
 
 
-#: Keys that came after hashes of scenes were recorded, with their defaults as tables write them.
+#: Keys added after hashes of scenes were recorded, with their defaults as tables write them.
 LATER: dict[str, dict[str, object]] = {
     "aggregate": {"position": "0.0 um", "smooth": False, "inert_fraction": 0.0},
     "flow": {"interpolation": "steps", "biomass": "viscous"},
@@ -462,15 +492,40 @@ LATER: dict[str, dict[str, object]] = {
     "substrates.acceptor": {"interpolation": "steps"},
     "substrates.donor": {"interpolation": "steps"},
 }
-#: A scene, or where it is said: a file, a packaged name, a dict of tables.
+#: A scene, or its source: a file, a packaged name, a dict of tables.
 Source = Scene | str | Path | dict
 KEYS = tuple(dotted(Scene))  # every dotted key of a scene, its sections among them
 
 
 def load_scene(source: Source, overrides: Sequence[str] = (), unset: Sequence[str] = ()) -> Scene:
-    """The scene in a TOML file, of a packaged name, in a dict of tables as a file has them, or as
-    it is, without the keys of --unset and with the "KEY=VALUE" of --set. Raises SceneError if it
-    is not accepted.
+    """Load a scene, with changes.
+
+    Parameters
+    ----------
+    source : Scene, str, Path or dict
+        A TOML file, the name of a packaged scene, a dict of tables like those of a file, or a
+        loaded scene.
+    overrides : sequence of str, optional
+        Changes "KEY=VALUE", like those of ``--set``: dotted keys, values in TOML with units.
+    unset : sequence of str, optional
+        Dotted keys or sections to leave out, like those of ``--unset``; before ``overrides``.
+
+    Returns
+    -------
+    Scene
+        The checked scene, with values in um, h, mg/L, MPa and rad.
+
+    Raises
+    ------
+    SceneError
+        If the scene is not accepted: names the file, key, value and accepted values.
+
+    Examples
+    --------
+    >>> import repro
+    >>> scene = repro.load_scene("base", ['pore.width="60 um"'], unset=["flow"])
+    >>> scene.pore.width, scene.flow
+    (60.0, None)
     """
     if isinstance(source, Scene) and not (overrides or unset):
         return source
@@ -480,14 +535,14 @@ def load_scene(source: Source, overrides: Sequence[str] = (), unset: Sequence[st
 
 
 def label(source: Source) -> str:
-    """What a scene is called in messages: the name of its file, or its own."""
+    """Name of a scene in messages: that of its file, or its own."""
     if isinstance(source, Scene):
         return source.name
     return "scene" if isinstance(source, dict) else str(source)
 
 
 def load_tables(source: Source, overrides: Sequence[str] = (), unset: Sequence[str] = ()) -> dict:
-    """What a scene says, as it stands, after --unset and then --set."""
+    """Load the tables of a scene without checks, and apply --unset and then --set."""
     file = label(source)
     if isinstance(source, Scene):
         tables = scene_tables(source)
@@ -501,30 +556,30 @@ def load_tables(source: Source, overrides: Sequence[str] = (), unset: Sequence[s
 
 
 def parse_scene(tables: dict, name: str, file: str, changed: Sequence[str] = ()) -> Scene:
-    """The scene that TOML `tables` describe, called `name`.
+    """Parse and check TOML `tables` as a scene called `name`.
 
-    `changed`: the dotted keys that were set last, such as those of --set; of keys that do not go
-    together an error names one of these. Raises SceneError, naming `file`, if it is not accepted.
+    changed: dotted keys that were set last, such as those of --set. If keys contradict each other,
+    the error names one of these. Raises SceneError, naming `file`, if the scene is not accepted.
     """
     _refuse_missing(tables, file)
     if "substrates" in tables and "aggregate" in tables:
         tables = {"kinetics": {}, **tables}
     scene = read_table(Scene, _with_preset(tables), Place(file, known=KEYS), name=name)
-    for broken, wanted in rules(scene):
+    for broken, requirement in rules(scene):
         if broken:
-            key = _to_name(list(wanted), tables, changed)
+            key = _to_name(list(requirement), tables, changed)
             value = _at(tables, key, _at(scene_tables(scene), key, MISSING))
-            raise Place(file, key).refuse(value, wanted[key])
+            raise Place(file, key).refuse(value, requirement[key])
     return scene
 
 
 def _to_name(keys: list[str], tables: dict, changed: Sequence[str]) -> str:
-    """Of keys that do not go together the first that was changed, else that the tables set."""
+    """Of contradicting keys, the first one that was changed, else the first one in the tables."""
     for key in keys:
         if any(_within(key, other) or _within(other, key) for other in changed):
             return key
-    said = [key for key in keys if _at(tables, key, MISSING) is not MISSING]
-    return [*said, *keys][0]
+    present = [key for key in keys if _at(tables, key, MISSING) is not MISSING]
+    return [*present, *keys][0]
 
 
 def _within(key: str, section: str) -> bool:
@@ -532,39 +587,39 @@ def _within(key: str, section: str) -> bool:
 
 
 def _refuse_missing(tables: dict, file: str) -> None:
-    """Raise SceneError where there is no section at all, or one substrate without the other."""
+    """Raise SceneError if there is no section, or one substrate without the other."""
     if not tables:
         sections = ", ".join(f"[{key}]" for key in entries(Scene))
         raise SceneError(f"{file}: an empty scene: one section or more is needed of {sections}")
-    given = tables.get("substrates")
+    substrates = tables.get("substrates")
     for key, other in (("acceptor", "donor"), ("donor", "acceptor")):
-        if isinstance(given, dict) and other in given and key not in given:
-            wanted = (f"it is needed beside substrates.{other}; one that is not to limit is "
+        if isinstance(substrates, dict) and other in substrates and key not in substrates:
+            requirement = (f"it is needed beside substrates.{other}; one that is not to limit is "
                       'supplied at many times its half_saturation, such as supply = "1000 mg/L"')
-            raise Place(file, f"substrates.{key}").refuse(MISSING, wanted)
+            raise Place(file, f"substrates.{key}").refuse(MISSING, requirement)
 
 
 def _with_preset(tables: dict) -> dict:
-    """The tables with the defaults of the preset that they name, "fast" where they name none."""
-    given = tables.get("numerics", {})
-    named = given.get("preset", "fast") if isinstance(given, dict) else None
+    """The tables with the defaults of their preset, "fast" if they name none."""
+    numerics = tables.get("numerics", {})
+    named = numerics.get("preset", "fast") if isinstance(numerics, dict) else None
     if not isinstance(named, str) or named not in PRESETS:
-        return tables  # what is wrong is told when it is read
-    return {**tables, "numerics": {"preset": named, **PRESETS[named], **given}}
+        return tables  # read_table reports the error
+    return {**tables, "numerics": {"preset": named, **PRESETS[named], **numerics}}
 
 
 def scene_tables(scene: Scene) -> dict:
-    """The scene as TOML tables with every default spelt out.
+    """Write the scene as TOML tables with all defaults.
 
-    `parse_scene` reads an equal scene back, bit by bit.
+    `parse_scene` reads them back as an equal scene, bit by bit.
     """
     return write_table(scene)
 
 
 def scene_hash(scene: Scene) -> str:
-    """16 hexadecimal digits that stand for all that a scene says but its name.
+    """Hash (16 hexadecimal digits) of all values of a scene, without its name.
 
-    A key of `LATER` counts where it does not have its default, so that recorded hashes stand.
+    A key of `LATER` counts if it differs from its default, so that recorded hashes stay valid.
     """
     tables = {key: _without_later(key, table) for key, table in scene_tables(scene).items()}
     canonical = json.dumps(tables, sort_keys=True, separators=(",", ":"), allow_nan=False)

@@ -1,4 +1,4 @@
-"""Sections that the physics at hand cannot be without, though a scene may leave them out."""
+"""Optional sections of a scene that a stage requires."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ Part = TypeVar("Part")
 
 
 class MissingError(AssertionError):
-    """Physics was asked for that the scene does not have: a mistake of the code that asks."""
+    """Code used a section that the scene does not have: an error of that code."""
 
 
-def needed(part: Part | None, what: str) -> Part:
-    """The part, which the caller knows to be there. Raises MissingError where it is not.
+def needed(part: Part | None, name: str) -> Part:
+    """The optional ``part``, which the caller knows to be present.
 
-    what: its name, such as "[growth]".
+    name: such as "[growth]". Raises MissingError if the part is None.
     """
     if part is None:
-        raise MissingError(f"{what} is needed here, and there is none")
+        raise MissingError(f"{name} is needed here, and there is none")
     return part

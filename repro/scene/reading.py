@@ -1,7 +1,7 @@
-"""Tables of TOML read into the dataclasses of a scene and written out of them; refusals.
+"""Conversion of TOML tables to the dataclasses of a scene and back, and refusals.
 
-A refusal is one line that names the file, the key, the value, what is accepted and, where there is
-one, the nearest thing that is.
+A refusal is one line that names the file, the key, the value, the accepted values and, if there is
+one, the nearest accepted value.
 """
 import json
 from collections.abc import Iterator
@@ -20,7 +20,7 @@ NOT_MODELLED = frozenset({
 
 @dataclass(frozen=True)
 class Place:
-    """A key of a file, to be named in a message; known: every dotted key that the file may have."""
+    """A key of a file, as messages name it; known: all dotted keys that the file may have."""
 
     file: str
     key: str = ""
@@ -30,43 +30,43 @@ class Place:
         key = key if len(key) <= LONGEST_KEY else key[: LONGEST_KEY - 3] + "..."
         return replace(self, key=f"{self.key}.{key}" if self.key else key)
 
-    def refuse(self, value: object, wanted: str) -> SceneError:
-        stated = f"{self.key} is missing" if value is MISSING else f"{self.key} = {shown(value)}"
-        return SceneError(f"{self.file}: {stated}: {wanted}")
+    def refuse(self, value: object, requirement: str) -> SceneError:
+        stated = f"{self.key} is missing" if value is MISSING else f"{self.key} = {quote(value)}"
+        return SceneError(f"{self.file}: {stated}: {requirement}")
 
 
 def entries(kind: type) -> dict[str, Field]:
-    """The keys of a section: its fields that are told about."""
+    """The keys of a section: its fields with metadata."""
     return {entry.name: entry for entry in fields(kind) if entry.metadata}
 
 
 def dotted(kind: type, above: str = "") -> Iterator[str]:
-    """Every key of a section and of those in it, the sections themselves included."""
+    """All keys of a section and its subsections, including the sections themselves."""
     for key, entry in entries(kind).items():
         yield above + key
         if "section" in entry.metadata:
             yield from dotted(entry.metadata["section"], f"{above}{key}.")
 
 
-def read_table(kind: type, table: object, place: Place, **given):
-    """The dataclass `kind` that a TOML table describes, with `given` for what is no key.
+def read_table(kind: type, table: object, place: Place, **extra):
+    """Read a TOML table into the dataclass `kind`; extra: fields that are not keys.
 
-    Raises SceneError if it is not accepted.
+    Raises SceneError if the table is not accepted.
     """
     keys = entries(kind)
     if not isinstance(table, dict):
         several = isinstance(table, list) and place.key in ("aggregate", "pore")
         one = f"one {place.key} is modelled, see {SCOPE}: " if several else ""
-        wanted = f"{one}a table [{place.key}] is needed, with the keys {', '.join(keys)}"
-        raise place.refuse(table, wanted)
+        requirement = f"{one}a table [{place.key}] is needed, with the keys {', '.join(keys)}"
+        raise place.refuse(table, requirement)
     for key in table:
         if key not in keys:
             raise place.below(key).refuse(table[key], _instead(key, list(keys), place))
     for key, entry in keys.items():
         if key not in table and entry.default is MISSING and entry.default_factory is MISSING:
-            raise place.below(key).refuse(MISSING, entry.metadata["kind"].wanted)
+            raise place.below(key).refuse(MISSING, entry.metadata["kind"].requirement)
     read = {key: _read_entry(keys[key], table[key], place.below(key)) for key in table}
-    return kind(**given, **read)
+    return kind(**extra, **read)
 
 
 def _read_entry(entry: Field, value: object, place: Place):
@@ -79,11 +79,11 @@ def _read_entry(entry: Field, value: object, place: Place):
         raise place.refuse(value, str(error)) from None
     except (ValueError, OverflowError):
         hint = unlike(kind, value) or did_you_mean(kind.near(value))
-        raise place.refuse(value, kind.wanted + hint) from None
+        raise place.refuse(value, kind.requirement + hint) from None
 
 
 def write_table(part) -> dict:
-    """The TOML table of a dataclass, with units; what is None is left out."""
+    """Write a dataclass as a TOML table with units, without fields that are None."""
     table = {}
     for key, entry in entries(type(part)).items():
         value = getattr(part, key)
@@ -94,7 +94,7 @@ def write_table(part) -> dict:
 
 
 def toml(tables: dict, above: str = "") -> str:
-    """Tables as a TOML file has them, values before the tables within; in ASCII."""
+    """Format tables as a TOML file in ASCII, values before subtables."""
     lines = [f"[{above[:-1]}]"] if above else []
     inner = {key: value for key, value in tables.items() if isinstance(value, dict)}
     lines += [f"{key} = {json.dumps(value)}" for key, value in tables.items() if key not in inner]
@@ -105,31 +105,32 @@ def toml(tables: dict, above: str = "") -> str:
 
 def _instead(key: str, keys: list[str], place: Place) -> str:
     table = f"[{place.key}]" if place.key else "a scene"
-    told = f"there is no such key; {table} takes {', '.join(keys)}"
+    message = f"there is no such key; {table} takes {', '.join(keys)}"
     words = NOT_MODELLED & set(key.casefold().split("_"))
     if words:
-        return f"{told}; {min(words)} is not modelled, see {SCOPE}"
-    return told + did_you_mean(nearest(key, keys) or elsewhere(key, place.known))
+        return f"{message}; {min(words)} is not modelled, see {SCOPE}"
+    return message + did_you_mean(nearest(key, keys) or elsewhere(key, place.known))
 
 
 def elsewhere(key: str, known: tuple[str, ...]) -> str:
-    """The dotted keys, joined by "or", whose last part, or all of which, may have been meant.
+    """The known keys nearest to a dotted key or to its last part, joined by "or".
 
-    "" where there are none.
+    Empty if there are none.
     """
-    whole = nearest(key, known) if "." in key else ""
+    full_key = nearest(key, known) if "." in key else ""
     lasts = [other.rpartition(".")[2] for other in known]
     last = nearest(key.rpartition(".")[2], lasts)
-    return whole or " or ".join(other for other, end in zip(known, lasts) if last and end == last)
+    same_last = [other for other, end in zip(known, lasts) if last and end == last]
+    return full_key or " or ".join(same_last)
 
 
 def did_you_mean(near: str) -> str:
-    """A hint in brackets; "" where there is nothing near."""
+    """A hint in brackets; empty without a near key or value."""
     return f" (did you mean {near}?)" if near else ""
 
 
-def shown(value: object, longest: int = 60) -> str:
-    """A value as a message quotes it: as TOML would write it, shortened."""
+def quote(value: object, longest: int = 60) -> str:
+    """Quote a value in a message: as TOML writes it, shortened."""
     try:
         text = json.dumps(value, ensure_ascii=False, default=str)
     except (ValueError, RecursionError):  # thousands of digits, tables nested by the thousand

@@ -1,10 +1,10 @@
-"""What keys of a scene ask of each other."""
+"""Constraints between the keys of a scene."""
 import math
 from collections.abc import Iterator
 from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
-from repro.scene.course import Course
+from repro.scene.time_table import TimeTable
 
 if TYPE_CHECKING:
     from repro.scene import Aggregate, Flow, Kinetics, Pore, Scene, Substrate
@@ -12,22 +12,22 @@ if TYPE_CHECKING:
 _NO_STATE = "nothing is supplied, so that no state is steady"
 _UNSTEADY = f', or numerics.transport = "gear": {_NO_STATE}'
 MOST_STEPS = 100_000  # shape updates of a run
-SHORTEST_STEP = 1e-6  # h: times are told apart to 1e-9 h
+SHORTEST_STEP = 1e-6  # h: times closer than 1e-9 h are equal
 FINEST = 1e-3  # of the width: the smallest seed, edge of an outline, and gap between two edges
 NEAREST = 1e-4  # of the width: from a point of an outline to a wall that it does not touch
 TIGHTEST = 1e-11  # of the square of the width: the smallest permeability
-#: What only linear elements have a choice of, and what the others have.
+#: Options that only linear elements have, and their values for all others.
 HIGHER_ORDER = {"transfer": "conserving", "flow_element": "stabilised"}
 
-#: What a number or a table gives.
-Driven = float | Course | None
+#: A number or a table over time.
+Driven = float | TimeTable | None
 Outlined = tuple[tuple[float, float], ...]
-#: Is it broken, and what is accepted of each key that breaks it, the likeliest first?
+#: Is a rule broken, and the requirement of each key involved, the likeliest first.
 Rules = Iterator[tuple[bool, dict[str, str]]]
 
 
 def rules(scene: "Scene") -> Rules:
-    """What is accepted of each key in the light of the others."""
+    """All rules: is each broken, and the requirement of each key given the others."""
     if scene.aggregate:
         yield from _aggregate_rules(scene)
     if scene.flow:
@@ -41,9 +41,9 @@ def rules(scene: "Scene") -> Rules:
 
 
 def _not_both(other: str, value: str = "") -> str:
-    """What is told of a key that another excludes."""
-    said = f"{other} ({value})" if value else other
-    return (f"{said} is given too; one of them is accepted, not both "
+    """Requirement of a key that excludes ``other``."""
+    setting = f"{other} ({value})" if value else other
+    return (f"{setting} is given too; one of them is accepted, not both "
             f"(--unset {other} leaves that out)")
 
 
@@ -56,21 +56,21 @@ def _aggregate_rules(scene: "Scene") -> Rules:
         yield from _outline_rules(aggregate)
         yield from _shape_rules(aggregate.outline, scene.pore)
     inert = aggregate.inert_fraction != 0 and scene.substrates is None
-    wanted = "0 is needed without [substrates], which tell active from inert biomass"
-    yield inert, {"aggregate.inert_fraction": wanted}
+    requirement = "0 is needed without [substrates], which tell active from inert biomass"
+    yield inert, {"aggregate.inert_fraction": requirement}
 
 
 def _seed_rules(aggregate: "Aggregate", pore: "Pore") -> Rules:
     radius = aggregate.radius
     least = f"aggregate.radius ({radius:g} um) is needed"
-    wanted = (f"less than pore.width ({pore.width:g} um) and half of pore.length "
-              f"({pore.length:g} um) is needed")
+    requirement = (f"less than pore.width ({pore.width:g} um) and half of pore.length "
+                   f"({pore.length:g} um) is needed")
     yield radius >= pore.width, {
-        "aggregate.radius": wanted,
+        "aggregate.radius": requirement,
         "pore.width": f"more than {least}",
     }
     yield 2 * radius >= pore.length, {
-        "aggregate.radius": wanted,
+        "aggregate.radius": requirement,
         "pore.length": f"more than twice {least}",
     }
     yield radius < pore.width * FINEST, {
@@ -88,8 +88,8 @@ def _position_rules(aggregate: "Aggregate", pore: "Pore") -> Rules:
         "aggregate.radius": f"less than {half} less the distance of {position} is needed",
         "pore.length": f"more than twice {radius} and the distance of {position} is needed",
     }
-    wanted = "true is accepted with aggregate.outline alone"
-    yield aggregate.smooth, {"aggregate.smooth": wanted}
+    requirement = "true is accepted with aggregate.outline alone"
+    yield aggregate.smooth, {"aggregate.smooth": requirement}
 
 
 def _outline_rules(aggregate: "Aggregate") -> Rules:
@@ -98,83 +98,86 @@ def _outline_rules(aggregate: "Aggregate") -> Rules:
         "aggregate.radius": _not_both("aggregate.outline"),
         "aggregate.outline": _not_both("aggregate.radius", radius),
     }
-    wanted = "0 um is needed with aggregate.outline, whose points say where it is"
+    requirement = "0 um is needed with aggregate.outline, whose points say where it is"
     yield aggregate.position != 0, {
-        "aggregate.position": wanted,
+        "aggregate.position": requirement,
         "aggregate.outline": _not_both("aggregate.position", f"{aggregate.position:g} um"),
     }
 
 
 def _shape_rules(points: Outlined, pore: "Pore") -> Rules:
-    """What is asked of an outline."""
+    """Rules of an outline."""
     first = points[0]
     last = points[-1]
-    wanted = "y = 0 um at the first and the last point is needed"
-    yield first[1] != 0 or last[1] != 0, {"aggregate.outline": wanted}
-    wanted = "the upstream end first (x of the first point less than of the last) is needed"
-    yield first[0] >= last[0], {"aggregate.outline": wanted}
+    requirement = "y = 0 um at the first and the last point is needed"
+    yield first[1] != 0 or last[1] != 0, {"aggregate.outline": requirement}
+    requirement = "the upstream end first (x of the first point less than of the last) is needed"
+    yield first[0] >= last[0], {"aggregate.outline": requirement}
     for number, point in enumerate(points, 1):
         end = number in (1, len(points))
-        said = f"point {number} ({point[0]:g} um, {point[1]:g} um)"
-        yield from _point_rules(said, point, end, pore)
+        point_name = f"point {number} ({point[0]:g} um, {point[1]:g} um)"
+        yield from _point_rules(point_name, point, end, pore)
     yield from _spacing_rules(points, pore.width)
-    wanted = "a line that neither crosses nor touches itself is needed"
-    yield _crosses(points, pore.width), {"aggregate.outline": wanted}
+    requirement = "a line that neither crosses nor touches itself is needed"
+    yield _crosses(points, pore.width), {"aggregate.outline": requirement}
     for one, other in nearest_edges(points, pore.width):
         yield True, {"aggregate.outline": f"{_least(pore.width)} is needed between the lines after "
                                           f"points {one} and {other}"}
 
 
-def _point_rules(said: str, point: tuple[float, float], end: bool, pore: "Pore") -> Rules:
+def _point_rules(point_name: str, point: tuple[float, float], end: bool, pore: "Pore") -> Rules:
     x, y = point
     yield abs(x) >= pore.length / 2, {
-        "aggregate.outline": f"|x| < half of pore.length ({pore.length:g} um) at {said} is needed",
-        "pore.length": f"more than twice |x| of {said} of aggregate.outline is needed",
+        "aggregate.outline": f"|x| < half of pore.length ({pore.length:g} um) at {point_name} is "
+                             "needed",
+        "pore.length": f"more than twice |x| of {point_name} of aggregate.outline is needed",
     }
-    wanted = f"0 < y <= pore.width ({pore.width:g} um) at {said} is needed"
-    yield y <= 0 and not end, {"aggregate.outline": wanted}
+    requirement = f"0 < y <= pore.width ({pore.width:g} um) at {point_name} is needed"
+    yield y <= 0 and not end, {"aggregate.outline": requirement}
     yield y > pore.width, {
-        "aggregate.outline": wanted,
-        "pore.width": f"y of {said} of aggregate.outline, or more, is needed",
+        "aggregate.outline": requirement,
+        "pore.width": f"y of {point_name} of aggregate.outline, or more, is needed",
     }
     near = min(y, pore.width - y)
-    wanted = (f"pore.width ({pore.width!r} um) over 10000, or more, is needed between {said} and a "
-              "wall that it does not touch; y = pore.width is contact")
-    yield 0 < near < pore.width * NEAREST, {"aggregate.outline": wanted}
-    wanted = f"pore.width over 10000, or more, is needed between {said} and the pore's end"
-    yield pore.length / 2 - abs(x) < pore.width * NEAREST, {"aggregate.outline": wanted}
+    requirement = (f"pore.width ({pore.width!r} um) over 10000, or more, is needed between "
+                   f"{point_name} and a wall that it does not touch; y = pore.width is contact")
+    yield 0 < near < pore.width * NEAREST, {"aggregate.outline": requirement}
+    requirement = (f"pore.width over 10000, or more, is needed between {point_name} and the pore's "
+                   "end")
+    yield pore.length / 2 - abs(x) < pore.width * NEAREST, {"aggregate.outline": requirement}
 
 
 def _least(width: float) -> str:
-    """The least length that an outline may ask a mesh for."""
+    """The least accepted length in an outline."""
     return f"a thousandth of pore.width ({width:g} um) or more"
 
 
 def _spacing_rules(points: Outlined, width: float) -> Rules:
     for number, (start, end) in enumerate(zip(points, points[1:]), 1):
         near = math.dist(start, end) < width * FINEST
-        wanted = f"{_least(width)} is needed from point {number} to the next"
-        yield near, {"aggregate.outline": wanted}
-    wanted = f"{_least(width)} is needed between the first and the last point"
-    yield points[-1][0] - points[0][0] < width * FINEST, {"aggregate.outline": wanted}
+        requirement = f"{_least(width)} is needed from point {number} to the next"
+        yield near, {"aggregate.outline": requirement}
+    requirement = f"{_least(width)} is needed between the first and the last point"
+    yield points[-1][0] - points[0][0] < width * FINEST, {"aggregate.outline": requirement}
     above = [number for number, (_, y) in enumerate(points) if y == width]
     run = above == list(range(above[0], above[0] + len(above))) if above else True
-    wanted = "two points or more in a row, or none, on the upper wall (y = pore.width) are needed"
-    yield len(above) == 1 or not run, {"aggregate.outline": wanted}
+    requirement = ("two points or more in a row, or none, on the upper wall (y = pore.width) are "
+                   "needed")
+    yield len(above) == 1 or not run, {"aggregate.outline": requirement}
 
 
 def _crosses(points: Outlined, width: float) -> bool:
-    """Does a line cross or touch itself?"""
+    """Does the outline cross or touch itself?"""
     from shapely import LineString
 
     return not LineString([(x / width, y / width) for x, y in points]).is_simple
 
 
 def nearest_edges(points: Outlined, width: float) -> list[tuple[int, int]]:
-    """The first pair of edges without a common point that are nearer to each other than
-    ``FINEST`` widths, by the numbers of the points that they begin at; empty without such a pair.
+    """The first pair of edges without a common point that are closer than ``FINEST`` widths.
 
-    points: from the lower wall to the lower wall, (x, y) in um; width: of the pore, um.
+    points: from the lower wall to the lower wall, (x, y) in um; width: of the pore, um. Returns
+    the numbers of the first points of both edges, or an empty list.
     """
     import shapely
 
@@ -188,8 +191,8 @@ def nearest_edges(points: Outlined, width: float) -> list[tuple[int, int]]:
 
 def _flow_rules(scene: "Scene", head: Driven, velocity: Driven) -> Rules:
     example = 'such as head = "1e-3 cm" or mean_velocity = "2.9 m/day"'
-    wanted = f"it or flow.mean_velocity is needed, {example}"
-    yield head is None and velocity is None, {"flow.head": wanted}
+    requirement = f"it or flow.mean_velocity is needed, {example}"
+    yield head is None and velocity is None, {"flow.head": requirement}
     yield head is not None and velocity is not None, {
         "flow.mean_velocity": _not_both("flow.head", _in_words(head, "um")),
         "flow.head": _not_both("flow.mean_velocity", _in_words(velocity, "m/day", 24e-6)),
@@ -202,7 +205,7 @@ def _flow_rules(scene: "Scene", head: Driven, velocity: Driven) -> Rules:
 
 
 def _biomass_rules(scene: "Scene", drive: "Flow") -> Rules:
-    """What slows the water in the aggregate."""
+    """Rules of the aggregate's resistance to flow."""
     drag = drive.biomass == "brinkman"
     permeable = f"{drive.permeability} um^2"
     yield not drag and drive.permeability is not None, {
@@ -224,11 +227,11 @@ def _biomass_rules(scene: "Scene", drive: "Flow") -> Rules:
     }
     alone = scene.aggregate is None
     yield drag and alone, {"flow.biomass": '"viscous" is needed without [aggregate]'}
-    wanted = '"quadratic" or "cubic" is needed with flow.biomass = "brinkman"'
+    requirement = '"quadratic" or "cubic" is needed with flow.biomass = "brinkman"'
     yield drag and scene.numerics.order == 1, {
         "flow.biomass": 'numerics.elements = "quadratic" or "cubic" is needed with it',
-        "numerics.elements": wanted,
-        "numerics.preset": f'numerics.elements = {wanted}',
+        "numerics.elements": requirement,
+        "numerics.preset": f'numerics.elements = {requirement}',
     }
     forces = scene.growth is not None and scene.growth.fluid_forces == "included"
     yield drag and forces, {
@@ -240,14 +243,14 @@ def _biomass_rules(scene: "Scene", drive: "Flow") -> Rules:
 def _in_words(value: Driven, unit: str, factor: float = 1.0) -> str:
     if value is None:
         return ""
-    return "a table" if isinstance(value, Course) else f"{factor * value:g} {unit}"
+    return "a table" if isinstance(value, TimeTable) else f"{factor * value:g} {unit}"
 
 
 def _table_rules(section: str, part: "Flow | Substrate", values: tuple[Driven, ...]) -> Rules:
-    """What is asked of a section with tables over time, or without."""
-    constant = not any(isinstance(value, Course) for value in values)
-    wanted = '"steps" is needed where no table of times and values is given'
-    yield constant and part.interpolation != "steps", {f"{section}.interpolation": wanted}
+    """Rules of a section's tables over time."""
+    constant = not any(isinstance(value, TimeTable) for value in values)
+    requirement = '"steps" is needed where no table of times and values is given'
+    yield constant and part.interpolation != "steps", {f"{section}.interpolation": requirement}
 
 
 def _boundary_rules(scene: "Scene") -> Rules:
@@ -270,9 +273,9 @@ def _boundary_rules(scene: "Scene") -> Rules:
 
 def _growth_rules(scene: "Scene") -> Rules:
     alone = not (scene.substrates and scene.aggregate)
-    wanted = "[aggregate] and [substrates] are needed with it"
-    yield alone and scene.kinetics is not None, {"kinetics": wanted}
-    yield alone and scene.growth is not None, {"growth": wanted}
+    requirement = "[aggregate] and [substrates] are needed with it"
+    yield alone and scene.kinetics is not None, {"kinetics": requirement}
+    yield alone and scene.growth is not None, {"growth": requirement}
     if scene.kinetics:
         yield from _demand_rules(scene.kinetics)
     if scene.growth:
@@ -308,10 +311,10 @@ def _step_rules(end: float, step: float) -> Rules:
 
 def _force_rules(scene: "Scene") -> Rules:
     yield scene.flow is None, {"growth.fluid_forces": '"neglected" is needed without [flow]'}
-    wanted = ('"neglected" is needed with growth.new_biomass = "stress_free", '
-              "which would yield at every update")
+    requirement = ('"neglected" is needed with growth.new_biomass = "stress_free", '
+                   "which would yield at every update")
     yield scene.growth.new_biomass == "stress_free", {
-        "growth.fluid_forces": wanted,
+        "growth.fluid_forces": requirement,
         "growth.new_biomass": '"stressed" is needed with growth.fluid_forces = "included"',
     }
 
@@ -320,9 +323,9 @@ def _with_elements(scene: "Scene") -> str:
     return f'with numerics.elements = "{scene.numerics.elements}"'
 
 
-def _element_keys(wanted: str) -> dict[str, str]:
-    """The keys that choose the elements, of which a rule may be told."""
-    return {"numerics.elements": wanted, "numerics.preset": wanted}
+def _element_keys(requirement: str) -> dict[str, str]:
+    """The same requirement for both keys that choose the elements."""
+    return {"numerics.elements": requirement, "numerics.preset": requirement}
 
 
 def _numerics_rules(scene: "Scene") -> Rules:
@@ -341,22 +344,22 @@ def _numerics_rules(scene: "Scene") -> Rules:
 def _higher_order_rules(scene: "Scene") -> Rules:
     for key, only in HIGHER_ORDER.items():
         value = getattr(scene.numerics, key)
-        wanted = f'"{only}" is needed {_with_elements(scene)}; "linear" has the others'
+        requirement = f'"{only}" is needed {_with_elements(scene)}; "linear" has the others'
         other = f'numerics.{key} = "{only}" is needed with it, not "{value}"'
-        yield value != only, {f"numerics.{key}": wanted, **_element_keys(other)}
+        yield value != only, {f"numerics.{key}": requirement, **_element_keys(other)}
 
 
 def _output_rules(scene: "Scene") -> Rules:
     end = scene.growth.end if scene.growth else 0.0
     last = max(scene.output.times or (0.0,))
     reason = f"growth.end is {end:g} h" if scene.growth else "there is no [growth]"
-    told = {"output.times": f"none after {end:g} h is accepted: {reason}"}
+    requirements = {"output.times": f"none after {end:g} h is accepted: {reason}"}
     if scene.growth:
-        told["growth.end"] = f"{last:g} h or more, the last of output.times, is needed"
-    yield last > end, told
+        requirements["growth.end"] = f"{last:g} h or more, the last of output.times, is needed"
+    yield last > end, requirements
     missing = scene.output.timeseries == "netcdf" and find_spec("xarray") is None
-    wanted = '"csv" is needed, or the package xarray: pip install xarray'
-    yield missing, {"output.timeseries": wanted}
+    requirement = '"csv" is needed, or the package xarray: pip install xarray'
+    yield missing, {"output.timeseries": requirement}
 
 
 def _steady(scene: "Scene") -> bool:

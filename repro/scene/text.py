@@ -1,7 +1,7 @@
-"""A scene written out with every key that it could have: value, default, unit, range and source.
+"""A scene as TOML text with every possible key: value, default, unit, range and source.
 
-What the scene says is active. What it leaves to the defaults is there too, behind a "#" without a
-space: changing the preset goes on changing what hangs on it. All words come from the fields of
+Keys that the scene sets are active. Keys that it leaves to the defaults follow a "#" without a
+space, so that they still change with the preset. All words come from the fields of
 :mod:`repro.scene`.
 """
 
@@ -13,7 +13,15 @@ from collections.abc import Iterator, Sequence
 from dataclasses import MISSING, Field
 from pathlib import Path
 
-from repro.scene import OURS, PRESETS, Numerics, Scene, load_tables, packaged_scenes, parse_scene
+from repro.scene import (
+    NOT_IN_PAPER,
+    PRESETS,
+    Numerics,
+    Scene,
+    load_tables,
+    packaged_scenes,
+    parse_scene,
+)
 from repro.scene.files import key_of, read_text
 from repro.scene.reading import entries
 from repro.scene.units import Choice, Flag, Number
@@ -25,9 +33,9 @@ HEAD = ("A \"#\" without a space is before what this scene leaves out, or leaves
 
 
 def scene_text(source: str, overrides: Sequence[str] = (), unset: Sequence[str] = ()) -> str:
-    """The TOML text of a packaged scene or of a file, with what --set and --unset change.
+    """The TOML text of a packaged scene or of a file, with the changes of --set and --unset.
 
-    It parses to an equal scene. Raises SceneError as load_scene.
+    The text parses to an equal scene. Raises SceneError like load_scene.
     """
     tables = load_tables(source, overrides, unset)
     changed = [key_of(entry) for entry in overrides]
@@ -40,61 +48,62 @@ def scene_text(source: str, overrides: Sequence[str] = (), unset: Sequence[str] 
 
 
 def titles() -> dict[str, str]:
-    """The first line of each packaged scene, which says what it is."""
+    """The title of each packaged scene: its first line."""
     first = {name: read_text(name).partition("\n")[0] for name in packaged_scenes()}
     return {name: line.removeprefix("# ") for name, line in first.items()}
 
 
-def _table(path: str, entry: Field, said: dict, made: object) -> Iterator[str]:
-    """The lines of a section.
+def _table(path: str, entry: Field, written: dict, part: object) -> Iterator[str]:
+    """Lines of a section.
 
-    said: what the scene writes in it; made: what it reads as, None where it is left out.
+    written: keys that the scene sets; part: the section of the scene, None if it is left out.
     """
     kind = entry.metadata["section"]
     yield ""
     yield from _comment(_about(entry))
-    yield f"[{path}]" if made else f"#[{path}]"
+    yield f"[{path}]" if part else f"#[{path}]"
     inner = {key: field for key, field in entries(kind).items() if "section" in field.metadata}
     for key, field in entries(kind).items():
         if key not in inner:
             yield from _comment(_about(field))
             yield from _comment(f"{field.metadata['kind'].accepted}; {_stated(kind, key, field)}")
-            value = said[key] if key in said else _default(field, getattr(made, key, None))
-            yield f"{'' if key in said else '#'}{key} = {_toml(value)}"
+            value = written[key] if key in written else _default(field, getattr(part, key, None))
+            yield f"{'' if key in written else '#'}{key} = {_toml(value)}"
     for key, field in inner.items():
-        yield from _table(f"{path}.{key}", field, said.get(key, {}), getattr(made, key, None))
+        yield from _table(f"{path}.{key}", field, written.get(key, {}), getattr(part, key, None))
 
 
 def _about(field: Field) -> str:
     source = field.metadata["source"]
-    return f"{field.metadata['about']}. {source if source == OURS else f'Paper: {source}'}."
+    return f"{field.metadata['about']}. {source if source == NOT_IN_PAPER else f'Paper: {source}'}."
 
 
 def _stated(kind: type, key: str, field: Field) -> str:
-    """What holds where a scene does not say."""
+    """The value of a key that a scene does not set, in words."""
     if field.metadata["stated"]:
         return field.metadata["stated"]
     if field.default is MISSING and field.default_factory is MISSING:
         return "must be given"
     if field.default is None:
         return "not set by default"
-    own = _default(field, None)
-    values = [preset.get(key, own) for preset in PRESETS.values()] if kind is Numerics else []
-    if set(values) <= {own}:
-        return f"default {_toml(own)}"
-    told = [f"{_toml(value)} ({preset})" for preset, value in zip(PRESETS, values)]
-    return "default " + ", ".join(told)
+    preset_default = _default(field, None)
+    presets = PRESETS.values() if kind is Numerics else []
+    values = [preset.get(key, preset_default) for preset in presets]
+    if set(values) <= {preset_default}:
+        return f"default {_toml(preset_default)}"
+    defaults = [f"{_toml(value)} ({preset})" for preset, value in zip(PRESETS, values)]
+    return "default " + ", ".join(defaults)
 
 
-def _default(field: Field, made: object) -> object:
-    """The value to show where the scene writes none.
+def _default(field: Field, value: object) -> object:
+    """Value to show for a key that the scene does not set.
 
-    It is what a preset has made of it, else the default or an example.
+    It is the value of the preset, else the default, else an example.
     """
     kind = field.metadata["kind"]
     if isinstance(kind, Choice | Flag | Number):
-        made = field.default if made is None else made
-        return kind.example if made is None and isinstance(kind, Number) else made
+        value = field.default if value is None else value
+        return kind.example if value is None and isinstance(kind, Number) else value
     return kind.example
 
 

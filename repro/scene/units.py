@@ -1,15 +1,14 @@
-"""What the values and tables of a scene may be, and their numbers in the units of the package.
+"""Kinds of values in a scene, and their conversion to the units of the package.
 
-Inside the package a length and a head are in um, a time in h, a concentration in mg/L, a modulus in
-MPa, an angle in rad, and what is made of them likewise (a velocity in um/h). A scene's values are
-converted here and nowhere else: exactly, and rounded once, so that "1164 min" and "19.4 h" are the
-same number.
+Inside the package lengths and heads are in um, times in h, concentrations in mg/L, moduli in MPa,
+angles in rad, and derived quantities accordingly (a velocity in um/h). Values of a scene are only
+converted here: exactly, and rounded once, so that "1164 min" and "19.4 h" are the same number.
 
-A kind of value has `read` (what TOML gave -> what the model uses; ValueError or OverflowError when
-it is not accepted), its inverse `write`, `accepted` and `wanted`, the words that say what is
-accepted, and `near`, what may have been meant by a value that is not ("" where that is unknown). A
-table of a scene is a dataclass, whose fields carry their kind, or the dataclass of their section,
-in their metadata, with what they are about and their source in the paper.
+A kind of value has the methods `read` (TOML value -> value of the model; raises ValueError or
+OverflowError if it is not accepted), its inverse `write`, and `near` (the accepted value nearest to
+a refused one, empty if unknown), and the texts `accepted` and `requirement`, which describe the
+accepted values. A section of a scene is a dataclass. The metadata of its fields hold their kind, or
+the dataclass of a subsection, a description, and the source in the paper.
 """
 import difflib
 import json
@@ -22,7 +21,7 @@ from functools import cache, partial
 from typing import NamedTuple
 
 from repro.scene import exact
-from repro.scene.course import Course
+from repro.scene.time_table import TimeTable
 
 NOUNS = {
     "um": "a length",
@@ -50,7 +49,7 @@ _PARTS = re.compile(r"[0-9 ]pp[mb](?![A-Za-z])")
 
 
 class Range(NamedTuple):
-    """The numbers accepted, in internal units: in words and as a test."""
+    """A range of accepted numbers, in internal units: in words and as a test."""
 
     words: str
     holds: Callable[[float], bool]
@@ -81,7 +80,7 @@ class Quantity:
         return f"{NOUNS[self.unit]}, {self.accepts.words}"
 
     @property
-    def wanted(self) -> str:
+    def requirement(self) -> str:
         return f'{NOUNS[self.unit]} is needed, such as "{self.example}" ({self.accepts.words})'
 
     def near(self, value: object) -> str:
@@ -100,7 +99,7 @@ class Quantity:
 
 
 class Refused(ValueError):
-    """A value that is not accepted, with what is wrong with it in words."""
+    """A value is not accepted; the message says why."""
 
 
 @dataclass(frozen=True)
@@ -114,14 +113,14 @@ class Timed(Quantity):
         return f"{super().accepted}; or a table of times, ascending from 0 h, and values"
 
     @property
-    def wanted(self) -> str:
-        return f"{super().wanted}, or a table such as {self._table}"
+    def requirement(self) -> str:
+        return f"{super().requirement}, or a table such as {self._table}"
 
     @property
     def _table(self) -> str:
         return json.dumps([["0 h", self.example], ["5 h", self.example]])
 
-    def read(self, value: object) -> float | Course:  # type: ignore[override]  # or a table
+    def read(self, value: object) -> float | TimeTable:  # type: ignore[override]  # or a table
         if not isinstance(value, list):
             return super().read(value)
         if not 1 <= len(value) <= MOST_POINTS:
@@ -133,7 +132,7 @@ class Timed(Quantity):
             if other <= one:
                 raise Refused(f"times of a table must ascend: {other:g} h of entry {number} is not "
                               f"after {one:g} h")
-        return Course(times, values)
+        return TimeTable(times, values)
 
     def _entry(self, number: int, entry: object) -> tuple[float, float]:
         """Time and value of an entry of a table."""
@@ -147,7 +146,7 @@ class Timed(Quantity):
                           f'{super().accepted}, such as ["5 h", "{self.example}"]') from None
 
     def write(self, value):
-        if not isinstance(value, Course):
+        if not isinstance(value, TimeTable):
             return super().write(value)
         return [[self.clock.write(time), super(Timed, self).write(one)]
                 for time, one in zip(value.times, value.values)]
@@ -157,35 +156,35 @@ class Timed(Quantity):
 class Share:
     """A quantity, read as a float, or a percentage of that of the key `of`, as a Fraction."""
 
-    whole: Quantity
+    absolute: Quantity
     of: str
 
     @property
     def example(self) -> str:
-        return self.whole.example
+        return self.absolute.example
 
     @property
     def accepted(self) -> str:
-        return f'{self.whole.accepted}, or a share of {self.of} such as "80 %"'
+        return f'{self.absolute.accepted}, or a share of {self.of} such as "80 %"'
 
     @property
-    def wanted(self) -> str:
-        return f'{self.whole.wanted}, or a share of {self.of} up to "100 %"'
+    def requirement(self) -> str:
+        return f'{self.absolute.requirement}, or a share of {self.of} up to "100 %"'
 
     def read(self, value: object) -> float | Fraction:
         text = value if isinstance(value, str) and len(value) <= LONGEST else ""
         match = _PERCENT.fullmatch(text)
         if match is None:
-            return self.whole.read(value)
+            return self.absolute.read(value)
         if not 0 < float(match[1]) <= 100:
             raise ValueError("not a share")
         return Fraction(match[1]) / 100
 
     def write(self, value: float) -> str:
-        return self.whole.write(value)
+        return self.absolute.write(value)
 
     def near(self, value: object) -> str:
-        return self.whole.near(value)
+        return self.absolute.near(value)
 
 
 @dataclass(frozen=True)
@@ -200,7 +199,7 @@ class Number:
         return f"a plain number, {self.accepts.words}"
 
     @property
-    def wanted(self) -> str:
+    def requirement(self) -> str:
         return f"a plain number is needed, such as {self.example:g} ({self.accepts.words})"
 
     def near(self, value: object) -> str:
@@ -229,7 +228,7 @@ class Choice:
         return " or ".join(f'"{word}"' for word in self.words)
 
     @property
-    def wanted(self) -> str:
+    def requirement(self) -> str:
         return f"{self.accepted} is needed"
 
     def near(self, value: object) -> str:
@@ -252,7 +251,7 @@ class Times:
     each = Quantity("h", "5 h", NON_NEGATIVE)
     example = ["5 h", "18 h"]
     accepted = "a list of one or more times, each zero or more"
-    wanted = 'a list of times is needed, such as ["5 h", "18 h"] (each zero or more)'
+    requirement = 'a list of times is needed, such as ["5 h", "18 h"] (each zero or more)'
 
     def read(self, value: object) -> tuple[float, ...]:
         if not isinstance(value, list) or not value:
@@ -264,8 +263,8 @@ class Times:
 
     def near(self, value: object) -> str:
         """A single time, in a list."""
-        taken = isinstance(value, str) and _takes(self.each, value)
-        return f"[{json.dumps(value)}]" if taken else ""
+        accepted = isinstance(value, str) and _takes(self.each, value)
+        return f"[{json.dumps(value)}]" if accepted else ""
 
 
 @dataclass(frozen=True)
@@ -275,7 +274,7 @@ class Points:
     each = Quantity("um", "4 um", EITHER_SIGN)
     example = [["-5 um", "0 um"], ["0 um", "4 um"], ["5 um", "0 um"]]
     accepted = f"a list of 3 to {MOST_POINTS} points [x, y], each a pair of lengths"
-    wanted = f"{accepted}, is needed, such as {json.dumps(example)}"
+    requirement = f"{accepted}, is needed, such as {json.dumps(example)}"
 
     def read(self, value: object) -> tuple[tuple[float, float], ...]:
         if not isinstance(value, list) or not 3 <= len(value) <= MOST_POINTS:
@@ -299,7 +298,7 @@ class Flag:
     """Yes or no."""
 
     accepted = "true or false"
-    wanted = "true or false is needed, without quotes"
+    requirement = "true or false is needed, without quotes"
 
     def read(self, value: object) -> bool:
         if not isinstance(value, bool):
@@ -320,62 +319,63 @@ Kind = Quantity | Share | Number | Choice | Times | Points | Flag
 
 def quantity(text: str, unit: str, accepts: Range = POSITIVE, *, about: str, source: str,
              stated: str = "", **default):
-    """A value with a unit: `text` is its default, or an example where another default is given.
+    """A value with a unit: `text` is its default, or an example if `default` is set.
 
-    `stated` says in words what holds where the key is left out, if that hangs on other keys.
+    stated: describes a default that depends on other keys.
     """
     default = default or {"default_factory": partial(to_internal, text, unit)}
-    return _told(Quantity(unit, text, accepts), about, source, stated, **default)
+    return _key_field(Quantity(unit, text, accepts), about, source, stated, **default)
 
 
-def course(text: str, unit: str, accepts: Range = POSITIVE, *, about: str, source: str, **default):
-    """A value with a unit, as :func:`quantity`'s, or a table of it over time."""
+def timed_quantity(text: str, unit: str, accepts: Range = POSITIVE, *, about: str, source: str,
+                   **default):
+    """A value with a unit, like :func:`quantity`, or a table over time."""
     default = default or {"default_factory": partial(to_internal, text, unit)}
-    return _told(Timed(unit, text, accepts), about, source, **default)
+    return _key_field(Timed(unit, text, accepts), about, source, **default)
 
 
 def points(*, about: str, source: str):
     """A list of points, or None."""
-    return _told(Points(), about, source, default=None)
+    return _key_field(Points(), about, source, default=None)
 
 
 def flag(*, about: str, source: str):
     """True or false, false by default."""
-    return _told(Flag(), about, source, default=False)
+    return _key_field(Flag(), about, source, default=False)
 
 
 def required(example: str, unit: str, accepts: Range = POSITIVE, *, about: str, source: str):
     """A value with a unit that has no default."""
-    return _told(Quantity(unit, example, accepts), about, source)
+    return _key_field(Quantity(unit, example, accepts), about, source)
 
 
 def share(text: str, unit: str, of: str, *, about: str, source: str, **default):
     """A quantity with a default, or a percentage of the key `of`."""
     default = default or {"default_factory": partial(to_internal, text, unit)}
-    return _told(Share(Quantity(unit, text), of), about, source, **default)
+    return _key_field(Share(Quantity(unit, text), of), about, source, **default)
 
 
 def number(example: float, accepts: Range = POSITIVE, *, about: str, source: str,
            stated: str = "", **default):
-    """A plain number; `example` is its default where no other one is given."""
+    """A plain number; `example` is its default unless `default` is set."""
     default = default or {"default": example}
-    return _told(Number(example, accepts), about, source, stated, **default)
+    return _key_field(Number(example, accepts), about, source, stated, **default)
 
 
 def choice(*words: str, about: str, source: str, stated: str = ""):
-    """One of the words, the first by default; stated: what the default follows from, where it is
-    not known before the whole scene is."""
-    return _told(Choice(words), about, source, stated, default=None if stated else words[0])
+    """One of several words, the first by default; stated: describes a default that depends on
+    the rest of the scene."""
+    return _key_field(Choice(words), about, source, stated, default=None if stated else words[0])
 
 
 def times(*, about: str, source: str):
     """A list of times, or None."""
-    return _told(Times(), about, source, default=None)
+    return _key_field(Times(), about, source, default=None)
 
 
-def _told(kind: Kind, about: str, source: str, stated: str = "", **default):
-    told = {"kind": kind, "about": about, "source": source, "stated": stated}
-    return field(metadata=told, **default)
+def _key_field(kind: Kind, about: str, source: str, stated: str = "", **default):
+    metadata = {"kind": kind, "about": about, "source": source, "stated": stated}
+    return field(metadata=metadata, **default)
 
 
 def section(kind: type, *, about: str, source: str, **default):
@@ -385,16 +385,26 @@ def section(kind: type, *, about: str, source: str, **default):
 
 
 class SceneError(ValueError):
-    """A scene that cannot be run: one line that names file, key, value and what is accepted."""
+    """A scene is not accepted: one line names the file, key, value and accepted values.
+
+    Examples
+    --------
+    >>> import repro
+    >>> try:
+    ...     repro.load_scene("base", ["pore.width=50"])
+    ... except repro.SceneError as error:
+    ...     print(str(error).partition(":")[0])
+    base
+    """
 
     def __init__(self, message: str):
         super().__init__("".join(letter if letter.isprintable() else " " for letter in message))
 
 
 def to_internal(value: object, unit: str) -> float:
-    """The number in the internal `unit` of a text such as "50 um".
+    """Convert a text such as "50 um" to a number in the internal `unit`.
 
-    Raises ValueError or OverflowError if it is none.
+    Raises ValueError or OverflowError if it is not such a quantity.
     """
     match = _QUANTITY.fullmatch(value) if isinstance(value, str) and len(value) <= LONGEST else None
     if match is None:
@@ -406,7 +416,7 @@ def to_internal(value: object, unit: str) -> float:
 
 
 def unlike(kind: Kind, value: object) -> str:
-    """What to give instead of moles, or of parts per million for a concentration; "" for others."""
+    """Hint against moles, and against parts per million for a concentration; else empty."""
     text = value if isinstance(value, str) and len(value) <= LONGEST else ""
     if _MOLES.search(text):
         return "; moles need a molar mass, which is not known here: give milligrams"
@@ -416,14 +426,11 @@ def unlike(kind: Kind, value: object) -> str:
 
 
 def nearest(word: str, words: Iterable[str]) -> str:
-    """The one of the words that may have been meant: near in its letters, or with it as a part.
-
-    "" where there is none.
-    """
+    """The word with similar letters, or with `word` as a part; empty if there is none."""
     folded, word = {other.casefold(): other for other in words}, word[:60].casefold()
     parts = [other for other in folded if word in other.split("_")]
-    found = difflib.get_close_matches(word, list(folded), n=1) or parts
-    return folded[found[0]] if found else ""
+    matches = difflib.get_close_matches(word, list(folded), n=1) or parts
+    return folded[matches[0]] if matches else ""
 
 
 def _takes(kind: "Quantity | Number", value: object) -> bool:
@@ -441,30 +448,30 @@ def _within(accepts: Range, value: float) -> float:
 
 
 @cache
-def _conversion(given: str, unit: str) -> Fraction:
+def _conversion(from_unit: str, unit: str) -> Fraction:
     """How many internal units the unit `given` is.
 
     Raises ValueError if it is no unit, or of another dimension.
     """
-    if unit == "rad" and given not in ANGLES:
-        raise ValueError(f"{given} is not a unit of angle")
-    known = exact.conversion(given, unit)
-    return _by_pint(given, unit) if known is None else known
+    if unit == "rad" and from_unit not in ANGLES:
+        raise ValueError(f"{from_unit} is not a unit of angle")
+    known = exact.conversion(from_unit, unit)
+    return _by_pint(from_unit, unit) if known is None else known
 
 
-def _by_pint(given: str, unit: str) -> Fraction:
-    """As `_conversion`, for any unit there is."""
+def _by_pint(from_unit: str, unit: str) -> Fraction:
+    """Like `_conversion`, for any unit."""
     registry = _registry()
     try:
-        one = registry.Quantity(Fraction(1), registry.Unit(re.sub("^ ?/", "1/", given)))
+        one = registry.Quantity(Fraction(1), registry.Unit(re.sub("^ ?/", "1/", from_unit)))
         return Fraction(one.to(unit).magnitude)
     except Exception as error:  # pint lets errors of its parser through: of tokens, of types, ...
-        raise ValueError(f"{given} is not convertible to {unit}") from error
+        raise ValueError(f"{from_unit} is not convertible to {unit}") from error
 
 
 @cache
 def _registry():
-    """Every unit, in exact fractions; made when first needed, for it takes half a second."""
+    """All units as exact fractions; built on first use, since this takes half a second."""
     import pint
 
     return pint.UnitRegistry(non_int_type=Fraction)

@@ -1,12 +1,12 @@
-"""Many pores: a scene with keys varied, each run in a process and a folder of its own.
+"""Many runs of a scene with varied keys, each in its own process and folder.
 
     design    the runs: a grid, lists, a Latin hypercube
-    state     the folder: what is wanted, what is there
-    task      one run, in a process of its own
-    preload   what such processes share
+    folder    sweep.json and the folders of the runs
+    single_run  one run in its own process
+    preload   imports shared by these processes
     pool      runs on all cores
     cluster   runs on a Dask cluster
     table     table.csv and runs.csv
     page      summary.html
-    making    all of it, for scripts too
+    driver    a sweep from its factors to its page
 """

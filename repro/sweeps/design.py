@@ -1,7 +1,7 @@
-"""The points of a sweep: what ``--vary`` asks for, crossed in a grid or drawn as a Latin hypercube.
+"""The points of a sweep: the factors of ``--vary``, combined in a grid or a Latin hypercube.
 
 Two forms: a range ``flow.mean_velocity=0.3:30 m/day:log:8`` (both ends in the unit that follows;
-``linear`` or ``log``; how many values), and a list ``pore.width=50 um, 60 um`` or
+``linear`` or ``log``; number of values), and a list ``pore.width=50 um, 60 um`` or
 ``numerics.preset=fast, paper``. A Latin hypercube takes its ranges without the number of values.
 """
 
@@ -30,21 +30,21 @@ from repro.scene import (
 )
 from repro.scene import label as label_of
 from repro.scene.files import override
-from repro.scene.reading import shown
+from repro.scene.reading import quote
 
 MOST_POINTS = 10_000
-#: Of each pair one is given: varying it replaces the other.
+#: A scene has one key of each pair: varying it replaces the other.
 PAIRS = {"flow.head": "flow.mean_velocity", "flow.mean_velocity": "flow.head"}
-WANTED = ('KEY=a:b UNIT:linear|log:N or KEY=VALUE, VALUE, ... is needed, such as '
-          '"flow.mean_velocity=0.3:30 m/day:log:8" or "pore.width=50 um, 60 um"')
+EXPECTED_FORM = ('KEY=a:b UNIT:linear|log:N or KEY=VALUE, VALUE, ... is needed, such as '
+                 '"flow.mean_velocity=0.3:30 m/day:log:8" or "pore.width=50 um, 60 um"')
 _NUMBER = re.compile(r"([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)\s*(.*)", re.S)
 
 
 @dataclass(frozen=True)
 class Factor:
-    """A key that is varied: numbers in `unit` ("" for plain ones), or words.
+    """A varied key: its values are numbers in `unit` ("" without one), or words.
 
-    A range has two, its ends.
+    The values of a range are its two ends.
     """
 
     key: str
@@ -60,17 +60,17 @@ class Factor:
 
     @property
     def column(self) -> str:
-        """Its name in a table, such as ``flow.mean_velocity_m_per_day``."""
+        """Name of its column, such as ``flow.mean_velocity_m_per_day``."""
         unit = re.sub(r"[\s*^]+", "", re.sub(r"\s*/\s*", "_per_", self.unit)).strip("_")
         return f"{self.key}_{unit}" if unit else self.key
 
     def text(self, value: float | str) -> str:
-        """A value as a scene writes it."""
+        """A value as in a scene."""
         number = value if isinstance(value, str) else repr(value)
         return f"{number} {self.unit}".strip()
 
     def short(self, value: float | str) -> str:
-        """A value for people to read."""
+        """A value with four digits."""
         number = value if isinstance(value, str) else f"{value:.4g}"
         return f"{number} {self.unit}".strip()
 
@@ -85,7 +85,7 @@ class Point:
 
     @cached_property
     def hash(self) -> str:
-        """What names its scene."""
+        """Hash of its scene."""
         return scene_hash(self.scene)
 
     @property
@@ -95,27 +95,24 @@ class Point:
 
 
 def parse(text: str) -> Factor:
-    """The factor that one ``--vary`` names.
-
-    Raises SceneError where it is neither a range nor a list.
-    """
+    """Parse an entry of ``--vary``. Raises SceneError if it is neither a range nor a list."""
     key, equals, rest = (part.strip() for part in text.partition("="))
     if not (key and equals and rest):
-        raise _refused(text, WANTED)
+        raise _refused(text, EXPECTED_FORM)
     return (_range if ":" in rest else _list)(text, key, rest)
 
 
-def _refused(text: str, wanted: str) -> SceneError:
-    return SceneError(f"--vary {shown(text, 100)}: {wanted}")
+def _refused(text: str, accepted: str) -> SceneError:
+    return SceneError(f"--vary {quote(text, 100)}: {accepted}")
 
 
 def _range(text: str, key: str, rest: str) -> Factor:
     low, high, spacing, count = (*(part.strip() for part in rest.split(":", 3)), "", "", "")[:4]
-    (start, other), (end, unit) = _number(low), _number(high)
-    if not (start and end) or other:
-        raise _refused(text, WANTED)
+    (start, first_unit), (end, unit) = _number(low), _number(high)
+    if not (start and end) or first_unit:
+        raise _refused(text, EXPECTED_FORM)
     if spacing not in ("linear", "log") or not re.fullmatch("[0-9]{0,9}", count):
-        raise _refused(text, WANTED)
+        raise _refused(text, EXPECTED_FORM)
     first, last = float(start), float(end)
     if not first < last < math.inf:
         raise _refused(text, "the lower end first, then a higher one, is needed")
@@ -145,24 +142,23 @@ def _bare(item: str) -> str:
 
 
 def _number(text: str) -> tuple[str, str]:
-    """The digits and the unit of a text, both empty where it is no number."""
+    """The digits and the unit of a text, both empty if it is not a number."""
     match = _NUMBER.fullmatch(text)
     return (match[1], match[2]) if match else ("", "")
 
 
 def levels(factor: Factor) -> list[float | str]:
-    """The values that a grid takes of a factor; those between the ends of a range have 12 digits.
-    """
+    """The values of a factor in a grid. Values between the ends of a range have 12 digits."""
     if factor.spacing == "list":
         return list(factor.values)
     low, high = factor.values
     spaced = np.geomspace if factor.spacing == "log" else np.linspace
-    found = spaced(low, high, factor.count or 2).tolist()
-    return [low, *(float(f"{value:.12g}") for value in found[1:-1]), high]
+    spaced_values = spaced(low, high, factor.count or 2).tolist()
+    return [low, *(float(f"{value:.12g}") for value in spaced_values[1:-1]), high]
 
 
 def grid(factors: list[Factor]) -> list[tuple]:
-    """Every combination, the last factor changing first.
+    """All combinations of values; the last factor varies fastest.
 
     Raises SceneError for a range without a number of values.
     """
@@ -176,9 +172,9 @@ def grid(factors: list[Factor]) -> list[tuple]:
 
 
 def latin(factors: list[Factor], samples: int, seed: int) -> list[tuple]:
-    """A Latin hypercube: each of `samples` strata of each range has one value.
+    """A Latin hypercube: one value from each of `samples` strata of each range.
 
-    A list's values are drawn evenly.
+    The values of a list are drawn evenly.
     """
     from scipy.stats import qmc
 
@@ -192,52 +188,55 @@ def latin(factors: list[Factor], samples: int, seed: int) -> list[tuple]:
     return [tuple(map(_at, factors, row.tolist())) for row in drawn]
 
 
-def _at(factor: Factor, part: float) -> float | str:
-    """The value at a part of the way, from 0 to 1, through a factor."""
+def _at(factor: Factor, fraction: float) -> float | str:
+    """The value of a factor at a fraction (0 to 1) of its range or list."""
     if factor.spacing == "list":
-        return factor.values[int(part * len(factor.values))]
+        return factor.values[int(fraction * len(factor.values))]
     low, high = factor.values
-    return low * (high / low) ** part if factor.spacing == "log" else low + part * (high - low)
+    if factor.spacing == "log":
+        return low * (high / low) ** fraction
+    return low + fraction * (high - low)
 
 
 def points(source: Source, sets: list[str], factors: list[Factor], combinations: list[tuple],
            unset: Sequence[str] = ()) -> list[Point]:
-    """The runs of a sweep, each checked; sets, unset: the entries of --set and --unset.
+    """Make and check the runs of a sweep; sets, unset: the entries of --set and --unset.
 
-    Raises SceneError, naming the run, where one is not accepted or is another's twin, and where a
-    key is given twice.
+    Raises SceneError, with the number of the run, if a scene is not accepted or equals another one,
+    or if a key is both varied and set.
     """
     _check_keys(sets, [factor.key for factor in factors])
-    found: list[Point] = []
+    runs: list[Point] = []
     first: dict[str, int] = {}
     for index, values in enumerate(combinations, 1):
-        said = label(factors, values)
+        run_label = label(factors, values)
         tables = load_tables(source, sets, unset)
-        scene = _scene(label_of(source), tables, factors, values, f"run {index} ({said})")
+        scene = _scene(label_of(source), tables, factors, values, f"run {index} ({run_label})")
         point = Point(index, values, scene)
         twin = first.setdefault(scene_hash(point.scene), index)
         if twin != index:
-            raise SceneError(f"run {index} ({said}): the same scene as run {twin}; each run once "
-                             "is accepted")
-        found.append(point)
-    return found
+            raise SceneError(f"run {index} ({run_label}): the same scene as run {twin}; each run "
+                             "once is accepted")
+        runs.append(point)
+    return runs
 
 
 def _check_keys(sets: list[str], varied: list[str]) -> None:
     for key, count in Counter(varied).items():
-        other = PAIRS.get(key)
+        partner = PAIRS.get(key)
         if count > 1:
             raise SceneError(f"--vary {key}: one --vary of it is accepted, with all its values")
-        if other in varied:
-            raise SceneError(f"--vary {key}: it and {other} exclude each other; one of them is "
+        if partner in varied:
+            raise SceneError(f"--vary {key}: it and {partner} exclude each other; one of them is "
                              "accepted")
-        if any(entry.partition("=")[0].strip() in (key, other) for entry in sets):
-            both = f"{key} or {other}" if other else key
-            raise SceneError(f"--set of {both}: it is not accepted beside --vary {key}, which "
+        if any(entry.partition("=")[0].strip() in (key, partner) for entry in sets):
+            named = f"{key} or {partner}" if partner else key
+            raise SceneError(f"--set of {named}: it is not accepted beside --vary {key}, which "
                              "replaces it")
 
 
-def _scene(source: str, tables: dict, factors: list[Factor], values: tuple, said: str) -> Scene:
+def _scene(source: str, tables: dict, factors: list[Factor], values: tuple,
+           run_label: str) -> Scene:
     for factor, value in zip(factors, values):
         section, _, key = PAIRS.get(factor.key, "").partition(".")
         if isinstance(tables.get(section), dict):
@@ -246,10 +245,10 @@ def _scene(source: str, tables: dict, factors: list[Factor], values: tuple, said
     try:
         return parse_scene(tables, Path(source).stem, source)
     except SceneError as error:
-        raise SceneError(f"{said}: {error}") from None
+        raise SceneError(f"{run_label}: {error}") from None
 
 
 def label(factors: list[Factor], values: tuple) -> str:
-    """What a run has of each factor, for people to read."""
+    """The value of each factor of a run, as text."""
     return ", ".join(f"{factor.key} = {factor.short(value)}"
                      for factor, value in zip(factors, values))

@@ -1,6 +1,6 @@
-"""``summary.html``: the laws of a single pore that a sweep finds, and how its runs ended.
+"""``summary.html``: charts of the runs of a sweep, and how each run ended.
 
-It needs no network.
+The page needs no network.
 """
 
 from __future__ import annotations
@@ -12,27 +12,27 @@ import numpy as np
 from repro.report import charts
 from repro.report.page import policy
 from repro.results import write_text
-from repro.results.files import whole
+from repro.results.files import atomic_path
 from repro.results.quantities import Quantity
 from repro.sweeps.design import Factor, label
-from repro.sweeps.state import Sweep
-from repro.sweeps.table import NUMBERS, Told
+from repro.sweeps.folder import Sweep
+from repro.sweeps.table import NUMBERS, SweepRun
 
-#: Viridis, dark to light on a light page and without its darkest part on a dark one: told apart by
-#: the colour-blind.
+#: Viridis, which the colour-blind can distinguish: dark to light on a light page, without its
+#: darkest part on a dark one.
 LIGHT = ("#440154", "#46327e", "#365c8d", "#277f8e", "#1fa187", "#4ab36b", "#86a51a")
 DARK = ("#8d7fe0", "#6f93dd", "#4fa5d0", "#35b7ae", "#5ac883", "#a5d84a", "#fde725")
 LEVELS = len(LIGHT)
-#: Of the dots of runs.
+#: Radius of the dots of runs.
 RADIUS = 4
 
 
 def _levels(colours: tuple[str, ...]) -> str:
-    """The colours as the style names them."""
+    """The colours as variables of the style."""
     return " ".join(f"--level{i}: {colour};" for i, colour in enumerate(colours))
 
 
-LOOK = """
+STYLE = """
 :root { color-scheme: light dark; --ink: #1c1c1c; --soft: #5a5a5a; --line: #d9d9d6; --page: #fff;
         --bad: #a5330d; LIGHT }
 @media (prefers-color-scheme: dark) {
@@ -60,44 +60,44 @@ th, td { text-align: right; padding: .25rem .6rem; border-bottom: 1px solid var(
          overflow-wrap: normal; }
 th { vertical-align: bottom; } td.text, th.text { text-align: left; } a { color: inherit; }
 """.replace("LIGHT", _levels(LIGHT)).replace("DARK", _levels(DARK))
-LOOK += "".join(f".line{i} {{ stroke: var(--level{i}); }} "
+STYLE += "".join(f".line{i} {{ stroke: var(--level{i}); }} "
                 f".dot{i} {{ fill: var(--level{i}); }}\n"
                 for i in range(LEVELS))
-#: The numbers of a run that its row shows.
-SHOWN = """end_h clogging_time_h clogging_biomass contact_time_h contact_biomass
+#: The numbers in the row of a run.
+TABLE_NUMBERS = """end_h clogging_time_h clogging_biomass contact_time_h contact_biomass
 wall_time_s""".split()
 
 
-def write(sweep: Sweep, told: list[Told], clogged: float) -> None:
+def write(sweep: Sweep, runs: list[SweepRun], clogged: float) -> None:
     """Write ``summary.html``."""
-    with whole(sweep.folder / "summary.html") as beside:
-        write_text(beside, page(sweep, told, clogged))
+    with atomic_path(sweep.folder / "summary.html") as beside:
+        write_text(beside, page(sweep, runs, clogged))
 
 
-def page(sweep: Sweep, told: list[Told], clogged: float) -> str:
-    """The whole page."""
-    done = sum(one.done for one in told)
+def page(sweep: Sweep, runs: list[SweepRun], clogged: float) -> str:
+    """The text of the page."""
+    finished = sum(run.is_over for run in runs)
     title = f"Sweep of {escape(sweep.source)}"
-    varied = "".join(f"<li>{escape(_described(factor))}</li>" for factor in sweep.factors)
+    varied = "".join(f"<li>{escape(_describe(factor))}</li>" for factor in sweep.factors)
     return f"""<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"/>
-<meta http-equiv="Content-Security-Policy" content="{policy(LOOK)}"/>
+<meta http-equiv="Content-Security-Policy" content="{policy(STYLE)}"/>
 <meta name="viewport" content="width=device-width, initial-scale=1"/>
-<title>{title}</title><style>{LOOK}</style></head><body>
+<title>{title}</title><style>{STYLE}</style></head><body>
 <h1>{title}</h1>
-<p>{done} of {len(told)} runs have come to their end. Varied:</p><ul>{varied}</ul>
-<p class="note">Biomass is the aggregate's area over the pore's. Conductivity is relative to that of
-the run's start. A pore counts as clogged where that has fallen to {clogged:g}; contact is the first
-row in which the aggregate touches the opposite wall. Between the rows of a run what is shown is
-interpolated: <code>output.times</code> makes more.</p>
-{_conductivity(sweep, told)}
-{_clogging(sweep, told, clogged)}
-<h2>Runs</h2>{_table(sweep, told)}
+<p>{finished} of {len(runs)} runs have come to their end. Varied:</p><ul>{varied}</ul>
+<p class="note">Biomass is the aggregate's area over the pore's. Conductivity is relative to that at
+the start of the run. A pore counts as clogged once it has fallen to {clogged:g}; contact is the
+first row in which the aggregate touches the opposite wall. Values between the rows of a run are
+interpolated; <code>output.times</code> adds rows.</p>
+{_conductivity(sweep, runs)}
+{_clogging(sweep, runs, clogged)}
+<h2>Runs</h2>{_table(sweep, runs)}
 </body></html>
 """
 
 
-def _described(factor: Factor) -> str:
+def _describe(factor: Factor) -> str:
     if factor.spacing == "list":
         return f"{factor.key}: {', '.join(map(factor.short, factor.values))}"
     count = f", {factor.count} values" if factor.count else ""
@@ -105,30 +105,30 @@ def _described(factor: Factor) -> str:
     return f"{factor.key}: {first} to {last}, {factor.spacing}{count}"
 
 
-def _log(factor: Factor) -> bool:
-    """Is it shown on a logarithmic scale?"""
+def _is_logarithmic(factor: Factor) -> bool:
+    """Does the factor need a logarithmic scale?"""
     numbers = [_number(factor, value) for value in factor.values] if factor.numeric else [1.0]
     return factor.spacing == "log" or factor.spacing == "list" and charts.is_wide(numbers)
 
 
 def _number(factor: Factor, value: float | str) -> float:
-    """Words are numbered in their order."""
+    """A numeric value, or the position of a word among the values."""
     return float(factor.values.index(value)) if isinstance(value, str) else value
 
 
 def _level(factor: Factor, value: float | str) -> int:
-    """The colour of a value."""
+    """The number of the colour of a value."""
     numbers = [_number(factor, each) for each in factor.values]
     low, high = min(numbers), max(numbers)
     if low == high:
         return 0
-    colours = charts.Scale(low, high, 0, LEVELS - 1, _log(factor))
+    colours = charts.Scale(low, high, 0, LEVELS - 1, _is_logarithmic(factor))
     return round(float(colours(_number(factor, value))))
 
 
-def _key(factor: Factor, told: list[Told], which: int) -> str:
-    """What the colours stand for."""
-    values = sorted({one.point.values[which] for one in told},
+def _key(factor: Factor, runs: list[SweepRun], k: int) -> str:
+    """The legend of the colours."""
+    values = sorted({run.point.values[k] for run in runs},
                     key=lambda value: _number(factor, value))
     if len(values) > 2 * LEVELS:
         last = len(values) - 1
@@ -138,137 +138,137 @@ def _key(factor: Factor, told: list[Told], which: int) -> str:
 
 
 def _entry(factor: Factor, value: float | str) -> str:
-    """A value in the key, beside a line in its colour."""
+    """A value in the legend, beside a line in its colour."""
     return f"<li>{charts.swatch(_level(factor, value))}{escape(factor.short(value))}</li>"
 
 
-def _said(sweep: Sweep, one: Told) -> str:
-    return f"run {one.point.index}: {label(sweep.factors, one.point.values)}"
+def _run_title(sweep: Sweep, run: SweepRun) -> str:
+    return f"run {run.point.index}: {label(sweep.factors, run.point.values)}"
 
 
-def _conductivity(sweep: Sweep, told: list[Told]) -> str:
-    """Conductivity against biomass, a line a run.
+def _conductivity(sweep: Sweep, runs: list[SweepRun]) -> str:
+    """Conductivity against biomass, one line for each run.
 
-    There is a picture for each key that is varied, coloured by it.
+    Each varied key has a chart that is coloured by it.
     """
-    shown = [one for one in told
-             if np.isfinite(one.relative).any() and np.isfinite(one.biomass).any()]
+    plotted = [run for run in runs
+             if np.isfinite(run.relative).any() and np.isfinite(run.biomass).any()]
     head = "<h2>Conductivity against biomass</h2>"
-    if not shown:
+    if not plotted:
         return f'{head}<p class="note">No run has both a flow and an aggregate.</p>'
-    figures = "".join(f"<figure>{_coloured(sweep, shown, which)}</figure>"
-                      for which in range(len(sweep.factors)))
+    figures = "".join(f"<figure>{_coloured(sweep, plotted, k)}</figure>"
+                      for k in range(len(sweep.factors)))
     return f'{head}<div class="pictures">{figures}</div>'
 
 
-def _coloured(sweep: Sweep, shown: list[Told], which: int) -> str:
-    """A line a run, coloured by one of the keys that are varied."""
-    factor = sweep.factors[which]
-    biomass = np.concatenate([one.biomass for one in shown])
-    relative = np.concatenate([one.relative for one in shown])
+def _coloured(sweep: Sweep, plotted: list[SweepRun], k: int) -> str:
+    """A chart with one line for each run, coloured by factor k."""
+    factor = sweep.factors[k]
+    biomass = np.concatenate([run.biomass for run in plotted])
+    relative = np.concatenate([run.relative for run in plotted])
     x, y = charts.across(*_ends(biomass)), charts.upwards(*_ends(relative))
-    lines = [charts.curve(x, y, one.biomass, one.relative, _level(factor, one.point.values[which]),
-                          _said(sweep, one)) for one in shown]
+    lines = [charts.curve(x, y, run.biomass, run.relative, _level(factor, run.point.values[k]),
+                          _run_title(sweep, run)) for run in plotted]
     axes = "biomass: aggregate area / pore area", "conductivity / initial conductivity"
     label = f"Conductivity against biomass, coloured by {factor.key}"
-    return charts.drawing(x, y, axes, label, "".join(lines)) + _key(factor, shown, which)
+    return charts.drawing(x, y, axes, label, "".join(lines)) + _key(factor, plotted, k)
 
 
 def _ends(values) -> tuple[float, float, bool]:
-    """The ends of an axis for positive values, and whether it is logarithmic: from zero, or
-    logarithmic where the values go far."""
+    """The ends of an axis for positive values, and whether it is logarithmic. A linear axis begins
+    at zero; an axis over a wide range is logarithmic."""
     known = np.array(values)[np.isfinite(values)]
     log = charts.is_wide(known)
     low, high = charts.limits(known if log else [0.0, *known], log)
     return low, high, log
 
 
-def _clogging(sweep: Sweep, told: list[Told], clogged: float) -> str:
-    """Clogging time against each key that is varied, coloured by another one."""
-    shown = [one for one in told
-             if _time(one) > 0 and (one.done or one.numbers["clogging_time_h"])]
+def _clogging(sweep: Sweep, runs: list[SweepRun], clogged: float) -> str:
+    """Clogging time against each varied key, coloured by the next one."""
+    plotted = [run for run in runs
+             if _time(run) > 0 and (run.is_over or run.numbers["clogging_time_h"])]
     head = "<h2>Clogging time</h2>"
-    if not shown:
+    if not plotted:
         return f'{head}<p class="note">No run has both a flow and a length in time.</p>'
-    figures = "".join(f"<figure>{_times(sweep, shown, which, clogged)}</figure>"
-                      for which in range(len(sweep.factors)))
+    figures = "".join(f"<figure>{_times(sweep, plotted, k, clogged)}</figure>"
+                      for k in range(len(sweep.factors)))
     return (f'{head}<p class="note">A hollow triangle stands at the end of a run that was not '
             f'clogged by then.</p><div class="pictures">{figures}</div>')
 
 
-def _times(sweep: Sweep, shown: list[Told], which: int, clogged: float) -> str:
-    factor, other = sweep.factors[which], (which + 1) % len(sweep.factors)
-    x = _across(factor, [_number(factor, one.point.values[which]) for one in shown])
-    y = charts.upwards(*_ends([_time(one) for one in shown]))
+def _times(sweep: Sweep, plotted: list[SweepRun], k: int, clogged: float) -> str:
+    factor, colour_index = sweep.factors[k], (k + 1) % len(sweep.factors)
+    x = _across(factor, [_number(factor, run.point.values[k]) for run in plotted])
+    y = charts.upwards(*_ends([_time(run) for run in plotted]))
     lines: list[str] = []
     marks: list[str] = []
-    alike: dict[tuple, tuple[int, list]] = {}
-    for one in sorted(shown, key=lambda one: _number(factor, one.point.values[which])):
-        reached = one.numbers["clogging_time_h"] is not None
-        place = charts.point(x(_number(factor, one.point.values[which])), y(_time(one)))
-        level = _level(sweep.factors[other], one.point.values[other])
-        said = f"{_said(sweep, one)}: {'' if reached else 'after '}{_time(one):.4g} h"
-        marks.append(charts.dot(place, level, said, RADIUS) if reached else
-                     charts.triangle(place, level, said))
-        rest = one.point.values[:which] + one.point.values[which + 1:]
-        alike.setdefault(rest, (level, []))[1].extend([place] if reached else [])
+    series: dict[tuple, tuple[int, list]] = {}
+    for run in sorted(plotted, key=lambda run: _number(factor, run.point.values[k])):
+        reached = run.numbers["clogging_time_h"] is not None
+        place = charts.point(x(_number(factor, run.point.values[k])), y(_time(run)))
+        level = _level(sweep.factors[colour_index], run.point.values[colour_index])
+        title = f"{_run_title(sweep, run)}: {'' if reached else 'after '}{_time(run):.4g} h"
+        marks.append(charts.dot(place, level, title, RADIUS) if reached else
+                     charts.triangle(place, level, title))
+        rest = run.point.values[:k] + run.point.values[k + 1:]
+        series.setdefault(rest, (level, []))[1].extend([place] if reached else [])
     if len(sweep.factors) > 1:
         lines = [charts.polyline(places, level)
-                 for level, places in alike.values() if len(places) > 1]
-    key = _key(sweep.factors[other], shown, other) if other != which else ""
-    axes = _named(factor), f"time to {clogged:g} of the conductivity (h)"
+                 for level, places in series.values() if len(places) > 1]
+    key = _key(sweep.factors[colour_index], plotted, colour_index) if colour_index != k else ""
+    axes = _axis_title(factor), f"time to {clogged:g} of the conductivity (h)"
     label = f"Clogging time against {factor.key}"
     return charts.drawing(x, y, axes, label, "".join(lines + marks)) + key
 
 
 def _across(factor: Factor, numbers: list[float]) -> charts.Scale:
-    """The axis of a key that is varied."""
+    """The horizontal axis of a varied key."""
     if not factor.numeric:
         return charts.across(-0.5, len(factor.values) - 0.5, words=factor.values)
-    log = _log(factor)
+    log = _is_logarithmic(factor)
     return charts.across(*charts.padded(numbers, log), log)
 
 
-def _named(factor: Factor) -> str:
+def _axis_title(factor: Factor) -> str:
     """A key and its unit."""
     return f"{factor.key} ({factor.unit})" if factor.unit else factor.key
 
 
-def _time(one: Told) -> float:
-    """When a pore has clogged, or how long it has been simulated (h).
+def _time(run: SweepRun) -> float:
+    """The time (h) at which a pore clogs, or the last simulated time if it does not.
 
-    Zero where there is no flow to clog.
+    Zero without flow.
     """
-    if not np.isfinite(one.relative).any():
+    if not np.isfinite(run.relative).any():
         return 0.0
-    reached = one.numbers["clogging_time_h"]
-    return float(one.times[-1]) if reached is None else reached
+    reached = run.numbers["clogging_time_h"]
+    return float(run.times[-1]) if reached is None else reached
 
 
-def _table(sweep: Sweep, told: list[Told]) -> str:
+def _table(sweep: Sweep, runs: list[SweepRun]) -> str:
     known = {each.name: each for each in NUMBERS}
     names = ["run", *(factor.key for factor in sweep.factors),
-             *(_above(known[name]) for name in SHOWN)]
+             *(_heading(known[name]) for name in TABLE_NUMBERS)]
     head = "".join(f"<th>{escape(name)}</th>" for name in names) + '<th class="text">status</th>'
-    rows = "".join(_row(sweep, one) for one in told)
-    failures = "".join(f'<li class="bad">run {one.point.index}: {escape(one.status)}</li>'
-                       for one in told if not one.done)
+    rows = "".join(_row(sweep, run) for run in runs)
+    failures = "".join(f'<li class="bad">run {run.point.index}: {escape(run.status)}</li>'
+                       for run in runs if not run.is_over)
     return (f'<div class="wide"><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>'
             f"</div><ul>{failures}</ul>")
 
 
-def _above(number: Quantity) -> str:
-    """What stands above a number: "end (h)"."""
-    return f"{number.label} ({number.unit.shown})" if number.unit.shown else number.label
+def _heading(number: Quantity) -> str:
+    """The heading of a number, such as "end (h)"."""
+    return f"{number.label} ({number.unit.symbol})" if number.unit.symbol else number.label
 
 
-def _row(sweep: Sweep, one: Told) -> str:
-    values = [factor.short(value) for factor, value in zip(sweep.factors, one.point.values)]
-    numbers = [_short(one.numbers[name]) for name in SHOWN]
+def _row(sweep: Sweep, run: SweepRun) -> str:
+    values = [factor.short(value) for factor, value in zip(sweep.factors, run.point.values)]
+    numbers = [_short(run.numbers[name]) for name in TABLE_NUMBERS]
     cells = "".join(f"<td>{escape(text)}</td>" for text in (*values, *numbers))
-    link = f'<td><a href="runs/{escape(one.point.name)}/">{one.point.index}</a></td>'
-    status = escape(one.status if one.done else one.status.partition(":")[0])
-    return f'<tr>{link}{cells}<td class="text{"" if one.done else " bad"}">{status}</td></tr>'
+    link = f'<td><a href="runs/{escape(run.point.name)}/">{run.point.index}</a></td>'
+    status = escape(run.status if run.is_over else run.status.partition(":")[0])
+    return f'<tr>{link}{cells}<td class="text{"" if run.is_over else " bad"}">{status}</td></tr>'
 
 
 def _short(value: float | None) -> str:

@@ -1,6 +1,6 @@
-"""Runs side by side on this machine, each in a process of its own.
+"""Parallel runs on this machine, each in its own process.
 
-What kills one is the failure of no other. A server that has imported everything forks them.
+A killed process fails only its own run. A server that has imported the package forks them.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from repro.sweeps import task
+from repro.sweeps import single_run
 from repro.sweeps.design import Point
 
-Each = Callable[[Sequence[Point], Path], Iterator[tuple[Point, str]]]
+RunPoints = Callable[[Sequence[Point], Path], Iterator[tuple[Point, str]]]
 _METHODS = multiprocessing.get_all_start_methods()
 CONTEXT: Any = multiprocessing.get_context("forkserver" if "forkserver" in _METHODS else "spawn")
-#: Of these processes: one thread each, and no module from the working folder; glibc keeps the
-#: memory that a run frees for its next step, which otherwise takes a short run 5 % of its time.
+#: Environment of these processes: one thread each, and no module from the working folder. glibc
+#: keeps freed memory for the next step; returning it costs a short run 5 % of its time.
 ENVIRONMENT = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1",
                "PYTHONSAFEPATH": "1", "MALLOC_MMAP_THRESHOLD_": "1073741824",
                "MALLOC_TRIM_THRESHOLD_": "1073741824", "MALLOC_TOP_PAD_": "67108864"}
@@ -35,98 +35,98 @@ _starting = threading.Lock()
 
 
 def cores() -> int:
-    """The cores that this process may use."""
+    """Number of cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @contextmanager
-def ready(workers: int) -> Iterator[Each]:
-    """What makes runs, `workers` at a time; the server starts at once."""
-    _serve()
-    yield partial(each, workers=workers)
+def ready(workers: int) -> Iterator[RunPoints]:
+    """Start the server; yields a function that makes runs, `workers` at a time."""
+    _start_server()
+    yield partial(run_points, workers=workers)
 
 
-def _serve() -> None:
-    """Start the server, if it does not run. Ctrl-C reaches neither it nor what it forks."""
+def _start_server() -> None:
+    """Start the server unless it is running. Ctrl-C reaches neither it nor its processes."""
     if CONTEXT.get_start_method() != "forkserver":
         return
     from multiprocessing import forkserver, resource_tracker
 
-    with _apart():
+    with _isolated():
         CONTEXT.set_forkserver_preload(["repro.sweeps.preload"])
         resource_tracker.ensure_running()  # which unblocks the signal
-        kept = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+        previous_mask = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
         try:
             forkserver.ensure_running()
         finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, kept)
+            signal.pthread_sigmask(signal.SIG_SETMASK, previous_mask)
 
 
 @contextmanager
-def _apart() -> Iterator[None]:
-    """Within, a process that is started has ENVIRONMENT, and does not run the user's script again.
-    """
+def _isolated() -> Iterator[None]:
+    """Start processes within with ENVIRONMENT, and without running the user's script again."""
     with _starting:
         main = sys.modules["__main__"]
-        before = {name: os.environ.get(name) for name in ENVIRONMENT}
+        previous = {name: os.environ.get(name) for name in ENVIRONMENT}
         try:
             os.environ.update(ENVIRONMENT)
             sys.modules["__main__"] = ModuleType("__main__")
             yield
         finally:
             sys.modules["__main__"] = main
-            for name, value in before.items():
+            for name, value in previous.items():
                 os.environ.pop(name) if value is None else os.environ.update({name: value})
 
 
-def each(points: Sequence[Point], folder: Path, workers: int,
+def run_points(points: Sequence[Point], folder: Path, workers: int,
          patience: float = 0.0) -> Iterator[tuple[Point, str]]:
-    """Make the runs into `folder`; yields each with how it ended, as they end.
+    """Make the runs in `folder`; yields each point with its status when its run ends.
 
-    patience: seconds that a run waits for another process to leave its folder.
+    patience: seconds that a run waits for another process that uses its folder.
     """
     waiting = iter(points)
-    at_work: dict[Any, tuple[Point, Any]] = {}
+    running: dict[Any, tuple[Point, Any]] = {}
     try:
         while True:
-            for point in islice(waiting, workers - len(at_work)):
-                answer, process = _started(point, folder, patience)
-                at_work[answer] = point, process
-            if not at_work:
+            for point in islice(waiting, workers - len(running)):
+                answer, process = _start(point, folder, patience)
+                running[answer] = point, process
+            if not running:
                 return
-            for answer in wait(list(at_work)):
-                point, process = at_work[answer]
-                status = _ended(answer, process)
-                del at_work[answer]
+            for answer in wait(list(running)):
+                point, process = running[answer]
+                status = _receive_status(answer, process)
+                del running[answer]
                 yield point, status
     finally:
-        _stop([process for _, process in at_work.values()])
+        _stop([process for _, process in running.values()])
 
 
-def _started(point: Point, folder: Path, patience: float) -> tuple[Any, Any]:
-    """The process that makes a run, and the connection to which it sends how that ended."""
+def _start(point: Point, folder: Path, patience: float) -> tuple[Any, Any]:
+    """Start the process of a run; return the connection that receives its status, and the process.
+    """
     answer, end = CONTEXT.Pipe(duplex=False)
-    process = CONTEXT.Process(target=task.answer, daemon=True,
+    process = CONTEXT.Process(target=single_run.send_status, daemon=True,
                               args=(end, point.scene, folder / point.name, patience))
-    _serve()
-    with _apart():
+    _start_server()
+    with _isolated():
         process.start()
     end.close()
     return answer, process
 
 
-def _ended(answer: Any, process: Any) -> str:
-    """How a run ended, or what ended its process."""
+def _receive_status(answer: Any, process: Any) -> str:
+    """Receive how a run ended, or describe how its process ended."""
     try:
         status = answer.recv()
     except EOFError:
         status = ""
     answer.close()
     process.join()
-    return status or _died(process.exitcode)
+    return status or _describe_exit(process.exitcode)
 
 
-def _died(code: int) -> str:
+def _describe_exit(code: int) -> str:
     try:
         cause = f"was killed by {signal.Signals(-code).name}"
     except ValueError:
@@ -135,7 +135,7 @@ def _died(code: int) -> str:
 
 
 def _stop(processes: Sequence[Any]) -> None:
-    """End processes, by force where they do not end in time."""
+    """Terminate processes; kill those that do not end in time."""
     for process in processes:
         process.terminate()
     for process in processes:

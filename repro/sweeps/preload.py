@@ -1,6 +1,6 @@
-"""The imports and the look-ups on the disk that all runs of a sweep share.
+"""Imports and disk accesses that all runs of a sweep share.
 
-The process that forks a process for each run imports this module.
+The server that forks the process of each run imports this module.
 """
 
 import gc
@@ -10,10 +10,10 @@ import meshio
 from repro import results
 from repro.runs.machine import conditions
 from repro.scene import load_scene
-from repro.sweeps import task
+from repro.sweeps import single_run
 
 results.provenance(load_scene("flow_only"))
 conditions()
 gc.freeze()  # the collector passes over what is imported, so that no process copies it
 
-__all__ = ["meshio", "task"]
+__all__ = ["meshio", "single_run"]

@@ -1,6 +1,6 @@
-"""What a sweep leaves for others to read.
+"""The tables of a sweep.
 
-``table.csv`` has a row a run and time, ``runs.csv`` a row a run.
+``table.csv`` has a row for each run and time, ``runs.csv`` a row for each run.
 """
 
 from __future__ import annotations
@@ -15,18 +15,21 @@ import numpy as np
 
 from repro import results
 from repro.report.reading import NoRun
-from repro.results.files import whole
+from repro.results.files import atomic_path
 from repro.results.quantities import Quantity
 from repro.runs import status
-from repro.runs.whole import run_of
+from repro.runs.integrity import read_scene_run
 from repro.sweeps.design import Point
-from repro.sweeps.state import Sweep
+from repro.sweeps.folder import Sweep
 
 
 @dataclass(frozen=True, eq=False)
-class Course:
-    """A run's rows: times (h), conductivity over the first one, biomass, all (T,), and where the
-    aggregate touches the opposite wall; wall: seconds; clogged: see :func:`clogging`."""
+class RunSeries:
+    """The rows of a run.
+
+    times (h), relative: conductivity over its first value, biomass, touches: does the aggregate
+    touch the opposite wall; all (T,). wall: wall time (s); clogged: see :func:`clogging`.
+    """
 
     times: np.ndarray
     relative: np.ndarray
@@ -37,17 +40,17 @@ class Course:
 
     @cached_property
     def clogging(self) -> tuple[float, float]:
-        """Time (h) and biomass of :func:`clogging`, NaN where there is none."""
+        """Time (h) and biomass of :func:`clogging`, NaN if the pore has not clogged."""
         return clogging(self.times, self.relative, self.biomass, self.clogged)
 
     def at_contact(self, values: np.ndarray) -> float:
-        """In the first row with contact, NaN without; it is a plug then, through which the fluid
-        seeps."""
+        """The value in the first row with contact, NaN without contact. The aggregate is then a
+        plug through which the fluid seeps."""
         first = np.flatnonzero(self.touches)[:1]
         return float(values[first[0]]) if len(first) else np.nan
 
 
-#: What ``runs.csv`` tells of a run besides what was varied: value takes its Course.
+#: The columns of ``runs.csv`` after the factors; ``value`` takes a RunSeries.
 NUMBERS = (
     Quantity("end_h", "last time of the run", "time_h of the last row",
              lambda run: run.times[-1], "end"),
@@ -66,16 +69,15 @@ NUMBERS = (
              "conductivity_m_per_d in that row over its first value",
              lambda run: run.at_contact(run.relative), "conductivity then"),
 )
-COLUMNS = [each.name for each in NUMBERS]
+COLUMNS = [number.name for number in NUMBERS]
 
 
 @dataclass(frozen=True, eq=False)
-class Told:
-    """A run as a sweep tells it.
+class SweepRun:
+    """The results of one run of a sweep.
 
-    times (h), relative: conductivity over the first one; biomass: area of the aggregate over that
-    of the pore; all of them (T,), empty where there is no run. `numbers`: those of COLUMNS, None
-    where there is none.
+    times (h); relative: conductivity over its first value; biomass: area of the aggregate over that
+    of the pore; all (T,), empty without a run. numbers: values of COLUMNS, None if undefined.
     """
 
     point: Point
@@ -86,81 +88,82 @@ class Told:
     numbers: dict[str, float | None]
 
     @property
-    def done(self) -> bool:
-        """Has it come to its end?"""
-        return status.done(self.status)
+    def is_over(self) -> bool:
+        """Is the run finished?"""
+        return status.is_over(self.status)
 
 
-def tell(sweep: Sweep, ended: dict[int, str], clogged: float) -> list[Told]:
-    """Every run of a sweep; `ended` says how those ended that left none to read, by number."""
-    return [_told(point, sweep.runs / point.name, ended.get(point.index, "not run"), clogged)
+def read_runs(sweep: Sweep, statuses: dict[int, str], clogged: float) -> list[SweepRun]:
+    """Read every run of a sweep; statuses: of runs that cannot be read, by their number."""
+    return [_read_run(point, sweep.runs / point.name, statuses.get(point.index, "not run"), clogged)
             for point in sweep.points]
 
 
-def _told(point: Point, folder: Path, otherwise: str, clogged: float) -> Told:
+def _read_run(point: Point, folder: Path, missing_status: str, clogged: float) -> SweepRun:
     try:
-        run = run_of(folder, point.scene)
+        run = read_scene_run(folder, point.scene)
     except NoRun:
-        return _empty(point, otherwise)
+        return _empty_run(point, missing_status)
     if run.record["status"] == status.RUNNING:  # it was killed, and its table may be cut short
-        return _empty(point, otherwise)
-    found = run.series
+        return _empty_run(point, missing_status)
+    series = run.series
     pore = point.scene.pore
     times = run.times
-    ended = run.record["status"]
+    run_status = run.record["status"]
     if not len(times):
-        return _empty(point, ended)
-    relative = found["conductivity_m_per_d"] / found["conductivity_m_per_d"][0]
-    biomass = found["aggregate_area_um2"] / (pore.width * pore.length)
+        return _empty_run(point, run_status)
+    relative = series["conductivity_m_per_d"] / series["conductivity_m_per_d"][0]
+    biomass = series["aggregate_area_um2"] / (pore.width * pore.length)
     wall = run.record["wall_time_s"]
-    course = Course(times, relative, biomass, found["contact"] > 0, wall, clogged)
-    numbers = {each.name: _or_none(each.reported(course)) for each in NUMBERS}
-    return Told(point, ended, times, relative, biomass, numbers)
+    course = RunSeries(times, relative, biomass, series["contact"] > 0, wall, clogged)
+    numbers = {number.name: _none_if_nan(number.reported(course)) for number in NUMBERS}
+    return SweepRun(point, run_status, times, relative, biomass, numbers)
 
 
-def _empty(point: Point, ended: str) -> Told:
+def _empty_run(point: Point, run_status: str) -> SweepRun:
     none = np.zeros(0)
-    return Told(point, ended, none, none, none, dict.fromkeys(COLUMNS))
+    return SweepRun(point, run_status, none, none, none, dict.fromkeys(COLUMNS))
 
 
-def _or_none(value: float) -> float | None:
+def _none_if_nan(value: float) -> float | None:
     return None if np.isnan(value) else float(value)
 
 
 def clogging(times: np.ndarray, relative: np.ndarray, biomass: np.ndarray,
-             part: float) -> tuple[float, float]:
-    """When (h) the relative conductivity has first fallen to `part`, and the biomass then.
+             threshold: float) -> tuple[float, float]:
+    """The time (h) at which the relative conductivity first falls to `threshold`, and the biomass
+    at that time.
 
-    Between two rows the logarithm of the conductivity is linear in time. NaN where it has not
-    fallen so far.
+    Between two rows the logarithm of the conductivity is linear in time. NaN if it does not fall
+    so far.
     """
-    low = np.flatnonzero(relative <= part)
+    low = np.flatnonzero(relative <= threshold)
     if not len(low):
         return np.nan, np.nan
     i = low[0]
-    along = np.log(relative[i - 1] / part) / np.log(relative[i - 1] / relative[i])
-    time, held = (float(values[i - 1] + along * (values[i] - values[i - 1]))
+    fraction = np.log(relative[i - 1] / threshold) / np.log(relative[i - 1] / relative[i])
+    time, mass = (float(values[i - 1] + fraction * (values[i] - values[i - 1]))
                   for values in (times, biomass))
-    return time, held
+    return time, mass
 
 
-def write(sweep: Sweep, told: list[Told]) -> None:
+def write(sweep: Sweep, runs: list[SweepRun]) -> None:
     """Write ``table.csv`` and ``runs.csv``."""
     varied = [factor.column for factor in sweep.factors]
-    with whole(sweep.folder / "table.csv") as beside:
-        results.write_table(beside, ["run", *varied, *results.COLUMNS], list(_rows(sweep, told)))
-    runs = [[one.point.index, *one.point.values, one.status, *one.numbers.values(),
-             f"runs/{one.point.name}"] for one in told]
-    with whole(sweep.folder / "runs.csv") as beside:
-        results.write_table(beside, ["run", *varied, "status", *COLUMNS, "folder"], runs)
+    with atomic_path(sweep.folder / "table.csv") as beside:
+        results.write_table(beside, ["run", *varied, *results.COLUMNS], list(_rows(sweep, runs)))
+    rows = [[run.point.index, *run.point.values, run.status, *run.numbers.values(),
+             f"runs/{run.point.name}"] for run in runs]
+    with atomic_path(sweep.folder / "runs.csv") as beside:
+        results.write_table(beside, ["run", *varied, "status", *COLUMNS, "folder"], rows)
 
 
-def _rows(sweep: Sweep, told: list[Told]) -> Iterator[list]:
-    """The rows of every run as its own table has them, behind its number and what was varied."""
-    for one in told:
-        if len(one.times):
-            path = sweep.runs / one.point.name / "timeseries.csv"
+def _rows(sweep: Sweep, runs: list[SweepRun]) -> Iterator[list]:
+    """The rows of each run's own table, preceded by its number and the values of its factors."""
+    for run in runs:
+        if len(run.times):
+            path = sweep.runs / run.point.name / "timeseries.csv"
             with path.open(encoding="utf-8", newline="") as lines:
                 for row in csv.DictReader(lines):
                     values = [row[name] for name in results.COLUMNS]
-                    yield [one.point.index, *one.point.values, *values]
+                    yield [run.point.index, *run.point.values, *values]

@@ -1,9 +1,9 @@
-"""``make bench``: error against time of every choice of method, cost against size, and what is claimed of both.
+"""``make bench``: error against time of every method, cost against size, and the claims about both.
 
 A *part* is a function ``name_part(quick) -> dict``: base, size, scenes and memory (:mod:`.runs`), box and channel
-against other codes (:mod:`.users`). What they measure is kept in ``verification/report/bench.json`` (:mod:`.record`),
-judged and drawn as ``verification/report/bench_*.svg`` (:mod:`.told`).
+against other codes (:mod:`.users`). The measurements are stored in ``verification/report/bench.json``
+(:mod:`.record`), judged and drawn as ``verification/report/bench_*.svg`` (:mod:`.report`).
 
-Times are of one machine in one run: quote the ratios. Importing the packages is not counted in them, nor is what a
-library compiles before its first solution.
+Times depend on the machine and the run: quote the ratios. They exclude the import of the packages and the compilation
+of a library before its first solution.
 """

@@ -8,38 +8,38 @@ from __future__ import annotations
 import argparse
 from importlib import import_module
 
-from verification.bench import record, told
+from verification.bench import record, report
 from verification.evidence.writing import plain, save
 
-#: Modules of the parts; that of other codes is imported for its own alone.
+#: Modules of the parts, imported when a part runs.
 PARTS = {"box": "users", "channel": "users", "base": "runs", "size": "runs", "scenes": "runs", "memory": "runs"}
 
 
 def main(arguments: list[str] | None = None) -> dict:
-    """Run the parts; the record as it is then."""
+    """Run the parts and return the record."""
     parser = argparse.ArgumentParser(prog="python -m verification.bench", description=__doc__.split("\n\n")[0])
     parser.add_argument("parts", nargs="*", metavar="PART", choices=[*PARTS, []], default=[],
                         help=f"of {', '.join(PARTS)}; all by default")
     parser.add_argument("--quick", action="store_true", help="small versions, nothing is written")
-    given = parser.parse_args(arguments)
-    return measure(given.parts or PARTS, given.quick)
+    options = parser.parse_args(arguments)
+    return measure(options.parts or PARTS, options.quick)
 
 
 def measure(names, quick: bool) -> dict:
-    """Run parts one after the other; each is recorded as soon as it is there."""
-    found = {"machine": record.machine(), "parts": {} if quick else record.load()["parts"]}
-    print(plain([told.machine(found["machine"])]))
+    """Run parts one after the other and save the record after each."""
+    benchmark = {"machine": record.machine(), "parts": {} if quick else record.load()["parts"]}
+    print(plain([report.machine(benchmark["machine"])]))
     for name in names:
         part = getattr(import_module(f"verification.bench.{PARTS[name]}"), f"{name}_part")(quick)
-        found["parts"][name] = part
-        found["verdicts"] = told.judged(found)
-        print(plain(told.blocks(name, part)), flush=True)
+        benchmark["parts"][name] = part
+        benchmark["verdicts"] = report.judged(benchmark)
+        print(plain(report.blocks(name, part)), flush=True)
         if not quick:
-            save(found, record.FILE)
+            save(benchmark, record.FILE)
     if not quick:
-        told.draw(found["parts"], record.FOLDER)
-    print(plain([told.verdicts(found["verdicts"])]))
-    return found
+        report.draw(benchmark["parts"], record.FOLDER)
+    print(plain([report.verdicts(benchmark["verdicts"])]))
+    return benchmark
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Whole runs and single steps: error against time of base, what a scene does not need, live memory over many
+"""Complete runs and single steps: error against time of base, cost of unneeded stages, live memory over many
 steps, and cost against size."""
 
 from __future__ import annotations
@@ -41,12 +41,12 @@ QUADRATIC = ((0.15, 0.02), (0.15, 0.01), (0.2, 0.01), (0.3, 0.005), (0.45, 0.002
 CUBIC = ((0.1, 0.01), (0.2, 0.0075), (0.3, 0.005), (0.45, 0.001))
 #: Refinements of order 2 in the paper's updates of 12 min.
 UPDATES = ((0.15,), (0.3,), (0.45,))
-#: How sizes are labelled, and the keys of the scene that they are of.
+#: Labels of sizes, and the keys of the scene that they set.
 BY_MINUTES = ("refinement {:g}, {} min", "numerics.refinement={}", "growth.time_step={} min")
 BY_TOLERANCE = ("refinement {:g}, tolerance {:g}", "numerics.refinement={}", "numerics.tolerance={}")
 OF_PAPER, OF_ACCURATE = ("numerics.preset=paper",), ("numerics.preset=accurate",)
 BUBBLE, MIDPOINT_RULE = "numerics.flow_element=bubble", "numerics.time=midpoint"
-#: Method, labels and keys, sizes, and what else the scene says.
+#: Method, labels and keys, sizes, and further changes of the scene.
 METHODS_OF_BASE = (
     (PRESET_PAPER, BY_MINUTES, PAPER, OF_PAPER),
     ("bubble alone", BY_MINUTES, CHANGED, (*OF_PAPER, BUBBLE)),
@@ -73,44 +73,45 @@ def base_part(quick: bool) -> dict:
     about = {"reference_values": problems.values(times, *OF_ACCURATE).tolist()} if quick else reference()
     repeats = 1 if quick else BASE_REPEATS
     lines = measured(jobs(np.array(about["reference_values"]), times, quick), repeats)
-    found = {"title": f"Base to {times[1]:g} h, nothing written", "repeats": repeats, "lines": lines,
+    part = {"title": f"Base to {times[1]:g} h, nothing written", "repeats": repeats, "lines": lines,
              "error": f"largest of eight numbers at {times[0]:g} and {times[1]:g} h: velocity, conductivity, area, "
                       "thickness, upstream, downstream relative, effluents over the supply", **about}
-    return found if quick else {**found, "wide": wide()}
+    return part if quick else {**part, "wide": wide()}
 
 
 def jobs(truth: np.ndarray, times, quick: bool) -> dict:
     """{(method, label): job}."""
-    found = {}
+    jobs_by_label = {}
     for method, (label, *keys), sizes, changes in METHODS_OF_BASE:
         for size in sizes[:2] if quick else sizes:
             sized = map(str.format, keys, size)
-            found[method, label.format(*size)] = partial(_judged, truth, problems.values, times, *changes, *sized)
+            jobs_by_label[method, label.format(*size)] = partial(_judged, truth, problems.values, times, *changes,
+                                                                 *sized)
     for preset in PRESETS:
-        found[preset, "as it is"] = partial(_judged, truth, problems.values, times,
+        jobs_by_label[preset, "as it is"] = partial(_judged, truth, problems.values, times,
                                             f"numerics.preset={preset.split()[1]}")
     for rings, steps in () if quick else SKFEM:
-        found["scikit-fem: quadratic elements, Runge-Kutta", f"{rings} rings, {steps} steps"] = partial(
+        jobs_by_label["scikit-fem: quadratic elements, Runge-Kutta", f"{rings} rings, {steps} steps"] = partial(
             _judged, truth, whole_run.numbers, whole_run.Pore(), rings, steps, times)
-    return found
+    return jobs_by_label
 
 
-def _judged(truth: np.ndarray, function, *given) -> dict:
-    """The errors of the rows that ``function(*given)`` finds: the largest, and those of each number."""
-    each = problems.errors(function(*given), truth).max(axis=0).tolist()
+def _judged(truth: np.ndarray, function, *arguments) -> dict:
+    """The errors of the rows of ``function(*arguments)``: the largest, and that of each number."""
+    each = problems.errors(function(*arguments), truth).max(axis=0).tolist()
     return {"error": max(each), "errors": each}
 
 
 def reference() -> dict:
-    """Values of the independent run at TIMES and what is told of it; worked out once and kept in the record."""
-    kept = record.load()["parts"].get("base", {})
-    if kept.get("reference_times") == list(TIMES):
-        return {key: value for key, value in kept.items() if key.startswith("reference")}
-    found, check = (whole_run.converged(whole_run.Pore(), TIMES, *size).values for size in (REFERENCE, CHECK))
+    """Values of the independent run at TIMES and its description; computed once and stored in the record."""
+    previous = record.load()["parts"].get("base", {})
+    if previous.get("reference_times") == list(TIMES):
+        return {key: value for key, value in previous.items() if key.startswith("reference")}
+    computed, check = (whole_run.converged(whole_run.Pore(), TIMES, *size).values for size in (REFERENCE, CHECK))
     return {
         "reference": f"scikit-fem's quadratic elements in moving coordinates, Runge-Kutta in time, extrapolated from "
                      f"{CHECK[0]} rings and {CHECK[1]} steps; from {REFERENCE[0]} and {REFERENCE[1]} they differ by "
-                     f"{problems.errors(found, check).max():.1e}",
+                     f"{problems.errors(computed, check).max():.1e}",
         "reference_times": list(TIMES), "reference_values": check.tolist()}
 
 
@@ -131,10 +132,10 @@ SCENES = {"whole": ({**FLOW, **SUBSTRATES, "growth": {"end": "2.4 h"}}, {"flow",
 
 
 def scenes_part(quick: bool) -> dict:
-    """What a scene does not need costs nothing: its own stages, and no more, take time.
+    """Time of a first solution, which must contain the stages of the scene alone.
 
-    Base with a seed of 20 um as it is, and without growth (its shape is frozen), without flow, and without substrates:
-    the time of a first solution, mesh included, of each.
+    Base with a seed of 20 um, unchanged, without growth (frozen shape), without flow, and without substrates. The time
+    includes the mesh.
     """
     repeats = 3 if quick else SCENES_REPEATS
     jobs = {(f"preset {preset}", name): partial(first, preset, name) for preset in problems.PRESETS for name in SCENES}
@@ -145,7 +146,7 @@ def scenes_part(quick: bool) -> dict:
 
 
 def first(preset: str, name: str) -> dict:
-    """The first instant of a run of one of SCENES: mesh and solution."""
+    """Measure the first report of a run of one of SCENES: mesh and solution."""
     sections, needed = SCENES[name]
     tables = {"pore": {"width": "50 um"}, "aggregate": {"radius": "20 um"}, "numerics": {"preset": preset}, **sections}
     timing.reset()
@@ -156,7 +157,7 @@ def first(preset: str, name: str) -> dict:
     return {"stages": stages, "took": took, "unneeded": sorted(set(stages) - needed - {"meshing"})}
 
 
-#: Steps, the length of one (h), and the part of them that is not looked at.
+#: Number of steps, their length (h), and the part of them that is ignored.
 MANY_STEPS, QUICK_STEPS = 180, 16
 LENGTH, WARM = 0.001, 0.25
 PART = 0.1
@@ -166,9 +167,9 @@ MEMORY_PRESETS = {"paper": 0.4, "accurate": 0.25}
 def memory_part(quick: bool) -> dict:
     """No allocation that grows with the number of steps: live memory of a long run of an aggregate that hardly grows.
 
-    The slope of the memory that Python's allocator knows (tracemalloc, numpy's arrays included) against the step, after
-    the first ones: the median of the slopes between all pairs (Theil and Sen), which single jumps do not move. To keep
-    one nodal field a step would be 8 bytes a node and step: the bound is a tenth of that.
+    The slope of the allocated memory (tracemalloc, numpy's arrays included) against the step, after the first ones: the
+    median of the slopes between all pairs (Theil and Sen), which is robust to single jumps. Storing one nodal field per
+    step would take 8 bytes per node and step; the bound is a tenth of that.
     """
     steps = QUICK_STEPS if quick else MANY_STEPS
     rows = [grown(preset, refinement, steps) for preset, refinement in MEMORY_PRESETS.items()]
@@ -176,7 +177,7 @@ def memory_part(quick: bool) -> dict:
 
 
 def grown(preset: str, refinement: float, steps: int) -> dict:
-    """The slope of a run of so many steps, bytes a step."""
+    """Slope (bytes per step) of a run of ``steps`` steps."""
     scene = load_scene("base", [f"numerics.preset={preset}", f"numerics.refinement={refinement}",
                                 "aggregate.radius=20 um", f"growth.time_step={LENGTH} h",
                                 *until(*(LENGTH * np.arange(1, steps + 1)))])
@@ -194,23 +195,23 @@ def grown(preset: str, refinement: float, steps: int) -> dict:
             "bound": PART * 8 * nodes}
 
 
-#: Nodes wanted, and how many steps are timed after the first; none: the first is, with its orderings.
+#: {target number of nodes: steps timed after the first}; with 0 the first step is timed, with its orderings.
 SIZES = {600: 5, 2500: 3, 10_000: 2, 40_000: 1, 160_000: 0}
 QUICK = {300: 1}
-#: Preset, and derivatives of Newton's methods: those used again make the floor lower, and the step.
+#: Preset and Jacobian of Newton's methods: a reused Jacobian makes the floor and the step cheaper.
 METHODS = {"preset paper": "paper fresh", "order 2, midpoint (accurate)": "accurate reused",
            "order 2, midpoint, fresh derivatives": "accurate fresh"}
 STAGES = ("flow", "transport", "growth", "mesh motion", "meshing", "transfer")
 FLOOR = "factorise and solve"
 RADIUS, STEP = 20.0, 0.2
-#: The refinement for so many nodes: c nodes^p, fitted to a few of them.
+#: Refinement for a number of nodes: c nodes^p, fitted to a few of them.
 REFINED = {"paper": (0.0265, 0.526), "accurate": (0.0109, 0.544)}
 
 
 def size_part(quick: bool) -> dict:
     """Cost against size: one growth step of 12 min of an aggregate of 20 um, by stage.
 
-    The first step, which orders the nodes, is left out unless it is the only one. The floor of a step is what
+    The first step, which orders the nodes, is omitted unless it is the only one. The floor of a step is the time that
     factorising and solving its linear systems takes.
     """
     sizes = QUICK if quick else SIZES
@@ -223,27 +224,27 @@ def size_part(quick: bool) -> dict:
 
 
 def measure(kind: str, nodes: int, steps: int) -> dict:
-    """Seconds of a step of base with a larger seed in about so many nodes, and of its stages, and their floor."""
+    """Seconds of a step of base with a larger seed on about ``nodes`` nodes, of its stages, and of their floor."""
     preset, jacobian = kind.split()
     factor, power = REFINED[preset]
-    given = load_scene("base", [f"numerics.preset={preset}", f"numerics.refinement={factor * nodes**power}",
+    scene = load_scene("base", [f"numerics.preset={preset}", f"numerics.refinement={factor * nodes**power}",
                                 f"numerics.jacobian={jacobian}", f"aggregate.radius={RADIUS} um"])
-    now, solved = _solved(given, pore.seeded(given))
+    state, solved = _solved(scene, pore.seeded(scene))
     rows = []
     for _ in range(steps + 1):
         timing.reset()
         start = clock()
-        taken = problems.step(given, now, solved, STEP)
-        now, solved = _solved(given, replace(taken.pore, time=now.time + STEP))
-        rows.append((taken.remeshed, [*(clock() - start), *map(timing.seconds.__getitem__, (*STAGES, FLOOR))]))
+        advanced = problems.step(scene, state, solved, STEP)
+        state, solved = _solved(scene, replace(advanced.pore, time=state.time + STEP))
+        rows.append((advanced.remeshed, [*(clock() - start), *map(timing.seconds.__getitem__, (*STAGES, FLOOR))]))
     rows = rows[1:] or rows
     usual = [row for remeshed, row in rows if not remeshed] or [row for _, row in rows]
     seconds, cpu, *stages = np.median(usual, axis=0)
-    return {"label": f"{nodes} nodes", "seconds": seconds, "cpu": cpu, "nodes": len(now.mesh.points),
+    return {"label": f"{nodes} nodes", "seconds": seconds, "cpu": cpu, "nodes": len(state.mesh.points),
             "stages": dict(zip((*STAGES, FLOOR), stages)), "ratio": seconds / stages[-1], "repeats": len(usual)}
 
 
-def _solved(given: Scene, now: pore.Pore) -> tuple[pore.Pore, pore.Solved]:
-    """The pore with its concentrations, and what is solved in it."""
-    found = pore.solve(given, now)
-    return replace(now, concentrations=found.concentrations), found
+def _solved(scene: Scene, state: pore.Pore) -> tuple[pore.Pore, pore.Solved]:
+    """The pore with its concentrations, and its solution."""
+    solution = pore.solve(scene, state)
+    return replace(state, concentrations=solution.concentrations), solution

@@ -81,7 +81,7 @@ class Problem:
 
 
 def fipy(problem: Problem, across: int) -> np.ndarray:
-    """(2,) what is judged."""
+    """(2,) numbers of FiPy's solution."""
     mesh = _fipy_mesh(problem, across)
     where = problem.inside(*mesh.cellCenters.value)
     X = CellVariable(mesh=mesh, value=np.where(where, DENSITY, 0.0))
@@ -125,17 +125,17 @@ def _fipy_ends(problem: Problem, mesh, field, k: int):
     return first * SUPPLY[k] - CentralDifferenceConvectionTerm(coeff=(problem.speed,), var=field)
 
 
-def _linear(now: np.ndarray) -> np.ndarray:
-    """(6, n) q at the present C (2, n) made linear: of the acceptor and then of the donor its slopes by C_A and C_D, by
-    central differences, and the constant beside them."""
-    by = derivatives(now, RATES)
-    rest = np.array(uptake(*now, RATES)) - np.einsum("kjn,jn->kn", by, now)
+def _linear(concentrations: np.ndarray) -> np.ndarray:
+    """(6, n) q linearised at C (2, n): for the acceptor and then the donor the derivatives by C_A and C_D, by central
+    differences, and the constant."""
+    by = derivatives(concentrations, RATES)
+    rest = np.array(uptake(*concentrations, RATES)) - np.einsum("kjn,jn->kn", by, concentrations)
     return np.concatenate([by, rest[:, None]], axis=1).reshape(6, -1)
 
 
 def py_pde(problem: Problem, across: int) -> tuple[np.ndarray, dict]:
-    """(2,) what is judged, and the seconds (wall, processor) before the run's first hundredth is over, less those of
-    another hundredth: numba compiles in them."""
+    """(2,) numbers of py-pde's solution, and the seconds (wall, processor) of numba's compilation: those of the run's
+    first hundredth, less those of another one."""
     grid = CartesianGrid([list(ends) for ends in problem.box], problem.cells(across))
     where = problem.inside(*np.moveaxis(grid.cell_coords, -1, 0))
     X = ScalarField(grid, np.where(where, DENSITY, 0.0))
@@ -147,8 +147,8 @@ def py_pde(problem: Problem, across: int) -> tuple[np.ndarray, dict]:
     dt = STABLE * min(grid.discretization) ** 2 / max(DIFFUSIVITY) / grid.num_axes
     marks = [clock()]
     watch = CallbackTracker(lambda state, t: marks.append(clock()), interrupts=time / PARTS)
-    found = Controller(EulerSolver(equation, backend="numba"), t_range=time, tracker=watch).run(state, dt=dt)
-    fields = np.array([part.data.ravel() for part in found])
+    solution = Controller(EulerSolver(equation, backend="numba"), t_range=time, tracker=watch).run(state, dt=dt)
+    fields = np.array([part.data.ravel() for part in solution])
     load = X.data.ravel() * np.prod(grid.discretization)
     return problem.judged(fields, load), _compiled(marks)
 
@@ -180,12 +180,12 @@ def _pde_ends(problem: Problem, k: int) -> dict:
     return ends if len(problem.box) == 1 else {**ends, "y": {"derivative": 0.0}}
 
 
-#: Substrates and kinetics of Table 1, but for the diffusivities.
-GIVEN = load_scene("base", [f"substrates.{name}.{key}={d} um^2/h" for name, d in zip(channels.NAMES, DIFFUSIVITY)
+#: Substrates and kinetics of Table 1, with other diffusivities.
+SCENE = load_scene("base", [f"substrates.{name}.{key}={d} um^2/h" for name, d in zip(channels.NAMES, DIFFUSIVITY)
                             for key in ("diffusivity", "diffusivity_in_aggregate")])
 
 
-def ours(problem: Problem, across: int, order: int) -> list[float]:
+def solve_with_repro(problem: Problem, across: int, order: int) -> list[float]:
     """(2,) what is judged, by linear (order 1), quadratic or cubic elements on halved squares, in one dimension a row
     of them."""
     ends, (along, *rows) = problem.box[0], problem.cells(across)
@@ -195,7 +195,7 @@ def ours(problem: Problem, across: int, order: int) -> list[float]:
     points, triangles = upright(halved.p.T, halved.t.T)
     biomass = problem.inside(*points[triangles].mean(axis=1).T)
     space = meshes.space_on(Mesh.of(points, triangles, biomass, np.empty(0, int), width, ends), order)
-    solved = channels.problem(space, problem.speed or None, GIVEN.substrates, GIVEN.kinetics)
+    solved = channels.problem(space, problem.speed or None, SCENE.substrates, SCENE.kinetics)
     sink = Sink(DENSITY * space.reaction.dx)
     fluxes = transport.fluxes(solved, sink, transport.steady(solved, sink))
     return [flux.effluent if problem.speed else flux.consumed for flux in fluxes]
@@ -203,29 +203,30 @@ def ours(problem: Problem, across: int, order: int) -> list[float]:
 
 #: Methods of this package, by the order of their elements.
 COMPILED = "py-pde, compiled"
-OURS = {1: "linear elements (paper)", 2: "order 2 (fast, accurate)", 3: "order 3"}
+METHODS = {1: "linear elements (paper)", 2: "order 2 (fast, accurate)", 3: "order 3"}
 QUADRATIC = "scikit-fem: quadratic elements"
 
 
-def _compared(problem: Problem, about: tuple[str, str, str], others: dict, truths, scale, quick: bool) -> dict:
-    """A part about (title, error, reference, told with the finer of both truths and what they differ by);
-    ``solve(cells)`` of the others {name: (sizes, solve)} finds what is judged, (2,); truths: the reference's, coarser
-    first. py-pde's compiled run comes once, on one grid: numba compiles for longer than it runs.
+def _compared(problem: Problem, about: tuple[str, str, str], other_codes: dict, truths, scale, quick: bool) -> dict:
+    """A part of the benchmark. about: (title, error, reference), the latter formatted with the finer of both truths and
+    their difference; other_codes: {name: (sizes, solve)}, ``solve(cells)`` returns (2,) numbers; truths: the reference,
+    coarser first. py-pde's compiled run comes once, on one grid: numba compiles for longer than it runs.
     """
     coarse, truth = truths
 
-    def error(found) -> float:
-        return float(np.max(np.abs(found - truth) / scale))
+    def error(uptake) -> float:
+        return float(np.max(np.abs(uptake - truth) / scale))
 
     def solved(solve, cells: int) -> dict:
         return {"error": error(solve(cells))}
 
     def stepped() -> dict:
-        found, compiled = py_pde(problem, problem.stepped)
-        return {"error": error(found), **compiled}
+        uptake, compiled = py_pde(problem, problem.stepped)
+        return {"error": error(uptake), **compiled}
 
-    methods = {method: (problem.linear if order == 1 else problem.curved, partial(ours, problem, order=order))
-               for order, method in OURS.items()} | others
+    methods = {method: (problem.linear if order == 1 else problem.curved,
+                        partial(solve_with_repro, problem, order=order))
+               for order, method in METHODS.items()} | other_codes
     jobs = {(method, f"{cells} cells"): partial(solved, solve, cells)
             for method, (sizes, solve) in methods.items() for cells in (sizes[:1] if quick else sizes)}
     once = {} if quick else {(COMPILED, f"{problem.stepped} cells"): stepped}
@@ -256,13 +257,13 @@ def box_part(quick: bool) -> dict:
     py-pde can do as well; error of what is taken up."""
     truths = [quadratic(cells) for cells in (COARSE, FINE)]
     cells = (8, 16, 32, 64)
-    others = {QUADRATIC: ((4, 8, 16), quadratic), "fipy": (cells, partial(fipy, BOX)),
+    other_codes = {QUADRATIC: ((4, 8, 16), quadratic), "fipy": (cells, partial(fipy, BOX)),
               "py-pde's Laplacian, Newton by scipy": (cells, _newton)}
     about = ("Uptake without flow: a block of 64 by 32 um in a box of 128 by 64 um; grid, assembly, solution",
              "what is taken up of each substrate, relative, the larger error",
              f"quadratic elements of scikit-fem, {FINE} cells across: {{:.9g}} and {{:.9g}} um2 mg/L/h; from {COARSE} "
              "cells on they change by {:.1e}")
-    return _compared(BOX, about, others, truths, truths[1], quick)
+    return _compared(BOX, about, other_codes, truths, truths[1], quick)
 
 
 def _newton(cells: int) -> np.ndarray:
@@ -272,14 +273,14 @@ def _newton(cells: int) -> np.ndarray:
 
 
 def quadratic(cells: int) -> np.ndarray:
-    """(2,) what is taken up, by scikit-fem's quadratic elements and Newton's method."""
+    """(2,) uptake from scikit-fem's quadratic elements and Newton's method."""
     mesh = MeshTri.init_tensor(np.linspace(-HALF, HALF, 2 * cells + 1), np.linspace(0.0, WIDTH, cells + 1))
-    whole = Basis(mesh, ElementTriP2(), intorder=6)
+    domain = Basis(mesh, ElementTriP2(), intorder=6)
     body = Basis(mesh, ElementTriP2(), intorder=6, elements=np.flatnonzero(_inside(*mesh.p[:, mesh.t].mean(axis=1))))
-    laplace = asm(stiffness, whole)
-    inner = np.flatnonzero(np.abs(whole.doflocs[0]) < HALF * (1 - 1e-9))
+    laplace = asm(stiffness, domain)
+    inner = np.flatnonzero(np.abs(domain.doflocs[0]) < HALF * (1 - 1e-9))
     fields = steady(body, [(d * laplace, 0.0) for d in DIFFUSIVITY], DENSITY, RATES,
-                    np.outer(SUPPLY, np.ones(whole.N)), inner)
+                    np.outer(SUPPLY, np.ones(domain.N)), inner)
     return BOX.judged([body.interpolate(field) for field in fields], DENSITY * body.dx)
 
 
@@ -297,15 +298,15 @@ def channel_part(quick: bool) -> dict:
     Other codes solve it in one dimension; here it is a ribbon of one cell across, which costs twice the unknowns and
     more.
     """
-    others = {"fipy": ((30, 60, 120, 240, 480), partial(fipy, CHANNEL))}
+    other_codes = {"fipy": ((30, 60, 120, 240, 480), partial(fipy, CHANNEL))}
     about = ("Uptake in plug flow through a strip, one-dimensional; grid, assembly and solution",
              "effluents over the supply, the larger error",
              "scipy's solve_bvp, tolerance 1e-9: {:.9f} and {:.9f} mg/L; from 1e-7 on they change by {:.1e} of the "
              "supply")
-    return _compared(CHANNEL, about, others, [reference(1e-7), reference(1e-9)], SUPPLY, quick)
+    return _compared(CHANNEL, about, other_codes, [reference(1e-7), reference(1e-9)], SUPPLY, quick)
 
 
 def reference(tolerance: float) -> np.ndarray:
     """(2,) effluents, mg/L."""
-    found = channel_bvp.solution(SPEED, SUPPLY, DIFFUSIVITY, DIFFUSIVITY, DENSITY, RATES, STRIP, tolerance)
-    return found(np.array([STRIP]))[:, 0]
+    solution = channel_bvp.solve(SPEED, SUPPLY, DIFFUSIVITY, DIFFUSIVITY, DENSITY, RATES, STRIP, tolerance)
+    return solution(np.array([STRIP]))[:, 0]

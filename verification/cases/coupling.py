@@ -1,10 +1,10 @@
-"""Smaller models that the whole one must become: no growth, no biomass, no viscosity jump, no stiffness.
+"""Limits, symmetries and time steps of the coupled model.
 
-Growth where nothing is scarce: the area follows (9)-(10), integrated by hand.
+Limits: no growth, no biomass, no viscosity jump, no stiffness, and growth at the supply, where the area follows
+(9)-(10) in closed form.
 
-What must not matter at all: units, left and right, and, where the theory is reversible, the flow's direction.
-
-What must not matter much: the time step, storage of the substrates, the part of the pore that is meshed.
+Results do not depend on units, on left and right, or, where the theory is reversible, on the direction of flow. They
+hardly depend on the time step, on storage of the substrates, or on the meshed part of the pore.
 
 The midpoint rule and the presets: order in time, the limit of the paper's updates, an independent solver.
 """
@@ -23,7 +23,7 @@ from repro.fem import linear
 from repro.fem.outline import FREE
 from repro.fem.space import Space
 from repro.march import midpoint
-from repro.march.loop import Instant
+from repro.march.loop import Report
 from repro.march.simulation import shaped, simulate
 from repro.model import flow, pore
 from repro.scene import Scene, load_scene
@@ -51,7 +51,7 @@ def test_no_growth(changes, record):
            at_most("C over the supply, less 1", _lack(last), *(EVEN if scene.numerics.order == 1 else UNEVEN)))
 
 
-def _lack(instant: Instant) -> float:
+def _lack(instant: Report) -> float:
     """Largest |C / supply - 1|."""
     return np.abs(both(instant.solved.concentrations) / 10.0 - 1).max()
 
@@ -62,14 +62,14 @@ def _poiseuille(scene: Scene) -> float:
     return scene.flow.head / poiseuille.head_loss(scene.pore.length, scene.pore.width, 1.0, viscosity)
 
 
-#: How far C may be from the supply. w is divergence-free for the very functions that carry C where these are linear;
-#: Taylor-Hood's u is so for functions of one order less, and jumps of viscosity bend it.
+#: Bounds of |C / supply - 1|. w is divergence-free against the functions of C if these are linear. Taylor-Hood's u is
+#: divergence-free against functions of one order less, and jumps of viscosity bend it.
 EVEN = 1e-12, runs.ROUND_OFF
 UNEVEN = 1e-4, "div u is zero against functions of one order less than C's: error in space"
 
 
 REFINEMENTS = (1.0, 1.4, 2.0, 2.8)
-#: Of linear elements in a clean channel, and of the others.
+#: Origins of the bounds in a clean channel: linear elements, and the others.
 LAYER = "first order: the stabilisation spoils one layer of elements at both ends of the mesh"
 PARABOLA = "elements hold the parabola: round-off"
 
@@ -82,7 +82,7 @@ PARABOLA = "elements hold the parabola: round-off"
     mutants=("extent-not-subtracted", "head-on-the-mesh-alone"), references=("poiseuille",), runs_with="paper")
 @parametrize("*changes", runs.every(0.3))
 def test_clean_channel(changes, record):
-    """The order of linear elements; what the others hold."""
+    """Record the order of linear elements, and the errors of the others."""
     if load_scene("base", changes).numerics.order > 1:
         error, lack = _clean(*changes)
         record(at_most("mean velocity", error, 1e-9, PARABOLA))
@@ -96,8 +96,8 @@ def test_clean_channel(changes, record):
 def _clean(*changes: str) -> tuple[float, float]:
     """Relative error of the mean velocity; largest |C / supply - 1|."""
     scene = load_scene("base", changes)
-    now = next(simulate(replace(scene, aggregate=None, kinetics=None, growth=None)))
-    return abs(now.solved.flow.mean_velocity / _poiseuille(scene) - 1), _lack(now)
+    report = next(simulate(replace(scene, aggregate=None, kinetics=None, growth=None)))
+    return abs(report.solved.flow.mean_velocity / _poiseuille(scene) - 1), _lack(report)
 
 
 @pytest.mark.case(
@@ -110,12 +110,13 @@ def _clean(*changes: str) -> tuple[float, float]:
 def test_equal_viscosities(changes, record):
     scene = runs.base("1 h", 'aggregate.radius="25 um"', "flow.viscosity_ratio=1.0", *changes)
     first, last = list(simulate(scene))
-    grid, found = last.pore.mesh, last.solved.flow
+    grid = last.pore.mesh
+    computed = last.solved.flow
     bare = replace(grid, topology=replace(grid.topology, biomass=np.zeros_like(grid.biomass)))
     empty = flow.unit_flow(Space(bare, last.pore.space.order), 7.0)
-    record(at_most("u", np.abs(found.velocity / found.mean_velocity - empty.velocity).max(), 1e-13,
+    record(at_most("u", np.abs(computed.velocity / computed.mean_velocity - empty.velocity).max(), 1e-13,
                    runs.ROUND_OFF),
-           at_most("mean velocity", abs(found.mean_velocity / _poiseuille(scene) - 1), 5e-3,
+           at_most("mean velocity", abs(computed.mean_velocity / _poiseuille(scene) - 1), 5e-3,
                    "linear elements: first order in the mesh, 0.3 % as in coupling-clean-channel"),
            at_least("growth of the area", last.pore.outline.area / first.pore.outline.area, 1.1,
                     "else nothing is tested"))
@@ -139,15 +140,17 @@ def test_stiffness(changes, record):
 EVERY_HOUR = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
 OF_UPDATES = 1e-8, "J = theta to the stabilisation, and C to 1e-8 of the supply: D is a million times D_A"
 OF_LONG_STEPS = 1e-6, "J = theta, and C to 1e-7 of the supply"
-#: Changes of a scene, by label, whose steps are those of a preset.
-LONG = {**{kind: (runs.by("fast"), runs.of(kind), runs.coarser(kind, 0.2)) for kind in runs.ELEMENTS},
-        **{preset: (runs.by(preset),) for preset in runs.QUADRATIC[1:]}}
+#: Changes of a scene, by label, with the steps of a preset.
+LONG = {**{kind: (runs.with_preset("fast"), runs.with_elements(kind), runs.coarser(kind, 0.2))
+           for kind in runs.ELEMENTS},
+        **{preset: (runs.with_preset(preset),) for preset in runs.QUADRATIC[1:]}}
 
 
 def uniform_growth(hours: tuple[float, ...], most: float, why: str, *changes: str):
-    """Checks of a run to the last of some hours, with rows at these."""
+    """Checks of a run with rows at some hours, the last of which is its end."""
     scene = runs.supplied_everywhere(runs.base(f"{hours[-1]} h", *changes, times=hours))
-    seed, instants = pore.seeded(scene).outline, runs.ours(scene)
+    seed = pore.seeded(scene).outline
+    instants = runs.reports_of(scene)
     expected = seed.area * np.array([runs.mass_after(scene, hour) for hour in hours])
     sizes = {"area": [instant.pore.outline.area for instant in instants],
              "mass": [instant.pore.mass / scene.kinetics.maximum_density for instant in instants]}
@@ -185,7 +188,7 @@ def test_curved_uniform_growth(hours, most, why, changes, record):
 
 
 def _roundness(scene, seed) -> tuple[float, str]:
-    """How far the outline may be from a half-disc, and why."""
+    """Bound of the deviation of the outline from a half-disc, and its origin."""
     if seed.geometry == 2:
         return 1e-4, "arcs that are parabolas: (edge / R)^4 / 100"
     chord = 1 - np.sqrt(2 * seed.area / np.pi) / scene.aggregate.radius
@@ -193,13 +196,13 @@ def _roundness(scene, seed) -> tuple[float, str]:
 
 
 def _unround(instant, area: float) -> float:
-    """Largest deviation of the interface's nodes from the half-disc of an area, over its radius."""
+    """Largest distance of the interface's nodes from the half-disc with an area, over its radius."""
     outline = instant.pore.outline
     radius = np.hypot(*outline.points[outline.wall == FREE].T)
     return np.abs(radius / np.sqrt(2 * area / np.pi) - 1).max()
 
 
-#: Of the length in the unit of each number.
+#: Power of the length in the unit of each number.
 POWERS = {"area": 2, "upstream tip": 1, "conductivity": 1}
 
 
@@ -212,15 +215,15 @@ POWERS = {"area": 2, "upstream tip": 1, "conductivity": 1}
 @parametrize("*changes", runs.EVERY)
 def test_units(changes, record):
     scene = runs.base("2 h", *changes)
-    own = runs.numbers(runs.last(scene))
+    reference = runs.numbers(runs.last(scene))
     for factor in (8.0, 0.125):
         other = runs.numbers(runs.last(runs.scaled(scene, factor, 1.0)))
-        apart = {name: abs(other[name] / value / factor ** POWERS[name] - 1) for name, value in own.items()}
+        apart = {name: abs(other[name] / value / factor ** POWERS[name] - 1) for name, value in reference.items()}
         record(each_at_most(apart, 1e-14, "powers of two are exact: even the mesher does the same",
                             f", lengths times {factor:g}"))
 
 
-#: Base to 1 h in other units.
+#: The scene base to 1 h in other units.
 FOREIGN = ('pore.width="0.05 mm"', 'pore.length="0.06 cm"', 'aggregate.radius="5e-6 m"', 'flow.head="1e-5 m"',
            'substrates.acceptor.supply="10 g/m^3"', 'substrates.donor.supply="0.01 g/L"',
            'substrates.acceptor.diffusivity="232 mm^2/day"', 'flow.gravity="981 cm/s^2"',
@@ -235,9 +238,10 @@ FOREIGN = ('pore.width="0.05 mm"', 'pore.length="0.06 cm"', 'aggregate.radius="5
     mutants=("rounded-twice",), runs_with="1 2")
 @parametrize("*changes", runs.WITH_EXACT)
 def test_foreign_units(changes, record):
-    ours, theirs = (runs.last(runs.base(end, *changes, *units)) for end, units in (("1 h", ()), ("60 min", FOREIGN)))
-    pairs = {"places": (ours.pore.mesh.points, theirs.pore.mesh.points),
-             "C_A": (ours.solved.concentrations.acceptor, theirs.solved.concentrations.acceptor)}
+    standard = runs.last(runs.base("1 h", *changes))
+    foreign = runs.last(runs.base("60 min", *changes, *FOREIGN))
+    pairs = {"places": (standard.pore.mesh.points, foreign.pore.mesh.points),
+             "C_A": (standard.solved.concentrations.acceptor, foreign.solved.concentrations.acceptor)}
     apart = {name: np.abs(a - b).max() for name, (a, b) in pairs.items()}
     record(each_at_most(apart, 0.0, "the same numbers after reading"))
 
@@ -268,8 +272,8 @@ def test_mirror(changes, record):
     mutants=("inlet-held",), runs_with="paper")
 @parametrize("*changes", runs.every(0.6, 2.0))
 def test_reversed(changes, record):
-    ours, theirs = (_lopsided(sign, *changes) for sign in (1.0, -1.0))
-    apart = {name: abs(ours[name] / theirs[name] - 1) for name in ours}
+    forward, mirrored = (_lopsided(sign, *changes) for sign in (1.0, -1.0))
+    apart = {name: abs(forward[name] / mirrored[name] - 1) for name in forward}
     record(at_most("conductivity", apart["conductivity"], 3e-4, ERROR),
            at_most("effluent", apart["effluent"], 3e-4, ERROR),
            at_least("C at the inlet, which no theorem makes equal", apart["inlet"], 3e-3,
@@ -286,7 +290,7 @@ FIRST_ORDER = ('substrates.acceptor.half_saturation="1e-9 mg/L"', 'substrates.do
 
 
 def _lopsided(sign: float, *changes: str) -> dict[str, float]:
-    """Conductivity, and C at the outlet and the inlet, with FIRST_ORDER."""
+    """Conductivity, and C at the outlet and the inlet, with uptake of first order."""
     scene = load_scene("base", (*changes, *FIRST_ORDER))
     scene = shaped(scene, _outline(sign, 80 * scene.numerics.geometry))
     solved = pore.solve(scene, pore.seeded(scene))
@@ -295,7 +299,7 @@ def _lopsided(sign: float, *changes: str) -> dict[str, float]:
 
 
 def _outline(sign: float, edges: int) -> np.ndarray:
-    """(edges + 1, 2): 24 um (1 + 0.35 cos a - 0.15 cos 2a), or its image in x -> -x for sign = -1."""
+    """(edges + 1, 2) um: r = 24 um (1 + 0.35 cos a - 0.15 cos 2a), or its mirror image for sign = -1."""
     angle = np.linspace(np.pi, 0.0, edges + 1)
     radius = 24.0 * (1 + 0.35 * sign * np.cos(angle) - 0.15 * np.cos(2 * angle))
     return runs.standing(radius * np.cos(angle), radius * np.sin(angle))
@@ -323,10 +327,10 @@ def test_quasi_steady(changes, record):
 
 
 def _lag(factor: float, *changes: str) -> dict[str, float]:
-    """How far the quasi-steady run is from the transient one, substrates being ``factor`` times slower than growth."""
-    ours, theirs = (runs.last(_slower(factor, name, *changes)) for name in ("quasi_steady", "gear"))
-    one, other = runs.numbers(ours), runs.numbers(theirs)
-    apart = ours.solved.concentrations.acceptor - theirs.solved.concentrations.acceptor
+    """Difference of the quasi-steady and the transient run, with substrates slowed by ``factor`` against growth."""
+    quasi_steady, transient = (runs.last(_slower(factor, name, *changes)) for name in ("quasi_steady", "gear"))
+    one, other = runs.numbers(quasi_steady), runs.numbers(transient)
+    apart = quasi_steady.solved.concentrations.acceptor - transient.solved.concentrations.acceptor
     return {**{name: abs(one[name] / other[name] - 1) for name in one}, "C_A": np.abs(apart).max() / 10.0}
 
 
@@ -355,38 +359,38 @@ def test_extent(changes, record):
 
 
 IN_SPACE = "error in space, 0.1 % at refinement 1, a quarter of that here"
-#: How far section means of C may be apart on the coarser mesh of a preset.
-APART = {(runs.by("fast"),): (2.5e-3, "error in space: a quarter of the 1 % that the preset stands for")}
+#: Bound of the difference of section means of C on the coarser mesh of a preset.
+APART = {(runs.with_preset("fast"),): (2.5e-3, "error in space: a quarter of the 1 % that the preset stands for")}
 BOUNDS = {"conductivity": (1e-3, "of first order in the mesh: 0.17 % in a clean channel at this refinement, most of "
                            "which both meshes have in common"),
           "effluent acceptor": (4e-4, IN_SPACE), "effluent donor": (4e-4, IN_SPACE)}
 
 
 def _solved(*changes: str):
-    """Conductivity and effluents of base at t = 0, and the section means along its central mesh."""
+    """Conductivity and effluents of base at t = 0, and section means along its central mesh."""
     scene = load_scene("base", changes)
-    now = pore.seeded(scene)
-    solved = pore.solve(scene, now)
+    seed = pore.seeded(scene)
+    solved = pore.solve(scene, seed)
     reach = min(10 * scene.aggregate.radius, 1.5 * scene.pore.width) + scene.aggregate.radius
-    x = np.linspace(-reach, reach, runs.PLACES)
+    x = np.linspace(-reach, reach, runs.SECTIONS)
     leaving = {f"effluent {name}": flux.effluent for name, flux in zip(NAMES, solved.fluxes)}
-    return {"conductivity": solved.flow.conductivity, **leaving}, runs.section_means(now, solved, x)
+    return {"conductivity": solved.flow.conductivity, **leaving}, runs.section_means(seed, solved, x)
 
 
 RULE_STEPS = (1, 2, 4, 8, 16)
 
 
 def _equal_steps(scene, steps: int) -> np.ndarray:
-    """Area and upstream tip after 2 h in equal steps, on one mesh."""
-    now = pore.seeded(scene)
+    """Area and upstream tip after 2 h in equal steps on one mesh. Raises RuntimeError at a remesh."""
+    state = pore.seeded(scene)
     for _ in range(steps):
-        solved = pore.solve(scene, now)
-        now = replace(now, concentrations=solved.concentrations)
-        step = midpoint.attempt(scene, now, solved, 2.0 / steps).step
+        solved = pore.solve(scene, state)
+        state = replace(state, concentrations=solved.concentrations)
+        step = midpoint.attempt(scene, state, solved, 2.0 / steps).step
         if step.remeshed:
             raise RuntimeError("a new mesh: the error in space would not be common")
-        now = step.pore
-    return np.array([now.outline.area, now.outline.upstream])
+        state = step.pore
+    return np.array([state.outline.area, state.outline.upstream])
 
 
 @pytest.mark.case(
@@ -397,7 +401,7 @@ def _equal_steps(scene, steps: int) -> np.ndarray:
     omitted="paper: coupling-midpoint-limit; accurate, exact: equal steps know no tolerance: those of fast")
 @pytest.mark.parametrize("elements", runs.ELEMENTS)
 def test_midpoint_order(elements, record):
-    scene = load_scene("base", (runs.by("fast"), runs.of(elements), "numerics.refinement=0.5",
+    scene = load_scene("base", (runs.with_preset("fast"), runs.with_elements(elements), "numerics.refinement=0.5",
                                 'aggregate.radius="25 um"'))
     values = np.array([_equal_steps(scene, steps) for steps in RULE_STEPS])
     apart = np.abs(np.diff(values, axis=0) / values[-1])
@@ -416,13 +420,13 @@ def test_midpoint_order(elements, record):
     omitted="fast, accurate, exact: coupling-midpoint-order; their own tolerances would be seen")
 @parametrize("*changes", runs.kinds(0.3, 0.6))
 def test_midpoint_limit(changes, record):
-    """Remeshes, and the orders."""
+    """Record the remeshes and the orders."""
     short = ('numerics.time="midpoint"', "numerics.tolerance=0.00003")
-    found = [runs.last(runs.base("3.2 h", 'aggregate.radius="25 um"', *changes, *how))
+    reports = [runs.last(runs.base("3.2 h", 'aggregate.radius="25 um"', *changes, *how))
              for how in (short, *((f'growth.time_step="{step} h"',) for step in STEPS))]
-    record(at_most("remeshes, all runs", sum(instant.remeshes for instant in found), 0.0,
+    record(at_most("remeshes, all runs", sum(instant.remeshes for instant in reports), 0.0,
                    "one mesh: the error in space is common"))
-    exact, *rows = map(runs.numbers, found)
+    exact, *rows = map(runs.numbers, reports)
     for name, value in exact.items():
         record(study(name, STEPS, [abs(row[name] / value - 1) for row in rows], 1, "frozen geometry: first order",
                      ceiling=2e-3, band=0.15))
@@ -433,9 +437,10 @@ TIMES = (19.2, 19.4)
 
 @cache
 def _reference():
-    """The independent solver's numbers of base at TIMES, (2, 8), and the largest estimate of their error."""
-    found = whole_run.converged(whole_run.Pore(), TIMES, rings=(6, 8), steps=(8, 16))
-    return found.values, runs.errors(found.values + np.abs(found.space) + np.abs(found.time), found.values).max()
+    """Numbers of base at TIMES (2, 8) by the independent solver, and the largest estimate of their error."""
+    solution = whole_run.converged(whole_run.Pore(), TIMES, rings=(6, 8), steps=(8, 16))
+    farthest = solution.values + np.abs(solution.space) + np.abs(solution.time)
+    return solution.values, runs.errors(farthest, solution.values).max()
 
 
 @pytest.mark.slow
@@ -451,13 +456,13 @@ def _reference():
 @parametrize(
     "bound, preset, *changes",
     {"fast": (1e-2, "fast"), "accurate": (1e-3, "accurate"),
-     "accurate, cubic": (1e-3, "accurate", runs.of("cubic")), "exact": (1e-4, "exact")})
+     "accurate, cubic": (1e-3, "accurate", runs.with_elements("cubic")), "exact": (1e-4, "exact")})
 def test_presets(bound, preset, changes, record):
-    """Checks of the eight numbers, and of the reference."""
-    theirs, error = _reference()
+    """Record checks of the eight numbers and of the reference."""
+    expected, error = _reference()
     record(at_most("the reference itself", error, 5e-5, "half of what is asked of exact"))
-    ours = runs.values(TIMES, runs.by(preset), *changes)
-    for name, errors in zip(whole_run.NAMES, runs.errors(ours, theirs).T):
+    computed = runs.values(TIMES, runs.with_preset(preset), *changes)
+    for name, errors in zip(whole_run.NAMES, runs.errors(computed, expected).T):
         record(at_most(name, errors.max(), bound, "what the preset is for"))
 
 
@@ -467,18 +472,20 @@ def test_presets(bound, preset, changes, record):
     norm="relative difference of the area, the tips and the conductivity at 2 h; factorisations over those of fresh "
          "derivatives; base from a seed of 25 um",
     mutants=("newton-never-reused",))
-@parametrize("*changes", {**{f"{kind}, fast": (runs.by("fast"), runs.of(kind)) for kind in runs.ELEMENTS},
-                          "linear, paper": (runs.by("paper"),), "quadratic, accurate": (runs.by("accurate"),),
-                          "quadratic, exact": (runs.by("exact"),)})
+@parametrize("*changes", {**{f"{kind}, fast": (runs.with_preset("fast"), runs.with_elements(kind))
+                             for kind in runs.ELEMENTS},
+                          "linear, paper": (runs.with_preset("paper"),),
+                          "quadratic, accurate": (runs.with_preset("accurate"),),
+                          "quadratic, exact": (runs.with_preset("exact"),)})
 def test_jacobian_reused(changes, record):
-    (fresh, made), (again, fewer) = (_factorisations(kind, *changes) for kind in ("fresh", "reused"))
-    record(at_most("difference", np.abs(again / fresh - 1).max(), 1e-8,
+    (fresh, fresh_count), (reused, reused_count) = (_factorisations(kind, *changes) for kind in ("fresh", "reused"))
+    record(at_most("difference", np.abs(reused / fresh - 1).max(), 1e-8,
                    "Newton's tolerances, 1e-10 and less, times the steps"),
-           at_most("factorisations", fewer / made, 0.8, "one in three of Newton's is saved"))
+           at_most("factorisations", reused_count / fresh_count, 0.8, "one in three of Newton's is saved"))
 
 
 def _factorisations(kind: str, *changes: str) -> tuple[np.ndarray, int]:
-    """Area, tips and conductivity at 2 h, and how many matrices were factorised on the way."""
+    """Area, tips and conductivity at 2 h, and the number of factorised matrices."""
     scene = runs.base("2 h", *changes, f'numerics.jacobian="{kind}"', 'aggregate.radius="25 um"',
                       'growth.time_step="1 h"')
     with mock.patch.object(linear, "factorised", wraps=linear.factorised) as factorised:

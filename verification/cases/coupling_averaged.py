@@ -1,12 +1,9 @@
-"""The paper's base run against the averaged pore, and what of their disagreement is the flow's and the substrates'.
+"""The paper's base run against the averaged pore.
 
-Fast diffusion, where averaging over sections is exact: the disagreement falls as theory says, to the coefficient.
-
-Aggregates that are long against the pore's width, where averaging over sections is exact.
-
-Flow, transport and uptake around thin aggregates at t = 0: Peclet by uptake, from hardly touched to starved.
-
-Supplies that change over time: starvation and recovery of an aggregate.
+The differences of the two models have two sources, the flow and the substrates. Averaging over sections is exact in
+two limits: fast diffusion, where the differences fall as theory predicts, coefficient included, and aggregates that are
+long against the width of the pore. Thin aggregates at t = 0 cover a range of Peclet numbers and of uptake, from low to
+starved. Supplies that change over time starve an aggregate and let it recover.
 """
 
 from __future__ import annotations
@@ -35,7 +32,7 @@ from verification.problems import runs
 from verification.problems.channels import NAMES, SCENE
 
 TIMES = (2.0, 4.0, 6.0, 8.0, 10.0, 12.0, 14.0, 16.0, 18.0, 19.4)
-#: Radii (um) at which Taylor-Hood elements give a half-disc's loss, and the reach of their meshes beyond it.
+#: Radii (um) of half-discs whose loss Taylor-Hood elements compute, and the reach (um) of their meshes beyond them.
 RADII, REACH = (5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 33.0), 75.0
 
 
@@ -51,8 +48,8 @@ RADII, REACH = (5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 33.0), 75.0
 @parametrize("*changes", runs.NUMERICS)
 def test_averaged_base(changes, record):
     scene = runs.base("19.4 h", *changes, times=TIMES)
-    instants = runs.ours(scene)
-    flow, rest = (runs.apart(scene, instants, moments) for moments in _clogged(changes[0]))
+    instants = runs.reports_of(scene)
+    flow, rest = (runs.differences(scene, instants, moments) for moments in _clogged(changes[0]))
     record(between("velocity, lubrication", flow["velocity"], 0.09, 0.12,
                    "lubrication loses 11.3 % of the loss around a half-disc of 30 um, by Taylor-Hood; less what its "
                    "aggregate, 2 % larger, gains"))
@@ -64,30 +61,33 @@ def test_averaged_base(changes, record):
 
 
 LINEAR = "linear elements: 0.3 % at the ends of the mesh, 0.5 % around the aggregate"
-#: What is compared of a run and its averaged pore.
+#: Quantities that are compared between a run and its averaged pore.
 APART = ("area", "effluents", "C along the pore")
 
 
 @cache
 def _clogged(preset: str) -> list[list]:
-    """The averaged pore's moments at TIMES under both losses, from the seed of a preset."""
+    """States of the averaged pore at TIMES under both losses, from the seed of a preset."""
     scene = runs.base("19.4 h", preset)
     return [runs.half_disc(scene, speed).run(TIMES) for speed in speeds(scene)]
 
 
 def _at_our_area(scene, instants) -> float:
     """Largest relative difference of the velocity from that under the loss of a half-disc of the same area."""
-    _, own = speeds(scene)
-    return max(abs(found.solved.flow.mean_velocity / own(None, runs.half_disc_radius(found.pore.outline.area)) - 1)
-               for found in instants)
+    _, half_disc_speed = speeds(scene)
+    radii = [runs.half_disc_radius(report.pore.outline.area) for report in instants]
+    return max(abs(report.solved.flow.mean_velocity / half_disc_speed(None, radius) - 1)
+               for report, radius in zip(instants, radii))
 
 
 SQUARE_LAW = "the square of the transverse Thiele number, as measured in coupling-averaged-run: 1.2 % of the area"
 
 
 def speeds(scene):
-    """Two functions (loss, half length) -> u under the scene's head: by lubrication, and by Taylor-Hood's loss around a
-    half-disc."""
+    """Two functions (loss, half length) -> u under the head of a scene.
+
+    The first takes the loss of lubrication theory, the second that of Taylor-Hood elements around a half-disc.
+    """
     drive = scene.flow
     push = drive.head * drive.gravity / drive.kinematic_viscosity
     loss = half_disc_loss(scene.pore.width, scene.pore.length, drive.viscosity_ratio)
@@ -96,7 +96,7 @@ def speeds(scene):
 
 @cache
 def half_disc_loss(width: float, length: float, ratio: float) -> CubicSpline:
-    """Loss of the whole pore per mean velocity (without nu/g) as a function of the radius, by Taylor-Hood elements."""
+    """Loss of the pore per mean velocity (without nu/g) as a function of the radius, by Taylor-Hood elements."""
     losses = [poiseuille.head_loss(length, width, 1.0, 1.0)]
     for radius in RADII:
         reach = radius + REACH
@@ -109,8 +109,7 @@ SQUARE = "regular perturbation in 1 / D: the square of the transverse Thiele num
 
 
 def thiele(scene: Scene) -> float:
-    """Transverse Thiele number of the donor over a thickness of half the pore's width:
-    W/2 sqrt(X_m k / (D_B (C_s + K)))."""
+    """Transverse Thiele number of the donor over half the width: W/2 sqrt(X_m k / (D_B (C_s + K)))."""
     law, donor = scene.kinetics, scene.substrates.donor
     rate = law.maximum_density * law.maximum_utilization_rate / (donor.supply + donor.half_saturation)
     return scene.pore.width / 2 * np.sqrt(rate / donor.diffusivity_in_aggregate)
@@ -129,26 +128,26 @@ FASTER = (4.0, 16.0, 64.0, 256.0)
     references=("averaged_pore", "poiseuille", "taylor_hood"), runs_with="paper")
 @parametrize("*changes", runs.every(0.5, 1.5))
 def test_averaged_mixing(changes, record):
-    found = refine(_leaving, FASTER, runs.base("0 h", 'aggregate.radius="20 um"', *changes))
+    errors = refine(_leaving, FASTER, runs.base("0 h", 'aggregate.radius="20 um"', *changes))
     for name in NAMES:
-        record(study(f"effluent {name} (mg/L)", found["size"], found[name], 2, SQUARE, ceiling=2.5e-5))
-        record(between(f"{name}: disagreement over first-order theory", found[f"{name} over first"][-1], 0.995, 1.005,
+        record(study(f"effluent {name} (mg/L)", errors["size"], errors[name], 2, SQUARE, ceiling=2.5e-5))
+        record(between(f"{name}: disagreement over first-order theory", errors[f"{name} over first"][-1], 0.995, 1.005,
                        "the next order: 0.2 %, a quarter of that at D times 64; mesh: 0.7 % at refinement 1 of linear "
                        "elements, less than half of that here"))
 
 
 def _leaving(factor: float, scene: Scene) -> dict[str, float]:
-    """Thiele number; mg/L: effluents, ours less the averaged pore's, in size, and over what they are to first order."""
+    """Thiele number; difference of effluents from the averaged pore (mg/L), and over its first-order value."""
     scene = runs.with_diffusivities(scene, lambda water, _: (factor * water, factor * water))
     scene = runs.at_velocity(scene, runs.SPEED)
     row = results.row(scene, next(simulate(scene)))
     radius = runs.half_disc_radius(row["aggregate_area_um2"])
     first = averaged_pore.excess(runs.pore_of(scene), radius, runs.SPEED)
-    found = {"size": thiele(scene)}
+    differences = {"size": thiele(scene)}
     for name, trusted, more in zip(NAMES, runs.half_disc(scene).seed().fields[:, -1], first):
         gap = row[f"effluent_{name}_mg_per_L"] - trusted
-        found |= {name: abs(gap), f"{name} over first": gap / more}
-    return found
+        differences |= {name: abs(gap), f"{name} over first": gap / more}
+    return differences
 
 
 SLOWER = (8.0, 16.0, 32.0, 64.0)
@@ -168,23 +167,23 @@ MIXING_TIMES = (5.0, 10.0, 15.0, 19.4)
             "coupling-averaged-refined")
 @pytest.mark.parametrize("preset", ("paper", "accurate"))
 def test_averaged_run(preset, record):
-    """Checks and studies of one preset."""
-    errors, base = refine(_whole, SLOWER, preset), _whole(1.0, preset)
+    """Record checks and studies of one preset."""
+    errors, base = refine(_whole_run, SLOWER, preset), _whole_run(1.0, preset)
     record(studies(errors, dict.fromkeys(APART, (2, SQUARE, 3e-4))))
     for name in APART[:2]:
         record(between(f"base, {name}: over the square law through the first of these",
                        base[name] / (SLOWER[0] * errors[name][0]), 1.0, 2.0, "terms of fourth order"))
 
 
-def _whole(factor: float, preset: str) -> dict[str, float]:
+def _whole_run(factor: float, preset: str) -> dict[str, float]:
     """Thiele number and largest differences of one run."""
     finer = ("numerics.tolerance=0.0002",) if preset == "accurate" else ()
-    scene = runs.faster(runs.base("19.4 h", runs.by(preset), *finer, times=MIXING_TIMES), factor)
+    scene = runs.faster(runs.base("19.4 h", runs.with_preset(preset), *finer, times=MIXING_TIMES), factor)
     moments = runs.half_disc(scene).run(MIXING_TIMES)
-    return {"size": thiele(scene), **runs.apart(scene, runs.ours(scene), moments)}
+    return {"size": thiele(scene), **runs.differences(scene, runs.reports_of(scene), moments)}
 
 
-#: Refinement of our mesh, our time step (min), and cells of the averaged pore: as in the whole run, and twice as fine.
+#: Refinement, time step (min), and factor of the cells of the averaged pore: as in the base run, and twice as fine.
 COARSE, FINE = (1.0, 12.0, 1), (2.0, 6.0, 2)
 
 
@@ -203,13 +202,13 @@ def test_averaged_refined(elements, record):
 
 
 def _piece(elements: str, refinement: float, minutes: float, finer: int) -> dict[str, float]:
-    """Differences after 2 h."""
-    scene = runs.base("2 h", 'aggregate.radius="20 um"', runs.of(elements),
+    """Differences from the averaged pore after 2 h."""
+    scene = runs.base("2 h", 'aggregate.radius="20 um"', runs.with_elements(elements),
                       runs.coarser(elements, 0.45 * refinement, refinement),
                       f'growth.time_step="{minutes} min"')
     scene = runs.at_velocity(scene, runs.SPEED)
     moments = runs.half_disc(scene, cells=finer * runs.CELLS).run((2.0,))
-    return runs.apart(scene, runs.ours(scene), moments)
+    return runs.differences(scene, runs.reports_of(scene), moments)
 
 
 WIDTH, THICKNESS = 20.0, 5.0
@@ -237,40 +236,45 @@ def test_averaged_strip(elements, record):
 
 
 def thin_scene(elements: str, aspect: float, speed: float = 5 * runs.SPEED, density: float = 3e6) -> Scene:
-    """Base for 1 h in a narrow pore, from a seed whose half length is its thickness over ``aspect``; speed: mean
-    velocity (um/h) over the aspect ratio; density: X_m (mg/L) over its square."""
-    found = runs.base("1 h", runs.of(elements), runs.coarser(elements, 0.5), f'aggregate.radius="{THICKNESS} um"',
+    """Base for 1 h in a narrow pore, from a seed whose half length is its thickness over ``aspect``.
+
+    speed: mean velocity (um/h) over the aspect ratio; density: X_m (mg/L) over its square.
+    """
+    scene = runs.base("1 h", runs.with_elements(elements), runs.coarser(elements, 0.5),
+                      f'aggregate.radius="{THICKNESS} um"',
                       f'pore.width="{WIDTH} um"', f'kinetics.maximum_density="{density * aspect**2} mg/L"',
                       'growth.time_step="6 min"', 'growth.minimum_contact_angle="0.01 deg"', times=(0.5, 1.0))
-    return runs.at_velocity(found, speed * aspect)
+    return runs.at_velocity(scene, speed * aspect)
 
 
 def _strip(aspect: float, elements: str) -> dict[str, float]:
-    """Aspect ratio; largest differences; of the ends, relative; (upstream over downstream length - 1) over the averaged
-    one's."""
-    given = shaped(thin_scene(elements, aspect), half_ellipse(elements, aspect))
-    seed, *instants = simulate(given)
-    moments = strip_of(given, seed.pore.outline.area, 2 * runs.CELLS).run(given.output.times)
+    """Aspect ratio; largest differences; that of the ends, relative; lean over that of the averaged pore.
+
+    The lean is the upstream over the downstream length, less 1.
+    """
+    scene = shaped(thin_scene(elements, aspect), half_ellipse(elements, aspect))
+    seed, *instants = simulate(scene)
+    moments = strip_of(scene, seed.pore.outline.area, 2 * runs.CELLS).run(scene.output.times)
     ends = np.array([(instants[-1].pore.outline.upstream, instants[-1].pore.outline.downstream), moments[-1].ends])
-    ours, theirs = -ends[:, 0] / ends[:, 1] - 1
-    return {"size": aspect, **runs.apart(given, instants, moments), "ends": np.abs(ends[0] / ends[1] - 1).max(),
-            "lean": ours / theirs}
+    lean, expected_lean = -ends[:, 0] / ends[:, 1] - 1
+    return {"size": aspect, **runs.differences(scene, instants, moments), "ends": np.abs(ends[0] / ends[1] - 1).max(),
+            "lean": lean / expected_lean}
 
 
-def strip_of(given: Scene, area: float, cells: int) -> averaged_pore.Averaged:
-    """The averaged run of a strip that has the area of the meshed seed."""
+def strip_of(scene: Scene, area: float, cells: int) -> averaged_pore.Averaged:
+    """The averaged run of a strip with the area of the meshed seed."""
     lengths, heights = averaged_pore.half_ellipse(2 * area / (np.pi * THICKNESS), THICKNESS, cells)
-    return averaged_pore.Averaged(runs.pore_of(given), lengths, heights, 4 * cells, keeps_shape=False)
+    return averaged_pore.Averaged(runs.pore_of(scene), lengths, heights, 4 * cells, keeps_shape=False)
 
 
 def half_ellipse(elements: str, aspect: float) -> np.ndarray:
-    """(n, 2) um of a seed THICKNESS high, at equal eccentric angles; twice as many edges on curved triangles."""
+    """(n, 2) um, points of a half-ellipse at equal eccentric angles. Curved triangles have twice as many edges."""
     edges = round((32 if elements == "linear" else 64) / np.sqrt(aspect))
     return bump(THICKNESS / aspect, lambda s: THICKNESS * np.sqrt(np.maximum(1 - s**2, 0.0)), edges)
 
 
 def bump(half_length: float, shape, edges: int) -> np.ndarray:
-    """(edges + 1, 2) um of height shape(x / half_length), from the upstream end."""
+    """(edges + 1, 2) um, points of the height shape(x / half_length), from the upstream end."""
     angle = np.linspace(np.pi, 0.0, edges + 1)
     return runs.standing(half_length * np.cos(angle), shape(np.cos(angle)))
 
@@ -293,17 +297,19 @@ SLENDER = (0.25, 0.177, 0.125, 0.0884)
     omitted="order 1: its own error is as large as what is measured")
 @parametrize("order", {f"order {order}": (order,) for order in (2, 3)})
 def test_averaged_flow(order, record):
-    """The coefficient, and the order, with elements of an order on straight triangles: the bump's ends lie flat on the
-    wall, which arcs would cross."""
-    ours, thin, more = np.array([_losses(order, aspect) for aspect in SLENDER]).T
+    """Record the coefficient and the order on straight triangles.
+
+    The ends of the bump lie flat on the wall, which arcs would cross.
+    """
+    losses, thin, more = np.array([_losses(order, aspect) for aspect in SLENDER]).T
     clean = poiseuille.head_loss(LENGTH, WIDTH, 1.0, 1.0)
-    record(between("gap over that of extended lubrication, the most slender", (ours - thin)[-1] / more[-1],
+    record(between("gap over that of extended lubrication, the most slender", (losses - thin)[-1] / more[-1],
                    0.94, 1.02, "mesh, 2 %; the next term, 1 %; lambda = 2000 for a rigid wall, 0.4 %"),
-           study("loss", SLENDER, (ours - thin) / (thin - clean), 2, THIN_SQUARE, ceiling=1.5e-2))
+           study("loss", SLENDER, (losses - thin) / (thin - clean), 2, THIN_SQUARE, ceiling=1.5e-2))
 
 
 def _losses(order: int, aspect: float) -> tuple[float, float, float]:
-    """Loss per mean velocity: ours; lubrication's; what extended lubrication theory adds.
+    """Loss per mean velocity: of the package, of lubrication theory, and the term that its extension adds.
 
     In a channel with one wall y = h(x) the stream function in powers of the slope, to the second, gives the loss
     12 W integral of (1 + 4/5 h'^2) / (W - h)^3 dx.
@@ -312,12 +318,12 @@ def _losses(order: int, aspect: float) -> tuple[float, float, float]:
     outline = polygon(bump(half, lambda s: LOW * (1 - s**2) ** 2, round(48 / np.sqrt(aspect))), WIDTH)
     grid, _ = mesher.generate(outline, (-reach, reach), Sizing(WIDTH, 2.5 / order, 2.0))
     drive = replace(thin_scene("linear", 0.5).flow, mean_velocity=1.0, kinematic_viscosity=1.0, gravity=1.0)
-    whole = flow.solve(Space(grid, order), drive, LENGTH)
+    solution = flow.solve(Space(grid, order), drive, LENGTH)
     s, weight = np.polynomial.legendre.leggauss(200)
     height, slope = LOW * (1 - s**2) ** 2, -4 * aspect * s * (1 - s**2)
     thin = half * weight @ layered_channel.gradient(WIDTH, height, RATIO)
     more = half * weight @ (12 * WIDTH * 4 / 5 * slope**2 / (WIDTH - height) ** 3)
-    return whole.head_loss, thin + poiseuille.head_loss(LENGTH - 2 * half, WIDTH, 1.0, 1.0), more
+    return solution.head_loss, thin + poiseuille.head_loss(LENGTH - 2 * half, WIDTH, 1.0, 1.0), more
 
 
 UPTAKE_ASPECTS = (0.2, 0.1, 0.05, 0.025)
@@ -343,32 +349,32 @@ def test_averaged_uptake(elements, record):
 
 
 def _around(aspect: float, elements: str) -> dict[str, float]:
-    """The largest difference for each Peclet number and density on one mesh, and the least acceptor left."""
+    """Largest difference for each Peclet number and density on one mesh, and the least acceptor at the outlet."""
     seed = pore.seeded(shaped(thin_scene(elements, aspect), half_ellipse(elements, aspect)))
-    found = {"size": aspect, "left": 1.0}
+    differences = {"size": aspect, "left": 1.0}
     for peclet, density in product(PECLETS, DENSITIES):
         scene = thin_scene(elements, aspect, peclet * SCENE.substrates.acceptor.diffusivity / THICKNESS, density)
-        now = replace(seed, active=scene.kinetics.maximum_density * seed.space.reaction.dx)
-        moment = strip_of(scene, now.outline.area, round(16 / aspect)).seed()
-        ours, theirs = runs.along(now, pore.solve(scene, now), moment)
-        found[f"Pe = {peclet:g}, X = {density:g} mg/L"] = np.abs(ours - theirs).max() / 10.0
-        found["left"] = min(found["left"], ours[0, -1] / 10.0)
-    return found
+        state = replace(seed, active=scene.kinetics.maximum_density * seed.space.reaction.dx)
+        moment = strip_of(scene, state.outline.area, round(16 / aspect)).seed()
+        computed, expected = runs.along(state, pore.solve(scene, state), moment)
+        differences[f"Pe = {peclet:g}, X = {density:g} mg/L"] = np.abs(computed - expected).max() / 10.0
+        differences["left"] = min(differences["left"], computed[0, -1] / 10.0)
+    return differences
 
 
-#: Diffusivities are so many times those of the paper: the averaged pore's own error falls as their inverse.
+#: Factor of the diffusivities. The error of the averaged pore falls as its inverse.
 QUICK = 64.0
-#: (time (h), supply of the donor (mg/L) from then on) as steps, and as the ends of slopes.
+#: (time (h), supply of the donor (mg/L)) as steps, and as the ends of linear pieces.
 COURSES = {"steps": ((0.0, 10.0), (2.0, 0.0), (4.5, 10.0), (7.0, 10.0)),
            "linear": ((0.0, 10.0), (2.0, 10.0), (4.5, 0.0), (7.0, 10.0))}
-#: Rows: while it is fed, at the jump or the bend, starved, at the next one, fed again.
+#: Times of the rows (h): fed, at the first change, starved, at the second change, fed again.
 ROWS = (1.0, 2.0, 3.3, 4.5, 5.7, 7.0)
 ACCEPTOR = 10.0
-#: Cells of the averaged pore, and its accuracy: C is nearly even here. Twice as many cells change the area by 7e-6.
+#: Cells of the averaged pore, and its accuracy. C is nearly uniform. Twice as many cells change the area by 7e-6.
 CELLS = 16
 ACCURACY = 1e-5
 THIELE = "the square of the transverse Thiele number: 1.2 % of the area of base over 64; and as much for the elements"
-#: Bounds where the supply jumps, and where it changes evenly, by preset; cubic: fast with cubic elements.
+#: Bounds by preset, with a supply that jumps or changes linearly; cubic: fast with cubic elements.
 HALF = 5e-3, "half of the 1 % that the preset may err by"
 SUPPLIED = {"steps": {preset: (4e-4, THIELE) for preset in runs.WITH_EXACT},
             "linear": {"paper": (1e-3, "second order in 12 min: a quarter of it with 6 min"), "fast": HALF,
@@ -389,9 +395,9 @@ SUPPLIED = {"steps": {preset: (4e-4, THIELE) for preset in runs.WITH_EXACT},
 @parametrize("how, bound, origin, *changes", {f"{how}, {preset}": (how, *bound, *runs.WITH_EXACT[preset])
                                               for how, bounds in SUPPLIED.items() for preset, bound in bounds.items()})
 def test_averaged_supply(how, bound, origin, changes, record):
-    """Checks of one course of the donor's supply."""
-    made, moments = supplied(how, *changes), _fed(how, changes[0])
-    worst = runs.apart(made, runs.ours(made), moments)
+    """Record checks of one course of the donor's supply."""
+    scene, moments = supplied(how, *changes), _fed(how, changes[0])
+    worst = runs.differences(scene, runs.reports_of(scene), moments)
     record([at_most(name, worst[name], bound, origin) for name in APART])
     if how == "steps":
         record(at_least("area at 2 h over that at 4.5 h", moments[1].area / moments[3].area, 1.005,
@@ -400,16 +406,16 @@ def test_averaged_supply(how, bound, origin, changes, record):
 
 @cache
 def _fed(how: str, preset: str) -> list:
-    """The averaged pore's moments, from the seed of a preset."""
+    """States of the averaged pore, from the seed of a preset."""
     both = [(end, (ACCEPTOR, first), (ACCEPTOR, first if how == "steps" else last))
             for (_, first), (end, last) in pairwise(COURSES[how])]
-    made = supplied(how, preset).at(0.0)
-    return runs.half_disc(made, cells=CELLS).run_through(both, ROWS, ACCURACY)
+    scene = supplied(how, preset).at(0.0)
+    return runs.half_disc(scene, cells=CELLS).run_through(both, ROWS, ACCURACY)
 
 
 def supplied(how: str, *changes: str) -> Scene:
     """Base with a donor whose supply changes."""
-    table = [[f"{time} h", f"{given} mg/L"] for time, given in COURSES[how]]
-    made = runs.base("7 h", *changes, 'aggregate.radius="20 um"', f"substrates.donor.supply={json.dumps(table)}",
+    table = [[f"{time} h", f"{supply} mg/L"] for time, supply in COURSES[how]]
+    scene = runs.base("7 h", *changes, 'aggregate.radius="20 um"', f"substrates.donor.supply={json.dumps(table)}",
                      f"substrates.donor.interpolation={how}", times=ROWS)
-    return runs.faster(made, QUICK)
+    return runs.faster(scene, QUICK)

@@ -1,11 +1,9 @@
-"""What a whole run conserves: substrates, biomass, the yield that links them, and X_m times the area.
+"""Balances of runs and of single steps: substrates, biomass, the yield that links them, and X_m times the area.
 
-What every single step must balance, all at once, and how right the amounts are that balance.
+The balances of substrates and biomass may close on wrong amounts, for instance if a step's ledger takes the flows of
+its start. The balance of growth against uptake, and a run with shorter steps, detect this.
 
-Two balances may close on wrong amounts, as both do when a step's ledger takes the flows of its start: the third one,
-of what is made against what is taken up, and a run with shorter steps see that.
-
-A short piece of a run through contact with the opposite wall, and a wedge that closes (2.3.3).
+Short runs cover contact with the opposite wall and a wedge that closes (2.3.3).
 """
 
 from __future__ import annotations
@@ -22,9 +20,10 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from repro.fem.outline import BOTTOM, FREE, TOP
-from repro.march.loop import Instant, Ledger
+from repro.march.loop import Ledger, Report
 from repro.march.simulation import simulate
 from repro.model import pore, remeshing
+from repro.model.contact_lines import CLOSE
 from repro.scene import Scene, load_scene
 from verification.evidence.cases import parametrize
 from verification.evidence.checks import Check, Study, at_least, at_most, between, study
@@ -44,16 +43,17 @@ LONG = 'growth.time_step="24 min"'
 @parametrize(
     "area, density, remeshes, *changes",
     {"linear": (6e-7, 4e-3, 3.0, LONG),
-     **{kind: (1e-10, 1e-3, 2.0, LONG, runs.of(kind), "numerics.refinement=0.2") for kind in runs.ELEMENTS[1:]},
-     **{kind: (1e-10, 1e-3, 2.0, runs.by(kind)) for kind in runs.QUADRATIC}})
+     **{kind: (1e-10, 1e-3, 2.0, LONG, runs.with_elements(kind), "numerics.refinement=0.2")
+        for kind in runs.ELEMENTS[1:]},
+     **{kind: (1e-10, 1e-3, 2.0, runs.with_preset(kind)) for kind in runs.QUADRATIC}})
 def test_ledger(area, density, remeshes, changes, record):
-    """Checks of a run of base: largest deviations of the area and of the density, and fewest remeshes."""
+    """Record checks of a run of base. area, density: bounds of their deviations; remeshes: the fewest."""
     scene = runs.base("19.4 h", *changes)
     instants = list(simulate(scene))
     rows, last = _ledgers(instants), instants[-1]
-    made = sum(row.biomass_made for row in rows)
+    growth = sum(row.biomass_made for row in rows)
     record(_steps(rows),
-           at_most("biomass, whole run", abs((rows[0].biomass_before + made) / rows[-1].biomass_after - 1),
+           at_most("biomass, whole run", abs((rows[0].biomass_before + growth) / rows[-1].biomass_after - 1),
                    1e-10, runs.ROUND_OFF),
            _area(scene, last, area, "J = theta in the mean: to the stabilisation of linear elements, else to Newton's "
                  "tolerance"),
@@ -63,9 +63,10 @@ def test_ledger(area, density, remeshes, changes, record):
 
 
 def _steps(rows: list[Ledger], equations: float = 1000) -> list[Check]:
-    """The worst of both substrates and of the biomass; and of one step's end against the next one's start.
+    """Checks of the worst step: substrates, biomass, and its start against the end of the step before.
 
-    equations: of each substrate, times the largest term of a row over what is supplied."""
+    equations: number of equations of a substrate times the largest term of a row over the supplied mass.
+    """
     parted = [abs(two.biomass_before / one.biomass_after - 1) for one, two in pairwise(rows)]
     return [at_most("substrates", runs.substrate_defect(rows), 1e-13 * equations,
                     "Newton's tolerance, 1e-13 of the largest term of each row, over all rows"),
@@ -86,7 +87,7 @@ REFINEMENTS = (0.7, 1.0, 1.4, 2.0)
     mutants=("density-not-worked-off", "theta-anew-at-a-remesh"), runs_with="paper")
 @parametrize("*changes", runs.every(0.5))
 def test_density_restored(changes, record):
-    """The order of linear elements; that the others are exact."""
+    """Record the order of linear elements, and the errors of the others."""
     if runs.base("1 h", *changes).numerics.order > 1:
         error, area = _restored(*changes)
         record(at_most("density", error, 1e-10,
@@ -104,32 +105,32 @@ def _restored(*changes: str) -> tuple[float, float]:
     """L2 of the density's error, and X_m times the area over the biomass, less 1."""
     scene = runs.base("1 h", 'kinetics.decay_coefficient="0 1/d"', 'kinetics.maximum_utilization_rate="0 1/d"',
                       'aggregate.radius="20 um"', *changes)
-    now = pore.seeded(scene)
-    x = aggregates.places(now.space)[0]
-    now = replace(now, active=now.active * (1 + 0.1 * x / scene.aggregate.radius))
-    solved = pore.solve(scene, now)
-    anew = remeshing.remesh(scene, now, now, solved.flow.mean_velocity)[0]
+    state = pore.seeded(scene)
+    x = aggregates.reaction_points(state.space)[0]
+    state = replace(state, active=state.active * (1 + 0.1 * x / scene.aggregate.radius))
+    solved = pore.solve(scene, state)
+    anew = remeshing.remesh(scene, state, state, solved.flow.mean_velocity)[0]
     after = runs.step(scene, anew, pore.solve(scene, anew), 0.2).pore
     weight, density = after.space.reaction.dx, runs.density(scene, after)
     error = np.sqrt(np.average((density - 1) ** 2, weights=weight))
     return error, abs(np.vdot(weight, density) / after.outline.area - 1)
 
 
-#: Round-off and Newton's tolerance, 1e-13 of the largest term of each row, over all rows and with room to spare.
+#: Round-off and Newton's tolerance, 1e-13 of the largest term of each row, over all rows, with a margin.
 CLOSED, CLOSES = 1e-9, "identities of the discrete equations: round-off and Newton's tolerance, with room"
-#: How long (h) a run goes on after contact.
+#: Time (h) that a run continues after contact.
 PAST = 2.0
 
 
 def _worth(scene: Scene, ledgers: list[Ledger]) -> float:
-    """Biomass made, against what is grown less what decays, in the worst step."""
-    made = np.array([step.biomass_made for step in ledgers])
+    """Relative defect of the yield in the worst step: |made - (grown - decayed)| / max(grown, decayed)."""
+    production = np.array([step.biomass_made for step in ledgers])
     grown, decayed = np.array([runs.worth(scene.kinetics, step) for step in ledgers]).T
-    return np.max(np.abs(made - (grown - decayed)) / np.maximum(np.abs(grown), np.abs(decayed)))
+    return np.max(np.abs(production - (grown - decayed)) / np.maximum(np.abs(grown), np.abs(decayed)))
 
 
 def _closed(scene: Scene, ledgers: list[Ledger]) -> list:
-    """Checks of a run: of the worst step."""
+    """Checks of the worst step of a run."""
     bound, why = WORTH.get((scene.numerics.transport, scene.numerics.time), (CLOSED, CLOSES))
     return [at_most("substrates", runs.substrate_defect(ledgers), CLOSED, CLOSES),
             at_most("biomass", runs.biomass_defect(ledgers), CLOSED, CLOSES),
@@ -137,19 +138,19 @@ def _closed(scene: Scene, ledgers: list[Ledger]) -> list:
 
 
 TRAPEZOIDAL = "trapezoidal rule on an exponential: (r step)^2 / 12, 1.2e-4 at the supply's rate"
-#: What the paper's schemes may err by in a step of 12 min: updates weigh the rates of both ends alike, and grow by
-#: their mean.
+#: Bounds of the yield's defect in a step of 12 min of the paper's schemes. Updates weigh the rates of both ends alike,
+#: and grow by their mean.
 WORTH = {("quasi_steady", "updates"): (2e-4, TRAPEZOIDAL), ("gear", "updates"): (1e-3, "its own tolerance, 0.1 %")}
 HEUN = "Heun's method, and the trapezoidal rule on what is consumed: second order"
 
 
 def _of_base(preset: str):
-    """Checks of base; in its updates the worst step is judged from both sides, and as steps become shorter."""
+    """Checks of base. For updates, the worst step has a lower bound too, and an order in the step size."""
     scene, ledgers, remeshes = _base(preset, STEPS[2])
     yield _closed(scene, ledgers)
     if scene.numerics.time == "updates":
-        theirs = (runs.growth_rates(scene.kinetics, scene.substrates)[0] * STEPS[2]) ** 2 / 12
-        yield between("made against taken up, over (r step)^2 / 12", _worth(scene, ledgers) / theirs, 0.95, 1.0,
+        expected = (runs.growth_rates(scene.kinetics, scene.substrates)[0] * STEPS[2]) ** 2 / 12
+        yield between("made against taken up, over (r step)^2 / 12", _worth(scene, ledgers) / expected, 0.95, 1.0,
                       "r at the supply; that of the seed is 1 % lower, and falls as the pore clogs")
         yield _order([_base(preset, step)[:2] for step in STEPS])
     yield at_least("remeshes", remeshes, 1.0, "else they are not tested")
@@ -157,15 +158,15 @@ def _of_base(preset: str):
 
 @cache
 def _base(preset: str, step: float) -> tuple[Scene, list[Ledger], int]:
-    """Base with updates, or a first step, of so many hours; its ledgers, and how many meshes were remade."""
-    scene = runs.base("19.4 h", runs.by(preset), f'growth.time_step="{60 * step:g} min"')
+    """Base with updates, or a first step, of so many hours; its ledgers and number of remeshes."""
+    scene = runs.base("19.4 h", runs.with_preset(preset), f'growth.time_step="{60 * step:g} min"')
     instants = list(simulate(scene))
     return scene, _ledgers(instants), sum(instant.remeshes for instant in instants)
 
 
 def _of_narrow(preset: str):
     """Checks of a pore of 40 um through contact."""
-    scene = load_scene("base", ('growth.end="25 h"', runs.by(preset), 'pore.width="40 um"'))
+    scene = load_scene("base", ('growth.end="25 h"', runs.with_preset(preset), 'pore.width="40 um"'))
     scene = runs.at_velocity(scene, runs.SPEED)
     instants, touched = [], np.inf
     for instant in simulate(scene):
@@ -177,13 +178,14 @@ def _of_narrow(preset: str):
     yield at_least("hours after contact", instants[-1].pore.time - touched, PAST, "else less is tested")
 
 
-def _ledgers(instants: Iterable[Instant]) -> list[Ledger]:
+def _ledgers(instants: Iterable[Report]) -> list[Ledger]:
     return [step for instant in instants for step in instant.ledgers]
 
 
 def _short(elements: str, *changes: str) -> Scene:
     """Base from 20 um to 1.6 h, with any kind of elements."""
-    return runs.base("1.6 h", runs.of(elements), 'aggregate.radius="20 um"', *changes, "numerics.refinement=0.5")
+    return runs.base("1.6 h", runs.with_elements(elements), 'aggregate.radius="20 um"', *changes,
+                     "numerics.refinement=0.5")
 
 
 def _of_short(elements: str, change: str) -> list:
@@ -193,22 +195,22 @@ def _of_short(elements: str, change: str) -> list:
 
 
 def _of_updates(elements: str) -> Study:
-    """The worst step of the paper's updates, as steps become shorter."""
+    """Study of the worst step of the paper's updates over the step size."""
     scenes = [_short(elements, f'growth.time_step="{step} h"') for step in STEPS]
     return _order([(scene, _ledgers(simulate(scene))) for scene in scenes])
 
 
-def _order(found: Iterable[tuple[Scene, list[Ledger]]]) -> Study:
-    """Made against taken up in the worst step of runs with steps of STEPS."""
-    errors = [_worth(*run) for run in found]
+def _order(series: Iterable[tuple[Scene, list[Ledger]]]) -> Study:
+    """Study of the yield's defect in the worst step of runs with step sizes STEPS."""
+    errors = [_worth(*run) for run in series]
     return study("made against taken up, worst step", STEPS, errors, 2, HEUN, ceiling=4e-5, band=0.15)
 
 
-#: The runs that are judged: base and a narrow pore by preset, a short run by scheme and elements.
+#: Runs by label: base and a narrow pore by preset, a short run by scheme and elements.
 BALANCED = {**{f"base, {preset}": (_of_base, preset) for preset in ("paper", *runs.QUADRATIC)},
             **{f"40 um, {preset}": (_of_narrow, preset) for preset in runs.PRESETS},
-            **{f"{told}, {kind}": (judge, kind, *change) for kind in runs.ELEMENTS
-               for told, judge, *change in (("midpoint rule", _of_short, runs.by("fast")),
+            **{f"{scheme}, {kind}": (judge, kind, *change) for kind in runs.ELEMENTS
+               for scheme, judge, *change in (("midpoint rule", _of_short, runs.with_preset("fast")),
                                             ("gear", _of_short, 'numerics.transport="gear"'),
                                             ("updates", _of_updates))}}
 
@@ -229,7 +231,7 @@ def test_one_balance(judge, arguments, record):
     record(judge(*arguments))
 
 
-#: What the presets are for, in all; three times that in a single step.
+#: Relative error that the presets promise in total; its factor in a single step.
 RIGHT = {"fast": 1e-2, "accurate": 1e-3, "exact": 1e-4}
 IN_A_STEP = 3.0
 
@@ -249,14 +251,15 @@ IN_A_STEP = 3.0
     "preset, end, *changes",
     {"fast": ("fast", "19.4 h"), "accurate": ("accurate", "19.4 h"),
      "exact": ("exact", "4 h", 'aggregate.radius="25 um"', "numerics.refinement=0.2"),
-     **{f"fast, {kind}": ("fast", "19.4 h", runs.of(kind)) for kind in ("linear", "cubic")}})
+     **{f"fast, {kind}": ("fast", "19.4 h", runs.with_elements(kind)) for kind in ("linear", "cubic")}})
 def test_amounts(preset, end, changes, record):
-    """Checks of one preset."""
-    scene = runs.base(end, runs.by(preset), *changes)
-    shorter = runs.base(end, runs.by(preset), *changes, f"numerics.tolerance={scene.numerics.tolerance / 100}")
-    (times, ours), (fine, theirs) = (_cumulated(one) for one in (scene, shorter))
-    there = CubicSpline(fine, theirs)(times)
-    in_all, in_a_step = np.abs(ours[-1] / there[-1] - 1), np.abs(np.diff(ours, axis=0) / np.diff(there, axis=0) - 1)
+    """Record checks of one preset."""
+    scene = runs.base(end, runs.with_preset(preset), *changes)
+    shorter = runs.base(end, runs.with_preset(preset), *changes, f"numerics.tolerance={scene.numerics.tolerance / 100}")
+    (times, amounts), (fine, fine_amounts) = (_cumulated(one) for one in (scene, shorter))
+    expected = CubicSpline(fine, fine_amounts)(times)
+    in_all = np.abs(amounts[-1] / expected[-1] - 1)
+    in_a_step = np.abs(np.diff(amounts, axis=0) / np.diff(expected, axis=0) - 1)
     for k, name in enumerate(("acceptor", "donor")):
         record(at_most(f"{name} in all", in_all[k], RIGHT[preset], "what the preset is for"))
         record(at_most(f"{name} in a step", in_a_step[:, k].max(), IN_A_STEP * RIGHT[preset],
@@ -266,7 +269,7 @@ def test_amounts(preset, end, changes, record):
 
 
 def _cumulated(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
-    """(ends of steps (n + 1,) h, amounts of acceptor and donor consumed until then (n + 1, 2)), zero first."""
+    """Ends of steps (n + 1,) h, and cumulated amounts of acceptor and donor consumed (n + 1, 2), from zero."""
     ledgers = _ledgers(simulate(scene))
     return (np.array([0.0, *(step.end for step in ledgers)]),
             np.cumsum([(0.0, 0.0), *(step.consumed for step in ledgers)], axis=0))
@@ -278,7 +281,7 @@ def _cumulated(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
           "the fluid is cut in two",
     norm="three steps from an aggregate 0.1 um short of closing the pore, 20 um wide",
     mutants=("films-stay-open", "reprojection-left-out"), runs_with="paper")
-@parametrize("*changes", runs.EVERY | {"exact": (runs.by("exact"), "numerics.refinement=0.3")})
+@parametrize("*changes", runs.EVERY | {"exact": (runs.with_preset("exact"), "numerics.refinement=0.3")})
 def test_contact(changes, record):
     scene = runs.base("0.6 h", 'pore.width="20 um"', 'aggregate.radius="17.9 um"', *changes,
                       times=(0.2, 0.4, 0.6))
@@ -290,7 +293,7 @@ def test_contact(changes, record):
            between("parts of the fluid", _parts(last.mesh), 1.9, 2.1, "a plug"))
 
 
-def _area(scene: Scene, last: Instant, bound: float = 3e-6, origin: str = "J = theta to the stabilisation") -> Check:
+def _area(scene: Scene, last: Report, bound: float = 3e-6, origin: str = "J = theta to the stabilisation") -> Check:
     total = scene.kinetics.maximum_density * last.pore.outline.area
     return at_most("X_m times the area", abs(total / last.ledgers[-1].biomass_after - 1), bound, origin)
 
@@ -306,22 +309,27 @@ def test_wedge(changes, record):
     scene = runs.base("0.2 h", *changes)
     instants = list(simulate(scene, _disc(20.0, 19.8, 60 * scene.numerics.geometry)))
     gaps = [_narrowest(scene, instant.pore, BOTTOM) for instant in instants]
+    error = CLOSE if scene.numerics.geometry == 2 else 1e-9
     record(at_most("narrowest gap over the least allowed, seed", gaps[0], 0.9, "8 degrees are under 16.7"),
-           at_least("the same after a step", gaps[1], 1 - 1e-9, "2 um, or 16.7 degrees beside contact"),
+           at_least("the same after a step", gaps[1], 1 - error,
+                    "2 um, or 16.7 degrees beside contact; on arcs the search ends at a clearance of CLOSE"),
            _area(scene, instants[-1]))
 
 
 def _disc(radius: float, height: float, edges: int) -> np.ndarray:
-    """(edges + 1, 2) um of a disc around (0, height), cut by the lower wall, from its upstream end."""
+    """(edges + 1, 2) um, points of a disc around (0, height) cut by the lower wall, from its upstream end."""
     start = np.arcsin(height / radius)
     angle = np.linspace(np.pi + start, -start, edges + 1)
     return runs.standing(radius * np.cos(angle), height + radius * np.sin(angle))
 
 
-def _narrowest(scene: Scene, now, wall: int) -> float:
-    """Least gap between a wall and the interface beyond the contact surface, over the smaller of the least film and
-    tan(least angle) times the distance from contact; zero without contact."""
-    outline, growth = now.outline, scene.growth
+def _narrowest(scene: Scene, state, wall: int) -> float:
+    """Least gap between a wall and the interface beyond the contact surface, over the allowed gap.
+
+    The allowed gap is the smaller of the least film and tan(least angle) times the distance from contact. Without
+    contact the result is zero.
+    """
+    outline, growth = state.outline, scene.growth
     free, on = outline.points[outline.wall == FREE], outline.points[outline.wall == wall, 0]
     if len(on) == 0:
         return 0.0

@@ -1,6 +1,6 @@
-"""The fluid's traction on the aggregate (20), (22): its balance, a closed form, and how little it does in base.
+"""The fluid's traction on the aggregate (20), (22): its balance, closed forms, and its small effect in base.
 
-The aggregate under the fluid's traction: closed forms, and that shape and flow agree.
+Under this traction the shape and the flow around it must agree.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from repro.fem.mesh import Mesh
 from repro.fem.newton import relative
 from repro.fem.outline import FREE, Outline
 from repro.fem.space import Space
-from repro.march.loop import Instant
+from repro.march.loop import Report
 from repro.march.simulation import simulate
 from repro.model import contact, flow, growth, mesh_motion, pore, traction
 from repro.model.flow import Flow
@@ -27,9 +27,9 @@ from verification.evidence.checks import at_least, at_most, between, each_at_mos
 from verification.problems import runs
 
 FORMS = ("laplacian", "traction")
-#: Every kind of elements on the paper's mesh, and the presets on theirs.
+#: Every kind of elements on the paper's mesh, and the presets on their meshes.
 DEFAULT = runs.every(1.0)
-#: A mesh three times finer than a cubic one of the default size takes longer than all others together.
+#: Coarser cubic elements: a mesh three times finer than the default one takes longer than all others together.
 REMESHED = DEFAULT | {"cubic": runs.every(0.5)["cubic"]}
 BOTH_ENDS = "the momentum balance of the solver's own equations: round-off"
 REFINEMENTS = (1.0, 1.4, 2.0, 2.8)
@@ -39,11 +39,11 @@ def loaded_scene(*changes: str):
     return runs.base("1 h", 'aggregate.radius="25 um"', 'growth.fluid_forces="included"', *changes)
 
 
-def nodal(scene, space: Space) -> tuple[np.ndarray, Flow]:
+def nodal_forces(scene, space: Space) -> tuple[np.ndarray, Flow]:
     """Nodal forces (N, 2) um2 of head on the nodes of a mesh, and the flow."""
-    found = pore.solve_flow(scene, space)
+    solution = pore.solve_flow(scene, space)
     viscosity = scene.flow.kinematic_viscosity / scene.flow.gravity
-    return traction.nodal(space, found, viscosity, scene.numerics.interface), found
+    return traction.nodal(space, solution, viscosity, scene.numerics.interface), solution
 
 
 @pytest.mark.case(
@@ -56,42 +56,46 @@ def nodal(scene, space: Space) -> tuple[np.ndarray, Flow]:
 @parametrize("*changes", {f"{form}, {label}": (f'numerics.interface="{form}"', *changes) for form in FORMS
                           for label, changes in DEFAULT.items()})
 def test_traction_balance(changes, record):
-    """Checks at t = 0 with one form of the flow; the drag's order with linear elements and the paper's form."""
+    """Record the balance at t = 0, and the order of the drag with linear elements and the paper's form."""
     scene = loaded_scene(*changes)
-    now = pore.seeded(scene)
-    on, found = nodal(scene, now.space)
-    mesh = now.mesh
+    seed = pore.seeded(scene)
+    on, solution = nodal_forces(scene, seed.space)
+    mesh = seed.mesh
     x, y = mesh.points.T
     rim = np.isin(x, mesh.ends) | np.isin(y, (0.0, mesh.width))
     rim[mesh.body] = True
-    free = mesh.loop[now.wall == FREE]
+    free = mesh.loop[seed.wall == FREE]
     largest = np.abs(on[free]).max()
-    apart = on[free] + _by_biomass(scene, now, found)[free]
+    apart = on[free] + _by_biomass(scene, seed, solution)[free]
     record(each_at_most({"force within the fluid": np.abs(on[~rim]).max() / largest,
                          "action and reaction": np.abs(apart).max() / largest}, 1e-9, BOTH_ENDS))
-    if now.space.order == 1 and scene.numerics.interface == FORMS[0]:
+    if seed.space.order == 1 and scene.numerics.interface == FORMS[0]:
         record(study("drag", 1 / np.array(REFINEMENTS), [*map(_drag_error, REFINEMENTS)], 1,
                      "shear from the slopes of linear triangles: first order"))
 
 
-def _by_biomass(scene, now: pore.Pore, found: Flow) -> np.ndarray:
-    """(N, 2) um2 of head: forces of the biomass' triangles, lambda times as viscous, as of a mesh on which biomass and
-    fluid are exchanged."""
-    mesh = now.mesh
+def _by_biomass(scene, state: pore.Pore, solution: Flow) -> np.ndarray:
+    """(N, 2) um2 of head, forces of the triangles of biomass, which are lambda times as viscous.
+
+    They are computed on a mesh in which biomass and fluid are exchanged.
+    """
+    mesh = state.mesh
     other = replace(mesh, topology=replace(mesh.topology, biomass=~mesh.biomass))
     viscosity = scene.flow.viscosity_ratio * scene.flow.kinematic_viscosity / scene.flow.gravity
-    return traction.nodal(Space(other, now.space.order), found, viscosity, scene.numerics.interface)
+    return traction.nodal(Space(other, state.space.order), solution, viscosity, scene.numerics.interface)
 
 
 def _drag_error(refinement: float) -> float:
-    """Relative error of the drag on a half-disc against head loss times W less the shear on the walls, from the slopes
-    beside them."""
+    """Relative error of the drag on a half-disc against head loss times W less the shear on the walls.
+
+    The shear comes from the velocity gradients beside the walls.
+    """
     scene = loaded_scene(f"numerics.refinement={refinement}")
-    now = pore.seeded(scene)
-    on, found = nodal(scene, now.space)
+    seed = pore.seeded(scene)
+    on, solution = nodal_forces(scene, seed.space)
     viscosity = scene.flow.kinematic_viscosity / scene.flow.gravity
-    left = found.meshed_loss * now.mesh.width - viscosity * _wall_shear(now.mesh, found.velocity)
-    return abs(on[now.mesh.loop, 0].sum() / left - 1)
+    left = solution.meshed_loss * seed.mesh.width - viscosity * _wall_shear(seed.mesh, solution.velocity)
+    return abs(on[seed.mesh.loop, 0].sum() / left - 1)
 
 
 def _wall_shear(grid: Mesh, velocity: np.ndarray) -> float:
@@ -122,7 +126,7 @@ def test_traction_layer(order, record):
         "shear": (2, "forces as residuals of linear elements: second order, as the flux", 1e-3)}))
 
 
-#: How many meshes of each level.
+#: Number of meshes of each level.
 LAYER_DRAWS = dict(enumerate((16, 12, 6, 2)))
 
 
@@ -134,8 +138,8 @@ def _shear(space: Space) -> float:
     """Relative error of the mean shear on the middle of the layer."""
     mesh = space.mesh
     ratio = 2000.0
-    found = flow.unit_flow(space, ratio)
-    as_flow = Flow(1.0, found.velocity, found.pressure, found.correction, 1.0, 1.0, 1.0)
+    unit = flow.unit_flow(space, ratio)
+    as_flow = Flow(1.0, unit.velocity, unit.pressure, unit.correction, 1.0, 1.0, 1.0)
     on = traction.nodal(space, as_flow, 1.0, "laplacian")
     along, across = mesh.points.T
     line = np.flatnonzero((across == flow_cases.LAYER) & (np.abs(along) < flow_cases.LAYER_END))
@@ -148,8 +152,10 @@ def _shear(space: Space) -> float:
 
 
 def _tested(mesh: Mesh, line: np.ndarray, weight: np.ndarray) -> float:
-    """Integral over a line of nodes of a function with values there: by trapezia, or by Simpson's rule where every
-    second node is a middle."""
+    """Integral of nodal values over a line of nodes.
+
+    It takes the trapezoidal rule, or Simpson's rule if every second node is a middle.
+    """
     order = np.argsort(mesh.points[line, 0])
     x, values = mesh.points[line[order], 0], weight[order]
     if mesh.geometry == 1:
@@ -165,17 +171,17 @@ def _tested(mesh: Mesh, line: np.ndarray, weight: np.ndarray) -> float:
     mutants=("density-squared", "forces-thousandfold"), runs_with="paper")
 @parametrize("*changes", runs.every(0.2, 0.6))
 def test_traction_base(changes, record):
-    _, *found = simulate(runs.base("16 h", 'growth.time_step="24 min"', *changes, times=(4, 10, 16)))
-    moves = [_next_move(instant, *changes) for instant in found]
+    _, *reports = simulate(runs.base("16 h", 'growth.time_step="24 min"', *changes, times=(4, 10, 16)))
+    moves = [_next_move(instant, *changes) for instant in reports]
     record(at_most("largest move", max(moves), 1e-4, "0.1 Pa of the fluid on a stiffness of 2 to 10 kPa, some times "
                    "for the slender shape"),
            at_least("least move", min(moves), 1e-7, "else no force has acted"))
 
 
-def _next_move(found: Instant, *changes: str) -> float:
-    """Both from the same pore: on the same mesh."""
+def _next_move(report: Report, *changes: str) -> float:
+    """Largest move of the interface by the fluid in a step, over the thickness. Both shapes are on one mesh."""
     scenes = (runs.base("16 h", *changes, f'growth.fluid_forces="{word}"') for word in ("neglected", "included"))
-    plain, pushed = (runs.next_shape(scene, found.pore, found.solved, 0.4) for scene in scenes)
+    plain, pushed = (runs.next_shape(scene, report.pore, report.solved, 0.4) for scene in scenes)
     return np.abs(pushed.mesh.points - plain.mesh.points).max() / plain.outline.thickness
 
 
@@ -189,10 +195,10 @@ def _next_move(found: Instant, *changes: str) -> float:
 @parametrize("*changes", DEFAULT)
 def test_traction_even(changes, record):
     scene = loaded_scene(*changes)
-    now = pore.seeded(scene)
-    theta = _uneven(now, 0.002)
-    plain = contact._at_rest(scene, now, theta, now, None, contact.PATIENT).pore
-    space = now.moved(mesh_motion.move(now.mesh, plain.mesh.points[now.mesh.body], 1.0, 100.0)).space
+    seed = pore.seeded(scene)
+    theta = _uneven(seed, 0.002)
+    plain = contact._at_rest(scene, seed, theta, seed, None, contact.PATIENT).pore
+    space = seed.moved(mesh_motion.move(seed.mesh, plain.mesh.points[seed.mesh.body], 1.0, 100.0)).space
     mesh = space.mesh
     still = Flow(0.0, np.zeros((space.count, 2)), np.full(flow.pressure_space(space).count, 5.0), None, 0.0, 0.0, 0.0)
     on = traction.nodal(space, still, 1.0, "laplacian")
@@ -200,22 +206,24 @@ def test_traction_even(changes, record):
     apart = (on[mesh.loop] - by_hand)[plain.wall == FREE]
     record(at_most("forces", np.abs(apart).max() / np.abs(by_hand).max(), 1e-12, "the divergence theorem: round-off"))
     for sign in (1.0, -1.0):
-        pushed = contact._at_rest(scene, now, theta, now, sign * on[mesh.body], contact.PATIENT).pore
+        pushed = contact._at_rest(scene, seed, theta, seed, sign * on[mesh.body], contact.PATIENT).pore
         apart = np.abs(pushed.mesh.points - plain.mesh.points).max() / 25.0
         change = (pushed.pressure - plain.pressure)[mesh.topology.body_corners] + sign * 5.0
         record(at_most(f"move, {sign:+g}", apart, 1e-9, "J = theta: Newton's tolerance"))
         record(at_most(f"P, {sign:+g}", np.abs(change).max(), 1e-8, "Newton's tolerance"))
 
 
-def _uneven(now: pore.Pore, slope: float) -> np.ndarray:
+def _uneven(seed: pore.Pore, slope: float) -> np.ndarray:
     """(t, q) theta of a seed times 1.1 + slope x."""
-    shape = now.body.shape
-    return now.theta * (1.1 + slope * now.body.reference[shape.cells, 0] @ shape.table.shape.T)
+    shape = seed.body.shape
+    return seed.theta * (1.1 + slope * seed.body.reference[shape.cells, 0] @ shape.table.shape.T)
 
 
 def _normals(outline: Outline) -> np.ndarray:
-    """(M, 2) outward normals times length of the edges, shared between their nodes: by how much the area grows as a
-    node moves by one, of which it is a quadratic function."""
+    """(M, 2) outward normals times edge length, shared between the nodes: the gradient of the area.
+
+    The area is a quadratic function of the positions, so central differences are exact.
+    """
     def area(move):
         return replace(outline, points=outline.points + move.reshape(-1, 2)).area
 
@@ -226,8 +234,8 @@ def _normals(outline: Outline) -> np.ndarray:
 FACTORS = (800.0, 400.0, 200.0, 100.0)
 
 
-def _said(factor: float, *changes: str):
-    """A scene in water ``factor`` times as dense at the same velocities (0: without fluid forces)."""
+def _in_denser_water(factor: float, *changes: str):
+    """A scene in water ``factor`` times as dense at the same velocities. 0: without fluid forces."""
     if factor == 0:
         return loaded_scene(*changes, 'growth.fluid_forces="neglected"')
     return loaded_scene(*changes, f'flow.density="{998 * factor} mg/cm^3"')
@@ -235,11 +243,11 @@ def _said(factor: float, *changes: str):
 
 @cache
 def _moved(factor: float, *changes: str) -> tuple[pore.Pore, pore.Pore, np.ndarray]:
-    """A half-disc of 25 um, what a step of uneven growth makes of it, and its theta."""
-    said = _said(factor, *changes)
-    now = pore.seeded(said)
-    theta = _uneven(now, -0.002)
-    return now, contact.expand(said, now, theta).pore, theta
+    """A half-disc of 25 um, its shape after a step of uneven growth, and its theta."""
+    scene = _in_denser_water(factor, *changes)
+    seed = pore.seeded(scene)
+    theta = _uneven(seed, -0.002)
+    return seed, contact.expand(scene, seed, theta).pore, theta
 
 
 @pytest.mark.slow
@@ -255,11 +263,11 @@ def test_traction_fixed_point(changes, record):
     moves = [(_moved(factor, *changes)[1].mesh.points - plain) / factor for factor in (*FACTORS, 1.0)]
     size = np.abs(moves[-1]).max()
     apart = [np.abs(move - moves[-1]).max() / size for move in moves[:-1]]
-    own, before = _defects(*changes)
+    own_defect, previous_defect = _defects(*changes)
     record(study("move over force", FACTORS, apart, 1, "quadratic remainder of a smooth map: first order",
                  ceiling=1e-3))
-    record(at_most("defect with its own flow", own, 1e-8, "nodes at rest to 1e-8 of R"))
-    record(at_least("defect with the flow before", before, 1e-5, "else no round is needed"))
+    record(at_most("defect with its own flow", own_defect, 1e-8, "nodes at rest to 1e-8 of R"))
+    record(at_least("defect with the flow before", previous_defect, 1e-5, "else no round is needed"))
     record(between("downstream tip's move at factor 1, over the upstream one's", _tips(moves[-1], *changes), 0.2, 5.0,
                    "both are pushed downstream"))
     record(at_most("largest move at factor 1, over R", size / 25.0, 1e-4, "0.1 Pa on 10 kPa"))
@@ -273,25 +281,25 @@ def _tips(move: np.ndarray, *changes: str) -> float:
 
 
 def _defects(*changes: str) -> tuple[float, float]:
-    """Residual of the equilibrium over the size of its terms under the forces around its own shape, and the last's."""
-    said = _said(FACTORS[-1], *changes)
-    now, found, theta = _moved(FACTORS[-1], *changes)
-    nodes, body = now.mesh.body, now.body
-    held = contact.constrained(len(nodes), now.mesh.topology.body_loop, now.wall, now.fixed)
+    """Relative residual of the equilibrium under the flow around its own shape, and around the previous shape."""
+    scene = _in_denser_water(FACTORS[-1], *changes)
+    seed, grown, theta = _moved(FACTORS[-1], *changes)
+    nodes, body = seed.mesh.body, seed.body
+    constrained_dofs = contact.constrained(len(nodes), seed.mesh.topology.body_loop, seed.wall, seed.fixed)
     stabilising, defects = None, []
     if body.shape.geometry == 1:
         cells = body.shape.cells
-        stabilising = growth.gradient_stabilisation(now.mesh.points[nodes], cells, np.ones(len(cells)))
-    place, pressure = found.mesh.points[nodes], found.pressure[now.mesh.topology.body_corners]
-    rest = growth.System(body, held, stabilising=stabilising).under(theta, place, place, pressure)
-    for around in (found, now):
-        forces = traction.forces(said, traction.surroundings(said, now, around), around)
+        stabilising = growth.gradient_stabilisation(seed.mesh.points[nodes], cells, np.ones(len(cells)))
+    place, pressure = grown.mesh.points[nodes], grown.pressure[seed.mesh.topology.body_corners]
+    rest = growth.System(body, constrained_dofs, stabilising=stabilising).under(theta, place, place, pressure)
+    for around in (grown, seed):
+        forces = traction.forces(scene, traction.surroundings(scene, seed, around), around)
         load = np.concatenate([forces.T.ravel(), np.zeros(len(pressure))])
         defects.append(relative((rest.residual - load)[rest.free], (rest.size + np.abs(load))[rest.free]))
     return tuple(defects)
 
 
-#: The least refinement at which the mesh of a seed that followed is not fine enough.
+#: The least refinement at which the moved mesh of a seed is not fine enough.
 ANEW = 1.35
 
 
@@ -303,20 +311,20 @@ ANEW = 1.35
     mutants=("forces-shared-evenly",), runs_with="paper")
 @parametrize("*changes", REMESHED)
 def test_traction_remeshed(changes, record):
-    now, found, _ = _moved(0.0, *changes)
+    seed, grown, _ = _moved(0.0, *changes)
     coarse = loaded_scene(*changes)
     fine = loaded_scene(*changes, f"numerics.refinement={max(ANEW, 3 * coarse.numerics.refinement)}")
-    mesh, _ = pore.generate(fine, found.outline)
-    on = nodal(fine, Space(mesh, found.space.order))[0]
+    mesh, _ = pore.generate(fine, grown.outline)
+    on = nodal_forces(fine, Space(mesh, grown.space.order))[0]
     scale = traction.MPA_PER_UM * fine.flow.density * fine.flow.gravity / fine.growth.shear_modulus
     new = _sums(mesh.points[mesh.loop], scale * on[mesh.loop])
-    places = found.mesh.points[now.mesh.body]
-    both = [traction.forces(scene, traction.surroundings(scene, now, found), found) for scene in (fine, coarse)]
-    ours, followed = (_sums(places, forces) for forces in both)
-    record(at_most("new mesh, nodes of the outline", np.abs(ours / new - 1).max(), 1e-9, runs.ROUND_OFF),
-           at_most("new mesh, mesh that followed, x", abs(ours[0] / followed[0] - 1), 0.02,
+    places = grown.mesh.points[seed.mesh.body]
+    both = [traction.forces(scene, traction.surroundings(scene, seed, grown), grown) for scene in (fine, coarse)]
+    transferred, on_moved_mesh = (_sums(places, forces) for forces in both)
+    record(at_most("new mesh, nodes of the outline", np.abs(transferred / new - 1).max(), 1e-9, runs.ROUND_OFF),
+           at_most("new mesh, mesh that followed, x", abs(transferred[0] / on_moved_mesh[0] - 1), 0.02,
                    "the drag's own error at this refinement: 0.012"),
-           at_least("nodes, new over old", len(mesh.loop) / len(now.mesh.loop), 1.5,
+           at_least("nodes, new over old", len(mesh.loop) / len(seed.mesh.loop), 1.5,
                     "else none was split"))
 
 

@@ -1,34 +1,33 @@
-"""Flow with a known answer: through channels, along layers, past a disc, and flow that is chosen beforehand.
+"""Flow with a known solution: through channels, along layers, past a disc, and manufactured.
 
-Plane Poiseuille flow in a clean channel, and through a plug, which leaves its profile alone in the Laplacian form. The
-stabilised pressure meets a condition that is not its own at inlet and outlet, dp/dn = 0, in a layer of one element:
-linear velocities are of second order, but the head loss (6), a difference of mean pressures *at* both ends, is of first
-order. Elements of order 2 and 3 hold a parabola and a linear head: all is exact.
+Plane Poiseuille flow in a clean channel, and through a plug, which keeps the profile in the Laplacian form. The
+stabilisation imposes dp/dn = 0 at inlet and outlet, which spoils one layer of elements. Linear velocities are of second
+order, but the head loss (6), the difference of the mean pressures *at* both ends, is of first order. Elements of order
+2 and 3 contain a parabola and a linear head, so they are exact.
 
 A layer of biomass along the lower wall of a long channel: two viscous layers, exact for any ratio of viscosities. The
-inlet's parabola turns into the layered profile within a few layers' thicknesses (like exp(-1.1 x / h) in biomass); the
-middle of the layer is ten of them away from its ends, where what is left is under 1e-4. The layers meet in a shear that
-both forms of [E2] have alike, but in the traction form a layer that is held below and free above forgets its ends more
-slowly, like exp(-z x / h) with cos z = z, z = 0.739. Elements of order 2 and 3 hold both parabolas: a coarse mesh of a
-longer layer shows that they err by what is left alone.
+parabola of the inlet turns into the layered profile over a few thicknesses (like exp(-1.1 x / h) in biomass). The
+middle of the layer is ten thicknesses from its ends, where the remainder is under 1e-4. Both forms of [E2] have the
+same shear between the layers, but in the traction form a layer that is held below and free above forgets its ends more
+slowly, like exp(-z x / h) with cos z = z, z = 0.739. Elements of order 2 and 3 contain both parabolas. On a coarse mesh
+of a longer layer this remainder is their only error.
 
-A permeable layer there: Brinkman's drag instead of a viscosity, exact for any drag. Its boundary layers are sqrt(k)
-thick; where elements resolve these, errors fall as the elements' order says. Much thinner ones (1e-15 m2 has 0.03 um)
-are not resolved: then the layer is nearly a wall, and what matters to the water beside it is the pressure gradient.
+A permeable layer has Brinkman's drag instead of a viscosity, exact for any drag. Its boundary layers are sqrt(k) thick.
+If elements resolve them, errors fall with the order of the elements. Much thinner ones (0.03 um for 1e-15 m2) are not
+resolved: the layer is nearly a wall, and the water beside it depends on the pressure gradient alone.
 
-A closed form in the paper's own geometry: how the head loss rises as biomass gets a little thicker than water.
+A closed form in the paper's geometry: the rise of the head loss as biomass becomes a little more viscous than water.
 
 A viscous disc in a sheared fluid: Schmid & Podladchikov's closed form, and its twin in the Laplacian form of [E2]. The
-pressure jumps at the interface by as much as it varies, and the continuous one of (3.2) smears the jump over one layer
-of elements: an error of order one over an area of order h, 1/2 in L2 whatever the elements. What it costs the velocity
-is of first order (its square, by duality): quadratic elements show it where lambda = 10, while beside the second-order
-error of linear ones it is not to be seen on these meshes, nor where lambda = 2000 holds the disc stiff. There curved
-elements, whose disc is round, keep their own orders until the jump's share is larger.
+pressure jumps at the interface by as much as it varies. The continuous pressure of (3.2) smears the jump over one layer
+of elements: an error of order one over an area of order h, or order 1/2 in L2 with any elements. Its effect on the
+velocity is of first order (the square, by duality). Quadratic elements show it at lambda = 10. On these meshes it is
+small beside the second-order error of linear elements, and at lambda = 2000, where the disc is stiff. There curved
+elements, whose disc is round, keep their orders until the share of the jump is larger.
 
-Manufactured flow through a straight interface: nothing jumps but the viscosity, so that no order is reduced. The force
-of the strong form (1) acts in both phases. The stabilisation of linear elements takes no notice of it, as in (3.2),
-where there is none: it stays consistent to second order. On bent triangles the interface stays straight: the map
-(s, t) -> (s, t + BEND s^2) leaves it so.
+Manufactured flow through a straight interface: only the viscosity jumps, so no order is reduced. The force of the
+strong form (1) acts in both phases. The stabilisation of linear elements ignores it, as in (3.2), which has no force;
+it stays consistent to second order. On bent triangles the map (s, t) -> (s, t + BEND s^2) keeps the interface straight.
 """
 
 from __future__ import annotations
@@ -56,7 +55,7 @@ from verification.problems.channels import box_errors
 WIDTH = 50.0
 ENDS = (-75.0, 75.0)
 RATIO = 2000.0
-#: What cases run over: both forms of [E2], orders of the elements, and (by :func:`viscous`) ratios of viscosities.
+#: Axes of the variants: both forms of [E2], orders of the elements, and (by :func:`viscous`) ratios of viscosities.
 FORMS = {form: form for form in ("laplacian", "traction")}
 ORDERS = {f"order {order}": order for order in (1, 2, 3)}
 HIGHER = {label: order for label, order in ORDERS.items() if order > 1}
@@ -72,9 +71,9 @@ def viscous(*ratios: float) -> dict[str, float]:
     return {f"lambda = {ratio:g}": ratio for ratio in ratios}
 
 
-def drive(**given) -> Drive:
-    """A head (um) or a mean velocity (um/h), as a scene gives it."""
-    return Drive(kinematic_viscosity=VISCOSITY, gravity=1.0, **given)
+def drive(**values) -> Drive:
+    """A drive of a scene: a head (um) or a mean velocity (um/h)."""
+    return Drive(kinematic_viscosity=VISCOSITY, gravity=1.0, **values)
 
 
 @pytest.mark.case(
@@ -96,19 +95,19 @@ def _clean(refinement: float, interface: str) -> dict[str, float]:
 
 
 def _poiseuille_errors(space: Space, half: float, interface: str = "laplacian") -> dict[str, float]:
-    """Of a channel with a plug of half a length (um) or none; the conductivity is that of a clean pore."""
-    found = flow.solve(space, drive(mean_velocity=MEAN, viscosity_ratio=RATIO), LENGTH, interface=interface)
+    """Errors in a channel with a plug of a half length (um), or none. The conductivity is that of a clean pore."""
+    solution = flow.solve(space, drive(mean_velocity=MEAN, viscosity_ratio=RATIO), LENGTH, interface=interface)
     exact = poiseuille.head_loss(np.ptp(ENDS) + 2 * half * (RATIO - 1), WIDTH, MEAN, VISCOSITY)
-    return {"velocity": meshes.field_error(space, found.velocity / MEAN, _velocity),
-            "head loss": abs(found.meshed_loss / exact - 1),
-            "conductivity": abs(found.conductivity / poiseuille.conductivity(WIDTH, VISCOSITY) - 1)}
+    return {"velocity": meshes.field_error(space, solution.velocity / MEAN, _velocity),
+            "head loss": abs(solution.meshed_loss / exact - 1),
+            "conductivity": abs(solution.conductivity / poiseuille.conductivity(WIDTH, VISCOSITY) - 1)}
 
 
 def _velocity(x, y):
     return np.stack([poiseuille.velocity(y, WIDTH), 0 * y], axis=-1)
 
 
-#: Half length of the plug (um), and elements (um) with how many meshes of each.
+#: Half length of the plug (um), and element sizes (um) with the number of meshes of each.
 PLUG, PLUG_SIZES = 30.0, {8.0: 12, 4.0: 8, 2.0: 4, 1.0: 1}
 
 
@@ -128,9 +127,9 @@ def _plug_errors(size: float, draw: int) -> dict[str, float]:
     return _poiseuille_errors(Space(grid, 1), PLUG)
 
 
-#: Half length of the plug (um) on curved meshes, whose ends are not alike.
+#: Half length of the plug (um) on curved meshes, and their unequal ends.
 HALF, CURVED_ENDS = 20.0, (-60.0, 70.0)
-#: Ratio and form in which the plug leaves the profile alone.
+#: Ratios and forms in which the plug keeps the profile.
 PARABOLAS = {f"lambda = {ratio:g}, {form}": (ratio, form)
              for ratio, form in ((1.0, "laplacian"), (1.0, "traction"), (RATIO, "laplacian"))}
 
@@ -146,36 +145,36 @@ PARABOLAS = {f"lambda = {ratio:g}, {form}": (ratio, form)
     references=("poiseuille",), omitted="order 1: flow-poiseuille, flow-plug")
 @parametrize("order, problem", combined(HIGHER, PARABOLAS))
 def test_curved_poiseuille(order, problem, record):
-    """On six-node triangles with biomass from wall to wall."""
+    """Record errors on six-node triangles with biomass from wall to wall."""
     ratio, interface = problem
     space = meshes.space_on(meshes.plug(CURVED_ENDS, WIDTH, HALF, 8.0, seed=3), order)
-    found = flow.solve(space, drive(mean_velocity=MEAN, viscosity_ratio=ratio), LENGTH, interface=interface)
+    solution = flow.solve(space, drive(mean_velocity=MEAN, viscosity_ratio=ratio), LENGTH, interface=interface)
     ends = space.mesh.topology
     u = poiseuille.velocity(space.points[:, 1], WIDTH, MEAN)
-    plugged = 2 * HALF * (ratio - 1)  # what the plug adds to the length of water that loses as much
-    meshed, whole = (poiseuille.head_loss(length + plugged, WIDTH, MEAN, VISCOSITY)
+    plugged = 2 * HALF * (ratio - 1)  # additional length of water with the same loss
+    meshed, full = (poiseuille.head_loss(length + plugged, WIDTH, MEAN, VISCOSITY)
                      for length in (np.ptp(CURVED_ENDS), LENGTH))
-    heads = found.head[ends.inlet].mean() - found.head[ends.outlet].mean()
-    errors = {"u_x": np.abs(found.velocity[:, 0] - u).max() / u.max(),
-              "u_y": np.abs(found.velocity[:, 1]).max() / u.max(),
-              "loss as work": abs(found.meshed_loss / meshed - 1),
-              "loss of the whole pore": abs(found.head_loss / whole - 1),
+    heads = solution.head[ends.inlet].mean() - solution.head[ends.outlet].mean()
+    errors = {"u_x": np.abs(solution.velocity[:, 0] - u).max() / u.max(),
+              "u_y": np.abs(solution.velocity[:, 1]).max() / u.max(),
+              "loss as work": abs(solution.meshed_loss / meshed - 1),
+              "loss of the whole pore": abs(solution.head_loss / full - 1),
               "difference of heads": abs(heads / meshed - 1)}
     record(each_at_most(errors, 1e-10, ROUND_OFF))
 
 
-#: Height and half length of the layer, clean water beyond its ends, and what is compared: |x| < MIDDLE; um.
+#: Height and half length of the layer, clean water beyond its ends, and half length of the compared middle (um).
 LAYER = 12.5
 LAYER_END = 125.0
 BEYOND = 15.0
 MIDDLE = 25.0
 RATIOS = viscous(1.0, 10.0, 100.0, RATIO, 1e5, 1e8)
 SIZES, DRAWS = LAYER / np.array([1.5, 3.0, 6.0, 12.0]), dict(enumerate((16, 12, 6, 1)))
-#: Orders of linear elements, and what the errors of the finest meshes may reach; in the traction form what is left of
-#: the ends rules in the layer.
+#: Orders of linear elements, and bounds of the errors on the finest meshes. In the traction form the remainder of the
+#: ends dominates in the layer.
 LINEAR = {"velocity": (2, SECOND, 1e-3), "velocity in the layer": (2, SECOND, 1e-3), "gradient": (2, SECOND, 1.2e-3)}
 STUDIED = {"laplacian": LINEAR, "traction": {"velocity": LINEAR["velocity"]}}
-#: Half length (um) of the layer of orders 2 and 3, and what is left of its ends in its middle: exp(-0.739 * 18).
+#: Half length (um) of the layer for orders 2 and 3, and the remainder of its ends in the middle: exp(-0.739 * 18).
 LONG, LEFT = 250.0, 2e-6
 
 
@@ -205,18 +204,18 @@ def _layer_errors(level: int, draw: int, ratio: float, interface: str) -> dict[s
 
 @cache
 def layer_grid(level: int, draw: int) -> Mesh:
-    """Of straight triangles, one of the random meshes of a level of SIZES."""
+    """One of the random meshes of straight triangles of a level of SIZES."""
     return _layered(LAYER_END, SIZES[level], draw)
 
 
 @cache
 def long_layer() -> Mesh:
-    """A coarse mesh of six-node triangles of a longer layer."""
+    """A coarse mesh of six-node triangles around a longer layer."""
     return curved(_layered(LONG, SIZES[0], 0), None)
 
 
 def _layered(half: float, size: float, draw: int) -> Mesh:
-    """The layer from -half to half (um), and clean water beyond."""
+    """A mesh of the layer from -half to half (um), and clean water beyond."""
     end = half + BEYOND
     return meshes.cut((-end, end), WIDTH, size, lambda x, y: (y < LAYER) & (np.abs(x) < half), across=(-half, half),
                       along=(LAYER,), seed=int(1000 * size) + draw)
@@ -231,18 +230,18 @@ def middle_of(grid: Mesh, half: float) -> np.ndarray:
     return np.abs(grid.points[grid.triangles, 0].mean(axis=1)) < half
 
 
-def in_the_middle(space: Space, found: flow.UnitFlow, reference: ModuleType, parameter: float,
+def in_the_middle(space: Space, solution: flow.UnitFlow, reference: ModuleType, parameter: float,
                   half: float = MIDDLE) -> dict[str, float]:
-    """Errors against a reference, which has a ratio of viscosities or a permeability for its parameter."""
+    """Errors against a reference, whose parameter is a ratio of viscosities or a permeability."""
     middle = middle_of(space.mesh, half)
 
     def exact(x, y):
         return np.stack([reference.velocity(y, WIDTH, LAYER, parameter), 0 * y], axis=-1)
 
     gradient = reference.gradient(WIDTH, LAYER, parameter)
-    return {"velocity": meshes.field_error(space, found.velocity, exact, middle),
-            "velocity in the layer": meshes.field_error(space, found.velocity, exact, middle & space.mesh.biomass),
-            "gradient": abs(slope(flow.pressure_space(space), found.pressure, middle) / gradient - 1)}
+    return {"velocity": meshes.field_error(space, solution.velocity, exact, middle),
+            "velocity in the layer": meshes.field_error(space, solution.velocity, exact, middle & space.mesh.biomass),
+            "gradient": abs(slope(flow.pressure_space(space), solution.pressure, middle) / gradient - 1)}
 
 
 def slope(space: Space, pressure: np.ndarray, chosen: np.ndarray) -> float:
@@ -252,9 +251,9 @@ def slope(space: Space, pressure: np.ndarray, chosen: np.ndarray) -> float:
     return -np.polyfit(where[..., 0].ravel(), p.ravel(), 1, w=np.sqrt(weight.ravel()))[0]
 
 
-#: Half length (um) of the permeable layer, elements (um) and how many meshes of each.
+#: Half length (um) of the permeable layer, and element sizes (um) with the number of meshes of each.
 PERMEABLE_END, PERMEABLE_SIZES = 150.0, dict(zip(LAYER / np.array([2.0, 3.0, 4.0, 6.0]), (4, 3, 2, 1)))
-#: um2: a boundary layer of ten micrometres, resolved by all sizes; one of three hundredths, by none.
+#: Permeabilities (um2): a boundary layer of 10 um, which all sizes resolve, and one of 0.03 um, which none resolves.
 RESOLVED, TIGHT = 100.0, 1e-3
 #: Third order; on unrelated meshes by sizes 1.33 apart, orders scatter more than by sizes 2 apart.
 THIRD = {"velocity": (around(3, 0.8), "quadratic elements: third order in L2", 2e-4)}
@@ -286,12 +285,12 @@ def test_permeable_layers(order, interface, record):
                        "of a wall instead of the layer: 2.5e-3; what the elements beside it add is of that order"))
 
 
-#: Half length and elements (um) of a permeable body from wall to wall, and its permeabilities (um2): layers of 3 um to
-#: 1 nm, the first of which the elements resolve.
+#: Half length and elements (um) of a permeable body from wall to wall, and its permeabilities (um2). Layers are 3 um to
+#: 1 nm thick, and elements resolve the first.
 SPAN, SPAN_SIZE, SPAN_PERMEABILITIES = 125.0, 10.0, (9.0, 1.0, 1e-2, 1e-4, 1e-6)
-#: What elements as long as is allowed add to a layer's energy in one dimension, by order; the square of a quarter, by
-#: which neighbours differ in size and so in their layers; and what is left of the ends in the middle: exp(-pi 100 / 50)
-#: times a hundredth of the gradient.
+#: Excess energy of a layer in one dimension with the longest allowed elements, by order; the square of a quarter, the
+#: difference in size of neighbours and so of their layers; and the remainder of the ends in the middle,
+#: exp(-pi 100 / 50) times a hundredth of the gradient.
 LAYER_EXCESS, NEIGHBOURS, FROM_THE_ENDS = {2: 0.18, 3: 0.014}, 0.25**2, 2e-5
 
 
@@ -305,36 +304,36 @@ LAYER_EXCESS, NEIGHBOURS, FROM_THE_ENDS = {2: 0.18, 3: 0.014}, 0.25**2, 2e-5
     omitted="linear elements are refused with a permeable body")
 @parametrize("order, interface", combined(HIGHER, FORMS))
 def test_permeable_plug(order, interface, record):
-    """Two layers in which the velocity falls by sqrt(k) / d of that beyond take 2 k / (d W) of the loss."""
+    """Record errors of the gradient. Two layers of thickness d take 2 k / (d W) of the loss."""
     space = meshes.space_on(meshes.plug((-SPAN - BEYOND, SPAN + BEYOND), WIDTH, SPAN, SPAN_SIZE, meshes.cut), order)
     middle = middle_of(space.mesh, MIDDLE)
     inside = np.unique(space.cells[middle])
     for k in SPAN_PERMEABILITIES:
-        found = flow.unit_flow(space, interface=interface, permeability=k)
-        error = abs(slope(flow.pressure_space(space), found.pressure, middle)
+        solution = flow.unit_flow(space, interface=interface, permeability=k)
+        error = abs(slope(flow.pressure_space(space), solution.pressure, middle)
                     / brinkman_channel.gradient(WIDTH, WIDTH, k) - 1)
         thickness = max(np.sqrt(k), SPAN_SIZE / ACROSS[order] / 2)
         record(at_most(
             f"gradient, k = {k:g} um2", error,
             (LAYER_EXCESS[order] + NEIGHBOURS) * 2 * k / (WIDTH * thickness) + FROM_THE_ENDS,
             "the layers' share of the loss times their excess, elements half as long as the mean; the ends"))
-        record(at_least(f"velocity, k = {k:g} um2", found.velocity[inside, 0].min(), -1e-2,
+        record(at_least(f"velocity, k = {k:g} um2", solution.velocity[inside, 0].min(), -1e-2,
                         "no node of a line of elements overshoots; a hundredth is for triangles"))
 
 
 def _permeable_layer(size: float, draw: int, permeability: float, interface: str, order: int) -> dict[str, float]:
     space = Space(curved(_layered(PERMEABLE_END, size, draw), None), order)
-    found = flow.unit_flow(space, interface=interface, permeability=permeability)
-    return in_the_middle(space, found, brinkman_channel, permeability)
+    solution = flow.unit_flow(space, interface=interface, permeability=permeability)
+    return in_the_middle(space, solution, brinkman_channel, permeability)
 
 
 RADIUS = 25.0
 RISE_REFINEMENTS = {0.5: 3, 1.0: 3, 2.0: 3, 4.0: 1}
-#: Half the difference of lambda in the central difference, whose own error is of the order of its square.
+#: Half step of lambda in the central difference, whose error is of the order of its square.
 STEP = 1e-3
 RISE_SECOND = "second order, like the dissipation of linear elements; what the ends spoil is in both losses"
-#: Refinement of the mesh of orders 2 and 3, and what they may err by: straight triangles hold the parabola, and those
-#: beside the arc all but their bow, which is of fourth order in the loss.
+#: Refinement of the mesh for orders 2 and 3, and bound of their error. Straight triangles contain the parabola. Those
+#: beside the arc err by their bow, which is of fourth order in the loss.
 CURVED, BOW = 0.5, 1e-5
 
 
@@ -372,8 +371,8 @@ JUMP = "1/2, from above: a continuous pressure cannot jump, the smooth part of t
 STIFF = JUMP + "; more so where lambda multiplies the error of the disc's strain"
 FULL_DISC = (2, "linear elements: second order; the jump's own share is smaller on these meshes", 1e-3)
 SLOWER = ((0.9, 1.8), "from 2 (chords of the circle) or more down to 1 (the jump)", 1e-3)
-#: Of a polygon or a round disc, with elements of an order: that, elements (um) with how many meshes of each, orders of
-#: the velocity where lambda = 10 and 2000, and of the pressure where lambda = 2000.
+#: Polygons and round discs: order of the elements, kind of mesh, element sizes (um) with the number of meshes of each,
+#: orders of the velocity at lambda = 10 and 2000, and of the pressure at lambda = 2000.
 SMEARED = ((0.35, 0.8), JUMP, 0.3)
 POLYGON = {"order 1": (1, meshes.disc, {4.8: 12, 2.4: 8, 1.2: 4, 0.6: 1}, FULL_DISC, FULL_DISC,
                        ((0.35, 1.2), STIFF, 0.3))}
@@ -423,9 +422,9 @@ def test_inclusion_quadratic(disc, ratio, interface, record):
     record(inclusion(disc, ratio, interface))
 
 
-def _errors(size: float, draw: int, made: Callable, how, *given) -> dict[str, float]:
-    """On one of the meshes ``made(size, draw, how)``; given: what :func:`box_errors` takes besides."""
-    return box_errors(made(size, draw, how), *given)
+def _errors(size: float, draw: int, make_mesh: Callable, how, *arguments) -> dict[str, float]:
+    """Errors on the mesh ``make_mesh(size, draw, how)``. arguments: the other arguments of :func:`box_errors`."""
+    return box_errors(make_mesh(size, draw, how), *arguments)
 
 
 @cache
@@ -433,7 +432,7 @@ def _disc_grid(size: float, draw: int, kind: Callable) -> Mesh:
     return kind(DISC_ENDS, WIDTH, size, CENTRE, DISC_RADIUS, seed=int(1000 * size) + draw)
 
 
-#: Elements of the manufactured flow, and how many meshes of each; how much triangles are bent.
+#: Element sizes of the manufactured flow with the number of meshes of each; bend of the triangles.
 BOX, COARSE_BOX = (dict(zip(sizes, (10, 6, 3, 1)))
                    for sizes in ((0.14, 0.07, 0.035, 0.0175), (0.28, 0.14, 0.07, 0.035)))
 BEND, STRAIGHT = 0.2, 0.0
@@ -443,14 +442,14 @@ BELOW = "that of the velocity's gradient in the end, the velocity's own at first
 #: Lowest and highest order of the pressure, and why, for each order of the elements.
 PRESSURE = {1: ((0.9, 1.7), LAYERS), 2: ((1.7, 3.3), BELOW), 3: ((2.7, 4.3), BELOW)}
 #: Order, bend, elements, and last errors of velocity and pressure.
-MADE = {"order 1": (1, STRAIGHT, BOX, 2e-4, 0.06)}
-MADE_HIGHER = {"order 2": (2, STRAIGHT, BOX, 1e-6, 3e-4), "order 3": (3, STRAIGHT, COARSE_BOX, 1e-7, 5e-5)}
-MADE_BENT = {"order 2": (2, BEND, COARSE_BOX, 3e-5, 1e-3), "order 3": (3, BEND, COARSE_BOX, 1e-6, 1e-4)}
+SETUPS = {"order 1": (1, STRAIGHT, BOX, 2e-4, 0.06)}
+SETUPS_HIGHER = {"order 2": (2, STRAIGHT, BOX, 1e-6, 3e-4), "order 3": (3, STRAIGHT, COARSE_BOX, 1e-7, 5e-5)}
+SETUPS_BENT = {"order 2": (2, BEND, COARSE_BOX, 3e-5, 1e-3), "order 3": (3, BEND, COARSE_BOX, 1e-6, 1e-4)}
 
 
 def manufactured(setup: tuple, ratio: float, interface: str):
     order, bend, sizes, velocity, pressure = setup
-    fields = manufactured_flow.evaluated(ratio, interface)
+    fields = manufactured_flow.evaluate(ratio, interface)
     errors = refine(_errors, sizes, _box_grid, bend, order, ratio, interface, lambda x, y: [f(x, y) for f in fields])
     return studies(errors, {"velocity": (order + 1, FULL, velocity), "pressure": (*PRESSURE[order], pressure)})
 
@@ -460,7 +459,7 @@ def manufactured(setup: tuple, ratio: float, interface: str):
     claim="Where nothing jumps but the viscosity all orders are full, for lambda = 10 and 2000 in both forms",
     norm="root mean square over random meshes of a size, relative L2 of u and p",
     mutants=("saddle-sign",), references=("manufactured_flow",), omitted="orders 2, 3: flow-manufactured-quadratic")
-@parametrize("setup, ratio, interface", combined(MADE, SOFT_AND_STIFF, FORMS))
+@parametrize("setup, ratio, interface", combined(SETUPS, SOFT_AND_STIFF, FORMS))
 def test_manufactured(setup, ratio, interface, record):
     record(manufactured(setup, ratio, interface))
 
@@ -473,7 +472,7 @@ def test_manufactured(setup, ratio, interface, record):
     norm="root mean square over random meshes of a size, relative L2 of u and p",
     mutants=("traction-transposed", "cubic-lower-degree"), references=("manufactured_flow",),
     omitted="order 1: flow-manufactured")
-@parametrize("setup, ratio, interface", combined(MADE_HIGHER, SOFT_AND_STIFF, FORMS))
+@parametrize("setup, ratio, interface", combined(SETUPS_HIGHER, SOFT_AND_STIFF, FORMS))
 def test_manufactured_quadratic(setup, ratio, interface, record):
     record(manufactured(setup, ratio, interface))
 
@@ -487,15 +486,17 @@ def test_manufactured_quadratic(setup, ratio, interface, record):
     mutants=("cubic-edge-crossed", "cubic-slope", "cubic-lower-degree", "curved-straight-divergence",
              "traction-transposed"),
     references=("manufactured_flow",), omitted="order 1 has straight triangles: flow-manufactured")
-@parametrize("setup, ratio, interface", combined(MADE_BENT, viscous(10.0), FORMS))
+@parametrize("setup, ratio, interface", combined(SETUPS_BENT, viscous(10.0), FORMS))
 def test_curved_manufactured(setup, ratio, interface, record):
     record(manufactured(setup, ratio, interface))
 
 
 @cache
 def _box_grid(size: float, draw: int, bend: float) -> Mesh:
-    """A box of unit width cut by the interface, which goes through the origin; both turned by ANGLE; of bent triangles
-    where ``bend`` is not zero."""
+    """A box of unit width cut by an interface through the origin, both turned by ANGLE.
+
+    Triangles are bent if ``bend`` is not zero.
+    """
     grid = meshes.cut((-0.6, 0.5), 1.0, size, lambda x, y: x > 0, across=(0.0,), seed=int(1e4 * size) + draw)
     if bend:
         grid = curved(grid, None)

@@ -1,25 +1,23 @@
-"""The paper's own geometries against scikit-fem's Taylor-Hood elements on curved meshes of their own: whole fields,
-both codes refined together.
+"""The paper's geometries against scikit-fem's Taylor-Hood elements on their own curved meshes. Both codes are refined.
 
-Taylor-Hood's pressure may jump at the interface; its errors are of third order and far below ours, so that differences
-fall at our orders. Two singularities limit them. The pressure jumps at the interface and ours cannot: order 1/2 for the
-pressure beside it, which is that of the biomass while it is stiff. At the three-phase corner the biomass is held by the
-wall and pushed by the water. In the traction form its pressure is like r^-0.41 there (cos(z pi / 2) = z, stress like
-r^(z - 1)), which would allow order 0.59; in the Laplacian form it is bounded; tests of the reference measure both. So
-the jump is the harder limit. Its share in the velocity and in the head loss is of first order, and seen at lambda = 10
-alone: a stiff body takes it all.
+Taylor-Hood's pressure may jump at the interface. Its errors are of third order and far below those of the package, so
+differences fall at the orders of the package. Two singularities limit them. The pressure jumps at the interface, which
+a continuous pressure cannot: the pressure beside it, that of the biomass while it is stiff, has order 1/2. At the
+three-phase corner the wall holds the biomass and the water pushes it. There its pressure is like r^-0.41 in the
+traction form (cos(z pi / 2) = z, stress like r^(z - 1)), which would allow order 0.59, and bounded in the Laplacian
+form; tests of the reference measure both. So the jump is the harder limit. Its effect on the velocity and the head loss
+is of first order, and visible at lambda = 10 alone: a stiff body takes the whole jump.
 
-The head loss has an error of first order besides, of both ends (see :mod:`verification.cases.flow`). It is that
-of the clean channel on the same mesh, so that the excess over that loss is free of it.
+The head loss has another error of first order, from both ends (see :mod:`verification.cases.flow`). It equals that of
+the clean channel on the same mesh, so the excess over that loss is free of it.
 
-On curved triangles of order 2 and 3 the jump is all that is left: 1/2 in energy, which is twice that in the loss, and
-in L2 of the velocity by duality.
+On curved triangles of order 2 and 3 only the jump remains: order 1/2 in energy, and twice that in the loss and, by
+duality, in L2 of the velocity.
 
-Linear velocities with a condensed bubble (MINI): the same as without condensing, and what it is worth.
-
-With c = 100 the stabilised element's tau = h^2 / (100 nu) is within 7 % of the bubble's, h^2 / (106.7 nu), for
-equilateral triangles: on good meshes both err alike. The bubble has no constant to choose, and on stretched triangles,
-where the circumscribed circle says little, it errs far less.
+Linear velocities with a condensed bubble (MINI) equal those without condensing. With c = 100 the stabilised element's
+tau = h^2 / (100 nu) is within 7 % of the bubble's, h^2 / (106.7 nu), for equilateral triangles, so both err alike on
+good meshes. The bubble has no constant to choose. On stretched triangles, where the circumscribed circle is a poor
+measure, it errs far less.
 """
 
 from __future__ import annotations
@@ -44,11 +42,11 @@ from verification.evidence.checks import at_least, at_most, between, each_at_mos
 from verification.problems import meshes
 
 CORNER = 4
-#: Refinement of our mesh on each level, where Taylor-Hood's is halved again, and how many meshes are drawn (see
-#: meshes.SPREAD).
+#: Refinement of the package's mesh on each level, where Taylor-Hood's elements are halved, and the number of meshes
+#: (see meshes.SPREAD).
 REFINEMENTS, DRAWS = (0.65, 1.3, 2.6, 5.2), dict(enumerate((3, 3, 3, 1)))
 FILM_REFINEMENTS, FILM_DRAWS = (0.9, 1.8, 3.6, 7.2), dict(enumerate((3, 3, 2, 1)))
-#: Radius of the half-disc that leaves a film (um), the refinement of its curved mesh, and what is compared there.
+#: Radius (um) of the half-disc that leaves a film, refinement of its curved mesh, and the compared quantities.
 FILM, FILM_CURVED = 41.0, 1.6
 IN_THE_FILM = ("velocity", "pressure in the fluid", "head loss")
 CODES = "0.1 % (cross-code)"
@@ -59,7 +57,7 @@ INSIDE = "2 inside, 3/2 by the layers of one element at both ends, 1 in the end"
 FIELDS = {"velocity": (2, SECOND, 8e-4), "pressure in the fluid": ((1.2, 2.2), INSIDE, 1e-3),
           "pressure in the biomass": (0.5, JUMP, 0.2)}
 EXCESS = {"excess of the head loss": (2, "second order: what the ends spoil is in both losses", 1e-3)}
-#: Radius, lambda, form, studies, and what the differences of the finest meshes may be besides.
+#: Radius, lambda, form, studies, and further bounds of the differences on the finest meshes.
 AROUND = {
     "R = 5 um": (5.0, RATIO, "laplacian", {**FIELDS, "head loss": (1, ENDS_FIRST, 4e-3)}, {
         "excess of the head loss": (
@@ -115,13 +113,15 @@ def test_half_disc_traction(radius, ratio, interface, orders, bounds, record):
     mutants=("viscosity-swapped",), references=("poiseuille", "taylor_hood"))
 @parametrize("order, interface", {"order 1": (1, "laplacian"), **combined(HIGHER, FORMS)})
 def test_film(order, interface, record):
-    """No order: elements grow from the walls of the film to its middle, whatever the refinement, so that no one size
-    tells how fine a mesh is there."""
+    """Record differences without orders.
+
+    Elements grow from the walls of the film to its middle at every refinement, so no single size describes a mesh.
+    """
     if order > 1:
         space = meshes.half_disc_space(FILM, FILM_CURVED, ENDS, WIDTH, order)
-        found = flow.unit_flow(space, RATIO, interface=interface)
-        apart = _apart(space, found, _trusted(FILM, RATIO, interface, [*DRAWS][-1]))
-        record(each_at_most({name: apart[name] for name in IN_THE_FILM}, 1e-3, CODES))
+        solution = flow.unit_flow(space, RATIO, interface=interface)
+        differences = _differences(space, solution, _trusted(FILM, RATIO, interface, [*DRAWS][-1]))
+        record(each_at_most({name: differences[name] for name in IN_THE_FILM}, 1e-3, CODES))
         return
     errors = refine(_level, FILM_DRAWS, FILM_REFINEMENTS, FILM, RATIO, interface)
     ratios = {name: (errors[name][1:] / errors[name][:-1]).max() for name in IN_THE_FILM}
@@ -142,36 +142,38 @@ def _space(radius: float, refinement: float) -> Space:
 
 
 def _level(level: int, draw: int, refinements, radius: float, ratio: float, interface: str) -> dict[str, float]:
-    """Differences of linear elements, both codes refined together; of the head loss also without what the ends add to
-    that of the clean channel, as to that around any aggregate on the same mesh."""
+    """Differences of linear elements with both codes refined.
+
+    The excess of the head loss leaves out the error of the ends, which the clean channel on the same mesh shares.
+    """
     space = _space(radius, refinements[level] * meshes.SPREAD[draw])
-    theirs = _trusted(radius, ratio, interface, level)
-    found, clean = (flow.unit_flow(space, each, interface=interface) for each in (ratio, 1.0))
+    reference = _trusted(radius, ratio, interface, level)
+    solution, clean = (flow.unit_flow(space, each, interface=interface) for each in (ratio, 1.0))
     spoilt = clean.loss - poiseuille.head_loss(np.ptp(ENDS), WIDTH, 1.0, 1.0)
-    return {**_apart(space, found, theirs), "excess of the head loss": abs((found.loss - spoilt) / theirs.loss - 1)}
+    excess = abs((solution.loss - spoilt) / reference.loss - 1)
+    return {**_differences(space, solution, reference), "excess of the head loss": excess}
 
 
-def _apart(space: Space, found: flow.UnitFlow, theirs: taylor_hood.Stokes) -> dict[str, float]:
-    """Size of our elements; differences of our flow from Taylor-Hood's at the middles of its edges, weighed by their
-    areas."""
+def _differences(space: Space, solution: flow.UnitFlow, reference: taylor_hood.Stokes) -> dict[str, float]:
+    """Element size, and differences from Taylor-Hood's flow at the middles of its edges, weighted by their areas."""
     pressures = flow.pressure_space(space)
     apart = {"size": meshes.mean_size(space.mesh),
-             "head loss": abs(found.loss / theirs.loss - 1),
-             "velocity": meshes.relative(meshes.field_at(space, found.velocity, theirs.points), theirs.velocity,
-                                         theirs.areas)}
-    for part in theirs.pressures:
+             "head loss": abs(solution.loss / reference.loss - 1),
+             "velocity": meshes.relative(meshes.field_at(space, solution.velocity, reference.points),
+                                         reference.velocity, reference.areas)}
+    for part in reference.pressures:
         apart[f"pressure in the {'biomass' if part.biomass else 'fluid'}"] = meshes.relative(
-            meshes.field_at(pressures, found.pressure, part.points), part.values, part.areas)
+            meshes.field_at(pressures, solution.pressure, part.points), part.values, part.areas)
     return apart
 
 
-#: Radius of the half-disc (um) on curved triangles, and refinements of its mesh: on coarser ones what is smooth, of
-#: third order, still counts (orders of 1.5 in the velocity, 0.5 in the loss, where it has the other sign).
+#: Radius of the half-disc (um) on curved triangles, and refinements of its mesh. On coarser meshes the smooth error of
+#: third order still counts (orders of 1.5 in the velocity, 0.5 in the loss, where it has the other sign).
 ROUND, ROUND_REFINEMENTS = 20.0, {0.85: 3, 1.3: 3, 2.0: 3, 3.0: 1}
-#: Refinements where lambda = 2000, with the most that they may differ by.
+#: Refinements at lambda = 2000, with bounds of the differences.
 STIFF = {0.6: 1e-3, 2.4: 1e-4}
 ROUND_JUMP = "the pressure jumps at the interface [E2], ours is continuous: 1/2 in energy, twice that in the loss"
-#: Highest order of the velocity of each order.
+#: Highest order of the velocity, by the order of the elements.
 ROUND_UPPER = {2: 1.3, 3: 1.6}
 #: Largest last error of the loss and of the velocity: the traction form pushes harder on biomass that gives way.
 SOFT = {"laplacian": 5e-4, "traction": 1.5e-3}
@@ -188,7 +190,7 @@ SOFT = {"laplacian": 5e-4, "traction": 1.5e-3}
     omitted="order 1: flow-half-disc, flow-half-disc-traction")
 @parametrize("ratio, order, interface", combined(flow_cases.viscous(10.0, RATIO), HIGHER, FORMS))
 def test_curved_half_disc(ratio, order, interface, record):
-    """Orders where the biomass gives way; differences where it all but stands still."""
+    """Record orders if the biomass yields, and differences if it is nearly rigid."""
     if ratio < RATIO:
         record(studies(refine(_round_errors, ROUND_REFINEMENTS, ratio, order, interface), {
              "head loss": (1, ROUND_JUMP, SOFT[interface]),
@@ -204,25 +206,27 @@ def test_curved_half_disc(ratio, order, interface, record):
 
 @cache
 def _round(refinement: float) -> Mesh:
-    """The mesh of a scene."""
+    """The mesh of a scene with a refinement."""
     refined = f"numerics.refinement={refinement}"
     return pore.seeded(flow_properties.scene_around(ROUND, flow_properties.ACCURATE, refined)).mesh
 
 
 def _round_errors(refinement: float, draw: int, ratio: float, order: int, interface: str) -> dict[str, float]:
     space = Space(_round(refinement * meshes.SPREAD[draw]), order)
-    found = flow.unit_flow(space, ratio, interface=interface)
-    return _apart(space, found, _trusted(ROUND, ratio, interface, 2, space.mesh.ends, 6))
+    solution = flow.unit_flow(space, ratio, interface=interface)
+    return _differences(space, solution, _trusted(ROUND, ratio, interface, 2, space.mesh.ends, 6))
 
 
-#: How many meshes of each level of the layer.
+#: Number of meshes of each level of the layer.
 BUBBLE_DRAWS = dict(enumerate((8, 6, 3, 1)))
 STABILISED, BUBBLE = flow.Stabilised(), flow.Bubble()
 
 
 def uncondensed(grid: Mesh, ratio: float, interface: str) -> dict[str, np.ndarray]:
-    """Velocity (N, 2) at the nodes, mean velocity (T, 2), bubble included, and pressure (N,) of scikit-fem's MINI
-    element, bubbles kept as unknowns, under the conditions (3)-(5)."""
+    """Flow of scikit-fem's MINI element under (3)-(5), with the bubbles as unknowns.
+
+    The fields are the velocity (N, 2) and pressure (N,) at the nodes, and the mean velocity (T, 2) with the bubble.
+    """
     basis = Basis(grid.fem, ElementVector(ElementTriMini()), intorder=4)
     k = np.where(grid.biomass, ratio, 1.0)[:, None] * np.ones(basis.dx.shape)
     B = -taylor_hood.divergence.assemble(basis, basis.with_element(ElementTriP1()))
@@ -235,8 +239,8 @@ def uncondensed(grid: Mesh, ratio: float, interface: str) -> dict[str, np.ndarra
     inlet = grid.topology.inlet
     profile = y[inlet] * (grid.width - y[inlet])
     value[u_x[inlet]] = profile * grid.width / np.trapezoid(profile, y[inlet])
-    held = np.concatenate([u_x[rim], u_y[rim | outlet]])
-    value = solve(*condense(system, 0 * value, value, D=held))
+    constrained = np.concatenate([u_x[rim], u_y[rim | outlet]])
+    value = solve(*condense(system, 0 * value, value, D=constrained))
     velocity, bubbles = value[nodes].T, value[basis.interior_dofs].T
     mean = velocity[grid.triangles].mean(axis=1) + 9 / 20 * bubbles
     return {"velocity": velocity, "pressure": value[basis.N:], "mean velocity": mean}
@@ -254,11 +258,11 @@ def test_bubble(interface, record):
     grid = meshes.cut(flow_properties.ENDS, 50.0, 6.0, lambda x, y: (np.abs(x) < 20) & (y < 25), across=(-20.0, 20.0),
                       along=(25.0,), seed=5)
     space = Space(grid, 1)
-    ours = flow.unit_flow(space, RATIO, interface=interface, element=BUBBLE)
-    carried = ours.velocity[grid.triangles].mean(axis=1) - ours.correction
-    found = {"velocity": ours.velocity, "pressure": ours.pressure, "mean velocity": carried}
-    for name, other in uncondensed(grid, RATIO, interface).items():
-        record(at_most(name, np.abs(found[name] - other).max() / np.abs(other).max(), 1e-9,
+    solution = flow.unit_flow(space, RATIO, interface=interface, element=BUBBLE)
+    carried = solution.velocity[grid.triangles].mean(axis=1) - solution.correction
+    computed = {"velocity": solution.velocity, "pressure": solution.pressure, "mean velocity": carried}
+    for name, expected in uncondensed(grid, RATIO, interface).items():
+        record(at_most(name, np.abs(computed[name] - expected).max() / np.abs(expected).max(), 1e-9,
                        "the same equations: round-off of a system whose viscosities differ by 2000"))
     record(at_most("flux of the mean velocity", flow_properties.flux_error(space, carried[:, None]), 1e-9,
                    "(2) tested with linear ramps, round-off"))
@@ -277,8 +281,8 @@ def test_bubble_layers(record):
     record(studies(errors, {"velocity": (2, SECOND, 1e-3), "gradient": (2, SECOND, 1.2e-3),
                             "velocity's gradient": (1, "linear elements: first order in H1", 0.1)}))
     ratio = stabilised["velocity"] / errors["velocity"]
-    for which, value in (("least", ratio.min()), ("largest", ratio.max())):
-        record(between(f"stabilised over bubble, {which}", value, 0.9, 1.1,
+    for extreme, value in (("least", ratio.min()), ("largest", ratio.max())):
+        record(between(f"stabilised over bubble, {extreme}", value, 0.9, 1.1,
                        "tau is the same to 7 % where triangles are equilateral"))
     stretched = _on_long_triangles(STABILISED) / _on_long_triangles(BUBBLE)
     record(at_least("stabilised over bubble, stretched", stretched, 10.0,
@@ -298,19 +302,19 @@ def _layer_errors(level: int, draw: int, element: flow.Stabilised | flow.Bubble)
 def _layered(grid: Mesh, element: flow.Stabilised | flow.Bubble, half: float) -> dict[str, float]:
     """Relative errors for |x| < half (um)."""
     space = Space(grid, 1)
-    found = flow.unit_flow(space, RATIO, element=element)
-    slope = _slope_error(grid, found.velocity[:, 0], flow_cases.middle_of(grid, half))
-    return {**flow_cases.in_the_middle(space, found, layered_channel, RATIO, half), "velocity's gradient": slope}
+    solution = flow.unit_flow(space, RATIO, element=element)
+    slope = _slope_error(grid, solution.velocity[:, 0], flow_cases.middle_of(grid, half))
+    return {**flow_cases.in_the_middle(space, solution, layered_channel, RATIO, half), "velocity's gradient": slope}
 
 
 def _slope_error(grid: Mesh, speed: np.ndarray, chosen: np.ndarray) -> float:
-    """Relative L2 error of grad u_x over some triangles, exact slopes by differences of the exact velocity."""
+    """Relative L2 error of grad u_x over some triangles. Exact gradients are differences of the exact velocity."""
     where, weight, _ = meshes.quadrature(grid.points, grid.triangles[chosen])
-    ours = np.einsum("tai,ta->ti", grid.gradients[chosen], speed[grid.triangles[chosen]])
+    computed = np.einsum("tai,ta->ti", grid.gradients[chosen], speed[grid.triangles[chosen]])
     y, step = where[..., 1], 1e-4
     above, below = (layered_channel.velocity(y + apart, WIDTH, LAYER, RATIO) for apart in (step, -step))
     exact = np.stack([0 * y, (above - below) / (2 * step)], axis=-1)
-    return meshes.relative(ours[:, None], exact, weight)
+    return meshes.relative(computed[:, None], exact, weight)
 
 
 STRETCH = 8.0

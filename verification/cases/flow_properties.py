@@ -1,6 +1,6 @@
-"""What no viscous flow may do, whatever its numbers: lose flux or energy, know its direction, gain by an obstacle.
+"""Properties of every viscous flow: it keeps flux and energy, is reversible, and never gains by an obstacle.
 
-Element sizes that grow with the distance from the aggregate, against one size everywhere.
+Element sizes that grow with the distance from the aggregate are compared with one size everywhere.
 """
 
 from __future__ import annotations
@@ -24,29 +24,29 @@ from verification.problems import meshes, runs
 
 #: Refinement of the meshes of each order.
 REFINED = {1: 1.0, 2: 0.5, 3: 0.4}
-#: Every order with both forms, and what the elements of scenes with a preset are, with the form of [E2] that is theirs.
-EVERY = {**combined(ORDERS, FORMS), **{preset: (runs.by(preset), "laplacian") for preset in runs.PRESETS}}
+#: Every order with both forms of [E2], and the elements and form of scenes with a preset.
+EVERY = {**combined(ORDERS, FORMS), **{preset: (runs.with_preset(preset), "laplacian") for preset in runs.PRESETS}}
 
 
 def scene_around(radius: float, *numerics: str) -> Scene:
-    """Flow alone, around a half-disc."""
+    """A scene with flow alone around a half-disc."""
     return load_scene("flow_only", (f'aggregate.radius="{radius} um"', *numerics))
 
 
 @cache
-def _around(radius: float, made: int | str, lean: float = 0.0, reach: float = 75.0) -> Space:
-    """Around a half-disc: functions of an order, or as scenes with a preset have them; one that leans is sheared."""
-    if isinstance(made, int):
-        order, refinement = made, REFINED[made]
+def _around(radius: float, elements: int | str, lean: float = 0.0, reach: float = 75.0) -> Space:
+    """A space around a half-disc, of an order or of a preset. ``lean`` shears the half-disc."""
+    if isinstance(elements, int):
+        order, refinement = elements, REFINED[elements]
     else:
-        scene = scene_around(radius, made)
+        scene = scene_around(radius, elements)
         if not lean:
             return pore.seeded(scene).space
         order, refinement = scene.numerics.order, scene.numerics.refinement
     return Space(meshes.half_disc(radius, refinement, (-reach, reach), WIDTH, geometry=min(order, 2), lean=lean), order)
 
 
-#: Radii of the half-discs (um), with the defect of u of linear elements on a coarse mesh, with margin; that of a plug.
+#: Radii (um) of half-discs with bounds of the flux defect of linear u on a coarse mesh; that bound for a plug.
 DISCS, DROP = {40.0: 0.012, 46.0: 0.008}, 0.003
 
 
@@ -66,24 +66,25 @@ def test_sections(numerics, interface, record):
 
 
 def _carried(space: Space, interface: str, name: str, drop: float):
-    """Errors of the flux of what carries the substrates; of linear elements of u itself besides."""
-    found = flow.unit_flow(space, RATIO, interface=interface)
+    """Checks of the flux of the velocity that carries the substrates, and of u with linear elements."""
+    solution = flow.unit_flow(space, RATIO, interface=interface)
     _, _, shape = meshes.fine(space)
-    u = shape @ found.velocity[space.cells]
+    u = shape @ solution.velocity[space.cells]
     why = "(2) tested with linear ramps, round-off"
-    if found.correction is None:
+    if solution.correction is None:
         yield at_most(f"u, {name}", flux_error(space, u), 1e-9, why)
-        out = space.mean_over(space.dofs.outlet, found.velocity[:, 0])
+        out = space.mean_over(space.dofs.outlet, solution.velocity[:, 0])
         yield at_most(f"outlet, {name}", abs(out - 1), 1e-11, "(2) tested with a constant, round-off")
     else:
-        yield at_most(f"w, {name}", flux_error(space, u - found.correction[:, None]), 1e-9, why)
+        yield at_most(f"w, {name}", flux_error(space, u - solution.correction[:, None]), 1e-9, why)
         if interface == "laplacian":
             yield at_most(f"u, {name}", flux_error(space, u), drop, "the defect of u on a coarse mesh, with margin")
 
 
 def flux_error(space: Space, carried: np.ndarray) -> float:
-    """Largest error of the flux through 25 sections of a field (T, q, 2) in the points of :func:`meshes.fine`, or
-    (T, 1, 2): tested with functions of the corners that fall from one at the inlet to zero at the outlet, each a ramp.
+    """Largest error of the flux through 25 sections of a field at the points of :func:`meshes.fine`.
+
+    The field is (T, q, 2) or (T, 1, 2). It is tested with ramps, which fall from one at the inlet to zero at the outlet.
     """
     grid = space.mesh
     _, weight, _ = meshes.fine(space)
@@ -115,7 +116,7 @@ def test_energy(numerics, interface, record):
 
 
 def _off_twice(once: flow.Flow, twice: flow.Flow) -> float:
-    """By how much the ratios of the fields of two flows differ from two."""
+    """Largest difference from two of the ratios of the fields of two flows."""
     fields = [(getattr(once, name), getattr(twice, name)) for name in ("velocity", "head", "correction")]
     return max(abs(np.abs(b).max() / np.abs(a).max() - 2) for a, b in fields if a is not None)
 
@@ -147,15 +148,15 @@ def _power(space: Space, unit: flow.UnitFlow, interface: str) -> tuple[float, fl
 def test_reversed(numerics, interface, record):
     space = _around(25.0, numerics, 0.6, 150.0)
     mirror = Space(_mirrored(space.mesh), space.order)
-    there, back = (flow.unit_flow(way, RATIO, interface=interface).velocity for way in (space, mirror))
+    forward, back = (flow.unit_flow(way, RATIO, interface=interface).velocity for way in (space, mirror))
     _, weight, shape = meshes.fine(space)
-    apart, whole = (np.einsum("tq,tqi->t", weight, (shape @ field[space.cells]) ** 2)
-                    for field in (there - back * [1.0, -1.0], there))
+    apart, total = (np.einsum("tq,tqi->t", weight, (shape @ field[space.cells]) ** 2)
+                    for field in (forward - back * [1.0, -1.0], forward))
     near = np.abs(space.mesh.points[space.mesh.triangles, 0]).max(axis=1) < 40
     for where, chosen, bound, why in (
             ("around the aggregate", near, 1e-6, "what differs at inlet and outlet decays like exp(-4.2 x / W)"),
             ("everywhere", slice(None), 5e-4, "second order, in the layer where inlet and outlet differ")):
-        record(at_most(f"difference {where}", np.sqrt(apart[chosen].sum() / whole.sum()), bound, why))
+        record(at_most(f"difference {where}", np.sqrt(apart[chosen].sum() / total.sum()), bound, why))
 
 
 def _mirrored(grid: Mesh) -> Mesh:
@@ -174,7 +175,7 @@ RATIOS = np.array([1.0, 2.0, 10.0, 100.0, 2000.0, 1e5])
     mutants=("thin-biomass",))
 @parametrize("numerics, interface", EVERY)
 def test_obstacle(numerics, interface, record):
-    """Losses of four half-discs."""
+    """Record the losses of four half-discs."""
     spaces = [_around(radius, numerics) for radius in (5.0, 25.0, 40.0, 46.0)]
     losses = np.array([flow.unit_flow(space, ratio, interface=interface).loss
                        for space, ratio in product(spaces, RATIOS)]).reshape(len(spaces), -1)
@@ -188,11 +189,11 @@ def test_obstacle(numerics, interface, record):
                     (np.diff(losses[:, 4]) / losses[1:, 4]).min(), 0.0, "nested obstacles: " + why))
 
 
-ACCURATE = runs.by("accurate")
-#: How far the loss may be from that on sizes which are the same everywhere: half of what the presets paper and fast are
-#: for, and what accurate is for; and what the mesh is made with.
-SCHEMES = {"paper": (5e-3, runs.by("paper")), "fast": (5e-3, runs.by("fast")), "accurate": (1e-3, ACCURATE),
-           "cubic": (1e-3, ACCURATE, runs.of("cubic"))}
+ACCURATE = runs.with_preset("accurate")
+#: Bounds of the difference from the loss with one element size, and changes of the scene. The bounds are half of the
+#: error that the presets paper and fast promise, and the error that accurate promises.
+SCHEMES = {"paper": (5e-3, runs.with_preset("paper")), "fast": (5e-3, runs.with_preset("fast")),
+           "accurate": (1e-3, ACCURATE), "cubic": (1e-3, ACCURATE, runs.with_elements("cubic"))}
 
 
 @pytest.mark.case(
@@ -212,8 +213,8 @@ def test_graded(bound, numerics, record):
 def _graded(*numerics: str) -> tuple[float, int]:
     """Loss of the pore and nodes of its mesh."""
     scene = scene_around(10.0, *numerics)
-    now = pore.seeded(scene)
-    return pore.solve(scene, now).flow.head_loss, len(now.mesh.points)
+    seed = pore.seeded(scene)
+    return pore.solve(scene, seed).flow.head_loss, len(seed.mesh.points)
 
 
 #: Flow enters a permeable aggregate in the gussets beside its upper contact lines.
@@ -235,9 +236,9 @@ def test_permeable_run(record):
     solved = [instant.solved.concentrations for instant in instants]
     largest = max(max(each.acceptor.max(), each.donor.max()) for each in solved)
     record(at_most("largest concentration", largest / 10.0, 1.01, "half of what a solution may overshoot by"))
-    end, found = instants[-1].pore, instants[-1].solved.flow
-    along = found.velocity[np.unique(end.space.cells[end.mesh.biomass]), 0]
+    end, solution = instants[-1].pore, instants[-1].solved.flow
+    along = solution.velocity[np.unique(end.space.cells[end.mesh.biomass]), 0]
     record(at_least("least velocity", along.min() / along.max(), -0.01, "no node of a line of elements overshoots"))
     scene = load_scene("base", [*overrides, "numerics.refinement=0.6", "numerics.contact_elements=10"], ["flow.head"])
     finer = pore.solve_flow(scene, Space(pore.generate(scene, end.boundary)[0], 3))
-    record(at_most("head loss", abs(found.head_loss / finer.head_loss - 1), 0.01, "what fast is for: 1 %"))
+    record(at_most("head loss", abs(solution.head_loss / finer.head_loss - 1), 0.01, "what fast is for: 1 %"))

@@ -1,18 +1,16 @@
-"""Homogeneous growth, which linear and quadratic elements hold exactly on any mesh: free and confined.
+"""Growth against closed forms, its law (14)-(24), and properties of every body.
 
-Patch tests: a body whose rim is held at F X has F inside, with constant pressure, on any mesh.
+Homogeneous growth, free and confined, is exact with linear and quadratic elements on any mesh. So are patch tests: a
+body whose rim is held at F X has F inside, with constant pressure. One end is free along its normal, or pulled, because
+the pressure is determined up to a constant if all of the rim is held.
 
-With all of its rim held the level of the pressure would be open, so that one end is free along its normal, or pulled.
+The half-cylinder that grows by theta(R) has a closed form of shape and pressure, far from t = 0. The stabilisation
+imposes dP/dn = 0 on the rim, where the exact pressure has a slope. In one layer of elements the pressure errs by O(h),
+which is O(h^(3/2)) in the mean square over the body. The literature agrees: order one is proven (Hughes, Franca and
+Balestra, 1986), and 3/2 on nearly regular meshes (Eichel, Tobiska and Xie, 2011).
 
-The half-cylinder that grows by theta(R): shape and pressure against the closed form, far from t = 0.
-
-The stabilisation wants dP/dn = 0 on the rim, where the exact pressure has a slope: in a layer of one element there the
-pressure is wrong by O(h), which in the mean square over the body is O(h^(3/2)). That is also what is known: order one
-for certain (Hughes, Franca and Balestra, 1986), 3/2 on meshes that are nearly regular (Eichel, Tobiska and Xie, 2011).
-
-The law itself (14)-(24): stress against its closed form, derivatives against differences, the stabilisation (27).
-
-What holds for any body: what a motion or another unit must not change, and what growth must keep.
+The law: stress against its closed form, derivatives against differences, the stabilisation (27). Properties: rigid
+motions and units do not change growth, and the area is the integral of theta.
 """
 
 from __future__ import annotations
@@ -30,33 +28,33 @@ from verification.evidence.checks import Check, around, at_most, each_at_most, l
 from verification.problems import bodies
 from verification.problems.bodies import Supported
 
-HELD = "round-off: the elements hold it; Newton's method stops at 1e-11"
-#: Rows and columns of a stress (3, 3) that the package gives.
+REPRODUCED = "round-off: the elements hold it; Newton's method stops at 1e-11"
+#: Rows and columns of the components of a stress (3, 3) that the package returns.
 COMPONENTS = [0, 1, 2, 0], [0, 1, 2, 1]
 
 
-def exactly(name: str, held: Supported, found: growth.Equilibrium, F: np.ndarray, pressure: float) -> list[Check]:
-    """Places, pressures and Cauchy stresses of an equilibrium against homogeneous F (2, 2) and P."""
+def exactly(name: str, body: Supported, solution: growth.Equilibrium, F: np.ndarray, pressure: float) -> list[Check]:
+    """Check positions, pressures and Cauchy stresses of an equilibrium against homogeneous F (2, 2) and P."""
     exact = neo_hookean.cauchy(F, pressure)
-    P = found.pressure[held.cells[:, :3]] @ held.shape.table.linear.T
-    stress = growth.cauchy(held.strained(found.position).F, P)
+    P = solution.pressure[body.cells[:, :3]] @ body.shape.table.linear.T
+    stress = growth.cauchy(body.strained(solution.position).F, P)
     most = max(largest(exact), abs(pressure))
-    sizes = {"place": largest(found.position @ np.linalg.inv(F).T - held.reference) / bodies.LENGTH,
-             "pressure": largest(found.pressure - pressure) / most,
+    sizes = {"place": largest(solution.position @ np.linalg.inv(F).T - body.reference) / bodies.LENGTH,
+             "pressure": largest(solution.pressure - pressure) / most,
              "stress": largest(stress - exact[COMPONENTS]) / most}
-    return each_at_most(sizes, 1e-9, HELD, f", {name}")
+    return each_at_most(sizes, 1e-9, REPRODUCED, f", {name}")
 
 
 NORM = "largest difference: places, carried back to t = 0, over the length; pressures and stresses over the largest"
-#: Elements (um) of each kind, and how far inner nodes are shaken at random (um).
+#: Element sizes (um) of each kind, and random displacements (um) of inner nodes.
 SIZES, SHAKEN = {1: 1.3, 2: 2.0, 3: 2.0}, {1: 0.1, 2: 0.02, 3: 0.02}
 
 
 def _supported(size: float, kind: int):
-    """(name, body, F and P of theta) of a body that is free, and of a confined one."""
+    """(name, body, function theta -> F and P) of a free body and of a confined one."""
     grid, side = bodies.rectangle(size, 4, kind)
-    for name, held, exact in (("free", side["left"], _free), ("confined", side["left"] | side["right"], _confined)):
-        yield name, bodies.on_mesh(grid, kind, held, side["bottom"]), exact
+    for name, support, exact in (("free", side["left"], _free), ("confined", side["left"] | side["right"], _confined)):
+        yield name, bodies.on_mesh(grid, kind, support, side["bottom"]), exact
 
 
 @pytest.mark.case(
@@ -72,13 +70,13 @@ def test_homogeneous(kind, record):
     for name, body, exact in _supported(SIZES[kind], kind):
         for theta in (36.0,) if kind == 3 else (2.0, 36.0, 2000.0):
             if theta < 2000 or name == "free":
-                record(exactly(f"{name}, theta = {theta:g}", body, bodies.grown(body, body.constant(theta)),
+                record(exactly(f"{name}, theta = {theta:g}", body, bodies.grow(body, body.constant(theta)),
                                *exact(theta)))
     for name, body, exact in _supported(1.6, kind):
-        for top, made_at in ((2.0, 1.0), (36.0, 1.0), (36.0, 5.0)):
-            start = body.reference @ exact(made_at)[0]
-            found = bodies.equilibrium(body, body.constant(top), start)
-            record(exactly(f"{name}, theta = {top:g}, mesh made at {made_at:g}", body, found, *exact(top))[:2])
+        for top, mesh_theta in ((2.0, 1.0), (36.0, 1.0), (36.0, 5.0)):
+            start = body.reference @ exact(mesh_theta)[0]
+            solution = bodies.equilibrium(body, body.constant(top), start)
+            record(exactly(f"{name}, theta = {top:g}, mesh made at {mesh_theta:g}", body, solution, *exact(top))[:2])
 
 
 def _free(theta: float):
@@ -109,12 +107,12 @@ def test_patch(kind, record):
 
 
 def _turned(body: Supported, change: np.ndarray) -> Supported:
-    """The body with its places, and which of them are held, changed by a matrix (2, 2) with one number in a row."""
-    return replace(body, reference=body.reference @ change.T, held=np.abs(body.held @ change.T) > 0)
+    """The body with its positions and constraints transformed by a matrix (2, 2) with one entry in each row."""
+    return replace(body, reference=body.reference @ change.T, constrained=np.abs(body.constrained @ change.T) > 0)
 
 
 def _sheared(kind: int, Q: np.ndarray, a: float, b: float, d: float) -> list[Check]:
-    """A body turned by Q, a multiple of a right angle, with its end that was the upper one free along its normal."""
+    """Check a sheared body turned by Q, a multiple of a right angle. Its former upper end is free along its normal."""
     grid, side = bodies.rectangle(SIZES[kind], 5, kind)
     rim = side["left"] | side["right"] | side["bottom"]
     body = _turned(bodies.on_mesh(grid, kind, rim | side["top"], rim), Q)
@@ -122,9 +120,9 @@ def _sheared(kind: int, Q: np.ndarray, a: float, b: float, d: float) -> list[Che
     def F(part):
         return Q @ np.array([[a**part, part * b], [0.0, d**part]]) @ Q.T
 
-    found = bodies.grown(body, body.constant(a * d), lambda part: body.reference @ F(part).T)
+    solution = bodies.grow(body, body.constant(a * d), lambda part: body.reference @ F(part).T)
     pressure = -neo_hookean.cauchy(Q.T @ F(1.0) @ Q, 0.0)[1, 1]
-    return exactly(f"a, b, d = {a:g}, {b:g}, {d:g}", body, found, F(1.0), pressure)
+    return exactly(f"a, b, d = {a:g}, {b:g}, {d:g}", body, solution, F(1.0), pressure)
 
 
 #: Any F: a turn, a shear in any direction, a stretch; and P over mu_L.
@@ -144,16 +142,16 @@ def test_patch_traction(kind, record):
 
 
 def _pulled(kind: int, F: np.ndarray, P: float) -> list[Check]:
-    """A body whose side on the right is pulled, from places that are shaken."""
+    """Check a body whose right side is pulled, from perturbed positions."""
     grid, side = bodies.rectangle(SIZES[kind], 8, kind)
     inside = ~np.any([*side.values()], axis=0)
     shake = np.random.default_rng(9).uniform(-1, 1, grid.points.shape) * inside[:, None] * SHAKEN[kind]
-    J, held = np.linalg.det(F), side["left"] | side["bottom"] | side["top"]
+    J, constrained = np.linalg.det(F), side["left"] | side["bottom"] | side["top"]
     S = J * neo_hookean.cauchy(F, P)[:2, :2] @ np.linalg.inv(F).T
-    body = bodies.on_mesh(grid, kind, held, held)
+    body = bodies.on_mesh(grid, kind, constrained, constrained)
     forces = bodies.traction(body, grid, lambda x, y: S)
-    found = bodies.equilibrium(body, body.constant(J), (grid.points + shake) @ F.T, forces)
-    return exactly(f"F = {F.tolist()}, P = {P:g}", body, found, F, P)
+    solution = bodies.equilibrium(body, body.constant(J), (grid.points + shake) @ F.T, forces)
+    return exactly(f"F = {F.tolist()}, P = {P:g}", body, solution, F, P)
 
 
 REFINEMENTS = {1: (1.3, 2.2, 3.5, 6.0), 2: (0.3, 0.6, 1.2, 2.4), 3: (0.3, 0.6, 1.2, 2.4)}
@@ -167,13 +165,13 @@ def exact(top: float) -> bodies.HalfCylinder:
 
 
 def errors(refinement: float, top: float, kind: int = 1) -> dict[str, float]:
-    """Size of the elements; largest error of the outline's radius; L2 of places and pressure over the body."""
+    """Element size, largest error of the outline's radius, and L2 errors of positions and pressure."""
     body, rim = bodies.half_disc(refinement, kind)
     known = exact(top)
-    found = bodies.grown(body, body.field(known.theta))
-    start, end = (np.hypot(*places[rim].T) for places in (body.reference, found.position))
+    solution = bodies.grow(body, body.field(known.theta))
+    start, end = (np.hypot(*places[rim].T) for places in (body.reference, solution.position))
     return {"outline": largest(end / known.radius(start) - 1),
-            **bodies.errors(body, found, known.at)}
+            **bodies.errors(body, solution, known.at)}
 
 
 CYLINDER_NORM = ("largest relative error of the outline's radius; L2 of places and of the pressure over the body at "
@@ -216,13 +214,13 @@ def test_half_cylinder_2000(record):
     mutants=("grad-div-dropped", "theta-power"), omitted="order 1: growth-half-cylinder")
 @parametrize("kind", bodies.CURVED)
 def test_curved_half_cylinder(kind, record):
-    found = refine(errors, REFINEMENTS[kind], 36.0, kind)
-    record(studies(found, {"place": (around(3, 0.4), "quadratic places: third order in L2", 1e-5),
+    computed = refine(errors, REFINEMENTS[kind], 36.0, kind)
+    record(studies(computed, {"place": (around(3, 0.4), "quadratic places: third order in L2", 1e-5),
                            "pressure": (2, "linear pressure: second order in L2", 2e-3)}, ", theta to 36"))
-    record(at_most("outline, theta to 36", found["outline"][-1], 1e-5, "under that of positions in L2"))
+    record(at_most("outline, theta to 36", computed["outline"][-1], 1e-5, "under that of positions in L2"))
     far = errors(REFINEMENTS[kind][-2], 2000.0, kind)
     for name in ("outline", "place", "pressure"):
-        record(at_most(f"{name}, theta to 2000", far[name], 1.05 * found[name][-2],
+        record(at_most(f"{name}, theta to 2000", far[name], 1.05 * computed[name][-2],
                        "as at theta = 36: what is left of the error is in the shape of theta(R), not in its size"))
 
 
@@ -265,14 +263,14 @@ def test_stress(record):
 
 
 def _near_one():
-    """Twenty F of det F = 1 with pressures, and directions to go from there."""
+    """Twenty F of det F = 1, pressures, and directions of differentiation."""
     F, P = admissible(20)
     F = F / np.sqrt(np.linalg.det(F))[:, None, None]
     return F, P, np.random.default_rng(2).standard_normal(F.shape) * 0.1
 
 
 def _energy():
-    """Its slope along a direction, and itself after a step."""
+    """Slope of the energy along a direction, and the energy after a step s."""
     F, P, G = _near_one()
 
     def potential(s):
@@ -283,8 +281,11 @@ def _energy():
 
 
 def _stress():
-    """The same of the stress: read from the nodal forces on unit triangles, whose second and third nodal function have
-    unit vectors for gradients, and whose area is one half."""
+    """Slope of the stress along a direction, and the stress after a step s.
+
+    The slope is read from nodal forces on triangles of area 1/2, whose second and third nodal functions have unit
+    vectors as gradients.
+    """
     F, P, G = _near_one()
     corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
     numbers = np.arange(3 * len(F))
@@ -297,7 +298,7 @@ def _stress():
 
 
 def _residual(kind: int):
-    """The same of the discrete residual of a sheared half-disc, in a random direction."""
+    """Slope of the discrete residual of a sheared half-disc in a random direction, and the residual after a step s."""
     body, _ = bodies.half_disc(0.6 if kind == 1 else 0.3, kind)
     random = np.random.default_rng(3)
     position = body.reference @ np.array([[1.1, 0.1], [0.2, 1.2]])
@@ -308,7 +309,7 @@ def _residual(kind: int):
 
 
 def _along(body: Supported, theta, place, pressure, move, push):
-    """Element tangents; the residual's slope along a direction; and itself after a step."""
+    """Element tangents, the slope of the residual along a direction, and the residual after a step s."""
     system = bodies.system(body, place, pressure, theta)
     tangents = system.tangent(place, pressure)
     linear = system.sparse.product(tangents, np.concatenate([*move.T, push]))
@@ -342,10 +343,10 @@ def test_curved_taylor(kind, record):
     grid, side = bodies.rectangle(1.6, 4, kind)
     body = bodies.on_mesh(grid, kind, side["left"], side["bottom"])
     random, theta = np.random.default_rng(6), body.constant(1.4)
-    here = grid.points @ np.array([[1.2, 0.1], [0.2, 1.1]])
-    push, move = random.standard_normal(body.corners), 0.05 * random.standard_normal(here.shape)
+    position = grid.points @ np.array([[1.2, 0.1], [0.2, 1.1]])
+    push, move = random.standard_normal(body.corners), 0.05 * random.standard_normal(position.shape)
     more, steps = random.standard_normal(body.corners), 0.25 * 0.5 ** np.arange(4)
-    tangents, linear, residual = _along(body, theta, here, push, move, more)
+    tangents, linear, residual = _along(body, theta, position, push, move, more)
     left = [largest(residual(s) - residual(0.0) - s * linear) for s in steps]
     record(at_most("symmetry", largest(tangents - tangents.mT) / largest(tangents), 1e-13, ROUND_OFF),
            study("residual", steps, left, 2, "Taylor's theorem: second order", band=0.25))
@@ -367,11 +368,11 @@ def test_stabilisation(record):
     h = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).prod(axis=1) / (2 * area)
     exact = area * h**2 * theta ** (2 / 3) / 12 * (g @ g)
     pressure = (points @ g)[triangles]
-    found = np.einsum("ta,tab,tb->t", pressure, growth.gradient_stabilisation(points, triangles, theta), pressure)
-    record(at_most("stabilisation", largest(found / exact - 1), 1e-11, ROUND_OFF))
+    computed = np.einsum("ta,tab,tb->t", pressure, growth.gradient_stabilisation(points, triangles, theta), pressure)
+    record(at_most("stabilisation", largest(computed / exact - 1), 1e-11, ROUND_OFF))
 
 
-KEPT_ROUND_OFF = "round-off; Newton's method stops at 1e-11"
+NEWTON_ROUND_OFF = "round-off; Newton's method stops at 1e-11"
 
 
 def _theta(x, y):
@@ -379,7 +380,7 @@ def _theta(x, y):
     return 2.6 + 0.9 * x / bodies.RADIUS + 0.5 * np.sin(3 * y / bodies.RADIUS)
 
 
-#: rad.
+#: Angles of rotation, rad.
 ANGLES = np.array([0.4, 1.9, 4.0])
 
 
@@ -399,7 +400,7 @@ def test_rigid(kind, record):
     most = largest(forces)
     moment = np.sum(place * (forces @ TURN)) / largest(place)
     record(each_at_most({"resultant": largest(forces.sum(axis=0)) / most,
-                         "moment over the largest distance": abs(moment) / most}, 1e-11, KEPT_ROUND_OFF))
+                         "moment over the largest distance": abs(moment) / most}, 1e-11, NEWTON_ROUND_OFF))
     for angle, Q in zip(ANGLES, _turns(ANGLES)):
         turned, same = _forces(body, place @ Q.T + [70.0, -30.0], pressure, theta)
         record(each_at_most({"forces": largest(turned - forces @ Q.T) / most,
@@ -428,10 +429,10 @@ def test_area(kind, record):
         body, _ = bodies.half_disc(refinement, kind)
         random = np.random.default_rng(12).uniform(0.7, 1.4, (len(body.cells), 1))
         theta = factor * (random if kind == 1 else 1.0) * body.field(_theta)
-        found = bodies.grown(body, theta)
-        asked = np.vdot(body.at.dx, theta)
-        got = elements.weights(found.position[body.cells], body.shape.table).sum()
-        record(at_most(f"area, theta to {theta.max():.0f}", abs(got / asked - 1), 1e-11, KEPT_ROUND_OFF))
+        solution = bodies.grow(body, theta)
+        expected = np.vdot(body.at.dx, theta)
+        computed = elements.weights(solution.position[body.cells], body.shape.table).sum()
+        record(at_most(f"area, theta to {theta.max():.0f}", abs(computed / expected - 1), 1e-11, NEWTON_ROUND_OFF))
 
 
 @pytest.mark.case(
@@ -443,13 +444,13 @@ def test_area(kind, record):
 @parametrize("kind", bodies.EVERY)
 def test_units(kind, record):
     changes = {"in metres": 1e-6 * np.eye(2), "upright": TURN, "mirrored": np.diag([-1.0, 1.0])}
-    ours = _changed(np.eye(2), kind)
+    reference = _changed(np.eye(2), kind)
     for name, change in changes.items():
-        found = _changed(change, kind)
-        back = found.position @ np.linalg.inv(change).T
-        gap = largest(found.pressure - ours.pressure) / largest(ours.pressure)
-        record(at_most(f"place, {name}", largest(back - ours.position) / bodies.RADIUS, 1e-9, KEPT_ROUND_OFF))
-        record(at_most(f"pressure, {name}", gap, 1e-8, KEPT_ROUND_OFF))
+        solution = _changed(change, kind)
+        back = solution.position @ np.linalg.inv(change).T
+        gap = largest(solution.pressure - reference.pressure) / largest(reference.pressure)
+        record(at_most(f"place, {name}", largest(back - reference.position) / bodies.RADIUS, 1e-9, NEWTON_ROUND_OFF))
+        record(at_most(f"pressure, {name}", gap, 1e-8, NEWTON_ROUND_OFF))
 
 
 #: Corners and middles of a triangle in the order of its mirror image.
@@ -457,10 +458,10 @@ MIRRORED = [2, 1, 0, 4, 3, 5]
 
 
 def _changed(change: np.ndarray, kind: int) -> growth.Equilibrium:
-    """Uneven growth of a half-disc whose places, supports and order of corners are changed by a matrix (2, 2)."""
+    """Uneven growth of a half-disc whose positions, supports and corners are transformed by a matrix (2, 2)."""
     body, _ = bodies.half_disc(1.0 if kind == 1 else 0.4, kind)
     cells = body.cells
     if np.linalg.det(change) < 0:
         cells = cells[:, MIRRORED[: cells.shape[1]]]
     same = replace(body, shape=growth.Shape(cells, body.corners, body.shape.degree))
-    return bodies.grown(_turned(same, change), same.field(_theta))
+    return bodies.grow(_turned(same, change), same.field(_theta))

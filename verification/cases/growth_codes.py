@@ -1,15 +1,15 @@
-"""Growth against quadratic elements of scikit-fem (reference/quadratic_growth.py): whole fields, both codes refined.
+"""Growth against quadratic elements of scikit-fem (reference/quadratic_growth.py), and against manufactured growth.
 
-Neither of the uneven cases has a closed form. The reference is solved with mu_L = 0.01 MPa, ours knows no mu_L: without
-traction it must drop out of the places and scale the pressure.
+Both codes are refined, and fields are compared over the whole body. The uneven cases have no closed form. The reference
+takes mu_L = 0.01 MPa, and the package takes no mu_L: without traction it drops out of the positions and scales the
+pressure.
 
-A growth that is made up, at finite strain, with theta, shear and pressure uneven and the loads to hold it.
-
-Random meshes of a square, three sides held and the fourth pulled by its traction, so that the pressure's level is
-determined. Where the exact pressure has a slope on the rim its order is that of the layer there (see
-:mod:`verification.cases.growth`). Where it has none, what is left is h_tau, which jumps from triangle to
-triangle: with one h for all of them the order is two (measured: 1.9 and 2.0 between 0.1 and 0.025), with their own it
-falls from two towards 3/2.
+The manufactured growth has finite strain, uneven theta, shear and pressure, and the loads that balance it. On random
+meshes of a square, three sides are held and the fourth is pulled by its traction, which determines the level of the
+pressure. If the exact pressure has a slope on the rim, its order is that of the layer there (see
+:mod:`verification.cases.growth`). Otherwise h_tau, which jumps from triangle to triangle, limits it: with one h for all
+triangles the order is two (measured: 1.9 and 2.0 between 0.1 and 0.025), and with their own h it falls from two towards
+3/2.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ from verification.evidence.cases import parametrize
 from verification.evidence.checks import Check, around, at_most, between, refine, studies
 from verification.problems import bodies, meshes
 
-#: Ours, by refinement; the reference on each level, by rings. 90 and 135 degrees have a node on all of them. Curved
-#: triangles of ours, whose refinements are the second ones, are compared with the last level alone.
+#: Refinements of the package, by geometry, and rings of the reference on each level. 90 and 135 degrees have a node on
+#: all levels. Curved triangles are compared with the last level alone.
 REFINEMENTS, RINGS = {1: (0.75, 1.35, 2.4, 4.05), 2: (0.3, 0.5, 0.8, 1.3)}, (4, 7, 12, 20)
 MODULUS = 0.01
 FRONT = 36.0
 CONTRAST = 10.0
-#: The upper wall (um), and how often the reference is refined towards the ends of the contact.
+#: Contact with an upper wall (um), and the number of refinements of the reference towards its ends.
 CONTACT, TOWARDS = Contact(np.pi / 2, 3 * np.pi / 4, 65.0), 3
 #: x + i y of these ends at t = 0, um.
 ENDS = bodies.RADIUS * np.exp([[1j * CONTACT.first], [1j * CONTACT.last]])
@@ -55,35 +55,37 @@ PROBLEMS = {"half-cylinder": (growth_cases.exact(2000.0).theta, 2000.0, None), "
 
 
 @cache
-def trusted(name: str, level: int) -> quadratic_growth.Grown:
-    """The reference on one level, from that of the level before."""
+def reference_solution(name: str, level: int) -> quadratic_growth.Equilibrium:
+    """The reference on one level. It starts from the level before."""
     theta, top, contact = PROBLEMS[name]
     ends = (contact.first, contact.last) if contact else ()
     mesh = quadratic_growth.half_disc(bodies.RADIUS, RINGS[level], ends, TOWARDS if ends else 0)
-    start = trusted(name, level - 1) if level else None
+    start = reference_solution(name, level - 1) if level else None
     return quadratic_growth.grow(mesh, theta, top, MODULUS, contact, start)
 
 
 @cache
-def ours(name: str, level: int, kind: int):
-    """(body, equilibrium) of ours."""
+def package_solution(name: str, level: int, kind: int):
+    """(body, equilibrium) of the package."""
     (theta, _, contact), (body, rim) = PROBLEMS[name], bodies.half_disc(REFINEMENTS[min(kind, 2)][level], kind)
-    move, held = np.zeros_like(body.reference), body.held.copy()
+    move, constrained = np.zeros_like(body.reference), body.constrained.copy()
     if contact:
         x, y = body.reference[rim].T
         angle = np.arctan2(y, x)
         on = rim[(angle > contact.first - 1e-9) & (angle < contact.last + 1e-9)]
-        held[on, 1] = True
+        constrained[on, 1] = True
         move[on, 1] = contact.height - body.reference[on, 1]
-    body = replace(body, held=held)
-    return body, bodies.grown(body, body.field(theta), lambda part: body.reference + part * move)
+    body = replace(body, constrained=constrained)
+    return body, bodies.grow(body, body.field(theta), lambda part: body.reference + part * move)
 
 
 def gaps(level: int, name: str, kind: int) -> dict[str, float]:
-    """Size of our elements, and the relative L2 difference of the two codes on a level, over the body at t = 0; of the
-    pressure also away from the ends of the contact."""
-    reference = trusted(name, level if kind == 1 else len(RINGS) - 1)
-    body, found = ours(name, level, kind)
+    """Element size, and relative L2 differences of the two codes on a level, over the body at t = 0.
+
+    The pressure has a second difference, away from the ends of the contact.
+    """
+    reference = reference_solution(name, level if kind == 1 else len(RINGS) - 1)
+    body, solution = package_solution(name, level, kind)
 
     def exact(x, y):
         place, pressure = reference.at(x, y)
@@ -91,51 +93,57 @@ def gaps(level: int, name: str, kind: int) -> dict[str, float]:
 
     middles = body.reference[body.cells[:, :3]].mean(axis=1) @ [1, 1j]
     away = np.abs(middles - ENDS).min(axis=0) > 0.2 * bodies.RADIUS
-    return {**bodies.errors(body, found, exact), "pressure away": bodies.errors(body, found, exact, away)["pressure"]}
+    return {**bodies.errors(body, solution, exact),
+            "pressure away": bodies.errors(body, solution, exact, away)["pressure"]}
 
 
-def _settled(name: str, difference: float) -> Check:
-    """Is the reference so fine that the difference is ours?"""
+def _reference_change(name: str, difference: float) -> Check:
+    """Check that the reference is fine enough: its last change is small against the difference."""
     where, weight = _points()
-    before, last = (trusted(name, level).at(*where)[0] for level in (len(RINGS) - 2, len(RINGS) - 1))
+    before, last = (reference_solution(name, level).at(*where)[0] for level in (len(RINGS) - 2, len(RINGS) - 1))
     return at_most("last change of the reference's places, over the last difference to ours",
                    meshes.relative(before, last, weight) / difference, 0.3,
                    "the reference must be the finer one; it changes by less with every level")
 
 
 def _points():
-    """X, Y (2, t, q) at the points of quadrature of a mesh of ours, and their weights (t, q)."""
+    """Quadrature points X, Y (2, t, q) of a mesh of the package, and their weights (t, q)."""
     body, _ = bodies.half_disc(REFINEMENTS[1][2])
-    where, weight, _ = bodies.integrated(body)
+    where, weight, _ = bodies.norm_points(body)
     return np.moveaxis(where, 2, 0), weight
 
 
-def _curved(found: dict, pressure: str, ceilings: tuple[float, float]):
-    """Curved triangles of ours against the last level of the reference: the last differences, and, without a contact's
-    ends, the orders over all refinements, as between two meshes of few triangles they scatter."""
-    fallen = {name: np.log(values[0] / values[-1]) for name, values in found.items()}
+def _curved(differences: dict, pressure: str, ceilings: tuple[float, float]):
+    """Checks of curved triangles against the last level of the reference.
+
+    They cover the last differences and, without contact, the orders over all refinements. Orders between two meshes of
+    few triangles scatter.
+    """
+    fallen = {name: np.log(values[0] / values[-1]) for name, values in differences.items()}
     for field, order, ceiling in zip(("place", pressure), (3, 2), ceilings):
         if pressure == "pressure":
             yield between(f"order of the {field}", fallen[field] / fallen["size"], *around(order, 0.5),
                           "quadratic places, linear pressure: third and second order")
-        yield at_most(field, found[field][-1], ceiling, "the reference's elements are finer")
+        yield at_most(field, differences[field][-1], ceiling, "the reference's elements are finer")
 
 
 NORM = "L2 over the body at t = 0 of the difference to the reference on the same level, relative: places; pressure"
 
 
 def compared(kind: int, problem: str, ceilings: dict[int, tuple[float, float]], pressure: str = "pressure"):
-    """Differences of the two codes with one kind of triangles; with straight ones that the reference is the finer.
-    ceilings: by kind, of the last differences of places and of the pressure; pressure: the one that has an order."""
-    found = refine(gaps, range(len(RINGS)), problem, kind)
+    """Checks of the differences of the two codes with one kind of triangles.
+
+    ceilings: by kind, of the last differences of positions and pressure; pressure: name of the one that has an order.
+    """
+    differences = refine(gaps, range(len(RINGS)), problem, kind)
     if kind > 1:
-        yield _curved(found, pressure, ceilings[2])
+        yield _curved(differences, pressure, ceilings[2])
     else:
         place, last = ceilings[1]
-        yield studies(found, {"place": (2, PLACE, place), pressure: (1.75, PRESSURE, last)})
-        yield _settled(problem, found["place"][-1])
+        yield studies(differences, {"place": (2, PLACE, place), pressure: (1.75, PRESSURE, last)})
+        yield _reference_change(problem, differences["place"][-1])
     if pressure != "pressure":
-        yield at_most("pressure, with the ends of the contact", found["pressure"][-1], 1e-2, SINGULAR)
+        yield at_most("pressure, with the ends of the contact", differences["pressure"][-1], 1e-2, SINGULAR)
 
 
 @pytest.mark.slow
@@ -150,13 +158,13 @@ def test_quadratic_cylinder(kind, record):
     record(compared(kind, "half-cylinder", {1: (6e-4, 6e-3), 2: (6e-5, 6e-3)}))
     if kind == 1:
         rows = {"places": (3, "quadratic elements", 5e-6), "pressure": (2, "linear elements", 1.2e-3)}
-        record(studies(refine(_own, range(len(RINGS))), rows, " of the reference"))
+        record(studies(refine(_reference_errors, range(len(RINGS))), rows, " of the reference"))
 
 
-def _own(level: int) -> dict[str, float]:
+def _reference_errors(level: int) -> dict[str, float]:
     """Size of the reference's elements, and its errors to the closed form."""
     where, weight = _points()
-    place, pressure = trusted("half-cylinder", level).at(*where)
+    place, pressure = reference_solution("half-cylinder", level).at(*where)
     exact, known = growth_cases.exact(2000.0).at(*where)
     return {"size": bodies.RADIUS / RINGS[level], "places": meshes.relative(place, exact, weight),
             "pressure": meshes.relative(pressure / MODULUS, known, weight)}
@@ -185,7 +193,7 @@ def test_between_walls(kind, record):
     record(compared(kind, "between walls", {1: (1e-3, 6e-3), 2: (1e-3, 6e-3)}, "pressure away"))
 
 
-#: Elements of straight and of curved triangles, and of how many random meshes of each size errors are averaged.
+#: Element sizes of straight and of curved triangles, with the number of random meshes of each.
 SIZES = {1: dict.fromkeys((0.2, 0.1, 0.05, 0.025), 3), 2: dict.fromkeys((0.2, 0.1, 0.05, 0.03), 6)}
 LAYER = "3/2 from a layer of one element at the rim, where the stabilisation wants dP/dn = 0"
 UNEVEN = "no layer where dP/dn = 0: between 2, linear elements, and 3/2, for an h that jumps between triangles"
@@ -193,21 +201,23 @@ TAYLOR_HOOD = "quadratic places: third order; linear pressure: second"
 #: Orders of the pressure, by kind, and why.
 ORDERS = {1: {"sloping": (1.5, LAYER), "flat on the rim": (1.75, UNEVEN)},
           2: {"sloping": (2, TAYLOR_HOOD), "flat on the rim": (2, TAYLOR_HOOD)}}
-#: Order of places, why, and the last errors of places and of the pressure, by kind.
+#: Order of positions and its origin, by kind; last errors of positions and pressure.
 PLACES = {1: (2, "linear elements: second order"),
           2: (around(3, 0.45), TAYLOR_HOOD)}  # the coarsest square has five elements a side
 CEILINGS = {1: (6e-4, 2e-2), 2: (3e-6, 4e-3)}
 
 
 def _errors(size: float, seed: int, kind: int, exact) -> dict[str, float]:
-    """Relative L2 errors on one random mesh of the unit square, its side X = 1 pulled, from the exact places of the
-    nodes and no pressure."""
+    """Relative L2 errors on a random mesh of the unit square, whose side X = 1 is pulled.
+
+    Newton's method starts from the exact positions without pressure.
+    """
     grid, side = bodies.rectangle(size, round(1 / size) + seed, kind, 1.0, 1.0, bent=0.0)
-    held = side["left"] | side["bottom"] | side["top"]
-    body = bodies.on_mesh(grid, kind, held, held)
+    constrained = side["left"] | side["bottom"] | side["top"]
+    body = bodies.on_mesh(grid, kind, constrained, constrained)
     forces = bodies.body_force(body, exact.force) + bodies.traction(body, grid, exact.stress)
-    found = bodies.equilibrium(body, body.field(exact.theta), exact.place(*grid.points.T), forces)
-    return bodies.errors(body, found, lambda x, y: (exact.place(x, y), exact.pressure(x, y)))
+    solution = bodies.equilibrium(body, body.field(exact.theta), exact.place(*grid.points.T), forces)
+    return bodies.errors(body, solution, lambda x, y: (exact.place(x, y), exact.pressure(x, y)))
 
 
 @pytest.mark.slow

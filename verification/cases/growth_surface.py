@@ -12,7 +12,7 @@ import pytest
 from reference import surface_stability, surface_stretch
 from repro.errors import RunEnd
 from repro.march.folding import Fold
-from repro.march.loop import Instant
+from repro.march.loop import Report
 from repro.march.simulation import simulate
 from repro.march.stepping import SHORTEST
 from repro.model import contact, growth, pore
@@ -28,7 +28,7 @@ ELEMENTS = ("linear", "quadratic", "cubic")
 
 
 def imposed(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Places (..., 2) um and their derivatives (..., 2, 2) of a smooth map that keeps the lower wall."""
+    """Positions (..., 2) um and gradients (..., 2, 2) of a smooth map that keeps the lower wall."""
     a, b, c = 4e-3, 0.6, 0.03
     place = np.stack([x + a * x * y, y * (1 + b * np.sin(c * x))], axis=-1)
     rows = [np.stack([1 + a * y, a * x], axis=-1),
@@ -43,26 +43,26 @@ def along_the_rim(radius: float, angle: np.ndarray) -> np.ndarray:
     return np.linalg.norm(np.einsum("...ij,...j->...i", F, tangent), axis=-1) / np.sqrt(np.linalg.det(F))
 
 
-def mapped(refinement: float, elements: str) -> dict[str, float]:
-    """Errors of the stretch on a half-disc of 20 um that the map has moved."""
+def mapped_errors(refinement: float, elements: str) -> dict[str, float]:
+    """Errors of the stretch on a half-disc of 20 um deformed by the map."""
     scene = load_scene("base", ["numerics.preset=accurate", f"numerics.elements={elements}",
                                 f"numerics.refinement={refinement}", 'aggregate.radius="20 um"'])
-    now = pore.seeded(scene)
-    found = surface(now.moved(imposed(*now.mesh.points.T)[0]))
-    before = surface(now).middles
+    seed = pore.seeded(scene)
+    deformed = surface(seed.moved(imposed(*seed.mesh.points.T)[0]))
+    before = surface(seed).middles
     exact = along_the_rim(20.0, np.arctan2(before[:, 1], before[:, 0]))
-    return {"size": 20 * np.pi / len(exact), "stretch": float(np.sqrt(np.mean((found.stretch - exact) ** 2))),
-            "reference": _independent(now)}
+    return {"size": 20 * np.pi / len(exact), "stretch": float(np.sqrt(np.mean((deformed.stretch - exact) ** 2))),
+            "reference": _independent(seed)}
 
 
-def _independent(now: pore.Pore) -> float:
-    """The error of the stretch that is computed from the fields of a file."""
-    mesh = now.mesh
+def _independent(seed: pore.Pore) -> float:
+    """Error of the stretch that the reference computes from the fields of a file."""
+    mesh = seed.mesh
     moved = imposed(*mesh.points.T)[0]
-    found, _, _ = surface_stretch.surface_stretch(moved, mesh.cells, mesh.biomass, mesh.points)
+    stretch, _, _ = surface_stretch.surface_stretch(moved, mesh.cells, mesh.biomass, mesh.points)
     _, _, before = surface_stretch.surface_stretch(mesh.points, mesh.cells, mesh.biomass, mesh.points)
     exact = along_the_rim(20.0, np.arctan2(before[:, 1], before[:, 0]))
-    return float(np.sqrt(np.mean((found - exact) ** 2)))
+    return float(np.sqrt(np.mean((stretch - exact) ** 2)))
 
 
 @pytest.mark.case(
@@ -74,13 +74,13 @@ def _independent(now: pore.Pore) -> float:
 @pytest.mark.parametrize("elements", ELEMENTS)
 def test_surface_stretch(elements, record):
     order = 1.0 if elements == "linear" else 2.0
-    errors = refine(mapped, (1.0, 1.5, 2.2, 3.2), elements)
+    errors = refine(mapped_errors, (1.0, 1.5, 2.2, 3.2), elements)
     record(studies(errors, {"stretch": (around(order), "a chord over its chord is of second order in its middle, J "
                                         "of an element's own order", 0.05),
                             "reference": (around(order), "the same", 0.05)}))
 
 
-#: Theta of a plug, at and between the limits.
+#: Values of theta of a plug, at and between the limits.
 THETAS = (1.5, 1 / CREASE**2, 3.0)
 
 
@@ -95,18 +95,18 @@ THETAS = (1.5, 1 / CREASE**2, 3.0)
 def test_surface_confined(elements, record):
     for rheology in ("stressed", "stress_free"):
         scene = plugged("fast", f"numerics.elements={elements}", f"growth.new_biomass={rheology}")
-        now = pore.seeded(scene)
+        state = pore.seeded(scene)
         since = 1.0
         for theta in THETAS:
-            now = contact.expand(scene, now, np.full_like(now.theta, theta)).pore
+            state = contact.expand(scene, state, np.full_like(state.theta, theta)).pore
             exact = (theta / since) ** -0.5
-            record(at_most(f"{rheology}, theta = {theta:.3g}", np.abs(surface(now).stretch - exact).max(), 1e-9,
+            record(at_most(f"{rheology}, theta = {theta:.3g}", np.abs(surface(state).stretch - exact).max(), 1e-9,
                            "homogeneous; Newton's tolerance"))
             since = theta if rheology == "stress_free" else 1.0
 
 
 def plugged(preset: str, *changes: str) -> Scene:
-    """A plug of 20 um in a pore of 20 um, with so much supply that it grows at the same rate everywhere."""
+    """A plug of 20 um in a pore of 20 um. Its large supply makes it grow at the same rate everywhere."""
     corners = "[[\"-10 um\", \"0 um\"], [\"-10 um\", \"20 um\"], [\"10 um\", \"20 um\"], [\"10 um\", \"0 um\"]]"
     supplies = [f'substrates.{name}.supply="1e6 mg/L"' for name in ("acceptor", "donor")]
     return load_scene("base", [*NUMERICS[preset], 'pore.width="20 um"', f"aggregate.outline={corners}", *supplies,
@@ -123,24 +123,24 @@ class Block(growth.System):
 
 
 @cache
-def of_ours(gamma: float) -> tuple[Callable, Callable]:
+def energy_and_constraint(gamma: float) -> tuple[Callable, Callable]:
     """(energy, constraint), functions of theta, of quadratic places and linear pressures on a block of 1 x 1."""
     grid, side = bodies.rectangle(0.25, 4, 2, 1.0, 1.0, 0.0)
     body = bodies.on_mesh(grid, 2, side["left"] | side["right"], side["bottom"])
-    free = np.flatnonzero(~body.held.T.ravel())
+    free = np.flatnonzero(~body.constrained.T.ravel())
     last = 2 * len(body.reference)
 
     def matrix(theta: float) -> np.ndarray:
-        system = Block(body, np.zeros_like(body.held))
+        system = Block(body, np.zeros_like(body.constrained))
         system.gamma = gamma
         P = surface_stability.confined_growth_pressure(theta)
         place = body.reference * [1.0, theta]
         system.under(body.constant(theta), place, place, body.resting + P)
         local = system.tangent(place, body.resting + P)
-        whole = np.zeros((last + body.corners,) * 2)
+        full_matrix = np.zeros((last + body.corners,) * 2)
         rows = system.unknowns
-        np.add.at(whole, (rows[:, :, None], rows[:, None, :]), local)
-        return whole
+        np.add.at(full_matrix, (rows[:, :, None], rows[:, None, :]), local)
+        return full_matrix
 
     return lambda theta: matrix(theta)[np.ix_(free, free)], lambda theta: matrix(theta)[last:, free]
 
@@ -155,12 +155,15 @@ def of_ours(gamma: float) -> tuple[Callable, Callable]:
     omitted="linear elements: their stabilisation is no part of the energy; cubic ones: those of order 2")
 def test_surface_stability(record):
     exact = surface_stability.biot()
-    found = surface_stability.critical_stretch(*surface_stability.divergence_free(surface_stability.mesh(4, 4)))
-    record(between("divergence-free", found / exact, 0.99, 1.0 + 1e-4, "short waves, on a conforming mesh from below"),
+    computed = surface_stability.critical_stretch(*surface_stability.divergence_free(surface_stability.mesh(4, 4)))
+    record(between("divergence-free", computed / exact, 0.99, 1.0 + 1e-4,
+                   "short waves, on a conforming mesh from below"),
            between("the limit at which a run ends", BIOT / exact, 0.999, 1.001, "three digits"))
-    ours = [surface_stability.critical_stretch(*of_ours(gamma)) for gamma in (growth.GAMMA, 10.0, 100.0)]
-    record(between("P2/P1, gamma of the package", ours[0] / exact, 0.95, 1.05, "not divergence-free in each point"))
-    for gamma, less, more in zip((10, 100), ours[1:], ours):
+    stretches = [surface_stability.critical_stretch(*energy_and_constraint(gamma))
+                 for gamma in (growth.GAMMA, 10.0, 100.0)]
+    record(between("P2/P1, gamma of the package", stretches[0] / exact, 0.95, 1.05,
+                   "not divergence-free in each point"))
+    for gamma, less, more in zip((10, 100), stretches[1:], stretches):
         record(at_most(f"P2/P1, gamma = {gamma}, over that of a tenth", less / more, 1.0,
                        "the energy grows with gamma"))
 
@@ -189,9 +192,9 @@ def test_fold(preset, record):
                            "the last state is within a step of it; 0.544^-2 = 3.38"))
 
 
-def _to_the_end(scene: Scene) -> tuple[Instant, RunEnd | None]:
-    """The last instant of a run, and what has ended it early."""
-    last: list[Instant] = []
+def _to_the_end(scene: Scene) -> tuple[Report, RunEnd | None]:
+    """The last instant of a run, and the RunEnd that ended it early, if any."""
+    last: list[Report] = []
     try:
         for instant in simulate(scene):
             last = [instant]

@@ -1,7 +1,7 @@
-"""A family of hostile scenes, drawn by seed: each is right, or is refused with advice that works.
+"""A family of hostile scenes, drawn by seed. Each is right, or is refused with advice that works.
 
 A member runs with the preset ``fast``, and a second time with other rows or with ``accurate``. ``reference.run_files``
-judges the folders. Where a run is refused, its advice is followed, and the run that follows must be right.
+judges the folders. If a run is refused, its advice is applied, and the new run must be right.
 ``pytest "verification/cases/hard_family.py::test_family[seed 17]"`` runs one member, and shows its scene if a check
 fails.
 """
@@ -20,7 +20,7 @@ import pytest
 
 from reference import run_files
 from repro.errors import SimulationError
-from repro.runs.running import run
+from repro.runs.execution import run
 from repro.scene import SceneError, load_scene
 from verification.evidence.checks import Check, at_most
 from verification.problems import hostile
@@ -28,25 +28,27 @@ from verification.problems.hard import TooLong, limited
 
 #: Processor time (s) of one run: a hundred times the median.
 LIMIT = 30.0
-#: Seeds of ``make test``, and those that ``make verify`` runs besides.
+#: Seeds of ``make test``, and further seeds of ``make verify``.
 QUICK, REST = range(30), range(30, 150)
 NO_HELP = re.compile(r"no setting helps|no numerics\.refinement that is accepted")
 FILE = re.compile(r"\S+/\S+\.(?:state|vtu)|fields/\S+\.vtu")
-#: What a message may advise: a pattern, the key, and values to try, of the present one or of the pattern's number.
+#: Advice in messages: pattern, key, and values to try, from the present value or the number in the message.
 ADVICE = (
-    (r"numerics\.refinement = ([\d.e+-]+) resolves", "numerics.refinement", lambda now, told: [float(told)]),
-    (r"larger numerics\.refinement", "numerics.refinement", lambda now, told: [1.5 * now, 2.5 * now]),
-    (r"smaller numerics\.refinement", "numerics.refinement", lambda now, told: [now / 2]),
-    (r"shorter growth\.time_step", "growth.time_step", lambda now, told: [f"{now / 4!r} h", f"{now / 20!r} h"]),
-    (r"larger growth\.shear_modulus", "growth.shear_modulus", lambda now, told: [f"{10 * now!r} MPa"]),
-    (r"flow\.permeability[^;]*? ([\d.e+-]+ (?:m|um)\^2) or more", "flow.permeability", lambda now, told: [told]),
-    (r"aggregate\.smooth = false|smooth = false", "aggregate.smooth", lambda now, told: [False]),
+    (r"numerics\.refinement = ([\d.e+-]+) resolves", "numerics.refinement", lambda present, number: [float(number)]),
+    (r"larger numerics\.refinement", "numerics.refinement", lambda present, number: [1.5 * present, 2.5 * present]),
+    (r"smaller numerics\.refinement", "numerics.refinement", lambda present, number: [present / 2]),
+    (r"shorter growth\.time_step", "growth.time_step",
+     lambda present, number: [f"{present / 4!r} h", f"{present / 20!r} h"]),
+    (r"larger growth\.shear_modulus", "growth.shear_modulus", lambda present, number: [f"{10 * present!r} MPa"]),
+    (r"flow\.permeability[^;]*? ([\d.e+-]+ (?:m|um)\^2) or more", "flow.permeability",
+     lambda present, number: [number]),
+    (r"aggregate\.smooth = false|smooth = false", "aggregate.smooth", lambda present, number: [False]),
 )
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """A run's files, None where there are none, and why it stopped, "" where it did not."""
+    """Files of a run, or None, and the message of its refusal, or ""."""
 
     files: run_files.Run | None
     refusal: str
@@ -74,7 +76,7 @@ def _judged(tables: dict, seed: int, room: Path) -> Iterator[Check]:
 
 
 def _outcome(tables: dict, folder: Path) -> Outcome:
-    """Run a scene; one that takes too long counts as refused. Any other exception is left to the caller."""
+    """Run a scene. One that takes too long counts as refused. Any other exception propagates."""
     refusal = ""
     try:
         with limited(LIMIT):
@@ -86,13 +88,13 @@ def _outcome(tables: dict, folder: Path) -> Outcome:
 
 
 def _checks(outcome: Outcome, tables: dict, room: Path) -> Iterator[Check]:
-    """What the files show, and whether a refusal is one that helps."""
+    """Checks of the files of a run, and of the advice of a refusal."""
     if outcome.files:
         yield from (Check(*finding) for finding in run_files.findings(outcome.files))
     if outcome.refusal:
         yield from _refusal(outcome.refusal, room)
         works = bool(NO_HELP.search(outcome.refusal)) or any(
-            _is_right(advised, room / "advised") for advised in _followed(tables, outcome.refusal))
+            _is_right(scene, room / "advised") for scene in _advised_scenes(tables, outcome.refusal))
         yield at_most(f"refusals without advice that works: {outcome.refusal}", not works, 0, "a refusal helps")
 
 
@@ -104,19 +106,19 @@ def _refusal(message: str, room: Path) -> Iterator[Check]:
     yield at_most("files that a refusal names and that are not there", len(missing), 0, "a user looks there")
 
 
-def _followed(tables: dict, message: str) -> Iterator[dict]:
-    """The scene with each piece of advice, one after the other; linear elements come with their refinement."""
+def _advised_scenes(tables: dict, message: str) -> Iterator[dict]:
+    """The scene with each piece of advice in turn. Linear elements come with their refinement."""
     if 'numerics.elements = "linear" with' in message:
         tables = _changed(tables, "numerics.elements", "linear")
     for pattern, key, values in ADVICE:
-        found = re.search(pattern, message)
-        if found:
-            told = found.group(1) if found.groups() else ""
-            yield from (_changed(tables, key, value) for value in values(_present(tables, key), told))
+        match = re.search(pattern, message)
+        if match:
+            number = match.group(1) if match.groups() else ""
+            yield from (_changed(tables, key, value) for value in values(_present(tables, key), number))
 
 
 def _present(tables: dict, key: str) -> float:
-    """The number of a key in the scene as it is read."""
+    """The value of a key in the scene, in the package's units."""
     section, name = key.split(".")
     return float(getattr(getattr(load_scene(tables), section), name) or 0.0)
 
@@ -129,19 +131,19 @@ def _changed(tables: dict, key: str, value) -> dict:
 
 
 def _is_right(tables: dict, folder: Path) -> bool:
-    """Does a run complete, and are its files right?"""
+    """Whether a run completes with files that are right."""
     outcome = _outcome(tables, folder / str(len(list(folder.glob("*")))))
     return not outcome.refusal and all(finding.holds for finding in run_files.findings(outcome.files))
 
 
 def member(seed: int) -> Check:
-    """How many checks of a member fail, and which."""
+    """Check that no check of a member fails. The name lists those that do."""
     failed = [f"{check.quantity} {check.value:.3g}" for check in judge(seed) if not check.holds]
-    told = f": {'; '.join(failed)[:600]}" if failed else ""
-    return at_most(f"{hostile.kind(seed)}{told}", len(failed), 0, "reference/run_files.py; a refusal's advice works")
+    message = f": {'; '.join(failed)[:600]}" if failed else ""
+    return at_most(f"{hostile.kind(seed)}{message}", len(failed), 0, "reference/run_files.py; a refusal's advice works")
 
 
-#: What the cases of the family have in common.
+#: Fields of the mark that both cases of the family share.
 COMMON = {
     "kind": "property",
     "claim": "Hostile scenes drawn by seed: balances, bounds, stoichiometry, area against mass and flow in the files, "
@@ -159,6 +161,6 @@ MARKS = {QUICK: (pytest.mark.case("hard-family", **COMMON),),
 @pytest.mark.parametrize("seed", [pytest.param(seed, id=f"seed {seed}", marks=marks)
                                   for seeds, marks in MARKS.items() for seed in seeds])
 def test_family(seed, record):
-    """A failure shows the scene."""
+    """Judge a member. A failure shows its scene."""
     print(json.dumps(hostile.scene(seed)))
     record(member(seed))

@@ -17,7 +17,7 @@ from repro.fem.outline import FREE, TOP, Outline, polygon
 from repro.fem.sizing import ACROSS_FILM
 from repro.fem.space import Space
 from repro.march import midpoint, simulation, stepping
-from repro.march.loop import Instant
+from repro.march.loop import Report
 from repro.model import contact, flow, growth, pore, remeshing
 from repro.model.contact_lines import CLOSE, Clearance, lines_of
 from repro.scene import Scene
@@ -32,31 +32,31 @@ CLOSING = 0.4
 FILM = ('pore.width="20 um"', 'aggregate.radius="17.6 um"', 'growth.end="1 h"')
 
 
-def remeshing_always(made: Scene) -> Iterator[Instant]:
+def remeshing_always(scene: Scene) -> Iterator[Report]:
     """A run each of whose steps ends with a new mesh, from which the next one goes on."""
-    pair = next(simulation.steps(made))
+    pair = next(simulation.steps(scene))
     while pair:
         state, instant = pair
         yield instant
-        pair = next((later for later in simulation.steps(made, state) if later[1] and later[1].ledgers), None)
+        pair = next((later for later in simulation.steps(scene, state) if later[1] and later[1].ledgers), None)
         if pair and pair[1].remeshes == 0:
-            pair = _on_a_new_mesh(made, *pair)
+            pair = _on_a_new_mesh(scene, *pair)
 
 
-def _on_a_new_mesh(made: Scene, state, instant: Instant):
+def _on_a_new_mesh(scene: Scene, state, instant: Report):
     """The same step, its pore and what is solved there on a new mesh."""
-    now, speed = instant.pore, instant.solved.flow.mean_velocity
-    fresh, _ = remeshing.remesh(made, now, now, speed)
+    old, speed = instant.pore, instant.solved.flow.mean_velocity
+    fresh, _ = remeshing.remesh(scene, old, old, speed)
     last = replace(instant.ledgers[-1], biomass_after=fresh.mass)
-    there, solved = hard.solved_in(made, fresh)
-    again = replace(instant, pore=there, solved=solved, ledgers=(*instant.ledgers[:-1], last), remeshes=1)
+    solved_pore, solved = hard.solved_in(scene, fresh)
+    again = replace(instant, pore=solved_pore, solved=solved, ledgers=(*instant.ledgers[:-1], last), remeshes=1)
     return replace(state, pore=fresh), again
 
 
-def landings(found: Run) -> list[tuple[float, float]]:
+def landings(run: Run) -> list[tuple[float, float]]:
     """The films (um) before and after each step that makes contact, which is made again."""
-    ends = [instant for instant in found.instants if instant.ledgers or instant.pore.time == 0]
-    return [midpoint.attempt(found.scene, a.pore, a.solved, b.pore.time - a.pore.time).gaps
+    ends = [instant for instant in run.instants if instant.ledgers or instant.pore.time == 0]
+    return [midpoint.attempt(run.scene, a.pore, a.solved, b.pore.time - a.pore.time).gaps
             for a, b in pairwise(ends) if b.pore.contact and not a.pore.contact]
 
 
@@ -65,40 +65,40 @@ def landings(found: Run) -> list[tuple[float, float]]:
 LATE = {"midpoint": (0.0, ""), "updates": (1.0, ", and 12 min between updates")}
 
 
-def film_closes(preset: str, way: Callable) -> Iterator:
+def film_closes(preset: str, simulator: Callable) -> Iterator:
     """From a film of 2.4 um through contact; way: how the scene is run."""
-    found = hard.ran(hard.scene("wide", preset, *FILM), way, density=CLOSING)
+    run = hard.run_scene(hard.load("wide", preset, *FILM), simulator, density=CLOSING)
     fine = hard.reference("wide", *FILM, 'output.times=["1 h"]')
-    yield found, contact_rests(found)
-    yield hard.close(found, fine, preset, "aggregate_area_um2", *EFFLUENTS)
-    yield _edge_wide(found, fine, preset)
-    if found.scene.numerics.time == "midpoint":
-        least = found.scene.growth.minimum_film
-        thinnest = min((after / least for _, after in landings(found)), default=0.0)
+    yield run, contact_rests(run)
+    yield hard.close(run, fine, preset, "aggregate_area_um2", *EFFLUENTS)
+    yield _edge_wide(run, fine, preset)
+    if run.scene.numerics.time == "midpoint":
+        least = run.scene.growth.minimum_film
+        thinnest = min((after / least for _, after in landings(run)), default=0.0)
         yield between("film when it closes over the least that stays", thinnest, stepping.LANDED, 1.0,
                       "a step ends where the film is first too thin: stepping.LANDED")
 
 
-def _edge_wide(found: Run, fine: Run, preset: str) -> Iterator:
+def _edge_wide(computed: Run, fine: Run, preset: str) -> Iterator:
     """Nodes join a wall one by one: each end of the contact surface is known to an edge of the interface, h.
 
     The surface's length c is then known to 2 h; and where a shape update comes late, when the film is thinner by d than
     it may be, c is longer by that of the chord at the depth d of a circle, (8 R d)^1/2. Of the loss of head, that of
     L K_clean / K um of clean channel, lambda dc is changed by dc; and a film closed over dc more adds dc film / 2 to
     each side of a plug W high."""
-    width, ratio = found.scene.pore.width, found.scene.flow.viscosity_ratio
-    film = found.scene.growth.minimum_film
-    edge = film / ACROSS_FILM / found.scene.numerics.refinement
-    loss = found.scene.pore.length * hard.clean_conductivity(found.scene) / fine.last[DRIVE[0]]
-    ours, theirs = (_contact_length(run.end.pore.outline) for run in (found, fine))
-    fall = -np.diff([width - line["thickness_um"] for line in found.rows if not line["contact"]]).min(initial=0.0)
-    share, late = LATE[found.scene.numerics.time]
+    width, ratio = computed.scene.pore.width, computed.scene.flow.viscosity_ratio
+    film = computed.scene.growth.minimum_film
+    edge = film / ACROSS_FILM / computed.scene.numerics.refinement
+    loss = computed.scene.pore.length * hard.clean_conductivity(computed.scene) / fine.last[DRIVE[0]]
+    surface_length, expected = (_contact_length(run.end.pore.outline) for run in (computed, fine))
+    fall = -np.diff([width - line["thickness_um"] for line in computed.rows if not line["contact"]]).min(initial=0.0)
+    share, late = LATE[computed.scene.numerics.time]
     known = 2 * edge + share * np.sqrt(8 * width * fall)
-    yield at_most("length of the contact surface against a finer run, um", abs(ours - theirs), known,
+    yield at_most("length of the contact surface against a finer run, um", abs(surface_length - expected), known,
                   f"an edge of the interface at each end{late}")
     tips = {tip: known * film / width / 2 / abs(fine.last[tip]) for tip in SHAPE[2:]}
     for name, more in {DRIVE[0]: known * ratio / loss, **tips}.items():
-        yield hard.close(found, fine, preset, name, allowed=TOLERANCE[preset] + more)
+        yield hard.close(computed, fine, preset, name, allowed=TOLERANCE[preset] + more)
 
 
 def _contact_length(shape: Outline) -> float:
@@ -106,13 +106,13 @@ def _contact_length(shape: Outline) -> float:
     return np.ptp(shape.points[shape.wall == TOP, 0]) if (shape.wall == TOP).any() else 0.0
 
 
-def contact_rests(found: Run) -> list[Check]:
+def contact_rests(run: Run) -> list[Check]:
     """What holds at every instant of a run through contact."""
-    width = found.scene.pore.width
-    film = found.scene.growth.minimum_film
-    angle = found.scene.growth.minimum_contact_angle
-    shapes = [i.pore.outline for i in found.instants]
-    before = [width - i.pore.outline.thickness for i in found.instants if not i.pore.contact]
+    width = run.scene.pore.width
+    film = run.scene.growth.minimum_film
+    angle = run.scene.growth.minimum_contact_angle
+    shapes = [i.pore.outline for i in run.instants]
+    before = [width - i.pore.outline.thickness for i in run.instants if not i.pore.contact]
     joins = [_closing(shape, width, film, angle) for shape in shapes]
     crossed = [shape.points[:, 1].max() > width or shape.points[:, 1].min() < 0 for shape in shapes]
     return [at_most("films or wedges that should have closed", sum(joins), 0, "contact rests (2.3.3)"),
@@ -139,8 +139,8 @@ CONTACT = HardCase(
     7, "contact", "Film of 2 um and contact, with remeshing forced just before and after",
     "The same shape and flow with and without forced remeshes, no film under 2 um left, the area that of the biomass",
     "A film that is passed over in one step, overlaps the wall, or a remesh that moves the contact",
-    {"as it comes": partial(film_closes, way=simulation.simulate),
-     "remeshed at every step": partial(film_closes, way=remeshing_always)},
+    {"as it comes": partial(film_closes, simulator=simulation.simulate),
+     "remeshed at every step": partial(film_closes, simulator=remeshing_always)},
     mutants=("hard-contact-passed-over",))
 
 
@@ -157,7 +157,7 @@ def wedge(angle: float, geometry: int) -> Outline:
 
 def least_angle(preset: str) -> list:
     """The stage alone: what joins the wall a tenth of a degree under and over the least angle, to both sides."""
-    kind = hard.scene("wide", preset).numerics.geometry
+    kind = hard.load("wide", preset).numerics.geometry
     under, over = (_sides(wedge(angle, kind)) for angle in (LEAST - 0.1, LEAST + 0.1))
     return [at_least("sides that join, a tenth of a degree under", sum(under), 2, "2.3.3: the wedge closes"),
             at_most("sides that join, a tenth of a degree over", sum(over), 0, "2.3.3: it stays")]
@@ -176,24 +176,24 @@ def _sides(shape: Outline) -> list[bool]:
 
 def in_a_wedge(preset: str) -> list:
     """The stage alone: a mesh around a plug with sides at the least angle, and the flow through it."""
-    own, fine = (_loss(hard.scene("wide", which, 'pore.width="20 um"', *more))
-                 for which, more in ((preset, ()), ("accurate", ("numerics.refinement=1",))))
-    return [at_most("head loss against a finer mesh", abs(own / fine - 1), 3 * TOLERANCE[preset],
+    loss, fine = (_loss(hard.load("wide", name, 'pore.width="20 um"', *more))
+                 for name, more in ((preset, ()), ("accurate", ("numerics.refinement=1",))))
+    return [at_most("head loss against a finer mesh", abs(loss / fine - 1), 3 * TOLERANCE[preset],
                     "that of velocity, times three: the loss is lambda h^-3")]
 
 
-def _loss(made: Scene) -> float:
+def _loss(scene: Scene) -> float:
     """Loss over the meshed part, 1/um."""
-    grid, _ = pore.generate(made, wedge(LEAST, made.numerics.geometry))
-    return flow.unit_flow(Space(grid, made.numerics.order), made.flow.viscosity_ratio).loss
+    grid, _ = pore.generate(scene, wedge(LEAST, scene.numerics.geometry))
+    return flow.unit_flow(Space(grid, scene.numerics.order), scene.flow.viscosity_ratio).loss
 
 
 def wedges_close(preset: str) -> list:
     """From contact on until wedges beside it close one after the other."""
-    found = hard.run("wide", preset, 'pore.width="20 um"', 'aggregate.radius="17.9 um"', 'growth.end="4 h"',
+    run = hard.run_packaged("wide", preset, 'pore.width="20 um"', 'aggregate.radius="17.9 um"', 'growth.end="4 h"',
                        density=CLOSING)
-    lengths = [_contact_length(i.pore.outline) for i in found.instants if i.pore.contact]
-    return [found, contact_rests(found),
+    lengths = [_contact_length(i.pore.outline) for i in run.instants if i.pore.contact]
+    return [run, contact_rests(run),
             at_least("length of the contact surface at the end, over that at first", lengths[-1] / lengths[0], 1.5,
                      "nodes never leave; else less is tested"),
             at_most("um by which it ever shrinks", max(0.0, -np.diff(lengths).min(initial=0.0)), 0.5,
@@ -211,11 +211,11 @@ ANGLE = HardCase(
 def tight(preset: str, radius: float, end: str) -> list:
     """Base with a seed nearly as wide as its pore of 50 um."""
     changes = (f'aggregate.radius="{radius} um"', f'growth.end="{end}"', f'output.times=["{end}"]')
-    found = hard.run("base", preset, *changes, density=CLOSING)
+    run = hard.run_packaged("base", preset, *changes, density=CLOSING)
     frozen, _, checks = hard.against("base", preset, (*FIXED, changes[0]), *DRIVE, *EFFLUENTS)
-    clean = hard.clean_conductivity(found.scene)
-    return [found, checks,
-            between("conductivity over that of the clean pore", found.last[DRIVE[0]] / clean, 1e-5,
+    clean = hard.clean_conductivity(run.scene)
+    return [run, checks,
+            between("conductivity over that of the clean pore", run.last[DRIVE[0]] / clean, 1e-5,
                     frozen.last[DRIVE[0]] / clean, "falls as the aggregate grows, and lambda is 2000")]
 
 
@@ -234,7 +234,7 @@ def forced(preset: str, seed: int) -> Iterator:
     width = random.uniform(25.0, 100.0)
     changes = (f'pore.width="{width} um"', f'aggregate.radius="{width - 3} um"', 'growth.end="0.4 h"',
                f'flow.mean_velocity="{random.uniform(0.5, 5.0)} m/day"', 'output.times=["0.4 h"]')
-    pushed, free = (hard.run("wide", preset, *changes, f'growth.fluid_forces="{word}"', density=CLOSING)
+    pushed, free = (hard.run_packaged("wide", preset, *changes, f'growth.fluid_forces="{word}"', density=CLOSING)
                     for word in ("included", "neglected"))
     yield pushed, contact_rests(pushed)
     yield hard.close(pushed, free, preset, "aggregate_area_um2", *EFFLUENTS)
@@ -253,11 +253,11 @@ FORCED = HardCase(
 def to_the_end(preset: str) -> list:
     """A pore that is 90 um long, 30 um wide: the aggregate grows to its upstream end."""
     changes = ('pore.width="30 um"', 'pore.length="90 um"', 'aggregate.radius="25 um"', 'growth.end="60 h"')
-    found = hard.run("wide", preset, *changes, density=CLOSING)
-    ends = np.array([i.pore.mesh.ends for i in found.instants])
-    upstream, downstream = (found.column(name) for name in SHAPE[2:])
+    run = hard.run_packaged("wide", preset, *changes, density=CLOSING)
+    ends = np.array([i.pore.mesh.ends for i in run.instants])
+    upstream, downstream = (run.column(name) for name in SHAPE[2:])
     beyond = max(0.0, largest([upstream, downstream, *ends.T]) - 45)
-    return [found, at_most("runs that did not say that the pore's end is reached", not found.ended, 0, "PoreEnd"),
+    return [run, at_most("runs that did not say that the pore's end is reached", not run.ended, 0, "PoreEnd"),
             at_most("um of mesh or aggregate beyond the pore", beyond, 0, "3.1: capped"),
             at_most("um of pore left without mesh", 45 - np.abs(ends[-1]).min(), 0, "1.5 W is past both ends"),
             at_most("um between the aggregate and the end, at the end", 45 - max(-upstream[-1], downstream[-1]),
@@ -278,23 +278,23 @@ UPDATE = {1: 1.25, 2: np.inf}
 
 def seed(preset: str) -> tuple[Supported, np.ndarray]:
     """A half-disc of 20 um on a wall, and nodes of its free rim."""
-    now = pore.seeded(hard.scene("wide", preset, f'aggregate.radius="{RADIUS} um"'))
-    return bodies.on_wall(now.mesh, now.space.order, now.outline)
+    start = pore.seeded(hard.load("wide", preset, f'aggregate.radius="{RADIUS} um"'))
+    return bodies.on_wall(start.mesh, start.space.order, start.outline)
 
 
-def grown(held: Supported, theta: np.ndarray) -> growth.Equilibrium:
+def grown(body: Supported, theta: np.ndarray) -> growth.Equilibrium:
     """The half-disc under theta at its nodes (n,); on straight triangles the mean of their corners."""
-    return bodies.grown(held, theta[held.cells] @ held.shape.table.values.T, factor=UPDATE[held.geometry])
+    return bodies.grow(body, theta[body.cells] @ body.shape.table.values.T, factor=UPDATE[body.geometry])
 
 
 def even(preset: str, theta: float) -> list[Check]:
     """Uniform theta: x = theta^1/2 X, and one pressure."""
-    held, _ = seed(preset)
-    found = grown(held, np.full(len(held.reference), theta))
+    body, _ = seed(preset)
+    solution = grown(body, np.full(len(body.reference), theta))
     push = neo_hookean.free_growth_pressure(theta)
-    apart = largest(found.position / np.sqrt(theta) - held.reference) / RADIUS
+    apart = largest(solution.position / np.sqrt(theta) - body.reference) / RADIUS
     return [at_most(f"places against theta^1/2 X, theta = {theta:g}, over the radius", apart, 1e-8, "exact; round-off"),
-            at_most("pressure against the closed form", largest(found.pressure / push - 1), 1e-6, "as above")]
+            at_most("pressure against the closed form", largest(solution.pressure / push - 1), 1e-6, "as above")]
 
 
 #: A bound over that of interpolation: two for the pressure, and the paper's stabilisation errs as much again.
@@ -306,32 +306,33 @@ def uneven(preset: str, inner: float, outer: float, pressed: bool = False) -> It
     of interpolation times the root of the ratio of moduli, which go as theta^(-2/3), and two for the pressure; the
     paper's stabilisation errs as much again, in the same order. pressed: the pressure too, outside of the middle
     quarter, where linear functions of R meet."""
-    held, rim = seed(preset)
+    body, rim = seed(preset)
     exact = HalfCylinder(inner, outer)
-    theta = exact.theta(*held.reference.T)
-    found = grown(held, theta)
+    theta = exact.theta(*body.reference.T)
+    solution = grown(body, theta)
     size, contrast = exact.radius(RADIUS), max(inner / outer, outer / inner)
-    places, interpolated = (_off(held, field, exact) for field in (found.position, exact.place(*held.reference.T)))
-    bound = CEA[held.geometry] * contrast ** (1 / 3) * interpolated / size
-    J, wanted = held.strained(found.position).J, theta[held.cells] @ held.shape.table.values.T
-    area = np.sum(held.at.dx * J) / np.sum(held.at.dx * wanted)
-    told, origin = f"theta from {inner:.3g} to {outer:.3g}", "Cea: that of interpolation, times contrast^(1/3)"
-    yield at_most(f"area against the integral of theta, {told}", abs(area - 1), 1e-8, "J = theta in the mean")
-    yield at_most(f"places in the mean over the radius, {told}", places / size, bound, origin)
-    yield at_most(f"radius of the rim, {told}", largest(np.hypot(*found.position[rim].T) / size - 1), bound, origin)
+    places = _rms_error(body, solution.position, exact)
+    interpolated = _rms_error(body, exact.place(*body.reference.T), exact)
+    bound = CEA[body.geometry] * contrast ** (1 / 3) * interpolated / size
+    J, expected = body.strained(solution.position).J, theta[body.cells] @ body.shape.table.values.T
+    area = np.sum(body.at.dx * J) / np.sum(body.at.dx * expected)
+    span, origin = f"theta from {inner:.3g} to {outer:.3g}", "Cea: that of interpolation, times contrast^(1/3)"
+    yield at_most(f"area against the integral of theta, {span}", abs(area - 1), 1e-8, "J = theta in the mean")
+    yield at_most(f"places in the mean over the radius, {span}", places / size, bound, origin)
+    yield at_most(f"radius of the rim, {span}", largest(np.hypot(*solution.position[rim].T) / size - 1), bound, origin)
     if pressed:
-        corners = held.reference[: held.corners]
+        corners = body.reference[: body.corners]
         far = np.hypot(*corners.T) > RADIUS / 4
         push = exact.pressure(*corners[far].T)
-        wrong = np.linalg.norm(found.pressure[far] - push) / np.linalg.norm(push)
+        wrong = np.linalg.norm(solution.pressure[far] - push) / np.linalg.norm(push)
         yield at_most("pressure outside of R_0 / 4, root of mean squares", wrong, PRESSURE[preset],
                       "[E6]; first order at least: half of h / R")
 
 
-def _off(held: Supported, places: np.ndarray, exact: HalfCylinder) -> float:
+def _rms_error(body: Supported, places: np.ndarray, exact: HalfCylinder) -> float:
     """Root mean square (um) over t = 0 of the error of places (n, 2)."""
-    where, weight, of = bodies.integrated(held)
-    gap = of.values @ places[held.cells] - exact.place(*np.moveaxis(where, 2, 0))
+    where, weight, table = bodies.norm_points(body)
+    gap = table.values @ places[body.cells] - exact.place(*np.moveaxis(where, 2, 0))
     return np.sqrt(np.sum(weight[..., None] * gap**2) / weight.sum())
 
 
@@ -356,31 +357,32 @@ UNEVEN = HardCase(
 def still_water(preset: str, *changes: str) -> Run:
     """A run in which diffusion holds the supply everywhere; what enters is then a small difference of large fluxes, and
     its balance says nothing."""
-    made = hard.scene("wide", preset, 'aggregate.radius="20 um"', *changes)
-    return hard.ran(runs.supplied_everywhere(made), balance=None)
+    scene = hard.load("wide", preset, 'aggregate.radius="20 um"', *changes)
+    return hard.run_scene(runs.supplied_everywhere(scene), balance=None)
 
 
 def one_step(preset: str) -> list:
     """A step of 3 h where rates are constant: the mass is exact however long the step, and a half-disc keeps its
     shape."""
-    found = still_water(preset, 'growth.end="3 h"', 'growth.time_step="3 h"')
-    wanted = runs.mass_after(found.scene, found.last["time_h"])
-    area, thickness = (found.over_first(name)[-1] for name in SHAPE[:2])
-    return [found,
-            at_most("area against exp-growing mass, relative", abs(area / wanted - 1), 1e-6, "C to 1e-7 of the supply"),
-            at_most("thickness against the root of it, relative", abs(thickness / np.sqrt(wanted) - 1), 1e-4,
+    run = still_water(preset, 'growth.end="3 h"', 'growth.time_step="3 h"')
+    expected = runs.mass_after(run.scene, run.last["time_h"])
+    area, thickness = (run.over_first(name)[-1] for name in SHAPE[:2])
+    return [run,
+            at_most("area against exp-growing mass, relative", abs(area / expected - 1), 1e-6,
+                    "C to 1e-7 of the supply"),
+            at_most("thickness against the root of it, relative", abs(thickness / np.sqrt(expected) - 1), 1e-4,
                     "uniform growth keeps the shape; arcs are parabolas"),
-            at_most("steps", sum(len(each.ledgers) for each in found.instants), 1, "the one step that is asked for")]
+            at_most("steps", sum(len(each.ledgers) for each in run.instants), 1, "the one step that is asked for")]
 
 
 def long_steps(preset: str) -> list:
     """Base from 25 um in one step of 3 h, or what the midpoint rule makes of it."""
     changes = ('aggregate.radius="25 um"', 'growth.end="3 h"', 'output.times=["3 h"]')
-    found = hard.run("base", preset, *changes, 'growth.time_step="3 h"')
+    run = hard.run_packaged("base", preset, *changes, 'growth.time_step="3 h"')
     fine = hard.reference("base", *changes)
-    late = UPDATES[found.scene.numerics.time]
-    return [found, hard.close(found, fine, preset, *SHAPE),
-            hard.close(found, fine, preset, *DRIVE, allowed=TOLERANCE[preset] + late)]
+    late = UPDATES[run.scene.numerics.time]
+    return [run, hard.close(run, fine, preset, *SHAPE),
+            hard.close(run, fine, preset, *DRIVE, allowed=TOLERANCE[preset] + late)]
 
 
 #: Half the step changes u by 0.2 %: updates of 12 min are 0.4 % off, of 3 h fifteen times as much.
@@ -395,23 +397,23 @@ LONG = HardCase(
 
 def decay(preset: str) -> Iterator:
     """Without donor, 2000 h: 0.2 + 0.8 exp(-b m_A t)."""
-    found = still_water(preset, 'substrates.donor.supply="0 mg/L"', 'growth.end="2000 h"', 'growth.time_step="50 h"',
+    run = still_water(preset, 'substrates.donor.supply="0 mg/L"', 'growth.end="2000 h"', 'growth.time_step="50 h"',
                         'output.times=["200 h", "1000 h", "2000 h"]')
-    area = found.over_first()
-    yield found
-    for time, left in zip(found.column("time_h")[1:], area[1:]):
+    area = run.over_first()
+    yield run
+    for time, left in zip(run.column("time_h")[1:], area[1:]):
         yield at_most(f"area over 0.2 + 0.8 exp(-b m_A t) at {time:g} h, less one",
-                      abs(left / runs.mass_after(found.scene, time) - 1), 1e-6, "C to 1e-7 of the supply")
+                      abs(left / runs.mass_after(run.scene, time) - 1), 1e-6, "C to 1e-7 of the supply")
     yield at_least("least area over that of the seed", area.min(), 0.2, "1 - f_d is never degraded")
 
 
 def starving(preset: str) -> list:
     """Without donor in the wide pore, with the paper's diffusivities: between decay at the least C_A and the supply."""
-    found = hard.run("wide", preset, 'aggregate.radius="20 um"', 'substrates.donor.supply="0 mg/L"',
+    run = hard.run_packaged("wide", preset, 'aggregate.radius="20 um"', 'substrates.donor.supply="0 mg/L"',
                        'growth.end="200 h"', 'growth.time_step="20 h"', 'output.times=["100 h", "200 h"]')
-    least = found.column("acceptor_min_mg_per_L").min()
-    low, high = (runs.mass_after(found.scene, 200, acceptor) for acceptor in (None, least))
-    return [found, between("area over that of the seed", found.over_first()[-1], low * (1 - 1e-6), high * (1 + 1e-6),
+    least = run.column("acceptor_min_mg_per_L").min()
+    low, high = (runs.mass_after(run.scene, 200, acceptor) for acceptor in (None, least))
+    return [run, between("area over that of the seed", run.over_first()[-1], low * (1 - 1e-6), high * (1 + 1e-6),
                            "decay at the supply and at the least C_A")]
 
 

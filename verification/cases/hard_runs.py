@@ -15,7 +15,7 @@ from repro.fem.mesh import POOR, POOR_ALLOWED, Mesh
 from repro.fem.outline import FREE, half_disc
 from repro.fem.space import Space
 from repro.march import midpoint
-from repro.march.loop import Step
+from repro.march.loop import StepResult
 from repro.model import biomass, flow, pore, remeshing
 from repro.model.pore import Pore
 from repro.scene import Scene, parse_scene, scene_tables
@@ -31,42 +31,42 @@ FIFTY = 50
 
 def remeshes(preset: str) -> list:
     """Fifty new meshes, of sizes that change by a third, around the aggregate of base at 4 h; then a step."""
-    found = hard.run("base", preset, 'aggregate.radius="20 um"', 'growth.end="4 h"', 'output.times=["4 h"]')
-    made = found.scene
-    first, speed = found.instants[-1].pore, found.instants[-1].solved.flow.mean_velocity
-    now = first
-    for which in range(FIFTY):
-        finer = replace(made.numerics, refinement=made.numerics.refinement * (0.85, 1.0, 1.15)[which % 3])
-        now, _ = remeshing.remesh(replace(made, numerics=finer), now, now, speed)
-    without, after = (_numbers(made, _step(made, start).pore) for start in (first, now))
-    return [found, *_kept(first, now),
+    run = hard.run_packaged("base", preset, 'aggregate.radius="20 um"', 'growth.end="4 h"', 'output.times=["4 h"]')
+    original = run.scene
+    first, speed = run.instants[-1].pore, run.instants[-1].solved.flow.mean_velocity
+    last = first
+    for index in range(FIFTY):
+        finer = replace(original.numerics, refinement=original.numerics.refinement * (0.85, 1.0, 1.15)[index % 3])
+        last, _ = remeshing.remesh(replace(original, numerics=finer), last, last, speed)
+    without, after = (_numbers(original, _step(original, start).pore) for start in (first, last))
+    return [run, *_conserved(first, last),
             *hard.alike("after a step more, with and without them", NAMES, after, without, preset)]
 
 
-def _kept(first: Pore, now: Pore) -> list[Check]:
+def _conserved(first: Pore, last: Pore) -> list[Check]:
     before, after = (biomass.at_nodes(one.space, one.inert / (one.active + one.inert))[one.mesh.body]
-                     for one in (first, now))
+                     for one in (first, last))
     beyond = max(before.min() - after.min(), after.max() - before.max(), 0.0) / np.ptp(before)
-    return [at_most("area, relative change", abs(now.outline.area / first.outline.area - 1), 1e-10,
+    return [at_most("area, relative change", abs(last.outline.area / first.outline.area - 1), 1e-10,
                     "outlines are split on themselves"),
-            at_most("biomass, relative change", abs(now.mass / first.mass - 1), 1e-8, "the transfer conserves it"),
-            at_most("X_I, relative change", abs(now.inert.sum() / first.inert.sum() - 1), 1e-8, "as above"),
+            at_most("biomass, relative change", abs(last.mass / first.mass - 1), 1e-8, "the transfer conserves it"),
+            at_most("X_I, relative change", abs(last.inert.sum() / first.inert.sum() - 1), 1e-8, "as above"),
             at_most("share of X_I beyond where it was, over its range", beyond, 0.05,
                     "projection overshoots by a part of a jump that there is not")]
 
 
-def _step(made: Scene, now: Pore):
+def _step(scene: Scene, start: Pore):
     """A step of 12 min."""
-    return midpoint.attempt(made, *hard.solved_in(made, now), 0.2).step
+    return midpoint.attempt(scene, *hard.solved_in(scene, start), 0.2).step
 
 
 NAMES = ("area", "thickness", "upstream tip", "conductivity")
 
 
-def _numbers(made: Scene, now: Pore) -> list[float]:
+def _numbers(scene: Scene, state: Pore) -> list[float]:
     """What NAMES say."""
-    shape = now.outline
-    return [shape.area, shape.thickness, shape.upstream, pore.solve_flow(made, now.space).conductivity]
+    shape = state.outline
+    return [shape.area, shape.thickness, shape.upstream, pore.solve_flow(scene, state.space).conductivity]
 
 
 REMESHES = HardCase(
@@ -79,10 +79,10 @@ REMESHES = HardCase(
 
 def cocircular(preset: str) -> list:
     """Outlines whose nodes are on a circle up to 1e-15, 1e-12, 1e-9, 1e-6 of its radius."""
-    made = hard.scene("base", preset)
-    checks, (_, exact) = [], _meshed(made, 0.0)
+    scene = hard.load("base", preset)
+    checks, (_, exact) = [], _mesh_and_loss(scene, 0.0)
     for size in (1e-15, 1e-12, 1e-9, 1e-6):
-        grid, loss = _meshed(made, size)
+        grid, loss = _mesh_and_loss(scene, size)
         corners = grid.straight
         covered = corners.areas.sum() / (corners.width * np.ptp(corners.ends))
         checks += [at_most(f"area covered, noise {size:g}", abs(covered - 1), 1e-12, "round-off"),
@@ -91,14 +91,14 @@ def cocircular(preset: str) -> list:
     return checks
 
 
-def _meshed(made: Scene, noise: float) -> tuple[Mesh, float]:
+def _mesh_and_loss(scene: Scene, noise: float) -> tuple[Mesh, float]:
     """(mesh, head loss) around a half-disc of 20 um with noise on its nodes."""
-    numerics = made.numerics
+    numerics = scene.numerics
     shape = half_disc(20.0, sizing.ACROSS_AGGREGATE * numerics.refinement, numerics.geometry)
     free = shape.wall == FREE
     points = shape.points.copy()
     points[free] += 20.0 * noise * np.random.default_rng(7).uniform(-1, 1, (free.sum(), 2))
-    grid, _ = pore.generate(made, replace(shape, points=points))
+    grid, _ = pore.generate(scene, replace(shape, points=points))
     return grid, flow.unit_flow(Space(grid, numerics.order), 2000.0).loss
 
 
@@ -108,8 +108,8 @@ TRANSFER = {1: transfer.project, 2: transfer.interpolated}
 
 def nearly_same(preset: str) -> list:
     """The transfer between meshes whose nodes agree up to 1e-15 and 1e-12: pieces without area, nodes on edges."""
-    made = hard.scene("base", preset, 'aggregate.radius="20 um"')
-    grid = pore.seeded(made).mesh
+    scene = hard.load("base", preset, 'aggregate.radius="20 um"')
+    grid = pore.seeded(scene).mesh
     places, cells = grid.points[grid.body], grid.topology.body_cells
     field = np.sin(places / 7.0)
     inner = ~np.isin(np.arange(len(places)), grid.topology.body_loop)
@@ -117,9 +117,9 @@ def nearly_same(preset: str) -> list:
     for noise in (0.0, 1e-14, 1e-11, 1e-8):
         other = places.copy()
         other[inner] += noise * random.uniform(-1, 1, (inner.sum(), 2))
-        found = TRANSFER[grid.geometry](places, cells, field, other, cells)
-        checks.append(at_most(f"largest change of a field of size one, noise {noise:g} um", np.abs(found - field).max(),
-                              1e-9 + noise, "the identity, and what the field changes"))
+        carried = TRANSFER[grid.geometry](places, cells, field, other, cells)
+        checks.append(at_most(f"largest change of a field of size one, noise {noise:g} um",
+                              np.abs(carried - field).max(), 1e-9 + noise, "the identity, and what the field changes"))
     return checks
 
 
@@ -133,33 +133,33 @@ COCIRCULAR = HardCase(
 
 def poor(preset: str) -> list:
     """Base from 20 um whose fluid starts with poor triangles: two steps of 12 min against those from a good mesh."""
-    made = hard.scene("base", preset, 'aggregate.radius="20 um"')
-    good, _ = hard.seeded(made)
+    scene = hard.load("base", preset, 'aggregate.radius="20 um"')
+    good, _ = hard.solved_seed(scene)
     bad, count = _spoilt(good)
     ends = []
     for start in (good, bad):
-        first = _step(made, start)
-        second = _step(made, first.pore)
-        ends.append(_numbers(made, second.pore))
+        first = _step(scene, start)
+        second = _step(scene, first.pore)
+        ends.append(_numbers(scene, second.pore))
     return [at_least("poor triangles at the start", count, POOR_ALLOWED + 1, "else less is tested"),
             at_least("remeshed on the way", first.remeshed or second.remeshed, 1, "3.5"),
             *hard.alike("after two steps", NAMES, ends[1], ends[0], preset)]
 
 
-def _spoilt(now: Pore) -> tuple[Pore, int]:
+def _spoilt(good: Pore) -> tuple[Pore, int]:
     """The pore with the fluid's inner nodes moved about as far as no triangle turns over, its edges straight, and its
     poor triangles."""
     random = np.random.default_rng(9)
-    topology = now.mesh.topology
-    straight = now.mesh.straight
+    topology = good.mesh.topology
+    straight = good.mesh.straight
     keep = np.concatenate([straight.body, topology.walls, topology.inlet, topology.outlet])
-    inner = np.setdiff1d(np.arange(now.mesh.corners), keep)
+    inner = np.setdiff1d(np.arange(good.mesh.corners), keep)
     push = np.zeros_like(straight.points)
     push[inner] = random.uniform(-1, 1, (len(inner), 2)) * np.sqrt(Space(straight, 1).lumped()[inner])[:, None]
     for part in 0.9 ** np.arange(60):
-        points = now.mesh.with_middles(straight.points + part * push)
-        points[now.mesh.body] = now.mesh.points[now.mesh.body]
-        moved = now.moved(points)
+        points = good.mesh.with_middles(straight.points + part * push)
+        points[good.mesh.body] = good.mesh.points[good.mesh.body]
+        moved = good.moved(points)
         if moved.mesh.areas.min() > 0.02 * straight.areas.min() and not moved.mesh.turned_over().any():
             return moved, np.count_nonzero(moved.mesh.quality < POOR)
     raise RuntimeError("no such mesh")
@@ -184,10 +184,10 @@ COLUMNS = {
 
 def units(preset: str, length: float, time: float) -> list:
     """Base from 15 um for 2.4 h, in other units."""
-    made = hard.scene("base", preset, 'aggregate.radius="15 um"', 'growth.end="2.4 h"', 'growth.time_step="1.2 h"',
+    scene = hard.load("base", preset, 'aggregate.radius="15 um"', 'growth.end="2.4 h"', 'growth.time_step="1.2 h"',
                         'output.times=["2.4 h"]')
-    there = parse_scene(scene_tables(problems.scaled(made, length, time)), "scaled", "scaled")
-    plain, other = hard.ran(made), hard.ran(there)
+    rescaled = parse_scene(scene_tables(problems.scaled(scene, length, time)), "scaled", "scaled")
+    plain, other = hard.run_scene(scene), hard.run_scene(rescaled)
     exact = np.log2(length) % 1 == 0
     bound, origin = (1e-9, "dimensions; round-off") if exact else (
         TOLERANCE[preset], "round-off makes another mesh; " + hard.PROMISED[preset])
@@ -203,7 +203,7 @@ UNITS = HardCase(
     17, "units", "Extreme units: lengths times 1e6, times times 1e-6",
     "The same numbers times their unit",
     "A length or a time that is written into the code: a tolerance, a smallest step, a size",
-    {told: partial(units, length=length, time=time) for told, (length, time) in SCALES.items()},
+    {label: partial(units, length=length, time=time) for label, (length, time) in SCALES.items()},
     refusable=tuple(SCALES),
     mutants=("length-scale",))
 
@@ -227,7 +227,7 @@ def at_random(preset: str, seed: int) -> list[Run]:
     value["aggregate.radius"] *= value["pore.width"]
     changes = [f'{key}="{value[key]!r} {unit}"' if unit else f"{key}={value[key]!r}"
                for key, (unit, _, _) in RANGES.items()]
-    return [hard.run("wide", preset, *changes, f'output.times=["{value["growth.end"]!r} h"]', density=CLOSING)]
+    return [hard.run_packaged("wide", preset, *changes, f'output.times=["{value["growth.end"]!r} h"]', density=CLOSING)]
 
 
 DRAWS = range(10)
@@ -239,19 +239,19 @@ RANDOM = HardCase(
     refusable=tuple(f"draw {seed}" for seed in DRAWS),
     mutants=("reprojection-left-out",))
 
-def seeded(preset: str, name: str, radius: float, end: str) -> list:
+def grow_seed(preset: str, name: str, radius: float, end: str) -> list:
     """Growth from a seed between the exponentials at its least concentrations and at the supply."""
     changes = (f'aggregate.radius="{radius} um"', f'growth.end="{end}"', f'output.times=["{end}"]')
-    found, _, checks = hard.against(name, preset, changes, *SHAPE, *DRIVE)
-    return [*checks, *exponential(found)]
+    run, _, checks = hard.against(name, preset, changes, *SHAPE, *DRIVE)
+    return [*checks, *exponential(run)]
 
 
 SEEDS = HardCase(
     14, "seeds", "Seeds of 0.5 and 20 um",
     "Growth between the exponentials at the least concentrations and at the supply, and a finer run's shape",
     "Elements of a seed that is 1/200 of the pore, or a seed that is starved at once",
-    {"0.5 um in 100 um": partial(seeded, name="wide", radius=0.5, end="8 h"),
-     "20 um in 50 um": partial(seeded, name="base", radius=20.0, end="4 h")},
+    {"0.5 um in 100 um": partial(grow_seed, name="wide", radius=0.5, end="8 h"),
+     "20 um in 50 um": partial(grow_seed, name="base", radius=20.0, end="4 h")},
     mutants=("curved-half-of-the-half",))
 
 #: Refinement with which base has 1e5 nodes, and a preset of those elements: fast and accurate differ in the step's
@@ -260,25 +260,25 @@ HUGE = {1: ("paper", 11.4), 2: ("accurate", 5.7), 3: ("cubic", 3.8)}
 
 
 @cache
-def _first_step(preset: str, *changes: str) -> tuple[Run, Step]:
+def _first_step(preset: str, *changes: str) -> tuple[Run, StepResult]:
     """What is solved in the seed of 15 um as a Run, and one step of 6 min from it."""
-    found = hard.run("base", preset, 'aggregate.radius="15 um"', *hard.FIXED, *changes)
-    seed = found.instants[0]
-    return found, problems.step(found.scene, seed.pore, seed.solved, 0.1)
+    run = hard.run_packaged("base", preset, 'aggregate.radius="15 um"', *hard.FIXED, *changes)
+    seed = run.instants[0]
+    return run, problems.step(run.scene, seed.pore, seed.solved, 0.1)
 
 
 def huge(preset: str) -> list:
     """One step of 6 min with 1e5 nodes, against the preset's own mesh."""
-    own, near = _first_step(preset)
-    which, refinement = HUGE[own.scene.numerics.order]
-    fine, far = _first_step(which, f"numerics.refinement={refinement}")
+    run, near = _first_step(preset)
+    fine_preset, refinement = HUGE[run.scene.numerics.order]
+    fine, far = _first_step(fine_preset, f"numerics.refinement={refinement}")
     shapes = [(step.pore.outline.area, step.pore.outline.thickness, step.pore.outline.upstream) for step in (near, far)]
-    return [fine, own, at_least("nodes", fine.instants[0].pore.space.count, 1e5, "else less is tested"),
+    return [fine, run, at_least("nodes", fine.instants[0].pore.space.count, 1e5, "else less is tested"),
             at_most("in - out - consumed over the step, over in", problems.substrate_defect([far.ledger]),
                     1e-12 * fine.last["nodes"], "Newton's tolerance of 1e-12 a row, times the rows"),
             at_most("biomass after - before - made, over after", problems.biomass_defect([far.ledger]),
                     hard.BALANCE, hard.MEAN),
-            *hard.close(own, fine, preset, *DRIVE, *EFFLUENTS),
+            *hard.close(run, fine, preset, *DRIVE, *EFFLUENTS),
             *hard.alike("after the step, own mesh", NAMES, *shapes, preset)]
 
 

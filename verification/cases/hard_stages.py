@@ -34,23 +34,23 @@ def disc(radius: float, *changes: str) -> tuple[str, ...]:
 SLOW = 'flow.mean_velocity="0.35 m/day"'
 
 
-def same_root(found: Run) -> Check:
+def same_root(run: Run) -> Check:
     """Newton's method must come to one solution from above, from zero and from far below zero, where the law of Monod
     has its spurious roots."""
-    solved = found.end.solved
+    solved = run.end.solved
     problem, state = solved.problem, channels.both(solved.concentrations)
     supplies = problem.supply.reshape(2, -1)
     starts = (transport.Concentrations(*(part * supplies)) for part in (0.0, 1.0, -7.6))
-    others = [channels.both(transport.steady(problem, biomass.sink(found.end.pore.active), start)) for start in starts]
+    solutions = [channels.both(transport.steady(problem, biomass.sink(run.end.pore.active), start)) for start in starts]
     return at_most("largest difference of C over the supply, from four starts",
-                   largest((np.array(others) - state) / supplies), 1e-6,
+                   largest((np.array(solutions) - state) / supplies), 1e-6,
                    "uptake is monotone: one solution; Newton's tolerance, times the system's condition")
 
 
 def starved(preset: str, changes: tuple[str, ...]) -> list:
     """A starved half-disc."""
-    found, _, checks = hard.against("wide", preset, changes, *EFFLUENTS)
-    return [checks, same_root(found)]
+    run, _, checks = hard.against("wide", preset, changes, *EFFLUENTS)
+    return [checks, same_root(run)]
 
 
 #: Half-discs that are starved.
@@ -69,27 +69,27 @@ STARVED = HardCase(
 
 def exhausted(preset: str, scarce: str) -> list:
     """One substrate at 10 mg/L, the other at 1000 mg/L; then that at 1e6 mg/L."""
-    def run(plenty: float) -> Run:
-        given = (10.0 if name == scarce else plenty for name in NAMES)
-        return hard.run("wide", preset, *disc(80, SLOW), *supply(*given))
+    def run_with(plenty: float) -> Run:
+        supplies = (10.0 if name == scarce else plenty for name in NAMES)
+        return hard.run_packaged("wide", preset, *disc(80, SLOW), *supply(*supplies))
 
-    found, more = run(1000.0), run(1e6)
+    run, more = run_with(1000.0), run_with(1e6)
     column = f"effluent_{scarce}_mg_per_L"
-    return [found, _stoichiometry(found),
-            at_most(f"least {scarce} over its supply", found.last[f"{scarce}_min_mg_per_L"] / 10, 0.02,
+    return [run, _stoichiometry(run),
+            at_most(f"least {scarce} over its supply", run.last[f"{scarce}_min_mg_per_L"] / 10, 0.02,
                     "else less is tested"),
             at_most(f"{column}: 1000 mg/L of the other for 1e6, over the supply",
-                    abs(found.last[column] - more.last[column]) / 10, 2e-3,
+                    abs(run.last[column] - more.last[column]) / 10, 2e-3,
                     "the other's m is 0.997 or more: uptake changes by less, and so does what leaves")]
 
 
-def _stoichiometry(found: Run) -> list[Check]:
+def _stoichiometry(run: Run) -> list[Check]:
     """(7) less F times (8) is what decay takes, d_c f_d b X m_A, whatever the concentrations."""
-    law, both = found.scene.kinetics, found.scene.substrates
-    acceptor, donor = (flux.consumed for flux in found.end.solved.fluxes)
+    law, both = run.scene.kinetics, run.scene.substrates
+    acceptor, donor = (flux.consumed for flux in run.end.solved.fluxes)
     demand = law.acceptor_to_donor_ratio * donor
-    decay = channels.decay_demand(law) * law.maximum_density * found.last["aggregate_area_um2"]
-    C = found.end.solved.concentrations.acceptor
+    decay = channels.decay_demand(law) * law.maximum_density * run.last["aggregate_area_um2"]
+    C = run.end.solved.concentrations.acceptor
     ends = np.array([max(C.min(), 0.0), C.max()])
     m = ends / (ends + both.acceptor.half_saturation)
     low, high = (acceptor - decay * m[::-1]) / demand
@@ -129,18 +129,18 @@ def slab_front(preset: str) -> list:
     most."""
     size = SIZES[preset]
     end, width = HALF + FILM, 1.5 * size
-    made = hard.scene("wide", preset, *SHARP, 'kinetics.decay_coefficient="0 1/d"',
+    scene = hard.load("wide", preset, *SHARP, 'kinetics.decay_coefficient="0 1/d"',
                         "kinetics.acceptor_to_donor_ratio=1e-9")
-    space = meshes.space_on(meshes.plug((-end, end), width, HALF, size, seed=1), made.numerics.order)
-    donor, depth = made.substrates.donor, DEPTH * HALF
+    space = meshes.space_on(meshes.plug((-end, end), width, HALF, size, seed=1), scene.numerics.order)
+    donor, depth = scene.substrates.donor, DEPTH * HALF
     ratio = donor.diffusivity_in_aggregate / donor.diffusivity
     sink = donor.supply * donor.diffusivity_in_aggregate / (depth**2 / 2 + FILM * ratio * depth)
     bound, origin = size**2 / 8 / (depth**2 / 2 + FILM * depth * 0.8), FRONT
-    problem = transport.problem(space, None, made.substrates, made.kinetics)
-    active = Sink(sink / made.kinetics.maximum_utilization_rate * space.reaction.dx)
+    problem = transport.problem(space, None, scene.substrates, scene.kinetics)
+    active = Sink(sink / scene.kinetics.maximum_utilization_rate * space.reaction.dx)
     state = transport.steady(problem, active)
-    given = (donor.supply, sink, HALF, donor.diffusivity_in_aggregate, FILM, donor.diffusivity)
-    exact = slab.zero_order(space.points[:, 0], *given)
+    parameters = (donor.supply, sink, HALF, donor.diffusivity_in_aggregate, FILM, donor.diffusivity)
+    exact = slab.zero_order(space.points[:, 0], *parameters)
     entering = transport.fluxes(problem, active, state)[1].consumed / (2 * width * sink)
     return [at_most("C_D over the supply, largest error at a node", largest(state.donor - exact) / donor.supply, bound,
                     origin),
@@ -163,17 +163,17 @@ ZERO_ORDER = HardCase(
 
 def saturated(preset: str) -> list:
     """Base with a supply of 1000 K_s: m is one to a few parts in a thousand, growth exponential."""
-    found = hard.run("base", preset, *supply(1000, 1000), 'growth.time_step="0.5 h"', 'output.times=["6 h", "12 h"]',
-                       'growth.end="12 h"')
-    return [found, exponential(found)]
+    run = hard.run_packaged("base", preset, *supply(1000, 1000), 'growth.time_step="0.5 h"',
+                            'output.times=["6 h", "12 h"]', 'growth.end="12 h"')
+    return [run, exponential(run)]
 
 
-def exponential(found: Run) -> list[Check]:
+def exponential(run: Run) -> list[Check]:
     """Biomass over that at the start against (9)-(10) at the supply, and at the least concentrations of the run."""
-    time, scene = found.last["time_h"], found.scene
-    lowest = (found.column(f"{name}_min_mg_per_L").min() for name in NAMES)
+    time, scene = run.last["time_h"], run.scene
+    lowest = (run.column(f"{name}_min_mg_per_L").min() for name in NAMES)
     least, _ = runs.growth_rates(scene.kinetics, scene.substrates, *lowest)
-    return [between("area over that of the seed", found.over_first()[-1], np.exp(least * time),
+    return [between("area over that of the seed", run.over_first()[-1], np.exp(least * time),
                     runs.mass_after(scene, time), "rates at the least C of the run, and at the supply")]
 
 
@@ -194,12 +194,12 @@ def speed(factor: float) -> str:
 
 def fast_flow(preset: str, factor: float) -> list:
     """A half-disc of 60 um that does not grow, and the same at a tenth of the velocity."""
-    slower = hard.run("wide", preset, *disc(60, speed(factor / 10)))
-    found, fine, checks = hard.against("wide", preset, disc(60, speed(factor)), *EFFLUENTS, *DRIVE,
+    slower = hard.run_packaged("wide", preset, *disc(60, speed(factor / 10)))
+    computed, fine, checks = hard.against("wide", preset, disc(60, speed(factor)), *EFFLUENTS, *DRIVE,
                                          refinement=FINER[factor])
-    ours, theirs = (run.end.solved.fluxes[0].consumed for run in (found, fine))
-    return [checks, _more_than(found, slower, preset),
-            at_most("acceptor taken up, against a finer run", abs(ours / theirs - 1), 2 * TOLERANCE[preset],
+    uptake, expected = (run.end.solved.fluxes[0].consumed for run in (computed, fine))
+    return [checks, _more_than(computed, slower, preset),
+            at_most("acceptor taken up, against a finer run", abs(uptake / expected - 1), 2 * TOLERANCE[preset],
                     "that of concentrations at the aggregate, area and rate: twice the preset's")]
 
 
@@ -207,13 +207,13 @@ def fast_flow(preset: str, factor: float) -> list:
 FINER = {1: 1.0, 10: 1.0, 100: 1.5, 1000: 2.8}
 
 
-def _more_than(found: Run, slower: Run, preset: str) -> list[Check]:
+def _more_than(faster: Run, slower: Run, preset: str) -> list[Check]:
     """Uptake between that at a tenth of the velocity and that at the supply everywhere."""
-    law, both = found.scene.kinetics, found.scene.substrates
+    law, both = faster.scene.kinetics, faster.scene.substrates
     m_a, m_d = (s.supply / (s.supply + s.half_saturation) for s in (both.acceptor, both.donor))
-    most = law.maximum_utilization_rate * m_a * m_d * law.maximum_density * found.last["aggregate_area_um2"]
-    taken, before = (run.end.solved.fluxes[1].consumed for run in (found, slower))
-    return [between("donor taken up over what it would be at the supply everywhere", taken / most,
+    most = law.maximum_utilization_rate * m_a * m_d * law.maximum_density * faster.last["aggregate_area_um2"]
+    uptake, before = (run.end.solved.fluxes[1].consumed for run in (faster, slower))
+    return [between("donor taken up over what it would be at the supply everywhere", uptake / most,
                     before / most * (1 - TOLERANCE[preset]), 1.0, "the faster, the more: at least that at a tenth")]
 
 
@@ -235,22 +235,22 @@ FAST = HardCase(
 
 def no_flow(preset: str) -> list:
     """A velocity of zero with substrates has no steady state that the inlet feeds: to run it is wrong."""
-    hard.scene("wide", preset, *FIXED, 'flow.mean_velocity="0 m/day"')
+    hard.load("wide", preset, *FIXED, 'flow.mean_velocity="0 m/day"')
     return [at_most("scenes without a supply that were accepted", 1, 0, "no state is steady")]
 
 
 def still(preset: str) -> list:
     """Without [flow] the supply is held at both ends: what diffuses in is what is taken up."""
-    own, fine = (hard.ran(runs.without_flow(hard.scene("wide", which, *disc(60, *size))))
-                 for which, size in ((preset, ()), ("accurate", ("numerics.refinement=1",))))
-    return [own, hard.close(own, fine, preset, *EFFLUENTS)]
+    computed, fine = (hard.run_scene(runs.without_flow(hard.load("wide", name, *disc(60, *size))))
+                 for name, size in ((preset, ()), ("accurate", ("numerics.refinement=1",))))
+    return [computed, hard.close(computed, fine, preset, *EFFLUENTS)]
 
 
 def trickle(preset: str, velocity: str, balance: float) -> list:
     """So little flow that C is uniform and one substrate is used up: with C_A -> 0 and C_D uniform, (7) and (8) are
     taken up in the ratio F + d_c f_d b / (k m_D), which gives C_D."""
-    found = hard.run("wide", preset, *disc(60, f'flow.mean_velocity="{velocity} m/day"'), balance=balance)
-    law, both = found.scene.kinetics, found.scene.substrates
+    run = hard.run_packaged("wide", preset, *disc(60, f'flow.mean_velocity="{velocity} m/day"'), balance=balance)
+    law, both = run.scene.kinetics, run.scene.substrates
     decay = channels.decay_demand(law)
     K, supply = both.donor.half_saturation, both.donor.supply
 
@@ -258,11 +258,11 @@ def trickle(preset: str, velocity: str, balance: float) -> list:
         ratio = law.acceptor_to_donor_ratio + decay * (c + K) / (law.maximum_utilization_rate * c)
         return both.acceptor.supply - ratio * (supply - c)
 
-    left, u = brentq(missing, 1e-3, supply * (1 - 1e-9)), found.last["mean_velocity_m_per_d"] / M_PER_D
-    peclet = u * found.last["thickness_um"] / both.donor.diffusivity_in_aggregate
-    apart = abs(found.last[EFFLUENTS[1]] - left) / supply
-    return [found,
-            at_most("acceptor leaving, over the supply", found.last[EFFLUENTS[0]] / both.acceptor.supply, peclet,
+    left, u = brentq(missing, 1e-3, supply * (1 - 1e-9)), run.last["mean_velocity_m_per_d"] / M_PER_D
+    peclet = u * run.last["thickness_um"] / both.donor.diffusivity_in_aggregate
+    apart = abs(run.last[EFFLUENTS[1]] - left) / supply
+    return [run,
+            at_most("acceptor leaving, over the supply", run.last[EFFLUENTS[0]] / both.acceptor.supply, peclet,
                     "C varies by u R / D over the aggregate"),
             at_most("donor leaving against the closed form, over the supply", apart, peclet, "as above")]
 
@@ -282,19 +282,20 @@ STILL = HardCase(
 def viscous(preset: str, ratio: float) -> list:
     """A half-disc of 80 um: conductivity against a finer run, at lambda = 1 against Poiseuille's."""
     changes = disc(80, f"flow.viscosity_ratio={ratio!r}")
-    found, _, checks = hard.against("wide", preset, changes, *DRIVE, *EFFLUENTS)
+    run, _, checks = hard.against("wide", preset, changes, *DRIVE, *EFFLUENTS)
     if ratio == 1:
-        apart = abs(found.last[DRIVE[0]] / hard.clean_conductivity(found.scene) - 1)
+        apart = abs(run.last[DRIVE[0]] / hard.clean_conductivity(run.scene) - 1)
         checks.append(hard.promised("conductivity against Poiseuille's", apart, preset))
     return checks
 
 
 def rigid(preset: str) -> list:
     """lambda from 1e5 to 1e9: nothing passes the aggregate any more."""
-    soft, stiff = (hard.run("wide", preset, *disc(80, f"flow.viscosity_ratio={ratio}")) for ratio in (1e5, 1e9))
+    soft, stiff = (hard.run_packaged("wide", preset, *disc(80, f"flow.viscosity_ratio={ratio}"))
+                   for ratio in (1e5, 1e9))
     layers = [layered_channel.gradient(soft.scene.pore.width, 80.0, ratio) for ratio in (1e5, 1e9)]
-    now = stiff.end.pore
-    grid, speed = now.mesh, np.hypot(*now.space.to_mesh(stiff.end.solved.flow.velocity).T)
+    state = stiff.end.pore
+    grid, speed = state.mesh, np.hypot(*state.space.to_mesh(stiff.end.solved.flow.velocity).T)
     through = speed[np.setdiff1d(grid.body, grid.loop)].max()
     return [soft, stiff,
             between("conductivity at 1e9 over that at 1e5", stiff.last[DRIVE[0]] / soft.last[DRIVE[0]],
@@ -312,28 +313,28 @@ def plugged(preset: str, size: float) -> Iterator[Check]:
     """The stage alone: biomass from wall to wall, lambda = 2000, elements of W / 4 and W / 7."""
     grid = meshes.plug(ENDS, WIDTH, PLUG, size, seed=3)
     exact = 12 / WIDTH**2 * (ENDS[1] - ENDS[0] + 1999 * 2 * PLUG)
-    space = meshes.space_on(grid, hard.scene("wide", preset).numerics.order)
-    found = flow.unit_flow(space, 2000.0)
-    flux = meshes.section_means(space, found.velocity[:, 0], SECTIONS, 64)
-    leak, lost, origin = LEAK[size] if space.order == 1 else HELD
-    if found.correction is not None:
-        yield at_most("sources of the velocity that carries, over the flux", _sources(grid, found), 1e-10,
+    space = meshes.space_on(grid, hard.load("wide", preset).numerics.order)
+    solution = flow.unit_flow(space, 2000.0)
+    flux = meshes.section_means(space, solution.velocity[:, 0], SECTIONS, 64)
+    leak, lost, origin = LEAK[size] if space.order == 1 else EXACT
+    if solution.correction is not None:
+        yield at_most("sources of the velocity that carries, over the flux", _sources(grid, solution), 1e-10,
                       "w = u - tau grad p is divergence-free")
     yield at_most("flux through a section against that supplied, largest difference", largest(flux - 1), leak, origin)
-    yield at_most("head loss against Poiseuille's", abs(found.loss / exact - 1), lost, origin)
+    yield at_most("head loss against Poiseuille's", abs(solution.loss / exact - 1), lost, origin)
 
 
 #: Quadratic and cubic velocities hold the parabola.
-HELD = (1e-10, 1e-10, "round-off: the elements hold a parabola")
+EXACT = (1e-10, 1e-10, "round-off: the elements hold a parabola")
 #: What the paper's velocity and head may miss in a plug with elements of so many um: 3.3 and 12.3 % on a coarse mesh,
 #: as was measured, and of second order.
 COARSE = "3.3 and 12.3 % with elements of W / 4, second order"
 LEAK = {12.5: (0.033, 0.123, COARSE), 7.0: (0.033 * 0.56**2, 0.123 * 0.56**2, COARSE)}
 
 
-def _sources(grid, found) -> float:
+def _sources(grid, solution) -> float:
     """Largest |(w, grad N_i)| of a node that is on no boundary, over the flux."""
-    w = found.velocity[grid.triangles].mean(axis=1) - found.correction
+    w = solution.velocity[grid.triangles].mean(axis=1) - solution.correction
     local = grid.areas[:, None] * np.einsum("tai,ti->ta", grid.gradients, w)
     total = np.bincount(grid.triangles.ravel(), local.ravel(), len(grid.points))
     rim = np.concatenate([grid.topology.walls, grid.topology.inlet, grid.topology.outlet])

@@ -70,8 +70,8 @@ def _nodes(straight: Mesh, geometry: int) -> Mesh:
 
 def _error(grid: Mesh, displacement: np.ndarray, gamma: float, nodes=slice(None)) -> float:
     """Largest difference from a displacement (N, 2) over its largest value."""
-    found = moved(grid, grid.points + displacement, gamma) - grid.points
-    return largest((found - displacement)[nodes]) / largest(displacement)
+    computed = moved(grid, grid.points + displacement, gamma) - grid.points
+    return largest((computed - displacement)[nodes]) / largest(displacement)
 
 
 #: Gradients of the places by those before, and what is added to them.
@@ -122,9 +122,9 @@ CEILINGS = {0.01: 3e-3, 0.1: 3e-3, 1.0: 2e-3, 10.0: 1.2e-3}
 @parametrize("geometry", EITHER)
 def test_waves(geometry, record):
     for gamma, ceiling in CEILINGS.items():
-        told = f"gamma = {gamma:g}"
-        record(studies(refine(_wave_error, SIZES, gamma, geometry, told),
-                       {told: (2, "linear elements: second order", ceiling)}))
+        label = f"gamma = {gamma:g}"
+        record(studies(refine(_wave_error, SIZES, gamma, geometry, label),
+                       {label: (2, "linear elements: second order", ceiling)}))
 
 
 def _wave(x, y, gamma: float) -> np.ndarray:
@@ -134,10 +134,10 @@ def _wave(x, y, gamma: float) -> np.ndarray:
     return np.stack([-np.sign(x) * along, across], axis=-1)
 
 
-def _wave_error(size: float, seed: int, gamma: float, geometry: int, told: str) -> dict[str, float]:
+def _wave_error(size: float, seed: int, gamma: float, geometry: int, label: str) -> dict[str, float]:
     grid = _nodes(meshes.plug((-END, END), NARROW, FACE, size, seed=10 * seed + round(size)), geometry)
-    found = moved(grid, grid.points + _wave(*grid.points.T, gamma), gamma) - grid.points
-    return {told: meshes.field_error(Space(grid, geometry), found, lambda x, y: _wave(x, y, gamma), ~grid.biomass)}
+    computed = moved(grid, grid.points + _wave(*grid.points.T, gamma), gamma) - grid.points
+    return {label: meshes.field_error(Space(grid, geometry), computed, lambda x, y: _wave(x, y, gamma), ~grid.biomass)}
 
 
 RADIUS = 25.0
@@ -164,14 +164,16 @@ SEGMENT_MOTIONS = {"grows": lambda x, y: np.array([x, y]), "slides": lambda x, y
 @parametrize("geometry", EITHER)
 def test_half_disc(geometry, record):
     for name, gamma in product(SEGMENT_MOTIONS, GAMMAS):
-        record(_compared(geometry, np.pi / 2, LEVELS, name, gamma, 2,
+        record(_comparison(geometry, np.pi / 2, LEVELS, name, gamma, 2,
                          "linear elements: second order, no singular corner (mirror images)", f"{name}, "))
 
 
-def _compared(geometry: int, contact: float, levels, motion: str, gamma: float, order: float, why: str, name: str = ""):
+def _comparison(geometry: int, contact: float, levels, motion: str, gamma: float, order: float, why: str,
+                name: str = ""):
     """The study of one motion."""
-    found = refine(_apart, levels, contact, geometry, gamma, motion)
-    return study(f"{name}gamma = {gamma:g}", found["size"], found["apart"], order, f"{why}; {BOTH}", ceiling=1e-3)
+    differences = refine(_difference, levels, contact, geometry, gamma, motion)
+    return study(f"{name}gamma = {gamma:g}", differences["size"], differences["apart"], order, f"{why}; {BOTH}",
+                 ceiling=1e-3)
 
 
 @pytest.mark.slow
@@ -183,7 +185,7 @@ def _compared(geometry: int, contact: float, levels, motion: str, gamma: float, 
     mutants=("gamma-inverted",), references=("quadratic_mesh_motion",), runs_with="3")
 @parametrize("geometry", EITHER)
 def test_corner(geometry, record):
-    record([_compared(geometry, CONTACT, CORNER_LEVELS, "grows", gamma,
+    record([_comparison(geometry, CONTACT, CORNER_LEVELS, "grows", gamma,
                       2 * quadratic_mesh_motion.exponent(np.pi - CONTACT, gamma),
                       "2 z, displacement like r^z at the corner") for gamma in GAMMAS])
 
@@ -204,18 +206,19 @@ def _segment(contact: float, refinement: float, geometry: int) -> Mesh:
 
 
 #: For straight triangles and for curved ones.
-_followed = cache(quadratic_mesh_motion.follow)
+_reference_motion = cache(quadratic_mesh_motion.follow)
 
 
-def _apart(level: tuple[float, int], contact: float, geometry: int, gamma: float, name: str) -> dict[str, float]:
+def _difference(level: tuple[float, int], contact: float, geometry: int, gamma: float, name: str) -> dict[str, float]:
     """Size of our elements, and the relative difference of both codes on a level; ours is linear in the motion, which
     may be as large as the aggregate."""
     refinement, parts = level
     grid, motion = _segment(contact, refinement, geometry), SEGMENT_MOTIONS[name]
-    theirs = _followed(RADIUS, contact, PORE, SEGMENT_END, parts, gamma, motion)
-    found = moved(grid, grid.points + motion(*grid.points.T).T, gamma) - grid.points
-    there = meshes.field_at(Space(grid, grid.geometry), found, theirs.points)
-    return {"size": meshes.mean_size(grid), "apart": meshes.relative(there, theirs.displacement, theirs.weights)}
+    reference = _reference_motion(RADIUS, contact, PORE, SEGMENT_END, parts, gamma, motion)
+    moved_by = moved(grid, grid.points + motion(*grid.points.T).T, gamma) - grid.points
+    computed = meshes.field_at(Space(grid, grid.geometry), moved_by, reference.points)
+    return {"size": meshes.mean_size(grid),
+            "apart": meshes.relative(computed, reference.displacement, reference.weights)}
 
 
 REACH = -75.0, 75.0
@@ -236,7 +239,7 @@ def test_growth(geometry, record):
     for radius, factor, way in JOURNEYS:
         for name, stretch, shift in (("grown", factor ** (0.5 / STEPS), 0.0), ("slid", 1.0, way * radius / STEPS)):
             first = _around(radius, geometry)
-            record(_kept(f"R = {radius:g} um, {name}", first, _journey(first, stretch, shift)))
+            record(_journey_checks(f"R = {radius:g} um, {name}", first, _journey(first, stretch, shift)))
 
 
 @cache
@@ -251,7 +254,7 @@ def _journey(grid: Mesh, stretch: float, shift: float) -> Mesh:
     return grid
 
 
-def _kept(name: str, first: Mesh, last: Mesh) -> list:
+def _journey_checks(name: str, first: Mesh, last: Mesh) -> list:
     """Checks of one journey."""
     apart = np.abs(last.points - first.points)
     lines = ((0, first.ends), (1, (0.0, first.width)))
@@ -282,18 +285,18 @@ STRIDES = (0.08, 0.04, 0.02, 0.01)
 def test_round_trip(geometry, record):
     grid = _around(20.0, geometry)
     for name, growth, shift, ceiling in (("grows", 1.0, 0.0, 4e-5), ("slides", 0.0, 20.0, 4e-6)):
-        back = [_there_and_back(grid, 1 + growth * stride, shift * stride) for stride in STRIDES]
+        back = [_round_trip(grid, 1 + growth * stride, shift * stride) for stride in STRIDES]
         record(study(f"a half-disc {name}", STRIDES, np.sqrt(np.mean(np.square(back), axis=(1, 2))) / 20.0, 2,
                      "(35) is linear in the motion on a given mesh: second order", ceiling=ceiling, band=0.1))
     plug = _nodes(meshes.plug(ENDS, WIDTH, HALF, 3.0, seed=4), geometry)
-    missed = largest(_there_and_back(plug, np.array([1.2, 1.0]), 10.0))
+    missed = largest(_round_trip(plug, np.array([1.2, 1.0]), 10.0))
     record(at_most("a plug that stretches and slides (um)", missed, 1e-11, "linear on each side: round-off"))
 
 
-def _there_and_back(grid: Mesh, stretch: float | np.ndarray, shift: float) -> np.ndarray:
+def _round_trip(grid: Mesh, stretch: float | np.ndarray, shift: float) -> np.ndarray:
     """(N, 2) um by which nodes miss their first place."""
-    there = grid.moved(moved(grid, stretch * grid.points + [shift, 0.0]))
-    return moved(there, (there.points - [shift, 0.0]) / stretch) - grid.points
+    away = grid.moved(moved(grid, stretch * grid.points + [shift, 0.0]))
+    return moved(away, (away.points - [shift, 0.0]) / stretch) - grid.points
 
 
 HALF_BENT = "the map is one to one while it is bent by less than half the height"

@@ -40,16 +40,16 @@ def test_mass(order, record):
     def density(x, y):
         return aggregates.DENSITY * (1 + 0.02 * np.sin(0.3 * x + 0.2 * y))
 
-    now = aggregates.placed(meshes.seed(20.0, 1.0, order), 1.0, density, order=order)
-    x, y = aggregates.places(now.space)
-    weight, made = aggregates.areas(now), 0.05 * (1 + np.sin(0.2 * x))
-    now.inert[:] = (50 + y) * weight
-    after = aggregates.expanded(aggregates.scene(order=order), now, made)
+    initial = aggregates.seed_around(meshes.seed(20.0, 1.0, order), 1.0, density, order=order)
+    x, y = aggregates.reaction_points(initial.space)
+    weight, increase = aggregates.areas(initial), 0.05 * (1 + np.sin(0.2 * x))
+    initial.inert[:] = (50 + y) * weight
+    after = aggregates.expand(aggregates.base_scene(order=order), initial, increase)
     ratio = aggregates.areas(after) / weight
     dx = after.space.reaction.dx
-    kept = {"X_A": ratio * (after.active / dx) / (density(x, y) * (1 + made)),
+    kinds = {"X_A": ratio * (after.active / dx) / (density(x, y) * (1 + increase)),
             "X_I": ratio * (after.inert / dx) / (50 + y)}
-    record(each_at_most({kind: largest(found - 1) for kind, found in kept.items()}, 1e-12, "(34): round-off"),
+    record(each_at_most({kind: largest(ratio - 1) for kind, ratio in kinds.items()}, 1e-12, "(34): round-off"),
            at_most("weights", largest(dx - aggregates.areas(after)) / dx.max(), 1e-12,
                    "biomass triangles only: round-off"),
            at_least("spread of the ratios of areas", np.ptp(ratio), 0.05, "else nothing is tested"))
@@ -64,15 +64,15 @@ def test_mass(order, record):
 @parametrize("order", aggregates.EVERY)
 def test_half_disc(order, record):
     """Checks of 27 updates with elements of an order."""
-    given = aggregates.scene(order=order)
-    now = aggregates.seed(RADIUS, order=order)
+    scene = aggregates.base_scene(order=order)
+    state = aggregates.seed(RADIUS, order=order)
     rows: list[dict] = []
     renewed: list[int] = []
-    first = now.mass
+    first = state.mass
     for update in range(1, UPDATES + 1):
-        now, anew = aggregates.updated(given, now, INCREASE)
+        state, anew = aggregates.update(scene, state, INCREASE)
         renewed += [update] * anew
-        rows.append(_errors(now, (1 + INCREASE) ** update, first))
+        rows.append(_errors(state, (1 + INCREASE) ** update, first))
     bounds = {"radius": (1e-4, "arcs that are parabolas: (edge / R)^4 / 100")} if order > 1 else {}
     for quantity, value in runs.worst(rows).items():
         record(at_most(quantity, value, *bounds.get(quantity, (1e-12, "closed form: round-off"))))
@@ -82,13 +82,13 @@ def test_half_disc(order, record):
                    "meshed to 11 R_0, remade beyond 8 R"))
 
 
-def _errors(now, theta: float, first: float) -> dict[str, float]:
+def _errors(state, theta: float, first: float) -> dict[str, float]:
     """Relative errors against the closed form; the outline's nodes are on the arc."""
-    distance = np.hypot(*now.outline.points[now.wall == FREE].T)
-    active, _ = aggregates.densities(now)
+    distance = np.hypot(*state.outline.points[state.wall == FREE].T)
+    active, _ = aggregates.densities(state)
     return {"radius": largest(distance / (RADIUS * np.sqrt(theta)) - 1),
-            "density": largest(active / aggregates.DENSITY - 1), "theta": largest(now.theta / theta - 1),
-            "mass": abs(now.mass / first / theta - 1)}
+            "density": largest(active / aggregates.DENSITY - 1), "theta": largest(state.theta / theta - 1),
+            "mass": abs(state.mass / first / theta - 1)}
 
 
 GROWING_UPDATES, SEED = 30, 8.0
@@ -108,64 +108,65 @@ WIDEST = 1.3
     mutants=("theta-without-density", "remeshed-too-late", "linear-transfer", "curved-mass-lost"))
 @parametrize("order", aggregates.EVERY)
 def test_growing(order, record):
-    rows = _growing_grown("conserving", order)
+    rows = _growth_history("conserving", order)
     record(at_most("biomass", largest(rows["drift"]), 1e-12, "round-off"))
     record(at_most("theta after a remesh", rows["restart"].max(), 1e-12, "J times the density over X_m"))
     record(at_most("triangles under 0.6", rows["poor"].max(), ALLOWED, "remesh criterion (3.5)"))
     record(at_most("missing reach (um)", rows["missing"].max(), 1e-9, "remesh criterion (3.1)"))
     record(at_least("remeshes", np.count_nonzero(rows["anew"]), 3, "else nothing is tested"))
     if order == 1:
-        record(at_least("drift of the biomass by the paper's transfer", largest(_growing_grown("linear", 1)["drift"]),
+        record(at_least("drift of the biomass by the paper's transfer", largest(_growth_history("linear", 1)["drift"]),
                         1e-4, "not conserving [E8]: the case would see it"))
 
 
-def _growing_grown(transfer: str, order: int) -> dict[str, np.ndarray]:
+def _growth_history(transfer: str, order: int) -> dict[str, np.ndarray]:
     """A row of numbers of every update."""
-    given = aggregates.scene(f'numerics.transfer="{transfer}"', order=order)
-    now, rows = aggregates.seed(SEED, order=order), []
-    wanted = now.mass
+    scene = aggregates.base_scene(f'numerics.transfer="{transfer}"', order=order)
+    state, rows = aggregates.seed(SEED, order=order), []
+    expected = state.mass
     for _ in range(GROWING_UPDATES):
-        made = _faster_in_front(now)
-        wanted += (now.active * made).sum()
-        now, anew = aggregates.updated(given, now, made)
-        rows.append({"drift": now.mass / wanted - 1, "restart": _restart(now) if anew else 0.0, "poor": _poor(now),
-                     "missing": _missing(now), "anew": anew})
+        increase = _faster_in_front(state)
+        expected += (state.active * increase).sum()
+        state, anew = aggregates.update(scene, state, increase)
+        rows.append({"drift": state.mass / expected - 1, "restart": _restart(state) if anew else 0.0,
+                     "poor": _poor(state), "missing": _missing(state), "anew": anew})
     return columns(rows)
 
 
-def _faster_in_front(now) -> np.ndarray:
+def _faster_in_front(state) -> np.ndarray:
     """(r, q) increase of X_A in an update: 15 % at the upstream tip, 2 % at the other."""
-    outline, x = now.outline, aggregates.places(now.space)[0]
+    outline, x = state.outline, aggregates.reaction_points(state.space)[0]
     return 0.15 * np.exp(-2 * (x - outline.upstream) / (outline.downstream - outline.upstream))
 
 
-def _restart(now) -> float:
+def _restart(state) -> float:
     """Largest relative difference of theta from J times the density over X_m."""
-    first = now.moved(now.origin)
-    if now.space.order == 1:
-        J = (now.mesh.areas / first.mesh.areas)[now.mesh.biomass, None]
+    first = state.moved(state.origin)
+    if state.space.order == 1:
+        J = (state.mesh.areas / first.mesh.areas)[state.mesh.biomass, None]
     else:
-        J = aggregates.areas(now) / aggregates.areas(first)
-    return largest(now.theta / (J * _where_theta_is(now, sum(aggregates.densities(now)) / aggregates.DENSITY)) - 1)
+        J = aggregates.areas(state) / aggregates.areas(first)
+    density = sum(aggregates.densities(state)) / aggregates.DENSITY
+    return largest(state.theta / (J * _at_theta_points(state, density)) - 1)
 
 
-def _where_theta_is(now, field: np.ndarray) -> np.ndarray:
+def _at_theta_points(state, field: np.ndarray) -> np.ndarray:
     """(t, q) of a field in the points of the reaction: of straight triangles the mean of their nodes, of curved ones
     that in each point."""
-    return field if now.space.order > 1 else field[now.mesh.topology.body_cells, 0].mean(axis=1, keepdims=True)
+    return field if state.space.order > 1 else field[state.mesh.topology.body_cells, 0].mean(axis=1, keepdims=True)
 
 
-def _poor(now) -> int:
+def _poor(state) -> int:
     """Triangles of quality under 0.6, from the squares of their sides alone: 16 area^2 is the square of their sum less
     twice the sum of their squares (Heron)."""
-    corner = now.mesh.points[now.mesh.triangles]
+    corner = state.mesh.points[state.mesh.triangles]
     squares = np.sum((corner - np.roll(corner, 1, axis=1)) ** 2, axis=2)
     return np.count_nonzero(3 - 6 * np.sum(squares**2, axis=1) / squares.sum(axis=1) ** 2 < POOR**2)
 
 
-def _missing(now) -> float:
+def _missing(state) -> float:
     """um of fluid that are missing beside the aggregate."""
-    outline, (left, right) = now.outline, now.mesh.ends
+    outline, (left, right) = state.outline, state.mesh.ends
     reach = min(REACH * outline.thickness, WIDEST * aggregates.WIDTH)
     return max(0.0, reach - (outline.upstream - left), reach - (right - outline.downstream))
 
@@ -200,17 +201,18 @@ def _plane(coefficients, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     {f"{transfer}, order {order}": (order, transfer) for order, transfers in TRANSFERS.items()
      for transfer in transfers})
 def test_remesh_linear(order, transfer, record):
-    given = aggregates.scene(f'numerics.transfer="{transfer}"', "numerics.refinement=1.2", order=order)
+    scene = aggregates.base_scene(f'numerics.transfer="{transfer}"', "numerics.refinement=1.2", order=order)
     kinds = KINDS if order == 1 else SHARES
-    new = aggregates.remeshed(given, _moved_linearly(order, kinds))
+    new = aggregates.remesh(scene, _moved_linearly(order, kinds))
     mesh, inside = new.mesh, new.mesh.topology.body_corners
-    exact = [_plane(of, *aggregates.places(new.space)) for of in kinds.values()]
-    errors = {name: largest(found / true - 1) for name, found, true in zip(kinds, aggregates.densities(new), exact)}
-    there = mesh.points[mesh.body]
+    exact = [_plane(plane, *aggregates.reaction_points(new.space)) for plane in kinds.values()]
+    errors = {name: largest(computed / true - 1)
+              for name, computed, true in zip(kinds, aggregates.densities(new), exact)}
+    positions = mesh.points[mesh.body]
     pressure = _plane(PRESSURE, *mesh.points[inside].T)
-    theta = np.linalg.det(MOTION) * _where_theta_is(new, sum(exact) / aggregates.DENSITY)
+    theta = np.linalg.det(MOTION) * _at_theta_points(new, sum(exact) / aggregates.DENSITY)
     record(each_at_most({**errors, "pressure": largest(new.pressure[inside] / pressure - 1),
-                         "places at t = 0": largest(new.body.reference @ MOTION.T - there) / largest(there),
+                         "places at t = 0": largest(new.body.reference @ MOTION.T - positions) / largest(positions),
                          "theta": largest(new.theta / theta - 1)}, 1e-12, "linear fields: round-off"))
 
 
@@ -221,11 +223,12 @@ def _moved_linearly(order: int, kinds: dict):
     flat = outline.points * [1.2, 1.0]
     if order > 1:
         flat[1::2] = 0.5 * (flat[::2] + np.roll(flat, -2, axis=0)[::2])
-    now = aggregates.placed(replace(outline, points=flat, origin=flat), 1.0, order=order)
-    points = now.mesh.points.copy()
-    points[now.mesh.body] = points[now.mesh.body] @ MOTION.T
-    moved = now.moved(points)
-    masses = {name: _plane(of, *aggregates.places(moved.space)) * moved.space.reaction.dx for name, of in kinds.items()}
+    initial = aggregates.seed_around(replace(outline, points=flat, origin=flat), 1.0, order=order)
+    points = initial.mesh.points.copy()
+    points[initial.mesh.body] = points[initial.mesh.body] @ MOTION.T
+    moved = initial.moved(points)
+    points = aggregates.reaction_points(moved.space)
+    masses = {name: _plane(plane, *points) * moved.space.reaction.dx for name, plane in kinds.items()}
     inside = moved.mesh.topology.body_corners
     pressure = np.zeros(moved.mesh.corners)
     pressure[inside] = _plane(PRESSURE, *moved.mesh.points[inside].T)
@@ -266,20 +269,20 @@ def _share(x, y):
     return 0.2 + 0.1 * np.cos(np.pi * np.hypot(x, y) / ROUND)
 
 
-def _share_errors(refinement: float, which: int, order: int) -> dict[str, float]:
+def _share_errors(refinement: float, number: int, order: int) -> dict[str, float]:
     """Errors of a pair of meshes, in the points of the reaction."""
-    before = _round(refinement, OLD[which], lambda x, y: aggregates.DENSITY * (1 - _share(x, y)), order)
+    before = _round(refinement, OLD[number], lambda x, y: aggregates.DENSITY * (1 - _share(x, y)), order)
     weight = before.space.reaction.dx
-    before.inert[:] = aggregates.DENSITY * _share(*aggregates.places(before.space)) * weight
-    after = _anew(refinement, before)
-    weight, exact = after.space.reaction.dx, _share(*aggregates.places(after.space))
-    found = after.inert / weight / aggregates.DENSITY
-    return {"size": _size(after), "share of X_I after the remesh": meshes.relative(found, exact, weight)}
+    before.inert[:] = aggregates.DENSITY * _share(*aggregates.reaction_points(before.space)) * weight
+    after = _remeshed(refinement, before)
+    weight, exact = after.space.reaction.dx, _share(*aggregates.reaction_points(after.space))
+    computed = after.inert / weight / aggregates.DENSITY
+    return {"size": _size(after), "share of X_I after the remesh": meshes.relative(computed, exact, weight)}
 
 
-def _size(now) -> float:
+def _size(state) -> float:
     """Of the elements of the aggregate, um."""
-    return meshes.mean_size(now.mesh, now.mesh.biomass)
+    return meshes.mean_size(state.mesh, state.mesh.biomass)
 
 
 def _hump(x, y):
@@ -289,26 +292,27 @@ def _hump(x, y):
 
 def _round(refinement: float, old: float, density, order: int = 1):
     """A half-disc with a density (x, y) on a mesh coarser than the one to come."""
-    return aggregates.placed(meshes.seed(ROUND, refinement, order), old * refinement, density, (-30.0, 30.0), order)
+    outline = meshes.seed(ROUND, refinement, order)
+    return aggregates.seed_around(outline, old * refinement, density, (-30.0, 30.0), order)
 
 
-def _anew(refinement: float, before):
-    return aggregates.remeshed(aggregates.scene(f"numerics.refinement={refinement}", 'pore.length="60 um"',
+def _remeshed(refinement: float, before):
+    return aggregates.remesh(aggregates.base_scene(f"numerics.refinement={refinement}", 'pore.length="60 um"',
                                                 order=before.space.order), before)
 
 
-def _density_errors(refinement: float, which: int) -> dict[str, float]:
+def _density_errors(refinement: float, number: int) -> dict[str, float]:
     """Errors after the remesh of a pair of meshes, and after the update that follows it."""
-    new = _anew(refinement, _round(refinement, OLD[which], _hump))
-    after, area = aggregates.expanded(aggregates.scene(), new, 0.0), new.mass / aggregates.DENSITY
-    return {"density after the remesh": _off(new, _hump), "density after the update": _off(after),
-            "before": _off(new), "area": abs(after.outline.area / area - 1), "size": _size(new)}
+    new = _remeshed(refinement, _round(refinement, OLD[number], _hump))
+    after, area = aggregates.expand(aggregates.base_scene(), new, 0.0), new.mass / aggregates.DENSITY
+    return {"density after the remesh": _density_error(new, _hump), "density after the update": _density_error(after),
+            "before": _density_error(new), "area": abs(after.outline.area / area - 1), "size": _size(new)}
 
 
-def _off(now, exact=aggregates.uniform) -> float:
+def _density_error(state, exact=aggregates.uniform) -> float:
     """L2 of the density less exact(x, y), X_m, over that."""
-    active, _ = aggregates.densities(now)
-    return meshes.l2_error(now.mesh.points[now.mesh.body], now.mesh.topology.body_cells, active[:, 0], exact)
+    active, _ = aggregates.densities(state)
+    return meshes.l2_error(state.mesh.points[state.mesh.body], state.mesh.topology.body_cells, active[:, 0], exact)
 
 
 @pytest.mark.case(
@@ -318,10 +322,10 @@ def _off(now, exact=aggregates.uniform) -> float:
     norm="largest relative difference; distance of the interface's nodes from a circle, over that before the update",
     mutants=("origin-on-the-chord",), runs_with="1", omitted="orders 2, 3 have arcs, which lie on it")
 def test_remesh_arc(record):
-    coarse, fine = (aggregates.scene('aggregate.radius="10 um"', f"numerics.refinement={r}") for r in (0.5, 1.0))
-    grown = aggregates.expanded(coarse, aggregates.seed(10.0, 0.5), 3.0)
-    new = aggregates.remeshed(fine, grown)
-    after = aggregates.expanded(fine, new, 0.0)
+    coarse, fine = (aggregates.base_scene('aggregate.radius="10 um"', f"numerics.refinement={r}") for r in (0.5, 1.0))
+    grown = aggregates.expand(coarse, aggregates.seed(10.0, 0.5), 3.0)
+    new = aggregates.remesh(fine, grown)
+    after = aggregates.expand(fine, new, 0.0)
     free = new.wall == FREE
     added = np.count_nonzero(free) / np.count_nonzero(grown.wall == FREE)
     beside = largest(np.hypot(*new.outline.origin[free].T) / 10 - 1)
@@ -332,9 +336,9 @@ def test_remesh_arc(record):
            at_least("interface nodes, after over before", added, 1.9, "split, else nothing is tested"))
 
 
-def _unround(now) -> float:
+def _unround(state) -> float:
     """Spread of the distances of the interface's nodes from the origin, um."""
-    return np.ptp(np.hypot(*now.outline.points[now.wall == FREE].T))
+    return np.ptp(np.hypot(*state.outline.points[state.wall == FREE].T))
 
 
 #: um/h, of the order of the base scene's; ends of the old mesh, um.
@@ -350,15 +354,15 @@ SPEED, ENDS = 1.2e5, (-40.0, 30.0)
     mutants=("upstream-reversed", "diffusivity-of-the-acceptor"))
 @parametrize("order", aggregates.EVERY)
 def test_beyond_the_ends(order, record):
-    now = aggregates.placed(meshes.seed(10.0, 1.0, order), 1.0, ends=ENDS, order=order)
-    old = _exact(np.clip(now.space.points[:, 0], *ENDS))
-    filled = replace(now, concentrations=Concentrations(*(SUPPLY * old)))
-    flowing, still = (aggregates.remeshed(aggregates.scene(order=order), filled, speed) for speed in (SPEED, 0.0))
+    initial = aggregates.seed_around(meshes.seed(10.0, 1.0, order), 1.0, ends=ENDS, order=order)
+    old = _exact(np.clip(initial.space.points[:, 0], *ENDS))
+    filled = replace(initial, concentrations=Concentrations(*(SUPPLY * old)))
+    flowing, still = (aggregates.remesh(aggregates.base_scene(order=order), filled, speed) for speed in (SPEED, 0.0))
     x = flowing.space.points[:, 0]
     outside = (x < ENDS[0]) | (x > ENDS[1])
-    found, resting = (both(new.concentrations) / SUPPLY for new in (flowing, still))
-    between = meshes.field_at(now.space, old.T, flowing.space.points[~outside]).T
-    gaps = {"beyond the ends": (found - _exact(x))[:, outside], "between": found[:, ~outside] - between,
+    computed, resting = (both(new.concentrations) / SUPPLY for new in (flowing, still))
+    between = meshes.field_at(initial.space, old.T, flowing.space.points[~outside]).T
+    gaps = {"beyond the ends": (computed - _exact(x))[:, outside], "between": computed[:, ~outside] - between,
             "beyond the ends, no flow": resting[:, outside] - 1, "between, no flow": resting[:, ~outside] - between}
     for k, name in enumerate(NAMES):
         record(each_at_most({f"{name} {where}": largest(gap[k]) for where, gap in gaps.items()}, 1e-12,

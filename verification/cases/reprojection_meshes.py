@@ -1,8 +1,7 @@
-"""What a transfer costs in accuracy: one transfer of a smooth field, and forty of a steep one.
+"""Accuracy of transfers between meshes: one transfer of a smooth field, and forty of a steep one.
 
-The projection limited by flux-corrected transport: conserves like the projection, bounded like interpolation.
-
-The common pieces of two meshes, and the projection that is integrated over them, against shapely's pieces.
+Flux-corrected transport limits the projection: it conserves like the projection and is bounded like interpolation.
+The common pieces of two meshes, and the projection integrated over them, are compared with shapely's pieces.
 """
 
 from __future__ import annotations
@@ -32,32 +31,32 @@ def steep(x, y):
     return np.exp(-((x - 18) ** 2 + (y - 10) ** 2) / 6)
 
 
-#: Why what is carried as a field of linear elements has no other orders.
+#: The reason why transfers of fields run with linear elements alone.
 MASSES = "orders 2 and 3 carry masses, not fields: reprojection-growing"
 
 
 def sampled(points, triangles, fields, new_points, new_triangles):
-    """The paper's transfer, with the arguments of the projection."""
+    """The paper's transfer by interpolation, with the arguments of the projection."""
     return transfer.interpolate(points, triangles, fields, new_points)
 
 
 def _located_errors(size: float, seed: int, order: int) -> dict[str, float]:
-    """Error of the field interpolated by an order."""
+    """Error of a field of an order, interpolated at random points."""
     where = np.random.default_rng(8).uniform((0.0, 0.0), (pairs.ENDS[1], pairs.WIDTH), (1000, 2))
     mesh = meshes.channel(pairs.ENDS, pairs.WIDTH, size, lambda x, y: x < 0, seed=seed)
     space = Space(mesh, order)
-    found = transfer.located(mesh.points, mesh.cells, where).field(smooth(*space.points.T), space.cells, order)
-    return {"located": np.sqrt(np.mean((found - smooth(*where.T)) ** 2))}
+    computed = transfer.located(mesh.points, mesh.cells, where).field(smooth(*space.points.T), space.cells, order)
+    return {"located": np.sqrt(np.mean((computed - smooth(*where.T)) ** 2))}
 
 
 def _carried_errors(size: float, seed: int, carry) -> dict[str, float]:
-    """Error of a transfer."""
+    """Error of a field after one transfer."""
     old, new = pairs.grid(size, 2 * seed), pairs.grid(0.9 * size, 2 * seed + 1)
-    found = carry(*old, smooth(*old[0].T)[:, None], *new)
-    return {"carried": meshes.l2_error(*new, found[:, 0], smooth)}
+    computed = carry(*old, smooth(*old[0].T)[:, None], *new)
+    return {"carried": meshes.l2_error(*new, computed[:, 0], smooth)}
 
 
-#: Transfers, with what errors on the finest mesh may reach; and that of fields, by their order.
+#: Transfers with bounds of the error on the finest mesh; those bounds for fields, by their order.
 CARRIERS = {"projection": (transfer.project, 2e-3), "interpolation": (sampled, 4e-3),
             "bounded": (transfer.project_bounded, 2e-3)}
 LOCATED = {1: 4e-3, 2: 1e-4, 3: 2e-6}
@@ -81,7 +80,7 @@ LOCATED = {1: 4e-3, 2: 1e-4, 3: 2e-6}
 def test_order(field, measure, method, expected, record):
     record(studies(refine(measure, SIZES, method), {field: expected}))
     if method is transfer.project_bounded:
-        gaps = [_bent(transfer.project_bounded(*old, _plane(old)[:, None], *new)[:, 0], new)
+        gaps = [_plane_error(transfer.project_bounded(*old, _plane(old)[:, None], *new)[:, 0], new)
                 for _, old, new in pairs.pairs()]
         record(at_most("linear field", max(gaps), 1e-12, "within its bounds at every node: round-off"))
 
@@ -94,9 +93,9 @@ def test_order(field, measure, method, expected, record):
          "least nodal value",
     mutants=("linear-transfer",), runs_with="1", omitted=MASSES)
 def test_chain(record):
-    kept, paper = (_remeshed(carry, steep) for carry in (transfer.project, sampled))
-    rise = (kept["square"][1:] / kept["square"][:-1]).max()
-    record(at_most("integral by projection", largest(kept["integral"] - 1), 1e-12, "round-off"))
+    projected, paper = (_remesh_history(carry, steep) for carry in (transfer.project, sampled))
+    rise = (projected["square"][1:] / projected["square"][:-1]).max()
+    record(at_most("integral by projection", largest(projected["integral"] - 1), 1e-12, "round-off"))
     record(at_most("square by projection, after over before", rise, 1.0, "a projection makes nothing longer"))
     record(at_most("largest value by interpolation", paper["largest"].max(), paper["largest"][0],
                    "weights between 0 and 1"))
@@ -105,9 +104,12 @@ def test_chain(record):
                     "not conserving: the case would see it"))
 
 
-def _remeshed(carry, field) -> dict[str, np.ndarray]:
-    """Of a field before and after each remesh (k + 1,): its integral over the first, its square, least and largest
-    value, the excess of its first range over that range, and its L2 error."""
+def _remesh_history(carry, field) -> dict[str, np.ndarray]:
+    """History of a field over the remeshes (k + 1,).
+
+    It has the integral over the first one, the integral of the square, the least and largest values, the excess over
+    the first range over that range, and the L2 error.
+    """
     grids = [pairs.grid(2.0, 1), pairs.grid(2.0, 2), pairs.grid(2.4, 3)]
     mesh, rows = grids[0], []
     values = field(*mesh[0].T)[:, None]
@@ -117,10 +119,10 @@ def _remeshed(carry, field) -> dict[str, np.ndarray]:
                      "error": meshes.l2_error(*mesh, values[:, 0], field)})
         new = grids[(k + 1) % 3]
         mesh, values = new, carry(*mesh, values, *new)
-    found = columns(rows)
-    least, most, integral = found["least"], found["largest"], found["integral"]
+    history = columns(rows)
+    least, most, integral = history["least"], history["largest"], history["integral"]
     outside = np.maximum(least[0] - least, most - most[0]) / (most[0] - least[0])
-    return {**found, "integral": integral / integral[0], "outside": outside}
+    return {**history, "integral": integral / integral[0], "outside": outside}
 
 
 def cylinder(x, y):
@@ -140,16 +142,16 @@ FIELDS = {"hill": (steep,), "cylinder": (cylinder,)}
     mutants=("bounded-lumped", "bounded-unlimited", "bounded-one-sided"), runs_with="1", omitted=MASSES)
 @parametrize("field", FIELDS)
 def test_bounded_chain(field, record):
-    ours, free = (_remeshed(carry, field) for carry in (transfer.project_bounded, transfer.project))
-    record(at_most("integral", largest(ours["integral"] - 1), 1e-12, "round-off"))
-    record(at_most("outside the range", ours["outside"].max(), 1e-14, "Zalesak's limiter: round-off"))
-    record(between("error over the projection's", ours["error"][-1] / free["error"][-1], 0.9, 1.15,
+    limited, free = (_remesh_history(carry, field) for carry in (transfer.project_bounded, transfer.project))
+    record(at_most("integral", largest(limited["integral"] - 1), 1e-12, "round-off"))
+    record(at_most("outside the range", limited["outside"].max(), 1e-14, "Zalesak's limiter: round-off"))
+    record(between("error over the projection's", limited["error"][-1] / free["error"][-1], 0.9, 1.15,
                    "limited at few nodes; the lumped projection alone: over 2"))
     record(at_least("outside the range by projection", free["outside"].max(), 0.02, "else there is nothing to limit"))
 
 
 ROUND_OFF = "round-off; over eight pairs of meshes"
-#: Degree of the polynomials that the pieces must integrate: that of the rule in :mod:`verification.problems.meshes`.
+#: Degree of the polynomials that the pieces integrate: that of the quadrature in :mod:`verification.problems.meshes`.
 DEGREE = 6
 
 
@@ -165,7 +167,7 @@ def test_supermesh(record):
 
 
 def _pieces(old: pairs.Grid, new: pairs.Grid) -> dict[str, float]:
-    """The errors of one pair of meshes."""
+    """Errors of the common pieces of a pair of meshes."""
     corners, of_old, of_new = transfer.supermesh(*old, *new)
     rim = corners.reshape(-1, 2), np.arange(3 * len(corners)).reshape(-1, 3)
     expected = galerkin_transfer.overlaps(*old, *new)
@@ -196,33 +198,33 @@ def _polynomials(pieces: pairs.Grid) -> float:
     runs_with="1", omitted=MASSES)
 def test_projection(record):
     random = np.random.default_rng(6)
-    rows = [_projected(old, new, random.uniform(0.0, 1.0, len(old[0]))) for _, old, new in pairs.pairs()]
+    rows = [_projection_errors(old, new, random.uniform(0.0, 1.0, len(old[0]))) for _, old, new in pairs.pairs()]
     record(each_at_most(runs.worst(rows), 1e-11, ROUND_OFF))
 
 
-def _projected(old: pairs.Grid, new: pairs.Grid, rough: np.ndarray) -> dict[str, float]:
-    """The errors of a rough field, and of a linear one, on one pair of meshes."""
-    found = transfer.project(*old, np.column_stack([rough, _plane(old)]), *new)
+def _projection_errors(old: pairs.Grid, new: pairs.Grid, rough: np.ndarray) -> dict[str, float]:
+    """Errors of a rough and of a linear field on a pair of meshes."""
+    projected = transfer.project(*old, np.column_stack([rough, _plane(old)]), *new)
     expected = galerkin_transfer.project(*old, rough[:, None], *new)[:, 0]
-    drifts = {name: abs(pairs.integral(new, found[:, 0], weight) / pairs.integral(old, rough, weight) - 1)
+    drifts = {name: abs(pairs.integral(new, projected[:, 0], weight) / pairs.integral(old, rough, weight) - 1)
               for name, weight in (("integral", lambda x, y: 1 + 0 * x), ("centre, x", lambda x, y: x),
                                    ("centre, y", lambda x, y: y))}
-    return {"against the dense code": largest(found[:, 0] - expected), "linear field": _bent(found[:, 1], new),
-            **drifts, "square": _pythagoras(old, rough, new, found[:, 0])}
+    return {"against the dense code": largest(projected[:, 0] - expected),
+            "linear field": _plane_error(projected[:, 1], new), **drifts,
+            "square": _pythagoras(old, rough, new, projected[:, 0])}
 
 
 def _plane(mesh: pairs.Grid) -> np.ndarray:
     return 3 + 2 * mesh[0][:, 0] - mesh[0][:, 1]
 
 
-def _bent(found: np.ndarray, mesh: pairs.Grid) -> float:
-    """Largest error of what should be the plane, over its range."""
-    return largest(found - _plane(mesh)) / np.ptp(_plane(mesh))
+def _plane_error(computed: np.ndarray, mesh: pairs.Grid) -> float:
+    """Largest error of a transferred plane, over its range."""
+    return largest(computed - _plane(mesh)) / np.ptp(_plane(mesh))
 
 
 def _pythagoras(old: pairs.Grid, before: np.ndarray, new: pairs.Grid, after: np.ndarray) -> float:
-    """|X_old|^2 - |X_new|^2 - |X_old - X_new|^2 over the first: zero where the difference is at right angles to X_new.
-    """
+    """|X_old|^2 - |X_new|^2 - |X_old - X_new|^2 over the first: zero if the difference is orthogonal to X_new."""
     corners, of_old, of_new = transfer.supermesh(*old, *new)
     gap = 0.0
     for (points, triangles), field, owner, sign in ((old, before, of_old, 1), (new, after, of_new, -1)):

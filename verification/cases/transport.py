@@ -35,19 +35,19 @@ from verification.problems.channels import (
     SLAB,
     WIDE,
     WORDS,
-    apart,
     both,
-    carrying,
-    changed,
     decay_demand,
-    filled,
     in_points,
     length,
     pair,
+    prescribed_flow,
     problem,
     rates,
-    spaced,
+    rms_errors,
+    slab_space,
     steady,
+    substrates_with,
+    uniform_masses,
 )
 from verification.problems.channels import WIDTH as CHANNEL
 
@@ -57,7 +57,7 @@ ACCEPTOR, DONOR = SCENE.substrates.acceptor, SCENE.substrates.donor
 DECAY_ALONE = replace(SCENE.kinetics, maximum_utilization_rate=0.0)
 #: First-order uptake of the donor, its half saturation far above the supply: q_D = C_D k / K_D; the acceptor
 #: never falls.
-FIRST_ORDER = changed(acceptor={"half_saturation": 1 / LARGE}, donor={"half_saturation": LARGE})
+FIRST_ORDER = substrates_with(acceptor={"half_saturation": 1 / LARGE}, donor={"half_saturation": LARGE})
 NO_DECAY = replace(SCENE.kinetics, maximum_utilization_rate=LARGE, decay_coefficient=0.0, acceptor_to_donor_ratio=1e-12)
 UPTAKE = 2e4
 #: Random meshes of each size over which errors are averaged: those of few triangles differ by a third.
@@ -108,16 +108,16 @@ def test_robin_higher(order, peclet, ends, ceiling, record):
 def _robin_errors(size: float, number: int, order: int, peclet: float, ends) -> dict[str, float]:
     """Size of the elements; root mean square of C, over that of the exact one with linear elements, else over the
     supply; C leaving over the supply."""
-    space, speed = spaced(size, number, order, ends), peclet * DONOR.diffusivity / SLAB
-    made = problem(space, speed, FIRST_ORDER, NO_DECAY)
-    state = steady(made, UPTAKE)
+    space, speed = slab_space(size, number, order, ends), peclet * DONOR.diffusivity / SLAB
+    equations = problem(space, speed, FIRST_ORDER, NO_DECAY)
+    state = steady(equations, UPTAKE)
 
     def exact(x):
         return robin_channel.strip(x, speed, DONOR.supply, DONOR.diffusivity, DONOR.diffusivity_in_aggregate, UPTAKE,
                                    SLAB)
 
-    gap, truth = apart(space, state.donor[None], lambda x, y: exact(x)[None])
-    leaving = transport.fluxes(made, Sink(filled(space, UPTAKE)), state)[1].effluent
+    gap, truth = rms_errors(space, state.donor[None], lambda x, y: exact(x)[None])
+    leaving = transport.fluxes(equations, Sink(uniform_masses(space, UPTAKE)), state)[1].effluent
     return {"size": length(space, size), "C": gap[0] / (truth[0] if order == 1 else DONOR.supply),
             "leaving": abs(leaving - float(exact(SLAB))) / DONOR.supply}
 
@@ -127,11 +127,11 @@ def _at_rest(size: float, number: int, sink: float, half_saturation: float, film
 
     sink: largest uptake, d_c f_d b X (mg/L/h); half_saturation: K (mg/L).
     """
-    space = spaced(size, number, order, (-SLAB - film, SLAB + film), (-SLAB, SLAB))
-    given = problem(space, None, changed(acceptor={"half_saturation": half_saturation}), DECAY_ALONE)
+    space = slab_space(size, number, order, (-SLAB - film, SLAB + film), (-SLAB, SLAB))
+    equations = problem(space, None, substrates_with(acceptor={"half_saturation": half_saturation}), DECAY_ALONE)
     density = sink / decay_demand(DECAY_ALONE)
-    state = steady(given, density)
-    return space, state.acceptor, transport.fluxes(given, Sink(filled(space, density)), state)[0]
+    state = steady(equations, density)
+    return space, state.acceptor, transport.fluxes(equations, Sink(uniform_masses(space, density)), state)[0]
 
 
 def _sides(film: float) -> dict[str, float]:
@@ -156,7 +156,7 @@ def _thiele(*orders: int) -> dict[str, tuple]:
             for order in orders for row in THIELE[order]}
 
 
-def first_order(order: int, modulus: float, film: float, ceiling: float, taken: float):
+def first_order(order: int, modulus: float, film: float, ceiling: float, uptake_ceiling: float):
     kappa = ACCEPTOR.diffusivity_in_aggregate * (modulus / SLAB) ** 2
 
     def exact(x):
@@ -167,9 +167,9 @@ def first_order(order: int, modulus: float, film: float, ceiling: float, taken: 
     yield studies(errors, {"C": (*EXPECTED[order], ceiling)})
     expected, why = FUNCTIONAL[order]
     if order == 1 or (order == 2 and modulus > 1):
-        yield studies(errors, {"taken up": (around(expected, order * BAND), why, taken)})
+        yield studies(errors, {"taken up": (around(expected, order * BAND), why, uptake_ceiling)})
     else:  # soon at round-off
-        yield at_most("taken up", errors["taken up"][-1], taken, why)
+        yield at_most("taken up", errors["taken up"][-1], uptake_ceiling, why)
 
 
 @pytest.mark.case(
@@ -179,9 +179,9 @@ def first_order(order: int, modulus: float, film: float, ceiling: float, taken: 
     norm=NORM,
     mutants=("decay-demand", "one-supply-held", "quarter-of-a-triangle", "fluid-diffusivity"), references=("slab",),
     omitted="orders 2, 3: transport-first-order-slab-higher")
-@parametrize("order, modulus, film, ceiling, taken", _thiele(1))
-def test_first_order_slab(order, modulus, film, ceiling, taken, record):
-    record(first_order(order, modulus, film, ceiling, taken))
+@parametrize("order, modulus, film, ceiling, uptake_ceiling", _thiele(1))
+def test_first_order_slab(order, modulus, film, ceiling, uptake_ceiling, record):
+    record(first_order(order, modulus, film, ceiling, uptake_ceiling))
 
 
 @pytest.mark.slow
@@ -192,18 +192,18 @@ def test_first_order_slab(order, modulus, film, ceiling, taken, record):
     norm=NORM,
     mutants=("reaction-evenly-weighted", "one-supply-held", "fluid-diffusivity"), references=("slab",),
     omitted="order 1: transport-first-order-slab")
-@parametrize("order, modulus, film, ceiling, taken", _thiele(2, 3))
-def test_first_order_slab_higher(order, modulus, film, ceiling, taken, record):
-    record(first_order(order, modulus, film, ceiling, taken))
+@parametrize("order, modulus, film, ceiling, uptake_ceiling", _thiele(2, 3))
+def test_first_order_slab_higher(order, modulus, film, ceiling, uptake_ceiling, record):
+    record(first_order(order, modulus, film, ceiling, uptake_ceiling))
 
 
 def _slab_errors(size: float, number: int, order: int, film: float, sink: float, half_saturation: float, exact,
-                 taken: str) -> dict[str, float]:
+                 uptake_name: str) -> dict[str, float]:
     """Size of the elements, and relative errors of C and of what enters a side over ``sink``; exact(x): both."""
     space, field, flux = _at_rest(size, number, sink, half_saturation, film, order)
     gap = meshes.distance(in_points(space), field[space.cells], lambda x, y: exact(x)[0])
     return {"size": length(space, size), "C": gap,
-            taken: abs(flux.consumed / (2 * CHANNEL * sink) / exact(0.0)[1] - 1)}
+            uptake_name: abs(flux.consumed / (2 * CHANNEL * sink) / exact(0.0)[1] - 1)}
 
 
 DEPTH = 20.0
@@ -271,8 +271,8 @@ def _exhausted(film: float):
     mutants=("reaction-in-the-fluid", "decay-demand"))
 @parametrize("judge, *row", {**{label: (_monod, *row) for label, row in MONOD.items()},
                              f"K = {LIMIT[0]:g} to {LIMIT[-1]:g} mg/L, linear": (_limit,),
-                             **{f"K = {LEAST:g} mg/L, {told}, linear": (_exhausted, film)
-                                for told, film in (("no films", 0.0), (f"films of {FILM:g} um", FILM))}})
+                             **{f"K = {LEAST:g} mg/L, {label}, linear": (_exhausted, film)
+                                for label, film in (("no films", 0.0), (f"films of {FILM:g} um", FILM))}})
 def test_zero_order_slab(judge, row, record):
     record(judge(*row))
 
@@ -283,24 +283,26 @@ ENDS = (-65.0, 65.0)
 LARGEST = 3e5
 #: X as a function of x and y.
 DENSITY = manufactured_transport.function(manufactured_transport.density(RADIUS, LARGEST))
-SUBSTRATES = changed(donor={"half_saturation": 3.0})
+SUBSTRATES = substrates_with(donor={"half_saturation": 3.0})
 #: Refinements of each order, and how many unrelated meshes about each: the refinement is NEAR times the last one's, up
 #: and down.
 REFINEMENTS = {1: {0.4: 5, 0.8: 3, 1.6: 2, 3.2: 1}, 2: {0.4: 5, 0.8: 3, 1.6: 2, 2.4: 1},
                3: {0.4: 6, 0.8: 4, 1.4: 3, 2.2: 1}}
 NEAR = 1.03
-#: u_ave W / D_A, and the last errors of acceptor and donor, of each order.
+#: u_ave W / D_A, and the last errors of acceptor and donor, of each order. Until the divergence-free w carried the
+#: substrates, advection hid the third order at Pe = 10, where the order was 4 +- 0.3; at Pe = 100 it was 4 +- 0.3 too,
+#: with last errors of 8e-6 and 1.7e-5. The orders and errors of w were seen before their present bounds were written.
 PECLETS = {1: {0.1: (3e-4, 9e-4), 1.0: (1.2e-3, 2.5e-3), 10.0: (2.5e-3, 3.5e-3), 100.0: (4e-3, 5e-3)},
-           2: {0.1: (1e-6, 1.5e-6), 1.0: (1e-6, 1.5e-6), 100.0: (8e-6, 1.7e-5)},
+           2: {0.1: (1e-6, 1.5e-6), 1.0: (1e-6, 1.5e-6), 100.0: (1.5e-6, 2.5e-6)},
            3: {0.1: (8e-9, 1.1e-8), 10.0: (1.6e-7, 3e-7)}}
 #: The last errors with u_ave for the inlet's u_x, at Pe = 10.
-PRINTED = {1: (3e-4, 3e-4), 2: (1.5e-6, 3e-6), 3: (1.6e-7, 3e-7)}
+PRINTED = {1: (3e-4, 3e-4), 2: (1e-6, 1.5e-6), 3: (1.6e-7, 3e-7)}
 
 
-def _made(*orders: int) -> dict[str, tuple]:
-    found = {f"pore's Pe = {peclet:g}, {WORDS[order]}": (order, peclet, "local", ceilings)
+def _variants(*orders: int) -> dict[str, tuple]:
+    variants = {f"pore's Pe = {peclet:g}, {WORDS[order]}": (order, peclet, "local", ceilings)
              for order in orders for peclet, ceilings in PECLETS[order].items()}
-    return found | {f"pore's Pe = 10, {WORDS[order]}, printed inlet": (order, 10.0, "mean", PRINTED[order])
+    return variants | {f"pore's Pe = 10, {WORDS[order]}, printed inlet": (order, 10.0, "mean", PRINTED[order])
                     for order in orders}
 
 
@@ -310,15 +312,15 @@ def _expected(order: int, peclet: float) -> tuple:
         return 2, "linear elements, lumped reaction, chords for arcs: second order"
     if order == 3:
         return around(4, 0.4), "cubic elements, parabolas for arcs: fourth order"
-    if peclet > 1:
-        return 4, "quadratic elements: fourth order of advection, which is all that is seen at a large Peclet number"
-    if peclet == 1:
+    if peclet > 10:
+        return around(4, 0.5), "quadratic elements: fourth order of advection; on the finest mesh third order begins"
+    if peclet >= 1:
         return around(3.3, 0.45), "quadratic elements: between fourth order of advection and third"
     return 3, "quadratic elements, parabolas for arcs: third order"
 
 
 @cache
-def _spaced(refinement: float, number: int, order: int) -> Space:
+def _half_disc_space(refinement: float, number: int, order: int) -> Space:
     about = refinement * NEAR ** (number - REFINEMENTS[order][refinement] // 2)
     return meshes.half_disc_space(RADIUS, about, ENDS, WIDTH, order)
 
@@ -336,20 +338,20 @@ def _chosen(peclet: float):
 def _solved(space: Space, peclet: float, inlet: str) -> np.ndarray:
     """(2, n) C, by the code."""
     mean, velocity, _ = _chosen(peclet)
-    carried = carrying(space, np.column_stack([part(*space.points.T) for part in velocity]), mean)
-    made = transport.problem(space, carried, SUBSTRATES, SCENE.kinetics, inlet)
-    made = replace(made, source=made.source + _added(space, peclet, inlet).ravel())
-    return both(transport.steady(made, Sink(DENSITY(*aggregates.places(space)) * space.reaction.dx)))
+    carried = prescribed_flow(space, np.column_stack([part(*space.points.T) for part in velocity]), mean)
+    equations = transport.problem(space, carried, SUBSTRATES, SCENE.kinetics, inlet)
+    equations = replace(equations, source=equations.source + _added(space, peclet, inlet).ravel())
+    return both(transport.steady(equations, Sink(DENSITY(*aggregates.reaction_points(space)) * space.reaction.dx)))
 
 
 def _added(space: Space, peclet: float, inlet: str) -> np.ndarray:
     """(2, n) the forcing and what enters through the sides."""
     where, weight, values = in_points(space)
     forcing = weight * _by_side(peclet, "forcing", space.mesh.biomass, *np.moveaxis(where, 2, 0))
-    found, edges = np.zeros((2, space.count)), _edges(space)
-    np.add.at(found, (slice(None), space.cells), forcing @ values)
-    np.add.at(found, (slice(None), edges), _through(space, edges, peclet, inlet))
-    return found
+    source, edges = np.zeros((2, space.count)), _edges(space)
+    np.add.at(source, (slice(None), space.cells), forcing @ values)
+    np.add.at(source, (slice(None), edges), _through(space, edges, peclet, inlet))
+    return source
 
 
 def _by_side(peclet: float, name: str, biomass: np.ndarray, x, y) -> np.ndarray:
@@ -399,7 +401,7 @@ def chosen_concentrations(order: int, peclet: float, inlet: str, ceilings: tuple
     mutants=("cross-flow-sign", "exchanged-half-saturation", "fluid-diffusivity", "ratio-on-the-donor-only",
              "quarter-of-a-triangle"),
     references=("manufactured_transport",), omitted="orders 2, 3: transport-manufactured-higher")
-@parametrize("order, peclet, inlet, ceilings", _made(1))
+@parametrize("order, peclet, inlet, ceilings", _variants(1))
 def test_manufactured(order, peclet, inlet, ceilings, record):
     record(chosen_concentrations(order, peclet, inlet, ceilings))
 
@@ -412,7 +414,7 @@ def test_manufactured(order, peclet, inlet, ceilings, record):
     norm="L2 of each substrate over the mesh, relative",
     mutants=("printed-inlet-forgotten", "conserving-cross-flow", "exchanged-half-saturation", "fluid-diffusivity"),
     references=("manufactured_transport",), omitted="order 1: transport-manufactured")
-@parametrize("order, peclet, inlet, ceilings", _made(2, 3))
+@parametrize("order, peclet, inlet, ceilings", _variants(2, 3))
 def test_manufactured_higher(order, peclet, inlet, ceilings, record):
     record(chosen_concentrations(order, peclet, inlet, ceilings))
 
@@ -420,7 +422,7 @@ def test_manufactured_higher(order, peclet, inlet, ceilings, record):
 def _chosen_errors(refinement: float, number: int, order: int, peclet: float, inlet: str) -> dict[str, float]:
     """Size of the elements, nominal for linear ones; L2 of both substrates, on each element less the chosen field of
     its side."""
-    space = _spaced(refinement, number, order)
-    gap, size = apart(space, _solved(space, peclet, inlet), lambda *at: _by_side(
+    space = _half_disc_space(refinement, number, order)
+    gap, size = rms_errors(space, _solved(space, peclet, inlet), lambda *at: _by_side(
         peclet, "value", space.mesh.biomass, *at))
     return {"size": length(space, WIDTH / ACROSS_PORE / refinement), **dict(zip(NAMES, gap / size))}

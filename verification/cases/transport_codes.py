@@ -38,7 +38,7 @@ from skfem.models import poisson
 
 from reference import channel_bvp, channel_fipy
 from reference import diffusion_reaction_pypde as pypde
-from reference.monod import sink, slopes, uptake
+from reference.monod import sink, sink_derivative, uptake
 from repro.fem import outline
 from repro.fem.elements import ELEMENTS
 from repro.fem.sizing import ACROSS_AGGREGATE
@@ -57,19 +57,19 @@ from verification.problems.channels import (
     SCENE,
     SLAB,
     WIDE,
-    apart,
     at_heights,
     both,
-    changed,
-    filled,
-    following,
     length,
+    mesh_with_sides,
     pair,
     problem,
     rates,
-    spaced,
+    rms_errors,
+    slab_space,
     speed_of,
     steady,
+    substrates_with,
+    uniform_masses,
 )
 
 LINEAR = {"linear": 1}
@@ -87,7 +87,7 @@ CEILINGS = {3e3: 1e-6, 3e4: 3e-5, 3e5: 4e-4}
 HIGHER_CEILINGS = {2: 1e-7, 3: 1e-9}
 
 
-def given(peclet: float, density: float):
+def reference_arguments(peclet: float, density: float):
     """What the references take."""
     return (speed_of(peclet), pair("supply"), pair("diffusivity"), pair("diffusivity_in_aggregate"), density,
             rates(SCENE.kinetics), SLAB)
@@ -99,25 +99,25 @@ def each(expected: int, why: str, ceiling: float) -> dict[str, tuple]:
 
 
 @cache
-def _ours(size: float, number: int, order: int, peclet: float, density: float, steps: int = 0, ends=CROSSED
+def _computed(size: float, number: int, order: int, peclet: float, density: float, steps: int = 0, ends=CROSSED
           ) -> np.ndarray:
     """(times, 2, n): each interval in equal steps, started anew from the end of the last; at rest if there are none."""
-    made = problem(spaced(size, number, order, ends), speed_of(peclet), law=LAW)
+    equations = problem(slab_space(size, number, order, ends), speed_of(peclet), law=LAW)
     if not steps:
-        return both(steady(made, density))[None]
+        return both(steady(equations, density))[None]
     states = []
-    active = filled(made.space, density)
-    now = transport.supplied_everywhere(made)
+    active = uniform_masses(equations.space, density)
+    state = transport.supplied_everywhere(equations)
     for interval in np.diff([0.0, *TIMES]):
-        now = gear.advance(made, active, 0 * active, now, interval, fixed_step=interval / steps).concentrations
-        states.append(both(now))
+        state = gear.advance(equations, active, 0 * active, state, interval, fixed_step=interval / steps).concentrations
+        states.append(both(state))
     return np.array(states)
 
 
 @cache
 def exact(peclet: float, density: float, tolerance: float):
     """x -> (C_A, C_D), by solve_bvp."""
-    return channel_bvp.solution(*given(peclet, density), tolerance=tolerance)
+    return channel_bvp.solve(*reference_arguments(peclet, density), tolerance=tolerance)
 
 
 #: Random meshes of each size (um), their ends, and solve_bvp's tolerance, which takes no less at Peclet 5: cubic
@@ -171,12 +171,12 @@ def _distances(size: float, number: int, order: int, peclet: float, density: flo
                ) -> dict[str, float]:
     """Size; of each substrate, over itself, of both, over the larger supply, and of the acceptor at the nodes of the
     slab, place by place over itself."""
-    space, truth = spaced(size, number, order, ends), exact(peclet, density, tolerance)
-    ours, pieces = _ours(size, number, order, peclet, density, ends=ends)[0], space.reaction
+    space, exact_profile = slab_space(size, number, order, ends), exact(peclet, density, tolerance)
+    computed, pieces = _computed(size, number, order, peclet, density, ends=ends)[0], space.reaction
     nodes = pieces.cells[:, 0]
-    ratio = ours[0, nodes] / truth(space.points[nodes, 0])[0]
-    gap, whole = apart(space, ours, lambda x, y: truth(x))
-    return {"size": length(space, size), **dict(zip(NAMES, gap / whole)), "C": np.hypot(*gap) / pair("supply")[0],
+    ratio = computed[0, nodes] / exact_profile(space.points[nodes, 0])[0]
+    gap, scale = rms_errors(space, computed, lambda x, y: exact_profile(x))
+    return {"size": length(space, size), **dict(zip(NAMES, gap / scale)), "C": np.hypot(*gap) / pair("supply")[0],
             ITSELF_STARVED: np.sqrt(np.average((ratio - 1) ** 2, weights=pieces.dx[:, 0]))}
 
 
@@ -188,7 +188,7 @@ def _over_the_supply(gap: np.ndarray) -> dict[str, float]:
 
 
 BOX, SIDE = 16.0, 8.0
-SUBSTRATES = changed(acceptor={"diffusivity": 8e6, "diffusivity_in_aggregate": 8e6},
+SUBSTRATES = substrates_with(acceptor={"diffusivity": 8e6, "diffusivity_in_aggregate": 8e6},
                      donor={"diffusivity": 4e6, "diffusivity_in_aggregate": 4e6})
 ITSELF = "donor in the biomass, over itself"
 #: Cells (um), and how many meshes of elements as long around the block.
@@ -215,15 +215,16 @@ HALF_DISCS = {"X = 1e+05 mg/L, linear": ("half-disc", 1, 1e5, 2e-5, 2e-5, 3e-5),
 def finite_differences(shape: str, order: int, density: float, *ceilings: float):
     """Around the half-disc py-pde's finest cells alone are compared with elements of order 2 and 3: one after the other
     they are off to one side or to the other, by no steady order."""
-    names, told = (*NAMES, ITSELF), ", of py-pde less ours"
+    names, suffix = (*NAMES, ITSELF), ", of py-pde less ours"
     if order > 1 and shape == "half-disc":
-        errors = _less(min(DISC), 0, density, shape, order)
-        return [at_most(name + told, errors[name], ceiling, "py-pde's error") for name, ceiling in zip(names, ceilings)]
+        errors = _differences(min(DISC), 0, density, shape, order)
+        return [at_most(name + suffix, errors[name], ceiling, "py-pde's error")
+                for name, ceiling in zip(names, ceilings)]
     samples, why = (BLOCK, "both of second order") if shape == "block" else (dict.fromkeys(DISC, 1), CUT)
     if order > 1:
         samples, why = dict.fromkeys(BLOCK, 1), "py-pde's second order"
     rows = {name: (2, why, ceiling) for name, ceiling in zip(names, ceilings)}
-    return studies(refine(_less, samples, density, shape, order), rows, told if order > 1 else "")
+    return studies(refine(_differences, samples, density, shape, order), rows, suffix if order > 1 else "")
 
 
 @pytest.mark.slow
@@ -257,32 +258,33 @@ def _pypde(cell: float, density: float, shape: str):
     """(centres (n, 2), C (2, n), part (n,) of each cell that is biomass)."""
     part = pypde.block(SIDE, SIDE) if shape == "block" else pypde.half_disc(SIDE)
     box = pypde.Box(round(BOX / cell), BOX, BOX, part)
-    found = box.steady(pair("diffusivity", SUBSTRATES), pair("supply"), density, rates(SCENE.kinetics))
-    return box.points, found, box.part
+    concentrations = box.steady(pair("diffusivity", SUBSTRATES), pair("supply"), density, rates(SCENE.kinetics))
+    return box.points, concentrations, box.part
 
 
 @cache
-def _settled(cell: float, number: int, density: float, shape: str, order: int) -> tuple[Space, np.ndarray]:
+def _rest_state(cell: float, number: int, density: float, shape: str, order: int) -> tuple[Space, np.ndarray]:
     """C (2, n) of linear elements as long as py-pde's cells; of others, finer ones, as the transient scheme comes to
     rest."""
     if shape == "block":
-        straight = following(2 * SIDE**2, cell, number, (-BOX, BOX), BOX, lambda x, y: (np.abs(x) < SIDE) & (y < SIDE),
-                             across=(-SIDE, SIDE), along=(SIDE,))
+        straight = mesh_with_sides(2 * SIDE**2, cell, number, (-BOX, BOX), BOX,
+                                   lambda x, y: (np.abs(x) < SIDE) & (y < SIDE),
+                                   across=(-SIDE, SIDE), along=(SIDE,))
         space = meshes.space_on(straight, order)
     else:
         space = meshes.half_disc_space(SIDE, DISC[cell], (-BOX, BOX), BOX, order)
-    given = transport.problem(space, None, SUBSTRATES, SCENE.kinetics), Sink(filled(space, density))
-    return space, both(transport.steady(*given) if order == 1 else gear.settle(*given, None))
+    arguments = transport.problem(space, None, SUBSTRATES, SCENE.kinetics), Sink(uniform_masses(space, density))
+    return space, both(transport.steady(*arguments) if order == 1 else gear.settle(*arguments, None))
 
 
-def _less(cell: float, number: int, density: float, shape: str, order: int) -> dict[str, float]:
+def _differences(cell: float, number: int, density: float, shape: str, order: int) -> dict[str, float]:
     """Differences of both substrates over their supply, and of the donor in the biomass, the scarcer, over itself."""
-    points, theirs, part = _pypde(cell, density, shape)
+    points, expected, part = _pypde(cell, density, shape)
     elements = cell if order == 1 else FINE_AROUND[shape][order]
-    space, fields = _settled(elements, number, density, shape, order)
-    ours = meshes.field_at(space, fields.T, points).T
-    ratio = (ours / theirs)[1, part == 1] - 1
-    return {**_over_the_supply((ours - theirs)[None]), ITSELF: np.sqrt(np.mean(ratio**2))}
+    space, fields = _rest_state(elements, number, density, shape, order)
+    computed = meshes.field_at(space, fields.T, points).T
+    ratio = (computed / expected)[1, part == 1] - 1
+    return {**_over_the_supply((computed - expected)[None]), ITSELF: np.sqrt(np.mean(ratio**2))}
 
 
 #: Steps of each of the three intervals.
@@ -311,20 +313,21 @@ def mass(space: Space) -> np.ndarray:
 def _exact_in_time(size: float, peclet: float, density: float, order: int) -> np.ndarray:
     """(times, 2, n): the same equations in space, M dC/dt = b - L C - X q in the points of the reaction, by scipy's
     integrator to 1e-8."""
-    space, law = spaced(size, 0, order), rates(LAW)
-    made, pieces = problem(space, speed_of(peclet), law=LAW), space.reaction
+    space, law = slab_space(size, 0, order), rates(LAW)
+    equations, pieces = problem(space, speed_of(peclet), law=LAW), space.reaction
     points = (pieces.values @ np.eye(space.count)[pieces.cells]).reshape(-1, space.count)
     back, read = (np.kron(np.eye(2), part) for part in (np.linalg.inv(mass(space)), points))
-    load = filled(space, density).ravel()
+    load = uniform_masses(space, density).ravel()
 
     def rise(_, y):
-        return back @ (made.source - made.operator @ y - read.T @ sink(read @ y, load, law))
+        return back @ (equations.source - equations.operator @ y - read.T @ sink(read @ y, load, law))
 
     def slope(_, y):
-        return back @ -(made.operator.toarray() + read.T @ slopes(read @ y, load, law) @ read)
+        return back @ -(equations.operator.toarray() + read.T @ sink_derivative(read @ y, load, law) @ read)
 
-    found = solve_ivp(rise, (0.0, TIMES[-1]), made.supply, jac=slope, method="BDF", t_eval=TIMES, rtol=1e-8, atol=1e-8)
-    return found.y.T.reshape(len(TIMES), 2, -1)
+    solution = solve_ivp(rise, (0.0, TIMES[-1]), equations.supply, jac=slope, method="BDF", t_eval=TIMES, rtol=1e-8,
+                         atol=1e-8)
+    return solution.y.T.reshape(len(TIMES), 2, -1)
 
 
 #: Order, Peclet number and density of what is studied in time, elements (um), and the last error.
@@ -347,13 +350,14 @@ IN_TIME = {f"Pe = {peclet:g}, X = {density:g} mg/L, {word}": (ORDERS[word], pecl
 def test_gear_in_time(order, peclet, density, size, ceiling, record):
     trusted = _exact_in_time(size, peclet, density, order)
     errors = refine(lambda steps: {"size": TIMES[0] / steps, **_over_the_supply(
-        _ours(size, 0, order, peclet, density, steps) - trusted)}, STEPS)
+        _computed(size, 0, order, peclet, density, steps) - trusted)}, STEPS)
     record(studies(errors, each(2, "BDF2 after a first step of backward Euler", ceiling)))
 
 
 def _channel(size: float, peclet: float, density: float) -> channel_fipy.Channel:
     """FiPy's, its cells half as long as our edges."""
-    return channel_fipy.Channel(round(2 * (CROSSED[1] - CROSSED[0]) / size), CROSSED, *given(peclet, density))
+    cells = round(2 * (CROSSED[1] - CROSSED[0]) / size)
+    return channel_fipy.Channel(cells, CROSSED, *reference_arguments(peclet, density))
 
 
 @cache
@@ -363,9 +367,9 @@ def _fipy(size: float, peclet: float, density: float, timed: bool) -> tuple[np.n
     return channel.x, channel.transient(TIMES) if timed else channel.steady()[None]
 
 
-def _at_cells(x, size: float, number: int, order: int, *given) -> np.ndarray:
+def _at_cells(x, size: float, number: int, order: int, *arguments) -> np.ndarray:
     """(times, 2, 5, n) ours at x, at five heights."""
-    return at_heights(spaced(size, number, order), _ours(size, number, order, *given), x)
+    return at_heights(slab_space(size, number, order), _computed(size, number, order, *arguments), x)
 
 
 def _rows(timed: bool) -> dict[str, tuple]:
@@ -420,19 +424,19 @@ def test_gear_fipy(timed, order, peclet, density, record):
 def _from_fipy(size: float, number: int, order: int, peclet: float, density: float, timed: bool) -> dict[str, float]:
     """Both codes refined together, or FiPy's cells against one mesh of quadratic or cubic elements; in the starved slab
     C_A over itself."""
-    x, theirs = _fipy(size, peclet, density, timed)
+    x, expected = _fipy(size, peclet, density, timed)
     elements, steps = (size, STEPS[-1] / size) if order == 1 else (FINE[order], STEPS[-1])
-    ours = _at_cells(x, elements, number, order, peclet, density, round(timed * steps))
+    computed = _at_cells(x, elements, number, order, peclet, density, round(timed * steps))
     inside = (x > 0) & (x < SLAB)
-    ratio = ours[-1, 0][:, inside] / theirs[-1, 0, inside]
-    return {**_over_the_supply(ours - theirs[:, :, None]), ITSELF_STARVED: np.sqrt(np.mean((ratio - 1) ** 2))}
+    ratio = computed[-1, 0][:, inside] / expected[-1, 0, inside]
+    return {**_over_the_supply(computed - expected[:, :, None]), ITSELF_STARVED: np.sqrt(np.mean((ratio - 1) ** 2))}
 
 
 def _from_backward_euler(steps: int, peclet: float, density: float) -> dict[str, float]:
     size = CELLS[-1]
     channel = _channel(size, peclet, density)
-    ours = _at_cells(channel.x, size, 0, 1, peclet, density, steps)
-    return {"size": TIMES[0] / steps, **_over_the_supply(ours - channel.backward_euler(TIMES, steps)[:, :, None])}
+    computed = _at_cells(channel.x, size, 0, 1, peclet, density, steps)
+    return {"size": TIMES[0] / steps, **_over_the_supply(computed - channel.backward_euler(TIMES, steps)[:, :, None])}
 
 
 WELL_MIXED, RADIUS = 24.0, 8.0
@@ -445,7 +449,7 @@ MIXED = {"C_A": 4e-5, "C_D": 1.5e-5, "X_A": 6e-5, "X_I": 1e-4}
 #: Kinetics five times slower than the paper's, and half saturations of the supply's size: C falls for days.
 SLOW_LAW = replace(SCENE.kinetics, maximum_utilization_rate=SCENE.kinetics.maximum_utilization_rate / 5)
 EVEN = {"diffusivity": 1e8, "diffusivity_in_aggregate": 1e8, "supply": SUPPLY}
-CLOSED = replace(changed(acceptor={"half_saturation": 300.0, **EVEN}, donor={"half_saturation": 600.0, **EVEN}),
+CLOSED = replace(substrates_with(acceptor={"half_saturation": 300.0, **EVEN}, donor={"half_saturation": 600.0, **EVEN}),
                  boundary="closed")
 MIXED_NORM = "largest relative difference, twice a day for five days"
 
@@ -458,45 +462,45 @@ def box_around(order: int) -> Space:
 
 
 @cache
-def _mixed_ours(step: float, order: int) -> np.ndarray:
+def _mixed(step: float, order: int) -> np.ndarray:
     """(times, 4, 2): mean and range of C_A and C_D over the nodes, of X_A and X_I over the points of the reaction, in
     steps of so many hours."""
-    made = transport.problem(box_around(order), None, CLOSED, SLOW_LAW)
-    weight = made.space.reaction.dx
+    equations = transport.problem(box_around(order), None, CLOSED, SLOW_LAW)
+    weight = equations.space.reaction.dx
     active = SEEDED * weight
     inert = 0 * active
-    now = transport.supplied_everywhere(made)
+    state = transport.supplied_everywhere(equations)
     rows = []
     for interval in np.diff([0.0, *HALF_DAYS]):
-        done = gear.advance(made, active, inert, now, interval, fixed_step=step)
-        active = done.active
-        inert = done.inert
-        now = done.concentrations
-        fields = (now.acceptor, now.donor, active / weight, inert / weight)
+        step = gear.advance(equations, active, inert, state, interval, fixed_step=step)
+        active = step.active
+        inert = step.inert
+        state = step.concentrations
+        fields = (state.acceptor, state.donor, active / weight, inert / weight)
         rows.append([(field.mean(), np.ptp(field)) for field in fields])
     return np.array(rows)
 
 
-def _theirs(order: int) -> np.ndarray:
+def _mixed_reference(order: int) -> np.ndarray:
     """(times, 4) by scipy."""
     space, law = box_around(order), rates(SLOW_LAW, CLOSED)
     share = space.reaction.dx.sum() / space.at.dx.sum()
 
     def right(_, y):
-        taken = share * np.array(uptake(y[0], y[1], law))
-        return y[2] * np.append(-taken, runs.growth_rates(SLOW_LAW, CLOSED, y[0], y[1]))
+        consumed = share * np.array(uptake(y[0], y[1], law))
+        return y[2] * np.append(-consumed, runs.growth_rates(SLOW_LAW, CLOSED, y[0], y[1]))
 
     return solve_ivp(right, (0, HALF_DAYS[-1]), [SUPPLY, SUPPLY, SEEDED, 0.0], t_eval=HALF_DAYS, rtol=1e-11, atol=1e-10,
                      method="DOP853").y.T
 
 
-def followed(order: int):
+def well_mixed(order: int):
     """How even the box is, and studies of the four."""
-    trusted = _theirs(order)
-    uneven = (_mixed_ours(MIXED_STEPS[-1], order)[:, :, 1] / trusted).max()
+    trusted = _mixed_reference(order)
+    uneven = (_mixed(MIXED_STEPS[-1], order)[:, :, 1] / trusted).max()
     yield at_most("unevenness in the box", uneven, 1e-6, "L^2 / D over the time in which the supply lasts")
     errors = refine(lambda step: {"size": step, **dict(zip(
-        MIXED, np.abs(_mixed_ours(step, order)[:, :, 0] / trusted - 1).max(axis=0)))}, MIXED_STEPS)
+        MIXED, np.abs(_mixed(step, order)[:, :, 0] / trusted - 1).max(axis=0)))}, MIXED_STEPS)
     yield studies(errors, {name: (2, "BDF2, started anew ten times", ceiling) for name, ceiling in MIXED.items()})
     if order == 1:
         yield at_most("X at constant C, 12 min steps", _constant_supply(), 1e-9,
@@ -512,7 +516,7 @@ def followed(order: int):
     references=("monod",), omitted="orders 2, 3: transport-well-mixed-higher")
 @parametrize("order", combined(LINEAR))
 def test_well_mixed(order, record):
-    record(followed(order))
+    record(well_mixed(order))
 
 
 @pytest.mark.slow
@@ -525,7 +529,7 @@ def test_well_mixed(order, record):
     omitted="order 1: transport-well-mixed")
 @parametrize("order", combined(HIGHER))
 def test_well_mixed_higher(order, record):
-    record(followed(order))
+    record(well_mixed(order))
 
 
 def _constant_supply() -> float:

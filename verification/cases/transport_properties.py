@@ -26,7 +26,7 @@ from verification.cases.transport_codes import box_around
 from verification.evidence.cases import combined, parametrize
 from verification.evidence.checks import Check, Study, at_most, each_at_most, study
 from verification.problems import runs
-from verification.problems.channels import NAMES, ORDERS, SCENE, both, changed, rates
+from verification.problems.channels import NAMES, ORDERS, SCENE, both, rates, substrates_with
 
 SLOW = 0.35e6 / 24
 #: Radius (um), supplies of acceptor and donor (mg/L): pores under 0.35 m/d whose biomass could take up far more.
@@ -47,8 +47,8 @@ def _solved(kind: tuple[str, ...], radius: float, acceptor: float = 10.0, donor:
     scene = load_scene("base", [f'aggregate.radius="{radius} um"', f'substrates.acceptor.supply="{acceptor} mg/L"',
                                 f'substrates.donor.supply="{donor} mg/L"', f'numerics.inlet="{inlet}"', *kind])
     scene = runs.without_flow(scene) if speed is None else runs.at_velocity(scene, speed)
-    now = pore.seeded(scene)
-    return now, pore.solve(scene, now)
+    seed = pore.seeded(scene)
+    return seed, pore.solve(scene, seed)
 
 
 def _defect(flux) -> float:
@@ -69,34 +69,34 @@ def test_balance(kind, record):
     pores = {"R = 5 um": _solved(kind, 5.0), "R = 40 um": _solved(kind, 40.0),
              "R = 20 um, no flow": _solved(kind, 20.0, speed=None),
              "R = 30 um, printed inlet": _solved(kind, 30.0, speed=SLOW, inlet="mean")}
-    for title, (now, solved) in pores.items():
-        beyond = _by_the_printed_inlet(now, solved) if "printed" in title else (0.0, 0.0)
+    for title, (seed, solved) in pores.items():
+        beyond = _by_the_printed_inlet(seed, solved) if "printed" in title else (0.0, 0.0)
         for name, flux, enters in zip(NAMES, solved.fluxes, beyond):
             record(at_most(f"{name}, {title}", abs(_defect(flux) - enters), 1e-9, ROUND_OFF))
     timed = [pores["R = 5 um"], pores["R = 20 um, no flow"]]
-    if now.space.order == 1:
+    if seed.space.order == 1:
         timed.append(_solved(kind, 42.0, 10.0, 0.15, SLOW))
-    record([_in_time(*found) for found in timed])
+    record([_in_time(*solution) for solution in timed])
 
 
-def _by_the_printed_inlet(now, solved) -> list[float]:
+def _by_the_printed_inlet(seed, solved) -> list[float]:
     """(u_ave - u_x) C of what is at the inlet, over the supply, of both substrates, as the weak form has it: lumped at
     the nodes with linear elements. What enters is u_ave C_s less that."""
-    space = now.space
+    space = seed.space
     edges = space.dofs.inlet
     apart = solved.flow.mean_velocity - solved.flow.velocity[:, 0]
     weight = space.summed(edges, space.end_loads(edges, apart))
     return [weight @ field / flux.supplied for field, flux in zip(both(solved.concentrations), solved.fluxes)]
 
 
-def _in_time(now, solved):
+def _in_time(seed, solved):
     """From the supply everywhere, over 36 s in controlled steps."""
     start = transport.supplied_everywhere(solved.problem)
-    done = gear.advance(solved.problem, now.active, now.inert, start, 0.01)
-    told = f"R = {now.outline.thickness:.0f} um, in time" + ("" if solved.flow else ", no flow")
-    return [at_most(f"{name}, {told}", abs(supplied - out - consumed - stored) / supplied, 3e-12,
+    step = gear.advance(solved.problem, seed.active, seed.inert, start, 0.01)
+    label = f"R = {seed.outline.thickness:.0f} um, in time" + ("" if solved.flow else ", no flow")
+    return [at_most(f"{name}, {label}", abs(supplied - out - consumed - stored) / supplied, 3e-12,
                     "fluxes are integrated by the formula of the concentrations: round-off")
-            for name, (supplied, out, consumed, stored) in zip(NAMES, zip(*done.flows))]
+            for name, (supplied, out, consumed, stored) in zip(NAMES, zip(*step.flows))]
 
 
 @pytest.mark.case(
@@ -111,36 +111,37 @@ def _in_time(now, solved):
     {f"R = {row[0]:g} um, supplies {row[1]:g}, {row[2]:g} mg/L, {label}": (kind, *row)
      for (label, kind), row in product(KINDS.items(), STARVED)})
 def test_starved(kind, radius, supplies, record):
-    now, solved = _solved(kind, radius, *supplies, SLOW)
-    found, linear = both(solved.concentrations), now.space.order == 1
-    least = max(-(field.min() / supply) for field, supply in zip(found, supplies))
+    seed, solved = _solved(kind, radius, *supplies, SLOW)
+    computed, linear = both(solved.concentrations), seed.space.order == 1
+    least = max(-(field.min() / supply) for field, supply in zip(computed, supplies))
     bound, why = (0.0, "C >= 0") if linear else (1e-3, "what is let pass as resolved")
     record(at_most("least C below zero", max(least, 0.0), bound, why))
     record(at_most("balance", max(abs(_defect(flux)) for flux in solved.fluxes), 1e-9, ROUND_OFF))
-    record(at_most("from other first iterates", _spread(now, solved, found), 1e-8, "one steady state"))
+    record(at_most("from other first iterates", _spread(seed, solved, computed), 1e-8, "one steady state"))
     if linear and radius == STARVED[0][0]:
-        again = both(gear.settle(solved.problem, Sink(now.active), None))
-        record(at_most("the transient scheme at rest", np.abs(again / found - 1).max(), 1e-7,
+        again = both(gear.settle(solved.problem, Sink(seed.active), None))
+        record(at_most("the transient scheme at rest", np.abs(again / computed - 1).max(), 1e-7,
                        "it stops when 1e-9 of the supply is left to come"))
 
 
-def _spread(now, solved, found) -> float:
+def _spread(seed, solved, computed) -> float:
     """From rich and from random first iterates, up to 30 mg/L: with linear elements over each concentration itself,
     else, where they may be zero, over the supply."""
     random = np.random.default_rng(1)
-    guesses = [np.full_like(found, 30.0), random.uniform(0, 30.0, found.shape), random.uniform(0, 0.1, found.shape)]
-    size = found if now.space.order == 1 else solved.problem.supply.reshape(2, -1)
-    again = [both(transport.steady(solved.problem, Sink(now.active), Concentrations(*guess))) for guess in guesses]
-    return max(np.abs((one - found) / size).max() for one in again)
+    shape = computed.shape
+    guesses = [np.full(shape, 30.0), random.uniform(0, 30.0, shape), random.uniform(0, 0.1, shape)]
+    size = computed if seed.space.order == 1 else solved.problem.supply.reshape(2, -1)
+    again = [both(transport.steady(solved.problem, Sink(seed.active), Concentrations(*guess))) for guess in guesses]
+    return max(np.abs((one - computed) / size).max() for one in again)
 
 
 SUPPLY = SCENE.substrates.acceptor.supply
-PAPER, FAST, ACCURATE = map(runs.by, runs.PRESETS)
+PAPER, FAST, ACCURATE = map(runs.with_preset, runs.PRESETS)
 #: What fronts are solved with, and how far its effluents may be from those far away.
 FINER = "numerics.refinement=0.45"
 SOLVED = {"fast": ((FAST, "numerics.refinement=0.25"), 1e-2), "accurate": ((FAST, FINER), 1e-3),
           "linear": ((PAPER,), 1e-2)}
-CUBIC = {"cubic": ((FAST, runs.of("cubic"), FINER), 1e-3)}
+CUBIC = {"cubic": ((FAST, runs.with_elements("cubic"), FINER), 1e-3)}
 #: Half saturations, and the least, at which cubic elements would take minutes.
 HALVES = {f"K_s = {half}": half for half in ("1e-2 mg/L", "1e-3 mg/L")}
 LEAST = {"K_s = 1e-5 mg/L": "1e-5 mg/L"}
@@ -177,8 +178,8 @@ def proportion(half: str, *numerics: str) -> Check:
 def test_curved_front(half, solved, record):
     numerics, bound = solved
     record(proportion(half, *numerics))
-    found, far = _front(half, *numerics), _front(half, FAST, "numerics.refinement=1.3")
-    apart = max(abs(a.effluent - b.effluent) for a, b in zip(found, far)) / SUPPLY
+    near, far = _front(half, *numerics), _front(half, FAST, "numerics.refinement=1.3")
+    apart = max(abs(a.effluent - b.effluent) for a, b in zip(near, far)) / SUPPLY
     record(at_most("effluents", apart, bound, "what the preset is for"))
 
 
@@ -192,14 +193,14 @@ def _front(half: str, *numerics: str):
     try:
         return _resolved(scene)
     except Unresolved as refusal:
-        advised = re.search(r"numerics\.refinement = ([\d.]+) resolves this state", str(refusal))
-        if advised is None:
+        match = re.search(r"numerics\.refinement = ([\d.]+) resolves this state", str(refusal))
+        if match is None:
             raise
-    return _resolved(replace(scene, numerics=replace(scene.numerics, refinement=float(advised[1]))))
+    return _resolved(replace(scene, numerics=replace(scene.numerics, refinement=float(match[1]))))
 
 
 def _resolved(scene: Scene):
-    return remeshing.resolved(scene, pore.seeded(scene))[1].fluxes
+    return remeshing.solve_graded(scene, pore.seeded(scene))[1].fluxes
 
 
 def _half_disc(width: float, radius: float, speed: str, *changes: str) -> Scene:
@@ -209,9 +210,9 @@ def _half_disc(width: float, radius: float, speed: str, *changes: str) -> Scene:
 
 
 @cache
-def _carried(*given):
+def _carried(*arguments):
     """Ledgers of a half-disc at t = 0, on the first mesh that is made."""
-    scene = _half_disc(*given)
+    scene = _half_disc(*arguments)
     return pore.solve(scene, pore.seeded(scene)).fluxes
 
 
@@ -219,8 +220,8 @@ WITHIN = "0.1 %, what preset accurate is for"
 TENTH = "a tenth of what preset fast is for"
 #: A half-disc under fast water: its numerics, how far effluents and consumption may be from those of quadratic elements
 #: of refinement 2.5, and why.
-FASTEST = {"quadratic, accurate": ((ACCURATE, runs.of("quadratic"), FINER), 1e-3, WITHIN),
-           "cubic": ((ACCURATE, runs.of("cubic"), FINER), 1e-3, WITHIN),
+FASTEST = {"quadratic, accurate": ((ACCURATE, runs.with_elements("quadratic"), FINER), 1e-3, WITHIN),
+           "cubic": ((ACCURATE, runs.with_elements("cubic"), FINER), 1e-3, WITHIN),
            "fast": ((FAST,), 1e-3, TENTH + ": its elements there are accurate's")}
 
 
@@ -243,7 +244,7 @@ def test_curved_peclet(speed, preset, record):
 #: The balance's round-off, and how far effluents may be from those of quadratic elements twice finer: of numerics.
 CONSERVES = 1e-11, "round-off: the form conserves"
 HALF_DISCS = {
-    "cubic": ((ACCURATE, runs.of("cubic")), CONSERVES, 1e-5, "a hundredth of what preset accurate is for"),
+    "cubic": ((ACCURATE, runs.with_elements("cubic")), CONSERVES, 1e-5, "a hundredth of what preset accurate is for"),
     "quadratic": ((ACCURATE, "numerics.refinement=0.9"), CONSERVES, 0.0, "itself what the others are compared with"),
     "linear, paper": ((PAPER,), (1e-9, ROUND_OFF), 1e-2, "1 %, what preset paper is for"),
     "fast": ((FAST,), CONSERVES, 1e-3, TENTH),
@@ -260,26 +261,26 @@ HALF_DISCS = {
 @parametrize("numerics, round_off, bound, why", HALF_DISCS)
 def test_cubic_half_disc(numerics, round_off, bound, why, record):
     far = _carried(50.0, 40.0, "2.9 m/day", *HALF_DISCS["quadratic"][0])
-    for name, ours, theirs in zip(NAMES, _carried(50.0, 40.0, "2.9 m/day", *numerics), far):
-        record(at_most(f"balance, {name}", abs(_defect(ours)), *round_off))
+    for name, flux, expected in zip(NAMES, _carried(50.0, 40.0, "2.9 m/day", *numerics), far):
+        record(at_most(f"balance, {name}", abs(_defect(flux)), *round_off))
         if bound:
-            record(at_most(f"effluent, {name}", abs(ours.effluent - theirs.effluent) / SUPPLY, bound, why))
+            record(at_most(f"effluent, {name}", abs(flux.effluent - expected.effluent) / SUPPLY, bound, why))
 
 
 #: Lengths of a step (h); X_A more than doubles in the last.
 HOURS = (0.2, 2.0, 8.0)
 #: The paper's kinetics and diffusivities, the supply held at both ends: both substrates fall towards the wall.
-OPEN = changed(acceptor={"supply": 1.0})
+OPEN = substrates_with(acceptor={"supply": 1.0})
 #: Elements of each order on a mesh of their own, and those of presets.
 MEAN: dict[str, int | str] = {**ORDERS, "paper": PAPER, "fast": FAST, "accurate": ACCURATE}
 
 
-def _open(made: int | str) -> transport.Problem:
+def _open(numerics: int | str) -> transport.Problem:
     """Around a half-disc: of an order, or with the elements of a preset."""
-    if isinstance(made, int):
-        space = box_around(made)
+    if isinstance(numerics, int):
+        space = box_around(numerics)
     else:
-        space = pore.seeded(_half_disc(50.0, 20.0, "2.9 m/day", made)).space
+        space = pore.seeded(_half_disc(50.0, 20.0, "2.9 m/day", numerics)).space
     return transport.problem(space, None, OPEN, SCENE.kinetics)
 
 
@@ -307,25 +308,25 @@ def _balanced(problem: transport.Problem, hours: float) -> Check:
     sink = Sink(active, hours)
     state = transport.steady(problem, sink)
     acceptor, donor = (hours * flux.consumed for flux in transport.fluxes(problem, sink, state))
-    found = biomass.rates(problem.space, state, problem.law)
-    grown = np.sum(kinetics.grow(active, 0 * active, found.growth, found.remains, hours)) - active.sum()
+    growth_rates = biomass.rates(problem.space, state, problem.law)
+    grown = np.sum(kinetics.grow(active, 0 * active, growth_rates.growth, growth_rates.remains, hours)) - active.sum()
     F, d_c = law.acceptor_to_donor_ratio, law.decay_oxygen_demand
-    asked = law.yield_coefficient * donor - (acceptor - F * donor) / d_c
-    return at_most(f"biomass made, {hours:g} h", abs(grown - asked) / grown, 1e-12,
+    expected = law.yield_coefficient * donor - (acceptor - F * donor) / d_c
+    return at_most(f"biomass made, {hours:g} h", abs(grown - expected) / grown, 1e-12,
                    "one integral of growth and uptake in each point: round-off")
 
 
 def _integrated(problem: transport.Problem, hours: float) -> Check:
     """Uptake at constant concentrations against the integral of (7)-(10) over the step, in which X_A grows as an
     exponential."""
-    given, seeded = np.array([0.7, 4.0]), 300.0
-    everywhere = Concentrations(*np.outer(given, np.ones(problem.space.count)))
-    ours = transport.fluxes(problem, Sink(seeded * problem.space.reaction.dx, hours), everywhere)
-    sinks = uptake(*given, rates(SCENE.kinetics, OPEN))
-    growth, _ = runs.growth_rates(SCENE.kinetics, OPEN, *given)
-    found = seeded * np.array(sinks) * np.expm1(growth * hours) / growth
-    taken = hours * np.array([flux.consumed for flux in ours]) / problem.space.reaction.dx.sum()
-    return at_most(f"uptake at constant C, {hours:g} h", np.abs(taken / found - 1).max(), 1e-10,
+    concentrations, seeded = np.array([0.7, 4.0]), 300.0
+    everywhere = Concentrations(*np.outer(concentrations, np.ones(problem.space.count)))
+    ledgers = transport.fluxes(problem, Sink(seeded * problem.space.reaction.dx, hours), everywhere)
+    sinks = uptake(*concentrations, rates(SCENE.kinetics, OPEN))
+    growth, _ = runs.growth_rates(SCENE.kinetics, OPEN, *concentrations)
+    expected = seeded * np.array(sinks) * np.expm1(growth * hours) / growth
+    computed = hours * np.array([flux.consumed for flux in ledgers]) / problem.space.reaction.dx.sum()
+    return at_most(f"uptake at constant C, {hours:g} h", np.abs(computed / expected - 1).max(), 1e-10,
                    "the integral of an exponential: round-off")
 
 

@@ -1,12 +1,12 @@
 """Every claim of the paper, judged by computed numbers: `make claims`, or `python -m verification.claims [C07 ...]`.
 
-A claim is a function without arguments that computes a `Finding`: numbers of ours against the paper's. A number that
-the paper prints is an interval, half a unit of its last digit to both sides; words become a range that says where it
-comes from and when it was set. Beside each number stand three widths: that of the printing, that of the numerics (a bar
-from several levels, see `levels`), and that of the inputs, Table 1 being rounded too (`verification.sensitivity`).
+A claim is a function without arguments that computes a `Finding`: our numbers against the paper's. A number that the
+paper prints is an interval, half a unit of its last digit to both sides; words become a range with its origin and the
+date when it was set. Each number has three widths: printing, numerics (a bar from several levels, see `levels`), and
+inputs, because Table 1 is rounded too (`verification.sensitivity`).
 
-What the paper says of **the model** is judged with a converged solution, the range of its own scheme beside it; what it
-says of **its scheme** with that. A verdict follows from the outcomes of the checks and is written down nowhere:
+Claims about **the model** are judged with a converged solution; the range of the paper's own scheme stands beside it.
+Claims about **the scheme** are judged with the scheme. A verdict follows from the outcomes of the checks alone:
 
     all hold                                                                 reproduced
     all hold, something was changed against the paper                        reproduced with a stated change
@@ -15,11 +15,11 @@ says of **its scheme** with that. A verdict follows from the outcomes of the che
     some fail beyond their bars                                              contradicted; the finding says why
     no check fails, but a bar reaches over a bound                           undecided
 
-What the paper says may or could be holds if it is so in one of the scenes that are tried, the one where it is so most;
-what it says hangs on the conditions holds if besides it is not so in another one.
+If the paper says that something may or could happen, the claim holds if it happens in at least one of the scenes that
+are tried. If the paper says that it depends on the conditions, it must also not happen in another scene.
 
-A number is told apart by what it rests on (`rests_on`): a prediction of a solution, or an input, a rule of construction
-or the arithmetic of Table 1, which no solution is needed for and which is not counted as a number reproduced.
+`rests_on` says what a number depends on: the prediction of a solution, or an input, a rule of construction or the
+arithmetic of Table 1. The latter need no solution and do not count as reproduced numbers.
 """
 
 from __future__ import annotations
@@ -53,15 +53,15 @@ CHANGED = "reproduced with a stated change"
 CONTRADICTED = "contradicted"
 WITHIN_ROUNDING, UNDECIDED = "reproduced within the rounding of Table 1", "undecided"
 VERDICTS = (REPRODUCED, WITHIN_ROUNDING, CHANGED, CONTRADICTED, UNDECIDED)
-#: What comes of a check.
+#: Outcomes of a check.
 HOLDS = "holds"
 FAILS = "fails"
 REACHES_OVER = "reaches over"
-#: What a claim is about.
+#: The subject of a claim.
 MODEL = "the model"
 OF_SCHEME = "the scheme"
 CLOSED = "closed forms"
-#: What a number rests on.
+#: The basis of a number.
 PREDICTED = "a solution"
 ARITHMETIC = "arithmetic of Table 1"
 CONSTRUCTION = "a rule of construction"
@@ -85,8 +85,8 @@ class ClaimError(RuntimeError):
 
 
 def interval(text: str) -> tuple[float, float] | None:
-    """What a printed number may stand for: 1.5 is 1.45 to 1.55. After a ~ zeros are no digits: ~60 is 55 to 65. None
-    for words."""
+    """The interval of a printed number: 1.5 is 1.45 to 1.55. After a ~ trailing zeros are no digits: ~60 is 55 to 65.
+    None for words."""
     if not PRINTED.fullmatch(text):
         return None
     value = Decimal(text.removeprefix("~"))
@@ -102,8 +102,8 @@ def outcome_of(bar: tuple[float, float], bounds: tuple[float, float]) -> str:
 
 
 def verdict_of(outcomes: set[str], changed: bool, rounding: bool) -> str:
-    """What follows from the outcomes of all checks; changed: was something, against the paper? rounding: does one set
-    of inputs within it give all printed numbers?"""
+    """The verdict from the outcomes of all checks. changed: does something differ from the paper? rounding: does one
+    set of inputs within the rounding give all printed numbers?"""
     if outcomes == {HOLDS}:
         return CHANGED if changed else REPRODUCED
     if FAILS not in outcomes:
@@ -115,13 +115,12 @@ def verdict_of(outcomes: set[str], changed: bool, rounding: bool) -> str:
 class PaperCheck(Check):
     """A check of a number against the paper's, whatever its bar.
 
-    paper: what the paper prints, as text: "2.9"; date: when the accepted range was set, that of the claim where none is
-    given; converges: has the number a
-    limit as mesh and step are refined? rests_on: what it takes to know it; input: its name in the record of the
-    sensitivities; bar: where the number lies, None before it is known; held: for a number without a limit, whether it
-    holds in the range of each level; scheme: least and largest value with the scheme of 2001, None where that is not
-    asked; on_sizes: of a claim about the model, its values on the sizes of the converged solution, the judged one
-    first.
+    paper: the paper's text, "2.9"; date: when the accepted range was set, by default the date of the claim; converges:
+    does the number have a limit as mesh and step are refined? rests_on: what the number depends on; input: its name in
+    the record of the sensitivities; bar: the interval of the number, None before it is known; holds_at: for a number
+    without a limit, whether it holds at each level; scheme: smallest and largest value with the scheme of 2001, None
+    where it is not computed; on_sizes: for a claim about the model, the values on the sizes of the converged solution,
+    the judged one first.
     """
 
     paper: str
@@ -131,18 +130,18 @@ class PaperCheck(Check):
     input: str = ""
     within: tuple[float, float] | None = None
     bar: Bar | None = None
-    held: tuple[bool, ...] = ()
+    holds_at: tuple[bool, ...] = ()
     scheme: tuple[float, float] | None = None
     on_sizes: tuple[float, ...] = ()
 
     @property
     def printed(self) -> tuple[float, float] | None:
-        """The interval of the value that the paper prints, None where it prints words or a bound."""
+        """The interval of the printed value; None if the paper prints words or a bound."""
         return interval(self.paper)
 
     @property
     def inputs(self) -> tuple[float, float] | None:
-        """Where the number goes as the inputs of Table 1 move within their rounding; None where that is not known."""
+        """The range of the number as the inputs of Table 1 vary within their rounding; None if it is not known."""
         return self.within or sensitivity.interval(self.input, self.value)
 
     @property
@@ -154,17 +153,17 @@ class PaperCheck(Check):
             raise ClaimError(f"{self.quantity}: no error bar")
         if self.converges:
             return outcome_of((self.bar.low, self.bar.high), (self.low, self.high))
-        return HOLDS if all(self.held) else FAILS if not any(self.held) else REACHES_OVER
+        return HOLDS if all(self.holds_at) else FAILS if not any(self.holds_at) else REACHES_OVER
 
 
 @dataclass(frozen=True)
 class Finding:
-    """What a claim came to.
+    """The result of a claim.
 
-    change: what had to be changed against the paper, empty if nothing; reason: used only where a check fails or cannot
-    be decided: why; rounding: the set of inputs within the rounding of Table 1 that gives all printed numbers of base
-    at once, empty where none was found; note: further computed numbers worth telling, a function where they take runs
-    or time of their own, which is called at the judged level alone.
+    change: the change against the paper, empty if there is none; reason: why a check fails or cannot be decided, used
+    only then; rounding: the set of inputs within the rounding of Table 1 that gives all printed numbers of base at
+    once, empty if no set does; note: further computed numbers, or a function that computes them at the judged level
+    alone, if they need runs or time of their own.
     """
 
     checks: tuple[PaperCheck, ...]
@@ -175,7 +174,7 @@ class Finding:
 
     @property
     def verdict(self) -> str:
-        """What follows from the checks and their bars; raises ClaimError where nothing does."""
+        """The verdict from the checks and their bars. Raises ClaimError if there is none."""
         if not self.checks:
             raise ClaimError("nothing is checked")
         outcomes = {check.outcome for check in self.checks}
@@ -183,8 +182,8 @@ class Finding:
             raise ClaimError("a check does not hold and no reason is given: " + self._failed())
         return verdict_of(outcomes, bool(self.change), bool(self.rounding))
 
-    def told(self) -> Finding:
-        """The same, its note worked out."""
+    def with_note(self) -> Finding:
+        """Return the finding with its note computed."""
         return replace(self, note=self.note() if callable(self.note) else self.note)
 
     def _failed(self) -> str:
@@ -194,7 +193,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Claim:
-    """A row of the table: the paper's section, what it says, how to compute it, and the function that does.
+    """A row of the table: the paper's section, its statement, and the function that computes the numbers.
 
     about: MODEL, OF_SCHEME or CLOSED; fine: sizes of the converged solution; beside: those of the scheme whose range
     stands beside it; sizes, steps: of the scheme; fixed: why one of them is not varied; date: when its ranges were set.
@@ -214,34 +213,34 @@ class Claim:
 
     @property
     def of_wide(self) -> bool:
-        """Is it about wide? It is judged on the sizes for that then."""
+        """Whether the claim is about wide, which has sizes of its own."""
         return self.fine == WIDE_FINE
 
     @property
     def meshes(self) -> dict[float, Level]:
-        """By size of their elements the levels that its bars come from."""
+        """{element size: level} of the levels that give the bars."""
         sizes = {MODEL: self.fine, OF_SCHEME: self.sizes, CLOSED: ALONE}[self.about]
         return {size: Level(CONVERGED if self.about == MODEL else SCHEME, size) for size in sizes}
 
     @property
     def stepped(self) -> dict[float, Level]:
-        """The same by steps, of a claim about the scheme."""
+        """{step: level} of the levels that give the bars of a claim about the scheme."""
         return {step: Level(step=step) for step in self.steps if self.about == OF_SCHEME}
 
     @property
-    def own(self) -> tuple[Level, ...]:
-        """Both, the one whose number is the claim's first."""
+    def judging_levels(self) -> tuple[Level, ...]:
+        """The levels of both, the judged one first."""
         return tuple(dict.fromkeys((*self.meshes.values(), *self.stepped.values())))
 
     @property
     def levels(self) -> tuple[Level, ...]:
-        """All levels: beside a claim about the model are those of the scheme."""
-        return (*self.own, *(Level(size=size) for size in self.beside if self.about == MODEL))
+        """All levels; a claim about the model adds those of the scheme."""
+        return (*self.judging_levels, *(Level(size=size) for size in self.beside if self.about == MODEL))
 
     @property
     def judged(self) -> Level:
-        """The level whose number is the claim's."""
-        return self.own[0]
+        """The level that gives the number of the claim."""
+        return self.judging_levels[0]
 
 
 CLAIMS: dict[str, Claim] = {}
@@ -255,32 +254,32 @@ def claim(id: str, where: str, text: str, **fields):
     return register
 
 
-def printed(quantity: str, paper_text: str, ours: float, why: str = DIGITS, **more) -> PaperCheck:
+def printed(quantity: str, paper_text: str, computed: float, why: str = DIGITS, **more) -> PaperCheck:
     """A number that the paper prints: it must lie in the interval of its digits. Raises ValueError for words."""
-    found = interval(paper_text)
-    if found is None:
+    accepted = interval(paper_text)
+    if accepted is None:
         raise ValueError(f"{quantity}: {paper_text!r} is no printed number")
-    return between(quantity, paper_text, ours, *found, why, date=LATER, **more)
+    return between(quantity, paper_text, computed, *accepted, why, date=LATER, **more)
 
 
-def near(quantity: str, paper_text: str, ours: float, target: float, apart: float, why: str, **more) -> PaperCheck:
-    """A number that must not be further apart from its target than a tolerance."""
-    return between(quantity, paper_text, ours, target - apart, target + apart, why, **more)
+def near(quantity: str, paper_text: str, computed: float, target: float, apart: float, why: str, **more) -> PaperCheck:
+    """A number that must lie within a tolerance of its target."""
+    return between(quantity, paper_text, computed, target - apart, target + apart, why, **more)
 
 
-def at_most(quantity: str, paper_text: str, ours: float, bound: float, why: str, **more) -> PaperCheck:
+def at_most(quantity: str, paper_text: str, computed: float, bound: float, why: str, **more) -> PaperCheck:
     """A number that must not exceed a bound."""
-    return between(quantity, paper_text, ours, -inf, bound, why, **more)
+    return between(quantity, paper_text, computed, -inf, bound, why, **more)
 
 
-def at_least(quantity: str, paper_text: str, ours: float, bound: float, why: str, **more) -> PaperCheck:
+def at_least(quantity: str, paper_text: str, computed: float, bound: float, why: str, **more) -> PaperCheck:
     """A number that must not be under a bound."""
-    return between(quantity, paper_text, ours, bound, inf, why, **more)
+    return between(quantity, paper_text, computed, bound, inf, why, **more)
 
 
-def between(quantity: str, paper_text: str, ours: float, low: float, high: float, why: str, **more) -> PaperCheck:
+def between(quantity: str, paper_text: str, computed: float, low: float, high: float, why: str, **more) -> PaperCheck:
     """A number that must lie in a range."""
-    return PaperCheck(quantity, float(ours), low, high, why, paper_text, **more)
+    return PaperCheck(quantity, float(computed), low, high, why, paper_text, **more)
 
 
 def without_limit(check: PaperCheck) -> PaperCheck:

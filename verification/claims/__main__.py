@@ -1,9 +1,8 @@
 """`python -m verification.claims [--record] [C07 C09 ...]`: judge the paper's claims, all of them by default.
 
-They are compared with the committed `claims.json`: where every number lies in its recorded interval and every verdict
-is the same, that file stays as it is. `--record` writes it anew, or of it the claims that are named.
-The exit status is 0 when every claim has a verdict, whatever it is, and agrees with the record; 1 when not; 2 for an
-unknown claim.
+The program compares the claims with the committed `claims.json`: every number must lie in its recorded interval, and
+every verdict must be the same. `--record` writes the file anew, or the named claims in it. The exit status is 0 if
+every claim has a verdict and agrees with the record, 1 if not, and 2 for an unknown claim.
 """
 
 from __future__ import annotations
@@ -13,7 +12,7 @@ import sys
 
 from repro.results import write_json
 from verification.claims import CLAIMS, EXPECTED, ClaimError, base_run, evaluate, report
-from verification.claims.evaluate import Found, barred
+from verification.claims.evaluate import Outcome, barred
 from verification.claims.levels import Level
 from verification.claims.report import Row
 
@@ -34,42 +33,43 @@ def main(arguments: list[str] | None = None) -> int:
         return 2
     rows = judged(tuple(chosen.ids) or EXPECTED)
     print("\n".join([report.LEGEND, *map(report.terminal, rows)]))
-    settled = all(row.verdict != NO_VERDICT for row in rows)
+    is_judged = all(row.verdict != NO_VERDICT for row in rows)
     if not chosen.ids:
         checks = base_run.independence()
         print(report.terminal_independence(checks))
-        settled = settled and all(check.holds for check in checks)
+        is_judged = is_judged and all(check.holds for check in checks)
     print(report.summary(rows))
-    return 0 if recorded(rows, chosen.record) and settled else 1
+    return 0 if recorded(rows, chosen.record) and is_judged else 1
 
 
 def recorded(rows: list[Row], anew: bool) -> bool:
-    """Do the rows agree with the committed record? Differences are told."""
-    ours = [report.entry(row) for row in rows if row.verdict != NO_VERDICT]
+    """Whether the rows agree with the committed record; prints the differences."""
+    entries = [report.entry(row) for row in rows if row.verdict != NO_VERDICT]
     if anew:
-        write_json(report.COMMITTED, report.replaced(ours))
+        write_json(report.COMMITTED, report.replaced(entries))
         print(f"{report.COMMITTED.name}: written")
         return True
-    told = report.differences(ours, report.read())
-    print("\n".join(told) if told else f"{len(ours)} claims as recorded in {report.COMMITTED.name}, which stays")
-    return not told
+    differences = report.differences(entries, report.read())
+    unchanged = f"{len(entries)} claims as recorded in {report.COMMITTED.name}, which stays"
+    print("\n".join(differences) or unchanged)
+    return not differences
 
 
 def judged(ids: tuple[str, ...]) -> list[Row]:
-    """The rows of claims, whatever goes wrong is in them."""
-    found = evaluate.everywhere(id for id in ids if id in CLAIMS)
-    return [_row(id, found.get(id, {})) for id in ids]
+    """The rows of claims; an error becomes part of its row."""
+    outcomes = evaluate.everywhere(id for id in ids if id in CLAIMS)
+    return [_row(id, outcomes.get(id, {})) for id in ids]
 
 
-def _row(id: str, found: dict[Level, Found]) -> Row:
+def _row(id: str, outcomes: dict[Level, Outcome]) -> Row:
     if id not in CLAIMS:
         return Row(id, None, None, NO_VERDICT, "no module computes it")
     claim, finding = CLAIMS[id], None
     try:
-        if errors := [each for each in found.values() if isinstance(each, str)]:
+        if errors := [each for each in outcomes.values() if isinstance(each, str)]:
             raise ClaimError("; ".join(errors))
-        finding = found[claim.judged][1]
-        finding = barred(claim, finding, {level: each[0] for level, each in found.items()})
+        finding = outcomes[claim.judged][1]
+        finding = barred(claim, finding, {level: each[0] for level, each in outcomes.items()})
         return Row(id, claim, finding, finding.verdict)
     except ClaimError as error:
         return Row(id, claim, finding, NO_VERDICT, str(error))

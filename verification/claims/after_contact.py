@@ -1,18 +1,17 @@
-"""How well the claims' numbers of base, and those after contact, are known:
+"""Accuracy of the claims' numbers of base, and of wide after contact:
 `python -m verification.claims.after_contact`.
 
-Of every number of the committed record about wide after its contact with the opposite wall, half the width of its bar
-over its value, the widest bar first. Asked are 1 % of conductivities and tips and 2 % of lengths of contact, which
-`verification.sensitivity.wide` measures. Known less well are the conductivity of the very first shape in contact, which
-closes by whole edges of the outline, and what is made of it, and ratios of peaks: a peak sits beside the ends of the
-contact surface, where stresses have no limit. A change of nearly nothing has a bar larger than itself.
+For every recorded number about wide after contact with the opposite wall, the module lists half the width of the bar
+over the value, the widest bar first. Required are 1 % for conductivities and tips and 2 % for lengths of contact, which
+`verification.sensitivity.wide` measures. Two kinds of numbers are less accurate: the conductivity of the first shape in
+contact, which closes by entire edges of the outline, with the numbers derived from it, and ratios of peaks, since a
+peak lies beside the ends of the contact surface, where stresses have no limit. The bar of a tiny change exceeds it.
 
-So it is with the numbers of base whose bars exceed the 0.2 % that are asked of its velocities, effluents, uptake and
-concentrations, which keep them. The replication note tells both lists, the second with the reason of their kind.
+A second list has the numbers of base whose bars exceed 0.2 %, the limit that its velocities, effluents, uptake and
+concentrations meet. The replication note prints both lists, the second with the reason for each kind.
 
-The program runs wide with the preset `exact`: how far it is from the finest of the recorded sizes, of which the bars
-are told with the values of all, and whether conductivities and tips are shown to be within 0.5 % in 60 s of processor
-time: distance and bar together.
+The program runs wide with the preset `exact` and prints its distance from the finest recorded size. It says whether
+conductivities and tips are within 0.5 %, distance and bar together, in 60 s of processor time.
 """
 
 from __future__ import annotations
@@ -27,12 +26,12 @@ from verification import sensitivity
 from verification.claims import CLAIMS, MODEL, evaluate
 from verification.claims.runs import ending
 from verification.sensitivity import wide
-from verification.sensitivity.rounding import scene
+from verification.sensitivity.rounding import load_varied
 
-#: What numbers of claims about wide are called that are about other things or earlier instants.
+#: Names of numbers in claims about wide that concern other scenes or earlier times.
 OTHER = re.compile(r"^base|before contact|a film left|^K / K_clean =|^the part filled|^layer|^wide, 30 h|"
                    r"in the 5 h before$|^uniform|^theta\(R\)")
-#: Percent above which a bar is told, after contact and of base.
+#: Percent above which a bar is listed, after contact and for base.
 WIDE_BAR, BASE_BAR = 2.0, 0.2
 #: Claims about the model that are neither about wide nor base: what is cut off a half-disc's pore, wide in other ways.
 NOT_OF_BASE = ("C19", "C41")
@@ -75,19 +74,19 @@ def of_base(entries: list[dict]) -> list[Known]:
 
 
 def _known(entries: list[dict], chosen: Callable[[dict, str], bool]) -> list[Known]:
-    found = [Known(entry["id"], check["quantity"], percent(check))
+    bars = [Known(entry["id"], check["quantity"], percent(check))
              for entry in entries for check in entry["checks"] if chosen(entry, check["quantity"])]
-    return sorted(found, key=lambda each: -each.percent)
+    return sorted(bars, key=lambda each: -each.percent)
 
 
 def wide_bars_of_base(entries: list[dict]) -> dict[str, list[Known]]:
-    """Those of base whose bars exceed BASE_BAR, by the reason; under "" what has none."""
-    found: dict[str, list[Known]] = {}
+    """Numbers of base whose bars exceed BASE_BAR, by reason; "" if there is none."""
+    by_reason: dict[str, list[Known]] = {}
     for each in of_base(entries):
         if each.percent > BASE_BAR:
             reasons = [why for why, names in KINDS.items() if re.match(names, f"{each.id}, {each.quantity}")]
-            found.setdefault(next(iter(reasons), ""), []).append(each)
-    return found
+            by_reason.setdefault(next(iter(reasons), ""), []).append(each)
+    return by_reason
 
 
 def percent(check: dict) -> float:
@@ -100,29 +99,29 @@ def percent(check: dict) -> float:
 
 
 def exact() -> tuple[dict[str, float], float]:
-    """What `verification.sensitivity.wide` measures, with the preset `exact`, and seconds that it takes."""
-    said = ending(scene("wide", {}, 'numerics.preset="exact"'), *wide.HOURS)
+    """The numbers of `verification.sensitivity.wide` with the preset `exact`, and the seconds that it takes."""
+    scene = ending(load_varied("wide", {}, 'numerics.preset="exact"'), *wide.HOURS)
     before = time.process_time()
-    found = wide.of_after(said)
-    return found, time.process_time() - before
+    numbers = wide.of_after(scene)
+    return numbers, time.process_time() - before
 
 
 def distance(row: dict, value: float) -> str:
     """A recorded number on all sizes with its bar, and how far a value of it is from the finest, in words."""
     apart = 100 * (value / row["values"][0] - 1)
     sizes = ", ".join(f"{each:.5g}" for each in row["values"])
-    words = "shown" if abs(apart) + row["bar_percent"] <= EXACT else "not shown"
-    shown = "" if row["asked_percent"] != 1.0 else f"; {EXACT:g} % {words}"
-    return f"{row['quantity']}: {sizes}, bar {row['bar_percent']:.2g} %; exact {value:.5g}, {apart:+.2g} %{shown}"
+    verdict = "shown" if abs(apart) + row["bar_percent"] <= EXACT else "not shown"
+    suffix = "" if row["asked_percent"] != 1.0 else f"; {EXACT:g} % {verdict}"
+    return f"{row['quantity']}: {sizes}, bar {row['bar_percent']:.2g} %; exact {value:.5g}, {apart:+.2g} %{suffix}"
 
 
 def main() -> None:
     """Print the distance of `exact`."""
     sizes = ", ".join(f"{size:.3g}" for size in wide.SIZES)
     print(f"wide at {wide.HOURS[0]:g} to {wide.HOURS[-1]:g} h on sizes {sizes}:")
-    ours, seconds = exact()
+    numbers, seconds = exact()
     for row in sensitivity.record()["after_contact"]:
-        print("  " + distance(row, ours[row["quantity"]]))
+        print("  " + distance(row, numbers[row["quantity"]]))
     print(f"exact took {seconds:.0f} s of processor time, {SECONDS:g} s are asked")
 
 

@@ -44,7 +44,7 @@ from verification.claims.runs import (
     at,
     grown,
     grown_anew,
-    scene,
+    load_packaged,
     series,
     until,
 )
@@ -73,12 +73,13 @@ def velocity_at_last() -> Finding:
 @claim("C03", "4", "effluent acceptor 4.19 K_s, donor 6.13 K_s at 19.4 h")
 def effluents() -> Finding:
     """Flow-weighted effluents of the state that the paper plots."""
-    found = [flux.effluent for flux in grown(BASE, PLOTTED)[1].fluxes]
+    effluents = [flux.effluent for flux in grown(BASE, PLOTTED)[1].fluxes]
     checks = tuple(printed(f"effluent {name} (K_s)", text, value, input=f"effluent_{name}")
-                   for name, text, value in zip(SUBSTRATES, ("4.19", "6.13"), found))
-    ratio = (SUPPLY - found[0]) / (SUPPLY - found[1])
-    reason = (f"with the printed inputs {found[0]:.3f} and {found[1]:.3f} leave; acceptor over donor consumed is "
-              f"{ratio:.3f}, the printed effluents make it {(SUPPLY - 4.19) / (SUPPLY - 6.13):.3f}, less than F [E14]")
+                   for name, text, value in zip(SUBSTRATES, ("4.19", "6.13"), effluents))
+    ratio = (SUPPLY - effluents[0]) / (SUPPLY - effluents[1])
+    reason = (f"with the printed inputs {effluents[0]:.3f} and {effluents[1]:.3f} leave; acceptor over donor consumed "
+              f"is {ratio:.3f}, the printed effluents make it {(SUPPLY - 4.19) / (SUPPLY - 6.13):.3f}, less than "
+              "F [E14]")
     return Finding(checks, reason=reason, rounding=sensitivity.verified_set(),
                    note="With the paper's own 1.6 % its effluents are 4.257 and 6.228.")
 
@@ -98,22 +99,22 @@ def at_the_meshed_inlet() -> Finding:
     In a mesh made anew: (11) stands at its end, and with it the concentrations near it. In the run's own mesh, which
     ends 68 to 73 um from the aggregate as the size has it, they move by 0.1 % from size to size and show no order.
     """
-    now, solved = grown_anew(BASE, PLOTTED)
-    means = {distance: upstream_means(now, solved, distance) for distance in DISTANCES}
+    pore, solved = grown_anew(BASE, PLOTTED)
+    means = {distance: upstream_means(pore, solved, distance) for distance in DISTANCES}
     checks = tuple(printed(f"acceptor {distance:g} um from the aggregate (K_s)", "~7", pair[0],
                            input=f"acceptor_at_{distance:g}") for distance, pair in means.items())
-    told = ", ".join(f"{pair[1]:.2f} at {distance:g} um" for distance, pair in means.items())
-    change = f"the paper names the donor, but the number is the acceptor's [E9]: the donor is {told}"
+    donors = ", ".join(f"{pair[1]:.2f} at {distance:g} um" for distance, pair in means.items())
+    change = f"the paper names the donor, but the number is the acceptor's [E9]: the donor is {donors}"
     return Finding(checks, change=change, reason="it is not 7 K_s at every distance that may be meant")
 
 
-def upstream_means(now: Pore, solved: Solved, distance: float) -> np.ndarray:
+def upstream_means(pore: Pore, solved: Solved, distance: float) -> np.ndarray:
     """(2,) flow-weighted C_A and C_D at a distance (um) upstream of the aggregate; beyond the mesh by (26)."""
-    x, inlet = now.boundary.upstream - distance, now.mesh.ends[0]
+    x, inlet = pore.boundary.upstream - distance, pore.mesh.ends[0]
     part = np.linspace(0.0, 1.0, 201)
-    where = np.column_stack([np.full_like(part, max(x, inlet)), part * now.mesh.width])
-    found = field_at(now.space, both(solved.concentrations).T, where)
-    mean = np.trapezoid(6 * part * (1 - part) * found.T, part)
+    where = np.column_stack([np.full_like(part, max(x, inlet)), part * pore.mesh.width])
+    concentrations = field_at(pore.space, both(solved.concentrations).T, where)
+    mean = np.trapezoid(6 * part * (1 - part) * concentrations.T, part)
     supply, diffusivity = (np.array(pair(name, solved.problem.substrates)) for name in ("supply", "diffusivity"))
     return supply - (supply - mean) * np.exp(solved.flow.mean_velocity * min(x - inlet, 0.0) / diffusivity)
 
@@ -136,7 +137,7 @@ def first_length() -> Finding:
 def last_length() -> Finding:
     """What the rules of 3.1 allow around our aggregate: between extension and generation. The length itself hangs on
     when the part was last regenerated, which has no limit as mesh and step are refined."""
-    row, width = at(BASE, END), scene(*BASE).pore.width
+    row, width = at(BASE, END), load_packaged(*BASE).pore.width
     span = row["downstream_um"] - row["upstream_um"]
     low, high = (span + 2 * factor * width for factor in (1.3, 1.5))
     half = 0.5 * span * sensitivity.reach("area")
@@ -196,10 +197,10 @@ def ratios() -> Finding:
 
 def change(run: tuple[str, ...], acceptor: float, donor: float) -> float:
     """Largest difference of a compared column from the run that is not scaled, in any row, over its largest."""
-    ours, plain = series(*run), series(*SHORT)
+    scaled, plain = series(*run), series(*SHORT)
     factors = dict.fromkeys(COMPARED, 1.0) | {f"{where}_{name}_mg_per_L": factor for where in ("inlet", "effluent")
                                               for name, factor in zip(SUBSTRATES, (acceptor, donor))}
-    return max(float(np.abs(ours[key] / factor - plain[key]).max() / np.abs(plain[key]).max())
+    return max(float(np.abs(scaled[key] / factor - plain[key]).max() / np.abs(plain[key]).max())
                for key, factor in factors.items())
 
 
@@ -214,15 +215,15 @@ WEIGHT = {"C": 12.011, "H": 1.008, "O": 15.999, "N": 14.007}
 def table_1() -> Finding:
     """F from Table 1's own entries and from chemical formulas; ratios of diffusivities. E1 tells what F's error does to
     base."""
-    said = scene(*BASE)
-    law, paper = said.kinetics, said.kinetics.acceptor_to_donor_ratio
+    scene = load_packaged(*BASE)
+    law, paper = scene.kinetics, scene.kinetics.acceptor_to_donor_ratio
     y, d_c = law.yield_coefficient, law.decay_oxygen_demand
     value, from_formulas = COD - y * d_c, oxygen_demand(7, C=6, H=6, O=1) - y * oxygen_demand(5, C=5, H=7, O=2, N=1)
     printed_values = [(each, HALF_DIGIT) for each in (COD, y, d_c)]
     checks = [printed("COD - Y d_c from the printed values (mg/mg)", f"{paper}", value, rests_on=ARITHMETIC,
                       within=sensitivity.in_closed_form(lambda cod, y, d_c: cod - y * d_c, *printed_values))]
     for name in SUBSTRATES:
-        substrate = getattr(said.substrates, name)
+        substrate = getattr(scene.substrates, name)
         printed_values = [(each / DIFFUSIVITY, HALF_DIGIT) for each in (substrate.diffusivity_in_aggregate,
                                                                        substrate.diffusivity)]
         checks.append(printed(f"{name}: diffusivity, aggregate over water (%)", "80",
@@ -253,10 +254,10 @@ ENDLESS = 1e12
 @claim("C09", "4", "doubling time about 3 h; decay half-time about 5.8 d")
 def doubling() -> Finding:
     """Doubling time of base's aggregate, mean over 19.2 h, and of a seed at the supply; ln 2 / b."""
-    said, row = scene(*BASE), at(BASE, PLOTTED)
-    supply, half = said.substrates.acceptor.supply, log(2) / said.kinetics.decay_coefficient / 24
+    scene, row = load_packaged(*BASE), at(BASE, PLOTTED)
+    supply, half = scene.substrates.acceptor.supply, log(2) / scene.kinetics.decay_coefficient / 24
     mean = row["time_h"] * log(2) / log(row["aggregate_area_um2"] / at(BASE, 0.0)["aggregate_area_um2"])
-    fastest, endless = (_doubling_time(said, value) for value in (supply, ENDLESS))
+    fastest, endless = (_doubling_time(scene, value) for value in (supply, ENDLESS))
     checks = (printed("doubling time of base's aggregate, mean to 19.2 h (h)", "~3", mean, input="doubling"),
               printed("doubling time at the supply of 10 K_s (h)", "~3", fastest, rests_on=ARITHMETIC,
                       input="doubling_at_supply"),
@@ -267,9 +268,9 @@ def doubling() -> Finding:
     return Finding(checks, reason=reason)
 
 
-def _doubling_time(said, concentration: float) -> float:
+def _doubling_time(scene, concentration: float) -> float:
     """ln 2 / (F3 / X_A), h, with so much of both substrates (mg/L)."""
-    return log(2) / float(rate_law(said.substrates, said.kinetics).growth_rate(concentration, concentration))
+    return log(2) / float(rate_law(scene.substrates, scene.kinetics).growth_rate(concentration, concentration))
 
 
 @claim("C18", "1", "within a 600 um pore: flow << 1 s, advection a few seconds, diffusion of the order of minutes, "
@@ -277,11 +278,11 @@ def _doubling_time(said, concentration: float) -> float:
 def time_scales() -> Finding:
     """W^2 / nu, L / u_ave, L^2 / D of both substrates, and the doubling time at the supply. Of these a solution gives
     u_ave alone, and the least of the ratios is that of two others."""
-    said, speed = scene(*BASE), at(BASE, 0.0)["mean_velocity_m_per_d"]
-    length, width = said.pore.length, said.pore.width
-    viscous, advection = SECONDS * width**2 / said.flow.kinematic_viscosity, SECONDS * length / speed * 24e-6
-    diffusion = [60 * length**2 / each for each in pair("diffusivity", said.substrates)]
-    growth = _doubling_time(said, said.substrates.acceptor.supply)
+    scene, speed = load_packaged(*BASE), at(BASE, 0.0)["mean_velocity_m_per_d"]
+    length, width = scene.pore.length, scene.pore.width
+    viscous, advection = SECONDS * width**2 / scene.flow.kinematic_viscosity, SECONDS * length / speed * 24e-6
+    diffusion = [60 * length**2 / each for each in pair("diffusivity", scene.substrates)]
+    growth = _doubling_time(scene, scene.substrates.acceptor.supply)
     apart = min(advection / viscous, growth * 60 / max(diffusion))
     tenfold = "of the order: one to ten of the unit"
     checks = (at_most("flow, W^2 / nu (s)", "<< 1", viscous, 0.1, "much less: a tenth",
@@ -314,8 +315,8 @@ def velocities(level: Level) -> list[float]:
 
 def independence() -> tuple[PaperCheck, ...]:
     """Halving the time step moves the velocity by less than 0.5 %, halving the mesh size by less than 1 %."""
-    found = dict(zip(LEVELS, side_by_side(velocities, LEVELS)))
-    return tuple(at_most(f"halving the {what} moves the velocity at {time:g} h (%)", f"< {bound:g}",
+    velocity = dict(zip(LEVELS, side_by_side(velocities, LEVELS)))
+    return tuple(at_most(f"halving the {size} moves the velocity at {time:g} h (%)", f"< {bound:g}",
                          100 * abs(new / old - 1), bound, "set beforehand")
-                 for what, (level, bound) in HALVED.items()
-                 for time, old, new in zip(TIMES, found[DEFAULT], found[level]))
+                 for size, (level, bound) in HALVED.items()
+                 for time, old, new in zip(TIMES, velocity[DEFAULT], velocity[level]))

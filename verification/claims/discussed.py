@@ -41,7 +41,7 @@ from verification.claims.runs import (
     bodies,
     full_biomass,
     halved,
-    scene,
+    load_packaged,
     series,
     solution,
 )
@@ -60,24 +60,24 @@ LAYERS = np.linspace(1e-4, 1.0, 4001)
 def less_biomass() -> Finding:
     """Biomass of a uniform layer on the lower wall, and of two layers on both, over that of the growing aggregate of
     wide, at equal conductivity of the 600 um pore: parallel flow in closed form."""
-    said = scene(*WIDE)
+    scene = load_packaged(*WIDE)
     checks = [at_least(f"K / K_clean = {reduced:g}: biomass of layers on {walls} wall{'s' * (walls - 1)} over the "
-                       "aggregate's", "less", filled(said.flow.viscosity_ratio, reduced, walls) / filled_at(reduced),
+                       "aggregate's", "less", filled(scene.flow.viscosity_ratio, reduced, walls) / filled_at(reduced),
                        1.0, "the words") for reduced in REDUCED for walls in (1, 2)]
     same = filled_at(SAME)
     checks += [at_least(f"the part filled with which the aggregate has K / K_clean = {SAME:g}: that of layers on "
                         f"{walls} wall{'s' * (walls - 1)} over it", "crucial to model permeability reduction",
-                        layered_share(said.flow.viscosity_ratio, same, walls) / SAME, 1 + FEW,
+                        layered_share(scene.flow.viscosity_ratio, same, walls) / SAME, 1 + FEW,
                         f"porosity does not determine it: more than {FEW_WORDS}") for walls in (1, 2)]
     return Finding(tuple(checks), reason="a layer plugs with less, or porosity determines the permeability")
 
 
 def filled_at(reduced: float) -> float:
     """Share of the pore that the aggregate of wide fills when it has reduced the conductivity to a part."""
-    said, rows = scene(*WIDE), series(*WIDE)
-    share = rows["conductivity_m_per_d"] / (24e-6 * clean(said))
+    scene, rows = load_packaged(*WIDE), series(*WIDE)
+    share = rows["conductivity_m_per_d"] / (24e-6 * clean(scene))
     area = np.exp(np.interp(-np.log(reduced), -np.log(share), np.log(rows["aggregate_area_um2"])))
-    return float(area) / (said.pore.width * said.pore.length)
+    return float(area) / (scene.pore.width * scene.pore.length)
 
 
 def filled(ratio: float, reduced: float, walls: int) -> float:
@@ -102,8 +102,8 @@ def mass_transfer() -> Finding:
     supply to the interface's mean, times thickness over diffusivity in water. Beside them a textbook's, that of a flat
     patch as long as the aggregate; and those of one shape in one flow with little and with much supply, whose sinks are
     nearly of first and of zero order, and with nothing left at the surface, the limit of ever faster uptake."""
-    early = [found for found in bodies(BASE) if found.pore.time <= PLOTTED + 1e-6]
-    numbers, textbook = np.array([sherwood(found) for found in early]), textbooks(early[-1])
+    early = [aggregate for aggregate in bodies(BASE) if aggregate.pore.time <= PLOTTED + 1e-6]
+    numbers, textbook = np.array([sherwood(aggregate) for aggregate in early]), textbooks(early[-1])
     shape = [in_one_shape(supply=supply) for supply in SINKS]
     sinks = np.array([*map(sherwood, shape), sherwood(at_the_surface(shape[0]))])
     rows = {"{}: largest over smallest Sherwood number, less one (%)": ("cannot be set", differing(numbers)),
@@ -111,8 +111,8 @@ def mass_transfer() -> Finding:
                 ("cannot be set", 100 * np.abs(textbook / numbers[-1] - 1)),
             "{}, one shape and flow: Sherwood numbers of three sinks, largest over smallest less one (%)":
                 ("depends on the sink in the solid", differing(sinks))}
-    checks = tuple(at_least(quantity.format(name), said, value, 100 * FEW, FEW_WORDS)
-                   for quantity, (said, values) in rows.items() for name, value in zip(SUBSTRATES, values))
+    checks = tuple(at_least(quantity.format(name), scene, value, 100 * FEW, FEW_WORDS)
+                   for quantity, (scene, values) in rows.items() for name, value in zip(SUBSTRATES, values))
     kinds = (*(f"with supplies of {supply:g} K_s" for supply in SINKS), "with nothing left at the surface")
     shapes = "; ".join(f"{a:.3g} and {d:.3g} {kind}" for kind, (a, d) in zip(kinds, sinks))
     fast = sherwood(in_one_shape(supply=SINKS[0], faster=FASTER))[0]
@@ -135,9 +135,9 @@ SINKS, RADIUS = (1.0, 100.0), 25.0
 FASTER = 100.0
 
 
-def at_the_surface(found: Body) -> Body:
+def at_the_surface(aggregate: Body) -> Body:
     """The same with both concentrations held at nothing in the aggregate: a sink at its surface alone."""
-    return replace(found, solved=holding(found.pore, found.solved, found.grid.body, 0.0))
+    return replace(aggregate, solved=holding(aggregate.pore, aggregate.solved, aggregate.grid.body, 0.0))
 
 
 def in_one_shape(radius: float = RADIUS, supply: float = 10.0, head: float = 1e-3, faster: float = 1.0) -> Body:
@@ -148,20 +148,20 @@ def in_one_shape(radius: float = RADIUS, supply: float = 10.0, head: float = 1e-
                    f'kinetics.maximum_utilization_rate="{9.3 * faster!r} 1/day"', *supplies))[0]
 
 
-def sherwood(found: Body) -> np.ndarray:
+def sherwood(aggregate: Body) -> np.ndarray:
     """(2,) of both substrates."""
-    outline, edges = found.outline, found.outline.interface_edges()
-    supply, diffusivity = (np.array(pair(name, found.scene.substrates)) for name in ("supply", "diffusivity"))
-    drop = supply - [found.concentration(name)[found.grid.loop[edges]].mean() for name in SUBSTRATES]
-    taken = np.array([flux.supplied - flux.out for flux in found.solved.fluxes])
-    return taken / (outline.edge_lengths()[edges].sum() * drop) * outline.thickness / diffusivity
+    outline, edges = aggregate.outline, aggregate.outline.interface_edges()
+    supply, diffusivity = (np.array(pair(name, aggregate.scene.substrates)) for name in ("supply", "diffusivity"))
+    drop = supply - [aggregate.concentration(name)[aggregate.grid.loop[edges]].mean() for name in SUBSTRATES]
+    uptake = np.array([flux.supplied - flux.out for flux in aggregate.solved.fluxes])
+    return uptake / (outline.edge_lengths()[edges].sum() * drop) * outline.thickness / diffusivity
 
 
-def textbooks(found: Body) -> np.ndarray:
+def textbooks(aggregate: Body) -> np.ndarray:
     """The same of a flat patch on the wall, as long as the aggregate (Leveque), with the aggregate's thickness."""
-    outline, shear = found.outline, 6 * found.solved.flow.mean_velocity / found.grid.width
+    outline, shear = aggregate.outline, 6 * aggregate.solved.flow.mean_velocity / aggregate.grid.width
     patch = outline.downstream - outline.upstream
-    diffusivities = np.array(pair("diffusivity", found.solved.problem.substrates))
+    diffusivities = np.array(pair("diffusivity", aggregate.solved.problem.substrates))
     return leveque(shear, patch, diffusivities) * outline.thickness / patch
 
 
@@ -182,19 +182,19 @@ MARGIN, FEWEST = 2.0, 4
 def not_crucial() -> Finding:
     """Acceptor taken up by the aggregate of wide over that of a layer on one wall and of two on both with its biomass,
     at the same mean velocity and supply, when it has reduced the conductivity to given parts."""
-    said = scene(*WIDE)
-    checks, told = [], []
+    scene = load_packaged(*WIDE)
+    checks, uptake_shares = [], []
     apart = []
     for reduced in REDUCED:
         part = filled_at(reduced)
-        ours, layers = aggregates_share(part), [in_the_model(part, walls) for walls in (1, 2)]
+        share, layers = aggregates_share(part), [in_the_model(part, walls) for walls in (1, 2)]
         checks += [between(f"K / K_clean = {reduced:g}: acceptor taken up over that of layers on {walls} "
-                           f"wall{'s' * (walls - 1)}", "not crucial", ours / other, 1 - NOT_CRUCIAL, 1 + NOT_CRUCIAL,
+                           f"wall{'s' * (walls - 1)}", "not crucial", share / other, 1 - NOT_CRUCIAL, 1 + NOT_CRUCIAL,
                            "not crucial: within a tenth") for walls, other in zip((1, 2), layers)]
-        told.append(f"{100 * ours:.0f} % against {100 * layers[0]:.0f} and {100 * layers[1]:.0f} % of the supply with "
-                    f"{100 * part:.1f} % filled")
-        apart.append("{:.3f} and {:.3f}".format(*np.array(layers) / layers_share(said, part)))
-    reason = "an aggregate lets more of the supply pass than layers of the same biomass do: " + "; ".join(told)
+        uptake_shares.append(f"{100 * share:.0f} % against {100 * layers[0]:.0f} and {100 * layers[1]:.0f} % of the "
+                             f"supply with {100 * part:.1f} % filled")
+        apart.append("{:.3f} and {:.3f}".format(*np.array(layers) / layers_share(scene, part)))
+    reason = "an aggregate lets more of the supply pass than layers of the same biomass do: " + "; ".join(uptake_shares)
     return Finding(tuple(checks), reason=reason, note=f"Changed on {LATER} after these values had been seen: layers "
                    "mixed over a section were judged with, of whose uptake the model's have, on one wall and on both, "
                    f"{'; '.join(apart)}; the verdict was the same.")
@@ -207,33 +207,34 @@ def shares(rows: dict[str, np.ndarray]) -> np.ndarray:
 
 def aggregates_share(part: float) -> float:
     """Part of the acceptor supplied that the aggregate of wide takes up when it fills a part of the pore."""
-    said, rows = scene(*WIDE), series(*WIDE)
-    return float(np.interp(part, rows["aggregate_area_um2"] / (said.pore.width * said.pore.length), shares(rows)))
+    scene, rows = load_packaged(*WIDE), series(*WIDE)
+    return float(np.interp(part, rows["aggregate_area_um2"] / (scene.pore.width * scene.pore.length), shares(rows)))
 
 
-def layers_share(said: Scene, part: float) -> float:
+def layers_share(scene: Scene, part: float) -> float:
     """Part of the acceptor supplied that layers take up which fill a part of the pore."""
-    supply = pair("supply", said.substrates)
-    water, inside = (np.array(pair(name, said.substrates)) for name in ("diffusivity", "diffusivity_in_aggregate"))
+    supply = pair("supply", scene.substrates)
+    water, inside = (np.array(pair(name, scene.substrates)) for name in ("diffusivity", "diffusivity_in_aggregate"))
     mean = (1 - part) * water + part * inside
-    found = channel_bvp.solution(said.flow.mean_velocity, supply, mean, mean, part * said.kinetics.maximum_density,
-                                 rates(said.kinetics, said.substrates), said.pore.length)
-    return 1 - float(found(np.array([said.pore.length]))[0, 0]) / supply[0]
+    density = part * scene.kinetics.maximum_density
+    concentrations = channel_bvp.solve(scene.flow.mean_velocity, supply, mean, mean, density,
+                                       rates(scene.kinetics, scene.substrates), scene.pore.length)
+    return 1 - float(concentrations(np.array([scene.pore.length]))[0, 0]) / supply[0]
 
 
 def in_the_model(part: float, walls: int) -> float:
     """The same of the model, layers on one or both walls as its aggregate."""
-    said = scene(*WIDE)
-    grid = layered(said, part, walls)
-    _, fluxes = solution(said, grid, full_biomass(said, grid))
-    return 1 - fluxes[0].effluent / said.substrates.acceptor.supply
+    scene = load_packaged(*WIDE)
+    grid = layered(scene, part, walls)
+    _, fluxes = solution(scene, grid, full_biomass(scene, grid))
+    return 1 - fluxes[0].effluent / scene.substrates.acceptor.supply
 
 
-def layered(said: Scene, part: float, walls: int) -> Mesh:
+def layered(scene: Scene, part: float, walls: int) -> Mesh:
     """A mesh of the whole pore, of which layers of equal thickness on one or both walls fill a part; they end MARGIN
     from its ends, to let in the flow."""
-    width, end = said.pore.width, 0.5 * said.pore.length
-    size = sized(said).largest
+    width, end = scene.pore.width, 0.5 * scene.pore.length
+    size = sized(scene).largest
     height = part * width / walls * end / (end - MARGIN)
     y = evenly((0.0, height, width) if walls == 1 else (0.0, height, width - height, width), size)
     x = evenly((-end, MARGIN - end, end - MARGIN, end), size)
@@ -242,7 +243,7 @@ def layered(said: Scene, part: float, walls: int) -> Mesh:
     middle_x, middle_y = points[cells].mean(axis=1).T
     biomass = (np.abs(middle_x) < end - MARGIN) & ((middle_y < height) | (middle_y > width - (walls - 1) * height))
     grid = unlocked(Mesh.of(points, cells, biomass, np.empty(0, int), width, (-end, end)))
-    return grid if said.numerics.geometry == 1 else curved(grid, None)
+    return grid if scene.numerics.geometry == 1 else curved(grid, None)
 
 
 def evenly(ends: tuple[float, ...], size: float) -> np.ndarray:
@@ -273,12 +274,12 @@ def for_networks() -> Finding:
 
 def beyond(run: tuple[str, ...], spanned: bool) -> np.ndarray:
     """(n,) ln(r / law's r) of a run's rows in the law's range from LEAST on, over the ln of its bound on that side."""
-    said, rows = scene(*run), series(*run)
-    width = said.pore.width
+    scene, rows = load_packaged(*run), series(*run)
+    width = scene.pore.width
     low, high = known(spanned)
     share = rows["aggregate_area_um2"] / width**2
-    here = (rows["contact"] == spanned) & (share >= max(low, LEAST)) & (share <= high)
-    resisted = 24e-6 * clean(said) / rows["conductivity_m_per_d"][here] - 1
-    law, least, most = np.log(added_resistance(share[here], 1.0, spanned, said.flow.viscosity_ratio))
-    apart = np.log(resisted * said.pore.length / width) - law
+    in_range = (rows["contact"] == spanned) & (share >= max(low, LEAST)) & (share <= high)
+    resisted = 24e-6 * clean(scene) / rows["conductivity_m_per_d"][in_range] - 1
+    law, least, most = np.log(added_resistance(share[in_range], 1.0, spanned, scene.flow.viscosity_ratio))
+    apart = np.log(resisted * scene.pore.length / width) - law
     return apart / np.where(apart < 0, law - least, most - law)

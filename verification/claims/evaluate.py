@@ -1,12 +1,12 @@
-"""Claims computed at all levels: each level in a process of its own, whose runs it keeps while it computes.
+"""Compute claims at all levels, each level in a process that keeps its runs meanwhile.
 
-The error bars of a claim's numbers, from what its function finds at other levels.
+The error bars of a claim's numbers follow from the values at its levels.
 
-Formal orders: every stage of the scheme is of second order in the mesh but for the head loss and the stresses, which
-are of first; its loop is of first order in the step. `make verify` measures all of them. The converged solution is of
-second order or more where nothing is singular, and of first at the least where biomass, water and wall meet.
+Formal orders: every stage of the scheme has second order in the mesh, except the head loss and the stresses, which have
+first order; the loop has first order in the step. `make verify` measures all of them. The converged solution has at
+least second order where it is smooth, and at least first order where biomass, water and wall meet.
 
-A number that is itself an error, or a difference of two runs that should be none, may have a bar larger than itself.
+The bar of an error, or of a difference between two runs that should agree, may exceed the number.
 """
 
 from __future__ import annotations
@@ -33,18 +33,18 @@ Numbers = tuple[tuple[str, float, bool], ...]
 
 
 def numbers(finding: Finding) -> Numbers:
-    """What a finding says at one level."""
+    """The numbers of a finding at one level."""
     return tuple((check.quantity, check.value, check.holds) for check in finding.checks)
 
 
-def barred(claim: Claim, finding: Finding, found: dict[Level, Numbers]) -> Finding:
+def barred(claim: Claim, finding: Finding, by_level: dict[Level, Numbers]) -> Finding:
     """The finding with a bar on each check, from its numbers at all levels. Raises ClaimError where these do not speak
     of the same quantities."""
-    said = {quantities(row) for row in found.values()}
-    if len(said) != 1:
-        raise ClaimError(f"the levels tell of different quantities: {sorted(said)}")
-    columns = zip(*found.values())
-    return replace(finding, checks=tuple(_judgeable(claim, check, dict(zip(found, column)))
+    scene = {quantities(row) for row in by_level.values()}
+    if len(scene) != 1:
+        raise ClaimError(f"the levels tell of different quantities: {sorted(scene)}")
+    columns = zip(*by_level.values())
+    return replace(finding, checks=tuple(_judgeable(claim, check, dict(zip(by_level, column)))
                                          for check, column in zip(finding.checks, columns)))
 
 
@@ -58,19 +58,20 @@ def unnumbered(quantity: str) -> str:
     return re.sub(r"\d+(\.\d+)?", "#", quantity)
 
 
-def _judgeable(claim: Claim, check: PaperCheck, found: dict[Level, tuple[str, float, bool]]) -> PaperCheck:
+def _judgeable(claim: Claim, check: PaperCheck, by_level: dict[Level, tuple[str, float, bool]]) -> PaperCheck:
     """The check with its bar, from its value and whether it holds at each level, which is added to a width of its own,
     that of the mesh around a place."""
-    values = {level: value for level, (_, value, _) in found.items()}
-    own = [values[level] for level in claim.own]
-    beside = [value for level, value in values.items() if level not in claim.own]
-    bar = spread(own) if not check.converges else combined(
+    values = {level: value for level, (_, value, _) in by_level.items()}
+    on_sizes = [values[level] for level in claim.judging_levels]
+    beside = [value for level, value in values.items() if level not in claim.judging_levels]
+    bar = spread(on_sizes) if not check.converges else combined(
         check.value, _estimate(claim.meshes, values, MESH_ORDERS), _estimate(claim.stepped, values, STEP_ORDERS))
     width = check.bar or Bar(check.value, check.value)
     bar = replace(bar, low=bar.low - check.value + width.low, high=bar.high - check.value + width.high)
-    return replace(check, bar=bar, held=tuple(found[level][-1] for level in claim.own), date=check.date or claim.date,
+    return replace(check, bar=bar, holds_at=tuple(by_level[level][-1] for level in claim.judging_levels),
+                   date=check.date or claim.date,
                    scheme=(min(beside), max(beside)) if beside else None,
-                   on_sizes=tuple(own) if claim.about == MODEL else ())
+                   on_sizes=tuple(on_sizes) if claim.about == MODEL else ())
 
 
 def _estimate(varied: dict[float, Level], values: dict[Level, float], formal: tuple[float, float]) -> Estimate | None:
@@ -79,7 +80,7 @@ def _estimate(varied: dict[float, Level], values: dict[Level, float], formal: tu
 
 
 #: Of a claim at one level: its numbers, with its finding where the level is the judged one, or the error in words.
-Found = tuple[Numbers, Finding | None] | str
+Outcome = tuple[Numbers, Finding | None] | str
 
 #: Runs as long as that of wide which a claim makes of its own at each of its levels; C32 reads those of C41.
 RUNS = {"C41": 5.5, "C42": 1, "C43": 1.5}
@@ -99,18 +100,18 @@ def import_all(package: ModuleType) -> None:
             importlib.import_module(f"{package.__name__}.{module.name}")
 
 
-def everywhere(ids: Iterable[str]) -> dict[str, dict[Level, Found]]:
-    """What claims come to at all of their levels, the dearest levels first."""
-    wanted: dict[Level, list[str]] = {}
-    by_claim: dict[str, dict[Level, Found]] = {}
+def everywhere(ids: Iterable[str]) -> dict[str, dict[Level, Outcome]]:
+    """Outcomes of claims at all of their levels; the most expensive levels run first."""
+    ids_at: dict[Level, list[str]] = {}
+    by_claim: dict[str, dict[Level, Outcome]] = {}
     for id in ids:
         by_claim[id] = {}
         for level in CLAIMS[id].levels:
-            wanted.setdefault(level, []).append(id)
-    levels = sorted(wanted, key=lambda level: effort(level, wanted[level]), reverse=True)
-    for level, found in zip(levels, side_by_side(found_at, levels, [wanted[level] for level in levels])):
-        for id in found:
-            by_claim[id][level] = found[id]
+            ids_at.setdefault(level, []).append(id)
+    levels = sorted(ids_at, key=lambda level: effort(level, ids_at[level]), reverse=True)
+    for level, outcomes in zip(levels, side_by_side(outcomes_at, levels, [ids_at[level] for level in levels])):
+        for id in outcomes:
+            by_claim[id][level] = outcomes[id]
     return by_claim
 
 
@@ -121,26 +122,26 @@ def effort(level: Level, ids: list[str]) -> float:
     return runs * (LEAST + level.size**-2) / level.step
 
 
-def side_by_side(function: Callable, *given: Iterable) -> list:
-    """map, in a process a core, each call in its turn."""
+def side_by_side(function: Callable, *arguments: Iterable) -> list:
+    """Like map, on one process per core."""
     with ProcessPoolExecutor() as pool:
-        return list(pool.map(function, *given))
+        return list(pool.map(function, *arguments))
 
 
-def found_at(level: Level, ids: list[str]) -> dict[str, Found]:
-    """What some claims come to at one level; its runs are forgotten afterwards."""
+def outcomes_at(level: Level, ids: list[str]) -> dict[str, Outcome]:
+    """Outcomes of some claims at one level, whose runs are dropped afterwards."""
     register_all()
     with at_level(level), np.errstate(all="raise", under="ignore"):
-        found = {id: _attempt(id, level) for id in ids}
+        outcomes = {id: _attempt(id, level) for id in ids}
     forget(level)
-    return found
+    return outcomes
 
 
-def _attempt(id: str, level: Level) -> Found:
+def _attempt(id: str, level: Level) -> Outcome:
     """A claim's numbers at the present level, or the error in words."""
     try:
         finding = CLAIMS[id].function()
-        judged = finding.told() if level == CLAIMS[id].judged else None
+        judged = finding.with_note() if level == CLAIMS[id].judged else None
         return numbers(finding), judged
     except Exception as error:
         return f"at {level}: {type(error).__name__}: {error}"

@@ -48,8 +48,8 @@ SMALL = 0.1
 
 def touching() -> tuple[Body, Body]:
     """Wide's last state that leaves a film to the opposite wall, and its first in contact."""
-    found = history(*WIDE)
-    return tuple(body_of(found.scene, each) for each in found.contact)
+    run = history(*WIDE)
+    return tuple(body_of(run.scene, each) for each in run.contact)
 
 
 @dataclass(frozen=True)
@@ -88,9 +88,10 @@ def fluid_forces() -> Finding:
     last, early = forces(end), forces(body(BASE, UPDATE))
     chosen = {"base, 19.2 h": forces(body(BASE, PLOTTED)), f"wide, {film.pore.time:.2f} h, a film left": forces(film),
               f"wide, {end.pore.time:g} h, a plug": last}
-    checks = [at_most(f"{name}: {what}", "neglected", value, SMALL, "small: a tenth") for name, found in chosen.items()
-              for what, value in (("fluid's over growth's stress", found.against_growth),
-                                  ("strain that the fluid would cause", found.strain))]
+    checks = [at_most(f"{name}: {ratio}", "neglected", value, SMALL, "small: a tenth")
+              for name, aggregate_forces in chosen.items()
+              for ratio, value in (("fluid's over growth's stress", aggregate_forces.against_growth),
+                                  ("strain that the fluid would cause", aggregate_forces.strain))]
     reason = (f"it holds in base, and in wide while a film of fluid is left; then the constant mean velocity is driven "
               f"through the plug by a head of {last.head:.3g} Pa, where growth's shear stress is {last.growth:.3g} Pa "
               f"and the stiffness has fallen as theta^(-2/3) to {last.stiffness:.3g} Pa")
@@ -99,34 +100,34 @@ def fluid_forces() -> Finding:
     return Finding(tuple(checks), reason=reason, note=note)
 
 
-def forces(found: Body) -> Forces:
+def forces(aggregate: Body) -> Forces:
     """Of an aggregate."""
-    head, shear = interface_forces(found)
-    drive, modulus = found.scene.flow, PASCAL * found.scene.growth.shear_modulus
+    head, shear = interface_forces(aggregate)
+    drive, modulus = aggregate.scene.flow, PASCAL * aggregate.scene.growth.shear_modulus
     weight = PASCAL * MPA_PER_UM * drive.density * drive.gravity
     return Forces(weight * float(np.ptp(head)), weight * float(np.abs(shear).max()),
-                  modulus * float(in_plane(stress(found)).max()),
-                  modulus * float((found.mean(found.strained.J) ** (-2 / 3)).min()))
+                  modulus * float(in_plane(stress(aggregate)).max()),
+                  modulus * float((aggregate.mean(aggregate.strained.J) ** (-2 / 3)).min()))
 
 
-def interface_forces(found: Body) -> tuple[np.ndarray, np.ndarray]:
+def interface_forces(aggregate: Body) -> tuple[np.ndarray, np.ndarray]:
     """(e,) head phi and viscous shear nu / g n.(grad u + grad u^T).s on each interface edge, um of water."""
-    drive, flow = found.scene.flow, found.solved.flow
-    first, last, beyond = interface(found)
-    slope = np.einsum("tai,tak->tik", flow.velocity[beyond], gradients(found.grid.points, beyond))
-    edge = found.grid.points[last] - found.grid.points[first]
+    drive, flow = aggregate.scene.flow, aggregate.solved.flow
+    first, last, beyond = interface(aggregate)
+    slope = np.einsum("tai,tak->tik", flow.velocity[beyond], gradients(aggregate.grid.points, beyond))
+    edge = aggregate.grid.points[last] - aggregate.grid.points[first]
     s = edge / np.linalg.norm(edge, axis=1)[:, None]
     n = np.column_stack([s[:, 1], -s[:, 0]])
     shear = np.einsum("ei,eik,ek->e", n, slope + np.swapaxes(slope, 1, 2), s)
     return 0.5 * (flow.head[first] + flow.head[last]), drive.kinematic_viscosity / drive.gravity * shear
 
 
-def interface(found: Body) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def interface(aggregate: Body) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """First and last corner (e,) of each interface edge, counterclockwise, and the corners (e, 3) of the fluid triangle
     beyond it."""
-    loop, chosen = found.grid.straight.loop, found.outline.corners.interface_edges()
+    loop, chosen = aggregate.grid.straight.loop, aggregate.outline.corners.interface_edges()
     first, last = loop[chosen], np.roll(loop, -1)[chosen]
-    fluid = found.grid.triangles[~found.grid.biomass]
+    fluid = aggregate.grid.triangles[~aggregate.grid.biomass]
     sides = sp.csr_array((np.arange(fluid.size), (fluid.ravel(), np.roll(fluid, -1, axis=1).ravel())))
     return first, last, fluid[sides[last, first] // 3]
 
@@ -149,14 +150,14 @@ def crossing() -> Finding:
                    reason="at contact some of the flux still goes beside it")
 
 
-def inside(found: Body) -> float:
+def inside(aggregate: Body) -> float:
     """Flux of u_x over the part of x = 0 that is in the aggregate, in percent of u_ave W."""
-    parts, flow = 1000, found.solved.flow
-    line = shapely.LineString([(0.0, -1.0), (0.0, found.grid.width + 1.0)])
-    height = shapely.intersection(polygon(found.outline), line).length
+    parts, flow = 1000, aggregate.solved.flow
+    line = shapely.LineString([(0.0, -1.0), (0.0, aggregate.grid.width + 1.0)])
+    height = shapely.intersection(polygon(aggregate.outline), line).length
     y = (np.arange(parts) + 0.5) / parts * height
-    speed = meshes.field_at(found.pore.space, flow.velocity, np.column_stack([0 * y, y]))[:, 0]
-    return 100 * float(speed.mean() * height) / (flow.mean_velocity * found.grid.width)
+    speed = meshes.field_at(aggregate.pore.space, flow.velocity, np.column_stack([0 * y, y]))[:, 0]
+    return 100 * float(speed.mean() * height) / (flow.mean_velocity * aggregate.grid.width)
 
 
 #: The distance over which the stress is averaged, over the pore's width; and what is told besides, half and twice that.
@@ -182,37 +183,37 @@ class Peak:
     y: float
 
     @property
-    def told(self) -> str:
+    def description(self) -> str:
         """In words."""
         return f"{self.value:.3g} mu_L at ({self.x:.0f}, {self.y:.0f}) um"
 
 
-def averaged(found: Body, distance: float, places: np.ndarray) -> np.ndarray:
+def averaged(aggregate: Body, distance: float, places: np.ndarray) -> np.ndarray:
     """(p, 4) Cauchy stress over mu_L, means over what of the aggregate is within a distance (um) of places (p, 2)."""
-    kept = found.pore.body
-    shape = growth.Shape(kept.shape.cells, kept.shape.corners, DEGREE)
-    finer = replace(found, pore=replace(found.pore, body=growth.Body(shape, kept.reference)))
-    where, areas = meshes.places(found.grid.points[found.triangles], shape.table)
+    body = aggregate.pore.body
+    shape = growth.Shape(body.shape.cells, body.shape.corners, DEGREE)
+    finer = replace(aggregate, pore=replace(aggregate.pore, body=growth.Body(shape, body.reference)))
+    where, areas = meshes.quadrature_points(aggregate.grid.points[aggregate.triangles], shape.table)
     apart = KDTree(places).sparse_distance_matrix(KDTree(where.reshape(-1, 2)), distance, output_type="coo_matrix")
     weights = sp.csr_array((areas.ravel()[apart.col], (apart.row, apart.col)), shape=apart.shape)
     means = (weights @ finer.stress.reshape(-1, 4)) / weights.sum(axis=1)[:, None]
-    return means / found.scene.growth.shear_modulus
+    return means / aggregate.scene.growth.shear_modulus
 
 
-def peak(found: Body, part: float = APART) -> Peak:
+def peak(aggregate: Body, part: float = APART) -> Peak:
     """Largest principal value of the stress in the mean over a part of the pore's width, and where."""
-    distance = part * found.grid.width
-    places = lattice(found, distance / PLACES)
-    values = growth.largest_principal(averaged(found, distance, places))
+    distance = part * aggregate.grid.width
+    places = lattice(aggregate, distance / PLACES)
+    values = growth.largest_principal(averaged(aggregate, distance, places))
     worst = int(values.argmax())
     return Peak(float(values[worst]), *map(float, places[worst]))
 
 
-def lattice(found: Body, spacing: float) -> np.ndarray:
+def lattice(aggregate: Body, spacing: float) -> np.ndarray:
     """(p, 2) um: the points of a square lattice through the origin that are in the aggregate, whatever its mesh is."""
-    outline = found.outline
+    outline = aggregate.outline
     x = spacing * np.arange(np.ceil(outline.upstream / spacing), np.floor(outline.downstream / spacing) + 1)
-    y = spacing * np.arange(np.floor(found.grid.width / spacing + 1e-9) + 1)
+    y = spacing * np.arange(np.floor(aggregate.grid.width / spacing + 1e-9) + 1)
     places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     return places[shapely.intersects_xy(polygon(outline), *places.T)]
 
@@ -223,24 +224,25 @@ def tearing() -> Finding:
     """Largest principal stress in the aggregate of base and wide: is there tension, where would it tear first, and
     how do size and place change with time?"""
     most = {run: max(bodies(run)[1:], key=tension) for run in (BASE, WIDE)}
-    base, wide = (peak(found) for found in most.values())
+    base, wide = (peak(aggregate) for aggregate in most.values())
     checks = [at_least(f"{run[0]}: largest principal stress over mu_L, in the mean over W / 10", "stress is computed",
-                       found.value, 0.0, "tension") for run, found in zip(most, (base, wide))]
-    early, late = (found.pore.time for found in most.values())
-    note = (f"In base it is {base.told} and {early:g} h; in wide {wide.told} and {late:g} h: there it would tear "
-            "first.")
+                       aggregate.value, 0.0, "tension") for run, aggregate in zip(most, (base, wide))]
+    early, late = (aggregate.pore.time for aggregate in most.values())
+    note = (f"In base it is {base.description} and {early:g} h; in wide {wide.description} and {late:g} h: there "
+            "it would tear first.")
     return Finding(tuple(checks), reason="nothing is under tension", note=lambda: f"{note} {_on_another_size(most)}")
 
 
 def _on_another_size(most: dict[Run, Body]) -> str:
     """Where the stress of runs at their worst is the largest, here and on the size of its figure, in words."""
-    here = [peak(found).x for found in most.values()]
-    hours = [found.pore.time for found in most.values()]
+    preset_x = [peak(aggregate).x for aggregate in most.values()]
+    hours = [aggregate.pore.time for aggregate in most.values()]
     with at_level(Level(CONVERGED, PAIRED[1])):
-        there = [peak(body((*run, rows_at(hour)), hour)).x for run, hour in zip(most, hours)]
-    told = ", ".join(f"at x = {x:.0f} and {other:.0f} um in {run[0]}" for run, x, other in zip(most, here, there))
+        paired_x = [peak(body((*run, rows_at(hour)), hour)).x for run, hour in zip(most, hours)]
+    places = ", ".join(f"at x = {x:.0f} and {other:.0f} um in {run[0]}"
+                       for run, x, other in zip(most, preset_x, paired_x))
     return ("The place is not known as well as the size: here and with the elements of its figure, "
-            f"{PAIRED[1]:g} times those of the preset, it is {told}.")
+            f"{PAIRED[1]:g} times those of the preset, it is {places}.")
 
 
 @claim("C46", "5", "the stress could link fluid flow, growth and detachment: the fluid changes the stress of which the "
@@ -254,17 +256,17 @@ def torn_by_the_fluid() -> Finding:
     check = at_least("largest principal stress, in the mean over W / 10, changed by the fluid, the most of three "
                      "states (%)", "could provide a link", most, 100 * FEW, f"more than {FEW_WORDS}")
     return Finding((check,), reason="the fluid changes the stress by a few percent at most",
-                   note=lambda: f"{_told_of_the_fluid(pairs)} {BEFORE}")
+                   note=lambda: f"{_describe_fluid_effect(pairs)} {BEFORE}")
 
 
 def changed(pair: tuple[Body, Body], part: float = APART) -> float:
     """By how many percent the fluid changes the largest principal stress."""
-    without, forced = (peak(found, part).value for found in pair)
+    without, forced = (peak(aggregate, part).value for aggregate in pair)
     return 100 * (forced / without - 1)
 
 
-def _told_of_the_fluid(pairs: dict[str, tuple[Body, Body]]) -> str:
-    peaks = "; ".join(f"{name} {peak(without).told} and {peak(forced).told}"
+def _describe_fluid_effect(pairs: dict[str, tuple[Body, Body]]) -> str:
+    peaks = "; ".join(f"{name} {peak(without).description} and {peak(forced).description}"
                       for name, (without, forced) in pairs.items())
     changes = "; ".join(f"{name} {_changes(pair)}" for name, pair in pairs.items())
     return (f"Without and with the fluid's forces: {peaks}. In the mean over W / 20, W / 10 and W / 5 it changes by, "
@@ -276,17 +278,17 @@ def _changes(pair: tuple[Body, Body]) -> str:
     return ", ".join(f"{changed(pair, part):.2g}" for part in DISTANCES)
 
 
-def pressed(found: Body) -> Body:
+def pressed(aggregate: Body) -> Body:
     """The same aggregate at rest under the fluid's forces. It is elastic, so that this does not hang on the way there,
     but for what the forces would have changed of its growth. Raises GrowthError where shape and flow do not agree."""
-    forced = replace(found.scene, growth=replace(found.scene.growth, fluid_forces="included"))
-    now = contact.expand(forced, found.pore, found.pore.theta).pore
-    return Body(forced, now, found.solved)
+    forced = replace(aggregate.scene, growth=replace(aggregate.scene.growth, fluid_forces="included"))
+    at_rest = contact.expand(forced, aggregate.pore, aggregate.pore.theta).pore
+    return Body(forced, at_rest, aggregate.solved)
 
 
-def tension(found: Body) -> tuple[float, float, float, float]:
+def tension(aggregate: Body) -> tuple[float, float, float, float]:
     """Largest principal stress (MPa) of a triangle, its place (um) and time (h)."""
-    values = found.mean(growth.largest_principal(found.stress))
+    values = aggregate.mean(growth.largest_principal(aggregate.stress))
     worst = int(values.argmax())
-    x, y = found.grid.points[found.triangles[worst]].mean(axis=0)
-    return float(values[worst]), float(x), float(y), round(found.pore.time, 9)
+    x, y = aggregate.grid.points[aggregate.triangles[worst]].mean(axis=0)
+    return float(values[worst]), float(x), float(y), round(aggregate.pore.time, 9)

@@ -20,7 +20,7 @@ from repro.model import growth
 from verification.claims import CLOSED, OF_SCHEME, Finding, at_least, at_most, between, claim, near, without_limit
 from verification.claims.levels import ABOUT_WIDE, ALONE, BESIDE, current
 from verification.claims.runs import WIDE, bodies, series
-from verification.problems.bodies import Supported, grown
+from verification.problems.bodies import Supported, grow
 from verification.problems.pairs import upright
 
 RADIUS = 5.0
@@ -72,7 +72,7 @@ def areas(body: Supported) -> np.ndarray:
 
 # C22: theta = INNER + MORE (R / R_0)^2 on meshes of the package's own, by refinement, and on regular ones, by parts.
 INNER, MORE = 1.5, 1.0
-OWN, REGULAR = (0.5, 0.7, 1.0, 1.4, 2.0, 2.8), (4, 8, 12)
+REFINEMENTS, REGULAR = (0.5, 0.7, 1.0, 1.4, 2.0, 2.8), (4, 8, 12)
 
 
 @claim("C22", "3.4", "P1-P1 with the stabilisation is stable and convergent; without it, it is not",
@@ -84,9 +84,10 @@ def stabilised() -> Finding:
     stability number is the least eigenvalue of B K^-1 B^T + C against the pressure's mass, on regular meshes: how much
     the scheme sees of the pressure that it sees least. Without the stabilisation C = 0; with the sign of (27), -C.
     """
-    own, regular = [half_disc(refinement) for refinement in OWN], [regular_half_disc(parts) for parts in REGULAR]
-    errors = np.array([growth_errors(body) for body in own])
-    outline, pressure = (order(own, column) for column in errors.T)
+    bodies = [half_disc(refinement) for refinement in REFINEMENTS]
+    regular = [regular_half_disc(parts) for parts in REGULAR]
+    errors = np.array([growth_errors(body) for body in bodies])
+    outline, pressure = (order(bodies, column) for column in errors.T)
     with_, without, printed = ([stability(body, factor) for body in regular] for factor in (1.0, 0.0, -1.0))
     checks = (at_least("order of the outline", "convergent", outline, 1.7, "2 in theory; 1.7 for unrelated meshes"),
               at_least("order of the pressure", "convergent", pressure, 1.0, "1 in theory, in the mean square"),
@@ -110,33 +111,33 @@ def growth_errors(body: Supported) -> tuple[float, float]:
     """Mean-square errors, relative, of the outline's radius and of the pressure."""
     start = growth.Equilibrium(body.reference, body.resting, 0)
     theta = radial_theta(body, INNER, MORE)
-    found = growth.reach(stabilised_by(body, 1.0), np.ones_like(theta), theta, start, body.reference)
+    solution = growth.reach(stabilised_by(body, 1.0), np.ones_like(theta), theta, start, body.reference)
     R = np.minimum(np.hypot(*body.reference.T), RADIUS)
     rim = R > (1 - 1e-9) * RADIUS
     radius, pressure = (exact(R, INNER, MORE, RADIUS) for exact in (neo_hookean.cylinder_radius,
                                                                     neo_hookean.cylinder_pressure))
     weight = np.bincount(body.cells.ravel(), np.repeat(areas(body) / 3, 3))
-    outline = np.hypot(*found.position[rim].T) / radius[rim] - 1
+    outline = np.hypot(*solution.position[rim].T) / radius[rim] - 1
     return (float(np.sqrt(np.mean(outline**2))),
-            float(np.sqrt(weight @ (found.pressure - pressure) ** 2 / (weight @ pressure**2))))
+            float(np.sqrt(weight @ (solution.pressure - pressure) ** 2 / (weight @ pressure**2))))
 
 
 def stability(body: Supported, factor: float) -> float:
     """Least eigenvalue of B K^-1 B^T + factor C against the pressure's mass matrix, at t = 0 (dense)."""
     n, of = body.corners, stabilised_by(body, factor)
     numbered = np.argsort(of.sparse.order)
-    whole = of.sparse.matrix(of.tangent(body.reference, body.resting)).toarray()[np.ix_(numbered, numbered)]
+    matrix = of.sparse.matrix(of.tangent(body.reference, body.resting)).toarray()[np.ix_(numbered, numbered)]
     M = np.zeros((n, n))
     np.add.at(M, (body.cells[:, :, None], body.cells[:, None, :]), mass(areas(body)))
-    divergence = whole[-n:, :-n]
-    schur = divergence @ np.linalg.solve(whole[:-n, :-n], divergence.T) - whole[-n:, -n:]
+    divergence = matrix[-n:, :-n]
+    schur = divergence @ np.linalg.solve(matrix[:-n, :-n], divergence.T) - matrix[-n:, -n:]
     return float(eigh(0.5 * (schur + schur.T), M, eigvals_only=True, subset_by_index=[0, 0])[0])
 
 
 def stabilised_by(body: Supported, factor: float) -> growth.System:
     """The equations of a body whose stabilisation at t = 0 is multiplied by a factor."""
     plain = growth.gradient_stabilisation(body.reference, body.cells, np.ones(len(body.cells)))
-    return growth.System(body, body.held, stabilising=factor * plain)
+    return growth.System(body, body.constrained, stabilising=factor * plain)
 
 
 # C25: the expansion, and the factor of an update: 165 of these make it.
@@ -152,12 +153,12 @@ def expansion() -> Finding:
     """
     body, inner = half_disc(1.4), TOTAL**0.9
     more = TOTAL - inner
-    uniform, radial = (grown(body, radial_theta(body, *law), factor=RAISED) for law in ((TOTAL, 0.0), (inner, more)))
+    uniform, radial = (grow(body, radial_theta(body, *law), factor=RAISED) for law in ((TOTAL, 0.0), (inner, more)))
     area = triangle_areas(uniform.position, body.cells).sum() / areas(body).sum()
     R = np.hypot(*body.reference.T)
-    radii = [np.hypot(*found.position[R > (1 - 1e-9) * RADIUS].T).mean() for found in (uniform, radial)]
+    radii = [np.hypot(*solution.position[R > (1 - 1e-9) * RADIUS].T).mean() for solution in (uniform, radial)]
     free, rim = RADIUS * np.sqrt(TOTAL), float(neo_hookean.cylinder_radius(RADIUS, inner, more, RADIUS))
-    largest = np.array([found.mean(found.pore.theta).max() for found in bodies(WIDE)])
+    largest = np.array([aggregate.mean(aggregate.pore.theta).max() for aggregate in bodies(WIDE)])
     hours = series(*WIDE)["time_h"]
     reached = float(np.interp(np.log(TOTAL), np.log(np.maximum.accumulate(largest)), hours, right=np.inf))
     checks = (at_most("uniform: error of the area", "handled", abs(area / TOTAL - 1), 1e-9,

@@ -17,15 +17,15 @@ from repro.fem.outline import BOTTOM, FREE, TOP, Outline
 from repro.model import biomass
 from repro.model.kinetics import rate_law
 from verification.claims import FEW, FEW_WORDS, LATER, Finding, at_least, at_most, between, claim, without_limit
-from verification.claims.levels import ABOUT_WIDE, BESIDE_OWN, COMPARED
+from verification.claims.levels import ABOUT_WIDE, BESIDE_PAIRS, COMPARED
 from verification.claims.rheology import STRESS_FREE, conductivity_change
 from verification.claims.runs import (
     BASE,
     END,
     PLOTTED,
     SUBSTRATES,
-    WHOLE,
     WIDE,
+    WIDE_TO_END,
     Body,
     Run,
     at,
@@ -35,8 +35,8 @@ from verification.claims.runs import (
     equivalent,
     grown,
     in_plane,
+    load_packaged,
     polygon,
-    scene,
     series,
     stress,
     uncovered,
@@ -47,11 +47,11 @@ from verification.uncertainty import Bar
 LAST_HOURS = 5.0
 
 
-def growth_rates(found: Body) -> np.ndarray:
+def growth_rates(aggregate: Body) -> np.ndarray:
     """(N,) (F3 + F4) / X_m, 1/h, at the mesh's nodes, zero in the fluid: how fast each place makes biomass."""
-    space, problem = found.pore.space, found.solved.problem
-    rates = biomass.rates(space, found.solved.concentrations, problem.law)
-    density = found.pore.active / space.reaction.dx / problem.law.constants.maximum_density
+    space, problem = aggregate.pore.space, aggregate.solved.problem
+    rates = biomass.rates(space, aggregate.solved.concentrations, problem.law)
+    density = aggregate.pore.active / space.reaction.dx / problem.law.constants.maximum_density
     return biomass.at_nodes(space, density * rates.total)
 
 
@@ -59,9 +59,9 @@ def growth_rates(found: Body) -> np.ndarray:
        "downgradient side")
 def extremes() -> Finding:
     """Places of the largest and the smallest growth rate over the aggregate's nodes; x = 0 is the seed's centre."""
-    found = Body(scene(*BASE), *grown(BASE, PLOTTED))
-    rate, grid = growth_rates(found), found.grid
-    nodes, last = grid.body, found.outline.downstream
+    aggregate = Body(load_packaged(*BASE), *grown(BASE, PLOTTED))
+    rate, grid = growth_rates(aggregate), aggregate.grid
+    nodes, last = grid.body, aggregate.outline.downstream
     fast, slow = nodes[np.argmax(rate[nodes])], nodes[np.argmin(rate[nodes])]
     (x_fast, _), (x_slow, y_slow) = grid.points[fast], grid.points[slow]
     checks = (at_most("x of the fastest growth (um)", "upgradient side", x_fast, 0.0, "the words"),
@@ -84,10 +84,10 @@ def nearby(grid: Mesh, node: int) -> float:
 def asymmetry() -> Finding:
     """Upstream against downstream half at 19.4 h: extents, growth rates, and expansion since t = 0, in percent."""
     row, after = at(BASE, END), body(BASE, END)
-    before = Body(scene(*BASE), *grown(BASE, PLOTTED))
+    before = Body(load_packaged(*BASE), *grown(BASE, PLOTTED))
     rate = growth_rates(before)
     compared = {"extent": (-row["upstream_um"], row["downstream_um"]),
-                "growth rate": made(before) / halves(before, before.areas),
+                "growth rate": biomass_rates(before) / halves(before, before.areas),
                 "expansion since t = 0": halves(after, after.areas) / halves(after, after.pore.body.at.dx.sum(axis=1))}
     checks = tuple(at_most(f"{name}, upstream over downstream half (%)", "a few", 100 * abs(up / down - 1), 100 * FEW,
                            FEW_WORDS) for name, (up, down) in compared.items())
@@ -98,15 +98,15 @@ def asymmetry() -> Finding:
     return Finding(checks, note=note)
 
 
-def halves(found: Body, values: np.ndarray) -> np.ndarray:
+def halves(aggregate: Body, values: np.ndarray) -> np.ndarray:
     """(2,) sums of values (t,) of biomass triangles upstream and downstream of the centre of the seed."""
-    x = found.grid.points[found.corners].mean(axis=1)[:, 0]
+    x = aggregate.grid.points[aggregate.corners].mean(axis=1)[:, 0]
     return np.array([values[side].sum() for side in (x < 0, x > 0)])
 
 
-def made(found: Body) -> np.ndarray:
+def biomass_rates(aggregate: Body) -> np.ndarray:
     """(2,) integrals of the growth rate over both sides, um2/h."""
-    return halves(found, found.areas * growth_rates(found)[found.corners].mean(axis=1))
+    return halves(aggregate, aggregate.areas * growth_rates(aggregate)[aggregate.corners].mean(axis=1))
 
 
 @claim("C12", "4, Fig 6", "after the pore is spanned, growth is strongly asymmetric, on the upgradient side only",
@@ -118,7 +118,7 @@ def upgradient_only() -> Finding:
     spanned = next(each for each in bodies(WIDE) if each.pore.time >= contact)
     late, since = (upstream_part(polygon(first.outline), polygon(last.outline))
                    for first in (body(WIDE, end - LAST_HOURS), spanned))
-    up, down = made(last)
+    up, down = biomass_rates(last)
     bound = "95 %, set beforehand"
     checks = (at_least("new area upgradient, last 5 h (%)", "only upgradient", 100 * late, 95, bound),
               at_least(f"biomass made upgradient, rate at {end:g} h (%)", "only upgradient", 100 * up / (up + down), 95,
@@ -136,8 +136,8 @@ def squeezed() -> Finding:
 
     A contact surface grows by whole edges of the outline: the least that it grows in an update has no limit.
     """
-    rows, width = series(*WIDE), scene(*WIDE).pore.width
-    outlines, after = [found.outline for found in bodies(WIDE)], rows["contact"] == 1
+    rows, width = series(*WIDE), load_packaged(*WIDE).pore.width
+    outlines, after = [aggregate.outline for aggregate in bodies(WIDE)], rows["contact"] == 1
     heights = np.concatenate([o.points[:, 1] for o in outlines])
     beyond = max(0.0 - heights.min(), heights.max() - width)
     slender = np.array([(o.downstream - o.upstream) / o.thickness for o in outlines])
@@ -167,11 +167,11 @@ def stays_half_disc() -> Finding:
     base, wide = (100 * np.array([*map(deviation, bodies(run))]) for run in (BASE, WIDE))
     rows, few = series(*WIDE), 100 * FEW
     before = rows["contact"] == 0
-    checks = (*(at_most(f"{name}: largest deviation (% of R)", "half-disc", found.max(), few, "a few percent")
-                for name, found in (("base", base), ("wide before contact", wide[before]))),
+    checks = (*(at_most(f"{name}: largest deviation (% of R)", "half-disc", deviations.max(), few, "a few percent")
+                for name, deviations in (("base", base), ("wide before contact", wide[before]))),
               at_least("wide at its end: deviation (% of R)", "until squeezed", wide[-1], few,
                        "more than a few percent"))
-    half = scene(*WIDE).substrates.acceptor.half_saturation
+    half = load_packaged(*WIDE).substrates.acceptor.half_saturation
     limited = rows["time_h"][rows["acceptor_min_mg_per_L"] < half]
     centre = 0.5 * (rows["upstream_um"] + rows["downstream_um"])
     return Finding(checks, note=f"Somewhere in wide C_A falls under K_s at {min(limited, default=np.inf):g} h: its "
@@ -180,9 +180,9 @@ def stays_half_disc() -> Finding:
                    reason="the deviation is not decided by these meshes")
 
 
-def deviation(found: Body) -> float:
+def deviation(aggregate: Body) -> float:
     """Largest | r / R - 1 | over the free nodes, r from the lower contact surface's middle, R = (2 area / pi)^(1/2)."""
-    outline = found.outline
+    outline = aggregate.outline
     low = outline.points[outline.wall == BOTTOM, 0]
     free = outline.points[outline.wall == FREE] - [0.5 * (low.min() + low.max()), 0.0]
     return float(np.abs(np.hypot(*free.T) / np.sqrt(2 * outline.area / np.pi) - 1).max())
@@ -195,16 +195,17 @@ PARTS = 16
 def least(run: Run, name: str) -> np.ndarray:
     """(rows,) smallest concentration of a substrate in the aggregate over K_s, between nodes too: which node is the
     nearest to the place of the least hangs on the mesh."""
-    half = getattr(scene(*run).substrates, name).half_saturation
-    return np.array([least_of(found, getattr(found.solved.concentrations, name)) for found in bodies(run)]) / half
+    half = getattr(load_packaged(*run).substrates, name).half_saturation
+    minima = [least_of(aggregate, getattr(aggregate.solved.concentrations, name)) for aggregate in bodies(run)]
+    return np.array(minima) / half
 
 
-def least_of(found: Body, field: np.ndarray) -> float:
+def least_of(aggregate: Body, field: np.ndarray) -> float:
     """Least value in the aggregate of the functions of a field's elements."""
     corner = np.stack(np.meshgrid(np.arange(PARTS + 1), np.arange(PARTS + 1)), axis=-1).reshape(-1, 2)
     places = corner[corner.sum(axis=1) <= PARTS] / PARTS
-    space = found.pore.space
-    return float((field[space.cells[found.grid.biomass]] @ elements.values(space.order, places).T).min())
+    space = aggregate.pore.space
+    return float((field[space.cells[aggregate.grid.biomass]] @ elements.values(space.order, places).T).min())
 
 
 @claim("C30", "2.2", "oxygen is always present", **ABOUT_WIDE)
@@ -225,16 +226,16 @@ def oxygen() -> Finding:
               f"C_A falls under K_s at {since:g} h and to {wide.min():.1g} K_s at {hours[wide.argmin()]:g} h, where it "
               f"is not zero, but {share_under(last, 1.0):.0f} % of the biomass has less than K_s and "
               f"{share_under(last, 0.1):.0f} % less than K_s / 10, and hardly decays any more")
-    lost = 100 * (1 - np.exp(-scene(*WIDE).kinetics.decay_coefficient * max(hours[-1] - since, 0.0)))
+    lost = 100 * (1 - np.exp(-load_packaged(*WIDE).kinetics.decay_coefficient * max(hours[-1] - since, 0.0)))
     return Finding(checks, reason=reason, note="What that leaves out is small: decay at its full rate b since then "
                    f"would have taken {lost:.1f} % of that biomass, at most.")
 
 
-def share_under(found: Body, bound: float) -> float:
+def share_under(aggregate: Body, bound: float) -> float:
     """Percentage of the active biomass at nodes with C_A under a bound (mg/L)."""
-    pieces, acceptor = found.pore.space.reaction, found.solved.concentrations.acceptor
+    pieces, acceptor = aggregate.pore.space.reaction, aggregate.solved.concentrations.acceptor
     under = acceptor[pieces.cells] @ pieces.values.T < bound
-    return 100 * float(found.pore.active[under].sum() / found.pore.active.sum())
+    return 100 * float(aggregate.pore.active[under].sum() / aggregate.pore.active.sum())
 
 
 #: C >> K_s, as the zero order of section 4 needs it: uptake within a tenth of its most.
@@ -260,16 +261,16 @@ def penetrated() -> Finding:
     return Finding(checks, reason=reason)
 
 
-def evenness(found: Body) -> float:
+def evenness(aggregate: Body) -> float:
     """Smallest over largest m_A m_D in the aggregate."""
-    law = rate_law(found.scene.substrates, found.scene.kinetics)
-    m_a, m_d = law.fractions(found.concentration("acceptor"), found.concentration("donor"))
-    rate = (m_a * m_d)[found.grid.body]
+    law = rate_law(aggregate.scene.substrates, aggregate.scene.kinetics)
+    m_a, m_d = law.fractions(aggregate.concentration("acceptor"), aggregate.concentration("donor"))
+    rate = (m_a * m_d)[aggregate.grid.body]
     return float(rate.min() / rate.max())
 
 
 @claim("C32", "5", "minor deformation stresses, so that how new biomass is born hardly matters", fine=COMPARED,
-       beside=BESIDE_OWN)
+       beside=BESIDE_PAIRS)
 def stresses() -> Finding:
     """Largest stresses over mu_L in every row of base and wide; both with stress-free new biomass.
 
@@ -278,12 +279,13 @@ def stresses() -> Finding:
     the rows: a contact surface grows by whole edges, with which single rows jump, in either run at other times.
     """
     minor, why = 2 * FEW, f"minor: twice the modulus times a strain of {100 * FEW:g} %"
-    found = {run[0]: peaks(run) for run in (BASE, WHOLE)}
+    largest_stresses = {run[0]: peaks(run) for run in (BASE, WIDE_TO_END)}
     kinds = ("in-plane shear stress / mu_L", "equivalent stress / mu_L",
              "in-plane shear stress / (mu_L theta^(-2/3))")
-    checks = [at_most(f"{name}: {what}", "minor", value, minor, why) for name, triple in found.items()
-              for what, value in zip(kinds, triple)]
-    for run, times, when in ((BASE, (PLOTTED,), f"{PLOTTED:g} h"), (WHOLE, after_contact(), "mean after contact")):
+    checks = [at_most(f"{name}: {kind}", "minor", value, minor, why) for name, triple in largest_stresses.items()
+              for kind, value in zip(kinds, triple)]
+    compared = ((BASE, (PLOTTED,), f"{PLOTTED:g} h"), (WIDE_TO_END, after_contact(), "mean after contact"))
+    for run, times, when in compared:
         label = f"{run[0]}, {when}, born stress-free"
         checks += [at_most(f"{label}: outlines apart (% of the area)", "not affected",
                            float(np.mean([apart(run, time) for time in times])), 100 * FEW, FEW_WORDS),
@@ -291,8 +293,9 @@ def stresses() -> Finding:
                            conductivity_change((*run, STRESS_FREE), times, run), -100 * FEW, 100 * FEW, FEW_WORDS)]
     uniform = 2.5 ** (-5 / 3) * (2.5 - 1)
     reason = ("it hangs on the modulus: in the plane the stress is minor against mu_L, that of t = 0, and in base also "
-              f"against that of the grown material, mu_L theta^(-2/3); in wide it reaches {found['wide'][2]:.2g} of "
-              "the latter after contact. Across the plane it is minor against neither: plane strain keeps growth from "
+              f"against that of the grown material, mu_L theta^(-2/3); in wide it reaches "
+              f"{largest_stresses['wide'][2]:.2g} of the latter after contact. "
+              "Across the plane it is minor against neither: plane strain keeps growth from "
               "expanding that way, and that alone makes the equivalent stress of uniform growth theta^(-5/3) "
               f"(theta - 1), {uniform:.3f} at its largest, for theta = 2.5. It does no work on the shape, and what the "
               "paper concludes from minor stresses holds")
@@ -304,10 +307,10 @@ def peaks(run: Run) -> tuple[float, float, float]:
     all rows of a run."""
     triples = []
     for each in bodies(run):
-        found = stress(each)
-        shear = in_plane(found)
+        cauchy = stress(each)
+        shear = in_plane(cauchy)
         softened = shear * each.mean(each.strained.J) ** (2 / 3)
-        triples.append((shear.max(), equivalent(found).max(), softened.max()))
+        triples.append((shear.max(), equivalent(cauchy).max(), softened.max()))
     return tuple(map(float, np.max(triples, axis=0)))
 
 
@@ -318,5 +321,5 @@ def apart(run: Run, time: float) -> float:
 
 def after_contact() -> tuple[float, ...]:
     """Times (h) of the rows of wide in which the aggregate touches the opposite wall, however new biomass is born."""
-    rows, free = series(*WHOLE), series(*WHOLE, STRESS_FREE)
+    rows, free = series(*WIDE_TO_END), series(*WIDE_TO_END, STRESS_FREE)
     return tuple(map(float, rows["time_h"][(rows["contact"] == 1) & (free["contact"] == 1)]))

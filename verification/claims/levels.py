@@ -1,6 +1,6 @@
 """The levels at which every claim is computed.
 
-What the paper claims of **the model** is judged with a converged solution, what it claims of **its scheme** with that.
+Claims about **the model** are judged with a converged solution, claims about **the scheme** with the scheme.
 
     converged   quadratic elements and the midpoint rule (the preset `accurate`, with small elements beside contact
                 lines), refined in space and time at once:
@@ -13,10 +13,10 @@ Elements twice as large as those of the preset `paper` (7 across half a pore) ar
 of base at 19.2 h shows an order of 2.9 to 3.1, without them 2.0. Steps 2, 3 and 4 times 12 min have 19.2 h as a whole
 number, and the next one ends at 19.4 h, where base does.
 
-What another solver is to take over the converged solution changes `CONVERGED` and `converged` alone.
+To use another solver for the converged solution, change `CONVERGED` and `converged` alone.
 
-A level is a context: a scene that a claim asks for within `at_level` gets that level's elements and steps, and what is
-kept by `cached` is kept for that level.
+A level is a context: a scene that a claim loads within `at_level` gets the elements and steps of that level, and
+`cached` stores results per level.
 """
 
 from __future__ import annotations
@@ -65,18 +65,18 @@ def converged(size: float) -> tuple[str, ...]:
 FINE = (0.5, 2**-0.5, 1.0)
 WIDE_FINE = (2**-0.5, 1.0, 2**0.5)
 PAIRED = tuple(2.25 * 2 ** (third / 3) for third in (-1, 0, 1))
-#: Those for changes of wide. A run with the least angle of contact halved hangs on its mesh: at 1.79 it stops in a step
-#: after contact, in which a triangle is turned over.
+#: Those for changes of wide. A run with half the least angle of contact depends on its mesh: at 1.79 it stops in a step
+#: after contact, in which a triangle is inverted.
 COMPARED = tuple(1.25 * 2 ** (half / 2) for half in (1, 2, 3))
 #: Size of the scheme beside claims that compare runs of their own, which are dear.
-BESIDE_OWN = (2**0.5,)
+BESIDE_PAIRS = (2**0.5,)
 #: Sizes and steps of the scheme, the default first.
 SIZES = (1.0, 2**0.5, 2**-0.5, 0.5)
 STEPS = (1.0, 2.0, 3.0, 4.0)
 #: Sizes whose range is the scheme's interval beside a claim about the model, and beside one about wide, which is dear.
 BESIDE = SIZES[:3]
 ABOUT_WIDE = {"fine": WIDE_FINE, "beside": SIZES[:2]}
-#: What is not varied.
+#: A single size or step.
 ALONE = (1.0,)
 DEFAULT = Level()
 
@@ -99,5 +99,5 @@ def at_level(level: Level) -> Iterator[None]:
 
 
 _memory = Memory(current)
-#: Keep what a function returns, by its arguments and by the level; drop what is kept of a level.
+#: Store the results of a function by arguments and level; drop the results of a level.
 cached, forget = _memory.cached, _memory.forget

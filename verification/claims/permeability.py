@@ -17,8 +17,8 @@ from repro.fem.mesher import generate
 from repro.model import biomass
 from repro.model.pore import sized
 from verification.claims import CLOSED, LATER, Finding, at_least, at_most, claim, near
-from verification.claims.growth_pattern import made
-from verification.claims.levels import ABOUT_WIDE, BESIDE_OWN, PAIRED
+from verification.claims.growth_pattern import biomass_rates
+from verification.claims.levels import ABOUT_WIDE, BESIDE_PAIRS, PAIRED
 from verification.claims.runs import (
     WIDE,
     Body,
@@ -27,15 +27,15 @@ from verification.claims.runs import (
     bodies,
     contact_time,
     flow_in,
+    load_packaged,
     rows_at,
-    scene,
     series,
 )
 
 
-def clean(said) -> float:
+def clean(scene) -> float:
     """Conductivity of a scene's pore without aggregate, g W^2 / (12 nu), um/h."""
-    return said.flow.gravity * said.pore.width**2 / (12 * said.flow.kinematic_viscosity)
+    return scene.flow.gravity * scene.pore.width**2 / (12 * scene.flow.kinematic_viscosity)
 
 
 @claim("C16", "4, 2.1", "conductivity falls sharply when the aggregate spans the pore", **ABOUT_WIDE)
@@ -44,10 +44,10 @@ def spanning() -> Finding:
     film has closed, by whole edges of the outline: it is known to first order in their length, to several percent,
     where the conductivity of later hours is known to less than one."""
     rows, touching = series(*WIDE), around_contact(*WIDE)
-    whole = 24e-6 * clean(scene(*WIDE))
-    time, share = rows["time_h"], rows["conductivity_m_per_d"] / whole
+    clean_conductivity = 24e-6 * clean(load_packaged(*WIDE))
+    time, share = rows["time_h"], rows["conductivity_m_per_d"] / clean_conductivity
     contact = contact_time(*WIDE)
-    film, closed = (float(value) / whole for value in touching["conductivity_m_per_d"])
+    film, closed = (float(value) / clean_conductivity for value in touching["conductivity_m_per_d"])
     sharp, twice = "falls sharply", "sharper: twice as sharp at least"
     earlier, through, later = (falls(time, share, (film, closed, contact), since) for since in (-10, -5, 0))
     checks = (at_most("K / K_clean at contact", sharp, closed, 0.01, "orders of magnitude: two at least"),
@@ -77,13 +77,13 @@ def falls(time: np.ndarray, share: np.ndarray, touching: tuple[float, float, flo
        about=CLOSED)
 def filled() -> Finding:
     """Clean over filled conductivity, biomass in every triangle of the whole pore, at the default mesh."""
-    said = scene("flow_only")
-    half = said.pore.length / 2
-    empty, _ = generate(None, (-half, half), sized(said))
+    scene = load_packaged("flow_only")
+    half = scene.pore.length / 2
+    empty, _ = generate(None, (-half, half), sized(scene))
     full = replace(empty, topology=replace(empty.topology, biomass=~empty.biomass))
-    open_, closed = (flow_in(said, grid).conductivity for grid in (empty, full))
-    check = near("reduction of the conductivity (times)", "up to 2000", open_ / closed, said.flow.viscosity_ratio,
-                 0.001 * said.flow.viscosity_ratio,
+    open_, closed = (flow_in(scene, grid).conductivity for grid in (empty, full))
+    check = near("reduction of the conductivity (times)", "up to 2000", open_ / closed, scene.flow.viscosity_ratio,
+                 0.001 * scene.flow.viscosity_ratio,
                  "exact in the Laplacian form: the problems differ by the factor lambda alone")
     return Finding((check,))
 
@@ -96,7 +96,7 @@ ORDER = "an order of magnitude"
 
 @claim("C43", "1, 4", "as biomass grows, permeability falls, which restricts flow and supply; once the pore is "
        "spanned, growth is on the upgradient side and the conductivity falls sharply: under constant head too",
-       fine=PAIRED, beside=BESIDE_OWN, date=LATER)
+       fine=PAIRED, beside=BESIDE_PAIRS, date=LATER)
 def throttled() -> Finding:
     """Base to 76 h: flow, uptake and growth at the end over their first or largest values; where it grows; decay of
     active biomass over its synthesis; and the fall of the conductivity in the 5 h up to contact, as in C16."""
@@ -106,7 +106,7 @@ def throttled() -> Finding:
     touched, rate = contact_time(*CLOSING), specific_growth(rows)
     fall = falls(rows["time_h"], velocity, (film, closed, touched), -5)
     tenth = float(np.interp(-0.1, -velocity / velocity[0], rows["time_h"]))
-    up, down = made(last)
+    up, down = biomass_rates(last)
     upgradient, words = 100 * up / (up + down), "restricts"
     checks = (
         at_most("velocity just after contact over that at t = 0", words, closed / velocity[0], 0.1, ORDER),
@@ -125,7 +125,8 @@ def throttled() -> Finding:
               f"velocity to be kept up. Most of the growth, but not all, is upgradient: {upgradient:.0f} %. Decay "
               "never balances it, since (9) lets it go on in proportion to m_A as growth does: where the acceptor is "
               "used up both stop")
-    decays = ", ".join(f"{decay_share(found):.2g} at {found.pore.time:g} h" for found in bodies(CLOSING)[::12])
+    decays = ", ".join(f"{decay_share(aggregate):.2g} at {aggregate.pore.time:g} h"
+                       for aggregate in bodies(CLOSING)[::12])
     return Finding(checks, reason=reason, note=f"Decay over synthesis is {decays}.")
 
 
@@ -139,10 +140,10 @@ def specific_growth(rows: Columns) -> np.ndarray:
     return np.diff(np.log(rows["aggregate_area_um2"])) / np.diff(rows["time_h"])
 
 
-def decay_share(found: Body) -> float:
+def decay_share(aggregate: Body) -> float:
     """Decay over synthesis of active biomass, both terms of (9) over the whole aggregate."""
-    now, solved = found.pore, found.solved
+    pore, solved = aggregate.pore, aggregate.solved
     law = solved.problem.law
-    rates = biomass.rates(now.space, solved.concentrations, law)
-    decay = float((now.active * rates.remains).sum()) / (1 - law.constants.degradable_fraction)
-    return decay / (float((now.active * rates.growth).sum()) + decay)
+    rates = biomass.rates(pore.space, solved.concentrations, law)
+    decay = float((pore.active * rates.remains).sum()) / (1 - law.constants.degradable_fraction)
+    return decay / (float((pore.active * rates.growth).sum()) + decay)

@@ -33,8 +33,8 @@ from verification.claims.runs import (
     full_biomass,
     half_disc,
     halved,
+    load_packaged,
     remeshed,
-    scene,
     solution,
     solved_pore,
 )
@@ -44,15 +44,15 @@ PARTS = 64
 
 
 @cached
-def whole_pore(*changes: str) -> tuple[Scene, Pore, Solved]:
+def fully_meshed_pore(*changes: str) -> tuple[Scene, Pore, Solved]:
     """The aggregate of base at 19.2 h in a mesh of the whole pore, at the same mean velocity, solved.
 
     changes: KEY=VALUE of the scene, such as a longer pore.
     """
-    now, solved = solved_pore(BASE, PLOTTED)
-    said = scene(*BASE, 'numerics.extent="full"', *changes)
-    said = replace(said, flow=replace(said.flow, head=None, mean_velocity=solved.flow.mean_velocity))
-    return said, *remeshed(said, now, solved)
+    pore, solved = solved_pore(BASE, PLOTTED)
+    scene = load_packaged(*BASE, 'numerics.extent="full"', *changes)
+    scene = replace(scene, flow=replace(scene.flow, head=None, mean_velocity=solved.flow.mean_velocity))
+    return scene, *remeshed(scene, pore, solved)
 
 
 @claim("C20", "3.1", "(26) describes the unmeshed part", about=OF_SCHEME, sizes=BESIDE)
@@ -62,12 +62,12 @@ def upstream_profile() -> Finding:
     The section is 1 W from the aggregate, where the mesh may end (C19). Compared are the means over sections from there
     to the pore's inlet, and the range of concentrations within a section: (26) takes them as constant there.
     """
-    said, now, solved = whole_pore()
-    x = np.linspace(now.outline.upstream - said.pore.width, -said.pore.length / 2, 40)
+    scene, pore, solved = fully_meshed_pore()
+    x = np.linspace(pore.outline.upstream - scene.pore.width, -scene.pore.length / 2, 40)
     checks, parts = [], []
     for name in SUBSTRATES:
-        substrate, field = getattr(said.substrates, name), getattr(solved.concentrations, name)
-        across = 100 * sections(now, field, x) / substrate.supply
+        substrate, field = getattr(scene.substrates, name), getattr(solved.concentrations, name)
+        across = 100 * sections(pore, field, x) / substrate.supply
         rate = solved.flow.mean_velocity / substrate.diffusivity
         law = 100 - (100 - across[0].mean()) * np.exp(rate * (x - x[0]))
         bend = np.ptp(across, axis=1)
@@ -80,11 +80,11 @@ def upstream_profile() -> Finding:
                    "u_x bends the isolines [E4].")
 
 
-def sections(now: Pore, field: np.ndarray, x: np.ndarray) -> np.ndarray:
+def sections(pore: Pore, field: np.ndarray, x: np.ndarray) -> np.ndarray:
     """(n, PARTS) values of a nodal field at the middles of equal parts of the sections x (n,)."""
-    heights = (np.arange(PARTS) + 0.5) / PARTS * now.mesh.width
+    heights = (np.arange(PARTS) + 0.5) / PARTS * pore.mesh.width
     where = np.stack(np.meshgrid(x, heights, indexing="ij"), axis=-1).reshape(-1, 2)
-    return field_at(now.space, field, where).reshape(len(x), PARTS)
+    return field_at(pore.space, field, where).reshape(len(x), PARTS)
 
 
 LENGTHS = (600.0, 900.0, 1200.0)
@@ -98,10 +98,10 @@ def downgradient_end() -> Finding:
     At one mean velocity. (12) at the end of the meshed part and of the whole pore; then C held at the pore's end at
     nothing, and at the supply: the least and the most that a next pore can offer; then the same in longer pores.
     """
-    said, _, full = whole_pore()
-    _, central = remeshed(replace(said, numerics=scene(*BASE).numerics), *solved_pore(BASE, PLOTTED))
+    scene, _, full = fully_meshed_pore()
+    _, central = remeshed(replace(scene, numerics=load_packaged(*BASE).numerics), *solved_pore(BASE, PLOTTED))
     effects = np.array([end_effect(f'pore.length="{length} um"') for length in LENGTHS])
-    rate = said.flow.mean_velocity / said.substrates.acceptor.diffusivity
+    rate = scene.flow.mean_velocity / scene.substrates.acceptor.diffusivity
     decay = np.log(effects[1] / effects[2]) / (0.5 * (LENGTHS[2] - LENGTHS[1])) / rate
     checks = (at_most("uptake, (12) put at the end of the meshed part: change (%)", "not affected",
                       apart(uptake(central), uptake(full)), 100 * TRANSPORT, TRANSPORT_WORDS),
@@ -109,9 +109,9 @@ def downgradient_end() -> Finding:
                       100 * FEW, FEW_WORDS),
               near("its decay with the pore's length, over u_ave / D_A", "if long enough", decay, 1.0, 0.05,
                    "(25): exp(-u x / D) upstream; 5 %, since the donor's part fades sooner"))
-    told = ", ".join(f"{effect:.2g} % at {length:g} um" for effect, length in zip(effects, LENGTHS))
+    changes = ", ".join(f"{effect:.2g} % at {length:g} um" for effect, length in zip(effects, LENGTHS))
     return Finding(checks, note=f"Largest change of the uptake with C held at nothing or at the supply at the pore's "
-                   f"end: {told}. The flux that enters is u_ave W C_supply whatever happens downstream, by (11).")
+                   f"end: {changes}. The flux that enters is u_ave W C_supply whatever happens downstream, by (11).")
 
 
 def uptake(solved: Solved) -> np.ndarray:
@@ -121,20 +121,20 @@ def uptake(solved: Solved) -> np.ndarray:
 
 def end_effect(*changes: str) -> float:
     """Largest change (%) of the uptake with C at the pore's end held at nothing, or at the supply."""
-    _, now, solved = whole_pore(*changes)
-    outlet = now.space.end_nodes(now.space.dofs.outlet)
-    return max(apart(uptake(holding(now, solved, outlet, part)), uptake(solved)) for part in (0.0, 1.0))
+    _, pore, solved = fully_meshed_pore(*changes)
+    outlet = pore.space.end_nodes(pore.space.dofs.outlet)
+    return max(apart(uptake(holding(pore, solved, outlet, part)), uptake(solved)) for part in (0.0, 1.0))
 
 
-def holding(now: Pore, solved: Solved, nodes: np.ndarray, part: float) -> Solved:
+def holding(pore: Pore, solved: Solved, nodes: np.ndarray, part: float) -> Solved:
     """Solved again with both concentrations held at a part of their supply at some nodes, at the outlet instead of
     (12)."""
     problem, state = solved.problem, solved.concentrations
     rows = np.tile(np.isin(np.arange(problem.space.count), nodes), 2)
-    problem = replace(problem, system=problem.system.holding(rows))
+    problem = replace(problem, system=problem.system.with_constrained(rows))
     guess = 0.5 * np.concatenate([state.acceptor, state.donor])
     guess[rows] = part * problem.supply[rows]
-    sink = Sink(now.active)
+    sink = Sink(pore.active)
     balance = transport.Balance(problem, sink)
     newton = Newton(transport.NEWTON, transport.ROUND_OFF, transport.MOST_ITERATIONS)
     last, _, converged = newton.solve(balance, balance.begun(guess))
@@ -144,9 +144,9 @@ def holding(now: Pore, solved: Solved, nodes: np.ndarray, part: float) -> Solved
     return replace(solved, problem=problem, concentrations=state, fluxes=transport.fluxes(problem, sink, state))
 
 
-def apart(ours: np.ndarray, other: np.ndarray) -> float:
+def apart(computed: np.ndarray, other: np.ndarray) -> float:
     """Largest relative difference, %."""
-    return 100 * float(np.abs(ours / other - 1).max())
+    return 100 * float(np.abs(computed / other - 1).max())
 
 
 RADII, REACHES = (5.0, 10.0, 20.0, 30.0), (0.25, 0.5, 1.0, 1.5)
@@ -157,15 +157,15 @@ RADII, REACHES = (5.0, 10.0, 20.0, 30.0), (0.25, 0.5, 1.0, 1.5)
 def truncation() -> Finding:
     """Conductivity, and effluents at one mean velocity, of half-discs of X_m meshed to parts of min(5 R, W), against
     the whole pore meshed, on nested meshes whose clean part resists alike."""
-    said = scene(*BASE)
-    errors = {radius: _errors(said, radius) for radius in RADII}
+    scene = load_packaged(*BASE)
+    errors = {radius: _errors(scene, radius) for radius in RADII}
     checks = tuple(at_most(f"largest error at min(5 R, W), R = {radius:g} um (%)", "suffices",
-                           found[REACHES.index(1.0)].max(), 0.5, "0.5 %: as little as the time step is to matter")
-                   for radius, found in errors.items())
-    told = "; ".join(f"R = {radius:g} um: {_listed(found)}" for radius, found in errors.items())
+                           deviations[REACHES.index(1.0)].max(), 0.5, "0.5 %: as little as the time step is to matter")
+                   for radius, deviations in errors.items())
+    table = "; ".join(f"R = {radius:g} um: {_listed(deviations)}" for radius, deviations in errors.items())
     return Finding(checks, reason="what is cut off matters by more than that",
                    note="Errors (%) of conductivity/acceptor effluent/donor effluent at parts of min(5 R, W): "
-                   f"{told}. That is without what the elements of the clean part add to the resistance, which is no "
+                   f"{table}. That is without what the elements of the clean part add to the resistance, which is no "
                    "truncation. Changed on 2026-11-22 after these values had been seen: the "
                    "converged solution judged, where these elements add nothing; the verdict was the same.")
 
@@ -175,21 +175,21 @@ def _listed(errors: np.ndarray) -> str:
     return ", ".join("{:g}: {:.2g}/{:.2g}/{:.2g}".format(part, *row) for part, row in zip(REACHES, errors))
 
 
-def _errors(said, radius: float) -> np.ndarray:
+def _errors(scene, radius: float) -> np.ndarray:
     """(parts, 3) errors in percent at each distance."""
-    meshes = nested(said, radius, [part * min(5 * radius, said.pore.width) for part in REACHES])
-    velocity = flow_in(said, meshes[-1]).mean_velocity
-    said = replace(said, flow=replace(said.flow, head=None, mean_velocity=velocity))
-    values = np.array([_numbers(said, grid) for grid in meshes])
+    meshes = nested(scene, radius, [part * min(5 * radius, scene.pore.width) for part in REACHES])
+    velocity = flow_in(scene, meshes[-1]).mean_velocity
+    scene = replace(scene, flow=replace(scene.flow, head=None, mean_velocity=velocity))
+    values = np.array([_numbers(scene, grid) for grid in meshes])
     return 100 * np.abs(values[:-1] / values[-1] - 1)
 
 
-def _numbers(said, grid: Mesh) -> list[float]:
+def _numbers(scene, grid: Mesh) -> list[float]:
     """Conductivity with an exact clean part, to which the aggregate adds what it adds to this mesh without biomass; and
     both effluents."""
-    flow, fluxes = solution(said, grid, full_biomass(said, grid))
-    added = 1 / flow.conductivity - 1 / flow_in(said, emptied(grid)).conductivity
-    return [1 / (added + 1 / clean(said)), *(flux.effluent for flux in fluxes)]
+    flow, fluxes = solution(scene, grid, full_biomass(scene, grid))
+    added = 1 / flow.conductivity - 1 / flow_in(scene, emptied(grid)).conductivity
+    return [1 / (added + 1 / clean(scene)), *(flux.effluent for flux in fluxes)]
 
 
 def emptied(grid: Mesh) -> Mesh:
@@ -198,11 +198,11 @@ def emptied(grid: Mesh) -> Mesh:
     return replace(grid, topology=topology)
 
 
-def nested(said, radius: float, reaches: list[float]) -> list[Mesh]:
+def nested(scene, radius: float, reaches: list[float]) -> list[Mesh]:
     """Meshes around a half-disc to ascending distances (um) from it, and to the pore's ends, each part of the next."""
-    meshes = [half_disc(said, radius, reaches[0])]
-    for end in (*(radius + reach for reach in reaches[1:]), said.pore.length / 2):
-        meshes.append(lengthened(meshes[-1], end, sized(said).largest))
+    meshes = [half_disc(scene, radius, reaches[0])]
+    for end in (*(radius + reach for reach in reaches[1:]), scene.pore.length / 2):
+        meshes.append(lengthened(meshes[-1], end, sized(scene).largest))
     return meshes
 
 

@@ -1,4 +1,4 @@
-"""The report of the claims on the terminal, and what it counts.
+"""The report of the claims on the terminal, with its counts.
 
 The committed record of the claims, `claims.json`: intervals and verdicts that a run on any machine must agree with.
 
@@ -81,7 +81,7 @@ def spanned(pair: tuple[float, float] | None) -> str:
     return f"at least {low:.4g}" if isfinite(low) else f"at most {high:.4g}"
 
 
-def told(check: PaperCheck) -> str:
+def described(check: PaperCheck) -> str:
     """A check with its widths."""
     widths = {"numerics": (check.bar.low, check.bar.high), "inputs": check.inputs, "scheme of 2001": check.scheme,
               "accepted": (check.low, check.high)}
@@ -103,7 +103,7 @@ def terminal(row: Row) -> str:
         finding = row.finding
         remarks = {"about": row.claim.about, "changed": finding.change, "because": row.reason,
                    "inputs": finding.rounding, "steps are not varied": row.claim.fixed, "note": finding.note, **remarks}
-    lines = [*map(told, row.checks), *(f"{name}: {text}" for name, text in remarks.items() if text)]
+    lines = [*map(described, row.checks), *(f"{name}: {text}" for name, text in remarks.items() if text)]
     head = _paragraph(f"{row.id}  {row.verdict.upper()}: {row.claim.text} (paper: {row.claim.where})", "")
     return "\n".join([head, *map(_paragraph, lines)]) + "\n"
 
@@ -135,13 +135,13 @@ ROUND_OFF, LAST_DIGITS = 1e-9, 1e-9
 
 
 def read() -> list[dict]:
-    """The committed record; empty where there is none yet."""
+    """The committed record; empty if there is none yet."""
     return load(COMMITTED, [])
 
 
-def replaced(ours: list[dict]) -> list[dict]:
+def replaced(entries: list[dict]) -> list[dict]:
     """The record with some claims anew, in order."""
-    known = {each["id"]: each for each in (*read(), *ours)}
+    known = {each["id"]: each for each in (*read(), *entries)}
     return [known[id] for id in sorted(known)]
 
 
@@ -170,27 +170,28 @@ def _finite(value: float) -> float | None:
     return value if isfinite(value) else None
 
 
-def differences(ours: list[dict], committed: list[dict]) -> list[str]:
+def differences(entries: list[dict], committed: list[dict]) -> list[str]:
     """Where claims do not agree with the record, a line each: another verdict or outcome, a number out of its interval.
     """
     known = {each["id"]: each for each in committed}
-    return [f"{each['id']}: {line}" for each in ours for line in _of_claim(each, known.get(each["id"]))]
+    return [f"{each['id']}: {line}" for each in entries for line in _of_claim(each, known.get(each["id"]))]
 
 
-def _of_claim(ours: dict, known: dict | None) -> Iterator[str]:
+def _of_claim(entry: dict, known: dict | None) -> Iterator[str]:
     if known is None:
         yield "not in the record"
         return
-    if ours["verdict"] != known["verdict"]:
-        yield f"{ours['verdict']}, recorded as {known['verdict']}"
-    if _quantities(ours) != _quantities(known):
+    if entry["verdict"] != known["verdict"]:
+        yield f"{entry['verdict']}, recorded as {known['verdict']}"
+    if _quantities(entry) != _quantities(known):
         yield "other quantities than recorded"
         return
-    for one, there in zip(ours["checks"], known["checks"]):
-        if not inside(one["value"], there["low"], there["high"]):
-            yield f"{one['quantity']} is {one['value']:.6g}, recorded as {there['low']:.6g} to {there['high']:.6g}"
-        if one["outcome"] != there["outcome"]:
-            yield f"{one['quantity']} {one['outcome']}, recorded: {there['outcome']}"
+    for one, recorded in zip(entry["checks"], known["checks"]):
+        if not inside(one["value"], recorded["low"], recorded["high"]):
+            yield (f"{one['quantity']} is {one['value']:.6g}, "
+                   f"recorded as {recorded['low']:.6g} to {recorded['high']:.6g}")
+        if one["outcome"] != recorded["outcome"]:
+            yield f"{one['quantity']} {one['outcome']}, recorded: {recorded['outcome']}"
 
 
 def _quantities(entry: dict) -> list[str]:
@@ -198,7 +199,7 @@ def _quantities(entry: dict) -> list[str]:
 
 
 def inside(value: float | None, low: float | None, high: float | None) -> bool:
-    """Does a value lie in a recorded interval, but for round-off? An open end is None."""
+    """Whether a value lies in a recorded interval, up to round-off. An open end is None."""
     if value is None or low is None or high is None:
         return value is None and (low is None or high is None)
     near = LAST_DIGITS * max(abs(low), abs(high)) + ROUND_OFF
@@ -218,11 +219,11 @@ class Flip:
 
 
 def flips(entry: dict) -> list[Flip]:
-    """What moving one bound by half the width of its number's bar, to either side, makes of a recorded claim; each
+    """Verdicts of a recorded claim that change if one bound moves by half the width of the bar, to either side; each
     check and verdict once."""
-    found = [Flip(entry["id"], check["quantity"], _verdict_with(entry, number, bounds))
+    moved = [Flip(entry["id"], check["quantity"], _verdict_with(entry, number, bounds))
              for number, check in enumerate(entry["checks"]) for bounds in _moved(check)]
-    return [flip for flip in dict.fromkeys(found) if flip.verdict != entry["verdict"]]
+    return [flip for flip in dict.fromkeys(moved) if flip.verdict != entry["verdict"]]
 
 
 def _moved(check: dict) -> list[tuple[float, float]]:
@@ -233,9 +234,9 @@ def _moved(check: dict) -> list[tuple[float, float]]:
     return [(low - half, high), (low + half, high), (low, high - half), (low, high + half)] if isfinite(half) else []
 
 
-def _ends(told: dict) -> tuple[float, float]:
-    """Of a recorded interval, in which an open end is null."""
-    return -inf if told["low"] is None else told["low"], inf if told["high"] is None else told["high"]
+def _ends(recorded: dict) -> tuple[float, float]:
+    """The ends of a recorded interval, in which an open end is null."""
+    return -inf if recorded["low"] is None else recorded["low"], inf if recorded["high"] is None else recorded["high"]
 
 
 def _verdict_with(entry: dict, number: int, bounds: tuple[float, float]) -> str:

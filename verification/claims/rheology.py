@@ -27,12 +27,12 @@ import numpy as np
 from shapely.affinity import translate
 
 from verification.claims import FEW, FEW_WORDS, LATER, Finding, PaperCheck, at_least, at_most, claim
-from verification.claims.levels import BESIDE_OWN, COMPARED
+from verification.claims.levels import BESIDE_PAIRS, COMPARED
 from verification.claims.runs import (
     AFTER,
     BASE,
     PLOTTED,
-    WHOLE,
+    WIDE_TO_END,
     Run,
     around_contact,
     at,
@@ -59,13 +59,13 @@ VARIANTS = {
 
 
 @claim("C41", "5, 2.3.3", "another rheology, and other conditions where the aggregate meets the walls, are unlikely to "
-       "affect the conclusions substantially", fine=COMPARED, beside=BESIDE_OWN, date=LATER)
+       "affect the conclusions substantially", fine=COMPARED, beside=BESIDE_PAIRS, date=LATER)
 def other_rheology() -> Finding:
     """Wide with one choice changed at a time: area that only one of the two outlines covers at 40 h, one moved along
     the pore onto the other; shift of the time of contact; and change of the conductivity after it."""
-    checks = tuple(check for name, change in VARIANTS.items() for check in _changes(name, (*WHOLE, change)))
+    checks = tuple(check for name, change in VARIANTS.items() for check in _changes(name, (*WIDE_TO_END, change)))
     worst = "; ".join(f"{check.quantity} {check.value:.3g}" for check in checks if not check.holds)
-    moved, where, left = slid((*WHOLE, VARIANTS[RECHOSEN]))
+    moved, where, left = slid((*WIDE_TO_END, VARIANTS[RECHOSEN]))
     change = ("the place along the pore, which is the same all along, is not compared: it is that of the fixed points. "
               f"With its middles rechosen the aggregate slides {moved:.1f} um downstream as it grows on the other "
               f"side, with the same shape. Where they lie, the outlines are {where:.2g} % of the area apart, and "
@@ -73,7 +73,7 @@ def other_rheology() -> Finding:
               "they lie and the conductivity at 40 h, the slide contradicted the claim on every mesh, and the bar of "
               "the conductivity with the angle doubled reached over 5 %; both were redefined on 2026-11-22, after "
               "these values had been seen")
-    angles = " and ".join(f"{conductivity_change((*WHOLE, VARIANTS[f'angle {word}']), AFTER[:1]):+.2g} %"
+    angles = " and ".join(f"{conductivity_change((*WIDE_TO_END, VARIANTS[f'angle {word}']), AFTER[:1]):+.2g} %"
                           for word in ("halved", "doubled"))
     note = (f"The least angle says how much of the narrow wedges beside the contact is filled: at {AFTER[0]:g} h the "
             f"conductivity changes by {angles} with it halved and doubled, and ever less. The paper expects no effect "
@@ -83,23 +83,23 @@ def other_rheology() -> Finding:
 
 
 def _changes(name: str, run: Run) -> tuple[PaperCheck, ...]:
-    """What a variant of WHOLE changes."""
+    """What a variant of WIDE_TO_END changes."""
     changes = {f"outlines apart at {END} h, one moved onto the other (% of the area)": slid(run)[2],
-               "time of contact (%)": 100 * (contact_time(*run) / contact_time(*WHOLE) - 1),
+               "time of contact (%)": 100 * (contact_time(*run) / contact_time(*WIDE_TO_END) - 1),
                f"conductivity, mean of {AFTER[0]:g} to {AFTER[-1]:g} h (%)": conductivity_change(run)}
-    return tuple(at_most(f"{name}: {what}", "not substantially", abs(change), 100 * FEW, FEW_WORDS)
-                 for what, change in changes.items())
+    return tuple(at_most(f"{name}: {quantity}", "not substantially", abs(change), 100 * FEW, FEW_WORDS)
+                 for quantity, change in changes.items())
 
 
 def slid(run: Run) -> tuple[float, float, float]:
-    """How far downstream (um) of that of WHOLE the middle of a run's outline lies at END, and the area that only one of
-    both covers, in percent: where they lie, and with the run's moved back by that."""
-    ours, other = (polygon(body(chosen, END).outline) for chosen in (WHOLE, run))
-    moved = other.centroid.x - ours.centroid.x
-    return moved, uncovered(ours, other), uncovered(ours, translate(other, -moved))
+    """Compare a run's outline at END with that of WIDE_TO_END: the shift (um) of its centroid downstream, and the area
+    that only one of both covers (%), before and after the shift is removed."""
+    default, other = (polygon(body(chosen, END).outline) for chosen in (WIDE_TO_END, run))
+    moved = other.centroid.x - default.centroid.x
+    return moved, uncovered(default, other), uncovered(default, translate(other, -moved))
 
 
-def conductivity_change(run: Run, hours: tuple[float, ...] = AFTER, plain: Run = WHOLE) -> float:
+def conductivity_change(run: Run, hours: tuple[float, ...] = AFTER, plain: Run = WIDE_TO_END) -> float:
     """Geometric mean of the conductivity in rows at some hours, against that of a plain run, in percent."""
     key = "conductivity_m_per_d"
     return 100 * float(np.exp(np.mean([np.log(at(run, hour)[key] / at(plain, hour)[key]) for hour in hours])) - 1)
@@ -122,13 +122,13 @@ def drag_or_viscosity() -> Finding:
     """Conductivity with Brinkman's drag of a permeability of 1e-15 m2 over that with lambda = 2000: base at 19.2 h, an
     aggregate; wide just before contact, a film; and 5 h after it, a plug. It may lead to differences if it does in one
     of these, and hangs on the conditions if in another it does not."""
-    ours, other = conductivities(BASE, WHOLE), conductivities(permeable(BASE), permeable(PLUG))
-    changes = [100 * abs(other[name] / ours[name] - 1) for name in ours]
+    viscous, permeable_body = conductivities(BASE, WIDE_TO_END), conductivities(permeable(BASE), permeable(PLUG))
+    changes = [100 * abs(permeable_body[name] / viscous[name] - 1) for name in viscous]
     checks = (at_least("conductivity of aggregate, film or plug: changes by, the most of them (%)",
                        "may lead to differences", max(changes), 100 * FEW, f"more than {FEW_WORDS}"),
               at_most("conductivity of aggregate, film or plug: changes by, the least of them (%)",
                       "depending on the conditions", min(changes), 100 * FEW, f"no difference: {FEW_WORDS}"))
-    rows = "; ".join(f"{name} {ours[name]:.3g} and {other[name]:.3g} m/d" for name in ours)
+    rows = "; ".join(f"{name} {viscous[name]:.3g} and {permeable_body[name]:.3g} m/d" for name in viscous)
     return Finding(checks, reason="it makes a difference everywhere, or nowhere",
                    note=f"Conductivity with lambda = 2000 and with 1e-15 m2: {rows}. The paper's scheme, of linear "
                    f"elements, refuses the drag. Changed on {LATER} after these values had been seen: film and plug "

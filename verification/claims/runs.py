@@ -1,12 +1,11 @@
 """The runs that the claims read: packaged scenes with changes, each computed once in a process, at the present level.
 
-Nothing is written: a run is its instants. In the converged solution, and in wide, rows are asked for (`ROWS`), since
-its steps end where they like; base in the scheme has a row a shape update. Contact with the opposite wall is a row of
-its own wherever it comes, with the last state before it.
+Nothing is written: a run is a list of reports. The converged solution and wide name the times of their rows (`ROWS`),
+since their steps end at other times; base in the scheme has a row per shape update. The first state in contact with the
+opposite wall and the last state before it are rows of their own.
 
-The aggregate and the pore of a run at an instant, and the stresses in it.
-
-Aggregates of a given shape, and what is solved around them.
+The module also gives the aggregate, the pore and the stresses of a run at a time, and meshes and solutions around
+aggregates of a prescribed shape.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ from repro.fem.outline import half_disc as seed
 from repro.fem.sizing import ACROSS_AGGREGATE
 from repro.fem.space import Space
 from repro.march import loop, simulation, updates
-from repro.march.loop import Instant, State
+from repro.march.loop import Report, RestartState
 from repro.model import biomass, flow, pore, remeshing, transport
 from repro.model.kinetics import Sink
 from repro.model.pore import Pore, Solved, solve
@@ -69,33 +68,33 @@ LAST = rows_at(PLOTTED, END)
 #: Section 4, where only the last two shapes are asked for.
 PLATES = (*BASE, LAST)
 #: Wide where it is compared with runs that are changed: every 5 h, the hours before its contact, and AFTER.
-WHOLE = ("wide", rows_at(*range(5, 31, 5), *range(31, 35), *sorted({*AFTER, 40})))
+WIDE_TO_END = ("wide", rows_at(*range(5, 31, 5), *range(31, 35), *sorted({*AFTER, 40})))
 
 
-def scene(name: str, *changes: str) -> Scene:
+def load_packaged(name: str, *changes: str) -> Scene:
     """A packaged scene with the KEY=VALUE of --set, in the elements and steps of the present level."""
     level = current()
     changes = (*level.wide, *changes) if name == "wide" else changes
     if level.kind == CONVERGED:
         return _with_rows(load_scene(name, (*converged(level.size), *changes)))
-    said = load_scene(name, changes)
-    numerics = replace(said.numerics, refinement=said.numerics.refinement / level.size)
-    growth = said.growth and replace(said.growth, time_step=round(said.growth.time_step * level.step, 12))
-    said = replace(said, numerics=numerics, growth=growth)
-    return _with_rows(said) if name == "wide" else said
+    scene = load_scene(name, changes)
+    numerics = replace(scene.numerics, refinement=scene.numerics.refinement / level.size)
+    growth = scene.growth and replace(scene.growth, time_step=round(scene.growth.time_step * level.step, 12))
+    scene = replace(scene, numerics=numerics, growth=growth)
+    return _with_rows(scene) if name == "wide" else scene
 
 
-def ending(said: Scene, *times: float) -> Scene:
+def ending(scene: Scene, *times: float) -> Scene:
     """The scene with rows at some times (h), the last of which is its end."""
-    return replace(said, growth=replace(said.growth, end=times[-1]), output=replace(said.output, times=times))
+    return replace(scene, growth=replace(scene.growth, end=times[-1]), output=replace(scene.output, times=times))
 
 
-def _with_rows(said: Scene) -> Scene:
+def _with_rows(scene: Scene) -> Scene:
     """The scene with its rows, where it grows and names none."""
-    if said.growth is None or said.output.times:
-        return said
-    times = tuple(time for time in ROWS[said.name] if time <= said.growth.end + 1e-9)
-    return replace(said, output=replace(said.output, times=times))
+    if scene.growth is None or scene.output.times:
+        return scene
+    times = tuple(time for time in ROWS[scene.name] if time <= scene.growth.end + 1e-9)
+    return replace(scene, output=replace(scene.output, times=times))
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,96 +103,96 @@ class History:
     after, None where it does not; far: the last state that is not NEAR that wall."""
 
     scene: Scene
-    instants: tuple[Instant, ...]
-    contact: tuple[Instant, Instant] | None
-    far: State | None
+    instants: tuple[Report, ...]
+    contact: tuple[Report, Report] | None
+    far: RestartState | None
 
 
 @cached
 def history(*run: str) -> History:
     """One run, computed. With a change that is LATE its rows begin where it can differ from the run without it. Raises
     SimulationError where it fails."""
-    said = scene(*run)
+    scene = load_packaged(*run)
     plain = tuple(change for change in run if not change.startswith(LATE))
-    instants: list[Instant] = []
+    instants: list[Report] = []
     contact = None
     begun = before = far = None if plain == run else history(*plain).far
-    for state, instant in simulation.steps(said, begun):
+    for state, instant in simulation.steps(scene, begun):
         if instant:
             instants.append(instant)
         if contact is None and before is not None and state.pore.contact:
-            contact = tuple(_solved(said, each) for each in (_with_a_film(said, before, state), state))
+            contact = tuple(_solved(scene, each) for each in (_with_a_film(scene, before, state), state))
         before = state
-        far = state if state.pore.boundary.thickness <= NEAR * said.pore.width else far
-    return History(said, tuple(instants), contact, far)
+        far = state if state.pore.boundary.thickness <= NEAR * scene.pore.width else far
+    return History(scene, tuple(instants), contact, far)
 
 
-def _with_a_film(said: Scene, before: State, contact: State) -> State:
+def _with_a_film(scene: Scene, before: RestartState, contact: RestartState) -> RestartState:
     """The last state that leaves a film: in the converged solution FILM before contact, in the scheme an update."""
     end = contact.pore.time - FILM
     if current().kind != CONVERGED or end <= before.pore.time:
         return before
-    *_, (state, _) = simulation.steps(ending(said, end), before)
+    *_, (state, _) = simulation.steps(ending(scene, end), before)
     return before if state.pore.contact else state
 
 
-def _solved(said: Scene, state: State) -> Instant:
+def _solved(scene: Scene, state: RestartState) -> Report:
     """A state as the instant of a row."""
-    found = pore.solve(said, state.pore)
-    return loop.instant(state, replace(state.pore, concentrations=found.concentrations), found, None)
+    solved = pore.solve(scene, state.pore)
+    return loop.make_report(state, replace(state.pore, concentrations=solved.concentrations), solved, None)
 
 
 @cached
 def series(*run: str) -> Columns:
     """Columns of a run's rows, as in ``timeseries.csv``."""
-    found = history(*run)
-    return columns([results.row(found.scene, each) for each in found.instants])
+    computed = history(*run)
+    return columns([results.row(computed.scene, each) for each in computed.instants])
 
 
 @cached
 def around_contact(*run: str) -> Columns:
-    """The same for the last state before contact and the first after. Raises LookupError where there is none."""
-    found = history(*run)
-    if found.contact is None:
+    """Columns of the last state before contact and of the first after. Raises LookupError without contact."""
+    computed = history(*run)
+    if computed.contact is None:
         raise LookupError(f"{run} does not touch the opposite wall")
-    return columns([results.row(found.scene, each) for each in found.contact])
+    return columns([results.row(computed.scene, each) for each in computed.contact])
 
 
 def contact_time(*run: str) -> float:
-    """When (h) a run touches the opposite wall."""
+    """Time (h) at which a run touches the opposite wall."""
     return float(around_contact(*run)["time_h"][1])
 
 
 @cached
 def ledger(*run: str) -> Columns:
     """Columns of ``ledger.csv``, of all steps."""
-    found = history(*run)
-    steps = np.array([results.ledger_row(found.scene, step) for each in found.instants for step in each.ledgers])
+    computed = history(*run)
+    steps = np.array([results.ledger_row(computed.scene, step) for each in computed.instants for step in each.ledgers])
     return dict(zip(results.LEDGER_COLUMNS, steps.T))
 
 
 def biomass_defects(run: Run) -> np.ndarray:
     """Relative defect of the biomass in each step of a run."""
     steps = ledger(*run)
-    before, made, after = (steps[f"biomass_{part}_pg_per_m"] for part in ("before", "made", "after"))
-    return (after - before - made) / after
+    before, grown, after = (steps[f"biomass_{part}_pg_per_m"] for part in ("before", "made", "after"))
+    return (after - before - grown) / after
 
 
-def instant(run: Run, time: float) -> Instant:
-    """The instant of a run's row at a time (h). Raises KeyError where there is none."""
-    found = [each for each in history(*run).instants if abs(each.pore.time - time) < 1e-6]
-    if len(found) != 1:
-        raise KeyError(f"{run}: {len(found)} rows at t = {time} h")
-    return found[0]
+def instant(run: Run, time: float) -> Report:
+    """The report of a run at a time (h). Raises KeyError if no row has this time."""
+    reports = [each for each in history(*run).instants if abs(each.pore.time - time) < 1e-6]
+    if len(reports) != 1:
+        raise KeyError(f"{run}: {len(reports)} rows at t = {time} h")
+    return reports[0]
 
 
 def at(run: Run, time: float) -> dict[str, float]:
-    """The row of a run at a time (h). Raises KeyError where there is none."""
+    """The row of a run at a time (h). Raises KeyError if there is none."""
     return results.row(history(*run).scene, instant(run, time))
 
 
 def nearest(run: Run, time: float) -> float:
-    """The time (h) of a run's row that is the nearest to a time (h): longer steps need not land on it."""
+    """Time (h) of the row nearest to a time (h), at which longer steps need not end."""
     return float(min(series(*run)["time_h"], key=lambda hour: abs(hour - time)))
 
 
@@ -201,19 +200,19 @@ def nearest(run: Run, time: float) -> float:
 def grown(run: Run, time: float) -> tuple[Pore, Solved]:
     """The shape of a run at a time (h) with what grows in it in the next 12 min, and what is solved then: the state
     "before the aggregate expands" [E12]."""
-    return _grown(scene(*run), *solved_pore(run, time))
+    return _grown(load_packaged(*run), *solved_pore(run, time))
 
 
 @cached
 def grown_anew(run: Run, time: float) -> tuple[Pore, Solved]:
     """The same in a mesh made at that time, whose ends are 1.5 W from the aggregate (3.1) at every level. Those of the
     run's own mesh hang on when that was last made."""
-    return _grown(scene(*run), *remeshed(scene(*run), *solved_pore(run, time)))
+    return _grown(load_packaged(*run), *remeshed(load_packaged(*run), *solved_pore(run, time)))
 
 
-def _grown(said: Scene, now: Pore, solved: Solved) -> tuple[Pore, Solved]:
-    made, _, _ = updates.make_biomass(said, now, solved, UPDATE)
-    return made, pore.solve(said, made)
+def _grown(scene: Scene, pore: Pore, solved: Solved) -> tuple[Pore, Solved]:
+    before_expansion, _, _ = updates.make_biomass(scene, pore, solved, UPDATE)
+    return before_expansion, solve(scene, before_expansion)
 
 
 #: Points of an arc of an outline, as a polygon.
@@ -253,22 +252,22 @@ class Body(Reported):
         return self.pore.space.to_mesh(getattr(self.solved.concentrations, name))
 
 
-def body_of(said: Scene, found: Instant) -> Body:
+def body_of(scene: Scene, report: Report) -> Body:
     """The aggregate at an instant."""
-    return Body(said, found.pore, found.solved)
+    return Body(scene, report.pore, report.solved)
 
 
 @cached
 def body(run: Run, time: float) -> Body:
     """The aggregate of a run in its row at a time (h). Raises KeyError where there is none."""
-    return body_of(scene(*run), instant(run, time))
+    return body_of(load_packaged(*run), instant(run, time))
 
 
 @cached
 def bodies(run: Run) -> tuple[Body, ...]:
     """The aggregate in every row of a run."""
-    found = history(*run)
-    return tuple(body_of(found.scene, each) for each in found.instants)
+    computed = history(*run)
+    return tuple(body_of(computed.scene, each) for each in computed.instants)
 
 
 def polygon(outline: Outline) -> shapely.Polygon:
@@ -281,30 +280,30 @@ def polygon(outline: Outline) -> shapely.Polygon:
 
 def solved_pore(run: Run, time: float) -> tuple[Pore, Solved]:
     """The pore of a run at a time (h) and what is solved in it."""
-    found = instant(run, time)
-    return found.pore, found.solved
+    report = instant(run, time)
+    return report.pore, report.solved
 
 
-def remeshed(chosen: Scene, now: Pore, solved: Solved) -> tuple[Pore, Solved]:
+def remeshed(chosen: Scene, pore: Pore, solved: Solved) -> tuple[Pore, Solved]:
     """The same aggregate in a new mesh of the extent that the scene asks for, solved."""
-    new, _ = remeshing.remesh(chosen, now, now, solved.flow.mean_velocity)
+    new, _ = remeshing.remesh(chosen, pore, pore, solved.flow.mean_velocity)
     return new, solve(chosen, new)
 
 
-def stress(found: Body) -> np.ndarray:
+def stress(aggregate: Body) -> np.ndarray:
     """(t, 4) Cauchy stress over mu_L, the mean over each triangle: xx, yy, zz, xy."""
-    means = [found.mean(part) for part in np.moveaxis(found.stress, -1, 0)]
-    return np.stack(means, axis=1) / found.scene.growth.shear_modulus
+    means = [aggregate.mean(part) for part in np.moveaxis(aggregate.stress, -1, 0)]
+    return np.stack(means, axis=1) / aggregate.scene.growth.shear_modulus
 
 
 def in_plane(stresses: np.ndarray) -> np.ndarray:
-    """(t,) half the difference of the two principal stresses in the plane, which is what can change the shape."""
+    """(t,) half the difference of the two principal stresses in the plane, the part that can change the shape."""
     xx, yy, _, xy = stresses.T
     return np.hypot(0.5 * (xx - yy), xy)
 
 
 def equivalent(stresses: np.ndarray) -> np.ndarray:
-    """(t,) equivalent (von Mises) stress: of the whole deviator, the direction across the plane included."""
+    """(t,) equivalent (von Mises) stress of the full deviator, including the direction across the plane."""
     xx, yy, zz, xy = stresses.T
     return np.sqrt(0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) + 3 * xy**2)
 
@@ -317,13 +316,13 @@ def solution(scene, grid: Mesh, active: np.ndarray, carried_by_u: bool = False) 
 
     carried_by_u: advect with u itself, as the paper writes it, and not with the divergence-free w = u - tau grad p.
     """
-    found = flow_in(scene, grid)
-    carrier = replace(found, correction=0 * found.correction) if carried_by_u else found
+    flow_field = flow_in(scene, grid)
+    carrier = replace(flow_field, correction=0 * flow_field.correction) if carried_by_u else flow_field
     space = Space(grid, scene.numerics.order)
     problem = transport.problem(space, carrier, scene.substrates, scene.kinetics, scene.numerics.inlet)
     sink = Sink(biomass.at_points(space, active) * space.reaction.dx)
     state = transport.steady(problem, sink)
-    return found, transport.fluxes(problem, sink, state)
+    return flow_field, transport.fluxes(problem, sink, state)
 
 
 def flow_in(scene, grid: Mesh) -> flow.Flow:
@@ -362,9 +361,9 @@ def halved(lattice: np.ndarray, falling=False) -> np.ndarray:
     return np.hstack([np.where(falling, [a, b, d], [a, b, c]), np.where(falling, [b, c, d], [a, c, d])]).T
 
 
-def uncovered(ours: shapely.Polygon, other: shapely.Polygon) -> float:
+def uncovered(outline: shapely.Polygon, other: shapely.Polygon) -> float:
     """Area that only one of two shapes covers, in percent of ours."""
-    return 100 * float(ours.symmetric_difference(other).area / ours.area)
+    return 100 * float(outline.symmetric_difference(other).area / outline.area)
 
 
 def upstream_part(first: shapely.Polygon, last: shapely.Polygon) -> float:

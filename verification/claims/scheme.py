@@ -17,9 +17,9 @@ import numpy as np
 
 from repro.fem.mesh import POOR, POOR_ALLOWED
 from repro.march import updates
-from repro.model import biomass, contact, gear, pore
+from repro.model import biomass, contact, gear
 from repro.model.kinetics import Sink, rate_law
-from repro.model.pore import Pore
+from repro.model.pore import Pore, solve
 from repro.model.transport import Concentrations
 from verification.claims import (
     FEW,
@@ -49,8 +49,8 @@ from verification.claims.runs import (
     grown,
     half_disc,
     ledger,
+    load_packaged,
     nearest,
-    scene,
     series,
     solution,
     solved_pore,
@@ -78,7 +78,7 @@ class Bookkeeping:
 
     end: np.ndarray
     volume: np.ndarray
-    made: np.ndarray
+    synthesised: np.ndarray
     consumed: np.ndarray
     grown: np.ndarray
     effluent: np.ndarray
@@ -88,11 +88,11 @@ class Bookkeeping:
         """(3, k): dM_X / dM_CA, dM_X / dM_CD and dM_CA / dM_CD over their expected values, less one; the effluents
         in dM_C are multiplied by the correction."""
         against = self.volume * (self.supply - correction * self.effluent) / self.consumed
-        return np.vstack([self.grown / self.made / against, against[:1] / against[1:]]) - 1
+        return np.vstack([self.grown / self.synthesised / against, against[:1] / against[1:]]) - 1
 
     def corrections(self) -> np.ndarray:
         """(2, k): factor on each effluent that makes dM_X / dM_C what is expected."""
-        return (self.supply - self.grown / self.made * self.consumed / self.volume) / self.effluent
+        return (self.supply - self.grown / self.synthesised * self.consumed / self.volume) / self.effluent
 
 
 def bookkeeping(run) -> Bookkeeping:
@@ -103,14 +103,15 @@ def bookkeeping(run) -> Bookkeeping:
     """
     steps = ledger(*run)
     rows = series(*run)
-    said = scene(*run)
-    supply = np.array(pair("supply", said.substrates))[:, None]
+    scene = load_packaged(*run)
+    supply = np.array(pair("supply", scene.substrates))[:, None]
     volume = steps["acceptor_supplied_pg_per_m"] / supply[0]
     out = np.array([steps[f"{name}_out_pg_per_m"] for name in SUBSTRATES])
     consumed = np.array([steps[f"{name}_consumed_pg_per_m"] for name in SUBSTRATES])
     first = np.array([rows[f"effluent_{name}_mg_per_L"][:-1] for name in SUBSTRATES])
-    made, grown = steps["biomass_made_pg_per_m"], said.kinetics.maximum_density * np.diff(rows["aggregate_area_um2"])
-    return Bookkeeping(steps["end_h"], volume, made, consumed, grown, 2 * out / volume - first, supply)
+    synthesised = steps["biomass_made_pg_per_m"]
+    grown = scene.kinetics.maximum_density * np.diff(rows["aggregate_area_um2"])
+    return Bookkeeping(steps["end_h"], volume, synthesised, consumed, grown, 2 * out / volume - first, supply)
 
 
 @claim("C13", "4", "mass balance from effluents within a few percent; 1.6 % on the effluents brings all ratios within "
@@ -183,11 +184,11 @@ def exceeding(book: Bookkeeping) -> float:
     return float(np.interp(0.0, -excess[last: last + 2], book.end[last: last + 2]))
 
 
-def carried_by_u(said, radius: float) -> np.ndarray:
+def carried_by_u(scene, radius: float) -> np.ndarray:
     """(2,) substrate lost by advection with u around a half-disc of X_m, meshed by 3.1: supplied - out - consumed, over
     what flows out; an effluent must be raised by this share to balance."""
-    grid = half_disc(said, radius, min(10 * radius, 1.5 * said.pore.width))
-    _, fluxes = solution(said, grid, full_biomass(said, grid), carried_by_u=True)
+    grid = half_disc(scene, radius, min(10 * radius, 1.5 * scene.pore.width))
+    _, fluxes = solution(scene, grid, full_biomass(scene, grid), carried_by_u=True)
     return np.array([(flux.supplied - flux.out - flux.consumed) / flux.out for flux in fluxes])
 
 
@@ -195,25 +196,25 @@ def carried_by_u(said, radius: float) -> np.ndarray:
        about=OF_SCHEME, sizes=BESIDE)
 def refined_balance() -> Finding:
     """Substrate lost by advection with u itself, on meshes of sizes 2, 1 and 1/2, around the seed and at 19.2 h."""
-    radii = {"t = 0": scene(*BASE).aggregate.radius, "19.2 h": at(BASE, PLOTTED)["thickness_um"]}
-    scenes = [scene("base", f"numerics.refinement={fineness}") for fineness in (0.5, 1.0, 2.0)]
-    checks, told = [], []
+    radii = {"t = 0": load_packaged(*BASE).aggregate.radius, "19.2 h": at(BASE, PLOTTED)["thickness_um"]}
+    scenes = [load_packaged("base", f"numerics.refinement={fineness}") for fineness in (0.5, 1.0, 2.0)]
+    checks, defects = [], []
     for when, radius in radii.items():
-        lost = np.array([carried_by_u(said, radius) for said in scenes])
-        told.append(f"{when}: " + ", ".join("{:.2g}/{:.2g}".format(*row) for row in 100 * lost))
+        lost = np.array([carried_by_u(scene, radius) for scene in scenes])
+        defects.append(f"{when}: " + ", ".join("{:.2g}/{:.2g}".format(*row) for row in 100 * lost))
         checks += [at_least(f"fall of the {name} defect per halving, {when} (times)", "improves", fall, 2,
                             "first order at least: halved with the mesh size")
                    for name, fall in zip(SUBSTRATES, (lost[:-1] / lost[1:]).min(axis=0))]
     closed = max(np.abs(series(*BASE)[f"{name}_balance"]).max() for name in SUBSTRATES)
     plain = f"Advected with u, as the paper writes it; the default, with w = u - tau grad p, closes to {closed:.0e}"
     return Finding(tuple(map(without_limit, checks)), reason="refining does not help on every mesh",
-                   note=f"{plain}. Defects on the meshes, % of the acceptor/donor effluent: {'; '.join(told)}.")
+                   note=f"{plain}. Defects on the meshes, % of the acceptor/donor effluent: {'; '.join(defects)}.")
 
 
 @claim("C34", "4", "at early times C_supply - C_effluent is comparable to its numerical error")
 def early_drop() -> Finding:
     """The paper's own numerical error, its 1.6 % of the effluents, over C_supply - C_effluent around the seed."""
-    row, supply = at(BASE, 0.0), scene(*BASE).substrates.acceptor.supply
+    row, supply = at(BASE, 0.0), load_packaged(*BASE).substrates.acceptor.supply
     effluent = np.array([row[f"effluent_{name}_mg_per_L"] for name in SUBSTRATES])
     drop = supply - effluent
     checks = tuple(between(f"the paper's 1.6 % of the {name} effluent over its drop, t = 0", "comparable", value,
@@ -225,9 +226,9 @@ def early_drop() -> Finding:
 @claim("C15", "4", "a higher influent concentration leaves the amounts consumed about the same")
 def richer_supply() -> Finding:
     """Consumption of both substrates at 20 K_s over that at 10 K_s, in the state that the paper plots."""
-    now, solved = grown(BASE, PLOTTED)
-    said = scene("base", *(f'substrates.{name}.supply="20 mg/L"' for name in SUBSTRATES))
-    poor, rich = solved.fluxes, pore.solve(said, replace(now, concentrations=None)).fluxes
+    pore, solved = grown(BASE, PLOTTED)
+    scene = load_packaged("base", *(f'substrates.{name}.supply="20 mg/L"' for name in SUBSTRATES))
+    poor, rich = solved.fluxes, solve(scene, replace(pore, concentrations=None)).fluxes
     amounts = [b.consumed / a.consumed for a, b in zip(poor, rich)]
     shares = [more * a.supplied / b.supplied for more, a, b in zip(amounts, poor, rich)]
     checks = [near(f"{name} consumed at 20 K_s over 10 K_s", "about the same", more, 1, FEW, FEW_WORDS)
@@ -235,7 +236,7 @@ def richer_supply() -> Finding:
     checks += [at_most(f"share of the {name} consumed, 20 K_s over 10 K_s", "smaller", less, 1, "the words")
                for name, less in zip(SUBSTRATES, shares)]
     row = at(BASE, PLOTTED)
-    law = rate_law(said.substrates, said.kinetics)
+    law = rate_law(scene.substrates, scene.kinetics)
     m_a, m_d = law.fractions(row["acceptor_min_mg_per_L"], row["donor_min_mg_per_L"])
     reason = (f"base is not in the zero-order range at 19.2 h (C33): m_A = {m_a:.2f} and m_D = {m_d:.2f} at its lowest "
               f"concentrations, so that uptake there stands at {100 * m_a * m_d:.0f} % of its most and can rise")
@@ -260,18 +261,18 @@ def reprojection_conserves() -> Finding:
 
 def node_defect(time: float) -> float:
     """Largest relative change of a node's mass of X_A or X_I in the update of base that starts at a time (h)."""
-    said, (now, solved) = scene(*BASE), solved_pore(BASE, time)
-    made, _, _ = updates.make_biomass(said, now, solved, said.growth.time_step)
-    expanded = contact.expand(said, made, updates.enlarged(said, now, made)).pore
-    pairs = zip(node_masses(made), node_masses(expanded))
+    scene, (pore, solved) = load_packaged(*BASE), solved_pore(BASE, time)
+    before_expansion, _, _ = updates.make_biomass(scene, pore, solved, scene.growth.time_step)
+    expanded = contact.expand(scene, before_expansion, updates.compute_theta(scene, pore, before_expansion)).pore
+    pairs = zip(node_masses(before_expansion), node_masses(expanded))
     return max(float(np.abs(after / before - 1).max()) for before, after in pairs)
 
 
-def node_masses(now: Pore) -> tuple[np.ndarray, np.ndarray]:
+def node_masses(pore: Pore) -> tuple[np.ndarray, np.ndarray]:
     """X_A and X_I of the aggregate's nodes, times the areas around them: um2 mg/L."""
-    area = now.space.lumped(now.mesh.biomass)[now.mesh.body]
-    return tuple(area * biomass.at_nodes(now.space, mass / now.space.reaction.dx)[now.mesh.body]
-                 for mass in (now.active, now.inert))
+    area = pore.space.lumped(pore.mesh.biomass)[pore.mesh.body]
+    return tuple(area * biomass.at_nodes(pore.space, mass / pore.space.reaction.dx)[pore.mesh.body]
+                 for mass in (pore.active, pore.inert))
 
 
 @claim("C24", "3.5", "the mesh degrades gradually; the remesh criterion keeps it acceptable", about=OF_SCHEME,
@@ -282,7 +283,7 @@ def mesh_quality() -> Finding:
     Of base alone: the paper says it of its mesher, and after contact a growing contact surface asks for a new mesh in
     every update, whose quality is our mesher's. Acceptable is what the criterion leaves as it is.
     """
-    qualities, new = [found.grid.quality for found in bodies(BASE)], series(*BASE)["remeshed"]
+    qualities, new = [aggregate.grid.quality for aggregate in bodies(BASE)], series(*BASE)["remeshed"]
     least = np.array([quality.min() for quality in qualities])
     updates_apart = np.diff(np.flatnonzero(new)).min()
     fall = -np.diff(least)[new[1:] == 0].min(initial=0.0)
@@ -318,7 +319,7 @@ def step_control() -> Finding:
     step may be, is none. The range of the steps hangs on the tolerance of the control, which is not printed, so that it
     proves nothing and is told alone.
     """
-    ours = update(PLOTTED)
+    controlled = update(PLOTTED)
     error = max(deviation(time) for time in (FIRST, PLOTTED))
     alone = deviation(PLOTTED, UPDATE)
     alike = next(n for n in range(2, 1000) if deviation(PLOTTED, UPDATE / n) <= deviation(PLOTTED))
@@ -327,28 +328,28 @@ def step_control() -> Finding:
               without_limit(at_least("growth of a disturbance in a step of 12 min, both substrates predicted",
                                      "not stable", growth, 1.0, "it grows", date=LATER)),
               without_limit(at_least("equal steps for the control's error, over its own", "steps saved",
-                                     alike / len(ours.steps), 1.5, "a third of the steps at least")))
+                                     alike / len(controlled.steps), 1.5, "a third of the steps at least")))
     reason = (f"in equal steps of 12 min a disturbance changes by a factor of {growth:.2g} a step where each substrate "
               f"sees the other's prediction, and of {damped:.2g} where the donor sees the corrected acceptor: backward "
               f"differences are stable, long steps are wrong ({100 * alone:.2g} %) but do not blow up")
     early = update(FIRST)
     note = (f"With the default tolerance of {gear.TOLERANCE:g}, {len(early.steps)} steps of "
-            f"{HOUR * min(early.steps):.0f} to {HOUR * max(early.steps):.0f} s at t = 0 and {len(ours.steps)} of "
-            f"{HOUR * min(ours.steps):.0f} to {HOUR * max(ours.steps):.0f} s at 19.2 h, where equal steps with its "
-            f"error are {alike}.")
+            f"{HOUR * min(early.steps):.0f} to {HOUR * max(early.steps):.0f} s at t = 0 and {len(controlled.steps)} of "
+            f"{HOUR * min(controlled.steps):.0f} to {HOUR * max(controlled.steps):.0f} s at 19.2 h, where equal steps "
+            f"with its error are {alike}.")
     return Finding(checks, reason=reason, note=note)
 
 
 def growth_of_a_disturbance(simultaneous: bool) -> float:
     """Factor a step of 12 min by which a disturbance of the acceptor in base at 19.2 h changes, biomass neither growing
     nor decaying; simultaneous: both substrates see the other's prediction."""
-    now, solved = solved_pore(BASE, PLOTTED)
+    pore, solved = solved_pore(BASE, PLOTTED)
     law = solved.problem.law
     still = replace(law.constants, yield_coefficient=1e-12, decay_coefficient=1e-15)
     problem = replace(solved.problem, law=replace(law, constants=still))
-    rest = gear.settle(problem, Sink(now.active), solved.concentrations)
+    rest = gear.settle(problem, Sink(pore.active), solved.concentrations)
     start = replace(rest, acceptor=(1 - DISTURBED) * rest.acceptor)
-    ends = [gear.advance(problem, now.active, now.inert, start, count * UPDATE, fixed_step=UPDATE,
+    ends = [gear.advance(problem, pore.active, pore.inert, start, count * UPDATE, fixed_step=UPDATE,
                          simultaneous=simultaneous).concentrations for count in LOOKED_AT]
     early, late = (np.abs(both(end) - both(rest)).max() for end in ends)
     return float((late / early) ** (1 / (LOOKED_AT[1] - LOOKED_AT[0])))
@@ -357,22 +358,22 @@ def growth_of_a_disturbance(simultaneous: bool) -> float:
 @cached
 def update(time: float, fixed_step: float | None = None, tolerance: float = gear.TOLERANCE) -> gear.Advance:
     """The transient of 12 min in base's geometry at a time (h), from settled profiles, in equal steps or controlled."""
-    now, solved = solved_pore(BASE, time)
-    return gear.advance(solved.problem, now.active, now.inert, settled(time), UPDATE, tolerance=tolerance,
+    pore, solved = solved_pore(BASE, time)
+    return gear.advance(solved.problem, pore.active, pore.inert, resting_profiles(time), UPDATE, tolerance=tolerance,
                         fixed_step=fixed_step)
 
 
 @cached
-def settled(time: float) -> Concentrations:
+def resting_profiles(time: float) -> Concentrations:
     """Profiles of the transient scheme with F3 = F4 = 0 (3.3.2) in base's geometry at a time (h)."""
-    now, solved = solved_pore(BASE, time)
-    return gear.settle(solved.problem, Sink(now.active), solved.concentrations)
+    pore, solved = solved_pore(BASE, time)
+    return gear.settle(solved.problem, Sink(pore.active), solved.concentrations)
 
 
 def deviation(time: float, fixed_step: float | None = None) -> float:
     """Error of an update: of both concentrations over the supply, and of the biomass made; the largest."""
-    now, solved = solved_pore(BASE, time)
-    ours, exact = update(time, fixed_step), update(time, None, EXACT)
-    gaps = np.abs(both(ours.concentrations) - both(exact.concentrations)).max(axis=1)
-    made = [float((found.active + found.inert - now.active - now.inert).sum()) for found in (ours, exact)]
-    return float(max(*gaps / pair("supply", solved.problem.substrates), abs(made[0] / made[1] - 1)))
+    pore, solved = solved_pore(BASE, time)
+    advanced, exact = update(time, fixed_step), update(time, None, EXACT)
+    gaps = np.abs(both(advanced.concentrations) - both(exact.concentrations)).max(axis=1)
+    grown = [float((advance.active + advance.inert - pore.active - pore.inert).sum()) for advance in (advanced, exact)]
+    return float(max(*gaps / pair("supply", solved.problem.substrates), abs(grown[0] / grown[1] - 1)))

@@ -1,9 +1,9 @@
-"""The paper's ambiguities and misprints, our reading, and what each costs: `python -m verification.errata`.
+"""The paper's ambiguities and misprints, our reading, and their consequences: `python -m verification.errata`.
 
-Each erratum is a function that computes the numbers of its own text; the text stands above it, in the decorator, with a
-{name} for each number. The program computes them all and rewrites ``reference/ERRATA.md``, so that prose and numbers
-cannot part. Runs are those of the claims; what a scene cannot say (a wrong sign, an
-explicit increment) is put together from the stages of `repro`. ``tests/test_errata.py`` computes the quick ones again.
+Each erratum is a function that computes the numbers of its text. The text is in the decorator, with a {name} for each
+number. The program computes all numbers and rewrites ``reference/ERRATA.md``, so that text and numbers agree. The runs
+are those of the claims. Variants without a key in a scene (a wrong sign, an explicit increment) are assembled from the
+stages of `repro`. ``tests/test_errata.py`` recomputes the quick errata.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from verification.evidence import writing
 from verification.switches import PLOTTED
 
 SUPPLY = 10.0
-#: Those of an entry, as they are printed, by name.
+#: {name: number of an entry as text}.
 Numbers = dict[str, str]
 
 
@@ -36,11 +36,11 @@ class Erratum:
     quick: bool = False
 
     def markdown(self) -> str:
-        """The entry, its numbers computed now."""
+        """Compute the numbers and return the entry."""
         parts = {"Printed": self.printed, "Our reading": self.reading,
                  "Consequence": cleandoc(self.consequence).format(**self.function())}
-        told = [f"**{name}.** {cleandoc(text)}" for name, text in parts.items() if text]
-        return filled("\n\n".join([f"## {self.id}. {self.title}", *told]))
+        paragraphs = [f"**{name}.** {cleandoc(text)}" for name, text in parts.items() if text]
+        return filled("\n\n".join([f"## {self.id}. {self.title}", *paragraphs]))
 
 
 ERRATA: dict[str, Erratum] = {}
@@ -74,7 +74,7 @@ def percent(ratio: float, digits: int = 2) -> str:
 
 
 def small(value: float) -> str:
-    """A defect with one digit; round-off is called that, since its digits differ between machines."""
+    """A defect with one digit, or "round-off", whose digits differ between machines."""
     return f"{value:.0e}" if abs(value) > 1e-12 else "round-off"
 
 
@@ -91,7 +91,7 @@ def state_row(name: str, run: tuple[str, ...]) -> list[str]:
     """A row of a table: velocity and effluents of a run at 19.2 h, with their deviations from base."""
     if run == BASE:
         return [name, *(f"{value:.3f}" for value in state(run))]
-    return [name, *(f"{value:.3f} ({percent(value / ours)})" for value, ours in zip(state(run), state(BASE)))]
+    return [name, *(f"{value:.3f} ({percent(value / default)})" for value, default in zip(state(run), state(BASE)))]
 
 
 def consumed_ratio(acceptor: float, donor: float) -> float:

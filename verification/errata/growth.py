@@ -16,10 +16,10 @@ from repro.fem.outline import half_disc as seed
 from repro.fem.sizing import ACROSS_AGGREGATE
 from repro.model import growth, mesh_motion
 from verification.claims.growth_mechanics import sliding, stabilised_by
-from verification.claims.runs import BASE, biomass_defects, half_disc, scene
+from verification.claims.runs import BASE, biomass_defects, half_disc, load_packaged
 from verification.errata import Numbers, erratum, percent, small, table
 from verification.problems import meshes, pairs
-from verification.problems.bodies import RADIUS, HalfCylinder, Supported, grown
+from verification.problems.bodies import RADIUS, HalfCylinder, Supported, grow
 from verification.switches import CHOICES
 
 #: Elements across the radius; stabilisations of E6.
@@ -135,9 +135,9 @@ def stabilisation_scale() -> Numbers:
     rows, places = [], 0.0
     for mean, name in product((36, 2000), KINDS):
         cases = [cylinder(rings, 0.75 * mean, 0.5 * mean) for rings in RINGS]
-        found = [equilibrium_errors(case, stabilisations(case)[name]) for case in cases]
-        rows.append([f"{mean}", name, *(f"{100 * p:.1f} %, {100 * most:.0f} %" for p, most, _ in found)])
-        places = max(places, *(x for _, _, x in found))
+        errors = [equilibrium_errors(case, stabilisations(case)[name]) for case in cases]
+        rows.append([f"{mean}", name, *(f"{100 * p:.1f} %, {100 * most:.0f} %" for p, most, _ in errors)])
+        places = max(places, *(x for _, _, x in errors))
     nodes = ", ".join(str(len(half_disc_body(rings).reference)) for rings in RINGS)
     head = ["m", "stabilisation", *(f"element size R / {rings}" for rings in RINGS)]
     fades = {f"fade_{mean}": f"1 / {mean ** (5 / 3):.3g}" for mean in (36, 2000)}
@@ -158,11 +158,11 @@ def equilibrium_errors(case: Cylinder, stabilising: np.ndarray) -> tuple[float, 
 
     Raises GrowthError where none is found.
     """
-    system = growth.System(case.body, case.body.held, stabilising=stabilising)
+    system = growth.System(case.body, case.body.constrained, stabilising=stabilising)
     exact = growth.Equilibrium(case.position, case.pressure, 0)
-    found = growth.reach(system, case.theta, case.theta, exact, case.position)
-    worst = np.abs(found.pressure - case.pressure).max() / np.abs(case.pressure).max()
-    return case.pressure_error(found.pressure), worst, case.place_error(found.position)
+    solution = growth.reach(system, case.theta, case.theta, exact, case.position)
+    worst = np.abs(solution.pressure - case.pressure).max() / np.abs(case.pressure).max()
+    return case.pressure_error(solution.pressure), worst, case.place_error(solution.position)
 
 
 @erratum(
@@ -186,11 +186,11 @@ def uniform_growth() -> Numbers:
     """Pressure, out-of-plane stress and radius of a half-disc grown by theta, against the closed form."""
     rows, body = [], half_disc_body(10)
     for theta in (2.0, 36.0, 2000.0):
-        found = grown(body, body.constant(theta))
+        solution = grow(body, body.constant(theta))
         exact = neo_hookean.free_growth_pressure(theta)
         across = neo_hookean.cauchy(np.sqrt(theta) * np.eye(2), exact)[0, 0] + theta ** (-5 / 3) * (1 - theta)
-        radius = np.linalg.norm(found.position, axis=1).max()
-        errors = np.abs(found.pressure / exact - 1).max(), radius / np.sqrt(theta) - 1
+        radius = np.linalg.norm(solution.position, axis=1).max()
+        errors = np.abs(solution.pressure / exact - 1).max(), radius / np.sqrt(theta) - 1
         rows.append([f"{theta:g}", f"{exact:.5f}", f"{across:.5f}", *map(small, errors)])
     head = ["theta", "P / mu_L", "stress across the plane / mu_L", "largest error of P", "error of the radius"]
     return {"table": table(head, rows), "kilopascal": f"{10 * neo_hookean.free_growth_pressure(2.5):.2f}"}
@@ -251,9 +251,9 @@ def transfers() -> Numbers:
     for name, run in (("linear", LINEAR), ("conserving", BASE)):
         defects = biomass_defects(run)
         masses, largest = chain(name)
-        steps, whole = np.diff(masses) / masses[:-1], masses[-1] / masses[0]
+        steps, remaining = np.diff(masses) / masses[:-1], masses[-1] / masses[0]
         rows.append([name, small(np.abs(defects).max()), small(np.sum(defects)), small(np.abs(steps).max()),
-                     percent(whole, 0) if name == "linear" else small(whole - 1)])
+                     percent(remaining, 0) if name == "linear" else small(remaining - 1)])
     head = ["transfer", "base: worst step", "base: whole run", "chain: worst remesh", "chain: 40 remeshes"]
     return {"table": table(head, rows), "overshoot": f"{100 * (largest - 1):.1f} %"}
 
@@ -295,7 +295,7 @@ def chain(how: str) -> tuple[np.ndarray, float]:
     quick=True)
 def compressibility_sign() -> Numbers:
     """Mesh motion with both signs of gamma."""
-    grid = half_disc(scene("initial_mesh"), 10.0, 75.0)
+    grid = half_disc(load_packaged("initial_mesh"), 10.0, 75.0)
     body, rows = 1.1 * grid.points[grid.body], []
     for gamma in (0.1, 0.5, 0.7, 0.8, 0.9, 1.0, 2.0):
         moved = [grid.moved(mesh_motion.move(grid, body, sign * gamma, 100.0)) for sign in (1, -1)]

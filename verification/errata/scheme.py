@@ -11,7 +11,7 @@ from repro.fem.mesher import generate
 from repro.fem.space import Space
 from repro.model import flow, pore
 from verification import switches
-from verification.claims.runs import BASE, END, WIDE, at, grown, half_disc, history, plug, scene, series
+from verification.claims.runs import BASE, END, WIDE, at, grown, half_disc, history, load_packaged, plug, series
 from verification.errata import (
     STATE_HEAD,
     Numbers,
@@ -50,14 +50,14 @@ TRACTION = CHOICES["traction"].run
 def interface_forms() -> Numbers:
     """Both forms around half-discs and through plugs of the pore's whole width."""
     width, rows = 50.0, []
-    said = [scene("flow_only", f"numerics.refinement={r}") for r in (1, 2)]
+    scenes = [load_packaged("flow_only", f"numerics.refinement={r}") for r in (1, 2)]
     for part in (0.1, 0.3, 0.5, 0.7, 0.9):
-        grids = [half_disc(s, part * width, min(10 * part, 1.5) * width) for s in said]
+        grids = [half_disc(s, part * width, min(10 * part, 1.5) * width) for s in scenes]
         rows.append([f"half-disc, R / W = {part}", *map(interface_difference, grids)])
     for part in (0.25, 0.5, 1.0, 2.0):
-        grids = [plug(s, -part * width / 2, part * width / 2) for s in said]
+        grids = [plug(s, -part * width / 2, part * width / 2) for s in scenes]
         rows.append([f"plug, length / W = {part}", *map(interface_difference, grids)])
-    laplacian, traction = losses(plug(said[1], -width / 2, width / 2))
+    laplacian, traction = losses(plug(scenes[1], -width / 2, width / 2))
     exact = flow.poiseuille_loss(600 + 1999 * width, width)
     saved = (laplacian - traction) / flow.poiseuille_loss(2000.0, width)
     return {"table": table(["", "default mesh", "twice finer"], rows), "saved": f"{saved:.1f} um",
@@ -73,7 +73,7 @@ def in_forms(grid: Mesh, ratio: float) -> list[flow.UnitFlow]:
 def losses(grid: Mesh) -> list[float]:
     """Loss (1/um) of the whole pore of 600 um in both forms."""
     rest = flow.poiseuille_loss(600 - float(np.ptp(grid.ends)), grid.width)
-    return [found.loss + rest for found in in_forms(grid, 2000.0)]
+    return [form.loss + rest for form in in_forms(grid, 2000.0)]
 
 
 def interface_difference(grid: Mesh) -> str:
@@ -101,8 +101,8 @@ def outlet() -> Numbers:
     """Poiseuille flow in three forms on two meshes."""
     rows = []
     for refinement in (1.0, 2.0):
-        said = scene("flow_only", f"numerics.refinement={refinement}")
-        grid, _ = generate(None, (-75.0, 75.0), pore.sized(said))
+        scene = load_packaged("flow_only", f"numerics.refinement={refinement}")
+        grid, _ = generate(None, (-75.0, 75.0), pore.sized(scene))
         laplacian, traction = in_forms(grid, 1.0)
         cases = {"laplacian (ours)": (laplacian.velocity, laplacian.loss),
                  "traction, u_y = 0 at the outlet": (traction.velocity, traction.loss),
@@ -117,11 +117,11 @@ def free_outlet(grid: Mesh) -> tuple[np.ndarray, float]:
     """Velocity and loss of unit flow in a clean channel, traction form, nothing prescribed at the outlet."""
     space, count = Space(grid, 1), len(grid.points)
     topology = grid.topology
-    held = np.zeros((count, 2), bool)
-    held[topology.walls] = held[topology.inlet] = True
+    constrained = np.zeros((count, 2), bool)
+    constrained[topology.walls] = constrained[topology.inlet] = True
     viscosity = np.ones(len(grid.triangles))
     elements = flow.stokes(space, viscosity, "traction", flow.Stabilised().mobility(grid, viscosity, "traction"))
-    system = saddle_system(space.cells, space.cells, held)
+    system = saddle_system(space.cells, space.cells, constrained)
     solution = system.solve(elements, np.zeros(3 * count), flow.prescribed(space))
     ends = [np.trapezoid(solution[2 * count + nodes], grid.points[nodes, 1])
             for nodes in (topology.inlet, topology.outlet)]
@@ -149,22 +149,24 @@ def density_drift() -> Numbers:
     """Base and wide, theta restarting as J X / X_m or as J, apart before and after contact with the opposite wall."""
     rows = []
     for run in (BASE, WIDE):
-        contact, found = series(*run)["contact"], switches.told(run)
-        ours, as_j = found["drift"], near(course(run, restarting_as_j).columns, "drift", found["time"])
+        contact = series(*run)["contact"]
+        columns_of_run = switches.run_columns(run)
+        default = columns_of_run["drift"]
+        as_j = near(course(run, restarting_as_j).columns, "drift", columns_of_run["time"])
         for name, chosen in (("before contact", contact == 0), ("in contact", contact == 1)):
             if chosen.any():
-                remeshes = sum(row.remeshes for row, kept in zip(history(*run).instants, chosen) if kept)
-                drifts = [f"{100 * drift[chosen].max():.2g} %" for drift in (ours, as_j)]
+                remeshes = sum(row.remeshes for row, is_chosen in zip(history(*run).instants, chosen) if is_chosen)
+                drifts = [f"{100 * drift[chosen].max():.2g} %" for drift in (default, as_j)]
                 rows.append([f"{run[0]}, {name}", remeshes, *drifts])
-    worst = int(np.argmax(ours))  # of wide, the last
+    worst = int(np.argmax(default))  # of wide, the last
     return {"table": table(["run", "remeshes", "restart as J X / X_m (ours)", "restart as J"], rows),
-            "time": f"{found['time'][worst]:g}",
-            "rms": f"{100 * density_rms(scene(*WIDE), history(*WIDE).instants[worst].pore):.1f} %"}
+            "time": f"{columns_of_run['time'][worst]:g}",
+            "rms": f"{100 * density_rms(load_packaged(*WIDE), history(*WIDE).instants[worst].pore):.1f} %"}
 
 
-def density_rms(said, now) -> float:
+def density_rms(scene, pore) -> float:
     """Root of the mean square of X / X_m - 1 over the aggregate."""
-    return float(np.sqrt(np.average((density(said, now) - 1) ** 2, weights=now.space.reaction.dx)))
+    return float(np.sqrt(np.average((density(scene, pore) - 1) ** 2, weights=pore.space.reaction.dx)))
 
 
 @erratum(
@@ -184,8 +186,8 @@ def plotted_state() -> Numbers:
     before = [flux.effluent for flux in grown(BASE, PLOTTED)[1].fluxes]
     rows = [["19.2 h", *state(BASE)], ["19.4 h, before the expansion", state(BASE)[0], *before],
             ["19.4 h, after it", *state(BASE, END)]]
-    told = [[name, *map("{:.3f}".format, (*values, consumed_ratio(*values[1:])))] for name, *values in rows]
-    return {"table": table([*STATE_HEAD, "acceptor / donor consumed"], told),
+    formatted = [[name, *map("{:.3f}".format, (*values, consumed_ratio(*values[1:])))] for name, *values in rows]
+    return {"table": table([*STATE_HEAD, "acceptor / donor consumed"], formatted),
             "fall": f"{100 * (1 - state(BASE, END)[0] / state(BASE)[0]):.1f} %"}
 
 
@@ -204,9 +206,9 @@ def plotted_state() -> Numbers:
         What the paper says to lie 60 um away from the aggregate is tabulated under E9.""")
 def sensitivity() -> Numbers:
     """Base with other stabilisation, mesh compressibility and refinement."""
-    shown = {"c = 100, gamma = 1, refinement = 1 (ours)": BASE,
+    runs = {"c = 100, gamma = 1, refinement = 1 (ours)": BASE,
              **{f"{number.choice} = {number.alternative}": number.run for number in NUMBERS}}
-    nodes = [[*state_row(name, run), f"{at(run, PLOTTED)['nodes']:.0f}"] for name, run in shown.items()]
+    nodes = [[*state_row(name, run), f"{at(run, PLOTTED)['nodes']:.0f}"] for name, run in runs.items()]
     return {"table": table([*STATE_HEAD, "nodes"], nodes)}
 
 
@@ -227,15 +229,15 @@ def sensitivity() -> Numbers:
         stays where it is.""")
 def explicit_increment() -> Numbers:
     """Base with one explicit Euler increment a shape update, against ours with both steps."""
-    found = course(BASE, explicit).columns
+    compared = switches.run_columns(BASE), switches.run_columns(HALF_STEP), course(BASE, explicit).columns
     rows = []
     for time in (PLOTTED, END):
-        ours, half, increment = ((near(columns, "velocity", time), near(columns, "area", time))
-                                 for columns in (switches.told(BASE), switches.told(HALF_STEP), found))
-        rows.append([f"{time:g} h", "integrated, 12 min (ours)", f"{ours[0]:.3f}", f"{ours[1]:.0f}"])
+        integrated, half, increment = ((near(columns, "velocity", time), near(columns, "area", time))
+                                       for columns in compared)
+        rows.append([f"{time:g} h", "integrated, 12 min (ours)", f"{integrated[0]:.3f}", f"{integrated[1]:.0f}"])
         for name, (u, area) in (("integrated, 6 min", half), ("one explicit increment, 12 min", increment)):
-            rows.append([f"{time:g} h", name, f"{u:.3f} ({percent(u / ours[0], 1)})",
-                         f"{area:.0f} ({percent(area / ours[1], 1)})"])
+            rows.append([f"{time:g} h", name, f"{u:.3f} ({percent(u / integrated[0], 1)})",
+                         f"{area:.0f} ({percent(area / integrated[1], 1)})"])
     return {"table": table(["", "", "mean velocity, m/d", "area, um2"], rows)}
 
 
@@ -256,8 +258,8 @@ def fixed_point() -> Numbers:
     """Base at 19.2 h and wide at 45 h with both choices."""
     rows = []
     for run, time in ((BASE, PLOTTED), (WIDE, 45.0)):
-        kept, rechosen = at(run, time), at(AGAIN[run], time)
-        rows.append([f"{run[0]}, {time:g} h, kept (ours)", *(f"{kept[key]:.4g}" for key in COLUMNS)])
-        moved = (f"{rechosen[key]:.4g} ({percent(rechosen[key] / kept[key], 1)})" for key in COLUMNS)
+        fixed, rechosen = at(run, time), at(AGAIN[run], time)
+        rows.append([f"{run[0]}, {time:g} h, kept (ours)", *(f"{fixed[key]:.4g}" for key in COLUMNS)])
+        moved = (f"{rechosen[key]:.4g} ({percent(rechosen[key] / fixed[key], 1)})" for key in COLUMNS)
         rows.append([f"{run[0]}, {time:g} h, rechosen", *moved])
     return {"table": table(["", *COLUMNS.values()], rows)}

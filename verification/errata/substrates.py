@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 from repro.model.kinetics import rate_law
 from verification.claims.base_run import upstream_means
 from verification.claims.levels import CONVERGED, Level, at_level
-from verification.claims.runs import BASE, PLATES, at, grown, grown_anew, scene, series, solved_pore
+from verification.claims.runs import BASE, PLATES, at, grown, grown_anew, load_packaged, series, solved_pore
 from verification.claims.scheme import PAPER_CORRECTION, bookkeeping, exceeding
 from verification.errata import (
     STATE_HEAD,
@@ -43,11 +43,11 @@ COD = 2.38  # of phenol, Table 1; it enters through F alone
         {table}""")
 def ratio_of_substrates() -> Numbers:
     """Base with F as defined."""
-    said = scene(*BASE).kinetics
+    scene = load_packaged(*BASE).kinetics
     with at_level(Level(CONVERGED)):
         rows = [state_row("F = 1.52 (ours)", BASE), state_row("F = 1.5138", SHORT_F)]
         ratios = [f"{consumed_ratio(*state(run)[1:]):.3f}" for run in (SHORT_F, BASE)]
-    return {"value": f"{COD - said.yield_coefficient * said.decay_oxygen_demand:.4f}",
+    return {"value": f"{COD - scene.yield_coefficient * scene.decay_oxygen_demand:.4f}",
             "ratio": ratios[0], "ours": ratios[1], "table": table(STATE_HEAD, rows)}
 
 
@@ -69,14 +69,14 @@ def ratio_of_substrates() -> Numbers:
         effluent {donor} against ours.""")
 def decay_demand() -> Numbers:
     """Size of the term, electron balance of the readings, and base with d_c left out."""
-    said = scene(*BASE)
-    law = said.kinetics
+    scene = load_packaged(*BASE)
+    law = scene.kinetics
     defined = replace(law, acceptor_to_donor_ratio=COD - law.yield_coefficient * law.decay_oxygen_demand)
     readings = {"F = 1.52, d_c f_d b (ours)": law, "F = 1.5138, d_c f_d b": defined,
                 "F = 1.5138, f_d b": replace(defined, decay_oxygen_demand=1.0),
                 "F = 1.5138, no term": replace(defined, decay_oxygen_demand=0.0)}
     rows = [[name, percent(1 + electron_defect(read))] for name, read in readings.items()]
-    share = 1 - taken_up(replace(law, decay_oxygen_demand=0.0))[0] / taken_up(law)[0]
+    share = 1 - acceptor_and_donor_uptake(replace(law, decay_oxygen_demand=0.0))[0] / acceptor_and_donor_uptake(law)[0]
     velocity, acceptor, donor = (percent(a / b) for a, b in zip(state(NO_D_C), state(BASE)))
     return {"share": f"{100 * share:.1f}", "velocity": velocity, "acceptor": acceptor, "donor": donor,
             "table": table(["reading", "oxygen used in excess"], rows)}
@@ -84,26 +84,26 @@ def decay_demand() -> Numbers:
 
 def plotted_biomass():
     """(weight, C_A, C_D) at the nodes of base at 19.2 h; weight: X_A times the biomass area around the node."""
-    now, solved = solved_pore(PLATES, PLOTTED)
-    nodes, state = now.space.reaction.cells[:, 0], solved.concentrations
-    return now.active[:, 0], state.acceptor[nodes], state.donor[nodes]
+    pore, solved = solved_pore(PLATES, PLOTTED)
+    nodes, state = pore.space.reaction.cells[:, 0], solved.concentrations
+    return pore.active[:, 0], state.acceptor[nodes], state.donor[nodes]
 
 
-def taken_up(law) -> np.ndarray:
+def acceptor_and_donor_uptake(law) -> np.ndarray:
     """(2,) oxygen and donor, over the aggregate."""
     weight, *both = plotted_biomass()
-    return np.array(rate_law(scene(*BASE).substrates, law).uptake(*both)) @ weight
+    return np.array(rate_law(load_packaged(*BASE).substrates, law).uptake(*both)) @ weight
 
 
 def electron_defect(law) -> float:
     """Oxygen taken up by a reading of (7) + oxygen demand of the biomass made - that of the donor taken up, over the
     oxygen taken up."""
-    said = scene(*BASE)
+    scene = load_packaged(*BASE)
     weight, acceptor, donor = plotted_biomass()
-    present = rate_law(said.substrates, said.kinetics)
+    present = rate_law(scene.substrates, scene.kinetics)
     rates = present.growth_rate(acceptor, donor) + present.inert_rate(acceptor)
-    oxygen, spent = taken_up(law)
-    return 1 + (said.kinetics.decay_oxygen_demand * weight @ rates - COD * spent) / oxygen
+    oxygen, spent = acceptor_and_donor_uptake(law)
+    return 1 + (scene.kinetics.decay_oxygen_demand * weight @ rates - COD * spent) / oxygen
 
 
 @erratum(
@@ -143,9 +143,9 @@ def inlet_condition() -> Numbers:
         {table}""")
 def meshed_inlet() -> Numbers:
     """Both substrates at the distances in question."""
-    now, solved = grown_anew(BASE, PLOTTED)
-    rows = [[f"{d} um", *map("{:.2f}".format, upstream_means(now, solved, float(d)))] for d in (60, 65, 75)]
-    distance = now.boundary.upstream - now.mesh.ends[0]
+    pore, solved = grown_anew(BASE, PLOTTED)
+    rows = [[f"{d} um", *map("{:.2f}".format, upstream_means(pore, solved, float(d)))] for d in (60, 65, 75)]
+    distance = pore.boundary.upstream - pore.mesh.ends[0]
     return {"table": table(["distance", "acceptor", "donor"], rows), "distance": f"{distance:.0f}"}
 
 
@@ -162,11 +162,11 @@ def meshed_inlet() -> Numbers:
         of {donor}: {apart} of the printed one.""")
 def printed_effluents() -> Numbers:
     """Stoichiometry of the printed numbers and of ours."""
-    ours = consumed_ratio(*(flux.effluent for flux in grown(BASE, PLOTTED)[1].fluxes))
-    donor = 10 - (10 - 4.19) / ours
+    computed = consumed_ratio(*(flux.effluent for flux in grown(BASE, PLOTTED)[1].fluxes))
+    donor = 10 - (10 - 4.19) / computed
     corrected = consumed_ratio(PAPER_CORRECTION * 4.19, PAPER_CORRECTION * 6.13)
     return {"printed": f"{consumed_ratio(4.19, 6.13):.3f}", "corrected": f"{corrected:.3f}",
-            "ours": f"{ours:.3f}", "donor": f"{donor:.2f}", "apart": percent(donor / 6.13, 1)}
+            "ours": f"{computed:.3f}", "donor": f"{donor:.2f}", "apart": percent(donor / 6.13, 1)}
 
 
 @erratum(
@@ -195,7 +195,8 @@ def balance_formula() -> Numbers:
         step = np.argmin(np.abs(book.end - time))
         rows.append([f"{time:g} h", *(percent(ratio, 1) for ratio in ratios[:, step])])
     head = ["step ending at", *(f"{name}, effluent {kind}" for kind in kinds for name in ("acceptor", "donor"))]
-    return {"table": table(head, rows), "width": f"{scene(*BASE).pore.width:g}", "until": f"{exceeding(book):.1f}"}
+    width = load_packaged(*BASE).pore.width
+    return {"table": table(head, rows), "width": f"{width:g}", "until": f"{exceeding(book):.1f}"}
 
 
 @erratum(
@@ -207,8 +208,8 @@ def balance_formula() -> Numbers:
     quick=True)
 def smaller_points() -> Numbers:
     """Numbers of Table 1 and of the text that can be checked against each other."""
-    said = scene("base")
-    crossing = said.pore.length / (2.9 / 24e-6) * 3600
+    scene = load_packaged("base")
+    crossing = scene.pore.length / (2.9 / 24e-6) * 3600
     linear = cbrt(36.0) - 1
     rows = [
         ["Table 1", "density of water, 998 mg cm-3",
@@ -300,7 +301,7 @@ def oxygen_supplied() -> Numbers:
     quick=True)
 def doubling_time() -> Numbers:
     """At saturation and at the supply."""
-    said = scene("base")
-    law = rate_law(said.substrates, said.kinetics)
+    scene = load_packaged("base")
+    law = rate_law(scene.substrates, scene.kinetics)
     rates = [float(law.growth_rate(value, value)) for value in (1e12, 10.0)]
     return dict(zip(("saturated", "supplied"), (f"{log(2) / rate:.2f}" for rate in rates)))

@@ -1,4 +1,4 @@
-"""What a case records: checks and studies. The verdict follows from the numbers alone.
+"""Checks and studies, which cases record. The verdict follows from the numbers alone.
 
 A check is a number with the interval that it must lie in. A study is a series of errors on at least four unrelated
 meshes or steps. Its orders between neighbours are judged on both sides, because an order above its band is as

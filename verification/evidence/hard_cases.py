@@ -43,7 +43,7 @@ def lines(cells: Collection[Mapping]) -> list[tuple[str, str, str, bool]]:
 
 
 def blocks(matrix: dict) -> Iterator[Block]:
-    """The matrix as a page shows it."""
+    """The matrix as blocks of a page."""
     presets = tuple(matrix["cases"][0]["cells"])
     yield Block("heading", "Hard cases")
     yield Block("text", "Right: the exact value, bound or conserved quantity of the case is met, and so are the "

@@ -1,9 +1,9 @@
-"""What verifies what: ``python -m verification.evidence.matrix`` writes ``verification/report/matrix.md``.
+"""The coverage matrix: ``python -m verification.evidence.matrix`` writes ``verification/report/matrix.md``.
 
 The first table has the cases by the elements and presets that they run with. The second has the paper's equations by
 the modules that solve them, the cases that must fail with a wrong change of these, the references of those cases, and
-the claims of the sections. Every column is derived, from the table of modules in ``repro/__init__.py`` and the
-registries, and nothing may be missing in any (:func:`orphans`).
+the claims of the sections. Every column is derived from the table of modules in ``repro/__init__.py`` and the
+registries, and no column may lack an entry (:func:`orphans`).
 """
 
 from __future__ import annotations
@@ -142,8 +142,8 @@ def claims_of(part: Part) -> list[str]:
             if any(starmap(_within, product(sections, part.sections)))]
 
 
-def _within(section: str, own: str) -> bool:
-    return section == own or section.startswith(f"{own}.")
+def _within(section: str, section_name: str) -> bool:
+    return section == section_name or section.startswith(f"{section_name}.")
 
 
 @cache
@@ -171,13 +171,13 @@ def _imported(name: str) -> set[str]:
 
 
 def orphans() -> list[str]:
-    """What stands in no line of the second table (of mutants those that cases catch), and lines without a case."""
+    """Entries that no line of the second table has (of mutants, those that cases catch), and lines without a case."""
     missing = [f"line {part.name}" for part in parts() if not cases_of(part)]
     references = {path.stem for path in (ROOT / "reference").glob("*.py")} - {"__init__"}
     kinds = {"case": (cases(), cases_of), "mutant": (runner.caught_by("cases"), mutants_of),
              "claim": (claims(), claims_of), "reference": (references, references_at)}
-    for kind, (every, shown) in kinds.items():
-        missing += [f"{kind} {id}" for id in sorted({*every}.difference(*map(shown, parts())))]
+    for kind, (every, covering) in kinds.items():
+        missing += [f"{kind} {id}" for id in sorted({*every}.difference(*map(covering, parts())))]
     return missing
 
 
@@ -192,7 +192,7 @@ def text() -> str:
 
 
 def main() -> int:
-    """Write the page and print what is missing in its columns; 1 if anything is."""
+    """Write the page and print the missing entries; return 1 if there are any."""
     FILE.write_text(text(), encoding="utf-8")
     missing = [*orphans(), *(f"case {id}: not with every order, and no reason why" for id in unexplained())]
     print("\n".join([*missing, f"{FILE.relative_to(ROOT)}: {len(cases())} cases, {len(missing)} missing"]))

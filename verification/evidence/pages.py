@@ -32,7 +32,7 @@ NOT_RUN = {"verdict": "not run", "numbers": 0, "errors": [], "table": []}
 
 
 def write(results: Iterable[Result]) -> None:
-    """Record the cases of which every variant ran, and write all pages."""
+    """Record the cases that ran with every variant, and write all pages."""
     known = cases()
     complete = [result.in_order(known[result.id].variants) for result in results
                 if result.evidence.keys() >= known[result.id].variants.keys()]
@@ -51,7 +51,7 @@ def entry(result: Result) -> dict:
 
 
 def lines(result: Result) -> list[tuple[str, str, str, bool]]:
-    """(quantity and its reproducible number, interval, origin, whether it holds) of all that a case measured."""
+    """(quantity and its reproducible number, interval, origin, whether it holds) of all evidence of a case."""
     return [(part.quantity + (f" ({part.reproducible})" if part.reproducible else ""), part.interval(3), part.origin,
              part.holds) for part in result.measured]
 
@@ -65,13 +65,13 @@ def grouped(rows: Iterable[tuple[str, str, str, bool]]) -> list[list[str]]:
 
 
 def recorded() -> dict[str, dict]:
-    """The records of all cases; that of a case which never ran says so."""
+    """The records of all cases; a case that never ran has a placeholder."""
     records = load(RECORD, {})
     return {id: records.get(id, NOT_RUN) for id in cases()}
 
 
 def summary(records: Iterable[Mapping]) -> str:
-    """How many cases pass, in one line."""
+    """The number of passing cases, in one line."""
     verdicts = [record["verdict"] for record in records]
     numbers = sum(record["numbers"] for record in records)
     return f"{verdicts.count(PASSES)} of {len(verdicts)} cases pass; {numbers} numbers judged."
@@ -170,7 +170,7 @@ def _ended_alike(names: list[str]) -> str:
 
 
 def mutant_state() -> str:
-    """How many mutants are caught, and how many records are of the present code."""
+    """The numbers of caught mutants and of records of the present code."""
     records = runner.recorded()
     caught = sum(bool(record["caught_by"]) for record in records.values())
     stale = len(records) - len(runner.fresh())

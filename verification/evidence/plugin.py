@@ -21,19 +21,19 @@ RECORDED = pytest.StashKey[list[Check | Study]]()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """``--pages``."""
+    """Add the option ``--pages``."""
     parser.addoption("--pages", action="store_true", help="write the pages of the verification cases that run")
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Records come together in the process that all workers report to."""
+    """Collect the records in the process that all workers report to."""
     if not hasattr(config, "workerinput"):
         config.pluginmanager.register(Session(config))
 
 
 def pytest_itemcollected(item: pytest.Item) -> None:
-    """A report says which variant of which case it is of, and ``-k`` knows the id. Cases turn no warning into an error,
-    because references use packages of others."""
+    """Add case and variant to the report, and the id to the keywords of ``-k``. Warnings do not fail a case, because
+    references use other packages."""
     mark = item.get_closest_marker("case")
     if mark:
         id = mark.args[0]
@@ -52,7 +52,7 @@ def record(request: pytest.FixtureRequest) -> Callable:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_pyfunc_call(pyfuncitem: pytest.Function):
-    """Run a case with floating-point errors raised. It fails unless it records something and all of that holds."""
+    """Run a case with floating-point errors raised. The case fails unless it records evidence and all of it holds."""
     with np.errstate(all="raise", under="ignore"):
         outcome = yield
     if pyfuncitem.get_closest_marker("case"):
@@ -65,20 +65,20 @@ def pytest_pyfunc_call(pyfuncitem: pytest.Function):
 
 
 class Session:
-    """The results of all cases that run in a session, whichever workers run them."""
+    """The results of all cases of a session, from all workers."""
 
     def __init__(self, config: pytest.Config):
         self.pages = config.getoption("pages", False)
         self.results: dict[str, Result] = {}
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        """A case has run, or one of its fixtures has failed."""
+        """Collect a case that ran, or whose fixture failed."""
         properties = dict(report.user_properties)
         if "case" in properties and (report.when == "call" or report.failed):
             self.results.setdefault(properties["case"], Result(properties["case"])).add(report)
 
     def pytest_sessionfinish(self) -> None:
-        """Write the records of what ran."""
+        """Write the records of the cases that ran."""
         if self.results:
             results.save_measured(self.results.values())
         if self.results and self.pages:

@@ -33,7 +33,7 @@ def from_row(row: dict, label: str = "") -> Check | Study:
 
 
 def shortfall(part: Check | Study) -> str:
-    """A line on one that does not hold."""
+    """One line on evidence that does not hold."""
     return f"{part.quantity}: {part.measured}; expected {part.interval()} ({part.origin})"
 
 
@@ -49,7 +49,7 @@ class Result:
     seconds: float = 0.0
 
     def add(self, report: pytest.TestReport) -> None:
-        """Take over what the report of a variant carries."""
+        """Add the report of a variant."""
         properties = dict(report.user_properties)
         label = properties["variant"]
         self.evidence[label] = [from_row(row, label) for row in properties.get("evidence", ())]
@@ -62,13 +62,13 @@ class Result:
 
     @property
     def measured(self) -> list[Check | Study]:
-        """All that must hold, the studies first."""
+        """All checks and studies, the studies first."""
         parts = [part for evidence in self.evidence.values() for part in evidence]
         return sorted(parts, key=lambda part: isinstance(part, Check))
 
     @property
     def holds(self) -> bool:
-        """Whether it measured something, and all of it holds."""
+        """Whether the case has evidence and all of it holds."""
         return bool(self.measured) and not self.errors and all(part.holds for part in self.measured)
 
     @property
@@ -77,10 +77,10 @@ class Result:
         return PASSES if self.holds else FAILS
 
     def in_order(self, labels: Iterable[str]) -> Result:
-        """The same with its variants in the order of some labels, whichever order they ran in."""
-        kept = {label: self.evidence[label] for label in labels}
+        """Return the result with its variants in the order of the labels."""
+        evidence = {label: self.evidence[label] for label in labels}
         cells = {label: self.cells[label] for label in labels if label in self.cells}
-        return Result(self.id, kept, self.errors, cells, self.seconds)
+        return Result(self.id, evidence, self.errors, cells, self.seconds)
 
 
 def save_measured(results: Iterable[Result]) -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from repro.results import write_text
-from repro.results.files import whole
+from repro.results.files import atomic_path
 
 ROOT = Path(__file__).parents[2]
 REPORT = ROOT / "verification" / "report"
@@ -47,8 +47,8 @@ def _markdown(block: Block, level: int, pictures: str) -> str:
     if block.kind == "heading":
         return f"{'#' * level} {block.text}"
     if block.kind == "picture":
-        name, _, shown = block.text.partition(": ")
-        return f"![{shown}]({pictures}/{name})"
+        name, _, caption = block.text.partition(": ")
+        return f"![{caption}]({pictures}/{name})"
     if block.kind != "table":
         return block.text
     head, *rows = block.rows
@@ -73,20 +73,20 @@ def _plain(block: Block) -> list[str]:
 
 
 def load(file: Path, empty: Any = None) -> Any:
-    """A record; ``empty`` where there is none."""
+    """Read a record; ``empty`` if there is no file."""
     return json.loads(file.read_text(encoding="utf-8")) if file.exists() else empty
 
 
 def save(record: Any, file: Path) -> None:
-    """Write a record whole or not at all; ValueError where it holds not-a-number."""
+    """Write a record completely or not at all. Raises ValueError if it contains not-a-number."""
     text = json.dumps(record, indent=1, allow_nan=False)
     file.parent.mkdir(parents=True, exist_ok=True)
-    with whole(file) as beside:
+    with atomic_path(file) as beside:
         write_text(beside, text + "\n")
 
 
 def lines(file: Path) -> list[dict]:
-    """Rows that were appended to a file, without those that were cut."""
+    """The complete rows of a file; rows that were cut off are skipped."""
     rows = []
     for line in file.read_text(encoding="utf-8").splitlines() if file.exists() else []:
         with suppress(json.JSONDecodeError):
@@ -95,8 +95,7 @@ def lines(file: Path) -> list[dict]:
 
 
 def append(row: dict, file: Path) -> None:
-    """Add a row to a file, so that a break loses one at most: a row begins with its break, and one that was cut spoils
-    no other."""
+    """Append a row to a file. Each row begins with its line break, so that an interruption loses at most one row."""
     file.parent.mkdir(parents=True, exist_ok=True)
     with file.open("a", encoding="utf-8") as opened:
         opened.write("\n" + json.dumps(row))

@@ -32,7 +32,7 @@ RUNS = (Growth(40, 1, 10, 5, 0, 52), Growth(50, 4, 20, 5, 10, 40), Growth(70, 6,
         Growth(150, 2.9, 10, 10, 0, 40), Growth(150, 1, 20, 10, 0, 40))
 #: Each shape of a run is larger than the one before by 4 %; up to a little more than the table's last plug.
 APART, MOST = 1.04, 4.7
-#: Added to both bounds: what the elements of the shapes that are compared come to (`shapes.QUICK`).
+#: Added to both bounds: the error of the elements of the compared shapes (`shapes.QUICK`).
 NUMERICS = 0.008
 #: The bounds at an area are of all shapes up to this many of the table's areas from it. With one, of the first fifty
 #: shapes that the fit had not seen one was outside: a grown body at A / W^2 = 1.47, lambda = 361, 2.8 % under the law,
@@ -42,11 +42,11 @@ TABLE_COLUMNS = ["spanned", "viscosity_ratio", "area_over_width2", "added_length
 
 
 def half_discs() -> list[Sample]:
-    """Of the table."""
+    """The half-discs of the table."""
     return [shapes.sample(shapes.half_disc(thickness)) for thickness in THICKNESSES]
 
 
-def others() -> Iterator[Sample]:
+def other_shapes() -> Iterator[Sample]:
     """The fit's other shapes: drawn between those of the table and at the corners of their ranges, and grown."""
     between = 0.5 * (np.array(THICKNESSES[1:]) + THICKNESSES[:-1])
     for radius, thicker, leaning in product(between, (1.0, *shapes.THICKER), (0.0, shapes.LEANING)):
@@ -59,10 +59,10 @@ def others() -> Iterator[Sample]:
         yield from shapes.grown(run, MOST, APART)
 
 
-def table_rows(discs: list[Sample], found: list[Sample]) -> list[list]:
-    """The table, a row a shape and lambda; `discs` are of the table, `found` all others."""
-    before = [one for one in found if not one.spanned]
-    after = [one for one in found if one.spanned]
+def table_rows(discs: list[Sample], samples: list[Sample]) -> list[list]:
+    """Rows of the table, one per shape and lambda; `discs`: those of the table; `samples`: all others."""
+    before = [one for one in samples if not one.spanned]
+    after = [one for one in samples if one.spanned]
     shares, lengths = np.array([one.share for one in discs]), np.array([one.lengths for one in discs])
     plugs = np.array(PLUGS)
     apart = departures(before, lambda one: law(shares, lengths, one.share))
@@ -82,26 +82,26 @@ def law(shares: np.ndarray, lengths: np.ndarray, share: float) -> np.ndarray:
     return np.exp(PchipInterpolator(np.log(shares), np.log(lengths), extrapolate=False)(np.log(share)))
 
 
-def departures(found: list[Sample], expected: Callable[[Sample], np.ndarray]) -> np.ndarray:
-    """(n, l) of r from what is expected of each shape, relative."""
-    return np.array([np.array(one.lengths) / expected(one) - 1 for one in found])
+def departures(samples: list[Sample], expected: Callable[[Sample], np.ndarray]) -> np.ndarray:
+    """(n, l) relative deviation of r from its expected value."""
+    return np.array([np.array(one.lengths) / expected(one) - 1 for one in samples])
 
 
-def mean_of_runs(found: list[Sample], but: Growth | None = None) -> np.ndarray:
+def mean_of_runs(samples: list[Sample], but: Growth | None = None) -> np.ndarray:
     """(m, l) geometric mean of r at the areas PLUGS over the runs that reach them, one of them left out."""
     curves = []
-    for run in dict.fromkeys(one.run for one in found if one.run not in (None, but)):
-        made = [one for one in found if one.run == run]
-        place = np.log([one.share for one in made])
-        columns = np.log([one.lengths for one in made]).T
+    for run in dict.fromkeys(one.run for one in samples if one.run not in (None, but)):
+        of_run = [one for one in samples if one.run == run]
+        place = np.log([one.share for one in of_run])
+        columns = np.log([one.lengths for one in of_run]).T
         curves.append([np.interp(np.log(PLUGS), place, column, np.nan, np.nan) for column in columns])
     return np.exp(np.nanmean(curves, axis=0)).T
 
 
-def bounds(shares: np.ndarray, found: list[Sample], apart: np.ndarray) -> np.ndarray:
-    """(2, m, l) the least and the largest r over the law's of shapes within NEIGHBOURS of each area of the table, with
-    what the elements err by."""
-    where, around = np.array([one.share for one in found]), np.pad(shares, NEIGHBOURS, "edge")
+def bounds(shares: np.ndarray, samples: list[Sample], apart: np.ndarray) -> np.ndarray:
+    """(2, m, l) least and largest r over that of the law, for shapes within NEIGHBOURS of each area of the table,
+    widened by the error of the elements."""
+    where, around = np.array([one.share for one in samples]), np.pad(shares, NEIGHBOURS, "edge")
     rows = []
     for low, high in zip(around, around[2 * NEIGHBOURS:]):
         near = apart[(where >= low) & (where <= high)]
@@ -113,8 +113,8 @@ SHAPES = Path(__file__).with_name("shapes.csv")
 COLUMNS = ["unseen", "grown", "spanned", "viscosity_ratio", "area_over_width2", "added_length_over_width"]
 #: The lambda of the fit's shapes there: the paper's.
 RATIO = 2000.0
-#: Areas over W^2 that the page tells, before contact and after it.
-TOLD = ((0.01, 0.03, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0, 1.2, 1.3, 1.4, 1.5), (1.6, 1.75, 2.0, 2.5, 3.0, 4.0, 4.5))
+#: Areas over W^2 that the page lists, before contact and after it.
+PAGE_SHARES = ((0.01, 0.03, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0, 1.2, 1.3, 1.4, 1.5), (1.6, 1.75, 2.0, 2.5, 3.0, 4.0, 4.5))
 
 
 def shape_row(one: Sample, new: int) -> list:
@@ -125,15 +125,15 @@ def shape_row(one: Sample, new: int) -> list:
 
 
 def read(unseen: bool) -> dict[str, np.ndarray]:
-    """The columns of the fit's shapes, or of those that it has not seen."""
+    """The columns of the fit's shapes, or of the shapes that the fit has not seen."""
     columns = read_table(SHAPES)
     return {name: values[columns["unseen"] == unseen] for name, values in columns.items()}
 
 
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """Of some shapes: apart (n,), ln of r over the law's; beyond (n,), the same over that of the bound on its side:
-    within the bounds where it is one at most."""
+    """Deviations of some shapes. apart: (n,) ln of r over that of the law; beyond: (n,) apart over the ln of the bound
+    on its side, at most one within the bounds."""
 
     apart: np.ndarray
     beyond: np.ndarray
@@ -150,7 +150,7 @@ class Judged:
 
 
 def judged(columns: dict[str, np.ndarray]) -> Judged:
-    """Shapes against the law, each at its lambda. Raises ValueError where one is outside the law's range."""
+    """Compare shapes with the law, each at its lambda. Raises ValueError if one is outside the law's range."""
     _, _, kinds, ratios, shares, lengths = (columns[name] for name in COLUMNS)
     laws = np.log([added_resistance(share, 1.0, kind, ratio) for share, kind, ratio in zip(shares, kinds, ratios)])
     law, least, most = laws.T
@@ -158,10 +158,10 @@ def judged(columns: dict[str, np.ndarray]) -> Judged:
     return Judged(apart, apart / np.where(apart < 0, least - law, most - law))
 
 
-def page(seen: dict[str, np.ndarray], found: Judged) -> str:
+def page(fit: dict[str, np.ndarray], check: Judged) -> str:
     """`docs/network.md`."""
-    grown = int(seen["grown"].sum())
-    worst = 100 * np.expm1(np.abs(found.apart))
+    grown = int(fit["grown"].sum())
+    worst = 100 * np.expm1(np.abs(check.apart))
     return f"""# A law for networks
 
 Made by `python -m verification.network`. What an aggregate of area A adds to the head loss of a pore of width W, for
@@ -177,20 +177,20 @@ let pass.
 
 At lambda = {RATIO:g}, with the bounds of shapes of the same area:
 
-{_told(False)}
+{_markdown_table(False)}
 
-{_told(True)}
+{_markdown_table(True)}
 
 The table, `repro/results/network.csv`, has r for half-discs, and after contact the mean of what growth makes in
-several runs. The bounds are the least and the largest r over that of the fit's {len(seen["grown"])} shapes, {grown} of
+several runs. The bounds are the least and the largest r over that of the fit's {len(fit["grown"])} shapes, {grown} of
 them grown in pores of 40 to 150 um at 0.5 to 6 m/d and W^2 / 2500 (W in um) to 20 mg/L of both substrates, the others
 drawn: half-discs, bodies from 1 % thinner to 3 % thicker than a half-disc and leaning by up to 5 %, plugs with ends of
 other lengths. Grown plugs are compared with the mean of the other runs. With less substrate the aggregate is thicker
 before contact, as growth is limited by diffusion, and r larger than the bounds say: near contact r doubles where the
 thickness grows by some 5 %.
 
-Judged with {found.count} shapes that the fit has not seen, of sizes, outlines, places, widths, velocities, supplies and
-lambdas drawn at random: {found.inside} are within the bounds; half of them are within {np.median(worst):.1f} % of the
+Judged with {check.count} shapes that the fit has not seen, of sizes, outlines, places, widths, velocities, supplies and
+lambdas drawn at random: {check.inside} are within the bounds; half of them are within {np.median(worst):.1f} % of the
 law, the worst is {worst.max():.0f} % from it.
 
 Outside its range (A / W^2 from {_range(False)} before contact and from {_range(True)} after it, lambda from 100 to
@@ -204,9 +204,9 @@ def _range(spanned: bool) -> str:
     return f"{low:.3g} to {high:.3g}"
 
 
-def _told(spanned: bool) -> str:
+def _markdown_table(spanned: bool) -> str:
     """A table in Markdown."""
-    shares = np.array(TOLD[spanned])
+    shares = np.array(PAGE_SHARES[spanned])
     head = (f"A / W^2, {'touching both walls' if spanned else 'before contact'}", "r", "least", "most")
     rows = zip(shares, *added_resistance(shares, 1.0, spanned, RATIO))
     return markdown([table(head, ("{:g} {:.3g} {:.3g} {:.3g}".format(*row).split() for row in rows))])
@@ -258,10 +258,10 @@ def _grown(random: np.random.Generator) -> Iterator[Sample]:
     width, velocity = random.uniform(40, 150), _log(random, 0.5, 6)
     supply = _log(random, max(shapes.LEAST_SUPPLY * width**2, 4), 20)
     run = Growth(width, velocity, supply, random.uniform(0.05, 0.15) * width, random.uniform(-0.5, 0.5) * width, END)
-    found = [one for one in shapes.grown(run, LARGEST, FURTHER, (_ratio(random),)) if _known(one)]
-    shares = np.array([one.share for one in found])
+    samples = [one for one in shapes.grown(run, LARGEST, FURTHER, (_ratio(random),)) if _known(one)]
+    shares = np.array([one.share for one in samples])
     for share in np.linspace(shares[0], shares[-1], OF_EACH):
-        yield found[np.abs(shares - share).argmin()]
+        yield samples[np.abs(shares - share).argmin()]
 
 
 def _known(one: Sample) -> bool:

@@ -1,4 +1,4 @@
-"""Aggregates whose added resistance the law is made of: half-discs, bodies drawn alike, and what growth makes."""
+"""Aggregates whose added resistance gives the law: half-discs, similar drawn bodies, and grown shapes."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ RATIOS = (100.0, 200.0, 500.0, 1000.0, 2000.0, 5000.0, 10000.0)
 LENGTH = 15.0
 #: Width (um) of the pores of drawn shapes: any other gives the same.
 WIDTH = 100.0
-#: Elements of what the law is, over the whole pore; and of what it is compared with. On half-discs of R / W from 0.05
+#: Numerics of the shapes of the law, over the entire pore, and of the compared shapes. On half-discs of R / W from 0.05
 #: to 0.96 they differ from the preset `exact` by 0.2 % and by 0.8 % at most.
 FINE = ('numerics.preset="accurate"', 'numerics.extent="full"')
 QUICK = ('numerics.preset="fast"',)
-#: Ranges of drawn bodies, which are those of what growth makes before contact: thickness over that of the half-disc of
+#: Ranges of drawn bodies, as growth makes them before contact: thickness over that of the half-disc of
 #: the same area; how far the top leans to either side, over its height. Of drawn plugs: length of the contact surface
 #: with the lower wall less that with the upper one, over W, and the larger share of that on one side.
 THICKER, LEANING = (0.99, 1.03), 0.05
@@ -65,8 +65,8 @@ def tables(width: float, aggregate: dict, velocity: float = 1.0) -> dict:
 
 @dataclass(frozen=True)
 class Sample:
-    """One aggregate. run: that has made it, None: drawn; spanned: does it touch both walls? share: A / W^2; ratios,
-    lengths: some lambdas, and r for each."""
+    """One aggregate. run: the run that grew it, None if drawn; spanned: does it touch both walls? share: A / W^2;
+    ratios, lengths: some lambdas, and r for each."""
 
     run: Growth | None
     spanned: bool
@@ -75,10 +75,10 @@ class Sample:
     lengths: tuple[float, ...]
 
 
-def sample(now: Pore, ratios: tuple[float, ...] = RATIOS, run: Growth | None = None) -> Sample:
+def sample(pore: Pore, ratios: tuple[float, ...] = RATIOS, run: Growth | None = None) -> Sample:
     """The added lengths of an aggregate in its mesh."""
-    share = now.boundary.area / now.mesh.width**2
-    return Sample(run, now.contact, share, ratios, tuple(added_length(now.space, ratio) for ratio in ratios))
+    share = pore.boundary.area / pore.mesh.width**2
+    return Sample(run, pore.contact, share, ratios, tuple(added_length(pore.space, ratio) for ratio in ratios))
 
 
 def added_length(space: Space, ratio: float) -> float:
@@ -123,7 +123,7 @@ def plug(share: float, ends: float, upstream: float) -> np.ndarray:
 
 
 def grown(run: Growth, most: float, apart: float, ratios=RATIOS) -> Iterator[Sample]:
-    """What a run makes, up to an area over W^2, each larger than the one before by a factor `apart` at least."""
+    """Yield shapes of a run up to an area over W^2, each larger than the last by a factor of at least `apart`."""
     last = 0.0
     for instant in simulate(run.scene()):
         share = instant.pore.boundary.area / run.width**2

@@ -1,1 +1,1 @@
-"""Pores, bodies, meshes and runs that cases, claims, errata, hard cases and benchmarks share: made once."""
+"""Pores, bodies, meshes and runs that cases, claims, errata, hard cases and benchmarks share: defined once."""

@@ -1,8 +1,7 @@
-"""Bodies of the cases, of straight and of curved triangles; their growth from t = 0 in steps; norms over them.
+"""Bodies of straight or curved triangles, their growth from t = 0 in steps, norms over them, and dead loads.
 
-A kind is the order of the elements of a scene: 1, straight triangles; 2 and 3, curved ones, integrated to degree 6, 8.
-
-Dead loads on a body, the f0 and t0 of (20), as nodal forces of straight and of curved triangles.
+A kind is the order of the elements of a scene. Kind 1 has straight triangles. Kinds 2 and 3 have curved triangles and
+integrate to degree 6 and 8. The dead loads are f0 and t0 of (20), as nodal forces.
 """
 
 from __future__ import annotations
@@ -18,29 +17,28 @@ from repro.fem import elements
 from repro.fem.mesh import Mesh
 from repro.fem.outline import FREE, Outline
 from repro.fem.space import Space
-from repro.model import growth, pore
-from repro.model.contact import constrained
+from repro.model import contact, growth, pore
 from verification.evidence.cases import combined
 from verification.evidence.checks import largest
 from verification.problems import meshes
 
-#: Radius of the half-discs (um), and the factor by which theta is raised at a time.
+#: Radius of the half-discs (um), and the largest factor of theta in one step.
 RADIUS, FACTOR = 20.0, 1.5
 LENGTH, HEIGHT = 10.0, 7.0
-#: Kinds, by label: the curved ones, and every one.
+#: Kinds by label: the curved kinds, and all kinds.
 CURVED = combined({"curved": 2, "curved, of cubic scenes": 3})
 EVERY = combined({"straight": 1}) | CURVED
-#: Ends of the mesh around a half-disc, at either side of it (um).
+#: Distance (um) from the middle of a half-disc to both ends of its mesh.
 ENDS = {1: 60.0, 2: 95.0, 3: 95.0}
-#: Degree of the quadrature of norms, and how far middles of inner edges are moved at random (of the elements' size).
+#: Degree of the quadrature of norms, and the random displacement of the middles of inner edges over the element size.
 DEGREE, BENT = 6, 0.075
 
 
 @dataclass(frozen=True, eq=False)
 class Supported(growth.Body):
-    """A body in its reference configuration, and which coordinates are held, (n, 2)."""
+    """A body in its reference configuration; constrained (n, 2) is True where a coordinate is prescribed."""
 
-    held: np.ndarray
+    constrained: np.ndarray
 
     @property
     def cells(self) -> np.ndarray:
@@ -54,41 +52,43 @@ class Supported(growth.Body):
 
     @property
     def corners(self) -> int:
-        """How many nodes are corners."""
+        """Number of corner nodes."""
         return self.shape.corners
 
     def field(self, function: Callable) -> np.ndarray:
-        """(t, q) of a function of X and Y at t = 0 where growth is taken."""
-        where, weight = meshes.places(self.reference[self.cells], self.shape.table)
+        """(t, q) values of a function of X and Y at t = 0, at the quadrature points of growth."""
+        where, weight = meshes.quadrature_points(self.reference[self.cells], self.shape.table)
         return np.broadcast_to(function(*np.moveaxis(where, 2, 0)), weight.shape).astype(float)
 
     def constant(self, value: float) -> np.ndarray:
-        """(t, q) of one value."""
+        """(t, q) array of one value."""
         return self.field(lambda x, y: value)
 
     @property
     def resting(self) -> np.ndarray:
-        """(corners,) no pressure."""
+        """(corners,) zero pressure."""
         return np.zeros(self.corners)
 
 
-def on_mesh(grid: Mesh, kind: int, *held: np.ndarray) -> Supported:
-    """The aggregate of a mesh at t = 0, as scenes have it; held: (n,) its nodes whose x is, and whose y is."""
-    whole = pore.material(Space(grid, kind), grid.points[grid.body])
-    return Supported(whole.shape, whole.reference, np.column_stack(held))
+def on_mesh(grid: Mesh, kind: int, *constrained: np.ndarray) -> Supported:
+    """The aggregate of a mesh at t = 0. constrained: (n,) nodes with prescribed x, then nodes with prescribed y."""
+    aggregate = pore.material(Space(grid, kind), grid.points[grid.body])
+    return Supported(aggregate.shape, aggregate.reference, np.column_stack(constrained))
 
 
 def on_wall(grid: Mesh, kind: int, outline: Outline) -> tuple[Supported, np.ndarray]:
-    """(body, nodes of its free rim without the corners (M,)): the aggregate of a mesh at t = 0, which slides on the
-    walls, its fixed points held."""
+    """The aggregate of a mesh at t = 0, and the nodes (M,) of its free rim without the contact lines.
+
+    The aggregate slides on the walls. Its fixed points do not move.
+    """
     rim = grid.topology.body_loop
-    held = constrained(len(grid.body), rim, outline.wall, outline.fixed)
-    return on_mesh(grid, kind, *held.T), rim[outline.wall == FREE]
+    supports = contact.constrained(len(grid.body), rim, outline.wall, outline.fixed)
+    return on_mesh(grid, kind, *supports.T), rim[outline.wall == FREE]
 
 
 @cache
 def half_disc(refinement: float, kind: int = 1) -> tuple[Supported, np.ndarray]:
-    """:func:`on_wall` of a half-disc, its middle fixed, in a mesh of the package's own."""
+    """:func:`on_wall` of a half-disc with a fixed middle, on a mesh of the package."""
     seed = meshes.seed(RADIUS, refinement, kind)
     grid, outline = meshes.around(seed, refinement, (-ENDS[kind], ENDS[kind]), 50.0)
     return on_wall(grid, kind, outline)
@@ -97,8 +97,10 @@ def half_disc(refinement: float, kind: int = 1) -> tuple[Supported, np.ndarray]:
 @cache
 def rectangle(size: float, seed: int, kind: int = 1, length: float = LENGTH, height: float = HEIGHT,
               bent: float = BENT):
-    """(mesh, nodes of each side {name: (n,)}) of a random mesh of LENGTH x HEIGHT um; middles of the inner edges of
-    curved triangles are moved at random by a part of the elements' size."""
+    """A random mesh of LENGTH x HEIGHT um, and the nodes of each side {name: (n,)}.
+
+    The middles of inner edges of curved triangles are moved at random by a part of the element size.
+    """
     straight = meshes.channel((0.0, length), height, size, lambda x, y: x >= 0, seed=seed)
     grid = meshes.space_on(straight, kind).mesh
     points = grid.points.copy()
@@ -118,11 +120,11 @@ class HalfCylinder:
     outer: float
 
     def theta(self, x, y):
-        """Of what was at X, Y."""
+        """theta of the material point X, Y."""
         return self.inner + (self.outer - self.inner) * (x**2 + y**2) / RADIUS**2
 
     def radius(self, R):
-        """um, of what was at R."""
+        """Radius (um) of the material point at R."""
         return neo_hookean.cylinder_radius(R, self.inner, self.outer - self.inner, RADIUS)
 
     def place(self, x, y) -> np.ndarray:
@@ -131,89 +133,100 @@ class HalfCylinder:
         return np.stack([x, y], axis=-1) * (self.radius(R) / R)[..., None]
 
     def pressure(self, x, y) -> np.ndarray:
-        """P over mu_L; the middle takes what is beside it."""
+        """P over mu_L. The middle takes the value beside it."""
         R = np.maximum(np.hypot(x, y), 1e-6 * RADIUS)
         flat = neo_hookean.cylinder_pressure(R.ravel(), self.inner, self.outer - self.inner, RADIUS)
         return flat.reshape(np.shape(R))
 
     def at(self, x, y) -> tuple[np.ndarray, np.ndarray]:
-        """Place and pressure."""
+        """Position and pressure."""
         return self.place(x, y), self.pressure(x, y)
 
 
-def size(held: Supported) -> float:
-    """Side of the square of mean triangle area twice over, um."""
-    return np.sqrt(2 * held.at.dx.sum() / len(held.cells))
+def size(body: Supported) -> float:
+    """Element size (um): the root of twice the mean triangle area."""
+    return np.sqrt(2 * body.at.dx.sum() / len(body.cells))
 
 
-def grown(held: Supported, theta: np.ndarray, path: Callable | None = None, factor: float = FACTOR
+def grow(body: Supported, theta: np.ndarray, path: Callable | None = None, factor: float = FACTOR
           ) -> growth.Equilibrium:
-    """Equilibrium under theta (t, q), raised by a factor at a time; ``path(part)`` are the prescribed places (n, 2)
-    under theta^part, those of t = 0 if there is none."""
-    position, pressure = held.reference, held.resting
+    """Equilibrium under theta (t, q), reached in steps that raise theta by at most ``factor``.
+
+    ``path(part)`` gives the prescribed positions (n, 2) under theta^part. By default they are those of t = 0.
+    """
+    position, pressure = body.reference, body.resting
     parts = max(1, int(np.ceil(largest(np.log(theta)) / np.log(factor))))
     for part in np.arange(1, parts + 1) / parts:
-        prescribed = path(part) if path else held.reference
-        found = growth.equilibrium(held, theta**part, position, pressure, held.held, prescribed)
-        position, pressure = found.position, found.pressure
-    return found
+        prescribed = path(part) if path else body.reference
+        solution = growth.equilibrium(body, theta**part, position, pressure, body.constrained, prescribed)
+        position, pressure = solution.position, solution.pressure
+    return solution
 
 
-def system(held: Supported, position: np.ndarray, pressure: np.ndarray, theta: np.ndarray) -> growth.System:
-    """The equations of a body under theta, nothing prescribed, at places (n, 2) and pressures (corners,); on straight
-    triangles stabilised as at that shape of expansion theta."""
+def system(body: Supported, position: np.ndarray, pressure: np.ndarray, theta: np.ndarray) -> growth.System:
+    """The equations of a free body under theta, at positions (n, 2) and pressures (corners,).
+
+    On straight triangles the stabilisation is that of this shape.
+    """
     stabilising = None
-    if held.geometry == 1:
-        stabilising = growth.gradient_stabilisation(position, held.cells, theta[:, 0])
-    found = growth.System(held, np.zeros_like(held.held), stabilising=stabilising)
-    found.under(theta, position, position, pressure)
-    return found
+    if body.geometry == 1:
+        stabilising = growth.gradient_stabilisation(position, body.cells, theta[:, 0])
+    equations = growth.System(body, np.zeros_like(body.constrained), stabilising=stabilising)
+    equations.under(theta, position, position, pressure)
+    return equations
 
 
-def integrated(held: Supported) -> tuple[np.ndarray, np.ndarray, elements.Table]:
-    """Where norms are taken: X, Y (t, q, 2), weights (t, q) um2 and the table."""
-    of = elements.table(held.geometry, held.geometry, DEGREE)
-    return *meshes.places(held.reference[held.cells], of), of
+def norm_points(body: Supported) -> tuple[np.ndarray, np.ndarray, elements.Table]:
+    """Quadrature of norms: points X, Y (t, q, 2), weights (t, q) um2 and the table."""
+    of = elements.table(body.geometry, body.geometry, DEGREE)
+    return *meshes.quadrature_points(body.reference[body.cells], of), of
 
 
-def errors(held: Supported, found: growth.Equilibrium, exact: Callable, chosen=slice(None)) -> dict[str, float]:
-    """Size of the elements; L2 over the body at t = 0, or over its triangles ``chosen``, of places (..., 2) and
-    pressures (...) less exact(X, Y), both of them, over that of these."""
-    where, weight, of = integrated(held)
+def errors(body: Supported, solution: growth.Equilibrium, exact: Callable, chosen=slice(None)) -> dict[str, float]:
+    """Element size, and relative L2 errors of positions and pressures against exact(X, Y).
+
+    The norm is over the body at t = 0, or over its triangles ``chosen``. ``exact`` gives both fields.
+    """
+    where, weight, of = norm_points(body)
     place, pressure = exact(*np.moveaxis(where[chosen], 2, 0))
-    cells, weight = held.cells[chosen], weight[chosen]
-    return {"size": size(held), "place": meshes.relative(of.values @ found.position[cells], place, weight),
-            "pressure": meshes.relative(found.pressure[cells[:, :3]] @ of.linear.T, pressure, weight)}
+    cells, weight = body.cells[chosen], weight[chosen]
+    return {"size": size(body), "place": meshes.relative(of.values @ solution.position[cells], place, weight),
+            "pressure": meshes.relative(solution.pressure[cells[:, :3]] @ of.linear.T, pressure, weight)}
 
 
-def equilibrium(held: Supported, theta: np.ndarray, start: np.ndarray, forces: np.ndarray | None = None
+def equilibrium(body: Supported, theta: np.ndarray, start: np.ndarray, forces: np.ndarray | None = None
                 ) -> growth.Equilibrium:
-    """Equilibrium under theta (t, q) and nodal forces (n, 2), over mu_L, that do not depend on the shape, from places
-    (n, 2) near it with the held ones on their targets, and without pressure. Raises GrowthError where there is none."""
-    return growth.equilibrium(held, theta, start, held.resting, held.held, start, forces=forces)
+    """Equilibrium under theta (t, q) and dead nodal forces (n, 2), over mu_L.
+
+    Newton's method starts without pressure, from positions (n, 2) near the solution with the prescribed ones in place.
+    Raises GrowthError if it does not converge.
+    """
+    return growth.equilibrium(body, theta, start, body.resting, body.constrained, start, forces=forces)
 
 
-def body_force(held: Supported, density) -> np.ndarray:
-    """(n, 2) nodal forces of a force density(X, Y) (..., 2) per area of t = 0."""
-    where, weight, of = integrated(held)
+def body_force(body: Supported, density) -> np.ndarray:
+    """(n, 2) nodal forces of a force density(X, Y) (..., 2) per area at t = 0."""
+    where, weight, of = norm_points(body)
     local = np.einsum("tq,qa,tqi->tai", weight, of.values, density(*np.moveaxis(where, 2, 0)))
-    return _summed(held, held.cells, local)
+    return _assemble(body, body.cells, local)
 
 
-def traction(held: Supported, grid: Mesh, stress) -> np.ndarray:
-    """(n, 2) nodal forces of S N per length of t = 0, stress(X, Y) (..., 2, 2) or (2, 2), on the straight right end of
-    the rectangle ``grid`` that is the whole body."""
-    order = held.geometry
+def traction(body: Supported, grid: Mesh, stress) -> np.ndarray:
+    """(n, 2) nodal forces of S N per length at t = 0 on the straight right end of a rectangular body.
+
+    stress(X, Y): S (..., 2, 2) or (2, 2); grid: the mesh, all of which is the body.
+    """
+    order = body.geometry
     edges = grid.topology.dofs(order).outlet
     _, weights, shape = meshes.along_edges(order, 5)
-    where = np.einsum("qa,eai->eqi", shape, held.reference[edges])
-    length = np.ptp(held.reference[edges, 1], axis=1)
+    where = np.einsum("qa,eai->eqi", shape, body.reference[edges])
+    length = np.ptp(body.reference[edges, 1], axis=1)
     pull = np.broadcast_to(stress(*np.moveaxis(where, 2, 0))[..., 0], where.shape)
-    return _summed(held, edges, np.einsum("e,q,qa,eqi->eai", length, weights, shape, pull))
+    return _assemble(body, edges, np.einsum("e,q,qa,eqi->eai", length, weights, shape, pull))
 
 
-def _summed(held: Supported, nodes: np.ndarray, local: np.ndarray) -> np.ndarray:
-    """(n, 2) sums at nodes (k, a) of local forces (k, a, 2)."""
-    total = np.zeros_like(held.reference)
+def _assemble(body: Supported, nodes: np.ndarray, local: np.ndarray) -> np.ndarray:
+    """(n, 2) sums of local forces (k, a, 2) at their nodes (k, a)."""
+    total = np.zeros_like(body.reference)
     np.add.at(total, nodes, local)
     return total

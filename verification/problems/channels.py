@@ -1,15 +1,14 @@
 """Problems that are simpler than the paper's: narrow channels for substrates, boxes for flow.
 
-What the one-dimensional cases share: narrow channels, meshed at random, with biomass from wall to wall in a slab.
+The one-dimensional cases share narrow channels with random meshes and a slab of biomass from wall to wall. Their
+references do not depend on y. Errors are averaged over several unrelated meshes of each size, because in a channel a
+few elements wide the errors of single meshes scatter by a factor of 2. Linear concentrations are on straight
+triangles, and those of order 2 and 3 on curved ones, as in runs of the package.
 
-Their references know nothing of y. Each size has several unrelated meshes, whose errors are averaged: in a channel of a
-few elements' width those of a single mesh scatter by a factor of 2. Linear concentrations are on straight triangles,
-those of order 2 and 3 on curved ones, as in the package's own runs.
-
-Boxes: Stokes flow with the exact velocity prescribed all around, for exact solutions without inlet and outlet. The
-element matrices of every form and order, the stabilisation, the assembly and the solver are those of ``repro``; only
-the boundary conditions of :mod:`repro.model.flow` are replaced, and a force may act. One pressure is prescribed in the
-place of the constant that the velocity leaves open, and the mean of the pressure is not compared.
+Boxes have the exact velocity prescribed all around, for exact solutions of Stokes flow without inlet and outlet. The
+element matrices of every form and order, the stabilisation, the assembly and the solver are those of ``repro``. Only
+the boundary conditions of :mod:`repro.model.flow` are replaced, and a force may act. One pressure is prescribed,
+because the velocity determines the pressure up to a constant. The mean of the pressure is not compared.
 """
 
 from __future__ import annotations
@@ -36,14 +35,14 @@ HEIGHTS = 5
 CROSSED, FILM = (-20.0, 60.0), 20.0
 #: The same with more fluid at both ends, for order 2 and 3.
 WIDE = (-40.0, 80.0)
-#: Sizes of elements (um), and how many meshes of each: the coarse ones cost nothing and scatter most.
+#: Element sizes (um) and the number of meshes of each. Coarse meshes are cheap and scatter most.
 SAMPLES = {4.0: 12, 2.0: 6, 1.0: 3, 0.5: 1}
 FINEST = min(SAMPLES)
 SECOND = "linear elements, lumped reaction: second order"
 WORDS = {1: "linear", 2: "quadratic", 3: "cubic"}
 #: Every order, by its word.
 ORDERS = {word: order for order, word in WORDS.items()}
-#: Of concentrations of an order in L2, and why; of what leaves or is taken up, twice the order of the gradient.
+#: Expected orders and their reasons: concentrations in L2, and effluents and uptake (twice the order of the gradient).
 EXPECTED = {1: (2, SECOND), 2: (3, "quadratic elements: third order in L2"),
             3: (4, "cubic elements: fourth order in L2")}
 FUNCTIONAL = {1: (2, SECOND), 2: (4, "twice the order of the gradient: fourth"),
@@ -52,10 +51,10 @@ FUNCTIONAL = {1: (2, SECOND), 2: (4, "twice the order of the gradient: fourth"),
 DEGREES = {1: 6, 2: 6, 3: 8}
 
 
-def following(area: float, size: float, sample: int, ends, width: float, is_biomass, **lines) -> Mesh:
-    """A mesh of the first random lattice whose triangulation follows all lines, so that the biomass has its area.
+def mesh_with_sides(area: float, size: float, sample: int, ends, width: float, is_biomass, **lines) -> Mesh:
+    """The first of nine random meshes whose triangles follow all lines, so that the biomass has the given area.
 
-    Raises ValueError where none of a few does.
+    Raises ValueError if none does.
     """
     for attempt in range(9):
         grid = meshes.channel(ends, width, size, is_biomass, **lines, seed=int(1000 * size) + 100 * sample + attempt)
@@ -65,41 +64,44 @@ def following(area: float, size: float, sample: int, ends, width: float, is_biom
 
 
 @cache
-def spaced(size: float, sample: int, order: int = 1, ends=CROSSED, slab=(0.0, SLAB)) -> Space:
-    """Functions of an order on one of the meshes of a size."""
+def slab_space(size: float, sample: int, order: int = 1, ends=CROSSED, slab=(0.0, SLAB)) -> Space:
+    """A space of an order on one of the meshes of a size."""
     sides = tuple(side for side in slab if side not in ends)
-    straight = following(WIDTH * (slab[1] - slab[0]), size, sample, ends, WIDTH,
+    straight = mesh_with_sides(WIDTH * (slab[1] - slab[0]), size, sample, ends, WIDTH,
                          lambda x, y: (x > slab[0]) & (x < slab[1]), across=sides)
     return meshes.space_on(straight, order)
 
 
-def carrying(space: Space, velocity: np.ndarray, mean: float) -> flow.Flow:
-    """A given flow: velocity (n, 2) um/h at the nodes of the space, mean velocity um/h."""
+def prescribed_flow(space: Space, velocity: np.ndarray, mean: float) -> flow.Flow:
+    """A prescribed flow: velocity (n, 2) um/h at the nodes of the space, and its mean (um/h)."""
     correction = np.zeros((len(space.cells), 2)) if space.order == 1 else None
     return flow.Flow(mean, velocity, np.zeros(space.mesh.corners), correction, 0.0, 0.0, 1.0)
 
 
 def problem(space: Space, speed: float | None, substrates=SCENE.substrates, law=SCENE.kinetics) -> transport.Problem:
-    """Both substrates under plug flow, the same velocity everywhere; None: without flow."""
-    carried = None if speed is None else carrying(space, np.tile([speed, 0.0], (space.count, 1)), speed)
+    """Both substrates under plug flow at a uniform velocity (um/h). Without flow if it is None."""
+    carried = None if speed is None else prescribed_flow(space, np.tile([speed, 0.0], (space.count, 1)), speed)
     return transport.problem(space, carried, substrates, law)
 
 
-def filled(space: Space, density: float) -> np.ndarray:
-    """(r, q) um2 mg/L, masses of biomass of one density (mg/L)."""
+def uniform_masses(space: Space, density: float) -> np.ndarray:
+    """(r, q) um2 mg/L, masses of biomass of a uniform density (mg/L)."""
     return density * space.reaction.dx
 
 
-def steady(made: transport.Problem, density: float) -> transport.Concentrations:
-    """Steady concentrations over biomass of one density, with a last step of Newton's method for order 2 and 3: it
-    stops where no row errs by more than 1e-13 of its terms, which at Peclet 0.1 and little uptake may be 1e-8 of the
-    supply, more than the mesh does."""
-    sink = Sink(filled(made.space, density))
-    found = transport.steady(made, sink)
-    if made.space.order == 1:
-        return found
-    balance, state = transport.Balance(made, sink), both(found).ravel()
-    state = state + made.system.solve(balance.tangent(state), -balance.residual(state))
+def steady(problem: transport.Problem, density: float) -> transport.Concentrations:
+    """Steady concentrations over biomass of a uniform density (mg/L).
+
+    Orders 2 and 3 take one more step of Newton's method. The method stops where no row errs by more than 1e-13 of its
+    terms. At Peclet 0.1 and little uptake this may be 1e-8 of the supply, more than the error of the mesh.
+    """
+    sink = Sink(uniform_masses(problem.space, density))
+    concentrations = transport.steady(problem, sink)
+    if problem.space.order == 1:
+        return concentrations
+    balance = transport.Balance(problem, sink)
+    state = both(concentrations).ravel()
+    state = state + problem.system.solve(balance.tangent(state), -balance.residual(state))
     return transport.Concentrations(*state.reshape(2, -1))
 
 
@@ -109,20 +111,20 @@ def decay_demand(law) -> float:
 
 
 def rates(law, substrates=SCENE.substrates) -> dict[str, float]:
-    """The kinetics for the references."""
+    """Constants of the kinetics, as the references take them."""
     return {"k": law.maximum_utilization_rate, "F": law.acceptor_to_donor_ratio, "decay": decay_demand(law),
             "K_A": substrates.acceptor.half_saturation, "K_D": substrates.donor.half_saturation}
 
 
 def pair(name: str, substrates=SCENE.substrates) -> tuple[float, float]:
-    """A number of both substrates, acceptor first."""
+    """A constant of both substrates, acceptor first."""
     return getattr(substrates.acceptor, name), getattr(substrates.donor, name)
 
 
-def changed(**changes: dict[str, float]):
+def substrates_with(**changes: dict[str, float]):
     """The paper's substrates with other values, by substrate and name."""
-    return replace(SCENE.substrates, **{which: replace(getattr(SCENE.substrates, which), **values)
-                                        for which, values in changes.items()})
+    return replace(SCENE.substrates, **{name: replace(getattr(SCENE.substrates, name), **values)
+                                        for name, values in changes.items()})
 
 
 def speed_of(peclet: float) -> float:
@@ -131,7 +133,7 @@ def speed_of(peclet: float) -> float:
 
 
 def length(space: Space, size: float) -> float:
-    """What errors are studied by: the nominal size of linear elements, the mean one of others."""
+    """Size for studies of orders: nominal for linear elements, the mean of the mesh for others."""
     return size if space.order == 1 else meshes.mean_size(space.mesh)
 
 
@@ -141,12 +143,12 @@ def both(state: transport.Concentrations) -> np.ndarray:
 
 
 def in_points(space: Space) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Where errors are integrated: places (T, q, 2) um, weights (T, q) um2 and functions (q, k)."""
+    """Quadrature of errors: points (T, q, 2) um, weights (T, q) um2 and functions (q, k)."""
     return meshes.fine(space, degree=DEGREES[space.order])
 
 
-def apart(space: Space, fields: np.ndarray, exact) -> tuple[np.ndarray, np.ndarray]:
-    """Root mean squares (m,) over the mesh of fields (m, n) less exact(x, y) (m, T, q), and of exact(x, y)."""
+def rms_errors(space: Space, fields: np.ndarray, exact) -> tuple[np.ndarray, np.ndarray]:
+    """Root mean squares (m,) over the mesh: of fields (m, n) less exact(x, y) (m, T, q), and of exact(x, y)."""
     where, weight, values = in_points(space)
     truth = np.asarray(exact(*np.moveaxis(where, 2, 0)))
     gap = fields[:, space.cells] @ values.T - truth
@@ -154,24 +156,27 @@ def apart(space: Space, fields: np.ndarray, exact) -> tuple[np.ndarray, np.ndarr
 
 
 def at_heights(space: Space, fields: np.ndarray, x) -> np.ndarray:
-    """(..., HEIGHTS, n) fields (..., count) at x (n,), at so many heights."""
+    """(..., HEIGHTS, n) values of fields (..., count) at x (n,) and HEIGHTS heights."""
     y = WIDTH * (np.arange(HEIGHTS) + 0.5) / HEIGHTS
     where = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     return meshes.field_at(space, fields.T, where).T.reshape(*fields.shape[:-1], HEIGHTS, -1)
 
 
 def box_errors(grid: Mesh, order: int, ratio: float, interface: str, exact: Callable) -> dict[str, float]:
-    """Relative L2 errors of the velocity and, without its mean, of the pressure. order: of the velocity; ratio: of the
-    viscosities; exact(x, y) gives velocity (..., 2), pressure (...) and force (..., 2), all without unit."""
+    """Relative L2 errors of the velocity, and of the pressure without its mean.
+
+    order: of the velocity; ratio: of the viscosities; exact(x, y): velocity (..., 2), pressure (...) and force
+    (..., 2), all dimensionless.
+    """
     space = Space(grid, order)
     pressures = flow.pressure_space(space)
     u, p = _box_flow(space, pressures, ratio, interface, exact)
     where, weight, shape = meshes.fine(space)
     truth, level, _ = exact(*np.moveaxis(where, 2, 0))
     heads = p[pressures.cells] @ meshes.fine(pressures)[2].T
-    found, known = (field - np.average(field, weights=weight) for field in (heads, level))
+    computed, expected = (field - np.average(field, weights=weight) for field in (heads, level))
     return {"velocity": meshes.relative(shape @ u[space.cells], truth, weight),
-            "pressure": meshes.relative(found, known, weight)}
+            "pressure": meshes.relative(computed, expected, weight)}
 
 
 def _box_flow(space: Space, pressures: Space, ratio: float, interface: str, exact: Callable
@@ -181,7 +186,7 @@ def _box_flow(space: Space, pressures: Space, ratio: float, interface: str, exac
     viscosity = np.where(grid.biomass, ratio, 1.0)
     mobility = flow.Stabilised().mobility(grid, viscosity, interface) if space.order == 1 else None
     blocks = flow.stokes(space, viscosity, interface, mobility)
-    system = grid.topology.system(("box", space.order), lambda: _rim_held(space, pressures))
+    system = grid.topology.system(("box", space.order), lambda: _constrained_rim(space, pressures))
     fields = _load(space, exact), _without_flux(space, exact(*space.points.T)[0])
     right, value = (np.append(field.T, np.zeros(pressures.count)) for field in fields)
     solution = system.solve(blocks, right, value)
@@ -190,24 +195,27 @@ def _box_flow(space: Space, pressures: Space, ratio: float, interface: str, exac
 
 
 def _rim(space: Space) -> np.ndarray:
-    """(n, 2) True of both components of the velocity at its nodes on the boundary."""
+    """(n, 2) True for both components of the velocity at nodes on the boundary."""
     dofs = space.dofs
     on = np.zeros((space.count, 2), bool)
     on[np.concatenate([dofs.walls, dofs.inlet.ravel(), dofs.outlet.ravel()])] = True
     return on
 
 
-def _rim_held(space: Space, pressures: Space) -> ElementSystem:
-    """All velocities of the rim and the first pressure prescribed."""
+def _constrained_rim(space: Space, pressures: Space) -> ElementSystem:
+    """The system with all velocities of the rim and the first pressure prescribed."""
     system = saddle_system(space.cells, pressures.cells, _rim(space))
-    held = system.held.copy()
-    held[2 * space.count] = True
-    return system.holding(held)
+    constrained = system.constrained.copy()
+    constrained[2 * space.count] = True
+    return system.with_constrained(constrained)
 
 
 def _without_flux(space: Space, velocity: np.ndarray) -> np.ndarray:
-    """The rim's velocity (n, 2) less the part c (x, y), in the fluid, of what the interpolated values would pump in: a
-    discrete incompressible flow can have none. c is of the order of the interpolation's error."""
+    """Velocity (n, 2) of the rim without net flux.
+
+    The interpolated values have a small net flux, which a discrete incompressible flow cannot have. Subtract c (x, y)
+    at nodes in the fluid; c is of the order of the interpolation error.
+    """
     rim = _rim(space)
     values = np.where(rim, velocity, 0.0)
     rim[space.cells[space.mesh.biomass]] = False

@@ -1,9 +1,9 @@
-"""What hard cases are made of: runs of scenes, what must hold in every run, and what a preset promises.
+"""Hard cases: runs of scenes, checks of every run, and the accuracy that a preset promises.
 
-When a cell of the matrix, a hard case with a preset, is right, refused or wrong.
+A cell of the matrix is a hard case with a preset. Its verdict is one of three:
 
-right     all checks of its parts hold, and so does what must hold in every run (balances, bounds, finite numbers);
-refused   a part has stopped with an error of ``repro``, which says what bound was met or what to change;
+right     all checks of its parts hold, and so do the checks of every run (balances, bounds, finite numbers);
+refused   a part stops with an error of ``repro`` that names the bound it met or a change to try;
 wrong     a check fails, another exception is raised, nothing is measured, or a part takes longer than LIMIT.
 
 Every hard case is a verification case whose variants are the presets.
@@ -23,10 +23,9 @@ import pytest
 
 from reference import poiseuille
 from repro.errors import RunEnd, SimulationError, StageError
-from repro.march.loop import Instant
+from repro.march.loop import Report
 from repro.march.simulation import simulate
-from repro.model import pore
-from repro.model.pore import Pore, Solved, peclet
+from repro.model.pore import Pore, Solved, peclet, seeded, solve
 from repro.results import M_PER_D, row
 from repro.scene import Scene, load_scene
 from repro.scene.units import SceneError
@@ -37,8 +36,8 @@ from verification.problems.runs import NUMERICS, worth
 PRESETS = tuple(NUMERICS)
 #: With the paper's scheme any part may be refused.
 LENIENT = "paper"
-#: Relative error that a preset stands for, in velocity, conductivity, area, thickness and tips, and of effluents over
-#: the supply. The paper names none: linear triangles of its sizes were measured 1 to 4 % off in the head loss.
+#: Relative error that a preset promises in velocity, conductivity, area, thickness and tips, and in effluents over the
+#: supply. The paper states none: linear triangles of its sizes were measured 1 to 4 % off in the head loss.
 TOLERANCE = {"paper": 0.04, "fast": 0.01, "accurate": 0.001, "cubic": 0.01}
 PROMISED = {"paper": "linear triangles: 1 to 4 % in the head loss",
             "fast": "what fast is for: 1 %", "accurate": "what accurate is for: 0.1 %",
@@ -52,44 +51,44 @@ FIXED = ('growth.end="0 h"',)
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """A scene that has run: its instants, their rows in ``timeseries.csv``, and the message of RunEnd or "".
+    """A finished run: its instants, their rows in ``timeseries.csv``, and the message of RunEnd or "".
 
-    balance: what the substrates' balances may miss, None where they say nothing; density: by how much a local
-    (X_A + X_I) / X_m may differ from one, more where a film closes at once under the aggregate.
+    balance: bound of the defect of the substrates' balances, None if they are not checked; density: bound of
+    |(X_A + X_I) / X_m - 1|, larger if a film closes at once under the aggregate.
     """
 
     scene: Scene
-    instants: Sequence[Instant]
+    instants: Sequence[Report]
     rows: Sequence[dict]
     ended: str = ""
     balance: float | None = BALANCE
     density: float = 0.05
 
     @property
-    def end(self) -> Instant:
+    def end(self) -> Report:
         """The last instant."""
         return self.instants[-1]
 
     @property
     def last(self) -> dict:
-        """Its row."""
+        """The row of the last instant."""
         return self.rows[-1]
 
     def column(self, name: str) -> np.ndarray:
-        """(rows,) of one name."""
+        """(rows,) values of a column."""
         return np.array([row[name] for row in self.rows])
 
     def over_first(self, name: str = "aggregate_area_um2") -> np.ndarray:
-        """(rows,) of one name over the first."""
+        """(rows,) values of a column over the first."""
         return self.column(name) / self.column(name)[0]
 
 
 @dataclass(frozen=True)
 class HardCase:
-    """One of the twenty-three: ``parts`` name -> function of the preset, which gives Checks and Runs, or lists of them.
+    """One of the twenty-three hard cases.
 
-    refusable: names of the parts that may be refused with ``fast`` and ``accurate``, and with ``paper`` all may;
-    mutants: ids of wrong changes that it catches.
+    parts: {name: function of the preset that gives Checks and Runs, or lists of them}; refusable: names of the parts
+    that ``fast`` and ``accurate`` may refuse (``paper`` may refuse all); mutants: ids of wrong changes that it catches.
     """
 
     number: int
@@ -103,7 +102,7 @@ class HardCase:
 
     @property
     def full_id(self) -> str:
-        """That of its verification case."""
+        """The id of its verification case."""
         return f"hard-{self.number:02d}-{self.id}"
 
     @property
@@ -114,66 +113,71 @@ class HardCase:
                                 runs_with="1 2")
 
 
-def scene(name: str, preset: str, *changes: str) -> Scene:
+def load(name: str, preset: str, *changes: str) -> Scene:
     """A packaged scene with a preset and other changes (KEY=VALUE)."""
     return load_scene(name, (*NUMERICS[preset], *changes))
 
 
-def ran(made: Scene, way: Callable[[Scene], Iterator[Instant]] = simulate, **how) -> Run:
-    """Run a scene to its end, the pore's, or a fold; how: of :class:`Run`."""
+def run_scene(scene: Scene, simulator: Callable[[Scene], Iterator[Report]] = simulate, **limits) -> Run:
+    """Run a scene to its end, the pore's end, or a fold. limits: balance and density of :class:`Run`."""
     instants, ended = [], ""
     try:
-        for instant in way(made):
+        for instant in simulator(scene):
             instants.append(instant)
     except RunEnd as end:
         ended = str(end)
-    return Run(made, instants, [row(made, instant) for instant in instants], ended, **how)
+    return Run(scene, instants, [row(scene, instant) for instant in instants], ended, **limits)
 
 
-def run(name: str, preset: str, *changes: str, **how) -> Run:
-    """Run a packaged scene with changes."""
-    return ran(scene(name, preset, *changes), **how)
+def run_packaged(name: str, preset: str, *changes: str, **limits) -> Run:
+    """Run a packaged scene with changes. limits: those of :func:`run_scene`."""
+    return run_scene(load(name, preset, *changes), **limits)
 
 
 @cache
 def reference(name: str, *changes: str, refinement: float = 1.0) -> Run:
-    """A finer run on curved triangles, whose error is well under that of ``accurate`` (refinement 0.45, 0.001)."""
-    return run(name, "accurate", *changes, f"numerics.refinement={refinement}", "numerics.tolerance=0.0005")
+    """A finer run on curved triangles. Its error is well under that of ``accurate`` (refinement 0.45, 0.001)."""
+    return run_packaged(name, "accurate", *changes, f"numerics.refinement={refinement}", "numerics.tolerance=0.0005")
 
 
 def against(name: str, preset: str, changes: Sequence[str], *columns: str, refinement: float = 1.0,
-            **how) -> tuple[Run, Run, list]:
-    """A run, a finer one, and the checks of the first with what it must share with the other; how: of :class:`Run`."""
-    found, fine = run(name, preset, *changes, **how), reference(name, *changes, refinement=refinement)
-    return found, fine, [found, *close(found, fine, preset, *columns)]
+            **limits) -> tuple[Run, Run, list]:
+    """A run, a finer run, and the first run with the checks of its columns against the finer one."""
+    run = run_packaged(name, preset, *changes, **limits)
+    fine = reference(name, *changes, refinement=refinement)
+    return run, fine, [run, *close(run, fine, preset, *columns)]
 
 
-def close(found: Run, trusted: Run, preset: str, *columns: str, allowed: float = 0.0) -> Iterator[Check]:
-    """Columns of the last rows against each other, as the presets promise them: relative, effluents over the supply;
-    ``allowed``: where a case has more to allow for."""
+def close(run: Run, finer: Run, preset: str, *columns: str, allowed: float = 0.0) -> Iterator[Check]:
+    """Check columns of the last rows against a finer run, to the accuracy that the preset promises.
+
+    Differences are relative, those of effluents over the supply. ``allowed`` replaces the bound of the preset.
+    """
     bound = allowed or TOLERANCE[preset]
     origin = f"{PROMISED[preset]}; and what the case allows for" if allowed else PROMISED[preset]
     for column in columns:
-        ours, theirs = found.last[column], trusted.last[column]
-        size = abs(theirs)
+        value, expected = run.last[column], finer.last[column]
+        size = abs(expected)
         if column in EFFLUENTS:
-            size = getattr(found.scene.substrates, column.split("_")[1]).supply
-        yield at_most(f"{column} against a finer run", abs(ours - theirs) / size, bound, origin)
+            size = getattr(run.scene.substrates, column.split("_")[1]).supply
+        yield at_most(f"{column} against a finer run", abs(value - expected) / size, bound, origin)
 
 
-def clean_conductivity(made: Scene) -> float:
-    """That of the scene's pore without an aggregate, m/d."""
-    drive = made.flow
-    return poiseuille.conductivity(made.pore.width, drive.kinematic_viscosity / drive.gravity) * M_PER_D
+def clean_conductivity(scene: Scene) -> float:
+    """Conductivity (m/d) of the pore without an aggregate."""
+    drive = scene.flow
+    return poiseuille.conductivity(scene.pore.width, drive.kinematic_viscosity / drive.gravity) * M_PER_D
 
 
-def alike(told: str, names: Sequence[str], ours: Sequence[float], theirs: Sequence[float], preset: str) -> list[Check]:
-    """Numbers against others that may differ by what the preset promises, relative."""
-    return [promised(f"{name} {told}", abs(one / other - 1), preset) for name, one, other in zip(names, ours, theirs)]
+def alike(suffix: str, names: Sequence[str], computed: Sequence[float], expected: Sequence[float], preset: str
+          ) -> list[Check]:
+    """Check numbers against others. They may differ by the relative error that the preset promises."""
+    rows = zip(names, computed, expected)
+    return [promised(f"{name} {suffix}", abs(value / other - 1), preset) for name, value, other in rows]
 
 
 def promised(quantity: str, value: float, preset: str) -> Check:
-    """A relative error that the preset stands for."""
+    """Check a relative error against the one that the preset promises."""
     return at_most(quantity, value, TOLERANCE[preset], PROMISED[preset])
 
 
@@ -182,49 +186,49 @@ SHAPE = ("aggregate_area_um2", "thickness_um", "upstream_um", "downstream_um")
 DRIVE = ("conductivity_m_per_d",)
 
 
-def sound(found: Run) -> Iterator[Check]:
-    """What holds in every run, whatever it is of: the worst over its instants."""
-    yield at_most("numbers that are not finite", unreal(found), 0, "none is")
-    if found.scene.substrates:
-        yield from _balances(found)
-        yield from _bounds(found)
-    if found.scene.kinetics:
-        yield from _biomass(found)
+def sound(run: Run) -> Iterator[Check]:
+    """Checks that hold in every run: the worst over its instants."""
+    yield at_most("numbers that are not finite", unreal(run), 0, "none is")
+    if run.scene.substrates:
+        yield from _balances(run)
+        yield from _bounds(run)
+    if run.scene.kinetics:
+        yield from _biomass(run)
 
 
-def unreal(found: Run) -> int:
-    """How many numbers of rows and fields are infinite or not a number."""
-    count = sum(not np.isfinite(value) for line in found.rows for value in line.values() if value is not None)
-    return count + sum(np.count_nonzero(~np.isfinite(values)) for i in found.instants for values in _fields(i))
+def unreal(run: Run) -> int:
+    """Count of numbers in rows and fields that are infinite or not a number."""
+    count = sum(not np.isfinite(value) for line in run.rows for value in line.values() if value is not None)
+    return count + sum(np.count_nonzero(~np.isfinite(values)) for i in run.instants for values in _fields(i))
 
 
-def _fields(instant: Instant) -> Iterator[np.ndarray]:
-    now, solved = instant.pore, instant.solved
-    for part in filter(None, (now, now.mesh, now.body, solved.flow, solved.concentrations)):
+def _fields(instant: Report) -> Iterator[np.ndarray]:
+    pore, solved = instant.pore, instant.solved
+    for part in filter(None, (pore, pore.mesh, pore.body, solved.flow, solved.concentrations)):
         yield from (values for values in vars(part).values() if isinstance(values, np.ndarray))
 
 
-def _balances(found: Run) -> Iterator[Check]:
-    if found.balance is None:
+def _balances(run: Run) -> Iterator[Check]:
+    if run.balance is None:
         return
-    most, origin = found.balance, "the flux is as much smaller than what diffuses"
-    if found.balance == BALANCE:
-        most, origin = max(BALANCE, 1e-12 * found.last["nodes"] / _slow(found)), NEWTON
+    most, origin = run.balance, "the flux is as much smaller than what diffuses"
+    if run.balance == BALANCE:
+        most, origin = max(BALANCE, 1e-12 * run.last["nodes"] / _slow(run)), NEWTON
     for name in NAMES:
-        yield at_most(f"{name} in - out - consumed, over the larger", largest(found.column(f"{name}_balance")), most,
+        yield at_most(f"{name} in - out - consumed, over the larger", largest(run.column(f"{name}_balance")), most,
                       origin)
 
 
-def _slow(found: Run) -> float:
-    """What flows over what diffuses, u W / D, one at most: Newton's tolerance is of the larger."""
-    speed = (found.last.get("mean_velocity_m_per_d") or 0.0) / 24e-6
-    return min(1.0, peclet(found.scene, speed)) if speed else 1.0
+def _slow(run: Run) -> float:
+    """The Peclet number u W / D, one at most: Newton's tolerance is relative to the larger flux."""
+    speed = (run.last.get("mean_velocity_m_per_d") or 0.0) / 24e-6
+    return min(1.0, peclet(run.scene, speed)) if speed else 1.0
 
 
-def _bounds(found: Run) -> Iterator[Check]:
-    supplies = pair("supply", found.scene.substrates)
+def _bounds(run: Run) -> Iterator[Check]:
+    supplies = pair("supply", run.scene.substrates)
     for name, supply in zip(NAMES, supplies):
-        fields = [getattr(i.solved.concentrations, name) for i in found.instants]
+        fields = [getattr(i.solved.concentrations, name) for i in run.instants]
         yield at_least(f"{name}'s least over the supply", min(f.min() for f in fields) / max(supplies), LOWEST,
                        "transport.UNRESOLVED")
         if supply:
@@ -232,66 +236,68 @@ def _bounds(found: Run) -> Iterator[Check]:
                           "transport.OVERSHOOT")
 
 
-def _biomass(found: Run) -> Iterator[Check]:
-    densities = {"least": found.column("biomass_density_min").min(),
-                 "largest": found.column("biomass_density_max").max()}
-    for which, density in densities.items():
-        yield between(f"local density over X_m, {which}", density, 1 - found.density, 1 + found.density, DENSITY)
-    yield between("share of X_I", max(found.column("inert_fraction"), key=abs), -1e-12, 1.0, "a share")
-    if found.scene.growth:
-        whole = found.scene.kinetics.maximum_density
-        apart = max(abs(i.pore.mass / whole / i.pore.outline.area - 1) for i in found.instants)
-        yield at_most("biomass after - before - made, over after", largest(found.column("biomass_balance")), BALANCE,
+def _biomass(run: Run) -> Iterator[Check]:
+    densities = {"least": run.column("biomass_density_min").min(),
+                 "largest": run.column("biomass_density_max").max()}
+    for extreme, density in densities.items():
+        yield between(f"local density over X_m, {extreme}", density, 1 - run.density, 1 + run.density, DENSITY)
+    yield between("share of X_I", max(run.column("inert_fraction"), key=abs), -1e-12, 1.0, "a share")
+    if run.scene.growth:
+        maximum_density = run.scene.kinetics.maximum_density
+        apart = max(abs(i.pore.mass / maximum_density / i.pore.outline.area - 1) for i in run.instants)
+        yield at_most("biomass after - before - made, over after", largest(run.column("biomass_balance")), BALANCE,
                       MEAN)
-        yield at_most("area against biomass over X_m", apart, AREA[found.scene.numerics.elements], MEAN)
-        if found.scene.numerics.time == "midpoint":
-            yield _oxygen_demand(found)
+        yield at_most("area against biomass over X_m", apart, AREA[run.scene.numerics.elements], MEAN)
+        if run.scene.numerics.time == "midpoint":
+            yield _oxygen_demand(run)
 
 
-def _oxygen_demand(found: Run) -> Check:
-    """Of the midpoint rule alone: the updates take up substrates at the concentrations of a step's ends, and grow with
-    rates of both."""
-    law = found.scene.kinetics
+def _oxygen_demand(run: Run) -> Check:
+    """Check the yield of the midpoint rule.
+
+    Updates do not hold it to round-off: their uptake and growth use the concentrations of both ends of a step.
+    """
+    law = run.scene.kinetics
     missing = [abs(ledger.biomass_made - np.subtract(*worth(law, ledger))) / ledger.biomass_after
-               for instant in found.instants for ledger in instant.ledgers]
+               for instant in run.instants for ledger in instant.ledgers]
     return at_most("biomass made less what donor makes and acceptor decays, over the biomass",
                    max(missing, default=0.0), 1e-12, "one integral, in the same points; round-off")
 
 
 MEAN = "J = theta in the mean; Newton's tolerance"
 DENSITY = "J = theta holds in the mean over elements: a local density is off by what an element does not resolve [E7]"
-#: Exact on curved triangles, where biomass is kept by its mass; with (34) on straight ones a remesh leaves an error
-#: that is worked off at the next update [E7].
+#: Exact on curved triangles, where masses are transferred. On straight ones a remesh leaves an error in (34), which the
+#: next update removes [E7].
 AREA = {"linear": 1e-4, "quadratic": 1e-8, "cubic": 1e-8}
 
 
-def seeded(made: Scene) -> tuple[Pore, Solved]:
-    """The pore at t = 0 and what is solved in it."""
-    return solved_in(made, pore.seeded(made))
+def solved_seed(scene: Scene) -> tuple[Pore, Solved]:
+    """The pore at t = 0, and the flow and transport solved in it."""
+    return solved_in(scene, seeded(scene))
 
 
-def solved_in(made: Scene, now: Pore) -> tuple[Pore, Solved]:
-    """A pore with its concentrations, and what is solved in it."""
-    found = pore.solve(made, now)
-    return replace(now, concentrations=found.concentrations), found
+def solved_in(scene: Scene, pore: Pore) -> tuple[Pore, Solved]:
+    """A pore with its concentrations, and the flow and transport solved in it."""
+    solved = solve(scene, pore)
+    return replace(pore, concentrations=solved.concentrations), solved
 
 
-#: CPU seconds that a part may take: ten times what the longest does.
+#: Limit of the CPU time (s) of a part: ten times that of the longest.
 LIMIT = 200.0
 RIGHT = "right"
 REFUSED = "refused"
 WRONG = "wrong"
-#: A refusal must say one of these: what to try, or which bound was met.
+#: A refusal must contain one of these words: it names a change to try, or the bound that was met.
 REASON = re.compile(r"\b(try|leave|needed|under|above|more than|accepted|outside of)\b")
 
 
 class TooLong(Exception):
-    """A part has taken more than LIMIT."""
+    """A part has exceeded LIMIT."""
 
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """What came of one part: its verdict, why, its own checks, and those of every run in it."""
+    """Result of one part: verdict, reason, its own checks, and the checks of every run in it."""
 
     name: str
     verdict: str
@@ -302,7 +308,7 @@ class Part:
 
 @dataclass(frozen=True, eq=False)
 class Cell:
-    """A case with a preset."""
+    """Result of a case with a preset."""
 
     case: HardCase
     preset: str
@@ -310,24 +316,23 @@ class Cell:
 
     @property
     def verdict(self) -> str:
-        """The worst of the parts'."""
+        """The worst verdict of the parts."""
         return max((part.verdict for part in self.parts), key=(RIGHT, REFUSED, WRONG).index, default=WRONG)
 
     @property
     def message(self) -> str:
-        """Why it is not right, part by part."""
+        """The messages of the parts that are not right."""
         return "; ".join(f"{part.name}: {part.message}" for part in self.parts if part.verdict != RIGHT)
 
     @property
     def unaccepted(self) -> tuple[Part, ...]:
-        """Parts that are neither right nor refused where the case says so, or with the paper's scheme."""
+        """Parts that are wrong, or refused although neither the case nor the paper's scheme allows it."""
         refusable = self.case.parts if self.preset == LENIENT else self.case.refusable
         return tuple(part for part in self.parts if part.verdict == WRONG
                      or part.verdict == REFUSED and part.name not in refusable)
 
     def as_row(self) -> dict:
-        """The cell in plain types for the pages: its case, its verdicts, why it is not right, and the intervals of the
-        right parts."""
+        """The cell in plain types for the pages: case, verdicts, messages, and the intervals of the right parts."""
         case = self.case
         parts = [{"name": part.name, "verdict": part.verdict, "accepted": part not in self.unaccepted,
                   "bounds": [[check.quantity, check.interval(3), check.origin] for check in part.checks
@@ -351,23 +356,24 @@ def run_part(name: str, function, preset: str, limit: float = LIMIT) -> Part:
             checks = tuple(item for item in items if isinstance(item, Check))
             always = tuple(check for item in items if isinstance(item, Run) for check in sound(item))
     except (SimulationError, StageError, SceneError) as error:
-        said = bool(REASON.search(str(error)))
-        return Part(name, REFUSED if said else WRONG, f"{error}" if said else f"refused without a reason: {error}")
+        has_reason = bool(REASON.search(str(error)))
+        message = f"{error}" if has_reason else f"refused without a reason: {error}"
+        return Part(name, REFUSED if has_reason else WRONG, message)
     except Exception as error:
         return Part(name, WRONG, f"{type(error).__name__}: {error}")
-    return judged(name, checks, always)
+    return judge_part(name, checks, always)
 
 
-def judged(name: str, checks: tuple[Check, ...], always: tuple[Check, ...]) -> Part:
-    """Right if there are checks and all of them hold."""
+def judge_part(name: str, checks: tuple[Check, ...], always: tuple[Check, ...]) -> Part:
+    """Judge a part: right if it has checks and all of them hold."""
     short = (f"{c.quantity} {c.measured} (expected {c.interval()})" for c in (*checks, *always) if not c.holds)
-    told = "; ".join(short) if checks or always else "nothing was measured"
-    return Part(name, WRONG if told else RIGHT, told, checks, always)
+    message = "; ".join(short) if checks or always else "nothing was measured"
+    return Part(name, WRONG if message else RIGHT, message, checks, always)
 
 
 @contextmanager
 def limited(seconds: float):
-    """Raises TooLong inside when the process has spent so many CPU seconds."""
+    """Raise TooLong in the block once the process has used so many CPU seconds."""
     def stop(*_):
         raise TooLong(f"not done after {seconds:g} s")
 
@@ -381,8 +387,11 @@ def limited(seconds: float):
 
 
 def evidence(cell: Cell) -> Iterator[Check]:
-    """All own checks of the parts that are right; the largest share of its tolerance that anything uses which must hold
-    in every run; and how many parts have a verdict that the case does not accept."""
+    """Checks of a cell.
+
+    These are the own checks of the right parts, the largest share of a tolerance that the checks of every run use, and
+    the number of parts whose verdict the case does not accept.
+    """
     right = [part for part in cell.parts if part.verdict == RIGHT]
     for part in right:
         yield from (replace(check, quantity=f"{part.name}, {check.quantity}") for check in part.checks)
@@ -402,7 +411,7 @@ def judge(case: HardCase, preset: str, record: Callable, record_property: Callab
 
 
 def parametrize(*cases: HardCase) -> pytest.MarkDecorator:
-    """Parametrize a test over "case" and "preset": each case is a verification case, a variant a preset."""
+    """Parametrize a test over "case" and "preset". Each hard case is a verification case, and each preset a variant."""
     sets = [pytest.param(case, preset, id=f"{case.full_id}, {preset}", marks=(pytest.mark.slow, case.mark))
             for case in cases for preset in PRESETS]
     return pytest.mark.parametrize("case, preset", sets)

@@ -1,8 +1,8 @@
-"""Scenes that are physically plausible and hard on the solver, drawn by seed: tables that jump, odd outlines, permeable
-bodies, transient substrates, soft bodies under the flow, closed pores, starved seeds, dense rows, still water, contact.
+"""Physically plausible scenes that are hard on the solver, drawn by seed.
 
-``scene(seed)`` gives the tables of a scene as TOML has them, each value a text with its unit. Seeds take the kinds of
-:data:`KINDS` in turn.
+They have tables that jump, odd outlines, permeable bodies, transient substrates, soft bodies under the flow, closed
+pores, starved seeds, dense rows, still water or contact. ``scene(seed)`` gives the tables of a scene as in TOML, each
+value a text with its unit. Seeds take the kinds of :data:`KINDS` in turn.
 """
 
 from __future__ import annotations
@@ -24,16 +24,16 @@ def scene(seed: int) -> dict:
 
 
 def kind(seed: int) -> str:
-    """What makes a member hostile."""
+    """The kind of a member: the feature that makes it hostile."""
     return tuple(KINDS)[seed % len(KINDS)]
 
 
 def with_other_rows(tables: dict, seed: int) -> dict:
-    """The same scene with half of its rows and two others."""
+    """The scene with half of its rows and two new ones."""
     random = np.random.default_rng((seed, 1))
     end = _hours(tables["growth"]["end"])
-    kept = tables["output"]["times"][::-2]
-    times = {*map(_hours, kept), *_inner(random, end, 2)}
+    retained = tables["output"]["times"][::-2]
+    times = {*map(_hours, retained), *_inner(random, end, 2)}
     return {**tables, "output": {"times": [f"{time!r} h" for time in sorted(times)]}}
 
 
@@ -62,7 +62,7 @@ def _rows(random: Random, end: float) -> list[str]:
 
 
 def _plain(random: Random) -> dict:
-    """A seed in a pore with a flow, its numbers within ranges that pores of soils and filters have."""
+    """A seed in a pore with flow. Its numbers lie in the ranges of pores in soils and filters."""
     width = _spread(random, 15.0, 120.0)
     end = round(_spread(random, 0.4, 6.0), 3)
     return {
@@ -84,7 +84,7 @@ def _substrate(random: Random) -> dict:
 
 
 def _updates(tables: dict, transport: str) -> None:
-    """Three steps of the paper's scheme."""
+    """Set three steps of the paper's scheme."""
     step = _hours(tables["growth"]["end"]) / 3
     tables["growth"]["time_step"] = f"{step!r} h"
     tables["numerics"] |= {"time": "updates", "transport": transport}
@@ -95,7 +95,7 @@ def _width(tables: dict) -> float:
 
 
 def _table(random: Random, end: float, value: str, low: float, high: float) -> list[list[str]]:
-    """A table of two to four jumps from a value, each by a factor."""
+    """A table of two to four jumps from a value. Each multiplies it by a random factor."""
     size, unit = value.split(" ", 1)
     times = [0.0, *sorted(_inner(random, end, int(random.integers(2, 5))))]
     factors = [1.0, *(_spread(random, low, high) for _ in times[1:])]
@@ -103,7 +103,7 @@ def _table(random: Random, end: float, value: str, low: float, high: float) -> l
 
 
 def jumps(random: Random, tables: dict) -> None:
-    """Tables of the drive and of a supply; a row at a jump; the end after the last row."""
+    """Tables of the drive and of a supply, with a row at a jump and the end after the last row."""
     end = _hours(tables["growth"]["end"])
     drive = tables["flow"]
     if random.uniform() < 0.5:
@@ -123,7 +123,7 @@ def jumps(random: Random, tables: dict) -> None:
 
 
 def outlines(random: Random, tables: dict) -> None:
-    """A ragged body that leans over its foot, of straight lines or smooth, at times with its head at the other wall."""
+    """A ragged body, polygonal or smooth, that leans over its foot. Some touch the other wall."""
     width = _width(tables)
     angles = np.linspace(np.pi, 0.0, int(random.integers(4, 9)))
     radii = random.uniform(0.4, 1.3, len(angles))
@@ -161,7 +161,7 @@ def forces(random: Random, tables: dict) -> None:
 
 
 def closed(random: Random, tables: dict) -> None:
-    """A pore that nothing enters or leaves: substrates run out."""
+    """A closed pore, in which the substrates run out."""
     del tables["flow"]
     tables["substrates"]["boundary"] = "closed"
     tables["growth"]["end"] = f"{round(random.uniform(0.1, 1.0), 3)!r} h"
@@ -169,7 +169,7 @@ def closed(random: Random, tables: dict) -> None:
 
 
 def starved(random: Random, tables: dict) -> None:
-    """A body that takes up all that comes: fronts inside it, or next to nothing to take up."""
+    """A starved body: it has sharp fronts, or hardly any supply."""
     tables["aggregate"]["radius"] = _um(_width(tables) * random.uniform(0.3, 0.85))
     for part in tables["substrates"].values():
         supply = _spread(random, 0.01, 3.0)
@@ -186,7 +186,7 @@ def dense(random: Random, tables: dict) -> None:
 
 
 def still(random: Random, tables: dict) -> None:
-    """Diffusion alone, at times with one supply of nothing: biomass only decays."""
+    """Diffusion alone. In every other scene one supply is zero, so that biomass only decays."""
     del tables["flow"]
     if random.uniform() < 0.5:
         name = ("acceptor", "donor")[int(random.integers(2))]
@@ -194,7 +194,7 @@ def still(random: Random, tables: dict) -> None:
 
 
 def narrow(random: Random, tables: dict) -> None:
-    """A thin film above the body, or an end of the pore beside it."""
+    """A thin film above the body, or a body close to an end of the pore."""
     width = _width(tables)
     length = float(tables["pore"]["length"].split()[0])
     radius = width * random.uniform(0.6, 0.97)
@@ -208,5 +208,5 @@ def narrow(random: Random, tables: dict) -> None:
 KINDS: dict[str, Callable[[Random, dict], None]] = {
     "jumps": jumps, "outline": outlines, "brinkman": brinkman, "gear": gear, "forces": forces, "closed": closed,
     "starved": starved, "dense rows": dense, "still": still, "narrow": narrow}
-#: Kinds whose substrates are transient, with many steps of their own.
+#: Kinds with transient substrates, which take many steps of their own.
 TRANSIENT = ("gear", "closed")

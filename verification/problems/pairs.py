@@ -1,5 +1,4 @@
-"""Pairs of meshes of one rectangle, related to each other in every way that a transfer may meet, and norms on them.
-"""
+"""Pairs of meshes of one rectangle, related in every way that a transfer may meet, and norms on them."""
 
 from __future__ import annotations
 
@@ -14,7 +13,7 @@ from verification.problems.meshes import upright
 
 ENDS, WIDTH = (0.0, 40.0), 25.0
 AREA = (ENDS[1] - ENDS[0]) * WIDTH
-#: Distances (um) by which nodes are set aside, and at which others lie from the rim: slivers of that width.
+#: Displacements (um) of nodes, and the distance (um) of nodes from the rim that makes slivers of this width.
 ASIDE, SLIVER = (1e-14, 1e-9, 1e-4), 1e-6
 Grid = tuple[np.ndarray, np.ndarray]
 
@@ -25,7 +24,7 @@ def grid(size: float, seed: int) -> Grid:
 
 
 def pairs() -> Iterator[tuple[str, Grid, Grid]]:
-    """(how the two are related, old mesh, new mesh)."""
+    """(relation of the two, old mesh, new mesh)."""
     first, other = grid(5.0, 1), grid(4.0, 2)
     yield "unrelated", first, other
     yield "the same, in another order", first, (first[0], np.roll(first[1], 1, axis=1)[::-1])
@@ -37,13 +36,13 @@ def pairs() -> Iterator[tuple[str, Grid, Grid]]:
 
 
 def cut_in_four(coarse: Grid) -> Grid:
-    """All nodes and edges are shared."""
+    """Each triangle cut in four. The meshes share all nodes and edges."""
     fine = MeshTri(coarse[0].T.copy(), coarse[1].T.copy()).refined()
     return upright(fine.p.T.copy(), fine.t.T.copy())
 
 
 def aside(old: Grid, distance: float) -> Grid:
-    """Inner nodes moved by no more than ``distance``: all edges cross at grazing angles."""
+    """The mesh with inner nodes moved by at most ``distance``. All edges cross at grazing angles."""
     points = old[0].copy()
     inner = (points > 0).all(axis=1) & (points < [ENDS[1], WIDTH]).all(axis=1)
     points[inner] += np.random.default_rng(5).uniform(-distance, distance, (inner.sum(), 2))
@@ -61,7 +60,7 @@ def slivers(seed: int) -> Grid:
 
 
 def integral(mesh: Grid, field: np.ndarray, weight=lambda x, y: 1 + 0 * x) -> float:
-    """Integral of a nodal field (N,) times weight(x, y), exact where the weight is a polynomial of degree five."""
+    """Integral of a nodal field (N,) times weight(x, y), exact for polynomial weights of degree five."""
     where, area, shape = meshes.quadrature(*mesh)
     return np.sum(area * (field[mesh[1]] @ shape.T) * weight(*np.moveaxis(where, 2, 0)))
 
@@ -73,7 +72,9 @@ def square(mesh: Grid, field: np.ndarray) -> float:
 
 
 def curved_weights(nodes: np.ndarray, barycentric: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """(t, q) um2, weights of a quadrature on triangles with nodes (t, 6, 2): corners, then middles of 01, 12 and 20, as
-    scikit-fem has them; barycentric: (q, 3) the points."""
-    by = [ElementTriP2().lbasis(barycentric[:, 1:].T, k)[1] for k in range(6)]
-    return np.linalg.det(np.einsum("tai,akq->tqik", nodes, by)) * weights
+    """(t, q) um2, weights of a quadrature at barycentric points (q, 3) on triangles with nodes (t, 6, 2).
+
+    The nodes are the corners, then the middles of 01, 12 and 20, as in scikit-fem.
+    """
+    gradients = [ElementTriP2().lbasis(barycentric[:, 1:].T, k)[1] for k in range(6)]
+    return np.linalg.det(np.einsum("tai,akq->tqik", nodes, gradients)) * weights

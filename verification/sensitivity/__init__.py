@@ -3,12 +3,12 @@
 Table 1 prints rounded numbers: an input may be anywhere within half a unit of its last digit. The record
 `sensitivity.json` holds the elasticities of every number that the paper prints of base, and of contact and conductivity
 of wide, with respect to each input, by central differences of the converged solution; and the set of inputs within the
-rounding that comes nearest to all printed numbers of base at once. The claims read it from here.
+rounding that comes nearest to all printed numbers of base at once. The claims read the record here.
 
-Runs are made in this process and not by `repro sweep`: a number needs a state that no row of a run holds (grown and not
-yet expanded [E12]) or another run from contact on, and elasticities and the set choose the next run by the last. They
-write no fields, no rows and no folders: what stays of a run are its numbers, 0.4 kB in `out/runs.jsonl`, of which the
-whole study makes 2 MB. A run is not made again while it stands there under its scene and the source that made it.
+Runs are computed in this process and not by `repro sweep`. Some numbers need a state that no row has (grown and not yet
+expanded [E12]) or a second run from contact on, and elasticities and the set choose each run from the results of the
+last. A run writes its numbers alone, 0.4 kB in `out/runs.jsonl`; the study writes 2 MB. A run is not repeated while its
+numbers are stored under the same scene and source.
 """
 
 from __future__ import annotations
@@ -25,13 +25,12 @@ RECORD = Path(__file__).parent / "sensitivity.json"
 
 @cache
 def record() -> dict:
-    """The committed record; empty where there is none."""
+    """The committed record; empty if there is none."""
     return load(RECORD, {})
 
 
 def interval(quantity: str, value: float) -> tuple[float, float] | None:
-    """Where a value goes as the rounded inputs move within their rounding, all at once, to first order; None where the
-    record does not tell."""
+    """Range of a value, to first order, as all inputs vary within their rounding; None if the record lacks it."""
     part = reach(quantity)
     return None if part is None else (value - abs(value) * part, value + abs(value) * part)
 
@@ -53,11 +52,11 @@ def in_closed_form(form: Callable[..., float], *inputs: tuple[float, float]) -> 
 
 
 def verified_set() -> str:
-    """The set of inputs that gives all printed numbers of base at once, in words; empty where none was found."""
-    found = record().get("one_set", {})
-    if not found.get("reached"):
+    """The set of inputs that gives all printed numbers of base at once, in words; empty if there is none."""
+    one_set = record().get("one_set", {})
+    if not one_set.get("reached"):
         return ""
-    inputs = ", ".join(f"{name} {value:.4g}" for name, value in found["inputs"].items())
-    numbers = ", ".join(f"{name.replace('_', ' ')} {value:.4f} ± {found['bars'][name]:.1g}"
-                        for name, value in found["numbers"].items())
+    inputs = ", ".join(f"{name} {value:.4g}" for name, value in one_set["inputs"].items())
+    numbers = ", ".join(f"{name.replace('_', ' ')} {value:.4f} ± {one_set['bars'][name]:.1g}"
+                        for name, value in one_set["numbers"].items())
     return f"with {inputs} a run gives {numbers}"

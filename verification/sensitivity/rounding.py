@@ -1,27 +1,27 @@
-"""The inputs of base and wide, those that Table 1 prints with so many digits and those that are taken as exact; and the
-numbers that a run comes to, each run computed once and kept on the disk.
+"""The inputs of base and wide, rounded in Table 1 or taken as exact, and the numbers of each run, which are computed
+once and stored on the disk.
 
-What the rounding of Table 1 allows in base and wide: elasticities, one set of inputs for all printed numbers of
+The effects of the rounding of Table 1 on base and wide: elasticities, one set of inputs for all printed numbers of
 base, and Sobol indices.
 
 **Elasticities** d ln(number) / d ln(input), by central differences. Two runs on either side at two distances give two
-estimates; the nearer one counts, and their difference is its bar: it holds what the larger distance adds to the error
-of the difference, and what two runs on unrelated meshes differ by. An elasticity is resolved where its bar is at most a
-tenth of it.
+estimates. The nearer one counts, and their difference is its bar: it contains the additional error of the larger
+distance and the difference of two runs on unrelated meshes. An elasticity is resolved if its bar is at most a tenth of
+it.
 
 **One set** within the rounding: a linear program, then real runs. With relative changes x_i of the inputs, r_i their
 rounding and e_ni the elasticities, the program is
 
     minimise t    such that    |x_i| <= t r_i    and    low_n <= f_n (1 + sum_i e_ni x_i) <= high_n
 
-so that t <= 1 is a set within the rounding. A run with it moves f_n by what is not linear, and the program is solved
-again from there. Where t > 1 the misfit that is left at t = 1 is minimised instead. The runs are made on SET_SIZES, and
-low_n and high_n are the ends of the printed interval moved inwards by the numerical bar of f_n from all of them, so
-that a set is reached where f_n lies in the interval with the whole of its bar.
+so that t <= 1 is a set within the rounding. A run with the set gives the nonlinear part of f_n, and the program is
+solved again from there. If t > 1, the misfit at t = 1 is minimised instead. The runs use SET_SIZES; low_n and high_n
+are the ends of the printed interval, moved inwards by the numerical bar of f_n from all sizes, so that a set is reached
+if f_n lies in the interval with its full bar.
 
-**Sobol indices** of base: how much of the variance of each printed number an input's rounding accounts for. Inputs are
-independent and uniform within their rounding; those whose elasticity moves no printed number by half a percent a
-percent are left where they are. `scipy.stats.sobol_indices` (Saltelli 2010) with N (d + 2) runs in the preset "fast",
+**Sobol indices** of base: the share of an input's rounding in the variance of each printed number. Inputs are
+independent and uniform within their rounding; inputs whose elasticity is at most 0.005 for all printed numbers are
+fixed. `scipy.stats.sobol_indices` (Saltelli 2010) with N (d + 2) runs in the preset "fast",
 and its bootstrap's intervals.
 """
 
@@ -39,7 +39,7 @@ from scipy.optimize import linprog
 from scipy.stats import sobol_indices, uniform
 
 from repro.march import simulation, updates
-from repro.march.loop import State
+from repro.march.loop import RestartState
 from repro.model import pore
 from repro.model.kinetics import rate_law
 from repro.results import M_PER_D
@@ -55,8 +55,8 @@ from verification.uncertainty import estimate
 
 @dataclass(frozen=True)
 class Input:
-    """name: as the paper has it; paths: keys of the scene that go with it, in proportion; value: as printed, and half:
-    half a unit of its last digit, zero where it is taken as exact; only: the scene it belongs to, where not to both."""
+    """name: in the paper; paths: keys of the scene in proportion to it; value: as printed; half: half a unit of its
+    last digit, zero for an exact input; only: the scene it belongs to, empty for both."""
 
     name: str
     paths: tuple[str, ...]
@@ -108,12 +108,12 @@ INPUTS = ROUNDED + EXACT
 BY_NAME = {each.name: each for each in INPUTS}
 
 
-def changed(said: Scene, factors: dict[str, float]) -> Scene:
+def changed(scene: Scene, factors: dict[str, float]) -> Scene:
     """A scene with some inputs, by name, times factors."""
     for name, factor in factors.items():
         for path in BY_NAME[name].paths:
-            said = _scaled(said, path.split("."), factor)
-    return said
+            scene = _scaled(scene, path.split("."), factor)
+    return scene
 
 
 def _scaled(node, keys: list[str], factor: float):
@@ -122,67 +122,67 @@ def _scaled(node, keys: list[str], factor: float):
     return replace(node, **{first: _scaled(part, rest, factor) if rest else factor * part})
 
 
-KEPT = Path(__file__).parent / "out" / "runs.jsonl"
+RUNS_FILE = Path(__file__).parent / "out" / "runs.jsonl"
 #: Conductivity is asked for so long after contact, h.
 AFTER = 4.0
 
 Row = dict[str, float]
 
 
-def scene(name: str, factors: dict[str, float], *changes: str) -> Scene:
+def load_varied(name: str, factors: dict[str, float], *changes: str) -> Scene:
     """Base or wide in the converged solution's preset, or with other numerics, with inputs times factors."""
     return changed(load_scene(name, changes or converged(1.0)), factors)
 
 
-def of_base(said: Scene) -> Row:
+def of_base(scene: Scene) -> Row:
     """What section 4 prints, concentrations in K_s; "before the aggregate expands" is the shape a time step before
     19.4 h with what grows in it [E12]."""
-    plotted = END - said.growth.time_step
-    first, shaped, last = simulation.simulate(ending(said, plotted, END))
-    grown, _, _ = updates.make_biomass(said, shaped.pore, shaped.solved, said.growth.time_step)
-    found = pore.solve(said, grown)
-    halves = [each.half_saturation for each in found.problem.both]
-    acceptor, donor = (flux.effluent / half for flux, half in zip(found.fluxes, halves))
-    supply = [each.supply for each in found.problem.both]
-    rate = float(rate_law(said.substrates, said.kinetics).growth_rate(*supply))
+    plotted = END - scene.growth.time_step
+    first, shaped, last = simulation.simulate(ending(scene, plotted, END))
+    grown, _, _ = updates.make_biomass(scene, shaped.pore, shaped.solved, scene.growth.time_step)
+    solved = pore.solve(scene, grown)
+    halves = [each.half_saturation for each in solved.problem.both]
+    acceptor, donor = (flux.effluent / half for flux, half in zip(solved.fluxes, halves))
+    supply = [each.supply for each in solved.problem.both]
+    rate = float(rate_law(scene.substrates, scene.kinetics).growth_rate(*supply))
     return {"velocity_0": M_PER_D * first.solved.flow.mean_velocity,
             "velocity": M_PER_D * shaped.solved.flow.mean_velocity,
             "effluent_acceptor": acceptor, "effluent_donor": donor,
             "consumed": 100 * (1 - acceptor * halves[0] / supply[0]),
-            **{f"acceptor_at_{d:g}": upstream_means(grown, found, d)[0] / halves[0] for d in DISTANCES},
-            "inert": 100 * last.pore.composition(said.kinetics.maximum_density)[0],
+            **{f"acceptor_at_{d:g}": upstream_means(grown, solved, d)[0] / halves[0] for d in DISTANCES},
+            "inert": 100 * last.pore.composition(scene.kinetics.maximum_density)[0],
             "area": shaped.pore.boundary.area,
             "doubling": plotted * log(2) / log(shaped.pore.boundary.area / first.pore.boundary.area),
             "doubling_at_supply": log(2) / rate}
 
 
-def of_wide(said: Scene) -> Row:
+def of_wide(scene: Scene) -> Row:
     """Contact with the opposite wall (h), and the conductivity (m/d) some hours after it."""
-    state = touching(ending(said, said.growth.end))
+    state = touching(ending(scene, scene.growth.end))
     time = state.pore.time
-    *_, (_, last) = simulation.steps(ending(said, time + AFTER), state)
+    *_, (_, last) = simulation.steps(ending(scene, time + AFTER), state)
     return {"contact_time": time, "conductivity_after": M_PER_D * last.solved.flow.conductivity}
 
 
-def touching(said: Scene) -> State:
+def touching(scene: Scene) -> RestartState:
     """The first state of a run in which the aggregate touches the opposite wall."""
-    return next(state for state, _ in simulation.steps(said) if state.pore.contact)
+    return next(state for state, _ in simulation.steps(scene) if state.pore.contact)
 
 
 OF: dict[str, Callable[[Scene], Row]] = {"base": of_base, "wide": of_wide}
 
 
 class Runs(Numbers):
-    """The numbers of runs, of which the file has a line each."""
+    """The numbers of runs, one line of the file per run."""
 
-    def __init__(self, file: Path = KEPT) -> None:
+    def __init__(self, file: Path = RUNS_FILE) -> None:
         super().__init__(computed, file)
 
 
-def computed(said: Scene) -> dict[str, float]:
-    """What a run comes to, with no operation that fails silently."""
+def computed(scene: Scene) -> dict[str, float]:
+    """The numbers of a run; floating-point errors raise."""
     with np.errstate(all="raise", under="ignore"):
-        return {name: float(value) for name, value in OF[said.name](said).items()}
+        return {name: float(value) for name, value in OF[scene.name](scene).items()}
 
 
 #: Relative distances of an input from its printed value; the larger one of an input that is taken as exact.
@@ -192,33 +192,33 @@ RESOLVED = 0.1
 
 
 def elasticities(runs: Runs, name: str) -> dict[str, dict[str, dict]]:
-    """{number: {input: elasticity, bar, resolved, and the changes (%) that +-10 % of an exact input make}}."""
+    """{number: {input: elasticity, bar, resolved, and the changes (%) caused by +-10 % of an exact input}}."""
     inputs = [each for each in INPUTS if each.only in ("", name)]
-    runs.get_all(said for each in inputs for said in _moved(name, each))
-    plain = runs.get(scene(name, {}))
-    found: dict[str, dict[str, dict]] = {number: {} for number in plain}
+    runs.get_all(scene for each in inputs for scene in _moved(name, each))
+    plain = runs.get(load_varied(name, {}))
+    by_number: dict[str, dict[str, dict]] = {number: {} for number in plain}
     for each in inputs:
         rows = [*map(runs.get, _moved(name, each))]
         for number, value in plain.items():
-            found[number][each.name] = _told(value, column(rows, number))
-    return found
+            by_number[number][each.name] = _elasticity(value, column(rows, number))
+    return by_number
 
 
 def _moved(name: str, each: Input) -> list[Scene]:
     """Scenes with an input above and below its value, at all distances at which differences are taken."""
     distances = (NEAR, FAR) if each.half else (NEAR, FAR, LARGE)
-    return [scene(name, {each.name: 1 + sign * distance}) for distance in distances for sign in (1, -1)]
+    return [load_varied(name, {each.name: 1 + sign * distance}) for distance in distances for sign in (1, -1)]
 
 
-def _told(value: float, moved: list[float]) -> dict:
-    """Of one number and one input: central differences of ln f over ln x."""
+def _elasticity(value: float, moved: list[float]) -> dict:
+    """Elasticity of one number by one input: central differences of ln f over ln x."""
     near = (moved[0] - moved[1]) / (2 * NEAR * value)
     far = (moved[2] - moved[3]) / (2 * FAR * value)
     bar = abs(far - near)
-    told = {"elasticity": near, "bar": bar, "resolved": bar <= RESOLVED * abs(near)}
+    elasticity = {"elasticity": near, "bar": bar, "resolved": bar <= RESOLVED * abs(near)}
     if moved[4:]:
-        told["by_10_percent"] = [100 * (each / value - 1) for each in moved[4:]]
-    return told
+        elasticity["by_10_percent"] = [100 * (each / value - 1) for each in moved[4:]]
+    return elasticity
 
 
 #: What section 4 prints: C01-C04.
@@ -230,16 +230,16 @@ MIDDLE, HALF = INTERVALS.mean(axis=1), np.ptp(INTERVALS, axis=1) / 2
 #: Sizes of elements and steps of the runs that make the set, the one that counts first: on 0.5, 2**-0.5 and 1 the bar
 #: of the acceptor effluent, 0.005, is as wide as what its digits leave to either side.
 SET_SIZES = (2**-1.5, 0.5, 2**-0.5)
-#: How many bars a number is kept inside its interval.
-KEPT_INSIDE = 1.5
-#: The part of the interval around its middle that is aimed at; the rest is for what is not linear, of which AIMED to
-#: ENOUGH is let be.
+#: Distance of a number from the ends of its interval, in bars.
+BARS_INSIDE = 1.5
+#: Part of the half interval that the program aims at; the rest is for nonlinearity. A misfit up to ENOUGH ends the
+#: search.
 AIMED, ENOUGH = 0.4, 0.5
 ROUNDS = 6
 
 
 def printed_of(numbers: Numbers) -> np.ndarray:
-    """Those that the paper prints."""
+    """The numbers that the paper prints."""
     return np.array([numbers[name] for name in PRINTED])
 
 
@@ -250,15 +250,15 @@ def misfit(numbers: Row, bars: ArrayLike = 0.0) -> float:
 
 
 def one_set(runs: Runs, elasticities: dict[str, dict[str, dict]]) -> dict:
-    """The set, what runs with it give and how well that is known, the share t of the rounding that it takes, and
-    whether it is reached."""
+    """The set, the numbers of its runs with their bars, the share t of the rounding that it uses, and whether it is
+    reached."""
     rows = _on_sizes(runs, {})
     start, bars = rows[0], _bars(rows)
     slopes = start[:, None] * _table(elasticities)
     for _ in range(ROUNDS):
         x, t = program(start, slopes, bars)
         factors = {each.name: 1 + value for each, value in zip(ROUNDED, x)}
-        numbers = runs.get(scene("base", factors, *converged(SET_SIZES[0])))
+        numbers = runs.get(load_varied("base", factors, *converged(SET_SIZES[0])))
         if misfit(numbers) <= ENOUGH and misfit(numbers, bars) <= 1:
             break
         start = printed_of(numbers) - slopes @ x
@@ -271,44 +271,44 @@ def one_set(runs: Runs, elasticities: dict[str, dict[str, dict]]) -> dict:
 
 
 def _table(elasticities: dict[str, dict[str, dict]]) -> np.ndarray:
-    """(printed numbers, rounded inputs) their elasticities."""
-    found = [elasticities[name][each.name]["elasticity"] for name, each in product(PRINTED, ROUNDED)]
-    return np.reshape(found, (len(PRINTED), -1))
+    """(printed numbers, rounded inputs) elasticities."""
+    listed = [elasticities[name][each.name]["elasticity"] for name, each in product(PRINTED, ROUNDED)]
+    return np.reshape(listed, (len(PRINTED), -1))
 
 
 def column(rows: list[Row], name: str) -> list[float]:
-    """A number of some runs."""
+    """One number of each run."""
     return [row[name] for row in rows]
 
 
 def _on_sizes(runs: Runs, factors: dict[str, float]) -> np.ndarray:
     """(sizes, printed numbers) of base on SET_SIZES."""
-    rows = runs.get_all(scene("base", factors, *converged(size)) for size in SET_SIZES)
+    rows = runs.get_all(load_varied("base", factors, *converged(size)) for size in SET_SIZES)
     return np.array([*map(printed_of, rows)])
 
 
 def _bars(rows: np.ndarray) -> np.ndarray:
-    """Of each printed number."""
+    """(printed numbers,) bars."""
     return np.array([estimate(SET_SIZES, values, MESH_ORDERS).bar for values in rows.T])
 
 
 def program(start: np.ndarray, slopes: np.ndarray, bars: np.ndarray) -> tuple[np.ndarray, float]:
-    """Relative changes and the share of the rounding that they take; within it, with the least misfit, where the
-    intervals, less the bars, are out of reach."""
+    """Relative changes of the inputs and the share of the rounding that they use. If the intervals, less the bars, are
+    out of reach, the changes within the rounding that have the least misfit."""
     rounding = np.array([each.rounding for each in ROUNDED])
-    aimed = np.minimum(HALF - KEPT_INSIDE * bars, AIMED * HALF)
-    given = slopes * rounding, MIDDLE - start
+    aimed = np.minimum(HALF - BARS_INSIDE * bars, AIMED * HALF)
+    system = slopes * rounding, MIDDLE - start
     none = 0 * HALF
     ones = np.ones(len(rounding))
-    best = _solved(*given, aimed, none, 0 * ones, ones)
+    best = _solved(*system, aimed, none, 0 * ones, ones)
     share = best[-1] if best is not None else np.inf
     if share > 1:
-        best = _solved(*given, none, HALF, ones, 0 * ones)
+        best = _solved(*system, none, HALF, ones, 0 * ones)
     return best[:-1] * rounding, float(share)
 
 
 def _solved(A: np.ndarray, b: np.ndarray, *within: np.ndarray) -> np.ndarray | None:
-    """The y and, last, the least t with |A y - b| <= c + t d and |y| <= e + t f; None where there is none. within: c,
+    """The y and, last, the least t with |A y - b| <= c + t d and |y| <= e + t f; None if there is none. within: c,
     d, e and f."""
     c, d, e, f = within
     unit = np.eye(len(f))
@@ -333,12 +333,12 @@ def sobol(runs: Runs, elasticities: dict[str, dict[str, dict]], samples: int = S
     names = [name for name, moved in zip(PRINTED, moves.any(axis=1)) if moved and name != "consumed"]
 
     def numbers(x: np.ndarray) -> list[list[float]]:
-        rows = runs.get_all(scene("base", dict(zip(inputs, factors)), *FAST) for factors in x.T)
+        rows = runs.get_all(load_varied("base", dict(zip(inputs, factors)), *FAST) for factors in x.T)
         return [column(rows, name) for name in names]
     spread = [uniform(1 - each.rounding, 2 * each.rounding) for each in chosen]
-    found = sobol_indices(func=numbers, n=samples, dists=spread, rng=np.random.default_rng(SEED))
-    sure = found.bootstrap(confidence_level=CONFIDENCE, n_resamples=999)
-    orders = zip(names, _listed(found.first_order, sure.first_order), _listed(found.total_order, sure.total_order))
+    indices = sobol_indices(func=numbers, n=samples, dists=spread, rng=np.random.default_rng(SEED))
+    sure = indices.bootstrap(confidence_level=CONFIDENCE, n_resamples=999)
+    orders = zip(names, _listed(indices.first_order, sure.first_order), _listed(indices.total_order, sure.total_order))
     return {"samples": samples, "inputs": inputs, "confidence": CONFIDENCE,
             "numbers": {name: {"first_order": first, "total_order": total} for name, first, total in orders}}
 

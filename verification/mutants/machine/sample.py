@@ -55,7 +55,7 @@ def statements(text: str) -> int:
 
 def shared(sizes: dict, available: dict, count: int) -> dict:
     """``count`` in proportion to sizes, one at least and no more than are available, by largest remainders."""
-    seats = [(name, sizes[name] / (taken + 0.5)) for name in available for taken in range(1, available[name])]
+    seats = [(name, sizes[name] / (seat + 0.5)) for name in available for seat in range(1, available[name])]
     more = nlargest(count - len(available), seats, key=itemgetter(1))
     return Counter([*available, *(name for name, _ in more)])
 
@@ -68,12 +68,12 @@ def _places(items, texts: dict[Path, str]) -> dict[Path, dict[tuple[int, int], l
         mutation = item.mutations[0]
         place = tuple(mutation.start_pos)
         is_hidden = any(start <= place < end for start, end in unseen[mutation.module_path])
-        if is_taken(mutation.operator_name.removeprefix("core/")) and not is_hidden:
+        if is_used(mutation.operator_name.removeprefix("core/")) and not is_hidden:
             places[mutation.module_path][place].append(item)
     return places
 
 
-def is_taken(operator: str) -> bool:
+def is_used(operator: str) -> bool:
     """Whether an operator of cosmic-ray is used."""
     pair = {*operator.split("_")[1:]}
     return operator in _SINGLE or bool(pair) and any(map(pair.issubset, _GROUPS))

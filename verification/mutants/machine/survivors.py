@@ -25,8 +25,8 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
     ("model/transport.py", "return state.reshape(2, -1)[:, pieces.cells] @ pieces.values.T",
      "return state.reshape(2, - 2)[:, pieces.cells] @ pieces.values.T"):
         "numpy takes any negative length of one axis for the one that is left.",
-    ("report/quantities.py", 'made = run.series.get("remeshed", run.times * np.nan) == 1',
-     'made = run.series.get("remeshed", run.times * np.nan) >= 1'):
+    ("report/quantities.py", 'is_new_mesh = run.series.get("remeshed", run.times * np.nan) == 1',
+     'is_new_mesh = run.series.get("remeshed", run.times * np.nan) >= 1'):
         "The column is 0 or 1, and NaN is neither.",
     ("model/growth.py", "MOST_ITERATIONS = 25", "MOST_ITERATIONS = 24"):
         "Identical outputs of base in the three presets, whose equilibria take 5, 5 and 3 iterations at most.",
@@ -39,7 +39,7 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
 
 #: Survivors that are left: (effect, why no test).
 LEFT: dict[tuple[str, str, str], tuple[str, str]] = {
-    ("run/__init__.py", "INTERVAL = 60.0", "INTERVAL = 59.0"):
+    ("runs/__init__.py", "INTERVAL = 60.0", "INTERVAL = 59.0"):
         ("Checkpoints are written every 59 s, and the help says so.",
          "It is a choice; what a run makes does not depend on it."),
     ("model/transport.py", "woken = (iterate.saturations <= 0) & (predicted <= 0) & (concentrations > 0)",

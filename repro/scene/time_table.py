@@ -1,8 +1,8 @@
-"""What a scene gives as a table over time: supplies, and the head or mean velocity.
+"""Tables over time in a scene: supplies, and the head or mean velocity.
 
-A table's times ascend from 0 h. Between them its last value holds ("steps", the new one from its
-time on), or values change evenly ("linear"); after the last time its value stays. Steps of a run
-end at every one of its times, so that no step goes over a jump or a bend.
+The times of a table ascend from 0 h. Between two times the table keeps its last value ("steps") or
+is interpolated linearly ("linear"). After the last time it keeps the last value. The steps of a run
+end at all of these times, so that no step contains a jump or a kink.
 """
 from bisect import bisect_right
 from collections.abc import Callable
@@ -13,15 +13,15 @@ Part = TypeVar("Part")
 
 
 @dataclass(frozen=True)
-class Course:
-    """Values at times (h), ascending from 0; linear: do they change evenly in between?"""
+class TimeTable:
+    """Values at times (h), ascending from 0; linear: are they interpolated linearly?"""
 
     times: tuple[float, ...]
     values: tuple[float, ...]
     linear: bool = False
 
     def at(self, time: float) -> float:
-        """The value at a time (h), after the jump that may be there."""
+        """Value at a time (h), after a jump at that time."""
         last = bisect_right(self.times, time) - 1
         if not self.linear or last + 1 == len(self.times):
             return self.values[last]
@@ -31,29 +31,29 @@ class Course:
 
     @property
     def largest(self) -> float:
-        """Of all values."""
+        """The largest value."""
         return max(self.values)
 
 
-def constant(part: Part, value: Callable[[Course], float]) -> Part:
-    """A scene, or a section, with a value in place of every table; itself where there is none."""
+def constant(part: Part, value: Callable[[TimeTable], float]) -> Part:
+    """Replace every table of a scene or a section by a value; the same object without tables."""
     changed: dict[str, object] = {}
     for entry in fields(part):  # type: ignore[arg-type]  # a dataclass
         old = getattr(part, entry.name)
-        if isinstance(old, Course):
+        if isinstance(old, TimeTable):
             changed[entry.name] = value(old)
         elif is_dataclass(old) and (new := constant(old, value)) is not old:
             changed[entry.name] = new
     return replace(part, **changed) if changed else part  # type: ignore[type-var]  # a dataclass
 
 
-def courses(part: object) -> list[Course]:
+def time_tables(part: object) -> list[TimeTable]:
     """All tables of a scene or a section."""
-    found = []
+    tables = []
     for entry in fields(part):  # type: ignore[arg-type]  # a dataclass
         value = getattr(part, entry.name)
-        if isinstance(value, Course):
-            found.append(value)
+        if isinstance(value, TimeTable):
+            tables.append(value)
         elif is_dataclass(value):
-            found += courses(value)
-    return found
+            tables += time_tables(value)
+    return tables

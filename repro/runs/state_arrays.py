@@ -1,7 +1,7 @@
-"""The state of a run as plain data and arrays, and back.
+"""Convert the state of a run to plain data and arrays, and back.
 
-The checksum of a checkpoint says that the numbers are those that were written; all that is asked
-here is whether they are of this scene.
+The checksum of a checkpoint guarantees that its numbers are unchanged. This module only checks that
+they belong to the scene.
 """
 
 from __future__ import annotations
@@ -14,22 +14,22 @@ from repro.errors import CheckpointError
 from repro.fem.linear import Method
 from repro.fem.mesh import Mesh
 from repro.fem.space import Space
-from repro.march.loop import Ledger, State
-from repro.march.pace import Pace
+from repro.march.loop import Ledger, RestartState
+from repro.march.step_control import StepControl
 from repro.model.pore import Pore, material
 from repro.model.transport import Concentrations
 from repro.runs.checkpoint import Arrays
 from repro.scene import Scene, scene_hash
 
-#: Arrays of the mesh, and of the pore, by the names of its fields.
+#: Arrays of the mesh and of the pore, by the names of their fields.
 OF_MESH = ("points", "cells", "biomass", "loop")
 OF_PORE = ("wall", "fixed", "active", "inert", "theta", "pressure")
-#: Of the concentrations, from which Newton's method starts.
+#: Arrays of the concentrations from which Newton's method starts.
 OF_GUESS = ("acceptor", "donor")
 
 
-def packed(scene: Scene, state: State) -> tuple[dict, Arrays]:
-    """A state as what JSON can say, and arrays."""
+def pack_state(scene: Scene, state: RestartState) -> tuple[dict, Arrays]:
+    """Convert a state to values for JSON, and arrays."""
     pore = state.pore
     guess = pore.concentrations
     arrays = {name: getattr(pore.mesh, name) for name in OF_MESH}
@@ -40,7 +40,7 @@ def packed(scene: Scene, state: State) -> tuple[dict, Arrays]:
     if guess:
         arrays |= {name: getattr(guess, name) for name in OF_GUESS}
     arrays["pending"] = np.array([_numbers(ledger) for ledger in state.ledgers], dtype=float)
-    plain = {"scene": scene_hash(scene), "time_h": pore.time, "pace": asdict(state.pace),
+    plain = {"scene": scene_hash(scene), "time_h": pore.time, "pace": asdict(state.step_control),
              "ends_um": [float(x) for x in pore.mesh.ends], "front": float(pore.front),
              "guess": guess.iterations if guess else None, "remeshes": int(state.remeshes),
              "iterations": state.iterations, "row_h": float(state.row)}
@@ -48,22 +48,22 @@ def packed(scene: Scene, state: State) -> tuple[dict, Arrays]:
 
 
 def _numbers(ledger: Ledger) -> list[float]:
-    """A ledger's numbers in the order of its fields, pairs one after the other."""
+    """The numbers of a ledger in the order of its fields, with pairs flattened."""
     return [float(value) for part in astuple(ledger) for value in np.atleast_1d(part)]
 
 
-def unpacked(scene: Scene, plain: dict, arrays: Arrays) -> State:
-    """The state that :func:`packed` was given. Raises CheckpointError where it is of another scene.
-    """
+def unpack_state(scene: Scene, plain: dict, arrays: Arrays) -> RestartState:
+    """Invert :func:`pack_state`. Raises CheckpointError if the state is of another scene."""
     if plain["scene"] != scene_hash(scene):
         raise CheckpointError("it is of another scene")
     ledgers = tuple(map(_ledger, arrays["pending"].tolist()))
-    return State(_pore(scene, plain, arrays), Pace(**plain["pace"]), ledgers, plain["remeshes"],
-                 plain["iterations"], plain["row_h"])
+    step_control = StepControl(**plain["pace"])
+    return RestartState(_pore(scene, plain, arrays), step_control, ledgers, plain["remeshes"],
+                        plain["iterations"], plain["row_h"])
 
 
 def _ledger(row: list[float]) -> Ledger:
-    """A ledger from its numbers in the order of :func:`_numbers`."""
+    """Invert :func:`_numbers`."""
     supplied, out, consumed, stored = zip(row[2:10:2], row[3:10:2])
     return Ledger(row[0], row[1], supplied, out, consumed, stored, *row[10:])
 

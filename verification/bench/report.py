@@ -1,8 +1,8 @@
-"""What the benchmark has measured, told: verdicts, tables, pictures.
+"""Verdicts, tables and pictures of a benchmark.
 
-What is claimed of speed and accuracy is judged here by the numbers of a record; the verdicts are written nowhere else.
-Ratios are of wall times of one run; those of processor times, which other users of the machine disturb less, are told
-beside them.
+The claims about speed and accuracy are judged by the numbers of a record; the verdicts are written nowhere else. Ratios
+compare wall times of one run. Ratios of processor times, which other loads of the machine disturb less, stand beside
+them.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from verification.evidence.writing import Block, table
 #: (error, least ratio, aim) of the paper's scheme at its own best speed over a preset.
 FASTER = {runs.FAST: (0.01, 5.0, 10.0), runs.ACCURATE: (0.001, 20.0, 20.0)}
 WIDE, ACCURATE_RUN = 12.0, 3.0
-OTHERS, TIMES_FASTER = ("fipy", "py-pde, compiled"), 10.0
-#: Largest ratio of a growth step to its floor, above and up to so many nodes.
+OTHER_CODES, TIMES_FASTER = ("fipy", "py-pde, compiled"), 10.0
+#: Largest ratio of a growth step to its floor, above and up to a number of nodes.
 FLOORS = {"from 2500 nodes on": (1.5, 1500, inf), "at 600 nodes": (2.0, 499, 1500)}
-#: What a scene may take above the stages that it needs, over the whole model's time.
+#: Time that a scene may use beyond its own stages, over that of the complete model.
 EXCESS = 0.1
 NOT_MEASURED = "not measured"
 
@@ -33,19 +33,19 @@ NOT_MEASURED = "not measured"
 def judged(record: dict) -> list[dict]:
     """All verdicts of a record; what it has not measured neither holds nor fails."""
     parts = defaultdict(dict, record["parts"])
-    return [*_base(parts["base"]), *_others(parts), *_steps(parts["size"]), *_scenes(parts["scenes"]),
+    return [*_base(parts["base"]), *_other_codes(parts), *_steps(parts["size"]), *_scenes(parts["scenes"]),
             *_memory(parts["memory"])]
 
 
-def verdict(claim: str, wanted: str, measure: Callable[..., tuple[str, bool]], *given) -> dict:
-    """One of them: ``measure(*given)`` tells what was measured, and whether it holds; LookupError where the record
-    lacks it, as no rows have a first or a last."""
+def verdict(claim: str, required: str, measure: Callable[..., tuple[str, bool]], *arguments) -> dict:
+    """A verdict. ``measure(*arguments)`` returns the measurement in words and whether the claim holds, or raises
+    LookupError if the record lacks it."""
     try:
-        measured, holds = measure(*given)
+        measured, holds = measure(*arguments)
         holds = bool(holds)
     except LookupError:
         measured, holds = NOT_MEASURED, None
-    return {"claim": claim, "measured": measured, "wanted": wanted, "holds": holds}
+    return {"claim": claim, "measured": measured, "wanted": required, "holds": holds}
 
 
 def _base(part: dict) -> Iterator[dict]:
@@ -53,9 +53,9 @@ def _base(part: dict) -> Iterator[dict]:
         percent = f"{100 * error:g} %"
         yield verdict(f"base: the error of {name} is at most {percent}", f"at most {percent}",
                       _accurate, part, name, error)
-        wanted = f"at least {least:g} times" + (f" (aim {aim:g})" if aim > least else "")
+        required = f"at least {least:g} times" + (f" (aim {aim:g})" if aim > least else "")
         for words, at in ((percent, error), ("the error that the preset has", None)):
-            yield verdict(f"base: {name} is faster than the paper's scheme at its own best speed for {words}", wanted,
+            yield verdict(f"base: {name} is faster than the paper's scheme at its own best speed for {words}", required,
                           _faster, part, name, at, least)
     yield verdict(f"base: {runs.ACCURATE} takes about {ACCURATE_RUN:g} s", f"at most {ACCURATE_RUN:g} s",
                   _quick, part)
@@ -63,18 +63,18 @@ def _base(part: dict) -> Iterator[dict]:
 
 
 def _accurate(part: dict, name: str, error: float) -> tuple[str, bool]:
-    found = points(part, name)[0]["error"]
-    return f"{100 * found:.2g} %", found <= error
+    computed = points(part, name)[0]["error"]
+    return f"{100 * computed:.2g} %", computed <= error
 
 
 def _faster(part: dict, name: str, error: float | None, least: float) -> tuple[str, bool]:
-    """At an error, None: at its own."""
+    """error: at which the times are compared; None: at the preset's own."""
     point = points(part, name)[0]
-    wanted = point["error"] if error is None else error
-    best = reading(points(part, runs.PRESET_PAPER), wanted)
+    required = point["error"] if error is None else error
+    best = reading(points(part, runs.PRESET_PAPER), required)
     ratio, cpu = best.seconds / point["seconds"], best.cpu / point["cpu"]
-    told = f"{ratio:.1f} times (processor time {cpu:.1f}): {best.seconds:.2f} s, {best.how}"
-    return f"{told}, against {point['seconds']:.2f} s", ratio >= least and point["error"] <= wanted
+    description = f"{ratio:.1f} times (processor time {cpu:.1f}): {best.seconds:.2f} s, {best.how}"
+    return f"{description}, against {point['seconds']:.2f} s", ratio >= least and point["error"] <= required
 
 
 def _quick(part: dict) -> tuple[str, bool]:
@@ -91,16 +91,16 @@ def _wide(part: dict) -> tuple[str, bool]:
     return f"{_seconds(run)} to {run['end']:g} h, {run['steps']} steps", run["seconds"] <= WIDE
 
 
-def _others(parts: dict) -> Iterator[dict]:
-    for name, other in product(("box", "channel"), OTHERS):
+def _other_codes(parts: dict) -> Iterator[dict]:
+    for name, other in product(("box", "channel"), OTHER_CODES):
         claim = f"transport, {name}: faster than {other.split(',')[0]} at equal error (compilation left out)"
         yield verdict(claim, f"at least {TIMES_FASTER:g} times", _least_ratio, parts[name], other)
 
 
 def _least_ratio(part: dict, other: str) -> tuple[str, bool]:
-    """At each point of another code: its time over that of the order-2 line, read at its error; the least of them."""
-    ours, theirs = points(part, "order 2 (fast, accurate)"), points(part, other)
-    rows = [(point, reading(ours, point["error"])) for point in theirs]
+    """Least ratio over the points of another code: its time over that of the order-2 line at the same error."""
+    order_2, other_points = points(part, "order 2 (fast, accurate)"), points(part, other)
+    rows = [(point, reading(order_2, point["error"])) for point in other_points]
     ratios = sorted((p["seconds"] / r.seconds, p["cpu"] / r.cpu, p["error"]) for p, r in rows)
     least, cpu, error = ratios[0]
     return (f"{least:.1f} times (processor time {cpu:.1f}) at an error of {error:.1e}, the least of {len(ratios)}",
@@ -108,24 +108,24 @@ def _least_ratio(part: dict, other: str) -> tuple[str, bool]:
 
 
 def _steps(part: dict) -> Iterator[dict]:
-    for method, (told, (bound, low, high)) in product(runs.METHODS, FLOORS.items()):
-        yield verdict(f"a growth step over its factorise-and-solve time, {method}, {told}", f"at most {bound:g}",
+    for method, (size_range, (bound, low, high)) in product(runs.METHODS, FLOORS.items()):
+        yield verdict(f"a growth step over its factorise-and-solve time, {method}, {size_range}", f"at most {bound:g}",
                       _floor, part, method, bound, low, high)
 
 
 def _floor(part: dict, method: str, bound: float, low: float, high: float) -> tuple[str, bool]:
     ratios = {point["nodes"]: point["ratio"] for point in points(part, method) if low < point["nodes"] <= high}
-    told = ", ".join(f"{ratio:.2f} at {nodes}" for nodes, ratio in ratios.items())
-    return told, sorted(ratios.values())[-1] <= bound
+    listed = ", ".join(f"{ratio:.2f} at {nodes}" for nodes, ratio in ratios.items())
+    return listed, sorted(ratios.values())[-1] <= bound
 
 
 def _scenes(part: dict) -> Iterator[dict]:
-    wanted = f"no other stage runs; at most {100 * EXCESS:g} % of the whole model's first solution above them"
+    required = f"no other stage runs; at most {100 * EXCESS:g} % of the whole model's first solution above them"
     for name in list(runs.SCENES)[1:]:
-        yield verdict(f"{name}: a scene costs what its own stages cost", wanted, _own, part, name)
+        yield verdict(f"{name}: a scene costs what its own stages cost", required, _stage_cost, part, name)
 
 
-def _own(part: dict, name: str) -> tuple[str, bool]:
+def _stage_cost(part: dict, name: str) -> tuple[str, bool]:
     rows = [row for row in part["rows"] if row["scene"] == name]
     wholes = {row["method"]: row for row in part["rows"] if row["scene"] == "whole"}
     strange = sorted({stage for row in rows for stage in row["unneeded"]})
@@ -134,11 +134,11 @@ def _own(part: dict, name: str) -> tuple[str, bool]:
             not strange and worst <= EXCESS)
 
 
-def excess(row: dict, whole: dict) -> float:
+def excess(row: dict, complete: dict) -> float:
     """Processor time of a scene less that of the whole without the stages that the scene does not have, over the
     whole's; what these have of it is what they had of the wall time of one run."""
-    spared = sum(seconds for stage, seconds in whole["stages"].items() if stage not in row["stages"])
-    return row["cpu"] / whole["cpu"] - 1 + spared / whole["took"]
+    spared = sum(seconds for stage, seconds in complete["stages"].items() if stage not in row["stages"])
+    return row["cpu"] / complete["cpu"] - 1 + spared / complete["took"]
 
 
 def _memory(part: dict) -> Iterator[dict]:
@@ -149,8 +149,8 @@ def _memory(part: dict) -> Iterator[dict]:
 
 def _flat(part: dict, method: str) -> tuple[str, bool]:
     row = {row["method"]: row for row in part["rows"]}[method]
-    told = f"{row['slope']:.0f} bytes a step over {row['steps']} steps; {row['bound']:.0f} allowed"
-    return told, row["slope"] <= row["bound"]
+    description = f"{row['slope']:.0f} bytes a step over {row['steps']} steps; {row['bound']:.0f} allowed"
+    return description, row["slope"] <= row["bound"]
 
 
 WORDS = {True: "holds", False: "does not hold", None: NOT_MEASURED}
@@ -163,16 +163,16 @@ def machine(about: dict) -> Block:
                          "differ, ratios less.")
 
 
-def verdicts(found: list[dict]) -> Block:
+def verdicts(rows: list[dict]) -> Block:
     """A table."""
     return table(("claim", "wanted", "measured", ""), (
-        (one["claim"], one["wanted"], one["measured"], WORDS[one["holds"]]) for one in found))
+        (one["claim"], one["wanted"], one["measured"], WORDS[one["holds"]]) for one in rows))
 
 
 def blocks(name: str, part: dict) -> list[Block]:
-    """A part with all its points, for a terminal."""
-    told = "; ".join(f"{key}: {part[key]}" for key in ("error", "reference", "repeats") if key in part)
-    return [Block("heading", f"{name}: {part['title']}"), Block("text", told),
+    """The blocks of a part with all its points, for a terminal."""
+    description = "; ".join(f"{key}: {part[key]}" for key in ("error", "reference", "repeats") if key in part)
+    return [Block("heading", f"{name}: {part['title']}"), Block("text", description),
             table(("method", "", "seconds and errors"), _rows(part))]
 
 
@@ -194,24 +194,24 @@ COLORS = (*(f"C{k}" for k in range(10)), "black", "navy", "darkgreen", "darkred"
 
 
 def draw(parts: dict, folder: Path) -> list[Path]:
-    """Draw the errors that the parts have; the files."""
-    made = []
+    """Draw the errors of the parts; return the files."""
+    files = []
     for name, part in parts.items():
         if "error" in part:
-            made.append(folder / f"bench_{name}.svg")
-            _precision(part).savefig(made[-1], metadata={"Date": None})
-    return made
+            files.append(folder / f"bench_{name}.svg")
+            _precision(part).savefig(files[-1], metadata={"Date": None})
+    return files
 
 
 def _precision(part: dict) -> Figure:
-    """Each method's points and its envelope; methods that failed throughout are named in the legend."""
+    """Draw the points and the envelope of each method; the legend counts failures."""
     figure = Figure(figsize=(7.8, 4.6), layout="constrained")
     axis = figure.subplots()
     for line, color, mark in zip(part["lines"], cycle(COLORS), cycle(MARKS)):
-        shown = [p for p in line["points"] if p["error"] > 0]
+        positive = [p for p in line["points"] if p["error"] > 0]
         label = line["method"] + (f" ({len(line['failed'])} failed)" if line["failed"] else "")
-        _curve(axis, shown, mark, color=color, alpha=0.6)
-        _curve(axis, envelope(shown), f"-{mark}", color=color, label=label)
+        _curve(axis, positive, mark, color=color, alpha=0.6)
+        _curve(axis, envelope(positive), f"-{mark}", color=color, label=label)
     axis.set_title(part["title"], fontsize=9)
     axis.set_xlabel("wall time (s)", fontsize=8)
     axis.set_ylabel(part["error"] if len(part["error"]) < 60 else "largest error", fontsize=8)
@@ -221,6 +221,6 @@ def _precision(part: dict) -> Figure:
     return figure
 
 
-def _curve(axis, shown, look: str, **how) -> None:
+def _curve(axis, points_drawn, look: str, **how) -> None:
     """Error against time."""
-    axis.loglog([p["seconds"] for p in shown], [p["error"] for p in shown], look, ms=4, **how)
+    axis.loglog([p["seconds"] for p in points_drawn], [p["error"] for p in points_drawn], look, ms=4, **how)

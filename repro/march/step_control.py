@@ -1,0 +1,73 @@
+"""Step-size control of the midpoint rule, by the error estimates of the last two steps.
+
+The estimate of a step of length h is c h^2, so the tolerance allows h (tolerance / estimate)^(1/2).
+c grows faster as the aggregate approaches the opposite wall, by about the same factor from step to
+step. The controller reduces the next step by that factor too, so that few steps are rejected
+(Gustafsson's controller: Hairer and Wanner, Solving Ordinary Differential Equations II, section
+IV.8).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+#: Limits of the ratio of consecutive steps.
+FASTER = 5.0
+SLOWER = 0.2
+#: Length of a step over the length that its estimate allows.
+SAFETY = 0.9
+#: Largest accepted estimate, in tolerances. A step may exceed its ideal length by the square root
+#: of it.
+EXCESS = 2.0
+STRETCH = EXCESS**0.5
+
+
+@dataclass(frozen=True)
+class StepControl:
+    """State of the step-size control.
+
+    length: h, of the next attempted step; duration (h) and estimate: of the last accepted step,
+    zero before the first one.
+    """
+
+    length: float
+    duration: float = 0.0
+    estimate: float = 0.0
+
+
+def fit_to_interval(length: float, remaining: float, stretch: float = 1.0) -> float:
+    """Fit a step of about ``length`` (h) to the ``remaining`` time (h), leaving no tiny step.
+
+    The step is up to ``stretch`` times as long as ``length`` if that makes it the last one.
+    """
+    if stretch * length >= remaining * (1 - 1e-9):
+        return remaining
+    return min(length, remaining / 2) if 2 * length > remaining else length
+
+
+def allowed_ratio(estimate: float, tolerance: float, largest: float = FASTER) -> float:
+    """Ratio of the length that the tolerance allows to that of the step with this estimate."""
+    if estimate <= 0:
+        return largest
+    return min(largest, max(SLOWER, SAFETY * (tolerance / estimate) ** 0.5))
+
+
+def exceeds_tolerance(control: StepControl, tolerance: float) -> bool:
+    """Is the estimate of the last step too large? A step of the least length is accepted anyway."""
+    return control.estimate > EXCESS * tolerance * (1 + 1e-9)
+
+
+def next_step_size(control: StepControl, duration: float, estimate: float,
+                   tolerance: float) -> StepControl:
+    """Step control after an accepted step of ``duration`` (h).
+
+    The next step is at most FASTER times as long, or as long as the planned step if that was cut.
+    """
+    largest = max(FASTER, control.length / duration)
+    factor = allowed_ratio(estimate, tolerance, largest)
+    if control.estimate > 0 and estimate > 0:
+        rise = max(1.0, (estimate / control.estimate) ** 0.5 * control.duration / duration)
+        factor = min(factor, max(SLOWER, allowed_ratio(estimate, tolerance, np.inf) / rise))
+    return StepControl(duration * factor, duration, estimate)

@@ -1,0 +1,558 @@
+"""Run a scene into a folder, or resume the run in a folder.
+
+Rows and fields are written as they are computed.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from itertools import chain
+from pathlib import Path
+from time import perf_counter
+
+from repro import results, timing
+from repro.errors import CheckpointError, Interrupted, OutputError, RunEnd, SimulationError
+from repro.march.loop import Report, RestartState
+from repro.march.simulation import ends_soon, same_rows, steps
+from repro.preflight import simplifications
+from repro.preflight.memory import require_memory, require_outline
+from repro.preflight.numbers import evaluate_at_largest
+from repro.preflight.resolved import find_unresolved_flow
+from repro.preflight.simplifications import Caveat
+from repro.results.files import is_file, read_json, read_sealed
+from repro.runs import INTERVAL, checkpoint
+from repro.runs.folder import (
+    CHECKPOINTS,
+    PROVENANCE,
+    REPORT,
+    folder_errors,
+    list_written_files,
+    locked,
+    prepare,
+    refuse_foreign,
+    refuse_links,
+    remove_temporary,
+)
+from repro.runs.integrity import find_damage
+from repro.runs.machine import conditions, differences, require_packages
+from repro.runs.recorder import Recorder, complete_folder, interruption
+from repro.runs.status import COMPLETED, FAILED, INTERRUPTED, RUNNING, is_over, is_unfinished
+from repro.scene import (
+    KEYS,
+    Scene,
+    SceneError,
+    Source,
+    load_scene,
+    parse_scene,
+    scene_hash,
+    scene_tables,
+)
+from repro.scene.files import key_of, override
+
+__all__ = ["OutputError", "Recorder", "Watch", "prepare", "resume", "run"]
+
+#: The state after each step and, if the step is reported, its row.
+ReportedSteps = Iterator[tuple[RestartState, Report | None]]
+#: At most this many differing keys are listed in a message.
+MOST_DESCRIBED = 4
+#: Why a folder of results needs a ``run.json``, and what to do without one.
+RECORD_NEEDED = ("it lists which files there a run has written, without which nothing is "
+                 "overwritten or removed, by --force neither: move the folder away, or name "
+                 "another")
+#: The only key that can be changed after a run has begun.
+END = "growth.end"
+
+Progress = Callable[[float], None]
+
+
+def issue_warnings(event: dict) -> None:
+    """Issue warning events as Python warnings, and drop all other events.
+
+    Warnings about a key of the scene are only in ``run.json``.
+    """
+    if event["event"] == "warning" and "key" not in event:
+        warnings.warn(event["message"], stacklevel=2)
+
+
+def ignore_progress(time: float) -> None:
+    """Ignore the simulated time."""
+
+
+@dataclass(frozen=True)
+class Watch:
+    """How a run reports and when it stops.
+
+    tell: receives each event; interval: wall time (s) between checkpoints; stop: returns the number
+    of a signal that asks the run to stop, or 0; patience: how long (s) to wait for another process
+    that uses the folder.
+    """
+
+    tell: Callable[[dict], None] = issue_warnings
+    interval: float = INTERVAL
+    stop: Callable[[], int] = lambda: 0
+    patience: float = 0.0
+
+    def warn(self, message: str) -> None:
+        """Report a warning."""
+        self.tell({"event": "warning", "message": message})
+
+
+DEFAULT_WATCH = Watch()
+
+
+def run(scene: Source, folder: str | Path, progress: Progress = ignore_progress,
+        watch: Watch = DEFAULT_WATCH, *, force: bool = False, origin: dict | None = None) -> str:
+    """Run a scene and write its results to a folder.
+
+    If the folder already holds a run of the same scene, code and package versions, that run is
+    resumed; a finished run is left unchanged.
+
+    Parameters
+    ----------
+    scene : Scene, str, Path or dict
+        A loaded scene, a TOML file, the name of a packaged scene, or a dict of tables.
+    folder : str or Path
+        Folder for the results. It is created if it does not exist.
+    progress : callable, optional
+        Called with the simulated time (h) after each step.
+    watch : Watch, optional
+        Receives events, sets the interval (s) between checkpoints, and can stop the run.
+    force : bool, optional
+        Remove the files of any run in the folder first.
+    origin : dict, optional
+        The ``file`` of the scene and the changes ``set`` and ``unset``, for ``run.json``.
+
+    Returns
+    -------
+    str
+        How the run ended: "completed", or where the model itself ended it.
+
+    Raises
+    ------
+    SceneError
+        If the scene is not accepted, or the machine lacks a package or the memory that it needs.
+    OutputError
+        If the folder holds anything else, cannot be used, or is used by another run.
+    SimulationError
+        If a stage fails. All results so far are written, and :func:`resume` continues the run.
+    Interrupted
+        If ``watch.stop`` asks the run to stop. All results so far are written.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import repro
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     repro.run("flow_only", folder)
+    'completed'
+    """
+    scene = load_scene(scene)
+    folder = Path(folder)
+    _require(scene, watch)
+    with locked(folder, watch.patience):
+        recorder = Recorder(scene, folder, origin=origin)
+        if not is_file(folder / PROVENANCE):
+            prepare(folder)
+            return _run_from_start(recorder, progress, watch)
+        read = read_json if force else read_sealed
+        record = _read_record(folder / PROVENANCE, read, RECORD_NEEDED)
+        recorder.run_files = list_written_files(folder, record)
+        refuse_links(folder, recorder.run_files)
+        if force:
+            refuse_foreign(folder, recorder.run_files)
+            return _run_from_start(recorder, progress, watch)
+        _refuse_another(recorder, record)
+        prepare(folder, recorder.run_files)
+        return _continue(recorder, record, progress, watch)
+
+
+def _require(scene: Scene, watch: Watch) -> None:
+    """Raise SceneError if the machine lacks a package or the memory that a scene needs, or if the
+    spline of its outline crosses itself or leaves the pore."""
+    require_packages(scene)
+    require_outline(scene)
+    require_memory(scene, watch.warn)
+
+
+def _refuse_another(recorder: Recorder, record: dict) -> None:
+    """Raise OutputError if the folder holds a run of another scene, code or package version."""
+    current = results.provenance(recorder.scene) | {"source": recorder.conditions["source"]}
+    previous = record | {"source": _table(record, "conditions").get("source")}
+    keys = ("source", "versions") if previous["hash"] == current["hash"] else ("tables",)
+    differing = differences({key: previous.get(key) for key in keys},
+                            {key: current.get(key) for key in keys})
+    if differing:
+        longer = " (--resume makes a run longer)" if list(differing) == [f"tables.{END}"] else ""
+        raise OutputError(
+            f"--out {recorder.folder}: the run there is another one: {_describe(differing)}; a new "
+            f"folder is needed{longer}, or --force, which removes the files of that run")
+
+
+def _describe(differing: dict[str, list]) -> str:
+    """List the first differing keys with both values, and the number of the others."""
+    pairs = [f"{key.removeprefix('tables.')} ({_text(before)} there, now {_text(after)})"
+             for key, (before, after) in differing.items()]
+    more = f" and {len(pairs) - MOST_DESCRIBED} more" if len(pairs) > MOST_DESCRIBED else ""
+    return ", ".join(pairs[:MOST_DESCRIBED]) + more
+
+
+def _text(value: object) -> str:
+    if isinstance(value, dict):
+        return "a section"
+    return "not set" if value is None else str(value)
+
+
+def _table(record: dict, key: str) -> dict:
+    return record[key] if isinstance(record.get(key), dict) else {}
+
+
+def resume(folder: str | Path, progress: Progress = ignore_progress,
+           watch: Watch = DEFAULT_WATCH, *, overrides: Sequence[str] = ()) -> str:
+    """Resume a run that was interrupted, was killed or has failed, or make a run longer.
+
+    The results are equal, bit for bit, to those of an uninterrupted run. A warning is issued if
+    package versions have changed or a checkpoint cannot be used.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Folder of the run.
+    progress : callable, optional
+        Called with the simulated time (h) after each step.
+    watch : Watch, optional
+        Receives events, sets the interval (s) between checkpoints, and can stop the run.
+    overrides : sequence of str, optional
+        A later end, such as ``['growth.end="30 h"']``. No other key can be changed. The longer run
+        equals a run that had this end from its start.
+
+    Returns
+    -------
+    str
+        How the run ended. The status of a finished run is returned at once.
+
+    Raises
+    ------
+    OutputError
+        If the folder holds no run, cannot be used, or is used by another run.
+    SceneError
+        If the new end is not later, or the machine lacks a package or the memory needed.
+    SimulationError
+        If a stage fails.
+    Interrupted
+        If ``watch.stop`` asks the run to stop.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import repro
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     _ = repro.run("flow_only", folder)
+    ...     repro.resume(folder)
+    'completed'
+    """
+    folder = Path(folder)
+    if not is_file(folder / PROVENANCE):
+        raise OutputError(f"--resume {folder}: there is no run.json; the folder of a run is needed")
+    with locked(folder, watch.patience):
+        record = _read_record(folder / PROVENANCE, read_sealed, "the run.json of a run is needed")
+        run_files = list_written_files(folder, record)
+        refuse_links(folder, run_files)
+        scene = _scene(record, folder / PROVENANCE)
+        recorder = Recorder(scene, folder, run_files, _table(record, "origin"))
+        _warn_changed_file(recorder, watch)
+        extended = _extended_scene(scene, overrides, str(folder / PROVENANCE))
+        if extended == scene:
+            return _continue(recorder, record, progress, watch)
+        return _extend(recorder, extended, overrides, record, progress, watch)
+
+
+def _extended_scene(scene: Scene, overrides: Sequence[str], file: str) -> Scene:
+    """Return the scene with a later end. Raises SceneError for any other change."""
+    if not overrides:
+        return scene
+    if scene.growth is None:
+        raise SceneError(f"{file}: its scene has no [growth], which alone takes time")
+    tables = scene_tables(scene)
+    for entry in overrides:
+        if key_of(entry) != END:
+            raise SceneError(f"{file}: --set {entry}: {END} alone can be changed of a run that has "
+                             "begun; a new folder is needed for another scene")
+        override(tables, entry, file, KEYS)
+    extended = parse_scene(tables, scene.name, file, [END])
+    if extended.growth.end < scene.growth.end:
+        raise SceneError(f"{file}: {END} = {extended.growth.end:g} h: {scene.growth.end:g} h were "
+                         "asked for before; a later time is needed")
+    return extended
+
+
+def _extend(recorder: Recorder, extended: Scene, overrides: Sequence[str], record: dict,
+                progress: Progress, watch: Watch) -> str:
+    """Continue the run of this ``run.json`` to a later end; return how it ended."""
+    _require(extended, watch)
+    timing.reset()
+    changed = _find_changes(record, recorder, watch)
+    previous_changes = recorder.origin.get("set")
+    previous_changes = previous_changes if isinstance(previous_changes, list) else []
+    changes = [*(entry for entry in previous_changes if key_of(str(entry)) != END), *overrides]
+    changed[END] = [f"{scene.growth.end:g} h" for scene in (recorder.scene, extended)]
+    names: tuple[str, ...] = (checkpoint.NEWEST, checkpoint.PREVIOUS)
+    if recorder.has_last_state:
+        names = (checkpoint.LAST,)
+    with folder_errors(recorder.folder):
+        remove_temporary(recorder.folder)
+        is_restored = _restore(recorder, names, watch)
+    if is_restored and not same_rows(recorder.scene, extended, recorder.time):
+        recorder.forget()  # rows lie as the end asks for them: these would not be the longer run's
+        is_restored = False
+    recorder.history.resumes.append({"time_h": recorder.time, "changed": changed})
+    if not is_restored:
+        recorder.scene = extended
+        recorder.origin["set"] = changes
+        return _run_from_start(recorder, progress, watch)
+    _warn(recorder, extended, recorder.first_velocity, watch)
+    recorder.extend(extended, changes, ends_soon(extended, recorder.state))
+    recorder.remove_later_fields()
+    return _record_run(recorder, steps(extended, recorder.state), progress, watch)
+
+
+def _warn_changed_file(recorder: Recorder, watch: Watch) -> None:
+    """Warn if the file from which the scene was read has changed since."""
+    file = recorder.origin.get("file")
+    changes = [recorder.origin.get(key, []) for key in ("set", "unset")]
+    if not isinstance(file, str) or not all(isinstance(entries, list) for entries in changes):
+        return
+    with suppress(SceneError, TypeError, AttributeError):  # it is gone, or is no scene any more
+        current = load_scene(file, *changes)
+        differing = differences(scene_tables(recorder.scene), scene_tables(current))
+        if differing:
+            watch.warn(f"{file}: it is not the scene of the run any more: {_describe(differing)}; "
+                       "the run goes on with its own")
+
+
+def _continue(recorder: Recorder, record: dict, progress: Progress, watch: Watch) -> str:
+    """Continue the run of this ``run.json`` unless it has finished; return how it ended."""
+    if is_over(record["status"]) and _is_unchanged(recorder, record, watch):
+        return _complete_finished_run(recorder, record, watch)
+    _require(recorder.scene, watch)
+    timing.reset()
+    changed = _find_changes(record, recorder, watch)
+    with folder_errors(recorder.folder):
+        remove_temporary(recorder.folder)
+        is_restored = _restore(recorder, (checkpoint.NEWEST, checkpoint.PREVIOUS), watch)
+    recorder.history.resumes.append({"time_h": recorder.time, "changed": changed})
+    if not is_restored:
+        return _run_from_start(recorder, progress, watch)
+    recorder.write_record(RUNNING)
+    recorder.remove_later_fields()
+    return _record_run(recorder, steps(recorder.scene, recorder.state), progress, watch)
+
+
+def _is_unchanged(recorder: Recorder, record: dict, watch: Watch) -> bool:
+    """Are all files of a finished run as they were written? Raises OutputError if not, and there is
+    no checkpoint from which to resume."""
+    damage = find_damage(recorder.folder, record)
+    names = (checkpoint.NEWEST, checkpoint.PREVIOUS)
+    if damage and not any(is_file(recorder.folder / name) for name in names):
+        raise OutputError(f"{damage}; there is no checkpoint to go on from: --force with its scene "
+                          "makes the run anew")
+    if damage:
+        watch.warn(f"{damage}; it goes on from its checkpoint")
+    return not damage
+
+
+def _complete_finished_run(recorder: Recorder, record: dict, watch: Watch) -> str:
+    """Report a finished run; write its page and remove its checkpoints if it was killed before."""
+    folder = recorder.folder
+    has_checkpoint = any((folder / name).exists() for name in CHECKPOINTS)
+    if has_checkpoint or REPORT not in record["sha256"] or not is_file(folder / REPORT):
+        complete_folder(folder, record, recorder.run_files)
+    watch.tell({"event": "end", "scene": recorder.scene.name, "status": record["status"],
+                "folder": str(folder), "changed": False})
+    return record["status"]
+
+
+def _read_record(path: Path, read: Callable[[Path], dict], accepted: str) -> dict:
+    """Read ``run.json``. Raises OutputError, which ends with ``accepted``, if it is not a run's."""
+    try:
+        record = read(path)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise OutputError(f"{path}: cannot be read ({reason}); {accepted}") from None
+    if not _is_record(record):
+        raise OutputError(f"{path}: it has no scene or no status; {accepted}")
+    if not (is_over(record["status"]) or is_unfinished(record["status"])):
+        raise OutputError(f"{path}: its status {record['status']!r} is none that a run writes; "
+                          f"{accepted}")
+    return record
+
+
+def _scene(record: dict, path: Path) -> Scene:
+    """The scene of ``run.json``. Raises SceneError, or OutputError if its hash does not match."""
+    scene = parse_scene(record["tables"], record["scene"], str(path))
+    if scene_hash(scene) != record["hash"]:
+        raise OutputError(f"{path}: its scene is not the one that was run: the hash "
+                          f"{record['hash']!r} is of another")
+    return scene
+
+
+def _is_record(record) -> bool:
+    """Does it have the keys that every ``run.json`` has?"""
+    required = {"scene": str, "hash": str, "tables": dict, "status": str}
+    return isinstance(record, dict) and all(
+        isinstance(record.get(key), kind) for key, kind in required.items())
+
+
+def _find_changes(record: dict, recorder: Recorder, watch: Watch) -> dict[str, list]:
+    """Find, and warn of, changes since the run began that could change its numbers."""
+    before = {key: _table(record, key) for key in ("versions", "conditions")}
+    versions = results.provenance(recorder.scene)["versions"]
+    after = {"versions": versions, "conditions": conditions()}
+    changed = {key: pair for key, pair in differences(before, after).items()
+               if not key.startswith("conditions.threads")}
+    if changed:
+        pairs = [f"{key} ({old} before, now {new})" for key, (old, new) in changed.items()]
+        watch.warn(f"{recorder.folder}: not as it was when the run began: {', '.join(pairs)}; the "
+                   "result need not be that of an uninterrupted run to the last bit")
+    return changed
+
+
+def _restore(recorder: Recorder, names: Sequence[str], watch: Watch) -> bool:
+    """Restore the recorder from the first valid checkpoint; warn of each refused one."""
+    for name in names:
+        path = recorder.folder / name
+        if path.exists():
+            try:
+                recorder.restore(path)
+                return True
+            except CheckpointError as error:
+                path.replace(recorder.folder / checkpoint.REFUSED)
+                watch.warn(f"{path}: refused: {error}; it is {checkpoint.REFUSED} now")
+    watch.warn(f"{recorder.folder}: no checkpoint to go on from; it starts again from t = 0")
+    return False
+
+
+def _run_from_start(recorder: Recorder, progress: Progress, watch: Watch) -> str:
+    """Run from t = 0. The first state is solved before any file is written. Raises SceneError if it
+    cannot be solved."""
+    timing.reset()
+    run_steps = steps(recorder.scene)
+    try:
+        first = next(run_steps)
+    except SimulationError as error:
+        raise SceneError(f"{recorder.scene.name}: it cannot be run: {error}") from error
+    recorder.write_record(RUNNING)
+    recorder.clear()
+    return _record_run(recorder, chain([first], run_steps), progress, watch)
+
+
+def _record_run(recorder: Recorder, run_steps: ReportedSteps, progress: Progress,
+                watch: Watch) -> str:
+    """Run until the run ends, and write its status; return how it ended."""
+    watch.tell({"event": "start", "scene": recorder.scene.name, "folder": str(recorder.folder),
+                "from_h": recorder.time, "end_h": recorder.end, "step": recorder.steps})
+    try:
+        status = _simulate(recorder, run_steps, progress, watch)
+    except SimulationError as error:
+        message = SimulationError(f"{error}; {recorder.describe_last_state()}")
+        _finish(recorder, f"{FAILED}{message}", watch)
+        raise message from error
+    except (KeyboardInterrupt, Interrupted):
+        _finish(recorder, INTERRUPTED, watch)
+        raise
+    except BaseException as error:
+        with suppress(OutputError):  # the first error is the one to report
+            _finish(recorder, f"{FAILED}{error}", watch)
+        raise
+    return _finish(recorder, status, watch)
+
+
+def _finish(recorder: Recorder, status: str, watch: Watch) -> str:
+    recorder.finish(status)
+    _emit_warnings(recorder.warn_missed_tolerance(), watch)
+    watch.tell({"event": "end", "scene": recorder.scene.name, "status": status,
+                "folder": str(recorder.folder), "time_h": recorder.time, "step": recorder.steps,
+                "rows": len(recorder.history.rows), "changed": True})
+    return status
+
+
+def _simulate(recorder: Recorder, run_steps: ReportedSteps, progress: Progress,
+              watch: Watch) -> str:
+    """Record every step from the recorder's state on; return how the run ended."""
+    try:
+        _record_steps(recorder, run_steps, progress, watch)
+    except RunEnd as end:
+        if not recorder.has_last_state:
+            recorder.save_last_state()
+        return str(end)
+    except MemoryError as error:
+        raise SimulationError(f"stopped at t = {recorder.time:g} h, out of memory while results "
+                              f"are written ({error}); try a smaller "
+                              "numerics.refinement") from error
+    return COMPLETED
+
+
+def _record_steps(recorder: Recorder, run_steps: ReportedSteps, progress: Progress,
+                  watch: Watch) -> None:
+    saved_at = perf_counter()
+    for state, instant in run_steps:
+        remeshes = recorder.remeshes
+        contact = recorder.contact
+        steps_before = recorder.steps if recorder.state else -1
+        recorder.add(state, instant)
+        if instant and len(recorder.history.rows) == 1:
+            _warn(recorder, recorder.scene, recorder.first_velocity, watch)
+        _emit_warnings(recorder.find_crease(), watch)
+        if not recorder.has_last_state and ends_soon(recorder.scene, state):
+            recorder.save_last_state()
+        if recorder.steps > steps_before:  # no row within a step
+            _emit_step(recorder, recorder.remeshes > remeshes, recorder.contact > contact, watch)
+        progress(recorder.time)
+        if number := watch.stop():
+            raise interruption(recorder, number)
+        if perf_counter() - saved_at >= watch.interval:
+            _checkpoint(recorder, watch)
+            saved_at = perf_counter()
+
+
+def _warn(recorder: Recorder, scene: Scene, velocity: float | None, watch: Watch) -> None:
+    """Report and record the simplifications that do not hold, as in ``repro check``."""
+    scene_warnings = find_warnings(scene, velocity)
+    recorder.history.warnings = [asdict(warning) for warning in scene_warnings]
+    _emit_warnings(scene_warnings, watch)
+
+
+def _emit_warnings(scene_warnings: list[Caveat], watch: Watch) -> None:
+    for warning in scene_warnings:
+        message = f"{warning.key}: {warning.text}"
+        watch.tell({"event": "warning", "key": warning.key, "message": message})
+
+
+def find_warnings(scene: Scene, velocity: float | None) -> list[Caveat]:
+    """Find the simplifications of a scene that do not hold; velocity: mean velocity (um/h) at
+    t = 0, None without flow."""
+    try:
+        largest, computed = evaluate_at_largest(scene, velocity)
+        return [*simplifications.find_warnings(largest, computed), *find_unresolved_flow(scene)]
+    except ArithmeticError as error:
+        return [Caveat("scene", f"its dimensionless numbers cannot be worked out ({error})")]
+
+
+def _emit_step(recorder: Recorder, remeshed: bool, contact: bool, watch: Watch) -> None:
+    """Emit the events of a step."""
+    state = {"time_h": recorder.time, "end_h": recorder.end, "step": recorder.steps,
+           "remeshes": recorder.remeshes, "contact": recorder.contact}
+    watch.tell({"event": "step", **state})
+    for event, happened in (("remesh", remeshed), ("contact", contact)):
+        if happened:
+            watch.tell({"event": event, **state})
+
+
+def _checkpoint(recorder: Recorder, watch: Watch) -> None:
+    start = perf_counter()
+    recorder.save(RUNNING)
+    file = str(recorder.folder / checkpoint.NEWEST)
+    watch.tell({"event": "checkpoint", "time_h": recorder.time, "file": file,
+                "seconds": perf_counter() - start})

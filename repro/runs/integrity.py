@@ -1,0 +1,74 @@
+"""Check by SHA-256 whether the files of a run are complete and unchanged."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from repro.report.reading import NoRun, Run, hashes, read, require_columns
+from repro.results.files import is_file, read_sealed, sha256_of
+from repro.runs.folder import PROVENANCE, REPORT, read_sums
+from repro.runs.status import RUNNING, is_over, is_unfinished
+from repro.scene import Scene, scene_hash
+
+
+def read_scene_run(folder: Path, scene: Scene) -> Run:
+    """Read the run of a scene in a folder, finished or not. Raises NoRun if there is none, if it is
+    of another scene, or if its files have changed since they were written."""
+    run = read(folder)
+    _require_scene(folder, run.record, scene)
+    require_columns(run)
+    return run
+
+
+def _require_scene(folder: Path, record: dict, scene: Scene) -> None:
+    """Raise NoRun if a record is of another scene, or has no valid status."""
+    status = str(record.get("status"))
+    if record.get("hash") != scene_hash(scene) or not (is_over(status) or is_unfinished(status)):
+        raise NoRun(f"{folder}: run.json tells of a run of another scene, or has no status")
+
+
+def find_defect(folder: Path, scene: Scene) -> str:
+    """Say why a folder does not hold a finished, complete run of a scene; empty if it does."""
+    try:
+        record = read_record(folder)
+        _require_scene(folder, record, scene)
+    except NoRun as error:
+        return str(error)
+    if not is_over(record["status"]):
+        return f"{folder}: the run is not over: {record['status']}"
+    return find_damage(folder, record)
+
+
+def read_record(folder: Path) -> dict:
+    """Read ``run.json``. Raises NoRun if it is missing or has changed since it was written."""
+    try:
+        return read_sealed(folder / PROVENANCE)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise NoRun(f"{folder}: run.json cannot be read: {reason}") from error
+
+
+def find_damage(folder: Path, record: dict) -> str:
+    """Name a file of a run that has changed since it was written; empty if none has.
+
+    ``run.json`` has the SHA-256 of tables and lists, and ``fields.sha256`` those of the fields. A
+    missing page is no damage: it is made again. A running run has only the SHA-256 of its fields.
+    """
+    expected = hashes(record) | read_sums(folder)
+    if not is_file(folder / REPORT):
+        expected.pop(REPORT, None)
+    for name, digest in expected.items():
+        if not is_file(folder / name) or sha256_of(folder / name) != digest:
+            return f"{folder}: {name} is not as it was written: missing, cut short or altered"
+    return ""
+
+
+def read_status(folder: Path) -> str:
+    """Read the status of the run in a folder. Raises NoRun if its files are damaged."""
+    record = read_record(folder)
+    status = str(record.get("status"))
+    if not (is_over(status) or is_unfinished(status)):
+        raise NoRun(f"{folder}: its status {status!r} is none that a run writes")
+    if status != RUNNING and (damage := find_damage(folder, record)):
+        raise NoRun(damage)
+    return status

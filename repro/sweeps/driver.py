@@ -1,0 +1,156 @@
+"""Run a sweep and write its tables and page; for scripts and for ``repro sweep``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from repro.runs.machine import require_packages
+from repro.scene import Source, label
+from repro.sweeps import cluster, design, page, pool, table
+from repro.sweeps.folder import Sweep, folder_errors, lock_folder
+
+#: The part of the first conductivity at which a pore counts as clogged.
+CLOGGED = 0.1
+#: Receives the events {"event": "start" or "run", "done": runs, "total": runs, ...}.
+Tell = Callable[[dict[str, Any]], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Swept:
+    """The results of a sweep: ``runs`` extends ``runs.csv``; :func:`repro.load_run` reads one of
+    ``paths``."""
+
+    source: str
+    folder: Path
+    factors: list[design.Factor]
+    runs: list[table.SweepRun]
+
+    @property
+    def paths(self) -> list[Path]:
+        """The folder of each run."""
+        return [self.folder / "runs" / run.point.name for run in self.runs]
+
+    @property
+    def failed(self) -> list[table.SweepRun]:
+        """The runs that are not finished."""
+        return [run for run in self.runs if not run.is_over]
+
+    def label(self, run: table.SweepRun) -> str:
+        """The value of each factor of a run, as text."""
+        return design.label(self.factors, run.point.values)
+
+    def __repr__(self) -> str:
+        return (f"<Sweep of {self.source}: {len(self.runs) - len(self.failed)} of {len(self.runs)} "
+                f"runs done, in {self.folder}>")
+
+
+def ignore_event(event: dict[str, Any]) -> None:
+    """Ignore an event."""
+
+
+def sweep(source: Source, vary: Sequence[str], folder: str | Path, overrides: Sequence[str] = (),
+          unset: Sequence[str] = (), *, samples: int | None = None, seed: int = 0,
+          workers: int | None = None, scheduler: str | None = None, clogged: float = CLOGGED,
+          tell: Tell = ignore_event) -> Swept:
+    """Run a scene many times with varied keys, and write tables and a page.
+
+    Finished runs in the folder are not repeated. A run that fails has a status that says so.
+
+    Parameters
+    ----------
+    source : Scene, str, Path or dict
+        A loaded scene, a TOML file, the name of a packaged scene, or a dict of tables.
+    vary : sequence of str
+        A range or a list for each varied key, such as ``"flow.mean_velocity=0.3:30 m/day:log:8"``
+        or ``"pore.width=50 um, 60 um"``, as for ``repro sweep --vary``.
+    folder : str or Path
+        Folder for the runs, the tables and the page.
+    overrides : sequence of str, optional
+        Changes of the scene, such as ``"growth.end=5 h"``.
+    unset : sequence of str, optional
+        Keys or sections of the scene to leave out.
+    samples : int, optional
+        Number of runs of a Latin hypercube. By default all combinations of the values are run.
+    seed : int, optional
+        Seed of the Latin hypercube.
+    workers : int, optional
+        Number of parallel runs, by default one for each core.
+    scheduler : str, optional
+        Address of a Dask scheduler whose workers make the runs.
+    clogged : float, optional
+        The part of the first conductivity at which a pore counts as clogged.
+    tell : callable, optional
+        Receives each event as a dict.
+
+    Returns
+    -------
+    Swept
+        The runs with their values, statuses and folders. Times are in h.
+
+    Raises
+    ------
+    SceneError
+        If a scene is not accepted.
+    OutputError
+        If the folder cannot be used, or the scheduler does not answer.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import repro
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     swept = repro.sweep("flow_only", ["pore.width=48 um, 50 um"], folder, workers=1)
+    >>> [run.status for run in swept.runs]
+    ['completed', 'completed']
+    """
+    statuses: dict[int, str] = {}
+    factors = [design.parse(text) for text in vary]
+    combinations = design.grid(factors) if samples is None else design.latin(factors, samples, seed)
+    with _ready(scheduler, min(workers or pool.cores(), len(combinations))) as run_points:
+        points = design.points(source, list(overrides), factors, combinations, unset)
+        for point in points if scheduler is None else ():
+            require_packages(point.scene)
+        plan = Sweep(Path(folder), label(source), factors, points)
+        with lock_folder(plan):
+            try:
+                _run_missing(plan, run_points, statuses, tell)
+            finally:
+                swept_runs = _write_results(plan, statuses, clogged)
+    return Swept(plan.source, plan.folder, factors, swept_runs)
+
+
+def _ready(scheduler: str | None, workers: int) -> AbstractContextManager[pool.RunPoints]:
+    """The context that makes runs: processes of this machine, or a cluster."""
+    return cluster.ready(scheduler) if scheduler else pool.ready(workers)
+
+
+def _run_missing(plan: Sweep, run_points: pool.RunPoints, statuses: dict[int, str],
+                 tell: Tell) -> None:
+    """Make the missing runs; adds the status of each to `statuses`, by its number."""
+    missing = plan.missing()
+    total = len(plan.points)
+    completed = total - len(missing)
+    tell({"event": "start", "scene": plan.source, "done": completed, "total": total})
+    for point, status in _run_points(missing, plan.runs, run_points):
+        statuses[point.index] = status
+        tell({"event": "run", "done": completed + len(statuses), "total": total, "run": point.index,
+              "values": design.label(plan.factors, point.values), "status": status})
+
+
+def _run_points(missing: list[design.Point], runs: Path,
+          run_points: pool.RunPoints) -> Iterator[tuple[design.Point, str]]:
+    if missing:
+        yield from run_points(missing, runs)
+
+
+def _write_results(plan: Sweep, statuses: dict[int, str], clogged: float) -> list[table.SweepRun]:
+    """Read the runs, and write the tables and the page."""
+    runs = table.read_runs(plan, statuses, clogged)
+    with folder_errors(plan.folder):
+        table.write(plan, runs)
+        page.write(plan, runs, clogged)
+    return runs

@@ -1,0 +1,141 @@
+"""The folder of a sweep: ``sweep.json`` lists the planned runs, ``runs/`` holds their folders.
+
+``repro run`` could have made the folder of each run. The same command continues a sweep that was
+cut off: it resumes unfinished runs and repeats damaged ones.
+"""
+
+from __future__ import annotations
+
+import os
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from repro.errors import OutputError
+from repro.report.reading import NoRun
+from repro.results import write_json
+from repro.results.files import atomic_path, is_folder, read_json
+from repro.runs.folder import LOCK, PROVENANCE, find_foreign, locked
+from repro.runs.integrity import find_defect, read_record
+from repro.sweeps import single_run
+from repro.sweeps.design import Factor, Point
+
+
+class SweepError(OutputError):
+    """A sweep cannot be made in this folder or on this cluster."""
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """The plan of a sweep: its folder, the name of the scene, the varied keys, and the runs."""
+
+    folder: Path
+    source: str
+    factors: list[Factor]
+    points: list[Point]
+
+    @property
+    def runs(self) -> Path:
+        """The folder that holds the folders of the runs."""
+        return self.folder / "runs"
+
+    def missing(self) -> list[Point]:
+        """The runs that are not finished."""
+        return [point for point in self.points
+                if find_defect(self.runs / point.name, point.scene)]
+
+
+@contextmanager
+def lock_folder(sweep: Sweep):
+    """Lock the folder of a sweep, which is made if it does not exist.
+
+    Raises OutputError if it holds anything else or another sweep, if another process uses it, or if
+    it cannot be written.
+    """
+    with folder_errors(sweep.folder):
+        _check(sweep.folder, _as_json(sweep))
+        _refuse_foreign(sweep)
+    with locked(sweep.folder):
+        with folder_errors(sweep.folder):
+            _check(sweep.folder, _as_json(sweep))  # again: another sweep may have begun meanwhile
+            sweep.runs.mkdir(exist_ok=True)
+            with atomic_path(sweep.folder / "sweep.json") as beside:
+                write_json(beside, _as_json(sweep))
+        yield
+
+
+@contextmanager
+def folder_errors(folder: Path):
+    """Convert errors of the file system into SweepError for the folder."""
+    try:
+        yield
+    except OSError as error:
+        reason = error.strerror or error
+        required = "a folder that can be written is needed"
+        raise SweepError(f"--out {folder}: {reason}; {required}") from error
+
+
+def _as_json(sweep: Sweep) -> dict:
+    points = [{"run": point.index, "folder": f"runs/{point.name}", "hash": point.hash,
+               "values": list(point.values)} for point in sweep.points]
+    factors = [{**asdict(factor), "values": list(factor.values)} for factor in sweep.factors]
+    return {"scene": sweep.source, "code": single_run.code(), "varied": factors, "points": points}
+
+
+def _check(folder: Path, expected: dict) -> None:
+    """Raise SweepError if the folder belongs to another sweep or to something else."""
+    if folder.is_dir() and not os.path.lexists(folder / "sweep.json"):
+        foreign = sorted({path.name for path in folder.iterdir()} - {"runs", LOCK})
+        if foreign:
+            raise SweepError(f"--out {folder}: it holds {foreign[0]!r}, which is not of a sweep; a "
+                             "new or empty folder, or one of the same sweep, is accepted")
+    elif folder.exists():
+        _compare(folder, _read(folder), expected)
+
+
+def _read(folder: Path) -> dict:
+    try:
+        record = read_json(folder / "sweep.json")
+        len(record["points"])  # raises TypeError where it is no list
+        return {name: record[name] for name in ("scene", "code", "varied", "points")}
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        reason = f" ({error.strerror})" if isinstance(error, OSError) else ""
+        raise SweepError(f"--out {folder}: its sweep.json cannot be read{reason}; a new folder is "
+                         "needed") from None
+
+
+def _compare(folder: Path, record: dict, expected: dict) -> None:
+    if record["code"] != expected["code"]:
+        raise SweepError(f"--out {folder}: its sweep was begun with version {record['code']} of "
+                         f"this package, this is {expected['code']}; a new folder is needed")
+    if (record["varied"], record["points"]) != (expected["varied"], expected["points"]):
+        raise SweepError(f"--out {folder}: it holds another sweep ({record['scene']}, "
+                         f"{len(record['points'])} runs); a new folder, or the same scene, --set, "
+                         "--vary, --samples and --seed, is needed")
+
+
+def _refuse_foreign(sweep: Sweep) -> None:
+    """Raise SweepError if the folder of a run, or of all runs, is a link or not a folder, or holds
+    files that do not belong to the run."""
+    for folder in (sweep.runs, *(sweep.runs / point.name for point in sweep.points)):
+        if os.path.lexists(folder) and not is_folder(folder):
+            raise SweepError(f"{folder}: it is a link, or no folder, and so not of this sweep; "
+                             "move it away")
+    for point in sweep.points:
+        if (sweep.runs / point.name).exists():
+            _refuse_other_run(sweep.runs / point.name, point)
+
+
+def _refuse_other_run(folder: Path, point: Point) -> None:
+    """Raise SweepError if a folder holds files that do not belong to the run of a point."""
+    if not os.path.lexists(folder / PROVENANCE):
+        if foreign := find_foreign(folder):
+            raise SweepError(f"{folder}: it holds {foreign[0]!r}, which is not of a run; move it "
+                             "away")
+        return
+    try:
+        record = read_record(folder)
+    except NoRun as error:
+        raise SweepError(f"{error}; move the folder away") from error
+    if record.get("hash") != point.hash:
+        raise SweepError(f"{folder}: it holds the run of another scene; move it away")
