@@ -16,10 +16,10 @@ TABLES = {
 INTRODUCTION = """# Reported quantities
 
 Written by `python docs/quantities.py > docs/quantities.md` from the definitions in `repro/results/columns.py`,
-`repro/results/arrays.py`, `repro/report/quantities.py`, `repro/runs/history.py` and `repro/sweeps/table.py`. Symbols are
-the paper's. A column is empty if its part is not modelled. An array is defined at nodes or in triangles, in the pore or
-in the aggregate only, with NaN in the fluid; nodes of the interface have the aggregate's value. The time (h) is
-`TimeValue` in the field data of a `.vtu` file."""
+`repro/results/arrays.py`, `repro/report/quantities.py`, `repro/runs/history.py` and `repro/sweeps/table.py`. Symbols
+are the paper's. A column is empty if its part is not modelled. An array is defined at nodes or in triangles, in the
+pore or in the aggregate only, with NaN in the fluid; nodes of the interface have the aggregate's value. The time (h)
+is `TimeValue` in the field data of a `.vtu` file."""
 
 
 def text() -> str:

@@ -6,16 +6,16 @@ Ten lines of use; ``docs/tutorial.md`` of the repository has more:
 
     scene = repro.load_scene("base", ['growth.end="5 h"'])  # a packaged scene, a file or a dict
     print(scene)                                            # its TOML, every key with its unit
-    print(repro.check(scene))                               # what a run of it will be
+    print(repro.check(scene))                               # expected model, mesh and cost
     results = repro.solve(scene)                            # rows of timeseries.csv, as arrays
     print(results["conductivity_m_per_d"], results.units["conductivity_m_per_d"])
     repro.run(scene, "runs/base")                           # the same as files, and a page
     results = repro.load_run("runs/base")                   # ... and back; results.to_pandas()
     repro.sweep(scene, ["pore.width=50 um, 60 um"], "sweep")
 
-``simulate(scene)`` yields the state step by step, with all that is known, in um, h, mg/L.
+``simulate(scene)`` yields the full state at every reported time, in um, h, mg/L.
 
-Where the paper is in the code, whose modules name the equations that they solve:
+Sections of the paper and their modules, which name the equations that they solve:
 
     section                    equations    module
     Table 1, 2.1-2.3                        repro.scene: keys with unit, default, range and source
@@ -23,7 +23,7 @@ Where the paper is in the code, whose modules name the equations that they solve
     3.1  mesh                               repro.fem.outline, .sizing, .mesher, .mesh, .division
     3.5  transfer to a new mesh             repro.fem.transfer
     2.1, 3.2  flow             (1)-(6)      repro.model.flow, .brinkman
-    2.2  kinetics              (7)-(10)     repro.model.kinetics
+    2.2  kinetics              (7)-(10)     repro.model.uptake_law, .kinetics
     2.2  substrates            (7)-(13)     repro.model.transport (at rest in each shape)
     3.3  transient scheme      (7)-(13)     repro.model.gear (predictor-corrector)
     2.3, 3.4  growth           (14)-(27)    repro.model.growth
@@ -35,26 +35,27 @@ Where the paper is in the code, whose modules name the equations that they solve
     3.1, 3.5  remeshing                     repro.model.remeshing
     2    state of the pore                  repro.model.pore
     2    coupling, 3.3                      repro.march.updates (the paper's shape updates)
-         steps by their error               repro.march.midpoint, .stepping, .step_control (not the paper's)
+         error control (not the paper's)    repro.march.midpoint, .stepping, .step_control
          the end as a fold                  repro.march.folding
          the loop of both                   repro.march.loop, .simulation
     4, 5  results, a law for networks       repro.results, .columns, .arrays, .tables, .network
 
-Where data enters, and what it passes:
+Data flow:
 
-    repro.scene       a .toml file is read, checked and converted to um, h, mg/L: a Scene, or one
-                      line that says what is wrong (.files, .reading, .units, .rules; .text)
-    repro.model.pore  the Scene becomes a Pore at t = 0: outline, mesh, masses
-    repro.march       a Pore goes through steps, and gives Reports: pore, flow, substrates, ledgers
-    repro.results     a Report becomes  rows and fields in the units that their names end in
-    repro.preflight   what a run of a scene will be: numbers, doubts, cost (repro check)
+    repro.scene       reads, checks and converts a .toml file to a Scene in um, h, mg/L, or refuses
+                      it in one line (.files, .reading, .units, .rules; .text)
+    repro.model.pore  makes the Pore at t = 0 from the Scene: outline, mesh, masses
+    repro.march       advances the Pore step by step, and yields Reports: pore, flow, substrates,
+                      ledgers
+    repro.results     makes rows and fields from Reports, in the units that their names end in
+    repro.preflight   predicts a run: dimensionless numbers, warnings, cost (repro check)
     repro.report      pages that show and compare runs (repro compare)
     repro.runs        a run on the disk: folder, recorder, checkpoints, provenance (repro run)
     repro.sweeps      many scenes at once (repro sweep)
     repro.cli         the command line
 
-A room imports only from rooms further up in this list, repro.fem before repro.model; repro.errors
-and repro.timing serve all of them.
+A package imports only from packages above it in this list, with repro.fem before repro.model. All
+of them may import repro.errors and repro.timing.
 """
 
 from __future__ import annotations
@@ -77,7 +78,7 @@ if TYPE_CHECKING:
 
     __version__: str
 else:
-    #: The module of each public name, imported when it is first asked for: the solver takes half a
+    #: The module of each public name, imported on first use: importing the solver takes half a
     #: second.
     _MODULES = {"Fold": "march.folding", "OutputError": "errors",
                 "PoreEnd": "march.loop", "Results": "results.tables",

@@ -38,7 +38,7 @@ def short(tmp_path_factory):
 def quick(short, monkeypatch, tmp_path):
     """`python -m paper_figures` on short runs and few points, in coarse pictures, into a temporary folder."""
     transfer, tearing, layers = (MODULES[f"discussion_{name}"] for name in ("transfer", "tearing", "biomass"))
-    changed = [(transfer, "RUN", BRIEF[0]), (tearing, "COURSES", tuple(BRIEF)), (tearing, "EVERY", 0.2),
+    changed = [(transfer, "RUN", BRIEF[0]), (tearing, "RUN_OVERRIDES", tuple(BRIEF)), (tearing, "EVERY", 0.2),
                (figure_6, "EVERY", 0.2), (figures, "OUT", tmp_path / "out"), (style, "save", _coarse),
                (runs, "folders", lambda requests: [short[request.scene] for request in requests])]
     changed += [(module, points, getattr(module, points)[[0, -1]]) for module, points in (

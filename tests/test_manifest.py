@@ -34,9 +34,9 @@ def committed(folder):
 def test_a_repeated_run_has_the_same_hashes(folder, committed, tmp_path):
     """Every file with data is hashed."""
     run(load_scene(NAME), tmp_path / "again")
-    files = manifest.of_run(runs.INITIAL_MESH, tmp_path / "again")["files"]
+    hashes = manifest.of_run(runs.INITIAL_MESH, tmp_path / "again")["files"]
     files = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
-    assert files == committed["runs"][NAME]["files"] and {*files} == files - {*manifest.NOT_DATA}
+    assert hashes == committed["runs"][NAME]["files"] and {*hashes} == files - {*manifest.NOT_DATA}
 
 
 def test_a_figure_is_hashed_by_its_data_and_texts():

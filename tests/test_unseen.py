@@ -520,7 +520,7 @@ def test_an_advised_refinement_ends_its_warning_and_a_smaller_one_does_not(layer
 def test_the_worst_step_that_misses_the_tolerance_is_reported(tmp_path):
     recorder = execution.Recorder(load_scene("base", ["numerics.tolerance=0.01"]), tmp_path)
     for estimate in (0.03, 0.5, 0.04, 0.001):
-        recorder._judge(StepControl(1.0, 1.0, estimate))
+        recorder._count_missed_tolerance(StepControl(1.0, 1.0, estimate))
     assert recorder.history.missed == 3 and not recorder.contact
     assert "errs by 0.5 (estimate)" in recorder.warn_missed_tolerance()[0].text
 

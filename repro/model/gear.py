@@ -61,7 +61,7 @@ FIRST = 45 / 3600
 #: A shorter step (h) fails.
 SHORTEST = 1e-6 / 3600
 #: Profiles are steady if further steps of LONG (h) would sum up to this change over the supply.
-SETTLED = 1e-9
+STEADY = 1e-9
 LONG = 1e6
 #: Until then: the largest change over the supply in a step.
 SETTLING = 0.3
@@ -236,7 +236,7 @@ def settle(problem: Problem, sink: Sink | None, guess: Concentrations | None) ->
     for count in range(1, MOST_STEPS + 1):
         new, change = _accepted(system, level, step, SETTLING, "while the profiles settle",
                                 1 / FASTER)
-        if new.step >= LONG and change <= SETTLED * (1 - change / last):
+        if new.step >= LONG and change <= STEADY * (1 - change / last):
             acceptor, donor = new.fields
             return Concentrations(acceptor, donor, count)
         level = _level(new.fields, level.biomass)

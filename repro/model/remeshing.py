@@ -98,7 +98,8 @@ def advise(scene: Scene, pore: Pore, error: Unresolved) -> UnresolvedWithAdvice:
     for refinement in candidates:
         finer = replace(scene, numerics=replace(scene.numerics, refinement=refinement))
         if _resolves(finer, pore):
-            return UnresolvedWithAdvice(f"{error}; numerics.refinement = {refinement:g} resolves this state")
+            return UnresolvedWithAdvice(
+                f"{error}; numerics.refinement = {refinement:g} resolves this state")
     failed = f"no numerics.refinement that is accepted (up to {MOST_REFINED:g}) is much larger"
     if candidates:
         failed = f"numerics.refinement up to {candidates[-1]:g} does not resolve it"

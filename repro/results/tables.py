@@ -19,8 +19,8 @@ from repro.results.netcdf import TIME
 from repro.results.quantities import plain as unit
 from repro.scene import Source, load_scene
 
-#: Times of a notebook's table at either end.
-SHOWN = 5
+#: Number of first and of last times in the table of a notebook.
+END_TIMES = 5
 
 
 class Results(Mapping[str, np.ndarray]):
@@ -136,7 +136,7 @@ class Results(Mapping[str, np.ndarray]):
         """HTML for notebooks: key figures, a picture of the last state, and a table with a row per
         column, at the first and the last times."""
         rows = list(range(len(self.time)))
-        rows = rows if len(rows) <= 2 * SHOWN else [*rows[:SHOWN], *rows[-SHOWN:]]
+        rows = rows if len(rows) <= 2 * END_TIMES else [*rows[:END_TIMES], *rows[-END_TIMES:]]
         lines = [_html_row(f"{name} ({unit(name)})", column[rows])
                  for name, column in self.items()]
         caption = escape(f"{self.name}: {len(self.time)} rows, {len(rows)} shown; {self.status}")

@@ -84,7 +84,7 @@ def _carried(space: Space, interface: str, name: str, drop: float):
 def flux_error(space: Space, carried: np.ndarray) -> float:
     """Largest error of the flux through 25 sections of a field at the points of :func:`meshes.fine`.
 
-    The field is (T, q, 2) or (T, 1, 2). It is tested with ramps, which fall from one at the inlet to zero at the outlet.
+    The field is (T, q, 2) or (T, 1, 2). It is tested with ramps that fall from one at the inlet to zero at the outlet.
     """
     grid = space.mesh
     _, weight, _ = meshes.fine(space)

@@ -1,6 +1,7 @@
-"""Hard cases of contact: remeshing forced around it, the least angle, a seed as wide as the pore, the pore's ends.
+"""Hard cases of contact and growth.
 
-Hard cases of the growth: theta to 2000, uneven, far under one, in one long step; and seeds from tiny to large.
+Contact: forced remeshes around it, the least angle, a seed as wide as the pore, the pore's ends. Growth: theta to 2000,
+uneven, far under one, and in one long step.
 """
 
 from __future__ import annotations
@@ -26,14 +27,15 @@ from verification.problems import bodies, hard, runs
 from verification.problems.bodies import RADIUS, HalfCylinder, Supported
 from verification.problems.hard import DRIVE, EFFLUENTS, FIXED, SHAPE, TOLERANCE, HardCase, Run
 
-#: A film that closes at once takes a seventh of the elements' height under it, and their biomass aside. The bound was
-#: 0.3 while whole arcs joined the wall. A divided arc has smaller elements beside the contact line: 0.32 was measured.
+#: A film that closes at once removes a seventh of the height of the elements under it, and displaces their biomass. The
+#: bound was 0.3 while whole arcs joined the wall. A divided arc has smaller elements beside the contact line: 0.32 was
+#: measured.
 CLOSING = 0.4
 FILM = ('pore.width="20 um"', 'aggregate.radius="17.6 um"', 'growth.end="1 h"')
 
 
 def remeshing_always(scene: Scene) -> Iterator[Report]:
-    """A run each of whose steps ends with a new mesh, from which the next one goes on."""
+    """A run with a remesh after every step. The next step starts from the new mesh."""
     pair = next(simulation.steps(scene))
     while pair:
         state, instant = pair
@@ -44,7 +46,7 @@ def remeshing_always(scene: Scene) -> Iterator[Report]:
 
 
 def _on_a_new_mesh(scene: Scene, state, instant: Report):
-    """The same step, its pore and what is solved there on a new mesh."""
+    """The state and report of a step on a new mesh, with flow and transport solved there."""
     old, speed = instant.pore, instant.solved.flow.mean_velocity
     fresh, _ = remeshing.remesh(scene, old, old, speed)
     last = replace(instant.ledgers[-1], biomass_after=fresh.mass)
@@ -54,19 +56,19 @@ def _on_a_new_mesh(scene: Scene, state, instant: Report):
 
 
 def landings(run: Run) -> list[tuple[float, float]]:
-    """The films (um) before and after each step that makes contact, which is made again."""
+    """Films (um) before and after each step that makes contact. The step is repeated."""
     ends = [instant for instant in run.instants if instant.ledgers or instant.pore.time == 0]
     return [midpoint.attempt(run.scene, a.pore, a.solved, b.pore.time - a.pore.time).gaps
             for a, b in pairwise(ends) if b.pore.contact and not a.pore.contact]
 
 
-#: What is known of contact from a step to the next: a midpoint step ends where the film is first too thin, an update
-#: comes up to 12 min late.
+#: Delay of contact, by scheme: a midpoint step ends where the film is first too thin, and an update is up to 12 min
+#: late.
 LATE = {"midpoint": (0.0, ""), "updates": (1.0, ", and 12 min between updates")}
 
 
 def film_closes(preset: str, simulator: Callable) -> Iterator:
-    """From a film of 2.4 um through contact; way: how the scene is run."""
+    """From a film of 2.4 um through contact. simulator: function that runs the scene."""
     run = hard.run_scene(hard.load("wide", preset, *FILM), simulator, density=CLOSING)
     fine = hard.reference("wide", *FILM, 'output.times=["1 h"]')
     yield run, contact_rests(run)
@@ -80,12 +82,14 @@ def film_closes(preset: str, simulator: Callable) -> Iterator:
 
 
 def _edge_wide(computed: Run, fine: Run, preset: str) -> Iterator:
-    """Nodes join a wall one by one: each end of the contact surface is known to an edge of the interface, h.
+    """Check the contact surface and its effects, to the accuracy of its ends.
 
-    The surface's length c is then known to 2 h; and where a shape update comes late, when the film is thinner by d than
-    it may be, c is longer by that of the chord at the depth d of a circle, (8 R d)^1/2. Of the loss of head, that of
-    L K_clean / K um of clean channel, lambda dc is changed by dc; and a film closed over dc more adds dc film / 2 to
-    each side of a plug W high."""
+    Nodes join a wall one by one, so each end of the contact surface is known to an edge h of the interface, and the
+    length c of the surface to 2 h. If a shape update is late and the film thinner by d than allowed, c is longer by the
+    chord at the depth d of a circle, (8 R d)^1/2. A change dc changes the loss of head by lambda dc, where the loss
+    is that of L K_clean / K um of clean channel. A film closed over dc more adds dc film / 2 to each side of a plug W
+    high.
+    """
     width, ratio = computed.scene.pore.width, computed.scene.flow.viscosity_ratio
     film = computed.scene.growth.minimum_film
     edge = film / ACROSS_FILM / computed.scene.numerics.refinement
@@ -102,12 +106,12 @@ def _edge_wide(computed: Run, fine: Run, preset: str) -> Iterator:
 
 
 def _contact_length(shape: Outline) -> float:
-    """Of the surface on the upper wall, um."""
+    """Length (um) of the contact surface on the upper wall."""
     return np.ptp(shape.points[shape.wall == TOP, 0]) if (shape.wall == TOP).any() else 0.0
 
 
 def contact_rests(run: Run) -> list[Check]:
-    """What holds at every instant of a run through contact."""
+    """Checks of every instant of a run through contact."""
     width = run.scene.pore.width
     film = run.scene.growth.minimum_film
     angle = run.scene.growth.minimum_contact_angle
@@ -122,15 +126,15 @@ def contact_rests(run: Run) -> list[Check]:
 
 
 def _closing(shape: Outline, width: float, film: float, angle: float) -> int:
-    """Nodes of a polygon that should join a wall, or contact lines of arcs with too little fluid beyond them."""
+    """Number of nodes of a polygon that should join a wall, or of contact lines of arcs with too little clearance."""
     if shape.geometry == 1:
         return np.count_nonzero(contact.closing_nodes(shape, width, film, angle))
-    # The rows' arcs are shorter than those of the search, so the clearance is taken at other places.
+    # Arcs in the rows are shorter than those of the search, so the clearance is evaluated at other points.
     return sum(clearance < -2 * CLOSE for clearance in _clearances(shape, width, film, angle).values())
 
 
 def _clearances(shape: Outline, width: float, film: float, angle: float) -> dict[tuple[int, int], float]:
-    """Of all contact lines, by wall and direction."""
+    """Clearance (um) of all contact lines, by wall and direction."""
     rule = Clearance(width, film, angle)
     return {line.key: rule.beyond(shape, line.node, line.direction)[0] for line in lines_of(shape)}
 
@@ -148,7 +152,7 @@ LEAST = 16.7
 
 
 def wedge(angle: float, geometry: int) -> Outline:
-    """A plug 20 um high, whose sides leave the upper wall at an angle (degrees) in the fluid."""
+    """A plug 20 um high. Its sides meet the upper wall at an angle (degrees) in the fluid."""
     height = 20.0
     side = np.linspace(0, 1, 12 // geometry + 1)[:, None]
     left = [-30.0, 0.0] + np.hstack([(side - 1) / np.tan(np.deg2rad(angle)), side]) * height
@@ -156,7 +160,7 @@ def wedge(angle: float, geometry: int) -> Outline:
 
 
 def least_angle(preset: str) -> list:
-    """The stage alone: what joins the wall a tenth of a degree under and over the least angle, to both sides."""
+    """The stage alone: sides that join the wall a tenth of a degree under and over the least angle."""
     kind = hard.load("wide", preset).numerics.geometry
     under, over = (_sides(wedge(angle, kind)) for angle in (LEAST - 0.1, LEAST + 0.1))
     return [at_least("sides that join, a tenth of a degree under", sum(under), 2, "2.3.3: the wedge closes"),
@@ -164,7 +168,7 @@ def least_angle(preset: str) -> list:
 
 
 def _sides(shape: Outline) -> list[bool]:
-    """Does the wedge beside the upper contact surface close, upstream and downstream?"""
+    """Whether the wedge beside the upper contact surface closes, upstream and downstream."""
     angle = np.deg2rad(LEAST)
     if shape.geometry == 2:
         values = _clearances(shape, 20.0, 2.0, angle)
@@ -189,7 +193,7 @@ def _loss(scene: Scene) -> float:
 
 
 def wedges_close(preset: str) -> list:
-    """From contact on until wedges beside it close one after the other."""
+    """From contact until wedges beside it have closed one after the other."""
     run = hard.run_packaged("wide", preset, 'pore.width="20 um"', 'aggregate.radius="17.9 um"', 'growth.end="4 h"',
                        density=CLOSING)
     lengths = [_contact_length(i.pore.outline) for i in run.instants if i.pore.contact]
@@ -229,7 +233,7 @@ TIGHT = HardCase(
 
 
 def forced(preset: str, seed: int) -> Iterator:
-    """Through contact under the fluid's forces: width and flow are drawn; the film of 3 um closes at 2 um."""
+    """Through contact under the fluid's forces, with random width and flow. The film of 3 um closes at 2 um."""
     random = np.random.default_rng(seed)
     width = random.uniform(25.0, 100.0)
     changes = (f'pore.width="{width} um"', f'aggregate.radius="{width - 3} um"', 'growth.end="0.4 h"',
@@ -251,7 +255,7 @@ FORCED = HardCase(
 
 
 def to_the_end(preset: str) -> list:
-    """A pore that is 90 um long, 30 um wide: the aggregate grows to its upstream end."""
+    """A pore 90 um long and 30 um wide. The aggregate grows to its upstream end."""
     changes = ('pore.width="30 um"', 'pore.length="90 um"', 'aggregate.radius="25 um"', 'growth.end="60 h"')
     run = hard.run_packaged("wide", preset, *changes, density=CLOSING)
     ends = np.array([i.pore.mesh.ends for i in run.instants])
@@ -271,19 +275,19 @@ END = HardCase(
     {"wide, short": to_the_end},
     mutants=("hard-extent-uncapped",))
 
-#: The paper's stabilisation is that of the last known shape [E6]: theta goes to where it is asked to be by this factor
-#: a call, as in shape updates, but always as an expansion since t = 0. On curved triangles it does so in one call.
+#: Factor of theta in one call. The paper's stabilisation is that of the last known shape [E6], so theta rises in steps
+#: as in shape updates, always as an expansion since t = 0. Curved triangles need one call.
 UPDATE = {1: 1.25, 2: np.inf}
 
 
 def seed(preset: str) -> tuple[Supported, np.ndarray]:
-    """A half-disc of 20 um on a wall, and nodes of its free rim."""
+    """A half-disc of 20 um on a wall, and the nodes of its free rim."""
     start = pore.seeded(hard.load("wide", preset, f'aggregate.radius="{RADIUS} um"'))
     return bodies.on_wall(start.mesh, start.space.order, start.outline)
 
 
 def grown(body: Supported, theta: np.ndarray) -> growth.Equilibrium:
-    """The half-disc under theta at its nodes (n,); on straight triangles the mean of their corners."""
+    """The half-disc under theta at its nodes (n,). Straight triangles take the mean of their corners."""
     return bodies.grow(body, theta[body.cells] @ body.shape.table.values.T, factor=UPDATE[body.geometry])
 
 
@@ -297,15 +301,17 @@ def even(preset: str, theta: float) -> list[Check]:
             at_most("pressure against the closed form", largest(solution.pressure / push - 1), 1e-6, "as above")]
 
 
-#: A bound over that of interpolation: two for the pressure, and the paper's stabilisation errs as much again.
+#: Error bound over that of interpolation: two for the pressure, doubled by the paper's stabilisation.
 CEA = {1: 4, 2: 2}
 
 
 def uneven(preset: str, inner: float, outer: float, pressed: bool = False) -> Iterator[Check]:
-    """theta = a + c (R / R_0)^2, the closed forms of a half-cylinder: places and area; Cea's lemma: the error is that
-    of interpolation times the root of the ratio of moduli, which go as theta^(-2/3), and two for the pressure; the
-    paper's stabilisation errs as much again, in the same order. pressed: the pressure too, outside of the middle
-    quarter, where linear functions of R meet."""
+    """theta = a + c (R / R_0)^2 against the closed forms of a half-cylinder: positions and area.
+
+    By Cea's lemma the error is that of interpolation times the root of the ratio of moduli, which go as theta^(-2/3),
+    times two for the pressure. The paper's stabilisation doubles it, in the same order. pressed: check the pressure,
+    outside of the middle quarter, where linear functions of R meet.
+    """
     body, rim = seed(preset)
     exact = HalfCylinder(inner, outer)
     theta = exact.theta(*body.reference.T)
@@ -330,7 +336,7 @@ def uneven(preset: str, inner: float, outer: float, pressed: bool = False) -> It
 
 
 def _rms_error(body: Supported, places: np.ndarray, exact: HalfCylinder) -> float:
-    """Root mean square (um) over t = 0 of the error of places (n, 2)."""
+    """Root mean square error (um) of positions (n, 2), over the body at t = 0."""
     where, weight, table = bodies.norm_points(body)
     gap = table.values @ places[body.cells] - exact.place(*np.moveaxis(where, 2, 0))
     return np.sqrt(np.sum(weight[..., None] * gap**2) / weight.sum())
@@ -355,15 +361,16 @@ UNEVEN = HardCase(
 
 
 def still_water(preset: str, *changes: str) -> Run:
-    """A run in which diffusion holds the supply everywhere; what enters is then a small difference of large fluxes, and
-    its balance says nothing."""
+    """A run in which diffusion keeps the supply everywhere.
+
+    The uptake is then a small difference of large fluxes, so the balances are not checked.
+    """
     scene = hard.load("wide", preset, 'aggregate.radius="20 um"', *changes)
     return hard.run_scene(runs.supplied_everywhere(scene), balance=None)
 
 
 def one_step(preset: str) -> list:
-    """A step of 3 h where rates are constant: the mass is exact however long the step, and a half-disc keeps its
-    shape."""
+    """A step of 3 h at constant rates. The mass is exact for any step, and a half-disc keeps its shape."""
     run = still_water(preset, 'growth.end="3 h"', 'growth.time_step="3 h"')
     expected = runs.mass_after(run.scene, run.last["time_h"])
     area, thickness = (run.over_first(name)[-1] for name in SHAPE[:2])
@@ -376,7 +383,7 @@ def one_step(preset: str) -> list:
 
 
 def long_steps(preset: str) -> list:
-    """Base from 25 um in one step of 3 h, or what the midpoint rule makes of it."""
+    """Base from 25 um in one step of 3 h, which the midpoint rule may divide."""
     changes = ('aggregate.radius="25 um"', 'growth.end="3 h"', 'output.times=["3 h"]')
     run = hard.run_packaged("base", preset, *changes, 'growth.time_step="3 h"')
     fine = hard.reference("base", *changes)
@@ -385,7 +392,7 @@ def long_steps(preset: str) -> list:
             hard.close(run, fine, preset, *DRIVE, allowed=TOLERANCE[preset] + late)]
 
 
-#: Half the step changes u by 0.2 %: updates of 12 min are 0.4 % off, of 3 h fifteen times as much.
+#: Halving the step changes u by 0.2 %: updates of 12 min err by 0.4 %, and those of 3 h by fifteen times as much.
 UPDATES = {"updates": 0.06, "midpoint": 0.0}
 LONG = HardCase(
     11, "three-hours", "A growth step of 3 h",
@@ -408,7 +415,7 @@ def decay(preset: str) -> Iterator:
 
 
 def starving(preset: str) -> list:
-    """Without donor in the wide pore, with the paper's diffusivities: between decay at the least C_A and the supply."""
+    """Without donor in the wide pore, with the paper's diffusivities: decay between the least C_A and the supply."""
     run = hard.run_packaged("wide", preset, 'aggregate.radius="20 um"', 'substrates.donor.supply="0 mg/L"',
                        'growth.end="200 h"', 'growth.time_step="20 h"', 'output.times=["100 h", "200 h"]')
     least = run.column("acceptor_min_mg_per_L").min()

@@ -1,6 +1,7 @@
-"""Hard cases of meshes: fifty remeshes, nearly cocircular points, a poor mesh to start from, 1e5 nodes in one step.
+"""Hard cases of meshes and runs.
 
-Hard cases of runs: tiny and large seeds, huge and tiny units, 1e5 nodes, parameters drawn at random.
+Meshes: fifty remeshes, nearly cocircular points, a poor initial mesh. Runs: tiny and large seeds, huge and tiny units,
+1e5 nodes in one step, random parameters.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ FIFTY = 50
 
 
 def remeshes(preset: str) -> list:
-    """Fifty new meshes, of sizes that change by a third, around the aggregate of base at 4 h; then a step."""
+    """Fifty remeshes around the aggregate of base at 4 h, with sizes that differ by a third; then a step."""
     run = hard.run_packaged("base", preset, 'aggregate.radius="20 um"', 'growth.end="4 h"', 'output.times=["4 h"]')
     original = run.scene
     first, speed = run.instants[-1].pore, run.instants[-1].solved.flow.mean_velocity
@@ -64,7 +65,7 @@ NAMES = ("area", "thickness", "upstream tip", "conductivity")
 
 
 def _numbers(scene: Scene, state: Pore) -> list[float]:
-    """What NAMES say."""
+    """Values of NAMES."""
     shape = state.outline
     return [shape.area, shape.thickness, shape.upstream, pore.solve_flow(scene, state.space).conductivity]
 
@@ -78,7 +79,7 @@ REMESHES = HardCase(
 
 
 def cocircular(preset: str) -> list:
-    """Outlines whose nodes are on a circle up to 1e-15, 1e-12, 1e-9, 1e-6 of its radius."""
+    """Outlines with nodes on a circle up to 1e-15, 1e-12, 1e-9 and 1e-6 of its radius."""
     scene = hard.load("base", preset)
     checks, (_, exact) = [], _mesh_and_loss(scene, 0.0)
     for size in (1e-15, 1e-12, 1e-9, 1e-6):
@@ -102,12 +103,12 @@ def _mesh_and_loss(scene: Scene, noise: float) -> tuple[Mesh, float]:
     return grid, flow.unit_flow(Space(grid, numerics.order), 2000.0).loss
 
 
-#: How fields at the nodes go from mesh to mesh.
+#: Transfer of nodal fields between meshes, by geometry.
 TRANSFER = {1: transfer.project, 2: transfer.interpolated}
 
 
 def nearly_same(preset: str) -> list:
-    """The transfer between meshes whose nodes agree up to 1e-15 and 1e-12: pieces without area, nodes on edges."""
+    """The transfer between nearly equal meshes, which have pieces without area and nodes on edges."""
     scene = hard.load("base", preset, 'aggregate.radius="20 um"')
     grid = pore.seeded(scene).mesh
     places, cells = grid.points[grid.body], grid.topology.body_cells
@@ -132,7 +133,7 @@ COCIRCULAR = HardCase(
 
 
 def poor(preset: str) -> list:
-    """Base from 20 um whose fluid starts with poor triangles: two steps of 12 min against those from a good mesh."""
+    """Base from 20 um with poor triangles in the fluid: two steps of 12 min against those from a good mesh."""
     scene = hard.load("base", preset, 'aggregate.radius="20 um"')
     good, _ = hard.solved_seed(scene)
     bad, count = _spoilt(good)
@@ -147,8 +148,10 @@ def poor(preset: str) -> list:
 
 
 def _spoilt(good: Pore) -> tuple[Pore, int]:
-    """The pore with the fluid's inner nodes moved about as far as no triangle turns over, its edges straight, and its
-    poor triangles."""
+    """The pore with straight edges and randomly moved inner nodes of the fluid, and its number of poor triangles.
+
+    The nodes move as far as possible without turning a triangle over.
+    """
     random = np.random.default_rng(9)
     topology = good.mesh.topology
     straight = good.mesh.straight
@@ -173,7 +176,7 @@ POOR_MESH = HardCase(
     mutants=("hard-poor-mesh-kept",))
 
 
-#: Powers of the columns that have a unit of length or time.
+#: Powers of length and time in the units of columns.
 COLUMNS = {
     "time_h": (0, 1), "mean_velocity_m_per_d": (1, -1), "head_loss_cm": (1, 0), "conductivity_m_per_d": (1, -1),
     "aggregate_area_um2": (2, 0), "thickness_um": (1, 0), "upstream_um": (1, 0), "downstream_um": (1, 0),
@@ -207,7 +210,7 @@ UNITS = HardCase(
     refusable=tuple(SCALES),
     mutants=("length-scale",))
 
-#: What is drawn: key of the scene, its unit, and its physical range; that of the radius over the width.
+#: Random keys of the scene with their units and physical ranges. The radius is over the width.
 RANGES = {
     "pore.width": ("um", 20.0, 200.0), "aggregate.radius": ("um", 0.04, 0.8),
     "flow.mean_velocity": ("m/day", 0.03, 30.0), "flow.viscosity_ratio": ("", 1.0, 1e5),
@@ -221,7 +224,7 @@ RANGES = {
 
 
 def at_random(preset: str, seed: int) -> list[Run]:
-    """One draw: values that lie so far between the ends of their ranges, by their logarithms."""
+    """One draw: the logarithms of the values are uniform in their ranges."""
     random = np.random.default_rng(seed)
     value = {key: low * (high / low) ** random.uniform() for key, (_, low, high) in RANGES.items()}
     value["aggregate.radius"] *= value["pore.width"]
@@ -254,21 +257,21 @@ SEEDS = HardCase(
      "20 um in 50 um": partial(grow_seed, name="base", radius=20.0, end="4 h")},
     mutants=("curved-half-of-the-half",))
 
-#: Refinement with which base has 1e5 nodes, and a preset of those elements: fast and accurate differ in the step's
-#: tolerance alone.
+#: Preset and refinement with which base has 1e5 nodes, by order. fast and accurate differ in the tolerance of the step
+#: alone.
 HUGE = {1: ("paper", 11.4), 2: ("accurate", 5.7), 3: ("cubic", 3.8)}
 
 
 @cache
 def _first_step(preset: str, *changes: str) -> tuple[Run, StepResult]:
-    """What is solved in the seed of 15 um as a Run, and one step of 6 min from it."""
+    """The seed of 15 um with its flow and transport as a Run, and one step of 6 min from it."""
     run = hard.run_packaged("base", preset, 'aggregate.radius="15 um"', *hard.FIXED, *changes)
     seed = run.instants[0]
     return run, problems.step(run.scene, seed.pore, seed.solved, 0.1)
 
 
 def huge(preset: str) -> list:
-    """One step of 6 min with 1e5 nodes, against the preset's own mesh."""
+    """One step of 6 min with 1e5 nodes, against the mesh of the preset."""
     run, near = _first_step(preset)
     fine_preset, refinement = HUGE[run.scene.numerics.order]
     fine, far = _first_step(fine_preset, f"numerics.refinement={refinement}")

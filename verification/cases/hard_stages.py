@@ -1,6 +1,7 @@
-"""Hard cases of the substrates: starved pores, an exhausted substrate, fronts of zero order, kinetics saturated.
+"""Hard cases of the substrates and the flow.
 
-Hard cases of the flow: high and vanishing speed, viscosity ratios to 1e9, a plug on coarse meshes.
+Substrates: starved pores, an exhausted substrate, fronts of zero order, saturated kinetics. Flow: high and vanishing
+speed, viscosity ratios to 1e9, a plug on coarse meshes.
 """
 
 from __future__ import annotations
@@ -35,8 +36,10 @@ SLOW = 'flow.mean_velocity="0.35 m/day"'
 
 
 def same_root(run: Run) -> Check:
-    """Newton's method must come to one solution from above, from zero and from far below zero, where the law of Monod
-    has its spurious roots."""
+    """Check that Newton's method reaches one solution from above, from zero and from far below zero.
+
+    Monod's law has spurious roots below zero.
+    """
     solved = run.end.solved
     problem, state = solved.problem, channels.both(solved.concentrations)
     supplies = problem.supply.reshape(2, -1)
@@ -53,7 +56,7 @@ def starved(preset: str, changes: tuple[str, ...]) -> list:
     return [checks, same_root(run)]
 
 
-#: Half-discs that are starved.
+#: Changes of the scene, by part: starved half-discs.
 HUNGRY = {"0.35 m/d, R = 27 um": disc(27, SLOW, 'pore.width="50 um"'),
           "0.35 m/d, R = 42 um": disc(42, SLOW, 'pore.width="50 um"'),
           "supply 0.15 mg/L": disc(40, *supply(0.15, 0.15)), "supply 0.02 K_s": disc(40, *supply(0.02, 0.02))}
@@ -84,7 +87,7 @@ def exhausted(preset: str, scarce: str) -> list:
 
 
 def _stoichiometry(run: Run) -> list[Check]:
-    """(7) less F times (8) is what decay takes, d_c f_d b X m_A, whatever the concentrations."""
+    """Check that (7) less F times (8) is the uptake of decay, d_c f_d b X m_A, at any concentrations."""
     law, both = run.scene.kinetics, run.scene.substrates
     acceptor, donor = (flux.consumed for flux in run.end.solved.fluxes)
     demand = law.acceptor_to_donor_ratio * donor
@@ -112,21 +115,21 @@ SHARP = tuple(f'substrates.{name}.half_saturation="1e-5 mg/L"' for name in NAMES
 
 
 def front(preset: str, radius: float, more: tuple[str, ...] = ()) -> list:
-    """A half-disc with such fronts."""
+    """A half-disc with half saturations of a millionth of the supply."""
     return hard.against("wide", preset, disc(radius, *SHARP, *more), *EFFLUENTS, refinement=0.8)[2]
 
 
-#: Half thickness and films of the slab, um; its penetration depth over the half thickness.
+#: Half thickness and films of the slab (um), and its penetration depth over the half thickness.
 HALF = 40.0
 FILM = 20.0
 DEPTH = 0.6
 
 
 def slab_front(preset: str) -> list:
-    """The stage alone: a slab between films of still water, in which the donor is used up at 0.6 of the way in.
+    """The stage alone: a slab between films of still water, in which the donor is used up at 0.6 of its half thickness.
 
-    Behind the front C'' jumps from s / D to zero, so that whatever the order an element is off by s h^2 / (8 D) at the
-    most."""
+    At the front C'' jumps from s / D to zero, so an element of any order errs by at most s h^2 / (8 D).
+    """
     size = SIZES[preset]
     end, width = HALF + FILM, 1.5 * size
     scene = hard.load("wide", preset, *SHARP, 'kinetics.decay_coefficient="0 1/d"',
@@ -149,7 +152,7 @@ def slab_front(preset: str) -> list:
 
 
 FRONT = "the jump of C'' at the front: s h^2 / (8 D_B)"
-#: Of the elements, um.
+#: Element sizes, um.
 SIZES = {"paper": 6.0, "fast": 12.0, "accurate": 5.0, "cubic": 12.0}
 ZERO_ORDER = HardCase(
     3, "zero-order", "Half saturations of a millionth of the supply: fronts of zero order",
@@ -162,14 +165,14 @@ ZERO_ORDER = HardCase(
 
 
 def saturated(preset: str) -> list:
-    """Base with a supply of 1000 K_s: m is one to a few parts in a thousand, growth exponential."""
+    """Base with a supply of 1000 K_s: m is one to a few parts in a thousand, and growth is exponential."""
     run = hard.run_packaged("base", preset, *supply(1000, 1000), 'growth.time_step="0.5 h"',
                             'output.times=["6 h", "12 h"]', 'growth.end="12 h"')
     return [run, exponential(run)]
 
 
 def exponential(run: Run) -> list[Check]:
-    """Biomass over that at the start against (9)-(10) at the supply, and at the least concentrations of the run."""
+    """Check the growth of biomass against (9)-(10) at the supply and at the least concentrations of the run."""
     time, scene = run.last["time_h"], run.scene
     lowest = (run.column(f"{name}_min_mg_per_L").min() for name in NAMES)
     least, _ = runs.growth_rates(scene.kinetics, scene.substrates, *lowest)
@@ -193,7 +196,7 @@ def speed(factor: float) -> str:
 
 
 def fast_flow(preset: str, factor: float) -> list:
-    """A half-disc of 60 um that does not grow, and the same at a tenth of the velocity."""
+    """A half-disc of 60 um that does not grow, at a velocity and at a tenth of it."""
     slower = hard.run_packaged("wide", preset, *disc(60, speed(factor / 10)))
     computed, fine, checks = hard.against("wide", preset, disc(60, speed(factor)), *EFFLUENTS, *DRIVE,
                                          refinement=FINER[factor])
@@ -203,12 +206,12 @@ def fast_flow(preset: str, factor: float) -> list:
                     "that of concentrations at the aggregate, area and rate: twice the preset's")]
 
 
-#: Boundary layers ask for refinements of 0.23, 0.49, 1.06 and 2.3 (pore.resolution); the finer run has more.
+#: Refinement of the finer run. Boundary layers need 0.23, 0.49, 1.06 and 2.3 (pore.resolution).
 FINER = {1: 1.0, 10: 1.0, 100: 1.5, 1000: 2.8}
 
 
 def _more_than(faster: Run, slower: Run, preset: str) -> list[Check]:
-    """Uptake between that at a tenth of the velocity and that at the supply everywhere."""
+    """Check that uptake lies between that at a tenth of the velocity and that at the supply everywhere."""
     law, both = faster.scene.kinetics, faster.scene.substrates
     m_a, m_d = (s.supply / (s.supply + s.half_saturation) for s in (both.acceptor, both.donor))
     most = law.maximum_utilization_rate * m_a * m_d * law.maximum_density * faster.last["aggregate_area_um2"]
@@ -234,21 +237,23 @@ FAST = HardCase(
 
 
 def no_flow(preset: str) -> list:
-    """A velocity of zero with substrates has no steady state that the inlet feeds: to run it is wrong."""
+    """A velocity of zero with substrates has no steady state fed by the inlet. The scene must be refused."""
     hard.load("wide", preset, *FIXED, 'flow.mean_velocity="0 m/day"')
     return [at_most("scenes without a supply that were accepted", 1, 0, "no state is steady")]
 
 
 def still(preset: str) -> list:
-    """Without [flow] the supply is held at both ends: what diffuses in is what is taken up."""
+    """Without [flow] both ends have the supply, and uptake equals diffusion."""
     computed, fine = (hard.run_scene(runs.without_flow(hard.load("wide", name, *disc(60, *size))))
                  for name, size in ((preset, ()), ("accurate", ("numerics.refinement=1",))))
     return [computed, hard.close(computed, fine, preset, *EFFLUENTS)]
 
 
 def trickle(preset: str, velocity: str, balance: float) -> list:
-    """So little flow that C is uniform and one substrate is used up: with C_A -> 0 and C_D uniform, (7) and (8) are
-    taken up in the ratio F + d_c f_d b / (k m_D), which gives C_D."""
+    """So little flow that C is uniform and one substrate is used up.
+
+    With C_A -> 0 and C_D uniform, (7) and (8) have the ratio F + d_c f_d b / (k m_D), which gives C_D.
+    """
     run = hard.run_packaged("wide", preset, *disc(60, f'flow.mean_velocity="{velocity} m/day"'), balance=balance)
     law, both = run.scene.kinetics, run.scene.substrates
     decay = channels.decay_demand(law)
@@ -267,7 +272,7 @@ def trickle(preset: str, velocity: str, balance: float) -> list:
             at_most("donor leaving against the closed form, over the supply", apart, peclet, "as above")]
 
 
-#: Velocities (m/d), and what the substrates' balances may miss.
+#: Velocities (m/d), and bounds of the substrates' balances.
 TRICKLES = {"1e-4": 1e-8, "1e-6": 1e-6, "1e-12": 1e-6}
 STILL = HardCase(
     5, "still", "No flow, and flow so small that the inlet's condition degenerates",
@@ -290,7 +295,7 @@ def viscous(preset: str, ratio: float) -> list:
 
 
 def rigid(preset: str) -> list:
-    """lambda from 1e5 to 1e9: nothing passes the aggregate any more."""
+    """lambda from 1e5 to 1e9: the aggregate is nearly rigid."""
     soft, stiff = (hard.run_packaged("wide", preset, *disc(80, f"flow.viscosity_ratio={ratio}"))
                    for ratio in (1e5, 1e9))
     layers = [layered_channel.gradient(soft.scene.pore.width, 80.0, ratio) for ratio in (1e5, 1e9)]
@@ -324,16 +329,16 @@ def plugged(preset: str, size: float) -> Iterator[Check]:
     yield at_most("head loss against Poiseuille's", abs(solution.loss / exact - 1), lost, origin)
 
 
-#: Quadratic and cubic velocities hold the parabola.
+#: Quadratic and cubic velocities contain the parabola.
 EXACT = (1e-10, 1e-10, "round-off: the elements hold a parabola")
-#: What the paper's velocity and head may miss in a plug with elements of so many um: 3.3 and 12.3 % on a coarse mesh,
-#: as was measured, and of second order.
+#: Bounds of the errors of velocity and head of the paper's scheme in a plug, by element size (um): 3.3 and 12.3 % were
+#: measured on a coarse mesh, and are of second order.
 COARSE = "3.3 and 12.3 % with elements of W / 4, second order"
 LEAK = {12.5: (0.033, 0.123, COARSE), 7.0: (0.033 * 0.56**2, 0.123 * 0.56**2, COARSE)}
 
 
 def _sources(grid, solution) -> float:
-    """Largest |(w, grad N_i)| of a node that is on no boundary, over the flux."""
+    """Largest |(w, grad N_i)| of an inner node, over the flux."""
     w = solution.velocity[grid.triangles].mean(axis=1) - solution.correction
     local = grid.areas[:, None] * np.einsum("tai,ti->ta", grid.gradients, w)
     total = np.bincount(grid.triangles.ravel(), local.ravel(), len(grid.points))

@@ -1,10 +1,8 @@
-"""One motion of a mesh, straight or curved, and what the cases measure on it.
+"""Motion of straight and curved meshes with the aggregate.
 
-Motions of the aggregate for which the displacement of the fluid is known.
-
-The fluid around an aggregate on a wall, against quadratic elements without a pressure on meshes of their own.
-
-What every motion of the mesh must keep: triangles upright, nodes on their lines, a way back; and when to remesh.
+Some motions have a known displacement of the fluid. The fluid around an aggregate on a wall is compared with quadratic
+elements without a pressure on their own meshes. Every motion keeps triangles upright and nodes on their lines, and can
+be reversed. The criterion for a remesh is exact.
 """
 
 from __future__ import annotations
@@ -25,15 +23,15 @@ from verification.evidence.cases import parametrize
 from verification.evidence.checks import at_least, at_most, largest, refine, studies, study
 from verification.problems import meshes
 
-#: gamma of (35) and c of the stabilisation as scenes have them, and the gammas that cases compare (E13).
+#: gamma of (35) and c of the stabilisation in scenes, and the values of gamma that cases compare (E13).
 GAMMA, STABILISATION = 1.0, 100.0
 GAMMAS = (0.1, GAMMA, 10.0)
-#: Straight triangles, as linear elements have them, and curved ones, as those of order 2 and 3.
+#: Straight triangles, those of linear elements, and curved ones, those of order 2 and 3.
 EITHER = {"straight": (1,), "curved": (2,)}
 
 
 def moved(grid: Mesh, points: np.ndarray, gamma: float = GAMMA) -> np.ndarray:
-    """(N, 2) nodes of the mesh after its aggregate's have moved to theirs of ``points`` (N, 2)."""
+    """(N, 2) nodes of the mesh after those of its aggregate have moved to their ``points`` (N, 2)."""
     return mesh_motion.move(grid, points[grid.body], gamma, STABILISATION)
 
 
@@ -64,7 +62,7 @@ def test_plug(geometry, record):
 
 
 def _nodes(straight: Mesh, geometry: int) -> Mesh:
-    """With nodes in the middles of edges where triangles are to be curved."""
+    """The mesh with triangles of a geometry: curved ones have nodes in the middles of edges."""
     return meshes.space_on(straight, geometry).mesh
 
 
@@ -74,7 +72,7 @@ def _error(grid: Mesh, displacement: np.ndarray, gamma: float, nodes=slice(None)
     return largest((computed - displacement)[nodes]) / largest(displacement)
 
 
-#: Gradients of the places by those before, and what is added to them.
+#: Gradients of linear motions, and their shifts (um).
 MOTIONS = {"slides": (np.eye(2), (3.0, 1.0)),
            "turns by 30 degrees": ([[np.sqrt(0.75), -0.5], [0.5, np.sqrt(0.75)]], 0.0),
            "is sheared": ([[1.0, 0.4], [0.0, 1.0]], 0.0), "doubles": (2 * np.eye(2), 0.0),
@@ -108,7 +106,7 @@ SIZES = dict.fromkeys((5.0, 2.5, 1.25, 0.625), 3)
 END = 30.0
 FACE = 10.0
 NARROW = 20.0
-#: Every gamma of the waves, nearly incompressible the first, with the most that the last error may be.
+#: Values of gamma of the waves with bounds of the last error. The first is nearly incompressible.
 CEILINGS = {0.01: 3e-3, 0.1: 3e-3, 1.0: 2e-3, 10.0: 1.2e-3}
 
 
@@ -128,7 +126,7 @@ def test_waves(geometry, record):
 
 
 def _wave(x, y, gamma: float) -> np.ndarray:
-    """(..., 2) closed form on both sides, a mirror image of each other; within the plug that of its faces."""
+    """(..., 2) closed form on both sides, which are mirror images. Inside the plug it is that of the faces."""
     far = np.minimum(END - np.abs(x), END - FACE)
     along, across = sliding_waves.displacement(far, y, NARROW, gamma, END - FACE)
     return np.stack([-np.sign(x) * along, across], axis=-1)
@@ -143,10 +141,10 @@ def _wave_error(size: float, seed: int, gamma: float, geometry: int, label: str)
 RADIUS = 25.0
 #: Width of the pores around aggregates, and ends of that around a segment of a disc (um).
 PORE, SEGMENT_END = 50.0, 50.0
-#: Refinements of our meshes with the parts a side of theirs: both codes are refined.
+#: Refinements of the package's mesh with the divisions of the reference. Both codes are refined.
 LEVELS = ((0.7, 6), (1.1, 8), (1.9, 12), (3.3, 16))
 CORNER_LEVELS = ((0.7, 8), (1.3, 12), (2.4, 16), (4.4, 24))
-#: Contact angle of the second aggregate: the fluid's, 120 degrees, is what makes a corner singular.
+#: Contact angle of the second aggregate. The angle of the fluid, 120 degrees, makes the corner singular.
 CONTACT = np.radians(60)
 BOTH = "0.1 % between codes"
 
@@ -192,7 +190,7 @@ def test_corner(geometry, record):
 
 @cache
 def _segment(contact: float, refinement: float, geometry: int) -> Mesh:
-    """A mesh around a segment of a disc that meets the wall at an angle; pi/2: the half-disc."""
+    """A mesh around a segment of a disc that meets the wall at an angle. pi/2 gives the half-disc."""
     height = RADIUS * (1 - np.cos(contact))
     half = int(np.ceil(contact * RADIUS / height * ACROSS_AGGREGATE * refinement))
     turn = np.linspace(np.pi / 2 - contact, np.pi / 2 + contact, 2 * geometry * half + 1)
@@ -205,13 +203,15 @@ def _segment(contact: float, refinement: float, geometry: int) -> Mesh:
     return meshes.around(segment, refinement, (-SEGMENT_END, SEGMENT_END), PORE)[0]
 
 
-#: For straight triangles and for curved ones.
+#: Cached: straight and curved triangles share the reference.
 _reference_motion = cache(quadratic_mesh_motion.follow)
 
 
 def _difference(level: tuple[float, int], contact: float, geometry: int, gamma: float, name: str) -> dict[str, float]:
-    """Size of our elements, and the relative difference of both codes on a level; ours is linear in the motion, which
-    may be as large as the aggregate."""
+    """Element size, and relative difference of both codes on a level.
+
+    The displacement is linear in the motion, which may be as large as the aggregate.
+    """
     refinement, parts = level
     grid, motion = _segment(contact, refinement, geometry), SEGMENT_MOTIONS[name]
     reference = _reference_motion(RADIUS, contact, PORE, SEGMENT_END, parts, gamma, motion)
@@ -222,7 +222,7 @@ def _difference(level: tuple[float, int], contact: float, geometry: int, gamma: 
 
 
 REACH = -75.0, 75.0
-#: Radius of the half-disc (um), by which factor it grows, and how far it slides over its radius.
+#: Radius of the half-disc (um), factor of its area, and distance that it slides over its radius.
 JOURNEYS = ((5.0, 2.0, 1.0), (20.0, 2.0, 1.0), (35.0, 1.3, 0.5))
 STEPS = 18
 
@@ -248,7 +248,7 @@ def _around(radius: float, geometry: int) -> Mesh:
 
 
 def _journey(grid: Mesh, stretch: float, shift: float) -> Mesh:
-    """The mesh after all steps, in each of which the aggregate is stretched and shifted."""
+    """The mesh after all steps. Each stretches and shifts the aggregate."""
     for _ in range(STEPS):
         grid = grid.moved(moved(grid, stretch * grid.points + [shift, 0.0]))
     return grid
@@ -268,7 +268,7 @@ def _journey_checks(name: str, first: Mesh, last: Mesh) -> list:
 
 
 def _area(grid: Mesh) -> float:
-    """Of all triangles, bent edges included, um2."""
+    """Area (um2) of all triangles, including their bent edges."""
     return meshes.fine(Space(grid, grid.geometry))[1].sum()
 
 
@@ -294,7 +294,7 @@ def test_round_trip(geometry, record):
 
 
 def _round_trip(grid: Mesh, stretch: float | np.ndarray, shift: float) -> np.ndarray:
-    """(N, 2) um by which nodes miss their first place."""
+    """(N, 2) um, distances of the nodes from their first positions after a motion and its reverse."""
     away = grid.moved(moved(grid, stretch * grid.points + [shift, 0.0]))
     return moved(away, (away.points - [shift, 0.0]) / stretch) - grid.points
 
@@ -326,7 +326,7 @@ def test_criterion(record):
 
 
 def _stretched(count: int, by: float) -> Mesh:
-    """Thirty triangles, so many of them stretched."""
+    """Thirty triangles, of which ``count`` are stretched."""
     return _triangles(np.where(np.arange(30) < count, by, 1.0))
 
 
@@ -343,7 +343,7 @@ def _bowed(bow: float) -> Mesh:
 
 
 def _triangles(stretch: np.ndarray, biomass: bool = False) -> Mesh:
-    """Equilateral triangles, each stretched along a line of its own, each apart from the others; negative: mirrored."""
+    """Separate equilateral triangles, each stretched along a different line. A negative stretch mirrors one."""
     count = len(stretch)
     x, y = np.array([0.0, 1.0, 0.5]), np.array([0.0, 0.0, np.sqrt(0.75)])
     turned = (np.outer(stretch, x) + 1j * y) * np.exp(1j * np.linspace(0.0, 3.0, count))[:, None]

@@ -1,10 +1,9 @@
-"""(30)-(34): the mass in every point of the reaction is kept as the aggregate expands.
+"""Reprojection (30)-(34) and remeshes.
 
-An aggregate that grows unevenly through many updates and remeshes: what must hold after each of them.
-
-A new mesh around the aggregate: what it carries over, and what it starts from.
-
-Substrates on a new mesh that reaches further than the old one: (26) upstream, constant downstream.
+Reprojection keeps the mass at every point of the reaction as the aggregate expands. An aggregate that grows unevenly
+through many updates and remeshes keeps its balances after each of them. A new mesh carries over densities, positions at
+t = 0, pressure and theta. On a new mesh that is longer than the old one, substrates follow (26) upstream and are
+constant downstream.
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ from verification.evidence.checks import at_least, at_most, columns, each_at_mos
 from verification.problems import aggregates, meshes, runs
 from verification.problems.channels import NAMES, both, pair
 
-#: The seed's radius (um), the increase of the biomass in an update, and how many of them: the area grows eightfold.
+#: Radius of the seed (um), relative increase of biomass in an update, and number of updates: the area grows eightfold.
 RADIUS = 5.0
 INCREASE = 0.08
 UPDATES = 27
@@ -36,7 +35,7 @@ UPDATES = 27
     mutants=("reprojection-left-out", "inverse-ratio", "fluid-triangles-too"))
 @parametrize("order", aggregates.EVERY)
 def test_mass(order, record):
-    """Checks of one update of a half-disc of 20 um with elements of an order."""
+    """Record checks of one update of a half-disc of 20 um with elements of an order."""
     def density(x, y):
         return aggregates.DENSITY * (1 + 0.02 * np.sin(0.3 * x + 0.2 * y))
 
@@ -63,7 +62,7 @@ def test_mass(order, record):
     mutants=("reprojection-left-out", "inverse-ratio", "theta-forgotten", "extent-kept-too-long"))
 @parametrize("order", aggregates.EVERY)
 def test_half_disc(order, record):
-    """Checks of 27 updates with elements of an order."""
+    """Record checks of 27 updates with elements of an order."""
     scene = aggregates.base_scene(order=order)
     state = aggregates.seed(RADIUS, order=order)
     rows: list[dict] = []
@@ -83,7 +82,7 @@ def test_half_disc(order, record):
 
 
 def _errors(state, theta: float, first: float) -> dict[str, float]:
-    """Relative errors against the closed form; the outline's nodes are on the arc."""
+    """Relative errors against the closed form. The nodes of the outline are on the arc."""
     distance = np.hypot(*state.outline.points[state.wall == FREE].T)
     active, _ = aggregates.densities(state)
     return {"radius": largest(distance / (RADIUS * np.sqrt(theta)) - 1),
@@ -92,7 +91,7 @@ def _errors(state, theta: float, first: float) -> dict[str, float]:
 
 
 GROWING_UPDATES, SEED = 30, 8.0
-#: Remesh where more than six triangles are under 0.6 (3.5), or nearer to an end than min(7 R, 1.3 W) (3.1).
+#: Criteria for a remesh: more than six triangles under 0.6 (3.5), or less than min(7 R, 1.3 W) to an end (3.1).
 POOR = 0.6
 ALLOWED = 6
 REACH = 7.0
@@ -120,7 +119,7 @@ def test_growing(order, record):
 
 
 def _growth_history(transfer: str, order: int) -> dict[str, np.ndarray]:
-    """A row of numbers of every update."""
+    """Numbers of every update, by name."""
     scene = aggregates.base_scene(f'numerics.transfer="{transfer}"', order=order)
     state, rows = aggregates.seed(SEED, order=order), []
     expected = state.mass
@@ -134,7 +133,7 @@ def _growth_history(transfer: str, order: int) -> dict[str, np.ndarray]:
 
 
 def _faster_in_front(state) -> np.ndarray:
-    """(r, q) increase of X_A in an update: 15 % at the upstream tip, 2 % at the other."""
+    """(r, q) relative increase of X_A in an update: 15 % at the upstream tip, 2 % at the downstream tip."""
     outline, x = state.outline, aggregates.reaction_points(state.space)[0]
     return 0.15 * np.exp(-2 * (x - outline.upstream) / (outline.downstream - outline.upstream))
 
@@ -151,34 +150,36 @@ def _restart(state) -> float:
 
 
 def _at_theta_points(state, field: np.ndarray) -> np.ndarray:
-    """(t, q) of a field in the points of the reaction: of straight triangles the mean of their nodes, of curved ones
-    that in each point."""
+    """(t, q) of a field at the points of the reaction: the mean over the nodes of straight triangles, or itself."""
     return field if state.space.order > 1 else field[state.mesh.topology.body_cells, 0].mean(axis=1, keepdims=True)
 
 
 def _poor(state) -> int:
-    """Triangles of quality under 0.6, from the squares of their sides alone: 16 area^2 is the square of their sum less
-    twice the sum of their squares (Heron)."""
+    """Number of triangles of quality under 0.6, from the squares of their sides alone.
+
+    By Heron's formula 16 area^2 is the square of their sum less twice the sum of their squares.
+    """
     corner = state.mesh.points[state.mesh.triangles]
     squares = np.sum((corner - np.roll(corner, 1, axis=1)) ** 2, axis=2)
     return np.count_nonzero(3 - 6 * np.sum(squares**2, axis=1) / squares.sum(axis=1) ** 2 < POOR**2)
 
 
 def _missing(state) -> float:
-    """um of fluid that are missing beside the aggregate."""
+    """Length (um) of fluid that is missing beside the aggregate."""
     outline, (left, right) = state.outline, state.mesh.ends
     reach = min(REACH * outline.thickness, WIDEST * aggregates.WIDTH)
     return max(0.0, reach - (outline.upstream - left), reach - (right - outline.downstream))
 
 
-#: A motion that is linear in the place and keeps the lower wall; det = 1.17.
+#: A linear motion that keeps the lower wall; det = 1.17.
 MOTION = np.array([[1.3, 0.2], [0.0, 0.9]])
 ROUND, REFINEMENTS = 20.0, (0.75, 1.3, 2.3, 4.0)
-#: Refinements of the meshes before the remesh over that of the new one: three unrelated pairs of meshes a size.
+#: Refinement of the old mesh over that of the new one: three unrelated pairs of meshes a size.
 OLD = (0.7, 0.8, 0.9)
-#: Those that a scene may have, by the order of its elements.
+#: Transfers that a scene may have, by the order of its elements.
 TRANSFERS = {1: ("conserving", "bounded", "linear"), 2: ("conserving",), 3: ("conserving",)}
-#: mg/L of X_A and X_I, as a + b x + c y, of linear elements; and of both kinds X_m together. The pressure's, over mu_L.
+#: (a, b, c) of linear fields a + b x + c y: X_A and X_I (mg/L) of linear elements; X_A and X_I whose sum is X_m; the
+#: pressure over mu_L.
 KINDS = {"active": (25000.0, 100.0, -200.0), "inert": (3000.0, -20.0, 50.0)}
 SHARES = {**KINDS, "active": (27000.0, 20.0, -50.0)}
 PRESSURE = (0.1, 0.01, 0.02)
@@ -217,8 +218,10 @@ def test_remesh_linear(order, transfer, record):
 
 
 def _moved_linearly(order: int, kinds: dict):
-    """An aggregate that is no half-disc, moved by MOTION; its arcs are straight, so that linear fields are linear in
-    all triangles' own coordinates too."""
+    """An aggregate that is not a half-disc, moved by MOTION.
+
+    Its arcs are straight, so that linear fields are also linear in the local coordinates of all triangles.
+    """
     outline = meshes.seed(15.0, 1.0, order)
     flat = outline.points * [1.2, 1.0]
     if order > 1:
@@ -265,12 +268,12 @@ FITTED = "a linear fit in each triangle, averaged at the nodes: second order"
 
 
 def _share(x, y):
-    """X_I over X_m, level across the rim and the wall, a tenth up and down."""
+    """X_I over X_m, 0.2 +- 0.1, with zero slope across the rim and the wall."""
     return 0.2 + 0.1 * np.cos(np.pi * np.hypot(x, y) / ROUND)
 
 
 def _share_errors(refinement: float, number: int, order: int) -> dict[str, float]:
-    """Errors of a pair of meshes, in the points of the reaction."""
+    """Errors of a pair of meshes at the points of the reaction."""
     before = _round(refinement, OLD[number], lambda x, y: aggregates.DENSITY * (1 - _share(x, y)), order)
     weight = before.space.reaction.dx
     before.inert[:] = aggregates.DENSITY * _share(*aggregates.reaction_points(before.space)) * weight
@@ -281,17 +284,17 @@ def _share_errors(refinement: float, number: int, order: int) -> dict[str, float
 
 
 def _size(state) -> float:
-    """Of the elements of the aggregate, um."""
+    """Element size (um) in the aggregate."""
     return meshes.mean_size(state.mesh, state.mesh.biomass)
 
 
 def _hump(x, y):
-    """X_A, level across the rim and the wall, 5 % above and below X_m."""
+    """X_A, X_m +- 5 %, with zero slope across the rim and the wall."""
     return aggregates.DENSITY * (1 + 0.05 * np.cos(np.pi * np.hypot(x, y) / ROUND))
 
 
 def _round(refinement: float, old: float, density, order: int = 1):
-    """A half-disc with a density (x, y) on a mesh coarser than the one to come."""
+    """A half-disc with a density (x, y) on a mesh coarser than the next one."""
     outline = meshes.seed(ROUND, refinement, order)
     return aggregates.seed_around(outline, old * refinement, density, (-30.0, 30.0), order)
 
@@ -302,7 +305,7 @@ def _remeshed(refinement: float, before):
 
 
 def _density_errors(refinement: float, number: int) -> dict[str, float]:
-    """Errors after the remesh of a pair of meshes, and after the update that follows it."""
+    """Errors after the remesh of a pair of meshes, and after the next update."""
     new = _remeshed(refinement, _round(refinement, OLD[number], _hump))
     after, area = aggregates.expand(aggregates.base_scene(), new, 0.0), new.mass / aggregates.DENSITY
     return {"density after the remesh": _density_error(new, _hump), "density after the update": _density_error(after),
@@ -310,7 +313,7 @@ def _density_errors(refinement: float, number: int) -> dict[str, float]:
 
 
 def _density_error(state, exact=aggregates.uniform) -> float:
-    """L2 of the density less exact(x, y), X_m, over that."""
+    """Relative L2 error of the density against exact(x, y), by default X_m."""
     active, _ = aggregates.densities(state)
     return meshes.l2_error(state.mesh.points[state.mesh.body], state.mesh.topology.body_cells, active[:, 0], exact)
 
@@ -376,7 +379,6 @@ SUPPLY = np.array([pair("supply")]).T
 
 
 def _exact(x: np.ndarray) -> np.ndarray:
-    """(2, n) both concentrations over the supply for places x, constant beyond the old outlet:
-    1 - 0.3 exp(u (x - x_out) / D)."""
+    """(2, n) concentrations over the supply at x: 1 - 0.3 exp(u (x - x_out) / D), constant beyond the old outlet."""
     diffusivity = np.array([pair("diffusivity")]).T
     return 1 - 0.3 * np.exp(SPEED / diffusivity * (np.minimum(x, ENDS[1]) - ENDS[1]))

@@ -1,9 +1,8 @@
-"""Substrates with a known answer: in slabs of biomass, and concentrations that are chosen beforehand.
+"""Substrates with a known solution: in slabs of biomass, and manufactured.
 
-Slabs: (26) with the Robin channel, and Monod's two limits at rest.
-
-Chosen concentrations: the full nonlinear equations, flow that bends, D that jumps at a half-disc. The forcing, and the
-flux through the mesh's sides, are added to the operators' sources; all else is the code's.
+Slabs have (26) with the Robin channel, and the two limits of Monod's law without flow. Manufactured concentrations
+solve the full nonlinear equations with a curved flow and a D that jumps at a half-disc. The forcing and the flux
+through the sides of the mesh are added to the source; everything else is the code's.
 """
 
 from __future__ import annotations
@@ -55,12 +54,12 @@ LARGE = 1e13
 ACCEPTOR, DONOR = SCENE.substrates.acceptor, SCENE.substrates.donor
 #: No growth: the acceptor is taken up by decay alone, d_c f_d b X m_A, whatever the donor.
 DECAY_ALONE = replace(SCENE.kinetics, maximum_utilization_rate=0.0)
-#: First-order uptake of the donor, its half saturation far above the supply: q_D = C_D k / K_D; the acceptor
-#: never falls.
+#: First-order uptake of the donor, q_D = C_D k / K_D: its half saturation is far above the supply. The acceptor never
+#: falls.
 FIRST_ORDER = substrates_with(acceptor={"half_saturation": 1 / LARGE}, donor={"half_saturation": LARGE})
 NO_DECAY = replace(SCENE.kinetics, maximum_utilization_rate=LARGE, decay_coefficient=0.0, acceptor_to_donor_ratio=1e-12)
 UPTAKE = 2e4
-#: Random meshes of each size over which errors are averaged: those of few triangles differ by a third.
+#: Element sizes (um) with the number of random meshes of each. Errors on meshes of few triangles differ by a third.
 SIZED = {1: SAMPLES, 2: {3.2: 12, 1.6: 6, 0.8: 3, 0.4: 1}, 3: {3.2: 12, 1.6: 8, 0.8: 4, 0.4: 1}}
 #: Order, Peclet number, ends (um), and the last error of C.
 ROBIN = {"Pe = 0.1": (1, 0.1, CROSSED, 2e-4), "Pe = 1": (1, 1.0, CROSSED, 2e-4), "Pe = 10": (1, 10.0, CROSSED, 5e-5),
@@ -68,7 +67,7 @@ ROBIN = {"Pe = 0.1": (1, 0.1, CROSSED, 2e-4), "Pe = 1": (1, 1.0, CROSSED, 2e-4),
 ROBIN_HIGHER = {"Pe = 0.1, quadratic": (2, 0.1, WIDE, 3e-9), "Pe = 1, quadratic": (2, 1.0, WIDE, 1.5e-8),
                 "Pe = 10, quadratic": (2, 10.0, WIDE, 1e-7), "Pe = 1, cubic": (3, 1.0, WIDE, 2e-11),
                 "Pe = 10, cubic": (3, 10.0, WIDE, 1e-9)}
-#: Where and how large the error of C leaving may be, for each order.
+#: Index of the size and bound of the error of the effluent, by order.
 LEAVING = {2: (-1, 6e-9), 3: (1, 1e-11)}
 
 
@@ -106,8 +105,10 @@ def test_robin_higher(order, peclet, ends, ceiling, record):
 
 
 def _robin_errors(size: float, number: int, order: int, peclet: float, ends) -> dict[str, float]:
-    """Size of the elements; root mean square of C, over that of the exact one with linear elements, else over the
-    supply; C leaving over the supply."""
+    """Element size, root mean square error of C, and error of the effluent over the supply.
+
+    The error of C is over the exact root mean square with linear elements, and over the supply with others.
+    """
     space, speed = slab_space(size, number, order, ends), peclet * DONOR.diffusivity / SLAB
     equations = problem(space, speed, FIRST_ORDER, NO_DECAY)
     state = steady(equations, UPTAKE)
@@ -123,7 +124,7 @@ def _robin_errors(size: float, number: int, order: int, peclet: float, ends) -> 
 
 
 def _at_rest(size: float, number: int, sink: float, half_saturation: float, film: float, order: int = 1):
-    """Space, C_A and its fluxes in a slab without flow, the supply held at both ends.
+    """Space, C_A and its fluxes in a slab without flow, with the supply at both ends.
 
     sink: largest uptake, d_c f_d b X (mg/L/h); half_saturation: K (mg/L).
     """
@@ -144,9 +145,9 @@ def _sides(film: float) -> dict[str, float]:
 THIELE = {1: ((0.1, 0.0, 3e-7, 3e-7), (1.0, 0.0, 4e-5, 4e-5), (10.0, 0.0, 4e-3, 4e-3), (1.0, FILM, 3e-5, 3e-5)),
           2: ((0.1, 0.0, 1e-12, 3e-12), (1.0, 0.0, 1e-8, 1e-11), (10.0, 0.0, 2e-5, 3e-7), (1.0, FILM, 7e-9, 1e-11)),
           3: ((1.0, 0.0, 2e-11, 3e-12), (10.0, 0.0, 2e-7, 1e-10), (1.0, FILM, 2e-11, 3e-12))}
-#: What tells of films.
+#: Words of the labels for films.
 FILMED = {0.0: "", FILM: f", films of {FILM:g} um"}
-#: Elements (um), and how many meshes of each.
+#: Element sizes (um) with the number of meshes of each.
 THIELE_MESHES = {1: SAMPLES, 2: {4.0: 8, 2.0: 4, 1.0: 2, 0.5: 1}, 3: SAMPLES}
 NORM = "L2 of C over the mesh, relative; what is taken up, relative; several meshes a size"
 
@@ -199,7 +200,7 @@ def test_first_order_slab_higher(order, modulus, film, ceiling, uptake_ceiling, 
 
 def _slab_errors(size: float, number: int, order: int, film: float, sink: float, half_saturation: float, exact,
                  uptake_name: str) -> dict[str, float]:
-    """Size of the elements, and relative errors of C and of what enters a side over ``sink``; exact(x): both."""
+    """Element size, and relative errors of C and of the uptake on a side over ``sink``. exact(x): both."""
     space, field, flux = _at_rest(size, number, sink, half_saturation, film, order)
     gap = meshes.distance(in_points(space), field[space.cells], lambda x, y: exact(x)[0])
     return {"size": length(space, size), "C": gap,
@@ -209,8 +210,8 @@ def _slab_errors(size: float, number: int, order: int, film: float, sink: float,
 DEPTH = 20.0
 LIMIT = (0.3, 0.1, 0.03, 0.01)
 LEAST = 1e-3
-#: Order, K (mg/L), film (um), elements (um) with how many meshes of each, and the last errors of C and of the depth;
-#: of orders 2 and 3 without films: with more of K what is left in the middle shows.
+#: Order, K (mg/L), film (um), element sizes (um) with the number of meshes of each, and last errors of C and of the
+#: depth. Orders 2 and 3 have no films: with a larger K the concentration in the middle would show.
 MONOD = {"K = 0.1 mg/L, linear": (1, 0.1, 0.0, SAMPLES, 3e-4, 4e-5),
          "K = 0.03 mg/L, linear": (1, 0.03, 0.0, SAMPLES, 4e-4, 4e-5),
          f"K = 0.01 mg/L, films of {FILM:g} um, linear": (1, 0.01, FILM, SAMPLES, 1e-4, 3e-5),
@@ -230,13 +231,13 @@ def _monod(order: int, half_saturation: float, film: float, samples: dict, ceili
 
 
 def _sink(film: float) -> float:
-    """s (mg/L/h) that zero order brings DEPTH deep."""
+    """Uptake s (mg/L/h) of zero order whose penetration depth is DEPTH."""
     b = film * ACCEPTOR.diffusivity_in_aggregate / ACCEPTOR.diffusivity
     return 2 * ACCEPTOR.diffusivity_in_aggregate * ACCEPTOR.supply / ((DEPTH + b) ** 2 - b**2)
 
 
 def _limit():
-    """How the slab without films goes to zero order as its half saturation does to zero, on one fine mesh."""
+    """Studies of the slab without films on one fine mesh, as its half saturation goes to zero."""
     why = "C_s / K large: K / (2 C_s) ln(1 + C_s / K) for the depth; the mesh's error is 30 times smaller"
     errors = refine(_from_zero_order, LIMIT)
     return studies(errors, {"C": (around(0.8, 0.1), why, 1e-2), "depth": (around(0.8, 0.1), why, 4e-3)},
@@ -252,7 +253,7 @@ def _from_zero_order(half_saturation: float) -> dict[str, float]:
 
 
 def _exhausted(film: float):
-    """What is left beyond the depth of penetration."""
+    """Checks of C beyond the depth of penetration."""
     size = sorted(SAMPLES)[1]
     space, field, _ = _at_rest(size, 0, _sink(film), LEAST, film)
     beyond = np.abs(space.points[:, 0]) < SLAB - DEPTH - 4 * size
@@ -284,14 +285,14 @@ LARGEST = 3e5
 #: X as a function of x and y.
 DENSITY = manufactured_transport.function(manufactured_transport.density(RADIUS, LARGEST))
 SUBSTRATES = substrates_with(donor={"half_saturation": 3.0})
-#: Refinements of each order, and how many unrelated meshes about each: the refinement is NEAR times the last one's, up
-#: and down.
+#: Refinements of each order with the number of unrelated meshes. Refinements of the meshes differ by powers of NEAR.
 REFINEMENTS = {1: {0.4: 5, 0.8: 3, 1.6: 2, 3.2: 1}, 2: {0.4: 5, 0.8: 3, 1.6: 2, 2.4: 1},
                3: {0.4: 6, 0.8: 4, 1.4: 3, 2.2: 1}}
 NEAR = 1.03
-#: u_ave W / D_A, and the last errors of acceptor and donor, of each order. Until the divergence-free w carried the
-#: substrates, advection hid the third order at Pe = 10, where the order was 4 +- 0.3; at Pe = 100 it was 4 +- 0.3 too,
-#: with last errors of 8e-6 and 1.7e-5. The orders and errors of w were seen before their present bounds were written.
+#: Peclet number u_ave W / D_A with the last errors of acceptor and donor, by order. Until the divergence-free w carried
+#: Peclet number u_ave W / D_A and the last errors of acceptor and donor, by order. Until the divergence-free w carried
+#: where the last errors were at most 8e-6 and 1.7e-5. Orders and errors of w were seen before the present bounds were
+#: written.
 PECLETS = {1: {0.1: (3e-4, 9e-4), 1.0: (1.2e-3, 2.5e-3), 10.0: (2.5e-3, 3.5e-3), 100.0: (4e-3, 5e-3)},
            2: {0.1: (1e-6, 1.5e-6), 1.0: (1e-6, 1.5e-6), 100.0: (1.5e-6, 2.5e-6)},
            3: {0.1: (8e-9, 1.1e-8), 10.0: (1.6e-7, 3e-7)}}
@@ -307,7 +308,7 @@ def _variants(*orders: int) -> dict[str, tuple]:
 
 
 def _expected(order: int, peclet: float) -> tuple:
-    """Order in L2, or the lowest and the highest, and why."""
+    """Order in L2, or the lowest and the highest order, and its origin."""
     if order == 1:
         return 2, "linear elements, lumped reaction, chords for arcs: second order"
     if order == 3:
@@ -336,7 +337,7 @@ def _chosen(peclet: float):
 
 
 def _solved(space: Space, peclet: float, inlet: str) -> np.ndarray:
-    """(2, n) C, by the code."""
+    """(2, n) C computed by the code."""
     mean, velocity, _ = _chosen(peclet)
     carried = prescribed_flow(space, np.column_stack([part(*space.points.T) for part in velocity]), mean)
     equations = transport.problem(space, carried, SUBSTRATES, SCENE.kinetics, inlet)
@@ -345,7 +346,7 @@ def _solved(space: Space, peclet: float, inlet: str) -> np.ndarray:
 
 
 def _added(space: Space, peclet: float, inlet: str) -> np.ndarray:
-    """(2, n) the forcing and what enters through the sides."""
+    """(2, n) source of the forcing and of the flux through the sides."""
     where, weight, values = in_points(space)
     forcing = weight * _by_side(peclet, "forcing", space.mesh.biomass, *np.moveaxis(where, 2, 0))
     source, edges = np.zeros((2, space.count)), _edges(space)
@@ -372,8 +373,10 @@ def _edges(space: Space) -> np.ndarray:
 
 
 def _through(space: Space, edges: np.ndarray, peclet: float, inlet: str) -> np.ndarray:
-    """(2, E, e) of what enters through edges: D dC/dn; and at the inlet, where the code has it leave, u_x (C - C_s), or
-    with the printed condition u_ave (C - C_s) [E4]."""
+    """(2, E, e) of the flux that enters through edges, D dC/dn.
+
+    At the inlet the code lets u_x (C - C_s) leave, or with the printed condition u_ave (C - C_s) [E4].
+    """
     _, weights, values = meshes.along_edges(space.order, 6)
     nodes = space.points[edges]
     x, y = np.moveaxis(values @ nodes, 2, 0)
@@ -420,8 +423,7 @@ def test_manufactured_higher(order, peclet, inlet, ceilings, record):
 
 
 def _chosen_errors(refinement: float, number: int, order: int, peclet: float, inlet: str) -> dict[str, float]:
-    """Size of the elements, nominal for linear ones; L2 of both substrates, on each element less the chosen field of
-    its side."""
+    """Element size, nominal for linear elements, and L2 errors of both substrates on the side of each element."""
     space = _half_disc_space(refinement, number, order)
     gap, size = rms_errors(space, _solved(space, peclet, inlet), lambda *at: _by_side(
         peclet, "value", space.mesh.biomass, *at))

@@ -1,13 +1,13 @@
-"""Substrates against other codes: steady and in time, in slabs, around biomass, and in a box that is well mixed.
+"""Substrates against other codes: steady and in time, in slabs, around biomass, and in a well-mixed box.
 
 Dual Monod uptake in a slab under plug flow, steady: against scipy's collocation, and against FiPy's finite volumes.
 Peclet numbers u l / D_A are 0.1, 1 and 5. Thiele's modulus l sqrt(k F X / (K_A D_A)) is 0.6, 1.9 and 6; the last slab,
-at Peclet number 0.1, is starved: three ten-thousandths of the acceptor's supply leave it.
+at Peclet number 0.1, is starved: 3e-4 of the acceptor's supply leaves it.
 
-Diffusion into biomass in two dimensions, without flow, against py-pde's finite differences. A box whose ends hold the
-supply; D is the same in fluid and biomass, as py-pde's Laplacian has it. Both codes are refined together, elements as
-long as cells: around a block whose sides follow the cells, and around the paper's half-disc, which cuts them. Thiele's
-modulus is SIDE sqrt(k F X / (K_A D_A)); at 7 the donor is used up, at 4.3 a few percent of it are left.
+Diffusion into biomass in two dimensions, without flow, against py-pde's finite differences. The box has the supply at
+its ends and one D in fluid and biomass, as py-pde's Laplacian requires. Both codes are refined together, with elements
+as long as cells: around a block along the cells, and around a half-disc, which cuts them. Thiele's
+modulus is SIDE sqrt(k F X / (K_A D_A)). At 7 the donor is used up, and at 4.3 a few percent of it are left.
 
 The modified Gear scheme (3.3): from the supply everywhere towards the steady profiles of the slab. X_A does not change
 (no yield, and less than 1e-5 of it decays). In time the scheme is compared with an integrator that makes no error of
@@ -76,7 +76,7 @@ LINEAR = {"linear": 1}
 HIGHER = {word: order for word, order in ORDERS.items() if order > 1}
 PECLETS = {f"Pe = {peclet:g}": peclet for peclet in (0.1, 1.0, 5.0)}
 DENSITIES = {f"X = {density:g} mg/L": density for density in (3e3, 3e4, 3e5)}
-#: Peclet number and density of the starved slab, and of the one that FiPy's cells and elements of order 2 and 3 share.
+#: Peclet number and density of the starved slab, and of the slab that FiPy and elements of order 2 and 3 share.
 STARVED, SHARED = (0.1, 3e5), (1.0, 3e4)
 ITSELF_STARVED = "C_A in the starved slab over itself"
 LAW = replace(SCENE.kinetics, yield_coefficient=1e-12)
@@ -88,7 +88,7 @@ HIGHER_CEILINGS = {2: 1e-7, 3: 1e-9}
 
 
 def reference_arguments(peclet: float, density: float):
-    """What the references take."""
+    """Arguments of the references."""
     return (speed_of(peclet), pair("supply"), pair("diffusivity"), pair("diffusivity_in_aggregate"), density,
             rates(SCENE.kinetics), SLAB)
 
@@ -101,7 +101,7 @@ def each(expected: int, why: str, ceiling: float) -> dict[str, tuple]:
 @cache
 def _computed(size: float, number: int, order: int, peclet: float, density: float, steps: int = 0, ends=CROSSED
           ) -> np.ndarray:
-    """(times, 2, n): each interval in equal steps, started anew from the end of the last; at rest if there are none."""
+    """(times, 2, n) C, restarted at each interval with equal steps. Without steps: the steady state."""
     equations = problem(slab_space(size, number, order, ends), speed_of(peclet), law=LAW)
     if not steps:
         return both(steady(equations, density))[None]
@@ -169,8 +169,11 @@ def test_monod_higher(order, peclet, density, record):
 
 def _distances(size: float, number: int, order: int, peclet: float, density: float, ends, tolerance: float
                ) -> dict[str, float]:
-    """Size; of each substrate, over itself, of both, over the larger supply, and of the acceptor at the nodes of the
-    slab, place by place over itself."""
+    """Element size and differences from solve_bvp.
+
+    They are relative for each substrate, over the larger supply for both together, and pointwise relative for the
+    acceptor at the nodes of the slab.
+    """
     space, exact_profile = slab_space(size, number, order, ends), exact(peclet, density, tolerance)
     computed, pieces = _computed(size, number, order, peclet, density, ends=ends)[0], space.reaction
     nodes = pieces.cells[:, 0]
@@ -181,8 +184,7 @@ def _distances(size: float, number: int, order: int, peclet: float, density: flo
 
 
 def _over_the_supply(gap: np.ndarray) -> dict[str, float]:
-    """Of each substrate the largest over the times of root mean squares over the places, gap (times, 2, ...), over its
-    supply."""
+    """Root mean squares of each substrate over space, the largest over time, over its supply. gap: (times, 2, ...)."""
     squares = np.mean(gap**2, axis=tuple(range(2, gap.ndim)))
     return dict(zip(NAMES, np.sqrt(squares).max(axis=0) / pair("supply")))
 
@@ -191,9 +193,9 @@ BOX, SIDE = 16.0, 8.0
 SUBSTRATES = substrates_with(acceptor={"diffusivity": 8e6, "diffusivity_in_aggregate": 8e6},
                      donor={"diffusivity": 4e6, "diffusivity_in_aggregate": 4e6})
 ITSELF = "donor in the biomass, over itself"
-#: Cells (um), and how many meshes of elements as long around the block.
+#: Cells (um) with the number of meshes of equally long elements around the block.
 BLOCK = {2.0: 6, 1.0: 4, 0.5: 2, 0.25: 1}
-#: Elements (um) of order 2 and 3 around either, which err less than a tenth as much as the finest cells.
+#: Elements (um) of order 2 and 3 by shape. They err less than a tenth as much as the finest cells.
 FINE_AROUND = {"block": {2: 0.5, 3: 1.0}, "half-disc": {2: 1 / 3, 3: 2 / 3}}
 #: Cells (um), and the refinement that makes elements twice as long on average around the half-disc.
 DISC = {4 / 3: 0.35, 2 / 3: 0.77, 1 / 3: 1.55, 1 / 6: 3.1}
@@ -213,8 +215,11 @@ HALF_DISCS = {"X = 1e+05 mg/L, linear": ("half-disc", 1, 1e5, 2e-5, 2e-5, 3e-5),
 
 
 def finite_differences(shape: str, order: int, density: float, *ceilings: float):
-    """Around the half-disc py-pde's finest cells alone are compared with elements of order 2 and 3: one after the other
-    they are off to one side or to the other, by no steady order."""
+    """Checks and studies against py-pde.
+
+    Around the half-disc only the finest cells are compared with elements of order 2 and 3, because the error of py-pde
+    changes sign from size to size.
+    """
     names, suffix = (*NAMES, ITSELF), ", of py-pde less ours"
     if order > 1 and shape == "half-disc":
         errors = _differences(min(DISC), 0, density, shape, order)
@@ -264,8 +269,7 @@ def _pypde(cell: float, density: float, shape: str):
 
 @cache
 def _rest_state(cell: float, number: int, density: float, shape: str, order: int) -> tuple[Space, np.ndarray]:
-    """C (2, n) of linear elements as long as py-pde's cells; of others, finer ones, as the transient scheme comes to
-    rest."""
+    """Steady C (2, n) of linear elements as long as py-pde's cells, or the rest state of the transient scheme."""
     if shape == "block":
         straight = mesh_with_sides(2 * SIDE**2, cell, number, (-BOX, BOX), BOX,
                                    lambda x, y: (np.abs(x) < SIDE) & (y < SIDE),
@@ -278,7 +282,7 @@ def _rest_state(cell: float, number: int, density: float, shape: str, order: int
 
 
 def _differences(cell: float, number: int, density: float, shape: str, order: int) -> dict[str, float]:
-    """Differences of both substrates over their supply, and of the donor in the biomass, the scarcer, over itself."""
+    """Differences of both substrates over their supply, and of the scarce donor in the biomass over itself."""
     points, expected, part = _pypde(cell, density, shape)
     elements = cell if order == 1 else FINE_AROUND[shape][order]
     space, fields = _rest_state(elements, number, density, shape, order)
@@ -289,11 +293,10 @@ def _differences(cell: float, number: int, density: float, shape: str, order: in
 
 #: Steps of each of the three intervals.
 STEPS = (16, 32, 64, 128)
-#: FiPy's cells (um), half as long as these, and the elements of order 2 and 3 that they are compared with, whose error
-#: is less than a tenth of theirs.
+#: Twice FiPy's cells (um), and the elements (um) of order 2 and 3, whose error is less than a tenth of FiPy's.
 CELLS, FINE = (4.0, 2.5, 5 / 3, 1.0), {2: 1.0, 3: 5 / 3}
-#: Steady and in time: elements (um) with how many meshes of each, why orders are of second order, the last error of a
-#: density of linear elements, and that of FiPy's cells less those of order 2 and 3.
+#: Steady and in time: elements (um) with the number of meshes of each, origin of the second order, last error of linear
+#: elements by density, and that against elements of order 2 and 3.
 AGAINST_FIPY = {
     False: (SAMPLES, "both codes are of second order", {3e3: 1e-6, 3e4: 6e-6, 3e5: 5e-5}, 6e-6),
     True: (dict(zip(CELLS, (4, 3, 2, 1))), "both codes are of second order; the error in time is a tenth",
@@ -301,7 +304,7 @@ AGAINST_FIPY = {
 
 
 def mass(space: Space) -> np.ndarray:
-    """(n, n) um2, the mass matrix on a straight mesh by scikit-fem; of linear functions lumped."""
+    """(n, n) um2, the mass matrix on a straight mesh by scikit-fem, lumped for order 1."""
     if space.order == 1:
         return np.diag(space.lumped())
     grid = space.mesh.fem
@@ -311,8 +314,10 @@ def mass(space: Space) -> np.ndarray:
 
 
 def _exact_in_time(size: float, peclet: float, density: float, order: int) -> np.ndarray:
-    """(times, 2, n): the same equations in space, M dC/dt = b - L C - X q in the points of the reaction, by scipy's
-    integrator to 1e-8."""
+    """(times, 2, n) C by scipy's integrator to 1e-8.
+
+    The equations in space are the same, M dC/dt = b - L C - X q at the points of the reaction.
+    """
     space, law = slab_space(size, 0, order), rates(LAW)
     equations, pieces = problem(space, speed_of(peclet), law=LAW), space.reaction
     points = (pieces.values @ np.eye(space.count)[pieces.cells]).reshape(-1, space.count)
@@ -330,7 +335,7 @@ def _exact_in_time(size: float, peclet: float, density: float, order: int) -> np
     return solution.y.T.reshape(len(TIMES), 2, -1)
 
 
-#: Order, Peclet number and density of what is studied in time, elements (um), and the last error.
+#: Studies in time: order, Peclet number, density, elements (um), and last error.
 IN_TIME = {f"Pe = {peclet:g}, X = {density:g} mg/L, {word}": (ORDERS[word], peclet, density, size, ceiling)
            for word, size, peclet, density, ceiling in (
                ("linear", CELLS[0], 0.1, 3e5, 2e-5), ("linear", CELLS[0], 1.0, 3e4, 3e-6),
@@ -355,20 +360,20 @@ def test_gear_in_time(order, peclet, density, size, ceiling, record):
 
 
 def _channel(size: float, peclet: float, density: float) -> channel_fipy.Channel:
-    """FiPy's, its cells half as long as our edges."""
+    """FiPy's channel. Its cells are half as long as the edges of the package."""
     cells = round(2 * (CROSSED[1] - CROSSED[0]) / size)
     return channel_fipy.Channel(cells, CROSSED, *reference_arguments(peclet, density))
 
 
 @cache
 def _fipy(size: float, peclet: float, density: float, timed: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Centres of its cells (n,), and (times, 2, n) there."""
+    """Centres (n,) of FiPy's cells, and C (times, 2, n) at them."""
     channel = _channel(size, peclet, density)
     return channel.x, channel.transient(TIMES) if timed else channel.steady()[None]
 
 
 def _at_cells(x, size: float, number: int, order: int, *arguments) -> np.ndarray:
-    """(times, 2, 5, n) ours at x, at five heights."""
+    """(times, 2, 5, n) C of the package at x and five heights."""
     return at_heights(slab_space(size, number, order), _computed(size, number, order, *arguments), x)
 
 
@@ -422,8 +427,10 @@ def test_gear_fipy(timed, order, peclet, density, record):
 
 
 def _from_fipy(size: float, number: int, order: int, peclet: float, density: float, timed: bool) -> dict[str, float]:
-    """Both codes refined together, or FiPy's cells against one mesh of quadratic or cubic elements; in the starved slab
-    C_A over itself."""
+    """Differences from FiPy, over the supply, and of C_A in the slab over itself.
+
+    Both codes are refined together, or FiPy's cells are compared with one mesh of quadratic or cubic elements.
+    """
     x, expected = _fipy(size, peclet, density, timed)
     elements, steps = (size, STEPS[-1] / size) if order == 1 else (FINE[order], STEPS[-1])
     computed = _at_cells(x, elements, number, order, peclet, density, round(timed * steps))
@@ -441,7 +448,7 @@ def _from_backward_euler(steps: int, peclet: float, density: float) -> dict[str,
 
 WELL_MIXED, RADIUS = 24.0, 8.0
 SUPPLY, SEEDED = 1000.0, 300.0
-#: Times (h) at which both are compared; the transient scheme starts anew at each.
+#: Times (h) of the comparison. The transient scheme restarts at each.
 HALF_DAYS = 12.0 * np.arange(1, 11)
 MIXED_STEPS = (2.0, 1.0, 0.5, 0.25)
 #: Last errors.
@@ -463,8 +470,10 @@ def box_around(order: int) -> Space:
 
 @cache
 def _mixed(step: float, order: int) -> np.ndarray:
-    """(times, 4, 2): mean and range of C_A and C_D over the nodes, of X_A and X_I over the points of the reaction, in
-    steps of so many hours."""
+    """(times, 4, 2) mean and range of C_A and C_D over the nodes, and of X_A and X_I over the points of the reaction.
+
+    step: h.
+    """
     equations = transport.problem(box_around(order), None, CLOSED, SLOW_LAW)
     weight = equations.space.reaction.dx
     active = SEEDED * weight
@@ -472,17 +481,17 @@ def _mixed(step: float, order: int) -> np.ndarray:
     state = transport.supplied_everywhere(equations)
     rows = []
     for interval in np.diff([0.0, *HALF_DAYS]):
-        step = gear.advance(equations, active, inert, state, interval, fixed_step=step)
-        active = step.active
-        inert = step.inert
-        state = step.concentrations
+        advance = gear.advance(equations, active, inert, state, interval, fixed_step=step)
+        active = advance.active
+        inert = advance.inert
+        state = advance.concentrations
         fields = (state.acceptor, state.donor, active / weight, inert / weight)
         rows.append([(field.mean(), np.ptp(field)) for field in fields])
     return np.array(rows)
 
 
 def _mixed_reference(order: int) -> np.ndarray:
-    """(times, 4) by scipy."""
+    """(times, 4) C_A, C_D, X_A and X_I by scipy."""
     space, law = box_around(order), rates(SLOW_LAW, CLOSED)
     share = space.reaction.dx.sum() / space.at.dx.sum()
 
@@ -495,7 +504,7 @@ def _mixed_reference(order: int) -> np.ndarray:
 
 
 def well_mixed(order: int):
-    """How even the box is, and studies of the four."""
+    """A check that the box is uniform, and studies of C_A, C_D, X_A and X_I."""
     trusted = _mixed_reference(order)
     uneven = (_mixed(MIXED_STEPS[-1], order)[:, :, 1] / trusted).max()
     yield at_most("unevenness in the box", uneven, 1e-6, "L^2 / D over the time in which the supply lasts")
@@ -533,7 +542,7 @@ def test_well_mixed_higher(order, record):
 
 
 def _constant_supply() -> float:
-    """X_A and X_I as the quasi-steady scheme integrates them, over five days of 12 min updates."""
+    """Relative error of X_A and X_I of the quasi-steady scheme over five days of 12 min updates."""
     acceptor, donor = 400.0, 900.0
     law = kinetics.rate_law(CLOSED, SLOW_LAW)
     growth = law.growth_rate(acceptor, donor)

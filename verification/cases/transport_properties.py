@@ -1,9 +1,8 @@
-"""What must hold whatever the solution is: the balance closes, nothing is negative, and there is one steady state.
+"""Properties of every solution: the balance closes, nothing is negative, and there is one steady state.
 
-Substrates around a half-disc as scenes have them, sharp fronts and fast water among them, against finer meshes.
-
-A step of the midpoint rule takes up substrates with the mean biomass of the step, at concentrations at rest: with C_A
-and C_D constant over the step that is what (7)-(10) say, and what is made then balances what is taken up.
+Substrates around a half-disc of scenes, with sharp fronts and fast water too, are compared with finer meshes. A step of
+the midpoint rule takes up substrates with the mean biomass of the step, at steady concentrations. At constant C_A and
+C_D this is the integral of (7)-(10), and the biomass made balances the uptake.
 """
 
 from __future__ import annotations
@@ -29,10 +28,10 @@ from verification.problems import runs
 from verification.problems.channels import NAMES, ORDERS, SCENE, both, rates, substrates_with
 
 SLOW = 0.35e6 / 24
-#: Radius (um), supplies of acceptor and donor (mg/L): pores under 0.35 m/d whose biomass could take up far more.
+#: Radius (um) and supplies of acceptor and donor (mg/L) of pores at 0.35 m/d whose biomass could take up far more.
 STARVED = [(radius, *supplies) for radius in (27.0, 42.0)
            for supplies in ((0.15, 0.15), (0.15, 10.0), (10.0, 0.15), (10.0, 10.0))]
-#: Changes of the scene base, which has the preset paper: elements of each order, curved ones coarser; and presets.
+#: Changes of the scene base, whose preset is paper: elements of each order (curved ones are coarser), and presets.
 KINDS = {"linear, paper": ('numerics.elements="linear"',),
          "quadratic": ('numerics.elements="quadratic"', "numerics.refinement=0.5"),
          "cubic": ('numerics.elements="cubic"', "numerics.refinement=0.4"),
@@ -80,8 +79,11 @@ def test_balance(kind, record):
 
 
 def _by_the_printed_inlet(seed, solved) -> list[float]:
-    """(u_ave - u_x) C of what is at the inlet, over the supply, of both substrates, as the weak form has it: lumped at
-    the nodes with linear elements. What enters is u_ave C_s less that."""
+    """(u_ave - u_x) C at the inlet over the supply, of both substrates.
+
+    The integral is that of the weak form, lumped at the nodes with linear elements. The flux that enters is u_ave C_s
+    less this.
+    """
     space = seed.space
     edges = space.dofs.inlet
     apart = solved.flow.mean_velocity - solved.flow.velocity[:, 0]
@@ -90,7 +92,7 @@ def _by_the_printed_inlet(seed, solved) -> list[float]:
 
 
 def _in_time(seed, solved):
-    """From the supply everywhere, over 36 s in controlled steps."""
+    """Check the balance over 36 s in controlled steps from the supply everywhere."""
     start = transport.supplied_everywhere(solved.problem)
     step = gear.advance(solved.problem, seed.active, seed.inert, start, 0.01)
     label = f"R = {seed.outline.thickness:.0f} um, in time" + ("" if solved.flow else ", no flow")
@@ -125,8 +127,10 @@ def test_starved(kind, radius, supplies, record):
 
 
 def _spread(seed, solved, computed) -> float:
-    """From rich and from random first iterates, up to 30 mg/L: with linear elements over each concentration itself,
-    else, where they may be zero, over the supply."""
+    """Largest difference between steady states from rich and random first iterates, up to 30 mg/L.
+
+    It is over the concentration with linear elements, and over the supply with others, which may be zero.
+    """
     random = np.random.default_rng(1)
     shape = computed.shape
     guesses = [np.full(shape, 30.0), random.uniform(0, 30.0, shape), random.uniform(0, 0.1, shape)]
@@ -137,12 +141,12 @@ def _spread(seed, solved, computed) -> float:
 
 SUPPLY = SCENE.substrates.acceptor.supply
 PAPER, FAST, ACCURATE = map(runs.with_preset, runs.PRESETS)
-#: What fronts are solved with, and how far its effluents may be from those far away.
+#: Numerics of the fronts, and bounds of the difference of effluents from those of a finer mesh.
 FINER = "numerics.refinement=0.45"
 SOLVED = {"fast": ((FAST, "numerics.refinement=0.25"), 1e-2), "accurate": ((FAST, FINER), 1e-3),
           "linear": ((PAPER,), 1e-2)}
 CUBIC = {"cubic": ((FAST, runs.with_elements("cubic"), FINER), 1e-3)}
-#: Half saturations, and the least, at which cubic elements would take minutes.
+#: Half saturations, and the least one, at which cubic elements would take minutes.
 HALVES = {f"K_s = {half}": half for half in ("1e-2 mg/L", "1e-3 mg/L")}
 LEAST = {"K_s = 1e-5 mg/L": "1e-5 mg/L"}
 
@@ -159,7 +163,7 @@ def test_proportion(half, solved, record):
 
 
 def proportion(half: str, *numerics: str) -> Check:
-    """Consumed acceptor over consumed donor, over F, less one."""
+    """Check consumed acceptor over F times consumed donor."""
     acceptor, donor = _front(half, *numerics)
     ratio = acceptor.consumed / donor.consumed / SCENE.kinetics.acceptor_to_donor_ratio
     return at_most("proportion", abs(ratio - 1), 1e-9, "one rate for both: exact but for where Newton's method stops")
@@ -185,8 +189,10 @@ def test_curved_front(half, solved, record):
 
 @cache
 def _front(half: str, *numerics: str):
-    """Ledgers of a thick half-disc that the donor, 1 mg/L, does not pass, without decay; on elements that are graded to
-    the front, and if these are refused, with the refinement that is then advised."""
+    """Ledgers of a thick half-disc without decay, which the donor (1 mg/L) does not cross.
+
+    Elements are graded to the front. If they are refused, the advised refinement is taken.
+    """
     halves = (f'substrates.{name}.half_saturation="{half}"' for name in NAMES)
     scene = _half_disc(100.0, 60.0, "0.29 m/day", *numerics, *halves, 'substrates.donor.supply="1 mg/L"',
                        'kinetics.decay_coefficient="0 1/day"')
@@ -204,22 +210,22 @@ def _resolved(scene: Scene):
 
 
 def _half_disc(width: float, radius: float, speed: str, *changes: str) -> Scene:
-    """Of a pore of another width."""
+    """A half-disc in the scene wide, with another width of the pore."""
     return load_scene("wide", (f'pore.width="{width} um"', f'aggregate.radius="{radius} um"',
                                f'flow.mean_velocity="{speed}"', *changes))
 
 
 @cache
 def _carried(*arguments):
-    """Ledgers of a half-disc at t = 0, on the first mesh that is made."""
+    """Ledgers of a half-disc at t = 0, on the first mesh."""
     scene = _half_disc(*arguments)
     return pore.solve(scene, pore.seeded(scene)).fluxes
 
 
 WITHIN = "0.1 %, what preset accurate is for"
 TENTH = "a tenth of what preset fast is for"
-#: A half-disc under fast water: its numerics, how far effluents and consumption may be from those of quadratic elements
-#: of refinement 2.5, and why.
+#: A half-disc under fast water: numerics, bound of the difference of effluents and consumption from those of quadratic
+#: elements of refinement 2.5, and its origin.
 FASTEST = {"quadratic, accurate": ((ACCURATE, runs.with_elements("quadratic"), FINER), 1e-3, WITHIN),
            "cubic": ((ACCURATE, runs.with_elements("cubic"), FINER), 1e-3, WITHIN),
            "fast": ((FAST,), 1e-3, TENTH + ": its elements there are accurate's")}
@@ -241,7 +247,7 @@ def test_curved_peclet(speed, preset, record):
                              "consumed": abs(flux.consumed / trusted.consumed - 1)}, bound, why, f" {name}"))
 
 
-#: The balance's round-off, and how far effluents may be from those of quadratic elements twice finer: of numerics.
+#: Numerics, bound of the balance, and bound of the difference of effluents from quadratic elements twice finer.
 CONSERVES = 1e-11, "round-off: the form conserves"
 HALF_DISCS = {
     "cubic": ((ACCURATE, runs.with_elements("cubic")), CONSERVES, 1e-5, "a hundredth of what preset accurate is for"),
@@ -269,14 +275,14 @@ def test_cubic_half_disc(numerics, round_off, bound, why, record):
 
 #: Lengths of a step (h); X_A more than doubles in the last.
 HOURS = (0.2, 2.0, 8.0)
-#: The paper's kinetics and diffusivities, the supply held at both ends: both substrates fall towards the wall.
+#: The paper's kinetics and diffusivities with the supply at both ends. Both substrates fall towards the wall.
 OPEN = substrates_with(acceptor={"supply": 1.0})
-#: Elements of each order on a mesh of their own, and those of presets.
+#: Elements of each order on their own meshes, and those of presets.
 MEAN: dict[str, int | str] = {**ORDERS, "paper": PAPER, "fast": FAST, "accurate": ACCURATE}
 
 
 def _open(numerics: int | str) -> transport.Problem:
-    """Around a half-disc: of an order, or with the elements of a preset."""
+    """Substrates around a half-disc, with elements of an order or of a preset."""
     if isinstance(numerics, int):
         space = box_around(numerics)
     else:
@@ -302,7 +308,7 @@ def test_mean_biomass(numerics, record):
 
 
 def _balanced(problem: transport.Problem, hours: float) -> Check:
-    """Biomass made against uptake, at the steady concentrations of a step."""
+    """Check biomass made against uptake, at the steady concentrations of a step."""
     law = SCENE.kinetics
     active = law.maximum_density * problem.space.reaction.dx
     sink = Sink(active, hours)
@@ -317,8 +323,7 @@ def _balanced(problem: transport.Problem, hours: float) -> Check:
 
 
 def _integrated(problem: transport.Problem, hours: float) -> Check:
-    """Uptake at constant concentrations against the integral of (7)-(10) over the step, in which X_A grows as an
-    exponential."""
+    """Check uptake at constant concentrations against the integral of (7)-(10) over a step of exponential X_A."""
     concentrations, seeded = np.array([0.7, 4.0]), 300.0
     everywhere = Concentrations(*np.outer(concentrations, np.ones(problem.space.count)))
     ledgers = transport.fluxes(problem, Sink(seeded * problem.space.reaction.dx, hours), everywhere)
@@ -331,7 +336,7 @@ def _integrated(problem: transport.Problem, hours: float) -> Check:
 
 
 def _tangent(problem: transport.Problem, hours: float) -> Study:
-    """Remainders of the residual along a direction."""
+    """Study of the remainders of the residual along a direction."""
     random = np.random.default_rng(13)
     balance = Balance(problem, Sink(SCENE.kinetics.maximum_density * problem.space.reaction.dx, hours))
     state, along = random.uniform(0.5, 1.0, (2, 2 * problem.space.count))
