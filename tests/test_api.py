@@ -18,7 +18,7 @@ from repro import results
 from repro.cli import main
 from repro.errors import OutputError
 from repro.results import field_files
-from repro.results.tables import SHOWN, Results, solve
+from repro.results.tables import END_TIMES, Results, solve
 from repro.scene import SceneError, load_scene, packaged_scenes
 from tests import faults
 from tests.pages import PURE, cached_run
@@ -84,7 +84,7 @@ def test_the_table_of_a_notebook_escapes_and_is_short(solved):
     rows = [dict.fromkeys(results.COLUMNS) | {"time_h": float(k)} for k in range(40)]
     html = Results("<script>alert(1)</script>&", rows, [{}] * 40, "<b>")._repr_html_()
     assert "<script" not in html and "&lt;script&gt;" in html and "<b>" not in html
-    assert html.count("<td>") == 2 * SHOWN and "<td>39</td>" in html and "<td>20</td>" not in html
+    assert html.count("<td>") == 2 * END_TIMES and "<td>39</td>" in html and "<td>20</td>" not in html
     assert solved._repr_html_().count("<td>") == len(solved) * len(solved.time)
     assert "<th>conductivity_m_per_d (m/d)</th>" in solved._repr_html_()
     assert repr(solved) == f"<Results of base: {len(solved.time)} rows, {len(solved)} columns, completed>"

@@ -18,12 +18,12 @@ import scipy.sparse as sp
 from repro.fem import linear
 from repro.fem.linear import DEFAULT, Method
 
-#: Arrays of one kind of element, or of several.
+#: One array, or one array for each kind of element.
 Parts: TypeAlias = np.ndarray | tuple[np.ndarray, ...]
 
 
 def each(coefficient: np.ndarray, elements: np.ndarray) -> np.ndarray:
-    """Element matrices (T, a, b) times coefficients of the triangles (T,) or of the rows (T, a)."""
+    """Multiply element matrices (T, a, b) by a coefficient per triangle (T,) or per row (T, a)."""
     return coefficient.reshape(len(coefficient), -1, 1) * elements
 
 
@@ -156,10 +156,10 @@ def saddle_blocks(upper: np.ndarray, divergence: np.ndarray,
 
 def saddle_system(velocity: np.ndarray, pressure: np.ndarray, constrained: np.ndarray,
                   order: np.ndarray | None = None, method: Method = DEFAULT) -> ElementSystem:
-    """The system of two components on the same nodes and a pressure on some of these.
+    """Build the system of a velocity and of a pressure on some of its nodes.
 
-    velocity: (T, a) nodes of each component; pressure: (T, b) nodes among the first ones of the
-    velocity's; constrained: (n, 2) prescribed components; order: (n,) nodes in elimination order,
+    velocity: (T, a) nodes of each component; pressure: (T, b) nodes, the first ones of the
+    velocity; constrained: (n, 2) prescribed components; order: (n,) nodes in elimination order,
     if known. Unknowns are numbered x, then y, then pressure; each pressure is eliminated after the
     components at its node.
     """

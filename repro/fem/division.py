@@ -1,8 +1,8 @@
 """Division of arcs of the aggregate's boundary at any point.
 
-A contact line may lie within an arc. There the arc is divided, and so are the two triangles beside
-it, along the straight line on the unit triangle from that place to the opposite corner. Each part
-keeps the map of the triangle that it belongs to, so a division changes no shape and no field.
+A contact line may lie within an arc. It divides the arc and the two triangles beside it, along the
+straight line on the unit triangle from the contact line to the opposite corner. Each part keeps the
+map of its triangle, so a division changes no shape and no field.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
 class DividedTriangle:
     """A triangle beside a divided arc.
 
-    cell: number of the triangle; edge: which of its edges the arc is; arc: position of the arc in
+    cell: number of the triangle; edge: number of its edge on the arc; arc: position of the arc in
     :attr:`Division.arcs`; forward: does the edge run as the loop does; t: where the edge is
     divided, from its first corner.
     """
@@ -48,7 +48,7 @@ class DividedTriangle:
 
     @property
     def place(self) -> np.ndarray:
-        """(2,) where the edge is divided, on the unit triangle."""
+        """(2,) point that divides the edge, on the unit triangle."""
         start, end, _ = self.corners
         return start + self.t * (end - start)
 
@@ -233,7 +233,7 @@ class Division:
         amounts : (r, q) float
             At the quadrature points of the parent's aggregate.
         table : Table
-            Of the quadrature.
+            Functions at the quadrature points.
         """
         rows = np.cumsum(self.parent.biomass) - 1
         divided = amounts.copy()

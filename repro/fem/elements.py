@@ -54,7 +54,7 @@ def values(order: int, where: np.ndarray) -> np.ndarray:
 
 
 def derivatives(order: int, where: np.ndarray) -> np.ndarray:
-    """(q, k, 2) their derivatives by s and t."""
+    """(q, k, 2) derivatives of the shape functions by s and t."""
     return evaluated(order, where)[1]
 
 
@@ -73,7 +73,7 @@ class Table:
     """Functions of an order at quadrature points of the unit triangle.
 
     weights: (q,); values: (q, k), slopes: (q, k, 2) of the functions; shape: (q, g), bends:
-    (q, g, 2) of those that map the triangle; linear: (q, 3) barycentric coordinates.
+    (q, g, 2) of the functions that map the triangle; linear: (q, 3) barycentric coordinates.
     """
 
     weights: np.ndarray
@@ -85,7 +85,7 @@ class Table:
 
     @property
     def products(self) -> np.ndarray:
-        """(q, k k) of two functions."""
+        """(q, k k) products of two functions."""
         count, k = self.values.shape
         return (self.values[:, :, None] * self.values[:, None, :]).reshape(count, k * k)
 
@@ -99,7 +99,7 @@ def table(order: int, geometry: int, degree: int) -> Table:
 
 @cache
 def vertex_table(order: int, geometry: int) -> Table:
-    """The same at the corners, which gives lumped integrals."""
+    """Like :func:`table`, but at the corners, which lumps the integrals."""
     return _tabulated(order, geometry, nodes(1), np.full(3, 1 / 6))
 
 
@@ -141,7 +141,7 @@ def side_table(order: int, geometry: int, side: int) -> tuple[np.ndarray, np.nda
 
 
 def by_component(tensor: np.ndarray) -> np.ndarray:
-    """(T, q, 2, 2) of (2, 2, T, q), each component contiguous in memory, for faster arithmetic."""
+    """(T, q, 2, 2) view of (2, 2, T, q): contiguous components make arithmetic faster."""
     return np.ascontiguousarray(tensor).transpose(2, 3, 0, 1)
 
 
@@ -198,5 +198,5 @@ def points(corners: np.ndarray, of: Table) -> Points:
 
 
 def weights(corners: np.ndarray, of: Table) -> np.ndarray:
-    """(T, q) um2, dx alone."""
+    """(T, q) um2, the weights dx without the gradients."""
     return determinant(jacobian(corners, of.bends)) * of.weights

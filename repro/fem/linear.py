@@ -28,9 +28,9 @@ from repro.timing import timed
 
 #: Largest accepted componentwise backward error, max |A x - b|_i / (|A| (|x| + t) + |b| + t)_i.
 RESIDUAL = 1e-10
-#: t there, the smallest number with all its digits: what underflows has the absolute error of a
-#: number of that size, eps t, and a row multiplies that of its unknowns by A_ij (Demmel 1984, SIAM
-#: J. Sci. Stat. Comput. 5). Unknowns above 2 t / eps, 2e-292, are not changed in their last bit.
+#: t above, the smallest normal number. A number that underflows has the absolute error eps t, and a
+#: row multiplies the errors of its unknowns by A_ij (Demmel 1984, SIAM J. Sci. Stat. Comput. 5).
+#: The last bit of unknowns above 2 t / eps, 2e-292, does not change.
 UNDERFLOW = np.finfo(float).tiny
 #: The solution is refined if its error is larger than this.
 REFINE = 1e-14
@@ -126,7 +126,7 @@ class _Pardiso:
 class Solver:
     """Solves A x = b for one matrix (n, n) and any number of right-hand sides.
 
-    The unknowns are eliminated in their order. Raises LinearError if the residual stays above
+    Unknowns are eliminated in ascending order. Raises LinearError if the residual stays above
     RESIDUAL.
     """
 

@@ -52,7 +52,7 @@ class Dofs:
 
     @cached_property
     def beside_outlet(self) -> tuple[np.ndarray, np.ndarray]:
-        """The same for the outlet."""
+        """Like :attr:`beside_inlet`, for the outlet."""
         return _beside(self.cells, self.outlet)
 
 
@@ -100,7 +100,7 @@ class Topology:
 
     @cached_property
     def straight(self) -> Topology:
-        """Topology of the triangles between the corners alone."""
+        """Topology of the straight triangles between the corners."""
         if self.geometry == 1:
             return self
         return replace(self, cells=np.ascontiguousarray(self.triangles), loop=self.loop[::2].copy())
@@ -122,8 +122,8 @@ class Topology:
 
     @cached_property
     def beside_loop(self) -> tuple[np.ndarray, np.ndarray]:
-        """(edges,) triangle of each edge of ``loop``, among those of the aggregate, and which of
-        its edges 01, 12 and 20 that is."""
+        """(edges,) triangle of the aggregate beside each edge of ``loop``, and the number of this
+        edge among the triangle's edges 01, 12 and 20."""
         corners = self.straight.loop
         line = np.column_stack([corners, np.roll(corners, -1)])
         owner, places = _beside(self.cells[self.biomass], line)
@@ -197,8 +197,8 @@ class Topology:
 def _numbered(topology: Topology, order: int) -> Dofs:
     """Number the nodes of functions of an order.
 
-    An edge has order - 1 nodes. Of two, the one near the corner with the lower number has the
-    number of the edge, the other one that plus the count of edges. The nodes of order 2 are thus
+    An edge has order - 1 nodes. The one near the corner with the lower number has the number of
+    the edge; a second one has this number plus the count of edges. The nodes of order 2 are thus
     among those of order 3, and are the nodes of a curved mesh.
     """
     make = {1: _linear, 2: _quadratic, 3: _cubic}[order]
@@ -285,7 +285,7 @@ class Mesh:
            width: float, ends: tuple[float, float], method: Method = DEFAULT) -> Mesh:
         """Build the mesh of triangles with nodes (T, 3 or 6), corners numbered first.
 
-        loop: that of the :class:`Topology`.
+        loop: as in :class:`Topology`.
         """
         count = len(points) if cells.shape[1] == 3 else int(cells[:, 3:].min())
         x, y = points[:count].T
@@ -336,7 +336,7 @@ class Mesh:
 
     @cached_property
     def straight(self) -> Mesh:
-        """The triangles between the corners alone."""
+        """The mesh of the straight triangles between the corners."""
         if self.geometry == 1:
             return self
         return replace(self, points=self.points[: self.corners], topology=self.topology.straight)
@@ -405,8 +405,8 @@ class Mesh:
         return elements.determinant(J).min(axis=1) <= 0
 
     def strained_arcs(self) -> np.ndarray:
-        """(M,) True where an edge of the aggregate's boundary has a curved triangle beside it that
-        is turned over."""
+        """(M,) True where the curved triangle beside an edge of the aggregate's boundary is turned
+        over."""
         if self.geometry == 1:
             return np.zeros(len(self.loop), bool)
         return np.isin(self.loop[1::2], self.cells[self.turned_over(), 3:])

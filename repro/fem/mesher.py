@@ -34,7 +34,7 @@ SLIVER = 1e-12
 #: Rounds in which arcs that bend too much for the triangles beside them are halved.
 HALVINGS = 6
 
-#: Nodes of a polygon, and whether there is biomass in it.
+#: Nodes of a polygon, and whether it encloses biomass.
 Polygon: TypeAlias = tuple[np.ndarray, bool]
 #: Points, triangles, and region of each triangle: 1 fluid, 2 biomass.
 Regions: TypeAlias = tuple[np.ndarray, np.ndarray, np.ndarray]
@@ -137,7 +137,7 @@ def _boundaries(outline: Outline | None, ends: tuple[float, float],
 
 def _over_the_top(outline: Outline, corners: np.ndarray, element_sizes: ElementSizes,
                   store: _PointStore) -> list[Polygon]:
-    """The fluid around an aggregate that touches the lower wall alone."""
+    """The fluid around an aggregate that touches only the lower wall."""
     south_west, south_east, north_east, north_west = corners
     west, east = _contact(outline, BOTTOM)
     start = store.add(element_sizes.path(south_west, outline.points[west]))
@@ -258,7 +258,7 @@ def _constrained_delaunay(points: np.ndarray, nodes: np.ndarray) -> np.ndarray:
 def _without_slivers(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """The same triangles (K, 3), without those whose nodes lie on one line: Mmg refuses them.
 
-    The longest edge of such a triangle is exchanged for the other diagonal.
+    The longest edge of a removed triangle is exchanged for the other diagonal.
     """
     corners = points[triangles]
     lengths = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
@@ -269,7 +269,7 @@ def _without_slivers(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 
 def _complex(points: np.ndarray) -> np.ndarray:
-    """(N,) x + i y of points (N, 2), which have an order."""
+    """(N,) complex numbers x + i y of points (N, 2), which can be sorted."""
     return np.ascontiguousarray(points).view(complex)[:, 0]
 
 
@@ -286,7 +286,7 @@ def _find(new_points: np.ndarray, points: np.ndarray) -> np.ndarray:
 def unlocked(straight: Mesh) -> Mesh:
     """The same nodes without triangles that have two edges on the boundary of their region.
 
-    A region is the fluid or the biomass. Linear pressures in such a corner leave quadratic
+    A region is the fluid or the biomass. In these triangles linear pressures leave quadratic
     displacements too little freedom. If possible, the corner's inner edge is exchanged for the
     other diagonal.
     """
@@ -297,7 +297,7 @@ def unlocked(straight: Mesh) -> Mesh:
 
 
 def _region_edges(triangles: np.ndarray, biomass: np.ndarray) -> np.ndarray:
-    """(T, 3) Is edge i -> i + 1 on the boundary of the triangle's region?"""
+    """(T, 3) True where edge i -> i + 1 is on the boundary of the triangle's region."""
     edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]], axis=2).reshape(-1, 2)
     keys = (edges[:, 0] * (edges.max() + 1) + edges[:, 1]) * 2 + np.repeat(biomass, 3)
     _, edge_numbers, counts = np.unique(keys, return_inverse=True, return_counts=True)

@@ -41,7 +41,7 @@ class System(Protocol[State]):
         """Factorise the derivative at an iterate."""
 
     def advanced(self, iterate: State, factors: Factored, fresh: bool) -> State:
-        """The next iterate; fresh: is the derivative that of this iterate?"""
+        """The next iterate; fresh: was the derivative computed at this iterate?"""
 
 
 @dataclass(frozen=True)

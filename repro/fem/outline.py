@@ -76,7 +76,7 @@ class Outline:
 
     @cached_property
     def corners(self) -> Outline:
-        """The polygon of the corners alone."""
+        """The polygon through the corners, without middles."""
         if self.geometry == 1:
             return self
         return Outline(self.points[::2], self.wall[::2], self.fixed[::2], self.origin[::2])
@@ -164,9 +164,9 @@ def polygon(corners: np.ndarray, width: float, geometry: int = 1, smooth: bool =
     """The outline of an aggregate through points (K, 2) um, from lower wall to lower wall.
 
     The points go from the upstream to the downstream end; those on the upper wall, y = ``width``
-    um, are contact. smooth: a natural cubic spline takes the place of straight lines between two
-    points of which one is free. at_tips: length (um) of the edges at tips; they grow from
-    there. The middle of each contact surface is its fixed point. Raises OutsidePore where the
+    um, are contact. smooth: a natural cubic spline replaces the straight line between two points
+    unless both are contact. at_tips: length (um) of the edges at tips; edges grow away from
+    tips. The middle of each contact surface is its fixed point. Raises OutsidePore where the
     curve leaves the pore.
     """
     # Counterclockwise: from the downstream end over the top to the upstream end.
@@ -189,9 +189,9 @@ def polygon(corners: np.ndarray, width: float, geometry: int = 1, smooth: bool =
 
 #: Corners that turn by more than this angle have smaller edges beside them.
 CORNER = np.radians(30.0)
-#: Edges at a notch, over those at a tip, which juts into the water.
+#: Length of edges at a notch, over that at a tip, which juts into the water.
 AT_NOTCH = 3.0
-#: Distances from a corner to the nodes beside it, each over the one before.
+#: Ratio of successive distances from a corner to the nodes beside it.
 CORNER_RATIO = 3.0
 
 
@@ -231,14 +231,14 @@ def _ladder(least: float) -> np.ndarray:
     return least * CORNER_RATIO ** np.arange(count)
 
 
-#: Points of a spline for each of the points that it goes through, and at most for all of them.
+#: Points of a spline for each interpolated point, and the largest number in all.
 BETWEEN = 8
 MOST_SPLINED = 1000
 
 
 def _splined(rim: np.ndarray, width: float) -> np.ndarray:
     """Points (M, 2) on a spline through points (K, 2), straight along the upper wall."""
-    from scipy.interpolate import CubicSpline  # a quarter of a second, and few scenes ask for it
+    from scipy.interpolate import CubicSpline  # its import takes 0.25 s; few scenes need it
 
     length = np.sqrt(np.linalg.norm(np.diff(rim, axis=0), axis=1))
     knots = np.concatenate([[0.0], np.cumsum(length)])

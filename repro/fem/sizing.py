@@ -17,15 +17,15 @@ from repro.fem.outline import FREE, TOP, Outline, parabola, slopes
 ACROSS_PORE = 14.0
 ACROSS_AGGREGATE = 10.0
 ACROSS_FILM = 10.0
-#: Elements along the interface that the aggregate's thickness may ask for, at refinement 1. A
-#: half-disc asks for 31; a body more than 60 times longer than thick asks for more. With 200 or 400
+#: Limit on the elements along the interface, at refinement 1, that follow from the thickness. A
+#: half-disc has 31; a body more than 60 times longer than thick reaches the limit. With 200 or 400
 #: slivers fail at their first new mesh, with 4000 a step takes minutes.
 ALONG_INTERFACE = 600.0
 #: Growth of the element size with the distance from its source; zero: one size everywhere.
 GRADATION = 0.25
 #: An interface edge is split if it is longer than the element size by this factor.
 SPLIT = 1.4
-#: Distances between points and sources that are in memory at once.
+#: Largest number of distances between points and sources in memory at once.
 DISTANCES = 2**20
 
 
@@ -237,9 +237,9 @@ def _parameters(nodes: np.ndarray, x: np.ndarray) -> np.ndarray:
 
 
 def placed(outline: Outline, edge: np.ndarray, t: np.ndarray, seed: float | None = None) -> Outline:
-    """New nodes (K,), each at t in [0, 1) of an edge: where t is zero the edge's own first corner.
+    """Place nodes (K,), each at t in [0, 1) of an edge; t = 0 is the edge's first corner.
 
-    seed: as that of :class:`Sizing`. Places at t = 0 between two nodes of the seed's arc lie on
+    seed: as in :class:`Sizing`. Origins, at time zero, between two nodes of the seed's arc lie on
     that arc: a straight edge of the present outline was round at t = 0, and the elastic stress
     makes it round again at the next update.
     """

@@ -1,7 +1,7 @@
 """Functions of order 1, 2 or 3 on a mesh: nodes, quadrature points, element matrices.
 
-Every integral of a weak form is a sum over quadrature points; element matrices are those that
-scikit-fem's assembly gives with the same quadrature. The reaction of the substrates is taken in the
+Every integral of a weak form is a sum over quadrature points. Element matrices equal those of
+scikit-fem's assembly with the same quadrature. The reaction of the substrates is evaluated at the
 points of a :class:`Reaction`: all quadrature points of the biomass, or the nodes for linear
 functions (lumped, as in the paper).
 """
@@ -21,8 +21,8 @@ from repro.fem.mesh import Dofs, Mesh
 
 @dataclass(frozen=True, eq=False)
 class Reaction:
-    """Points in which the reaction is integrated. cells: (r, k) nodes of each piece of biomass;
-    values: (q, k) the functions in its points; dx: (r, q) um2, the points' weights."""
+    """Points at which the reaction is integrated. cells: (r, k) nodes of each piece of biomass;
+    values: (q, k) the functions at its points; dx: (r, q) um2, the points' weights."""
 
     cells: np.ndarray
     values: np.ndarray
@@ -54,7 +54,7 @@ class Space:
 
     @cached_property
     def table(self) -> Table:
-        """The functions where products of them are integrated."""
+        """The functions at the quadrature points for products."""
         degree = max(elements.DEGREES[self.order], self._curved_degree)
         return elements.table(self.order, self.mesh.geometry, degree)
 
@@ -74,7 +74,7 @@ class Space:
 
     @cached_property
     def gradient_table(self) -> Table:
-        """The functions where their gradients are integrated."""
+        """The functions at the quadrature points for gradients."""
         return elements.table(self.order, self.mesh.geometry, self.gradient_degree)
 
     @cached_property
@@ -86,7 +86,7 @@ class Space:
 
     @cached_property
     def stiffness(self) -> np.ndarray:
-        """(T, k, k) of (grad u, grad v), 1."""
+        """(T, k, k) element matrices of (grad u, grad v), without unit."""
         return np.swapaxes(self.gradients_at.rows, 1, 2) @ self.gradients_at.weighted
 
     @cached_property
@@ -115,7 +115,7 @@ class Space:
         return elements.values_on(self.order, of)
 
     def of_mesh(self, field: np.ndarray) -> np.ndarray:
-        """(count, ...) of a field (N, ...) at the mesh's own nodes."""
+        """(count, ...) nodal values of a field (N, ...) that lives on the mesh's own nodes."""
         if self.order == self.mesh.geometry:
             return field
         up = elements.values(self.mesh.geometry, elements.nodes(self.order))
@@ -124,7 +124,7 @@ class Space:
         return all_values
 
     def to_mesh(self, field: np.ndarray) -> np.ndarray:
-        """(N, ...) at the mesh's own nodes of a field (count, ...)."""
+        """(N, ...) values of a field (count, ...) at the mesh's own nodes."""
         if self.order == self.mesh.geometry:
             return field
         down = elements.values(self.order, elements.nodes(self.mesh.geometry))
@@ -137,12 +137,12 @@ class Space:
         return field[..., self.cells] @ self.table.values.T
 
     def mass(self, coefficient: np.ndarray) -> np.ndarray:
-        """(T, k, k) of (c u, v) with c dx (T, q)."""
+        """(T, k, k) element matrices of (c u, v), from c dx (T, q)."""
         k = self.cells.shape[1]
         return (coefficient @ self.table.products).reshape(-1, k, k)
 
     def load(self, coefficient: np.ndarray) -> np.ndarray:
-        """(T, ..., k) of (c, v) with c dx (T, ..., q), all in one product of two matrices."""
+        """(T, ..., k) element loads (c, v), from c dx (T, ..., q), in one matrix product."""
         flat = coefficient.reshape(-1, coefficient.shape[-1])
         return (flat @ self.table.values).reshape(*coefficient.shape[:-1], -1)
 
@@ -151,7 +151,7 @@ class Space:
         return np.append(edges[:, :-1].ravel(), edges[-1, -1])
 
     def end_lengths(self, edges: np.ndarray) -> np.ndarray:
-        """(E,) um."""
+        """(E,) lengths of the edges of an end, um."""
         return self.mesh.points[edges[:, -1], 1] - self.mesh.points[edges[:, 0], 1]
 
     def end_loads(self, edges: np.ndarray, speed: np.ndarray) -> np.ndarray:
@@ -167,7 +167,7 @@ class Space:
         return (along.T * weight[:, None]) @ along
 
     def summed(self, edges: np.ndarray, loads: np.ndarray) -> np.ndarray:
-        """(count,) of loads (E, e) on the edges of an end."""
+        """(count,) sum of loads (E, e) on the edges of an end."""
         return np.bincount(edges.ravel(), loads.ravel(), self.count)
 
     def mean_over(self, edges: np.ndarray, field: np.ndarray) -> float:

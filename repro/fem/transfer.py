@@ -13,9 +13,9 @@ Kuzmin 2012): with m_ij the mass matrix, m_i its row sums and b_i = (X_old, N_i)
 
     m_i X_i = b_i + sum_j f_ij,        f_ij = m_ij (X_i - X_j) = -f_ji
 
-and b_i / m_i alone is a mean of the old field around node i, bounded by its values there. Each f_ij
-is multiplied by the largest alpha_ij = alpha_ji from 0 to 1 that Zalesak's limiter finds safe: no
-flux is lost, no bound exceeded.
+where b_i / m_i is a mean of the old field around node i, bounded by its values there. Each f_ij is
+multiplied by the largest alpha_ij = alpha_ji from 0 to 1 that Zalesak's limiter allows. This keeps
+the total, and exceeds no bound.
 """
 
 from __future__ import annotations
@@ -36,9 +36,9 @@ COVER = 1e-9
 #: A projection that exceeds its bounds by less than this part of the field's largest value is not
 #: limited.
 OVERSHOOT = 1e-14
-#: Newton's steps to the place in a curved triangle.
+#: Largest number of Newton steps that locate a point in a curved triangle.
 NEWTON_STEPS = 12
-#: The last step of it, after which the error is the square of this, on the unit triangle.
+#: Length of the last step on the unit triangle; the error after it is the square of this.
 CLOSE = 1e-8
 #: A triangle's map to t = 0 counts as folded where its determinant is below this part of its
 #: largest.
@@ -119,7 +119,7 @@ def _inside(local: np.ndarray) -> np.ndarray:
 
 
 def barycentric(corners: np.ndarray, where: np.ndarray) -> np.ndarray:
-    """(..., 3) coordinates of places (..., 2) in triangles (..., 3, 2)."""
+    """(..., 3) barycentric coordinates of points (..., 2) in triangles (..., 3, 2)."""
     a, b, c = (corners[..., i, :] for i in range(3))
 
     def cross(u: np.ndarray, v: np.ndarray) -> np.ndarray:
@@ -186,9 +186,9 @@ def clip(polygons: np.ndarray, windows: np.ndarray) -> np.ndarray:
     """Convex polygons (p, k, 2) cut to counterclockwise triangles (p, 3, 2), pair by pair.
 
     Returns (p, m, 2): polygons with fewer than m corners repeat one of them, empty ones are a
-    single point. m is at least 3, and k + 3 at most but where round-off has corners on a line of
-    the window change sides more than twice. Sutherland and Hodgman's algorithm: each side of the
-    window in turn keeps what is to its left.
+    single point. m is from 3 to k + 3, or larger where round-off makes corners on a line of the
+    window change sides more than twice. Sutherland and Hodgman's algorithm: each side of the
+    window in turn cuts off the part on its right.
     """
     for side in range(3):
         start = windows[:, side, None]
@@ -270,8 +270,8 @@ def _bounds(pieces: Pieces, triangles: np.ndarray, fields: np.ndarray,
 
 def _limited(low: np.ndarray, lumped: np.ndarray, ends: np.ndarray, flux: np.ndarray,
              least: np.ndarray, most: np.ndarray) -> np.ndarray:
-    """(K,) values ``low`` with as much of the fluxes (e,), um2 times the field, into the first of
-    the two ``ends`` and out of the second as keeps them from ``least`` to ``most`` (K,)."""
+    """(K,) values ``low`` plus limited fluxes (e,), um2 times the field, from the second of the two
+    ``ends`` into the first. The limits keep them from ``least`` to ``most`` (K,)."""
     first, second = ends.T
     into = [np.bincount(first, np.maximum(sign * flux, 0), len(low))
             + np.bincount(second, np.maximum(-sign * flux, 0), len(low)) for sign in (1, -1)]
@@ -286,8 +286,8 @@ def _limited(low: np.ndarray, lumped: np.ndarray, ends: np.ndarray, flux: np.nda
 
 @dataclass(frozen=True, eq=False)
 class Pieces:
-    """Common pieces of two meshes. corners: (p, 3, 2) um; old, new: (p,) triangle that each is a
-    part of; area: (p,) um2."""
+    """Common pieces of two meshes. corners: (p, 3, 2) um; old, new: (p,) triangles that
+    contain them; area: (p,) um2."""
 
     corners: np.ndarray
     old: np.ndarray
@@ -325,8 +325,8 @@ def _loads(pieces: Pieces, points: np.ndarray, triangles: np.ndarray, fields: np
 
 
 def _solve_mass(points: np.ndarray, triangles: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """(K, m) solution with the mass matrix of the linear nodal functions for each column of the
-    right side; every node has a triangle."""
+    """(K, m) solutions with the mass matrix of the linear nodal functions, one for each column of
+    the right side. Every node must belong to a triangle."""
     rank = np.argsort(linear.node_order(len(points), triangles))
     system = ElementSystem(triangles, rank, np.zeros(len(points), bool))
     solver = linear.Solver(system.matrix(mass(triangle_areas(points, triangles))))

@@ -2,8 +2,8 @@
 
 Defects are relative. A positive defect means that too much was supplied or made. If the amounts
 are of the size of round-off, the defect is relative to a floor: round-off divided by LARGEST.
-Apart from the exceptions that :func:`refuse` states, a step closes to round-off; any other defect
-is an error of the code or of its use.
+A step closes to round-off, apart from the exceptions of :func:`refuse`. Any other defect is an
+error of the code or of its use.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ def defect(supplied: float, out: float, consumed: float, stored: float = 0.0,
 
 
 def floor(problem: Problem, k: int, supply: float) -> float:
-    """Flux (um2 mg/L/h) that is round-off over LARGEST, of the acceptor (k = 0) or the donor (1).
+    """Round-off in the flux (um2 mg/L/h) of the acceptor (k = 0) or the donor (1), over LARGEST.
 
     Round-off is eps times the sum of the magnitudes of all terms of its equations at a supply
     (mg/L).
@@ -147,7 +147,7 @@ def _turned_over(kinetics: Kinetics, ledger: Ledger) -> float:
 
 
 def _exchanged(scene: Scene, after: Pore, ledger: Ledger, k: int) -> float:
-    """Amount exchanged besides the flow, um2 mg/L, against which the defect is small.
+    """Amount exchanged other than by flow, um2 mg/L, to which the defect is compared.
 
     It is the diffusion in a step, and with Gear's method at least the content of the mesh.
     """

@@ -1,4 +1,4 @@
-"""Folding of the aggregate's surface: an end of the model, and no failure.
+"""Folding of the aggregate's surface: an end of the model, not a failure.
 
 See :mod:`repro.model.surface`. A step that ends below Biot's limit is rejected. A step without a
 smooth equilibrium fails like any other step. If the surface can crease already, the failure is
@@ -25,7 +25,7 @@ DENSITIES = 0.5, 2.0
 class Fold(RunEnd):
     """The aggregate's surface folds: the model has no smooth equilibrium any more.
 
-    :func:`repro.simulate` raises it after the last Report. It is an end of the model, and no
+    :func:`repro.simulate` raises it after the last Report. It is an end of the model, not a
     failure: the message names the time (h), the coordinates (um) of the fold, and the elastic
     stretch of the surface there. :class:`repro.PoreEnd` is the other early end of a run.
 

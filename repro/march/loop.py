@@ -88,7 +88,7 @@ class Report:
 
 @dataclass(frozen=True, eq=False)
 class InterpolatedState:
-    """Pore and solution interpolated within a step; ``before``: both, not yet expanded."""
+    """Pore and solution interpolated within a step; ``before``: both before the expansion."""
 
     pore: Pore
     solved: Solved
@@ -97,7 +97,7 @@ class InterpolatedState:
 
 @dataclass(frozen=True, eq=False)
 class StepResult:
-    """Result of one step: the new pore, the pore and its solution before it expanded, and ledger.
+    """Result of one step: the new pore, pore and solution before the expansion, and the ledger.
 
     within: interpolates the state to a time (h) within the step.
     """
@@ -154,7 +154,7 @@ class Scheme:
 class PoreEnd(RunEnd):
     """The aggregate has reached an end of the pore.
 
-    :func:`repro.simulate` raises it after the last Report. It is an end of the model, and no
+    :func:`repro.simulate` raises it after the last Report. It is an end of the model, not a
     failure: the message names the end of the pore and the time (h).
 
     Examples

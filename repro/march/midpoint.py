@@ -6,9 +6,9 @@ a mass M that grows by e^z. These rates integrate (9)-(10) over the entire step.
 in a step are then one integral, and both balances close to round-off.
 
 Within the step, at the part s of its length h, (9)-(10) are integrated over s h with the rates
-(1 - s) k_1 + s k_2 of the start and of half way. This is the interpolation that belongs to the
-rule: it is of second order too, and gives k_2 over h at the end (Hairer, Norsett and Wanner,
-Solving Ordinary Differential Equations I, section II.6). Shape, contact and mesh follow from those
+(1 - s) k_1 + s k_2 of the start and of half way. This is the rule's own interpolation: it is also
+of second order, and its end has k_2 over h, as the step does (Hairer, Norsett and Wanner, Solving
+Ordinary Differential Equations I, section II.6). Shape, contact and mesh follow from those
 at the start as in a step; flow and substrates are solved for.
 """
 
@@ -201,8 +201,8 @@ def _match_production(previous: Pore, after: Pore, produced: tuple[float, float]
 def _extrapolate_substrates(start: Solved, half: Solved, part: float) -> Concentrations:
     """Initial guess of the substrates at a part of the step, extrapolated from its first half.
 
-    If the extrapolation is negative anywhere, the guess is the solution half way. If the mesh half
-    way is another one, the guess is the solution at the start.
+    If the extrapolation is negative anywhere, the guess is the solution half way. If the mesh has
+    changed half way, the guess is the solution at the start.
     """
     first = needed(start.concentrations, "[substrates]")
     second = needed(half.concentrations, "[substrates]")

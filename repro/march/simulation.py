@@ -34,7 +34,7 @@ def simulate(scene: Source, shape: Shape | None = None,
         A loaded scene, the name of a packaged scene, a TOML file, or a dict of tables.
     shape : (K, 2) sequence of float, optional
         Boundary of the aggregate at t = 0, points (x, y) in um from the upstream to the downstream
-        end on the lower wall. It replaces that of the scene (see ``aggregate.outline``).
+        end on the lower wall. It replaces the shape of the scene (see ``aggregate.outline``).
     state : RestartState, optional
         State of :func:`steps` after which the simulation continues; t = 0 by default.
 
@@ -110,7 +110,7 @@ def steps(scene: Scene,
           state: RestartState | None = None) -> Iterator[tuple[RestartState, Report | None]]:
     """Yield the state after every step, t = 0 first, with a Report if one is due.
 
-    A run restarts from such a state bit for bit.
+    A run restarts from any of these states bit for bit.
     """
     Method(scene.numerics.solver, scene.numerics.ordering).checked()
     return loop.steps(scene, _scheme(scene), state)

@@ -33,8 +33,8 @@ from repro.scene import Scene, needed
 
 #: Length of the first attempted step over growth.time_step.
 FIRST = 8.0
-#: Least length of a step over growth.time_step: a step that fails or errs too much is repeated,
-#: shorter, down to this. The estimate of such a step may exceed the tolerance, which is reported.
+#: Least length of a step over growth.time_step. A step that fails or errs too much is shortened and
+#: repeated, down to this length. A warning reports a step of this length that misses the tolerance.
 SHORTEST = 1e-3
 #: Least number of rows after t = 0 without ``output.times``.
 LEAST = 24
@@ -109,7 +109,7 @@ def _find_step(scene: Scene, previous: Pore, solved: Solved,
             if trial.step:
                 end = _end_of(previous, duration, corner)
                 step, after = _solve_after(scene, _end_at(trial.step, end))
-                if trial.gaps is not None:  # contact alone made the step short
+                if trial.gaps is not None:  # only contact shortened the step
                     return step, after, control
                 attempted = replace(control, length=length)
                 following = next_step_size(attempted, duration, estimate, tolerance)

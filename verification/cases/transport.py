@@ -290,8 +290,8 @@ REFINEMENTS = {1: {0.4: 5, 0.8: 3, 1.6: 2, 3.2: 1}, 2: {0.4: 5, 0.8: 3, 1.6: 2, 
                3: {0.4: 6, 0.8: 4, 1.4: 3, 2.2: 1}}
 NEAR = 1.03
 #: Peclet number u_ave W / D_A with the last errors of acceptor and donor, by order. Until the divergence-free w carried
-#: Peclet number u_ave W / D_A and the last errors of acceptor and donor, by order. Until the divergence-free w carried
-#: where the last errors were at most 8e-6 and 1.7e-5. Orders and errors of w were seen before the present bounds were
+#: the substrates, advection hid the third order at Pe = 10, where the order was 4 +- 0.3; at Pe = 100 it was 4 +- 0.3
+#: too, with last errors of at most 8e-6 and 1.7e-5. Orders and errors of w were seen before the present bounds were
 #: written.
 PECLETS = {1: {0.1: (3e-4, 9e-4), 1.0: (1.2e-3, 2.5e-3), 10.0: (2.5e-3, 3.5e-3), 100.0: (4e-3, 5e-3)},
            2: {0.1: (1e-6, 1.5e-6), 1.0: (1e-6, 1.5e-6), 100.0: (1.5e-6, 2.5e-6)},
