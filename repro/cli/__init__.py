@@ -2,7 +2,7 @@
 
 Exit status: 0 on success, 1 if a stage failed, 2 if the input is wrong, or a folder, a file or
 standard output cannot be used, 3 if some runs of a sweep have failed, 130 or 143 if interrupted or
-terminated. A closed pipe, such as after ``| head -1``, is no failure.
+terminated. A closed pipe, as after ``| head -1``, is not a failure.
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ def add_scene(command, nargs: str | None = None) -> None:
 
 
 def path(text: str) -> Path:
-    """Parse a path. An empty text, such as an unset variable of the shell, is refused."""
+    """Parse a path. An empty text, for example an unset variable of the shell, is refused."""
     if not text:
         raise argparse.ArgumentTypeError("a path is needed, this one is empty")
     return Path(text)

@@ -35,7 +35,7 @@ def mass(areas: np.ndarray) -> np.ndarray:
 class ElementSystem:
     """K x = b with some unknowns prescribed, K summed from element matrices.
 
-    unknowns: (T, k) numbers of each element's unknowns, or several of these, one for each kind of
+    unknowns: (T, k) numbers of each element's unknowns, or an array for each kind of
     element; rank: (n,) sorting key of the unknowns in elimination order; constrained: (n,) True
     where the unknown is prescribed. Methods take element matrices (T, k, k) for each kind.
     """

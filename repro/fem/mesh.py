@@ -70,7 +70,7 @@ def _beside(cells: np.ndarray, edges: np.ndarray) -> tuple[np.ndarray, np.ndarra
 class Topology:
     """Connections of a mesh.
 
-    cells: (T, 3 or 6) nodes, corners counterclockwise, then middles; corners: how many nodes are
+    cells: (T, 3 or 6) nodes, corners counterclockwise, then middles; corners: number of
     corners; biomass: (T,) True in the aggregate; loop: (M,) nodes of the aggregate's boundary,
     counterclockwise, corner and middle in turn where there are middles, empty in a clean channel;
     inlet, outlet: corners from the lower wall up; walls: corners of both walls; method: of the

@@ -45,8 +45,8 @@ def generate(outline: Outline | None, ends: tuple[float, float], sizing: Sizing,
              geometry: int = 1, method: Method = DEFAULT) -> tuple[Mesh, Outline | None]:
     """Generate a mesh around the aggregate; also returns the outline with the mesh's nodes.
 
-    outline: None for a clean channel; ends: x of inlet and outlet (um); geometry: 1, straight
-    triangles, 2, curved ones, as the outline's edges are; method: of the linear systems on the
+    outline: None for a clean channel; ends: x of inlet and outlet (um); geometry: 1 for straight
+    triangles, 2 for curved ones, as in the outline; method: of the linear systems on the
     mesh. Raises MeshError if the outline crosses itself or the channel's ends, or if a curved
     triangle is turned over.
     """

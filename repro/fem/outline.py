@@ -27,8 +27,8 @@ TOP = 2
 class Outline:
     """Boundary of the aggregate.
 
-    points: (M, 2) um; wall: (M,) FREE, BOTTOM or TOP; fixed: (M,) True where x is constrained for
-    good; origin: (M, 2) um, where the material of each node was at t = 0; geometry: 1, edges are
+    points: (M, 2) um; wall: (M,) FREE, BOTTOM or TOP; fixed: (M,) True where x is always
+    fixed; origin: (M, 2) um, where the material of each node was at t = 0; geometry: 1, edges are
     straight; 2, they are arcs.
     """
 
@@ -199,8 +199,8 @@ def _graded_to_corners(rim: np.ndarray, width: float, least: float) -> np.ndarra
     """Points (M, 2) on the lines between points (K, 2), closer and closer to each corner.
 
     At a sharp tip the water's velocity gradient grows as the distance to the power of -1/2, and the
-    error of the head loss falls with the first power of the elements there. In a notch the biomass
-    deforms alike. Where the aggregate spans the pore the water passes through it, and its contact
+    error of the head loss falls with the first power of the element size there. Strain in a notch
+    grows alike. Where the aggregate spans the pore the water passes through it, and its contact
     lines count as tips.
     """
     way = np.diff(rim, axis=0)

@@ -115,7 +115,7 @@ class Space:
         return elements.values_on(self.order, of)
 
     def of_mesh(self, field: np.ndarray) -> np.ndarray:
-        """(count, ...) nodal values of a field (N, ...) that lives on the mesh's own nodes."""
+        """(count, ...) values at the space's nodes, from a field (N, ...) at the mesh's own."""
         if self.order == self.mesh.geometry:
             return field
         up = elements.values(self.mesh.geometry, elements.nodes(self.order))

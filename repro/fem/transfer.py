@@ -228,7 +228,7 @@ def project(points: np.ndarray, triangles: np.ndarray, fields: np.ndarray,
 
 def project_bounded(points: np.ndarray, triangles: np.ndarray, fields: np.ndarray,
                     new_points: np.ndarray, new_triangles: np.ndarray) -> np.ndarray:
-    """Like :func:`project`, with each field bounded at a node by its old values around the node."""
+    """Like :func:`project`; the old values around a node bound each field there."""
     pieces = _pieces(points, triangles, new_points, new_triangles)
     right = _loads(pieces, points, triangles, fields, new_points, new_triangles)
     projected = _solve_mass(new_points, new_triangles, right)

@@ -1,8 +1,8 @@
 """Steps as long as the growth allows (``numerics.time = "midpoint"``): second order in time.
 
 The midpoint rule integrates (9)-(10) over a step with the rates of the shape half way. Euler's rule
-would use those of the start. ``numerics.tolerance`` bounds the mean over the aggregate of their
-difference, times the step. The error of the midpoint rule is of higher order; ``make bench``
+would use the rates at the start. ``numerics.tolerance`` bounds their difference, averaged over the
+aggregate, times the step. The error of the midpoint rule is of higher order; ``make bench``
 measures it for each tolerance. A step ends when the film between the aggregate and the opposite
 wall first becomes too thin (2.3.3), and at the times of the scene's tables. Rows and the end of the
 run change no step.

@@ -42,7 +42,7 @@ ON_GRID = 1e-3
 def schedule(scene: Scene) -> tuple[list[float], set[float]]:
     """Times (h) at which steps end, and times that are reported; t = 0 first.
 
-    growth.end cuts the last step. A reported time between two steps cuts none.
+    growth.end cuts the last step. A reported time between two steps cuts no step.
     """
     if scene.growth is None:
         return [0.0], {0.0}

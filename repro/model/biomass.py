@@ -2,12 +2,12 @@
 
 A mass stays with its material when the aggregate changes its shape. At the nodes of linear elements
 this is (34), X'_i = X_i S_i / S'_i with the lumped areas S; elements of higher order apply it at
-every quadrature point. Densities are masses over the points' weights (um2). Uptake and growth see
-the same masses in the same points, so that
+every quadrature point. Densities are masses over the points' weights (um2). Uptake and growth use
+the same masses at the same points, so that
 
     biomass made = Y donor - (acceptor - F donor) / d_c
 
-holds for the uptake of every point, and of the aggregate. A new mesh gets the masses by a transfer
+holds at every point, and for the aggregate. A new mesh gets the masses by a transfer
 that conserves their sum, or by the paper's interpolation, which does not [E8].
 """
 
@@ -58,12 +58,12 @@ def change(first: Rates, second: Rates, weight: np.ndarray) -> float:
 
 
 def sink(active: np.ndarray | None, duration: float = 0.0) -> Sink | None:
-    """The sink of substrates of active masses (r, q) over a duration (h), None without biomass."""
+    """The sink due to active masses (r, q) over a duration (h); None without biomass."""
     return None if active is None else Sink(active, duration)
 
 
 def at_nodes(space: Space, field: np.ndarray) -> np.ndarray:
-    """(N,) values at the mesh's nodes of a field (r, q) in the points of the reaction, zero in the
+    """(N,) values at the mesh's nodes of a field (r, q) at the points of the reaction, zero in the
     fluid. With lumping they are the field's own values; otherwise a linear function is fitted to
     the points of each triangle, and a node has the mean over its triangles."""
     mesh = space.mesh
@@ -80,7 +80,7 @@ def at_nodes(space: Space, field: np.ndarray) -> np.ndarray:
 
 
 def at_points(space: Space, nodal: np.ndarray) -> np.ndarray:
-    """(r, q) in the points of the reaction of a field (N,) at the mesh's nodes."""
+    """(r, q) values at the points of the reaction of a field (N,) at the mesh's nodes."""
     mesh = space.mesh
     if space.order == 1:
         return nodal[space.reaction.cells]
@@ -101,7 +101,7 @@ def transfer_amounts(method: str, old: Space, new: Space, at: Located, amounts: 
     Parameters
     ----------
     method : {"conserving", "bounded", "linear"}
-        The transfer of linear elements.
+        Method of transfer for linear elements.
     old, new : Space
     at : Located
         The nodes of the new mesh's aggregate in the old mesh.
@@ -134,7 +134,7 @@ def transfer_amounts(method: str, old: Space, new: Space, at: Located, amounts: 
 
 
 def _linear(method: str, old: Space, new: Space, amounts: Amounts) -> Amounts:
-    """The amounts as densities at the nodes of straight triangles, by the chosen transfer."""
+    """Transfer amounts as densities at the nodes of straight triangles, by ``method``."""
     old_nodes = old.reaction.cells[:, 0]
     new_nodes = new.reaction.cells[:, 0]
     densities = np.column_stack([amount[:, 0] / old.reaction.dx[:, 0] for amount in amounts])

@@ -6,11 +6,11 @@ triangle of biomass resolves its layer where its longest edge h is at most ``ACR
 module solves Brinkman's equation unchanged there. In every larger triangle it widens the layer:
 
 - **Thickness.** The viscosity over that of water becomes nu_r = d^2 / k, so that the layer is
-  d = h / ``ACROSS`` thick. Darcy's flow u = -k grad p has no part in this: div u = 0 makes every
+  d = h / ``ACROSS`` thick. Darcy's flow u = -k grad p does not change: div u = 0 makes every
   component harmonic, and nu_r lap u = 0. Head loss and flux through the aggregate stay those of k.
 - **Walls.** A layer on a wall takes sqrt(k) U from the flow along the wall, with U the flow beyond
-  the layer; the widened one would take d U. So the velocity may slide on the wall, against a
-  friction (b u_x, v_x) with b = d / (sqrt(k) (d - sqrt(k))), which takes sqrt(k) U again. On a
+  the layer; the widened one would take d U. Therefore the velocity slides on the wall against a
+  friction (b u_x, v_x) with b = d / (sqrt(k) (d - sqrt(k))), which restores sqrt(k) U. On a
   contact line, which belongs to the fluid too, u = 0.
 - **Divergence.** Taylor-Hood elements conserve mass in the mean over several elements. Near a
   contact line the pressure of the drag drives large local sources, which carry concentrations out

@@ -1,8 +1,8 @@
 """Contact with the walls, closing films, and the grown aggregate's new shape (2.3.3, 3.4).
 
 A film of fluid closes where it is thinner than the least film, a wedge beside a contact surface
-where its angle is under the least angle. Both say: at the distance d from the contact line the gap
-to the wall is at least min(film, tan(angle) d). Straight edges, the paper's, test this at their
+where its angle is under the least angle. Then, at the distance d from the contact line, the gap to
+the wall is at least min(film, tan(angle) d). Straight edges, the paper's, test this at their
 nodes, which join the wall one by one. On arcs it holds everywhere on the free surface, and contact
 lines may lie anywhere on it: :mod:`repro.model.contact_lines` searches for them.
 """
@@ -33,11 +33,11 @@ from repro.scene import Growth, Scene, needed
 
 #: Rounds in which closing films may change the contact surfaces within one step.
 CONTACT_ROUNDS = 60
-#: Trials in which contact lines that went too far go back.
+#: Largest number of times that contact lines go back after a trial that fails.
 RETREATS = 6
 #: Rounds of shape and fluid forces.
 FORCE_ROUNDS = 12
-#: The largest move of a node in the last of them over the aggregate's thickness.
+#: Largest move of a node in the last round, over the aggregate's thickness.
 FORCE_REST = 1e-8
 PATIENT = SearchOptions()
 #: Lengths of the first contact to both sides of the highest place, over the least film.
@@ -48,9 +48,9 @@ FIRST_LENGTHS = np.array([1.0, 0.5, 0.25])
 class Expansion:
     """The aggregate in its new shape.
 
-    pore: with the fluid's nodes where they were, on the divided mesh where a contact line lies
+    pore: with the fluid's nodes not yet moved, on the divided mesh if a contact line lies
     within an arc; iterations: of Newton's method; gap: um, the least distance to the opposite wall
-    before films closed; division: of the mesh of the grown pore, None where it stays as it is;
+    before films closed; division: of the mesh of the grown pore, None if it is not divided;
     advances: {(wall, direction): um} by which contact lines have advanced
     along the outline of the grown pore.
     """
@@ -76,7 +76,7 @@ class Expansion:
 
 def expand(scene: Scene, grown: Pore, theta: np.ndarray, guess: Pore | None = None,
            search: SearchOptions = PATIENT) -> Expansion:
-    """The aggregate in its new shape under theta (t, q).
+    """Expand the aggregate to its new shape under theta (t, q).
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def expand(scene: Scene, grown: Pore, theta: np.ndarray, guess: Pore | None = No
         A pore on the same mesh with the shape and pressure from which the search starts; ``grown``
         by default.
     search : SearchOptions
-        How contact lines are searched for.
+        Options of the search for contact lines.
 
     Raises
     ------
@@ -130,14 +130,14 @@ def expand(scene: Scene, grown: Pore, theta: np.ndarray, guess: Pore | None = No
 
 
 def _gathered(shape: Expansion, loads: np.ndarray) -> np.ndarray:
-    """(n, 2) loads on the nodes of the grown pore's aggregate, from those on a divided one's."""
+    """(n, 2) loads on the nodes of the grown aggregate, from loads on the divided one."""
     division = needed(shape.division, "a division")
     return division.gathered_loads(_on_mesh(shape.pore.mesh, loads))[division.parent.body]
 
 
 def _at_rest(scene: Scene, grown: Pore, theta: np.ndarray, start: Pore, forces: np.ndarray | None,
              search: SearchOptions) -> Expansion:
-    """The new shape under nodal forces (n, 2) um, over mu_L, that stay as they are (None: none)."""
+    """The new shape under constant nodal forces (n, 2) um, over mu_L; None for no forces."""
     stressed = needed(scene.growth, "[growth]").new_biomass == "stressed"
     last = None if stressed else grown.mesh.points[grown.mesh.body]
     grown = replace(grown, theta=theta, fixed=_fixed_points(scene, grown), last=last)
@@ -148,8 +148,8 @@ def _at_rest(scene: Scene, grown: Pore, theta: np.ndarray, start: Pore, forces: 
 
 def _close_by_nodes(scene: Scene, grown: Pore, start: Pore, forces: np.ndarray | None,
                     search: SearchOptions) -> Expansion:
-    """The shape after all nodes whose film or wedge is too thin have joined the wall: they join
-    after each equilibrium, and the next one follows until no film or wedge is too thin."""
+    """The shape after all nodes at too thin films or wedges have joined the wall. Nodes join after
+    each equilibrium, until no film or wedge is too thin."""
     keys = needed(scene.growth, "[growth]")
     width = scene.pore.width
     shape = replace(grown, space=start.space, pressure=start.pressure)
@@ -216,7 +216,7 @@ def _close_by_lines(scene: Scene, grown: Pore, start: Pore, forces: np.ndarray |
 
 
 def _refuse_late(gap: float, film: float, search: SearchOptions) -> None:
-    """Raises FirstContact if the gap (um) at the first contact is much less than the least film."""
+    """Raise FirstContact if the gap (um) at the first contact is much less than the least film."""
     if gap < search.landing * film:
         raise FirstContact(gap)
 
@@ -309,8 +309,8 @@ class _Trials:
     def solve(self, wall: np.ndarray, lines: Sequence[Line]) -> Expansion:
         """The equilibrium with walls (M,) of the grown pore's outline and advances of the lines.
 
-        Where it fails, lines go half of the way back to a place that was too short. Raises
-        GrowthError where that does not help.
+        If it fails, lines go half of the way back to an advance that was too short. Raises
+        GrowthError if that does not help.
         """
         for _ in range(RETREATS):
             try:
@@ -429,9 +429,9 @@ def _divided_loads(division: Division, loads: np.ndarray) -> np.ndarray:
 
 
 def _strained_from(keys: Growth, grown: Pore, theta: np.ndarray) -> tuple[growth.Body, np.ndarray]:
-    """The configuration from which strain counts, that of t = 0 or the present one (section 5), and
-    the expansion since then. From the present one it is theta / J, which removes the error of
-    J = theta, so that the area does not drift away from the mass."""
+    """The configuration from which strain counts, of t = 0 or the present one (section 5), and the
+    expansion since then. Since the present one it is theta / J, which removes the error of
+    J = theta and so keeps the area from drifting away from the mass."""
     if keys.new_biomass == "stressed":
         return grown.body, theta
     position = grown.mesh.points[grown.mesh.body]
@@ -462,7 +462,7 @@ def _constraints(shape: Pore, width: float) -> tuple[np.ndarray, np.ndarray]:
 def constrained(count: int, rim: np.ndarray, wall: np.ndarray, fixed: np.ndarray) -> np.ndarray:
     """(count, 2) True where a coordinate is prescribed: x at fixed points, y on the walls (2.3.3).
 
-    rim: (M,) the boundary's nodes among all; wall, fixed: (M,), as those of an outline.
+    rim: (M,) the boundary's nodes among all; wall, fixed: (M,), as in an outline.
     """
     prescribed = np.zeros((count, 2), bool)
     prescribed[rim[fixed], 0] = True
@@ -487,7 +487,7 @@ def _with_new_surface(outline: Outline) -> np.ndarray:
 
 def middle_of(outline: Outline, wall: int) -> np.ndarray:
     """(M,) True at the node nearest to the middle of the contact surface with a wall; the corner
-    before it where that is the middle of an arc."""
+    before it if that node is the middle of an arc."""
     on = outline.wall == wall
     x = outline.points[:, 0]
     chosen = np.zeros(len(on), bool)
@@ -499,12 +499,12 @@ def middle_of(outline: Outline, wall: int) -> np.ndarray:
 
 
 def closing_nodes(outline: Outline, width: float, film: float, angle: float) -> np.ndarray:
-    """(M,) wall that each node must join next: FREE where none (2.3.3).
+    """(M,) wall that each node must join next, or FREE (2.3.3).
 
     A layer of fluid thinner than ``film`` to the opposite wall closes, and so does a wedge of fluid
-    beside a contact surface whose angle is under ``angle``. Beside contact both say: the gap must
+    beside a contact surface whose angle is under ``angle``. Beside contact the gap must
     not be less than the smaller of film and tan(angle) times the distance from the contact line.
-    Nodes between closing ones close too: no fluid is trapped.
+    Nodes between closing nodes close too, so that no fluid is trapped.
     """
     joins = np.full(len(outline.points), FREE)
     for wall, gap in ((BOTTOM, outline.points[:, 1]), (TOP, width - outline.points[:, 1])):
@@ -528,7 +528,7 @@ def _closing_run(outline: Outline, gap: np.ndarray, line: int, step: int, film: 
     x = outline.points[:, 0]
     gaps = gap[walk]
     apart = x[walk] - x[line]
-    # Free nodes end at the other line; where that is on the same wall, the nearer one takes a node.
+    # Free nodes end at the other line. If it is on the same wall, nodes belong to the nearer line.
     nearer = np.abs(apart) <= np.abs(x[walk] - x[other])
     if outline.wall[other] != outline.wall[line]:
         nearer = np.ones(len(walk), bool)

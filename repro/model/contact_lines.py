@@ -34,9 +34,9 @@ LEAST_PART = 0.02
 FIRST_TRIAL = 0.7
 #: The second trial after a first one that went too far, as a fraction of the way back.
 FIRST_RETREAT = 0.2
-#: Factor of secant steps before any trial has gone far enough.
+#: Factor on secant steps until a trial goes far enough.
 BEYOND = 1.05
-#: The longest of these steps (arcs) if no surface beyond the line is too near.
+#: Longest step (arcs) until then, if no surface beyond the line is too near.
 LEAST_REACH = 0.5
 #: Secant steps keep this fraction of the interval away from its ends.
 INSIDE = 0.03

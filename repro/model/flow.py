@@ -108,12 +108,12 @@ def poiseuille_loss(length: float, width: float) -> float:
 
 
 def pressure_space(velocity: Space) -> Space:
-    """Of one order less than the velocity's; linear at least."""
+    """Space of the pressure, one order below the velocity's, at least linear."""
     return Space(velocity.mesh, max(1, velocity.order - 1))
 
 
 def divergence(velocity: Space) -> np.ndarray:
-    """(T, m, 2k) of (q, div u): u_x of all nodes, then u_y."""
+    """(T, m, 2k) element matrices of (q, div u): columns u_x of all nodes, then u_y."""
     at = velocity.gradients_at
     slopes = at.slopes.reshape(*at.dx.shape, -1)
     values = pressure_space(velocity).values_at(velocity.gradient_table)
@@ -121,8 +121,8 @@ def divergence(velocity: Space) -> np.ndarray:
 
 
 def viscous(velocity: Space, viscosity: np.ndarray, interface: str) -> np.ndarray:
-    """(T, 2k, 2k) element matrices of a(u, v): test functions of x, then y, by trial functions
-    alike; (T, k, k) of each component where they are not coupled. viscosity: (T,) nu_r."""
+    """(T, 2k, 2k) element matrices of a(u, v), x before y in rows and columns; (T, k, k) for each
+    component if the two are not coupled. viscosity: (T,) nu_r."""
     laplace = each(viscosity, velocity.stiffness)
     if interface == "laplacian":
         return laplace
@@ -218,9 +218,9 @@ def prescribed(velocity: Space) -> np.ndarray:
 
 
 def work(load: np.ndarray, solution: np.ndarray, width: float) -> float:
-    """Loss (1/um) as the work of the inlet per unit flux: (6) where the flow is developed, and of
-    the order of the energy, twice that of the velocity's gradient. load: (2n + m,), the system's
-    matrix times the prescribed values; found: (2n + m,), its solution."""
+    """Loss (1/um) as the work of the inlet per unit flux. It equals (6) where the flow is developed
+    and converges with twice the order of the velocity's gradient. load: (2n + m,), the system's
+    matrix times the prescribed values; solution: (2n + m,), of the system."""
     return float(load @ solution) / width
 
 
@@ -231,8 +231,8 @@ def _drop(space: Space, pressure: np.ndarray) -> float:
 
 
 def scaled(unit: UnitFlow, mesh: Mesh, length: float, drive: Drive) -> Flow:
-    """The flow driven by a scene's head over the whole pore, of a length (um), or of its mean
-    velocity: the problem is linear (2.1). The head is zero at the outlet in the mean (4)."""
+    """Scale the unit flow to a scene's head over the whole pore, of a length (um), or to its mean
+    velocity: the problem is linear (2.1). The mean head at the outlet is zero (4)."""
     viscosity = drive.kinematic_viscosity / drive.gravity
     total_loss = unit.loss + poiseuille_loss(length - (mesh.ends[1] - mesh.ends[0]), mesh.width)
     speed = drive.mean_velocity

@@ -54,7 +54,7 @@ TOLERANCE = 1e-3
 #: Bounds on the ratio of successive steps.
 LONGER = 2.0
 SHORTER = 0.2
-#: The part taken of the step that would just be accepted.
+#: Size of a step over the size that would just be accepted.
 SAFETY = 0.8
 #: Longest first step (h), which is of first order: 45 s keep its error under 2e-4 (720 s: 2e-2).
 FIRST = 45 / 3600
@@ -63,13 +63,13 @@ SHORTEST = 1e-6 / 3600
 #: Profiles are steady if further steps of LONG (h) would sum up to this change over the supply.
 STEADY = 1e-9
 LONG = 1e6
-#: Until then: the largest change over the supply in a step.
+#: While profiles settle: the largest change over the supply in a step.
 SETTLING = 0.3
-#: Until then: the factor by which steps grow and shrink, and the largest number of steps.
+#: While profiles settle: the factor by which steps grow and shrink, and the most steps.
 FASTER = 10.0
 MOST_STEPS = 1000
 
-#: (r, q) 1/h, or one number everywhere.
+#: A rate at each point (r, q), 1/h, or one number for all points.
 Rate: TypeAlias = np.ndarray | float
 
 
@@ -89,7 +89,7 @@ class Level:
 
 
 class Flows(NamedTuple):
-    """Of acceptor and donor in a step, um2 mg/L."""
+    """Amounts of acceptor and donor in the balance of a step, um2 mg/L."""
 
     supplied: tuple[float, float]
     out: tuple[float, float]
@@ -171,13 +171,13 @@ class System:
 
     @cached_property
     def mass(self) -> sp.csc_matrix:
-        """(n, n) um2, of :attr:`storage`."""
+        """(n, n) um2, assembled from :attr:`storage`."""
         size = self.space.count
         rows, columns = (part.ravel() for part in linear.pairs(self.space.cells))
         return sp.csc_matrix((self.storage.ravel(), (rows, columns)), shape=(size, size))
 
     def at(self, fields: np.ndarray) -> np.ndarray:
-        """(2, r, q) concentrations (2, n) in the points of the reaction."""
+        """(2, r, q) values of concentrations (2, n) at the points of the reaction."""
         pieces = self.space.reaction
         return fields[:, pieces.cells] @ pieces.values.T
 

@@ -6,8 +6,8 @@ Stationary in phi and P is
     Pi = integral of mu/2 (J^(-2/3) tr C - 3) + P (J - theta) dV
          - 1/2 sum_tau integral of h^2/(12 mu_tau) |grad P|^2 dv
 
-(14)-(17), (21)-(24) and (27), hence J = theta. Signs are [E5]'s: the stabilisation makes the
-pressure block negative. Without tractions mu_L scales P and nothing else: it is 1 in here. P is
+(14)-(17), (21)-(24) and (27), hence J = theta. Signs follow [E5]: the stabilisation makes the
+pressure block negative. Without tractions mu_L only scales P; this module sets it to 1. P is
 linear. With A = mu J^(-2/3) and H = F^-T (dJ = J H : dF), first Piola-Kirchhoff stress and tangent
 are
 
@@ -17,7 +17,7 @@ are
 
 *Straight triangles*, linear displacements. [E6]: h, grad and dv are those of the last known shape,
 and the modulus is the incremental one there, mu_tau = mu_L theta^(-2/3); in reference quantities
-the stabilisation so grows as J^(5/3). It is kept fixed while an equilibrium is sought.
+the stabilisation grows as J^(5/3). It is kept fixed while an equilibrium is sought.
 
 *Curved triangles*, quadratic displacements (Taylor-Hood): no term in |grad P|^2, but P + gamma
 theta^(-5/3) (J - theta) for P in S. This grad-div stabilisation vanishes where J = theta. It is
@@ -46,12 +46,12 @@ from repro.timing import timed
 
 #: Newton's method stops at this residual against the size of its terms.
 NEWTON = 1e-11
-#: Or at this one, where round-off keeps it from falling.
+#: Or at this one, if round-off keeps the residual from falling.
 ROUND_OFF = 1e-8
 MOST_ITERATIONS = 25
 #: Halvings in a line search.
 HALVINGS = 8
-#: Sub-steps of a continuation: where a step may be cut instead, none.
+#: Sub-steps of a continuation, by ``patient``; an impatient caller shortens its step instead.
 CONTINUATION = {True: (1, 8, 64), False: (1,)}
 #: gamma: the energy's curvature in J is -2/9 J^(-5/3) and less, so that one makes it convex with
 #: room to spare.
@@ -67,7 +67,7 @@ MOST_POINTS = 0.95
 @dataclass(frozen=True, eq=False)
 class Shape:
     """Connections of the aggregate's own mesh. cells: (t, 3 or 6), corners numbered first; corners:
-    how many; degree: of the quadrature; method: of the linear systems."""
+    their number; degree: of the quadrature; method: of the linear systems."""
 
     cells: np.ndarray
     corners: int
@@ -108,8 +108,8 @@ class Shape:
 @brief
 @dataclass(frozen=True, eq=False)
 class Body:
-    """The aggregate in its reference configuration: its nodes, on the mesh of ``shape``, are at
-    (n, 2) um."""
+    """The aggregate in its reference configuration: positions (n, 2) um of its nodes, on the mesh
+    of ``shape``."""
 
     shape: Shape
     reference: np.ndarray
@@ -125,8 +125,8 @@ class Body:
         return self.at.weighted
 
     def strained(self, position: np.ndarray) -> Strained:
-        """The deformation (t, q, 2, 2) that brings the reference to positions (n, 2) um, with what
-        the stress takes from it."""
+        """The deformation (t, q, 2, 2) from the reference to positions (n, 2) um, with its terms in
+        the stress."""
         gradient = np.swapaxes(position[self.shape.cells], 1, 2) @ np.swapaxes(self.at.rows, 1, 2)
         count, points = self.at.dx.shape
         F = gradient.reshape(count, 2, points, 2).transpose(1, 3, 0, 2)
@@ -456,8 +456,8 @@ def equilibrium(body: Body, theta: np.ndarray, position: np.ndarray, pressure: n
 def reach(system: System, start: np.ndarray, theta: np.ndarray, first: Equilibrium,
           prescribed: np.ndarray, parts: int = 1, modified_newton: bool = False,
           patient: bool = True) -> Equilibrium:
-    """Equilibrium of a system under theta, from J = ``start`` (of theta's shape), in ``parts``, or
-    in more if that fails; see :func:`equilibrium`."""
+    """Solve for equilibrium under theta, from J = ``start`` (t, q), in ``parts`` sub-steps, or in
+    more if these fail; see :func:`equilibrium`."""
     failure = ""
     for steps in CONTINUATION[patient]:
         try:

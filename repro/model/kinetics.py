@@ -6,8 +6,8 @@ With the fractions m_A(C_A) and m_D(C_D) of a law of uptake (:mod:`repro.model.u
     F2 = -k X_A m_A m_D                        F4 = X_A m_A b (1 - f_d)
 
 [E3]: the demand of decay is d_c f_d b. [E1]: F is the 1.52 of Table 1 by default, not COD - Y d_c =
-1.5138. So, for all fractions, F3 + F4 = -Y F2 + (F1 - F F2) / d_c: biomass is made of donor, and
-decay takes up acceptor.
+1.5138. So, for all fractions, F3 + F4 = -Y F2 + (F1 - F F2) / d_c: donor becomes biomass, and decay
+takes up acceptor.
 
 Uptake and growth are functions of max(C, 0). Only the linearisation of the transient scheme uses
 the extension of a law below zero: the uptake of a substrate continues linearly below zero in its
@@ -65,7 +65,7 @@ class RateLaw:
         return m_a * self.per_acceptor(m_d), self.per_donor(m_a) * m_d
 
     def own_uptake(self, substrate: int, acceptor: Values, donor: Values) -> tuple[Values, Values]:
-        """Uptake of the acceptor (0) or the donor (1) at C_A and C_D, extended below zero of that
+        """Uptake of the acceptor (0) or the donor (1) at C_A and C_D, extended below zero in that
         substrate's concentration, and its derivative by this concentration."""
         concentration, other = (acceptor, donor) if substrate == 0 else (donor, acceptor)
         laws = tuple(self.both)
@@ -132,7 +132,7 @@ def grow(active: np.ndarray, inert: np.ndarray, growth: np.ndarray, remains: np.
     """(9)-(10) integrated exactly over a step (h) at constant rates: X_A grows by exp(growth step).
 
     active, inert: X_A, X_I, mg/L, or masses of them; growth, remains: F3/X_A and F4/X_A (1/h).
-    Returns the new two.
+    Returns the new X_A and X_I.
     """
     mean = mean_growth(growth * step)
     return active * (1 + growth * step * mean), inert + active * mean * remains * step

@@ -24,7 +24,7 @@ from repro.scene import Scene, needed
 #: A permeable aggregate that spans the pore draws the water in at its upper contact lines: elements
 #: beside them are no larger than the least film over this.
 CONTACT_ELEMENTS = 2.0
-#: The thinnest film to resolve where no [growth] says when it closes (Table 1), um.
+#: Thinnest film to resolve (um, Table 1) without [growth], which states when a film closes.
 MINIMUM_FILM = 2.0
 #: Under this Peclet number u W / D the supply of the inlet is round-off.
 SLOWEST = 1e-8
@@ -147,7 +147,7 @@ def resolution(scene: Scene) -> float:
 
 
 def fastest(scene: Scene) -> float:
-    """Largest mean velocity (um/h) of a scene's flow; under a head that of the clean channel."""
+    """Largest mean velocity (um/h) of a scene; under a head, that in the clean channel."""
     drive = needed(scene.largest.flow, "[flow]")
     if drive.mean_velocity is not None:
         return drive.mean_velocity
@@ -170,7 +170,7 @@ def sized(scene: Scene, front: float = 1.0) -> Sizing:
 def generate(scene: Scene, outline: Outline | None,
              front: float = 1.0) -> tuple[Mesh, Outline | None]:
     """A new mesh around the aggregate (None: a clean channel) with the extent of 3.1, and the
-    outline with its nodes on that mesh. Raises MeshError if there is no such mesh."""
+    outline with its nodes on that mesh. Raises MeshError if no mesh can be made."""
     numerics = scene.numerics
     is_full = numerics.extent == "full"
     ends = sizing.meshed_extent(outline, scene.pore.width, scene.pore.length, is_full)
@@ -233,7 +233,7 @@ def seeded(scene: Scene, front: float = 1.0, outline: Outline | None = None) -> 
 
 def material(space: Space, reference: np.ndarray) -> growth.Body:
     """The aggregate of a mesh; reference: (n, 2) um, its nodes in the reference configuration.
-    Growth on a straight triangle is integrated in one point."""
+    Growth on a straight triangle is integrated at one point."""
     topology = space.mesh.topology
     degree = elements.DEGREES[max(2, space.order)]
     if space.mesh.geometry == 1:
@@ -288,7 +288,7 @@ def peclet(scene: Scene, speed: float) -> float:
 
 
 def refuse_no_supply(scene: Scene, carried: Flow | None) -> None:
-    """Raises TransportError if the flow is too slow to supply the pore: no state is steady."""
+    """Raise TransportError if the flow is too slow to supply the pore: no state is steady."""
     if carried and peclet(scene, carried.mean_velocity) < SLOWEST:
         raise TransportError("the Peclet number u W / D is "
                              f"{peclet(scene, carried.mean_velocity):.2g}, under {SLOWEST:g}: "

@@ -59,10 +59,10 @@ def new_mesh(scene: Scene, previous: Pore, expanded: Pore, speed: float) -> tupl
 
 
 def solve_graded(scene: Scene, pore: Pore) -> tuple[Pore, Solved]:
-    """Solve flow and substrates. Where the mesh is too coarse for a front of the substrates, order
-    2 and 3 take a mesh that is graded to it.
+    """Solve flow and substrates. If the mesh is too coarse for a front of the substrates, elements
+    of order 2 and 3 get a mesh graded to it.
 
-    Raises Unresolved where no such mesh resolves the front.
+    Raises Unresolved if no graded mesh resolves the front.
     """
     while True:
         try:
@@ -75,7 +75,7 @@ def solve_graded(scene: Scene, pore: Pore) -> tuple[Pore, Solved]:
 
 
 def grade(scene: Scene, pore: Pore) -> Pore | None:
-    """The same pore on elements half as large at the aggregate; None where they may not be halved
+    """The same pore on elements half as large at the aggregate; None if they may not be halved
     again."""
     front = 2 * pore.front
     if scene.numerics.order == 1 or front > MOST_GRADED:
@@ -235,7 +235,7 @@ def expansion(scene: Scene, pore: Pore) -> np.ndarray:
 
 
 def at_growth_points(space: Space, field: np.ndarray) -> np.ndarray:
-    """(t, q) values, in the points where growth is integrated, of a field (r, q) in the points of
+    """(t, q) values at the points where growth is integrated, from a field (r, q) at the points of
     the reaction: the mean over the nodes of each straight triangle (29); on curved triangles the
     points are the same, and the field is returned unchanged."""
     if space.order > 1:
@@ -266,7 +266,7 @@ def transfer_substrates(scene: Scene, old: Space, new: Space, state: Concentrati
 
 def _beyond(field: np.ndarray, substrate: Substrate, x: np.ndarray, ends: tuple[float, float],
             speed: float) -> np.ndarray:
-    """(n,) mg/L: ``field`` with the values of (26) beyond the old ends, where it has those of the
+    """(n,) mg/L: ``field`` with the values of (26) beyond the old ends, in place of those of the
     nearest end."""
     before = np.minimum(x - ends[0], 0.0)
     if speed == 0:

@@ -22,7 +22,7 @@ from repro.model.pore import Pore
 
 #: A crease lowers the energy of a surface that is compressed to this stretch, whatever its size.
 CREASE = 0.647
-#: Small waves of every length lower it.
+#: Below this stretch, small waves of every length lower the energy.
 BIOT = 0.544
 #: Stretches closer to a contact line than this fraction of the free surface's length do not count:
 #: the stress at the line is singular.
@@ -89,8 +89,8 @@ def _expansion(nodes: np.ndarray, local: np.ndarray) -> np.ndarray:
 
 
 def _lengths(nodes: np.ndarray, local: np.ndarray) -> np.ndarray:
-    """(edges,) um, chords of the edges. They serve for the stretch in the middle of an edge: the
-    tangent of a parabola there is parallel to its chord."""
+    """(edges,) um, chords of the edges. They give the stretch in the middle of an edge: the tangent
+    of a parabola there is parallel to its chord."""
     every = np.arange(len(nodes))
     chords = nodes[every, np.take(elements.NEXT, local)] - nodes[every, local]
     return np.linalg.norm(chords, axis=1)

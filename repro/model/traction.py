@@ -33,7 +33,7 @@ from repro.scene import Scene, needed
 
 #: rho g in MPa/um, for rho in mg/L and g in um/h^2.
 MPA_PER_UM = 1e-3 * 1e-6 / 3600**2 * 1e-12
-#: The mesh moves with a shape that is farther from it than this, over W.
+#: Distance of a shape from the mesh, over W, beyond which the mesh moves with it.
 ROUND_OFF = 1e-14
 
 

@@ -11,8 +11,8 @@ lumped at the nodes,
 
     (D grad C, grad N_i) + (w . grad C, N_i) + <u_x (C - C_supply), N_i>_inlet + m_i q(C_i) X_i = 0
 
-where w = u - tau grad p is that velocity by :mod:`repro.model.flow`. Summed over i either is the
-balance: supply in = out + consumed, to round-off. Without flow both ends have the concentration
+where w = u - tau grad p is that velocity by :mod:`repro.model.flow`. Summed over i, either form is
+the balance: supply in = out + consumed, to round-off. Without flow both ends have the concentration
 C_supply, or nothing passes them ("closed"). With u_ave for the inlet's u_x, (11) reads as printed
 [E4], but the supply u_ave W C_supply then differs slightly from the inflow.
 """
@@ -40,7 +40,7 @@ from repro.timing import timed
 
 #: Newton's method stops at this residual against the size of its terms.
 NEWTON = 1e-13
-#: Or at this one, where round-off keeps it from falling.
+#: Or at this one, if round-off keeps the residual from falling.
 ROUND_OFF = 1e-12
 MOST_ITERATIONS = 60
 #: No predicted saturation s is larger than this, so that C = K s / (1 - s) is finite.
@@ -49,10 +49,10 @@ SATURATED = 0.9
 SWITCH = 0.5
 #: A concentration below zero by more than this part of its supply is not resolved.
 UNRESOLVED = 1e-3
-#: Neither is one above its supply by more than this part of it.
+#: Nor is one above its supply by more than this part of it.
 OVERSHOOT = 0.02
-#: Neither is uptake where a quadrature of a degree higher by FINER differs by more than this. The
-#: difference is of the same concentrations, which have not come to rest with the finer one: in base
+#: Nor is the uptake if a quadrature of a degree higher by FINER differs by more than this. Both use
+#: the same concentrations, which are not solved for again with the finer quadrature: in base
 #: with fronts of half saturations from 1e-1 to 1e-6 of the supply, biomass made in 2 h was wrong by
 #: a hundredth of the largest difference or less.
 APART = 0.05
@@ -65,7 +65,7 @@ class Problem:
     """Both substrates in one geometry, with n nodes in all and k a triangle.
 
     matrices: (T, k, k) um2/h of each, without uptake; operator: (2n, 2n) of both, not coupled, and
-    magnitude: the same of its entries; source: (2n,) um2 mg/L/h; inflow, outflow: (n,) um2/h,
+    magnitude: its absolute entries; source: (2n,) um2 mg/L/h; inflow, outflow: (n,) um2/h,
     integrals of u_x N_i over an end; system: of both, coupled where there is biomass; law: None
     without biomass; modified_newton: does Newton's method keep its derivative while the defect
     falls fast enough?
@@ -85,7 +85,7 @@ class Problem:
 
     @property
     def mesh(self) -> Mesh:
-        """Of the space."""
+        """The mesh of the space."""
         return self.space.mesh
 
     @property
@@ -199,8 +199,8 @@ def divergence_free(space: Space, velocity: np.ndarray) -> np.ndarray:
         (grad psi, grad v) = (u, grad v) + <u_x, v>_inlet - <u_x, v>_outlet    for all v of it.
 
     So (w, grad v) is the flux through the ends for every v. The divergence of Taylor-Hood
-    velocities is zero against functions of one order less only: carried by u, a constant is not a
-    solution. The exact velocity has psi = 0, and grad psi is no larger than the error of u.
+    velocities vanishes only against functions of one order less, so a constant carried by u is not
+    a solution. The exact velocity has psi = 0, and grad psi is no larger than the error of u.
     """
     rows = space.at.rows
     dofs = space.dofs
@@ -217,7 +217,7 @@ def divergence_free(space: Space, velocity: np.ndarray) -> np.ndarray:
 
 
 def _potential(space: Space) -> ElementSystem:
-    """One function of the space, zero in one node of the outlet."""
+    """The system of one function of the space, zero at one node of the outlet."""
     constrained = np.zeros(space.count, bool)
     constrained[space.dofs.outlet[0, 0]] = True
     return ElementSystem(space.cells, _places(space), constrained, space.mesh.topology.method)
@@ -245,7 +245,7 @@ def _by_divergence_free(space: Space, velocity: np.ndarray, correction: np.ndarr
 
 def _add_at(matrices: np.ndarray, beside: tuple[np.ndarray, np.ndarray],
             blocks: np.ndarray) -> None:
-    """Add (E, e, e) of the edges of an end to the element matrices of the triangles beside them, in
+    """Add matrices (E, e, e) of the edges of an end to those of the triangles beside them, in
     place."""
     owner, place = beside
     np.add.at(matrices, (owner[:, None, None], place[:, :, None], place[:, None, :]), blocks)
@@ -286,8 +286,8 @@ def supplied_everywhere(problem: Problem) -> Concentrations:
 @dataclass(frozen=True, eq=False)
 class Iterate:
     """Both concentrations (2n,); the saturations (2, r, q) about which the uptake is linearised;
-    the residual at the concentrations and the size of its terms, um2 mg/L/h; consistent: are the
-    saturations those of the concentrations?"""
+    the residual at the concentrations and the size of its terms, um2 mg/L/h; consistent: do the
+    saturations follow from the concentrations?"""
 
     state: np.ndarray
     saturations: np.ndarray
@@ -485,7 +485,7 @@ def steady(problem: Problem, sink: Sink | None,
 
     Notes
     -----
-    If the method fails, as behind a sharp front, it starts again from the supply with the half
+    If the method fails, often behind a sharp front, it starts again from the supply with the half
     saturations at the supply, and lowers them to their values by a factor of ten at a time.
     """
     if problem.law is None:
@@ -548,7 +548,7 @@ def _checked(problem: Problem, state: np.ndarray, iterations: int) -> Concentrat
 
 
 def _refuse_unresolved(problem: Problem, sink: Sink, state: Concentrations) -> None:
-    """Raises Unresolved where two quadratures of the uptake differ by more than APART."""
+    """Raise Unresolved if two quadratures of the uptake differ by more than APART."""
     apart = quadrature_error(problem, sink, state)
     if apart > APART:
         raise _front(f"two quadratures of the uptake differ by {100 * apart:.2g} % (up to "

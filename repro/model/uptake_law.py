@@ -2,7 +2,7 @@
 
 A law is a subclass of :class:`UptakeLaw` and an entry of LAWS. It states m(C), dm/dC, the constants
 that it takes from a substrate, and bounds. The rates (7)-(10), Newton's method, Gear's scheme and
-`repro check` use it through this class alone.
+`repro check` use it only through this class.
 """
 
 from __future__ import annotations
@@ -101,7 +101,7 @@ class UptakeLaw:
         return self.fraction(concentration), slope
 
     def sharpness(self, supply: Values) -> Values:
-        """The part of the supply (mg/L) over which uptake falls to nothing: K over it, at most 1.
+        """The part of the supply (mg/L) over which uptake falls to zero: K / supply, at most 1.
         """
         return self.half_saturation / np.maximum(supply, self.half_saturation)
 
@@ -123,11 +123,11 @@ class Monod(UptakeLaw):
         return self.half_saturation / (np.maximum(concentration, 0.0) + self.half_saturation) ** 2
 
     def largest(self, supply: float) -> float:
-        """One, whatever the supply."""
+        """One, for any supply."""
         return 1.0
 
     def saturates(self, supply: float) -> bool:
-        """Over K."""
+        """True for a supply above K."""
         return supply > self.half_saturation
 
     def at_saturation(self, saturation: Values) -> tuple[Values, float]:

@@ -21,7 +21,7 @@ from repro.scene import Scene, Source, label, load_scene
 from repro.scene.units import SceneError
 
 WIDTH = 110
-#: Larger meshes are not made for a check: their number of nodes is estimated.
+#: A check makes no larger mesh: it estimates the number of nodes.
 MOST_MESHED = 20_000
 #: Nodes per triangle, by the geometry of the triangles.
 PER_TRIANGLE = {1: 0.5, 2: 2.0}

@@ -40,10 +40,10 @@ ROW = 0.5
 #: Length of a midpoint step at tolerance 0.01, times the growth rate; it scales with the root of
 #: the tolerance.
 ALLOWED = 0.5
-#: The trial covers this many growth.time_step. Its first step is slow; the fastest one counts.
+#: Length of the trial over growth.time_step. Its first step is slow; the fastest one counts.
 FIRST_STEPS = 3
 MOST_STEPS = 9  # of the trial, if its steps are shorter
-#: A larger mesh is replaced by a coarser one, whose time grows with the nodes to this power.
+#: The trial replaces a larger mesh by a coarser one. Time grows with the nodes to this power.
 MOST_NODES = 5000
 POWER = 1.2
 COARSER = 0.9

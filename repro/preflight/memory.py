@@ -38,7 +38,7 @@ LEAST = 30e6
 PER_CORNER = 4.0
 #: Pieces of each edge of an outline, each with its own size.
 PIECES = 16
-#: A run that needs more than this part of the free memory is warned of.
+#: A run that needs more than this part of the free memory causes a warning.
 WARNED = 0.5
 HEXAGON = math.sqrt(3) / 2
 MB = 1e6
@@ -47,7 +47,7 @@ MB = 1e6
 def expected_nodes(scene: Scene) -> float:
     """Estimated nodes, midside nodes included, of the first or the last mesh if that is larger.
 
-    Nothing is meshed for it.
+    No mesh is generated.
     """
     expected = [first_nodes(scene)]
     if scene.growth:

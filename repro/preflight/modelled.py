@@ -1,4 +1,4 @@
-"""Describe in words, section by section, what a scene models, with the paper's equations."""
+"""Describe the model of a scene in words, section by section, with the paper's equations."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ LEFT_OUT = {
 
 
 def describe_model(scene: Scene) -> list[tuple[str, str]]:
-    """(section, description) in the order of the scene, also of absent sections."""
+    """(section, description) in the order of the scene, including absent sections."""
     words = {"pore": _pore, "aggregate": _aggregate, "flow": _flow, "substrates": _substrates,
              "kinetics": _kinetics, "growth": _growth, "numerics": _numerics, "output": _output}
     return [(name, "; ".join(describe(scene)) if getattr(scene, name) else LEFT_OUT[name])

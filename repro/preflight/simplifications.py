@@ -22,15 +22,15 @@ REYNOLDS = 0.1
 #: Linear elements may overshoot where a concentration changes within an element of a cell Peclet
 #: number above this.
 CELL_PECLET = 2.0
-#: Quasi-steady substrates lag behind the growth by about this share.
+#: Largest share by which quasi-steady substrates lag behind the growth.
 LAG = 0.05
 #: Largest ratio of the transit time of water to the time of growth for profiles at rest in each
 #: shape. From a pore full of the supply, a seed of 20 um in base makes in 6 h 0.5, 2, 4, 7 and 19 %
 #: less biomass than with Gear's method at ratios of 0.009, 0.027, 0.05, 0.09 and 0.28.
 TRANSIT = 0.05
-#: The neglected forces strain the aggregate by about this much.
+#: Largest strain of the aggregate, roughly, due to the neglected forces.
 STRAIN = 0.01
-#: A shape update with the rates at its start errs by about half of its growth.
+#: Largest growth in a shape update, which errs by about half of it with the rates at its start.
 GROWTH_IN_A_STEP = 0.1
 #: The bound on the time of contact is 10 % early in the paper's pores. An end later than this many
 #: times the bound is long after contact.

@@ -159,7 +159,7 @@ def _roomy(low: float, high: float) -> tuple[float, float]:
 
 
 def _step(span: float, parts: int) -> float:
-    """1, 2 or 5 times a power of ten, of which about `parts` make the span."""
+    """The step, 1, 2 or 5 times a power of ten, that divides a span into about `parts` parts."""
     power = 10.0 ** math.floor(math.log10(span / parts))
     return next(k * power for k in (1, 2, 5, 10) if k * power >= span / parts * (1 - 1e-9))
 

@@ -17,7 +17,7 @@ NOT_COMPARED = {"time_h", "nodes", *names.DEFECTS, *names.YES_NO}
 
 
 def build(runs: Sequence[Run]) -> str:
-    """The text of the page; the others are compared with the first run."""
+    """The text of the page, which compares each further run with the first one."""
     labels = short([run.folder for run in runs])
     figures = "".join(map(charts.svg, quantities.overlaid(runs, labels)))
     body = (_head(runs, labels) + _scenes(runs, labels) + _values(runs, labels)

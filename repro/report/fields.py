@@ -32,7 +32,7 @@ _FILE = re.compile(r"fields/(?:fields|before_expansion)_\d{4,}\.vtu")
 FIELDS = """velocity_m_per_d head_cm acceptor_mg_per_L donor_mg_per_L active_biomass inert_biomass
 theta J largest_principal_stress_MPa stress_xx_MPa stress_yy_MPa stress_zz_MPa stress_xy_MPa
 pressure_MPa displacement_um region""".split()
-#: Fields of the aggregate alone: those unknown in the fluid, and biomass, which is zero there.
+#: Fields only of the aggregate: those undefined in the fluid, and biomass, which is zero there.
 OF_AGGREGATE = {each.name for each in ARRAYS if each.body} | {"active_biomass", "inert_biomass"}
 
 
@@ -43,7 +43,7 @@ def index(folder: Path, name: str = "fields.pvd") -> list[tuple[float, Path]]:
 
 
 def listed_files(folder: Path, name: str = "fields.pvd") -> list[tuple[float, Path]]:
-    """(time in h, file) of the fields in a list, whether they still exist or not; only names that a
+    """(time in h, file) of all listed fields, existing or not; only names that a
     run uses. Raises ValueError if the list cannot be read."""
     if not (folder / name).exists():
         return []
@@ -149,7 +149,7 @@ def _frame(time: float, grid: Grid, low, high, meshes: dict[bytes, dict]) -> dic
 
 
 def _values(grid: Grid, region: np.ndarray) -> dict[str, list]:
-    """The values of FIELDS; those of the aggregate alone only in its triangles (`region`)."""
+    """The values of FIELDS; fields of the aggregate only in its triangles (`region`)."""
     nodes = np.unique(grid.cells[region])
     cells = np.flatnonzero(region)
     arrays = grid.point_data | grid.cell_data

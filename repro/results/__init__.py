@@ -40,7 +40,7 @@ PACKAGES = ("numpy", "scipy", "scikit-fem", "meshio", "mmgpy", "shapely", "pint"
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a file, its lines as they are."""
+    """Write a text file without changing its line ends."""
     path.write_text(text, encoding="utf-8", newline="")
 
 

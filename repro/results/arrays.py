@@ -26,7 +26,7 @@ class State:
 
     @cached_property
     def strained(self) -> growth.Strained:
-        """The aggregate's deformation since t = 0, in the points (t, q) of the growth's integrals.
+        """The aggregate's deformation since t = 0, at the quadrature points (t, q) of the growth.
         """
         mesh = self.pore.mesh
         return self.pore.body.strained(mesh.points[mesh.body])
@@ -59,8 +59,8 @@ NEEDS: dict[str, Callable[[State], bool]] = {
 class Array(Quantity):
     """An array of a ``.vtu`` file.
 
-    cells: has it a value per triangle, not per node? body: is it defined in the aggregate alone,
-    and NaN in the fluid?
+    cells: does it have a value per triangle, not per node? body: is it defined only in the
+    aggregate, and NaN in the fluid?
     """
 
     cells: bool = False

@@ -33,7 +33,7 @@ def _least(k: int, scene: Scene, at: Report) -> float:
 
 
 def _overshoot(k: int, scene: Scene, at: Report) -> float:
-    """mg/L; with Gear, where water of earlier supplies is in the pore, over the largest supply."""
+    """mg/L; with Gear, over the largest supply: the pore may contain water of earlier supplies."""
     supply = at.solved.problem.both[k].supply
     if scene.numerics.transport == "gear":
         supply = getattr(scene.largest.substrates, SUBSTRATES[k]).supply

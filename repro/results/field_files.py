@@ -63,7 +63,7 @@ def read(path: Path) -> Grid:
     """Read the grid in a file.
 
     Raises OSError if the file cannot be read or is longer than MOST_DATA, and ValueError if it
-    holds no such grid.
+    contains no grid.
     """
     import meshio
 

@@ -1,7 +1,7 @@
-"""The time series as NetCDF with CF conventions; what is read back equals the CSV table.
+"""The time series as NetCDF with CF conventions; reading it back gives the CSV table.
 
-The time is the simulated one since the start of the run, which has no date: a coordinate in hours
-without the "since ..." of a CF time axis, which would have to invent one.
+The coordinate is the simulated time in hours since the start of the run. It lacks the "since ..."
+of a CF time axis, because simulated time has no date.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ TIME = "time_h"
 
 
 def write(path: Path, scene: Scene, rows: list[list]) -> None:
-    """Write ``rows`` of ``results.COLUMNS``; what is not modelled is NaN."""
+    """Write ``rows`` of ``results.COLUMNS``; quantities that are not modelled are NaN."""
     xarray = import_module(PACKAGE)
     table = np.array(rows, dtype=float)  # None becomes NaN
     columns = dict(zip(results.COLUMNS, table.reshape(len(rows), len(results.COLUMNS)).T))

@@ -115,7 +115,7 @@ def _law(spanned: bool, share: np.ndarray, ratio: float) -> np.ndarray:
 
 
 def _refuse(name: str, values: np.ndarray, known: np.ndarray, kind: str) -> None:
-    """Raises ValueError for values outside the table, and for not-a-number."""
+    """Raise ValueError for values outside the table, and for not-a-number."""
     outside = values[~((values >= known[0]) & (values <= known[-1]))]
     if outside.size:
         raise ValueError(f"added_resistance: {name} = {outside.flat[0]:.6g} is not known for "

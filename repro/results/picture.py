@@ -42,7 +42,7 @@ def key_figures(columns: Mapping[str, np.ndarray]) -> str:
 
 
 def figure(fields: Mapping[str, np.ndarray], time: float) -> str:
-    """A field at a time (h) as HTML with the picture in it; empty if the run has no such field."""
+    """A field at a time (h) as HTML with a picture; empty if the run has none of FIELDS."""
     name = next((name for name in FIELDS if name in fields), "")
     if not name:
         return ""
@@ -82,7 +82,7 @@ def _pixels(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _edges(inside: np.ndarray) -> np.ndarray:
-    """Pixels inside with a neighbour above, below or beside that is outside."""
+    """Pixels inside that have a neighbour outside: above, below or beside."""
     padded = np.pad(inside, 1, mode="edge")
     all_in = padded[2:, 1:-1] & padded[:-2, 1:-1] & padded[1:-1, 2:] & padded[1:-1, :-2]
     return inside & ~all_in

@@ -1,7 +1,7 @@
 """Reported quantities: name, unit, words and formula.
 
-A name ends in its unit (``conductivity_m_per_d``, ``aggregate_area_um2``); a name without a unit is
-that of a pure number. Formulas give the package's own units (um, h, mg/L, MPa); this module alone
+A name ends in its unit (``conductivity_m_per_d``, ``aggregate_area_um2``); a name without a unit
+denotes a pure number. Formulas give the package's own units (um, h, mg/L, MPa); only this module
 converts them.
 """
 
@@ -14,8 +14,8 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Unit:
-    """udunits: as UDUNITS (and so CF) writes it; symbol: as readers know it; factor: how many
-    are in the package's own unit of the same kind."""
+    """udunits: as UDUNITS (and so CF) writes it; symbol: as readers know it; factor: number
+    of these in the package's own unit of the same kind."""
 
     udunits: str
     symbol: str
@@ -48,7 +48,7 @@ class Quantity:
     label : str
         Short name, for legends and heads of columns.
     needs : str
-        Parts that the scene must model, such as "aggregate and flow": words of ``NEEDS`` in
+        Parts that the scene must model, like "aggregate and flow": words of ``NEEDS`` in
         :mod:`columns` or :mod:`arrays`. Empty if there are none.
     yes_no : bool
         Does it stand for yes (1) and no (0)?
@@ -94,5 +94,5 @@ def unit_of(name: str) -> Unit:
 
 
 def plain(name: str) -> str:
-    """Its unit as the name spells it ("m/d", "um2"), "1" for a pure number."""
+    """The unit as a name spells it ("m/d", "um2"), "1" for a pure number."""
     return ending(name).removeprefix("_").replace("_per_", "/") or "1"

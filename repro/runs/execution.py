@@ -58,7 +58,7 @@ __all__ = ["OutputError", "Recorder", "Watch", "prepare", "resume", "run"]
 ReportedSteps = Iterator[tuple[RestartState, Report | None]]
 #: At most this many differing keys are listed in a message.
 MOST_DESCRIBED = 4
-#: Why a folder of results needs a ``run.json``, and what to do without one.
+#: Reason why a folder of results needs a ``run.json``, and the remedy without one.
 RECORD_NEEDED = ("it lists which files there a run has written, without which nothing is "
                  "overwritten or removed, by --force neither: move the folder away, or name "
                  "another")
@@ -305,7 +305,7 @@ def _extend(recorder: Recorder, extended: Scene, overrides: Sequence[str], recor
         remove_temporary(recorder.folder)
         is_restored = _restore(recorder, names, watch)
     if is_restored and not same_rows(recorder.scene, extended, recorder.time):
-        recorder.forget()  # rows lie as the end asks for them: these would not be the longer run's
+        recorder.forget()  # the end sets the times of rows: a longer run has others
         is_restored = False
     recorder.history.resumes.append({"time_h": recorder.time, "changed": changed})
     if not is_restored:
@@ -324,7 +324,7 @@ def _warn_changed_file(recorder: Recorder, watch: Watch) -> None:
     changes = [recorder.origin.get(key, []) for key in ("set", "unset")]
     if not isinstance(file, str) or not all(isinstance(entries, list) for entries in changes):
         return
-    with suppress(SceneError, TypeError, AttributeError):  # it is gone, or is no scene any more
+    with suppress(SceneError, TypeError, AttributeError):  # the file is gone, or no scene now
         current = load_scene(file, *changes)
         differing = differences(scene_tables(recorder.scene), scene_tables(current))
         if differing:
@@ -351,8 +351,8 @@ def _continue(recorder: Recorder, record: dict, progress: Progress, watch: Watch
 
 
 def _is_unchanged(recorder: Recorder, record: dict, watch: Watch) -> bool:
-    """Are all files of a finished run as they were written? Raises OutputError if not, and there is
-    no checkpoint from which to resume."""
+    """Are all files of a finished run unchanged? Raises OutputError if not, and if there is no
+    checkpoint from which to resume."""
     damage = find_damage(recorder.folder, record)
     names = (checkpoint.NEWEST, checkpoint.PREVIOUS)
     if damage and not any(is_file(recorder.folder / name) for name in names):

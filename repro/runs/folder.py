@@ -177,7 +177,7 @@ def locked(folder: Path, patience: float = 0.0) -> Iterator[None]:
     The kernel releases the lock when the process ends for any reason. Raises OutputError if another
     process has the lock for longer than `patience` seconds.
     """
-    from filelock import FileLock, Timeout  # a twentieth of a second
+    from filelock import FileLock, Timeout  # its import takes a twentieth of a second
 
     lock = FileLock(folder / LOCK, timeout=patience)
     with folder_errors(folder):

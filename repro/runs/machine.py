@@ -21,7 +21,7 @@ from repro.scene import Scene, SceneError
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 #: The packages that compute the numbers of a run.
 ROOMS = ("scene", "fem", "model", "march", "results")
-#: A docstring alone on its lines, a comment, or another string, which may look like either.
+#: A docstring that fills its lines, a comment, or another string, which may look like either.
 REMARK = re.compile(r"""
     (?P<indent>^[ ]*)r?\"{3}(?:[^\\]|\\.)*?\"{3}[ ]*$
     | [ ]*\#[^\n]*

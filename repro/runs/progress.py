@@ -47,7 +47,7 @@ def say(text: str, *, to_stderr: bool = False) -> None:
     """Print a line to standard output, or to standard error.
 
     After the reader of a pipe has closed it, further output is discarded. Raises OutputError if
-    standard output fails otherwise, such as on a full disk; errors of standard error are ignored.
+    standard output fails otherwise, as on a full disk; errors of standard error are ignored.
     """
     stream = sys.stderr if to_stderr else sys.stdout
     try:

@@ -166,8 +166,8 @@ class Recorder:
     def write_record(self, status: str) -> dict:
         """Write ``run.json``, and return its content.
 
-        It has the SHA-256 of the other files unless the run is still running. The file SUMS has
-        those of the fields, each checkpoint has its own, and the page does not exist yet.
+        It lists the SHA-256 of the other files unless the run is still running. SUMS lists those of
+        the fields, each checkpoint contains its own, and the page does not exist yet.
         """
         history = self._current_history()
         warnings = history.warnings + [asdict(warning) for warning in self.warn_missed_tolerance()]

@@ -76,9 +76,9 @@ UNITS: dict[str, Unit] = {
 
 
 def conversion(from_unit: str, unit: str) -> Fraction | None:
-    """How many of `unit` the unit `given` is; None where either has a unit that is not known here.
+    """Factor from `from_unit` to `unit`; None if either contains a unit that is not listed here.
 
-    Both are products and quotients such as "mg/L", "1/day", "m^2 s^-1". Raises ValueError if
+    Both are products and quotients like "mg/L", "1/day", "m^2 s^-1". Raises ValueError if
     their dimensions differ.
     """
     one = _product(from_unit)

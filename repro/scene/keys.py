@@ -108,9 +108,9 @@ def _interpolate(section: "Flow | Substrate", *keys: str) -> None:
 class Flow:
     """Section 2.1, (1)-(6): driven by `head` (um, whole pore) or `mean_velocity` (um/h).
 
-    The other one of them is None. Either is a Course where the scene gives a table, a number in
-    what `Scene.at` returns. Of `viscosity_ratio` and `permeability` (um^2) the one that `biomass`
-    does not ask for is None.
+    The other one is None. A table of the scene is a TimeTable here, and a number in the scene that
+    `Scene.at` returns. `biomass` selects `viscosity_ratio` or `permeability` (um^2); the other one
+    is None.
     """
 
     head: float | None = timed_quantity(
@@ -149,8 +149,8 @@ class Flow:
 class Substrate:
     """A substrate of section 2.2: supply and K_s (mg/L), D in water and in biomass (um^2/h).
 
-    A Fraction for D in biomass is a share of D in water. `supply` is a Course where the scene gives
-    a table, a number in what `Scene.at` returns.
+    A Fraction for D in biomass is a share of D in water. A `supply` given as a table is a TimeTable
+    here, and a number in the scene that `Scene.at` returns.
     """
 
     supply: float = timed_quantity("10 mg/L", "mg/L", NON_NEGATIVE,
@@ -254,7 +254,7 @@ class Kinetics:
 
     @property
     def implied_ratio(self) -> float | None:
-        """COD - Y d_c (mg/mg), which F is by (7); None where no COD is given."""
+        """F = COD - Y d_c (mg/mg) by (7); None if the scene has no COD."""
         if self.donor_oxygen_demand is None:
             return None
         return self.donor_oxygen_demand - self.yield_coefficient * self.decay_oxygen_demand
@@ -369,8 +369,8 @@ PRESETS: dict[str, dict[str, str | float]] = {
 
 @dataclass(frozen=True)
 class Output:
-    """Times (h) of the rows and fields wanted, ascending; None: every step and, with midpoint,
-    every growth.time_step times a power of two, such that there are 24 or more."""
+    """Times (h) of the requested rows and fields, ascending. None: every step and, with midpoint,
+    every growth.time_step times a power of two that gives 24 or more."""
 
     times: tuple[float, ...] | None = times(
         source="Figures 4-6",
@@ -558,7 +558,7 @@ def load_tables(source: Source, overrides: Sequence[str] = (), unset: Sequence[s
 def parse_scene(tables: dict, name: str, file: str, changed: Sequence[str] = ()) -> Scene:
     """Parse and check TOML `tables` as a scene called `name`.
 
-    changed: dotted keys that were set last, such as those of --set. If keys contradict each other,
+    changed: dotted keys that were set last, for example by --set. If keys contradict each other,
     the error names one of these. Raises SceneError, naming `file`, if the scene is not accepted.
     """
     _refuse_missing(tables, file)
@@ -574,7 +574,7 @@ def parse_scene(tables: dict, name: str, file: str, changed: Sequence[str] = ())
 
 
 def _to_name(keys: list[str], tables: dict, changed: Sequence[str]) -> str:
-    """Of contradicting keys, the first one that was changed, else the first one in the tables."""
+    """The contradicting key to name: the first changed one, else the first one in the tables."""
     for key in keys:
         if any(_within(key, other) or _within(other, key) for other in changed):
             return key

@@ -14,7 +14,7 @@ class MissingError(AssertionError):
 def needed(part: Part | None, name: str) -> Part:
     """The optional ``part``, which the caller knows to be present.
 
-    name: such as "[growth]". Raises MissingError if the part is None.
+    name: for example "[growth]". Raises MissingError if the part is None.
     """
     if part is None:
         raise MissingError(f"{name} is needed here, and there is none")

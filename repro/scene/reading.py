@@ -11,7 +11,7 @@ from repro.scene.units import Refused, SceneError, nearest, unlike
 
 LONGEST_KEY = 60  # characters of a key in a message
 SCOPE = "docs/scope.md"
-#: Words of keys that other models have.
+#: Words in the keys of other models.
 NOT_MODELLED = frozenset({
     "attachment", "detachment", "erosion", "sloughing", "depth", "dimension", "dimensions",
     "inhibition", "temperature",

@@ -104,7 +104,7 @@ class Refused(ValueError):
 
 @dataclass(frozen=True)
 class Timed(Quantity):
-    """A quantity, or a table of times (h) and values: read as a float, or as a Course."""
+    """A quantity, or a table of times (h) and values: read as a float, or as a TimeTable."""
 
     clock = Quantity("h", "5 h", NON_NEGATIVE)
 
@@ -203,7 +203,7 @@ class Number:
         return f"a plain number is needed, such as {self.example:g} ({self.accepts.words})"
 
     def near(self, value: object) -> str:
-        """The number that a text begins with."""
+        """The number at the start of a text."""
         text = value if isinstance(value, str) and len(value) <= LONGEST else ""
         match = re.match(_DIGITS, text)
         return match[0] if match and _takes(self, float(match[0])) else ""
@@ -309,7 +309,7 @@ class Flag:
         return value
 
     def near(self, value: object) -> str:
-        """The word that a text, in quotes, is."""
+        """The word true or false without its quotes."""
         word = value.casefold() if isinstance(value, str) else ""
         return word if word in ("true", "false") else ""
 
@@ -404,7 +404,7 @@ class SceneError(ValueError):
 def to_internal(value: object, unit: str) -> float:
     """Convert a text such as "50 um" to a number in the internal `unit`.
 
-    Raises ValueError or OverflowError if it is not such a quantity.
+    Raises ValueError or OverflowError if the text is not a quantity of this kind.
     """
     match = _QUANTITY.fullmatch(value) if isinstance(value, str) and len(value) <= LONGEST else None
     if match is None:
@@ -449,7 +449,7 @@ def _within(accepts: Range, value: float) -> float:
 
 @cache
 def _conversion(from_unit: str, unit: str) -> Fraction:
-    """How many internal units the unit `given` is.
+    """Factor from `from_unit` to the internal `unit`.
 
     Raises ValueError if it is no unit, or of another dimension.
     """

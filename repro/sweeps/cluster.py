@@ -30,7 +30,7 @@ ANSWER, PATIENCE, LEAVING = 2, 10, 30
 
 @contextmanager
 def ready(address: str) -> Iterator[RunPoints]:
-    """Connect to the scheduler at an address such as tcp://host:8786; yields a function that makes
+    """Connect to the scheduler at an address like tcp://host:8786; yields a function that makes
     runs on its workers.
 
     Raises SweepError within seconds, before anything is written, if no scheduler answers or the
@@ -38,7 +38,7 @@ def ready(address: str) -> Iterator[RunPoints]:
     """
     distributed = _package(address)
     try:
-        with ThreadPoolExecutor(1) as thread:  # a notebook has a loop of its own in this one
+        with ThreadPoolExecutor(1) as thread:  # a notebook has its own event loop in this one
             thread.submit(lambda: asyncio.run(_ask(distributed, address))).result()
     except Exception as error:  # another kind of server may cause any error
         raise SweepError(f"--scheduler {address}: no Dask scheduler answers there; an address such "
@@ -113,7 +113,7 @@ def run_on_worker(point: Point, folder: Path, expected: str) -> str:
     if single_run.code() != expected:
         return (f"failed: a worker that joined has version {single_run.code()} of this package, "
                 f"{expected} is needed")
-    multiprocessing.current_process().daemon = False  # a daemon, as under a nanny, starts no others
+    multiprocessing.current_process().daemon = False  # a daemon, as under a nanny, has no children
     ((_, status),) = pool.run_points([point], folder, 1, patience=LEAVING)
     return status
 

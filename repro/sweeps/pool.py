@@ -54,7 +54,7 @@ def _start_server() -> None:
 
     with _isolated():
         CONTEXT.set_forkserver_preload(["repro.sweeps.preload"])
-        resource_tracker.ensure_running()  # which unblocks the signal
+        resource_tracker.ensure_running()  # it unblocks the signal
         previous_mask = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
         try:
             forkserver.ensure_running()

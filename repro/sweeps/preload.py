@@ -14,6 +14,6 @@ from repro.sweeps import single_run
 
 results.provenance(load_scene("flow_only"))
 conditions()
-gc.freeze()  # the collector passes over what is imported, so that no process copies it
+gc.freeze()  # the collector skips imported objects, so that no process copies them
 
 __all__ = ["meshio", "single_run"]

@@ -44,8 +44,8 @@ class RunSeries:
         return clogging(self.times, self.relative, self.biomass, self.clogged)
 
     def at_contact(self, values: np.ndarray) -> float:
-        """The value in the first row with contact, NaN without contact. The aggregate is then a
-        plug through which the fluid seeps."""
+        """The value in the first row with contact, NaN without contact. From that row on the
+        aggregate is a plug through which the fluid seeps."""
         first = np.flatnonzero(self.touches)[:1]
         return float(values[first[0]]) if len(first) else np.nan
 
@@ -134,8 +134,8 @@ def clogging(times: np.ndarray, relative: np.ndarray, biomass: np.ndarray,
     """The time (h) at which the relative conductivity first falls to `threshold`, and the biomass
     at that time.
 
-    Between two rows the logarithm of the conductivity is linear in time. NaN if it does not fall
-    so far.
+    Between two rows the logarithm of the conductivity is linear in time. Both are NaN if the
+    conductivity stays above the threshold.
     """
     low = np.flatnonzero(relative <= threshold)
     if not len(low):
