@@ -1,10 +1,10 @@
 """Contact with the walls, closing films, and the grown aggregate's new shape (2.3.3, 3.4).
 
-A film of fluid closes where it is thinner than the least film, a wedge beside a contact surface
-where its angle is under the least angle. Then, at the distance d from the contact line, the gap to
-the wall is at least min(film, tan(angle) d). Straight edges, the paper's, test this at their
-nodes, which join the wall one by one. On arcs it holds everywhere on the free surface, and contact
-lines may lie anywhere on it: :mod:`repro.model.contact_lines` searches for them.
+A film of fluid closes if it is thinner than the least film. A wedge beside a contact surface closes
+if its angle is less than the least angle. Both rules together require a gap to the wall of at least
+min(film, tan(angle) d) at the distance d from the contact line. On straight edges, which the paper
+uses, nodes that violate the rule join the wall one by one. On arcs the rule applies everywhere on
+the free surface, and :mod:`repro.model.contact_lines` finds the contact lines, anywhere on an arc.
 """
 
 from __future__ import annotations
@@ -192,9 +192,7 @@ def _close_by_lines(scene: Scene, grown: Pore, start: Pore, forces: np.ndarray |
     rule = Clearance(scene.pore.width, keys.minimum_film, keys.minimum_contact_angle)
     trials = _Trials(scene, grown, start, forces, search.patient)
     lines = contact_lines.lines_of(grown.boundary)
-    for line in lines:
-        length = search.advances.get(line.key, 0.0)
-        line.advance = contact_lines.to_arcs(grown.boundary, line, length)
+    _place_lines(grown.boundary, lines, search)
     shape = trials.solve(grown.wall, lines)
     gap = rule.width - shape.pore.boundary.thickness
     wall = grown.wall
@@ -225,9 +223,9 @@ def _touch(grown: Pore, shape: Expansion, rule: Clearance, trials: _Trials,
            search: SearchOptions) -> tuple[np.ndarray, list[Line], Expansion]:
     """The first contact of a shape: walls (M,), contact lines, and the equilibrium with them.
 
-    Contact covers the least film's thickness to both sides of the highest place, at least: a
-    single point could not hold an elastic body. The tip of a pointed body cannot be pressed flat
-    over this length; contact then covers half of it, or a quarter.
+    Contact covers at least the least film's thickness on both sides of the highest place, because
+    a force at a single point would indent an elastic body without limit. If the body is too pointed
+    to be flat over this length, contact covers half of it, or a quarter.
     """
     lengths = rule.film * FIRST_LENGTHS
     width = _tip_width(shape.pore.boundary, rule.film)
@@ -237,16 +235,19 @@ def _touch(grown: Pore, shape: Expansion, rule: Clearance, trials: _Trials,
                           "not describe so thin a tip, and no setting helps")
     for length in lengths:
         wall, lines = _first_contact(shape.pore.boundary, length)
-        touching = replace(grown.boundary, wall=wall)
-        for line in lines:
-            advance = search.advances.get(line.key, 0.0)
-            known = contact_lines.to_arcs(touching, line, advance)
-            line.advance = max(line.least, known)
+        _place_lines(replace(grown.boundary, wall=wall), lines, search)
         try:
             return wall, lines, trials.solve(wall, lines)
         except (GrowthError, LinearError) as error:
             failure = error
     raise failure
+
+
+def _place_lines(outline: Outline, lines: Sequence[Line], search: SearchOptions) -> None:
+    """Start each contact line at its advance in ``search``, but not before its smallest one."""
+    for line in lines:
+        length = search.advances.get(line.key, 0.0)
+        line.advance = max(line.least, contact_lines.to_arcs(outline, line, length))
 
 
 def _tip_width(outline: Outline, depth: float) -> float:

@@ -2,13 +2,13 @@
 
 A contact line is the end of a contact surface. Its advance is the number of arcs of the boundary
 that have joined the wall beyond its previous position; a fraction divides an arc. The clearance
-beyond a line is the least value, over the free surface at distances d from the line along the wall,
-of
+beyond a line is the smallest value on the free surface of
 
     gap / min(film, tan(angle) d) - 1
 
-If it is not negative no film and no wedge is too thin. The contact surface is the smallest one that
-allows this, so each line advances until its clearance vanishes. The secant method, safeguarded by
+at the distance d from the line along the wall. A film or a wedge is too thin where it is negative.
+The contact surface is the smallest one without a negative clearance, so each line advances until
+its clearance vanishes. The secant method, safeguarded by
 bisection, searches for all lines at once. Each trial is an equilibrium of the aggregate.
 """
 

@@ -136,14 +136,14 @@ def _remove_temporary(temporary: Path) -> None:
 
 
 @contextmanager
-def folder_errors(folder: Path) -> Iterator[None]:
-    """Convert errors of the file system into OutputError for the folder."""
+def folder_errors(folder: Path, kind: type[OutputError] = OutputError) -> Iterator[None]:
+    """Convert errors of the file system into an OutputError of a kind, for the folder."""
     try:
         yield
     except OSError as error:
         reason = error.strerror or error
         expected = "a folder that can be written is needed"
-        raise OutputError(f"--out {folder}: {reason}; {expected}") from error
+        raise kind(f"--out {folder}: {reason}; {expected}") from error
 
 
 @contextmanager

@@ -88,7 +88,7 @@ def _integers(rows: Table) -> np.ndarray:
 def unpack_history(plain: dict, arrays: Arrays) -> History:
     """Invert :func:`pack_history`."""
     ledgers = arrays["ledgers"]
-    pairs = {name: [tuple(entry) for entry in plain[name]] for name in ("index", "before")}
+    pairs = {name: list(map(tuple, plain[name])) for name in ("index", "before")}
     return History(rows=_table(arrays["rows"], arrays["integers"]),
                   ledgers=_table(ledgers, np.zeros_like(ledgers, dtype=bool)), **plain | pairs)
 

@@ -23,9 +23,12 @@ from repro.sweeps.folder import SweepError
 from repro.sweeps.pool import RunPoints
 
 PACKAGE = "distributed"
-#: Seconds to wait for the answer of a scheduler, for its workers, and for the process of a dead
-#: worker to release its folder.
-ANSWER, PATIENCE, LEAVING = 2, 10, 30
+#: Seconds to wait for the answer of a scheduler.
+ANSWER = 2
+#: Seconds to wait for the workers of a scheduler.
+PATIENCE = 10
+#: Seconds to wait until the process of a dead worker releases its folder.
+LEAVING = 30
 
 
 @contextmanager

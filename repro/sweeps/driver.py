@@ -8,10 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from repro.runs.folder import folder_errors
 from repro.runs.machine import require_packages
 from repro.scene import Source, label
 from repro.sweeps import cluster, design, page, pool, table
-from repro.sweeps.folder import Sweep, folder_errors, lock_folder
+from repro.sweeps.folder import Sweep, SweepError, lock_folder
 
 #: The part of the first conductivity at which a pore counts as clogged.
 CLOGGED = 0.1
@@ -150,7 +151,7 @@ def _run_points(missing: list[design.Point], runs: Path,
 def _write_results(plan: Sweep, statuses: dict[int, str], clogged: float) -> list[table.SweepRun]:
     """Read the runs, and write the tables and the page."""
     runs = table.read_runs(plan, statuses, clogged)
-    with folder_errors(plan.folder):
+    with folder_errors(plan.folder, SweepError):
         table.write(plan, runs)
         page.write(plan, runs, clogged)
     return runs

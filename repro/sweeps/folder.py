@@ -1,7 +1,7 @@
 """The folder of a sweep: ``sweep.json`` lists the planned runs, ``runs/`` holds their folders.
 
-``repro run`` could have made the folder of each run. The same command continues a sweep that was
-cut off: it resumes unfinished runs and repeats damaged ones.
+The folder of each run is the same as one that ``repro run`` makes. The command of an interrupted
+sweep continues it: unfinished runs are resumed, damaged ones are repeated.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from repro.errors import OutputError
 from repro.report.reading import NoRun
 from repro.results import write_json
 from repro.results.files import atomic_path, is_folder, read_json
-from repro.runs.folder import LOCK, PROVENANCE, find_foreign, locked
+from repro.runs.folder import LOCK, PROVENANCE, find_foreign, folder_errors, locked
 from repro.runs.integrity import find_defect, read_record
 from repro.sweeps import single_run
 from repro.sweeps.design import Factor, Point
@@ -52,27 +52,16 @@ def lock_folder(sweep: Sweep):
     Raises OutputError if it holds anything else or another sweep, if another process uses it, or if
     it cannot be written.
     """
-    with folder_errors(sweep.folder):
+    with folder_errors(sweep.folder, SweepError):
         _check(sweep.folder, _as_json(sweep))
         _refuse_foreign(sweep)
     with locked(sweep.folder):
-        with folder_errors(sweep.folder):
+        with folder_errors(sweep.folder, SweepError):
             _check(sweep.folder, _as_json(sweep))  # again: another sweep may have begun meanwhile
             sweep.runs.mkdir(exist_ok=True)
             with atomic_path(sweep.folder / "sweep.json") as beside:
                 write_json(beside, _as_json(sweep))
         yield
-
-
-@contextmanager
-def folder_errors(folder: Path):
-    """Convert errors of the file system into SweepError for the folder."""
-    try:
-        yield
-    except OSError as error:
-        reason = error.strerror or error
-        required = "a folder that can be written is needed"
-        raise SweepError(f"--out {folder}: {reason}; {required}") from error
 
 
 def _as_json(sweep: Sweep) -> dict:
