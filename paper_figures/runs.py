@@ -21,8 +21,23 @@ STORE = Folders(Path(__file__).parent / "cache")
 
 @dataclass(frozen=True)
 class Request:
-    """A packaged scene with its `--set` options; `label` is its name if a scene has several runs, by default that of
-    the scene."""
+    """A run of a packaged scene.
+
+    Parameters
+    ----------
+    scene : str
+        Name of the packaged scene.
+    overrides : tuple of str
+        Changes of the scene, as for `--set`.
+    label : str
+        Name of the run, by default that of the scene. A scene with several runs needs a label for each.
+
+    Examples
+    --------
+    >>> from paper_figures.runs import Request
+    >>> Request("base", ('growth.end="1 h"',), "base_short").name
+    'base_short'
+    """
 
     scene: str
     overrides: tuple[str, ...] = ()
@@ -38,7 +53,7 @@ class Request:
         return load_scene(self.scene, self.overrides)
 
     def command(self) -> str:
-        """The command that computes the same run."""
+        """Return the command that computes the same run."""
         changes = [part for change in self.overrides for part in ("--set", change)]
         return shlex.join(["repro", "run", self.scene, "--out", f"runs/{self.name}", *changes])
 

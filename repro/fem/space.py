@@ -21,8 +21,11 @@ from repro.fem.mesh import Dofs, Mesh
 
 @dataclass(frozen=True, eq=False)
 class Reaction:
-    """Points at which the reaction is integrated. cells: (r, k) nodes of each piece of biomass;
-    values: (q, k) the functions at its points; dx: (r, q) um2, the points' weights."""
+    """Points at which the reaction is integrated.
+
+    cells: (r, k) nodes of each piece of biomass; values: (q, k) the functions at its points; dx:
+    (r, q) um2, the weights of the points.
+    """
 
     cells: np.ndarray
     values: np.ndarray
@@ -32,7 +35,23 @@ class Reaction:
 @brief
 @dataclass(frozen=True, eq=False)
 class Space:
-    """Continuous functions of an order on a mesh, by their values at the nodes of ``dofs``."""
+    """Continuous functions of an order on a mesh, by their values at the nodes of ``dofs``.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Triangles with straight or curved sides; coordinates in um.
+    order : int
+        Degree of the functions: 1, 2 or 3.
+
+    Examples
+    --------
+    >>> import repro
+    >>> scene = repro.load_scene("base", ['growth.end="0 h"', 'numerics.preset="fast"'])
+    >>> space = next(repro.simulate(scene)).pore.space
+    >>> space.points.shape == (space.count, 2)
+    True
+    """
 
     mesh: Mesh
     order: int

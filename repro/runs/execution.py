@@ -170,8 +170,11 @@ def run(scene: Source, folder: str | Path, progress: Progress = ignore_progress,
 
 
 def _require(scene: Scene, watch: Watch) -> None:
-    """Raise SceneError if the machine lacks a package or the memory that a scene needs, or if the
-    spline of its outline crosses itself or leaves the pore."""
+    """Raise SceneError if the machine or the outline does not permit a run of the scene.
+
+    The machine may lack a package or memory. The spline of the outline may cross itself or leave
+    the pore.
+    """
     require_packages(scene)
     require_outline(scene)
     require_memory(scene, watch.warn)
@@ -351,8 +354,10 @@ def _continue(recorder: Recorder, record: dict, progress: Progress, watch: Watch
 
 
 def _is_unchanged(recorder: Recorder, record: dict, watch: Watch) -> bool:
-    """Are all files of a finished run unchanged? Raises OutputError if not, and if there is no
-    checkpoint from which to resume."""
+    """Return whether all files of a finished run are unchanged.
+
+    Raises OutputError if they are not and there is no checkpoint from which to resume.
+    """
     damage = find_damage(recorder.folder, record)
     names = (checkpoint.NEWEST, checkpoint.PREVIOUS)
     if damage and not any(is_file(recorder.folder / name) for name in names):
@@ -390,7 +395,7 @@ def _read_record(path: Path, read: Callable[[Path], dict], accepted: str) -> dic
 
 
 def _scene(record: dict, path: Path) -> Scene:
-    """The scene of ``run.json``. Raises SceneError, or OutputError if its hash does not match."""
+    """Read the scene of ``run.json``. Raises SceneError, or OutputError for another hash."""
     scene = parse_scene(record["tables"], record["scene"], str(path))
     if scene_hash(scene) != record["hash"]:
         raise OutputError(f"{path}: its scene is not the one that was run: the hash "
@@ -399,7 +404,7 @@ def _scene(record: dict, path: Path) -> Scene:
 
 
 def _is_record(record) -> bool:
-    """Does it have the keys that every ``run.json`` has?"""
+    """Return whether it has the keys that every ``run.json`` has."""
     required = {"scene": str, "hash": str, "tables": dict, "status": str}
     return isinstance(record, dict) and all(
         isinstance(record.get(key), kind) for key, kind in required.items())
@@ -435,8 +440,10 @@ def _restore(recorder: Recorder, names: Sequence[str], watch: Watch) -> bool:
 
 
 def _run_from_start(recorder: Recorder, progress: Progress, watch: Watch) -> str:
-    """Run from t = 0. The first state is solved before any file is written. Raises SceneError if it
-    cannot be solved."""
+    """Run from t = 0.
+
+    The first state is solved before any file is written. Raises SceneError if it cannot be solved.
+    """
     timing.reset()
     run_steps = steps(recorder.scene)
     try:
@@ -531,8 +538,10 @@ def _emit_warnings(scene_warnings: list[Caveat], watch: Watch) -> None:
 
 
 def find_warnings(scene: Scene, velocity: float | None) -> list[Caveat]:
-    """Find the simplifications of a scene that do not hold; velocity: mean velocity (um/h) at
-    t = 0, None without flow."""
+    """Find the simplifications of a scene that do not hold.
+
+    velocity: mean velocity (um/h) at t = 0, None without flow.
+    """
     try:
         largest, computed = evaluate_at_largest(scene, velocity)
         return [*simplifications.find_warnings(largest, computed), *find_unresolved_flow(scene)]

@@ -60,7 +60,7 @@ def load_run(folder: str | Path) -> Results:
 
 
 def _none_if_nan(value: float) -> float | None:
-    """A value of a table, or None if it is NaN."""
+    """Replace NaN in a table by None."""
     return None if np.isnan(value) else value
 
 
@@ -92,7 +92,7 @@ class _Files(Sequence[dict[str, np.ndarray]]):
         return (self._read(path) for path in self.files.values() if path.is_file())
 
     def _read(self, path: Path) -> dict[str, np.ndarray]:
-        """The arrays of a file. Raises OutputError if it has changed or cannot be read."""
+        """Read the arrays of a file. Raises OutputError if it has changed or cannot be read."""
         try:
             if sha256_of(path) != self.sums.get(f"fields/{path.name}"):
                 raise ValueError("the file is not as it was written: cut short or altered")

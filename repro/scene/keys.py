@@ -369,8 +369,11 @@ PRESETS: dict[str, dict[str, str | float]] = {
 
 @dataclass(frozen=True)
 class Output:
-    """Times (h) of the requested rows and fields, ascending. None: every step and, with midpoint,
-    every growth.time_step times a power of two that gives 24 or more."""
+    """Times (h) of the requested rows and fields, ascending.
+
+    None: every step and, with midpoint, every growth.time_step times a power of two that gives 24
+    or more.
+    """
 
     times: tuple[float, ...] | None = times(
         source="Figures 4-6",
@@ -450,7 +453,7 @@ class Scene:
 
     @property
     def stagnant(self) -> bool:
-        """Are there substrates without flow, at any time?"""
+        """Whether there are substrates without flow, at any time."""
         if self.substrates is None or self.flow is None:
             return self.substrates is not None
         velocity = self.flow.mean_velocity
@@ -462,7 +465,7 @@ class Scene:
         return time_tables(self)
 
     def at(self, time: float) -> "Scene":
-        """The scene with the values of its tables at a time (h), after a jump at that time."""
+        """Return the scene with the values of its tables at a time (h), after a jump then."""
         return constant(self, lambda table: table.at(time)) if self.time_tables else self
 
     @cached_property
@@ -471,7 +474,7 @@ class Scene:
         return constant(self, lambda table: table.largest)
 
     def corner(self, time: float) -> float:
-        """The next time (h) of its tables after ``time``; infinite if there is none."""
+        """Return the next time (h) of its tables after ``time``; infinite if there is none."""
         later = [corner for table in self.time_tables for corner in table.times if corner > time]
         return min(later, default=inf)
 
@@ -574,7 +577,7 @@ def parse_scene(tables: dict, name: str, file: str, changed: Sequence[str] = ())
 
 
 def _to_name(keys: list[str], tables: dict, changed: Sequence[str]) -> str:
-    """The contradicting key to name: the first changed one, else the first one in the tables."""
+    """Choose the contradicting key to name: the first changed one, else the first in a table."""
     for key in keys:
         if any(_within(key, other) or _within(other, key) for other in changed):
             return key
@@ -600,7 +603,7 @@ def _refuse_missing(tables: dict, file: str) -> None:
 
 
 def _with_preset(tables: dict) -> dict:
-    """The tables with the defaults of their preset, "fast" if they name none."""
+    """Return the tables with the defaults of their preset, "fast" if they name none."""
     numerics = tables.get("numerics", {})
     named = numerics.get("preset", "fast") if isinstance(numerics, dict) else None
     if not isinstance(named, str) or named not in PRESETS:
@@ -627,14 +630,14 @@ def scene_hash(scene: Scene) -> str:
 
 
 def _without_later(section: str, table: dict) -> dict:
-    """The table of a section without the keys of `LATER` that have their default."""
+    """Remove the keys of `LATER` that have their default from the table of a section."""
     later = LATER.get(section, {})
     return {key: _without_later(f"{section}.{key}", value) if isinstance(value, dict) else value
             for key, value in table.items() if key not in later or value != later[key]}
 
 
 def _at(tables: dict, key: str, default: object) -> object:
-    """The value at a dotted key."""
+    """Return the value at a dotted key."""
     for part in key.split("."):
         if part not in tables:
             return default

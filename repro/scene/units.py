@@ -84,7 +84,7 @@ class Quantity:
         return f'{NOUNS[self.unit]} is needed, such as "{self.example}" ({self.accepts.words})'
 
     def near(self, value: object) -> str:
-        """A plain number with the unit of the example."""
+        """Suggest a plain number with the unit of the example."""
         endless = isinstance(value, int) and abs(value) >= 10**LONGEST
         if isinstance(value, bool) or endless or not isinstance(value, int | float | str):
             return ""
@@ -203,7 +203,7 @@ class Number:
         return f"a plain number is needed, such as {self.example:g} ({self.accepts.words})"
 
     def near(self, value: object) -> str:
-        """The number at the start of a text."""
+        """Suggest the number at the start of a text."""
         text = value if isinstance(value, str) and len(value) <= LONGEST else ""
         match = re.match(_DIGITS, text)
         return match[0] if match and _takes(self, float(match[0])) else ""
@@ -262,7 +262,7 @@ class Times:
         return [self.each.write(time) for time in value]
 
     def near(self, value: object) -> str:
-        """A single time, in a list."""
+        """Suggest a single time, in a list."""
         accepted = isinstance(value, str) and _takes(self.each, value)
         return f"[{json.dumps(value)}]" if accepted else ""
 
@@ -309,7 +309,7 @@ class Flag:
         return value
 
     def near(self, value: object) -> str:
-        """The word true or false without its quotes."""
+        """Suggest the word true or false without its quotes."""
         word = value.casefold() if isinstance(value, str) else ""
         return word if word in ("true", "false") else ""
 
@@ -319,7 +319,7 @@ Kind = Quantity | Share | Number | Choice | Times | Points | Flag
 
 def quantity(text: str, unit: str, accepts: Range = POSITIVE, *, about: str, source: str,
              stated: str = "", **default):
-    """A value with a unit: `text` is its default, or an example if `default` is set.
+    """Declare a value with a unit: `text` is its default, or an example if `default` is set.
 
     stated: describes a default that depends on other keys.
     """
@@ -329,47 +329,69 @@ def quantity(text: str, unit: str, accepts: Range = POSITIVE, *, about: str, sou
 
 def timed_quantity(text: str, unit: str, accepts: Range = POSITIVE, *, about: str, source: str,
                    **default):
-    """A value with a unit, like :func:`quantity`, or a table over time."""
+    """Declare a value with a unit, like :func:`quantity`, or a table over time."""
     default = default or {"default_factory": partial(to_internal, text, unit)}
     return _key_field(Timed(unit, text, accepts), about, source, **default)
 
 
 def points(*, about: str, source: str):
-    """A list of points, or None."""
+    """Declare a list of points, or None."""
     return _key_field(Points(), about, source, default=None)
 
 
 def flag(*, about: str, source: str):
-    """True or false, false by default."""
+    """Declare true or false, false by default."""
     return _key_field(Flag(), about, source, default=False)
 
 
 def required(example: str, unit: str, accepts: Range = POSITIVE, *, about: str, source: str):
-    """A value with a unit that has no default."""
+    """Declare a value with a unit that has no default."""
     return _key_field(Quantity(unit, example, accepts), about, source)
 
 
 def share(text: str, unit: str, of: str, *, about: str, source: str, **default):
-    """A quantity with a default, or a percentage of the key `of`."""
+    """Declare a quantity with a default, or a percentage of the key `of`."""
     default = default or {"default_factory": partial(to_internal, text, unit)}
     return _key_field(Share(Quantity(unit, text), of), about, source, **default)
 
 
 def number(example: float, accepts: Range = POSITIVE, *, about: str, source: str,
            stated: str = "", **default):
-    """A plain number; `example` is its default unless `default` is set."""
+    """Declare a plain number; `example` is its default unless `default` is set."""
     default = default or {"default": example}
     return _key_field(Number(example, accepts), about, source, stated, **default)
 
 
 def choice(*words: str, about: str, source: str, stated: str = ""):
-    """One of several words, the first by default; stated: describes a default that depends on
-    the rest of the scene."""
+    """Declare a key of a scene that is one of several words.
+
+    Parameters
+    ----------
+    *words : str
+        The accepted words. The first one is the default.
+    about : str
+        Meaning of the key, for ``repro scene``.
+    source : str
+        Section or table of the paper.
+    stated : str
+        Description of a default that depends on the rest of the scene.
+
+    Returns
+    -------
+    dataclasses.Field
+        The field of the section's dataclass.
+
+    Examples
+    --------
+    >>> from repro.scene.units import choice
+    >>> choice("steps", "linear", about="Between the times", source="Not in the paper").default
+    'steps'
+    """
     return _key_field(Choice(words), about, source, stated, default=None if stated else words[0])
 
 
 def times(*, about: str, source: str):
-    """A list of times, or None."""
+    """Declare a list of times, or None."""
     return _key_field(Times(), about, source, default=None)
 
 
@@ -379,13 +401,18 @@ def _key_field(kind: Kind, about: str, source: str, stated: str = "", **default)
 
 
 def section(kind: type, *, about: str, source: str, **default):
-    """A table, whose keys are those of the dataclass `kind`."""
+    """Declare a table, whose keys are those of the dataclass `kind`."""
     default = default or {"default_factory": kind}
     return field(metadata={"section": kind, "about": about, "source": source}, **default)
 
 
 class SceneError(ValueError):
     """A scene is not accepted: one line names the file, key, value and accepted values.
+
+    Parameters
+    ----------
+    message : str
+        The line. Unprintable letters become spaces.
 
     Examples
     --------
@@ -426,7 +453,7 @@ def unlike(kind: Kind, value: object) -> str:
 
 
 def nearest(word: str, words: Iterable[str]) -> str:
-    """The word with similar letters, or with `word` as a part; empty if there is none."""
+    """Return the word with similar letters, or with `word` as a part; empty if there is none."""
     folded, word = {other.casefold(): other for other in words}, word[:60].casefold()
     parts = [other for other in folded if word in other.split("_")]
     matches = difflib.get_close_matches(word, list(folded), n=1) or parts
