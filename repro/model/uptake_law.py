@@ -40,7 +40,7 @@ class UptakeLaw:
     --------
     >>> from repro.model.uptake_law import LAWS
     >>> law = LAWS["dual Monod"](half_saturation=1.0)
-    >>> law.fraction(1.0), law.slope(1.0)
+    >>> float(law.fraction(1.0)), float(law.slope(1.0))
     (0.5, 0.25)
     """
 
@@ -102,7 +102,7 @@ class UptakeLaw:
         Examples
         --------
         >>> from repro.model.uptake_law import Monod
-        >>> Monod(half_saturation=1.0).fraction(3.0)
+        >>> float(Monod(half_saturation=1.0).fraction(3.0))
         0.75
         """
         raise NotImplementedError

@@ -51,11 +51,11 @@ def added_resistance(area: ArrayLike, width: ArrayLike, spanned: ArrayLike,
     Parameters
     ----------
     area : array_like
-        Areas of the aggregates, in any unit of area.
+        Areas of the aggregates, in any unit of area and of any shape.
     width : array_like
-        Widths of the pores, in the square root of that unit.
+        Widths of the pores, in the square root of that unit. Its shape broadcasts with the areas.
     spanned : array_like of bool
-        Does the aggregate touch both walls? The three arguments broadcast.
+        True if the aggregate touches both walls. Its shape broadcasts with the areas.
     viscosity_ratio : float
         Viscosity of the aggregates over that of water, lambda, without unit.
 

@@ -86,7 +86,7 @@ class Results(Mapping[str, np.ndarray]):
         return self.columns[TIME]
 
     def fields(self, time: float) -> Mapping[str, np.ndarray]:
-        """Fields at a reported time.
+        """Return the fields at a reported time.
 
         Parameters
         ----------
@@ -97,7 +97,8 @@ class Results(Mapping[str, np.ndarray]):
         -------
         mapping of str to array
             ``places_um`` (N, 2), ``triangles`` (T, 3), or (T, 6) if they are quadratic, and the
-            fields by name: (N,) at nodes, (N, 3) for vectors, (T,) in triangles.
+            fields by name: (N,) at nodes, (N, 3) for vectors, (T,) in triangles. Names end in their
+            units.
 
         Raises
         ------
@@ -109,7 +110,7 @@ class Results(Mapping[str, np.ndarray]):
         >>> import repro
         >>> fields = repro.solve("flow_only").fields(0.0)
         >>> fields["places_um"].shape[1], fields["triangles"].shape[1]
-        (2, 6)
+        (2, 3)
         """
         apart = np.abs(self.time - time)
         if not (apart <= SAME_TIME).any():
