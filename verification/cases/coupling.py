@@ -168,29 +168,29 @@ def uniform_growth(hours: tuple[float, ...], most: float, why: str, *changes: st
     mutants=("growth-three-percent-low", "euler-biomass", "inert-not-in-the-area", "theta-anew-at-a-remesh",
              "geometry-of-the-step-before"), runs_with="paper")
 @parametrize(
-    "hours, most, why, *changes",
+    "*setup",
     {kind: (EVERY_HOUR, *OF_UPDATES, *changes) for kind, changes in runs.every(0.3).items()})
-def test_uniform_growth(hours, most, why, changes, record):
+def test_uniform_growth(setup, record):
     """Where diffusion holds the supply everywhere the aggregate stays a half-disc of exactly exp-growing mass, through
     a remesh.
 
     Norm: largest relative error of area and mass, every hour to 6 h; largest deviation of the outline from a half-disc.
     """
-    record(uniform_growth(hours, most, why, *changes))
+    record(uniform_growth(*setup))
 
 
 @pytest.mark.case(
     "coupling-curved-uniform-growth", kind="exact",
     mutants=("theta-power", "curved-mass-lost", "curved-half-of-the-half"), runs_with="fast",
     omitted="paper: coupling-uniform-growth")
-@parametrize("hours, most, why, *changes", {kind: ((9.0,), *OF_LONG_STEPS, *changes) for kind, changes in LONG.items()})
-def test_curved_uniform_growth(hours, most, why, changes, record):
+@parametrize("*setup", {kind: ((9.0,), *OF_LONG_STEPS, *changes) for kind, changes in LONG.items()})
+def test_curved_uniform_growth(setup, record):
     """Where diffusion holds the supply everywhere the midpoint rule keeps a half-disc of exactly exp-growing mass
     through remeshes, in few long steps.
 
     Norm: relative error of area and mass; largest deviation of the outline from a half-disc.
     """
-    record(uniform_growth(hours, most, why, *changes))
+    record(uniform_growth(*setup))
 
 
 def _roundness(scene, seed) -> tuple[float, str]:

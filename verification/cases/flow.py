@@ -408,13 +408,13 @@ def inclusion(disc: tuple, ratio: float, interface: str):
 @pytest.mark.case(
     "flow-inclusion", kind="exact", mutants=("traction-transposed", "normal-stress-halved"),
     references=("viscous_inclusion",), omitted="orders 2, 3: flow-inclusion-quadratic")
-@parametrize("disc, ratio, interface", combined(POLYGON, SOFT_AND_STIFF, FORMS))
-def test_inclusion(disc, ratio, interface, record):
+@parametrize("*setup", combined(POLYGON, SOFT_AND_STIFF, FORMS))
+def test_inclusion(setup, record):
     """A viscous disc under pure shear strains as the closed form says, for lambda = 10 and 2000 in both forms.
 
     Norm: root mean square over random meshes of a size, relative L2 of u and p.
     """
-    record(inclusion(disc, ratio, interface))
+    record(inclusion(*setup))
 
 
 @pytest.mark.slow
@@ -422,15 +422,15 @@ def test_inclusion(disc, ratio, interface, record):
     "flow-inclusion-quadratic", kind="exact", mutants=("normal-stress-halved", "curved-straight-divergence"),
     references=("viscous_inclusion",), omitted="order 1: flow-inclusion")
 @parametrize(
-    "disc, ratio, interface",
+    "*setup",
     {**combined(POLYGON_2, SOFT_AND_STIFF, {"traction": "traction"}), **combined(ROUND, SOFT_AND_STIFF, FORMS)})
-def test_inclusion_quadratic(disc, ratio, interface, record):
+def test_inclusion_quadratic(setup, record):
     """Quadratic and cubic velocities show what the jump of the pressure costs: first order where the disc gives way, in
     both forms; a stiff disc shows the chords of its polygon, second order, or, round, the full order.
 
     Norm: root mean square over random meshes of a size, relative L2 of u and p.
     """
-    record(inclusion(disc, ratio, interface))
+    record(inclusion(*setup))
 
 
 def _errors(size: float, draw: int, make_mesh: Callable, how, *arguments) -> dict[str, float]:
@@ -468,27 +468,27 @@ def manufactured(setup: tuple, ratio: float, interface: str):
 @pytest.mark.case(
     "flow-manufactured", kind="manufactured", mutants=("saddle-sign",), references=("manufactured_flow",),
     omitted="orders 2, 3: flow-manufactured-quadratic")
-@parametrize("setup, ratio, interface", combined(SETUPS, SOFT_AND_STIFF, FORMS))
-def test_manufactured(setup, ratio, interface, record):
+@parametrize("*setup", combined(SETUPS, SOFT_AND_STIFF, FORMS))
+def test_manufactured(setup, record):
     """Where nothing jumps but the viscosity all orders are full, for lambda = 10 and 2000 in both forms.
 
     Norm: root mean square over random meshes of a size, relative L2 of u and p.
     """
-    record(manufactured(setup, ratio, interface))
+    record(manufactured(*setup))
 
 
 @pytest.mark.slow
 @pytest.mark.case(
     "flow-manufactured-quadratic", kind="manufactured", mutants=("traction-transposed", "cubic-lower-degree"),
     references=("manufactured_flow",), omitted="order 1: flow-manufactured")
-@parametrize("setup, ratio, interface", combined(SETUPS_HIGHER, SOFT_AND_STIFF, FORMS))
-def test_manufactured_quadratic(setup, ratio, interface, record):
+@parametrize("*setup", combined(SETUPS_HIGHER, SOFT_AND_STIFF, FORMS))
+def test_manufactured_quadratic(setup, record):
     """The same flow with quadratic velocities is of third order, its pressure of second; with cubic ones of fourth, its
     pressure of third.
 
     Norm: root mean square over random meshes of a size, relative L2 of u and p.
     """
-    record(manufactured(setup, ratio, interface))
+    record(manufactured(*setup))
 
 
 @pytest.mark.slow
@@ -497,14 +497,14 @@ def test_manufactured_quadratic(setup, ratio, interface, record):
     mutants=("cubic-edge-crossed", "cubic-slope", "cubic-lower-degree", "curved-straight-divergence",
              "traction-transposed"), references=("manufactured_flow",),
     omitted="order 1 has straight triangles: flow-manufactured")
-@parametrize("setup, ratio, interface", combined(SETUPS_BENT, viscous(10.0), FORMS))
-def test_curved_manufactured(setup, ratio, interface, record):
+@parametrize("*setup", combined(SETUPS_BENT, viscous(10.0), FORMS))
+def test_curved_manufactured(setup, record):
     """On bent triangles quadratic velocities are of third order and cubic ones of fourth, their pressures of second and
     third, where the viscosity jumps tenfold at a straight interface, in both forms.
 
     Norm: root mean square over random meshes of a size, relative L2 of u and p.
     """
-    record(manufactured(setup, ratio, interface))
+    record(manufactured(*setup))
 
 
 @cache

@@ -84,20 +84,20 @@ def half_disc(radius: float, ratio: float, interface: str, orders: dict, bounds:
 @pytest.mark.case(
     "flow-half-disc", kind="cross-code", norm=NORM, mutants=("viscosity-swapped",),
     references=("poiseuille", "taylor_hood"), runs_with="1", omitted="orders 2, 3: flow-curved-half-disc")
-@parametrize("radius, ratio, interface, orders, bounds", AROUND)
-def test_half_disc(radius, ratio, interface, orders, bounds, record):
+@parametrize("*setup", AROUND)
+def test_half_disc(setup, record):
     """Around half-discs of 5 and 25 um, lambda = 2000, velocity, pressure and head loss are Taylor-Hood's."""
-    record(half_disc(radius, ratio, interface, orders, bounds))
+    record(half_disc(*setup))
 
 
 @pytest.mark.slow
 @pytest.mark.case(
     "flow-half-disc-traction", kind="cross-code", norm=NORM, mutants=("traction-transposed",),
     references=("poiseuille", "taylor_hood"), runs_with="1", omitted="orders 2, 3: flow-curved-half-disc")
-@parametrize("radius, ratio, interface, orders, bounds", AROUND_TRACTION)
-def test_half_disc_traction(radius, ratio, interface, orders, bounds, record):
+@parametrize("*setup", AROUND_TRACTION)
+def test_half_disc_traction(setup, record):
     """With continuous traction too the flow around a half-disc of 25 um is Taylor-Hood's, lambda = 10 and 2000."""
-    record(half_disc(radius, ratio, interface, orders, bounds))
+    record(half_disc(*setup))
 
 
 @pytest.mark.slow

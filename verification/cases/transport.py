@@ -83,14 +83,14 @@ def robin(order: int, peclet: float, ends, ceiling: float):
     "transport-robin-channel", kind="exact",
     mutants=("fluid-diffusivity", "half-of-the-advection", "no-inlet-flux", "weights-of-the-ends"),
     references=("robin_channel",), runs_with="1", omitted="orders 2, 3: transport-robin-higher")
-@parametrize("order, peclet, ends, ceiling", ROBIN)
-def test_robin_channel(order, peclet, ends, ceiling, record):
+@parametrize("*setup", ROBIN)
+def test_robin_channel(setup, record):
     """First-order uptake in a slab under plug flow follows its closed form, (26) upstream included, at Peclet 0.1, 1,
     10, wherever the inlet is put.
 
     Norm: L2 of C over the mesh, relative; several meshes a size.
     """
-    record(robin(order, peclet, ends, ceiling))
+    record(robin(*setup))
 
 
 @pytest.mark.slow
@@ -98,14 +98,14 @@ def test_robin_channel(order, peclet, ends, ceiling, record):
     "transport-robin-higher", kind="exact",
     mutants=("outlet-forgotten", "fluid-diffusivity", "reaction-evenly-weighted"), references=("robin_channel",),
     omitted="order 1: transport-robin-channel")
-@parametrize("order, peclet, ends, ceiling", ROBIN_HIGHER)
-def test_robin_higher(order, peclet, ends, ceiling, record):
+@parametrize("*setup", ROBIN_HIGHER)
+def test_robin_higher(setup, record):
     """Quadratic and cubic concentrations follow the closed form of first-order uptake in a slab to third and fourth
     order, the inlet's (11) included, at Peclet 0.1, 1, 10 (cubic: 1, 10).
 
     Norm: root mean square of C over the mesh, and C leaving, over the supply.
     """
-    record(robin(order, peclet, ends, ceiling))
+    record(robin(*setup))
 
 
 def _robin_errors(size: float, number: int, order: int, peclet: float, ends) -> dict[str, float]:
@@ -181,12 +181,12 @@ def first_order(order: int, modulus: float, film: float, ceiling: float, uptake_
     "transport-first-order-slab", kind="exact", norm=NORM,
     mutants=("decay-demand", "one-supply-held", "quarter-of-a-triangle", "fluid-diffusivity"), references=("slab",),
     omitted="orders 2, 3: transport-first-order-slab-higher")
-@parametrize("order, modulus, film, ceiling, uptake_ceiling", _thiele(1))
-def test_first_order_slab(order, modulus, film, ceiling, uptake_ceiling, record):
+@parametrize("*setup", _thiele(1))
+def test_first_order_slab(setup, record):
     """A slab that takes up kappa C has the profile cosh(phi x / l) and the effectiveness tanh(phi) / phi of Thiele's
     modulus 0.1, 1, 10, and those of its films where it has some.
     """
-    record(first_order(order, modulus, film, ceiling, uptake_ceiling))
+    record(first_order(*setup))
 
 
 @pytest.mark.slow
@@ -194,12 +194,12 @@ def test_first_order_slab(order, modulus, film, ceiling, uptake_ceiling, record)
     "transport-first-order-slab-higher", kind="exact", norm=NORM,
     mutants=("reaction-evenly-weighted", "one-supply-held", "fluid-diffusivity"), references=("slab",),
     omitted="order 1: transport-first-order-slab")
-@parametrize("order, modulus, film, ceiling, uptake_ceiling", _thiele(2, 3))
-def test_first_order_slab_higher(order, modulus, film, ceiling, uptake_ceiling, record):
+@parametrize("*setup", _thiele(2, 3))
+def test_first_order_slab_higher(setup, record):
     """With quadratic and cubic elements the slab that takes up kappa C has its profile to third and fourth order, and
     its effectiveness to fourth and sixth.
     """
-    record(first_order(order, modulus, film, ceiling, uptake_ceiling))
+    record(first_order(*setup))
 
 
 def _slab_errors(size: float, number: int, order: int, film: float, sink: float, half_saturation: float, exact,
@@ -405,14 +405,14 @@ def chosen_concentrations(order: int, peclet: float, inlet: str, ceilings: tuple
     mutants=("cross-flow-sign", "exchanged-half-saturation", "fluid-diffusivity", "ratio-on-the-donor-only",
              "quarter-of-a-triangle"), references=("manufactured_transport",),
     omitted="orders 2, 3: transport-manufactured-higher")
-@parametrize("order, peclet, inlet, ceilings", _variants(1))
-def test_manufactured(order, peclet, inlet, ceilings, record):
+@parametrize("*setup", _variants(1))
+def test_manufactured(setup, record):
     """Chosen concentrations around a half-disc come out of the full equations with second order, at Peclet numbers of
     the pore from 0.1 to 100 and of the elements from 0.002 to 18, with either inlet condition.
 
     Norm: L2 of each substrate over the mesh, relative.
     """
-    record(chosen_concentrations(order, peclet, inlet, ceilings))
+    record(chosen_concentrations(*setup))
 
 
 @pytest.mark.slow
@@ -420,14 +420,14 @@ def test_manufactured(order, peclet, inlet, ceilings, record):
     "transport-manufactured-higher", kind="manufactured",
     mutants=("printed-inlet-forgotten", "conserving-cross-flow", "exchanged-half-saturation", "fluid-diffusivity"),
     references=("manufactured_transport",), omitted="order 1: transport-manufactured")
-@parametrize("order, peclet, inlet, ceilings", _variants(2, 3))
-def test_manufactured_higher(order, peclet, inlet, ceilings, record):
+@parametrize("*setup", _variants(2, 3))
+def test_manufactured_higher(setup, record):
     """The same with quadratic and cubic elements on curved triangles, at Peclet numbers from 0.1 to 100, with either
     inlet condition: third order, of advection alone fourth; and fourth order.
 
     Norm: L2 of each substrate over the mesh, relative.
     """
-    record(chosen_concentrations(order, peclet, inlet, ceilings))
+    record(chosen_concentrations(*setup))
 
 
 def _chosen_errors(refinement: float, number: int, order: int, peclet: float, inlet: str) -> dict[str, float]:

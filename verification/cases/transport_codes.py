@@ -141,15 +141,15 @@ def collocation(order: int, peclet: float, density: float):
     "transport-monod-collocation", kind="cross-code",
     mutants=("decay-demand", "no-inlet-flux", "ratio-on-the-donor-only", "reaction-in-the-fluid",
              "exchanged-substrates"), references=("channel_bvp",), omitted="orders 2, 3: transport-monod-higher")
-@parametrize("order, peclet, density", combined(LINEAR, PECLETS, DENSITIES))
-def test_monod_collocation(order, peclet, density, record):
+@parametrize("*setup", combined(LINEAR, PECLETS, DENSITIES))
+def test_monod_collocation(setup, record):
     """Dual Monod uptake under plug flow is solve_bvp's at Peclet 0.1, 1, 5 times Thiele numbers 0.6, 1.9, 6, from
     barely touched to starved.
 
     Norm: L2 of each substrate over the mesh, relative; starved: root mean square over the slab of C_A over its own
     value; several meshes a size.
     """
-    record(collocation(order, peclet, density))
+    record(collocation(*setup))
 
 
 @pytest.mark.slow
@@ -158,16 +158,16 @@ def test_monod_collocation(order, peclet, density, record):
     mutants=("uptake-without-decay", "fluid-diffusivity", "reaction-evenly-weighted"), references=("channel_bvp",),
     omitted="order 1: transport-monod-collocation")
 @parametrize(
-    "order, peclet, density",
+    "*setup",
     {**combined({"quadratic": 2}, {"Pe = 0.5": 0.5, "Pe = 1": 1.0, "Pe = 5": 5.0}, DENSITIES),
      **combined({"cubic": 3}, {"Pe = 1": 1.0}, DENSITIES)})
-def test_monod_higher(order, peclet, density, record):
+def test_monod_higher(setup, record):
     """Dual Monod uptake under plug flow on quadratic and cubic triangles is solve_bvp's, to third and fourth order, at
     Peclet 0.5, 1, 5 (cubic: 1) times Thiele numbers 0.6, 1.9, 6, from barely touched to starved.
 
     Norm: root mean square over the mesh of both substrates less solve_bvp, over the supply.
     """
-    record(collocation(order, peclet, density))
+    record(collocation(*setup))
 
 
 def _distances(size: float, number: int, order: int, peclet: float, density: float, ends, tolerance: float
@@ -239,29 +239,29 @@ def finite_differences(shape: str, order: int, density: float, *ceilings: float)
 @pytest.mark.case(
     "transport-block", kind="cross-code", mutants=("one-supply-held", "reaction-in-the-fluid"),
     references=("diffusion_reaction_pypde",))
-@parametrize("shape, order, density, *ceilings", BLOCKS)
-def test_block(shape, order, density, ceilings, record):
+@parametrize("*setup", BLOCKS)
+def test_block(setup, record):
     """Diffusion into a block of biomass on a wall is py-pde's, both codes refined together, at Thiele numbers 0.7, 2.2
     and 4.3; with quadratic and cubic elements the transient scheme comes to rest in what py-pde's cells come to.
 
     Norm: root mean square over py-pde's cells over the supply; that of C_D in the biomass over itself; several meshes a
     size.
     """
-    record(finite_differences(shape, order, density, *ceilings))
+    record(finite_differences(*setup))
 
 
 @pytest.mark.slow
 @pytest.mark.case(
     "transport-half-disc", kind="cross-code", mutants=("ratio-on-the-donor-only",),
     references=("diffusion_reaction_pypde",))
-@parametrize("shape, order, density, *ceilings", HALF_DISCS)
-def test_half_disc(shape, order, density, ceilings, record):
+@parametrize("*setup", HALF_DISCS)
+def test_half_disc(setup, record):
     """Diffusion into a half-disc is py-pde's, both codes refined together, at Thiele numbers 0.7, 2.2 and 7; with
     quadratic and cubic elements the transient scheme comes to rest in what py-pde's cells come to.
 
     Norm: root mean square over py-pde's cells over the supply; that of C_D in the biomass over itself.
     """
-    record(finite_differences(shape, order, density, *ceilings))
+    record(finite_differences(*setup))
 
 
 @cache
@@ -409,8 +409,8 @@ def finite_volumes(timed: bool, order: int, peclet: float, density: float):
 @pytest.mark.slow
 @pytest.mark.case(
     "transport-monod-fipy", kind="cross-code", mutants=("decay-demand", "no-inlet-flux"), references=("channel_fipy",))
-@parametrize("timed, order, peclet, density", _rows(False))
-def test_monod_fipy(timed, order, peclet, density, record):
+@parametrize("*setup", _rows(False))
+def test_monod_fipy(setup, record):
     """Dual Monod uptake under plug flow is FiPy's, both codes refined together, at Peclet 0.1, 1, 5 times Thiele
     numbers 0.6, 1.9, 6, from barely touched to starved; that of quadratic and cubic elements, on one mesh, is what
     FiPy's cells come to.
@@ -418,15 +418,15 @@ def test_monod_fipy(timed, order, peclet, density, record):
     Norm: root mean square over FiPy's cells, at five heights, of each substrate over its supply, and in the starved
     slab over its own value; several meshes a size.
     """
-    record(finite_volumes(timed, order, peclet, density))
+    record(finite_volumes(*setup))
 
 
 @pytest.mark.slow
 @pytest.mark.case(
     "transport-gear-fipy", kind="cross-code", mutants=("storage-of-the-biomass-alone", "storage-diagonal"),
     references=("channel_fipy",))
-@parametrize("timed, order, peclet, density", _rows(True))
-def test_gear_fipy(timed, order, peclet, density, record):
+@parametrize("*setup", _rows(True))
+def test_gear_fipy(setup, record):
     """Transient profiles of both substrates are FiPy's, both codes refined together in space, at Peclet 0.1, 1, 5 times
     Thiele numbers 0.6, 1.9, 6; and refined in time, where FiPy's own scheme is of first order; those of quadratic and
     cubic elements, on one mesh, are what FiPy's cells come to.
@@ -434,7 +434,7 @@ def test_gear_fipy(timed, order, peclet, density, record):
     Norm: largest over three times of the root mean square over FiPy's cells, at five heights, over the supply; several
     meshes a size.
     """
-    record(finite_volumes(timed, order, peclet, density))
+    record(finite_volumes(*setup))
 
 
 def _from_fipy(size: float, number: int, order: int, peclet: float, density: float, timed: bool) -> dict[str, float]:
