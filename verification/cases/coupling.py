@@ -9,8 +9,6 @@ hardly depend on the time step, on storage of the substrates, or on the meshed p
 The midpoint rule and the presets: order in time, the limit of the paper's updates, an independent solver.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 from unittest import mock

@@ -6,8 +6,6 @@ long against the width of the pore. Thin aggregates at t = 0 cover a range of Pe
 starved. Supplies that change over time starve an aggregate and let it recover.
 """
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from functools import cache

@@ -6,8 +6,6 @@ its start. The balance of growth against uptake, and a run with shorter steps, d
 Short runs cover contact with the opposite wall and a wedge that closes (2.3.3).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import replace
 from functools import cache

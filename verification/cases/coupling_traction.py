@@ -3,8 +3,6 @@
 Under this traction the shape and the flow around it must agree.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 

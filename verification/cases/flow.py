@@ -30,8 +30,6 @@ strong form (1) acts in both phases. The stabilisation of linear elements ignore
 it stays consistent to second order. On bent triangles the map (s, t) -> (s, t + BEND s^2) keeps the interface straight.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache
 from types import ModuleType

@@ -20,8 +20,6 @@ good meshes. The bubble has no constant to choose. On stretched triangles, where
 measure, it errs far less.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 

@@ -3,8 +3,6 @@
 Element sizes that grow with the distance from the aggregate are compared with one size everywhere.
 """
 
-from __future__ import annotations
-
 from functools import cache
 from itertools import product
 

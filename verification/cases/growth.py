@@ -13,8 +13,6 @@ The law: stress against its closed form, derivatives against differences, the st
 motions and units do not change growth, and the area is the integral of theta.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

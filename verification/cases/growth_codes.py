@@ -12,8 +12,6 @@ triangles the order is two (measured: 1.9 and 2.0 between 0.1 and 0.025), and wi
 3/2.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 

@@ -1,7 +1,5 @@
 """The elastic stretch along the free surface, the limits of its stability, and a run that ends as a fold."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from functools import cache

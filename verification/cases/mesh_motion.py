@@ -5,8 +5,6 @@ elements without a pressure on their own meshes. Every motion keeps triangles up
 be reversed. The criterion for a remesh is exact.
 """
 
-from __future__ import annotations
-
 from functools import cache
 from itertools import product
 

@@ -6,8 +6,6 @@ t = 0, pressure and theta. On a new mesh that is longer than the old one, substr
 constant downstream.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

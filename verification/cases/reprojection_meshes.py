@@ -4,8 +4,6 @@ Flux-corrected transport limits the projection: it conserves like the projection
 The common pieces of two meshes, and the projection integrated over them, are compared with shapely's pieces.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -5,8 +5,6 @@ solve the full nonlinear equations with a curved flow and a D that jumps at a ha
 through the sides of the mesh are added to the source; everything else is the code's.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 

@@ -24,8 +24,6 @@ the box biomass,
 are integrated by scipy to 1e-11. The box is followed for five days, by when half of the acceptor is gone.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 

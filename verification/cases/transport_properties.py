@@ -5,8 +5,6 @@ the midpoint rule takes up substrates with the mean biomass of the step, at stea
 C_D this is the integral of (7)-(10), and the biomass made balances the uptake.
 """
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 from functools import cache

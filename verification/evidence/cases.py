@@ -5,8 +5,6 @@ are those of :class:`Case` up to ``omitted``. The docstring begins with the clai
 "Norm: ...". A mark that has these fields itself takes precedence.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
