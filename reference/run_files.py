@@ -7,8 +7,6 @@ nodes at the midpoints of their sides. Lengths are in um, times in h, concentrat
 pg/m = um2 mg/L.
 """
 
-from __future__ import annotations
-
 import csv
 import json
 from collections.abc import Callable, Iterator

@@ -3,8 +3,6 @@
 C37: the small-strain limit of the stresses.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.linalg import eigh
 from skfem import MeshTri

@@ -8,8 +8,6 @@ by more. Columns of linear elements resist by some tenths of a percent more than
 no truncation: the same mesh without biomass tells by how much, and that is taken off.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """E5, E6, E11, E17: the growing body, against closed forms; E8, E15: fields on a new mesh, and the motion of a mesh."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise, product

@@ -1,8 +1,6 @@
 """E2, E10: what the flow's equations leave open; E7, E12, E13, E16: what happens in a step, and what is not printed;
 E20: the point that stays where it is."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from repro.fem.assembly import saddle_system

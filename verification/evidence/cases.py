@@ -1,15 +1,15 @@
 """The registry: every verification case, read from the marks of the test functions in ``verification/cases``.
 
 A case is a test function with ``@pytest.mark.case``. Each of its parameter sets is a variant. The fields of the mark
-are those of :class:`Case` up to ``omitted``.
+are those of :class:`Case` up to ``omitted``. The docstring begins with the claim, and its second paragraph is the norm,
+"Norm: ...". A mark that has these fields itself takes precedence.
 """
-
-from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from importlib import import_module
+from inspect import getdoc
 from itertools import product
 from pathlib import Path
 from pkgutil import iter_modules
@@ -169,10 +169,18 @@ def _cases_of(function) -> Iterator[Case]:
         if "case" in names:
             id = names["case"].args[0]
             file = Path(function.__code__.co_filename)
-            fresh = Case(id, **names["case"].kwargs, slow="slow" in names, file=file)
+            fields = {**_documented(function), **names["case"].kwargs}
+            fresh = Case(id, **fields, slow="slow" in names, file=file)
             test = f"{file.relative_to(ROOT)}::{function.__name__}" + (f"[{parameters}]" if parameters else "")
             groups.setdefault(id, fresh).variants[label_of(id, parameters)] = test
     yield from groups.values()
+
+
+def _documented(function) -> dict[str, str]:
+    """The claim and the norm that the docstring of a test function states."""
+    paragraphs = (getdoc(function) or "").split("\n\n")
+    claim, norm = (" ".join(text.split()).removesuffix(".") for text in (*paragraphs, "")[:2])
+    return {"claim": claim, "norm": norm.removeprefix("Norm: ")}
 
 
 def _parameter_sets(marks: Iterable) -> Iterator[tuple[str, list]]:

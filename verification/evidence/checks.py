@@ -5,8 +5,6 @@ meshes or steps. Its orders between neighbours are judged on both sides, because
 unexpected as one below it. Each states the origin of its interval.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import floor, inf, isfinite, log10

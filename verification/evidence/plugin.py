@@ -6,8 +6,6 @@ end of a session ``report/live/measured.json`` holds the numbers of the cases th
 written anew, and all other pages stay as recorded.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

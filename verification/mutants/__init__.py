@@ -6,8 +6,6 @@ id, what is wrong with the mutant, the text to change, which must occur once in 
 the tests that catch it. A row without tests is a mutant that cases catch: those that name it in their mark.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 

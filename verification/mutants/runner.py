@@ -11,8 +11,6 @@ The record of a mutant, in ``report/mutants.json``, has a digest of the mutated 
 It is stale if one of these files changes, and a change elsewhere leaves it fresh.
 """
 
-from __future__ import annotations
-
 import argparse
 import contextlib
 import hashlib

@@ -5,8 +5,6 @@ Fifty shapes that the fit of the law has not seen: half-discs, drawn bodies and 
 sizes, positions, pores, velocities and lambdas drawn at random.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import product

@@ -4,8 +4,6 @@ A kind is the order of the elements of a scene. Kind 1 has straight triangles. K
 integrate to degree 6 and 8. The dead loads are f0 and t0 of (20), as nodal forces.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache

@@ -11,8 +11,6 @@ the boundary conditions of :mod:`repro.model.flow` are replaced, and a force may
 because the velocity determines the pressure up to a constant. The mean of the pressure is not compared.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache

@@ -1,7 +1,5 @@
 """Runs that cases share, their results, and the averaged pore of :mod:`reference.averaged_pore`."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import fields, is_dataclass, replace
 from operator import itemgetter
