@@ -15,7 +15,6 @@ from repro import cli, load_scene, results, run
 from repro.fem.outline import polygon_area
 from repro.scene import scene_hash
 from verification.claims import report
-from verification.claims.levels import converged
 
 MODULES = {name: import_module(f"paper_figures.{name}") for name in paper_figures.FIGURES}
 REQUESTS = list(dict.fromkeys(request for module in MODULES.values() for request in module.RUNS))
@@ -122,14 +121,3 @@ def test_a_curve_matches_its_legends(unlike):
             table = tables[line.get_color()]
             expected = table["time_h"], table[column.format(kinds[line.get_linestyle()])]
             assert np.array_equal(line.get_xydata().T, expected)
-
-
-def test_the_outlines_of_figure_6_are_those_of_the_converged_solution(short, monkeypatch):
-    """They use the elements and steps that judge the claims, with a row every tenth of an hour around contact. At first
-    half of the newly covered area lies upstream."""
-    scene = figure_6.RUNS[0].load()
-    assert scene.numerics == load_scene("wide", converged(1.0)).numerics and scene.growth.end == 45.0
-    assert set(np.arange(5.0, 46.0, 5.0)) <= set(scene.output.times)
-    assert np.diff([time for time in scene.output.times if 34 <= time <= 35]) == pytest.approx(0.1)
-    monkeypatch.setattr(figure_6, "EVERY", 0.2)
-    assert figure_6.upstream_share(short["wide"]) == pytest.approx(0.5, abs=0.01)

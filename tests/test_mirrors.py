@@ -19,7 +19,7 @@ from repro.preflight import numbers, simplifications
 from repro.report import comparison
 from repro.report.reading import Run
 from tests.strategies import outlines, share
-from verification import claims, sensitivity, uncertainty
+from verification import claims, sensitivity
 from verification.network import law
 
 SIDES = pytest.mark.parametrize("sign, side", [(-1, "upstream"), (1, "downstream")])
@@ -143,15 +143,6 @@ def test_the_interval_of_a_negative_number_is_that_of_its_mirror(value, quantity
     assert sensitivity.interval(quantity, -value) == (-high, -low)
 
 
-@given(*3 * [st.tuples(st.floats(-5.0, 5.0), st.floats(0.0, 0.5))])
-def test_the_interval_of_a_closed_form_is_that_of_its_mirror(a, b, c):
-    low, high = sensitivity.in_closed_form(lambda x, y, z: x - y * z, a, b, c)
-    assert low <= a[0] - b[0] * c[0] <= high
-    assert sensitivity.in_closed_form(float, a) == (a[0] - a[1], a[0] + a[1])
-    negative = sensitivity.in_closed_form(lambda x, y, z: y * z - x, a, b, c)
-    assert negative == pytest.approx((-high, -low), rel=1e-12, abs=1e-12)
-
-
 @given(*2 * [st.lists(st.floats(-10.0, 10.0), min_size=2, max_size=2).map(sorted)])
 def test_an_outcome_is_that_of_its_mirror(bar, bounds):
     """The outcome follows from an error bar and the accepted bounds."""
@@ -160,12 +151,6 @@ def test_an_outcome_is_that_of_its_mirror(bar, bounds):
     assert outcome == claims.outcome_of((-high, -low), (-most, -least))
     assert (outcome == claims.HOLDS) == (least <= low and high <= most)
     assert (outcome == claims.FAILS) == (high < least or most < low)
-
-
-@given(st.lists(st.floats(-1e3, 1e3), min_size=3, max_size=5))
-def test_a_bar_of_levels_is_that_of_its_mirror(values):
-    one, other = (uncertainty.spread(sign * np.array(values)) for sign in (1, -1))
-    assert (one.low, one.high) == (-other.high, -other.low) == (min(values), max(values))
 
 
 @pytest.mark.parametrize("side", [0, 1])

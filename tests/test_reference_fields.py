@@ -8,9 +8,6 @@ import pytest
 
 from reference import (
     layered_channel,
-    manufactured_flow,
-    manufactured_growth,
-    manufactured_transport,
     neo_hookean,
     quadratic_mesh_motion,
     robin_channel,
@@ -82,16 +79,6 @@ def test_the_inclusion_solves_stokes_and_its_velocity_and_stress_are_continuous(
     assert traction(outside, 1.0) == pytest.approx(traction(inside, ratio), abs=1e-6)
 
 
-@FORMS
-@pytest.mark.parametrize("across, viscosity", [(-0.2, 1.0), (0.3, 2000.0)])
-def test_the_manufactured_force_is_the_residual_of_the_strong_form(interface, across, viscosity):
-    """This holds on both sides of the interface."""
-    velocity, pressure, force = manufactured_flow.evaluate(2000.0, interface)
-    t, turn = np.linspace(-0.4, 0.4, 9), np.exp(1j * manufactured_flow.ANGLE)
-    x, y = (turn * (across + 1j * t)).real, (turn * (across + 1j * t)).imag
-    assert_stokes(velocity, pressure, viscosity, x, y, force(x, y))
-
-
 def test_the_cylinder_is_in_equilibrium_and_free_on_its_rim():
     """theta = a + c (R / R_0)^2: d sigma_rr / dr = (sigma_tt - sigma_rr) / r, and sigma_rr = 0 where R = R_0."""
     law, R = (12.0, 24.0, 20.0), np.linspace(1.0, 20.0, 400)
@@ -101,19 +88,6 @@ def test_the_cylinder_is_in_equilibrium_and_free_on_its_rim():
     expected = (sigma[:, 1, 1] - sigma[:, 0, 0]) / r
     assert abs(sigma[-1, 0, 0]) < 1e-14
     assert np.gradient(sigma[:, 0, 0], r, edge_order=2) == pytest.approx(expected, abs=1e-3 * np.abs(expected).max())
-
-
-@pytest.mark.parametrize("name", manufactured_growth.PRESSURES)
-def test_the_manufactured_growth_is_in_equilibrium_with_its_loads(name):
-    """theta is the determinant, S the closed form's stress, f = -Div S: by differences of step h, to h^2."""
-    case, h = manufactured_growth.growth(name), 1e-5
-    X, Y = np.random.default_rng(3).uniform(0.1, 0.9, (2, 20))
-    F = derivatives(case.place, X, Y, h)[0]
-    J = np.linalg.det(F)
-    sigma = np.array([neo_hookean.cauchy(f, p)[:2, :2] for f, p in zip(F, case.pressure(X, Y))])
-    assert case.theta(X, Y) == pytest.approx(J, rel=1e-9)
-    assert case.stress(X, Y) @ np.swapaxes(F, 1, 2) / J[:, None, None] == pytest.approx(sigma, abs=1e-8)
-    assert case.force(X, Y) == pytest.approx(-divergence(case.stress, X, Y, h), abs=1e-7)
 
 
 @GAMMAS
@@ -184,17 +158,3 @@ def test_the_monod_slab_obeys_its_equation(half_saturation, film):
     assert BIOMASS * first_and_second(c, inside, 1e-2)[1] == pytest.approx(uptake_rate, rel=1e-2)
     assert BIOMASS * first_and_second(c, HALF - 1e-3, 5e-4)[0] == pytest.approx(6e5 * depth, rel=1e-3)
     assert c(HALF + film) == pytest.approx(SUPPLY) and least < 1e-5
-
-
-@pytest.mark.parametrize("side, active, diffusivities, x, y", [
-    ("fluid", 0.0, (1e7, 4e6), 30.0, 25.0), ("biomass", 2.7e5, (8e6, 3e6), -6.0, 9.0)])
-def test_the_forcing_is_the_strong_form(side, active, diffusivities, x, y):
-    """The uptake is that of reference.monod with the biomass X_0 (1 + x / (3 R))."""
-    fields = manufactured_transport.fields(50.0, 20.0, 1e5, (1e7, 4e6), (8e6, 3e6), 3e5, RATES)[side]
-    speed = [float(manufactured_transport.function(part)(x, y)) for part in manufactured_transport.velocity(50.0, 1e5)]
-    sinks = uptake(*(float(field.value(x, y)) for field in fields), RATES)
-    for field, diffusivity, uptake_rate in zip(fields, diffusivities, sinks):
-        gradient, curvature = derivatives(field.value, x, y)[0], derivatives(field.value, x, y, 1e-2)[1]
-        expected = -diffusivity * curvature + gradient @ speed + active * uptake_rate
-        assert field.forcing(x, y) == pytest.approx(expected, rel=1e-4)
-        assert field.flux(x, y)[0] == pytest.approx(diffusivity * gradient[0], rel=1e-6)

@@ -5,7 +5,6 @@ The cases that compare them with `repro` judge their flow and transport, to 1e-4
 import numpy as np
 import pytest
 
-from reference import whole_run
 from reference.averaged_pore import Averaged, Pore, half_ellipse
 
 RATES = {"k": 0.4, "F": 1.5, "decay": 0.006, "K_A": 1.0, "K_D": 1.0, "Y": 0.6, "b": 0.005, "remains": 0.001}
@@ -27,12 +26,3 @@ def test_growth_at_the_supply_is_the_closed_form(keeps_shape):
         right = 20 * np.sqrt(growth_factor(time))
         assert state.time == time and state.area == pytest.approx(np.pi / 2 * 100 * growth_factor(time), rel=1e-5)
         assert state.ends == pytest.approx((-right, right), rel=1e-5)
-
-
-def test_a_step_in_time_is_of_fourth_order():
-    """The difference between one step and two half steps is of the fifth power of the step."""
-    run = whole_run.Run(whole_run.Pore(), 2)
-    one, half = run.step(run.seed, 4.0), run.step(run.seed, 2.0)
-    two, four = run.step(half, 2.0), run.step(run.step(run.seed, 1.0), 1.0)
-    first, second = (np.abs(a - b).max() for a, b in ((one, two), (half, four)))
-    assert 4.5 < np.log2(first / second) < 5.5

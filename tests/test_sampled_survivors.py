@@ -19,7 +19,6 @@ from repro import results, timing
 from repro.cli import sweep
 from repro.errors import Unresolved
 from repro.fem import linear, sizing
-from repro.fem.brief import brief
 from repro.fem.mesh import Mesh, triangle_areas
 from repro.fem.mesher import unlocked
 from repro.fem.outline import BOTTOM, TOP
@@ -28,9 +27,9 @@ from repro.model import remeshing
 from repro.model.contact_lines import surface_ends
 from repro.model.pore import initial_outline, seeded, solve
 from repro.preflight import cost, numbers, simplifications
-from repro.report import charts, fields, run_page
+from repro.report import charts, fields
 from repro.results import field_files, netcdf
-from repro.runs import execution, state_arrays
+from repro.runs import state_arrays
 from repro.scene import load_scene
 from repro.sweeps import page, table
 from repro.sweeps.design import Point, parse
@@ -74,25 +73,6 @@ def test_the_default_seed_of_a_hypercube_is_0():
     assert options.seed == 0
 
 
-def test_the_brief_form_shows_public_fields():
-    @brief
-    @dataclasses.dataclass(frozen=True, eq=False)
-    class Field:
-        order: int
-        values: np.ndarray
-        _cache: dict
-
-    assert repr(Field(2, np.zeros((3, 2)), {})) == "Field(order=2, values=float64[3, 2])"
-
-
-def test_the_label_of_an_axis_is_centred():
-    line = charts.Line("area", np.array([0.0, 1.0]), np.array([1.0, 2.0]))
-    chart = charts.svg(charts.Chart("Area", "area (um²)", [line]))
-    top, bottom = map(float, re.search(r'class="now" x1="0" x2="0" y1="([0-9.]+)" y2="([0-9.]+)"', chart).groups())
-    position = float(re.search(r'class="name" transform="translate\(10 ([0-9.]+)\)', chart)[1])
-    assert position == (top + bottom) / 2
-
-
 def test_contact_lines_do_not_depend_on_the_first_node():
     """If the numbers of the ring's nodes are shifted, the same positions result."""
     outline = initial_outline(load_scene("base"))
@@ -111,16 +91,6 @@ def test_every_stage_of_a_step_is_timed():
     assert last.pore.time == 0.2
     assert {"flow", "transport", "growth", "mesh motion", "meshing", linear.FLOOR} <= set(timing.seconds)
     assert min(timing.seconds.values()) > 0
-
-
-def test_a_timed_function_keeps_its_name_and_docstring():
-    """Help and tracebacks use them."""
-    @timing.timed("stage")
-    def counted(numbers):
-        """How many there are."""
-        return len(numbers)
-
-    assert (counted.__name__, counted.__doc__) == ("counted", "How many there are.") and counted("abc") == 3
 
 
 @pytest.mark.parametrize("low, begins", [(1.0, 0.0), (4.9, 0.0), (5.1, 4.0), (9.0, 9.0)])
@@ -166,11 +136,6 @@ def test_a_second_signal_ends_the_process_with_the_signal_s_status():
             "with catch_signals():\n    for _ in range(2):\n        os.kill(os.getpid(), signal.SIGTERM)\n"
             "        time.sleep(DUPLICATE + 0.2)")
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 128 + signal.SIGTERM
-
-
-def test_the_modelled_stages_are_listed():
-    assert run_page._sentence(["flow", "growth"]) == "Modelled: flow; growth."
-    assert run_page._sentence([]) == "Modelled: the geometry and its mesh."
 
 
 def test_fields_of_the_aggregate_alone_are_those_without_values_in_the_fluid(fast):
@@ -239,10 +204,3 @@ def test_rows_within_steps_are_counted_as_parts_of_steps(count):
     parts = 1.5 * (free + 15 * touching + 0.5 * count)
     estimate = cost.estimate_cost(scene, cost.Trial(None, 5.0, 2.0, 1000), 4000)
     assert estimate.seconds == pytest.approx((5.0 + 2.0 * parts) * 4**1.2, rel=1e-12)
-
-
-def test_the_first_four_differences_are_described():
-    description = execution._describe({f"tables.growth.{name}": [1.0, 2.0] for name in "abcdef"})
-    assert description.startswith("growth.a") and description.endswith(" and 2 more")
-    assert description.count("there, now") == 4
-    assert "more" not in execution._describe({f"tables.growth.{name}": [1.0, 2.0] for name in "abcd"})

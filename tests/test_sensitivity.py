@@ -1,12 +1,10 @@
 """The effect of the rounding of Table 1: inputs are those of the scenes, and elasticities of power laws are exact."""
 import pytest
 
-from paper_figures import replication
 from repro.scene import load_scene
-from verification import claims, sensitivity
-from verification.claims import evaluate, report
+from verification import sensitivity
 from verification.sensitivity import __main__ as driver
-from verification.sensitivity import rounding, wide
+from verification.sensitivity import rounding
 from verification.sensitivity.rounding import EXACT, ROUNDED, changed
 
 PAPER = {"k": 9.3 / 24, "Y": 0.61, "b": 0.12 / 24, "f_d": 0.8, "d_c": 1.42, "F": 1.52, "K_sA": 1.0, "K_sD": 1.0,
@@ -87,14 +85,3 @@ def test_page_and_diagrams_are_those_of_the_record(record, tmp_path):
     pictures = tmp_path / "one.svg", tmp_path / "outlines.svg"
     driver.write(record, *pictures)
     assert [file.read_bytes() for file in pictures] == [driver.TARGET.read_bytes(), driver.OUTLINES.read_bytes()]
-
-
-def test_claims_about_wide_are_judged_with_other_supplies_or_named_as_left_out(record):
-    """This includes claims that read wide without being about it."""
-    read_records = {each["id"] for each in report.read() for check in each["checks"] if "wide" in check["quantity"]}
-    evaluate.register_all()
-    judged = set(record["supplies"]["10"]["claims"])
-    assert judged.isdisjoint(wide.LEFT_OUT)
-    assert read_records | {id for id, one in claims.CLAIMS.items() if one.of_wide} <= {*judged, *wide.LEFT_OUT}
-    note = " ".join(replication.NOTE.read_text(encoding="utf-8").split())
-    assert all(f"{id}, which {why}" in note for id, why in wide.LEFT_OUT.items())

@@ -3,25 +3,11 @@ the pages. No test asserts a time."""
 import json
 import re
 
-import numpy as np
 import pytest
 
 from verification import speed
 from verification.bench import __main__ as bench
 from verification.bench import record, report
-from verification.problems import runs as problems
-
-
-def lines(points):
-    """A part of methods {name: points}."""
-    return {"title": "t", "error": "largest", "reference": "another code", "lines": [
-        {"method": method, "points": of, "failed": []} for method, of in points.items()]}
-
-
-def test_errors_are_relative_and_those_of_effluents_over_the_supply():
-    truth = np.array([[2.0, 80.0, 1000.0, 30.0, -30.0, 30.0, 4.0, 6.0]])
-    computed = truth + np.array([[0.02, 0, 0, 0, -0.6, 0, 0.5, 0]])
-    assert problems.errors(computed, truth)[0] == pytest.approx([0.01, 0, 0, 0, 0.02, 0, 0.05, 0])
 
 
 def test_the_recorded_verdicts_follow_from_the_recorded_numbers():

@@ -3,11 +3,9 @@
 import numpy as np
 import pytest
 
-from repro.scene import load_scene, scene_hash
 from verification import claims
-from verification.claims import Claim, Finding, evaluate, levels, runs
-from verification.claims.levels import ALONE, CONVERGED, DEFAULT, SCHEME, WIDE_FINE, Level, at_level
-from verification.sensitivity.wide import supplied
+from verification.claims import Claim, Finding, evaluate, levels
+from verification.claims.levels import ALONE, CONVERGED, DEFAULT, SCHEME, WIDE_FINE
 from verification.uncertainty import FORMAL, OBSERVED, Bar, estimate
 
 BOTH = (1.0, 2.0)
@@ -35,37 +33,6 @@ def test_the_example_of_celik_et_al():
 def test_an_unreasonable_order_and_oscillation_get_three_and_the_formal_order(values, formal):
     """The bar is 3 times the range over that of the sizes at the lowest formal order, one."""
     assert estimate(SIZES, values, formal).bar == pytest.approx(FORMAL * np.ptp(values) / (2**0.5 - 0.5))
-
-
-@pytest.mark.parametrize("noise", [0.02, 0.5])
-@pytest.mark.parametrize("order", [1.0, 2.0])
-def test_the_bar_covers_the_error_of_noisy_values(noise, order):
-    """It covers at least 19 of 20, Roache's aim, with noise of a part of the error."""
-    generator = np.random.default_rng(2001)
-    covered = 0
-    for _ in range(200):
-        values = 3.0 + SIZES**order + noise * generator.uniform(-1, 1, len(SIZES))
-        covered += abs(values[0] - 3.0) <= estimate(SIZES, values, BOTH).bar
-    assert covered >= 190
-
-
-# Levels.
-def test_a_scene_is_that_of_the_level():
-    """The converged solution is refined in space and time: half the element size, a fourth of the tolerance. The supply
-    of wide applies to wide alone."""
-    assert scene_hash(runs.load_packaged("base")) == scene_hash(load_scene("base"))
-    with at_level(Level(size=0.5, step=3.0)):
-        coarse = runs.load_packaged("base", "numerics.refinement=0.7")
-    assert coarse.numerics.refinement == pytest.approx(1.4) and coarse.growth.time_step == 0.6
-    with at_level(Level(CONVERGED, 0.5)):
-        fine = runs.load_packaged("base")
-    plain = load_scene("base", ['numerics.preset="accurate"']).numerics
-    assert (fine.numerics.refinement, fine.numerics.tolerance) == (2 * plain.refinement, plain.tolerance / 4)
-    assert fine.numerics.elements == "quadratic" and fine.output.times[-2:] == (19.2, 19.4)
-    with at_level(supplied(5.0, 59.0)):
-        base, wide = runs.load_packaged("base"), runs.load_packaged("wide")
-    assert base.substrates.acceptor.supply == 10.0 and base.growth.end == pytest.approx(19.4)
-    assert wide.substrates.donor.supply == 5.0 and wide.growth.end == wide.output.times[-1] == 59.0
 
 
 #: Claims with fewer than three sizes of the scheme of 2001: linear elements have no permeable body (C42), and
@@ -115,12 +82,6 @@ def test_a_bar_is_that_of_elements_and_steps_and_of_the_mesh_around_a_place(chec
     """The bar is 1.25 times the errors, those of the converged solution on its sizes; a fixed parameter adds none."""
     result = judge_check(check, speed, **fields)
     assert (2.91 - result.bar.low, result.bar.high - 2.91) == pytest.approx((below, above))
-
-
-def test_the_scheme_does_not_enter_the_bar_of_the_converged_solution():
-    result = judge_check(SPEED, lambda level: speed(level) + (level.kind == SCHEME), about=claims.MODEL)
-    assert result.bar.high - result.value == pytest.approx(1.25 * 0.005)
-    assert result.scheme == pytest.approx((3.9 + 0.01 * 2**-0.5, 3.9 + 0.01 * 2**0.5)) and len(result.on_sizes) == 3
 
 
 @pytest.mark.parametrize("large, outcome", [((), claims.HOLDS), ((0.5,), claims.REACHES_OVER),
