@@ -2,7 +2,6 @@
 
 import base64
 import copy
-import importlib.resources
 import io
 import re
 import tomllib
@@ -88,12 +87,6 @@ def test_the_table_of_a_notebook_escapes_and_is_short(solved):
     assert solved._repr_html_().count("<td>") == len(solved) * len(solved.time)
     assert "<th>conductivity_m_per_d (m/d)</th>" in solved._repr_html_()
     assert repr(solved) == f"<Results of base: {len(solved.time)} rows, {len(solved)} columns, completed>"
-
-
-def test_the_package_ships_its_data_files():
-    project = (importlib.resources.files("repro") / ".." / "pyproject.toml").read_text(encoding="utf-8")
-    for name in ("py.typed", "results/network.csv"):
-        assert (importlib.resources.files("repro") / name).is_file() and f'"{name}"' in project
 
 
 NARROW = {"pore": {"width": "30 um"}, "aggregate": {"radius": "8 um"}, "flow": {"mean_velocity": "1.5 m/day"},

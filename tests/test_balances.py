@@ -213,18 +213,6 @@ def test_a_step_that_does_not_balance_ends_the_run_and_keeps_its_files(quantity,
     assert "last good state" in line and (out / "checkpoint.state").exists()
 
 
-@pytest.mark.parametrize("sets, column", [
-    (["numerics.inlet=mean"], "acceptor_balance"),
-    (["growth.time_step=12 min"], "oxygen_demand_balance"),
-    (["numerics.transport=gear"], "oxygen_demand_balance")])
-def test_stated_defects_are_reported_and_do_not_stop_a_run(sets, column, tmp_path):
-    """The defects of E4, the paper's updates and Gear's method (E8: tests/test_derived.py) exceed the tolerance that
-    stops a run, and rows report them."""
-    instants = list(simulate(load_scene("base", ["numerics.refinement=0.5", 'growth.end="0.4 h"', *sets])))
-    defects = [abs(row(load_scene("base", sets), instant)[column]) for instant in instants[1:]]
-    assert max(defects) > 1e-6 and (column != "oxygen_demand_balance" or max(defects) < 1e-3)
-
-
 def test_a_slow_flow_is_no_leak():
     """At a Peclet number of 2e-8, just above the accepted minimum, diffusion moves so much more than the flow that
     round-off exceeds a millionth of the supply."""

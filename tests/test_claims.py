@@ -15,11 +15,8 @@ from verification.claims import (
     ClaimError,
     Finding,
     after_contact,
-    evaluate,
-    levels,
     report,
 )
-from verification.claims import __main__ as driver
 from verification.uncertainty import Bar
 
 
@@ -64,45 +61,6 @@ def test_a_verdict_needs_numbers_bars_and_a_reason(finding, excerpt):
     ("<0.5", None), ("about the same", None)])
 def test_a_printed_number_is_an_interval_and_words_are_none(text, printed):
     assert claims.interval(text) == (printed and pytest.approx(printed))
-
-
-# The command.
-@pytest.fixture
-def registry(monkeypatch, tmp_path):
-    """An empty registry and record, and a driver that registers no claims and works in one process."""
-    monkeypatch.setattr(claims, "CLAIMS", {})
-    for module in (driver, evaluate):
-        monkeypatch.setattr(module, "CLAIMS", claims.CLAIMS)
-    monkeypatch.setattr(evaluate, "register_all", lambda: None)
-    monkeypatch.setattr(evaluate, "side_by_side", lambda function, *arguments: list(map(function, *arguments)))
-    monkeypatch.setattr(report, "COMMITTED", tmp_path / "claims.json")
-
-
-def registered(id, function, **fields):
-    return claims.claim(id, "4", "what it says", **fields)(function)
-
-
-def failing_with_double_steps():
-    if levels.current().step == 2:
-        raise KeyError("no row at 19.2 h")
-    return Finding((GOOD,))
-
-
-@pytest.mark.parametrize("judge, status, told", [
-    (lambda: Finding((BAD,), reason="it leaks"), 0, ["CONTRADICTED", "because: it leaks"]),
-    (failing_with_double_steps, 1, ["NO VERDICT", "step=2.0", "no row at 19.2 h"]),
-    (lambda: Finding((BAD,)), 1, ["NO VERDICT", "no reason is given"]),
-    (None, 1, ["NO VERDICT", "no module computes it"]),
-])
-def test_a_claim_without_a_verdict_is_a_failure_and_the_others_are_judged(registry, capsys, judge, status, told):
-    """A contradicted claim is no failure."""
-    if judge:
-        registered("C01", judge, about=claims.OF_SCHEME)
-    registered("C02", lambda: Finding((GOOD,)))
-    driver.main(["--record", "C01", "C02"])
-    assert driver.main(["C01", "C02"]) == status
-    out = capsys.readouterr().out
-    assert f"C01  {told[0]}" in out and "C02  REPRODUCED" in out and all(words in out for words in told)
 
 
 # The committed record.

@@ -6,13 +6,11 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from matplotlib.patches import Polygon
 
 import paper_figures
 from paper_figures import __main__ as figures
 from paper_figures import claims, figure_6, runs, states, style
 from repro import cli, load_scene, results, run
-from repro.fem.outline import polygon_area
 from repro.scene import scene_hash
 from verification.claims import report
 
@@ -74,24 +72,6 @@ def test_every_figure_is_drawn_and_described(quick):
     assert len({request.name for request in REQUESTS}) == len(REQUESTS)
     links = [element.get(key, "") for element in root.iter() for key in ("src", "href")]
     assert not [link for link in links if link.startswith("http")]
-
-
-def test_a_state_agrees_with_the_time_series(short):
-    state, row = states.last(short["base"]), states.row(short["base"], 0.6)
-    assert polygon_area(state.rim) == pytest.approx(row["aggregate_area_um2"], rel=1e-12)
-    assert np.ptp(state.ends) == pytest.approx(row["meshed_length_um"], rel=1e-12)
-    for name in ("acceptor", "donor"):
-        for end, place in enumerate(("inlet", "effluent")):
-            assert state.carried(f"{name}_mg_per_L", end) == pytest.approx(row[f"{place}_{name}_mg_per_L"], rel=2e-4)
-
-
-@pytest.mark.parametrize("name, panels", [("figure_5", 1), ("plate_1", 4)])
-def test_the_drawn_shape_precedes_the_expansion(short, name, panels):
-    """This holds in every panel, as the caption says."""
-    expected = states.last(short["base"], "before_expansion").rim
-    patches = [patch for axes in MODULES[name].draw(short["base"]).axes for patch in axes.patches]
-    drawn = [patch.get_xy()[:-1] for patch in patches if isinstance(patch, Polygon)]
-    assert sum(np.array_equal(shape, expected) for shape in drawn) == panels
 
 
 @pytest.fixture

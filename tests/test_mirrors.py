@@ -12,13 +12,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from repro import PoreEnd, load_scene, simulate
-from repro.errors import MeshError
 from repro.fem import sizing
-from repro.fem.outline import polygon
 from repro.preflight import numbers, simplifications
 from repro.report import comparison
 from repro.report.reading import Run
-from tests.strategies import outlines, share
+from tests.strategies import outlines
 from verification import claims, sensitivity
 from verification.network import law
 
@@ -37,17 +35,6 @@ def test_a_run_ends_at_either_end_of_the_pore_and_names_it(time, from_end, momen
     changes = [*HASTY, f"numerics.time={time}", f"aggregate.position={sign * (100 - from_end)} um"]
     with pytest.raises(PoreEnd, match=f"^the aggregate reaches the pore's {side} end {moment}"):
         list(simulate(load_scene("base", changes)))
-
-
-@st.composite
-def leaning(draw, width=50.0):
-    """Points of an aggregate.outline that leans upstream or downstream, upstream end first."""
-    count = draw(st.integers(3, 6))
-    angle = np.linspace(np.pi, 0.0, count + 2)
-    radius = np.array(draw(st.lists(st.floats(8.0, 30.0), min_size=count + 2, max_size=count + 2)))
-    x, y = radius * np.cos(angle), radius * np.sin(angle)
-    y[[0, -1]] = 0.0
-    return np.column_stack([x + draw(st.floats(-60.0, 60.0)), y])
 
 
 def scene_with_outline(name, points, *changes):
@@ -69,18 +56,6 @@ def assert_alike(one, other):
     assert [*one[0].values()] == [pytest.approx(pair, rel=1e-9) for pair in other[0].values()]
 
 
-@share(0.5)
-@given(leaning(), st.sampled_from([None, 1e5]))
-def test_an_outline_and_its_mirror_image_are_judged_alike(points, speed):
-    """Numbers and warnings agree with and without flow, however far the aggregate reaches to one side."""
-    changes = ["pore.length=260 um", "growth.shear_modulus=1e-6 MPa", "numerics.extent=central"]
-    both = [scene_with_outline("wide", each, *changes) for each in (points, points[::-1] * [-1, 1])]
-    one, other = (judge(scene, speed) for scene in both)
-    assert_alike(one, other)
-    reach = np.abs(points[:, 0]).max()
-    assert ("pore.length" in one[1]) or reach < 130
-
-
 @SIDES
 def test_the_reach_of_an_outline_is_reported_on_either_side(sign, side):
     """The farther end counts: 100 um of 130 um."""
@@ -94,26 +69,6 @@ def test_the_reach_of_an_outline_is_reported_on_either_side(sign, side):
 def test_a_seed_and_its_mirror_image_are_judged_alike(position):
     one, other = (judge(load_scene("base", [f"aggregate.position={sign * position} um"]), 1e5) for sign in (1, -1))
     assert_alike(one, other)
-
-
-def build_outline(points, geometry, smooth):
-    """An outline, or None if it is refused."""
-    try:
-        return polygon(points, 50.0, geometry, smooth)
-    except MeshError:
-        return None
-
-
-@given(leaning(), st.sampled_from([1, 2]), st.booleans())
-def test_an_outline_of_a_scene_and_its_mirror_image(points, geometry, smooth):
-    """Extremes change places; area and fixed points stay. Both are refused if a spline leaves the pore."""
-    one, other = (build_outline(each, geometry, smooth) for each in (points, points[::-1] * [-1, 1]))
-    if None in (one, other):
-        assert one is other and smooth
-        return
-    assert (one.upstream, one.downstream) == pytest.approx((-other.downstream, -other.upstream), rel=1e-9, abs=1e-9)
-    assert (one.area, one.thickness) == pytest.approx((other.area, other.thickness), rel=1e-9)
-    assert np.sort(one.points[one.fixed, 0]) == pytest.approx(np.sort(-other.points[other.fixed, 0]), abs=1e-9)
 
 
 def mirror_image(outline):

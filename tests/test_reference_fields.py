@@ -7,15 +7,12 @@ import numpy as np
 import pytest
 
 from reference import (
-    layered_channel,
     neo_hookean,
     quadratic_mesh_motion,
     robin_channel,
     slab,
     sliding_waves,
-    viscous_inclusion,
 )
-from reference.monod import sink, uptake
 
 FORMS = pytest.mark.parametrize("interface", ("traction", "laplacian"))
 GAMMAS = pytest.mark.parametrize("gamma", [0.1, 1.0, 10.0])
@@ -37,46 +34,6 @@ def first_and_second(function, x, step=1e-3):
     """(first, second) derivative of a function of x."""
     gradient, laplace = derivatives(lambda x, _: function(x), x, 0.0, step)
     return gradient[..., 0], laplace
-
-
-def assert_stokes(velocity, pressure, viscosity, x, y, force=0.0):
-    """-viscosity Laplace u + grad p = f, div u = 0."""
-    assert divergence(velocity, x, y) == pytest.approx(np.zeros(len(x)), abs=1e-7)
-    residual = derivatives(pressure, x, y)[0] - viscosity * derivatives(velocity, x, y)[1] - force
-    assert np.abs(residual).max() < 1e-6 * max(viscosity, 10)
-
-
-@pytest.mark.parametrize("ratio", [1.0, 2000.0, 1e8])
-def test_layers_carry_one_stress_and_a_mean_velocity_of_one(ratio):
-    y, G = np.linspace(0.0, 50.0, 5001), layered_channel.gradient(50.0, 12.5, ratio)
-    u = layered_channel.velocity(y, 50.0, 12.5, ratio)
-    assert np.trapezoid(u, y) / 50 == pytest.approx(1.0, rel=1e-6) and np.abs(u[[0, -1]]).max() < 1e-12
-    sheared = np.where(y[:-1] < 12.495, ratio, 1.0) * np.diff(u)
-    assert np.diff(sheared) / 0.01**2 == pytest.approx(np.full(4999, -G), rel=1e-4, abs=1e-7 * ratio)
-
-
-@FORMS
-@pytest.mark.parametrize("ratio", [0.1, 2000.0])
-def test_the_inclusion_solves_stokes_and_its_velocity_and_stress_are_continuous(interface, ratio):
-    """The form of the interface selects the stress that is continuous."""
-    angle, r = np.random.default_rng(1).uniform([0, 1], [6.28, 3], (40, 2)).T
-    normal, arguments = np.stack([np.cos(angle), np.sin(angle)], axis=-1), (ratio, interface, 0.4)
-    x, y = 1.3 * normal.T
-
-    def outside(x, y):
-        return viscous_inclusion.outside(x, y, 1.3, *arguments)
-
-    def inside(x, y):
-        return viscous_inclusion.inside(x, y, *arguments)
-
-    def traction(side, viscosity):
-        gradient = derivatives(lambda x, y: side(x, y)[0], x, y)[0]
-        viscous = gradient + np.swapaxes(gradient, 1, 2) * (interface == "traction")
-        return viscosity * np.einsum("kij,kj->ki", viscous, normal) - side(x, y)[1][:, None] * normal
-
-    assert_stokes(lambda x, y: outside(x, y)[0], lambda x, y: outside(x, y)[1], 1.0, r * x, r * y)
-    assert outside(x, y)[0] == pytest.approx(inside(x, y)[0], abs=1e-12)
-    assert traction(outside, 1.0) == pytest.approx(traction(inside, ratio), abs=1e-6)
 
 
 def test_the_cylinder_is_in_equilibrium_and_free_on_its_rim():
@@ -119,13 +76,6 @@ def test_the_corner_exponent_makes_the_displacement_vanish_on_the_fixed_side(gam
 RATES = {"k": 0.4, "F": 1.5, "decay": 0.006, "K_A": 1.0, "K_D": 2.0}
 WATER, BIOMASS = 9e6, 7e6
 HALF, SUPPLY = 40.0, 10.0
-
-
-def test_uptake_is_dual_monod():
-    """(7)-(8) written out; the acceptor is the first sink."""
-    q = 0.75 * (0.4 * 1.5 * 0.75 + 0.006), 0.4 * 0.75 * 0.75
-    assert uptake(3.0, 6.0, RATES) == pytest.approx(q)
-    assert sink(np.array([3.0, 6.0]), np.array([2.0]), RATES) == pytest.approx(2.0 * np.array(q))
 
 
 def test_the_robin_channel_obeys_its_equation_and_its_conditions():

@@ -1,6 +1,5 @@
 """Behaviour that no other test covers: changes of mutants made by machine that no test had caught."""
 import argparse
-import contextlib
 import dataclasses
 import importlib
 import pkgutil
@@ -17,15 +16,13 @@ import xarray
 import repro
 from repro import results, timing
 from repro.cli import sweep
-from repro.errors import Unresolved
 from repro.fem import linear, sizing
 from repro.fem.mesh import Mesh, triangle_areas
 from repro.fem.mesher import unlocked
 from repro.fem.outline import BOTTOM, TOP
 from repro.march.simulation import rows_within, simulate, steps
-from repro.model import remeshing
 from repro.model.contact_lines import surface_ends
-from repro.model.pore import initial_outline, seeded, solve
+from repro.model.pore import initial_outline
 from repro.preflight import cost, numbers, simplifications
 from repro.report import charts, fields
 from repro.results import field_files, netcdf
@@ -115,19 +112,6 @@ def test_columns_have_a_fill_value_and_time_has_none(tmp_path):
     with xarray.open_dataset(tmp_path / "timeseries.nc", engine="scipy", decode_cf=False) as dataset:
         filled = {name for name in dataset.variables if "_FillValue" in dataset[name].attrs}
     assert filled == set(results.COLUMNS) - {"time_h"}
-
-
-def test_an_advised_refinement_resolves_and_smaller_ones_do_not():
-    """The seed has a front, since its supply is small."""
-    scene = load_scene("base", ["numerics.preset=fast", "aggregate.radius=20 um", "numerics.refinement=0.1", *(
-        f'substrates.{name}.{key}="{value} mg/L"' for name in ("donor", "acceptor")
-        for key, value in (("supply", 0.3), ("half_saturation", 1e-3)))])
-    message = str(remeshing.advise(scene, seeded(scene), Unresolved("refused")))
-    advised = float(re.fullmatch(r"refused; numerics\.refinement = ([0-9.]+) resolves this state", message)[1])
-    for refinement, resolves in ((advised, True), (advised / 1.4, False)):
-        finer = dataclasses.replace(scene, numerics=dataclasses.replace(scene.numerics, refinement=refinement))
-        with contextlib.nullcontext() if resolves else pytest.raises(Unresolved):
-            solve(finer, seeded(finer))
 
 
 def test_a_second_signal_ends_the_process_with_the_signal_s_status():

@@ -63,23 +63,6 @@ def rebuild(mesh, **changes):
     return Mesh.of(**parts)
 
 
-@pytest.mark.parametrize("kind", ORDERS.values())
-def test_a_replaced_object_has_no_caches(kind):
-    """``replace`` copies the fields of an object with caches, and none of its caches."""
-    scene = load_scene("base", ["numerics.preset=fast", f"numerics.elements={kind}", "numerics.refinement=0.5"])
-    state = pore.seeded(scene)
-    pore.solve(scene, state)
-    contact.expand(scene, state, 1.02 * state.theta)
-    topology = state.mesh.topology
-    objects = (state, state.space, state.mesh, topology, topology.straight, state.body, state.body.shape)
-    for each in map(fill_caches, objects):
-        names = {field.name for field in fields(each)}
-        assert names < vars(each).keys(), "else nothing is tested"
-        other = replace(each)
-        assert vars(other).keys() == names, type(each)
-        assert all(value == {} for value in vars(other).values() if isinstance(value, dict)), type(each)
-
-
 @geometries
 def test_a_mesh_with_other_points_has_new_caches(geometry):
     """Properties that depend on coordinates are computed anew; those of the connections alone stay."""

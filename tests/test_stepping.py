@@ -11,9 +11,7 @@ import numpy as np
 import pytest
 
 from repro.errors import GrowthError, SimulationError, Unresolved
-from repro.fem.sizing import ACROSS_PORE
 from repro.march import midpoint, simulation, step_control, stepping
-from repro.march.loop import PoreEnd
 from repro.march.midpoint import Attempt
 from repro.model import pore
 from repro.scene import load_scene
@@ -49,34 +47,9 @@ SCENES = {"fast": (FAST, 'growth.end="9.7 h"'), "contact": (FAST, 'growth.end="0
           "stress-free": (FAST, 'growth.end="0.6 h"', 'growth.new_biomass="stress_free"', *CONTACT)}
 
 
-def steps_of(name, *changes):
-    """The last state, the reports, and the ledgers of all steps of a scene, reported or not."""
-    scene = load_scene("base", (*SCENES[name], *changes))
-    results = list(simulation.steps(scene))
-    rows = [instant for _, instant in results if instant]
-    last = results[-1][0]
-    return last, rows, [*(row for instant in rows for row in instant.ledgers), *last.ledgers]
-
-
 def same(one, other):
     """Are two states, without their rows, the same to the last bit?"""
     return alike(one.pore, other.pore) and one.step_control == other.step_control
-
-
-@pytest.mark.parametrize("name", ["fast", "paper", *map(THOROUGH, ("contact", "gear", "stress-free"))])
-def test_steps_do_not_depend_on_rows(name):
-    """The last state and the ledger of every step agree to the last bit with 1 row, 7 rows, and a row at the end of
-    every step."""
-    last, rows, ledgers = steps_of(name)
-    for count in (1, 7):
-        times = np.linspace(0, last.pore.time, count + 1)[1:].tolist()
-        output_times = json.dumps([f"{time!r} h" for time in times])
-        other, reports, all_ledgers = steps_of(name, f"output.times={output_times}")
-        assert len(reports) == count + 1 and all_ledgers == ledgers
-        assert same(other, last)
-    assert len(ledgers) > 1 and {row.end for row in ledgers} <= {instant.pore.time for instant in rows}
-    if CONTACT[0] in SCENES[name]:
-        assert not rows[0].pore.contact and rows[-1].pore.contact and sum(instant.remeshes for instant in rows) > 1
 
 
 @pytest.mark.parametrize("part", [0.55, THOROUGH(0.97)])
@@ -175,18 +148,6 @@ def test_a_failure_of_the_shortest_step_stops_the_run(monkeypatch, error, messag
     with pytest.raises(SimulationError, match=rf"stopped in the step from t = 0.4 h.*{message}"):
         list(simulation.simulate(base('growth.end="1 h"', 'growth.time_step="0.05 h"')))
     assert 2.5e-5 < tried[-1] <= 5e-5 and len(tried) < 20  # to the end, then 2 h 2^-16
-
-
-@pytest.mark.parametrize("order", [1, 2, THOROUGH(3)])
-def test_a_run_ends_where_the_aggregate_reaches_an_end_of_the_pore(order):
-    """The last instant is reported, then PoreEnd."""
-    scene = base('pore.length="90 um"', 'growth.end="19 h"', *sets(order))
-    reports = []
-    with pytest.raises(PoreEnd, match="reaches the pore's upstream end"):
-        for instant in simulation.simulate(scene):
-            reports += [instant] if instant.ledgers else []
-    near = scene.pore.width / ACROSS_PORE
-    assert 0.1 * near - 45 <= reports[-1].pore.outline.upstream < near - 45 <= reports[-2].pore.outline.upstream
 
 
 @pytest.mark.parametrize("order", [1, 2, THOROUGH(3)])
