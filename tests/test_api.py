@@ -4,8 +4,6 @@ import base64
 import copy
 import io
 import re
-import tomllib
-from dataclasses import replace
 from importlib.metadata import version
 
 import matplotlib.pyplot as plt
@@ -18,7 +16,7 @@ from repro.cli import main
 from repro.errors import OutputError
 from repro.results import field_files
 from repro.results.tables import END_TIMES, Results, solve
-from repro.scene import SceneError, load_scene, packaged_scenes
+from repro.scene import SceneError, load_scene
 from tests import faults
 from tests.pages import PURE, cached_run
 from tests.strategies import arrays_of, same_arrays
@@ -108,14 +106,6 @@ def test_a_scene_may_be_a_dict_a_file_or_a_name(tmp_path):
     assert extended.flow is None and scene.flow is not None and original == NARROW
     with pytest.raises(SceneError, match=r"scene: pore.width = 3: a length"):
         load_scene({"pore": {"width": 3}})
-
-
-def test_a_scene_prints_as_its_toml(tmp_path):
-    """The text has every key with its unit and reads as an equal scene."""
-    for name in packaged_scenes():
-        scene = load_scene(name)
-        assert load_scene(tomllib.loads(str(scene))) == replace(scene, name="scene") and 'width = "' in str(scene)
-    assert repr(load_scene("flow_only")).startswith("<Scene flow_only: pore, aggregate, flow, numerics, output; hash ")
 
 
 def test_check_prints_the_same_as_repro_check(capsys):

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
 
 from repro.errors import SimulationError
 from repro.fem.division import Division
@@ -15,7 +14,7 @@ from repro.model import contact, contact_lines
 from repro.model.contact_lines import Clearance, Contact
 from repro.model.pore import seeded
 from repro.scene import load_scene
-from tests.strategies import attached_aggregates, mirrored, plug
+from tests.strategies import mirrored, plug
 
 FILM, ANGLE = 2.0, np.radians(16.7)
 
@@ -62,17 +61,6 @@ def test_nodes_close_beside_a_contact_surface(name, outline, wanted):
     """The minimum angle is 16.7 degrees, and the minimum film is 2 um (Table 1)."""
     assert joins(outline) == wanted
     assert joins(mirrored(outline)) == wanted[::-1]
-
-
-@given(attached_aggregates(thickest=1.02))
-def test_closing_is_the_same_in_a_mirror(drawn):
-    """No node on a wall joins again. Every free node nearer to the upper wall than the film joins."""
-    outline, width = drawn
-    joined, image = (contact.closing_nodes(each, width, FILM, ANGLE) for each in (outline, mirrored(outline)))
-    assert image.tolist() == joined[::-1].tolist()
-    assert ((joined == FREE) | (outline.wall == FREE)).all()
-    over = (outline.wall == FREE) & (width - outline.points[:, 1] < FILM)
-    assert ((joined == TOP) == over).all()
 
 
 RULE = Clearance(20.0, FILM, ANGLE)

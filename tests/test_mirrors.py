@@ -3,8 +3,6 @@
 The mirror of a pore is x -> -x: areas, numbers and warnings stay the same, the two ends change places. The mirror of a
 number is its negative: the ends of its interval change places and signs.
 """
-import html
-import re
 
 import numpy as np
 import pytest
@@ -14,8 +12,6 @@ from hypothesis import strategies as st
 from repro import PoreEnd, load_scene, simulate
 from repro.fem import sizing
 from repro.preflight import numbers, simplifications
-from repro.report import comparison
-from repro.report.reading import Run
 from tests.strategies import outlines
 from verification import claims, sensitivity
 from verification.network import law
@@ -118,15 +114,3 @@ def test_a_shape_is_judged_by_the_bound_of_the_law_on_its_side(spanned, area, pa
     row = dict(zip(law.COLUMNS, np.array([[1], [1], [spanned], [2000.0], [area], [shape]], float)))
     verdict = law.judged(row)
     assert verdict.inside == inside and verdict.beyond == pytest.approx(part, rel=1e-9)
-
-
-@pytest.mark.parametrize("first, second, expected", [
-    (2.0, 3.0, "+50 %"), (3.0, 1.5, "-50 %"), (-2.0, -3.0, "-50 %"), (-2.0, -1.0, "+50 %"), (-2.0, 1.0, "+150 %"),
-    (2.0, -1.0, "-150 %")])
-def test_a_difference_is_up_or_down_whatever_the_signs(tmp_path, first, second, expected):
-    """The page that compares two runs writes + if the second value is larger."""
-    series = [{"time_h": np.array([0.0]), "upstream_um": np.array([value])} for value in (first, second)]
-    runs = [Run(tmp_path / str(k), {"scene": "drawn"}, columns, {}) for k, columns in enumerate(series)]
-    row = re.search(r"<tr><t[hd][^>]*>upstream end of the aggregate \(um\)</t[hd]>(.*?)</tr>", comparison.build(runs))
-    cells = re.findall(r"<td[^>]*>(.*?)</td>", row[1])
-    assert html.unescape(cells[-1]) == expected

@@ -14,7 +14,6 @@ from reference import (
     sliding_waves,
 )
 
-FORMS = pytest.mark.parametrize("interface", ("traction", "laplacian"))
 GAMMAS = pytest.mark.parametrize("gamma", [0.1, 1.0, 10.0])
 STEP = 1e-4
 
@@ -73,7 +72,6 @@ def test_the_corner_exponent_makes_the_displacement_vanish_on_the_fixed_side(gam
     assert quadratic_mesh_motion.exponent(w, 1e9) == pytest.approx(0.75)
 
 
-RATES = {"k": 0.4, "F": 1.5, "decay": 0.006, "K_A": 1.0, "K_D": 2.0}
 WATER, BIOMASS = 9e6, 7e6
 HALF, SUPPLY = 40.0, 10.0
 

@@ -20,10 +20,10 @@ from repro.fem import linear, sizing
 from repro.fem.mesh import Mesh, triangle_areas
 from repro.fem.mesher import unlocked
 from repro.fem.outline import BOTTOM, TOP
-from repro.march.simulation import rows_within, simulate, steps
+from repro.march.simulation import simulate, steps
 from repro.model.contact_lines import surface_ends
 from repro.model.pore import initial_outline
-from repro.preflight import cost, numbers, simplifications
+from repro.preflight import numbers, simplifications
 from repro.report import charts, fields
 from repro.results import field_files, netcdf
 from repro.runs import state_arrays
@@ -175,16 +175,3 @@ def test_elements_are_small_beside_the_upper_wall_s_contact_lines_alone():
     distance = np.abs(plug_outline.points[upper, :1] - ends).min(axis=1)
     assert sizes[upper] == pytest.approx(np.minimum(50.0 / 14, 0.1 + sizing.GRADATION * distance))
     assert sizes[upper].min() == 0.1 and (sizes[lower] == 50.0 / 14).all()
-
-
-@pytest.mark.parametrize("count", [1, 7])
-def test_rows_within_steps_are_counted_as_parts_of_steps(count):
-    """The expected time of a run grows with its rows, its steps and its mesh."""
-    times = [round(0.31 * k, 2) for k in range(count + 1)]
-    scene = load_scene("base", ["numerics.preset=fast", "growth.end=3 h",
-                                "output.times=[" + ", ".join(f'"{time} h"' for time in times) + "]"])
-    assert rows_within(scene) == {*times[1:]}
-    free, touching = cost.steps(scene)
-    parts = 1.5 * (free + 15 * touching + 0.5 * count)
-    estimate = cost.estimate_cost(scene, cost.Trial(None, 5.0, 2.0, 1000), 4000)
-    assert estimate.seconds == pytest.approx((5.0 + 2.0 * parts) * 4**1.2, rel=1e-12)

@@ -26,11 +26,6 @@ def base(*changes):
     return load_scene("base", (FAST, 'aggregate.radius="25 um"', *changes))
 
 
-def sets(order):
-    """Elements of an order, of the size of preset fast."""
-    return (f"numerics.elements={ORDERS[order]}", f"numerics.refinement={0.4 if order == 1 else 0.2}")
-
-
 @pytest.mark.parametrize("end, spacing", [
     (0.001, 0.2 / 2**13), (0.01, 0.2 / 2**9), (1.0, 0.025), (4.79, 0.1), (4.8, 0.2), (19.4, 0.8), (45.0, 1.6)])
 def test_a_run_without_times_has_about_25_rows_at_round_times(end, spacing):

@@ -781,7 +781,7 @@ MUTANTS = (
          "Two quadratures of the uptake may differ by a half.",
          "APART = 0.05",
          "APART = 0.5",
-         f"{UNSEEN}a_front_between_the_points_of_a_quadrature_is_refused[2]")),
+         f"{GUARDS}two_quadratures_of_the_uptake_may_differ_by_five_percent")),
     *changes(
         "repro/model/gear.py",
         ("steps-by-the-larger-supply",
@@ -1215,7 +1215,7 @@ MUTANTS = (
          "A difference from a negative number has the other sign.",
          "{100 * (value - first) / abs(first):",
          "{100 * (value - first) / first:",
-         f"{MIRRORS}a_difference_is_up_or_down_whatever_the_signs"),
+         f"{UNSEEN}runs_are_compared_under_their_own_names_with_signs"),
         ("difference-without-sign",
          "A difference does not say which run has less.",
          "(value - first) / abs(first)",
