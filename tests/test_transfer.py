@@ -147,8 +147,8 @@ def check_substrates(scene, remeshed):
 @pytest.mark.parametrize("speed, expected", [(0.0, 7.0), (4e6, 3.0)])
 def test_water_beyond_the_old_mesh_has_the_supply_of_its_time(speed, expected):
     """The supply is a table, and the aggregate is off the middle. Still water has the first supply, flowing water the
-    present one, and neither the largest one; concentrations in the old mesh stay. `test_unseen.py` tests the profile
-    towards the mesh."""
+    present one, and neither the largest one; concentrations in the old mesh stay. The case reprojection-beyond-the-ends
+    tests the profile towards the mesh."""
     tables = {"pore": {"width": "100 um", "length": "160 um"}, "aggregate": {"radius": "20 um", "position": "15 um"},
              "substrates": {"boundary": "closed", "donor": {"supply": "5 mg/L"}, "acceptor": {
                  "supply": [["0 h", "7 mg/L"], ["1 h", "20 mg/L"], ["4 h", "3 mg/L"]]}},

@@ -1,4 +1,4 @@
-"""Error bars from values on several sizes: exact for manufactured series, covering noise; and the levels for them."""
+"""Error bars from values on several sizes, exact for manufactured series; and the levels for them."""
 
 import numpy as np
 import pytest

@@ -200,27 +200,6 @@ def test_an_update_takes_the_mean_of_the_rates_at_its_ends(order):
 
 
 @EVERY_ORDER
-@pytest.mark.parametrize("speed", [0.0, 2e5])
-def test_water_beyond_the_old_mesh_has_the_profile_of_flow_or_diffusion(speed, order):
-    """It follows (26) with each substrate's diffusivity upstream, and the outflow downstream; without flow the supply.
-    """
-    scene, pore = base(order)
-    new = base(order, "numerics.extent=full")[1].space
-    before, x = (node_coordinates(space)[:, 0] for space in (pore.space, new))
-    state = transport.Concentrations(3 + 0.01 * before, 2 - 0.02 * before)
-    computed = remeshing.transfer_substrates(scene, pore.space, new, state, speed)
-    first, last = pore.mesh.ends
-    certain = np.abs([x - first, x - last]).min(axis=0) > 1e-9
-    for name, slope, start in (("acceptor", 0.01, 3), ("donor", -0.02, 2)):
-        substrate = getattr(scene.substrates, name)
-        faded = np.exp(speed * np.minimum(x - first, 0) / substrate.diffusivity)
-        faded[(x < first) | (x > last)] *= speed > 0
-        expected = substrate.supply - (substrate.supply - start - slope * np.clip(x, first, last)) * faded
-        assert getattr(computed, name)[certain] == pytest.approx(expected[certain], rel=1e-9)
-        assert certain.sum() > 0.9 * len(x)
-
-
-@EVERY_ORDER
 def test_every_transferred_amount_keeps_its_sum(order):
     """The sums of active and inert biomass and of two more amounts stay to 1e-12. The amounts are rough or, with curved
     elements, inert in every other triangle; none becomes negative."""

@@ -22,7 +22,9 @@ COURSE = "tests/test_scene_course.py::test_"
 MIRRORS = "tests/test_mirrors.py::test_"
 PAIRS = "tests/test_option_pairs.py::test_"
 GUARDS = "tests/test_guards.py::test_"
-SINGLE = "tests/test_single_terms.py::test_"
+SENSITIVITY = "tests/test_sensitivity.py::test_"
+UNCERTAINTY = "tests/test_uncertainty.py::test_"
+NEW_MESH = "tests/test_new_mesh_due.py::test_"
 SHRINKING = "tests/test_shrinking.py::test_"
 CACHE_KEYS = "tests/test_cache_keys.py::test_"
 DEEPEST = "tests/test_deepest_level.py::test_elements_are_halved_as_often_as_a_front_needs"
@@ -679,7 +681,7 @@ MUTANTS = (
          "Without flow a mesh that grows downstream does not find the supply there.",
          "(before < 0) | (x > ends[1])",
          "before < 0",
-         f"{UNSEEN}water_beyond_the_old_mesh_has_the_profile_of_flow_or_diffusion[0.0-2]"),
+         "tests/test_transfer.py::test_water_beyond_the_old_mesh_has_the_supply_of_its_time[0.0-7.0]"),
         ("largest-supply-beyond-the-ends",
          "Beyond the ends of the old mesh there is the largest supply of a table, whatever the time.",
          "supplied = scene.at(expanded.time if speed else 0.0)",
@@ -1340,46 +1342,46 @@ MUTANTS = (
          "A set of inputs is reached whose numbers leave their intervals.",
          "bool(t <= 1 + 1e-9 and left <= 1)",
          "bool(t <= 1 + 1e-9)",
-         f"{SINGLE}a_set_is_reached_if_it_is_within_the_rounding_and_fits_with_its_bars"),
+         f"{SENSITIVITY}a_set_is_reached_if_it_is_within_the_rounding_and_fits_with_its_bars"),
         ("reached-beyond-the-rounding",
          "A set of inputs is reached that takes more than the rounding.",
          "bool(t <= 1 + 1e-9 and left <= 1)",
          "bool(left <= 1)",
-         f"{SINGLE}a_set_is_reached_if_it_is_within_the_rounding_and_fits_with_its_bars"),
+         f"{SENSITIVITY}a_set_is_reached_if_it_is_within_the_rounding_and_fits_with_its_bars"),
         ("misfit-without-bars",
          "A number fits whose bar leaves its interval.",
          "np.abs(printed_of(numbers) - MIDDLE) + bars)",
          "np.abs(printed_of(numbers) - MIDDLE))",
-         f"{SINGLE}a_set_is_reached_if_it_is_within_the_rounding_and_fits_with_its_bars")),
+         f"{SENSITIVITY}a_set_is_reached_if_it_is_within_the_rounding_and_fits_with_its_bars")),
     *changes(
         "verification/uncertainty.py",
         ("bar-without-its-own-distance",
          "A bar leaves out how far the number is off the law.",
          "+ scatter + abs(apart[0]))",
          "+ scatter)",
-         f"{SINGLE}a_bar_is_the_sum_of_its_three_terms"),
+         f"{UNCERTAINTY}a_bar_is_the_sum_of_its_three_terms"),
         ("bar-without-scatter",
          "A bar leaves out how far values scatter about the law.",
          "+ scatter + abs(apart[0]))",
          "+ abs(apart[0]))",
-         f"{SINGLE}a_bar_is_the_sum_of_its_three_terms")),
+         f"{UNCERTAINTY}a_bar_is_the_sum_of_its_three_terms")),
     *changes(
         "repro/model/remeshing.py",
         ("contact-on-the-old-mesh",
          "A mesh is moved on through a change of contact.",
          "or not outline.same_contact(previous.boundary)\n",
          "or False\n",
-         f"{SINGLE}a_new_mesh_is_due_if_one_criterion_requires_it"),
+         f"{NEW_MESH}a_new_mesh_is_due_if_one_criterion_requires_it"),
         ("coarse-mesh-kept",
          "A mesh is moved on whose edges have become too long.",
          "            or sizing.too_coarse(outline.corners, sized(scene))):",
          "            ):",
-         f"{SINGLE}a_new_mesh_is_due_if_one_criterion_requires_it"),
+         f"{NEW_MESH}a_new_mesh_is_due_if_one_criterion_requires_it"),
         ("poor-mesh-kept",
          "A mesh is moved on whose triangles have become poor.",
          "moved if moved.acceptable() else None",
          "moved if not moved.turned_over().any() else None",
-         f"{SINGLE}a_new_mesh_is_due_if_one_criterion_requires_it"),
+         f"{NEW_MESH}a_new_mesh_is_due_if_one_criterion_requires_it"),
         ("advice-not-to-the-last",
          "The largest refinement that may be advised is not tried.",
          "for factor in TRIED]\n    candidates",
