@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from verification import claims
 from verification.claims import Claim, Finding, evaluate, levels
@@ -35,6 +37,26 @@ def test_an_unreasonable_order_and_oscillation_get_three_and_the_formal_order(va
     assert estimate(SIZES, values, formal).bar == pytest.approx(FORMAL * np.ptp(values) / (2**0.5 - 0.5))
 
 
+# The bar of a number on several sizes: the law's error, the scatter about the law, and the number's distance from it.
+def parts(sizes, values, order):
+    """The three terms of a bar with an order, by NumPy's least squares."""
+    law = np.column_stack([np.ones(len(sizes)), sizes**order])
+    coefficients = np.linalg.lstsq(law, values, rcond=None)[0]
+    residual = values - law @ coefficients
+    scatter = (residual @ residual / max(len(sizes) - 3, 1)) ** 0.5
+    return OBSERVED * abs(coefficients[1]) * sizes[0] ** order, scatter, abs(residual[0])
+
+
+@given(st.lists(st.floats(-0.15, 0.15), min_size=4, max_size=4), st.floats(0.6, 2.0), st.sampled_from([1.0, -1.0]))
+def test_a_bar_is_the_sum_of_its_three_terms(noise, order, sign):
+    """This holds for a law with any noise, if the observed order is accepted."""
+    values = 7.0 + sign * (SIZES**order + noise)
+    result = estimate(SIZES, values, (1.0, 2.0))
+    if result.factor == OBSERVED:
+        assert result.bar == pytest.approx(sum(parts(SIZES, values, min(result.order, 1.0))), rel=1e-6)
+
+
+# Levels.
 #: Claims with fewer than three sizes of the scheme of 2001: linear elements have no permeable body (C42), and
 #: comparisons of many or long runs would take minutes (C32, C41, C43). Claims about wide have two.
 FEWER_OF_SCHEME = {"C32": 1, "C41": 1, "C42": 0, "C43": 1}
