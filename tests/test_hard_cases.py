@@ -8,9 +8,8 @@ import pytest
 from repro.errors import SimulationError, TransportError
 from verification.cases import hard_family
 from verification.evidence.checks import at_most
-from verification.evidence.results import Result
 from verification.problems import hard
-from verification.problems.hard import PRESETS, REFUSED, RIGHT, WRONG, HardCase
+from verification.problems.hard import REFUSED, RIGHT, WRONG
 
 GOOD, BAD = at_most("good", 0.5, 1.0, ""), at_most("bad", 2.0, 1.0, "")
 
@@ -25,12 +24,6 @@ def raising(error):
 PARTS = {RIGHT: lambda preset: [GOOD], WRONG: lambda preset: [BAD], REFUSED: raising(SimulationError("try another"))}
 
 
-def a_case(*verdicts, refusable=()):
-    """Return a case whose parts have these verdicts with every preset."""
-    parts = {verdict: PARTS[verdict] for verdict in verdicts}
-    return HardCase(99, "made-up", "Made up", "Right", "Wrong", parts, refusable, ("m",))
-
-
 @pytest.mark.parametrize("function, verdict, excerpt", [
     (PARTS[RIGHT], RIGHT, ""), (lambda preset: [GOOD, BAD], WRONG, "bad 2 (expected at most 1)"),
     (lambda preset: [], WRONG, "nothing was measured"),
@@ -43,19 +36,6 @@ def a_case(*verdicts, refusable=()):
 def test_a_part_is_right_refused_or_wrong(function, verdict, excerpt):
     cell = hard.run_part("a part", function, "fast", 0.2)
     assert cell.verdict == verdict and excerpt in cell.message
-
-
-@pytest.mark.parametrize("verdict, preset, refusable, fine", [
-    (RIGHT, "fast", (), True), (REFUSED, "fast", (), False), (REFUSED, "paper", (), True), (WRONG, "paper", (), False),
-    (WRONG, "fast", (WRONG,), False), (REFUSED, "fast", (REFUSED,), True), (REFUSED, "fast", (RIGHT,), False)])
-def test_a_cell_is_accepted_according_to_its_verdicts(verdict, preset, refusable, fine):
-    """A cell has the verdict of its worst part. A verification case holds if its cells of all presets are accepted."""
-    chosen = a_case(RIGHT, verdict, refusable=refusable)
-    cells = {name: hard.run_cell(chosen, name) for name in PRESETS}
-    accepted = {name: not cell.unaccepted for name, cell in cells.items()}
-    assert cells[preset].verdict == verdict and accepted[preset] is fine
-    evidence = {name: [*hard.evidence(cell)] for name, cell in cells.items()}
-    assert Result("hard-99", evidence).holds is all(accepted.values())
 
 
 @pytest.mark.parametrize("message, works, wrong", [

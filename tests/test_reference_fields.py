@@ -11,7 +11,6 @@ from reference import (
     quadratic_mesh_motion,
     robin_channel,
     slab,
-    sliding_waves,
 )
 
 GAMMAS = pytest.mark.parametrize("gamma", [0.1, 1.0, 10.0])
@@ -22,11 +21,6 @@ def derivatives(field, x, y, h=STEP):
     """(gradient (n, ..., 2), Laplacian (n, ...)) of a field (n, ...) of points by central differences."""
     centre, east, west, north, south = (field(x + a, y + b) for a, b in ((0, 0), (h, 0), (-h, 0), (0, h), (0, -h)))
     return np.stack([east - west, north - south], axis=-1) / (2 * h), (east + west + north + south - 4 * centre) / h**2
-
-
-def divergence(field, x, y, h=STEP):
-    """Divergence over the last index."""
-    return np.trace(derivatives(field, x, y, h)[0], axis1=-2, axis2=-1)
 
 
 def first_and_second(function, x, step=1e-3):
@@ -44,21 +38,6 @@ def test_the_cylinder_is_in_equilibrium_and_free_on_its_rim():
     expected = (sigma[:, 1, 1] - sigma[:, 0, 0]) / r
     assert abs(sigma[-1, 0, 0]) < 1e-14
     assert np.gradient(sigma[:, 0, 0], r, edge_order=2) == pytest.approx(expected, abs=1e-3 * np.abs(expected).max())
-
-
-@GAMMAS
-def test_sliding_waves_solve_35_and_slide_along_walls_and_end(gamma):
-    def d(s, y):
-        return sliding_waves.displacement(s, y, 20.0, gamma, 20.0).T
-
-    s, y, h = *np.random.default_rng(2).uniform([1, 1], [19, 19], (30, 2)).T, 1e-3
-    laplace = derivatives(d, s, y, h)[1]
-    slope = derivatives(lambda s, y: divergence(d, s, y, h), s, y, h)[0]
-    assert laplace == pytest.approx(-slope / gamma, abs=1e-6 * np.abs(laplace).max())
-    for wall in (0.0, 20.0):
-        assert np.abs(d(s, wall)[:, 1]).max() < 1e-12
-        assert np.abs(d(s, wall + h) - d(s, wall - h))[:, 0].max() < 1e-9
-    assert np.abs(d(0.0, y)[:, 0]).max() == 0.0 and np.abs(d(h, y) - d(-h, y))[:, 1].max() < 1e-9
 
 
 @GAMMAS

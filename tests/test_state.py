@@ -7,11 +7,9 @@ import numpy as np
 import pytest
 from skfem import Mesh as SkfemMesh
 
-from repro.fem.linear import DEFAULT, Method
 from repro.fem.mesh import Mesh, Topology
 from repro.fem.space import Space
 from repro.march.simulation import simulate
-from repro.model import contact, pore, remeshing
 from repro.scene import load_scene
 from tests import faults
 from tests.strategies import ORDERS, meshed, seed
@@ -112,24 +110,3 @@ def test_runs_in_turns_do_not_affect_each_other(which, monkeypatch):
     assert not alike(alone[0][-1], alone[1][-1]), "else the order of the unknowns would not show"
     for one, other in zip(alone[0][-1][1:], alone[1][-1][1:]):
         assert np.allclose(one, other, rtol=1e-6, atol=1e-6 * np.abs(one).max())
-
-
-@pytest.mark.parametrize("which", [0, 1], ids=["paper", "fast"])
-def test_the_method_of_a_scene_reaches_every_system(which, monkeypatch):
-    """Systems of flow, substrates, mesh motion and growth use it, at t = 0 and on a new mesh."""
-    for package in ("pymetis", "pypardiso"):
-        faults.replace_package(monkeypatch, package)
-    scene = scenes(*OTHER_PACKAGES)[which]
-    expected = Method("pardiso", "metis")
-    first = pore.seeded(scene)
-    expanded = contact.expand(scene, first, 1.05 * first.theta).pore
-    assert remeshing.moved_mesh(scene, first, expanded) is not None
-    remeshed = remeshing.remesh(scene, first, expanded, 0.0)[0]
-    for state in (first, remeshed):
-        pore.solve(scene, state)
-        topologies = state.mesh.topology, state.mesh.topology.straight
-        systems = [system for topology in topologies for system in topology._systems.values()]
-        assert {topology.method for topology in topologies} == {state.body.shape.method} == {expected}
-        assert {system.method for system in (*systems, state.body.shape.unconstrained)} == {expected}
-        assert len(systems) >= 3
-    assert {system.method for system in pore.seeded(scenes()[which]).mesh.topology._systems.values()} <= {DEFAULT}

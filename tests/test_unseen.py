@@ -32,9 +32,8 @@ from repro.scene import load_scene
 from repro.sweeps import page, table
 from repro.sweeps.design import grid, parse, points
 from repro.sweeps.folder import Sweep
-from tests import oracles
 from tests.shell import read_record, rows
-from tests.strategies import ORDERS, rate_constants
+from tests.strategies import ORDERS
 from tests.test_derived import EVERY_ORDER, arcs, integrate_over_end, node_coordinates
 from tests.test_gear import case, storage
 
@@ -181,22 +180,6 @@ def uneven(order):
     part = np.random.default_rng(order).uniform(0.7, 1.2, pore.active.shape)
     pore = replace(pore, active=0.6 * part * pore.active, inert=0.3 * pore.active, theta=1.5 * pore.theta)
     return scene, pore, solve(scene, pore)
-
-
-@EVERY_ORDER
-def test_an_update_takes_the_mean_of_the_rates_at_its_ends(order):
-    """Active and inert biomass follow (9) and (10), as printed, at the concentrations of both ends, to round-off."""
-    scene, pore, solved = uneven(order)
-    after, end, _ = updates.make_biomass(scene, pore, solved, 2.0)
-    pieces, rates = pore.space.reaction, []
-    for state in (solved.concentrations, end):
-        both = (field[pieces.cells] @ pieces.values.T for field in (state.acceptor, state.donor))
-        rates.append(np.array(oracles.rates(*both, **rate_constants(scene))[2:]))
-    growth, remains = np.mean(rates, axis=0)
-    assert np.abs(rates[0] / rates[1] - 1).max(axis=(1, 2)).min() > 1e-4, "else the start would suffice"
-    assert after.active == pytest.approx(pore.active * np.exp(2 * growth), rel=1e-12)
-    new_inert = pore.active * np.expm1(2 * growth) / growth * remains
-    assert after.inert - pore.inert == pytest.approx(new_inert, rel=1e-9)
 
 
 @EVERY_ORDER
