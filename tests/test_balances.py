@@ -20,11 +20,10 @@ from repro.model.pore import seeded, solve
 from repro.results import read_table, row
 from repro.scene import load_scene
 from tests import oracles, pages, shell, strategies
-from tests.strategies import ORDERS, between, scenes, share
+from tests.strategies import EVERY_ORDER, ORDERS, between, scenes, share
 from tests.test_derived import integrate_over_end, total_uptake
 
 ANY_ORDER = tuple(ORDERS.values())
-EVERY_ORDER = pytest.mark.parametrize("order", ORDERS)
 
 
 def resolved_instants(scene):

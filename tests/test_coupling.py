@@ -12,9 +12,7 @@ from repro.march.simulation import simulate
 from repro.model import contact
 from repro.model.pore import seeded
 from tests import strategies
-from tests.strategies import ORDERS
-
-EVERY_ORDER = pytest.mark.parametrize("order", ORDERS)
+from tests.strategies import EVERY_ORDER, ORDERS
 
 
 def elements(order):

@@ -14,11 +14,10 @@ from repro.model.pore import seeded, solve_flow
 from repro.model.transport import Concentrations
 from repro.scene import load_scene
 from tests import strategies
-from tests.strategies import ORDERS
+from tests.strategies import EVERY_ORDER, ORDERS
 
 SECOND = 1 / 3600
 
-EVERY_ORDER = pytest.mark.parametrize("order", ORDERS)
 
 
 def coarse(order):

@@ -14,9 +14,8 @@ from repro.model import pore, transport
 from repro.model.kinetics import Sink
 from repro.model.transport import Concentrations
 from repro.scene import parse_scene, scene_tables
-from tests.strategies import ORDERS, scene, space_of
+from tests.strategies import EVERY_ORDER, ORDERS, scene, space_of
 
-EVERY_ORDER = pytest.mark.parametrize("order", ORDERS)
 FINE = {1: 1.0, 2: 0.45, 3: 0.3}
 
 

@@ -33,20 +33,13 @@ from repro.sweeps import page, table
 from repro.sweeps.design import grid, parse, points
 from repro.sweeps.folder import Sweep
 from tests.shell import read_record, rows
-from tests.strategies import ORDERS
-from tests.test_derived import EVERY_ORDER, arcs, integrate_over_end, node_coordinates
+from tests.strategies import EVERY_ORDER, coarse_base
+from tests.test_derived import arcs, integrate_over_end, node_coordinates
 from tests.test_gear import case, storage
 
 NOTHING = Solved(None, None, None)
 UNLIKE_OF = {"acceptor": "donor", "donor": "acceptor"}
 EVEN = Ledger(0.0, 1.0, (5.0, 3.0), (1.0, 1.5), (4.0, 1.5), (0.0, 0.0), 70.0, 10.0, 80.0)
-UNLIKE = ['substrates.acceptor.supply="9 mg/L"', 'substrates.donor.supply="4 mg/L"', "numerics.refinement=0.3"]
-
-
-def base(order, *changes, unset=()):
-    """(scene, its seed) with coarse elements of an order, and supplies that differ."""
-    scene = load_scene("base", [*UNLIKE, f"numerics.elements={ORDERS[order]}", *changes], unset)
-    return scene, seeded(scene)
 
 
 def row_of(scene, pore, solved=NOTHING, ledgers=(), remeshes=0):
@@ -56,7 +49,7 @@ def row_of(scene, pore, solved=NOTHING, ledgers=(), remeshes=0):
 @EVERY_ORDER
 def test_ends_and_top_are_those_of_the_boundary_between_its_nodes(order):
     """The seed is swollen and leans, and its arcs are sampled to 1e-6. The nodes alone are off by 4e-4 um or more."""
-    scene, pore = base(order, "numerics.refinement=0.5")
+    scene, pore = coarse_base(order, "numerics.refinement=0.5")
     x, y = pore.mesh.points.T
     near = np.exp(-(x**2 + y**2) / 100)
     pore = pore.moved(np.column_stack([x + (0.2 * x * y + 0.1 * y) * near, y * (1 + 0.05 * x * near)]))
@@ -70,7 +63,7 @@ def test_ends_and_top_are_those_of_the_boundary_between_its_nodes(order):
 
 
 def test_a_row_states_whether_any_of_its_steps_made_a_mesh():
-    scene, pore = base(1)
+    scene, pore = coarse_base(1)
     assert [row_of(scene, pore, remeshes=count)["remeshed"] for count in (0, 1, 2, 7)] == [0, 1, 1, 1]
 
 
@@ -84,8 +77,8 @@ def test_biomass_is_reported_for_a_scene_without_growth():
 @pytest.mark.parametrize("k, name", [(0, "acceptor"), (1, "donor")])
 def test_each_substrates_defect_is_over_its_own_terms(k, name):
     """Without a step it is over the row's fluxes, with Gear over the content of the meshed part at the supply."""
-    scene, pore = base(1)
-    gear, solved = base(1, "numerics.transport=gear")[0], solve(scene, pore)
+    scene, pore = coarse_base(1)
+    gear, solved = coarse_base(1, "numerics.transport=gear")[0], solve(scene, pore)
     fluxes = [transport.Fluxes(5e3, 1e3, 4e3, 9.0, 8.0), transport.Fluxes(3e3, 1.5e3, 1.5e3, 4.0, 3.0)]
     fluxes[k] = replace(fluxes[k], out=fluxes[k].out - 60)
     unit = np.eye(2)[k]
@@ -102,7 +95,7 @@ def test_an_overshoot_is_over_each_substrates_own_supply(k, name):
     """It is over the present supply, with Gear over the largest of its table. It is zero below the supply, and defined
     for a supply of zero."""
     table = f'substrates.{name}.supply=[["0 h", "5 mg/L"], ["1 h", "9 mg/L"], ["2 h", "0 mg/L"]]'
-    both = [base(1, table, *more)[0] for more in ((), ("numerics.transport=gear",))]
+    both = [coarse_base(1, table, *more)[0] for more in ((), ("numerics.transport=gear",))]
     pore = replace(seeded(both[0]), time=2.0)
     solved = solve(both[0], pore)
     for largest, overshoots in ((0.25, (0.25, 0.0)), (9.5, (9.5, 0.5)), (-1e-6, (0.0, 0.0))):
@@ -117,7 +110,7 @@ def test_an_overshoot_is_over_each_substrates_own_supply(k, name):
 @EVERY_ORDER
 def test_stress_is_reported_only_for_strain_since_the_start(order):
     kinds = ("stressed", "stress_free")
-    grids = [results.fields(*base(order, f"growth.new_biomass={kind}"), NOTHING) for kind in kinds]
+    grids = [results.fields(*coarse_base(order, f"growth.new_biomass={kind}"), NOTHING) for kind in kinds]
     stressed, free = ({*grid.point_data, *grid.cell_data} for grid in grids)
     assert len(stressed - free) == 6 and free == {name for name in stressed if not name.endswith("_MPa")}
 
@@ -134,7 +127,7 @@ def test_a_picture_has_upstream_on_the_left_and_the_upper_wall_above():
 @EVERY_ORDER
 def test_without_flow_the_ends_are_means_over_their_height(order):
     """The fields are not linear, and differ at inlet and outlet. Gauss's rule integrates along each end."""
-    scene, pore = base(order, "numerics.transport=gear", "substrates.boundary=closed", unset=["flow"])
+    scene, pore = coarse_base(order, "numerics.transport=gear", "substrates.boundary=closed", unset=["flow"])
     x, y = node_coordinates(pore.space).T
     fields = [2 + np.sin(y / 7) + 0.01 * x, 5 + np.cos(y / 9) - 0.02 * x]
     problem = transport.problem(pore.space, None, scene.substrates, scene.kinetics)
@@ -146,7 +139,7 @@ def test_without_flow_the_ends_are_means_over_their_height(order):
 
 @EVERY_ORDER
 def test_the_inlet_is_weighted_with_the_flow_for_any_inlet_condition(order):
-    scene, pore = base(order)
+    scene, pore = coarse_base(order)
     flow = solve(scene, pore).flow
     local, mean = (transport.problem(pore.space, flow, scene.substrates, scene.kinetics, inlet).inflow
                    for inlet in ("local", "mean"))
@@ -156,7 +149,7 @@ def test_the_inlet_is_weighted_with_the_flow_for_any_inlet_condition(order):
 @EVERY_ORDER
 def test_a_concentration_may_leave_its_bounds_by_the_documented_part(order):
     """It may fall below zero by a thousandth of its supply and, with curved elements, exceed it by a fiftieth."""
-    scene, pore = base(order)
+    scene, pore = coarse_base(order)
     problem = transport.problem(pore.space, None, scene.substrates, scene.kinetics)
     for k, (part, accepted) in product((0, 1), ((-9e-4, True), (-1.1e-3, False), (1.019, True), (1.021, order == 1))):
         state = problem.supply
@@ -167,7 +160,7 @@ def test_a_concentration_may_leave_its_bounds_by_the_documented_part(order):
 
 def test_a_step_ends_at_a_jump_to_the_last_bit():
     """For any start the new value applies after the step. A step shorter by a microhour ends earlier."""
-    _, pore = base(1)
+    _, pore = coarse_base(1)
     for start, k, factor in product((0.1, 0.7, 2.3, 19.1), range(1, 50), (1 - 4e-16, 1.0, 1 + 4e-16)):
         length, shorter = k / 7 * factor, k / 7 * factor - 1e-6
         assert stepping._end_of(replace(pore, time=start), length, start + k / 7) == start + k / 7
@@ -176,7 +169,7 @@ def test_a_step_ends_at_a_jump_to_the_last_bit():
 
 def uneven(order):
     """(scene, pore, its solution) with masses that differ from X_m from point to point."""
-    scene, pore = base(order)
+    scene, pore = coarse_base(order)
     part = np.random.default_rng(order).uniform(0.7, 1.2, pore.active.shape)
     pore = replace(pore, active=0.6 * part * pore.active, inert=0.3 * pore.active, theta=1.5 * pore.theta)
     return scene, pore, solve(scene, pore)
@@ -239,7 +232,7 @@ def test_runs_are_compared_under_their_own_names_with_signs():
 def test_a_mesh_moves_by_the_scenes_constants_unless_it_is_too_coarse(order):
     """The motion uses gamma of (35) and c of its stabilisation. Edges three times as long as a film of 2.5 um allows
     are too coarse."""
-    coarse, pore = base(order, 'pore.width="20 um"', 'aggregate.radius="17.5 um"', "numerics.refinement=0.6",
+    coarse, pore = coarse_base(order, 'pore.width="20 um"', 'aggregate.radius="17.5 um"', "numerics.refinement=0.6",
                        "numerics.mesh_compressibility=3", "numerics.flow_stabilisation=40")
     coordinates = pore.mesh.points.copy()
     coordinates[pore.mesh.body] *= 1.001
@@ -254,9 +247,9 @@ def test_a_shape_leans_as_the_flow_at_the_end_of_its_step_pushes(time):
     and a jump at the end of the step has no effect."""
     leans = []
     for first, last, kind in ((4, 4, "linear"), (1, 4, "linear"), (4, 1, "steps")):
-        scene, _ = base(2, f'flow.head=[["0 h", "{first}e-3 cm"], ["0.2 h", "{last}e-3 cm"]]', 'growth.end="0.2 h"',
-                        f"flow.interpolation={kind}", "growth.fluid_forces=included", f"numerics.time={time}",
-                        'growth.shear_modulus="1e-3 MPa"', 'output.times=["0.2 h"]')
+        scene, _ = coarse_base(2, f'flow.head=[["0 h", "{first}e-3 cm"], ["0.2 h", "{last}e-3 cm"]]',
+                               f"flow.interpolation={kind}", "growth.fluid_forces=included", f"numerics.time={time}",
+                               'growth.end="0.2 h"', 'growth.shear_modulus="1e-3 MPa"', 'output.times=["0.2 h"]')
         _, end = simulation.simulate(scene)
         leans.append(end.pore.outline.upstream + end.pore.outline.downstream)
     assert leans == pytest.approx([leans[0]] * 3, rel=1e-2) and leans[0] > 1e-4
@@ -265,7 +258,7 @@ def test_a_shape_leans_as_the_flow_at_the_end_of_its_step_pushes(time):
 def test_a_step_grows_as_much_on_a_new_mesh_half_way():
     """In 4 h a seed grows by half and the supply falls to a tenth. The mesh half way is new, since edges are three
     times too long, or the old one."""
-    scene, pore = base(2, 'substrates.donor.supply=[["0 h", "4 mg/L"], ["4 h", "0.4 mg/L"]]',
+    scene, pore = coarse_base(2, 'substrates.donor.supply=[["0 h", "4 mg/L"], ["4 h", "0.4 mg/L"]]',
                       "substrates.donor.interpolation=linear")
     solved = solve(scene, pore)
     first = updates.compute_rates(scene, pore, solved.concentrations)
@@ -346,7 +339,8 @@ def test_each_contact_surface_has_its_own_fixed_point(fixed_point, order):
     """They are the corners nearest to the middles of both, -2 and -1 um, for any points and any previous fixed point.
     """
     leaning = [(-21, 0), (-19, 9), (-12, 17), (-6, 20), (-5.5, 20), (-5, 20), (-4.5, 20), (4, 20), (12, 12), (17, 0)]
-    scene = simulation.shaped(base(order, 'pore.width="20 um"', f"numerics.fixed_point={fixed_point}")[0], leaning)
+    narrow, _ = coarse_base(order, 'pore.width="20 um"', f"numerics.fixed_point={fixed_point}")
+    scene = simulation.shaped(narrow, leaning)
     pore = seeded(scene)
     pore = replace(pore, fixed=np.roll(pore.fixed, 2 * (fixed_point == "rechosen")))
     x, y = pore.mesh.points[pore.mesh.loop][contact._fixed_points(scene, pore)].T
@@ -382,7 +376,7 @@ def test_a_seed_anywhere_was_round_at_its_start(seed):
 def test_continuation_in_half_saturations_reaches_the_same_state(order):
     """Newton's method reaches the same state from the supply and through larger half saturations, one above its supply.
     """
-    scene, pore = base(order, 'substrates.acceptor.half_saturation="1e-3 mg/L"',
+    scene, pore = coarse_base(order, 'substrates.acceptor.half_saturation="1e-3 mg/L"',
                       'substrates.donor.half_saturation="30 mg/L"')
     problem = solve(scene, pore).problem
     sink = biomass.sink(pore.active)
@@ -397,7 +391,7 @@ def test_a_front_between_the_points_of_a_quadrature_is_refused(order, monkeypatc
     test_guards.py tests the accepted part."""
     front = ['substrates.acceptor.supply="2 mg/L"', 'substrates.acceptor.half_saturation="1e-4 mg/L"',
              'aggregate.radius="20 um"', "numerics.refinement=0.4", 'flow.mean_velocity="0.5 m/day"']
-    scene, pore = base(order, *front, unset=["flow.head"])
+    scene, pore = coarse_base(order, *front, unset=["flow.head"])
     solved = solve(scene, pore)
     problem, sink = solved.problem, biomass.sink(pore.active)
     error = transport.quadrature_error(problem, sink, solved.concentrations)
@@ -442,7 +436,7 @@ def test_the_worst_step_that_misses_the_tolerance_is_reported(tmp_path):
 @pytest.mark.parametrize("times", ['["5 h", "18 h"]', '["0 h", "5 h", "18 h"]'])
 def test_requested_rows_are_counted_with_that_at_zero(times):
     """The permeability is reported in the units of the scene."""
-    scene, _ = base(2, f"output.times={times}", "flow.biomass=brinkman", 'flow.permeability="2.5e-15 m^2"')
+    scene, _ = coarse_base(2, f"output.times={times}", "flow.biomass=brinkman", 'flow.permeability="2.5e-15 m^2"')
     description = dict(modelled.describe_model(scene))
     assert "rows and fields at 3 times" in description["output"]
     assert "an aggregate with a permeability of 2.5e-15 m2" in description["flow"]
@@ -515,7 +509,7 @@ def test_gears_steps_are_scaled_by_the_larger_of_content_and_supply():
 def test_an_update_under_a_table_starts_from_gears_concentrations(order):
     """It uses the supply half way, and not the steady profiles of that supply."""
     table_of = 'substrates.acceptor.supply=[["0 h", "9 mg/L"], ["1 h", "29 mg/L"]]'
-    scene, pore = base(order, "numerics.transport=gear", table_of, "substrates.acceptor.interpolation=linear")
+    scene, pore = coarse_base(order, "numerics.transport=gear", table_of, "substrates.acceptor.interpolation=linear")
     solved = solve(scene, pore)
     half_way = updates._solve_midway(scene, pore, solved, 0.2)
     assert half_way.concentrations is solved.concentrations and half_way.problem.both[0].supply == pytest.approx(11.0)

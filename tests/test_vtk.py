@@ -10,10 +10,8 @@ from repro import results
 from repro.results import field_files
 from repro.scene import load_scene
 from tests.pages import cached_run
-from tests.strategies import ORDERS, arrays_of, same_arrays
+from tests.strategies import EVERY_ORDER, arrays_of, same_arrays
 from tests.test_derived import late_instant
-
-EVERY_ORDER = pytest.mark.parametrize("order", ORDERS)
 
 
 @pytest.fixture
