@@ -5,16 +5,18 @@ import copy
 import io
 import re
 from importlib.metadata import version
+from itertools import product
 
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from scipy.spatial import Delaunay
 
 import repro
 from repro import results
 from repro.cli import main
 from repro.errors import OutputError
-from repro.results import field_files
+from repro.results import field_files, picture
 from repro.results.tables import END_TIMES, Results, solve
 from repro.scene import SceneError, load_scene
 from tests import faults
@@ -210,3 +212,31 @@ def test_help_begins_with_use_and_the_version_is_printed(capsys):
         main(["--version"])
     assert ended.value.code == 0 and capsys.readouterr().out == f"repro {repro.__version__}\n"
     assert repro.__version__ == version("dupin2001-repro") and dir(repro) == sorted(repro.__all__)
+
+
+def test_a_picture_has_upstream_on_the_left_and_the_upper_wall_above():
+    """A field that rises along x and y: dark below upstream, light above downstream."""
+    coordinates = np.array(list(product(np.linspace(-10, 30, 9), np.linspace(0, 20, 5))))
+    cells = Delaunay(coordinates).simplices
+    drawing = {"places_um": coordinates, "triangles": cells, "region": np.zeros(len(cells), bool)}
+    pixels = plt.imread(io.BytesIO(picture.png(drawing, coordinates @ [1, 3])))[..., :3]
+    assert (np.diff(pixels[[-1, -1, 0, 0], [0, -1, 0, -1]].sum(axis=1)) > 0).all()
+
+
+def test_xarray_has_units_that_udunits_knows():
+    pytest.importorskip("xarray")
+    results_of_run = Results("x", [dict.fromkeys(results.COLUMNS, 1.0)], [], "failed: y")
+    dataset = results_of_run.to_xarray()
+    assert dataset.attrs["status"] == results_of_run.to_pandas().attrs["status"] == "failed: y"
+    expected = {"mean_velocity_m_per_d": "m d-1", "aggregate_area_um2": "um2", "nodes": "1",
+              "inlet_donor_mg_per_L": "mg L-1"}
+    assert {name: dataset[name].attrs["units"] for name in expected} == expected
+
+
+def test_a_picture_states_which_values_are_dark():
+    coordinates = np.array([(0.0, 0.0), (4.0, 0.0), (0.0, 3.0)])
+    drawing = {"places_um": coordinates, "triangles": np.array([[0, 1, 2]]), "region": np.zeros(1)}
+    caption = picture.figure(drawing | {"acceptor_mg_per_L": np.array([3.0, 1.5, 7.0])}, 2.5)
+    assert caption.count("acceptor (mg/L), 1.5 (dark) to 7 (light), at t = 2.5 h") == 2
+    caption = picture.figure(drawing | {"velocity_m_per_d": np.array([[-3.0, 4, 0], [0, 1, 0], [0, 2, 0]])}, 2.5)
+    assert "velocity (m/day), 1 (dark) to 5 (light)" in caption

@@ -1,4 +1,4 @@
-"""The aggregate's boundary of straight edges or parabolic arcs. `test_unseen.py` tests its measures, `test_sizing.py`
+"""The aggregate's boundary of straight edges or parabolic arcs. `test_rows.py` tests its measures, `test_sizing.py`
 its splits."""
 import numpy as np
 import pytest

@@ -1,4 +1,7 @@
 """State is explicit: cached values belong to the object that they derive from, and runs share nothing."""
+import dataclasses
+import importlib
+import pkgutil
 from dataclasses import fields, is_dataclass, replace
 from functools import cached_property
 from itertools import zip_longest
@@ -7,6 +10,7 @@ import numpy as np
 import pytest
 from skfem import Mesh as SkfemMesh
 
+import repro
 from repro.fem.mesh import Mesh, Topology
 from repro.fem.space import Space
 from repro.march.simulation import simulate
@@ -110,3 +114,15 @@ def test_runs_in_turns_do_not_affect_each_other(which, monkeypatch):
     assert not alike(alone[0][-1], alone[1][-1]), "else the order of the unknowns would not show"
     for one, other in zip(alone[0][-1][1:], alone[1][-1][1:]):
         assert np.allclose(one, other, rtol=1e-6, atol=1e-6 * np.abs(one).max())
+
+
+def test_states_are_immutable():
+    """Objects with caches and the definitions of keys are frozen. Objects with arrays, whose comparison has no single
+    truth value, are equal only to themselves."""
+    names = [module.name for module in pkgutil.walk_packages(repro.__path__, "repro.") if "__main__" not in module.name]
+    every = {each for name in names for each in vars(importlib.import_module(name)).values()
+             if "__dataclass_params__" in getattr(each, "__dict__", ()) and each.__module__.startswith("repro.")}
+    assert {each.__name__ for each in every if not each.__dataclass_params__.frozen} == {"Line", "History"}
+    assert len(every) > 50
+    compared = [part for each in every if each.__dataclass_params__.eq for part in dataclasses.fields(each)]
+    assert not [part for part in compared if "ndarray" in str(part.type)]

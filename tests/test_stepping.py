@@ -6,16 +6,22 @@ the case hard-07-contact that contact ends a step.
 import json
 from dataclasses import replace
 from functools import partial
+from itertools import product
 
 import numpy as np
 import pytest
 
+from repro import timing
 from repro.errors import GrowthError, SimulationError, Unresolved
-from repro.march import midpoint, simulation, step_control, stepping
+from repro.fem import linear
+from repro.march import midpoint, simulation, step_control, stepping, updates
 from repro.march.midpoint import Attempt
-from repro.model import pore
+from repro.march.simulation import simulate
+from repro.march.step_control import EXCESS, StepControl, exceeds_tolerance
+from repro.model import contact, pore
+from repro.model.pore import solve
 from repro.scene import load_scene
-from tests.strategies import ORDERS, scene
+from tests.strategies import EVERY_ORDER, ORDERS, coarse_base, scene
 from tests.test_state import alike
 
 FAST = 'numerics.preset="fast"'
@@ -179,3 +185,66 @@ def test_the_last_step_uses_finer_elements_if_a_front_needs_them(needed, message
             list(scene)
     else:
         assert [instant.pore.front for instant in scene][-1] == needed
+
+
+def test_a_step_ends_at_a_jump_to_the_last_bit():
+    """For any start the new value applies after the step. A step shorter by a microhour ends earlier."""
+    _, pore = coarse_base(1)
+    for start, k, factor in product((0.1, 0.7, 2.3, 19.1), range(1, 50), (1 - 4e-16, 1.0, 1 + 4e-16)):
+        length, shorter = k / 7 * factor, k / 7 * factor - 1e-6
+        assert stepping._end_of(replace(pore, time=start), length, start + k / 7) == start + k / 7
+        assert stepping._end_of(replace(pore, time=start), shorter, start + k / 7) == start + shorter
+
+
+@pytest.mark.parametrize("time", ["updates", "midpoint"])
+def test_a_shape_leans_as_the_flow_at_the_end_of_its_step_pushes(time):
+    """The lean is the difference between the ends' motion. It is the same under a rising head as under its last value,
+    and a jump at the end of the step has no effect."""
+    leans = []
+    for first, last, kind in ((4, 4, "linear"), (1, 4, "linear"), (4, 1, "steps")):
+        scene, _ = coarse_base(2, f'flow.head=[["0 h", "{first}e-3 cm"], ["0.2 h", "{last}e-3 cm"]]',
+                               f"flow.interpolation={kind}", "growth.fluid_forces=included", f"numerics.time={time}",
+                               'growth.end="0.2 h"', 'growth.shear_modulus="1e-3 MPa"', 'output.times=["0.2 h"]')
+        _, end = simulation.simulate(scene)
+        leans.append(end.pore.outline.upstream + end.pore.outline.downstream)
+    assert leans == pytest.approx([leans[0]] * 3, rel=1e-2) and leans[0] > 1e-4
+
+
+def test_a_step_grows_as_much_on_a_new_mesh_half_way():
+    """In 4 h a seed grows by half and the supply falls to a tenth. The mesh half way is new, since edges are three
+    times too long, or the old one."""
+    scene, pore = coarse_base(2, 'substrates.donor.supply=[["0 h", "4 mg/L"], ["4 h", "0.4 mg/L"]]',
+                      "substrates.donor.interpolation=linear")
+    solved = solve(scene, pore)
+    first = updates.compute_rates(scene, pore, solved.concentrations)
+    numerics = [replace(scene.numerics, refinement=part) for part in (0.3, 0.9)]
+    same_mesh, new_mesh = (midpoint.solve_halfway(replace(scene, numerics=each), pore, solved, first, 4.0,
+                                                  contact.PATIENT) for each in numerics)
+    assert new_mesh.produced == pytest.approx(same_mesh.produced, rel=1e-2)
+    assert len(new_mesh.solved.flow.velocity) > 2 * len(same_mesh.solved.flow.velocity)
+
+
+def test_a_step_misses_the_tolerance_only_beyond_the_accepted_excess():
+    for part, expected in ((0.0, False), (1.0, False), (EXCESS, False), (1.01 * EXCESS, True)):
+        assert exceeds_tolerance(StepControl(1.0, 1.0, 0.3 * part), 0.3) is expected
+
+
+@EVERY_ORDER
+def test_an_update_under_a_table_starts_from_gears_concentrations(order):
+    """It uses the supply half way, and not the steady profiles of that supply."""
+    table_of = 'substrates.acceptor.supply=[["0 h", "9 mg/L"], ["1 h", "29 mg/L"]]'
+    scene, pore = coarse_base(order, "numerics.transport=gear", table_of, "substrates.acceptor.interpolation=linear")
+    solved = solve(scene, pore)
+    half_way = updates._solve_midway(scene, pore, solved, 0.2)
+    assert half_way.concentrations is solved.concentrations and half_way.problem.both[0].supply == pytest.approx(11.0)
+    risen = updates.step(scene, pore, solved, 0.2).ledger.stored[0] / (scene.pore.width * np.ptp(pore.mesh.ends))
+    assert risen == pytest.approx(2.0, rel=0.05)
+
+
+def test_every_stage_of_a_step_is_timed():
+    """These times are the reported cost of a run."""
+    timing.reset()
+    *_, last = simulate(load_scene("base", ["growth.end=0.2 h", "numerics.refinement=0.5"]))
+    assert last.pore.time == 0.2
+    assert {"flow", "transport", "growth", "mesh motion", "meshing", linear.FLOOR} <= set(timing.seconds)
+    assert min(timing.seconds.values()) > 0
