@@ -1445,8 +1445,8 @@ MUTANTS = (
          "A run is kept without the name of its scene.",
          "{scene.name}-{scene_hash(scene)}",
          "{scene_hash(scene)}",
-         f"{CACHE_KEYS}a_cached_run_belongs_to_its_scene_name_and_source",
-         f"{CACHE_KEYS}the_runs_of_the_sensitivities_are_cached_by_scene_name_and_source")),
+         f"{CACHE_KEYS}a_cached_run_belongs_to_its_scene_name_and_source[number_of_folder]",
+         f"{CACHE_KEYS}a_cached_run_belongs_to_its_scene_name_and_source[number_of_sensitivities]")),
     *changes(
         "repro/runs/machine.py",
         ("source-of-the-top",
