@@ -19,7 +19,6 @@ from verification.evidence.checks import at_least, at_most, between, study
 from verification.mutants import runner
 
 SIZES = 0.5 ** np.arange(4)
-GOOD, BAD = (at_most("quantity A", value, 1.0, "theory") for value in (0.5, 2.0))
 
 
 @pytest.mark.parametrize("build, bounds, inside, outside", [
