@@ -176,3 +176,11 @@ def test_a_state_at_the_end_to_round_off_is_kept():
     *_, (last, _) = steps(short)
     assert 0 < last.pore.time - short.growth.end < SAME_TIME
     assert state_arrays.unpack_state(short, *state_arrays.pack_state(short, last)).pore.time == last.pore.time
+
+
+def test_a_pore_without_an_aggregate_is_packed_and_unpacked():
+    scene = load_scene("flow_only", unset=["aggregate"])
+    state, _ = next(steps(scene))
+    assert scene.aggregate is None and state.pore.outline is None
+    restored = state_arrays.unpack_state(scene, *state_arrays.pack_state(scene, state))
+    assert np.array_equal(restored.pore.mesh.points, state.pore.mesh.points)

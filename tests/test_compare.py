@@ -5,6 +5,7 @@ import json
 import os
 import re
 import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ import repro
 from repro import results
 from repro.cli import main
 from repro.report import comparison, quantities
-from repro.report.reading import read
+from repro.report.reading import Run, read
 from tests.faults import limit_memory
 from tests.pages import Page
 from tests.shell import flip, read_record, refusal, rewrite
@@ -144,3 +145,25 @@ def test_a_run_at_work_may_have_more_rows_than_its_record(fast, tmp_path):
     copy = at_work(fast, tmp_path)
     rewrite(copy, rows=read_record(copy)["rows"] - 1)
     assert len(read(copy).times) == read_record(fast)["rows"]
+
+
+def test_runs_are_compared_under_their_own_names_with_signs():
+    """The first run is not the first by name. A tip further upstream, at a smaller x, is a decrease."""
+    runs = []
+    for name, scale in (("zeta", 1.0), ("alpha", 1.5), ("mu", 0.5)):
+        series = {column: scale * (1.0 + k + np.array([0.1, 0.4])) for k, column in enumerate(results.COLUMNS)}
+        series |= {"time_h": np.array([0.0, 3.0]), "upstream_um": scale * np.array([-5.0, -8.0])}
+        runs.append(Run(Path("runs") / name, {"scene": name, "tables": {"factor": 1.0 + (scale < 1)}}, series, {}))
+    labels = comparison.short([run.folder for run in runs])
+    for chart in quantities.overlaid(runs, labels):
+        assert [line.label for line in chart.lines] == labels, chart.title
+        if chart.title != "Mesh: made anew":
+            assert [line.values[-1] / chart.lines[0].values[-1] for line in chart.lines] == pytest.approx([1, 1.5, 0.5])
+    assert comparison.differences(runs) == [("factor", "1", "1", "2")]
+    page_text = comparison.build(runs)
+    assert page_text.count("status unknown to t = 3 h") == 3
+    values = page_text[page_text.index("Values at the common last time"):]
+    heads = re.findall('<th scope="col" class="value">([^<]*)', values)
+    assert heads == ["zeta", "alpha", "difference", "mu", "difference"]
+    (row,) = re.findall("<tr><td>upstream end of the aggregate.*?</tr>", page_text)
+    assert re.findall('class="value">([^<]*)<', row) == ["-8", "-12", "-50 %", "-4", "+50 %"]

@@ -15,6 +15,7 @@ from unittest.mock import Mock
 
 import pytest
 
+from repro import timing
 from repro.cli import main
 from repro.errors import Interrupted, SimulationError
 from repro.march import loop
@@ -377,3 +378,26 @@ def test_results_do_not_depend_on_the_number_of_threads(tmp_path):
         assert run_and_wait(*LONG, "--out", tmp_path / threads, threads=threads)[0] == 0
     assert files(tmp_path / "1") == files(tmp_path / "2")
     assert read_record(tmp_path / "2")["conditions"]["threads"]["OMP_NUM_THREADS"] == "2"
+
+
+def test_times_by_stage_are_those_before_a_resume_and_since(tmp_path, monkeypatch):
+    monkeypatch.setattr(timing, "seconds", {"growth": 2.0, "transfer": 4.0})
+    recorder = execution.Recorder(load_scene("base"), tmp_path)
+    recorder.history.stages, recorder.history.seconds = {"flow": 8.0, "growth": 16.0}, 1000.0
+    recorder.write_record("running")
+    assert read_record(tmp_path)["wall_time_by_stage_s"] == {"flow": 8.0, "growth": 18.0, "transfer": 4.0}
+    assert 1000 < read_record(tmp_path)["wall_time_s"] < 1100
+
+
+@pytest.mark.parametrize("key", ["blas", "libc", "geos", "machine", "system", "source"])
+def test_a_resume_under_other_conditions_is_reported(key, tmp_path, monkeypatch, recwarn):
+    """Conditions that may change numbers are reported; threads are not."""
+    recorder = execution.Recorder(load_scene("flow_only"), tmp_path)
+    recorder.write_record("running")
+    before = read_record(tmp_path)
+    present = {**before["conditions"], "threads": {"OMP_NUM_THREADS": "7"}}
+    monkeypatch.setattr(execution, "conditions", lambda: present)
+    assert execution._find_changes(before, recorder, execution.DEFAULT_WATCH) == {} and not recwarn.list
+    present[key] = "another"
+    with pytest.warns(UserWarning, match=f"conditions.{key} .*now another"):
+        execution._find_changes(before, recorder, execution.DEFAULT_WATCH)
