@@ -49,8 +49,10 @@ SATURATED = 0.9
 SWITCH = 0.5
 #: A concentration below zero by more than this part of its supply is not resolved.
 UNRESOLVED = 1e-3
-#: Nor is one above its supply by more than this part of it, by the order of the elements.
-OVERSHOOT = {1: np.inf, 2: 0.02, 3: 0.02}
+#: Nor is one above its supply by more than this part of it.
+OVERSHOOT = 0.02
+#: Largest accepted concentration over its supply, by the order of the elements.
+HIGHEST = {1: np.inf, 2: 1 + OVERSHOOT, 3: 1 + OVERSHOOT}
 #: Nor is the uptake if a quadrature of a degree higher by FINER differs by more than this. Both use
 #: the same concentrations, which are not solved for again with the finer quadrature: in base
 #: with fronts of half saturations from 1e-1 to 1e-6 of the supply, biomass made in 2 h was wrong by
@@ -511,7 +513,7 @@ def _checked(problem: Problem, state: np.ndarray, iterations: int) -> Concentrat
     for name, field, substrate in zip(("acceptor", "donor"), state.reshape(2, -1), problem.both):
         if field.min() < -UNRESOLVED * substrate.supply:
             raise _outside(problem, name, field, int(field.argmin()), substrate)
-        if field.max() / (1 + OVERSHOOT[problem.space.order]) > substrate.supply:
+        if field.max() / HIGHEST[problem.space.order] > substrate.supply:
             raise _outside(problem, name, field, int(field.argmax()), substrate)
     acceptor, donor = state.reshape(2, -1)
     return Concentrations(acceptor, donor, iterations)
