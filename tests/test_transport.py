@@ -99,7 +99,7 @@ def test_advection_by_u_leaves_the_bounds(monkeypatch, order):
     monkeypatch.setattr(pore, "BOUNDARY_LAYER", 0.0)
     state = at_start(thick("290 m/day", order, 0.2))[1].concentrations
     assert max(state.acceptor.max(), state.donor.max()) < 10 * (1 + transport.OVERSHOOT / 4)
-    monkeypatch.setattr(transport, "divergence_free", lambda space, velocity: space.at_points(velocity.T))
+    monkeypatch.setattr(transport, "divergence_free", lambda space, velocity: space.at.evaluate(velocity.T))
     with pytest.raises(Unresolved, match=OUT_OF_BOUNDS):
         at_start(thick("290 m/day", order, 0.2))
 

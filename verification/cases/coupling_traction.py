@@ -293,12 +293,10 @@ def _defects(*changes: str) -> tuple[float, float]:
     seed, grown, theta = _moved(FACTORS[-1], *changes)
     nodes, body = seed.mesh.body, seed.body
     constrained_dofs = contact.constrained(len(nodes), seed.mesh.topology.body_loop, seed.wall, seed.fixed)
-    stabilising, defects = None, []
-    if body.shape.geometry == 1:
-        cells = body.shape.cells
-        stabilising = growth.gradient_stabilisation(seed.mesh.points[nodes], cells, np.ones(len(cells)))
+    defects = []
+    stabilisation = growth.STABILISATIONS[body.shape.geometry].on(body, seed.mesh.points[nodes])
     place, pressure = grown.mesh.points[nodes], grown.pressure[seed.mesh.topology.body_corners]
-    rest = growth.System(body, constrained_dofs, stabilising=stabilising).under(theta, place, place, pressure)
+    rest = growth.System(body, constrained_dofs, stabilisation=stabilisation).under(theta, place, place, pressure)
     for around in (grown, seed):
         forces = traction.forces(scene, traction.surroundings(scene, seed, around), around)
         load = np.concatenate([forces.T.ravel(), np.zeros(len(pressure))])

@@ -73,7 +73,7 @@ def _carried(space: Space, interface: str, name: str, drop: float):
     why = "(2) tested with linear ramps, round-off"
     if solution.correction is None:
         yield at_most(f"u, {name}", flux_error(space, u), 1e-9, why)
-        out = space.mean_over(space.dofs.outlet, solution.velocity[:, 0])
+        out = space.outlet.mean(solution.velocity[:, 0])
         yield at_most(f"outlet, {name}", abs(out - 1), 1e-11, "(2) tested with a constant, round-off")
     else:
         yield at_most(f"w, {name}", flux_error(space, u - solution.correction[:, None]), 1e-9, why)
@@ -88,7 +88,7 @@ def flux_error(space: Space, carried: np.ndarray) -> float:
     """
     grid = space.mesh
     _, weight, _ = meshes.fine(space)
-    slopes = elements.points(grid.points[grid.cells], elements.table(1, grid.geometry, meshes.FINE)).slopes
+    slopes = elements.mapped(grid.points[grid.cells], elements.table(1, grid.geometry, meshes.FINE))[1]
     carries = np.einsum("tqi,tqia->ta", weight[..., None] * carried, slopes)
     sections = np.linspace(-65.0, 65.0, 25)[:, None]
     ramps = np.clip((sections + 5.0 - grid.points[: grid.corners, 0]) / 10.0, 0.0, 1.0)
@@ -130,7 +130,7 @@ def _power(space: Space, unit: flow.UnitFlow, interface: str) -> tuple[float, fl
     upper = np.einsum("tab,ta,tb->", blocks[:, : 2 * count, : 2 * count], moving, moving)
     forces = np.einsum("tij,tj->ti", blocks, np.hstack([moving, pressure]))
     force = np.bincount(cells.ravel(), forces[:, :count].ravel(), space.count)
-    inlet = space.end_nodes(space.dofs.inlet)
+    inlet = space.inlet.nodes
     work = force[inlet] @ unit.velocity[inlet, 0]
     if space.order > 1:
         return work, upper

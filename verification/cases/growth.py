@@ -276,7 +276,7 @@ def _energy():
 
     def potential(s):
         ahead = F + s * G
-        return growth.energy(ahead) + P * (np.linalg.det(ahead) - 1.3)
+        return neo_hookean.energy(ahead) + P * (np.linalg.det(ahead) - 1.3)
 
     return np.sum(growth.piola(F, P) * G, axis=(1, 2)), potential
 

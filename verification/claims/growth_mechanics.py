@@ -135,7 +135,7 @@ def stability(body: Supported, factor: float) -> float:
 def stabilised_by(body: Supported, factor: float) -> growth.System:
     """The equations of a body whose stabilisation at t = 0 is multiplied by a factor."""
     plain = growth.gradient_stabilisation(body.reference, body.cells, np.ones(len(body.cells)))
-    return growth.System(body, body.constrained, stabilising=factor * plain)
+    return growth.System(body, body.constrained, stabilisation=growth.PressureGradient(factor * plain))
 
 
 # C25: the expansion, and the factor of an update: 165 of these make it.

@@ -156,7 +156,7 @@ def equilibrium_errors(case: Cylinder, stabilising: np.ndarray) -> tuple[float, 
 
     Raises GrowthError where none is found.
     """
-    system = growth.System(case.body, case.body.constrained, stabilising=stabilising)
+    system = growth.System(case.body, case.body.constrained, stabilisation=growth.PressureGradient(stabilising))
     exact = growth.Equilibrium(case.position, case.pressure, 0)
     solution = growth.reach(system, case.theta, case.theta, exact, case.position)
     worst = np.abs(solution.pressure - case.pressure).max() / np.abs(case.pressure).max()

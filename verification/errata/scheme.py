@@ -118,9 +118,10 @@ def free_outlet(grid: Mesh) -> tuple[np.ndarray, float]:
     constrained = np.zeros((count, 2), bool)
     constrained[topology.walls] = constrained[topology.inlet] = True
     viscosity = np.ones(len(grid.triangles))
-    elements = flow.stokes(space, viscosity, "traction", flow.Stabilised().mobility(grid, viscosity, "traction"))
+    pair = flow.Linear(space, flow.Stabilised().mobility(grid, viscosity, "traction"))
+    elements = flow.stokes(space, viscosity, "traction", pair.lower)
     system = saddle_system(space.cells, space.cells, constrained)
-    solution = system.solve(elements, np.zeros(3 * count), flow.prescribed(space))
+    solution = system.solve(elements, np.zeros(3 * count), pair.prescribed())
     ends = [np.trapezoid(solution[2 * count + nodes], grid.points[nodes, 1])
             for nodes in (topology.inlet, topology.outlet)]
     return solution[: 2 * count].reshape(2, -1).T, float(ends[0] - ends[1]) / grid.width

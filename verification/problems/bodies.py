@@ -166,10 +166,10 @@ def system(body: Supported, position: np.ndarray, pressure: np.ndarray, theta: n
 
     On straight triangles the stabilisation is that of this shape.
     """
-    stabilising = None
+    stabilisation: growth.PressureGradient | growth.GradDiv = growth.GradDiv()
     if body.geometry == 1:
-        stabilising = growth.gradient_stabilisation(position, body.cells, theta[:, 0])
-    equations = growth.System(body, np.zeros_like(body.constrained), stabilising=stabilising)
+        stabilisation = growth.PressureGradient(growth.gradient_stabilisation(position, body.cells, theta[:, 0]))
+    equations = growth.System(body, np.zeros_like(body.constrained), stabilisation=stabilisation)
     equations.under(theta, position, position, pressure)
     return equations
 
