@@ -18,7 +18,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cache, partial
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 from repro.scene import exact
 from repro.scene.time_table import TimeTable
@@ -74,6 +74,10 @@ class Quantity:
     unit: str
     example: str
     accepts: Range = POSITIVE
+
+    @property
+    def default(self) -> dict:
+        return {"default_factory": partial(self.read, self.example)}
 
     @property
     def accepted(self) -> str:
@@ -153,38 +157,27 @@ class Timed(Quantity):
 
 
 @dataclass(frozen=True)
-class Share:
+class Share(Quantity):
     """A quantity, read as a float, or a percentage of that of the key `of`, as a Fraction."""
 
-    absolute: Quantity
-    of: str
-
-    @property
-    def example(self) -> str:
-        return self.absolute.example
+    of: str = ""
 
     @property
     def accepted(self) -> str:
-        return f'{self.absolute.accepted}, or a share of {self.of} such as "80 %"'
+        return f'{super().accepted}, or a share of {self.of} such as "80 %"'
 
     @property
     def requirement(self) -> str:
-        return f'{self.absolute.requirement}, or a share of {self.of} up to "100 %"'
+        return f'{super().requirement}, or a share of {self.of} up to "100 %"'
 
-    def read(self, value: object) -> float | Fraction:
+    def read(self, value: object) -> float | Fraction:  # type: ignore[override]  # or a share
         text = value if isinstance(value, str) and len(value) <= LONGEST else ""
         match = _PERCENT.fullmatch(text)
         if match is None:
-            return self.absolute.read(value)
+            return super().read(value)
         if not 0 < float(match[1]) <= 100:
             raise ValueError("not a share")
         return Fraction(match[1]) / 100
-
-    def write(self, value: float) -> str:
-        return self.absolute.write(value)
-
-    def near(self, value: object) -> str:
-        return self.absolute.near(value)
 
 
 @dataclass(frozen=True)
@@ -193,6 +186,10 @@ class Number:
 
     example: float
     accepts: Range = POSITIVE
+
+    @property
+    def default(self) -> dict:
+        return {"default": self.example}
 
     @property
     def accepted(self) -> str:
@@ -224,6 +221,10 @@ class Choice:
     words: tuple[str, ...]
 
     @property
+    def default(self) -> dict:
+        return {"default": self.words[0]}
+
+    @property
     def accepted(self) -> str:
         return " or ".join(f'"{word}"' for word in self.words)
 
@@ -249,6 +250,7 @@ class Times:
     """A list of one or more times (h), in any order; read in ascending order, each once."""
 
     each = Quantity("h", "5 h", NON_NEGATIVE)
+    default: ClassVar[dict] = {"default": None}
     example = ["5 h", "18 h"]
     accepted = "a list of one or more times, each zero or more"
     requirement = 'a list of times is needed, such as ["5 h", "18 h"] (each zero or more)'
@@ -272,6 +274,7 @@ class Points:
     """A list of points (x, y), um, in their order."""
 
     each = Quantity("um", "4 um", EITHER_SIGN)
+    default: ClassVar[dict] = {"default": None}
     example = [["-5 um", "0 um"], ["0 um", "4 um"], ["5 um", "0 um"]]
     accepted = f"a list of 3 to {MOST_POINTS} points [x, y], each a pair of lengths"
     requirement = f"{accepted}, is needed, such as {json.dumps(example)}"
@@ -297,6 +300,7 @@ class Points:
 class Flag:
     """Yes or no."""
 
+    default: ClassVar[dict] = {"default": False}
     accepted = "true or false"
     requirement = "true or false is needed, without quotes"
 
@@ -314,68 +318,42 @@ class Flag:
         return word if word in ("true", "false") else ""
 
 
-Kind = Quantity | Share | Number | Choice | Times | Points | Flag
+Kind = Quantity | Number | Choice | Times | Points | Flag
 
 
-def quantity(text: str, unit: str, accepts: Range = POSITIVE, *, about: str, source: str,
-             stated: str = "", **default):
-    """A value with a unit: `text` is its default, or an example if `default` is set.
+def scene_key(kind: Kind, *, about: str, source: str, stated: str = "", **default):
+    """A key of a scene: a field of a dataclass whose metadata describe the key.
 
-    stated: describes a default that depends on other keys.
+    default: of the field, if it is not that of the kind; stated: describes a default that depends
+    on other keys.
     """
-    default = default or {"default_factory": partial(to_internal, text, unit)}
-    return _key_field(Quantity(unit, text, accepts), about, source, stated, **default)
-
-
-def timed_quantity(text: str, unit: str, accepts: Range = POSITIVE, *, about: str, source: str,
-                   **default):
-    """A value with a unit, like :func:`quantity`, or a table over time."""
-    default = default or {"default_factory": partial(to_internal, text, unit)}
-    return _key_field(Timed(unit, text, accepts), about, source, **default)
-
-
-def points(*, about: str, source: str):
-    """A list of points, or None."""
-    return _key_field(Points(), about, source, default=None)
-
-
-def flag(*, about: str, source: str):
-    """True or false, false by default."""
-    return _key_field(Flag(), about, source, default=False)
-
-
-def required(example: str, unit: str, accepts: Range = POSITIVE, *, about: str, source: str):
-    """A value with a unit that has no default."""
-    return _key_field(Quantity(unit, example, accepts), about, source)
-
-
-def share(text: str, unit: str, of: str, *, about: str, source: str, **default):
-    """A quantity with a default, or a percentage of the key `of`."""
-    default = default or {"default_factory": partial(to_internal, text, unit)}
-    return _key_field(Share(Quantity(unit, text), of), about, source, **default)
-
-
-def number(example: float, accepts: Range = POSITIVE, *, about: str, source: str,
-           stated: str = "", **default):
-    """A plain number; `example` is its default unless `default` is set."""
-    default = default or {"default": example}
-    return _key_field(Number(example, accepts), about, source, stated, **default)
-
-
-def choice(*words: str, about: str, source: str, stated: str = ""):
-    """One of several words, the first by default; stated: describes a default that depends on
-    the rest of the scene."""
-    return _key_field(Choice(words), about, source, stated, default=None if stated else words[0])
-
-
-def times(*, about: str, source: str):
-    """A list of times, or None."""
-    return _key_field(Times(), about, source, default=None)
-
-
-def _key_field(kind: Kind, about: str, source: str, stated: str = "", **default):
     metadata = {"kind": kind, "about": about, "source": source, "stated": stated}
-    return field(metadata=metadata, **default)
+    return field(metadata=metadata, **(default or kind.default))
+
+
+def quantity(text: str, unit: str, accepts: Range = POSITIVE, **described):
+    """A value with a unit: `text` is its default, or an example if `default` is set."""
+    return scene_key(Quantity(unit, text, accepts), **described)
+
+
+def timed_quantity(text: str, unit: str, accepts: Range = POSITIVE, **described):
+    """A value with a unit, like :func:`quantity`, or a table over time."""
+    return scene_key(Timed(unit, text, accepts), **described)
+
+
+def share(text: str, unit: str, of: str, **described):
+    """A value with a unit, like :func:`quantity`, or a percentage of the key `of`."""
+    return scene_key(Share(unit, text, of=of), **described)
+
+
+def number(example: float, accepts: Range = POSITIVE, **described):
+    """A plain number; `example` is its default unless `default` is set."""
+    return scene_key(Number(example, accepts), **described)
+
+
+def choice(*words: str, **described):
+    """One of several words, the first by default."""
+    return scene_key(Choice(words), **described)
 
 
 def section(kind: type, *, about: str, source: str, **default):
