@@ -51,7 +51,7 @@ CONTROLS = """<div class="controls"><label>Field <select id="field"></select></l
 
 
 def build(run: Run) -> str:
-    """The text of the page. Raises ValueError if a file of fields cannot be read."""
+    """The text of the page. Raises OutputError if a file of fields cannot be read."""
     drawn = _charts(run, quantities.charts_of(run))
     packed = _packed(run, len(drawn))
     body = (_head(run) + _fields(run, packed) + drawn
@@ -63,12 +63,10 @@ def build(run: Run) -> str:
 
 
 def _packed(run: Run, spent: int) -> dict:
-    try:
-        has_unexpanded = "before_expansion.pvd" in _list(run.record.get("files"))
-        before = fields.index(run.folder, "before_expansion.pvd") if has_unexpanded else []
-        return fields.packed(fields.index(run.folder), before, spent)
-    except (ValueError, LookupError, TypeError) as error:
-        raise ValueError(f"{run.folder}: the fields cannot be read: {error!r}") from error
+    before = []
+    if "before_expansion.pvd" in run.record["files"]:
+        before = fields.index(run.folder, "before_expansion.pvd")
+    return fields.packed(fields.index(run.folder), before, spent)
 
 
 def _head(run: Run) -> str:
