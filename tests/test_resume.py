@@ -205,7 +205,8 @@ def test_every_bit_of_a_finished_run_is_checked(tmp_path, capsys):
     for number, (name, change) in enumerate(changes):
         out = Path(copytree(uninterrupted, tmp_path / str(number)))
         change(out / name)
-        for arguments in (["check"], ["run", "--resume"], *([["run", *command]] if number < 3 or name == "run.json" else [])):
+        same_command = [["run", *command]] if number < 3 or name == "run.json" else []
+        for arguments in (["check"], ["run", "--resume"], *same_command):
             message = refusal(out, capsys, *arguments, out)
             assert name in message and str(out) in message, message
     assert len(changes) > 2 * 10
