@@ -22,7 +22,7 @@ def build(runs: Sequence[Run]) -> str:
     figures = "".join(map(charts.svg, quantities.overlaid(runs, labels)))
     body = (_head(runs, labels) + _scenes(runs, labels) + _values(runs, labels)
             + page.section("Over time", f'<div class="charts">{figures}</div>' if figures else ""))
-    return page.page("Runs compared", body, ["charts.js"])
+    return page.page("Runs compared", body, ["errors.js", "charts.js"])
 
 
 def short(folders: Sequence[Path]) -> list[str]:

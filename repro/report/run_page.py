@@ -58,8 +58,8 @@ def build(run: Run) -> str:
             + f'<div class="pair">{_numbers(run)}{_cost(run)}</div>' + _modelled(run)
             + _provenance(run))
     more = page.data("fields", packed) if packed else ""
-    return page.page(f"{run.record.get('scene')}: a pore", body + more,
-                     ["charts.js", *(["mesh.js", "fields.js"] if packed else [])])
+    scripts = ["errors.js", "charts.js", *(["mesh.js", "fields.js"] if packed else [])]
+    return page.page(f"{run.record['scene']}: a pore", body + more, scripts)
 
 
 def _packed(run: Run, spent: int) -> dict:
