@@ -322,7 +322,7 @@ Kind = Quantity | Number | Choice | Times | Points | Flag
 
 
 def scene_key(kind: Kind, *, about: str, source: str, stated: str = "", **default):
-    """A key of a scene: a field of a dataclass whose metadata describe the key.
+    """Declare a key of a scene: a field of a dataclass whose metadata describe the key.
 
     default: of the field, if it is not that of the kind; stated: describes a default that depends
     on other keys.
@@ -332,27 +332,46 @@ def scene_key(kind: Kind, *, about: str, source: str, stated: str = "", **defaul
 
 
 def quantity(text: str, unit: str, accepts: Range = POSITIVE, **described):
-    """A value with a unit: `text` is its default, or an example if `default` is set."""
+    """Declare a value with a unit: `text` is its default, or an example if `default` is set."""
     return scene_key(Quantity(unit, text, accepts), **described)
 
 
 def timed_quantity(text: str, unit: str, accepts: Range = POSITIVE, **described):
-    """A value with a unit, like :func:`quantity`, or a table over time."""
+    """Declare a value with a unit, like :func:`quantity`, or a table over time."""
     return scene_key(Timed(unit, text, accepts), **described)
 
 
 def share(text: str, unit: str, of: str, **described):
-    """A value with a unit, like :func:`quantity`, or a percentage of the key `of`."""
+    """Declare a value with a unit, like :func:`quantity`, or a share of the key `of`."""
     return scene_key(Share(unit, text, of=of), **described)
 
 
 def number(example: float, accepts: Range = POSITIVE, **described):
-    """A plain number; `example` is its default unless `default` is set."""
+    """Declare a plain number; `example` is its default unless `default` is set."""
     return scene_key(Number(example, accepts), **described)
 
 
 def choice(*words: str, **described):
-    """One of several words, the first by default."""
+    """Declare a key of a scene that is one of several words.
+
+    Parameters
+    ----------
+    *words : str
+        The accepted words. The first one is the default.
+    **described : str
+        ``about``, ``source`` and ``stated`` as in :func:`scene_key`, and ``default``.
+
+    Returns
+    -------
+    dataclasses.Field
+        The field of the section's dataclass.
+
+    Examples
+    --------
+    >>> from repro.scene.units import choice
+    >>> choice("steps", "linear", about="Between the times", source="Not in the paper").default
+    'steps'
+    """
     return scene_key(Choice(words), **described)
 
 
