@@ -89,7 +89,7 @@ class _Files(Sequence[dict[str, np.ndarray]]):
         return (self._read(path) for path in self.files.values() if path.is_file())
 
     def _read(self, path: Path) -> dict[str, np.ndarray]:
-        """The arrays of a file. Raises OutputError if it has changed or cannot be read."""
+        """Read the arrays of a file. Raises OutputError if it has changed or cannot be read."""
         if sha256_of(path) != self.sums.get(f"fields/{path.name}"):
             raise OutputError(f"{path}: the fields are not as they were written: cut short or "
                               "altered")
