@@ -33,17 +33,17 @@ from repro.scene.units import (
     POSITIVE_FRACTION,
     UP_TO_1,
     UP_TO_20,
+    Flag,
+    Points,
     SceneError,
+    Times,
     choice,
-    flag,
     number,
-    points,
     quantity,
-    required,
+    scene_key,
     section,
     share,
     timed_quantity,
-    times,
 )
 
 __all__ = ["Scene", "SceneError", "load_scene", "packaged_scenes", "parse_scene", "scene_hash",
@@ -80,12 +80,14 @@ class Aggregate:
     position: float = quantity(
         "0 um", "um", EITHER_SIGN, source=NOT_IN_PAPER,
         about="x of the middle of the half-disc; 0 is the middle of the pore")
-    outline: tuple[tuple[float, float], ...] | None = points(
+    outline: tuple[tuple[float, float], ...] | None = scene_key(
+        Points(),
         about="The seed's surface instead of a half-disc: both ends on the lower wall (y = 0), the "
         "upstream one first; points with y = pore.width are contact with the upper wall",
         source=NOT_IN_PAPER)
-    smooth: bool = flag(about="A spline through the points of outline, or straight lines",
-                        source=NOT_IN_PAPER)
+    smooth: bool = scene_key(
+        Flag(), about="A spline through the points of outline, or straight lines",
+        source=NOT_IN_PAPER)
     inert_fraction: float = number(
         0.0, BELOW_1, source=NOT_IN_PAPER,
         about="Share of X_I in the biomass at t = 0, where X_A + X_I = X_m")
@@ -161,8 +163,9 @@ class Substrate:
         about="Between the times of a table of supply: jumps, or an even change")
     half_saturation: float = quantity(
         "1.0 mg/L", "mg/L", about="K_s of Monod's law", source="(7)-(10), Table 1")
-    diffusivity: float = required(
-        "2.32 cm^2/day", "um^2/h", about="D in water", source="(7)-(8), Table 1")
+    diffusivity: float = quantity(
+        "2.32 cm^2/day", "um^2/h", default=MISSING, about="D in water",
+        source="(7)-(8), Table 1")
     diffusivity_in_aggregate: float = share(
         "1.85 cm^2/day", "um^2/h", "diffusivity", about="D in the aggregate",
         source="2.2, Table 1", default=MISSING)
@@ -264,8 +267,9 @@ class Kinetics:
 class Growth:
     """Sections 2.3 and 3.4, (14)-(29), to the time `end` (h), updates every `time_step` (h)."""
 
-    end: float = required(
-        "19.4 h", "h", NON_NEGATIVE, about="Time at which the run ends", source="Section 4")
+    end: float = quantity(
+        "19.4 h", "h", NON_NEGATIVE, default=MISSING, about="Time at which the run ends",
+        source="Section 4")
     time_step: float = quantity(
         "12 min", "h", source="Section 2, Table 1",
         about="Delta t between shape updates; with numerics.time = \"midpoint\" the first one")
@@ -308,7 +312,7 @@ class Numerics:
     transfer: str = choice("conserving", "linear", "bounded", source="3.5 is linear [E8]",
                            about="How X_A and X_I go to a new mesh")
     extent: str | None = choice(
-        "central", "full", source="3.1",
+        "central", "full", default=None, source="3.1",
         stated='default "central", or "full" where there are substrates and nothing flows, at '
                'times or ever: (26) and (12), which stand for the rest of the pore, need a flow',
         about="Mesh the part around the aggregate, or the whole pore")
@@ -375,7 +379,8 @@ class Output:
     or more.
     """
 
-    times: tuple[float, ...] | None = times(
+    times: tuple[float, ...] | None = scene_key(
+        Times(),
         source="Figures 4-6",
         about="Times of the rows and fields wanted, which change no step; left out: every step, "
         "with midpoint also every 1/4, 1/2, 1, 2, 4 ... growth.time_step, so that there are 24 or "

@@ -144,7 +144,7 @@ def scaled(section, length: float, time: float):
     changes = {}
     for key in fields(section):
         value, kind = getattr(section, key.name), key.metadata.get("kind")
-        along, during = UNITS.get(getattr(getattr(kind, "absolute", kind), "unit", ""), (0, 0))
+        along, during = UNITS.get(getattr(kind, "unit", ""), (0, 0))
         if is_dataclass(value):
             changes[key.name] = scaled(value, length, time)
         elif key.name == "times" and value:
