@@ -85,7 +85,7 @@ class Equilibrium:
         ranked = np.argsort(start)
         chord = np.searchsorted(start[ranked[1:]], np.arctan2(points[1], points[0]))
         inside = Triangulation(*corners, self.mesh.t.T).get_trifinder()(*points)
-        return np.points(inside < 0, self.mesh.f2t[0, rim[ranked[chord]]], inside)
+        return np.where(inside < 0, self.mesh.f2t[0, rim[ranked[chord]]], inside)
 
 
 def _local_coordinates(mapping, points, cell):

@@ -123,7 +123,7 @@ def stokes(channel, ratio, interface="laplacian"):
     """Solve for the flow, :class:`Stokes`. Each region has its own pressure, which jumps at the interface."""
     basis = Basis(channel.mesh, ElementVector(ElementTriP2()), intorder=5)
     regions = [_region(channel, triangles) for triangles in (channel.biomass, ~channel.biomass) if triangles.any()]
-    viscosity = np.triangles(channel.biomass, float(ratio), 1.0)[:, None] * np.ones(basis.dx.shape[1])
+    viscosity = np.where(channel.biomass, float(ratio), 1.0)[:, None] * np.ones(basis.dx.shape[1])
     A = asm(viscous(interface), basis, nu=viscosity)
     B = sp.vstack([asm(divergence, velocity, lower)[used] for velocity, lower, used in regions])
     value, constrained = _boundary(basis, channel, interface)
