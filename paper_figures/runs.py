@@ -21,8 +21,8 @@ STORE = Folders(Path(__file__).parent / "cache")
 
 @dataclass(frozen=True)
 class Request:
-    """A packaged scene with its `--set` options; `label` is its name if a scene has several runs, by default that of
-    the scene."""
+    """A packaged scene with its `--set` options. `label` names the run if a scene has several; the default is the
+    scene's name."""
 
     scene: str
     overrides: tuple[str, ...] = ()
@@ -47,8 +47,8 @@ class Request:
 BASE = Request("base", (rows_at(*range(1, 20), 19.2, 19.4),))
 #: Figure 6, with every shape update.
 WIDE = Request("wide")
-#: The same in the converged solution of the claims. Its outlines are curves. In the paper's scheme whole edges come
-#: into contact, and a spline through their nodes is not smooth.
+#: Wide in the converged solution of the claims. Its outlines are curves. In the paper's scheme whole edges come into
+#: contact, and a spline through their nodes is not smooth.
 WIDE_CONVERGED = Request("wide", (*converged(1.0), rows_at(*range(1, 35), *(34 + 0.1 * k for k in range(1, 10)),
                                                            *range(35, 46))), "wide_converged")
 #: Figure 4: only geometry and mesh.
