@@ -191,8 +191,8 @@ growth, the aggregate is thicker before contact, and r exceeds the bounds: near 
 by some 5 %.
 
 The law is judged with {check.count} shapes that are not in the fit. Their sizes, outlines, places, widths, velocities,
-supplies and lambdas are drawn at random. {check.inside} are within the bounds; half of them are within {np.median(worst):.1f} % of the
-law, and the worst is {worst.max():.0f} % from it.
+supplies and lambdas are drawn at random. {check.inside} are within the bounds; half of them are
+within {np.median(worst):.1f} % of the law, and the worst is {worst.max():.0f} % from it.
 
 Outside its range (A / W^2 from {_range(False)} before contact and from {_range(True)} after it, lambda from 100 to
 10 000) the function raises `ValueError`. It holds for the paper's viscous aggregate with its own condition on the
