@@ -30,7 +30,7 @@ class Request:
     overrides : tuple of str
         Changes of the scene, as for `--set`.
     label : str
-        Name of the run, by default that of the scene. A scene with several runs needs a label for each.
+        Name of the run if a scene has several; the default is the scene's name.
 
     Examples
     --------
@@ -62,8 +62,8 @@ class Request:
 BASE = Request("base", (rows_at(*range(1, 20), 19.2, 19.4),))
 #: Figure 6, with every shape update.
 WIDE = Request("wide")
-#: The same in the converged solution of the claims. Its outlines are curves. In the paper's scheme whole edges come
-#: into contact, and a spline through their nodes is not smooth.
+#: Wide in the converged solution of the claims. Its outlines are curves. In the paper's scheme whole edges come into
+#: contact, and a spline through their nodes is not smooth.
 WIDE_CONVERGED = Request("wide", (*converged(1.0), rows_at(*range(1, 35), *(34 + 0.1 * k for k in range(1, 10)),
                                                            *range(35, 46))), "wide_converged")
 #: Figure 4: only geometry and mesh.

@@ -202,7 +202,7 @@ class Lumped:
     space: Space
 
     def reaction(self) -> Basis:
-        """The nodes of the biomass, each with the function that is one there."""
+        """Return the nodes of the biomass, each with the function that is one there."""
         mesh = self.space.mesh
         lumped = self.space.lumped(mesh.biomass)
         nodes = mesh.topology.body_corners
@@ -213,7 +213,7 @@ class Lumped:
         return each(self.space.mesh.areas / 3, np.eye(3)[None])
 
     def finer(self, degrees: int) -> tuple[Basis, np.ndarray]:
-        """The same rule, whatever the degree, and the matrix (1, 1) that keeps a density."""
+        """Return the same rule for every degree, and the matrix (1, 1) that keeps a density."""
         return self.space.reaction, np.ones((1, 1))
 
 
@@ -224,7 +224,7 @@ class Quadrature:
     space: Space
 
     def reaction(self) -> Basis:
-        """The quadrature points of the biomass."""
+        """Return the quadrature points of the biomass."""
         at = self.space.at
         biomass = self.space.mesh.biomass
         return Basis(at.cells[biomass], at.count, at.values, at.dx[biomass])
@@ -234,8 +234,11 @@ class Quadrature:
         return self.space.at.mass(self.space.at.dx)
 
     def finer(self, degrees: int) -> tuple[Basis, np.ndarray]:
-        """The functions in the biomass at points of a quadrature that is more exact by ``degrees``,
-        and the matrix (q, p) that takes a density there, linear in each triangle."""
+        """Return the functions in the biomass at points of a more exact quadrature.
+
+        Its degree is larger by ``degrees``. The matrix (q, p) takes a density there, linear in each
+        triangle.
+        """
         space = self.space
         mesh = space.mesh
         biomass = mesh.biomass

@@ -177,7 +177,7 @@ def _cases_of(function) -> Iterator[Case]:
 
 
 def _documented(function) -> dict[str, str]:
-    """The claim and the norm that the docstring of a test function states."""
+    """Read the claim and the norm from the docstring of a test function."""
     paragraphs = (getdoc(function) or "").split("\n\n")
     claim, norm = (" ".join(text.split()).removesuffix(".") for text in (*paragraphs, "")[:2])
     return {"claim": claim, "norm": norm.removeprefix("Norm: ")}
