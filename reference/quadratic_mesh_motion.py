@@ -5,8 +5,8 @@ The second equation of (35), gamma P = -div d, eliminates the pressure from the 
     (grad d, grad v) + 1/gamma (div d, div v) = 0   for all v,
 
 which needs no stabilisation. d is prescribed on the aggregate. d_y = 0 on the walls and d_x = 0 at inlet and outlet;
-the other component is free. This is Navier's equation with (lambda + mu) / mu = 1/gamma; Kolosov's kappa is
-1 + 2 gamma.
+the other component is free. This is Navier's equation with (lambda + mu) / mu = 1/gamma: Kolosov's kappa is 1 + 2
+gamma.
 
 **Corners.** At inlet and outlet, and where the aggregate meets the wall at a right angle, reflections in the lines on
 which the displacement slides extend it smoothly. Where the fluid has another angle w at the wall, the reflection gives
