@@ -149,7 +149,8 @@ def test_runs_are_compared_under_their_own_names_with_signs():
     for name, scale in (("zeta", 1.0), ("alpha", 1.5), ("mu", 0.5)):
         series = {column: scale * (1.0 + k + np.array([0.1, 0.4])) for k, column in enumerate(results.COLUMNS)}
         series |= {"time_h": np.array([0.0, 3.0]), "upstream_um": scale * np.array([-5.0, -8.0])}
-        runs.append(Run(Path("runs") / name, {"scene": name, "tables": {"factor": 1.0 + (scale < 1)}}, series, {}))
+        record = {"scene": name, "status": "completed", "tables": {"factor": 1.0 + (scale < 1)}}
+        runs.append(Run(Path("runs") / name, record, series, {}))
     labels = comparison.short([run.folder for run in runs])
     for chart in quantities.overlaid(runs, labels):
         assert [line.label for line in chart.lines] == labels, chart.title
@@ -157,7 +158,7 @@ def test_runs_are_compared_under_their_own_names_with_signs():
             assert [line.values[-1] / chart.lines[0].values[-1] for line in chart.lines] == pytest.approx([1, 1.5, 0.5])
     assert comparison.differences(runs) == [("factor", "1", "1", "2")]
     page_text = comparison.build(runs)
-    assert page_text.count("status unknown to t = 3 h") == 3
+    assert page_text.count("completed to t = 3 h") == 3
     values = page_text[page_text.index("Values at the common last time"):]
     heads = re.findall('<th scope="col" class="value">([^<]*)', values)
     assert heads == ["zeta", "alpha", "difference", "mu", "difference"]

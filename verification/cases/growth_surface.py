@@ -114,15 +114,6 @@ def plugged(preset: str, *changes: str) -> Scene:
                                "numerics.refinement=0.3", *changes], ["aggregate.radius"])
 
 
-class Block(growth.System):
-    """The equations of a body with another factor of its stabilisation."""
-
-    gamma = growth.GAMMA
-
-    def _stiffening(self):
-        return self.gamma * self.theta ** (-5 / 3)
-
-
 @cache
 def energy_and_constraint(gamma: float) -> tuple[Callable, Callable]:
     """(energy, constraint), functions of theta, of quadratic places and linear pressures on a block of 1 x 1."""
@@ -132,14 +123,13 @@ def energy_and_constraint(gamma: float) -> tuple[Callable, Callable]:
     last = 2 * len(body.reference)
 
     def matrix(theta: float) -> np.ndarray:
-        system = Block(body, np.zeros_like(body.constrained))
-        system.gamma = gamma
+        system = growth.System(body, np.zeros_like(body.constrained), stabilisation=growth.GradDiv(gamma))
         P = surface_stability.confined_growth_pressure(theta)
         place = body.reference * [1.0, theta]
         system.under(body.constant(theta), place, place, body.resting + P)
         local = system.tangent(place, body.resting + P)
         full_matrix = np.zeros((last + body.corners,) * 2)
-        rows = system.unknowns
+        (rows,) = system.sparse.kinds
         np.add.at(full_matrix, (rows[:, :, None], rows[:, None, :]), local)
         return full_matrix
 

@@ -8,8 +8,8 @@ from scipy.linalg import eigh
 from skfem import MeshTri
 
 from reference import neo_hookean
-from repro.fem.assembly import mass
 from repro.fem.elements import GRADIENT_DEGREES
+from repro.fem.forms import mass
 from repro.fem.mesh import triangle_areas
 from repro.fem.mesher import generate
 from repro.fem.outline import half_disc as seed
