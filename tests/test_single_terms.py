@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from repro import load_scene
 from repro.fem import sizing
 from repro.fem.outline import TOP
-from repro.model.pore import seeded, sized
+from repro.model.pore import Meshing, seeded, sized
 from repro.model.remeshing import moved_mesh
 from tests.test_sensitivity import value_of
 from verification.sensitivity import rounding
@@ -157,6 +157,6 @@ def criteria(scene, pore, expanded):
 def test_a_new_mesh_is_due_if_one_criterion_requires_it(change, criterion, kind):
     first = grown_seed(kind)
     scene, expanded = change(*first)
-    assert (moved_mesh(scene, first[1], expanded) is None) == (criterion is not None)
+    assert (moved_mesh(Meshing.of(scene), first[1], expanded) is None) == (criterion is not None)
     due = [name for name, is_due in criteria(scene, first[1], expanded).items() if is_due]
     assert due == [*filter(None, [criterion])]

@@ -12,6 +12,7 @@ from repro.fem.mesh import Mesh, Topology
 from repro.fem.space import Space
 from repro.march.simulation import simulate
 from repro.model import contact, pore, remeshing
+from repro.model.remeshing import Remeshing
 from repro.scene import load_scene
 from tests import faults
 from tests.strategies import ORDERS, meshed, seed
@@ -69,7 +70,7 @@ def test_a_replaced_object_has_no_caches(kind):
     scene = load_scene("base", ["numerics.preset=fast", f"numerics.elements={kind}", "numerics.refinement=0.5"])
     state = pore.seeded(scene)
     pore.solve(scene, state)
-    contact.expand(scene, state, 1.02 * state.theta)
+    contact.expand(contact.Mechanics.of(scene), state, 1.02 * state.theta)
     topology = state.mesh.topology
     objects = (state, state.space, state.mesh, topology, topology.straight, state.body, state.body.shape)
     for each in map(fill_caches, objects):
@@ -139,9 +140,9 @@ def test_the_method_of_a_scene_reaches_every_system(which, monkeypatch):
     scene = scenes(*OTHER_PACKAGES)[which]
     expected = Method("pardiso", "metis")
     first = pore.seeded(scene)
-    expanded = contact.expand(scene, first, 1.05 * first.theta).pore
-    assert remeshing.moved_mesh(scene, first, expanded) is not None
-    remeshed = remeshing.remesh(scene, first, expanded, 0.0)[0]
+    expanded = contact.expand(contact.Mechanics.of(scene), first, 1.05 * first.theta).pore
+    assert remeshing.moved_mesh(pore.Meshing.of(scene), first, expanded) is not None
+    remeshed = remeshing.remesh(Remeshing.of(scene), first, expanded, 0.0)[0]
     for state in (first, remeshed):
         pore.solve(scene, state)
         topologies = state.mesh.topology, state.mesh.topology.straight

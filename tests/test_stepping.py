@@ -16,6 +16,7 @@ from repro.march import midpoint, simulation, step_control, stepping
 from repro.march.loop import PoreEnd
 from repro.march.midpoint import Attempt
 from repro.model import pore
+from repro.model.stages import Stages
 from repro.scene import load_scene
 from tests.strategies import ORDERS, scene
 from tests.test_state import alike
@@ -37,7 +38,7 @@ def sets(order):
     (0.001, 0.2 / 2**13), (0.01, 0.2 / 2**9), (1.0, 0.025), (4.79, 0.1), (4.8, 0.2), (19.4, 0.8), (45.0, 1.6)])
 def test_a_run_without_times_has_about_25_rows_at_round_times(end, spacing):
     """The last row is at the end of the run."""
-    rows = stepping.rows(base(f'growth.end="{end} h"'))
+    rows = stepping.rows(base(f'growth.end="{end} h"').growth)
     assert 24 <= len(rows) <= 49 and rows[-1] == end and rows[0] == pytest.approx(spacing, abs=1e-9)
     assert np.diff(rows[:-1]) == pytest.approx(spacing, abs=2e-9) and 0 < rows[-1] - rows[-2] <= spacing * 1.0001
 
@@ -115,8 +116,8 @@ def test_rows_within_steps_are_of_second_order():
     state = replace(state, concentrations=solved.concentrations)
     differences = []
     for hours in (1.0, 0.5, 0.25):
-        row = midpoint.attempt(scene, state, solved, hours).step.within(0.37 * hours)
-        shorter = midpoint.attempt(scene, state, solved, 0.37 * hours).step.pore
+        row = midpoint.attempt(Stages.of(scene), state, solved, hours).step.within(0.37 * hours)
+        shorter = midpoint.attempt(Stages.of(scene), state, solved, 0.37 * hours).step.pore
         differences.append(numbers(row.pore, row.solved) - numbers(shorter, pore.solve(scene, shorter)))
     assert np.abs(np.log2(np.divide(differences[:-1], differences[1:])) - 3).max() < 0.35
 
@@ -202,7 +203,7 @@ def test_a_film_too_thin_from_the_start_closes(order):
                                        ("3e-7 h", "1e-6 h")])
 def test_rows_of_very_short_runs_do_not_coincide(end, step):
     scene = base(f'growth.end="{end}"', f'growth.time_step="{step}"')
-    rows = stepping.rows(scene)
+    rows = stepping.rows(scene.growth)
     assert bool(rows) == (scene.growth.end > 1e-9) and all(np.diff((0.0, *rows)) >= 0.99e-9)
 
 

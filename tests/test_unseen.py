@@ -20,10 +20,13 @@ from repro.errors import TransportError, Unresolved
 from repro.fem.outline import FREE, half_disc
 from repro.fem.sizing import Sizing, split
 from repro.march import midpoint, simulation, stepping, updates
-from repro.march.loop import Ledger, Report
+from repro.march.balance import Ledger
+from repro.march.loop import Report
 from repro.march.step_control import EXCESS, StepControl, exceeds_tolerance
 from repro.model import biomass, contact, gear, mesh_motion, remeshing, transport
-from repro.model.pore import Solved, resolution, seeded, solve
+from repro.model.pore import Meshing, Solved, resolution, seeded, solve
+from repro.model.remeshing import Remeshing
+from repro.model.stages import Stages
 from repro.preflight import modelled, numbers, simplifications
 from repro.report import comparison, quantities, run_page
 from repro.report.reading import Run
@@ -210,7 +213,7 @@ def uneven(order):
 def test_an_update_takes_the_mean_of_the_rates_at_its_ends(order):
     """Active and inert biomass follow (9) and (10), as printed, at the concentrations of both ends, to round-off."""
     scene, pore, solved = uneven(order)
-    after, end, _ = updates.make_biomass(scene, pore, solved, 2.0)
+    after, end, _ = updates.make_biomass(Stages.of(scene), pore, solved, 2.0)
     pieces, rates = pore.space.reaction, []
     for state in (solved.concentrations, end):
         both = (field[pieces.cells] @ pieces.values.T for field in (state.acceptor, state.donor))
@@ -231,7 +234,7 @@ def test_water_beyond_the_old_mesh_has_the_profile_of_flow_or_diffusion(speed, o
     new = base(order, "numerics.extent=full")[1].space
     before, x = (node_coordinates(space)[:, 0] for space in (pore.space, new))
     state = transport.Concentrations(3 + 0.01 * before, 2 - 0.02 * before)
-    computed = remeshing.transfer_substrates(scene, pore.space, new, state, speed)
+    computed = remeshing.transfer_substrates(scene.substrates, pore.space, new, state, speed)
     first, last = pore.mesh.ends
     certain = np.abs([x - first, x - last]).min(axis=0) > 1e-9
     for name, slope, start in (("acceptor", 0.01, 3), ("donor", -0.02, 2)):
@@ -255,7 +258,7 @@ def test_every_transferred_amount_keeps_its_sum(order):
     pressure = pore.mesh.points[: pore.mesh.corners] @ [0.02, 0.03] + 1
     for inert, *amounts in (rough, [patchy, patchy])[:order]:
         before = replace(pore, active=full - inert, inert=inert, pressure=pressure)
-        after, carried = remeshing.remesh(finer, pore, before, 0.0, tuple(amounts))
+        after, carried = remeshing.remesh(Remeshing.of(finer), pore, before, 0.0, tuple(amounts))
         inside = after.mesh.topology.body_corners
         assert after.pressure[inside] == pytest.approx(after.mesh.points[inside] @ [0.02, 0.03] + 1, abs=1e-2)
         sums = [amount.sum() for amount in (after.inert, *carried)]
@@ -305,8 +308,10 @@ def test_a_mesh_moves_by_the_scenes_constants_unless_it_is_too_coarse(order):
     coordinates = pore.mesh.points.copy()
     coordinates[pore.mesh.body] *= 1.001
     expected = mesh_motion.move(pore.mesh, coordinates[pore.mesh.body], compressibility=3.0, stabilisation=40.0)
-    assert np.array_equal(remeshing.moved_mesh(coarse, pore, pore.moved(coordinates)).points, expected)
-    assert remeshing.moved_mesh(replace(coarse, numerics=replace(coarse.numerics, refinement=1.8)), pore, pore) is None
+    moved = remeshing.moved_mesh(Meshing.of(coarse), pore, pore.moved(coordinates))
+    assert np.array_equal(moved.points, expected)
+    fine = replace(coarse, numerics=replace(coarse.numerics, refinement=1.8))
+    assert remeshing.moved_mesh(Meshing.of(fine), pore, pore) is None
 
 
 @pytest.mark.parametrize("time", ["updates", "midpoint"])
@@ -329,9 +334,9 @@ def test_a_step_grows_as_much_on_a_new_mesh_half_way():
     scene, pore = base(2, 'substrates.donor.supply=[["0 h", "4 mg/L"], ["4 h", "0.4 mg/L"]]',
                       "substrates.donor.interpolation=linear")
     solved = solve(scene, pore)
-    first = updates.compute_rates(scene, pore, solved.concentrations)
+    first = Stages.of(scene).rates(pore, solved)
     numerics = [replace(scene.numerics, refinement=part) for part in (0.3, 0.9)]
-    same_mesh, new_mesh = (midpoint.solve_halfway(replace(scene, numerics=each), pore, solved, first, 4.0,
+    same_mesh, new_mesh = (midpoint.solve_halfway(Stages.of(replace(scene, numerics=each)), pore, solved, first, 4.0,
                                                   contact.PATIENT) for each in numerics)
     assert new_mesh.produced == pytest.approx(same_mesh.produced, rel=1e-2)
     assert len(new_mesh.solved.flow.velocity) > 2 * len(same_mesh.solved.flow.velocity)
@@ -613,5 +618,6 @@ def test_an_update_under_a_table_starts_from_gears_concentrations(order):
     solved = solve(scene, pore)
     half_way = updates._solve_midway(scene, pore, solved, 0.2)
     assert half_way.concentrations is solved.concentrations and half_way.problem.both[0].supply == pytest.approx(11.0)
-    risen = updates.step(scene, pore, solved, 0.2).ledger.stored[0] / (scene.pore.width * np.ptp(pore.mesh.ends))
+    stored = updates.step(Stages.of(scene), pore, solved, 0.2).ledger.stored[0]
+    risen = stored / (scene.pore.width * np.ptp(pore.mesh.ends))
     assert risen == pytest.approx(2.0, rel=0.05)

@@ -21,6 +21,7 @@ from __future__ import annotations
 
 from copy import copy
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -590,6 +591,15 @@ class Fluxes:
     consumed: float
     inlet: float
     effluent: float
+
+
+class Flows(NamedTuple):
+    """Amounts of acceptor and donor in the balance of a step, um2 mg/L."""
+
+    supplied: tuple[float, float]
+    out: tuple[float, float]
+    consumed: tuple[float, float]
+    stored: tuple[float, float]
 
 
 def fluxes(problem: Problem, sink: Sink | None, state: Concentrations) -> tuple[Fluxes, Fluxes]:
