@@ -242,6 +242,6 @@ def test_a_trial_starts_from_a_shape_in_which_no_triangle_is_turned_over():
     """The last trial's shape is the first guess; a mirrored shape cannot be the start."""
     scene = load_scene("base", ['numerics.preset="fast"'])
     seed = seeded(scene)
-    trials = contact._Trials(scene, seed, seed, None, True)
+    trials = contact._Trials(contact.Mechanics.of(scene), seed, seed, None, True)
     trials._shapes = [(np.zeros(2), seed.mesh.points * [-1.0, 1.0], seed.pressure)]
     assert np.array_equal(trials._first(seed, np.zeros(2)).mesh.points, seed.mesh.points)

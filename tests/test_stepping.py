@@ -136,10 +136,10 @@ def test_a_failing_step_is_halved_until_it_succeeds(monkeypatch):
         tried.append(duration)
         if duration > 0.02:
             raise GrowthError("too long")
-        return Attempt(stepping.StepResult(state, None, None, False, 0), 1e-9, None)
+        return Attempt(stepping.StepResult(state, None, None, False, 0, None), 1e-9, None)
 
     monkeypatch.setattr(midpoint, "attempt", attempt)
-    result, _, after = stepping._advance(scene, state, None, step_control.StepControl(0.2))
+    result, _, after = stepping._advance(Stages.of(scene), state, None, step_control.StepControl(0.2))
     assert tried == [0.2, 0.1, 0.05, 0.025, 0.0125]
     assert result.pore.time == 0.0125 and after.length == pytest.approx(step_control.FASTER * 0.0125)
 

@@ -415,7 +415,7 @@ def test_each_contact_surface_has_its_own_fixed_point(fixed_point, order):
     scene = simulation.shaped(base(order, 'pore.width="20 um"', f"numerics.fixed_point={fixed_point}")[0], leaning)
     pore = seeded(scene)
     pore = replace(pore, fixed=np.roll(pore.fixed, 2 * (fixed_point == "rechosen")))
-    x, y = pore.mesh.points[pore.mesh.loop][contact._fixed_points(scene, pore)].T
+    x, y = pore.mesh.points[pore.mesh.loop][contact._fixed_points(scene.numerics, pore)].T
     assert y.tolist() == [0.0, 20.0] and x == pytest.approx([-2.0, -1.0], abs=0.3)
 
 

@@ -157,8 +157,8 @@ def _gathered(division: Division, loads: np.ndarray) -> np.ndarray:
     return division.gathered_loads(_on_mesh(division.mesh, loads))[division.parent.body]
 
 
-def _at_rest(mechanics: Mechanics, grown: Pore, theta: np.ndarray, start: Pore, forces: np.ndarray | None,
-             search: SearchOptions) -> Expansion:
+def _at_rest(mechanics: Mechanics, grown: Pore, theta: np.ndarray, start: Pore,
+             forces: np.ndarray | None, search: SearchOptions) -> Expansion:
     """The new shape under constant nodal forces (n, 2) um, over mu_L; None for no forces."""
     stressed = mechanics.keys.new_biomass == "stressed"
     last = None if stressed else grown.mesh.points[grown.mesh.body]
@@ -391,7 +391,8 @@ class _Trials:
             locked = divided(grown, division, contact, self._shape)
             self._shape = locked.body.shape
             forces = None if forces is None else _divided_loads(division, forces)
-        shape, iterations = _equilibrium(self._mechanics, locked, self._first(locked, advances), forces,
+        first = self._first(locked, advances)
+        shape, iterations = _equilibrium(self._mechanics, locked, first, forces,
                                          patient=self._patient)
         self.iterations += iterations
         expansion = Expansion(shape, iterations, 0.0, division)
