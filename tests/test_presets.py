@@ -10,7 +10,6 @@ from repro.march import midpoint, simulation
 from repro.model import pore, remeshing
 from repro.model.biomass import Rates
 from repro.model.contact import Expansion
-from repro.model.pore import Solved
 from repro.model.remeshing import Remeshing
 from repro.model.transport import Concentrations
 from repro.scene import PRESETS, Numerics, load_scene, parse_scene
@@ -29,20 +28,19 @@ def base(*changes, order=2):
     return load_scene("base", (*sets, *changes))
 
 
-def solved(acceptor, donor):
-    """A solution that consists of these concentrations alone."""
-    return Solved(None, None, Concentrations(np.array(acceptor), np.array(donor)))
+def concentrations(acceptor, donor):
+    return Concentrations(np.array(acceptor), np.array(donor))
 
 
 def test_the_first_guess_at_a_step_s_end():
     """The change of the first half is added once more; not below zero, nor on another mesh."""
-    start, half = solved([3.0, 2.0], [5.0, 4.0]), solved([2.5, 1.5], [5.0, 3.5])
+    start, half = concentrations([3.0, 2.0], [5.0, 4.0]), concentrations([2.5, 1.5], [5.0, 3.5])
     for part, acceptor, donor in ((1.0, [2.0, 1.0], [5.0, 3.0]), (0.25, [2.75, 1.75], [5.0, 3.75])):
         guess = midpoint._extrapolate_substrates(start, half, part)
         assert guess.acceptor.tolist() == acceptor and guess.donor.tolist() == donor
-    other, spent = solved([1.0], [1.0]), solved([2.5, 0.5], [5.0, 3.5])
-    assert midpoint._extrapolate_substrates(start, other, 1.0) is start.concentrations
-    assert midpoint._extrapolate_substrates(start, spent, 1.0) is spent.concentrations
+    other, spent = concentrations([1.0], [1.0]), concentrations([2.5, 0.5], [5.0, 3.5])
+    assert midpoint._extrapolate_substrates(start, other, 1.0) is start
+    assert midpoint._extrapolate_substrates(start, spent, 1.0) is spent
 
 
 @pytest.mark.parametrize("count", [0.0, 8.0])

@@ -91,7 +91,7 @@ def attempt(stages: Stages, previous: Pore, solved: Solved, duration: float,
     if leaves := pore_end(stages.scene.pore, expanded, 0.1):
         raise PoreEnd(f"{leaves} in the step from t = {previous.time:g} h")
     refuse_fold(previous, expanded)
-    expanded = replace(expanded, concentrations=_extrapolate_substrates(solved, half.solved, 1.0))
+    expanded = replace(expanded, concentrations=_guess_substrates(solved, half, 1.0))
     new, remeshed = stages.new_mesh(previous, expanded, solved)
     refuse_density(new, stages.remeshing.maximum_density)
     flows = _flows(half.solved.substrates.fluxes, duration)
@@ -162,7 +162,7 @@ def interpolate(stages: Stages, previous: Pore, solved: Solved, half: Halfway,
                  (1 - part) * half.first.remains + part * half.rates.remains)
     after = replace(grow(previous, mean, part * half.duration), time=time)
     expanded = _expand(stages, previous, after, half, part, contact.PATIENT).pore
-    expanded = replace(expanded, concentrations=_extrapolate_substrates(solved, half.solved, part))
+    expanded = replace(expanded, concentrations=_guess_substrates(solved, half, part))
     inner, _ = stages.new_mesh(previous, expanded, solved)
     return InterpolatedState(*remeshing.solve_graded(stages.scene, inner))
 
@@ -193,14 +193,19 @@ def _match_production(previous: Pore, after: Pore, produced: tuple[float, float]
                    inert=after.inert + missing[1] * share)
 
 
-def _extrapolate_substrates(start: Solved, half: Solved, part: float) -> Concentrations:
-    """Initial guess of the substrates at a part of the step, extrapolated from its first half.
+def _guess_substrates(start: Solved, half: Halfway, part: float) -> Concentrations:
+    """Initial guess of the substrates at a part of the step."""
+    first = start.substrates.concentrations
+    return _extrapolate_substrates(first, half.solved.substrates.concentrations, part)
+
+
+def _extrapolate_substrates(first: Concentrations, second: Concentrations,
+                            part: float) -> Concentrations:
+    """Extrapolate concentrations to a part of the step, from its start and half way.
 
     If the extrapolation is negative anywhere, the guess is the solution half way. If the mesh has
     changed half way, the guess is the solution at the start.
     """
-    first = start.substrates.concentrations
-    second = half.substrates.concentrations
     if len(second.acceptor) != len(first.acceptor):
         return first
     acceptor = first.acceptor + 2 * part * (second.acceptor - first.acceptor)

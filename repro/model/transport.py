@@ -95,6 +95,11 @@ class Problem:
         return self.substrates.acceptor, self.substrates.donor
 
     @property
+    def rate_law(self) -> RateLaw:
+        """The law of the biomass. Raises MissingError without biomass."""
+        return needed(self.law, "[kinetics]")
+
+    @property
     def supply(self) -> np.ndarray:
         """(2n,) mg/L, of the acceptor at all nodes, then of the donor."""
         return np.repeat([s.supply for s in self.both], self.space.count)
@@ -327,8 +332,12 @@ class Balance:
         return state.reshape(2, -1)[:, pieces.cells] @ pieces.values.T
 
     @property
+    def _present_sink(self) -> Sink:
+        return needed(self.sink, "a sink")
+
+    @property
     def _law(self) -> RateLaw:
-        return needed(self.problem.law, "[kinetics]")
+        return self.problem.rate_law
 
     @property
     def _both(self) -> UptakeLaw:
@@ -349,7 +358,7 @@ class Balance:
     def uptake(self, state: np.ndarray) -> np.ndarray:
         """(r, 2, q) um2 mg/L/h."""
         fractions = self._both.fraction(self.at(state))
-        return needed(self.sink, "a sink").uptake(fractions, self._law)
+        return self._present_sink.uptake(fractions, self._law)
 
     def residual(self, state: np.ndarray, loads: np.ndarray | None = None) -> np.ndarray:
         """(2n,) um2 mg/L/h for C_A, then C_D, of all nodes (2n,), mg/L; loads: the uptake, if it is
@@ -376,7 +385,7 @@ class Balance:
     def _uptake_slopes(self, saturations: np.ndarray) -> np.ndarray:
         """(2, 2, r, q) derivatives of the uptake by the saturations."""
         fractions, slopes = self._both.at_saturation(saturations)
-        return needed(self.sink, "a sink").slopes(fractions, self._law) * slopes
+        return self._present_sink.slopes(fractions, self._law) * slopes
 
     def tangent(self, state: np.ndarray,
                 saturations: np.ndarray | None = None) -> tuple[np.ndarray, ...]:
@@ -525,7 +534,7 @@ def _front(failure: str) -> Unresolved:
 
 def _eased(problem: Problem, sink: Sink | None, state: np.ndarray) -> tuple[np.ndarray, int]:
     """Newton's method with half saturations that fall from the supply to their own values."""
-    law = needed(problem.law, "[kinetics]")
+    law = problem.rate_law
     supply = np.array([s.supply for s in problem.both])[:, None, None]
     sharpest = law.both.sharpness(supply).min()
     total = 0
@@ -567,7 +576,7 @@ def quadrature_error(problem: Problem, sink: Sink, state: Concentrations) -> flo
     densities = sink.active / space.reaction.dx @ fitted
     both = np.stack([state.acceptor, state.donor])
     acceptor, donor = both[:, space.cells[mesh.biomass]] @ of.values.T
-    rate = needed(problem.law, "[kinetics]").uptake(acceptor, donor)[1]
+    rate = problem.rate_law.uptake(acceptor, donor)[1]
     finer = float(np.vdot(densities * elements.weights(corners, of), rate))
     quadrature = float(Balance(problem, Sink(sink.active)).uptake(both.ravel())[:, 1].sum())
     return abs(finer - quadrature) / quadrature if quadrature else 0.0
