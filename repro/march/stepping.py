@@ -30,7 +30,7 @@ from repro.model import remeshing
 from repro.model.contact_lines import SearchOptions
 from repro.model.pore import Pore, Solved
 from repro.model.stages import Stages
-from repro.scene import Growth, Scene, needed
+from repro.scene import Growth, needed
 
 #: Length of the first attempted step over growth.time_step.
 FIRST = 8.0
@@ -75,18 +75,17 @@ def _cut_step(stages: Stages, previous: Pore, solved: Solved,
 
     Times within it are still interpolated in the step that passes growth.end.
     """
-    scene = stages.scene
     end = stages.growth.end
     while True:
         try:
             trial = midpoint.attempt(stages, previous, solved, end - previous.time)
             break
         except Unresolved as error:
-            finer = _halve_elements(scene, previous)
+            finer = _halve_elements(stages, previous)
             if finer is None:
-                raise remeshing.advise(scene, previous, error) from None
+                raise remeshing.advise(stages.scene, previous, error) from None
             previous, solved = finer
-    step, after = _solve_after(scene, _end_at(needed(trial.step, "a shorter step"), end))
+    step, after = _solve_after(stages, _end_at(needed(trial.step, "a shorter step"), end))
     return replace(step, within=passing.within), after
 
 
@@ -116,7 +115,7 @@ def _find_step(
             if trial.step:
                 start = previous, solved
                 end = _end_of(previous, duration, corner)
-                step, after = _solve_after(scene, _end_at(trial.step, end))
+                step, after = _solve_after(stages, _end_at(trial.step, end))
                 if trial.gaps is not None:  # only contact shortened the step
                     return start, step, after, control
                 attempted = replace(control, length=length)
@@ -129,9 +128,9 @@ def _find_step(
             else:
                 length = max(duration * allowed_ratio(estimate, tolerance), shortest)
         except Unresolved as error:
-            finer = _halve_elements(scene, previous)
+            finer = _halve_elements(stages, previous)
             if finer is None and duration <= time_step:
-                raise remeshing.advise(scene, previous, error) from None
+                raise remeshing.advise(stages.scene, previous, error) from None
             if finer is None:
                 length = duration / 2
             else:
@@ -143,21 +142,21 @@ def _find_step(
         duration = fit_to_interval(length, remaining)
 
 
-def _halve_elements(scene: Scene, previous: Pore) -> tuple[Pore, Solved] | None:
+def _halve_elements(stages: Stages, previous: Pore) -> tuple[Pore, Solved] | None:
     """Halve the elements at the aggregate at the start of a step, and solve there.
 
     None if they have been halved as often as allowed.
     """
-    finer = remeshing.grade(scene, previous)
+    finer = remeshing.grade(stages.scene, previous)
     if finer is None:
         return None
-    graded, solved = remeshing.solve_graded(scene, finer)
+    graded, solved = remeshing.solve_graded(stages.scene, finer)
     return replace(graded, concentrations=solved.concentrations), solved
 
 
-def _solve_after(scene: Scene, step: StepResult) -> tuple[StepResult, Solved]:
+def _solve_after(stages: Stages, step: StepResult) -> tuple[StepResult, Solved]:
     """Solve after a step, on a mesh graded to a sharp front if one needs it."""
-    after, solved = remeshing.solve_graded(scene, step.pore)
+    after, solved = remeshing.solve_graded(stages.scene, step.pore)
     if after is not step.pore:
         step = replace(step, pore=contiguous(after), remeshed=True)
     return step, solved

@@ -197,7 +197,8 @@ def test_traction_even(changes, record):
     scene = loaded_scene(*changes)
     seed = pore.seeded(scene)
     theta = _uneven(seed, 0.002)
-    plain = contact._at_rest(scene, seed, theta, seed, None, contact.PATIENT).pore
+    mechanics = contact.Mechanics.of(scene)
+    plain = contact._at_rest(mechanics, seed, theta, seed, None, contact.PATIENT).pore
     space = seed.moved(mesh_motion.move(seed.mesh, plain.mesh.points[seed.mesh.body], 1.0, 100.0)).space
     mesh = space.mesh
     still = Flow(0.0, np.zeros((space.count, 2)), np.full(flow.pressure_space(space).count, 5.0), None, 0.0, 0.0, 0.0)
@@ -206,7 +207,7 @@ def test_traction_even(changes, record):
     apart = (on[mesh.loop] - by_hand)[plain.wall == FREE]
     record(at_most("forces", np.abs(apart).max() / np.abs(by_hand).max(), 1e-12, "the divergence theorem: round-off"))
     for sign in (1.0, -1.0):
-        pushed = contact._at_rest(scene, seed, theta, seed, sign * on[mesh.body], contact.PATIENT).pore
+        pushed = contact._at_rest(mechanics, seed, theta, seed, sign * on[mesh.body], contact.PATIENT).pore
         apart = np.abs(pushed.mesh.points - plain.mesh.points).max() / 25.0
         change = (pushed.pressure - plain.pressure)[mesh.topology.body_corners] + sign * 5.0
         record(at_most(f"move, {sign:+g}", apart, 1e-9, "J = theta: Newton's tolerance"))
