@@ -54,7 +54,7 @@ def drawn(seed):
 
 def warnings(changes):
     scene = load_scene("base", changes, ["flow.head"])
-    return simplifications.find_warnings(*numbers.evaluate_at_largest(scene, pore.fastest(scene)))
+    return simplifications.find_warnings(*numbers.evaluate_at_largest(scene, pore.fastest(scene.flow, scene.pore)))
 
 
 def setting(warned):

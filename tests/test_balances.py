@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from repro.errors import SimulationError, TransportError, Unresolved
 from repro.march import balance, midpoint, updates
-from repro.march.loop import Ledger
+from repro.march.balance import Ledger
 from repro.march.simulation import simulate
 from repro.model import transport
 from repro.model.kinetics import Sink

@@ -232,7 +232,7 @@ def test_a_trial_starts_from_a_shape_in_which_no_triangle_is_turned_over():
     """The last trial's shape is the first guess; a mirrored shape cannot be the start."""
     scene = load_scene("base", ['numerics.preset="fast"'])
     seed = seeded(scene)
-    trials = contact._Trials(scene, seed, seed, None, True)
+    trials = contact._Trials(contact.Mechanics.of(scene), seed, seed, None, True)
     trials._shapes = [(np.zeros(2), seed.mesh.points * [-1.0, 1.0], seed.pressure)]
     assert np.array_equal(trials._first(seed, np.zeros(2)).mesh.points, seed.mesh.points)
 
@@ -247,7 +247,7 @@ def test_each_contact_surface_has_its_own_fixed_point(fixed_point, order):
     scene = simulation.shaped(narrow, leaning)
     pore = seeded(scene)
     pore = replace(pore, fixed=np.roll(pore.fixed, 2 * (fixed_point == "rechosen")))
-    x, y = pore.mesh.points[pore.mesh.loop][contact._fixed_points(scene, pore)].T
+    x, y = pore.mesh.points[pore.mesh.loop][contact._fixed_points(scene.numerics, pore)].T
     assert y.tolist() == [0.0, 20.0] and x == pytest.approx([-2.0, -1.0], abs=0.3)
 
 

@@ -77,7 +77,7 @@ def test_the_fixed_point_is_kept_or_rechosen(order):
     shifted = replace(pore, fixed=np.arange(len(x)) == aside)
     for option, stays, goes in (("kept", aside, middle), ("rechosen", middle, aside)):
         variant = replace(scene, numerics=replace(scene.numerics, fixed_point=option))
-        expanded = contact.expand(variant, shifted, 1.2 * pore.theta).pore
+        expanded = contact.expand(contact.Mechanics.of(variant), shifted, 1.2 * pore.theta).pore
         assert np.flatnonzero(expanded.fixed).tolist() == [stays]
         after = expanded.outline.points[:, 0]
         assert after[stays] == x[stays] and abs(after[goes] - x[goes]) > 0.05

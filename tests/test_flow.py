@@ -70,4 +70,4 @@ def test_the_elements_of_a_scene_reach_the_flow(element, setting):
     space = pore.seeded(scene).space
     unit = flow.unit_flow(space, scene.flow.viscosity_ratio, element=element)
     expected = flow.scaled(unit, space.mesh, scene.pore.length, scene.flow)
-    assert np.array_equal(pore.solve_flow(scene, space).head, expected.head)
+    assert np.array_equal(pore.solve_flow(space, scene.flow, scene.pore.length, scene.numerics).head, expected.head)

@@ -13,7 +13,8 @@ import repro
 from repro.cli import main
 from repro.errors import GrowthError, LinearError, MeshError, SimulationError
 from repro.march import loop
-from repro.march.loop import InterpolatedState, Ledger, RestartState, Scheme, StepResult
+from repro.march.balance import Ledger
+from repro.march.loop import InterpolatedState, RestartState, Scheme, StepResult
 from repro.march.step_control import StepControl
 from repro.model import contact
 from repro.model.pore import seeded, solve
@@ -86,7 +87,7 @@ def compressed(theta):
     """The plug after uniform growth by theta, with the concentrations in its new shape."""
     scene = plug()
     seed = seeded(scene)
-    pore = contact.expand(scene, seed, np.full_like(seed.theta, theta)).pore
+    pore = contact.expand(contact.Mechanics.of(scene), seed, np.full_like(seed.theta, theta)).pore
     pore = replace(pore, active=theta * pore.active, inert=theta * pore.inert, time=1.0)
     return replace(pore, concentrations=solve(scene, pore).concentrations)
 

@@ -32,7 +32,7 @@ def case(radius="20 um", velocity="2.9 m/day", boundary="open", order=1, **secti
     scene = strategies.scene(radius, velocity=velocity, numerics=coarse(order),
                              **{**sections, "substrates": {"acceptor": {}, "donor": {}, **substrates}})
     pore = seeded(scene)
-    carried = solve_flow(scene, pore.space) if scene.flow else None
+    carried = solve_flow(pore.space, scene.flow, scene.pore.length, scene.numerics) if scene.flow else None
     return pore, transport.problem(pore.space, carried, scene.substrates, scene.kinetics)
 
 

@@ -9,7 +9,7 @@ import pytest
 from repro import load_scene
 from repro.errors import BalanceError, Unresolved
 from repro.march import balance
-from repro.march.loop import Ledger
+from repro.march.balance import Ledger, Limits
 from repro.march.simulation import steps
 from repro.model import transport
 from repro.model.pore import seeded, solve
@@ -71,18 +71,19 @@ def test_a_leak_below_the_tolerance_passes_and_a_larger_one_is_refused(kind, way
     """The leaks are 2 % below and above the tolerance, with gains and losses in one balance at a time."""
     scene, pore = base(way)
     limit = sign * (accepted_demand(scene, way) if kind == "demand" else 1e-6)
-    balance.refuse(scene, pore, ledger(scene))
-    balance.refuse(scene, pore, ledger(scene, **{kind: 0.98 * limit}))
+    balance.refuse(Limits.of(scene), pore, ledger(scene))
+    balance.refuse(Limits.of(scene), pore, ledger(scene, **{kind: 0.98 * limit}))
     name = "oxygen demand" if kind == "demand" else kind
     with pytest.raises(BalanceError, match=rf"it lacks -?[\d.e-]+ of the {name}; try") as error:
-        balance.refuse(scene, pore, ledger(scene, **{kind: 1.02 * limit}))
+        balance.refuse(Limits.of(scene), pore, ledger(scene, **{kind: 1.02 * limit}))
     assert ("lacks -" in str(error.value)) == (sign < 0)
 
 
 def test_the_demand_of_a_longer_update_may_be_off_by_its_square():
     """A step twice as long may err four times as much."""
     scene, _ = base("updates")
-    one, two = (balance.accepted_demand(scene, replace(ledger(scene), end=end)) - 1.1e-6 for end in (0.2, 0.4))
+    limits = Limits.of(scene)
+    one, two = (balance.accepted_demand(limits, replace(ledger(scene), end=end)) - 1.1e-6 for end in (0.2, 0.4))
     assert two == pytest.approx(4 * one, rel=0.01)
 
 
@@ -92,10 +93,10 @@ def test_a_stated_defect_lets_no_other_one_pass(changes, kind):
     """[E4] excuses the substrates only, [E8] the biomass only."""
     scene, pore = base("updates", *changes)
     excused = {"acceptor", "donor"} if kind != "biomass" else {"biomass"}
-    balance.refuse(scene, pore, ledger(scene, **{kind: 0.03}))
+    balance.refuse(Limits.of(scene), pore, ledger(scene, **{kind: 0.03}))
     for other in {"acceptor", "donor", "biomass", "demand"} - excused:
         with pytest.raises(BalanceError):
-            balance.refuse(scene, pore, ledger(scene, **{kind: 0.03, other: 0.03}))
+            balance.refuse(Limits.of(scene), pore, ledger(scene, **{kind: 0.03, other: 0.03}))
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), -float("inf")])
@@ -103,7 +104,7 @@ def test_a_stated_defect_lets_no_other_one_pass(changes, kind):
 def test_a_non_finite_ledger_is_refused(field, value):
     scene, pore = base("midpoint")
     with pytest.raises(BalanceError):
-        balance.refuse(scene, pore, replace(ledger(scene), **{field: value}))
+        balance.refuse(Limits.of(scene), pore, replace(ledger(scene), **{field: value}))
 
 
 def test_counts_in_the_record_include_every_step(tmp_path):

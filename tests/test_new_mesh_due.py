@@ -8,7 +8,7 @@ from repro import load_scene
 from repro.fem import sizing
 from repro.fem.outline import TOP
 from repro.model import mesh_motion, remeshing
-from repro.model.pore import seeded, sized
+from repro.model.pore import Meshing, seeded, sized
 from repro.model.remeshing import moved_mesh
 from tests.strategies import EVERY_ORDER, coarse_base
 
@@ -78,7 +78,7 @@ def criteria(scene, pore, expanded):
 def test_a_new_mesh_is_due_if_one_criterion_requires_it(change, criterion, kind):
     first = grown_seed(kind)
     scene, expanded = change(*first)
-    assert (moved_mesh(scene, first[1], expanded) is None) == (criterion is not None)
+    assert (moved_mesh(Meshing.of(scene), first[1], expanded) is None) == (criterion is not None)
     due = [name for name, is_due in criteria(scene, first[1], expanded).items() if is_due]
     assert due == [*filter(None, [criterion])]
 
@@ -92,5 +92,5 @@ def test_a_mesh_moves_by_the_scenes_constants_unless_it_is_too_coarse(order):
     coordinates = pore.mesh.points.copy()
     coordinates[pore.mesh.body] *= 1.001
     expected = mesh_motion.move(pore.mesh, coordinates[pore.mesh.body], compressibility=3.0, stabilisation=40.0)
-    assert np.array_equal(remeshing.moved_mesh(coarse, pore, pore.moved(coordinates)).points, expected)
+    assert np.array_equal(remeshing.moved_mesh(Meshing.of(coarse), pore, pore.moved(coordinates)).points, expected)
     assert remeshing.moved_mesh(replace(coarse, numerics=replace(coarse.numerics, refinement=1.8)), pore, pore) is None

@@ -77,7 +77,8 @@ def test_the_force_on_the_aggregate_comes_through_every_section_of_the_fluid(int
     force = -np.einsum("tq,tqik,tqk->i", space.gradients_at.dx[wet], stress[wet], slope[wet])
     pascals = (drive.density * 1e-3) * (drive.gravity * 1e-6 / 3600**2) * 1e-6
     expected = pascals / (scene.growth.shear_modulus * 1e6) * force
-    forces = traction.forces(scene, traction.surroundings(scene, state, state), state).sum(axis=0)
+    fluid = traction.Fluid.of(scene)
+    forces = traction.forces(fluid, traction.surroundings(fluid.meshing, state, state), state).sum(axis=0)
     assert np.abs(forces).max() > 0 and forces == pytest.approx(expected, rel=1e-8, abs=1e-8 * np.abs(expected).max())
 
 

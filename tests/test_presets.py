@@ -52,7 +52,7 @@ def test_rates_are_carried_back_from_a_new_mesh(order, straight):
     start = pore.seeded(scene_of_order)
     points = start.mesh.with_middles(start.mesh.points[: start.mesh.corners]) if straight else start.mesh.points
     half = start.moved(points * [1.1, 1.1])
-    remeshed, _ = remeshing.remesh(scene_of_order, start, half, 0.0)
+    remeshed, _ = remeshing.remesh(remeshing.Remeshing.of(scene_of_order), start, half, 0.0)
     (x, y), (u, v) = reaction_points(remeshed.space), reaction_points(half.space)
     accepted = 1e-6 if straight or order == 1 else 0.01 * 88
     for rates, expected, bound in ((Rates(2 * x + y, 3 - y), (2 * u + v, 3 - v), accepted),

@@ -45,7 +45,7 @@ def ragged(seed):
 
 
 def head_loss(scene_of_outline):
-    return pore.solve_flow(scene_of_outline, pore.seeded(scene_of_outline).space).head_loss
+    return pore.solve(scene_of_outline, pore.seeded(scene_of_outline)).flow.head_loss
 
 
 def test_a_spiked_outline_is_the_same_in_every_preset():

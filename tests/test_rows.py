@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from repro import results
-from repro.march.loop import Ledger, Report
+from repro.march.balance import Ledger
+from repro.march.loop import Report
 from repro.model import transport
 from repro.model.pore import Solved, seeded, solve
 from repro.scene import load_scene

@@ -82,7 +82,7 @@ def test_the_mesher_gets_the_sizes_of_the_scene():
             "numerics.gradation=0.2", "numerics.contact_elements=4"]
     outline = json.dumps([["-5 um", "0 um"], ["0 um", "4 um"], ["5 um", "0 um"]])
     for seed, middle in (('position="3 um"', 3.0), (f"outline={outline}", None)):
-        sizes = pore.sized(load_scene("base", [*changes, f"aggregate={{{seed}}}"]), 2.0)
+        sizes = replace(pore.sized(load_scene("base", [*changes, f"aggregate={{{seed}}}"])), front=2.0)
         assert sizes == Sizing(80.0, 0.7, 0.5, 0.2, 2.0, 0.125, middle)
 
 

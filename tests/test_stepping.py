@@ -20,6 +20,7 @@ from repro.march.simulation import simulate
 from repro.march.step_control import EXCESS, StepControl, exceeds_tolerance
 from repro.model import contact, pore
 from repro.model.pore import solve
+from repro.model.stages import Stages
 from repro.scene import load_scene
 from tests.strategies import EVERY_ORDER, ORDERS, coarse_base, scene
 from tests.test_state import alike
@@ -36,7 +37,7 @@ def base(*changes):
     (0.001, 0.2 / 2**13), (0.01, 0.2 / 2**9), (1.0, 0.025), (4.79, 0.1), (4.8, 0.2), (19.4, 0.8), (45.0, 1.6)])
 def test_a_run_without_times_has_about_25_rows_at_round_times(end, spacing):
     """The last row is at the end of the run."""
-    rows = stepping.rows(base(f'growth.end="{end} h"'))
+    rows = stepping.rows(base(f'growth.end="{end} h"').growth)
     assert 24 <= len(rows) <= 49 and rows[-1] == end and rows[0] == pytest.approx(spacing, abs=1e-9)
     assert np.diff(rows[:-1]) == pytest.approx(spacing, abs=2e-9) and 0 < rows[-1] - rows[-2] <= spacing * 1.0001
 
@@ -89,8 +90,8 @@ def test_rows_within_steps_are_of_second_order():
     state = replace(state, concentrations=solved.concentrations)
     differences = []
     for hours in (1.0, 0.5, 0.25):
-        row = midpoint.attempt(scene, state, solved, hours).step.within(0.37 * hours)
-        shorter = midpoint.attempt(scene, state, solved, 0.37 * hours).step.pore
+        row = midpoint.attempt(Stages.of(scene), state, solved, hours).step.within(0.37 * hours)
+        shorter = midpoint.attempt(Stages.of(scene), state, solved, 0.37 * hours).step.pore
         differences.append(numbers(row.pore, row.solved) - numbers(shorter, pore.solve(scene, shorter)))
     assert np.abs(np.log2(np.divide(differences[:-1], differences[1:])) - 3).max() < 0.35
 
@@ -109,10 +110,10 @@ def test_a_failing_step_is_halved_until_it_succeeds(monkeypatch):
         tried.append(duration)
         if duration > 0.02:
             raise GrowthError("too long")
-        return Attempt(stepping.StepResult(state, None, None, False, 0), 1e-9, None)
+        return Attempt(stepping.StepResult(state, None, None, False, 0, None), 1e-9, None)
 
     monkeypatch.setattr(midpoint, "attempt", attempt)
-    result, _, after = stepping._advance(scene, state, None, step_control.StepControl(0.2))
+    result, _, after = stepping._advance(Stages.of(scene), state, None, step_control.StepControl(0.2))
     assert tried == [0.2, 0.1, 0.05, 0.025, 0.0125]
     assert result.pore.time == 0.0125 and after.length == pytest.approx(step_control.FASTER * 0.0125)
 
@@ -164,7 +165,7 @@ def test_a_film_too_thin_from_the_start_closes(order):
                                        ("3e-7 h", "1e-6 h")])
 def test_rows_of_very_short_runs_do_not_coincide(end, step):
     scene = base(f'growth.end="{end}"', f'growth.time_step="{step}"')
-    rows = stepping.rows(scene)
+    rows = stepping.rows(scene.growth)
     assert bool(rows) == (scene.growth.end > 1e-9) and all(np.diff((0.0, *rows)) >= 0.99e-9)
 
 
@@ -216,9 +217,9 @@ def test_a_step_grows_as_much_on_a_new_mesh_half_way():
     scene, pore = coarse_base(2, 'substrates.donor.supply=[["0 h", "4 mg/L"], ["4 h", "0.4 mg/L"]]',
                       "substrates.donor.interpolation=linear")
     solved = solve(scene, pore)
-    first = updates.compute_rates(scene, pore, solved.concentrations)
+    first = Stages.of(scene).rates(pore, solved)
     numerics = [replace(scene.numerics, refinement=part) for part in (0.3, 0.9)]
-    same_mesh, new_mesh = (midpoint.solve_halfway(replace(scene, numerics=each), pore, solved, first, 4.0,
+    same_mesh, new_mesh = (midpoint.solve_halfway(Stages.of(replace(scene, numerics=each)), pore, solved, first, 4.0,
                                                   contact.PATIENT) for each in numerics)
     assert new_mesh.produced == pytest.approx(same_mesh.produced, rel=1e-2)
     assert len(new_mesh.solved.flow.velocity) > 2 * len(same_mesh.solved.flow.velocity)
@@ -237,7 +238,8 @@ def test_an_update_under_a_table_starts_from_gears_concentrations(order):
     solved = solve(scene, pore)
     half_way = updates._solve_midway(scene, pore, solved, 0.2)
     assert half_way.concentrations is solved.concentrations and half_way.problem.both[0].supply == pytest.approx(11.0)
-    risen = updates.step(scene, pore, solved, 0.2).ledger.stored[0] / (scene.pore.width * np.ptp(pore.mesh.ends))
+    stored = updates.step(Stages.of(scene), pore, solved, 0.2).ledger.stored[0]
+    risen = stored / (scene.pore.width * np.ptp(pore.mesh.ends))
     assert risen == pytest.approx(2.0, rel=0.05)
 
 

@@ -21,4 +21,4 @@ def test_a_shape_without_equilibrium_under_the_forces_is_refused(monkeypatch, de
                                "growth.fluid_forces=included", f"flow.density={density}"])
     seed = pore.seeded(scene)
     with pytest.raises(error, match=message):
-        contact.expand(scene, seed, 1.1 * seed.theta)
+        contact.expand(contact.Mechanics.of(scene), seed, 1.1 * seed.theta)

@@ -12,6 +12,7 @@ from repro.errors import TransferError
 from repro.fem import transfer
 from repro.model import biomass, pore, remeshing
 from repro.model.pore import solve
+from repro.model.remeshing import Remeshing
 from repro.model.transport import OVERSHOOT, UNRESOLVED, Concentrations
 from repro.scene import load_scene
 from tests.strategies import EVERY_ORDER, ORDERS, coarse_base, scene, scenes, share
@@ -100,7 +101,7 @@ def test_repeated_remeshes_keep_the_biomass(scene, seed, refinements):
     for refinement in refinements:
         finer = replace(scene, numerics=replace(scene.numerics, refinement=refinement))
         speed = solved.flow.mean_velocity if solved.flow else 0.0
-        remeshed, _ = remeshing.remesh(finer, previous, previous, speed)
+        remeshed, _ = remeshing.remesh(Remeshing.of(finer), previous, previous, speed)
         assert remeshed.outline.area == pytest.approx(previous.outline.area, rel=1e-12)
         check_biomass(scene, previous, remeshed)
         check_substrates(scene, remeshed)
@@ -158,7 +159,7 @@ def test_water_beyond_the_old_mesh_has_the_supply_of_its_time(speed, expected):
     old = pore.seeded(load_scene(tables))
     along = old.mesh.points[:, 0]
     late = replace(old, time=6.0, concentrations=Concentrations(4 + 0.02 * along, 3 - 0.01 * along))
-    new, _ = remeshing.remesh(full_pore, late, late, speed)
+    new, _ = remeshing.remesh(Remeshing.of(full_pore), late, late, speed)
     x, (first, last) = new.mesh.points[:, 0], old.mesh.ends
     within, far = (x > first) & (x < last), x < first - 50
     for field, supply, start, slope in ((new.concentrations.acceptor, expected, 4, 0.02),
@@ -189,7 +190,7 @@ def test_every_transferred_amount_keeps_its_sum(order):
     pressure = pore.mesh.points[: pore.mesh.corners] @ [0.02, 0.03] + 1
     for inert, *amounts in (rough, [patchy, patchy])[:order]:
         before = replace(pore, active=full - inert, inert=inert, pressure=pressure)
-        after, carried = remeshing.remesh(finer, pore, before, 0.0, tuple(amounts))
+        after, carried = remeshing.remesh(remeshing.Remeshing.of(finer), pore, before, 0.0, tuple(amounts))
         inside = after.mesh.topology.body_corners
         assert after.pressure[inside] == pytest.approx(after.mesh.points[inside] @ [0.02, 0.03] + 1, abs=1e-2)
         sums = [amount.sum() for amount in (after.inert, *carried)]

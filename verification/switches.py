@@ -16,8 +16,9 @@ from scipy.interpolate import CubicSpline
 from repro.fem.outline import Outline
 from repro.march import updates
 from repro.march.loop import Report
-from repro.model import mesh_motion, pore, remeshing
+from repro.model import mesh_motion, pore
 from repro.model.pore import Pore, Solved
+from repro.model.stages import Stages
 from repro.results import row
 from repro.scene import Scene
 from verification.claims import runs
@@ -209,12 +210,12 @@ def course(run: Run, step: Callable[[Scene, Pore, Solved, float], Pore], bulge: 
 
 def step_of_paper(scene: Scene, previous: Pore, solved: Solved, hours: float) -> Pore:
     """The pore after one step."""
-    return updates.step(scene, previous, solved, hours).pore
+    return updates.step(Stages.of(scene), previous, solved, hours).pore
 
 
 def restarting_as_j(scene: Scene, previous: Pore, solved: Solved, hours: float) -> Pore:
     """The pore after one step; after a remesh theta = J [E7]."""
-    update = updates.step(scene, previous, solved, hours)
+    update = updates.step(Stages.of(scene), previous, solved, hours)
     after = update.pore
     if update.remeshed:
         return replace(after, theta=after.body.strained(after.mesh.points[after.mesh.body]).J)
@@ -223,10 +224,10 @@ def restarting_as_j(scene: Scene, previous: Pore, solved: Solved, hours: float) 
 
 def explicit(scene: Scene, previous: Pore, solved: Solved, hours: float) -> Pore:
     """The pore after one step with dX_A = dt F_3 and dX_I = dt F_4 at the rates of its beginning, (28)-(29) [E16]."""
-    rates = updates.compute_rates(scene, previous, solved.concentrations)
+    rates = Stages.of(scene).rates(previous, solved)
     grown = replace(previous, active=previous.active + previous.active * hours * rates.growth,
                     inert=previous.inert + previous.active * hours * rates.remains)
-    return remeshing.new_mesh(scene, previous, shape_of(scene, previous, grown), solved.flow.mean_velocity)[0]
+    return Stages.of(scene).new_mesh(previous, shape_of(scene, previous, grown), solved)[0]
 
 
 #: The seed's radius is R (1 + BULGE cos 3 phi) or R (1 - BULGE cos 3 phi): area as before to second order, one tip
@@ -238,5 +239,5 @@ def uneven(scene: Scene, bulge: float) -> Pore:
     """The pore at t = 0 with a seed of radius R (1 + bulge cos 3 phi), phi from downstream."""
     seed = pore.initial_outline(scene)
     points = seed.points * (1 + bulge * np.cos(3 * np.arctan2(*seed.points.T[::-1])))[:, None]
-    pore_parts = pore.generate(scene, replace(seed, points=points, origin=points.copy()))
+    pore_parts = pore.Meshing.of(scene).generate(replace(seed, points=points, origin=points.copy()))
     return aggregates.seed_on(*pore_parts, scene.numerics.order)

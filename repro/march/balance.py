@@ -1,4 +1,4 @@
-"""Defects of the mass balances of a step, and the check that ends a run.
+"""Mass balances of a step, their defects, and the check that ends a run.
 
 Defects are relative. A positive defect means that too much was supplied or made. If the amounts
 are of the size of round-off, the defect is relative to a floor: round-off divided by LARGEST.
@@ -8,7 +8,7 @@ error of the code or of its use.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,10 +16,7 @@ from repro.errors import BalanceError
 from repro.model.pore import Pore
 from repro.model.transport import Problem
 from repro.model.uptake_law import uptake_law
-from repro.scene import Kinetics, Scene, needed
-
-if TYPE_CHECKING:
-    from repro.march.loop import Ledger
+from repro.scene import Kinetics, Numerics, Scene, Substrates, at_largest
 
 #: Largest accepted defect.
 LARGEST = 1e-6
@@ -30,6 +27,40 @@ GEAR = 1e-3
 #: blocks of 128 in 8 lanes errs by (16 + log2(n / 128)) eps at most, less than 40 eps for any mesh;
 #: a difference has two sums of X_A and two of X_I, and so errs by up to 4e-14.
 ROUND_OFF = 1e-13
+
+
+@dataclass(frozen=True)
+class Ledger:
+    """Mass balance of one step per unit depth (um2 mg/L = 1e-12 g/m): substrates, then biomass."""
+
+    start: float
+    end: float
+    supplied: tuple[float, float]
+    out: tuple[float, float]
+    consumed: tuple[float, float]
+    stored: tuple[float, float]
+    biomass_before: float
+    biomass_made: float
+    biomass_after: float
+
+
+@dataclass(frozen=True, eq=False)
+class Limits:
+    """What the accepted defects of a run depend on.
+
+    width: um, of the pore; substrates: with their largest supplies.
+    """
+
+    width: float
+    substrates: Substrates
+    kinetics: Kinetics
+    numerics: Numerics
+
+    @classmethod
+    def of(cls, scene: Scene) -> Limits:
+        """The limits of a scene with growth."""
+        substrates, kinetics, _ = scene.growing
+        return cls(scene.pore.width, at_largest(substrates), kinetics, scene.numerics)
 
 
 def defect(supplied: float, out: float, consumed: float, stored: float = 0.0,
@@ -81,24 +112,23 @@ def oxygen_demand(kinetics: Kinetics, ledger: Ledger) -> float:
     return (ledger.biomass_made - grown + decayed) / demand_scale(kinetics, ledger)
 
 
-def refuse(scene: Scene, after: Pore, ledger: Ledger) -> None:
+def refuse(limits: Limits, after: Pore, ledger: Ledger) -> None:
     """Raise BalanceError if a defect of the step that ends in ``after`` is larger than LARGEST.
 
     Some options have known defects, which are reported and not refused: the substrates with
     numerics.inlet = "mean" [E4] and the biomass with numerics.transfer = "linear" [E8]. The oxygen
     demand has the limit of :func:`accepted_demand`.
     """
-    numerics = scene.numerics
+    numerics = limits.numerics
     defects = {}
     if numerics.inlet != "mean":
         for k, name in enumerate(("acceptor", "donor")):
-            defects[name] = substrate(ledger, k, _exchanged(scene, after, ledger, k))
+            defects[name] = substrate(ledger, k, _exchanged(limits, after, ledger, k))
     if numerics.transfer != "linear":
         defects["biomass"] = biomass(ledger)
     wrong = {name: part for name, part in defects.items() if not abs(part) <= LARGEST}
-    kinetics = needed(scene.kinetics, "[kinetics]")
-    demand = oxygen_demand(kinetics, ledger)
-    if not abs(demand) <= accepted_demand(scene, ledger):
+    demand = oxygen_demand(limits.kinetics, ledger)
+    if not abs(demand) <= accepted_demand(limits, ledger):
         wrong["oxygen demand"] = demand
     if wrong:
         message = ", ".join(f"{part:.2g} of the {name}" for name, part in wrong.items())
@@ -108,7 +138,7 @@ def refuse(scene: Scene, after: Pore, ledger: Ledger) -> None:
                            "growth.time_step or a larger numerics.refinement, and report it")
 
 
-def accepted_demand(scene: Scene, ledger: Ledger) -> float:
+def accepted_demand(limits: Limits, ledger: Ledger) -> float:
     """Largest accepted defect of the oxygen demand in a step.
 
     The midpoint rule closes to round-off. In the paper's updates the trapezoidal rule errs by (dt
@@ -118,22 +148,22 @@ def accepted_demand(scene: Scene, ledger: Ledger) -> float:
     most GEAR supply / K. The accepted defect is this part, and at least GEAR, of the turnover at
     the fastest rate (away from exhaustion at most 4e-4 is measured).
     """
-    if scene.numerics.time == "midpoint":
+    if limits.numerics.time == "midpoint":
         return LARGEST
-    kinetics = needed(scene.kinetics, "[kinetics]")
+    kinetics = limits.kinetics
     scale = demand_scale(kinetics, ledger)
     fastest = (kinetics.maximum_utilization_rate * kinetics.yield_coefficient
                + kinetics.decay_coefficient)
     part = fastest * (ledger.end - ledger.start)
-    if scene.numerics.transport == "gear":
-        return LARGEST + GEAR * _steepness(scene) * part * ledger.biomass_before / scale
+    if limits.numerics.transport == "gear":
+        steepness = _steepness(limits.substrates, kinetics)
+        return LARGEST + GEAR * steepness * part * ledger.biomass_before / scale
     return LARGEST + part**2 / 12 * _turned_over(kinetics, ledger) / scale
 
 
-def _steepness(scene: Scene) -> float:
+def _steepness(both: Substrates, kinetics: Kinetics) -> float:
     """Change of m_A + m_D for a change of both concentrations by their supplies; at least one."""
-    both = needed(scene.substrates, "[substrates]")
-    laws = uptake_law(both, needed(scene.kinetics, "[kinetics]"))
+    laws = uptake_law(both, kinetics)
     supplies = both.acceptor.supply, both.donor.supply
     return max(1.0, sum(law.proportional(supply) for law, supply in zip(laws, supplies)))
 
@@ -146,16 +176,16 @@ def _turned_over(kinetics: Kinetics, ledger: Ledger) -> float:
     return acceptor / demand + abs(ledger.biomass_made) + of_donor * donor
 
 
-def _exchanged(scene: Scene, after: Pore, ledger: Ledger, k: int) -> float:
+def _exchanged(limits: Limits, after: Pore, ledger: Ledger, k: int) -> float:
     """Amount exchanged other than by flow, um2 mg/L, to which the defect is compared.
 
     It is the diffusion in a step, and with Gear's method at least the content of the mesh.
     """
-    both = needed(scene.substrates, "[substrates]")
+    both = limits.substrates
     kind = (both.acceptor, both.donor)[k]
     fastest = max(kind.diffusivity, kind.diffusivity_in_aggregate)
     exchanged = (ledger.end - ledger.start) * fastest * kind.supply
-    if scene.numerics.transport != "gear":
+    if limits.numerics.transport != "gear":
         return exchanged
     first, last = after.mesh.ends
-    return max(exchanged, (last - first) * scene.pore.width * kind.supply)
+    return max(exchanged, (last - first) * limits.width * kind.supply)

@@ -13,7 +13,6 @@ from contextlib import contextmanager
 from repro.errors import GrowthError, MeshError, RunEnd
 from repro.model.pore import Pore
 from repro.model.surface import BIOT, CREASE, surface
-from repro.scene import Scene, needed
 
 #: The surface folds if no equilibrium exists and the last stretch is below this. Meshes of two
 #: presets and refinements stop at 0.64 to 0.66 (docs/design.md): a crease begins within a step.
@@ -71,10 +70,12 @@ def _message(pore: Pore, time: float) -> str:
             'growth.new_biomass = "stress_free" does')
 
 
-def refuse_density(scene: Scene, pore: Pore) -> None:
-    """Raise GrowthError if the density at a node is out of bounds: J = theta does not hold."""
-    maximum = needed(scene.kinetics, "[kinetics]").maximum_density
-    _, least, largest = pore.composition(maximum)
+def refuse_density(pore: Pore, maximum_density: float) -> None:
+    """Raise GrowthError if the density at a node is out of bounds: J = theta does not hold.
+
+    maximum_density: X_m, mg/L.
+    """
+    _, least, largest = pore.composition(maximum_density)
     low, high = DENSITIES
     if least < low or largest > high:
         raise GrowthError(f"the density of biomass comes to {least:.2g} to {largest:.2g} X_m, out "

@@ -21,12 +21,15 @@ from repro.errors import RunEnd, SimulationError, StageError
 from repro.fem.brief import brief
 from repro.fem.sizing import ACROSS_PORE
 from repro.march import balance
+from repro.march.balance import Ledger, Limits
 from repro.march.folding import folding, refuse_density
 from repro.march.step_control import StepControl
 from repro.model.advice import with_advice
 from repro.model.pore import Pore, Solved, seeded
 from repro.model.remeshing import solve_graded
-from repro.scene import Scene, needed
+from repro.model.stages import Stages
+from repro.scene import Growth, Output, Scene
+from repro.scene import Pore as Channel
 
 
 class Dataclass(Protocol):
@@ -39,21 +42,6 @@ Data = TypeVar("Data", bound=Dataclass)
 
 #: Two times (h) this close are the same time.
 SAME_TIME = 1e-9
-
-
-@dataclass(frozen=True)
-class Ledger:
-    """Mass balance of one step per unit depth (um2 mg/L = 1e-12 g/m): substrates, then biomass."""
-
-    start: float
-    end: float
-    supplied: tuple[float, float]
-    out: tuple[float, float]
-    consumed: tuple[float, float]
-    stored: tuple[float, float]
-    biomass_before: float
-    biomass_made: float
-    biomass_after: float
 
 
 @brief
@@ -107,7 +95,7 @@ class StepResult:
     ledger: Ledger
     remeshed: bool
     iterations: int
-    within: Callable[[float], InterpolatedState] | None = None
+    within: Callable[[float], InterpolatedState]
 
 
 @brief
@@ -137,16 +125,16 @@ class RestartState:
 class Scheme:
     """Time-stepping scheme.
 
-    advance(scene, pore, solved, step_control): makes one step, and returns its StepResult, the
+    advance(stages, pore, solved, step_control): makes one step, and returns its StepResult, the
     solution after it and the step control of the next one. The length of the step does not depend
     on ``growth.end`` or on the requested rows; a step that passes ``growth.end`` is cut there.
-    rows(scene): times (h) of rows besides the ends of steps, without ``output.times``;
-    first: length of the first attempted step, as a multiple of growth.time_step; ends(scene): times
-    (h) at which steps end, if known in advance.
+    rows(growth): times (h) of rows besides the ends of steps, without ``output.times``; first:
+    length of the first attempted step, as a multiple of growth.time_step; ends(scene): times (h) at
+    which steps end, if known in advance.
     """
 
-    advance: Callable[[Scene, Pore, Solved, StepControl], tuple[StepResult, Solved, StepControl]]
-    rows: Callable[[Scene], tuple[float, ...]] = lambda _: ()
+    advance: Callable[[Stages, Pore, Solved, StepControl], tuple[StepResult, Solved, StepControl]]
+    rows: Callable[[Growth], tuple[float, ...]] = lambda _: ()
     first: float = 1.0
     ends: Callable[[Scene], Iterable[float]] = lambda _: ()
 
@@ -184,25 +172,33 @@ def steps(scene: Scene, scheme: Scheme,
         refined, solved = solve_graded(scene, state.pore)
         if refined is not state.pore:
             state = replace(state, pore=contiguous(refined))
-    pore = replace(state.pore, concentrations=solved.concentrations)
     if first:
+        pore = replace(state.pore, concentrations=solved.concentrations)
         yield state, Report(pore, solved, None, (), 0, newton_counts(solved))
     if scene.growth:
-        refuse_end(scene, pore, 1.0 if pore.time > 0 else 0.1)
-    rows = row_times(scene, scheme)
-    largest = scene.largest
-    end = scene.growth.end if scene.growth else 0.0
-    while end - pore.time > SAME_TIME:
+        yield from _grow(Stages.of(scene), scheme, state, solved)
+
+
+def _grow(stages: Stages, scheme: Scheme, state: RestartState,
+          solved: Solved) -> Iterator[tuple[RestartState, Report | None]]:
+    """Yield the state after every step from ``state`` on, whose solution is ``solved``."""
+    scene = stages.scene
+    density = stages.remeshing.maximum_density
+    pore = replace(state.pore, concentrations=solved.concentrations)
+    refuse_end(scene.pore, pore, 1.0 if pore.time > 0 else 0.1)
+    rows = row_times(scheme, stages.growth, scene.output)
+    limits = Limits.of(scene)
+    while stages.growth.end - pore.time > SAME_TIME:
         try:
             with stopping(pore.time), folding(pore, state.time):
-                step, after, control = scheme.advance(scene, pore, solved, state.step_control)
-                balance.refuse(largest, step.pore, step.ledger)
-                refuse_density(scene, step.pore)
+                step, after, control = scheme.advance(stages, pore, solved, state.step_control)
+                balance.refuse(limits, step.pore, step.ledger)
+                refuse_density(step.pore, density)
             for time in rows:
                 if state.time + SAME_TIME < time < step.pore.time - SAME_TIME:
                     with stopping(pore.time), folding(pore, state.time):
-                        inner = needed(step.within, "a step's interior")(time)
-                        refuse_density(scene, inner.pore)
+                        inner = step.within(time)
+                        refuse_density(inner.pore, density)
                     report = make_report(state, inner.pore, inner.solved, inner.before)
                     state = mark_reported(state, time)
                     yield state, report
@@ -214,20 +210,20 @@ def steps(scene: Scene, scheme: Scheme,
         state = _after_step(state, step, solved, control)
         pore = replace(state.pore, concentrations=solved.concentrations)
         row = _row_time_at(rows, pore.time)
-        if scene.output.times is None or row is not None or pore_end(scene, pore, 1.0):
+        if scene.output.times is None or row is not None or pore_end(scene.pore, pore, 1.0):
             reported = pore if row is None else replace(pore, time=row)
             yield mark_reported(state, pore.time), make_report(state, reported, solved, step.before)
             state = mark_reported(state, pore.time)
         else:
             yield state, None
-        refuse_end(scene, pore, 1.0)
+        refuse_end(scene.pore, pore, 1.0)
 
 
-def row_times(scene: Scene, scheme: Scheme) -> tuple[float, ...]:
+def row_times(scheme: Scheme, growth: Growth | None, output: Output) -> tuple[float, ...]:
     """Return the times (h) of rows after t = 0, ascending: ``output.times``, or the scheme's."""
-    if scene.growth is None:
+    if growth is None:
         return ()
-    return scheme.rows(scene) if scene.output.times is None else scene.output.times
+    return scheme.rows(growth) if output.times is None else output.times
 
 
 def _row_time_at(rows: tuple[float, ...], time: float) -> float | None:
@@ -299,6 +295,11 @@ def stopping(time: float) -> Iterator[None]:
                               "try a smaller numerics.refinement") from error
 
 
+def time_before_end(previous: Pore, duration: float) -> float:
+    """Time (h) just before the end of a step, before a jump of the scene's tables there."""
+    return max(previous.time, previous.time + duration - SAME_TIME)
+
+
 def newton_counts(solved: Solved) -> dict[str, int]:
     """Newton iterations by stage."""
     return {"transport": solved.concentrations.iterations if solved.concentrations else 0}
@@ -312,21 +313,21 @@ def sum_counts(*counts: dict[str, int]) -> dict[str, int]:
     return dict(sorted(total.items()))
 
 
-def pore_end(scene: Scene, pore: Pore, elements: float) -> str:
+def pore_end(channel: Channel, pore: Pore, elements: float) -> str:
     """Say which end of the pore the aggregate has reached; empty if it has reached none.
 
     elements: distance from an end that counts as reached, in elements of the fluid.
     """
     outline = pore.boundary
-    end = scene.pore.length / 2
-    near = elements * scene.pore.width / ACROSS_PORE
+    end = channel.length / 2
+    near = elements * channel.width / ACROSS_PORE
     if outline.upstream < near - end or outline.downstream > end - near:
         side = "upstream" if outline.upstream < near - end else "downstream"
         return f"the aggregate reaches the pore's {side} end"
     return ""
 
 
-def refuse_end(scene: Scene, pore: Pore, elements: float) -> None:
+def refuse_end(channel: Channel, pore: Pore, elements: float) -> None:
     """Raise PoreEnd if the aggregate has reached an end of the pore (see :func:`pore_end`)."""
-    if message := pore_end(scene, pore, elements):
+    if message := pore_end(channel, pore, elements):
         raise PoreEnd(f"{message} at t = {pore.time:g} h")

@@ -21,17 +21,17 @@ import numpy as np
 
 from repro.fem import transfer
 from repro.fem.space import Space
+from repro.march.balance import Ledger
 from repro.march.folding import refuse_density, refuse_fold
-from repro.march.loop import InterpolatedState, Ledger, PoreEnd, StepResult, pore_end
-from repro.march.updates import compute_rates, compute_theta, grown, time_before_end
+from repro.march.loop import InterpolatedState, PoreEnd, StepResult, pore_end, time_before_end
 from repro.model import biomass, contact, pore, remeshing
 from repro.model.biomass import Rates
 from repro.model.contact import Expansion
 from repro.model.contact_lines import FirstContact, SearchOptions
-from repro.model.gear import Flows
+from repro.model.growing import grow
 from repro.model.pore import Pore, Solved
-from repro.model.transport import Concentrations
-from repro.scene import Scene, needed
+from repro.model.stages import Stages
+from repro.model.transport import Concentrations, Flows, Fluxes
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,85 +65,85 @@ class Halfway:
     produced: tuple[float, float]
 
 
-def attempt(scene: Scene, previous: Pore, solved: Solved, duration: float,
+def attempt(stages: Stages, previous: Pore, solved: Solved, duration: float,
             largest_change: float = np.inf, search: SearchOptions = contact.PATIENT) -> Attempt:
     """Attempt a step of ``duration`` (h).
 
     It succeeds if the rates change by at most ``largest_change`` (1/h) over its first half. Raises
     StageError if a stage fails.
     """
-    first = compute_rates(scene, previous, solved.concentrations)
-    gap = scene.pore.width - previous.boundary.thickness
+    first = stages.rates(previous, solved)
+    gap = stages.mechanics.width - previous.boundary.thickness
     try:
-        half = solve_halfway(scene, previous, solved, first, duration, search)
+        half = solve_halfway(stages, previous, solved, first, duration, search)
     except FirstContact as early:
         return Attempt(None, 0.0, (gap, gap - 2 * (gap - early.gap)))
     change = biomass.change(first, half.rates, previous.space.reaction.dx)
     if change > largest_change:
         return Attempt(None, change)
-    after = _match_production(previous, grown(previous, half.rates, duration), half.produced)
+    after = _match_production(previous, grow(previous, half.rates, duration), half.produced)
     after = replace(after, time=time_before_end(previous, duration))
     try:
-        expansion = _expand(scene, previous, after, half, 1.0, search)
+        expansion = _expand(stages, previous, after, half, 1.0, search)
     except FirstContact as early:
         return Attempt(None, 0.0, (gap, early.gap))
     expanded = expansion.pore
-    if leaves := pore_end(scene, expanded, 0.1):
+    if leaves := pore_end(stages.scene.pore, expanded, 0.1):
         raise PoreEnd(f"{leaves} in the step from t = {previous.time:g} h")
     refuse_fold(previous, expanded)
-    expanded = replace(expanded, concentrations=_extrapolate_substrates(solved, half.solved, 1.0))
-    new, remeshed = remeshing.new_mesh(scene, previous, expanded, _speed(solved))
-    refuse_density(scene, new)
-    ledger = Ledger(previous.time, previous.time + duration, *_flows(half.solved, duration),
-                    previous.mass, after.mass - previous.mass, new.mass)
-    inner = partial(interpolate, scene, previous, solved, half)
-    step = StepResult(new, (previous, solved), ledger, remeshed, expansion.iterations, inner)
+    expanded = replace(expanded, concentrations=_guess_substrates(solved, half, 1.0))
+    new, remeshed = stages.new_mesh(previous, expanded, solved)
+    refuse_density(new, stages.remeshing.maximum_density)
+    flows = _flows(half.solved.substrates.fluxes, duration)
+    ledger = Ledger(previous.time, previous.time + duration, *flows, previous.mass,
+                    after.mass - previous.mass, new.mass)
+    inner = partial(interpolate, stages, previous, solved, half)
+    step = StepResult(new, None, ledger, remeshed, expansion.iterations, inner)
     makes_contact = expanded.contact and not previous.contact
     return Attempt(step, change, (gap, expansion.gap) if makes_contact else None)
 
 
-def _expand(scene: Scene, previous: Pore, after: Pore, half: Halfway, part: float,
-              search: SearchOptions) -> Expansion:
+def _expand(stages: Stages, previous: Pore, after: Pore, half: Halfway, part: float,
+            search: SearchOptions) -> Expansion:
     """Equilibrium of the aggregate at a part of the step, starting from the extrapolated half step.
 
     Contact lines continue at their speed.
     """
     advances = {key: 2 * part * arcs for key, arcs in half.expansion.advances.items()}
-    return contact.expand(scene, after, compute_theta(scene, previous, after),
-                          _extrapolate_shape(previous, half.expansion, part),
-                          replace(search, advances=advances))
+    guess = _extrapolate_shape(previous, half.expansion, part)
+    return stages.expand(previous, after, guess, replace(search, advances=advances))
 
 
-def _flows(solved: Solved, duration: float) -> Flows:
+def _flows(fluxes: tuple[Fluxes, Fluxes], duration: float) -> Flows:
     """Integrate the fluxes of acceptor and donor over a step (h)."""
     acceptor, donor = ((duration * flux.supplied, duration * flux.out, duration * flux.consumed)
-                       for flux in needed(solved.fluxes, "[substrates]"))
+                       for flux in fluxes)
     supplied, out, consumed = zip(acceptor, donor)
     return Flows(supplied, out, consumed, stored=(0.0, 0.0))
 
 
-def solve_halfway(scene: Scene, previous: Pore, solved: Solved, first: Rates, duration: float,
-            search: SearchOptions) -> Halfway:
+def solve_halfway(stages: Stages, previous: Pore, solved: Solved, first: Rates, duration: float,
+                  search: SearchOptions) -> Halfway:
     """Solve in the shape after half of ``duration`` (h) with the rates at the start.
 
     If the moved mesh is not acceptable, a new one replaces it. Masses are carried to its points,
     and rates back to the points of the material.
     """
-    ahead = replace(grown(previous, first, duration / 2), time=previous.time + duration / 2)
-    expansion = contact.expand(scene, ahead, compute_theta(scene, previous, ahead),
-                               _scale_shape(previous, ahead), search)
+    ahead = replace(grow(previous, first, duration / 2), time=previous.time + duration / 2)
+    expansion = stages.expand(previous, ahead, _scale_shape(previous, ahead), search)
     shape = expansion.pore
-    mesh = remeshing.moved_mesh(scene, previous, shape)
+    mesh = remeshing.moved_mesh(stages.remeshing.meshing, previous, shape)
     if mesh is not None:
         middle = replace(previous, space=Space(mesh, previous.space.order), time=shape.time)
     else:
         amounts = tuple(expansion.amounts(amount, previous)
                         for amount in (previous.active, previous.inert))
-        middle, (active, inert) = remeshing.remesh(scene, previous, shape, _speed(solved), amounts)
+        middle, (active, inert) = remeshing.remesh(stages.remeshing, previous, shape,
+                                                   solved.mean_velocity, amounts)
         middle = replace(middle, active=active, inert=inert)
-    solution = pore.solve(scene, middle, duration)
-    rates = compute_rates(scene, middle, solution.concentrations)
-    after = grown(middle, rates, duration)
+    solution = pore.solve(stages.scene, middle, duration)
+    rates = stages.rates(middle, solution)
+    after = grow(middle, rates, duration)
     if mesh is None:
         rates = _carry_rates_back(middle, previous, expansion, rates)
     active_growth = float((after.active - middle.active).sum())
@@ -151,7 +151,7 @@ def solve_halfway(scene: Scene, previous: Pore, solved: Solved, first: Rates, du
     return Halfway(duration, first, expansion, solution, rates, (active_growth, inert_growth))
 
 
-def interpolate(scene: Scene, previous: Pore, solved: Solved, half: Halfway,
+def interpolate(stages: Stages, previous: Pore, solved: Solved, half: Halfway,
                 time: float) -> InterpolatedState:
     """Interpolate the pore to a time (h) within a step, and solve there.
 
@@ -160,16 +160,11 @@ def interpolate(scene: Scene, previous: Pore, solved: Solved, half: Halfway,
     part = (time - previous.time) / half.duration
     mean = Rates((1 - part) * half.first.growth + part * half.rates.growth,
                  (1 - part) * half.first.remains + part * half.rates.remains)
-    after = replace(grown(previous, mean, part * half.duration), time=time)
-    expanded = _expand(scene, previous, after, half, part, contact.PATIENT).pore
-    expanded = replace(expanded, concentrations=_extrapolate_substrates(solved, half.solved, part))
-    inner, _ = remeshing.new_mesh(scene, previous, expanded, _speed(solved))
-    return InterpolatedState(*remeshing.solve_graded(scene, inner))
-
-
-def _speed(solved: Solved) -> float:
-    """Mean velocity, um/h; zero without flow."""
-    return solved.flow.mean_velocity if solved.flow else 0.0
+    after = replace(grow(previous, mean, part * half.duration), time=time)
+    expanded = _expand(stages, previous, after, half, part, contact.PATIENT).pore
+    expanded = replace(expanded, concentrations=_guess_substrates(solved, half, part))
+    inner, _ = stages.new_mesh(previous, expanded, solved)
+    return InterpolatedState(*remeshing.solve_graded(stages.scene, inner))
 
 
 def _carry_rates_back(middle: Pore, previous: Pore, half: Expansion, rates: Rates) -> Rates:
@@ -198,14 +193,19 @@ def _match_production(previous: Pore, after: Pore, produced: tuple[float, float]
                    inert=after.inert + missing[1] * share)
 
 
-def _extrapolate_substrates(start: Solved, half: Solved, part: float) -> Concentrations:
-    """Initial guess of the substrates at a part of the step, extrapolated from its first half.
+def _guess_substrates(start: Solved, half: Halfway, part: float) -> Concentrations:
+    """Initial guess of the substrates at a part of the step."""
+    first = start.substrates.concentrations
+    return _extrapolate_substrates(first, half.solved.substrates.concentrations, part)
+
+
+def _extrapolate_substrates(first: Concentrations, second: Concentrations,
+                            part: float) -> Concentrations:
+    """Extrapolate concentrations to a part of the step, from its start and half way.
 
     If the extrapolation is negative anywhere, the guess is the solution half way. If the mesh has
     changed half way, the guess is the solution at the start.
     """
-    first = needed(start.concentrations, "[substrates]")
-    second = needed(half.concentrations, "[substrates]")
     if len(second.acceptor) != len(first.acceptor):
         return first
     acceptor = first.acceptor + 2 * part * (second.acceptor - first.acceptor)

@@ -94,7 +94,7 @@ def same_rows(one: Scene, other: Scene, time: float) -> bool:
 
 def row_times(scene: Scene) -> tuple[float, ...]:
     """Return the times (h) of rows after t = 0: :func:`repro.march.loop.row_times`."""
-    return loop.row_times(scene, _scheme(scene))
+    return loop.row_times(_scheme(scene), scene.growth, scene.output)
 
 
 def rows_within(scene: Scene) -> set[float]:

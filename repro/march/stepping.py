@@ -29,7 +29,8 @@ from repro.march.step_control import (
 from repro.model import remeshing
 from repro.model.contact_lines import SearchOptions
 from repro.model.pore import Pore, Solved
-from repro.scene import Scene, needed
+from repro.model.stages import Stages
+from repro.scene import Growth, needed
 
 #: Length of the first attempted step over growth.time_step.
 FIRST = 8.0
@@ -42,13 +43,12 @@ LEAST = 24
 LANDED = 0.999
 
 
-def rows(scene: Scene) -> tuple[float, ...]:
+def rows(growth: Growth) -> tuple[float, ...]:
     """Times (h) of rows besides the ends of steps: growth.end, and multiples of an interval.
 
     The interval is growth.time_step times a power of two (1/4, 1/2, 1, 2 ...), the largest one with
     at least LEAST rows.
     """
-    growth = needed(scene.growth, "[growth]")
     if growth.end <= SAME_TIME:
         return ()
     power = math.floor(math.log2(growth.end / (LEAST * growth.time_step)) + 1e-9)
@@ -57,43 +57,49 @@ def rows(scene: Scene) -> tuple[float, ...]:
     return (*(time for time in times if growth.end - time > SAME_TIME), growth.end)
 
 
-def _advance(scene: Scene, previous: Pore, solved: Solved,
+def _advance(stages: Stages, previous: Pore, solved: Solved,
              planned: StepControl) -> tuple[StepResult, Solved, StepControl]:
     """Advance one full step, or a step to growth.end if that lies within the full step.
 
     The length of the full step does not depend on growth.end or on the requested rows.
     """
-    step, after, control = _find_step(scene, previous, solved, planned)
-    if step.pore.time - needed(scene.growth, "[growth]").end > SAME_TIME:
-        return *_cut_step(scene, step), planned
-    return replace(step, before=None), after, control
+    start, step, after, control = _find_step(stages, previous, solved, planned)
+    if step.pore.time - stages.growth.end > SAME_TIME:
+        return *_cut_step(stages, *start, step), planned
+    return step, after, control
 
 
-def _cut_step(scene: Scene, passing: StepResult) -> tuple[StepResult, Solved]:
+def _cut_step(stages: Stages, previous: Pore, solved: Solved,
+              passing: StepResult) -> tuple[StepResult, Solved]:
     """Cut a step that passes growth.end: the step to growth.end, and the solution after it.
 
     Times within it are still interpolated in the step that passes growth.end.
     """
-    end = needed(scene.growth, "[growth]").end
-    previous, solved = needed(passing.before, "the start of a step")
+    end = stages.growth.end
     while True:
         try:
-            trial = midpoint.attempt(scene, previous, solved, end - previous.time)
+            trial = midpoint.attempt(stages, previous, solved, end - previous.time)
             break
         except Unresolved as error:
-            finer = _halve_elements(scene, previous)
+            finer = _halve_elements(stages, previous)
             if finer is None:
-                raise remeshing.advise(scene, previous, error) from None
+                raise remeshing.advise(stages.scene, previous, error) from None
             previous, solved = finer
-    step, after = _solve_after(scene, _end_at(needed(trial.step, "a shorter step"), end))
-    return replace(step, before=None, within=passing.within), after
+    step, after = _solve_after(stages, _end_at(needed(trial.step, "a shorter step"), end))
+    return replace(step, within=passing.within), after
 
 
-def _find_step(scene: Scene, previous: Pore, solved: Solved,
-              control: StepControl) -> tuple[StepResult, Solved, StepControl]:
-    """Shorten a step until it is accepted: the step, its solution, and the next step control."""
+def _find_step(
+        stages: Stages, previous: Pore, solved: Solved, control: StepControl
+) -> tuple[tuple[Pore, Solved], StepResult, Solved, StepControl]:
+    """Shorten a step until it is accepted.
+
+    Returns its start, possibly on finer elements, the step, the solution after it, and the next
+    step control.
+    """
+    scene = stages.scene
     tolerance = scene.numerics.tolerance
-    time_step = needed(scene.growth, "[growth]").time_step
+    time_step = stages.growth.time_step
     shortest = SHORTEST * time_step
     length = control.length
     corner = scene.corner(previous.time)
@@ -104,25 +110,27 @@ def _find_step(scene: Scene, previous: Pore, solved: Solved,
         try:
             cut = duration > shortest
             search = SearchOptions(landing=LANDED if cut else 0.0, patient=not cut)
-            trial = midpoint.attempt(scene, previous, solved, duration, largest_change, search)
+            trial = midpoint.attempt(stages, previous, solved, duration, largest_change, search)
             estimate = trial.change * duration
             if trial.step:
+                start = previous, solved
                 end = _end_of(previous, duration, corner)
-                step, after = _solve_after(scene, _end_at(trial.step, end))
+                step, after = _solve_after(stages, _end_at(trial.step, end))
                 if trial.gaps is not None:  # only contact shortened the step
-                    return step, after, control
+                    return start, step, after, control
                 attempted = replace(control, length=length)
                 following = next_step_size(attempted, duration, estimate, tolerance)
-                return step, after, replace(following, length=max(following.length, shortest))
+                following = replace(following, length=max(following.length, shortest))
+                return start, step, after, following
             if trial.gaps:
-                film = needed(scene.growth, "[growth]").minimum_film
+                film = stages.growth.minimum_film
                 length = duration * _part_to_contact(*trial.gaps, film)
             else:
                 length = max(duration * allowed_ratio(estimate, tolerance), shortest)
         except Unresolved as error:
-            finer = _halve_elements(scene, previous)
+            finer = _halve_elements(stages, previous)
             if finer is None and duration <= time_step:
-                raise remeshing.advise(scene, previous, error) from None
+                raise remeshing.advise(stages.scene, previous, error) from None
             if finer is None:
                 length = duration / 2
             else:
@@ -134,21 +142,21 @@ def _find_step(scene: Scene, previous: Pore, solved: Solved,
         duration = fit_to_interval(length, remaining)
 
 
-def _halve_elements(scene: Scene, previous: Pore) -> tuple[Pore, Solved] | None:
+def _halve_elements(stages: Stages, previous: Pore) -> tuple[Pore, Solved] | None:
     """Halve the elements at the aggregate at the start of a step, and solve there.
 
     None if they have been halved as often as allowed.
     """
-    finer = remeshing.grade(scene, previous)
+    finer = remeshing.grade(stages.scene, previous)
     if finer is None:
         return None
-    graded, solved = remeshing.solve_graded(scene, finer)
+    graded, solved = remeshing.solve_graded(stages.scene, finer)
     return replace(graded, concentrations=solved.concentrations), solved
 
 
-def _solve_after(scene: Scene, step: StepResult) -> tuple[StepResult, Solved]:
+def _solve_after(stages: Stages, step: StepResult) -> tuple[StepResult, Solved]:
     """Solve after a step, on a mesh graded to a sharp front if one needs it."""
-    after, solved = remeshing.solve_graded(scene, step.pore)
+    after, solved = remeshing.solve_graded(stages.scene, step.pore)
     if after is not step.pore:
         step = replace(step, pore=contiguous(after), remeshed=True)
     return step, solved

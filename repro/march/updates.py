@@ -12,28 +12,28 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
-import numpy as np
-
 from repro.errors import Unresolved
+from repro.march.balance import Ledger
 from repro.march.folding import refuse_fold
 from repro.march.loop import (
     SAME_TIME,
     InterpolatedState,
-    Ledger,
     PoreEnd,
     Scheme,
     StepResult,
     contiguous,
     pore_end,
+    time_before_end,
 )
 from repro.march.step_control import StepControl
-from repro.model import biomass, contact, gear, kinetics, pore, remeshing, transport
+from repro.model import biomass, gear, pore, remeshing, transport
 from repro.model.biomass import Rates
-from repro.model.gear import Flows
+from repro.model.growing import grow
 from repro.model.kinetics import Sink
 from repro.model.pore import Pore, Solved
-from repro.model.transport import Concentrations, Fluxes
-from repro.scene import Scene, needed
+from repro.model.stages import Stages
+from repro.model.transport import Concentrations, Flows, Fluxes
+from repro.scene import Growth, Scene
 
 #: A time this close to a multiple of growth.time_step, relative to it, is that multiple.
 ON_GRID = 1e-3
@@ -49,21 +49,19 @@ def schedule(scene: Scene) -> tuple[list[float], set[float]]:
     end = scene.growth.end
     ends = [0.0]
     while end - ends[-1] > SAME_TIME:
-        ends.append(next_time(scene, ends[-1]))
+        ends.append(next_time(scene.growth, ends[-1], scene.corner(ends[-1])))
     return ends, {0.0, *(scene.output.times or ends)}
 
 
-def next_time(scene: Scene, time: float) -> float:
+def next_time(growth: Growth, time: float, corner: float) -> float:
     """Time (h) at which the step after ``time`` ends.
 
     It is the earliest of the next multiple of growth.time_step, the next time of the scene's
-    tables, and growth.end. Within SAME_TIME, a table's time replaces the multiple, and growth.end
-    replaces both.
+    tables, ``corner``, and growth.end. Within SAME_TIME, a table's time replaces the multiple, and
+    growth.end replaces both.
     """
-    growth = needed(scene.growth, "[growth]")
     count = math.floor(time / growth.time_step + ON_GRID) + 1
     update = round(count * growth.time_step, 9)
-    corner = scene.corner(time)
     if corner - update < SAME_TIME:
         update = corner
     if update < growth.end - max(SAME_TIME, SAME_TIME * growth.time_step):
@@ -71,14 +69,13 @@ def next_time(scene: Scene, time: float) -> float:
     return growth.end
 
 
-def _advance(scene: Scene, previous: Pore, solved: Solved,
+def _advance(stages: Stages, previous: Pore, solved: Solved,
              control: StepControl) -> tuple[StepResult, Solved, StepControl]:
     """Make the step to the next update, or to growth.end."""
-    time = next_time(scene, previous.time)
-    advanced = step(scene, previous, solved, time - previous.time)
+    time = next_time(stages.growth, previous.time, stages.scene.corner(previous.time))
+    advanced = step(stages, previous, solved, time - previous.time)
     after = contiguous(replace(advanced.pore, time=time))
-    within = partial(_interpolate, scene, previous, solved)
-    return replace(advanced, pore=after, within=within), _solve_after(scene, after), control
+    return replace(advanced, pore=after), _solve_after(stages.scene, after), control
 
 
 def _solve_after(scene: Scene, after: Pore) -> Solved:
@@ -92,35 +89,30 @@ def _solve_after(scene: Scene, after: Pore) -> Solved:
         raise remeshing.advise(scene, after, error) from None
 
 
-def _interpolate(scene: Scene, previous: Pore, solved: Solved, time: float) -> InterpolatedState:
+def _interpolate(stages: Stages, previous: Pore, solved: Solved, time: float) -> InterpolatedState:
     """Interpolate to a time (h) within a step, by a shorter step from its start."""
-    shorter = step(scene, previous, solved, time - previous.time)
+    shorter = step(stages, previous, solved, time - previous.time)
     after = replace(shorter.pore, time=time)
-    return InterpolatedState(after, _solve_after(scene, after), shorter.before)
+    return InterpolatedState(after, _solve_after(stages.scene, after), shorter.before)
 
 
-def step(scene: Scene, previous: Pore, solved: Solved, duration: float) -> StepResult:
+def step(stages: Stages, previous: Pore, solved: Solved, duration: float) -> StepResult:
     """Make one step of ``duration`` (h): biomass, shape, mesh."""
-    solved = _solve_midway(scene, previous, solved, duration)
-    grown, end, flows = make_biomass(scene, previous, solved, duration)
+    within = partial(_interpolate, stages, previous, solved)
+    solved = _solve_midway(stages.scene, previous, solved, duration)
+    grown, end, flows = make_biomass(stages, previous, solved, duration)
     grown = replace(grown, time=time_before_end(previous, duration))
-    expansion = contact.expand(scene, grown, compute_theta(scene, previous, grown))
+    expansion = stages.expand(previous, grown)
     expanded = expansion.pore
-    if leaves := pore_end(scene, expanded, 0.1):
+    if leaves := pore_end(stages.scene.pore, expanded, 0.1):
         raise PoreEnd(f"{leaves} in the step from t = {previous.time:g} h")
     refuse_fold(previous, expanded)
-    speed = solved.flow.mean_velocity if solved.flow else 0.0
     expanded = replace(expanded, concentrations=end)
-    after, remeshed = remeshing.new_mesh(scene, previous, expanded, speed)
+    after, remeshed = stages.new_mesh(previous, expanded, solved)
     ledger = Ledger(previous.time, previous.time + duration, *flows, previous.mass,
                     grown.mass - previous.mass, after.mass)
     last = replace(grown, time=previous.time + duration), replace(solved, concentrations=end)
-    return StepResult(after, last, ledger, remeshed, expansion.iterations)
-
-
-def time_before_end(previous: Pore, duration: float) -> float:
-    """Time (h) just before the end of a step, before a jump of the scene's tables there."""
-    return max(previous.time, previous.time + duration - SAME_TIME)
+    return StepResult(after, last, ledger, remeshed, expansion.iterations, within)
 
 
 def _solve_midway(scene: Scene, previous: Pore, solved: Solved, duration: float) -> Solved:
@@ -137,7 +129,7 @@ def _solve_midway(scene: Scene, previous: Pore, solved: Solved, duration: float)
     return halfway
 
 
-def make_biomass(scene: Scene, previous: Pore, solved: Solved,
+def make_biomass(stages: Stages, previous: Pore, solved: Solved,
                  duration: float) -> tuple[Pore, Concentrations, Flows]:
     """Integrate (9)-(10) over a step (h) in a fixed geometry: grown pore, concentrations, flows.
 
@@ -145,24 +137,24 @@ def make_biomass(scene: Scene, previous: Pore, solved: Solved,
     its rate. The second rates are those of the steady concentrations over the grown biomass. Gear's
     method is the paper's transient.
     """
-    problem = needed(solved.problem, "[substrates]")
-    start = needed(solved.concentrations, "[substrates]")
-    if scene.numerics.transport == "gear":
+    problem = solved.substrates.problem
+    start = solved.substrates.concentrations
+    if stages.scene.numerics.transport == "gear":
         transient = gear.advance(problem, previous.active, previous.inert, start, duration)
         after = replace(previous, active=transient.active, inert=transient.inert)
         return after, transient.concentrations, transient.flows
-    first = compute_rates(scene, previous, start)
-    guess = grown(previous, first, duration)
+    first = biomass.rates(previous.space, start, stages.law)
+    guess = grow(previous, first, duration)
     try:
         end = transport.steady(problem, Sink(guess.active), start)
     except Unresolved as error:
         ahead = replace(guess, time=time_before_end(previous, duration))
-        raise remeshing.advise(scene, ahead, error) from None
-    second = compute_rates(scene, previous, end)
+        raise remeshing.advise(stages.scene, ahead, error) from None
+    second = biomass.rates(previous.space, end, stages.law)
     mean = Rates((first.growth + second.growth) / 2, (first.remains + second.remains) / 2)
     at_start = transport.fluxes(problem, Sink(previous.active), start)
     at_end = transport.fluxes(problem, Sink(guess.active), end)
-    return grown(previous, mean, duration), end, _mean_flows(at_start, at_end, duration)
+    return grow(previous, mean, duration), end, _mean_flows(at_start, at_end, duration)
 
 
 def _mean_flows(before: Sequence[Fluxes], after: Sequence[Fluxes], duration: float) -> Flows:
@@ -173,33 +165,6 @@ def _mean_flows(before: Sequence[Fluxes], after: Sequence[Fluxes], duration: flo
     supplied, out, consumed = zip(acceptor, donor)
     return Flows(supplied, out, consumed, stored=(0.0, 0.0))
 
-
-def compute_rates(scene: Scene, previous: Pore, state: Concentrations | None) -> Rates:
-    """F3 / X_A and F4 / X_A, 1/h, at the points of the reaction."""
-    law = kinetics.rate_law(needed(scene.substrates, "[substrates]"),
-                            needed(scene.kinetics, "[kinetics]"))
-    return biomass.rates(previous.space, needed(state, "[substrates]"), law)
-
-
-def grown(previous: Pore, rates: Rates, duration: float) -> Pore:
-    """Integrate (9)-(10) over a step (h) at constant rates."""
-    active, inert = kinetics.grow(previous.active, previous.inert, rates.growth, rates.remains,
-                                  duration)
-    return replace(previous, active=active, inert=inert)
-
-
-def compute_theta(scene: Scene, previous: Pore, after: Pore) -> np.ndarray:
-    """(t, q) theta after growth: (28)-(29), from the increase of X_A + X_I over X_m.
-
-    On curved triangles theta grows with the mass at each point.
-    """
-    before = previous.active + previous.inert
-    total = after.active + after.inert
-    if previous.space.order > 1:
-        return previous.theta * (total / before)
-    density = needed(scene.kinetics, "[kinetics]").maximum_density
-    more = (total - before) / previous.space.reaction.dx / density
-    return previous.theta * (1 + remeshing.at_growth_points(previous.space, more))
 
 #: The paper's scheme.
 SCHEME = Scheme(_advance, ends=lambda scene: schedule(scene)[0])

@@ -29,7 +29,8 @@ from repro.model.contact_lines import (
     contact_with,
 )
 from repro.model.pore import Pore, material
-from repro.scene import Growth, Scene, needed
+from repro.model.traction import Fluid
+from repro.scene import Growth, Numerics, Scene
 
 #: Rounds in which closing films may change the contact surfaces within one step.
 CONTACT_ROUNDS = 60
@@ -42,6 +43,27 @@ FORCE_REST = 1e-8
 PATIENT = SearchOptions()
 #: Lengths of the first contact to both sides of the highest place, over the least film.
 FIRST_LENGTHS = np.array([1.0, 0.5, 0.25])
+
+
+@dataclass(frozen=True, eq=False)
+class Mechanics:
+    """What the shape of a grown aggregate depends on.
+
+    width: um, of the pore; keys: section [growth] of the scene; numerics: fixed points and Newton's
+    method; fluid: its forces on the aggregate, None if they are neglected.
+    """
+
+    width: float
+    keys: Growth
+    numerics: Numerics
+    fluid: Fluid | None = None
+
+    @classmethod
+    def of(cls, scene: Scene) -> Mechanics:
+        """The mechanics of a scene with growth."""
+        keys = scene.growing.growth
+        fluid = Fluid.of(scene) if keys.fluid_forces == "included" else None
+        return cls(scene.pore.width, keys, scene.numerics, fluid)
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,13 +96,13 @@ class Expansion:
         return self.division.amounts(amounts, grown.space.table)
 
 
-def expand(scene: Scene, grown: Pore, theta: np.ndarray, guess: Pore | None = None,
+def expand(mechanics: Mechanics, grown: Pore, theta: np.ndarray, guess: Pore | None = None,
            search: SearchOptions = PATIENT) -> Expansion:
     """Expand the aggregate to its new shape under theta (t, q).
 
     Parameters
     ----------
-    scene : Scene
+    mechanics : Mechanics
     grown : Pore
         Biomass as it has grown, in the old shape.
     theta : (t, q) float
@@ -105,23 +127,24 @@ def expand(scene: Scene, grown: Pore, theta: np.ndarray, guess: Pore | None = No
     With fluid forces, shape and flow are computed in turn until both agree.
     """
     start = grown if guess is None else guess
-    if needed(scene.growth, "[growth]").fluid_forces == "neglected":
-        return _at_rest(scene, grown, theta, start, None, search)
-    around = traction.surroundings(scene, grown, grown)
+    fluid = mechanics.fluid
+    if fluid is None:
+        return _at_rest(mechanics, grown, theta, start, None, search)
+    around = traction.surroundings(fluid.meshing, grown, grown)
     last = Expansion(grown, 0, 0.0)
     iterations = 0
     for _ in range(FORCE_ROUNDS):
-        forces = traction.forces(scene, around, last.pore)
+        forces = traction.forces(fluid, around, last.pore)
         if last.division is not None:
-            forces = _gathered(last, forces)
-        shape = _at_rest(scene, grown, theta, start, forces, search)
+            forces = _gathered(last.division, forces)
+        shape = _at_rest(mechanics, grown, theta, start, forces, search)
         search = replace(search, advances=shape.advances)
         iterations += shape.iterations
         moved = np.abs(shape.position - last.position).max()
         if moved <= FORCE_REST * shape.pore.boundary.thickness:
             return replace(shape, iterations=iterations)
         if last.pore is grown or not shape.pore.boundary.same_contact(last.pore.boundary):
-            around = traction.surroundings(scene, grown, shape.pore)
+            around = traction.surroundings(fluid.meshing, grown, shape.pore)
         last = shape
     raise GrowthError(f"the fluid's forces and the shape do not agree after {FORCE_ROUNDS} rounds, "
                       f"a node still moves by {moved:.2g} um: the aggregate is too soft for this "
@@ -129,35 +152,34 @@ def expand(scene: Scene, grown: Pore, theta: np.ndarray, guess: Pore | None = No
                       'growth.fluid_forces = "neglected"')
 
 
-def _gathered(shape: Expansion, loads: np.ndarray) -> np.ndarray:
+def _gathered(division: Division, loads: np.ndarray) -> np.ndarray:
     """(n, 2) loads on the nodes of the grown aggregate, from loads on the divided one."""
-    division = needed(shape.division, "a division")
-    return division.gathered_loads(_on_mesh(shape.pore.mesh, loads))[division.parent.body]
+    return division.gathered_loads(_on_mesh(division.mesh, loads))[division.parent.body]
 
 
-def _at_rest(scene: Scene, grown: Pore, theta: np.ndarray, start: Pore, forces: np.ndarray | None,
-             search: SearchOptions) -> Expansion:
+def _at_rest(mechanics: Mechanics, grown: Pore, theta: np.ndarray, start: Pore,
+             forces: np.ndarray | None, search: SearchOptions) -> Expansion:
     """The new shape under constant nodal forces (n, 2) um, over mu_L; None for no forces."""
-    stressed = needed(scene.growth, "[growth]").new_biomass == "stressed"
+    stressed = mechanics.keys.new_biomass == "stressed"
     last = None if stressed else grown.mesh.points[grown.mesh.body]
-    grown = replace(grown, theta=theta, fixed=_fixed_points(scene, grown), last=last)
+    grown = replace(grown, theta=theta, fixed=_fixed_points(mechanics.numerics, grown), last=last)
     if grown.boundary.geometry == 1:
-        return _close_by_nodes(scene, grown, start, forces, search)
-    return _close_by_lines(scene, grown, start, forces, search)
+        return _close_by_nodes(mechanics, grown, start, forces, search)
+    return _close_by_lines(mechanics, grown, start, forces, search)
 
 
-def _close_by_nodes(scene: Scene, grown: Pore, start: Pore, forces: np.ndarray | None,
+def _close_by_nodes(mechanics: Mechanics, grown: Pore, start: Pore, forces: np.ndarray | None,
                     search: SearchOptions) -> Expansion:
     """The shape after all nodes at too thin films or wedges have joined the wall. Nodes join after
     each equilibrium, until no film or wedge is too thin."""
-    keys = needed(scene.growth, "[growth]")
-    width = scene.pore.width
+    keys = mechanics.keys
+    width = mechanics.width
     shape = replace(grown, space=start.space, pressure=start.pressure)
     iterations = 0
     gaps: list[float] = []
     for _ in range(CONTACT_ROUNDS):
         last = None if gaps else grown.mesh.points[grown.mesh.body]
-        shape, used = _equilibrium(scene, grown, shape, forces, last=last)
+        shape, used = _equilibrium(mechanics, grown, shape, forces, last=last)
         iterations += used
         gaps.append(width - shape.boundary.thickness)
         if not shape.contact:
@@ -171,26 +193,26 @@ def _close_by_nodes(scene: Scene, grown: Pore, start: Pore, forces: np.ndarray |
                       "try a shorter growth.time_step")
 
 
-def _equilibrium(scene: Scene, grown: Pore, start: Pore, forces: np.ndarray | None, *,
+def _equilibrium(mechanics: Mechanics, grown: Pore, start: Pore, forces: np.ndarray | None, *,
                  last: np.ndarray | None = None, patient: bool = True) -> tuple[Pore, int]:
     """The equilibrium of a grown pore under its theta with the contact of ``start``, searched for
     from the shape and pressure of ``start``; and Newton's iterations."""
-    body, target_J = _strained_from(needed(scene.growth, "[growth]"), grown, grown.theta)
+    body, target_J = _strained_from(mechanics.keys, grown, grown.theta)
     nodes = grown.mesh.body
     inside = grown.mesh.topology.body_corners
-    locked, target = _constraints(start, scene.pore.width)
+    locked, target = _constraints(start, mechanics.width)
     rest = growth.equilibrium(body, target_J, start.mesh.points[nodes], start.pressure[inside],
                               locked, target, forces=forces, last=last, patient=patient,
-                              modified_newton=scene.numerics.jacobian == "reused")
+                              modified_newton=mechanics.numerics.jacobian == "reused")
     return _placed(grown, start, rest), rest.iterations
 
 
-def _close_by_lines(scene: Scene, grown: Pore, start: Pore, forces: np.ndarray | None,
+def _close_by_lines(mechanics: Mechanics, grown: Pore, start: Pore, forces: np.ndarray | None,
                     search: SearchOptions) -> Expansion:
     """The shape with the smallest contact surfaces that leave no film and no wedge too thin."""
-    keys = needed(scene.growth, "[growth]")
-    rule = Clearance(scene.pore.width, keys.minimum_film, keys.minimum_contact_angle)
-    trials = _Trials(scene, grown, start, forces, search.patient)
+    keys = mechanics.keys
+    rule = Clearance(mechanics.width, keys.minimum_film, keys.minimum_contact_angle)
+    trials = _Trials(mechanics, grown, start, forces, search.patient)
     lines = contact_lines.lines_of(grown.boundary)
     _place_lines(grown.boundary, lines, search)
     shape = trials.solve(grown.wall, lines)
@@ -295,9 +317,9 @@ class _Trials:
     Each starts from the last one, extrapolated in the advance of the line that moves most.
     """
 
-    def __init__(self, scene: Scene, grown: Pore, start: Pore, forces: np.ndarray | None,
+    def __init__(self, mechanics: Mechanics, grown: Pore, start: Pore, forces: np.ndarray | None,
                  patient: bool):
-        self._scene = scene
+        self._mechanics = mechanics
         self._grown = grown
         self._forces = forces
         self._patient = patient
@@ -369,7 +391,8 @@ class _Trials:
             locked = divided(grown, division, contact, self._shape)
             self._shape = locked.body.shape
             forces = None if forces is None else _divided_loads(division, forces)
-        shape, iterations = _equilibrium(self._scene, locked, self._first(locked, advances), forces,
+        first = self._first(locked, advances)
+        shape, iterations = _equilibrium(self._mechanics, locked, first, forces,
                                          patient=self._patient)
         self.iterations += iterations
         expansion = Expansion(shape, iterations, 0.0, division)
@@ -471,9 +494,9 @@ def constrained(count: int, rim: np.ndarray, wall: np.ndarray, fixed: np.ndarray
     return prescribed
 
 
-def _fixed_points(scene: Scene, grown: Pore) -> np.ndarray:
+def _fixed_points(numerics: Numerics, grown: Pore) -> np.ndarray:
     """(M,) fixed points: the previous ones, or the present middles of the contact surfaces."""
-    if scene.numerics.fixed_point == "kept":
+    if numerics.fixed_point == "kept":
         return grown.fixed
     return middle_of(grown.boundary, BOTTOM) | middle_of(grown.boundary, TOP)
 

@@ -42,7 +42,6 @@ from repro.fem.mesh import Mesh
 from repro.fem.space import Space
 from repro.model.brinkman import Permeable
 from repro.scene import Flow as Drive
-from repro.scene import needed
 from repro.timing import timed
 
 
@@ -267,7 +266,7 @@ def scaled(unit: UnitFlow, mesh: Mesh, length: float, drive: Drive) -> Flow:
     total_loss = unit.loss + poiseuille_loss(length - (mesh.ends[1] - mesh.ends[0]), mesh.width)
     speed = drive.mean_velocity
     if speed is None:
-        speed = needed(drive.head, "flow.head") / (viscosity * total_loss)
+        speed = drive.driving_head / (viscosity * total_loss)
     scale = viscosity * speed
     at_outlet = Space(mesh, 1).outlet.mean(unit.pressure[: mesh.corners])
     head = scale * (unit.pressure - at_outlet)

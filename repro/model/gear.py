@@ -27,7 +27,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 import scipy.sparse as sp
@@ -40,6 +40,7 @@ from repro.model.kinetics import Sink
 from repro.model.transport import (
     UNRESOLVED,
     Concentrations,
+    Flows,
     Problem,
     both_ends,
     supplied_everywhere,
@@ -89,15 +90,6 @@ class Level:
     biomass_rise: np.ndarray
     flow_rise: np.ndarray
     step: float = np.inf
-
-
-class Flows(NamedTuple):
-    """Amounts of acceptor and donor in the balance of a step, um2 mg/L."""
-
-    supplied: tuple[float, float]
-    out: tuple[float, float]
-    consumed: tuple[float, float]
-    stored: tuple[float, float]
 
 
 @dataclass(frozen=True, eq=False)

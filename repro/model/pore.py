@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import inf
+from typing import overload
 
 import numpy as np
 
@@ -16,10 +17,12 @@ from repro.fem.mesh import Mesh
 from repro.fem.outline import TOP, Outline, half_disc, polygon
 from repro.fem.sizing import Sizing
 from repro.fem.space import Space
-from repro.model import biomass, flow, gear, growth, transport
+from repro.model import biomass, flow, gear, growth, mesh_motion, transport
 from repro.model.flow import Bubble, Flow, Stabilised
 from repro.model.transport import Concentrations, Fluxes, Problem
-from repro.scene import Scene, needed
+from repro.scene import Flow as Drive
+from repro.scene import MissingError, Numerics, Scene, Substrates, at_largest, needed
+from repro.scene import Pore as Channel
 
 #: A permeable aggregate that spans the pore draws the water in at its upper contact lines: elements
 #: beside them are no larger than the least film over this.
@@ -118,6 +121,15 @@ class Pore:
         return float(self.inert.sum() / self.mass), float(density.min()), float(density.max())
 
 
+@dataclass(frozen=True, eq=False)
+class SolvedSubstrates:
+    """The substrates in the geometry of a pore; none of the parts is optional."""
+
+    problem: Problem
+    concentrations: Concentrations
+    fluxes: tuple[Fluxes, Fluxes]
+
+
 @brief
 @dataclass(frozen=True, eq=False)
 class Solved:
@@ -128,6 +140,18 @@ class Solved:
     problem: Problem | None
     concentrations: Concentrations | None
     fluxes: tuple[Fluxes, Fluxes] | None = None
+
+    @property
+    def substrates(self) -> SolvedSubstrates:
+        """The substrates. Raises MissingError if the scene does not model them."""
+        if self.problem is None or self.concentrations is None or self.fluxes is None:
+            raise MissingError("a solution for the substrates is needed here")
+        return SolvedSubstrates(self.problem, self.concentrations, self.fluxes)
+
+    @property
+    def mean_velocity(self) -> float:
+        """Mean velocity, um/h; zero without flow."""
+        return self.flow.mean_velocity if self.flow else 0.0
 
 
 def film(scene: Scene) -> float:
@@ -142,40 +166,89 @@ def resolution(scene: Scene) -> float:
     """
     if scene.numerics.order == 1 or scene.flow is None or scene.substrates is None:
         return scene.numerics.refinement
-    layers = peclet(scene, fastest(scene)) ** (1 / 3)
+    speed = fastest(scene.flow, scene.pore)
+    layers = peclet(scene.substrates, scene.pore.width, speed) ** (1 / 3)
     return max(scene.numerics.refinement, BOUNDARY_LAYER * layers)
 
 
-def fastest(scene: Scene) -> float:
-    """Largest mean velocity (um/h) of a scene; under a head, that in the clean channel."""
-    drive = needed(scene.largest.flow, "[flow]")
-    if drive.mean_velocity is not None:
-        return drive.mean_velocity
-    loss = flow.poiseuille_loss(scene.pore.length, scene.pore.width)
-    return needed(drive.head, "flow.head") * drive.gravity / drive.kinematic_viscosity / loss
+def fastest(drive: Drive, channel: Channel) -> float:
+    """Largest mean velocity (um/h) of a flow; under a head, that in the clean channel."""
+    largest = at_largest(drive)
+    if largest.mean_velocity is not None:
+        return largest.mean_velocity
+    loss = flow.poiseuille_loss(channel.length, channel.width)
+    return largest.driving_head * drive.gravity / drive.kinematic_viscosity / loss
 
 
-def sized(scene: Scene, front: float = 1.0) -> Sizing:
-    """Element sizes of a scene's meshes; front: as :attr:`Pore.front`."""
+def sized(scene: Scene) -> Sizing:
+    """Element sizes of a scene's meshes, without a front of the substrates."""
     seed = scene.aggregate
     middle = seed.position if seed and seed.outline is None else None
     least = film(scene)
     across = scene.numerics.contact_elements
     if scene.flow and scene.flow.permeability is not None:
         across = max(across, CONTACT_ELEMENTS)
-    return Sizing(scene.pore.width, resolution(scene), least, scene.numerics.gradation, front,
-                  least / across if across else inf, middle)
+    return Sizing(scene.pore.width, resolution(scene), least, scene.numerics.gradation,
+                  contact=least / across if across else inf, seed=middle)
 
 
-def generate(scene: Scene, outline: Outline | None,
-             front: float = 1.0) -> tuple[Mesh, Outline | None]:
-    """A new mesh around the aggregate (None: a clean channel) with the extent of 3.1, and the
-    outline with its nodes on that mesh. Raises MeshError if no mesh can be made."""
-    numerics = scene.numerics
-    is_full = numerics.extent == "full"
-    ends = sizing.meshed_extent(outline, scene.pore.width, scene.pore.length, is_full)
-    method = Method(numerics.solver, numerics.ordering)
-    return mesher.generate(outline, ends, sized(scene, front), numerics.geometry, method)
+@dataclass(frozen=True, eq=False)
+class Meshing:
+    """How the meshes of a scene are generated and moved.
+
+    channel: section [pore] of the scene; sizes: of the elements, without a front; numerics: extent
+    and elements of a mesh, solver and constants of its motion.
+    """
+
+    channel: Channel
+    sizes: Sizing
+    numerics: Numerics
+
+    @classmethod
+    def of(cls, scene: Scene) -> Meshing:
+        """The meshing of a scene."""
+        return cls(scene.pore, sized(scene), scene.numerics)
+
+    @overload
+    def generate(self, outline: Outline, front: float = 1.0) -> tuple[Mesh, Outline]: ...
+
+    @overload
+    def generate(self, outline: Outline | None,
+                 front: float = 1.0) -> tuple[Mesh, Outline | None]: ...
+
+    def generate(self, outline: Outline | None,
+                 front: float = 1.0) -> tuple[Mesh, Outline | None]:
+        """Generate a mesh around an aggregate, with the extent of 3.1.
+
+        Parameters
+        ----------
+        outline : Outline, optional
+            Boundary of the aggregate; None for a clean channel.
+        front : float
+            As :attr:`Pore.front`.
+
+        Returns
+        -------
+        mesh : Mesh
+        outline : Outline, optional
+            The boundary with its nodes on that mesh.
+
+        Raises
+        ------
+        MeshError
+            If no mesh can be made.
+        """
+        numerics = self.numerics
+        is_full = numerics.extent == "full"
+        ends = sizing.meshed_extent(outline, self.channel.width, self.channel.length, is_full)
+        method = Method(numerics.solver, numerics.ordering)
+        sizes = replace(self.sizes, front=front)
+        return mesher.generate(outline, ends, sizes, numerics.geometry, method)
+
+    def move(self, mesh: Mesh, body: np.ndarray) -> Mesh:
+        """Move a mesh with its aggregate, whose nodes are at ``body`` (n, 2) um (3.5)."""
+        constants = self.numerics.mesh_compressibility, self.numerics.flow_stabilisation
+        return mesh.moved(mesh_motion.move(mesh, body, *constants))
 
 
 def initial_outline(scene: Scene, front: float = 1.0) -> Outline | None:
@@ -184,18 +257,17 @@ def initial_outline(scene: Scene, front: float = 1.0) -> Outline | None:
     if seed is None:
         return None
     geometry = scene.numerics.geometry
-    if seed.outline is not None:
+    if seed.radius is None:
         return polygon(np.array(seed.outline), scene.pore.width, geometry, seed.smooth,
-                       size_at_tips(scene))
+                       size_at_tips(scene.numerics, scene.pore.width))
     across = sizing.ACROSS_AGGREGATE * resolution(scene) * front
-    return half_disc(needed(seed.radius, "aggregate.radius"), across, geometry, seed.position)
+    return half_disc(seed.radius, across, geometry, seed.position)
 
 
-def size_at_tips(scene: Scene) -> float:
-    """Length (um) of the edges at an outline's tips."""
-    numerics = scene.numerics
+def size_at_tips(numerics: Numerics, width: float) -> float:
+    """Length (um) of the edges at an outline's tips, in a pore of a width (um)."""
     finest = min(AT_TIPS[numerics.order] * numerics.refinement**2, MOST_AT_TIPS)
-    return scene.pore.width / finest
+    return width / finest
 
 
 def seeded(scene: Scene, front: float = 1.0, outline: Outline | None = None) -> Pore:
@@ -218,7 +290,8 @@ def seeded(scene: Scene, front: float = 1.0, outline: Outline | None = None) -> 
     MeshError
         If no mesh can be made around the outline.
     """
-    mesh, outline = generate(scene, outline or initial_outline(scene, front), front)
+    meshing = Meshing.of(scene)
+    mesh, outline = meshing.generate(outline or initial_outline(scene, front), front)
     space = Space(mesh, scene.numerics.order)
     density = scene.kinetics.maximum_density if scene.kinetics else 0.0
     total = density * space.reaction.dx
@@ -264,44 +337,57 @@ def solve(scene: Scene, pore: Pore, over: float = 0.0) -> Solved:
         If the flow or the substrates cannot be solved.
     """
     scene = scene.at(pore.time)
-    carried = solve_flow(scene, pore.space) if scene.flow else None
+    numerics = scene.numerics
+    carried = None
+    if scene.flow:
+        carried = solve_flow(pore.space, scene.flow, scene.pore.length, numerics)
     if scene.substrates is None:
         return Solved(carried, None, None)
-    numerics = scene.numerics
     problem = transport.problem(pore.space, carried, scene.substrates, scene.kinetics,
                                 numerics.inlet, numerics.jacobian == "reused")
     sink = biomass.sink(pore.active if scene.kinetics else None, over)
     if numerics.transport == "gear":
         state = gear.settle(problem, sink, pore.concentrations)
     else:
-        refuse_no_supply(scene, carried)
+        if carried:
+            refuse_no_supply(peclet(scene.substrates, scene.pore.width, carried.mean_velocity))
         state = transport.steady(problem, sink, pore.concentrations)
     return Solved(carried, problem, state, transport.fluxes(problem, sink, state))
 
 
-def peclet(scene: Scene, speed: float) -> float:
-    """u W / D with the smaller diffusivity, for a mean velocity (um/h)."""
-    both = needed(scene.substrates, "[substrates]")
+def peclet(substrates: Substrates, width: float, speed: float) -> float:
+    """u W / D with the smaller diffusivity, for a width (um) and a mean velocity (um/h)."""
     slowest = min(min(s.diffusivity, s.diffusivity_in_aggregate)
-                  for s in (both.acceptor, both.donor))
-    return speed * scene.pore.width / slowest
+                  for s in (substrates.acceptor, substrates.donor))
+    return speed * width / slowest
 
 
-def refuse_no_supply(scene: Scene, carried: Flow | None) -> None:
-    """Raise TransportError if the flow is too slow to supply the pore: no state is steady."""
-    if carried and peclet(scene, carried.mean_velocity) < SLOWEST:
-        raise TransportError("the Peclet number u W / D is "
-                             f"{peclet(scene, carried.mean_velocity):.2g}, under {SLOWEST:g}: "
+def refuse_no_supply(number: float) -> None:
+    """Raise TransportError if the Peclet number u W / D is too small: no state is steady."""
+    if number < SLOWEST:
+        raise TransportError(f"the Peclet number u W / D is {number:.2g}, under {SLOWEST:g}: "
                              "nothing is supplied through the inlet; leave [flow] out for pure "
                              "diffusion")
 
 
-def solve_flow(scene: Scene, space: Space) -> Flow:
-    """Stokes flow under the head or mean velocity of a scene at a time."""
-    numerics = scene.numerics
+def solve_flow(space: Space, drive: Drive, length: float, numerics: Numerics) -> Flow:
+    """Solve the Stokes flow on a space of velocities.
+
+    Parameters
+    ----------
+    space : Space
+    drive : repro.scene.Flow
+        Head or mean velocity at one time, without tables.
+    length : float
+        Length of the whole pore, um.
+    numerics : Numerics
+        Element of linear velocities and form of the viscous term.
+
+    Returns
+    -------
+    Flow
+    """
     element: Bubble | Stabilised = Stabilised(numerics.flow_stabilisation)
     if numerics.flow_element == "bubble":
         element = Bubble()
-    drive = needed(scene.flow, "[flow]")
-    length = scene.pore.length
     return flow.solve(space, drive, length, interface=numerics.interface, element=element)

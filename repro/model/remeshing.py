@@ -3,7 +3,7 @@ which the fields are transferred."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,12 +12,12 @@ from repro.fem import sizing, transfer
 from repro.fem.mesh import Mesh
 from repro.fem.space import Space
 from repro.fem.transfer import Located
-from repro.model import biomass, mesh_motion
+from repro.model import biomass, growing
 from repro.model.biomass import Amounts
 from repro.model.growth import Body
-from repro.model.pore import Pore, Solved, generate, material, resolution, seeded, sized, solve
+from repro.model.pore import Meshing, Pore, Solved, material, resolution, seeded, solve
 from repro.model.transport import UNRESOLVED, Concentrations
-from repro.scene import Scene, SceneError, Substrate, load_scene, needed
+from repro.scene import Scene, SceneError, Substrate, Substrates, at_time, load_scene
 
 #: A front of the substrates divides element sizes at the aggregate by at most this.
 MOST_GRADED = 4.0
@@ -27,12 +27,32 @@ TRIED = (1.5, 2.0, 3.0)
 MOST_REFINED = 20.0
 
 
-def new_mesh(scene: Scene, previous: Pore, expanded: Pore, speed: float) -> tuple[Pore, bool]:
+@dataclass(frozen=True, eq=False)
+class Remeshing:
+    """How the mesh of a growing aggregate follows it, and what fields on a new mesh depend on.
+
+    meshing: of the scene; transfer: method of :func:`biomass.transfer_amounts`; maximum_density:
+    X_m, mg/L; substrates: section of the scene, whose supplies may be tables over time.
+    """
+
+    meshing: Meshing
+    transfer: str
+    maximum_density: float
+    substrates: Substrates
+
+    @classmethod
+    def of(cls, scene: Scene) -> Remeshing:
+        """The remeshing of a scene with growth."""
+        substrates, kinetics, _ = scene.growing
+        return cls(Meshing.of(scene), scene.numerics.transfer, kinetics.maximum_density, substrates)
+
+
+def new_mesh(rules: Remeshing, previous: Pore, expanded: Pore, speed: float) -> tuple[Pore, bool]:
     """Give an expanded aggregate a mesh: the present one, moved with it, or a new one.
 
     Parameters
     ----------
-    scene : Scene
+    rules : Remeshing
     previous : Pore
         The pore before the aggregate took its new shape, on a good mesh.
     expanded : Pore
@@ -52,10 +72,10 @@ def new_mesh(scene: Scene, previous: Pore, expanded: Pore, speed: float) -> tupl
     acceptable (3.5). Two more cases need one: contact has changed, or interface edges are twice too
     long for the narrowest film.
     """
-    mesh = moved_mesh(scene, previous, expanded)
+    mesh = moved_mesh(rules.meshing, previous, expanded)
     if mesh is not None:
         return replace(expanded, space=Space(mesh, previous.space.order)), False
-    return remesh(scene, previous, expanded, speed)[0], True
+    return remesh(rules, previous, expanded, speed)[0], True
 
 
 def solve_graded(scene: Scene, pore: Pore) -> tuple[Pore, Solved]:
@@ -82,7 +102,7 @@ def grade(scene: Scene, pore: Pore) -> Pore | None:
         return None
     if pore.time == 0:
         return seeded(scene, front)
-    return remesh(scene, pore, replace(pore, front=front), 0.0)[0]
+    return remesh(Remeshing.of(scene), pore, replace(pore, front=front), 0.0)[0]
 
 
 def advise(scene: Scene, pore: Pore, error: Unresolved) -> UnresolvedWithAdvice:
@@ -117,7 +137,7 @@ def _resolves(scene: Scene, pore: Pore) -> bool:
         solved = solve(scene, _with_elements_of(scene, pore))
     except StageError:
         return False
-    return _has_margin(scene, pore, solved)
+    return _has_margin(solved)
 
 
 def _with_elements_of(scene: Scene, pore: Pore) -> Pore:
@@ -126,9 +146,10 @@ def _with_elements_of(scene: Scene, pore: Pore) -> Pore:
     if pore.time == 0:
         return seeded(scene, pore.front if scene.numerics.order > 1 else 1.0)
     if scene.numerics.order == pore.space.order:
-        return remesh(scene, pore, pore, 0.0)[0]
+        return remesh(Remeshing.of(scene), pore, pore, 0.0)[0]
     fresh = replace(seeded(scene, outline=pore.boundary.corners), time=pore.time)
-    state = transfer_substrates(scene.at(0.0), pore.space, fresh.space, pore.concentrations, 0.0)
+    supplied = at_time(scene.growing.substrates, 0.0)
+    state = transfer_substrates(supplied, pore.space, fresh.space, pore.concentrations, 0.0)
     return replace(fresh, concentrations=state)
 
 
@@ -149,60 +170,71 @@ def _with_linear(scene: Scene) -> Scene | None:
         return None
 
 
-def _has_margin(scene: Scene, pore: Pore, solved: Solved) -> bool:
+def _has_margin(solved: Solved) -> bool:
     """Do concentrations fall below zero by at most half of the accepted amount?"""
-    substrates = needed(scene.at(pore.time).substrates, "[substrates]")
-    state = needed(solved.concentrations, "concentrations")
-    kinds = (substrates.acceptor, substrates.donor)
+    state = solved.substrates.concentrations
+    kinds = solved.substrates.problem.both
     fields = (state.acceptor, state.donor)
     return all(field.min() >= -0.5 * UNRESOLVED * s.supply for field, s in zip(fields, kinds))
 
 
-def moved_mesh(scene: Scene, previous: Pore, expanded: Pore) -> Mesh | None:
+def moved_mesh(meshing: Meshing, previous: Pore, expanded: Pore) -> Mesh | None:
     """The mesh, moved with the aggregate; None where a new mesh is due."""
     outline = expanded.boundary
     mesh = previous.mesh
-    if (sizing.extent_too_short(outline, mesh.ends, scene.pore.width, scene.pore.length)
+    channel = meshing.channel
+    if (sizing.extent_too_short(outline, mesh.ends, channel.width, channel.length)
             or not outline.same_contact(previous.boundary)
-            or sizing.too_coarse(outline.corners, sized(scene))):
+            or sizing.too_coarse(outline.corners, meshing.sizes)):
         return None
-    numerics = scene.numerics
-    points = mesh_motion.move(mesh, expanded.mesh.points[mesh.body],
-                              numerics.mesh_compressibility, numerics.flow_stabilisation)
-    moved = mesh.moved(points)
+    moved = meshing.move(mesh, expanded.mesh.points[mesh.body])
     return moved if moved.acceptable() else None
 
 
-def remesh(scene: Scene, previous: Pore, expanded: Pore, speed: float,
+def remesh(rules: Remeshing, previous: Pore, expanded: Pore, speed: float,
            amounts: Amounts = ()) -> tuple[Pore, Amounts]:
     """Make a new mesh around the aggregate, with the extent of 3.1, and transfer all fields to it.
 
-    previous: the pore whose mesh has the concentrations; speed: mean velocity (um/h), zero where
-    nothing flows and the whole pore is meshed, or where substrates are only a first guess; amounts:
-    (r, q) further amounts of the aggregate's material. Returns the pore and these amounts on the
-    new mesh.
+    Parameters
+    ----------
+    rules : Remeshing
+    previous : Pore
+        The pore whose mesh has the concentrations.
+    expanded : Pore
+        The aggregate and its biomass.
+    speed : float
+        Mean velocity, um/h; zero where nothing flows and the whole pore is meshed, or where the
+        substrates are only a first guess.
+    amounts : tuple of (r, q) arrays, optional
+        Further amounts of the aggregate's material.
 
+    Returns
+    -------
+    pore : Pore
+    amounts : tuple of (r, q) arrays
+        These amounts on the new mesh.
+
+    Notes
+    -----
     theta restarts as J times the density over X_m. This expansion brings each density back to X_m,
     so that the next update removes the error of the constraint and it does not accumulate [E7].
     """
-    mesh, generated = generate(scene, expanded.boundary, expanded.front)
-    outline = needed(generated, "an aggregate")
+    mesh, outline = rules.meshing.generate(expanded.boundary, expanded.front)
     old = expanded.mesh
     new = Space(mesh, expanded.space.order)
     at = transfer.located(old.points, old.cells[old.biomass], mesh.points[mesh.body])
     body = _material(new, expanded, outline.origin, at)
     active, inert, *rest = biomass.transfer_amounts(
-        scene.numerics.transfer, expanded.space, new, at,
-        (expanded.active, expanded.inert, *amounts),
-        needed(scene.kinetics, "[kinetics]").maximum_density)
-    supplied = scene.at(expanded.time if speed else 0.0)
+        rules.transfer, expanded.space, new, at, (expanded.active, expanded.inert, *amounts),
+        rules.maximum_density)
+    supplied = at_time(rules.substrates, expanded.time if speed else 0.0)
     substrates = transfer_substrates(supplied, previous.space, new, expanded.concentrations, speed)
     last = expanded.last
     if last is not None:
         last = at.field(last, old.topology.body_cells, old.geometry)
     pore = Pore(expanded.time, new, outline.wall, outline.fixed, active, inert, np.empty(0), body,
                 _pressure(mesh, expanded, at), substrates, expanded.front, last)
-    return replace(pore, theta=expansion(scene, pore)), tuple(rest)
+    return replace(pore, theta=growing.restart_theta(pore, rules.maximum_density)), tuple(rest)
 
 
 def _pressure(mesh: Mesh, expanded: Pore, at: Located) -> np.ndarray:
@@ -225,31 +257,13 @@ def _material(new: Space, expanded: Pore, rim: np.ndarray, at: Located) -> Body:
     return material(new, transfer.unfolded(mesh, origin)[mesh.body])
 
 
-def expansion(scene: Scene, pore: Pore) -> np.ndarray:
-    """(t, q) J times the density over X_m, in the points where growth is integrated: on straight
-    triangles the mean density of their nodes (29), on curved ones that of each point."""
-    J = pore.body.strained(pore.mesh.points[pore.mesh.body]).J
-    maximum = needed(scene.kinetics, "[kinetics]").maximum_density
-    density = (pore.active + pore.inert) / pore.space.reaction.dx / maximum
-    return J * at_growth_points(pore.space, density)
-
-
-def at_growth_points(space: Space, field: np.ndarray) -> np.ndarray:
-    """(t, q) values at the points where growth is integrated, from a field (r, q) at the points of
-    the reaction: the mean over the nodes of each straight triangle (29); on curved triangles the
-    points are the same, and the field is returned unchanged."""
-    if space.order > 1:
-        return field
-    return field[space.mesh.straight.topology.body_cells, 0].mean(axis=1, keepdims=True)
-
-
-def transfer_substrates(scene: Scene, old: Space, new: Space, state: Concentrations | None,
+def transfer_substrates(supplied: Substrates, old: Space, new: Space, state: Concentrations | None,
                         speed: float) -> Concentrations | None:
     """C_A and C_D on a new mesh: interpolated within the old ends; beyond them (26) upstream, a
     constant downstream, and the supply where nothing flows.
 
-    scene: at the time of the supply. Where nothing flows this is t = 0, because the water beyond
-    the old ends has been there since.
+    supplied: the substrates at the time of the supply, without tables. Where nothing flows this is
+    t = 0, because the water beyond the old ends has been there since.
     """
     if state is None:
         return None
@@ -258,9 +272,9 @@ def transfer_substrates(scene: Scene, old: Space, new: Space, state: Concentrati
     clipped = np.column_stack([np.clip(x, first, last), new.points[:, 1]])
     at = transfer.located(old.mesh.points, old.mesh.cells, clipped)
     fields = at.field(np.column_stack([state.acceptor, state.donor]), old.cells, old.order)
-    both = needed(scene.substrates, "[substrates]")
+    kinds = supplied.acceptor, supplied.donor
     acceptor, donor = (_beyond(field, substrate, x, old.mesh.ends, speed)
-                       for field, substrate in zip(fields.T, (both.acceptor, both.donor)))
+                       for field, substrate in zip(fields.T, kinds))
     return Concentrations(acceptor, donor)
 
 

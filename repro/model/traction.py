@@ -26,10 +26,11 @@ from repro.errors import GrowthError
 from repro.fem import elements, transfer
 from repro.fem.mesh import Mesh
 from repro.fem.space import Space
-from repro.model import mesh_motion, pore, remeshing
+from repro.model import pore, remeshing
 from repro.model.flow import Flow, pressure_space
-from repro.model.pore import Pore
-from repro.scene import Scene, needed
+from repro.model.pore import Meshing, Pore
+from repro.scene import Flow as Drive
+from repro.scene import Scene, at_time, needed
 
 #: rho g in MPa/um, for rho in mg/L and g in um/h^2.
 MPA_PER_UM = 1e-3 * 1e-6 / 3600**2 * 1e-12
@@ -51,40 +52,57 @@ class Surroundings:
     share: np.ndarray
 
 
-def surroundings(scene: Scene, before: Pore, shaped: Pore) -> Surroundings:
+@dataclass(frozen=True, eq=False)
+class Fluid:
+    """What the fluid's forces on an aggregate depend on.
+
+    meshing: of the scene; drive: section [flow], whose head or mean velocity may be a table over
+    time; shear_modulus: mu_L, MPa.
+    """
+
+    meshing: Meshing
+    drive: Drive
+    shear_modulus: float
+
+    @classmethod
+    def of(cls, scene: Scene) -> Fluid:
+        """The fluid of a scene with flow and growth."""
+        drive = needed(scene.flow, "[flow]")
+        return cls(Meshing.of(scene), drive, scene.growing.growth.shear_modulus)
+
+
+def surroundings(meshing: Meshing, before: Pore, shaped: Pore) -> Surroundings:
     """The mesh of ``before``, moved with the aggregate, or a new one where one is due."""
-    mesh = before.mesh if shaped is before else remeshing.moved_mesh(scene, before, shaped)
+    mesh = before.mesh if shaped is before else remeshing.moved_mesh(meshing, before, shaped)
     if mesh is not None:
         nodes = np.arange(len(mesh.body))[:, None]
         return Surroundings(mesh, nodes, np.ones(nodes.shape))
-    mesh, _ = pore.generate(scene, shaped.outline)
+    mesh, _ = meshing.generate(shaped.outline)
     cells = shaped.mesh.topology.body_cells
     at = transfer.located(shaped.mesh.points[shaped.mesh.body], cells, mesh.points[mesh.body])
     return Surroundings(mesh, cells[at.triangle], elements.values(mesh.geometry, at.local))
 
 
-def forces(scene: Scene, around: Surroundings, shaped: Pore) -> np.ndarray:
+def forces(fluid: Fluid, around: Surroundings, shaped: Pore) -> np.ndarray:
     """(n, 2) um: nodal forces over mu_L on ``shaped.mesh.body`` by the flow around that shape."""
     mesh = around.mesh
     positions = shaped.mesh.points[shaped.mesh.body]
     places = np.einsum("ka,kai->ki", around.share, positions[around.nodes])
     if np.abs(places - mesh.points[mesh.body]).max() > ROUND_OFF * mesh.width:
-        numerics = scene.numerics
-        mesh = mesh.moved(mesh_motion.move(mesh, places, numerics.mesh_compressibility,
-                                           numerics.flow_stabilisation))
+        mesh = fluid.meshing.move(mesh, places)
     if mesh.areas.min() <= 0 or mesh.turned_over().any():
         raise GrowthError("the fluid's forces move the aggregate so far that the mesh around it "
                           "turns over; try a shorter growth.time_step, or "
                           'growth.fluid_forces = "neglected"')
-    drive = needed(scene.flow, "[flow]")
-    modulus = needed(scene.growth, "[growth]").shear_modulus
+    drive = at_time(fluid.drive, shaped.time)
+    numerics = fluid.meshing.numerics
     space = Space(mesh, shaped.space.order)
-    flow_field = pore.solve_flow(scene.at(shaped.time), space)
+    flow_field = pore.solve_flow(space, drive, fluid.meshing.channel.length, numerics)
     viscosity = drive.kinematic_viscosity / drive.gravity
-    on = nodal(space, flow_field, viscosity, scene.numerics.interface)[mesh.body]
+    on = nodal(space, flow_field, viscosity, numerics.interface)[mesh.body]
     total = np.zeros_like(positions)
     np.add.at(total, around.nodes, around.share[..., None] * on[:, None])
-    return MPA_PER_UM * drive.density * drive.gravity / modulus * total
+    return MPA_PER_UM * drive.density * drive.gravity / fluid.shear_modulus * total
 
 
 def nodal(space: Space, solution: Flow, viscosity: float, interface: str) -> np.ndarray:

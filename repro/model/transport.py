@@ -21,6 +21,7 @@ from __future__ import annotations
 
 from copy import copy
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -94,6 +95,11 @@ class Problem:
     def both(self) -> tuple[Substrate, Substrate]:
         """Acceptor and donor, as the scene describes them."""
         return self.substrates.acceptor, self.substrates.donor
+
+    @property
+    def rate_law(self) -> RateLaw:
+        """The law of the biomass. Raises MissingError without biomass."""
+        return needed(self.law, "[kinetics]")
 
     @property
     def supply(self) -> np.ndarray:
@@ -314,8 +320,12 @@ class Balance:
         return self._reaction.evaluate(state.reshape(2, -1))
 
     @property
+    def _present_sink(self) -> Sink:
+        return needed(self.sink, "a sink")
+
+    @property
     def _law(self) -> RateLaw:
-        return needed(self.problem.law, "[kinetics]")
+        return self.problem.rate_law
 
     @property
     def _both(self) -> UptakeLaw:
@@ -325,7 +335,7 @@ class Balance:
     def uptake(self, state: np.ndarray) -> np.ndarray:
         """(r, 2, q) um2 mg/L/h."""
         fractions = self._both.fraction(self.at(state))
-        return needed(self.sink, "a sink").uptake(fractions, self._law)
+        return self._present_sink.uptake(fractions, self._law)
 
     def residual(self, state: np.ndarray, loads: np.ndarray | None = None) -> np.ndarray:
         """(2n,) um2 mg/L/h for C_A, then C_D, of all nodes (2n,), mg/L; loads: the uptake, if it is
@@ -352,7 +362,7 @@ class Balance:
     def _uptake_slopes(self, saturations: np.ndarray) -> np.ndarray:
         """(2, 2, r, q) derivatives of the uptake by the saturations."""
         fractions, slopes = self._both.at_saturation(saturations)
-        return needed(self.sink, "a sink").slopes(fractions, self._law) * slopes
+        return self._present_sink.slopes(fractions, self._law) * slopes
 
     def tangent(self, state: np.ndarray,
                 saturations: np.ndarray | None = None) -> tuple[np.ndarray, ...]:
@@ -496,7 +506,7 @@ def _front(failure: str) -> Unresolved:
 
 def _eased(problem: Problem, sink: Sink | None, state: np.ndarray) -> tuple[np.ndarray, int]:
     """Newton's method with half saturations that fall from the supply to their own values."""
-    law = needed(problem.law, "[kinetics]")
+    law = problem.rate_law
     supply = np.array([s.supply for s in problem.both])[:, None, None]
     sharpest = law.both.sharpness(supply).min()
     total = 0
@@ -533,7 +543,7 @@ def quadrature_error(problem: Problem, sink: Sink, state: Concentrations) -> flo
     reaction = problem.space.reaction
     finer, fit = problem.space.integration.finer(FINER)
     both = np.stack([state.acceptor, state.donor])
-    _, rate = needed(problem.law, "[kinetics]").uptake(*finer.evaluate(both))
+    _, rate = problem.rate_law.uptake(*finer.evaluate(both))
     masses = sink.active / reaction.dx @ fit * finer.dx
     exact = float(np.vdot(masses, rate))
     quadrature = float(Balance(problem, Sink(sink.active)).uptake(both.ravel())[:, 1].sum())
@@ -558,6 +568,15 @@ class Fluxes:
     consumed: float
     inlet: float
     effluent: float
+
+
+class Flows(NamedTuple):
+    """Amounts of acceptor and donor in the balance of a step, um2 mg/L."""
+
+    supplied: tuple[float, float]
+    out: tuple[float, float]
+    consumed: tuple[float, float]
+    stored: tuple[float, float]
 
 
 def fluxes(problem: Problem, sink: Sink | None, state: Concentrations) -> tuple[Fluxes, Fluxes]:

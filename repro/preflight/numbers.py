@@ -18,7 +18,7 @@ from repro.model.kinetics import rate_law
 from repro.model.pore import film, initial_outline, sized
 from repro.model.traction import MPA_PER_UM
 from repro.model.uptake_law import UptakeLaw
-from repro.scene import Scene, Substrate, needed
+from repro.scene import Scene, Substrate, at_largest, at_time
 
 #: Number of steps in which the bound on the growth is integrated.
 STEPS = 2000
@@ -169,13 +169,12 @@ def evaluate_at_largest(scene: Scene, velocity: float | None) -> tuple[Scene, li
     """Return the scene with each table at its largest value, and its numbers; velocity: mean
     velocity (um/h) at t = 0, None without flow."""
     most = scene.largest
-    if velocity is None:
+    if velocity is None or scene.flow is None:
         return most, numbers(most, None)
-    start = needed(scene.at(0.0).flow, "[flow]")
-    drive = needed(most.flow, "[flow]")
+    drive = at_largest(scene.flow)
     if drive.mean_velocity is not None:
         return most, numbers(most, drive.mean_velocity)
-    rise = needed(drive.head, "flow.head") / needed(start.head, "flow.head")
+    rise = drive.driving_head / at_time(scene.flow, 0.0).driving_head
     return most, numbers(most, velocity * rise)
 
 

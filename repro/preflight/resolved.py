@@ -10,7 +10,7 @@ from repro.model import pore
 from repro.model.remeshing import MOST_REFINED
 from repro.preflight.memory import first_nodes
 from repro.preflight.simplifications import Caveat
-from repro.scene import Scene
+from repro.scene import Flow, Scene, at_time
 
 #: The head loss of a resolved flow changes by at most this share on a mesh twice as fine. Near
 #: unresolved corners the error falls with the first power of the size, and is twice the change.
@@ -27,7 +27,7 @@ def find_unresolved_flow(scene: Scene) -> Iterator[Caveat]:
     """
     if scene.flow is None or scene.aggregate is None or scene.aggregate.outline is None:
         return
-    losses = _compute_losses(scene)
+    losses = _compute_losses(scene, at_time(scene.flow, 0.0))
     if len(losses) < 2 or (len(losses) == 2 and _is_converged(losses)):
         return
     first = losses[0][1]
@@ -48,7 +48,7 @@ def _is_converged(losses: list[tuple[float, float]]) -> bool:
     return abs(losses[-2][1] / losses[-1][1] - 1) <= CHANGE
 
 
-def _compute_losses(scene: Scene) -> list[tuple[float, float]]:
+def _compute_losses(scene: Scene, drive: Flow) -> list[tuple[float, float]]:
     """(refinement, head loss in um) of meshes, each twice as fine as the one before, until the loss
     converges, or the next mesh is too large or fails."""
     losses: list[tuple[float, float]] = []
@@ -58,7 +58,7 @@ def _compute_losses(scene: Scene) -> list[tuple[float, float]]:
         if refinement > MOST_REFINED or first_nodes(finer) > MOST_COMPARED:
             break
         try:
-            losses.append((refinement, _head_loss(finer)))
+            losses.append((refinement, _head_loss(finer, drive)))
         except StageError:
             break
         if doubling and _is_converged(losses):
@@ -66,6 +66,7 @@ def _compute_losses(scene: Scene) -> list[tuple[float, float]]:
     return losses
 
 
-def _head_loss(scene: Scene) -> float:
-    """Head loss (um) of the whole pore at t = 0."""
-    return pore.solve_flow(scene.at(0.0), pore.seeded(scene).space).head_loss
+def _head_loss(scene: Scene, drive: Flow) -> float:
+    """Head loss (um) of the whole pore at t = 0, with the flow at that time."""
+    space = pore.seeded(scene).space
+    return pore.solve_flow(space, drive, scene.pore.length, scene.numerics).head_loss

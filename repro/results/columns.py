@@ -6,7 +6,8 @@ from collections.abc import Callable
 from functools import partial
 
 from repro.march import balance
-from repro.march.loop import Ledger, Report
+from repro.march.balance import Ledger
+from repro.march.loop import Report
 from repro.model.surface import BESIDE, BIOT, CREASE, STRETCH, surface
 from repro.results.quantities import Quantity, is_modelled
 from repro.scene import Scene

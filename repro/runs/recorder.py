@@ -9,7 +9,8 @@ from time import perf_counter
 
 from repro import report, results, timing
 from repro.errors import Interrupted
-from repro.march.loop import Ledger, Report, RestartState, sum_counts
+from repro.march.balance import Ledger
+from repro.march.loop import Report, RestartState, sum_counts
 from repro.march.step_control import StepControl, exceeds_tolerance
 from repro.preflight.simplifications import CREASED, Caveat, warn_crease, warn_missed_tolerance
 from repro.results import field_files, netcdf

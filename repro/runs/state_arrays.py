@@ -14,7 +14,8 @@ from repro.errors import CheckpointError
 from repro.fem.linear import Method
 from repro.fem.mesh import Mesh
 from repro.fem.space import Space
-from repro.march.loop import Ledger, RestartState
+from repro.march.balance import Ledger
+from repro.march.loop import RestartState
 from repro.march.step_control import StepControl
 from repro.model.pore import Pore, material
 from repro.model.transport import Concentrations

@@ -17,12 +17,13 @@ from fractions import Fraction
 from functools import cached_property
 from math import inf
 from pathlib import Path
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 from repro.scene.files import key_of, leave_out, override, packaged_scenes, read_tables
+from repro.scene.needed import MissingError, needed
 from repro.scene.reading import Place, dotted, entries, read_table, toml, write_table
 from repro.scene.rules import rules
-from repro.scene.time_table import TimeTable, constant, time_tables
+from repro.scene.time_table import TimeTable, at_largest, at_time, time_tables
 from repro.scene.units import (
     ACUTE,
     BELOW_1,
@@ -145,6 +146,11 @@ class Flow:
         _interpolate(self, "head", "mean_velocity")
         if self.viscosity_ratio is None and self.biomass == "viscous":
             object.__setattr__(self, "viscosity_ratio", LAMBDA)
+
+    @property
+    def driving_head(self) -> float:
+        """`head` of a flow that has no `mean_velocity`."""
+        return needed(self.head, "flow.head")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -390,6 +396,14 @@ class Output:
         about="timeseries.csv alone, or timeseries.nc besides, which needs the package xarray")
 
 
+class GrowingSections(NamedTuple):
+    """The sections that a scene with [growth] has; none of them is optional."""
+
+    substrates: Substrates
+    kinetics: Kinetics
+    growth: Growth
+
+
 @dataclass(frozen=True)
 class Scene:
     """A scene, read and checked: one attribute for each section of its TOML file.
@@ -457,6 +471,13 @@ class Scene:
             object.__setattr__(self, "numerics", replace(self.numerics, extent=extent))
 
     @property
+    def growing(self) -> GrowingSections:
+        """The sections of growth. Raises MissingError if there is no [growth]."""
+        if self.substrates is None or self.kinetics is None or self.growth is None:
+            raise MissingError("[substrates], [kinetics] and [growth] are needed here")
+        return GrowingSections(self.substrates, self.kinetics, self.growth)
+
+    @property
     def stagnant(self) -> bool:
         """Whether there are substrates without flow, at any time."""
         if self.substrates is None or self.flow is None:
@@ -471,12 +492,12 @@ class Scene:
 
     def at(self, time: float) -> "Scene":
         """Return the scene with the values of its tables at a time (h), after a jump then."""
-        return constant(self, lambda table: table.at(time)) if self.time_tables else self
+        return at_time(self, time) if self.time_tables else self
 
     @cached_property
     def largest(self) -> "Scene":
         """The scene with the largest value of each table."""
-        return constant(self, lambda table: table.largest)
+        return at_largest(self)
 
     def corner(self, time: float) -> float:
         """Return the next time (h) of its tables after ``time``; infinite if there is none."""

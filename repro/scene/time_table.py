@@ -35,6 +35,16 @@ class TimeTable:
         return max(self.values)
 
 
+def at_time(part: Part, time: float) -> Part:
+    """A scene or a section with the values of its tables at a time (h), after a jump there."""
+    return constant(part, lambda table: table.at(time))
+
+
+def at_largest(part: Part) -> Part:
+    """A scene or a section with the largest value of each table."""
+    return constant(part, lambda table: table.largest)
+
+
 def constant(part: Part, value: Callable[[TimeTable], float]) -> Part:
     """Replace every table of a scene or a section by a value; the same object without tables."""
     changed: dict[str, object] = {}

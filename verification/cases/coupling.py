@@ -24,6 +24,7 @@ from repro.march import midpoint
 from repro.march.loop import Report
 from repro.march.simulation import shaped, simulate
 from repro.model import flow, pore
+from repro.model.stages import Stages
 from repro.scene import Scene, load_scene
 from verification.evidence.cases import parametrize
 from verification.evidence.checks import at_least, at_most, each_at_most, refine, study
@@ -394,7 +395,7 @@ def _equal_steps(scene, steps: int) -> np.ndarray:
     for _ in range(steps):
         solved = pore.solve(scene, state)
         state = replace(state, concentrations=solved.concentrations)
-        step = midpoint.attempt(scene, state, solved, 2.0 / steps).step
+        step = midpoint.attempt(Stages.of(scene), state, solved, 2.0 / steps).step
         if step.remeshed:
             raise RuntimeError("a new mesh: the error in space would not be common")
         state = step.pore

@@ -18,10 +18,12 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from repro.fem.outline import BOTTOM, FREE, TOP
-from repro.march.loop import Ledger, Report
+from repro.march.balance import Ledger
+from repro.march.loop import Report
 from repro.march.simulation import simulate
 from repro.model import pore, remeshing
 from repro.model.contact_lines import CLOSE
+from repro.model.remeshing import Remeshing
 from repro.scene import Scene, load_scene
 from verification.evidence.cases import parametrize
 from verification.evidence.checks import Check, Study, at_least, at_most, between, study
@@ -113,7 +115,7 @@ def _restored(*changes: str) -> tuple[float, float]:
     x = aggregates.reaction_points(state.space)[0]
     state = replace(state, active=state.active * (1 + 0.1 * x / scene.aggregate.radius))
     solved = pore.solve(scene, state)
-    anew = remeshing.remesh(scene, state, state, solved.flow.mean_velocity)[0]
+    anew = remeshing.remesh(Remeshing.of(scene), state, state, solved.flow.mean_velocity)[0]
     after = runs.step(scene, anew, pore.solve(scene, anew), 0.2).pore
     weight, density = after.space.reaction.dx, runs.density(scene, after)
     error = np.sqrt(np.average((density - 1) ** 2, weights=weight))
@@ -293,7 +295,8 @@ def test_contact(changes, record):
                       times=(0.2, 0.4, 0.6))
     instants = list(simulate(runs.at_velocity(scene, runs.SPEED)))
     rows, last = _ledgers(instants), instants[-1].pore
-    record(_steps(rows, last.space.count * max(1.0, 1 / pore.peclet(scene, runs.SPEED))), _area(scene, instants[-1]),
+    peclet = pore.peclet(scene.substrates, scene.pore.width, runs.SPEED)
+    record(_steps(rows, last.space.count * max(1.0, 1 / peclet)), _area(scene, instants[-1]),
            at_least("narrowest gap over the least allowed", _narrowest(scene, last, TOP), 1 - 1e-9,
                     "2 um, or 16.7 degrees beside contact"),
            between("parts of the fluid", _parts(last.mesh), 1.9, 2.1, "a plug"))

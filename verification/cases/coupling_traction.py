@@ -39,7 +39,7 @@ def loaded_scene(*changes: str):
 
 def nodal_forces(scene, space: Space) -> tuple[np.ndarray, Flow]:
     """Nodal forces (N, 2) um2 of head on the nodes of a mesh, and the flow."""
-    solution = pore.solve_flow(scene, space)
+    solution = pore.solve_flow(space, scene.flow, scene.pore.length, scene.numerics)
     viscosity = scene.flow.kinematic_viscosity / scene.flow.gravity
     return traction.nodal(space, solution, viscosity, scene.numerics.interface), solution
 
@@ -202,7 +202,8 @@ def test_traction_even(changes, record):
     scene = loaded_scene(*changes)
     seed = pore.seeded(scene)
     theta = _uneven(seed, 0.002)
-    plain = contact._at_rest(scene, seed, theta, seed, None, contact.PATIENT).pore
+    mechanics = contact.Mechanics.of(scene)
+    plain = contact._at_rest(mechanics, seed, theta, seed, None, contact.PATIENT).pore
     space = seed.moved(mesh_motion.move(seed.mesh, plain.mesh.points[seed.mesh.body], 1.0, 100.0)).space
     mesh = space.mesh
     still = Flow(0.0, np.zeros((space.count, 2)), np.full(flow.pressure_space(space).count, 5.0), None, 0.0, 0.0, 0.0)
@@ -211,7 +212,7 @@ def test_traction_even(changes, record):
     apart = (on[mesh.loop] - by_hand)[plain.wall == FREE]
     record(at_most("forces", np.abs(apart).max() / np.abs(by_hand).max(), 1e-12, "the divergence theorem: round-off"))
     for sign in (1.0, -1.0):
-        pushed = contact._at_rest(scene, seed, theta, seed, sign * on[mesh.body], contact.PATIENT).pore
+        pushed = contact._at_rest(mechanics, seed, theta, seed, sign * on[mesh.body], contact.PATIENT).pore
         apart = np.abs(pushed.mesh.points - plain.mesh.points).max() / 25.0
         change = (pushed.pressure - plain.pressure)[mesh.topology.body_corners] + sign * 5.0
         record(at_most(f"move, {sign:+g}", apart, 1e-9, "J = theta: Newton's tolerance"))
@@ -252,7 +253,7 @@ def _moved(factor: float, *changes: str) -> tuple[pore.Pore, pore.Pore, np.ndarr
     scene = _in_denser_water(factor, *changes)
     seed = pore.seeded(scene)
     theta = _uneven(seed, -0.002)
-    return seed, contact.expand(scene, seed, theta).pore, theta
+    return seed, contact.expand(contact.Mechanics.of(scene), seed, theta).pore, theta
 
 
 @pytest.mark.slow
@@ -298,7 +299,8 @@ def _defects(*changes: str) -> tuple[float, float]:
     place, pressure = grown.mesh.points[nodes], grown.pressure[seed.mesh.topology.body_corners]
     rest = growth.System(body, constrained_dofs, stabilisation=stabilisation).under(theta, place, place, pressure)
     for around in (grown, seed):
-        forces = traction.forces(scene, traction.surroundings(scene, seed, around), around)
+        fluid = traction.Fluid.of(scene)
+        forces = traction.forces(fluid, traction.surroundings(fluid.meshing, seed, around), around)
         load = np.concatenate([forces.T.ravel(), np.zeros(len(pressure))])
         defects.append(relative((rest.residual - load)[rest.free], (rest.size + np.abs(load))[rest.free]))
     return tuple(defects)
@@ -319,12 +321,13 @@ def test_traction_remeshed(changes, record):
     seed, grown, _ = _moved(0.0, *changes)
     coarse = loaded_scene(*changes)
     fine = loaded_scene(*changes, f"numerics.refinement={max(ANEW, 3 * coarse.numerics.refinement)}")
-    mesh, _ = pore.generate(fine, grown.outline)
+    mesh, _ = pore.Meshing.of(fine).generate(grown.outline)
     on = nodal_forces(fine, Space(mesh, grown.space.order))[0]
     scale = traction.MPA_PER_UM * fine.flow.density * fine.flow.gravity / fine.growth.shear_modulus
     new = _sums(mesh.points[mesh.loop], scale * on[mesh.loop])
     places = grown.mesh.points[seed.mesh.body]
-    both = [traction.forces(scene, traction.surroundings(scene, seed, grown), grown) for scene in (fine, coarse)]
+    both = [traction.forces(fluid, traction.surroundings(fluid.meshing, seed, grown), grown)
+            for fluid in map(traction.Fluid.of, (fine, coarse))]
     transferred, on_moved_mesh = (_sums(places, forces) for forces in both)
     record(at_most("new mesh, nodes of the outline", np.abs(transferred / new - 1).max(), 1e-9, runs.ROUND_OFF),
            at_most("new mesh, mesh that followed, x", abs(transferred[0] / on_moved_mesh[0] - 1), 0.02,

@@ -242,5 +242,6 @@ def test_permeable_run(record):
     along = solution.velocity[np.unique(end.space.cells[end.mesh.biomass]), 0]
     record(at_least("least velocity", along.min() / along.max(), -0.01, "no node of a line of elements overshoots"))
     scene = load_scene("base", [*overrides, "numerics.refinement=0.6", "numerics.contact_elements=10"], ["flow.head"])
-    finer = pore.solve_flow(scene, Space(pore.generate(scene, end.boundary)[0], 3))
+    fine_mesh, _ = pore.Meshing.of(scene).generate(end.boundary)
+    finer = pore.solve_flow(Space(fine_mesh, 3), scene.flow, scene.pore.length, scene.numerics)
     record(at_most("head loss", abs(solution.head_loss / finer.head_loss - 1), 0.01, "what fast is for: 1 %"))

@@ -19,6 +19,8 @@ from repro.march import midpoint, simulation, stepping
 from repro.march.loop import Report
 from repro.model import contact, flow, growth, pore, remeshing
 from repro.model.contact_lines import CLOSE, Clearance, lines_of
+from repro.model.remeshing import Remeshing
+from repro.model.stages import Stages
 from repro.scene import Scene
 from verification.evidence.checks import Check, at_least, at_most, between, largest
 from verification.problems import bodies, hard, runs
@@ -46,7 +48,7 @@ def remeshing_always(scene: Scene) -> Iterator[Report]:
 def _on_a_new_mesh(scene: Scene, state, instant: Report):
     """The state and report of a step on a new mesh, with flow and transport solved there."""
     old, speed = instant.pore, instant.solved.flow.mean_velocity
-    fresh, _ = remeshing.remesh(scene, old, old, speed)
+    fresh, _ = remeshing.remesh(Remeshing.of(scene), old, old, speed)
     last = replace(instant.ledgers[-1], biomass_after=fresh.mass)
     solved_pore, solved = hard.solved_in(scene, fresh)
     again = replace(instant, pore=solved_pore, solved=solved, ledgers=(*instant.ledgers[:-1], last), remeshes=1)
@@ -56,7 +58,7 @@ def _on_a_new_mesh(scene: Scene, state, instant: Report):
 def landings(run: Run) -> list[tuple[float, float]]:
     """Films (um) before and after each step that makes contact. The step is repeated."""
     ends = [instant for instant in run.instants if instant.ledgers or instant.pore.time == 0]
-    return [midpoint.attempt(run.scene, a.pore, a.solved, b.pore.time - a.pore.time).gaps
+    return [midpoint.attempt(Stages.of(run.scene), a.pore, a.solved, b.pore.time - a.pore.time).gaps
             for a, b in pairwise(ends) if b.pore.contact and not a.pore.contact]
 
 
@@ -186,7 +188,7 @@ def in_a_wedge(preset: str) -> list:
 
 def _loss(scene: Scene) -> float:
     """Loss over the meshed part, 1/um."""
-    grid, _ = pore.generate(scene, wedge(LEAST, scene.numerics.geometry))
+    grid, _ = pore.Meshing.of(scene).generate(wedge(LEAST, scene.numerics.geometry))
     return flow.unit_flow(Space(grid, scene.numerics.order), scene.flow.viscosity_ratio).loss
 
 

@@ -17,6 +17,8 @@ from repro.march import midpoint
 from repro.march.loop import StepResult
 from repro.model import biomass, flow, pore, remeshing
 from repro.model.pore import Pore
+from repro.model.remeshing import Remeshing
+from repro.model.stages import Stages
 from repro.scene import Scene, parse_scene, scene_tables
 from verification.cases.hard_mechanics import CLOSING
 from verification.cases.hard_stages import exponential
@@ -36,7 +38,7 @@ def remeshes(preset: str) -> list:
     last = first
     for index in range(FIFTY):
         finer = replace(original.numerics, refinement=original.numerics.refinement * (0.85, 1.0, 1.15)[index % 3])
-        last, _ = remeshing.remesh(replace(original, numerics=finer), last, last, speed)
+        last, _ = remeshing.remesh(Remeshing.of(replace(original, numerics=finer)), last, last, speed)
     without, after = (_numbers(original, _step(original, start).pore) for start in (first, last))
     return [run, *_conserved(first, last),
             *hard.alike("after a step more, with and without them", NAMES, after, without, preset)]
@@ -56,7 +58,7 @@ def _conserved(first: Pore, last: Pore) -> list[Check]:
 
 def _step(scene: Scene, start: Pore):
     """A step of 12 min."""
-    return midpoint.attempt(scene, *hard.solved_in(scene, start), 0.2).step
+    return midpoint.attempt(Stages.of(scene), *hard.solved_in(scene, start), 0.2).step
 
 
 NAMES = ("area", "thickness", "upstream tip", "conductivity")
@@ -65,7 +67,8 @@ NAMES = ("area", "thickness", "upstream tip", "conductivity")
 def _numbers(scene: Scene, state: Pore) -> list[float]:
     """Values of NAMES."""
     shape = state.outline
-    return [shape.area, shape.thickness, shape.upstream, pore.solve_flow(scene, state.space).conductivity]
+    solution = pore.solve_flow(state.space, scene.flow, scene.pore.length, scene.numerics)
+    return [shape.area, shape.thickness, shape.upstream, solution.conductivity]
 
 
 REMESHES = HardCase(
@@ -97,7 +100,7 @@ def _mesh_and_loss(scene: Scene, noise: float) -> tuple[Mesh, float]:
     free = shape.wall == FREE
     points = shape.points.copy()
     points[free] += 20.0 * noise * np.random.default_rng(7).uniform(-1, 1, (free.sum(), 2))
-    grid, _ = pore.generate(scene, replace(shape, points=points))
+    grid, _ = pore.Meshing.of(scene).generate(replace(shape, points=points))
     return grid, flow.unit_flow(Space(grid, numerics.order), 2000.0).loss
 
 

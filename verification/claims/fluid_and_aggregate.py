@@ -281,7 +281,7 @@ def pressed(aggregate: Body) -> Body:
     """The same aggregate at rest under the fluid's forces. It is elastic, so that this does not hang on the way there,
     but for what the forces would have changed of its growth. Raises GrowthError where shape and flow do not agree."""
     forced = replace(aggregate.scene, growth=replace(aggregate.scene.growth, fluid_forces="included"))
-    at_rest = contact.expand(forced, aggregate.pore, aggregate.pore.theta).pore
+    at_rest = contact.expand(contact.Mechanics.of(forced), aggregate.pore, aggregate.pore.theta).pore
     return Body(forced, at_rest, aggregate.solved)
 
 

@@ -25,6 +25,8 @@ from repro.march.loop import Report, RestartState
 from repro.model import biomass, flow, pore, remeshing, transport
 from repro.model.kinetics import Sink
 from repro.model.pore import Pore, Solved, solve
+from repro.model.remeshing import Remeshing
+from repro.model.stages import Stages
 from repro.results.arrays import State as Reported
 from repro.scene import Scene, load_scene
 from verification.claims.levels import CONVERGED, cached, converged, current
@@ -209,7 +211,7 @@ def grown_anew(run: Run, time: float) -> tuple[Pore, Solved]:
 
 
 def _grown(scene: Scene, pore: Pore, solved: Solved) -> tuple[Pore, Solved]:
-    before_expansion, _, _ = updates.make_biomass(scene, pore, solved, UPDATE)
+    before_expansion, _, _ = updates.make_biomass(Stages.of(scene), pore, solved, UPDATE)
     return before_expansion, solve(scene, before_expansion)
 
 
@@ -284,7 +286,7 @@ def solved_pore(run: Run, time: float) -> tuple[Pore, Solved]:
 
 def remeshed(chosen: Scene, pore: Pore, solved: Solved) -> tuple[Pore, Solved]:
     """The same aggregate in a new mesh of the extent that the scene asks for, solved."""
-    new, _ = remeshing.remesh(chosen, pore, pore, solved.flow.mean_velocity)
+    new, _ = remeshing.remesh(Remeshing.of(chosen), pore, pore, solved.flow.mean_velocity)
     return new, solve(chosen, new)
 
 
@@ -325,7 +327,7 @@ def solution(scene, grid: Mesh, active: np.ndarray, carried_by_u: bool = False) 
 
 def flow_in(scene, grid: Mesh) -> flow.Flow:
     """Flow under the scene's drive."""
-    return pore.solve_flow(scene, Space(grid, scene.numerics.order))
+    return pore.solve_flow(Space(grid, scene.numerics.order), scene.flow, scene.pore.length, scene.numerics)
 
 
 def full_biomass(scene, grid: Mesh) -> np.ndarray:

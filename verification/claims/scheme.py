@@ -15,9 +15,10 @@ import numpy as np
 
 from repro.fem.mesh import POOR, POOR_ALLOWED
 from repro.march import updates
-from repro.model import biomass, contact, gear
+from repro.model import biomass, gear
 from repro.model.kinetics import Sink, rate_law
 from repro.model.pore import Pore, solve
+from repro.model.stages import Stages
 from repro.model.transport import Concentrations
 from verification.claims import (
     FEW,
@@ -260,8 +261,8 @@ def reprojection_conserves() -> Finding:
 def node_defect(time: float) -> float:
     """Largest relative change of a node's mass of X_A or X_I in the update of base that starts at a time (h)."""
     scene, (pore, solved) = load_packaged(*BASE), solved_pore(BASE, time)
-    before_expansion, _, _ = updates.make_biomass(scene, pore, solved, scene.growth.time_step)
-    expanded = contact.expand(scene, before_expansion, updates.compute_theta(scene, pore, before_expansion)).pore
+    before_expansion, _, _ = updates.make_biomass(Stages.of(scene), pore, solved, scene.growth.time_step)
+    expanded = Stages.of(scene).expand(pore, before_expansion).pore
     pairs = zip(node_masses(before_expansion), node_masses(expanded))
     return max(float(np.abs(after / before - 1).max()) for before, after in pairs)
 

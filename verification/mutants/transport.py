@@ -60,7 +60,7 @@ MUTANTS = (
          "NEWTON = 1e-4"),
         ("unpaired",
          "below zero each substrate is taken up on its own, so that the two are not in proportion",
-         'return needed(self.sink, "a sink").uptake(fractions, self._law)',
+         'return self._present_sink.uptake(fractions, self._law)',
          "rates = [self._law.own_uptake(s, *self.at(state))[0] for s in (0, 1)]\n"
          "        return self.sink.active[:, None] * np.stack(rates, axis=1)")),
     *changes(

@@ -7,9 +7,10 @@ import numpy as np
 from repro.fem.mesh import Mesh
 from repro.fem.outline import Outline
 from repro.fem.space import Space
-from repro.march import updates
-from repro.model import contact, remeshing
+from repro.model import remeshing
 from repro.model.pore import Pore, material, seeded
+from repro.model.remeshing import Remeshing
+from repro.model.stages import Stages
 from repro.scene import load_scene
 from verification.evidence.cases import combined
 from verification.problems import channels, meshes, pairs, runs
@@ -53,18 +54,18 @@ def reaction_points(space: Space) -> np.ndarray:
 
 def remesh(scene, pore: Pore, speed: float = 0.0) -> Pore:
     """A new mesh around the aggregate; speed: mean velocity, um/h."""
-    return remeshing.remesh(scene, pore, pore, speed)[0]
+    return remeshing.remesh(Remeshing.of(scene), pore, pore, speed)[0]
 
 
 def expand(scene, pore: Pore, increase) -> Pore:
     """The shape after X_A has grown by the factors 1 + increase (r, q), (28)-(34), on the old mesh."""
     grown = replace(pore, active=pore.active * (1 + increase))
-    return contact.expand(scene, grown, updates.compute_theta(scene, pore, grown)).pore
+    return Stages.of(scene).expand(pore, grown).pore
 
 
 def update(scene, pore: Pore, increase) -> tuple[Pore, bool]:
     """One update: growth, then a moved or a new mesh. Also return whether the mesh is new."""
-    return remeshing.new_mesh(scene, pore, expand(scene, pore, increase), 0.0)
+    return remeshing.new_mesh(Remeshing.of(scene), pore, expand(scene, pore, increase), 0.0)
 
 
 def seed(radius: float, refinement: float = 1.0, order: int = 1) -> Pore:

@@ -220,7 +220,7 @@ def _balances(run: Run) -> Iterator[Check]:
 def _slow(run: Run) -> float:
     """The Peclet number u W / D, one at most: Newton's tolerance is relative to the larger flux."""
     speed = (run.last.get("mean_velocity_m_per_d") or 0.0) / 24e-6
-    return min(1.0, peclet(run.scene, speed)) if speed else 1.0
+    return min(1.0, peclet(run.scene.substrates, run.scene.pore.width, speed)) if speed else 1.0
 
 
 def _bounds(run: Run) -> Iterator[Check]:

@@ -9,10 +9,11 @@ import numpy as np
 from reference import averaged_pore, whole_run
 from repro import results
 from repro.march import midpoint, updates
-from repro.march.loop import Ledger, Report, StepResult
+from repro.march.balance import Ledger
+from repro.march.loop import Report, StepResult
 from repro.march.simulation import simulate
-from repro.model import contact
 from repro.model.pore import Pore, Solved, seeded
+from repro.model.stages import Stages
 from repro.scene import Kinetics, Scene, Substrates, load_scene
 from verification.evidence.checks import columns
 from verification.problems import channels, meshes
@@ -75,18 +76,18 @@ def standing(x: np.ndarray, y: np.ndarray) -> np.ndarray:
 def step(scene: Scene, pore: Pore, solved: Solved, hours: float) -> StepResult:
     """A step by the scene's ``numerics.time``. A step of the midpoint rule is accepted whatever its error estimate."""
     if scene.numerics.time == "updates":
-        return updates.step(scene, pore, solved, hours)
-    return midpoint.attempt(scene, pore, solved, hours).step
+        return updates.step(Stages.of(scene), pore, solved, hours)
+    return midpoint.attempt(Stages.of(scene), pore, solved, hours).step
 
 
 def shape_of(scene: Scene, pore: Pore, grown: Pore) -> Pore:
     """The shape of grown biomass, (28)-(34), on the mesh of the previous shape."""
-    return contact.expand(scene, grown, updates.compute_theta(scene, pore, grown)).pore
+    return Stages.of(scene).expand(pore, grown).pore
 
 
 def next_shape(scene: Scene, pore: Pore, solved: Solved, hours: float) -> Pore:
     """The shape after an update of so many hours."""
-    grown, _, _ = updates.make_biomass(scene, pore, solved, hours)
+    grown, _, _ = updates.make_biomass(Stages.of(scene), pore, solved, hours)
     return shape_of(scene, pore, grown)
 
 

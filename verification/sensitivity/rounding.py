@@ -40,6 +40,7 @@ from repro.march import simulation, updates
 from repro.march.loop import RestartState
 from repro.model import pore
 from repro.model.kinetics import rate_law
+from repro.model.stages import Stages
 from repro.results import M_PER_D
 from repro.scene import Scene, load_scene, needed
 from verification.claims import interval
@@ -137,7 +138,7 @@ def of_base(scene: Scene) -> Row:
     19.4 h with what grows in it [E12]."""
     plotted = END - scene.growth.time_step
     first, shaped, last = simulation.simulate(ending(scene, plotted, END))
-    grown, _, _ = updates.make_biomass(scene, shaped.pore, shaped.solved, scene.growth.time_step)
+    grown, _, _ = updates.make_biomass(Stages.of(scene), shaped.pore, shaped.solved, scene.growth.time_step)
     solved = pore.solve(scene, grown)
     halves = [each.half_saturation for each in solved.problem.both]
     acceptor, donor = (flux.effluent / half for flux, half in zip(solved.fluxes, halves))

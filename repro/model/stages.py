@@ -1,0 +1,50 @@
+"""The parts of a scene that the stages of a step take, resolved once: none of them is optional."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from repro.model import biomass, contact, growing, remeshing
+from repro.model.biomass import Rates
+from repro.model.contact import Expansion, Mechanics
+from repro.model.contact_lines import SearchOptions
+from repro.model.kinetics import RateLaw, rate_law
+from repro.model.pore import Pore, Solved
+from repro.model.remeshing import Remeshing
+from repro.scene import Growth, Scene
+
+
+@dataclass(frozen=True, eq=False)
+class Stages:
+    """The stages of a step of growth.
+
+    scene: for what depends on the time, and for advice; growth: its section [growth]; law: rates
+    of uptake and growth; mechanics: shape of the grown aggregate; remeshing: mesh after a step.
+    """
+
+    scene: Scene
+    growth: Growth
+    law: RateLaw
+    mechanics: Mechanics
+    remeshing: Remeshing
+
+    @classmethod
+    def of(cls, scene: Scene) -> Stages:
+        """The stages of a scene with growth."""
+        substrates, kinetics, growth = scene.growing
+        return cls(scene, growth, rate_law(substrates, kinetics), Mechanics.of(scene),
+                   Remeshing.of(scene))
+
+    def rates(self, pore: Pore, solved: Solved) -> Rates:
+        """F3 / X_A and F4 / X_A, 1/h, at the points of the reaction."""
+        return biomass.rates(pore.space, solved.substrates.concentrations, self.law)
+
+    def expand(self, previous: Pore, grown: Pore, guess: Pore | None = None,
+               search: SearchOptions = contact.PATIENT) -> Expansion:
+        """Expand an aggregate that has grown since ``previous``, by :func:`contact.expand`."""
+        theta = growing.compute_theta(previous, grown, self.remeshing.maximum_density)
+        return contact.expand(self.mechanics, grown, theta, guess, search)
+
+    def new_mesh(self, previous: Pore, expanded: Pore, solved: Solved) -> tuple[Pore, bool]:
+        """Give an expanded aggregate a mesh, by :func:`remeshing.new_mesh`."""
+        return remeshing.new_mesh(self.remeshing, previous, expanded, solved.mean_velocity)
