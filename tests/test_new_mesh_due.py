@@ -93,4 +93,5 @@ def test_a_mesh_moves_by_the_scenes_constants_unless_it_is_too_coarse(order):
     coordinates[pore.mesh.body] *= 1.001
     expected = mesh_motion.move(pore.mesh, coordinates[pore.mesh.body], compressibility=3.0, stabilisation=40.0)
     assert np.array_equal(remeshing.moved_mesh(Meshing.of(coarse), pore, pore.moved(coordinates)).points, expected)
-    assert remeshing.moved_mesh(replace(coarse, numerics=replace(coarse.numerics, refinement=1.8)), pore, pore) is None
+    fine = replace(coarse, numerics=replace(coarse.numerics, refinement=1.8))
+    assert remeshing.moved_mesh(Meshing.of(fine), pore, pore) is None
