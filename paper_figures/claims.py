@@ -44,8 +44,8 @@ STATEMENTS = {
 
 @cache
 def verdicts() -> dict[str, str]:
-    """The verdict of each claim in the committed record."""
-    return {claim["id"]: claim["verdict"] for claim in report.read()}
+    """The verdict of each claim in the committed record, by its first definition, with a later one's beside it."""
+    return {claim["id"]: report.describe_verdicts(claim) for claim in report.read()}
 
 
 def judged(ids: tuple[str, ...]) -> str:

@@ -17,6 +17,7 @@ from pathlib import Path
 
 from paper_figures import FIGURES, manifest, overview
 from paper_figures.claims import STATEMENTS
+from paper_figures.claims import verdicts as verdicts_in_words
 from repro.results import write_text
 from verification import sensitivity, speed
 from verification.bench import runs
@@ -65,8 +66,7 @@ def fields(known: dict) -> dict[str, Callable[[], str]]:
             "base.bars": lambda: _bars_of_base(claims),
             "inputs.share": lambda: f"{100 * sensitivity.record()['one_set']['share_of_the_rounding']:.0f}",
             "table.values": lambda: "\n".join(map(_value, _printed(claims))),
-            "overview.claims": lambda: "; ".join(f"{claim['id']} {claim['verdict']}" for claim in claims
-                                                 if claim["id"] in overview.CLAIMS),
+            "overview.claims": lambda: "; ".join(f"{id} {verdicts_in_words()[id]}" for id in overview.CLAIMS),
             "table.figures": lambda: "\n".join(map(_figure, FIGURES)),
             "environment": lambda: _environment(known["environment"])}
 
@@ -131,8 +131,8 @@ def _about() -> dict[str, Callable[[], str]]:
 
 
 def _with(claims: list[dict], verdict: str) -> list[dict]:
-    """The claims with a given verdict."""
-    return [claim for claim in claims if claim["verdict"] == verdict]
+    """The claims that count with a given verdict, that of their first definition."""
+    return [claim for claim in claims if claims_record.counted(claim)["verdict"] == verdict]
 
 
 def _verdicts(claims: list[dict]) -> dict[str, Callable[[], str]]:
@@ -141,7 +141,8 @@ def _verdicts(claims: list[dict]) -> dict[str, Callable[[], str]]:
               for verdict, name in NAMES.items()}
     lists = {f"list.{name}": lambda verdict=verdict: "\n".join(map(_entry, _with(claims, verdict))) or "None."
              for verdict, name in NAMES.items()}
-    return {**counts, **lists, "claims.total": lambda: str(len(claims)), "paper.total": lambda: str(len(outcomes)),
+    return {**counts, **lists, "claims.anew": lambda: _defined_anew(claims),
+            "claims.total": lambda: str(len(claims)), "paper.total": lambda: str(len(outcomes)),
             "paper.within": lambda: str(outcomes.count(HOLDS)), "paper.outside": lambda: str(outcomes.count(FAILS)),
             "paper.open": lambda: str(outcomes.count(REACHES_OVER))}
 
@@ -172,10 +173,18 @@ def _span(low: float | None, high: float | None) -> str:
 
 def _entry(claim: dict) -> str:
     """A claim in the list of its verdict, with the explanation."""
-    check = claim["checks"][0]
-    words = ([f"Here: {check['quantity']}, {check['value']:.4g}"] if claim["verdict"] == REPRODUCED else
-             [f"*{word}:* {claim[key].rstrip('.')}" for word, key in WHY[claim["verdict"]]])
-    return ". ".join((f"- **{claim['id']}** ({claim['where']}): {claim['claim']}", *words)) + "."
+    first, *later = claims_record.definitions(claim)
+    check = first["checks"][0]
+    words = ([f"Here: {check['quantity']}, {check['value']:.4g}"] if first["verdict"] == REPRODUCED else
+             [f"*{word}:* {first[key].rstrip('.')}" for word, key in WHY[first["verdict"]]])
+    anew = [f"*Defined anew* on {each['defined']}, after values had been seen: {each['verdict']}" for each in later]
+    return ". ".join((f"- **{claim['id']}** ({claim['where']}): {claim['claim']}", *words, *anew)) + "."
+
+
+def _defined_anew(claims: list[dict]) -> str:
+    """The claims with more than one definition, and both verdicts."""
+    return ", ".join(f"{claim['id']} {claims_record.describe_verdicts(claim)}" for claim in claims
+                     if claim["other_definitions"])
 
 
 def _figure(name: str) -> str:
@@ -257,8 +266,9 @@ def _wrap(block: str) -> str:
 def _of_claim(claims: dict[str, dict], id: str, quantity: str, form: str = "") -> str:
     claim = claims[id]
     if not form:
-        if claim["verdict"] != quantity:
-            raise LookupError(f"{id} is {claim['verdict']}, not {quantity}")
+        verdict = claims_record.counted(claim)["verdict"]
+        if verdict != quantity:
+            raise LookupError(f"{id} is {verdict}, not {quantity}")
         return id
     check = {check["quantity"]: check for check in claim["checks"]}[quantity]
     if form == "off":

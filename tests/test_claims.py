@@ -77,15 +77,63 @@ def bounds_of(entry):
 def test_the_recorded_verdicts_follow_from_the_recorded_numbers(record):
     """The test computes every outcome and verdict from intervals and tolerances alone. A printed number holds if its
     interval contains the bar; only statements in words have other tolerances."""
-    for entry in record:
+    for entry in (definition for known in record for definition in report.definitions(known)):
         for check in entry["checks"]:
             bounds, printed = bounds_of(check["tolerance"]), claims.interval(check["paper"])
-            assert claims.outcome_of(bounds_of(check), bounds) == check["outcome"], (entry["id"], check["quantity"])
-            assert (check["paper_low"], check["paper_high"]) == (printed or (None, None)), entry["id"]
-            assert printed in (None, bounds), (entry["id"], check["quantity"])
+            assert claims.outcome_of(bounds_of(check), bounds) == check["outcome"], check["quantity"]
+            assert (check.get("paper_low"), check.get("paper_high")) == (printed or (None, None)), check["quantity"]
+            assert printed in (None, bounds), check["quantity"]
         outcomes = {check["outcome"] for check in entry["checks"]}
         verdict = claims.verdict_of(outcomes, bool(entry["change"]), bool(entry["rounding"]))
-        assert entry["verdict"] == verdict, entry["id"]
+        assert entry["verdict"] == verdict, entry["defined"]
+
+
+def test_a_claim_counts_with_its_first_definition(record):
+    """The four that were defined anew after their values had been seen keep all definitions."""
+    anew = {entry["id"]: entry for entry in record if entry["other_definitions"]}
+    assert {"C13", "C39", "C41", "C46"} <= anew.keys()
+    for entry in anew.values():
+        first, *later = report.definitions(entry)
+        assert report.counted(entry) is first and all(first["defined"] < each["defined"] for each in later)
+        assert all(each["replaced_because"] and each["words"] for each in entry["other_definitions"])
+        assert f"{first['verdict']} (as defined anew: {later[-1]['verdict']})" == report.describe_verdicts(entry)
+    assert [report.counted(anew[id])["verdict"] for id in ("C13", "C39", "C41")] == [CONTRADICTED] * 3
+
+
+#: Since when a definition must be dated before its first value; some older ones were written with their values.
+RULE_SINCE = "2026-11-24"
+
+
+def test_a_definition_is_dated_before_its_first_value(record):
+    """No definition in the record is later than its first value, and none of the rule's time is as late."""
+    for entry in record:
+        for definition in report.definitions(entry):
+            times = definition["defined"], definition["first_value"]
+            assert times[0] < times[1] or times[0] == times[1] < RULE_SINCE, entry["id"]
+
+
+DEFINED = {"id": "C01", "defined": "2030-01-02 10:00", "checks": [
+    {"quantity": "speed at 3 h", "paper": "2.9", "tolerance": {"origin": "half a unit"}}]}
+OTHER = {**DEFINED, "checks": [{**DEFINED["checks"][0], "quantity": "speed of another shape"}]}
+
+
+def test_a_first_value_is_stamped_once_per_definition():
+    """A value at another hour is of the same definition."""
+    known = report.stamped(DEFINED, None, "2030-01-02 10:01")
+    again = {**DEFINED, "checks": [{**DEFINED["checks"][0], "quantity": "speed at 4 h"}]}
+    assert report.stamped(again, known, "2030-02-01 00:00")["first_value"] == "2030-01-02 10:01"
+    anew = {**OTHER, "defined": "2030-01-02 10:02"}
+    assert report.stamped(anew, known, "2030-01-02 10:03")["first_value"] == "2030-01-02 10:03"
+
+
+@pytest.mark.parametrize("entry, known, now", [
+    (DEFINED, None, "2030-01-02 09:59"),
+    (OTHER, {**DEFINED, "first_value": "2030-01-02 10:01"}, "2030-01-02 10:03"),
+    ({**OTHER, "defined": "2030-01-02 10:04"}, {**DEFINED, "first_value": "2030-01-02 10:01"}, "2030-01-02 10:03"),
+])
+def test_a_definition_without_a_date_before_its_values_is_refused(entry, known, now):
+    with pytest.raises(ClaimError, match="C01: defined anew"):
+        report.stamped(entry, known, now)
 
 
 def test_no_recorded_verdict_flips_to_its_opposite(record):

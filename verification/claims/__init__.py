@@ -18,6 +18,10 @@ Claims about **the scheme** are judged with the scheme. A verdict follows from t
 If the paper says that something may or could happen, the claim holds if it happens in at least one of the scenes that
 are tried. If the paper says that it depends on the conditions, it must also not happen in another scene.
 
+A definition carries the date when it was written, which is before its first value. A claim that is defined anew after
+its values have been seen keeps its other definitions with their outcomes in `other_definitions.json`, and counts with
+the verdict of its first definition.
+
 `rests_on` says what a number depends on: the prediction of a solution, or an input, a rule of construction or the
 arithmetic of Table 1. The latter need no solution and do not count as reproduced numbers.
 """
@@ -196,7 +200,8 @@ class Claim:
     """A row of the table: the paper's section, its statement, and the function that computes the numbers.
 
     about: MODEL, OF_SCHEME or CLOSED; fine: sizes of the converged solution; beside: those of the scheme whose range
-    stands beside it; sizes, steps: of the scheme; fixed: why one of them is not varied; date: when its ranges were set.
+    stands beside it; sizes, steps: of the scheme; fixed: why one of them is not varied; date: when its
+    definition was written (UTC).
     """
 
     id: str

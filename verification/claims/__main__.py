@@ -7,6 +7,7 @@ every claim has a verdict and agrees with the record, 1 if not, and 2 for an unk
 
 import argparse
 import sys
+from datetime import UTC, datetime
 
 from repro.results import write_json
 from verification.claims import CLAIMS, EXPECTED, ClaimError, base_run, evaluate, report
@@ -44,6 +45,9 @@ def recorded(rows: list[Row], anew: bool) -> bool:
     """Whether the rows agree with the committed record; prints the differences."""
     entries = [report.entry(row) for row in rows if row.verdict != NO_VERDICT]
     if anew:
+        known = {each["id"]: each for each in report.read()}
+        now = f"{datetime.now(UTC):%Y-%m-%d %H:%M}"
+        entries = [report.stamped(each, known.get(each["id"]), now) for each in entries]
         write_json(report.COMMITTED, report.replaced(entries))
         print(f"{report.COMMITTED.name}: written")
         return True

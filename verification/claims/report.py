@@ -2,6 +2,10 @@
 
 The committed record of the claims, `claims.json`: intervals and verdicts that a run on any machine must agree with.
 
+An entry has the date of its definition, `defined`, and the time of the first value that was recorded for it,
+`first_value`. `other_definitions` are those that the claim had before or after, with their outcomes and the reason why
+they were replaced. A claim counts with the verdict of its first definition.
+
 A check's `value` lies in `low` to `high` (numerics), the paper's in `paper_low` to `paper_high` (printing, null for
 words), and `input_low` to `input_high` is where the value goes as the inputs of Table 1 move within their rounding
 (from the committed record of the sensitivities or a closed form, null where none tells). `scheme_2001` is the range
@@ -14,6 +18,7 @@ import textwrap
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 from math import inf, isfinite
 from pathlib import Path
 
@@ -27,6 +32,7 @@ from verification.claims import (
     REPRODUCED,
     VERDICTS,
     Claim,
+    ClaimError,
     Finding,
     PaperCheck,
     outcome_of,
@@ -56,6 +62,11 @@ class Row:
     def checks(self) -> tuple[PaperCheck, ...]:
         """Those that have a bar: none of a claim that came to an error."""
         return tuple(check for check in self.finding.checks if check.bar) if self.finding else ()
+
+    @property
+    def counted(self) -> str:
+        """The verdict that counts, that of the first definition."""
+        return counted(entry(self))["verdict"] if self.checks else self.verdict
 
     @property
     def reason(self) -> str:
@@ -106,6 +117,28 @@ def terminal(row: Row) -> str:
     return "\n".join([head, *map(_paragraph, lines)]) + "\n"
 
 
+@cache
+def other_definitions() -> dict[str, list[dict]]:
+    """{id: the definitions that a claim had before or after the one that is computed}, with their outcomes."""
+    return load(OTHERS, {})
+
+
+def definitions(entry: dict) -> list[dict]:
+    """The definitions of a recorded claim with their verdicts and reasons, the first one first."""
+    return sorted([entry, *entry["other_definitions"]], key=lambda each: each["defined"])
+
+
+def counted(entry: dict) -> dict:
+    """The definition of a recorded claim that counts: the first."""
+    return definitions(entry)[0]
+
+
+def describe_verdicts(entry: dict) -> str:
+    """The verdict that counts, with the last definition's beside it where the claim was defined anew."""
+    first, *later = definitions(entry)
+    return f"{first['verdict']} (as defined anew: {later[-1]['verdict']})" if later else first["verdict"]
+
+
 def predicted(checks) -> list[PaperCheck]:
     """Numbers that the paper prints and a solution predicts: what can be reproduced."""
     return [check for check in checks if check.printed and check.rests_on == PREDICTED]
@@ -113,13 +146,14 @@ def predicted(checks) -> list[PaperCheck]:
 
 def summary(rows: list[Row]) -> str:
     """How many claims have each verdict, and what becomes of their numbers."""
-    verdicts = Counter(row.verdict for row in rows)
+    verdicts = Counter(row.counted for row in rows)
     checks = [check for row in rows for check in row.checks]
     outcomes = Counter(check.outcome for check in checks)
     values = Counter(check.outcome for check in predicted(checks))
     named = [*VERDICTS, *(verdict for verdict in verdicts if verdict not in VERDICTS)]
+    tally = "; ".join(f"{verdicts[verdict]} {verdict}" for verdict in named)
     return "\n".join((
-        f"{len(rows)} claims: " + "; ".join(f"{verdicts[verdict]} {verdict}" for verdict in named) + ".",
+        f"{len(rows)} claims, as first defined: {tally}.",
         f"{len(checks)} numbers with their bars: {outcomes[HOLDS]} hold, {outcomes[FAILS]} fail, the bar of "
         f"{outcomes[REACHES_OVER]} reaches over a bound.",
         f"{values.total()} printed values that a solution predicts: {values[HOLDS]} within their printed digits, "
@@ -127,7 +161,7 @@ def summary(rows: list[Row]) -> str:
         "Table 1 are not among them."))
 
 
-COMMITTED = Path(__file__).parent / "claims.json"
+COMMITTED, OTHERS = (Path(__file__).parent / name for name in ("claims.json", "other_definitions.json"))
 #: Numbers this small are the round-off of exact ones, which differs between machines; so do last digits.
 ROUND_OFF, LAST_DIGITS = 1e-9, 1e-9
 
@@ -148,7 +182,26 @@ def entry(row: Row) -> dict:
     claim, finding = row.claim, row.finding
     return {"id": row.id, "claim": claim.text, "verdict": row.verdict, "where": claim.where, "about": claim.about,
             "change": finding.change, "reason": row.reason, "rounding": finding.rounding, "note": finding.note,
-            "fixed": claim.fixed, "checks": [_check(check, claim.about) for check in row.checks]}
+            "fixed": claim.fixed, "defined": claim.date, "first_value": "",
+            "other_definitions": other_definitions().get(row.id, []),
+            "checks": [_check(check, claim.about) for check in row.checks]}
+
+
+def stamped(entry: dict, known: dict | None, now: str) -> dict:
+    """The entry with the time of its first value: the recorded one while the definition is the same, else now (UTC).
+    Raises ClaimError for a definition that is not dated before its first value, or not after those of another one."""
+    if known and _definition(entry) == _definition(known):
+        return {**entry, "first_value": known["first_value"]}
+    if not (known["first_value"] if known else "") < entry["defined"] < now:
+        raise ClaimError(f"{entry['id']}: defined anew, and {entry['defined']} is not between the values of the other "
+                         f"definition and {now}")
+    return {**entry, "first_value": now}
+
+
+def _definition(entry: dict) -> tuple:
+    """The date of a definition, and what it judges by what."""
+    tolerances = [(check["paper"], unnumbered(check["tolerance"]["origin"])) for check in entry["checks"]]
+    return entry["defined"], _quantities(entry), tolerances
 
 
 def _check(check: PaperCheck, about: str) -> dict:
