@@ -64,11 +64,19 @@ def fields(known: dict) -> dict[str, Callable[[], str]]:
             "verify": _verified, "audit.defaults": _of_defaults, **_supplies(),
             "list.flips": lambda: _flips(claims), "after.contact": lambda: _after_contact(claims),
             "base.bars": lambda: _bars_of_base(claims),
-            "inputs.share": lambda: f"{100 * sensitivity.record()['one_set']['share_of_the_rounding']:.0f}",
+            "inputs.set": _set_of_inputs,
             "table.values": lambda: "\n".join(map(_value, _printed(claims))),
             "overview.claims": lambda: "; ".join(f"{id} {verdicts_in_words()[id]}" for id in overview.CLAIMS),
             "table.figures": lambda: "\n".join(map(_figure, FIGURES)),
             "environment": lambda: _environment(known["environment"])}
+
+
+def _set_of_inputs() -> str:
+    """Whether one set of inputs gives all printed numbers of Base."""
+    one_set = sensitivity.record()["one_set"]
+    reached = "One" if one_set["reached"] else "No"
+    return (f"{reached} set of inputs within the rounding gives all printed numbers of Base at once: such a set takes "
+            f"{one_set['share_of_the_rounding']:.2g} times the rounding")
 
 
 def _supplies() -> dict[str, Callable[[], str]]:

@@ -7,7 +7,7 @@ from verification.sensitivity import __main__ as driver
 from verification.sensitivity import rounding
 from verification.sensitivity.rounding import EXACT, INPUTS, ROUNDED
 
-PAPER = {"k": 9.3 / 24, "Y": 0.61, "b": 0.12 / 24, "f_d": 0.8, "d_c": 1.42, "F": 1.52, "K_sA": 1.0, "K_sD": 1.0,
+PAPER = {"k": 9.3 / 24, "Y": 0.61, "b": 0.12 / 24, "f_d": 0.8, "d_c": 1.42, "F": 1.52,
          "D_a": 2.32e8 / 24, "D_fa": 1.85e8 / 24, "D_d": 1.01e8 / 24, "D_fd": 0.81e8 / 24}
 
 
@@ -26,6 +26,15 @@ def test_the_rounded_inputs_are_those_of_table_1_and_of_the_scenes():
         digits = len(f"{rounded.value}".partition(".")[2])
         assert rounded.half == pytest.approx(0.5 * 10**-digits), rounded.name
     assert all(rounded.half == 0 for rounded in EXACT)
+
+
+def test_the_stipulated_saturation_constants_are_in_no_set_and_no_width(record):
+    """Section 2.2 sets both K_s to 1 mg/L. Their elasticities stay."""
+    for name in ("K_sA", "K_sD"):
+        assert rounding.BY_NAME[name] in EXACT
+        assert all(name in known for known in record["elasticities"].values())
+        for part in (record["rounding"], record["one_set"]["inputs"], record["sobol"]["inputs"]):
+            assert name not in part
 
 
 class Law:
@@ -98,6 +107,17 @@ def test_a_set_is_reached_if_it_is_within_the_rounding_and_fits_with_its_bars(la
     result = rounding.one_set(Law(law), elasticities)
     assert (result["share_of_the_rounding"] <= 1, result["misfit_in_half_intervals"] <= 1) == (within, fits)
     assert result["reached"] is (within and fits)
+
+
+def test_a_set_that_reaches_nothing_is_described_as_the_nearest(monkeypatch):
+    """A set that reaches all numbers is the only one that counts."""
+    one_set = {"reached": False, "share_of_the_rounding": 5.0, "inputs": {"k": 9.35}, "numbers": {"velocity": 1.47},
+               "bars": {"velocity": 0.001}}
+    monkeypatch.setattr(sensitivity, "record", lambda: {"one_set": one_set})
+    assert sensitivity.verified_set() == ""
+    assert "5.0 times the rounding; the nearest: with k 9.35" in sensitivity.nearest_set()
+    one_set["reached"] = True
+    assert sensitivity.nearest_set() == "" and sensitivity.verified_set().startswith("with k 9.35 a run gives")
 
 
 # The committed record.

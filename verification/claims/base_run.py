@@ -78,6 +78,7 @@ def effluents() -> Finding:
     reason = (f"with the printed inputs {effluents[0]:.3f} and {effluents[1]:.3f} leave; acceptor over donor consumed "
               f"is {ratio:.3f}, the printed effluents make it {(SUPPLY - 4.19) / (SUPPLY - 6.13):.3f}, less than "
               "F [E14]")
+    reason = "; ".join(filter(None, (reason, sensitivity.nearest_set())))
     return Finding(checks, reason=reason, rounding=sensitivity.verified_set(),
                    note="With the paper's own 1.6 % its effluents are 4.257 and 6.228.")
 

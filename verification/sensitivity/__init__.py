@@ -51,9 +51,20 @@ def in_closed_form(form: Callable[..., float], *inputs: tuple[float, float]) -> 
 
 def verified_set() -> str:
     """The set of inputs that gives all printed numbers of base at once, in words; empty if there is none."""
-    one_set = record().get("one_set", {})
-    if not one_set.get("reached"):
+    return _described_set() if record().get("one_set", {}).get("reached") else ""
+
+
+def nearest_set() -> str:
+    """The set of inputs that comes nearest to all printed numbers of base, in words; empty if one reaches them."""
+    one_set = record().get("one_set", {"reached": True})
+    if one_set["reached"]:
         return ""
+    return (f"no set of inputs within the rounding of Table 1 reaches all printed numbers of base, which would take "
+            f"{one_set['share_of_the_rounding']:.1f} times the rounding; the nearest: {_described_set()}")
+
+
+def _described_set() -> str:
+    one_set = record()["one_set"]
     inputs = ", ".join(f"{name} {value:.4g}" for name, value in one_set["inputs"].items())
     numbers = ", ".join(f"{name.replace('_', ' ')} {value:.4f} ± {one_set['bars'][name]:.1g}"
                         for name, value in one_set["numbers"].items())

@@ -73,7 +73,6 @@ def _of(substrate: str, *keys: str) -> tuple[str, ...]:
     return tuple(f"substrates.{substrate}.{key}" for key in keys)
 
 
-#: The supply is printed as 10 K_s, and goes with K_s.
 ROUNDED = (
     Input("k", ("kinetics.maximum_utilization_rate",), 9.3, 0.05),
     Input("Y", ("kinetics.yield_coefficient",), 0.61, 0.005),
@@ -81,14 +80,16 @@ ROUNDED = (
     Input("f_d", ("kinetics.degradable_fraction",), 0.8, 0.05),
     Input("d_c", ("kinetics.decay_oxygen_demand",), 1.42, 0.005),
     Input("F", ("kinetics.acceptor_to_donor_ratio",), 1.52, 0.005),
-    Input("K_sA", _of("acceptor", "half_saturation", "supply"), 1.0, 0.05),
-    Input("K_sD", _of("donor", "half_saturation", "supply"), 1.0, 0.05),
     Input("D_a", _of("acceptor", "diffusivity"), 2.32, 0.005),
     Input("D_fa", _of("acceptor", "diffusivity_in_aggregate"), 1.85, 0.005),
     Input("D_d", _of("donor", "diffusivity"), 1.01, 0.005),
     Input("D_fd", _of("donor", "diffusivity_in_aggregate"), 0.81, 0.005),
 )
+#: Section 2.2 sets both K_s to 1 mg/L: they are a choice and no rounded measurement, so no set of inputs moves them.
+#: The supply is printed as 10 K_s, and goes with K_s.
 EXACT = (
+    Input("K_sA", _of("acceptor", "half_saturation", "supply")),
+    Input("K_sD", _of("donor", "half_saturation", "supply")),
     Input("X_m", ("kinetics.maximum_density",)),
     Input("R_0", ("aggregate.radius",)),
     Input("W_pore", ("pore.width",)),
