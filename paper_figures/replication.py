@@ -144,7 +144,7 @@ def _with(claims: list[dict], verdict: str) -> list[dict]:
 
 
 def _verdicts(claims: list[dict]) -> dict[str, Callable[[], str]]:
-    outcomes = [check["outcome"] for _, check in _predicted(claims)]
+    outcomes = [*claims_record.distinct(claims).values()]
     counts = {f"claims.{name}": lambda verdict=verdict: str(len(_with(claims, verdict)))
               for verdict, name in NAMES.items()}
     lists = {f"list.{name}": lambda verdict=verdict: "\n".join(map(_entry, _with(claims, verdict))) or "None."
@@ -158,11 +158,6 @@ def _verdicts(claims: list[dict]) -> dict[str, Callable[[], str]]:
 def _printed(claims: list[dict]) -> list[tuple[dict, dict]]:
     """(claim, check) of every number whose value the paper prints."""
     return [(claim, check) for claim in claims for check in claim["checks"] if check["paper_low"] is not None]
-
-
-def _predicted(claims: list[dict]) -> list[tuple[dict, dict]]:
-    """(claim, check) of every printed number that a solution predicts."""
-    return [(claim, check) for claim, check in _printed(claims) if check["rests_on"] == PREDICTED]
 
 
 def _value(pair: tuple[dict, dict]) -> str:

@@ -136,6 +136,17 @@ def test_a_definition_without_a_date_before_its_values_is_refused(entry, known, 
         report.stamped(entry, known, now)
 
 
+def test_a_printed_value_counts_once_however_many_checks_judge_it(record):
+    """C05 judges one value at three distances. With the state of E12, four of seven values lie in their digits."""
+    assert sum(check["paper"] == "~7" for entry in record for check in entry["checks"]) == 3
+    outcomes = report.distinct(record)
+    assert len(outcomes) == 7 and sum(outcome == claims.HOLDS for outcome in outcomes.values()) == 4
+    checks = [{"paper": "2.9", "paper_low": 2.85, "rests_on": claims.PREDICTED, "outcome": outcome}
+              for outcome in (claims.HOLDS, claims.REACHES_OVER, claims.FAILS)]
+    for number, outcome in enumerate((claims.HOLDS, claims.REACHES_OVER, claims.FAILS), 1):
+        assert report.distinct([{"id": "C01", "checks": checks[:number]}]) == {("C01", "2.9"): outcome}
+
+
 def test_no_recorded_verdict_flips_to_its_opposite(record):
     """If a bound moves by the bar of its number, a decided verdict becomes undecided at most, or an undecided one
     decided. At most a tenth of the decided verdicts become undecided."""

@@ -139,9 +139,15 @@ def describe_verdicts(entry: dict) -> str:
     return f"{first['verdict']} (as defined anew: {later[-1]['verdict']})" if later else first["verdict"]
 
 
-def predicted(checks) -> list[PaperCheck]:
-    """Numbers that the paper prints and a solution predicts: what can be reproduced."""
-    return [check for check in checks if check.printed and check.rests_on == PREDICTED]
+def distinct(entries: list[dict]) -> dict[tuple[str, str], str]:
+    """{(claim, printed text): outcome} of the distinct values that the paper prints and a solution predicts. A value
+    that several checks of a claim judge counts once: it holds where all of them do, and fails where one does."""
+    outcomes: dict[tuple[str, str], set[str]] = {}
+    for entry in entries:
+        for check in entry["checks"]:
+            if check["paper_low"] is not None and check["rests_on"] == PREDICTED:
+                outcomes.setdefault((entry["id"], check["paper"]), set()).add(check["outcome"])
+    return {key: next(kind for kind in (FAILS, REACHES_OVER, HOLDS) if kind in each) for key, each in outcomes.items()}
 
 
 def summary(rows: list[Row]) -> str:
@@ -149,16 +155,16 @@ def summary(rows: list[Row]) -> str:
     verdicts = Counter(row.counted for row in rows)
     checks = [check for row in rows for check in row.checks]
     outcomes = Counter(check.outcome for check in checks)
-    values = Counter(check.outcome for check in predicted(checks))
+    values = Counter(distinct([entry(row) for row in rows if row.checks]).values())
     named = [*VERDICTS, *(verdict for verdict in verdicts if verdict not in VERDICTS)]
     tally = "; ".join(f"{verdicts[verdict]} {verdict}" for verdict in named)
     return "\n".join((
         f"{len(rows)} claims, as first defined: {tally}.",
         f"{len(checks)} numbers with their bars: {outcomes[HOLDS]} hold, {outcomes[FAILS]} fail, the bar of "
         f"{outcomes[REACHES_OVER]} reaches over a bound.",
-        f"{values.total()} printed values that a solution predicts: {values[HOLDS]} within their printed digits, "
-        f"{values[FAILS]} outside, {values[REACHES_OVER]} not decided. Inputs, rules of construction and arithmetic of "
-        "Table 1 are not among them."))
+        f"{values.total()} distinct printed values that a solution predicts: {values[HOLDS]} within their printed "
+        f"digits, {values[FAILS]} outside, {values[REACHES_OVER]} not decided. Inputs, rules of construction and "
+        "arithmetic of Table 1 are not among them."))
 
 
 COMMITTED, OTHERS = (Path(__file__).parent / name for name in ("claims.json", "other_definitions.json"))
