@@ -27,6 +27,7 @@ from verification.claims import (
     CONTRADICTED,
     FAILS,
     HOLDS,
+    NOT_JUDGED,
     PREDICTED,
     REACHES_OVER,
     REPRODUCED,
@@ -45,9 +46,10 @@ NOTE, TEMPLATE = (FOLDER / name for name in ("replication.md", "replication_temp
 REPORT = ROOT / "verification" / "report"
 FIELD = re.compile(r"\{\{(.+?)\}\}")
 #: Names of the verdicts in the template, and the explanations that the note gives for each verdict.
-NAMES = dict(zip(VERDICTS, ("reproduced", "rounding", "changed", "contradicted", "undecided")))
+NAMES = dict(zip(VERDICTS, ("reproduced", "rounding", "changed", "contradicted", "undecided", "unjudged")))
 WHY = {WITHIN_ROUNDING: (("As printed", "reason"), ("Inputs", "rounding")), CHANGED: (("Changed", "change"),),
-       CONTRADICTED: (("Why not", "reason"),), UNDECIDED: (("Why", "reason"),)}
+       CONTRADICTED: (("Why not", "reason"),), UNDECIDED: (("Why", "reason"),),
+       NOT_JUDGED: (("Why", "reason"), ("Computed", "note"))}
 WIDTH = 120
 
 
@@ -177,17 +179,17 @@ def _span(low: float | None, high: float | None) -> str:
 def _entry(claim: dict) -> str:
     """A claim in the list of its verdict, with the explanation."""
     first, *later = claims_record.definitions(claim)
-    check = first["checks"][0]
-    words = ([f"Here: {check['quantity']}, {check['value']:.4g}"] if first["verdict"] == REPRODUCED else
-             [f"*{word}:* {first[key].rstrip('.')}" for word, key in WHY[first["verdict"]]])
+    words = [f"*{word}:* {first[key].rstrip('.')}" for word, key in WHY.get(first["verdict"], ())]
+    words += [f"Here: {check['quantity']}, {check['value']:.4g}" for check in first["checks"][:1]
+              if first["verdict"] == REPRODUCED]
     anew = [f"*Defined anew* on {each['defined']}, after values had been seen: {each['verdict']}" for each in later]
     return ". ".join((f"- **{claim['id']}** ({claim['where']}): {claim['claim']}", *words, *anew)) + "."
 
 
 def _defined_anew(claims: list[dict]) -> str:
-    """The claims with more than one definition, and both verdicts."""
+    """The claims whose definitions have more than one verdict, with the first and the last."""
     return ", ".join(f"{claim['id']} {claims_record.describe_verdicts(claim)}" for claim in claims
-                     if claim["other_definitions"])
+                     if len({each["verdict"] for each in claims_record.definitions(claim)}) > 1)
 
 
 def _figure(name: str) -> str:

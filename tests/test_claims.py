@@ -8,6 +8,7 @@ from verification import claims, sensitivity
 from verification.claims import (
     CHANGED,
     CONTRADICTED,
+    NOT_JUDGED,
     REPRODUCED,
     UNDECIDED,
     VERDICTS,
@@ -41,7 +42,7 @@ FAILED, DOUBTED_FAILURE = sure(BAD, 0.1), sure(BAD, 0.3)
 ])
 def test_each_verdict_follows_from_the_checks_and_their_bars(checks, words, verdict):
     assert Finding(checks, reason="it leaks", **words).verdict == verdict
-    assert verdict in VERDICTS and len(VERDICTS) == 5
+    assert verdict in VERDICTS and len(VERDICTS) == 6
 
 
 @pytest.mark.parametrize("finding, excerpt", [
@@ -61,6 +62,14 @@ def test_a_verdict_needs_numbers_bars_and_a_reason(finding, excerpt):
     ("<0.5", None), ("about the same", None)])
 def test_a_printed_number_is_an_interval_and_words_are_none(text, printed):
     assert claims.interval(text) == (printed and pytest.approx(printed))
+
+
+def test_a_claim_that_is_not_judged_has_no_checks_and_one_level():
+    claim = claims.Claim("C00", "5", "it could be", Finding, unjudged="nothing could contradict it")
+    assert claim.verdict(Finding(())) == NOT_JUDGED and claim.levels == (claim.judged,)
+    assert report.Row("C00", claim, Finding(()), NOT_JUDGED).reason == "nothing could contradict it"
+    with pytest.raises(ClaimError, match="not judged has checks"):
+        claim.verdict(Finding((SATISFIED,)))
 
 
 # The committed record.
@@ -84,7 +93,8 @@ def test_the_recorded_verdicts_follow_from_the_recorded_numbers(record):
             assert (check.get("paper_low"), check.get("paper_high")) == (printed or (None, None)), check["quantity"]
             assert printed in (None, bounds), check["quantity"]
         outcomes = {check["outcome"] for check in entry["checks"]}
-        verdict = claims.verdict_of(outcomes, bool(entry["change"]), bool(entry["rounding"]))
+        follows = claims.verdict_of(outcomes, bool(entry["change"]), bool(entry["rounding"]))
+        verdict = follows if outcomes else NOT_JUDGED
         assert entry["verdict"] == verdict, entry["defined"]
 
 
@@ -94,6 +104,9 @@ def test_a_claim_counts_with_its_first_definition(record):
     assert {"C13", "C39", "C41", "C46"} <= anew.keys()
     for entry in anew.values():
         first, *later = report.definitions(entry)
+        if entry["verdict"] == NOT_JUDGED:
+            assert (first, later) == (entry, []) and report.describe_verdicts(entry) == NOT_JUDGED
+            continue
         assert report.counted(entry) is first and all(first["defined"] < each["defined"] for each in later)
         assert all(each["replaced_because"] and each["words"] for each in entry["other_definitions"])
         assert f"{first['verdict']} (as defined anew: {later[-1]['verdict']})" == report.describe_verdicts(entry)

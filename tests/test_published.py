@@ -51,11 +51,11 @@ def test_the_template_has_no_number_that_a_run_computes():
 def test_every_claim_and_erratum_is_in_the_note(record):
     """Each claim appears once, in the list of its verdict; contradicted and undecided claims have a reason. Counts of
     verdicts agree with the record."""
-    kinds = ("reproduced", "rounding", "changed", "contradicted", "undecided")
+    kinds = ("reproduced", "rounding", "changed", "contradicted", "undecided", "unjudged")
     by_kind = {kind: re.findall(r"^- \*\*(C\d\d)\*\*", replication.fill_template(f"{{{{list.{kind}}}}}", record), re.M)
              for kind in kinds}
     assert sorted(sum(by_kind.values(), [])) == list(EXPECTED)
-    unreproduced = {*by_kind["contradicted"], *by_kind["undecided"]}
+    unreproduced = {*by_kind["contradicted"], *by_kind["undecided"], *by_kind["unjudged"]}
     assert all(counted(claim)["reason"] for claim in record["claims"] if claim["id"] in unreproduced)
     for name in ("README.md", "paper_figures/replication.md", "docs/scope.md", "codecheck.author.yml"):
         counts = re.findall(r"\b(\d+) (?:claims )?(?:are )?(reproduced|contradicted|undecided)\b", text(name))

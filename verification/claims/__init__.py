@@ -14,6 +14,7 @@ Claims about **the scheme** are judged with the scheme. A verdict follows from t
     of Table 1 gives every printed number of base at once                    reproduced within the rounding of Table 1
     some fail beyond their bars                                              contradicted; the finding says why
     no check fails, but a bar reaches over a bound                           undecided
+    no value could contradict the statement; the claim says why              not judged
 
 If the paper says that something may or could happen, the claim holds if it happens in at least one of the scenes that
 are tried. If the paper says that it depends on the conditions, it must also not happen in another scene.
@@ -56,7 +57,8 @@ REPRODUCED = "reproduced"
 CHANGED = "reproduced with a stated change"
 CONTRADICTED = "contradicted"
 WITHIN_ROUNDING, UNDECIDED = "reproduced within the rounding of Table 1", "undecided"
-VERDICTS = (REPRODUCED, WITHIN_ROUNDING, CHANGED, CONTRADICTED, UNDECIDED)
+NOT_JUDGED = "not judged"
+VERDICTS = (REPRODUCED, WITHIN_ROUNDING, CHANGED, CONTRADICTED, UNDECIDED, NOT_JUDGED)
 #: Outcomes of a check.
 HOLDS = "holds"
 FAILS = "fails"
@@ -201,7 +203,7 @@ class Claim:
 
     about: MODEL, OF_SCHEME or CLOSED; fine: sizes of the converged solution; beside: those of the scheme whose range
     stands beside it; sizes, steps: of the scheme; fixed: why one of them is not varied; date: when its
-    definition was written (UTC).
+    definition was written (UTC); unjudged: why no value could contradict it, empty where one could.
     """
 
     id: str
@@ -215,6 +217,13 @@ class Claim:
     steps: tuple[float, ...] = STEPS
     fixed: str = ""
     date: str = SET
+    unjudged: str = ""
+
+    def verdict(self, finding: Finding) -> str:
+        """The verdict of a finding. Raises ClaimError if there is none, or if a claim that is not judged has checks."""
+        if self.unjudged and finding.checks:
+            raise ClaimError("a claim that is not judged has checks")
+        return NOT_JUDGED if self.unjudged else finding.verdict
 
     @property
     def of_wide(self) -> bool:
@@ -234,13 +243,15 @@ class Claim:
 
     @property
     def judging_levels(self) -> tuple[Level, ...]:
-        """The levels of both, the judged one first."""
-        return tuple(dict.fromkeys((*self.meshes.values(), *self.stepped.values())))
+        """The levels of both, the judged one first; that one alone where no number needs a bar."""
+        levels = tuple(dict.fromkeys((*self.meshes.values(), *self.stepped.values())))
+        return levels[:1] if self.unjudged else levels
 
     @property
     def levels(self) -> tuple[Level, ...]:
         """All levels; a claim about the model adds those of the scheme."""
-        return (*self.judging_levels, *(Level(size=size) for size in self.beside if self.about == MODEL))
+        beside = self.about == MODEL and not self.unjudged
+        return (*self.judging_levels, *(Level(size=size) for size in self.beside if beside))
 
     @property
     def judged(self) -> Level:

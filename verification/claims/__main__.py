@@ -72,7 +72,7 @@ def _row(id: str, outcomes: dict[Level, Outcome]) -> Row:
             raise ClaimError("; ".join(errors))
         finding = outcomes[claim.judged][1]
         finding = barred(claim, finding, {level: each[0] for level, each in outcomes.items()})
-        return Row(id, claim, finding, finding.verdict)
+        return Row(id, claim, finding, claim.verdict(finding))
     except ClaimError as error:
         return Row(id, claim, finding, NO_VERDICT, str(error))
 

@@ -26,6 +26,7 @@ from verification.claims import (
     CHANGED,
     FAILS,
     HOLDS,
+    NOT_JUDGED,
     OF_SCHEME,
     PREDICTED,
     REACHES_OVER,
@@ -66,11 +67,13 @@ class Row:
     @property
     def counted(self) -> str:
         """The verdict that counts, that of the first definition."""
-        return counted(entry(self))["verdict"] if self.checks else self.verdict
+        return counted(entry(self))["verdict"] if self.finding else self.verdict
 
     @property
     def reason(self) -> str:
-        """Why a check does not hold; empty where all do."""
+        """Why a check does not hold, or the claim is not judged; empty where all checks hold."""
+        if self.verdict == NOT_JUDGED:
+            return self.claim.unjudged
         return "" if self.verdict in (REPRODUCED, CHANGED) or not self.finding else self.finding.reason
 
 
@@ -108,7 +111,7 @@ def terminal(row: Row) -> str:
     if row.claim is None:
         return f"{row.id}  {row.verdict.upper()}: {row.error}\n"
     remarks = {"error": row.error, "command": f"python -m verification.claims {row.id}"}
-    if row.checks:
+    if row.checks or row.verdict == NOT_JUDGED:
         finding = row.finding
         remarks = {"about": row.claim.about, "changed": finding.change, "because": row.reason,
                    "inputs": finding.rounding, "steps are not varied": row.claim.fixed, "note": finding.note, **remarks}
@@ -124,12 +127,15 @@ def other_definitions() -> dict[str, list[dict]]:
 
 
 def definitions(entry: dict) -> list[dict]:
-    """The definitions of a recorded claim with their verdicts and reasons, the first one first."""
+    """The definitions of a recorded claim with their verdicts and reasons, the first one first; that without a verdict
+    alone where a claim is not judged any more."""
+    if entry["verdict"] == NOT_JUDGED:
+        return [entry]
     return sorted([entry, *entry["other_definitions"]], key=lambda each: each["defined"])
 
 
 def counted(entry: dict) -> dict:
-    """The definition of a recorded claim that counts: the first."""
+    """The definition of a recorded claim that counts: the first, unless the claim is not judged."""
     return definitions(entry)[0]
 
 

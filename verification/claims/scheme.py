@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from repro.fem.mesh import POOR, POOR_ALLOWED
 from repro.march import updates
 from repro.model import biomass, gear
 from repro.model.kinetics import Sink, rate_law
@@ -28,7 +27,6 @@ from verification.claims import (
     Finding,
     at_least,
     at_most,
-    between,
     claim,
     interval,
     near,
@@ -199,16 +197,16 @@ def refined_balance() -> Finding:
                    note=f"{plain}. Defects on the meshes, % of the acceptor/donor effluent: {'; '.join(defects)}.")
 
 
-@claim("C34", "4", "at early times C_supply - C_effluent is comparable to its numerical error")
+@claim("C34", "4", "at early times C_supply - C_effluent is comparable to its numerical error",
+       date="2026-11-24 12:50",
+       unjudged="it is the numerical error of the paper's own effluents at early times, which is not printed; the 1.6 "
+                "% of its correction cannot be this error, since an effluent so raised exceeds the supply [E18]")
 def early_drop() -> Finding:
-    """The paper's own numerical error, its 1.6 % of the effluents, over C_supply - C_effluent around the seed."""
+    """C_supply - C_effluent around the seed, as a part of the effluent."""
     row, supply = at(BASE, 0.0), load_packaged(*BASE).substrates.acceptor.supply
     effluent = np.array([row[f"effluent_{name}_mg_per_L"] for name in SUBSTRATES])
-    drop = supply - effluent
-    checks = tuple(between(f"the paper's 1.6 % of the {name} effluent over its drop, t = 0", "comparable", value,
-                           1 / 3, 3, "comparable: within a factor of three")
-                   for name, value in zip(SUBSTRATES, (PAPER_CORRECTION - 1) * effluent / drop))
-    return Finding(checks, reason="it is larger, or smaller, by more than a factor of three")
+    drops = " and ".join(f"{drop:.2g}" for drop in 100 * (supply / effluent - 1))
+    return Finding((), note=f"At t = 0 the drop is {drops} % of the effluent, acceptor and donor.")
 
 
 @claim("C15", "4", "a higher influent concentration leaves the amounts consumed about the same")
@@ -264,23 +262,22 @@ def node_masses(pore: Pore) -> tuple[np.ndarray, np.ndarray]:
 
 
 @claim("C24", "3.5", "the mesh degrades gradually; the remesh criterion keeps it acceptable", about=OF_SCHEME,
-       steps=ALONE, fixed="it is counted in updates of 12 min, and what an update does is asked")
+       steps=ALONE, date="2026-11-24 12:50",
+       fixed="it is counted in updates of 12 min, and what an update does is asked")
 def mesh_quality() -> Finding:
     """Quality of every mesh of base, its fall in an update, and the updates between remeshes.
 
     Of base alone: the paper says it of its mesher, and after contact a growing contact surface asks for a new mesh in
-    every update, whose quality is our mesher's. Acceptable is what the criterion leaves as it is.
+    every update, whose quality is our mesher's. That the criterion keeps the mesh acceptable is not judged: the run
+    applies it, so that nothing could contradict it.
     """
     qualities, new = [aggregate.grid.quality for aggregate in bodies(BASE)], series(*BASE)["remeshed"]
     least = np.array([quality.min() for quality in qualities])
     updates_apart = np.diff(np.flatnonzero(new)).min()
     fall = -np.diff(least)[new[1:] == 0].min(initial=0.0)
-    poor = max(np.count_nonzero(quality < POOR) for quality in qualities)
     checks = (at_most("base: largest fall of the least quality in an update", "gradually", fall, 0.05,
                       "twice the strain of an update, 2.4 %: what a triangle can lose"),
-              at_least("base: fewest updates between remeshes", "gradually", updates_apart, 5, "many updates, not one"),
-              at_most(f"base: most triangles under {POOR:g}", "acceptable: not more than six", poor, POOR_ALLOWED,
-                      "the paper's criterion"))
+              at_least("base: fewest updates between remeshes", "gradually", updates_apart, 5, "many updates, not one"))
     return Finding(tuple(map(without_limit, checks)), reason="not on every mesh",
                    note=f"{int(new.sum())} remeshes, at least {updates_apart} updates apart, least quality "
                    f"{least.min():.2f}.")
@@ -288,6 +285,8 @@ def mesh_quality() -> Finding:
 
 #: Control tolerance over the supply of a reference.
 EXACT = 1e-7
+#: A tolerance of the control with which the steps go from minutes to about a second.
+FINE = 1e-5
 FIRST = 0.0
 #: Seconds in an hour.
 HOUR = 3600.0
@@ -304,8 +303,8 @@ def step_control() -> Finding:
 
     The error is the largest of both concentrations (over the supply) and of the biomass made (relative), against a
     tolerance of 1e-7. Unstable is a disturbance that grows from step to step: one that dies out, however wrong a long
-    step may be, is none. The range of the steps hangs on the tolerance of the control, which is not printed, so that it
-    proves nothing and is told alone.
+    step may be, is none. The range of the steps depends on the tolerance of the control, which is not printed, and on
+    its first step, so that it is not judged: the note has it for two tolerances.
     """
     controlled = update(PLOTTED)
     error = max(deviation(time) for time in (FIRST, PLOTTED))
@@ -320,12 +319,17 @@ def step_control() -> Finding:
     reason = (f"in equal steps of 12 min a disturbance changes by a factor of {growth:.2g} a step where each substrate "
               f"sees the other's prediction, and of {damped:.2g} where the donor sees the corrected acceptor: backward "
               f"differences are stable, long steps are wrong ({100 * alone:.2g} %) but do not blow up")
-    early = update(FIRST)
-    note = (f"With the default tolerance of {gear.TOLERANCE:g}, {len(early.steps)} steps of "
-            f"{HOUR * min(early.steps):.0f} to {HOUR * max(early.steps):.0f} s at t = 0 and {len(controlled.steps)} of "
-            f"{HOUR * min(controlled.steps):.0f} to {HOUR * max(controlled.steps):.0f} s at 19.2 h, where equal steps "
-            f"with its error are {alike}.")
+    early, fine = update(FIRST), update(PLOTTED, None, FINE)
+    note = (f"With the default tolerance of {gear.TOLERANCE:g} there are {_steps(early)} at t = 0 and "
+            f"{_steps(controlled)} at 19.2 h, where equal steps with its error are {alike}. The paper's steps, from "
+            f"minutes to about a second, are those of a tolerance of {FINE:g}, with {_steps(fine)} at 19.2 h; the "
+            "paper prints no tolerance, so that they are not judged.")
     return Finding(checks, reason=reason, note=note)
+
+
+def _steps(advance: gear.Advance) -> str:
+    """The steps of an update, in words."""
+    return f"{len(advance.steps)} steps of {HOUR * min(advance.steps):.2g} to {HOUR * max(advance.steps):.3g} s"
 
 
 def growth_of_a_disturbance(simultaneous: bool) -> float:

@@ -49,6 +49,15 @@ def in_closed_form(form: Callable[..., float], *inputs: tuple[float, float]) -> 
     return min(values), max(values)
 
 
+def holds_for_supplies(id: str) -> str:
+    """With which supplies of Figure 6 a claim holds and with which it does not, in words."""
+    by_supply = record()["supplies"]
+    holds = {supply: all(known["claims"][id].values()) for supply, known in by_supply.items()}
+    sides = (" and ".join(supply for supply in holds if holds[supply] == side) or "none" for side in (True, False))
+    return ("the paper prints no supply for Figure 6, and 10 K_s of both is assumed; with {} K_s the claim holds, with "
+            "{} K_s it does not").format(*sides)
+
+
 def verified_set() -> str:
     """The set of inputs that gives all printed numbers of base at once, in words; empty if there is none."""
     return _described_set() if record().get("one_set", {}).get("reached") else ""

@@ -89,9 +89,6 @@ SUPPLIES, SIZE = (5.0, 10.0, 20.0, 40.0), 2**0.5
 END = 120.0
 #: Claims that read this run but are not judged again, since they compare it with other models; with the reasons.
 LEFT_OUT = {"C32": "compares two ways for biomass to be born", "C41": "changes the rheology and the walls",
-            "C42": "puts a permeable body in the place of a viscous one",
-            "C44": "holds a law for networks, made of other shapes, against it",
-            "C45": "compares its shapes with layers",
             "C46": "compares its stresses with and without the fluid's forces"}
 #: Hours before it reaches an end of the pore at which an aggregate is still clear of it.
 MARGIN = 0.1
@@ -140,7 +137,7 @@ def _of_supply(runs: Runs, supply: float) -> dict:
     level = supplied(supply, contact["end"])
     with at_level(level), np.errstate(all="raise", under="ignore"):
         judged = {id: holding(CLAIMS[id].function()) for id in sorted(CLAIMS)
-                  if CLAIMS[id].of_wide and id not in LEFT_OUT}
+                  if CLAIMS[id].of_wide and id not in LEFT_OUT and not CLAIMS[id].unjudged}
         judged_supply = {**contact, "outlines": _outlines(), "claims": judged}
     forget(level)
     return judged_supply
