@@ -39,6 +39,7 @@ STATEMENTS = {
     "C44": "a pore can be incorporated into a network model",
     "C45": "aggregate or layer, the distinction is not crucial for the consumption of substrates",
     "C46": "the stress could link fluid flow, growth and detachment",
+    "C47": "a mass transfer coefficient cannot be set a priori, since it depends on geometry and flow",
 }
 
 

@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 
 from paper_figures import runs, states, style
 from verification.claims import discussed
-from verification.claims.discussed import LAYERS, layered_share
-from verification.claims.permeability import clean
+from verification.claims.discussed import LAYERS
+from verification.claims.permeability import clean, layered_share
 
 TITLE = "Addition. The same biomass as an aggregate and as layers"
 RUNS = (runs.WIDE,)

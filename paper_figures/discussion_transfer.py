@@ -14,7 +14,7 @@ from verification.claims.runs import BASE, UPDATE, Body, bodies, grown_anew
 
 TITLE = "Addition. Mass transfer to the growing aggregate"
 RUNS = ()
-CLAIMS = ("C39", "C05")
+CLAIMS = ("C39", "C47", "C05")
 COMPUTED = CLAIMS
 
 #: Resolution of the computed numbers: that of the preset "fast".

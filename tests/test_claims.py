@@ -99,7 +99,7 @@ def test_the_recorded_verdicts_follow_from_the_recorded_numbers(record):
 
 
 def test_a_claim_counts_with_its_first_definition(record):
-    """The four that were defined anew after their values had been seen keep all definitions."""
+    """Claims that were defined anew after their values had been seen keep all definitions."""
     anew = {entry["id"]: entry for entry in record if entry["other_definitions"]}
     assert {"C13", "C39", "C41", "C46"} <= anew.keys()
     for entry in anew.values():

@@ -28,7 +28,7 @@ from verification.sensitivity.rounding import load_varied
 
 #: Names of numbers in claims about wide that concern other scenes or earlier times.
 OTHER = re.compile(r"^base|before contact|a film left|^K / K_clean =|^the part filled|^layer|^wide, 30 h|"
-                   r"in the 5 h before$|^uniform|^theta\(R\)")
+                   r"^uniform|^theta\(R\)")
 #: Percent above which a bar is listed, after contact and for base.
 WIDE_BAR, BASE_BAR = 2.0, 0.2
 #: Claims about the model that are neither about wide nor base: what is cut off a half-disc's pore, wide in other ways.
@@ -39,7 +39,7 @@ KINDS = {
     "a small difference of two halves, or of two runs or solutions, which takes the errors of both in parts of itself":
         r"C11|C36|C42|.*(born stress-free|deviation|law's r|changed by the fluid)",
     "a Sherwood number, over the drop from the supply to the interface, small against the supply, and ratios less one":
-        r"C39",
+        r"C39|C47",
     "a peak of stress or strain, beside the corner of interface and wall or in one element, and ratios of such":
         r".*(stress|strain)",
     "a share of less than 1 %, made of what the fluid does to a body 2000 times as viscous": r"C35",

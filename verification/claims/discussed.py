@@ -1,4 +1,4 @@
-"""C38, C39: what the paper says in its introduction and discussion, and does not compute.
+"""C38, C39, C47: what the paper says in its introduction and discussion, and does not compute.
 
 C45: what an aggregate takes up, beside layers that have its biomass.
 
@@ -12,7 +12,6 @@ from math import gamma
 
 import numpy as np
 
-from reference import layered_channel
 from repro.fem.mesh import Mesh, curved
 from repro.fem.mesher import unlocked
 from repro.model.pore import sized
@@ -21,7 +20,7 @@ from repro.results.network import added_resistance, known
 from repro.scene import Scene
 from verification.claims import FEW, FEW_WORDS, LATER, Finding, at_least, claim
 from verification.claims.levels import ABOUT_WIDE
-from verification.claims.permeability import clean
+from verification.claims.permeability import clean, layered_share
 from verification.claims.runs import (
     BASE,
     PLOTTED,
@@ -76,40 +75,39 @@ def filled(ratio: float, reduced: float, walls: int) -> float:
     return float(np.interp(-reduced, -shares, LAYERS))
 
 
-def layered_share(ratio: float, part: float, walls: int) -> float:
-    """K / K_clean of a channel of which layers fill a part: Poiseuille's gradient over that of parallel flow at the
-    same mean velocity."""
-    if walls == 1:
-        return float(12.0 / layered_channel.gradient(1.0, part, ratio))
-    open_ = 1.0 - part
-    return open_**3 + (1.0 - open_**3) / ratio
-
-
 @claim("C39", "5", "a mass transfer coefficient cannot be set a priori: it depends on the sink in the solid",
-       date="2026-11-22 08:23")
-def mass_transfer() -> Finding:
+       date="2026-11-24 13:01")
+def depends_on_the_sink() -> Finding:
+    """Sherwood numbers of one shape in one flow with little and with much supply, whose sinks are nearly of first and
+    of zero order, and with a maximum rate of FASTER times that of Table 1: sinks that the model has."""
+    shapes = [in_one_shape(supply=supply) for supply in SINKS] + [in_one_shape(supply=SINKS[0], faster=FASTER)]
+    sinks = np.array([*map(sherwood, shapes)])
+    checks = tuple(at_least(f"{name}, one shape and flow: Sherwood numbers of three sinks, largest over smallest less "
+                            "one (%)", "depends on the sink in the solid", value, 100 * FEW, FEW_WORDS)
+                   for name, value in zip(SUBSTRATES, differing(sinks)))
+    kinds = (*(f"with supplies of {supply:g} K_s" for supply in SINKS), f"with k times {FASTER:g}")
+    rows = "; ".join(f"{a:.3g} and {d:.3g} {kind}" for kind, (a, d) in zip(kinds, sinks))
+    moved = " and ".join(f"{each:.1f}" for each in differing(sinks))
+    return Finding(checks, reason="from a sink of nearly zero order to one of "
+                   f"{FASTER:g} times the rate the number moves by {moved} % only, acceptor and donor",
+                   note=f"Sherwood numbers of acceptor and donor of a half-disc of {RADIUS:g} um in the flow of 1e-3 "
+                   f"cm: {rows}. Most of the drop is in the water upstream.")
+
+
+@claim("C47", "5", "a mass transfer coefficient cannot be set a priori: it depends on geometry and flow",
+       date="2026-11-24 13:01")
+def depends_on_geometry() -> Finding:
     """Sherwood numbers of base from t = 0 to 19.2 h: uptake over interface and drop of the concentration from the
     supply to the interface's mean, times thickness over diffusivity in water. Beside them a textbook's, that of a flat
-    patch as long as the aggregate; and those of one shape in one flow with little and with much supply, whose sinks are
-    nearly of first and of zero order, and with a maximum rate of FASTER times that of Table 1."""
+    patch as long as the aggregate."""
     early = [aggregate for aggregate in bodies(BASE) if aggregate.pore.time <= PLOTTED + 1e-6]
-    numbers, textbook = np.array([sherwood(aggregate) for aggregate in early]), textbooks(early[-1])
-    shape = [in_one_shape(supply=supply) for supply in SINKS]
-    sinks = np.array([*map(sherwood, shape), sherwood(in_one_shape(supply=SINKS[0], faster=FASTER))])
-    rows = {"{}: largest over smallest Sherwood number, less one (%)": ("cannot be set", differing(numbers)),
+    numbers, textbook = np.array([*map(sherwood, early)]), textbooks(early[-1])
+    rows = {"{}: largest over smallest Sherwood number, less one (%)": differing(numbers),
             "{}, 19.2 h: Leveque's number over ours, less one, either way (%)":
-                ("cannot be set", 100 * np.abs(textbook / numbers[-1] - 1)),
-            "{}, one shape and flow: Sherwood numbers of three sinks, largest over smallest less one (%)":
-                ("depends on the sink in the solid", differing(sinks))}
-    checks = tuple(at_least(quantity.format(name), scene, value, 100 * FEW, FEW_WORDS)
-                   for quantity, (scene, values) in rows.items() for name, value in zip(SUBSTRATES, values))
-    kinds = (*(f"with supplies of {supply:g} K_s" for supply in SINKS), f"with k times {FASTER:g}")
-    shapes = "; ".join(f"{a:.3g} and {d:.3g} {kind}" for kind, (a, d) in zip(kinds, sinks))
-    note = (f"Sherwood numbers of acceptor and donor of a half-disc of {RADIUS:g} um in the flow of 1e-3 cm: {shapes}. "
-            "The sink moves the number by a few percent, since most of the drop is in the water upstream.")
-    moved = " and ".join(f"{each:.1f}" for each in differing(sinks))
-    return Finding(checks, note=note, reason="shape and flow move the number, but from a sink of nearly zero order to "
-                   f"one of {FASTER:g} times the rate it moves by {moved} % only, acceptor and donor")
+                100 * np.abs(textbook / numbers[-1] - 1)}
+    checks = tuple(at_least(quantity.format(name), "cannot be set", value, 100 * FEW, FEW_WORDS)
+                   for quantity, values in rows.items() for name, value in zip(SUBSTRATES, values))
+    return Finding(checks, reason="it does not depend on shape or flow by more than a few percent")
 
 
 def differing(numbers: np.ndarray) -> np.ndarray:
