@@ -239,7 +239,6 @@ FILES = {"meshio", "rich"}
 COMMAND = """
 import sys
 from repro.cli import main
-from repro.fem import linear
 try:
     main(sys.argv[1:])
 except SystemExit:
