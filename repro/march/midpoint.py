@@ -108,7 +108,7 @@ def _expand(scene: Scene, previous: Pore, after: Pore, half: Halfway, part: floa
 
     Contact lines continue at their speed.
     """
-    advances = {key: 2 * part * arcs for key, arcs in half.expansion.advances.items()}
+    advances = {key: advance.times(2 * part) for key, advance in half.expansion.advances.items()}
     return contact.expand(scene, after, compute_theta(scene, previous, after),
                           _extrapolate_shape(previous, half.expansion, part),
                           replace(search, advances=advances))

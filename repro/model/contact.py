@@ -21,6 +21,7 @@ from repro.fem.outline import BOTTOM, FREE, TOP, Outline
 from repro.fem.space import Space
 from repro.model import contact_lines, growth, traction
 from repro.model.contact_lines import (
+    Advance,
     Clearance,
     Contact,
     FirstContact,
@@ -35,6 +36,8 @@ from repro.scene import Growth, Scene, needed
 CONTACT_ROUNDS = 60
 #: Largest number of times that contact lines go back after a trial that fails.
 RETREATS = 6
+#: Defect of the equilibria while contact lines are searched for.
+TRIAL = 1e-5
 #: Rounds of shape and fluid forces.
 FORCE_ROUNDS = 12
 #: Largest move of a node in the last round, over the aggregate's thickness.
@@ -51,15 +54,15 @@ class Expansion:
     pore: with the fluid's nodes not yet moved, on the divided mesh if a contact line lies
     within an arc; iterations: of Newton's method; gap: um, the least distance to the opposite wall
     before films closed; division: of the mesh of the grown pore, None if it is not divided;
-    advances: {(wall, direction): um} by which contact lines have advanced
-    along the outline of the grown pore.
+    advances: {(wall, direction): advance} of contact lines along the outline of
+    the grown pore.
     """
 
     pore: Pore
     iterations: int
     gap: float
     division: Division | None = None
-    advances: Mapping[tuple[int, int], float] = field(default_factory=dict)
+    advances: Mapping[tuple[int, int], Advance] = field(default_factory=dict)
 
     @property
     def position(self) -> np.ndarray:
@@ -172,7 +175,8 @@ def _close_by_nodes(scene: Scene, grown: Pore, start: Pore, forces: np.ndarray |
 
 
 def _equilibrium(scene: Scene, grown: Pore, start: Pore, forces: np.ndarray | None, *,
-                 last: np.ndarray | None = None, patient: bool = True) -> tuple[Pore, int]:
+                 last: np.ndarray | None = None, patient: bool = True,
+                 tolerance: float = growth.NEWTON) -> tuple[Pore, int]:
     """The equilibrium of a grown pore under its theta with the contact of ``start``, searched for
     from the shape and pressure of ``start``; and Newton's iterations."""
     body, target_J = _strained_from(needed(scene.growth, "[growth]"), grown, grown.theta)
@@ -181,6 +185,7 @@ def _equilibrium(scene: Scene, grown: Pore, start: Pore, forces: np.ndarray | No
     locked, target = _constraints(start, scene.pore.width)
     rest = growth.equilibrium(body, target_J, start.mesh.points[nodes], start.pressure[inside],
                               locked, target, forces=forces, last=last, patient=patient,
+                              tolerance=tolerance,
                               modified_newton=scene.numerics.jacobian == "reused")
     return _placed(grown, start, rest), rest.iterations
 
@@ -193,7 +198,7 @@ def _close_by_lines(scene: Scene, grown: Pore, start: Pore, forces: np.ndarray |
     trials = _Trials(scene, grown, start, forces, search.patient)
     lines = contact_lines.lines_of(grown.boundary)
     _place_lines(grown.boundary, lines, search)
-    shape = trials.solve(grown.wall, lines)
+    shape = trials.solve(grown.wall, lines, accurate=not grown.contact)
     gap = rule.width - shape.pore.boundary.thickness
     wall = grown.wall
     if not grown.contact and gap < rule.film:
@@ -202,13 +207,14 @@ def _close_by_lines(scene: Scene, grown: Pore, start: Pore, forces: np.ndarray |
     for _ in range(CONTACT_ROUNDS):
         for line in lines:
             line.record(*_clearance(rule, shape.pore.boundary, line))
-        if all(line.accepted for line in lines):
+        at_rest = all(line.accepted for line in lines)
+        if at_rest and trials.accurate:
             rest = replace(shape.pore, fixed=_with_new_surface(shape.pore.boundary))
             return replace(shape, pore=rest, iterations=trials.iterations, gap=gap)
         for line in lines:
             if not line.accepted:
                 line.step()
-        shape = trials.solve(wall, lines)
+        shape = trials.solve(wall, lines, accurate=at_rest)
     raise GrowthError(f"the contact lines still move after {CONTACT_ROUNDS} trials; "
                       "try a shorter growth.time_step")
 
@@ -244,10 +250,9 @@ def _touch(grown: Pore, shape: Expansion, rule: Clearance, trials: _Trials,
 
 
 def _place_lines(outline: Outline, lines: Sequence[Line], search: SearchOptions) -> None:
-    """Start each contact line at its advance in ``search``, but not before its smallest one."""
+    """Start each contact line at its advance in ``search``."""
     for line in lines:
-        length = search.advances.get(line.key, 0.0)
-        line.advance = max(line.least, contact_lines.to_arcs(outline, line, length))
+        contact_lines.place(outline, line, search.advances.get(line.key, Advance(0.0)))
 
 
 def _tip_width(outline: Outline, depth: float) -> float:
@@ -306,19 +311,21 @@ class _Trials:
         self._divided: Division | None = None
         self._shape: growth.Shape | None = None
         self.iterations = 0
+        self.accurate = False
 
-    def solve(self, wall: np.ndarray, lines: Sequence[Line]) -> Expansion:
+    def solve(self, wall: np.ndarray, lines: Sequence[Line], accurate: bool = False) -> Expansion:
         """The equilibrium with walls (M,) of the grown pore's outline and advances of the lines.
 
         If it fails, lines go half of the way back to an advance that was too short. Raises
         GrowthError if that does not help.
         """
+        self.accurate = accurate
         for _ in range(RETREATS):
             try:
                 shape = self._solve(contact_with(wall, lines),
                                     np.array([line.advance for line in lines]))
                 outline = replace(self._grown.boundary, wall=wall)
-                advances = {line.key: contact_lines.to_length(outline, line) for line in lines}
+                advances = {line.key: contact_lines.advance_of(outline, line) for line in lines}
                 return replace(shape, advances=advances)
             except (GrowthError, LinearError) as error:
                 failure = error
@@ -370,7 +377,8 @@ class _Trials:
             self._shape = locked.body.shape
             forces = None if forces is None else _divided_loads(division, forces)
         shape, iterations = _equilibrium(self._scene, locked, self._first(locked, advances), forces,
-                                         patient=self._patient)
+                                         patient=self._patient,
+                                         tolerance=growth.NEWTON if self.accurate else TRIAL)
         self.iterations += iterations
         expansion = Expansion(shape, iterations, 0.0, division)
         at_rest = advances, expansion.position, shape.pressure[: grown.mesh.corners]

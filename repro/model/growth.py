@@ -396,7 +396,7 @@ class System:
 def equilibrium(body: Body, theta: np.ndarray, position: np.ndarray, pressure: np.ndarray,
                 constrained: np.ndarray, prescribed: np.ndarray, *, last: np.ndarray | None = None,
                 forces: np.ndarray | None = None, modified_newton: bool = False,
-                patient: bool = True) -> Equilibrium:
+                patient: bool = True, tolerance: float = NEWTON) -> Equilibrium:
     """Solve for the equilibrium of an aggregate under an expansion, (14)-(27).
 
     Parameters
@@ -420,6 +420,8 @@ def equilibrium(body: Body, theta: np.ndarray, position: np.ndarray, pressure: n
         Does Newton's method keep its derivative while the defect falls fast enough?
     patient : bool
         Is an equilibrium that fails tried again in more sub-steps?
+    tolerance : float
+        Largest defect.
 
     Returns
     -------
@@ -450,28 +452,30 @@ def equilibrium(body: Body, theta: np.ndarray, position: np.ndarray, pressure: n
         parts = max(1, int(np.ceil(apart / np.log(FACTOR))))
     system = System(body, constrained, stabilising=stabilising, forces=forces)
     first = Equilibrium(position, pressure, 0)
-    return reach(system, start, theta, first, prescribed, parts, modified_newton, patient)
+    return reach(system, start, theta, first, prescribed, parts, modified_newton, patient,
+                 tolerance)
 
 
 def reach(system: System, start: np.ndarray, theta: np.ndarray, first: Equilibrium,
           prescribed: np.ndarray, parts: int = 1, modified_newton: bool = False,
-          patient: bool = True) -> Equilibrium:
+          patient: bool = True, tolerance: float = NEWTON) -> Equilibrium:
     """Solve for equilibrium under theta, from J = ``start`` (t, q), in ``parts`` sub-steps, or in
     more if these fail; see :func:`equilibrium`."""
     failure = ""
     for steps in CONTINUATION[patient]:
         try:
             return _continued(system, start, theta, first, prescribed, parts * steps,
-                              modified_newton)
+                              modified_newton, tolerance)
         except (GrowthError, LinearError) as error:
             failure = str(error)
     raise GrowthError(f"{failure}; try a shorter growth.time_step or a larger numerics.refinement")
 
 
 def _continued(system: System, start: np.ndarray, theta: np.ndarray, first: Equilibrium,
-               prescribed: np.ndarray, steps: int, modified_newton: bool) -> Equilibrium:
+               prescribed: np.ndarray, steps: int, modified_newton: bool,
+               tolerance: float) -> Equilibrium:
     """Newton's method at theta = start (theta / start)^s for s = 1 / steps ... 1."""
-    newton = Newton(NEWTON, ROUND_OFF, MOST_ITERATIONS, modified_newton)
+    newton = Newton(tolerance, max(ROUND_OFF, tolerance), MOST_ITERATIONS, modified_newton)
     solution = first
     for part in np.arange(1, steps + 1) / steps:
         target = first.position + part * (prescribed - first.position)
