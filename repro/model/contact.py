@@ -11,10 +11,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
 from repro.errors import GrowthError, LinearError
+from repro.fem.assembly import Factored
 from repro.fem.division import Division
 from repro.fem.mesh import Mesh
 from repro.fem.outline import BOTTOM, FREE, TOP, Outline
@@ -160,8 +162,8 @@ def _close_by_nodes(scene: Scene, grown: Pore, start: Pore, forces: np.ndarray |
     gaps: list[float] = []
     for _ in range(CONTACT_ROUNDS):
         last = None if gaps else grown.mesh.points[grown.mesh.body]
-        shape, used = _equilibrium(scene, grown, shape, forces, last=last)
-        iterations += used
+        shape, rest = _equilibrium(scene, grown, shape, forces, last=last)
+        iterations += rest.iterations
         gaps.append(width - shape.boundary.thickness)
         if not shape.contact:
             _refuse_late(gaps[-1], keys.minimum_film, search)
@@ -176,7 +178,8 @@ def _close_by_nodes(scene: Scene, grown: Pore, start: Pore, forces: np.ndarray |
 
 def _equilibrium(scene: Scene, grown: Pore, start: Pore, forces: np.ndarray | None, *,
                  last: np.ndarray | None = None, patient: bool = True,
-                 tolerance: float = growth.NEWTON) -> tuple[Pore, int]:
+                 tolerance: float = growth.NEWTON,
+                 factors: Factored | None = None) -> tuple[Pore, growth.Equilibrium]:
     """The equilibrium of a grown pore under its theta with the contact of ``start``, searched for
     from the shape and pressure of ``start``; and Newton's iterations."""
     body, target_J = _strained_from(needed(scene.growth, "[growth]"), grown, grown.theta)
@@ -185,9 +188,9 @@ def _equilibrium(scene: Scene, grown: Pore, start: Pore, forces: np.ndarray | No
     locked, target = _constraints(start, scene.pore.width)
     rest = growth.equilibrium(body, target_J, start.mesh.points[nodes], start.pressure[inside],
                               locked, target, forces=forces, last=last, patient=patient,
-                              tolerance=tolerance,
+                              tolerance=tolerance, factors=factors,
                               modified_newton=scene.numerics.jacobian == "reused")
-    return _placed(grown, start, rest), rest.iterations
+    return _placed(grown, start, rest), rest
 
 
 def _close_by_lines(scene: Scene, grown: Pore, start: Pore, forces: np.ndarray | None,
@@ -294,6 +297,52 @@ def _clearance(rule: Clearance, outline: Outline, line: Line) -> tuple[float, fl
     return rule.beyond(outline, node, line.direction)
 
 
+@dataclass(frozen=True, eq=False)
+class _Trial:
+    """An equilibrium with contact lines at some advances (arcs): positions (N, 2) um and pressures
+    of all nodes, on the mesh of a division or on the undivided one."""
+
+    advances: np.ndarray
+    points: np.ndarray
+    pressure: np.ndarray
+    division: Division | None = None
+
+    @cached_property
+    def smooth(self) -> tuple[np.ndarray, np.ndarray]:
+        """Positions and pressures on the undivided mesh."""
+        if self.division is None:
+            return self.points, self.pressure
+        corners = self.division.parent.corners
+        return self.division.restricted(self.points), self.pressure[:corners]
+
+    def on(self, other: Division | None, moved: tuple[np.ndarray, np.ndarray]
+           ) -> tuple[np.ndarray, np.ndarray]:
+        """Positions and pressures on the mesh of another division, from those on the undivided mesh
+        after they have ``moved``. If both divide the same arcs, kinks move with the contact lines.
+        """
+        fields = _on_division(other, moved)
+        if self.division is None or not same_arcs(self.division, other):
+            return fields
+        kinks = zip(fields, (self.points, self.pressure), _on_division(self.division, self.smooth))
+        points, pressure = (field + value - smooth for field, value, smooth in kinks)
+        return points, pressure
+
+
+def _on_division(division: Division | None,
+                 fields: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Positions and pressures on a divided mesh, from those on the undivided one."""
+    if division is None:
+        return fields
+    points, pressure = fields
+    return division.nodal(points), division.at_corners(pressure)
+
+
+def same_arcs(one: Division | None, other: Division | None) -> bool:
+    """Do two divisions of a mesh divide the same arcs, so that their meshes have the same nodes?"""
+    arcs = [np.zeros(0) if division is None else division.arcs for division in (one, other)]
+    return np.array_equal(*arcs)
+
+
 class _Trials:
     """Equilibria of one grown pore with several places of its contact lines.
 
@@ -306,10 +355,11 @@ class _Trials:
         self._grown = grown
         self._forces = forces
         self._patient = patient
-        self._start = start.mesh.points, start.pressure
-        self._shapes = [(np.zeros(0), *self._start)]
+        self._start = _Trial(np.zeros(0), start.mesh.points, start.pressure)
+        self._trials = [self._start]
         self._divided: Division | None = None
         self._shape: growth.Shape | None = None
+        self._factors: Factored | None = None
         self.iterations = 0
         self.accurate = False
 
@@ -344,27 +394,21 @@ class _Trials:
             self._divided = self._divided.at(contact.t)
         return self._divided
 
-    def _guesses(self, advances: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Positions (N, 2) um and pressures from which a trial may start, the best ones first."""
-        ahead = self._ahead(advances)
-        if ahead is not None:
-            yield ahead
-        yield self._shapes[-1][1:]
-        yield self._start
-
-    def _ahead(self, advances: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-        """The last two shapes, extrapolated in the advance of the line that moves most."""
-        last, points, pressure = self._shapes[-1]
-        before, points_before, pressure_before = self._shapes[0]
-        if len(self._shapes) < 2 or len(before) != len(advances):
-            return None
-        line = np.argmax(np.abs(last - before))
-        if last[line] == before[line]:
-            return None
-        part = (advances[line] - last[line]) / (last[line] - before[line])
-        part = min(max(part, -1.0), 1.0)
-        return (points + part * (points - points_before),
-                pressure + part * (pressure - pressure_before))
+    def _guesses(self, advances: np.ndarray,
+                 division: Division | None) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """Positions (N, 2) um and pressures from which a trial may start, the best ones first: the
+        last two shapes, extrapolated in the advance of the line that moves most, then each of
+        them."""
+        *before, last = self._trials
+        if before and len(before[0].advances) == len(advances):
+            line = np.argmax(np.abs(last.advances - before[0].advances))
+            moved = last.advances[line] - before[0].advances[line]
+            part = (advances[line] - last.advances[line]) / moved if moved else 0.0
+            part = min(max(part, -1.0), 1.0)
+            ahead = [now + part * (now - then) for now, then in zip(last.smooth, before[0].smooth)]
+            yield last.on(division, (ahead[0], ahead[1]))
+        yield last.on(division, last.smooth)
+        yield self._start.on(division, self._start.smooth)
 
     def _solve(self, contact: Contact, advances: np.ndarray) -> Expansion:
         grown = self._grown
@@ -376,26 +420,25 @@ class _Trials:
             locked = divided(grown, division, contact, self._shape)
             self._shape = locked.body.shape
             forces = None if forces is None else _divided_loads(division, forces)
-        shape, iterations = _equilibrium(self._scene, locked, self._first(locked, advances), forces,
+        shape, rest = _equilibrium(self._scene, locked, self._first(locked, advances, division),
+                                         forces,
                                          patient=self._patient,
-                                         tolerance=growth.NEWTON if self.accurate else TRIAL)
-        self.iterations += iterations
-        expansion = Expansion(shape, iterations, 0.0, division)
-        at_rest = advances, expansion.position, shape.pressure[: grown.mesh.corners]
-        self._shapes = [*self._shapes[-1:], at_rest]
+                                   tolerance=growth.NEWTON if self.accurate else TRIAL,
+                                   factors=self._factors)
+        self.iterations += rest.iterations
+        self._factors = rest.factors
+        expansion = Expansion(shape, rest.iterations, 0.0, division)
+        trial = _Trial(advances, shape.mesh.points, shape.pressure, division)
+        self._trials = [*self._trials[-1:], trial]
         return expansion
 
-    def _first(self, locked: Pore, advances: np.ndarray) -> Pore:
+    def _first(self, locked: Pore, advances: np.ndarray, division: Division | None) -> Pore:
         """The pore from which a trial starts: the best guess in which no triangle is turned over.
 
         A divided arc may have a kink where its contact begins. The undivided arc rounds it off,
         which can turn a triangle over.
         """
-        division = self._divided
-        for points, pressure in self._guesses(advances):
-            if division is not None and len(points) < len(locked.mesh.points):
-                points = division.nodal(points)
-                pressure = division.at_corners(pressure)
+        for points, pressure in self._guesses(advances, division):
             if locked.body.strained(points[locked.mesh.body]).J.min() > 0:
                 break
         return replace(locked.moved(points), pressure=pressure)
