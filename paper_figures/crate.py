@@ -2,7 +2,8 @@
 
 The crate is a copy of the checkout with the figures of `make figures` and `ro-crate-metadata.json`. The metadata list
 every file with its size and SHA-256, the workflow (`python -m paper_figures`) with its inputs (scenes) and outputs
-(figures), the action that produced them, and the action that judged the claims. PROFILES lists the profiles.
+(figures), the action that produced them, and the action that judged the claims.
+PROFILES lists the profiles to which the crate conforms.
 """
 
 from __future__ import annotations
@@ -58,8 +59,8 @@ def main() -> int:
 
 
 def write(out: Path, crate: Path) -> Path:
-    """Write the crate from the checkout and the figures in `out`. Raises FileNotFoundError if they are missing or are
-    those of another source."""
+    """Write the crate from the checkout and the figures in `out`. Raises FileNotFoundError if figures are
+    missing or were drawn by another source."""
     pictures = figures(out)
     temporary = crate.with_name(f".part-{crate.name}")
     shutil.rmtree(temporary, ignore_errors=True)

@@ -18,13 +18,13 @@ LINES = ("-", "-", "--")
 LABELS = ("viscosity ratio 2000", *(f"permeability {value:.2g} m²" for value in runs.PERMEABILITIES))
 
 
-#: Times (h) of the conductivities in the caption: an aggregate, a remaining film, a plug.
+#: Times (h) of the conductivities in the caption. They show an aggregate, a remaining film and a plug.
 REPORTED_HOURS = (20.0, 34.0, 40.0)
 
 
 @style.styled
 def draw(*folders: Path) -> Figure:
-    """Conductivity over time, and over that with the pseudoviscosity."""
+    """Conductivity over time, and its ratio to that with the pseudoviscosity."""
     figure = style.figure(2.7)
     panels = figure.subplots(1, 2)
     first = states.series(folders[0])

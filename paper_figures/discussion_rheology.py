@@ -1,4 +1,4 @@
-"""Wide with one change of its rheology or of its contact with the walls at a time. Not in the paper."""
+"""Variants of Wide, each with one change of rheology or wall contact. Not in the paper."""
 
 from __future__ import annotations
 

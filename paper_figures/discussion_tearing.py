@@ -27,7 +27,7 @@ NAMES, COLOURS = ("Base", "Wide"), (style.BLUE, style.RED)
 RUN_OVERRIDES = (BASE, WIDE)
 #: Hours between the outlines.
 EVERY = 5.0
-PASCAL = 1e6  # in a MPa
+PASCAL = 1e6  # Pa in one MPa
 
 
 @cached

@@ -34,10 +34,10 @@ NAMES, COLOURS = ("acceptor", "donor"), (style.BLUE, style.RED)
 def draw() -> Figure:
     """Sherwood numbers over time, velocity, supply and radius; and the concentrations upstream of the aggregate."""
     figure = style.figure(4.6)
-    panels = figure.subplot_mosaic([["time"] * 3 + ["pull"] * 3, ["velocity"] * 2 + ["supply"] * 2 + ["shape"] * 2])
+    panels = figure.subplot_mosaic([["time"] * 3 + ["upstream"] * 3, ["velocity"] * 2 + ["supply"] * 2 + ["shape"] * 2])
     with at_level(LEVEL):
         _over_time(panels["time"])
-        _upstream_depletion(panels["pull"])
+        _upstream_depletion(panels["upstream"])
         driven = [in_one_shape(head=float(head)) for head in HEADS]
         speeds = [24e-6 * body.solved.flow.mean_velocity for body in driven]
         _panel(panels["velocity"], speeds, driven, "mean velocity (m/d)", True)
@@ -50,8 +50,8 @@ def draw() -> Figure:
             axes.set(ylim=(0, None), title=f"steady half-disc, by {name if name != 'shape' else 'radius'}")
     panels["velocity"].set_ylabel("Sherwood number")
     panels["time"].legend(ncols=2, loc="upper left")
-    panels["pull"].legend()
-    style.number_panels(*(panels[name] for name in ("time", "pull", "velocity", "supply", "shape")))
+    panels["upstream"].legend()
+    style.number_panels(*(panels[name] for name in ("time", "upstream", "velocity", "supply", "shape")))
     return figure
 
 
@@ -74,7 +74,7 @@ def _panel(axes: Axes, x, bodies_at_rest: list[Body], label: str, log: bool) -> 
 
 
 def _pairs(axes: Axes, x, numbers: list[tuple[float, float]], leveque: list[tuple[float, float]]) -> None:
-    """The numbers of both substrates, and those of a textbook dashed."""
+    """Draw the computed numbers of both substrates (full) and those of a textbook (dashed)."""
     for name, colour, computed, textbook in zip(NAMES, COLOURS, np.transpose(numbers), np.transpose(leveque)):
         axes.plot(x, computed, color=colour, label=name)
         axes.plot(x, textbook, "--", color=colour, label=f"{name}, Lévêque")

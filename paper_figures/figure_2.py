@@ -22,7 +22,7 @@ THICKNESS = 0.6
 
 @style.styled
 def draw() -> Figure:
-    """The pore to scale, the aggregate closer, and how a thin layer of fluid closes."""
+    """The pore to scale, a close-up of the aggregate, and the closing of a thin layer of fluid."""
     scene = runs.BASE.load()
     figure = style.figure(4.1)
     panels = figure.subplot_mosaic([["pore", "pore"], ["domains", "closing"]], height_ratios=[1, 2.4],

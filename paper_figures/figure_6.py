@@ -38,7 +38,7 @@ def draw(folder: Path) -> Figure:
 
 
 def outlines(axes: Axes, folder: Path, hours: float | None = None) -> None:
-    """The channel with the outlines of a run every ``hours`` hours, EVERY by default, the latest at the back, and a
+    """Draw the outlines of a run every ``hours`` hours (default EVERY) in its channel, the latest at the back, with a
     colour scale of their times."""
     hours = hours or EVERY
     states_drawn = states.every(folder, hours)
@@ -56,8 +56,8 @@ def outlines(axes: Axes, folder: Path, hours: float | None = None) -> None:
 
 
 def smooth(rim: np.ndarray, width: float) -> np.ndarray:
-    """Smooth a closed outline (M, 2): a cubic spline (K, 2) through the nodes of each stretch between the walls, which
-    meets the walls at the outline's corners."""
+    """Smooth a closed outline (M, 2). Between the outline's corners on the walls, a cubic spline (K, 2) joins the nodes
+    of each stretch."""
     wall = np.where(rim[:, 1] <= 0, 1, np.where(rim[:, 1] >= width, 2, 0))
     start = int(np.flatnonzero((wall > 0) & (np.roll(wall, -1) == 0))[0])
     points, wall = (np.roll(values, -start, axis=0) for values in (rim, wall))

@@ -4,9 +4,9 @@ Pictures are listed by name and size. The hashes are those of their data: the fi
 each figure. Fields are hashed as arrays, so that the packing of a file does not matter.
 `python -m paper_figures.manifest` is `make check-manifest`. It hashes the present outputs and compares them first with
 the manifest that `make figures` wrote beside the pictures (a difference is a file altered since), then with the
-committed copy. The committed bits are not promised: where a linear mesh moves and is remade, the last bit of another
-processor's kernels leads to another mesh. The promise is that every number of a run's last row lies within `PROMISED`
-of the committed one. If a number does not, or if a figure differs although its data agree, the check gives the cause
+committed copy. Identical bits are not promised: the last bit of another processor's kernels can lead
+to another mesh after a remesh. The promise is that every number of a run's last row lies within `PROMISED` of the
+committed one. If a number does not, or if a figure differs although its data agree, the check gives the cause
 and fails.
 """
 
@@ -47,7 +47,7 @@ DEFAULT_PROMISED = 0.02
 #: the last mesh of wide has 707 nodes with one kernel of OpenBLAS and 927 with another, while all other numbers agree
 #: as promised.
 NOT_PROMISED = ("_balance", "remeshed", "nodes")
-#: Files of a run without data: they contain times of day, or describe other files.
+#: Files of a run that are not hashed: they contain times of day, or describe other files.
 NOT_DATA = ("run.json", "report.html", "checkpoint.last", "fields.sha256")
 
 
@@ -126,7 +126,7 @@ def differences(computed: dict, committed: dict) -> list[str]:
 
 
 def _data(manifest: dict) -> dict[str, str]:
-    """The hash of each output by a name that locates it; for pictures, the fact that they exist."""
+    """The hash of each output by a name that locates it. A picture has a fixed text instead of a hash."""
     digests: dict[str, str] = {}
     for name, run in manifest["runs"].items():
         digests |= {f"{name}/{file}": digest for file, digest in run["files"].items()}

@@ -50,7 +50,7 @@ def _law(axes: Axes) -> None:
 
 
 def _new(axes: Axes) -> None:
-    """Shapes that are not in the fit, relative to the law, 0, and its bounds, 1 and -1."""
+    """Shapes that are not in the fit, relative to the law (0) and its bounds (1 and -1)."""
     columns = read(unseen=True)
     verdict = judged(columns)
     side = np.sign(verdict.apart) * verdict.beyond

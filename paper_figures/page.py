@@ -1,4 +1,4 @@
-"""`index.html`: every figure with its caption, the commands of its runs and its claims. It needs no network."""
+"""`index.html`: every figure with its caption, the commands of its runs and its claims, readable offline."""
 
 from __future__ import annotations
 

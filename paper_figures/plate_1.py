@@ -21,7 +21,7 @@ CONTOURS = 20
 
 @style.styled
 def draw(folder: Path) -> Figure:
-    """C_A and C_D in the meshed part, X_A and X_I over the density of 12 min before; each with a colour scale."""
+    """C_A and C_D in the meshed part, X_A and X_I over the density 12 min earlier; each has a colour scale."""
     state = states.last(folder, "before_expansion")
     grown = {name: grown_since(folder, f"{name}_biomass") for name in ("active", "inert")}
     figure = style.figure(4.35)
@@ -43,7 +43,7 @@ def draw(folder: Path) -> Figure:
 
 
 def grown_since(folder: Path, name: str) -> np.ndarray:
-    """A biomass before the last expansion over the density X_A + X_I of 12 min before at the same nodes, (N,).
+    """Biomass before the last expansion over the density X_A + X_I at the same nodes 12 min earlier, (N,).
 
     That density differs from X_m by 0.1 % at the interface, where (34) satisfies J = theta on the average of the
     triangles around a node. This difference is not growth and would take half of the colours. In the fluid the ratio

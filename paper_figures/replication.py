@@ -90,7 +90,7 @@ def _list_supplies(every: list[str], some: list[str], none: list[str]) -> str:
 
 
 def _flips(claims: list[dict]) -> str:
-    """Verdicts that change if a bound moves by the bar of its number."""
+    """List of verdicts that change if a bound moves by the error bar of its number."""
     changed = [(claim, flip) for claim in claims for flip in claims_record.flips(claim)]
     return "\n".join(f"- **{flip.id}**, {flip.quantity}: {claim['verdict']}, and {flip.verdict} with a bound moved."
                      for claim, flip in changed) or "None."
@@ -117,7 +117,7 @@ def _bars_of_base(claims: list[dict]) -> str:
 
 
 def _ids(numbers: list) -> str:
-    """The distinct ids of the claims."""
+    """The distinct ids of the numbers' claims."""
     return ", ".join(dict.fromkeys(number.id for number in numbers))
 
 

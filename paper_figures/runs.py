@@ -21,8 +21,23 @@ STORE = Folders(Path(__file__).parent / "cache")
 
 @dataclass(frozen=True)
 class Request:
-    """A packaged scene with its `--set` options; `label` is its name if a scene has several runs, by default that of
-    the scene."""
+    """A run of a packaged scene.
+
+    Parameters
+    ----------
+    scene : str
+        Name of the packaged scene.
+    overrides : tuple of str
+        Changes of the scene, as for `--set`.
+    label : str
+        Name of the run if a scene has several; the default is the scene's name.
+
+    Examples
+    --------
+    >>> from paper_figures.runs import Request
+    >>> Request("base", ('growth.end="1 h"',), "base_short").name
+    'base_short'
+    """
 
     scene: str
     overrides: tuple[str, ...] = ()
@@ -38,7 +53,7 @@ class Request:
         return load_scene(self.scene, self.overrides)
 
     def command(self) -> str:
-        """The command that computes the same run."""
+        """Return the command that computes the same run."""
         changes = [part for change in self.overrides for part in ("--set", change)]
         return shlex.join(["repro", "run", self.scene, "--out", f"runs/{self.name}", *changes])
 
@@ -47,8 +62,8 @@ class Request:
 BASE = Request("base", (rows_at(*range(1, 20), 19.2, 19.4),))
 #: Figure 6, with every shape update.
 WIDE = Request("wide")
-#: The same in the converged solution of the claims. Its outlines are curves. In the paper's scheme whole edges come
-#: into contact, and a spline through their nodes is not smooth.
+#: Wide in the converged solution of the claims. Its outlines are curves. In the paper's scheme whole edges come into
+#: contact, and a spline through their nodes is not smooth.
 WIDE_CONVERGED = Request("wide", (*converged(1.0), rows_at(*range(1, 35), *(34 + 0.1 * k for k in range(1, 10)),
                                                            *range(35, 46))), "wide_converged")
 #: Figure 4: only geometry and mesh.

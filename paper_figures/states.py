@@ -19,7 +19,8 @@ PARTS = {3: np.array([[0, 1, 2]]), 6: np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2],
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """Fields of one time: points (N, 2), triangles (T, 3), biomass (T,) True in the aggregate; nodes, cells by name."""
+    """Fields at one time: points (N, 2), triangles (T, 3), biomass (T,) True in the aggregate; nodes, cells:
+    {name: values}."""
 
     time: float
     points: np.ndarray
@@ -143,6 +144,6 @@ def contact(folder: Path) -> float:
 
 
 def last_step(folder: Path) -> tuple[float, float]:
-    """Start and end of the last shape update; the preceding geometry is that of the start."""
+    """Start and end (h) of the last shape update. The fields before the expansion have the shape of the start."""
     table = read_table(folder / "ledger.csv")
     return float(table["start_h"][-1]), float(table["end_h"][-1])

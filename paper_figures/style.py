@@ -38,7 +38,7 @@ RULES = {
 
 
 def styled(draw: Callable) -> Callable:
-    """Decorator: draw or save with RULES, without a change of matplotlib's settings outside."""
+    """Decorator: apply RULES within the function only."""
     @wraps(draw)
     def within(*arguments, **keywords):
         with matplotlib.rc_context(RULES):
@@ -54,7 +54,7 @@ def figure(height: float, width: float = PAGE) -> Figure:
 
 
 def lay_out(figure: Figure) -> None:
-    """Fix the positions of the parts. One pass does not account for the space that equal axes leave free."""
+    """Fix the positions of the parts. Axes with equal scales leave free space, which requires a second pass."""
     for _ in range(LAYOUT_PASSES):
         figure.get_layout_engine().execute(figure)
     figure.set_layout_engine("none")

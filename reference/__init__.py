@@ -1,1 +1,1 @@
-"""Ways to know the answer that do not trust `repro`, and never import it."""
+"""Independent solutions for comparison with `repro`. No module imports it."""

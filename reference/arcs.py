@@ -1,4 +1,4 @@
-"""Triangles of scikit-fem in and around a half-disc on the wall y = 0, whose edges follow its arc."""
+"""Meshes of scikit-fem for a half-disc on the wall y = 0. Edges of the triangles follow its arc."""
 import numpy as np
 from skfem import Basis, ElementTriP2, MeshTri, MeshTri2
 

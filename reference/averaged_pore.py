@@ -1,8 +1,8 @@
 """A pore averaged over its cross-sections: flow, substrates and growth in one dimension, by FiPy and scipy.
 
 An aggregate of height h(x) lies on the lower wall of the channel 0 < y < W, -L/2 < x < L/2. The model is the limit of
-an aggregate that is long compared with W and takes up little over its height. The next terms scale with the squares of
-its slope and of its transverse Thiele number h sqrt(X q / (D C)).
+an aggregate that is long compared with W and takes up little over its height. Its error scales with the squares of the
+slope and of the transverse Thiele number h sqrt(X q / (D C)).
 
 *Flow* is fully developed in each section, between two layers (:mod:`reference.layered_channel`): with the mean velocity
 u of the open channel, the flux u W is the same everywhere and the loss is the integral of G(h) dx (lubrication).
@@ -19,7 +19,7 @@ i' = a r_I(C), (9)-(10); its area grows by theta = a + i. A thin strip that slid
 sigma_xx = sigma_yy = 0, so that both stretches of each cell are sqrt(theta); x = 0 stays in place. An aggregate that
 keeps its shape, as a half-disc nearly does, stretches by the root of the mean theta; its biomass is uniform.
 
-Units: any that agree. Pairs are of the acceptor and the donor.
+Any consistent units. Pairs are (acceptor, donor).
 """
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -137,8 +137,8 @@ def _unit_flux(cells):
 
 
 class Averaged:
-    """The run of a seed of cells ``lengths`` and ``heights`` (n,); fluid: cells on each side of it; keeps_shape: the
-    seed keeps its shape instead of deforming as a strip."""
+    """The run of a seed with cells of ``lengths`` and ``heights`` (n,). fluid: number of cells on each side of it;
+    keeps_shape: whether the seed keeps its shape. Otherwise it deforms as a strip."""
 
     def __init__(self, pore, lengths, heights, fluid, keeps_shape):
         self.pore = pore

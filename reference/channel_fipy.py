@@ -31,7 +31,7 @@ def matrix(term, mesh):
 
 
 def diffusion(mesh, diffusivity):
-    """FiPy's diffusion term with one diffusivity a cell."""
+    """FiPy's diffusion term; diffusivity: a number for each cell."""
     return DiffusionTerm(coeff=CellVariable(mesh=mesh, value=diffusivity).harmonicFaceValue)
 
 
@@ -66,7 +66,7 @@ class Channel:
         return np.concatenate(self.sources) - self.transport @ fields - sink(fields, self.load, self.rates)
 
     def _derivative(self, fields):
-        """Its derivative."""
+        """Derivative of :meth:`_balance`, (2n, 2n)."""
         return sp.csc_array(-self.transport - sink_derivative(fields, self.load, self.rates))
 
     def steady(self):
@@ -85,7 +85,8 @@ class Channel:
         return history.y.T.reshape(len(times), 2, -1)
 
     def backward_euler(self, times, steps):
-        """The same by FiPy's scheme, V (C - C_old) / dt = V dC/dt, with ``steps`` equal steps in each interval."""
+        """C_A and C_D at each time by FiPy's scheme, V (C - C_old) / dt = V dC/dt; each interval has ``steps`` equal
+        steps."""
         fields, states = np.repeat(self.supply, len(self.x)), []
         for interval in np.diff([0.0, *times]):
             for _ in range(steps):

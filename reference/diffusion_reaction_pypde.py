@@ -8,7 +8,7 @@ patterns; no two cells of a pattern are neighbours of the same cell. Newton's me
 this matrix. Nothing is compiled.
 
 The scheme is of second order if the biomass's sides follow the cells. A curved side cuts cells: the fractions keep the
-amount of uptake correct, and its location errs by a fraction of a cell, to either side.
+amount of uptake correct, but shift its location by a fraction of a cell.
 """
 import numpy as np
 import scipy.sparse as sp
@@ -20,7 +20,7 @@ from reference.monod import sink, sink_derivative, solve_steady
 TOLERANCE = 1e-11
 #: Options of SuperLU: the diagonal dominates, and pivoting would destroy the ordering.
 NO_PIVOTS = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
-#: No two of the five cells of the stencil have the same x + 2 y modulo five.
+#: Number of patterns. The five cells of the stencil have different values of x + 2 y modulo five.
 PATTERNS = 5
 
 

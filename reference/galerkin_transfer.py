@@ -1,4 +1,4 @@
-"""Galerkin projection of nodal fields between two triangulations of one polygon: slow, and readable line by line.
+"""Galerkin projection of nodal fields between two triangulations of one polygon, by direct formulas.
 
     (X_new, N_i) = (X_old, N_i)  for every nodal function N_i of the new mesh.
 

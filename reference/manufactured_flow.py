@@ -6,8 +6,8 @@ On either side u = (psi_y, -psi_x), which is divergence-free, from
     psi = A(t) + B s + C(t) s^2 + D(t) s^3
 
 with the same A and B on both sides: u is continuous. On the interface du/ds is 0 across and -2 C along it, and the
-shear of grad u + grad u^T is A'' - 2 C. Both sides have the same shear stress T(t) and the same pressure, with another
-slope. The stress that each form makes continuous is continuous if
+shear of grad u + grad u^T is A'' - 2 C. Both sides have the same shear stress T(t) and the same pressure there; the
+pressure's slope differs. Each form makes one stress continuous, which requires
 
     nu du/dn - p n:                     C = -T / (2 nu)              "laplacian" [E2]
     nu (grad u + grad u^T) n - p n:     C = (A'' - T / nu) / 2       "traction"

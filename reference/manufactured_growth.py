@@ -4,9 +4,9 @@ The unit square goes to
 
     x = X (1 + X / 2) + Y^2 / 2,   y = Y (1 + Y) - X^2 / 4,   theta = det F = (1 + X)(1 + 2 Y) + X Y / 2,
 
-which is sheared by up to one and grows by 1 at a corner and by 6.5 at the opposite one. With a pressure P(X, Y) the
+with a shear of up to one. theta is 1 at one corner and 6.5 at the opposite one. With a pressure P(X, Y) the
 first Piola-Kirchhoff stress S is the derivative of the energy 1/2 (J^(-2/3) (F : F + 1) - 3) + P (J - theta) by F (21),
-the body force of t = 0 is f = -Div S and the traction on a side with normal N is S N; all over mu_L.
+the body force per volume at t = 0 is f = -Div S, and the traction on a side with normal N is S N. All are over mu_L.
 
 Two pressures: "sloping" everywhere, and "flat on the rim", with grad P = 0 there.
 """
@@ -52,7 +52,7 @@ def _stress(gradient, P):
 
 
 def _function(matrix):
-    """One function of arrays for (m, n) expressions; a column gives (..., m), a single expression (...)."""
+    """Convert expressions (m, n) to a function of arrays. A column gives (..., m), a single expression (...)."""
     components = [sp.lambdify((X, Y), component, "numpy", cse=True) for component in matrix]
     shape = tuple(size for size in matrix.shape if size > 1)
 

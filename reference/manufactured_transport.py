@@ -1,7 +1,7 @@
 """Manufactured concentrations around a half-disc of biomass, and the forcing that makes them solutions of (7)-(8).
 
 The stream function psi = u_ave W (3 e^2 - 2 e^3 + 3/2 sin(2 pi x / W) e^2 (1 - e)^2), e = y / W, gives a parabola that
-bends up and down, is divergence-free and has no flow through the walls. With s = (x^2 + y^2) / R^2 - 1, zero on the
+bends up and down. It is divergence-free, and no water passes the walls. With s = (x^2 + y^2) / R^2 - 1, zero on the
 interface, and any smooth g,
 
     C = c + g s D_B / D

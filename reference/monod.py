@@ -7,7 +7,7 @@ Iterates can be negative. There C / K_s replaces C / (C + K_s), and the factor o
 import numpy as np
 import scipy.sparse as sp
 
-#: Step of the differences, mg/L.
+#: Step of the central differences of the uptake, mg/L.
 DIFFERENCE_STEP = 1e-6
 #: Newton's method stops with an error after this number of steps.
 MAX_ITERATIONS = 100
@@ -21,7 +21,7 @@ def uptake(acceptor, donor, rates):
 
 
 def sink(fields, load, rates):
-    """(2n,) load q of all C_A and then all C_D in ``fields`` (2n,), ``load`` (n,)."""
+    """Uptake (2n,): load times q_A, then load times q_D. fields (2n,): all C_A, then all C_D; load: (n,)."""
     return (load * np.stack(uptake(*fields.reshape(2, -1), rates))).ravel()
 
 

@@ -8,14 +8,14 @@ since u_x'' = -12 u_ave / W^2 and the mean of 6 s (1 - s) over 0..1 is one. The 
 L / (g W^2), hence the conductivity K = u_ave L / dphi = g W^2 / (12 nu).
 
 A small rise of viscosity in a part B of the channel changes the loss, to first order, by the dissipation of the
-unchanged flow in B: the flow has the least dissipation of all velocities with its flux, so that its change has an
-effect of second order. The rise over (lambda - 1) nu u_ave / g is int_B (36 / W^2) (1 - 2 y / W)^2 dA / W in either
-form of [E2], as |grad u|^2 = u_x'^2 = 2 e:e.
+unchanged flow in B. The flow has the least dissipation of all velocities with its flux, so the change of velocity has
+an effect of second order only. The rise over (lambda - 1) nu u_ave / g is int_B (36 / W^2) (1 - 2 y / W)^2 dA / W in
+either form of [E2], as |grad u|^2 = u_x'^2 = 2 e:e.
 """
 
 
 def velocity(y, width, mean_velocity=1.0):
-    """u_x at heights y; the unit of mean_velocity."""
+    """u_x at heights y, in the unit of mean_velocity."""
     return 6 * mean_velocity * (y / width) * (1 - y / width)
 
 

@@ -1,6 +1,6 @@
 """Growth of a half-disc by scikit-fem: quadratic positions and linear pressure on independent curved triangles.
 
-The energy is (21) with modulus mu, per volume of t = 0 in plane strain (F33 = 1, tr C = F : F + 1), plus a term that
+The energy per volume at t = 0 is (21) with modulus mu in plane strain (F33 = 1, tr C = F : F + 1), plus a term that
 is zero where J = theta,
 
     Psi = mu/2 (J^(-2/3) tr C - 3) + P (J - theta) + kappa/2 (J - theta)^2.
@@ -41,9 +41,9 @@ from skfem.helpers import ddot, det, grad
 
 from reference.arcs import arc, curved, refined
 
-#: Newton's method converges when its step is this small relative to the body. It fails after this number of steps,
+#: Newton's method converges when its step relative to the body is this small. It fails after this number of steps.
 TOLERANCE, MAX_ITERATIONS = 1e-10, 30
-#: or after this number of halvings of one step.
+#: It also fails after this number of halvings of one step.
 HALVINGS = 10
 #: kappa over mu theta^(-5/3), and the factor of theta in one increment.
 STIFFENING, FACTOR = 3.0, 1.6
@@ -62,7 +62,7 @@ class Contact:
 
 @dataclass(frozen=True, eq=False)
 class Equilibrium:
-    """An equilibrium: the curved mesh of t = 0, the place (2, K) of its quadratic nodes, and the pressure (M,) at its
+    """An equilibrium: the curved mesh at t = 0, the place (2, K) of its quadratic nodes, and the pressure (M,) at its
     corners."""
 
     mesh: MeshTri2
@@ -70,7 +70,7 @@ class Equilibrium:
     pressure: np.ndarray
 
     def at(self, x, y):
-        """Position (..., 2) and pressure (...) of the material at x, y (...) in the half-disc of t = 0."""
+        """Position (..., 2) and pressure (...) of the material at x, y (...) in the half-disc at t = 0."""
         points = np.array([np.ravel(x), np.ravel(y)])
         cell = self._containing_cells(points)
         local = _local_coordinates(self.mesh.mapping(), points, cell)
@@ -85,7 +85,7 @@ class Equilibrium:
         ranked = np.argsort(start)
         chord = np.searchsorted(start[ranked[1:]], np.arctan2(points[1], points[0]))
         inside = Triangulation(*corners, self.mesh.t.T).get_trifinder()(*points)
-        return np.points(inside < 0, self.mesh.f2t[0, rim[ranked[chord]]], inside)
+        return np.where(inside < 0, self.mesh.f2t[0, rim[ranked[chord]]], inside)
 
 
 def _local_coordinates(mapping, points, cell):

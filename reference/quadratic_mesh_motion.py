@@ -4,8 +4,9 @@ The second equation of (35), gamma P = -div d, eliminates the pressure from the 
 
     (grad d, grad v) + 1/gamma (div d, div v) = 0   for all v,
 
-which needs no stabilisation. d is given on the aggregate; d_y = 0 on the walls and d_x = 0 at inlet and outlet, the
-other component free. This is Navier's equation with (lambda + mu) / mu = 1/gamma: Kolosov's kappa is 1 + 2 gamma.
+which needs no stabilisation. d is prescribed on the aggregate. d_y = 0 on the walls and d_x = 0 at inlet and outlet;
+the other component is free. This is Navier's equation with (lambda + mu) / mu = 1/gamma: Kolosov's kappa is 1 + 2
+gamma.
 
 **Corners.** At inlet and outlet, and where the aggregate meets the wall at a right angle, reflections in the lines on
 which the displacement slides extend it smoothly. Where the fluid has another angle w at the wall, the reflection gives
@@ -56,7 +57,7 @@ def exponent(fluid_angle, gamma):
 
 
 def _mesh(radius, angle, width, end, parts):
-    """The strip 0 < t < 3, 0 < s < 1 in graded squares, halved, mapped by :func:`_placed`; middles of edges too."""
+    """The strip 0 < t < 3, 0 < s < 1 in graded squares, halved, mapped by :func:`_map_strip` with edge midpoints."""
     side = np.linspace(0, 1, parts + 1)
     along = np.concatenate([side**TOWARDS_WALL, 1 + side[1:-1], 3 - side[::-1] ** TOWARDS_WALL])
     flat = MeshTri.init_tensor(along, side**TOWARDS_ARC)

@@ -4,7 +4,7 @@ Fluid upstream, x < 0; the strip 0 < x < l takes up kappa C; fluid downstream, x
 
     u C' = D C'' (fluid),      u C' = D_B C'' - kappa C (strip),      u C - D C' = u C_s at any inlet x = -a  (11).
 
-*Upstream* the flux u C - D C' does not depend on x. It is u C_s for any position of the inlet, and so
+*Upstream* the flux u C - D C' does not depend on x. It is u C_s for any position of the inlet, so
 C = C_s (1 - alpha exp(u x / D)): this is (26), with alpha = 1 - C(0)/C_s. *Downstream* C = const, the only solution
 with C' = 0 at the outlet (12). Flux and C are continuous at x = 0 and x = l, so the strip satisfies
 

@@ -7,8 +7,6 @@ nodes at the midpoints of their sides. Lengths are in um, times in h, concentrat
 pg/m = um2 mg/L.
 """
 
-from __future__ import annotations
-
 import csv
 import json
 from collections.abc import Callable, Iterator
@@ -69,7 +67,7 @@ class Finding(NamedTuple):
 
     @property
     def holds(self) -> bool:
-        """Whether the number is in its range. NaN never is; infinity is if the range includes it."""
+        """Whether the number is in its range, which may include infinity. NaN is in no range."""
         return bool(self.low <= self.value <= self.high)
 
 
@@ -183,7 +181,7 @@ def _shapes(at: np.ndarray) -> np.ndarray:
 
 
 def _shape_gradients(at: np.ndarray) -> np.ndarray:
-    """Their derivatives (q, 6, 2) by the two coordinates of the unit triangle."""
+    """Derivatives (q, 6, 2) of the shape functions by the two coordinates of the unit triangle."""
     second, third = at.T
     first = 1 - second - third
     zero = 0 * first
@@ -536,7 +534,7 @@ def _steps(run: Run) -> Iterator[Finding]:
 
 
 def _substrates(run: Run) -> Iterator[Finding]:
-    """The supplied amount leaves, is consumed or is stored."""
+    """Each substrate's supply equals the amounts that leave, are consumed and are stored."""
     scene = run.scene
     width, length = scene.number("pore", "width"), scene.number("pore", "length")
     for name in NAMES:

@@ -8,10 +8,10 @@ First order: C = C_0 cosh(phi x / l) / cosh(phi) with Thiele's modulus phi = l s
 phi tanh(phi). The uptake relative to that at the supply, kappa C_s l, is tanh(phi) / phi without films.
 
 Zero order: C = s (|x| - l + p)^2 / (2 D_B) down to the depth p, and zero below it; N = s p. With C_0 = s p^2 /
-(2 D_B) the film gives p^2 + 2 b p = 2 D_B C_s / s, b = a D_B / D: without films p = sqrt(2 D_B C_s / s). It must be
-p < l.
+(2 D_B) the film gives p^2 + 2 b p = 2 D_B C_s / s, b = a D_B / D: without films p = sqrt(2 D_B C_s / s). This
+requires p < l.
 
-Monod, exhausted before the middle: multiplied by C' and integrated from C = C' = 0, D_B C'^2 / 2 = s G(C) with
+Monod, exhausted before the middle: the equation times C', integrated from C = C' = 0, gives D_B C'^2 / 2 = s G(C) with
 
     G(C) = C - K ln(1 + C / K),      N = sqrt(2 s D_B G(C_0)),
 
@@ -39,7 +39,7 @@ def first_order(x, supply, uptake, half, in_slab, film=0.0, diffusivity=1.0):
 
 
 def penetration(supply, sink, in_slab, film=0.0, diffusivity=1.0):
-    """p: sink is s."""
+    """Penetration depth p; sink is s."""
     b = film * in_slab / diffusivity
     return np.sqrt(b**2 + 2 * in_slab * supply / sink) - b
 

@@ -22,7 +22,7 @@ from reference.neo_hookean import confined_growth_pressure
 
 
 def biot():
-    """The elastic stretch at which waves of every length are neutral on a half-space."""
+    """Biot's stretch: a half-space is neutral to waves of every length."""
     return brentq(lambda stretch: (1 + stretch**4) ** 2 - 4 * stretch**2, 0.3, 0.8, xtol=1e-14)
 
 
@@ -46,7 +46,7 @@ def _constraint(u, q, w):
 
 
 def mesh(across, up, length=1.0, height=1.0):
-    """Right-angled triangles with parallel diagonals: no inner vertex is singular."""
+    """Right-angled triangles with parallel diagonals, so that no inner vertex is singular."""
     return MeshTri.init_tensor(np.linspace(0, length, across + 1), np.linspace(0, height, up + 1))
 
 

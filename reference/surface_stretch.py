@@ -1,7 +1,7 @@
 """The elastic stretch along an aggregate's free surface, from the fields of a ``.vtu`` file alone.
 
 The position X(x) at t = 0 is a field on the present triangles, straight or curved. A surface with the unit tangent s
-has the stretch 1 / |grad X s|, and the material the volume ratio J = 1 / det(grad X). The elastic stretch is
+has the stretch 1 / |grad X s|. The material has the volume ratio J = 1 / det(grad X). The elastic stretch is
 det(grad X)^(1/2) / |grad X s|. It is evaluated at three Gauss points of each edge between the aggregate and the fluid,
 and averaged over the edge.
 """

@@ -6,7 +6,7 @@ plane Stokes flow of viscosity one (Muskhelishvili),
 
     2 (u + i v) = phi - z phi'* - psi*,       p = -2 Re phi'
 
-and Schmid & Podladchikov (2003), Geophys. J. Int. 155, 269-288, find those of this problem:
+and Schmid & Podladchikov (2003), Geophys. J. Int. 155, 269-288, derive those of this problem:
 
     phi = -2 A E R^2 / z,   psi = -2 E* z - 2 A E R^4 / z^3   outside;      u + i v = (1 - A) E z*,   p = 0   inside.
 
@@ -18,7 +18,7 @@ import numpy as np
 
 
 def _strength(ratio, interface):
-    """A."""
+    """The amplitude A of the disturbance."""
     return (ratio - 1) / (ratio + {"traction": 1, "laplacian": 3}[interface])
 
 

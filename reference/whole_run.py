@@ -1,6 +1,6 @@
 """The whole base run (section 4), continuous in time, by scikit-fem's quadratic elements on curved triangles.
 
-Material at X at t = 0 has M_A and M_I, which are X_A and X_I per volume of t = 0, over X_m. Its mass grows as
+Material at X at t = 0 has M_A and M_I: X_A and X_I per volume at t = 0, over X_m. Its mass grows as
 
     d log(M_A)/dt = m_A (k Y m_D - b),      dM_I/dt = M_A m_A b (1 - f_d),      theta = M_A + M_I
 
@@ -22,8 +22,8 @@ from reference.whole_run_pore import ORDER, Flow, Section
 M_PER_D = 24e-6
 #: The numbers of a solution: m/d, m/d, um2, um, um, um, mg/L, mg/L.
 NAMES = ("velocity", "conductivity", "area", "thickness", "upstream", "downstream", "acceptor", "donor")
-#: Orders in space and in time for the extrapolation in :func:`converged`: the least order observed on 8 to 16 rings,
-#: and that of the method.
+#: Orders for the extrapolation in :func:`converged`: in space the least order observed on 8 to 16 rings, in time
+#: that of the method.
 SPACE, TIME = 3, 4
 
 
@@ -92,7 +92,7 @@ class Run:
         self.fields = np.multiply.outer(pore.supply, np.ones(self.grid.polar.shape[1]))
 
     def solve(self, state):
-        """:class:`Solved` at a state; the last shape and concentrations are where Newton's methods start."""
+        """:class:`CoupledSolution` at a state. Newton's methods start from the last shape and concentrations."""
         theta, pore = np.exp(state[0]) + state[1], self.pore
         places = self._deform(theta)
         outline = self.grid.outline(places)
@@ -128,7 +128,8 @@ class Run:
         return state + length / 6 * (a + 2 * b + 2 * c + d)
 
     def solutions(self, times, steps):
-        """Yields :class:`Solved` at ``times`` (h), ascending; ``steps`` to the first, and none longer from there on."""
+        """Yield :class:`CoupledSolution` at ascending ``times`` (h). ``steps`` lead to the first time;
+        later steps are no longer."""
         state, previous_time = self.seed, 0.0
         for time in times:
             count = int(np.ceil(round((time - previous_time) / times[0] * steps, 6)))

@@ -1,6 +1,6 @@
 """Shape of a growing aggregate: an incompressible neo-Hookean body in plane strain on quadratic curved triangles.
 
-(21) over the shear modulus, per volume of t = 0, with a term that is zero where J = theta:
+The energy is (21) over the shear modulus, per volume at t = 0, with a term that is zero where J = theta:
 
     Pi = integral of 1/2 (J^(-2/3) tr C - 3) + P (J - theta) + kappa/2 (J - theta)^2,      tr C = F : F + 1
 
@@ -8,9 +8,9 @@ With c = dJ/dF and p = P + kappa (J - theta), the equilibrium is
 
     (J^(-2/3) F + (p - J^(-5/3) tr C / 3) c, grad v) = 0,     (J - theta, q) = 0
 
-for quadratic positions and linear P. J^(1/3) + J^(-2/3) / 2 is concave in J. Since J = theta holds in the mean only,
-kappa = 3 theta^(-5/3) compensates this. The flat side slides on its wall (v_y = 0), and the origin stays in place.
-:mod:`reference.quadratic_growth` computes the Newton steps.
+for quadratic positions and linear P. J^(1/3) + J^(-2/3) / 2 is concave in J, and J = theta holds in the mean only.
+kappa = 3 theta^(-5/3) compensates the concavity. The flat side slides on its wall (v_y = 0), and the origin stays in
+place. :mod:`reference.quadratic_growth` computes the Newton steps.
 """
 import numpy as np
 from skfem import Basis, ElementTriP1, ElementTriP2, ElementVector

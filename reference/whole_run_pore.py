@@ -9,7 +9,7 @@ quasi-steady, with quadratic concentrations; u_x in (11) is the local velocity [
 
     (D grad C, grad v) + (u . grad C, v) + <u_x (C - C_supply), v>_inlet + (X_A q, v)_aggregate = 0
 
-div u = 0 holds in the mean only, so that supplied = out + consumed does not hold exactly. The difference measures the
+div u = 0 holds in the mean only. The difference of supplied and out + consumed is therefore not zero, and measures the
 error. q is that of :mod:`reference.monod`. Lengths are in um, times in h, concentrations in mg/L.
 """
 from dataclasses import dataclass
@@ -136,7 +136,7 @@ def _inside(body, fields):
 
 
 def _step(body, operators, active, rates, fields, free):
-    """Newton's step (2, free) of both substrates; slopes of the uptake by central differences."""
+    """Newton's step (2, free) of both substrates; derivatives of the uptake by central differences."""
     concentrations = _inside(body, fields)
     residual = [(matrix @ field - source + asm(_load, body, value=active * rate))[free]
                 for (matrix, source), field, rate in zip(operators, fields, uptake(*concentrations, rates))]
@@ -152,7 +152,7 @@ def _step(body, operators, active, rates, fields, free):
 
 
 def _divergence(basis):
-    """(q, div u) for all u and the linear q in the triangles of a basis; and the numbers of these q."""
+    """Matrix of (q, div u) for the linear q in the triangles of a basis, and the numbers of these q."""
     lower = basis.with_element(ElementTriP1())
     used = np.unique(lower.element_dofs)
     return sp.hstack([asm(_slope, basis, lower, axis=axis)[used] for axis in (0, 1)]), used

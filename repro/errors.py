@@ -6,7 +6,18 @@ of a scene that help.
 
 
 class StageError(RuntimeError):
-    """A stage has no reliable result; the message says where, why, and what to try."""
+    """A stage has no reliable result; the message says where, why, and what to try.
+
+    Its subclasses name their stage. A run adds the time and raises :class:`SimulationError`.
+
+    Examples
+    --------
+    >>> from repro.errors import StageError
+    >>> class DetachmentError(StageError):
+    ...     stage = "detachment"
+    >>> DetachmentError("no criterion for t < 0; try growth.end = 0 h").stage
+    'detachment'
+    """
 
     stage = "a stage"
 

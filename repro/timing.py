@@ -22,7 +22,27 @@ def reset() -> None:
 
 
 def timed(stage: str) -> Callable[[Function[Arguments, Result]], Function[Arguments, Result]]:
-    """Decorator: add the time of each call of a function to ``stage``."""
+    """Decorate a function: add the wall time (s) of each call to a stage.
+
+    Parameters
+    ----------
+    stage : str
+        Name of the stage in ``run.json`` and in :data:`seconds`.
+
+    Returns
+    -------
+    callable
+        The decorator. The decorated function has the same arguments, result and errors.
+
+    Examples
+    --------
+    >>> from repro import timing
+    >>> @timing.timed("flow")
+    ... def solve_flow():
+    ...     return 2.9
+    >>> solve_flow(), timing.seconds["flow"] > 0
+    (2.9, True)
+    """
     def decorate(function: Function[Arguments, Result]) -> Function[Arguments, Result]:
         @wraps(function)
         def wrapper(*args: Arguments.args, **kwargs: Arguments.kwargs) -> Result:

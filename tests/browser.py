@@ -90,25 +90,3 @@ class Browser:
         codes = {"ArrowLeft": 37, "Home": 36, "Tab": 9}
         for kind in ("rawKeyDown", "keyUp"):
             self.call("Input.dispatchKeyEvent", type=kind, key=key, code=key, windowsVirtualKeyCode=codes[key])
-
-    def box(self, selector: str) -> dict:
-        """Scroll an element into view and return its {x, y, width, height} in the window (CSS pixels)."""
-        element = f"document.querySelector({json.dumps(selector)})"
-        self.run(f"{element}.scrollIntoView({{block: 'center', behavior: 'instant'}})")
-        return json.loads(self.run(f"JSON.stringify({element}.getBoundingClientRect())"))
-
-    def click(self, selector: str) -> None:
-        """Click the middle of an element."""
-        self.drag(selector, 0.5, 0.5)
-
-    def drag(self, selector: str, start: float, end: float) -> None:
-        """Drag the mouse between two fractions of an element's width."""
-        box = self.box(selector)
-        y = box["y"] + box["height"] / 2
-        for kind, fraction in (("mousePressed", start), ("mouseMoved", end), ("mouseReleased", end)):
-            self.call("Input.dispatchMouseEvent", type=kind, x=box["x"] + fraction * box["width"], y=y, button="left",
-                      buttons=int(kind != "mouseReleased"), clickCount=1)
-
-    def point(self, x: float, y: float) -> None:
-        """Move the pointer to a position in the window (CSS pixels)."""
-        self.call("Input.dispatchMouseEvent", type="mouseMoved", x=x, y=y, button="none")

@@ -149,7 +149,8 @@ def make_hostile(out):
     record = read_sealed(out / "run.json")
     record |= {"scene": HOSTILE, "status": "failed: </script><script>pwned=1</script>", "extra": {HOSTILE: [HOSTILE]}}
     record["tables"][HOSTILE] = {HOSTILE: HOSTILE}
-    record["versions"][HOSTILE] = record["warnings"] = HOSTILE
+    record["versions"][HOSTILE] = HOSTILE
+    record["warnings"] = [{"key": HOSTILE, "text": HOSTILE}]
     record["wall_time_by_stage_s"][HOSTILE] = 0.1
     record["newton_iterations"][HOSTILE] = HOSTILE
     results.write_sealed(out / "run.json", record | {"sha256": {}})

@@ -2,6 +2,7 @@
 import math
 
 import numpy as np
+import pytest
 from hypothesis import settings
 from hypothesis import strategies as st
 
@@ -12,7 +13,7 @@ from repro.fem.outline import half_disc as half_disc_outline
 from repro.fem.sizing import Sizing
 from repro.fem.space import Space
 from repro.model import contact, pore
-from repro.scene import parse_scene
+from repro.scene import load_scene, parse_scene
 
 LENGTH = 600.0
 VISCOSITY, DIFFUSIVITY = 2.84e-5, 1e8 / 24  # nu_water / g in um h; 1 cm2/d in um2/h
@@ -23,6 +24,7 @@ lengths = st.floats(300.0, 1000.0)
 refinements = st.floats(0.4, 2.0)
 #: Orders of velocity and concentrations, and their names in scenes.
 ORDERS = {1: "linear", 2: "quadratic", 3: "cubic"}
+EVERY_ORDER = pytest.mark.parametrize("order", ORDERS)
 
 
 def share(part):
@@ -232,3 +234,10 @@ def scene(radius="5 um", width="50 um", acceptor="10 mg/L", donor="10 mg/L", vel
         tables["growth"] = growth
     tables["numerics"] = {"preset": "paper", **tables.get("numerics", {})}
     return parse_scene(tables, "test", "test.toml")
+
+
+def coarse_base(order, *changes, unset=()):
+    """(scene, its seed): base with coarse elements of an order, and supplies that differ."""
+    scene = load_scene("base", ['substrates.acceptor.supply="9 mg/L"', 'substrates.donor.supply="4 mg/L"',
+                                "numerics.refinement=0.3", f"numerics.elements={ORDERS[order]}", *changes], unset)
+    return scene, pore.seeded(scene)

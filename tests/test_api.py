@@ -2,24 +2,23 @@
 
 import base64
 import copy
-import importlib.resources
 import io
 import re
-import tomllib
-from dataclasses import replace
 from importlib.metadata import version
+from itertools import product
 
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from scipy.spatial import Delaunay
 
 import repro
 from repro import results
 from repro.cli import main
 from repro.errors import OutputError
-from repro.results import field_files
+from repro.results import field_files, picture
 from repro.results.tables import END_TIMES, Results, solve
-from repro.scene import SceneError, load_scene, packaged_scenes
+from repro.scene import SceneError, load_scene
 from tests import faults
 from tests.pages import PURE, cached_run
 from tests.strategies import arrays_of, same_arrays
@@ -90,12 +89,6 @@ def test_the_table_of_a_notebook_escapes_and_is_short(solved):
     assert repr(solved) == f"<Results of base: {len(solved.time)} rows, {len(solved)} columns, completed>"
 
 
-def test_the_package_ships_its_data_files():
-    project = (importlib.resources.files("repro") / ".." / "pyproject.toml").read_text(encoding="utf-8")
-    for name in ("py.typed", "results/network.csv"):
-        assert (importlib.resources.files("repro") / name).is_file() and f'"{name}"' in project
-
-
 NARROW = {"pore": {"width": "30 um"}, "aggregate": {"radius": "8 um"}, "flow": {"mean_velocity": "1.5 m/day"},
           "substrates": {"acceptor": {"supply": "8 mg/L"}, "donor": {"supply": "5 mg/L"}}, "growth": {"end": "1 h"}}
 
@@ -115,14 +108,6 @@ def test_a_scene_may_be_a_dict_a_file_or_a_name(tmp_path):
     assert extended.flow is None and scene.flow is not None and original == NARROW
     with pytest.raises(SceneError, match=r"scene: pore.width = 3: a length"):
         load_scene({"pore": {"width": 3}})
-
-
-def test_a_scene_prints_as_its_toml(tmp_path):
-    """The text has every key with its unit and reads as an equal scene."""
-    for name in packaged_scenes():
-        scene = load_scene(name)
-        assert load_scene(tomllib.loads(str(scene))) == replace(scene, name="scene") and 'width = "' in str(scene)
-    assert repr(load_scene("flow_only")).startswith("<Scene flow_only: pore, aggregate, flow, numerics, output; hash ")
 
 
 def test_check_prints_the_same_as_repro_check(capsys):
@@ -159,7 +144,7 @@ def test_missing_fields_are_refused_and_none_replaces_another(solved, tmp_path):
     (tmp_path / "fields/fields_0003.vtu").write_text("<VTKFile")
     assert "<img" not in loaded._repr_html_()
     for time, message in ((0.2, "fields_0001.vtu: the fields of 0.2 h are missing"),
-                       (0.6, "fields_0003.vtu: the fields cannot be read")):
+                       (0.6, "fields_0003.vtu: the fields are not as they were written")):
         with pytest.raises(OutputError, match=message):
             loaded.fields(time)
     (tmp_path / "fields.pvd").unlink()
@@ -227,3 +212,31 @@ def test_help_begins_with_use_and_the_version_is_printed(capsys):
         main(["--version"])
     assert ended.value.code == 0 and capsys.readouterr().out == f"repro {repro.__version__}\n"
     assert repro.__version__ == version("dupin2001-repro") and dir(repro) == sorted(repro.__all__)
+
+
+def test_a_picture_has_upstream_on_the_left_and_the_upper_wall_above():
+    """A field that rises along x and y: dark below upstream, light above downstream."""
+    coordinates = np.array(list(product(np.linspace(-10, 30, 9), np.linspace(0, 20, 5))))
+    cells = Delaunay(coordinates).simplices
+    drawing = {"places_um": coordinates, "triangles": cells, "region": np.zeros(len(cells), bool)}
+    pixels = plt.imread(io.BytesIO(picture.png(drawing, coordinates @ [1, 3])))[..., :3]
+    assert (np.diff(pixels[[-1, -1, 0, 0], [0, -1, 0, -1]].sum(axis=1)) > 0).all()
+
+
+def test_xarray_has_units_that_udunits_knows():
+    pytest.importorskip("xarray")
+    results_of_run = Results("x", [dict.fromkeys(results.COLUMNS, 1.0)], [], "failed: y")
+    dataset = results_of_run.to_xarray()
+    assert dataset.attrs["status"] == results_of_run.to_pandas().attrs["status"] == "failed: y"
+    expected = {"mean_velocity_m_per_d": "m d-1", "aggregate_area_um2": "um2", "nodes": "1",
+              "inlet_donor_mg_per_L": "mg L-1"}
+    assert {name: dataset[name].attrs["units"] for name in expected} == expected
+
+
+def test_a_picture_states_which_values_are_dark():
+    coordinates = np.array([(0.0, 0.0), (4.0, 0.0), (0.0, 3.0)])
+    drawing = {"places_um": coordinates, "triangles": np.array([[0, 1, 2]]), "region": np.zeros(1)}
+    caption = picture.figure(drawing | {"acceptor_mg_per_L": np.array([3.0, 1.5, 7.0])}, 2.5)
+    assert caption.count("acceptor (mg/L), 1.5 (dark) to 7 (light), at t = 2.5 h") == 2
+    caption = picture.figure(drawing | {"velocity_m_per_d": np.array([[-3.0, 4, 0], [0, 1, 0], [0, 2, 0]])}, 2.5)
+    assert "velocity (m/day), 1 (dark) to 5 (light)" in caption

@@ -20,11 +20,10 @@ from repro.model.pore import seeded, solve
 from repro.results import read_table, row
 from repro.scene import load_scene
 from tests import oracles, pages, shell, strategies
-from tests.strategies import ORDERS, between, scenes, share
+from tests.strategies import EVERY_ORDER, ORDERS, between, scenes, share
 from tests.test_derived import integrate_over_end, total_uptake
 
 ANY_ORDER = tuple(ORDERS.values())
-EVERY_ORDER = pytest.mark.parametrize("order", ORDERS)
 
 
 def resolved_instants(scene):
@@ -211,18 +210,6 @@ def test_a_step_that_does_not_balance_ends_the_run_and_keeps_its_files(quantity,
     assert re.search(rf"x = -\S+ and \S+ um: it lacks (.*, )?-?0\.0\d+ of the {quantity}.*; try a shorter", line)
     assert shell.read_record(out)["status"].startswith("failed: ")
     assert "last good state" in line and (out / "checkpoint.state").exists()
-
-
-@pytest.mark.parametrize("sets, column", [
-    (["numerics.inlet=mean"], "acceptor_balance"),
-    (["growth.time_step=12 min"], "oxygen_demand_balance"),
-    (["numerics.transport=gear"], "oxygen_demand_balance")])
-def test_stated_defects_are_reported_and_do_not_stop_a_run(sets, column, tmp_path):
-    """The defects of E4, the paper's updates and Gear's method (E8: tests/test_derived.py) exceed the tolerance that
-    stops a run, and rows report them."""
-    instants = list(simulate(load_scene("base", ["numerics.refinement=0.5", 'growth.end="0.4 h"', *sets])))
-    defects = [abs(row(load_scene("base", sets), instant)[column]) for instant in instants[1:]]
-    assert max(defects) > 1e-6 and (column != "oxygen_demand_balance" or max(defects) < 1e-3)
 
 
 def test_a_slow_flow_is_no_leak():

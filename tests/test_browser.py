@@ -2,13 +2,11 @@
 
 import json
 import re
-import time
 
 import numpy as np
 import pytest
 
 from repro import report, results
-from repro.cli import main
 from repro.report import fields
 from repro.results import field_files
 from tests import browser
@@ -79,44 +77,6 @@ def test_the_picture_is_the_field(window, runs, name):
     assert share * (box[1] - box[0]) * (box[3] - box[2]) == pytest.approx(area, rel=0.004 if name == "fast" else 0.02)
 
 
-def test_a_pointer_shows_values(window, runs):
-    show(window, runs["fast"])
-    box = window.box("#picture")
-    window.point(box["x"] + box["width"] / 2, box["y"] + 40)
-    text = window.run("document.getElementById('probe').textContent")
-    assert re.fullmatch(r"x = -?[\d.]+ um, y = [\d.]+ um: Velocity \(magnitude\) [\d.]+ m/day", text)
-    box = window.box("figure > svg")
-    series = results.read_table(runs["fast"] / "timeseries.csv")
-    for part, row in ((0.205, 0), (0.97, -1)):
-        window.point(box["x"] + part * box["width"], box["y"] + 80)
-        text = window.run("document.querySelector('figure output').textContent")
-        assert text == f"{series['time_h'][row]:g} h: {series['conductivity_m_per_d'][row]:.5g}"
-
-
-def test_the_mouse_moves_every_control(window, runs):
-    last = show(window, runs["fast"], "#field=theta")
-    window.drag("#frame", 0.99, 0.01)
-    assert picture(window)["frame"] == "0"
-    window.drag("#frame", 0.01, 0.5)
-    assert 0 < int(picture(window)["frame"]) < int(last["frame"])
-    image = "document.getElementById('picture').toDataURL()"
-    for switch in ("lines", "outline", "fixed", "whole"):
-        before, state = window.run(image), picture(window)
-        window.click(f"label:has(#{switch})")
-        assert window.run(image) != before, switch
-        assert (float(picture(window)["high"]) < float(state["high"])) == (switch == "fixed")
-        window.click(f"#{switch}")
-        assert window.run(image) == before, switch
-    start, deadline = picture(window)["frame"], time.monotonic() + 20
-    window.click("#play")
-    while picture(window)["frame"] == start:
-        assert time.monotonic() < deadline, "nothing plays"
-        time.sleep(0.05)
-    window.click("#play")
-    window.drag("figure > svg", 0.168, 0.168)
-    assert picture(window)["frame"] == "0"
-
-
 def test_the_keyboard_alone_is_enough(window, runs):
     """Tab reaches every control, which is native and shows its focus. The slider has its keys."""
     last = show(window, runs["fast"])
@@ -145,22 +105,3 @@ def test_hostile_names_run_nothing(window, tmp_path):
         assert window.run("typeof pwned") == "undefined" and window.run("document.images.length") == 0
     window.run("document.body.append(Object.assign(document.createElement('script'), {textContent: 'pwned = 1'}))")
     assert window.run("typeof pwned") == "undefined"
-
-
-@pytest.mark.parametrize("width", [1200, 390])
-def test_a_comparison_opens(window, runs, tmp_path, width):
-    target = tmp_path / "both.html"
-    assert main(["compare", *map(str, (runs["fast"], runs["paper"], runs["flow"])), "--out", str(target)]) == 0
-    show(window, target, width=width)
-    assert int(window.run("document.documentElement.dataset.charts")) > 20
-    assert window.run("document.documentElement.scrollWidth") <= width
-    assert window.run("document.querySelectorAll('figure:first-of-type .legend > span').length") == 3
-    box = window.box("figure > svg")
-    series = [results.read_table(runs[name] / "timeseries.csv") for name in ("fast", "paper")]
-    labels = window.run("[...document.querySelectorAll('.runs b')].map(each => each.textContent).join()").split(",")
-    end = series[0]["time_h"][-1]
-    time = min(np.concatenate([each["time_h"] for each in series]), key=lambda hour: abs(hour - 0.6))
-    window.point(box["x"] + (0.2 + 0.7722 * time / end) * box["width"], box["y"] + 80)
-    expected = [f"{label} {np.interp(time, each['time_h'], each['conductivity_m_per_d']):.5g}"
-             for label, each in zip(labels, series)]
-    assert window.run("document.querySelector('figure output').textContent") == f"{time:.5g} h: {', '.join(expected)}"

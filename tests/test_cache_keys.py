@@ -1,6 +1,7 @@
 """The key of every cache contains every input of the cached value."""
 from dataclasses import fields, is_dataclass, replace
 from functools import partial
+from itertools import count
 
 import numpy as np
 import pytest
@@ -8,13 +9,10 @@ import pytest
 from repro.fem.space import Space
 from repro.model import flow, gear, mesh_motion, transport
 from repro.model.kinetics import Sink
-from repro.preflight import numbers
 from repro.results.files import sealed
 from repro.scene import load_scene, scene_hash
 from tests.strategies import meshed, seed
 from verification import store
-from verification.claims import levels
-from verification.claims.levels import CONVERGED, Level, at_level
 from verification.sensitivity import rounding
 
 WIDE = load_scene("wide", ["numerics.preset=accurate", 'output.times=["1 h", "2 h"]', "growth.end=2 h"])
@@ -64,69 +62,30 @@ def test_every_section_of_a_scene_counts_in_its_hash():
     assert len({*map(scene_hash, scenes)}) == 5
 
 
-def test_a_cached_run_belongs_to_its_scene_name_and_source(tmp_path, monkeypatch):
+def number_of_folder(path, scene):
+    return store.provenance(store.Folders(path).get(scene))["number"]
+
+
+def number_of_sensitivities(path, scene):
+    return rounding.Runs(path / "runs.jsonl").get(scene)["number"]
+
+
+@pytest.mark.parametrize("number_of", [number_of_folder, number_of_sensitivities])
+def test_a_cached_run_belongs_to_its_scene_name_and_source(tmp_path, monkeypatch, number_of):
     """Another value, name or source makes another run; each run is computed once."""
-    computed = []
+    computed = count(1)
 
     def run(scene, folder):
-        computed.append(scene.name)
         folder.mkdir()
-        (folder / "run.json").write_text(sealed({"number": len(computed)}))
+        (folder / "run.json").write_text(sealed({"number": next(computed)}))
 
     monkeypatch.setattr(store, "run", run)
-    scenes = [BASE, replace(BASE, name="other"), changed(BASE, ("pore", "width")), changed(BASE, ("growth", "end"))]
-    for source in ("one", "two", "one"):
-        monkeypatch.setattr(store, "source_hash", lambda text=source: text)
-        numbers_of_runs = [store.provenance(store.Folders(tmp_path).get(scene))["number"] for scene in scenes]
-        assert numbers_of_runs == ([1, 2, 3, 4] if source == "one" else [5, 6, 7, 8])
-    assert len(computed) == 8
-
-
-def test_the_runs_of_the_sensitivities_are_cached_by_scene_name_and_source(tmp_path, monkeypatch):
-    """The numbers of a run depend on the scene's name, so two names of one scene are two runs."""
-    computed = []
-
-    def counted(scene):
-        computed.append(scene.name)
-        return {"number": len(computed)}
-
     for name in ("base", "wide"):
-        monkeypatch.setitem(rounding.OF, name, counted)
-    scenes = [BASE, replace(BASE, name="wide"), changed(BASE, ("flow", "head")), changed(BASE, ("numerics", "inlet"))]
-    for source in ("12345678", "87654321", "12345678"):
+        monkeypatch.setitem(rounding.OF, name, lambda scene: {"number": next(computed)})
+    scenes = [BASE, replace(BASE, name="wide"), changed(BASE, ("pore", "width")), changed(BASE, ("growth", "end"))]
+    for source, first in (("12345678", 1), ("87654321", 5), ("12345678", 1)):
         monkeypatch.setattr(store, "source_hash", lambda text=source: text)
-        numbers_of_runs = [rounding.Runs(tmp_path / "runs.jsonl").get(scene)["number"] for scene in scenes]
-        assert numbers_of_runs == ([1, 2, 3, 4] if source == "12345678" else [5, 6, 7, 8])
-
-
-def test_cached_values_of_claims_depend_on_function_arguments_and_level():
-    """Every field of a level counts."""
-    def one(*arguments):
-        return "one", arguments, levels.current()
-
-    def two(*arguments):
-        return "two", arguments, levels.current()
-
-    all_levels = [Level(), Level(CONVERGED), Level(size=2.0), Level(step=2.0), Level(wide=("pore.width=90 um",))]
-    for _ in range(2):
-        for level in all_levels:
-            with at_level(level):
-                for function in (one, two):
-                    cached_function = levels.cached(function)
-                    for arguments in ((), (1,), (1, "a"), ("a", 1)):
-                        assert cached_function(*arguments) == function(*arguments)
-    for level in all_levels[1:]:
-        levels.forget(level)
-
-
-def test_bounds_of_one_scene_are_not_those_of_another():
-    """This holds for every differing input and in any order of calls."""
-    paths = [("aggregate", "radius"), ("growth", "end"), ("kinetics", "yield_coefficient")]
-    short = load_scene("base", ["growth.end=5 h"])
-    scenes = [short, *(changed(short, path) for path in paths)]
-    alone = [numbers.at_end.__wrapped__(scene) for scene in scenes]
-    assert len({*alone}) == len(scenes)
-    assert [numbers.at_end(scene) for scene in (*scenes, *scenes[::-1])] == [*alone, *alone[::-1]]
+        assert [number_of(tmp_path, scene) for scene in scenes] == [*range(first, first + 4)]
 
 
 def disc():

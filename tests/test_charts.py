@@ -97,3 +97,9 @@ def test_many_points_are_thinned_with_both_ends():
     thin = charts.thinned(line)
     assert len(thin.times) == charts.MOST_POINTS and thin.times[[0, -1]].tolist() == [0, 4999]
     assert (thin.values == thin.times**2).all() and thin.dots
+
+
+@pytest.mark.parametrize("low, begins", [(1.0, 0.0), (4.9, 0.0), (5.1, 4.0), (9.0, 9.0)])
+def test_an_axis_begins_at_zero_if_zero_is_near(low, begins):
+    first, last = charts._roomy(low, 10.0)
+    assert first == begins and last >= 10.0

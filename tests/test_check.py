@@ -10,12 +10,13 @@ import pytest
 
 from repro.cli import main
 from repro.march.simulation import simulate
-from repro.preflight import checked, cost, numbers, simplifications
+from repro.preflight import checked, cost, modelled, numbers, simplifications
 from repro.preflight.checked import check
 from repro.preflight.modelled import describe_model
 from repro.scene import load_scene, packaged_scenes
 from tests import faults
 from tests.shell import refusal
+from tests.strategies import coarse_base
 
 #: Mean velocity of the clean channel of base: (1e-3 cm / 600 um) g W^2 / (12 nu), um/h.
 CLEAN = 1e-5 / 600e-6 * 9.81 * (50e-6) ** 2 / (12 * 1.003e-6) * 3600e6
@@ -284,3 +285,38 @@ def test_a_scene_that_cannot_run_is_refused(tmp_path, override, excerpt, capsys,
 def test_the_expected_time_grows_with_the_mesh():
     estimate = cost.estimate_cost(load_scene("flow_only"), cost.Trial(None, 2.0, 0.5, 1000), 4000)
     assert estimate.seconds == pytest.approx(2 * 4**1.2, rel=1e-12)
+
+
+def test_a_plug_ends_in_quarter_discs_and_its_pressure_drops_over_its_whole_length():
+    scene = load_scene("wide", ['flow.mean_velocity="2.9 m/day"', 'growth.end="45 h"'])
+    width = scene.pore.width
+    for area in (1.6 * width**2, 4 * width**2):
+        reach = numbers.sizes(scene, area).reach
+        assert 2 * (reach - width) * width + np.pi / 2 * width**2 == pytest.approx(area, rel=1e-12)
+    drop = 12 * 2000 * 998 * 1.003e-6 * 2.9 / 86400 / (width * 1e-6) ** 2 * 2 * numbers.at_end(scene).reach * 1e-6 / 1e4
+    assert numbers.stresses(scene, scene.flow.mean_velocity)[1] == pytest.approx(drop, rel=1e-12)
+
+
+@pytest.mark.parametrize("times", ['["5 h", "18 h"]', '["0 h", "5 h", "18 h"]'])
+def test_requested_rows_are_counted_with_that_at_zero(times):
+    """The permeability is reported in the units of the scene."""
+    scene, _ = coarse_base(2, f"output.times={times}", "flow.biomass=brinkman", 'flow.permeability="2.5e-15 m^2"')
+    description = dict(modelled.describe_model(scene))
+    assert "rows and fields at 3 times" in description["output"]
+    assert "an aggregate with a permeability of 2.5e-15 m2" in description["flow"]
+
+
+def test_a_seed_at_both_walls_is_in_contact_from_the_start():
+    scene = load_scene("base", ["aggregate.radius=49.9 um"])
+    assert numbers.at_start(scene).contact == 0.0
+    assert numbers.at_start(load_scene("base")).contact is None
+
+
+@pytest.mark.parametrize("half, kind", [("0.02 mg/L", "zero-order front"), ("20 mg/L", "layer of first-order uptake")])
+def test_the_warning_of_a_thin_layer_names_its_kind(half, kind):
+    """The layer is of zero order if the supply exceeds the half saturation."""
+    scene = load_scene("wide", [f'substrates.donor.half_saturation="{half}"', 'kinetics.maximum_density="3000000 mg/L"',
+                                "numerics.refinement=0.1"])
+    values = numbers.numbers(scene, scene.flow.mean_velocity or 1e4)
+    texts = [w.text for w in simplifications.find_warnings(scene, values) if "donor is used up" in w.text]
+    assert len(texts) == 1 and f"in a {kind} " in texts[0]

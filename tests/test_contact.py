@@ -1,21 +1,22 @@
 """Films and wedges that close (2.3.3): nodes of straight edges, and contact lines anywhere on arcs."""
 
+import dataclasses
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
 
 from repro.errors import SimulationError
 from repro.fem.division import Division
 from repro.fem.outline import BOTTOM, FREE, TOP, Outline, polygon
 from repro.fem.space import Space
+from repro.march import simulation
 from repro.march.simulation import simulate
 from repro.model import contact, contact_lines
-from repro.model.contact_lines import Clearance, Contact
-from repro.model.pore import seeded
+from repro.model.contact_lines import Clearance, Contact, surface_ends
+from repro.model.pore import initial_outline, seeded
 from repro.scene import load_scene
-from tests.strategies import attached_aggregates, mirrored, plug
+from tests.strategies import EVERY_ORDER, coarse_base, mirrored, plug
 
 FILM, ANGLE = 2.0, np.radians(16.7)
 
@@ -62,17 +63,6 @@ def test_nodes_close_beside_a_contact_surface(name, outline, wanted):
     """The minimum angle is 16.7 degrees, and the minimum film is 2 um (Table 1)."""
     assert joins(outline) == wanted
     assert joins(mirrored(outline)) == wanted[::-1]
-
-
-@given(attached_aggregates(thickest=1.02))
-def test_closing_is_the_same_in_a_mirror(drawn):
-    """No node on a wall joins again. Every free node nearer to the upper wall than the film joins."""
-    outline, width = drawn
-    joined, image = (contact.closing_nodes(each, width, FILM, ANGLE) for each in (outline, mirrored(outline)))
-    assert image.tolist() == joined[::-1].tolist()
-    assert ((joined == FREE) | (outline.wall == FREE)).all()
-    over = (outline.wall == FREE) & (width - outline.points[:, 1] < FILM)
-    assert ((joined == TOP) == over).all()
 
 
 RULE = Clearance(20.0, FILM, ANGLE)
@@ -190,7 +180,7 @@ def test_contact_begins_on_both_sides_of_the_highest_point(plugged):
     wall, lines = contact._first_contact(replace(free, wall=np.where(free.wall == TOP, FREE, free.wall)), FILM)
     (corner,) = np.flatnonzero(wall == TOP)
     upper = [line for line in lines if line.wall == TOP]
-    lengths = {line.direction: contact_lines.to_length(replace(free, wall=wall), line) for line in upper}
+    lengths = {line.direction: contact_lines.advance_of(replace(free, wall=wall), line).length for line in upper}
     apart = free.highest - free.points[corner, 0]
     assert sorted(lengths.values()) == pytest.approx(sorted([FILM - apart, FILM + apart]), abs=1e-9)
     assert all(line.advance == line.least == line.short > 0 for line in upper)
@@ -218,8 +208,8 @@ def test_the_contact_surface_is_the_smallest_that_leaves_enough_fluid(preset):
     for expansion in touching:
         values = clearances(expansion.pore.boundary, rule)
         assert min(values.values()) >= -contact_lines.CLOSE
-        for key, length in expansion.advances.items():
-            if length > 1.0:
+        for key, advance in expansion.advances.items():
+            if advance.length > 1.0:
                 advanced += values[key] <= contact_lines.CLOSE
     assert advanced >= 5
 
@@ -243,5 +233,30 @@ def test_a_trial_starts_from_a_shape_in_which_no_triangle_is_turned_over():
     scene = load_scene("base", ['numerics.preset="fast"'])
     seed = seeded(scene)
     trials = contact._Trials(contact.Mechanics.of(scene), seed, seed, None, True)
-    trials._shapes = [(np.zeros(2), seed.mesh.points * [-1.0, 1.0], seed.pressure)]
-    assert np.array_equal(trials._first(seed, np.zeros(2)).mesh.points, seed.mesh.points)
+    trials._trials = [contact._Trial(np.zeros(2), seed.mesh.points * [-1.0, 1.0], seed.pressure)]
+    assert np.array_equal(trials._first(seed, np.zeros(2), None).mesh.points, seed.mesh.points)
+
+
+@EVERY_ORDER
+@pytest.mark.parametrize("fixed_point", ["kept", "rechosen"])
+def test_each_contact_surface_has_its_own_fixed_point(fixed_point, order):
+    """They are the corners nearest to the middles of both, -2 and -1 um, for any points and any previous fixed point.
+    """
+    leaning = [(-21, 0), (-19, 9), (-12, 17), (-6, 20), (-5.5, 20), (-5, 20), (-4.5, 20), (4, 20), (12, 12), (17, 0)]
+    narrow, _ = coarse_base(order, 'pore.width="20 um"', f"numerics.fixed_point={fixed_point}")
+    scene = simulation.shaped(narrow, leaning)
+    pore = seeded(scene)
+    pore = replace(pore, fixed=np.roll(pore.fixed, 2 * (fixed_point == "rechosen")))
+    x, y = pore.mesh.points[pore.mesh.loop][contact._fixed_points(scene.numerics, pore)].T
+    assert y.tolist() == [0.0, 20.0] and x == pytest.approx([-2.0, -1.0], abs=0.3)
+
+
+def test_contact_lines_do_not_depend_on_the_first_node():
+    """If the numbers of the ring's nodes are shifted, the same positions result."""
+    outline = initial_outline(load_scene("base"))
+    expected = set(surface_ends(outline, BOTTOM))
+    assert {step for _, step in expected} == {-1, 1} and len(expected) == 2
+    for shift in range(1, len(outline.wall)):
+        parts = {name: np.roll(getattr(outline, name), shift, axis=0) for name in ("points", "wall", "fixed")}
+        moved = surface_ends(dataclasses.replace(outline, **parts), BOTTOM)
+        assert {((node - shift) % len(outline.wall), step) for node, step in moved} == expected

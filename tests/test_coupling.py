@@ -12,9 +12,7 @@ from repro.march.simulation import simulate
 from repro.model import contact
 from repro.model.pore import seeded
 from tests import strategies
-from tests.strategies import ORDERS
-
-EVERY_ORDER = pytest.mark.parametrize("order", ORDERS)
+from tests.strategies import EVERY_ORDER, ORDERS
 
 
 def elements(order):
@@ -43,23 +41,6 @@ def touching(request):
         radius, growth = "18.9 um", {"end": "1 h", "minimum_film": "1 um"}
     scene = strategies.scene(radius, "20 um", velocity="2.9 m/day", growth=growth, numerics=numerics)
     return scene, [instant for instant in run(scene) if instant.ledgers or instant.pore.time == 0]
-
-
-@EVERY_ORDER
-def test_decay_alone_follows_its_exponential(order):
-    """Without donor, X_A + X_I = X_m (0.2 + 0.8 exp(-b m_A t)) with m_A between its least and largest value (1e-5
-    apart), and the area shrinks in proportion."""
-    scene = strategies.scene(head="1e-3 cm", donor="0 mg/L", growth={"end": "6 h", "time_step": "1.5 h"},
-                            output={"times": ["6 h"]}, numerics=elements(order))
-    first, last = run(scene)
-    pieces = last.pore.space.reaction
-    acceptor = last.solved.concentrations.acceptor[pieces.cells] @ pieces.values.T
-    bounds = acceptor.min() - 1e-4, acceptor.max() + 1e-4
-    most, least = (0.2 + 0.8 * np.exp(-0.12 / 24 * 6 * c / (c + 1)) for c in bounds)
-    left = last.pore.mass / first.pore.mass
-    assert least <= left <= most and most - least < 1e-5
-    assert last.pore.outline.area / first.pore.outline.area == pytest.approx(left, rel=1e-5)
-    assert last.pore.inert.sum() / first.pore.mass == pytest.approx((1 - left) / 4, rel=1e-6)
 
 
 def test_contact_closes_the_film_and_the_run_continues(touching):

@@ -17,9 +17,8 @@ from repro.results.names import KNOWN
 from repro.scene import load_scene
 from tests import oracles
 from tests.pages import AXES, CHARTS, LEDGERS
-from tests.strategies import ORDERS, arrays_of, rate_constants
+from tests.strategies import EVERY_ORDER, ORDERS, arrays_of, rate_constants
 
-EVERY_ORDER = pytest.mark.parametrize("order", ORDERS)
 #: An outline that leans upstream and touches the upper wall of a pore of 20 um after some minutes.
 SHAPE = [(-21, 0), (-19, 9), (-12, 17), (-4, 19.2), (3, 18.6), (12, 12), (16, 5), (17, 0)]
 SETS = ['numerics.time="midpoint"', 'pore.width="20 um"', 'pore.length="400 um"', 'growth.end="1.2 h"',

@@ -5,9 +5,8 @@ import re
 import pytest
 
 from repro.scene import scene_tables
-from verification import switches
 from verification.claims import runs
-from verification.claims.runs import BASE, PLATES
+from verification.claims.runs import PLATES
 from verification.errata import ERRATA
 from verification.errata.__main__ import REPORT, load
 from verification.errata.scheme import HALF_STEP
@@ -66,21 +65,3 @@ def test_a_choice_changes_only_its_key(run):
     apart = [f"{name}.{key}" for name, table in plain.items() if isinstance(table, dict) for key in table
              if table[key] != changed[name][key]]
     assert apart == [run[1].partition("=")[0]] and plain["numerics"]["preset"] == "paper"
-
-
-SHORT = (*BASE, "numerics.refinement=0.5", 'aggregate.radius="15 um"', 'growth.end="0.8 h"', 'growth.time_step="0.4 h"')
-
-
-def short(*changes):
-    """State of base after two steps on a coarse mesh."""
-    return switches.state((*SHORT, *changes), 0.8)
-
-
-def test_one_state_distinguishes_two_scenes_on_one_mesh():
-    """A state equals itself to the last bit; F changes the acceptor, and fluid forces change only the shape."""
-    state = short()
-    assert set(switches.one_state(state, state.scene).values()) == {0.0}
-    fluid = switches.one_state(state, runs.load_packaged(*SHORT, 'growth.fluid_forces="included"'))
-    assert fluid["velocity"] == fluid["acceptor leaving"] == 0 and 0 < abs(fluid["upstream"]) < 1e-4
-    exact = switches.one_state(state, runs.load_packaged(*SHORT, "kinetics.acceptor_to_donor_ratio=1.5138"))
-    assert 1e-5 < exact["acceptor leaving"] < 1e-2 and exact["velocity"] == 0

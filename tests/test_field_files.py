@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from repro.errors import OutputError
 from repro.results import field_files
 from repro.results.field_files import Grid
 from tests.strategies import arrays_of, same_arrays
@@ -30,7 +31,7 @@ def test_a_file_without_fields_is_refused_by_name(tmp_path, capsys, damage):
     path = tmp_path / "one.vtu"
     field_files.write(path, Grid(np.eye(3), np.array([[0, 1, 2]])))
     path.write_text(damage(path.read_text()))
-    with pytest.raises(ValueError, match="one.vtu: it holds no fields: ."):
+    with pytest.raises(OutputError, match="one.vtu: it holds no fields: ."):
         field_files.read(path)
     assert capsys.readouterr() == ("", "")
 
@@ -38,5 +39,5 @@ def test_a_file_without_fields_is_refused_by_name(tmp_path, capsys, damage):
 def test_a_file_longer_than_fields_may_be_is_not_read(tmp_path, monkeypatch):
     field_files.write(tmp_path / "one.vtu", Grid(np.eye(3), np.array([[0, 1, 2]])))
     monkeypatch.setattr(field_files, "MOST_DATA", 100)
-    with pytest.raises(OSError, match="longer than 100 bytes"):
+    with pytest.raises(OutputError, match="longer than 100 bytes"):
         field_files.read(tmp_path / "one.vtu")

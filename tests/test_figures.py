@@ -6,16 +6,13 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from matplotlib.patches import Polygon
 
 import paper_figures
 from paper_figures import __main__ as figures
 from paper_figures import claims, figure_6, runs, states, style
 from repro import cli, load_scene, results, run
-from repro.fem.outline import polygon_area
 from repro.scene import scene_hash
 from verification.claims import report
-from verification.claims.levels import converged
 
 MODULES = {name: import_module(f"paper_figures.{name}") for name in paper_figures.FIGURES}
 REQUESTS = list(dict.fromkeys(request for module in MODULES.values() for request in module.RUNS))
@@ -77,24 +74,6 @@ def test_every_figure_is_drawn_and_described(quick):
     assert not [link for link in links if link.startswith("http")]
 
 
-def test_a_state_agrees_with_the_time_series(short):
-    state, row = states.last(short["base"]), states.row(short["base"], 0.6)
-    assert polygon_area(state.rim) == pytest.approx(row["aggregate_area_um2"], rel=1e-12)
-    assert np.ptp(state.ends) == pytest.approx(row["meshed_length_um"], rel=1e-12)
-    for name in ("acceptor", "donor"):
-        for end, place in enumerate(("inlet", "effluent")):
-            assert state.carried(f"{name}_mg_per_L", end) == pytest.approx(row[f"{place}_{name}_mg_per_L"], rel=2e-4)
-
-
-@pytest.mark.parametrize("name, panels", [("figure_5", 1), ("plate_1", 4)])
-def test_the_drawn_shape_precedes_the_expansion(short, name, panels):
-    """This holds in every panel, as the caption says."""
-    expected = states.last(short["base"], "before_expansion").rim
-    patches = [patch for axes in MODULES[name].draw(short["base"]).axes for patch in axes.patches]
-    drawn = [patch.get_xy()[:-1] for patch in patches if isinstance(patch, Polygon)]
-    assert sum(np.array_equal(shape, expected) for shape in drawn) == panels
-
-
 @pytest.fixture
 def unlike(monkeypatch):
     """Tables of runs that differ in every number. The first two touch the opposite wall in their second row."""
@@ -122,14 +101,3 @@ def test_a_curve_matches_its_legends(unlike):
             table = tables[line.get_color()]
             expected = table["time_h"], table[column.format(kinds[line.get_linestyle()])]
             assert np.array_equal(line.get_xydata().T, expected)
-
-
-def test_the_outlines_of_figure_6_are_those_of_the_converged_solution(short, monkeypatch):
-    """They use the elements and steps that judge the claims, with a row every tenth of an hour around contact. At first
-    half of the newly covered area lies upstream."""
-    scene = figure_6.RUNS[0].load()
-    assert scene.numerics == load_scene("wide", converged(1.0)).numerics and scene.growth.end == 45.0
-    assert set(np.arange(5.0, 46.0, 5.0)) <= set(scene.output.times)
-    assert np.diff([time for time in scene.output.times if 34 <= time <= 35]) == pytest.approx(0.1)
-    monkeypatch.setattr(figure_6, "EVERY", 0.2)
-    assert figure_6.upstream_share(short["wide"]) == pytest.approx(0.5, abs=0.01)

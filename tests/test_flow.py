@@ -5,32 +5,10 @@ hard-17-units cover units of length. `test_derived.py` covers the reported quant
 """
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
-from repro.fem import elements
 from repro.march.simulation import simulate
 from repro.model import flow, pore
 from repro.scene import load_scene
-from tests.strategies import ORDERS, between, meshes, share, space_of
-
-
-@share(0.4)
-@given(meshes(), between(1.0, 1e4), st.sampled_from(["laplacian", "traction"]), st.integers(0, 2**32 - 1),
-       st.sampled_from(list(ORDERS)))
-def test_every_section_carries_the_flux_of_the_inlet(grid, ratio, interface, seed, order):
-    """Any field that is one at the inlet and zero at the outlet is a smeared section. The velocity that carries the
-    substrates, w = u - tau grad p or u itself, carries u_ave W through it."""
-    space = space_of(grid, order)
-    unit = flow.unit_flow(space, ratio, interface=interface)
-    section = np.random.default_rng(seed).uniform(-1.0, 2.0, len(grid.points))
-    section[grid.topology.inlet], section[grid.topology.outlet] = 1.0, 0.0
-    mean = space.gradient_table.weights @ elements.values_on(order, space.gradient_table) * 2  # mean of each function
-    w = np.einsum("a,tai->ti", mean, unit.velocity[space.cells])
-    if unit.correction is not None:
-        w = w - unit.correction
-    slopes = np.einsum("tai,ta->ti", grid.gradients, section[grid.triangles])
-    assert -grid.areas @ np.sum(w * slopes, axis=1) == pytest.approx(grid.width, rel=1e-11)
 
 
 def in_a_permeable_body(permeability, refinement):
@@ -67,7 +45,6 @@ def dome(permeability):
     """A body that has just touched the upper wall: a quarter of an ellipse on either side."""
     out = np.linspace(0.0, 1.0, 12)
     return spanning(permeability, out, np.sqrt(1 - out**2))
-
 
 
 @pytest.mark.parametrize("permeability", [1e-15, 5.67e-17])

@@ -82,13 +82,6 @@ def test_a_run_stopped_after_every_step_equals_the_uninterrupted_run(tmp_path, r
         assert stretches[0] == 1 and (stretches[1:] > BIOT).all() and (stretches[1:] < 1 - 1e-6).all()
 
 
-def test_solve_returns_a_folded_run():
-    """`solve` returns the rows up to the fold, and its status."""
-    results = repro.solve(plug())
-    assert is_over(results.status) and "folds" in results.status and results.time[-1] < 6
-    assert results["surface_stretch_min"][-1] == pytest.approx(BIOT, rel=1e-3)
-
-
 @cache
 def compressed(theta):
     """The plug after uniform growth by theta, with the concentrations in its new shape."""

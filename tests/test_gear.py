@@ -14,11 +14,10 @@ from repro.model.pore import seeded, solve_flow
 from repro.model.transport import Concentrations
 from repro.scene import load_scene
 from tests import strategies
-from tests.strategies import ORDERS
+from tests.strategies import EVERY_ORDER, ORDERS
 
 SECOND = 1 / 3600
 
-EVERY_ORDER = pytest.mark.parametrize("order", ORDERS)
 
 
 def coarse(order):
@@ -42,7 +41,7 @@ def storage(problem):
     space = problem.space
     if space.order == 1:
         return space.lumped()
-    return np.bincount(space.cells.ravel(), space.load(space.at.dx).ravel(), space.count)
+    return space.at.assembled(space.at.dx)
 
 
 @EVERY_ORDER
@@ -136,7 +135,7 @@ def test_only_the_aggregate_controls_the_step(order):
     """
     pore, problem = case(order=order)
     steady = gear.settle(problem, Sink(pore.active), None)
-    steady.acceptor[pore.space.end_nodes(pore.space.dofs.inlet)] = 0.0
+    steady.acceptor[pore.space.inlet.nodes] = 0.0
     assert len(gear.advance(problem, pore.active, pore.inert, steady, 0.01 * SECOND).steps) == 1
 
 
@@ -185,3 +184,27 @@ def test_a_substrate_may_be_used_up_to_nothing(changes, unset):
     left = last.solved.concentrations
     assert 0 <= left.acceptor.min() and left.acceptor.max() < np.finfo(float).tiny and left.donor.min() > 1
     assert last.pore.time == starved.growth.end and last.pore.mass == pytest.approx(before.pore.mass, rel=1e-13)
+
+
+@pytest.mark.parametrize("order", [2, 3])
+def test_gears_method_bounds_undershoots_by_each_substrates_supply(order):
+    """A drain consumes all of the acceptor, 10 mg/L, and 5e-4 or 5e-3 of it too much. The donor has 1000 mg/L."""
+    pore, problem = case.__wrapped__(velocity=None, boundary="closed", order=order,
+                                    substrates={"donor": {"supply": "1000 mg/L"}})
+    drained = replace(problem, source=np.concatenate([-1e6 * storage(problem), np.zeros(problem.space.count)]))
+    nothing = np.zeros_like(pore.active)
+    start = transport.supplied_everywhere(problem)
+    consumed = gear.advance(drained, nothing, nothing, start, 10.005e-6).concentrations.acceptor
+    assert [consumed.min(), consumed.max()] == pytest.approx([-5e-3, -5e-3], rel=1e-6)
+    with pytest.raises(TransportError, match="the acceptor becomes negative"):
+        gear.advance(drained, nothing, nothing, start, 10.05e-6)
+
+
+def test_gears_steps_are_scaled_by_the_larger_of_content_and_supply():
+    """The acceptor's supply has fallen, the donor's has risen."""
+    _, problem = case.__wrapped__()
+    start = transport.supplied_everywhere(problem)
+    start = replace(start, acceptor=3 * start.acceptor, donor=start.donor / 2)
+    nothing = np.zeros_like(problem.space.reaction.dx)
+    scale = gear._started(problem, nothing, nothing, start)[0].scale
+    assert scale.ravel().tolist() == [3 * problem.both[0].supply, problem.both[1].supply]

@@ -6,12 +6,10 @@ import numpy as np
 import pytest
 
 from repro.errors import SimulationError, TransportError
-from repro.scene import load_scene
 from verification.cases import hard_family
 from verification.evidence.checks import at_most
-from verification.evidence.results import Result
 from verification.problems import hard
-from verification.problems.hard import PRESETS, REFUSED, RIGHT, WRONG, HardCase
+from verification.problems.hard import REFUSED, RIGHT, WRONG
 
 GOOD, BAD = at_most("good", 0.5, 1.0, ""), at_most("bad", 2.0, 1.0, "")
 
@@ -26,12 +24,6 @@ def raising(error):
 PARTS = {RIGHT: lambda preset: [GOOD], WRONG: lambda preset: [BAD], REFUSED: raising(SimulationError("try another"))}
 
 
-def a_case(*verdicts, refusable=()):
-    """Return a case whose parts have these verdicts with every preset."""
-    parts = {verdict: PARTS[verdict] for verdict in verdicts}
-    return HardCase(99, "made-up", "Made up", "Right", "Wrong", parts, refusable, ("m",))
-
-
 @pytest.mark.parametrize("function, verdict, excerpt", [
     (PARTS[RIGHT], RIGHT, ""), (lambda preset: [GOOD, BAD], WRONG, "bad 2 (expected at most 1)"),
     (lambda preset: [], WRONG, "nothing was measured"),
@@ -44,19 +36,6 @@ def a_case(*verdicts, refusable=()):
 def test_a_part_is_right_refused_or_wrong(function, verdict, excerpt):
     cell = hard.run_part("a part", function, "fast", 0.2)
     assert cell.verdict == verdict and excerpt in cell.message
-
-
-@pytest.mark.parametrize("verdict, preset, refusable, fine", [
-    (RIGHT, "fast", (), True), (REFUSED, "fast", (), False), (REFUSED, "paper", (), True), (WRONG, "paper", (), False),
-    (WRONG, "fast", (WRONG,), False), (REFUSED, "fast", (REFUSED,), True), (REFUSED, "fast", (RIGHT,), False)])
-def test_a_cell_is_accepted_according_to_its_verdicts(verdict, preset, refusable, fine):
-    """A cell has the verdict of its worst part. A verification case holds if its cells of all presets are accepted."""
-    chosen = a_case(RIGHT, verdict, refusable=refusable)
-    cells = {name: hard.run_cell(chosen, name) for name in PRESETS}
-    accepted = {name: not cell.unaccepted for name, cell in cells.items()}
-    assert cells[preset].verdict == verdict and accepted[preset] is fine
-    evidence = {name: [*hard.evidence(cell)] for name, cell in cells.items()}
-    assert Result("hard-99", evidence).holds is all(accepted.values())
 
 
 @pytest.mark.parametrize("message, works, wrong", [
@@ -77,16 +56,3 @@ def test_a_refusal_is_right_where_its_advice_works(message, works, wrong, tmp_pa
     tables = {"aggregate": {}, "flow": {"head": "1e-3 cm"}, "substrates": {}, "growth": {"end": "1 h"}, "numerics": {}}
     checks = [*hard_family._checks(hard_family.Outcome(None, message), tables, tmp_path)]
     assert sum(not check.holds for check in checks) == wrong
-
-
-def test_a_wrong_run_is_detected():
-    """Its numbers are not finite, or its balances, concentrations or densities are out of bounds."""
-    scene = load_scene("wide", ("numerics.preset=fast", 'growth.end="0 h"', 'aggregate.radius="40 um"'))
-    run = hard.run_scene(scene)
-    assert all(check.holds for check in hard.sound(run))
-    for column, value in (("acceptor_balance", 1e-6), ("biomass_density_min", 0.5), ("inert_fraction", -0.1),
-                          ("head_loss_cm", math.nan), ("biomass_balance", 1e-3)):
-        spoilt = hard.Run(scene, run.instants * 2, [{**run.rows[0], column: value}, run.rows[0]])
-        assert not all(check.holds for check in hard.sound(spoilt)), column
-    run.instants[0].solved.concentrations.donor[3] = 10.5
-    assert not all(check.holds for check in hard.sound(run))

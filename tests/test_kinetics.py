@@ -75,17 +75,3 @@ def test_every_law_of_uptake_satisfies_its_definition(substrate, name, scene, pa
     assert law_m.fraction(0.0) == 0 and law_m.slope(0.0) * half == pytest.approx(1.0, rel=1e-14)
     assert (law_m.slope(supplies) * half <= 1).all() and (law_m.fraction(supplies) <= law_m.largest(supplies[-1])).all()
     assert not law_m.saturates(0.5 * half)
-
-
-@given(SCENES, concentrations, concentrations, st.just(0.0) | between(1e-3, 5.0))
-def test_the_uptake_of_a_step_equals_its_growth(scene, acceptor, donor, duration):
-    """Y q_D - (q_A - F q_D) / d_c, times the step, is the growth of X_A and X_I at the same concentrations, to
-    round-off."""
-    k, sink = scene.kinetics, kinetics.Sink(np.array([[3.0]]), duration)
-    m = np.array(law(scene).fractions(acceptor, donor)).reshape(2, 1, 1)
-    q_a, q_d = duration * sink.uptake(m, law(scene))[0, :, 0]
-    growth, remains = law(scene).growth_rate(acceptor, donor), law(scene).inert_rate(acceptor)
-    active, inert = kinetics.grow(3.0, 0.5, growth, remains, duration)
-    growth_of_uptake = k.yield_coefficient * q_d - (q_a - k.acceptor_to_donor_ratio * q_d) / k.decay_oxygen_demand
-    size = k.yield_coefficient * q_d + q_a / k.decay_oxygen_demand + active
-    assert active + inert - 3.5 == pytest.approx(growth_of_uptake, abs=1e-13 * size)

@@ -4,10 +4,12 @@ from shutil import copytree
 
 import pytest
 
+from repro import results
 from repro.cli import main
 from repro.errors import Interrupted
 from repro.march.simulation import ends_soon, steps
 from repro.results import read_table
+from repro.runs import execution
 from repro.runs.checkpoint import LAST, NEWEST, PREVIOUS
 from repro.runs.execution import Watch, resume, run
 from repro.scene import SceneError, load_scene
@@ -132,3 +134,10 @@ def test_the_ledger_has_every_step_though_the_rows_end_before(preset, tmp_path):
     resume(tmp_path / "run", overrides=["growth.end=1.6 h"])
     spans = read_table(tmp_path / "run" / "ledger.csv")
     assert spans["end_h"][-1] == 1.6 and spans["start_h"][1:] == pytest.approx(spans["end_h"][:-1], abs=1e-9)
+
+
+def test_a_longer_run_is_judged_by_its_first_velocity(tmp_path):
+    recorder = execution.Recorder(load_scene("base"), tmp_path)
+    column = results.COLUMNS.index("mean_velocity_m_per_d")
+    recorder.history.rows = [[None] * column + [speed] for speed in (24.0, 0.024)]
+    assert recorder.first_velocity == pytest.approx(1e6, rel=1e-12)

@@ -1,24 +1,9 @@
 """Mutants made by machine: how their outcomes are judged, and the page."""
 
-import pytest
 
 from verification.evidence.writing import ROOT
 from verification.mutants.machine import record
 from verification.mutants.machine.survivors import EQUIVALENT, LEFT
-
-
-@pytest.mark.parametrize("caught, survivor, timeout, equal, is_enough", [
-    (95, 5, 0, 0, True), (94, 6, 0, 0, False), (94, 5, 1, 0, False), (0, 0, 0, 0, False), (90, 10, 0, 10, True),
-    (89, 11, 0, 11, False)])
-def test_the_caught_share_leaves_out_few_equivalent_mutants(monkeypatch, caught, survivor, timeout, equal,
-                                                                      is_enough):
-    counts = {"caught": caught, "timeout": timeout, "survivor": survivor}
-    rows = [{"file": "m.py", "old": verdict, "new": "", "verdict": verdict}
-            for verdict, count in counts.items() for _ in range(count)]
-    if equal:
-        monkeypatch.setitem(EQUIVALENT, record.key(rows[-1]), "it is the same")
-    verdicts = record.judged(rows)
-    assert len(verdicts["equivalent"]) == equal and record.holds(verdicts) is is_enough
 
 
 def test_the_page_is_that_of_the_record_and_its_reasons_quote_present_lines():

@@ -4,7 +4,6 @@ import json
 from importlib import import_module
 
 import pytest
-from matplotlib.figure import Figure
 
 import paper_figures
 from paper_figures import manifest, runs
@@ -37,19 +36,6 @@ def test_a_repeated_run_has_the_same_hashes(folder, committed, tmp_path):
     hashes = manifest.of_run(runs.INITIAL_MESH, tmp_path / "again")["files"]
     files = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
     assert hashes == committed["runs"][NAME]["files"] and {*hashes} == files - {*manifest.NOT_DATA}
-
-
-def test_a_figure_is_hashed_by_its_data_and_texts():
-    def hashed(x=1.0, label="h", ordinate=1.0, caption="c"):
-        figure = Figure()
-        axes = figure.subplots()
-        axes.plot([0.0, x], [0.0, 1.0])
-        axes.scatter([0.0, 1.0], [0.0, ordinate])
-        axes.set(xlabel=label, xlim=(0, 5), ylim=(0, 5))
-        return manifest.figure_hash(figure, caption)
-
-    variants = hashed(x=1.0 + 1e-15), hashed(label="s"), hashed(ordinate=2.0), hashed(caption="d")
-    assert hashed() == hashed() and len({hashed(), *variants}) == 5
 
 
 def changed(committed, factor=None, scene="", data="", **environment):

@@ -63,9 +63,10 @@ def test_a_survivor_or_a_case_that_passes_with_its_mutant_is_a_failure(trials, p
     assert runner.judge([outcome]) is passes and not runner.judge([])
 
 
-def test_a_record_is_stale_after_a_change_of_the_mutated_file_or_of_a_module_that_caught_it(tmp_path, monkeypatch):
-    """The records of other mutants stay fresh."""
-    files = {"repro/a.py": "old\n", "repro/b.py": "old\n", "tests/test_a.py": "a\n", "tests/test_b.py": "b\n"}
+def test_a_record_is_stale_after_a_change_of_the_mutated_file_or_of_a_test_that_caught_it(tmp_path, monkeypatch):
+    """The records of other mutants stay fresh, and so does a record if other tests of its module change."""
+    test = "import os\nLIMIT = 1\n\ndef test_it():\n    assert LIMIT\n"
+    files = {"repro/a.py": "old\n", "repro/b.py": "old\n", "tests/test_a.py": test, "tests/test_b.py": test}
     for name, text in files.items():
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_text(text)
@@ -78,8 +79,12 @@ def test_a_record_is_stale_after_a_change_of_the_mutated_file_or_of_a_module_tha
         runner.record(Outcome(id, (Trial(mutant.tests[0], True, "q: 2"),)))
     assert runner.fresh() == {"a", "b"}
     assert pages.mutant_state() == "2 of 2 mutants caught by `make mutants`, run on this code."
-    for name, fresh in (("repro/a.py", {"b"}), ("tests/test_b.py", {"a"})):
-        (tmp_path / name).write_text("old and more\n")
+    (tmp_path / "tests" / "test_a.py").write_text(f"import sys\nMORE = 2\n{test}\ndef test_other():\n    assert MORE\n")
+    assert runner.fresh() == {"a", "b"}
+    for name, text, fresh in (("repro/a.py", "old and more\n", {"b"}),
+                              ("tests/test_b.py", test.replace("assert", "return"), {"a"}),
+                              ("tests/test_b.py", test.replace("LIMIT = 1", "LIMIT = 2"), {"a"})):
+        (tmp_path / name).write_text(text)
         assert runner.fresh() == fresh and "1 of them run BEFORE THE LAST CHANGE" in pages.mutant_state()
         (tmp_path / name).write_text(files[name])
 

@@ -7,6 +7,7 @@ import xarray
 
 import repro
 from repro import results
+from repro.results import netcdf
 from repro.scene import load_scene, rules, scene_hash, scene_tables
 from tests.pages import run
 from tests.shell import flags, interrupt_run, refusal
@@ -58,3 +59,12 @@ def test_netcdf_without_xarray_is_refused_before_the_run(tmp_path, monkeypatch, 
     line = refusal(tmp_path, capsys, "run", "base", *flags(*SETS), "--out", tmp_path / "run")
     assert 'output.timeseries = "netcdf"' in line and "pip install xarray" in line
     assert not (run(tmp_path, "flow_only") / "timeseries.nc").exists()
+
+
+def test_columns_have_a_fill_value_and_time_has_none(tmp_path):
+    """CF forbids missing values of coordinates."""
+    scene = load_scene("flow_only")
+    netcdf.write(tmp_path / "timeseries.nc", scene, [[0.0] * len(results.COLUMNS)])
+    with xarray.open_dataset(tmp_path / "timeseries.nc", engine="scipy", decode_cf=False) as dataset:
+        filled = {name for name in dataset.variables if "_FillValue" in dataset[name].attrs}
+    assert filled == set(results.COLUMNS) - {"time_h"}

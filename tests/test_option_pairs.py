@@ -37,7 +37,7 @@ def solved(body, interface, order, *changes):
 
 def strain(space, velocity, interface):
     """(T, q, 2, 2) 1/h: the rate that viscosity multiplies, grad u (+ grad u^T in the traction form), and grad u."""
-    shape_gradients = space.gradients_at.slopes
+    shape_gradients = space.gradients_at.gradients
     gradient = np.einsum("tai,tqka->tqik", velocity[space.cells], shape_gradients)
     return gradient + np.swapaxes(gradient, 2, 3) * (interface == "traction"), gradient
 
@@ -51,7 +51,7 @@ def test_viscosity_and_drag_dissipate_the_work_of_the_head(body, interface, orde
     ratio = np.where(state.mesh.biomass & (body == "viscous"), 20.0, 1.0)
     dissipated = np.einsum("t,tq,tqik,tqik->", ratio, space.gradients_at.dx, symmetrised, gradient)
     if body == "permeable":
-        speed = space.at_points(stream.velocity.T)[:, state.mesh.biomass]
+        speed = space.at.evaluate(stream.velocity.T)[:, state.mesh.biomass]
         dissipated += np.einsum("tq,itq,itq->", space.at.dx[state.mesh.biomass], speed, speed) / 40.0
     work = scene.flow.gravity * stream.meshed_loss * stream.mean_velocity * scene.pore.width
     assert work == pytest.approx(scene.flow.kinematic_viscosity * dissipated, rel=1e-9)
@@ -72,7 +72,7 @@ def test_the_force_on_the_aggregate_comes_through_every_section_of_the_fluid(int
     dofs = space.dofs
     around = np.concatenate([dofs.walls, dofs.inlet.ravel(), dofs.outlet.ravel(), space.cells[mesh.biomass].ravel()])
     section[around] = space.of_mesh(np.isin(np.arange(len(mesh.points)), mesh.body).astype(float))[around]
-    slope = np.einsum("ta,tqka->tqk", section[space.cells], space.gradients_at.slopes)
+    slope = np.einsum("ta,tqka->tqk", section[space.cells], space.gradients_at.gradients)
     wet = ~mesh.biomass
     force = -np.einsum("tq,tqik,tqk->i", space.gradients_at.dx[wet], stress[wet], slope[wet])
     pascals = (drive.density * 1e-3) * (drive.gravity * 1e-6 / 3600**2) * 1e-6

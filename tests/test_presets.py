@@ -10,8 +10,6 @@ from repro.march import midpoint, simulation
 from repro.model import pore, remeshing
 from repro.model.biomass import Rates
 from repro.model.contact import Expansion
-from repro.model.remeshing import Remeshing
-from repro.model.transport import Concentrations
 from repro.scene import PRESETS, Numerics, load_scene, parse_scene
 from tests.strategies import ORDERS, scene
 from tests.test_scene import EVERYTHING
@@ -26,21 +24,6 @@ def elements(order):
 def base(*changes, order=2):
     sets = [f"numerics.{key}={value}" for key, value in elements(order).items()]
     return load_scene("base", (*sets, *changes))
-
-
-def concentrations(acceptor, donor):
-    return Concentrations(np.array(acceptor), np.array(donor))
-
-
-def test_the_first_guess_at_a_step_s_end():
-    """The change of the first half is added once more; not below zero, nor on another mesh."""
-    start, half = concentrations([3.0, 2.0], [5.0, 4.0]), concentrations([2.5, 1.5], [5.0, 3.5])
-    for part, acceptor, donor in ((1.0, [2.0, 1.0], [5.0, 3.0]), (0.25, [2.75, 1.75], [5.0, 3.75])):
-        guess = midpoint._extrapolate_substrates(start, half, part)
-        assert guess.acceptor.tolist() == acceptor and guess.donor.tolist() == donor
-    other, spent = concentrations([1.0], [1.0]), concentrations([2.5, 0.5], [5.0, 3.5])
-    assert midpoint._extrapolate_substrates(start, other, 1.0) is start
-    assert midpoint._extrapolate_substrates(start, spent, 1.0) is spent
 
 
 @pytest.mark.parametrize("count", [0.0, 8.0])
@@ -69,7 +52,7 @@ def test_rates_are_carried_back_from_a_new_mesh(order, straight):
     start = pore.seeded(scene_of_order)
     points = start.mesh.with_middles(start.mesh.points[: start.mesh.corners]) if straight else start.mesh.points
     half = start.moved(points * [1.1, 1.1])
-    remeshed, _ = remeshing.remesh(Remeshing.of(scene_of_order), start, half, 0.0)
+    remeshed, _ = remeshing.remesh(remeshing.Remeshing.of(scene_of_order), start, half, 0.0)
     (x, y), (u, v) = reaction_points(remeshed.space), reaction_points(half.space)
     accepted = 1e-6 if straight or order == 1 else 0.01 * 88
     for rates, expected, bound in ((Rates(2 * x + y, 3 - y), (2 * u + v, 3 - v), accepted),

@@ -7,11 +7,15 @@ import pty
 import re
 import signal
 import struct
+import subprocess
+import sys
 import termios
 import time
 from contextlib import suppress
 
 import pytest
+import tqdm
+from tqdm import tqdm as Bar
 
 from repro.cli import main
 from repro.model import growth
@@ -168,3 +172,22 @@ def test_the_help_lists_the_exit_statuses(capsys):
             main([command, "--help"])
         section = capsys.readouterr().out.casefold().partition("exit status:")[2]
         assert re.findall(r"\b\d+\b", section) == statuses
+
+
+def test_the_remaining_time_follows_from_the_speed_since_a_resume(monkeypatch):
+    """After a resume at 18 of 20 h, 1 h in 10 s leaves 10 s."""
+    monkeypatch.setattr(progress, "_fit", lambda bar, event: None)
+    bars = []
+    monkeypatch.setattr(tqdm, "tqdm", lambda **options: bars.append(Bar(**options)) or bars[0])
+    with progress.on_a_terminal() as tell:
+        tell({"event": "start", "scene": "base", "from_h": 18.0, "end_h": 20.0, "step": 90})
+        tell({"event": "step", "time_h": 19.0})
+        assert Bar.format_meter(**bars[0].format_dict | {"elapsed": 10.0, "rate": None}).endswith("[00:10 < 00:10]")
+
+
+def test_a_second_signal_ends_the_process_with_the_signal_s_status():
+    """The status is 128 plus the number of the signal, as in shells."""
+    code = ("import os, signal, time\nfrom repro.runs.interrupts import DUPLICATE, catch_signals\n"
+            "with catch_signals():\n    for _ in range(2):\n        os.kill(os.getpid(), signal.SIGTERM)\n"
+            "        time.sleep(DUPLICATE + 0.2)")
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 128 + signal.SIGTERM

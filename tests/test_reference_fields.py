@@ -7,20 +7,12 @@ import numpy as np
 import pytest
 
 from reference import (
-    layered_channel,
-    manufactured_flow,
-    manufactured_growth,
-    manufactured_transport,
     neo_hookean,
     quadratic_mesh_motion,
     robin_channel,
     slab,
-    sliding_waves,
-    viscous_inclusion,
 )
-from reference.monod import sink, uptake
 
-FORMS = pytest.mark.parametrize("interface", ("traction", "laplacian"))
 GAMMAS = pytest.mark.parametrize("gamma", [0.1, 1.0, 10.0])
 STEP = 1e-4
 
@@ -31,65 +23,10 @@ def derivatives(field, x, y, h=STEP):
     return np.stack([east - west, north - south], axis=-1) / (2 * h), (east + west + north + south - 4 * centre) / h**2
 
 
-def divergence(field, x, y, h=STEP):
-    """Divergence over the last index."""
-    return np.trace(derivatives(field, x, y, h)[0], axis1=-2, axis2=-1)
-
-
 def first_and_second(function, x, step=1e-3):
     """(first, second) derivative of a function of x."""
     gradient, laplace = derivatives(lambda x, _: function(x), x, 0.0, step)
     return gradient[..., 0], laplace
-
-
-def assert_stokes(velocity, pressure, viscosity, x, y, force=0.0):
-    """-viscosity Laplace u + grad p = f, div u = 0."""
-    assert divergence(velocity, x, y) == pytest.approx(np.zeros(len(x)), abs=1e-7)
-    residual = derivatives(pressure, x, y)[0] - viscosity * derivatives(velocity, x, y)[1] - force
-    assert np.abs(residual).max() < 1e-6 * max(viscosity, 10)
-
-
-@pytest.mark.parametrize("ratio", [1.0, 2000.0, 1e8])
-def test_layers_carry_one_stress_and_a_mean_velocity_of_one(ratio):
-    y, G = np.linspace(0.0, 50.0, 5001), layered_channel.gradient(50.0, 12.5, ratio)
-    u = layered_channel.velocity(y, 50.0, 12.5, ratio)
-    assert np.trapezoid(u, y) / 50 == pytest.approx(1.0, rel=1e-6) and np.abs(u[[0, -1]]).max() < 1e-12
-    sheared = np.where(y[:-1] < 12.495, ratio, 1.0) * np.diff(u)
-    assert np.diff(sheared) / 0.01**2 == pytest.approx(np.full(4999, -G), rel=1e-4, abs=1e-7 * ratio)
-
-
-@FORMS
-@pytest.mark.parametrize("ratio", [0.1, 2000.0])
-def test_the_inclusion_solves_stokes_and_its_velocity_and_stress_are_continuous(interface, ratio):
-    """The form of the interface selects the stress that is continuous."""
-    angle, r = np.random.default_rng(1).uniform([0, 1], [6.28, 3], (40, 2)).T
-    normal, arguments = np.stack([np.cos(angle), np.sin(angle)], axis=-1), (ratio, interface, 0.4)
-    x, y = 1.3 * normal.T
-
-    def outside(x, y):
-        return viscous_inclusion.outside(x, y, 1.3, *arguments)
-
-    def inside(x, y):
-        return viscous_inclusion.inside(x, y, *arguments)
-
-    def traction(side, viscosity):
-        gradient = derivatives(lambda x, y: side(x, y)[0], x, y)[0]
-        viscous = gradient + np.swapaxes(gradient, 1, 2) * (interface == "traction")
-        return viscosity * np.einsum("kij,kj->ki", viscous, normal) - side(x, y)[1][:, None] * normal
-
-    assert_stokes(lambda x, y: outside(x, y)[0], lambda x, y: outside(x, y)[1], 1.0, r * x, r * y)
-    assert outside(x, y)[0] == pytest.approx(inside(x, y)[0], abs=1e-12)
-    assert traction(outside, 1.0) == pytest.approx(traction(inside, ratio), abs=1e-6)
-
-
-@FORMS
-@pytest.mark.parametrize("across, viscosity", [(-0.2, 1.0), (0.3, 2000.0)])
-def test_the_manufactured_force_is_the_residual_of_the_strong_form(interface, across, viscosity):
-    """This holds on both sides of the interface."""
-    velocity, pressure, force = manufactured_flow.evaluate(2000.0, interface)
-    t, turn = np.linspace(-0.4, 0.4, 9), np.exp(1j * manufactured_flow.ANGLE)
-    x, y = (turn * (across + 1j * t)).real, (turn * (across + 1j * t)).imag
-    assert_stokes(velocity, pressure, viscosity, x, y, force(x, y))
 
 
 def test_the_cylinder_is_in_equilibrium_and_free_on_its_rim():
@@ -103,34 +40,6 @@ def test_the_cylinder_is_in_equilibrium_and_free_on_its_rim():
     assert np.gradient(sigma[:, 0, 0], r, edge_order=2) == pytest.approx(expected, abs=1e-3 * np.abs(expected).max())
 
 
-@pytest.mark.parametrize("name", manufactured_growth.PRESSURES)
-def test_the_manufactured_growth_is_in_equilibrium_with_its_loads(name):
-    """theta is the determinant, S the closed form's stress, f = -Div S: by differences of step h, to h^2."""
-    case, h = manufactured_growth.growth(name), 1e-5
-    X, Y = np.random.default_rng(3).uniform(0.1, 0.9, (2, 20))
-    F = derivatives(case.place, X, Y, h)[0]
-    J = np.linalg.det(F)
-    sigma = np.array([neo_hookean.cauchy(f, p)[:2, :2] for f, p in zip(F, case.pressure(X, Y))])
-    assert case.theta(X, Y) == pytest.approx(J, rel=1e-9)
-    assert case.stress(X, Y) @ np.swapaxes(F, 1, 2) / J[:, None, None] == pytest.approx(sigma, abs=1e-8)
-    assert case.force(X, Y) == pytest.approx(-divergence(case.stress, X, Y, h), abs=1e-7)
-
-
-@GAMMAS
-def test_sliding_waves_solve_35_and_slide_along_walls_and_end(gamma):
-    def d(s, y):
-        return sliding_waves.displacement(s, y, 20.0, gamma, 20.0).T
-
-    s, y, h = *np.random.default_rng(2).uniform([1, 1], [19, 19], (30, 2)).T, 1e-3
-    laplace = derivatives(d, s, y, h)[1]
-    slope = derivatives(lambda s, y: divergence(d, s, y, h), s, y, h)[0]
-    assert laplace == pytest.approx(-slope / gamma, abs=1e-6 * np.abs(laplace).max())
-    for wall in (0.0, 20.0):
-        assert np.abs(d(s, wall)[:, 1]).max() < 1e-12
-        assert np.abs(d(s, wall + h) - d(s, wall - h))[:, 0].max() < 1e-9
-    assert np.abs(d(0.0, y)[:, 0]).max() == 0.0 and np.abs(d(h, y) - d(-h, y))[:, 1].max() < 1e-9
-
-
 @GAMMAS
 def test_the_corner_exponent_makes_the_displacement_vanish_on_the_fixed_side(gamma):
     """kappa s^z - z s conj(s)^(z-1) = B conj(s)^z with a real B. For a large gamma, z is the Laplace operator's
@@ -142,16 +51,8 @@ def test_the_corner_exponent_makes_the_displacement_vanish_on_the_fixed_side(gam
     assert quadratic_mesh_motion.exponent(w, 1e9) == pytest.approx(0.75)
 
 
-RATES = {"k": 0.4, "F": 1.5, "decay": 0.006, "K_A": 1.0, "K_D": 2.0}
 WATER, BIOMASS = 9e6, 7e6
 HALF, SUPPLY = 40.0, 10.0
-
-
-def test_uptake_is_dual_monod():
-    """(7)-(8) written out; the acceptor is the first sink."""
-    q = 0.75 * (0.4 * 1.5 * 0.75 + 0.006), 0.4 * 0.75 * 0.75
-    assert uptake(3.0, 6.0, RATES) == pytest.approx(q)
-    assert sink(np.array([3.0, 6.0]), np.array([2.0]), RATES) == pytest.approx(2.0 * np.array(q))
 
 
 def test_the_robin_channel_obeys_its_equation_and_its_conditions():
@@ -184,17 +85,3 @@ def test_the_monod_slab_obeys_its_equation(half_saturation, film):
     assert BIOMASS * first_and_second(c, inside, 1e-2)[1] == pytest.approx(uptake_rate, rel=1e-2)
     assert BIOMASS * first_and_second(c, HALF - 1e-3, 5e-4)[0] == pytest.approx(6e5 * depth, rel=1e-3)
     assert c(HALF + film) == pytest.approx(SUPPLY) and least < 1e-5
-
-
-@pytest.mark.parametrize("side, active, diffusivities, x, y", [
-    ("fluid", 0.0, (1e7, 4e6), 30.0, 25.0), ("biomass", 2.7e5, (8e6, 3e6), -6.0, 9.0)])
-def test_the_forcing_is_the_strong_form(side, active, diffusivities, x, y):
-    """The uptake is that of reference.monod with the biomass X_0 (1 + x / (3 R))."""
-    fields = manufactured_transport.fields(50.0, 20.0, 1e5, (1e7, 4e6), (8e6, 3e6), 3e5, RATES)[side]
-    speed = [float(manufactured_transport.function(part)(x, y)) for part in manufactured_transport.velocity(50.0, 1e5)]
-    sinks = uptake(*(float(field.value(x, y)) for field in fields), RATES)
-    for field, diffusivity, uptake_rate in zip(fields, diffusivities, sinks):
-        gradient, curvature = derivatives(field.value, x, y)[0], derivatives(field.value, x, y, 1e-2)[1]
-        expected = -diffusivity * curvature + gradient @ speed + active * uptake_rate
-        assert field.forcing(x, y) == pytest.approx(expected, rel=1e-4)
-        assert field.flux(x, y)[0] == pytest.approx(diffusivity * gradient[0], rel=1e-6)

@@ -15,18 +15,17 @@ from unittest.mock import Mock
 
 import pytest
 
+from repro import timing
 from repro.cli import main
 from repro.errors import Interrupted, SimulationError
 from repro.march import loop
 from repro.march.simulation import steps
 from repro.model import growth, traction
 from repro.results import columns
-from repro.results.files import sealed
 from repro.results.quantities import Quantity
 from repro.runs import execution
 from repro.runs.checkpoint import NEWEST, PREVIOUS
 from repro.runs.execution import Watch, resume, run
-from repro.runs.integrity import find_defect
 from repro.scene import load_scene
 from tests import faults
 from tests.faults import limit_memory
@@ -164,16 +163,12 @@ def test_strided_arrays_are_copied():
         assert attribute(copied).flags.c_contiguous and (attribute(copied) == attribute(state)).all()
 
 
-RECORD = {"scene": "x", "hash": "x", "tables": {}, "files": ["thesis.tex"], "status": "sunning"}
-
-
 @pytest.mark.parametrize("arguments", [["run", "--resume"], ["run", "base", *flags(*BRIEF), "--force", "--out"]],
                          ids=["go on", "anew"])
 @pytest.mark.parametrize("content, why", [
     (None, "there is no run.json|it holds 'thesis.tex', which is not of a run; a new or empty folder"),
-    ("[" * 100_000, "run.json: cannot be read"), ("null", "run.json: cannot be read .it is not a JSON object"),
-    (sealed({"scene": "x", "files": ["thesis.tex"]}), "run.json: it has no scene or no status"),
-    (sealed(RECORD), "run.json: its status 'sunning' is none that a run writes")])
+    ("[" * 100_000, "run.json cannot be read"), ("null", "run.json cannot be read: it is not a JSON object"),
+    ('{"files": "thesis.tex"}', "run.json cannot be read: its checksum is wrong|run.json lists no files of a run")])
 def test_a_folder_without_a_run_is_refused(tmp_path, capsys, content, why, arguments):
     """The status is 2, one line describes the folder and the remedy, and nothing changes."""
     (tmp_path / "thesis.tex").write_text("years of work")
@@ -181,18 +176,7 @@ def test_a_folder_without_a_run_is_refused(tmp_path, capsys, content, why, argum
         (tmp_path / "run.json").write_text(content)
     message = refusal(tmp_path, capsys, *arguments, tmp_path)
     assert re.search(why, message)
-    assert content is None or "--resume" in arguments or "move the folder away, or name another" in message
-
-
-@pytest.mark.parametrize("status", ["", "Completed", "runningly", f"{PORE_END}, or so"])
-def test_a_status_that_no_run_writes_is_refused(tmp_path, capsys, status):
-    """The run neither counts as finished nor is resumed."""
-    run(load_scene("flow_only"), tmp_path)
-    rewrite(tmp_path, status=status)
-    message = refusal(tmp_path, capsys, "run", "--resume", tmp_path)
-    assert f"its status {status!r} is none that a run writes" in message
-    defect = find_defect(tmp_path, load_scene("flow_only"))
-    assert "run.json tells of a run of another scene, or has no status" in defect
+    assert content is None or "--resume" in arguments or "another" in message
 
 
 def test_a_damaged_finished_run_resumes_from_its_remaining_checkpoint(tmp_path, capsys):
@@ -222,7 +206,8 @@ def test_every_bit_of_a_finished_run_is_checked(tmp_path, capsys):
     for number, (name, change) in enumerate(changes):
         out = Path(copytree(uninterrupted, tmp_path / str(number)))
         change(out / name)
-        for arguments in (["check"], ["run", "--resume"], *([["run", *command]] if number < 3 else [])):
+        same_command = [["run", *command]] if number < 3 or name == "run.json" else []
+        for arguments in (["check"], ["run", "--resume"], *same_command):
             message = refusal(out, capsys, *arguments, out)
             assert name in message and str(out) in message, message
     assert len(changes) > 2 * 10
@@ -377,3 +362,26 @@ def test_results_do_not_depend_on_the_number_of_threads(tmp_path):
         assert run_and_wait(*LONG, "--out", tmp_path / threads, threads=threads)[0] == 0
     assert files(tmp_path / "1") == files(tmp_path / "2")
     assert read_record(tmp_path / "2")["conditions"]["threads"]["OMP_NUM_THREADS"] == "2"
+
+
+def test_times_by_stage_are_those_before_a_resume_and_since(tmp_path, monkeypatch):
+    monkeypatch.setattr(timing, "seconds", {"growth": 2.0, "transfer": 4.0})
+    recorder = execution.Recorder(load_scene("base"), tmp_path)
+    recorder.history.stages, recorder.history.seconds = {"flow": 8.0, "growth": 16.0}, 1000.0
+    recorder.write_record("running")
+    assert read_record(tmp_path)["wall_time_by_stage_s"] == {"flow": 8.0, "growth": 18.0, "transfer": 4.0}
+    assert 1000 < read_record(tmp_path)["wall_time_s"] < 1100
+
+
+@pytest.mark.parametrize("key", ["blas", "libc", "geos", "machine", "system", "source"])
+def test_a_resume_under_other_conditions_is_reported(key, tmp_path, monkeypatch, recwarn):
+    """Conditions that may change numbers are reported; threads are not."""
+    recorder = execution.Recorder(load_scene("flow_only"), tmp_path)
+    recorder.write_record("running")
+    before = read_record(tmp_path)
+    present = {**before["conditions"], "threads": {"OMP_NUM_THREADS": "7"}}
+    monkeypatch.setattr(execution, "conditions", lambda: present)
+    assert execution._find_changes(before, recorder, execution.DEFAULT_WATCH) == {} and not recwarn.list
+    present[key] = "another"
+    with pytest.warns(UserWarning, match=f"conditions.{key} .*now another"):
+        execution._find_changes(before, recorder, execution.DEFAULT_WATCH)

@@ -7,12 +7,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from repro.fem import sizing
 from repro.fem import sizing as of
-from repro.fem.outline import BOTTOM, FREE, TOP
-from repro.fem.sizing import Sizing
+from repro.fem.outline import BOTTOM, FREE, TOP, half_disc
+from repro.fem.sizing import Sizing, split
 from repro.model import pore
+from repro.model.pore import resolution
 from repro.scene import Numerics, load_scene
-from tests import oracles
+from tests import oracles, strategies
 from tests.strategies import attached_aggregates, lengths, outlines, refinements, widths
 
 FILM = 2.0
@@ -82,3 +84,34 @@ def test_the_mesher_gets_the_sizes_of_the_scene():
     for seed, middle in (('position="3 um"', 3.0), (f"outline={outline}", None)):
         sizes = replace(pore.sized(load_scene("base", [*changes, f"aggregate={{{seed}}}"])), front=2.0)
         assert sizes == Sizing(80.0, 0.7, 0.5, 0.2, 2.0, 0.125, middle)
+
+
+@pytest.mark.parametrize("key, unit", [("mean_velocity", "m/day"), ("head", "um")])
+def test_meshes_are_fine_enough_for_the_fastest_later_flow(key, unit):
+    """Curved elements under a table are as fine as under its largest value from the start."""
+    course = f'[["0 h", "2 {unit}"], ["1 h", "160 {unit}"], ["2 h", "3 {unit}"]]'
+    changes = [["numerics.preset=fast", f"flow.{key}={value}"] for value in (f"2 {unit}", f"160 {unit}", course)]
+    slow, fast, over_time = (resolution(load_scene("base", each, ["flow.head"])) for each in changes)
+    assert over_time == fast > 1.5 * slow
+
+
+@pytest.mark.parametrize("seed", [0.0, -30.0])
+def test_a_seed_anywhere_was_round_at_its_start(seed):
+    """New nodes on straight edges have initial positions on the seed's arc, to round-off."""
+    outline = half_disc(8.0, 4.0, 1, seed)
+    finer = split(outline, Sizing(50.0, 1.0, 2.0, seed=seed))
+    free = finer.wall == FREE
+    assert free.sum() > 1.5 * (outline.wall == FREE).sum()
+    assert np.hypot(*(finer.origin[free] - [seed, 0]).T) == pytest.approx(8.0, rel=1e-12)
+    assert np.hypot(*(finer.points[free] - [seed, 0]).T).min() < 7.99
+
+
+def test_elements_are_small_beside_the_upper_wall_s_contact_lines_alone():
+    """They grow with the distance from the contact lines."""
+    plug_outline = strategies.plug(50.0, -20.0, 15.0, 3.0)
+    sizes = sizing.interface_sizes(plug_outline, sizing.Sizing(50.0, 1.0, 1.0, contact=0.1))
+    lower, upper = plug_outline.wall == BOTTOM, plug_outline.wall == TOP
+    ends = np.array([15.0 + 3.0, -20.0 + 3.0])
+    distance = np.abs(plug_outline.points[upper, :1] - ends).min(axis=1)
+    assert sizes[upper] == pytest.approx(np.minimum(50.0 / 14, 0.1 + sizing.GRADATION * distance))
+    assert sizes[upper].min() == 0.1 and (sizes[lower] == 50.0 / 14).all()

@@ -6,19 +6,23 @@ the case hard-07-contact that contact ends a step.
 import json
 from dataclasses import replace
 from functools import partial
+from itertools import product
 
 import numpy as np
 import pytest
 
+from repro import timing
 from repro.errors import GrowthError, SimulationError, Unresolved
-from repro.fem.sizing import ACROSS_PORE
-from repro.march import midpoint, simulation, step_control, stepping
-from repro.march.loop import PoreEnd
+from repro.fem import linear
+from repro.march import midpoint, simulation, step_control, stepping, updates
 from repro.march.midpoint import Attempt
-from repro.model import pore
+from repro.march.simulation import simulate
+from repro.march.step_control import EXCESS, StepControl, exceeds_tolerance
+from repro.model import contact, pore
+from repro.model.pore import solve
 from repro.model.stages import Stages
 from repro.scene import load_scene
-from tests.strategies import ORDERS, scene
+from tests.strategies import EVERY_ORDER, ORDERS, coarse_base, scene
 from tests.test_state import alike
 
 FAST = 'numerics.preset="fast"'
@@ -27,11 +31,6 @@ THOROUGH = partial(pytest.param, marks=pytest.mark.thorough)
 
 def base(*changes):
     return load_scene("base", (FAST, 'aggregate.radius="25 um"', *changes))
-
-
-def sets(order):
-    """Elements of an order, of the size of preset fast."""
-    return (f"numerics.elements={ORDERS[order]}", f"numerics.refinement={0.4 if order == 1 else 0.2}")
 
 
 @pytest.mark.parametrize("end, spacing", [
@@ -50,34 +49,9 @@ SCENES = {"fast": (FAST, 'growth.end="9.7 h"'), "contact": (FAST, 'growth.end="0
           "stress-free": (FAST, 'growth.end="0.6 h"', 'growth.new_biomass="stress_free"', *CONTACT)}
 
 
-def steps_of(name, *changes):
-    """The last state, the reports, and the ledgers of all steps of a scene, reported or not."""
-    scene = load_scene("base", (*SCENES[name], *changes))
-    results = list(simulation.steps(scene))
-    rows = [instant for _, instant in results if instant]
-    last = results[-1][0]
-    return last, rows, [*(row for instant in rows for row in instant.ledgers), *last.ledgers]
-
-
 def same(one, other):
     """Are two states, without their rows, the same to the last bit?"""
     return alike(one.pore, other.pore) and one.step_control == other.step_control
-
-
-@pytest.mark.parametrize("name", ["fast", "paper", *map(THOROUGH, ("contact", "gear", "stress-free"))])
-def test_steps_do_not_depend_on_rows(name):
-    """The last state and the ledger of every step agree to the last bit with 1 row, 7 rows, and a row at the end of
-    every step."""
-    last, rows, ledgers = steps_of(name)
-    for count in (1, 7):
-        times = np.linspace(0, last.pore.time, count + 1)[1:].tolist()
-        output_times = json.dumps([f"{time!r} h" for time in times])
-        other, reports, all_ledgers = steps_of(name, f"output.times={output_times}")
-        assert len(reports) == count + 1 and all_ledgers == ledgers
-        assert same(other, last)
-    assert len(ledgers) > 1 and {row.end for row in ledgers} <= {instant.pore.time for instant in rows}
-    if CONTACT[0] in SCENES[name]:
-        assert not rows[0].pore.contact and rows[-1].pore.contact and sum(instant.remeshes for instant in rows) > 1
 
 
 @pytest.mark.parametrize("part", [0.55, THOROUGH(0.97)])
@@ -179,18 +153,6 @@ def test_a_failure_of_the_shortest_step_stops_the_run(monkeypatch, error, messag
 
 
 @pytest.mark.parametrize("order", [1, 2, THOROUGH(3)])
-def test_a_run_ends_where_the_aggregate_reaches_an_end_of_the_pore(order):
-    """The last instant is reported, then PoreEnd."""
-    scene = base('pore.length="90 um"', 'growth.end="19 h"', *sets(order))
-    reports = []
-    with pytest.raises(PoreEnd, match="reaches the pore's upstream end"):
-        for instant in simulation.simulate(scene):
-            reports += [instant] if instant.ledgers else []
-    near = scene.pore.width / ACROSS_PORE
-    assert 0.1 * near - 45 <= reports[-1].pore.outline.upstream < near - 45 <= reports[-2].pore.outline.upstream
-
-
-@pytest.mark.parametrize("order", [1, 2, THOROUGH(3)])
 def test_a_film_too_thin_from_the_start_closes(order):
     """It closes without growth: without a supply the aggregate neither grows nor decays."""
     numerics = {"preset": "fast", "elements": ORDERS[order], "refinement": 0.6 if order == 1 else 0.2}
@@ -224,3 +186,67 @@ def test_the_last_step_uses_finer_elements_if_a_front_needs_them(needed, message
             list(scene)
     else:
         assert [instant.pore.front for instant in scene][-1] == needed
+
+
+def test_a_step_ends_at_a_jump_to_the_last_bit():
+    """For any start the new value applies after the step. A step shorter by a microhour ends earlier."""
+    _, pore = coarse_base(1)
+    for start, k, factor in product((0.1, 0.7, 2.3, 19.1), range(1, 50), (1 - 4e-16, 1.0, 1 + 4e-16)):
+        length, shorter = k / 7 * factor, k / 7 * factor - 1e-6
+        assert stepping._end_of(replace(pore, time=start), length, start + k / 7) == start + k / 7
+        assert stepping._end_of(replace(pore, time=start), shorter, start + k / 7) == start + shorter
+
+
+@pytest.mark.parametrize("time", ["updates", "midpoint"])
+def test_a_shape_leans_as_the_flow_at_the_end_of_its_step_pushes(time):
+    """The lean is the difference between the ends' motion. It is the same under a rising head as under its last value,
+    and a jump at the end of the step has no effect."""
+    leans = []
+    for first, last, kind in ((4, 4, "linear"), (1, 4, "linear"), (4, 1, "steps")):
+        scene, _ = coarse_base(2, f'flow.head=[["0 h", "{first}e-3 cm"], ["0.2 h", "{last}e-3 cm"]]',
+                               f"flow.interpolation={kind}", "growth.fluid_forces=included", f"numerics.time={time}",
+                               'growth.end="0.2 h"', 'growth.shear_modulus="1e-3 MPa"', 'output.times=["0.2 h"]')
+        _, end = simulation.simulate(scene)
+        leans.append(end.pore.outline.upstream + end.pore.outline.downstream)
+    assert leans == pytest.approx([leans[0]] * 3, rel=1e-2) and leans[0] > 1e-4
+
+
+def test_a_step_grows_as_much_on_a_new_mesh_half_way():
+    """In 4 h a seed grows by half and the supply falls to a tenth. The mesh half way is new, since edges are three
+    times too long, or the old one."""
+    scene, pore = coarse_base(2, 'substrates.donor.supply=[["0 h", "4 mg/L"], ["4 h", "0.4 mg/L"]]',
+                      "substrates.donor.interpolation=linear")
+    solved = solve(scene, pore)
+    first = Stages.of(scene).rates(pore, solved)
+    numerics = [replace(scene.numerics, refinement=part) for part in (0.3, 0.9)]
+    same_mesh, new_mesh = (midpoint.solve_halfway(Stages.of(replace(scene, numerics=each)), pore, solved, first, 4.0,
+                                                  contact.PATIENT) for each in numerics)
+    assert new_mesh.produced == pytest.approx(same_mesh.produced, rel=1e-2)
+    assert len(new_mesh.solved.flow.velocity) > 2 * len(same_mesh.solved.flow.velocity)
+
+
+def test_a_step_misses_the_tolerance_only_beyond_the_accepted_excess():
+    for part, expected in ((0.0, False), (1.0, False), (EXCESS, False), (1.01 * EXCESS, True)):
+        assert exceeds_tolerance(StepControl(1.0, 1.0, 0.3 * part), 0.3) is expected
+
+
+@EVERY_ORDER
+def test_an_update_under_a_table_starts_from_gears_concentrations(order):
+    """It uses the supply half way, and not the steady profiles of that supply."""
+    table_of = 'substrates.acceptor.supply=[["0 h", "9 mg/L"], ["1 h", "29 mg/L"]]'
+    scene, pore = coarse_base(order, "numerics.transport=gear", table_of, "substrates.acceptor.interpolation=linear")
+    solved = solve(scene, pore)
+    half_way = updates._solve_midway(scene, pore, solved, 0.2)
+    assert half_way.concentrations is solved.concentrations and half_way.problem.both[0].supply == pytest.approx(11.0)
+    stored = updates.step(Stages.of(scene), pore, solved, 0.2).ledger.stored[0]
+    risen = stored / (scene.pore.width * np.ptp(pore.mesh.ends))
+    assert risen == pytest.approx(2.0, rel=0.05)
+
+
+def test_every_stage_of_a_step_is_timed():
+    """These times are the reported cost of a run."""
+    timing.reset()
+    *_, last = simulate(load_scene("base", ["growth.end=0.2 h", "numerics.refinement=0.5"]))
+    assert last.pore.time == 0.2
+    assert {"flow", "transport", "growth", "mesh motion", "meshing", linear.FLOOR} <= set(timing.seconds)
+    assert min(timing.seconds.values()) > 0

@@ -12,6 +12,7 @@ import signal
 import subprocess
 import sys
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from pathlib import Path
 from unittest.mock import Mock
 
@@ -19,12 +20,15 @@ import numpy as np
 import pytest
 
 import repro
-from repro import results
+from repro import cli, results
 from repro.cli import main
+from repro.report import charts
+from repro.runs import execution
 from repro.runs.integrity import find_damage
 from repro.runs.machine import THREADS
+from repro.scene import load_scene
 from repro.sweeps import page, pool, single_run, table
-from repro.sweeps.design import grid, latin, parse, points
+from repro.sweeps.design import Point, grid, latin, parse, points
 from repro.sweeps.folder import Sweep
 from tests import shell
 from tests.faults import limit_memory
@@ -422,3 +426,88 @@ def test_an_interrupted_sweep_is_continued(tmp_path, how, ends):
     assert sweep(out, *arguments) == 0
     assert [row["status"] for row in rows(out / "runs.csv")] == ["completed"] * 3
     assert len(list((out / "runs").iterdir())) == 3
+
+
+def sweep_of(folder, widths):
+    factors = [parse(f"pore.width={widths}")]
+    return Sweep(folder, "flow_only", factors, points("flow_only", [], factors, grid(factors)))
+
+
+def record_end(swept, point, status, rows=1):
+    """Record the end of a run of a sweep, with rows of t = 0 and ones; return its recorder."""
+    (swept.runs / point.name).mkdir(parents=True)
+    recorder = execution.Recorder(point.scene, swept.runs / point.name)
+    recorder.history.rows = [[0.0, *[1.0] * (len(results.COLUMNS) - 1)]] * rows
+    recorder.save(status)
+    return recorder
+
+
+def test_unfinished_runs_of_a_sweep_are_made_again(tmp_path):
+    """The pore's end counts only as the complete sentence."""
+    swept = sweep_of(tmp_path, "40 um, 50 um, 60 um, 70 um, 80 um, 90 um, 95 um")
+    end = "the aggregate reaches the pore's downstream end at t = 0 h"
+    statuses = ("completed", "failed: x", "interrupted", end, f"{end}!", end.replace("= 0", "= 1"),
+                end.replace("at t", "in the step from t"))
+    for point, status in zip(swept.points, statuses):
+        record_end(swept, point, status)
+    assert [point.index for point in swept.missing()] == [2, 3, 5]
+
+
+def test_a_run_without_rows_has_the_status_of_its_folder_or_attempt(tmp_path):
+    """A run failed before t = 0. A run without a folder has the status of its attempt, or "not run"."""
+    swept = sweep_of(tmp_path, "40 um, 50 um, 60 um")
+    record_end(swept, swept.points[0], "failed: x", rows=0)
+    for messages, second in (({}, "not run"), ({1: "failed: y", 2: "failed: z"}, "failed: z")):
+        assert [run.status for run in table.read_runs(swept, messages, 0.1)] == ["failed: x", second, "not run"]
+
+
+def test_rows_of_a_run_that_failed_are_in_the_table(tmp_path):
+    swept = sweep_of(tmp_path, "40 um, 50 um")
+    record_end(swept, swept.points[1], "failed: x")
+    table.write(swept, table.read_runs(swept, {}, 0.1))
+    assert [row["run"] for row in rows(tmp_path / "table.csv")] == ["2"]
+
+
+def test_marks_of_the_page_have_the_colour_of_their_key(tmp_path):
+    """Two factors are varied, and each figure has the key of the other one. Dots are runs that clogged, triangles runs
+    that ended before; failed runs have no mark."""
+    factors = [parse("pore.width=40 um, 50 um"), parse("flow.viscosity_ratio=100, 400, 1000")]
+    designed, course = points("flow_only", [], factors, grid(factors)), np.array([1.0, 8.0])
+    numbers_of = [dict.fromkeys(table.COLUMNS) | {"clogging_time_h": time} for time in (5.0, 5.0, None, 5.0, 5.0, None)]
+    runs = [table.SweepRun(one, "completed", course, course, course, each) for one, each in zip(designed, numbers_of)]
+    runs[5] = replace(runs[5], status="failed: x")
+    times = page.page(Sweep(tmp_path, "flow_only", factors, designed), runs, 0.3).split("<h2>Clogging time")[1]
+    figures = re.findall("<figure>.*?</figure>", times, re.S)
+    for figure, key in zip(figures, ("flow.viscosity_ratio", "pore.width"), strict=True):
+        named = dict(re.findall(r'class="line(.)" points="0,5 24,5"/></svg>([^<]*)</li>', figure))
+        mark = rf'<(\w+) class="[a-z]+(.)"[^>]*><title>run (.)[^<]*?{key} = ([^,:]*)[^<]*?: ([^:<]*)</title>'
+        marks = re.findall(mark, figure)
+        assert len(marks) == 5 and "time to 0.3 of the conductivity (h)" in figure
+        assert {named[level] == value for _, level, _, value, _ in marks} == {True}
+        for kind, _, run, _, message in marks:
+            assert (kind, message) == (("polygon", "after 8 h") if run == "3" else ("circle", "5 h"))
+
+
+def test_the_default_seed_of_a_hypercube_is_0():
+    """The help states this."""
+    options = cli._parser().parse_args(["sweep", "base", "--vary", "pore.width=1:2 um:log", "--out", "x"])
+    assert options.seed == 0
+
+
+def test_words_are_centred_in_equal_parts_of_an_axis():
+    factor = parse('numerics.preset="fast", "accurate", "exact"')
+    axis = page._across(factor, [])
+    ticks = charts.ticks(axis)
+    assert [text for _, text in ticks] == ["fast", "accurate", "exact"]
+    parts = [(axis(value) - charts.LEFT) / (charts.WIDTH - charts.LEFT - charts.RIGHT) for value, _ in ticks]
+    assert parts == pytest.approx([1 / 6, 3 / 6, 5 / 6])
+
+
+@pytest.mark.parametrize("status, word", [("failed: TransportError: at t = 3 h", "failed"), ("completed", "completed"),
+                                          ("not run", "not run")])
+def test_the_table_of_a_sweep_has_the_status_of_a_run(status, word):
+    """The table has one word; the reason is in the run's folder."""
+    point = Point(1, ("40 um",), load_scene("flow_only"))
+    empty = table.SweepRun(point, status, *[np.zeros(0)] * 3, dict.fromkeys(table.COLUMNS))
+    row = page._row(Sweep(Path("s"), "base", (parse("pore.width=40 um, 50 um"),), (point,)), empty)
+    assert re.search(r'<td class="text[ a-z]*">([^<]*)</td></tr>$', row)[1] == word

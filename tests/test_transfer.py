@@ -11,10 +11,11 @@ from hypothesis import strategies as st
 from repro.errors import TransferError
 from repro.fem import transfer
 from repro.model import biomass, pore, remeshing
+from repro.model.pore import solve
 from repro.model.remeshing import Remeshing
 from repro.model.transport import OVERSHOOT, UNRESOLVED, Concentrations
 from repro.scene import load_scene
-from tests.strategies import ORDERS, scene, scenes, share
+from tests.strategies import EVERY_ORDER, ORDERS, coarse_base, scene, scenes, share
 from verification.problems import pairs
 
 
@@ -148,8 +149,8 @@ def check_substrates(scene, remeshed):
 @pytest.mark.parametrize("speed, expected", [(0.0, 7.0), (4e6, 3.0)])
 def test_water_beyond_the_old_mesh_has_the_supply_of_its_time(speed, expected):
     """The supply is a table, and the aggregate is off the middle. Still water has the first supply, flowing water the
-    present one, and neither the largest one; concentrations in the old mesh stay. `test_unseen.py` tests the profile
-    towards the mesh."""
+    present one, and neither the largest one; concentrations in the old mesh stay. The case reprojection-beyond-the-ends
+    tests the profile towards the mesh."""
     tables = {"pore": {"width": "100 um", "length": "160 um"}, "aggregate": {"radius": "20 um", "position": "15 um"},
              "substrates": {"boundary": "closed", "donor": {"supply": "5 mg/L"}, "acceptor": {
                  "supply": [["0 h", "7 mg/L"], ["1 h", "20 mg/L"], ["4 h", "3 mg/L"]]}},
@@ -167,3 +168,32 @@ def test_water_beyond_the_old_mesh_has_the_supply_of_its_time(speed, expected):
         assert far.any() and field[far] == pytest.approx(np.full(far.sum(), supply), rel=1e-9)
         leaves = start + slope * last if speed else supply
         assert field[x > last + 20] == pytest.approx(np.full((x > last + 20).sum(), leaves), rel=1e-9)
+
+
+def uneven(order):
+    """(scene, pore, its solution) with masses that differ from X_m from point to point."""
+    scene, pore = coarse_base(order)
+    part = np.random.default_rng(order).uniform(0.7, 1.2, pore.active.shape)
+    pore = replace(pore, active=0.6 * part * pore.active, inert=0.3 * pore.active, theta=1.5 * pore.theta)
+    return scene, pore, solve(scene, pore)
+
+
+@EVERY_ORDER
+def test_every_transferred_amount_keeps_its_sum(order):
+    """The sums of active and inert biomass and of two more amounts stay to 1e-12. The amounts are rough or, with curved
+    elements, inert in every other triangle; none becomes negative."""
+    scene, pore, _ = uneven(order)
+    finer = replace(scene, numerics=replace(scene.numerics, refinement=0.47))
+    full = scene.kinetics.maximum_density * pore.space.reaction.dx
+    rough = full * np.random.default_rng(3).uniform(0.0, 0.3, (3, *full.shape))
+    patchy = full * (np.arange(len(full)) % 2)[:, None]
+    pressure = pore.mesh.points[: pore.mesh.corners] @ [0.02, 0.03] + 1
+    for inert, *amounts in (rough, [patchy, patchy])[:order]:
+        before = replace(pore, active=full - inert, inert=inert, pressure=pressure)
+        after, carried = remeshing.remesh(remeshing.Remeshing.of(finer), pore, before, 0.0, tuple(amounts))
+        inside = after.mesh.topology.body_corners
+        assert after.pressure[inside] == pytest.approx(after.mesh.points[inside] @ [0.02, 0.03] + 1, abs=1e-2)
+        sums = [amount.sum() for amount in (after.inert, *carried)]
+        assert sums == pytest.approx([amount.sum() for amount in (inert, *amounts)], rel=1e-12)
+        assert after.mass == pytest.approx(full.sum(), rel=1e-12 if order == 1 else 1e-9)
+        assert order == 1 or min(amount.min() for amount in (after.active, after.inert, *carried)) >= 0

@@ -1,7 +1,9 @@
 """Quasi-steady substrates (7)-(13) with elements of every order: solutions without biomass, starts of Newton's method,
 and refusals. Cases of the stage transport test closed forms, other codes, the balance, starved pores, scaling and the
 mean biomass of a step; `test_balances.py` tests that uptake follows from rates and concentrations."""
+from contextlib import nullcontext
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -10,13 +12,14 @@ from skfem import MeshTri
 from repro.errors import SimulationError, TransportError, Unresolved
 from repro.fem.mesh import Mesh, triangle_areas
 from repro.march.simulation import simulate
-from repro.model import pore, transport
+from repro.model import biomass, pore, transport
 from repro.model.kinetics import Sink
+from repro.model.pore import solve
 from repro.model.transport import Concentrations
 from repro.scene import parse_scene, scene_tables
-from tests.strategies import ORDERS, scene, space_of
+from tests.strategies import EVERY_ORDER, ORDERS, coarse_base, scene, space_of
+from tests.test_derived import integrate_over_end, node_coordinates
 
-EVERY_ORDER = pytest.mark.parametrize("order", ORDERS)
 FINE = {1: 1.0, 2: 0.45, 3: 0.3}
 
 
@@ -96,7 +99,7 @@ def test_advection_by_u_leaves_the_bounds(monkeypatch, order):
     monkeypatch.setattr(pore, "BOUNDARY_LAYER", 0.0)
     state = at_start(thick("290 m/day", order, 0.2))[1].concentrations
     assert max(state.acceptor.max(), state.donor.max()) < 10 * (1 + transport.OVERSHOOT / 4)
-    monkeypatch.setattr(transport, "divergence_free", lambda space, velocity: space.at_points(velocity.T))
+    monkeypatch.setattr(transport, "divergence_free", lambda space, velocity: space.at.evaluate(velocity.T))
     with pytest.raises(Unresolved, match=OUT_OF_BOUNDS):
         at_start(thick("290 m/day", order, 0.2))
 
@@ -161,3 +164,66 @@ def test_an_update_whose_biomass_meets_an_unresolved_front_gives_advice_that_was
         list(simulate(model))
     assert calls[2][1].active.sum() == pytest.approx(calls[1][1].active.sum(), rel=1e-3)
     assert calls[2][1].active.sum() > 1.005 * calls[0][1].active.sum()
+
+
+@EVERY_ORDER
+def test_without_flow_the_ends_are_means_over_their_height(order):
+    """The fields are not linear, and differ at inlet and outlet. Gauss's rule integrates along each end."""
+    scene, pore = coarse_base(order, "numerics.transport=gear", "substrates.boundary=closed", unset=["flow"])
+    x, y = node_coordinates(pore.space).T
+    fields = [2 + np.sin(y / 7) + 0.01 * x, 5 + np.cos(y / 9) - 0.02 * x]
+    problem = transport.problem(pore.space, None, scene.substrates, scene.kinetics)
+    all_fluxes = transport.fluxes(problem, None, transport.Concentrations(*fields))
+    for flux, field in zip(all_fluxes, fields):
+        means = [integrate_over_end(pore.space, end, field) / scene.pore.width for end in pore.mesh.ends]
+        assert [flux.inlet, flux.effluent] == pytest.approx(means, rel=1e-9) and abs(means[0] - means[1]) > 0.5
+
+
+@EVERY_ORDER
+def test_the_inlet_is_weighted_with_the_flow_for_any_inlet_condition(order):
+    scene, pore = coarse_base(order)
+    flow = solve(scene, pore).flow
+    local, mean = (transport.problem(pore.space, flow, scene.substrates, scene.kinetics, inlet).inflow
+                   for inlet in ("local", "mean"))
+    assert np.array_equal(mean, local) and mean.sum() == pytest.approx(flow.mean_velocity * scene.pore.width)
+
+
+@EVERY_ORDER
+def test_a_concentration_may_leave_its_bounds_by_the_documented_part(order):
+    """It may fall below zero by a thousandth of its supply and, with curved elements, exceed it by a fiftieth."""
+    scene, pore = coarse_base(order)
+    problem = transport.problem(pore.space, None, scene.substrates, scene.kinetics)
+    for k, (part, accepted) in product((0, 1), ((-9e-4, True), (-1.1e-3, False), (1.019, True), (1.021, order == 1))):
+        state = problem.supply
+        state[k * problem.space.count + 7] *= part
+        with nullcontext() if accepted else pytest.raises(Unresolved, match=("acceptor", "donor")[k]):
+            transport._checked(problem, state, 1)
+
+
+@EVERY_ORDER
+def test_continuation_in_half_saturations_reaches_the_same_state(order):
+    """Newton's method reaches the same state from the supply and through larger half saturations, one above its supply.
+    """
+    scene, pore = coarse_base(order, 'substrates.acceptor.half_saturation="1e-3 mg/L"',
+                      'substrates.donor.half_saturation="30 mg/L"')
+    problem = solve(scene, pore).problem
+    sink = biomass.sink(pore.active)
+    computed, _ = transport._newton(transport.Balance(problem, sink), problem.supply)
+    eased, _ = transport._eased(problem, sink, problem.supply)
+    assert eased == pytest.approx(computed, rel=1e-9)
+
+
+@pytest.mark.parametrize("order", [2, 3])
+def test_a_front_between_the_points_of_a_quadrature_is_refused(order, monkeypatch):
+    """Two quadratures differ by more than the accepted part behind a front 4e-2 um thick. The acceptor has 2 mg/L.
+    test_guards.py tests the accepted part."""
+    front = ['substrates.acceptor.supply="2 mg/L"', 'substrates.acceptor.half_saturation="1e-4 mg/L"',
+             'aggregate.radius="20 um"', "numerics.refinement=0.4", 'flow.mean_velocity="0.5 m/day"']
+    scene, pore = coarse_base(order, *front, unset=["flow.head"])
+    solved = solve(scene, pore)
+    problem, sink = solved.problem, biomass.sink(pore.active)
+    error = transport.quadrature_error(problem, sink, solved.concentrations)
+    for accepted in (2 * error, error / 2):
+        monkeypatch.setattr(transport, "APART", accepted)
+        with nullcontext() if accepted > error else pytest.raises(Unresolved, match="two quadratures"):
+            transport.steady(problem, sink)

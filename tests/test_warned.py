@@ -9,6 +9,7 @@ import pytest
 
 from repro.cli import main
 from repro.march.simulation import steps
+from repro.march.step_control import StepControl
 from repro.preflight import simplifications
 from repro.results import read_table
 from repro.runs import execution
@@ -126,3 +127,11 @@ def test_check_reports_first_steps_that_miss_the_tolerance(capsys, sets, count):
     messages = missed_tolerance(json.loads(capsys.readouterr().out))
     assert len(messages) == count == len(missed_tolerance(read_record(cached_run(load_scene("base", sets)))))
     assert all(text.startswith("1e-12 was not met in the first steps: the smallest") for text in messages)
+
+
+def test_the_worst_step_that_misses_the_tolerance_is_reported(tmp_path):
+    recorder = execution.Recorder(load_scene("base", ["numerics.tolerance=0.01"]), tmp_path)
+    for estimate in (0.03, 0.5, 0.04, 0.001):
+        recorder._count_missed_tolerance(StepControl(1.0, 1.0, estimate))
+    assert recorder.history.missed == 3 and not recorder.contact
+    assert "errs by 0.5 (estimate)" in recorder.warn_missed_tolerance()[0].text

@@ -12,8 +12,6 @@ the velocity by -0.05 to -0.23 %, and the effect is under 0.01 %.
 state at 19.2 h. ``cost_ratio`` compares processor times, medians of alternating runs.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Iterator
 from pathlib import Path

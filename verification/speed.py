@@ -5,8 +5,6 @@
 two marks and is never edited by hand; a test compares it with the records.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

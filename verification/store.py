@@ -5,8 +5,6 @@ anew. Missing results are computed side by side. :class:`Folders` keeps whole ru
 many runs, and :class:`Memory` what functions of claims return, which is lost when the process ends.
 """
 
-from __future__ import annotations
-
 import os
 import shutil
 from abc import ABC, abstractmethod

@@ -6,8 +6,6 @@ scene: the restart value of theta (28), an explicit increment, and an uneven see
 step or a seed of its own, also once.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from time import process_time

@@ -8,8 +8,6 @@ less than half a second a run. The exit status is 1 if the sweep is slower, or i
 run in a process that has imported them, each the best of five. Takes under four minutes on two free cores.
 """
 
-from __future__ import annotations
-
 import argparse
 import subprocess
 import sys

@@ -26,8 +26,6 @@ factors are Roache's, for three and more sizes and for two.
     (2014) 104.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import nan
 

@@ -9,7 +9,6 @@ import json
 from pathlib import Path
 
 from repro.cli.arguments import add_scene
-from repro.errors import OutputError
 from repro.runs.progress import say
 from repro.scene import load_scene, packaged_scenes
 
@@ -42,16 +41,12 @@ def call(options) -> int:
 
 def _check_run(options, folder: Path) -> int:
     """Report that the files of a run are unchanged. Raises OutputError if they are not."""
-    from repro.report.reading import NoRun
     from repro.runs.integrity import read_status
     from repro.runs.status import is_over
 
     if options.set or options.unset:
         options.refuse("no --set or --unset is accepted with the folder of a run")
-    try:
-        status = read_status(folder)
-    except NoRun as error:
-        raise OutputError(str(error)) from error
+    status = read_status(folder)
     files = "its files are as they were written"
     if not is_over(status):
         files += f", and repro run --resume {folder} goes on with it"

@@ -31,8 +31,6 @@ def call(options) -> int:
     _check(options.out)
     try:
         report.compare(options.runs, options.out)
-    except report.NoRun as error:
-        raise OutputError(str(error)) from error
     except OSError as error:
         raise OutputError(f"--out {options.out}: {error.strerror or error}; a file that can be "
                           "written is needed") from error

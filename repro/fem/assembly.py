@@ -22,16 +22,6 @@ from repro.fem.linear import DEFAULT, Method
 Parts: TypeAlias = np.ndarray | tuple[np.ndarray, ...]
 
 
-def each(coefficient: np.ndarray, elements: np.ndarray) -> np.ndarray:
-    """Multiply element matrices (T, a, b) by a coefficient per triangle (T,) or per row (T, a)."""
-    return coefficient.reshape(len(coefficient), -1, 1) * elements
-
-
-def mass(areas: np.ndarray) -> np.ndarray:
-    """(T, 3, 3) mass matrices of the linear nodal functions on triangles of areas (T,)."""
-    return each(areas, (np.ones((1, 3, 3)) + np.eye(3)) / 12)
-
-
 class ElementSystem:
     """K x = b with some unknowns prescribed, K summed from element matrices.
 
@@ -94,7 +84,11 @@ class ElementSystem:
         """(n,) K x for all unknowns x (n,)."""
         parts = [K @ x[unknowns][:, :, None]
                  for K, unknowns in zip(_several(elements), self.kinds, strict=True)]
-        return np.bincount(_flat(self.kinds), _flat(parts), len(x))
+        return self.assemble(tuple(parts))
+
+    def assemble(self, loads: Parts) -> np.ndarray:
+        """(n,) sums of element loads (T, k) for each kind."""
+        return np.bincount(_flat(self.kinds), _flat(_several(loads)), len(self.constrained))
 
     def factored(self, elements: Parts) -> Factored:
         """Factorise K."""

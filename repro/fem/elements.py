@@ -22,6 +22,8 @@ DEGREES = {1: 2, 2: 6, 3: 8}
 EDGE_DEGREES = {1: 2, 2: 6, 3: 9}
 #: Degrees for gradients: lower for linear functions on straight triangles, where they are constant.
 GRADIENT_DEGREES = {1: 1, 2: 6, 3: 8}
+#: Least degrees by the order of the map: on straight triangles (1) it is linear.
+MAP_DEGREES = {1: 1, 2: DEGREES[2]}
 #: The corner at the other end of the edges 01, 12 and 20.
 NEXT = [1, 2, 0]
 #: Shape functions of an edge among those of a triangle: the edge 01.
@@ -82,12 +84,6 @@ class Table:
     shape: np.ndarray
     bends: np.ndarray
     linear: np.ndarray
-
-    @property
-    def products(self) -> np.ndarray:
-        """(q, k k) products of two functions."""
-        count, k = self.values.shape
-        return (self.values[:, :, None] * self.values[:, None, :]).reshape(count, k * k)
 
 
 @cache
@@ -166,35 +162,17 @@ def jacobian(corners: np.ndarray, bends: np.ndarray) -> np.ndarray:
     return by_component(corners.transpose(2, 0, 1)[:, None] @ bends.transpose(2, 1, 0))
 
 
-@dataclass(frozen=True, eq=False)
-class Points:
-    """Quadrature points on triangles. dx: (T, q) um2, weights of the integral; slopes: (T, q, 2, k)
-    derivatives of k functions by x and by y, 1/um."""
-
-    dx: np.ndarray
-    slopes: np.ndarray
-
-    @property
-    def rows(self) -> np.ndarray:
-        """(T, 2 q, k) the same slopes, one row for each point and direction."""
-        return self.slopes.reshape(len(self.dx), -1, self.slopes.shape[3])
-
-    @property
-    def weighted(self) -> np.ndarray:
-        """(T, 2 q, k) the rows times dx."""
-        return np.repeat(self.dx, 2, axis=1)[:, :, None] * self.rows
-
-
-def points(corners: np.ndarray, of: Table) -> Points:
-    """Quadrature points on triangles with nodes (T, g, 2) um, none of them turned over."""
+def mapped(corners: np.ndarray, of: Table) -> tuple[np.ndarray, np.ndarray]:
+    """Weights (T, q) um2 of the points on triangles with nodes (T, g, 2) um, none of them turned
+    over, and gradients (T, q, 2, k) 1/um of the functions."""
     J = jacobian(corners, of.bends)
     det = determinant(J)
     turned = inverse_transpose(J, det)
     # Few products of large matrices.
     by_point = np.swapaxes(turned, 0, 1).reshape(len(of.weights), -1, 2)
     by_function = by_point @ np.swapaxes(of.slopes, 1, 2)
-    slopes = by_function.reshape(len(of.weights), len(corners), 2, -1)
-    return Points(det * of.weights, np.ascontiguousarray(np.swapaxes(slopes, 0, 1)))
+    gradients = by_function.reshape(len(of.weights), len(corners), 2, -1)
+    return det * of.weights, np.ascontiguousarray(np.swapaxes(gradients, 0, 1))
 
 
 def weights(corners: np.ndarray, of: Table) -> np.ndarray:

@@ -45,6 +45,13 @@ class Dofs:
         return node_order(self.count, self.cells, self.method)
 
     @cached_property
+    def places(self) -> np.ndarray:
+        """(count,) place of each node in elimination order."""
+        places = np.empty(self.count)
+        places[self.elimination] = np.arange(self.count)
+        return places
+
+    @cached_property
     def beside_inlet(self) -> tuple[np.ndarray, np.ndarray]:
         """(E,) triangle of each edge of the inlet, and (E, order + 1) places of the edge's nodes
         among those of the triangle."""
@@ -344,8 +351,7 @@ class Mesh:
     @cached_property
     def sides(self) -> np.ndarray:
         """(T, 3, 2) um: side i of a triangle is opposite its corner i."""
-        corner = self.points[self.triangles]
-        return np.take(corner, [2, 0, 1], axis=1) - np.take(corner, [1, 2, 0], axis=1)
+        return sides(self.points, self.triangles)
 
     @cached_property
     def areas(self) -> np.ndarray:
@@ -442,10 +448,15 @@ def triangle_areas(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     return 0.5 * (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
 
 
+def sides(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """(T, 3, 2) sides of triangles with corners points (N, 2), each opposite its corner."""
+    corner = points[triangles]
+    return np.take(corner, [2, 0, 1], axis=1) - np.take(corner, [1, 2, 0], axis=1)
+
+
 def gradients(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """(T, 3, 2) gradients of the barycentric coordinates."""
-    corner = points[triangles]
-    side = np.take(corner, [2, 0, 1], axis=1) - np.take(corner, [1, 2, 0], axis=1)
+    side = sides(points, triangles)
     double = 2 * triangle_areas(points, triangles)[:, None]
     return np.stack([-side[:, :, 1] / double, side[:, :, 0] / double], axis=2)
 

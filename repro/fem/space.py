@@ -1,9 +1,8 @@
-"""Functions of order 1, 2 or 3 on a mesh: nodes, quadrature points, element matrices.
+"""Functions of order 1, 2 or 3 on a mesh: nodes, and bases for the forms of :mod:`repro.fem.forms`.
 
 Every integral of a weak form is a sum over quadrature points. Element matrices equal those of
-scikit-fem's assembly with the same quadrature. The reaction of the substrates is evaluated at the
-points of a :class:`Reaction`: all quadrature points of the biomass, or the nodes for linear
-functions (lumped, as in the paper).
+scikit-fem's assembly with the same quadrature. The reaction of the substrates is integrated by one
+of two rules: :class:`Lumped` for linear functions, as in the paper, or :class:`Quadrature`.
 """
 
 from __future__ import annotations
@@ -15,24 +14,31 @@ import numpy as np
 
 from repro.fem import elements
 from repro.fem.brief import brief
-from repro.fem.elements import Points, Table
+from repro.fem.elements import Table
+from repro.fem.forms import Basis, basis, each
 from repro.fem.mesh import Dofs, Mesh
-
-
-@dataclass(frozen=True, eq=False)
-class Reaction:
-    """Points at which the reaction is integrated. cells: (r, k) nodes of each piece of biomass;
-    values: (q, k) the functions at its points; dx: (r, q) um2, the points' weights."""
-
-    cells: np.ndarray
-    values: np.ndarray
-    dx: np.ndarray
 
 
 @brief
 @dataclass(frozen=True, eq=False)
 class Space:
-    """Continuous functions of an order on a mesh, by their values at the nodes of ``dofs``."""
+    """Continuous functions of an order on a mesh, by their values at the nodes of ``dofs``.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Triangles with straight or curved sides; coordinates in um.
+    order : int
+        Degree of the functions: 1, 2 or 3.
+
+    Examples
+    --------
+    >>> import repro
+    >>> scene = repro.load_scene("base", ['growth.end="0 h"', 'numerics.preset="fast"'])
+    >>> space = next(repro.simulate(scene)).pore.space
+    >>> space.points.shape == (space.count, 2)
+    True
+    """
 
     mesh: Mesh
     order: int
@@ -55,22 +61,19 @@ class Space:
     @cached_property
     def table(self) -> Table:
         """The functions at the quadrature points for products."""
-        degree = max(elements.DEGREES[self.order], self._curved_degree)
+        degree = max(elements.DEGREES[self.order], elements.MAP_DEGREES[self.mesh.geometry])
         return elements.table(self.order, self.mesh.geometry, degree)
 
-    @property
-    def _curved_degree(self) -> int:
-        return elements.DEGREES[2] if self.mesh.geometry == 2 else 1
-
     @cached_property
-    def at(self) -> Points:
-        """Quadrature points for products of functions."""
-        return elements.points(self.mesh.points[self.mesh.cells], self.table)
+    def at(self) -> Basis:
+        """The functions at the quadrature points for products."""
+        return self._mapped(self.table)
 
     @property
     def gradient_degree(self) -> int:
         """Degree of the quadrature of gradients; it has one point on straight linear triangles."""
-        return max(elements.GRADIENT_DEGREES[self.order], self._curved_degree)
+        of_map = elements.MAP_DEGREES[self.mesh.geometry]
+        return max(elements.GRADIENT_DEGREES[self.order], of_map)
 
     @cached_property
     def gradient_table(self) -> Table:
@@ -78,31 +81,34 @@ class Space:
         return elements.table(self.order, self.mesh.geometry, self.gradient_degree)
 
     @cached_property
-    def gradients_at(self) -> Points:
-        """Quadrature points for gradients."""
+    def gradients_at(self) -> Basis:
+        """The functions at the quadrature points for gradients."""
         if self.gradient_table is self.table:
             return self.at
-        return elements.points(self.mesh.points[self.mesh.cells], self.gradient_table)
+        return self._mapped(self.gradient_table)
+
+    def _mapped(self, of: Table) -> Basis:
+        return basis(self.cells, self.count, self.mesh.points[self.mesh.cells], of)
 
     @cached_property
     def stiffness(self) -> np.ndarray:
-        """(T, k, k) element matrices of (grad u, grad v), without unit."""
-        return np.swapaxes(self.gradients_at.rows, 1, 2) @ self.gradients_at.weighted
+        """(T, k, k) of (grad u, grad v), without unit."""
+        return self.gradients_at.stiffness(self.gradients_at.dx)
 
     @cached_property
     def points(self) -> np.ndarray:
         """(count, 2) um, places of the nodes."""
         return self.of_mesh(self.mesh.points)
 
+    @property
+    def integration(self) -> Lumped | Quadrature:
+        """The rule that integrates the reaction."""
+        return Lumped(self) if self.order == 1 else Quadrature(self)
+
     @cached_property
-    def reaction(self) -> Reaction:
-        """The points of the biomass at which uptake and growth are integrated."""
-        biomass = self.mesh.biomass
-        if self.order > 1:
-            return Reaction(self.cells[biomass], self.table.values, self.at.dx[biomass])
-        lumped = self.lumped(biomass)
-        nodes = self.mesh.topology.body_corners
-        return Reaction(nodes[:, None], np.ones((1, 1)), lumped[nodes, None])
+    def reaction(self) -> Basis:
+        """The functions at the points of the biomass at which uptake and growth are integrated."""
+        return self.integration.reaction()
 
     def lumped(self, where: np.ndarray | slice = slice(None)) -> np.ndarray:
         """(corners,) um2, a third of the area of the triangles ``where`` around each corner."""
@@ -132,46 +138,112 @@ class Space:
         nodal[self.mesh.cells] = np.einsum("ab,tb...->ta...", down, field[self.cells])
         return nodal
 
-    def at_points(self, field: np.ndarray) -> np.ndarray:
-        """(..., T, q) fields (..., count) at the quadrature points."""
-        return field[..., self.cells] @ self.table.values.T
+    @cached_property
+    def inlet(self) -> End:
+        """The functions along the inlet."""
+        return self._end(self.dofs.inlet)
 
-    def mass(self, coefficient: np.ndarray) -> np.ndarray:
-        """(T, k, k) element matrices of (c u, v), from c dx (T, q)."""
-        k = self.cells.shape[1]
-        return (coefficient @ self.table.products).reshape(-1, k, k)
+    @cached_property
+    def outlet(self) -> End:
+        """The functions along the outlet."""
+        return self._end(self.dofs.outlet)
 
-    def load(self, coefficient: np.ndarray) -> np.ndarray:
-        """(T, ..., k) element loads (c, v), from c dx (T, ..., q), in one matrix product."""
-        flat = coefficient.reshape(-1, coefficient.shape[-1])
-        return (flat @ self.table.values).reshape(*coefficient.shape[:-1], -1)
+    def _end(self, edges: np.ndarray) -> End:
+        y = self.mesh.points[:, 1]
+        lengths = y[edges[:, -1]] - y[edges[:, 0]]
+        return End(edges, self.count, lengths, *elements.edge_table(self.order))
 
-    def end_nodes(self, edges: np.ndarray) -> np.ndarray:
-        """Nodes of an end's edges (E, order + 1), each once."""
-        return np.append(edges[:, :-1].ravel(), edges[-1, -1])
 
-    def end_lengths(self, edges: np.ndarray) -> np.ndarray:
-        """(E,) lengths of the edges of an end, um."""
-        return self.mesh.points[edges[:, -1], 1] - self.mesh.points[edges[:, 0], 1]
+@dataclass(frozen=True, eq=False)
+class End:
+    """Functions along an end of the mesh, and its forms <., v>.
 
-    def end_loads(self, edges: np.ndarray, speed: np.ndarray) -> np.ndarray:
-        """(E, e) integrals of u N_i over each edge of an end, for a speed (count,) um/h: um2/h."""
-        along, weights = elements.edge_table(self.order)
-        u = speed[edges] @ along.T
-        return self.end_lengths(edges)[:, None] * ((u * weights) @ along)
+    edges: (E, e) nodes of each edge, from the lower wall up, of ``count`` in all; lengths: (E,) um;
+    values: (p, e) of an edge's functions at its quadrature points, with weights (p,).
+    """
 
-    def end_masses(self, edges: np.ndarray, speed: np.ndarray) -> np.ndarray:
-        """(E, e, e) integrals of u N_i N_j over each edge of an end: um2/h."""
-        along, weights = elements.edge_table(self.order)
-        weight = (speed[edges] @ along.T) * weights * self.end_lengths(edges)[:, None]
-        return (along.T * weight[:, None]) @ along
+    edges: np.ndarray
+    count: int
+    lengths: np.ndarray
+    values: np.ndarray
+    weights: np.ndarray
 
-    def summed(self, edges: np.ndarray, loads: np.ndarray) -> np.ndarray:
-        """(count,) sum of loads (E, e) on the edges of an end."""
-        return np.bincount(edges.ravel(), loads.ravel(), self.count)
+    @property
+    def nodes(self) -> np.ndarray:
+        """Nodes of the edges, each once."""
+        return np.append(self.edges[:, :-1].ravel(), self.edges[-1, -1])
 
-    def mean_over(self, edges: np.ndarray, field: np.ndarray) -> float:
-        """Mean of a field (count,) over an end."""
-        loads = self.end_loads(edges, np.ones(self.count))
-        return float(np.sum(loads * field[edges]) / loads.sum())
+    def load(self, u: np.ndarray) -> np.ndarray:
+        """(E, e) of <u, v> for a speed u (count,) um/h: um2/h."""
+        return self.lengths[:, None] * ((self._speed(u) * self.weights) @ self.values)
 
+    def mass(self, u: np.ndarray) -> np.ndarray:
+        """(E, e, e) of <u C, v> for a speed u (count,) um/h: um2/h."""
+        c = self._speed(u) * self.weights * self.lengths[:, None]
+        return (self.values.T * c[:, None]) @ self.values
+
+    def _speed(self, u: np.ndarray) -> np.ndarray:
+        return u[self.edges] @ self.values.T
+
+    def assembled(self, u: np.ndarray) -> np.ndarray:
+        """(count,) sum of the loads of a speed u (count,)."""
+        return np.bincount(self.edges.ravel(), self.load(u).ravel(), self.count)
+
+    def mean(self, field: np.ndarray) -> float:
+        """Mean of a field (count,)."""
+        loads = self.load(np.ones(self.count))
+        return float(np.sum(loads * field[self.edges]) / loads.sum())
+
+
+@dataclass(frozen=True, eq=False)
+class Lumped:
+    """Integrals at the nodes, as in the paper: a node has a third of the area of its triangles."""
+
+    space: Space
+
+    def reaction(self) -> Basis:
+        """Return the nodes of the biomass, each with the function that is one there."""
+        mesh = self.space.mesh
+        lumped = self.space.lumped(mesh.biomass)
+        nodes = mesh.topology.body_corners
+        return Basis(nodes[:, None], self.space.count, np.ones((1, 1)), lumped[nodes, None])
+
+    def mass(self) -> np.ndarray:
+        """(T, 3, 3) um2 of (u, v)."""
+        return each(self.space.mesh.areas / 3, np.eye(3)[None])
+
+    def finer(self, degrees: int) -> tuple[Basis, np.ndarray]:
+        """Return the same rule for every degree, and the matrix (1, 1) that keeps a density."""
+        return self.space.reaction, np.ones((1, 1))
+
+
+@dataclass(frozen=True, eq=False)
+class Quadrature:
+    """Integrals at the quadrature points for products."""
+
+    space: Space
+
+    def reaction(self) -> Basis:
+        """Return the quadrature points of the biomass."""
+        at = self.space.at
+        biomass = self.space.mesh.biomass
+        return Basis(at.cells[biomass], at.count, at.values, at.dx[biomass])
+
+    def mass(self) -> np.ndarray:
+        """(T, k, k) um2 of (u, v)."""
+        return self.space.at.mass(self.space.at.dx)
+
+    def finer(self, degrees: int) -> tuple[Basis, np.ndarray]:
+        """Return the functions in the biomass at points of a more exact quadrature.
+
+        Its degree is larger by ``degrees``. The matrix (q, p) takes a density there, linear in each
+        triangle.
+        """
+        space = self.space
+        mesh = space.mesh
+        biomass = mesh.biomass
+        degree = elements.DEGREES[space.order] + degrees
+        of = elements.table(space.order, mesh.geometry, degree)
+        dx = elements.weights(mesh.points[mesh.cells[biomass]], of)
+        fit = elements.linear_fit(space.table).T @ of.linear.T
+        return Basis(space.cells[biomass], space.count, of.values, dx), fit

@@ -27,7 +27,8 @@ import shapely
 
 from repro.errors import NotCovered, OriginFolded
 from repro.fem import elements, linear
-from repro.fem.assembly import ElementSystem, mass
+from repro.fem.assembly import ElementSystem
+from repro.fem.forms import mass
 from repro.fem.mesh import Mesh, checked_bends, triangle_areas
 from repro.timing import timed
 

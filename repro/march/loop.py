@@ -220,7 +220,7 @@ def _grow(stages: Stages, scheme: Scheme, state: RestartState,
 
 
 def row_times(scheme: Scheme, growth: Growth | None, output: Output) -> tuple[float, ...]:
-    """Times (h) of rows after t = 0, ascending: ``output.times``, or those of the scheme."""
+    """Return the times (h) of rows after t = 0, ascending: ``output.times``, or the scheme's."""
     if growth is None:
         return ()
     return scheme.rows(growth) if output.times is None else output.times
@@ -233,7 +233,7 @@ def _row_time_at(rows: tuple[float, ...], time: float) -> float | None:
 
 def _after_step(state: RestartState, step: StepResult, solved: Solved,
                 control: StepControl) -> RestartState:
-    """The state after one more step, which is not reported yet."""
+    """Return the state after one more step, which is not reported yet."""
     before = newton_counts(step.before[1]) if step.before else {}
     counts = sum_counts(state.iterations, {"growth": step.iterations}, before,
                         newton_counts(solved))
@@ -249,12 +249,12 @@ def make_report(state: RestartState, pore: Pore, solved: Solved,
 
 
 def mark_reported(state: RestartState, time: float) -> RestartState:
-    """The state after a row at a time (h), without steps to report."""
+    """Return the state after a row at a time (h), without steps to report."""
     return RestartState(state.pore, state.step_control, row=time)
 
 
 def contiguous(pore: Pore) -> Pore:
-    """The same pore with contiguous arrays.
+    """Return the same pore with contiguous arrays.
 
     A sum over a strided view may differ in the last bit from that over its copy in a checkpoint.
     """
@@ -268,7 +268,7 @@ def contiguous(pore: Pore) -> Pore:
 
 
 def _contiguous_arrays(data: Data) -> Data:
-    """A dataclass with its strided arrays copied; the same object if it has none."""
+    """Return a dataclass with its strided arrays copied, or the same object if it has none."""
     arrays = {each.name: getattr(data, each.name) for each in fields(data) if each.init}
     strided = {name: np.ascontiguousarray(array) for name, array in arrays.items()
                if isinstance(array, np.ndarray) and not array.flags.forc}
@@ -306,7 +306,7 @@ def newton_counts(solved: Solved) -> dict[str, int]:
 
 
 def sum_counts(*counts: dict[str, int]) -> dict[str, int]:
-    """The sum of counts, key by key."""
+    """Add counts, key by key."""
     total: Counter[str] = Counter()
     for count in counts:
         total.update(count)

@@ -68,7 +68,7 @@ def simulate(scene: Source, shape: Shape | None = None,
 
 
 def shaped(scene: Scene, shape: Shape) -> Scene:
-    """The scene with another boundary of the aggregate at t = 0, checked like a scene file."""
+    """Replace the boundary of the aggregate at t = 0, and check the scene like a scene file."""
     tables = scene_tables(scene)
     seed = dict(tables.get("aggregate", {}))
     for key in ("radius", "position"):
@@ -78,7 +78,7 @@ def shaped(scene: Scene, shape: Shape) -> Scene:
 
 
 def ends_soon(scene: Scene, state: RestartState) -> bool:
-    """Does the next step depend on growth.end, because it may be cut there?
+    """Return whether the next step depends on growth.end, because it may be cut there.
 
     A step may be STRETCH times as long as its step control proposes.
     """
@@ -87,18 +87,18 @@ def ends_soon(scene: Scene, state: RestartState) -> bool:
 
 
 def same_rows(one: Scene, other: Scene, time: float) -> bool:
-    """Do runs of two scenes have the same rows up to a time (h)?"""
+    """Return whether runs of two scenes have the same rows up to a time (h)."""
     first = [row for row in row_times(one) if row <= time]
     return first == [row for row in row_times(other) if row <= time]
 
 
 def row_times(scene: Scene) -> tuple[float, ...]:
-    """Times (h) of rows after t = 0, ascending: :func:`repro.march.loop.row_times`."""
+    """Return the times (h) of rows after t = 0: :func:`repro.march.loop.row_times`."""
     return loop.row_times(_scheme(scene), scene.growth, scene.output)
 
 
 def rows_within(scene: Scene) -> set[float]:
-    """Times (h) of rows that may lie within steps: they are not at a known end of a step."""
+    """Return the times (h) of rows that may lie within a step, not at a known end of one."""
     return set(row_times(scene)) - {0.0, *_scheme(scene).ends(scene)}
 
 

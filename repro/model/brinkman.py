@@ -29,6 +29,7 @@ from functools import cached_property
 import numpy as np
 
 from repro.fem import elements
+from repro.fem.forms import product
 from repro.fem.space import Space
 
 #: Longest edge over the thickness of the layer, by order. In one dimension a node overshoots where
@@ -83,7 +84,7 @@ class Permeable:
         k = velocity.cells.shape[1]
         drag = velocity.mesh.biomass / self.permeability
         blocks = self._divergence()
-        along = velocity.mass(drag[:, None] * velocity.at.dx)
+        along = velocity.at.mass(drag[:, None] * velocity.at.dx)
         blocks[:, :k, :k] += along + self._friction()
         blocks[:, k:, k:] += along
         return blocks
@@ -93,9 +94,7 @@ class Permeable:
         where = self.widened | (self.spans & ~self.velocity.mesh.biomass)
         weight = DIVERGENCE * self.viscosity * where
         at = self.velocity.gradients_at
-        slopes = at.slopes.reshape(*at.dx.shape, -1)
-        weighted = (weight[:, None] * at.dx)[:, :, None] * slopes
-        return np.swapaxes(slopes, 1, 2) @ weighted
+        return product(at.div, weight[:, None] * at.dx, at.div)
 
     def _friction(self) -> np.ndarray:
         """(T, k, k) of (b u_x, v_x) over the walls under widened triangles."""

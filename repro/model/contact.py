@@ -361,8 +361,9 @@ def _on_division(division: Division | None,
 
 def same_arcs(one: Division | None, other: Division | None) -> bool:
     """Do two divisions of a mesh divide the same arcs, so that their meshes have the same nodes?"""
-    arcs = [np.zeros(0) if division is None else division.arcs for division in (one, other)]
-    return np.array_equal(*arcs)
+    if one is None or other is None:
+        return one is other
+    return np.array_equal(one.arcs, other.arcs)
 
 
 class _Trials:
@@ -421,14 +422,15 @@ class _Trials:
         """Positions (N, 2) um and pressures from which a trial may start, the best ones first: the
         last two shapes, extrapolated in the advance of the line that moves most, then each of
         them."""
-        *before, last = self._trials
-        if before and len(before[0].advances) == len(advances):
-            line = np.argmax(np.abs(last.advances - before[0].advances))
-            moved = last.advances[line] - before[0].advances[line]
+        first, last = self._trials[0], self._trials[-1]
+        if len(self._trials) == 2 and len(first.advances) == len(advances):
+            line = np.argmax(np.abs(last.advances - first.advances))
+            moved = last.advances[line] - first.advances[line]
             part = (advances[line] - last.advances[line]) / moved if moved else 0.0
             part = min(max(part, -1.0), 1.0)
-            ahead = [now + part * (now - then) for now, then in zip(last.smooth, before[0].smooth)]
-            yield last.on(division, (ahead[0], ahead[1]))
+            points, pressure = (end + part * (end - start)
+                                for start, end in zip(first.smooth, last.smooth))
+            yield last.on(division, (points, pressure))
         yield last.on(division, last.smooth)
         yield self._start.on(division, self._start.smooth)
 
@@ -459,9 +461,11 @@ class _Trials:
         A divided arc may have a kink where its contact begins. The undivided arc rounds it off,
         which can turn a triangle over.
         """
-        for points, pressure in self._guesses(advances, division):
+        guesses = list(self._guesses(advances, division))
+        for points, pressure in guesses:
             if locked.body.strained(points[locked.mesh.body]).J.min() > 0:
-                break
+                return replace(locked.moved(points), pressure=pressure)
+        points, pressure = guesses[-1]
         return replace(locked.moved(points), pressure=pressure)
 
 

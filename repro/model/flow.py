@@ -35,8 +35,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from repro.fem.assembly import ElementSystem, each, saddle_blocks, saddle_system
+from repro.fem.assembly import ElementSystem, saddle_blocks, saddle_system
 from repro.fem.brief import brief
+from repro.fem.forms import each, product
 from repro.fem.mesh import Mesh
 from repro.fem.space import Space
 from repro.model.brinkman import Permeable
@@ -101,6 +102,52 @@ class Bubble:
         return np.linalg.inv(each(20 * viscosity, block))
 
 
+@dataclass(frozen=True, eq=False)
+class Linear:
+    """Linear velocity and pressure; tau: (T, 2, 2) um2, by which grad p drives the correction."""
+
+    velocity: Space
+    tau: np.ndarray
+
+    @property
+    def lower(self) -> np.ndarray:
+        """(T, 3, 3) of (tau grad p, grad q)."""
+        gradients = self.velocity.mesh.gradients
+        return each(self.velocity.mesh.areas, gradients @ self.tau @ np.swapaxes(gradients, 1, 2))
+
+    def prescribed(self) -> np.ndarray:
+        """:func:`prescribed`, with u_x at the inlet scaled so that the discrete flux is exactly
+        u_ave W: linear elements replace the parabola by its chords, which lose 1 / n^2 of it."""
+        inlet = self.velocity.inlet
+        value = prescribed(self.velocity)
+        flux = inlet.load(value[: self.velocity.count]).sum()
+        value[inlet.nodes] *= self.velocity.mesh.width / flux
+        return value
+
+    def unit(self, u: np.ndarray, pressure: np.ndarray, work: float) -> UnitFlow:
+        """The flow of a velocity and a pressure, with the loss (6)."""
+        mesh = self.velocity.mesh
+        slope = np.einsum("tai,ta->ti", mesh.gradients, pressure[mesh.triangles])
+        correction = np.einsum("tij,tj->ti", self.tau, slope)
+        return UnitFlow(u, pressure, correction, _drop(pressure_space(self.velocity), pressure))
+
+
+@dataclass(frozen=True, eq=False)
+class TaylorHood:
+    """Velocity of order 2 or 3 with a pressure of one order less, which needs no tau."""
+
+    velocity: Space
+    lower: None = None
+
+    def prescribed(self) -> np.ndarray:
+        """:func:`prescribed`: these velocities represent the parabola exactly."""
+        return prescribed(self.velocity)
+
+    def unit(self, u: np.ndarray, pressure: np.ndarray, work: float) -> UnitFlow:
+        """The flow of a velocity and a pressure; its loss is the work of the inlet."""
+        return UnitFlow(u, pressure, None, work)
+
+
 def poiseuille_loss(length: float, width: float) -> float:
     """Loss (1/um) of plane Poiseuille flow of mean velocity one over a length (um): 12 L / W^2."""
     return 12 * length / width**2
@@ -114,9 +161,8 @@ def pressure_space(velocity: Space) -> Space:
 def divergence(velocity: Space) -> np.ndarray:
     """(T, m, 2k) element matrices of (q, div u): columns u_x of all nodes, then u_y."""
     at = velocity.gradients_at
-    slopes = at.slopes.reshape(*at.dx.shape, -1)
-    values = pressure_space(velocity).values_at(velocity.gradient_table)
-    return values.T @ (at.dx[:, :, None] * slopes)
+    q = pressure_space(velocity).values_at(velocity.gradient_table)
+    return product(q, at.dx, at.div)
 
 
 def viscous(velocity: Space, viscosity: np.ndarray, interface: str) -> np.ndarray:
@@ -127,15 +173,12 @@ def viscous(velocity: Space, viscosity: np.ndarray, interface: str) -> np.ndarra
         return laplace
     at = velocity.gradients_at
     k = velocity.cells.shape[1]
-    weight = (viscosity[:, None] * at.dx)[:, None, :]
-    matrices = np.zeros((len(laplace), 2 * k, 2 * k))
-    # nu u_j,i v_i,j: rows of component i of v, columns of component j of u.
-    for i, j in np.ndindex(2, 2):
-        test, trial = at.slopes[:, :, j], at.slopes[:, :, i]
-        matrices[:, i * k: i * k + k, j * k: j * k + k] = (weight * np.swapaxes(test, 1, 2)) @ trial
-    for first in (0, k):
-        matrices[:, first: first + k, first: first + k] += laplace
-    return matrices
+    matrices = product(at.div, viscosity[:, None] * at.dx, at.div).reshape(-1, 2, k, 2, k)
+    # nu u_j,i v_i,j is nu u_i,i v_j,j with its functions exchanged: (T, i, a, j, b).
+    matrices = np.swapaxes(matrices, 2, 4).copy()
+    for i in (0, 1):
+        matrices[:, i, :, i] += laplace
+    return matrices.reshape(-1, 2 * k, 2 * k)
 
 
 @timed("flow")
@@ -149,38 +192,32 @@ def unit_flow(velocity: Space, viscosity_ratio: float = 1.0, *, interface: str =
     """
     mesh = velocity.mesh
     viscosity = np.where(mesh.biomass, viscosity_ratio, 1.0)
-    mobility = element.mobility(mesh, viscosity, interface) if velocity.order == 1 else None
+    pair: Linear | TaylorHood = TaylorHood(velocity)
+    if velocity.order == 1:
+        pair = Linear(velocity, element.mobility(mesh, viscosity, interface))
     system = mesh.topology.system(("flow", interface, velocity.order),
                                   lambda: _system(velocity, interface))
     if permeability is None:
-        blocks = stokes(velocity, viscosity, interface, mobility)
+        blocks = stokes(velocity, viscosity, interface, pair.lower)
     else:
         body = Permeable(velocity, permeability)
         system = system.with_constrained(body.constrained(system.constrained))
         blocks = stokes(velocity, body.viscosity, interface, None, body.matrices())
-    value = prescribed(velocity)
+    value = pair.prescribed()
     load = system.product(blocks, value)
     solution = value + system.solve(blocks, -load)
     n = velocity.count
     u = solution[: 2 * n].reshape(2, n).T
-    pressure = solution[2 * n:]
-    if mobility is None:
-        return UnitFlow(u, pressure, None, work(load, solution, mesh.width))
-    slope = np.einsum("tai,ta->ti", mesh.gradients, pressure[mesh.triangles])
-    correction = np.einsum("tij,tj->ti", mobility, slope)
-    return UnitFlow(u, pressure, correction, _drop(pressure_space(velocity), pressure))
+    return pair.unit(u, solution[2 * n:], work(load, solution, mesh.width))
 
 
 def stokes(velocity: Space, viscosity: np.ndarray, interface: str,
-           mobility: np.ndarray | None, more: np.ndarray | None = None) -> np.ndarray:
+           lower: np.ndarray | None, more: np.ndarray | None = None) -> np.ndarray:
     """(T, 2k + m, 2k + m) element matrices of velocity and pressure.
 
-    viscosity: (T,) nu_r; mobility: (T, 2, 2) um2, tau; more: (T, 2k, 2k) added to a(u, v).
+    viscosity: (T,) nu_r; lower: (T, m, m) of (tau grad p, grad q), None without tau; more: (T, 2k,
+    2k) added to a(u, v).
     """
-    lower = None
-    if mobility is not None:
-        slopes = velocity.mesh.gradients
-        lower = each(velocity.mesh.areas, slopes @ mobility @ np.swapaxes(slopes, 1, 2))
     blocks = saddle_blocks(viscous(velocity, viscosity, interface), divergence(velocity), lower)
     if more is not None:
         size = more.shape[1]
@@ -193,26 +230,20 @@ def _system(velocity: Space, interface: str) -> ElementSystem:
     traction form [E10]."""
     dofs = velocity.dofs
     constrained = np.zeros((velocity.count, 2), bool)
-    constrained[np.concatenate([dofs.walls, velocity.end_nodes(dofs.inlet)])] = True
+    constrained[np.concatenate([dofs.walls, velocity.inlet.nodes])] = True
     if interface == "traction":
-        constrained[velocity.end_nodes(dofs.outlet), 1] = True
+        constrained[velocity.outlet.nodes, 1] = True
     pressure = pressure_space(velocity).cells
     return saddle_system(velocity.cells, pressure, constrained, dofs.elimination,
                          velocity.mesh.topology.method)
 
 
 def prescribed(velocity: Space) -> np.ndarray:
-    """(2n + m,) values of the constrained unknowns: u_x at the inlet (3), scaled so that the
-    discrete flux is exactly u_ave W. Linear elements replace the parabola by its chords, which lose
-    1 / n^2 of the flux; higher orders represent it exactly."""
-    dofs = velocity.dofs
-    width = velocity.mesh.width
+    """(2n + m,) values of the constrained unknowns: the parabola u_x at the inlet (3)."""
     value = np.zeros(2 * velocity.count + pressure_space(velocity).count)
-    nodes = velocity.end_nodes(dofs.inlet)
-    share = velocity.points[nodes, 1] / width
+    nodes = velocity.inlet.nodes
+    share = velocity.points[nodes, 1] / velocity.mesh.width
     value[nodes] = 6 * share * (1 - share)
-    if velocity.order == 1:
-        value[nodes] *= width / velocity.end_loads(dofs.inlet, value[: velocity.count]).sum()
     return value
 
 
@@ -225,8 +256,7 @@ def work(load: np.ndarray, solution: np.ndarray, width: float) -> float:
 
 def _drop(space: Space, pressure: np.ndarray) -> float:
     """Mean pressure at the inlet less the mean at the outlet (6)."""
-    at_inlet = space.mean_over(space.dofs.inlet, pressure)
-    return at_inlet - space.mean_over(space.dofs.outlet, pressure)
+    return space.inlet.mean(pressure) - space.outlet.mean(pressure)
 
 
 def scaled(unit: UnitFlow, mesh: Mesh, length: float, drive: Drive) -> Flow:
@@ -238,8 +268,7 @@ def scaled(unit: UnitFlow, mesh: Mesh, length: float, drive: Drive) -> Flow:
     if speed is None:
         speed = drive.driving_head / (viscosity * total_loss)
     scale = viscosity * speed
-    linear = Space(mesh, 1)
-    at_outlet = linear.mean_over(linear.dofs.outlet, unit.pressure[: mesh.corners])
+    at_outlet = Space(mesh, 1).outlet.mean(unit.pressure[: mesh.corners])
     head = scale * (unit.pressure - at_outlet)
     correction = None if unit.correction is None else speed * unit.correction
     return Flow(speed, speed * unit.velocity, head, correction, scale * unit.loss,

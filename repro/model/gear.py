@@ -34,7 +34,7 @@ import scipy.sparse as sp
 
 from repro.errors import TransportError
 from repro.fem import linear
-from repro.fem.assembly import ElementSystem, each
+from repro.fem.assembly import ElementSystem
 from repro.fem.space import Space
 from repro.model.kinetics import Sink
 from repro.model.transport import (
@@ -52,6 +52,9 @@ from repro.timing import timed
 #: the supply (seeds of 5 and 40 um), the largest error in concentrations, biomass made or uptake is
 #: 2e-2 at 1e-1, 9e-4 at 1e-2, 3.1e-4 at 1e-3: 0.1 % is kept.
 TOLERANCE = 1e-3
+#: A concentration may be below zero by this part of its supply, by the order of the elements. The
+#: lumped reaction of linear ones keeps them positive.
+BELOW_ZERO = {1: 0.0, 2: UNRESOLVED, 3: UNRESOLVED}
 #: Bounds on the ratio of successive steps.
 LONGER = 2.0
 SHORTER = 0.2
@@ -142,10 +145,7 @@ class System:
     @cached_property
     def storage(self) -> np.ndarray:
         """(T, k, k) um2, the mass matrix; lumped for linear functions."""
-        space = self.space
-        if space.order > 1:
-            return space.mass(space.at.dx)
-        return each(space.mesh.areas / 3, np.eye(3)[None])
+        return self.space.integration.mass()
 
     @cached_property
     def rows(self) -> tuple[Row, Row]:
@@ -168,23 +168,11 @@ class System:
         rows, columns = (part.ravel() for part in linear.pairs(self.space.cells))
         return sp.csc_matrix((self.storage.ravel(), (rows, columns)), shape=(size, size))
 
-    def at(self, fields: np.ndarray) -> np.ndarray:
-        """(2, r, q) values of concentrations (2, n) at the points of the reaction."""
-        pieces = self.space.reaction
-        return fields[:, pieces.cells] @ pieces.values.T
-
-    def assembled(self, loads: np.ndarray) -> np.ndarray:
-        """(n,) sum of loads (r, q) times the nodal functions."""
-        pieces = self.space.reaction
-        return np.bincount(pieces.cells.ravel(), (loads @ pieces.values).ravel(), self.space.count)
-
 
 def _sparse(space: Space, ends_constrained: bool) -> ElementSystem:
-    place = np.empty(space.count)
-    place[space.dofs.elimination] = np.arange(space.count)
     constrained = np.zeros(space.count, bool)
     constrained[both_ends(space)] = ends_constrained
-    return ElementSystem((space.cells, space.reaction.cells), place, constrained,
+    return ElementSystem((space.cells, space.reaction.cells), space.dofs.places, constrained,
                          space.mesh.topology.method)
 
 
@@ -349,10 +337,8 @@ def _tried(system: System, level: Level, step: float,
 
 
 def _lowest(problem: Problem) -> np.ndarray:
-    """(2, 1) least accepted concentrations, mg/L; zero for linear elements, whose lumped reaction
-    keeps them positive."""
-    part = 0.0 if problem.space.order == 1 else UNRESOLVED
-    return np.array([[-part * s.supply] for s in problem.both])
+    """(2, 1) least accepted concentrations, mg/L."""
+    return np.array([[-BELOW_ZERO[problem.space.order] * s.supply] for s in problem.both])
 
 
 def _factor(tolerance: float, size: float) -> float:
@@ -411,7 +397,7 @@ def _rates(system: System, fields: np.ndarray) -> tuple[Rate, Rate]:
     problem = system.problem
     if not system.living or problem.law is None:
         return 0.0, 0.0
-    acceptor, donor = system.at(fields)
+    acceptor, donor = system.space.reaction.evaluate(fields)
     return problem.law.growth_rate(acceptor, donor), problem.law.inert_rate(acceptor)
 
 
@@ -422,7 +408,7 @@ def _sink(system: System, active: np.ndarray, fields: np.ndarray, s: int,
     law = system.problem.law
     if law is None:
         return np.zeros_like(active), np.zeros_like(active)
-    concentrations = system.at(fields)
+    concentrations = system.space.reaction.evaluate(fields)
     substrate = concentrations[s]
     uptake, slope = law.own_uptake(s, *concentrations)
     if positive:
@@ -438,19 +424,16 @@ def _solved(system: System, s: int, interval: float, past: np.ndarray, slope: np
     the outflow and the consumption."""
     row = system.rows[s]
     sparse = system.sparse
-    pieces = system.space.reaction
-    k = pieces.cells.shape[1]
-    products = pieces.values[:, :, None] * pieces.values[:, None, :]
-    reaction = (slope @ products.reshape(-1, k * k)).reshape(-1, k, k)
-    entries = row.operator + row.storage / interval + sparse.entries(1, reaction)
-    right = row.mass @ past / interval + row.source - system.assembled(offset)
+    reaction = system.space.reaction
+    entries = row.operator + row.storage / interval + sparse.entries(1, reaction.mass(slope))
+    right = row.mass @ past / interval + row.source - reaction.assembled(offset)
     constrained = np.where(sparse.constrained, row.supply, 0.0)
     known = row.matrix @ constrained + row.mass @ constrained / interval
     field = constrained
     solver = linear.factorised(sparse.filled(entries), system.space.mesh.topology.method)
     field[sparse.order] = solver.solve((right - known)[sparse.order])
-    consumed = slope * (field[pieces.cells] @ pieces.values.T) + offset
+    consumed = slope * reaction.evaluate(field) + offset
     stored = row.mass @ (field - past) / interval
-    entered = row.matrix @ field + stored - row.source + system.assembled(consumed)
+    entered = row.matrix @ field + stored - row.source + reaction.assembled(consumed)
     supplied = row.source.sum() + entered[sparse.constrained].sum()
     return field, (supplied, float(system.problem.outflow @ field), consumed.sum())

@@ -28,7 +28,7 @@ so that modes of J that the linear pressure does not constrain would grow.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Generic, TypeVar
 
@@ -36,9 +36,10 @@ import numpy as np
 
 from repro.errors import GrowthError, LinearError
 from repro.fem import elements
-from repro.fem.assembly import ElementSystem, Factored, each, saddle_blocks, saddle_system
+from repro.fem.assembly import ElementSystem, Factored, saddle_blocks, saddle_system
 from repro.fem.brief import brief
-from repro.fem.elements import Points, Table
+from repro.fem.elements import Table
+from repro.fem.forms import Basis, basis, each, product
 from repro.fem.linear import DEFAULT, Method
 from repro.fem.mesh import gradients, triangle_areas
 from repro.fem.newton import Newton, relative
@@ -117,22 +118,22 @@ class Body:
     reference: np.ndarray
 
     @cached_property
-    def at(self) -> Points:
-        """Quadrature points: weights and gradients of the reference."""
-        return elements.points(self.reference[self.shape.cells], self.shape.table)
+    def at(self) -> Basis:
+        """The displacements' functions in the reference configuration."""
+        cells = self.shape.cells
+        return basis(cells, len(self.reference), self.reference[cells], self.shape.table)
 
     @cached_property
-    def weighted(self) -> np.ndarray:
-        """(t, 2 q, k) um, its gradients times weights."""
-        return self.at.weighted
+    def pressures(self) -> Basis:
+        """The linear functions of the pressure."""
+        linear = self.shape.table.linear
+        return Basis(self.shape.triangles, self.shape.corners, linear, self.at.dx)
 
     def strained(self, position: np.ndarray) -> Strained:
         """The deformation (t, q, 2, 2) from the reference to positions (n, 2) um, with its terms in
         the stress."""
-        gradient = np.swapaxes(position[self.shape.cells], 1, 2) @ np.swapaxes(self.at.rows, 1, 2)
-        count, points = self.at.dx.shape
-        F = gradient.reshape(count, 2, points, 2).transpose(1, 3, 0, 2)
-        return Strained(elements.by_component(F))
+        F = self.at.gradient(position)
+        return Strained(elements.by_component(F.transpose(1, 3, 0, 2)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,12 +181,6 @@ class Strained:
         return self.A[..., None, None] * self.F + volumetric[..., None, None] * self.H
 
 
-def energy(F: np.ndarray) -> np.ndarray:
-    """mu/2 (J^(-2/3) tr C - 3) for mu = 1 (17), of F (..., 2, 2)."""
-    J = np.linalg.det(F)
-    return 0.5 * (J ** (-2 / 3) * (np.sum(F**2, axis=(-2, -1)) + 1) - 3)
-
-
 def piola(F: np.ndarray, P: np.ndarray) -> np.ndarray:
     """:meth:`Strained.piola` of F (..., 2, 2)."""
     return Strained(F).piola(P)
@@ -219,6 +214,48 @@ def gradient_stabilisation(position: np.ndarray, triangles: np.ndarray,
     weight = areas * h**2 / 12 * theta ** (2 / 3)
     return weight[:, None, None] * np.einsum("tai,tbi->tab", slopes, slopes)
 
+
+@dataclass(frozen=True, eq=False)
+class PressureGradient:
+    """Stabilisation on straight triangles; matrices: (t, 3, 3) of |grad P|^2."""
+
+    matrices: np.ndarray
+    gamma = 0.0
+
+    @staticmethod
+    def on(body: Body, known: np.ndarray) -> PressureGradient:
+        """The stabilisation on the last known shape (n, 2) um [E6]."""
+        expansion = body.strained(known).J[:, 0]
+        return PressureGradient(gradient_stabilisation(known, body.shape.triangles, expansion))
+
+    @staticmethod
+    def parts(growth: np.ndarray) -> int:
+        """Sub-steps of a growth theta / J (t, q)."""
+        return 1
+
+
+@dataclass(frozen=True, eq=False)
+class GradDiv:
+    """Stabilisation on curved triangles; gamma: its weight."""
+
+    gamma: float = GAMMA
+    matrices = np.zeros((1, 3, 3))
+
+    @staticmethod
+    def on(body: Body, known: np.ndarray) -> GradDiv:
+        """The stabilisation, which does not depend on the shape."""
+        return GradDiv()
+
+    @staticmethod
+    def parts(growth: np.ndarray) -> int:
+        """Sub-steps of a growth theta / J (t, q), of at most FACTOR each in most points."""
+        apart = np.quantile(np.abs(np.log(growth)), MOST_POINTS)
+        return max(1, int(np.ceil(apart / np.log(FACTOR))))
+
+
+#: By the geometry of the triangles.
+STABILISATIONS: dict[int, type[PressureGradient] | type[GradDiv]] = {1: PressureGradient,
+                                                                     2: GradDiv}
 
 Value = TypeVar("Value")
 
@@ -270,20 +307,18 @@ class System:
     """Residual and tangent of Pi for one body at one theta and prescribed coordinates."""
 
     def __init__(self, body: Body, constrained: np.ndarray, *,
-                 stabilising: np.ndarray | None = None, forces: np.ndarray | None = None,
-                 system: ElementSystem | None = None):
-        """constrained: (n, 2) True where a coordinate is prescribed; stabilising: (t, 3, 3) of
-        |grad P|^2, None on curved triangles; forces: (n, 2) um, nodal forces over mu_L that do not
-        depend on the shape (the t0 of (20)), none by default; system: the sparse system without
-        constraints, if it is known."""
+                 stabilisation: PressureGradient | GradDiv = GradDiv(),
+                 forces: np.ndarray | None = None, system: ElementSystem | None = None):
+        """constrained: (n, 2) True where a coordinate is prescribed; forces: (n, 2) um, nodal
+        forces over mu_L that do not depend on the shape (the t0 of (20)), none by default; system:
+        the sparse system without constraints, if it is known."""
         self.body = body
         self.constrained = constrained
-        self.stabilising = stabilising
+        self.stabilisation = stabilisation
         none = np.zeros(body.shape.corners, bool)
         rows = np.concatenate([constrained[:, 0], constrained[:, 1], none])
         self.sparse = (body.shape.constrained(rows) if system is None
                        else system.with_constrained(rows))
-        self.unknowns = self.sparse.kinds[0]
         self.free = self.sparse.free
         self.pull = np.zeros(len(rows))
         if forces is not None:
@@ -306,43 +341,40 @@ class System:
         residual = self.residual(position, pressure)
         return Iterate(position, pressure, residual, self.sizes, lag, self.free)
 
-    def _stiffening(self) -> np.ndarray | float:
+    def _stiffening(self) -> np.ndarray:
         """gamma theta^(-5/3)."""
-        return 0.0 if self.stabilising is not None else GAMMA * self.theta ** (-5 / 3)
+        return self.stabilisation.gamma * self.theta ** (-5 / 3)
 
     def _pressed(self, position: np.ndarray, pressure: np.ndarray) -> tuple[Strained, np.ndarray]:
         """The deformation, and P with its stabilisation (t, q)."""
         at = self.strained(position)
-        linear = pressure[self.body.shape.triangles] @ self.body.shape.table.linear.T
-        if self.stabilising is not None:
-            return at, linear
+        linear = self.body.pressures.evaluate(pressure)
         return at, linear + self._stiffening() * (at.J - self.theta)
 
     def residual(self, position: np.ndarray, pressure: np.ndarray) -> np.ndarray:
         """(2n + corners,): x of all nodes, y, then P of the corners. The caller ensures det F > 0.
         """
         at, P = self._pressed(position, pressure)
-        gap = (self.body.at.dx * (at.J - self.theta)) @ self.body.shape.table.linear
-        if self.stabilising is not None:
-            local = pressure[self.body.shape.triangles]
-            gap = gap - np.einsum("tab,tb->ta", self.stabilising, local)
-        return self._summed(self._forces(at.piola(P), self.body.weighted), gap) - self.pull
+        gap = self.body.pressures.load(self.body.at.dx * (at.J - self.theta))
+        local = pressure[self.body.shape.triangles]
+        gap -= np.einsum("tab,tb->ta", self.stabilisation.matrices, local)
+        return self._summed(self._forces(at.piola(P), self.body.at.weighted), gap) - self.pull
 
     def _sizes(self, position: np.ndarray) -> np.ndarray:
         """Sizes of the terms of the residual."""
         at = self.strained(position)
-        linear = self.body.shape.table.linear
-        terms = self._forces(at.A[..., None, None] * np.abs(at.F), np.abs(self.body.weighted))
-        return self._summed(terms, (self.body.at.dx * self.theta) @ linear) + np.abs(self.pull)
+        positive = replace(self.body.at.weighted, gradients=np.abs(self.body.at.weighted.gradients))
+        terms = self._forces(at.A[..., None, None] * np.abs(at.F), positive)
+        gap = self.body.pressures.load(self.body.at.dx * self.theta)
+        return self._summed(terms, gap) + np.abs(self.pull)
 
-    def _forces(self, stress: np.ndarray, weighted: np.ndarray) -> np.ndarray:
-        """(t, 2, k) integrals of stress (t, q, 2, 2) : grad v; weighted: (t, 2 q, k) dx grad v."""
-        return np.swapaxes(stress, 1, 2).reshape(len(stress), 2, -1) @ weighted
+    def _forces(self, stress: np.ndarray, weighted: Basis) -> np.ndarray:
+        """(t, 2, k) of (S, grad v) for a stress (t, q, 2, 2), from grad v dx."""
+        return weighted.flux(np.swapaxes(stress, 1, 2))
 
     def _summed(self, force: np.ndarray, gap: np.ndarray) -> np.ndarray:
         """(2n + corners,) sum over all triangles of forces (t, 2, k) and gaps (t, 3)."""
-        local = np.concatenate([force[:, 0], force[:, 1], gap], axis=1)
-        return np.bincount(self.unknowns.ravel(), local.ravel(), len(self.pull))
+        return self.sparse.assemble(np.concatenate([force[:, 0], force[:, 1], gap], axis=1))
 
     def tangent(self, position: np.ndarray, pressure: np.ndarray) -> np.ndarray:
         """(t, 2k + 3, 2k + 3) symmetric element matrices of the residual's derivative."""
@@ -359,16 +391,15 @@ class System:
         K = blocks[:, :, : 2 * k] + np.swapaxes(blocks[:, :, : 2 * k], 1, 2)
         exchanged = K.reshape(-1, 2, k, 2, k)  # the same memory
         exchanged += np.swapaxes(blocks[:, :, 2 * k:].reshape(exchanged.shape), 1, 3)
-        weighted = np.repeat(at.A, 2, axis=1)[:, :, None] * self.body.weighted
-        plain = np.swapaxes(self.body.at.rows, 1, 2) @ weighted
+        plain = self.body.at.stiffness(at.A, self.body.at.weighted)
         exchanged[:, 0, :, 0] += plain
         exchanged[:, 1, :, 1] += plain
-        volume = self.body.shape.table.linear.T @ each(dx * at.J, h)
-        return saddle_blocks(K, -volume, self.stabilising)
+        volume = product(self.body.pressures.values, dx * at.J, h)
+        return saddle_blocks(K, -volume, self.stabilisation.matrices)
 
     def _pulled(self, tensor: np.ndarray) -> np.ndarray:
         """(t, q, 2k) a tensor (t, q, 2, 2) times grad N_a: component x for every node a, then y."""
-        return (tensor @ self.body.at.slopes).reshape(*self.body.at.dx.shape, -1)
+        return (tensor @ self.body.at.gradients).reshape(*self.body.at.dx.shape, -1)
 
     def factored(self, iterate: Iterate) -> Factored:
         """The derivative, factorised."""
@@ -455,16 +486,10 @@ def equilibrium(body: Body, theta: np.ndarray, position: np.ndarray, pressure: n
     if start.min() <= 0 or theta.min() <= 0:
         raise GrowthError("growth starts from a triangle that is turned over or from theta <= 0; "
                           "try a shorter growth.time_step")
-    stabilising = None
-    parts = 1
-    if body.shape.geometry == 1:
-        known = position if last is None else last
-        expansion = body.strained(known).J[:, 0]
-        stabilising = gradient_stabilisation(known, body.shape.triangles, expansion)
-    else:
-        apart = np.quantile(np.abs(np.log(theta / start)), MOST_POINTS)
-        parts = max(1, int(np.ceil(apart / np.log(FACTOR))))
-    system = System(body, constrained, stabilising=stabilising, forces=forces)
+    method = STABILISATIONS[body.shape.geometry]
+    known = position if last is None else last
+    parts = method.parts(theta / start)
+    system = System(body, constrained, stabilisation=method.on(body, known), forces=forces)
     first = Equilibrium(position, pressure, 0, factors)
     return reach(system, start, theta, first, prescribed, parts, modified_newton, patient,
                  tolerance)

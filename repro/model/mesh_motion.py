@@ -14,7 +14,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from repro.fem.assembly import ElementSystem, each, mass, saddle_blocks, saddle_system
+from repro.fem.assembly import ElementSystem, saddle_blocks, saddle_system
+from repro.fem.forms import each, mass
 from repro.fem.mesh import Mesh
 from repro.fem.space import Space
 from repro.model.flow import divergence

@@ -114,14 +114,14 @@ def nodal(space: Space, solution: Flow, viscosity: float, interface: str) -> np.
     wet = ~mesh.biomass
     pressure = pressure_space(space)
     at = space.gradients_at
-    grad = np.einsum("tai,tqka->tqik", solution.velocity[space.cells[wet]], at.slopes[wet])
+    grad = np.einsum("tai,tqka->tqik", solution.velocity[space.cells[wet]], at.gradients[wet])
     if interface == "traction":
         grad = grad + np.swapaxes(grad, 2, 3)
     head = solution.head[pressure.cells[wet]] @ pressure.values_at(space.gradient_table).T
     stress = viscosity * grad - head[..., None, None] * np.eye(2)
     of = elements.table(mesh.geometry, mesh.geometry, space.gradient_degree)
-    slopes = elements.points(mesh.points[mesh.cells[wet]], of).slopes
-    local = -np.einsum("tq,tqik,tqka->tai", at.dx[wet], stress, slopes)
+    _, gradients = elements.mapped(mesh.points[mesh.cells[wet]], of)
+    local = -np.einsum("tq,tqik,tqka->tai", at.dx[wet], stress, gradients)
     nodes = mesh.cells[wet].ravel()
     return np.column_stack([np.bincount(nodes, local[..., i].ravel(), len(mesh.points))
                             for i in (0, 1)])

@@ -27,12 +27,12 @@ import numpy as np
 import scipy.sparse as sp
 
 from repro.errors import LinearError, TransportError, Unresolved
-from repro.fem import elements
-from repro.fem.assembly import ElementSystem, Factored, each, mass
+from repro.fem.assembly import ElementSystem, Factored
 from repro.fem.brief import brief
+from repro.fem.forms import Basis, each, mass
 from repro.fem.mesh import Mesh
 from repro.fem.newton import Newton, relative
-from repro.fem.space import Space
+from repro.fem.space import End, Space
 from repro.model.flow import Flow
 from repro.model.kinetics import RateLaw, Sink, rate_law
 from repro.model.uptake_law import LARGEST_SATURATION, UptakeLaw
@@ -52,6 +52,8 @@ SWITCH = 0.5
 UNRESOLVED = 1e-3
 #: Nor is one above its supply by more than this part of it.
 OVERSHOOT = 0.02
+#: Largest accepted concentration over its supply, by the order of the elements.
+HIGHEST = {1: np.inf, 2: 1 + OVERSHOOT, 3: 1 + OVERSHOOT}
 #: Nor is the uptake if a quadrature of a degree higher by FINER differs by more than this. Both use
 #: the same concentrations, which are not solved for again with the finer quadrature: in base
 #: with fronts of half saturations from 1e-1 to 1e-6 of the supply, biomass made in 2 h was wrong by
@@ -167,12 +169,11 @@ def _through(space: Space, flow: Flow | None,
     zero without flow."""
     if flow is None:
         return np.zeros((1, 1, 1)), *np.zeros((3, space.count))
-    ends = space.dofs
     u_x = flow.velocity[:, 0]
     enters = u_x if inlet == "local" else np.full(space.count, flow.mean_velocity)
-    source = space.summed(ends.inlet, space.end_loads(ends.inlet, enters))
-    inflow = space.summed(ends.inlet, space.end_loads(ends.inlet, u_x))
-    outflow = space.summed(ends.outlet, space.end_loads(ends.outlet, u_x))
+    source = space.inlet.assembled(enters)
+    inflow = space.inlet.assembled(u_x)
+    outflow = space.outlet.assembled(u_x)
     return advection(space, flow, enters), source, inflow, outflow
 
 
@@ -187,15 +188,12 @@ def advection(space: Space, flow: Flow, enters: np.ndarray) -> np.ndarray:
 def _conserving(space: Space, velocity: np.ndarray, enters: np.ndarray) -> np.ndarray:
     """-(C w, grad v) with w of :func:`divergence_free`, u_x C v over the outlet, and (u_ave - u_x)
     C v over the inlet where (11) takes u_ave [E4]."""
-    at = space.at
     dofs = space.dofs
-    w_x, w_y = divergence_free(space, velocity) * -at.dx
-    along = w_x[..., None] * at.slopes[:, :, 0]
-    along += w_y[..., None] * at.slopes[:, :, 1]
-    matrices = space.load(np.swapaxes(along, 1, 2))
-    _add_at(matrices, dofs.beside_outlet, space.end_masses(dofs.outlet, velocity[:, 0]))
-    if enters is not velocity[:, 0] and np.any(enters[dofs.inlet] != velocity[dofs.inlet, 0]):
-        _add_at(matrices, dofs.beside_inlet, space.end_masses(dofs.inlet, enters - velocity[:, 0]))
+    u_x = velocity[:, 0]
+    matrices = space.at.advection(divergence_free(space, velocity) * -space.at.dx)
+    _add_at(matrices, dofs.beside_outlet, space.outlet.mass(u_x))
+    if np.any(enters[dofs.inlet] != u_x[dofs.inlet]):
+        _add_at(matrices, dofs.beside_inlet, space.inlet.mass(enters - u_x))
     return matrices
 
 
@@ -208,32 +206,21 @@ def divergence_free(space: Space, velocity: np.ndarray) -> np.ndarray:
     velocities vanishes only against functions of one order less, so a constant carried by u is not
     a solution. The exact velocity has psi = 0, and grad psi is no larger than the error of u.
     """
-    rows = space.at.rows
-    dofs = space.dofs
-    u = space.at_points(velocity.T)
-    speed = velocity[:, 0]
-    u_by_row = np.moveaxis(u * space.at.dx, 0, 2).reshape(len(rows), 1, -1)
-    load = np.bincount(space.cells.ravel(), (u_by_row @ rows).ravel(), space.count)
-    load += space.summed(dofs.inlet, space.end_loads(dofs.inlet, speed))
-    load -= space.summed(dofs.outlet, space.end_loads(dofs.outlet, speed))
+    at = space.at
+    u = at.evaluate(velocity.T)
+    load = at.assemble(at.flux(np.moveaxis(u * at.dx, 0, 2)[:, None]))
+    load += space.inlet.assembled(velocity[:, 0])
+    load -= space.outlet.assembled(velocity[:, 0])
     system = space.mesh.topology.system(("potential", space.order), lambda: _potential(space))
     psi = system.solve(space.stiffness, load)
-    gradient = (rows @ psi[space.cells][:, :, None]).reshape(len(rows), -1, 2)
-    return u - np.moveaxis(gradient, 2, 0)
+    return u - np.moveaxis(at.gradient(psi[:, None])[:, 0], 2, 0)
 
 
 def _potential(space: Space) -> ElementSystem:
     """The system of one function of the space, zero at one node of the outlet."""
     constrained = np.zeros(space.count, bool)
     constrained[space.dofs.outlet[0, 0]] = True
-    return ElementSystem(space.cells, _places(space), constrained, space.mesh.topology.method)
-
-
-def _places(space: Space) -> np.ndarray:
-    """(n,) place of each node in elimination order."""
-    places = np.empty(space.count)
-    places[space.dofs.elimination] = np.arange(space.count)
-    return places
+    return ElementSystem(space.cells, space.dofs.places, constrained, space.mesh.topology.method)
 
 
 def _by_divergence_free(space: Space, velocity: np.ndarray, correction: np.ndarray,
@@ -241,10 +228,9 @@ def _by_divergence_free(space: Space, velocity: np.ndarray, correction: np.ndarr
     """(w . grad C, v) with w = u - tau grad p, linear on each triangle, and, lumped, u_x C v over
     the inlet."""
     mesh = space.mesh
-    inlet = space.dofs.inlet
     w = velocity[mesh.triangles] - correction[:, None, :]
     matrices = mass(mesh.areas) @ (w @ np.swapaxes(mesh.gradients, 1, 2))
-    loads = space.end_loads(inlet, enters)
+    loads = space.inlet.load(enters)
     _add_at(matrices, space.dofs.beside_inlet, loads[:, :, None] * np.eye(loads.shape[1]))
     return matrices
 
@@ -267,12 +253,11 @@ def _apart(space: Space) -> ElementSystem:
 def _system(space: Space, ends_constrained: bool) -> ElementSystem:
     """Acceptor and donor of a node side by side, nodes in elimination order: their own triangles,
     then both together on the pieces of biomass, where the uptake couples them."""
-    place = _places(space)
     constrained = np.zeros(space.count, bool)
     constrained[both_ends(space)] = ends_constrained
     pieces = space.reaction.cells
     both = np.concatenate([pieces, space.count + pieces], axis=1)
-    rank = np.concatenate([place, place + 0.5])
+    rank = np.concatenate([space.dofs.places, space.dofs.places + 0.5])
     return ElementSystem((space.cells, space.count + space.cells, both), rank,
                          np.tile(constrained, 2),
                          space.mesh.topology.method)
@@ -280,7 +265,7 @@ def _system(space: Space, ends_constrained: bool) -> ElementSystem:
 
 def both_ends(space: Space) -> np.ndarray:
     """Nodes of the inlet and of the outlet."""
-    return np.concatenate([space.end_nodes(space.dofs.inlet), space.end_nodes(space.dofs.outlet)])
+    return np.concatenate([space.inlet.nodes, space.outlet.nodes])
 
 
 def supplied_everywhere(problem: Problem) -> Concentrations:
@@ -326,10 +311,13 @@ class Balance:
     problem: Problem
     sink: Sink | None
 
+    @property
+    def _reaction(self) -> Basis:
+        return self.problem.space.reaction
+
     def at(self, state: np.ndarray) -> np.ndarray:
         """(2, r, q) C_A and C_D in the points of the reaction."""
-        pieces = self.problem.space.reaction
-        return state.reshape(2, -1)[:, pieces.cells] @ pieces.values.T
+        return self._reaction.evaluate(state.reshape(2, -1))
 
     @property
     def _present_sink(self) -> Sink:
@@ -344,17 +332,6 @@ class Balance:
         """The law of uptake of both substrates."""
         return self._law.both
 
-    def _assembled(self, loads: np.ndarray) -> np.ndarray:
-        """(2n,) sum of loads (r, 2, q) times the nodal functions."""
-        return self._summed(loads @ self.problem.space.reaction.values)
-
-    def _summed(self, parts: np.ndarray) -> np.ndarray:
-        """(2n,) sum of the parts (r, 2, k) of each piece's nodes, for acceptor and donor."""
-        cells = self.problem.space.reaction.cells
-        count = self.problem.space.count
-        nodes = np.stack([cells, count + cells], axis=1)
-        return np.bincount(nodes.ravel(), parts.ravel(), 2 * count)
-
     def uptake(self, state: np.ndarray) -> np.ndarray:
         """(r, 2, q) um2 mg/L/h."""
         fractions = self._both.fraction(self.at(state))
@@ -366,7 +343,7 @@ class Balance:
         residual = self.problem.operator @ state - self.problem.source
         if self.sink is None:
             return residual
-        return residual + self._assembled(self.uptake(state) if loads is None else loads)
+        return residual + self._reaction.assembled(self.uptake(state) if loads is None else loads)
 
     def sizes(self, state: np.ndarray, loads: np.ndarray | None = None) -> np.ndarray:
         """Sizes (2n,) of the terms of the residual, all taken as positive; loads: the uptake, if it
@@ -375,7 +352,7 @@ class Balance:
         if self.sink is None:
             return sizes
         loads = self.uptake(state) if loads is None else loads
-        return sizes + self._summed(np.abs(loads) @ np.abs(self.problem.space.reaction.values))
+        return sizes + self._reaction.assemble(np.abs(loads) @ np.abs(self._reaction.values))
 
     def _slopes(self, state: np.ndarray, saturations: np.ndarray) -> np.ndarray:
         """(2, r, q) ds/dC at the saturations; zero where there is no substrate."""
@@ -399,16 +376,11 @@ class Balance:
 
     def _coupled(self, slopes: np.ndarray | None) -> np.ndarray:
         """(r, 2k, 2k) um2/h from the derivatives (2, 2, r, q) of uptake i by concentration j."""
-        pieces = self.problem.space.reaction
-        count, k = pieces.cells.shape
-        matrices = np.zeros((count, 2 * k, 2 * k))
+        count, k = self._reaction.cells.shape
         if slopes is None:
-            return matrices
-        products = pieces.values[:, :, None] * pieces.values[:, None, :]
-        for i, j in np.ndindex(2, 2):
-            block = slopes[i, j] @ products.reshape(-1, k * k)
-            matrices[:, i * k: i * k + k, j * k: j * k + k] = block.reshape(count, k, k)
-        return matrices
+            return np.zeros((count, 2 * k, 2 * k))
+        blocks = self._reaction.mass(slopes)
+        return blocks.transpose(2, 0, 3, 1, 4).reshape(count, 2 * k, 2 * k)
 
     def begun(self, state: np.ndarray) -> Iterate:
         """The first iterate."""
@@ -443,7 +415,7 @@ class Balance:
         apart = self._predicted(iterate, iterate.state) - about
         rise = np.einsum("ijrq,jrq->riq", self._uptake_slopes(about), apart)
         loads = self.sink.uptake(self._both.at_saturation(about)[0], self._law) + rise
-        return self.problem.operator @ iterate.state - self.problem.source + self._assembled(loads)
+        return self.residual(iterate.state, loads)
 
     def _predicted(self, iterate: Iterate, state: np.ndarray) -> np.ndarray:
         """(2, r, q) saturations at other concentrations by the linearisation."""
@@ -508,7 +480,7 @@ def steady(problem: Problem, sink: Sink | None,
     except TransportError:
         state, count = _eased(problem, sink, supply)
     solution = _checked(problem, state, count)
-    if sink is not None and problem.space.order > 1:
+    if sink is not None:
         _refuse_unresolved(problem, sink, solution)
     return solution
 
@@ -551,7 +523,7 @@ def _checked(problem: Problem, state: np.ndarray, iterations: int) -> Concentrat
     for name, field, substrate in zip(("acceptor", "donor"), state.reshape(2, -1), problem.both):
         if field.min() < -UNRESOLVED * substrate.supply:
             raise _outside(problem, name, field, int(field.argmin()), substrate)
-        if problem.space.order > 1 and field.max() > (1 + OVERSHOOT) * substrate.supply:
+        if field.max() / HIGHEST[problem.space.order] > substrate.supply:
             raise _outside(problem, name, field, int(field.argmax()), substrate)
     acceptor, donor = state.reshape(2, -1)
     return Concentrations(acceptor, donor, iterations)
@@ -568,18 +540,14 @@ def _refuse_unresolved(problem: Problem, sink: Sink, state: Concentrations) -> N
 def quadrature_error(problem: Problem, sink: Sink, state: Concentrations) -> float:
     """Relative difference of the donor's uptake between the quadrature and a finer one, at the same
     concentrations; the density of the biomass is linear in each triangle and does not grow."""
-    space = problem.space
-    mesh = problem.mesh
-    of = elements.table(space.order, mesh.geometry, elements.DEGREES[space.order] + FINER)
-    corners = mesh.points[mesh.cells[mesh.biomass]]
-    fitted = elements.linear_fit(space.table).T @ of.linear.T
-    densities = sink.active / space.reaction.dx @ fitted
+    reaction = problem.space.reaction
+    finer, fit = problem.space.integration.finer(FINER)
     both = np.stack([state.acceptor, state.donor])
-    acceptor, donor = both[:, space.cells[mesh.biomass]] @ of.values.T
-    rate = problem.rate_law.uptake(acceptor, donor)[1]
-    finer = float(np.vdot(densities * elements.weights(corners, of), rate))
+    _, rate = problem.rate_law.uptake(*finer.evaluate(both))
+    masses = sink.active / reaction.dx @ fit * finer.dx
+    exact = float(np.vdot(masses, rate))
     quadrature = float(Balance(problem, Sink(sink.active)).uptake(both.ravel())[:, 1].sum())
-    return abs(finer - quadrature) / quadrature if quadrature else 0.0
+    return abs(exact - quadrature) / quadrature if quadrature else 0.0
 
 
 def _outside(problem: Problem, name: str, field: np.ndarray, node: int,
@@ -614,7 +582,7 @@ class Flows(NamedTuple):
 def fluxes(problem: Problem, sink: Sink | None, state: Concentrations) -> tuple[Fluxes, Fluxes]:
     """Ledger of the acceptor and of the donor in one geometry: supplied and out from the ends,
     consumed from the uptake at the state."""
-    dofs = problem.space.dofs
+    space = problem.space
     both = np.stack([state.acceptor, state.donor])
     out = both @ problem.outflow
     consumed = np.zeros(2)
@@ -623,15 +591,15 @@ def fluxes(problem: Problem, sink: Sink | None, state: Concentrations) -> tuple[
     supplied = problem.source.reshape(2, -1).sum(axis=1)
     if problem.system.constrained.any():
         through = (problem.operator @ both.ravel()).reshape(2, -1)
-        supplied = through[:, both_ends(problem.space)].sum(axis=1)
-    enters = _end_means(problem.space, both, dofs.inlet, problem.inflow)
-    leaves = _end_means(problem.space, both, dofs.outlet, problem.outflow)
+        supplied = through[:, both_ends(space)].sum(axis=1)
+    enters = _end_means(space.inlet, both, problem.inflow)
+    leaves = _end_means(space.outlet, both, problem.outflow)
     acceptor, donor = np.column_stack([supplied, out, consumed, enters, leaves]).tolist()
     return Fluxes(*acceptor), Fluxes(*donor)
 
 
-def _end_means(space: Space, both: np.ndarray, edges: np.ndarray, load: np.ndarray) -> np.ndarray:
+def _end_means(end: End, both: np.ndarray, load: np.ndarray) -> np.ndarray:
     """(2,) mg/L, weighted with the flow through an end, plain where nothing flows."""
     if not load.any():
-        load = space.summed(edges, space.end_loads(edges, np.ones(space.count)))
+        load = end.assembled(np.ones(end.count))
     return both @ load / load.sum()

@@ -35,78 +35,194 @@ class UptakeLaw:
     -----
     Newton's method follows the saturation s = C / (C + K) in place of C. It rises from 0 to 1 with
     C for every law, so that a law need not be monotone.
+
+    Examples
+    --------
+    >>> from repro.model.uptake_law import LAWS
+    >>> law = LAWS["dual Monod"](half_saturation=1.0)
+    >>> float(law.fraction(1.0)), float(law.slope(1.0))
+    (0.5, 0.25)
     """
 
     half_saturation: Any
 
     @classmethod
     def constants(cls, substrate: Substrate) -> tuple[float, ...]:
-        """The law's constants of a substrate, in the order of its fields."""
+        """Return the law's constants of a substrate, in the order of the fields.
+
+        Parameters
+        ----------
+        substrate : Substrate
+            A substrate of the scene, with constants in mg/L.
+
+        Returns
+        -------
+        tuple of float
+            The half saturation K (mg/L). A subclass adds the values of its further fields, each in
+            the unit of its key.
+
+        Examples
+        --------
+        >>> import repro
+        >>> from repro.model.uptake_law import Monod
+        >>> Monod.constants(repro.load_scene("base").substrates.donor)
+        (1.0,)
+        """
         return (substrate.half_saturation,)
 
     @classmethod
     def of(cls, *substrates: Substrate) -> UptakeLaw:
-        """The law of several substrates at once; its constants are (k, 1, 1) arrays."""
+        """Make the law of several substrates at once; its constants are (k, 1, 1) arrays."""
         columns = zip(*map(cls.constants, substrates))
         return cls(*(np.array(column)[:, None, None] for column in columns))
 
     def __iter__(self) -> Iterator[UptakeLaw]:
-        """The laws of the single substrates; their constants are numbers."""
+        """Iterate over the laws of the single substrates; their constants are numbers."""
         columns = [getattr(self, field.name).ravel().tolist() for field in fields(self)]
         return (type(self)(*constants) for constants in zip(*columns))
 
     def fraction(self, concentration: Values) -> Values:
-        """m of max(C, 0), C in mg/L."""
+        """Return m of max(C, 0).
+
+        Parameters
+        ----------
+        concentration : float or array
+            C, mg/L, of any shape.
+
+        Returns
+        -------
+        float or array
+            The fraction m, of the shape of C, without unit; 0 at C = 0.
+
+        Raises
+        ------
+        NotImplementedError
+            If the subclass does not define it.
+
+        Examples
+        --------
+        >>> from repro.model.uptake_law import Monod
+        >>> float(Monod(half_saturation=1.0).fraction(3.0))
+        0.75
+        """
         raise NotImplementedError
 
     def slope(self, concentration: Values) -> Values:
-        """dm/dC of max(C, 0), L/mg."""
+        """Return dm/dC at max(C, 0).
+
+        Parameters
+        ----------
+        concentration : float or array
+            C, mg/L, of any shape.
+
+        Returns
+        -------
+        float or array
+            The slope dm/dC, L/mg, of the shape of C. At C = 0 it is 1 / K, its largest value.
+
+        Raises
+        ------
+        NotImplementedError
+            If the subclass does not define it.
+
+        Examples
+        --------
+        >>> from repro.model.uptake_law import Monod
+        >>> float(Monod(half_saturation=2.0).slope(0.0))
+        0.5
+        """
         raise NotImplementedError
 
     def largest(self, supply: float) -> float:
-        """An upper bound of m for concentrations up to a supply (mg/L)."""
+        """Return an upper bound of m for concentrations up to a supply.
+
+        Parameters
+        ----------
+        supply : float
+            The largest C, mg/L.
+
+        Returns
+        -------
+        float
+            The bound, without unit.
+
+        Raises
+        ------
+        NotImplementedError
+            If the subclass does not define it.
+
+        Examples
+        --------
+        >>> from repro.model.uptake_law import Monod
+        >>> Monod(half_saturation=1.0).largest(10.0)
+        1.0
+        """
         raise NotImplementedError
 
     def saturates(self, supply: float) -> bool:
-        """Is uptake nearly independent of C at the supply (mg/L)?"""
+        """Return whether uptake is nearly independent of C at a supply.
+
+        Parameters
+        ----------
+        supply : float
+            C, mg/L.
+
+        Returns
+        -------
+        bool
+            True if a small change of C hardly changes m.
+
+        Raises
+        ------
+        NotImplementedError
+            If the subclass does not define it.
+
+        Examples
+        --------
+        >>> from repro.model.uptake_law import Monod
+        >>> Monod(half_saturation=1.0).saturates(10.0)
+        True
+        """
         raise NotImplementedError
 
     def extended(self, concentration: Values) -> tuple[Values, Values]:
-        """m and dm/dC; below zero m continues along its tangent at zero."""
+        """Return m and dm/dC; below zero m continues along its tangent at zero."""
         slope = self.slope(concentration)
         return self.fraction(concentration) + np.minimum(concentration, 0.0) * slope, slope
 
     def proportional(self, concentration: Values) -> Values:
-        """C / K, the tangent at zero of m and of the saturation."""
+        """Return C / K, the tangent at zero of m and of the saturation."""
         return concentration / self.half_saturation
 
     def saturation(self, concentration: Values) -> Values:
-        """s = C / (C + K) of max(C, 0)."""
+        """Return s = C / (C + K) of max(C, 0)."""
         positive = np.maximum(concentration, 0.0)
         return positive / (positive + self.half_saturation)
 
     def saturation_slope(self, saturation: Values) -> Values:
-        """ds/dC = (1 - s)^2 / K, L/mg."""
+        """Return ds/dC = (1 - s)^2 / K, L/mg."""
         return (1 - saturation) ** 2 / self.half_saturation
 
     def concentration(self, saturation: Values) -> Values:
-        """C = K s / (1 - s), mg/L, for s up to LARGEST_SATURATION."""
+        """Return C = K s / (1 - s), mg/L, for s up to LARGEST_SATURATION."""
         return self.half_saturation * saturation / (1 - saturation)
 
     def at_saturation(self, saturation: Values) -> tuple[Values, Values | float]:
-        """m and dm/ds at a saturation."""
+        """Return m and dm/ds at a saturation."""
         bounded = np.minimum(saturation, LARGEST_SATURATION)
         concentration = self.concentration(bounded)
         slope = self.slope(concentration) / self.saturation_slope(bounded)
         return self.fraction(concentration), slope
 
     def sharpness(self, supply: Values) -> Values:
-        """The part of the supply (mg/L) over which uptake falls to zero: K / supply, at most 1.
+        """Return the part of the supply (mg/L) over which uptake falls to zero.
+
+        It is K / supply, at most 1.
         """
         return self.half_saturation / np.maximum(supply, self.half_saturation)
 
     def softened(self, factor: float, supply: Values) -> UptakeLaw:
-        """The law with K larger by a factor, up to the supply (mg/L)."""
+        """Return the law with K larger by a factor, up to the supply (mg/L)."""
         larger = np.minimum(factor * self.half_saturation, supply)
         return replace(self, half_saturation=np.maximum(self.half_saturation, larger))
 
@@ -115,23 +231,23 @@ class Monod(UptakeLaw):
     """Monod's law, m = C / (C + K): the fraction is the saturation itself."""
 
     def fraction(self, concentration: Values) -> Values:
-        """C / (C + K)."""
+        """Return C / (C + K)."""
         return self.saturation(concentration)
 
     def slope(self, concentration: Values) -> Values:
-        """K / (C + K)^2."""
+        """Return K / (C + K)^2, L/mg."""
         return self.half_saturation / (np.maximum(concentration, 0.0) + self.half_saturation) ** 2
 
     def largest(self, supply: float) -> float:
-        """One, for any supply."""
+        """Return one, for any supply."""
         return 1.0
 
     def saturates(self, supply: float) -> bool:
-        """True for a supply above K."""
+        """Return True for a supply above K."""
         return supply > self.half_saturation
 
     def at_saturation(self, saturation: Values) -> tuple[Values, float]:
-        """m = s."""
+        """Return m = s and dm/ds = 1."""
         return saturation, 1.0
 
 
@@ -140,5 +256,5 @@ LAWS: dict[str, type[UptakeLaw]] = {"dual Monod": Monod}
 
 
 def uptake_law(substrates: Substrates, kinetics: Kinetics) -> UptakeLaw:
-    """A scene's law of uptake of acceptor and donor."""
+    """Make a scene's law of uptake of acceptor and donor."""
     return LAWS[kinetics.law].of(substrates.acceptor, substrates.donor)

@@ -52,7 +52,7 @@ class SceneCheck:
                 f"{self.nodes} nodes at t = 0>")
 
     def tables(self) -> dict:
-        """The result as a dict for JSON."""
+        """Return the result as a dict for JSON."""
         return {**asdict(self), "modelled": dict(self.modelled)}
 
 
@@ -145,7 +145,7 @@ def _cost(estimate: Cost) -> Iterator[str]:
 
 
 def _seconds(value: float) -> str:
-    """A time with two digits, or three from 99.5 s to 120 s."""
+    """Write a time with two digits, or three from 99.5 s to 120 s."""
     if value < 120:
         return f"{value:.2g} s" if value < 99.5 else f"{value:.0f} s"
     return f"{value / 60:.0f} min" if value < 7200 else f"{value / 3600:.0f} h"

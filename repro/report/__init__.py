@@ -15,17 +15,17 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from repro.report import comparison, run_page
-from repro.report.reading import NoRun, read
+from repro.report.reading import read
 from repro.results import write_text
 from repro.results.files import atomic_path
 
-__all__ = ["NoRun", "compare", "write"]
+__all__ = ["compare", "write"]
 
 
 def write(folder: Path) -> Path:
     """Write ``report.html`` of the run in a folder; returns its path.
 
-    Raises NoRun if the folder holds no run, ValueError if its fields cannot be read.
+    Raises OutputError if the folder holds no run, or its fields cannot be read.
     """
     target = folder / "report.html"
     _write(target, run_page.build(read(folder)))
@@ -35,7 +35,7 @@ def write(folder: Path) -> Path:
 def compare(folders: Sequence[Path], target: Path) -> Path:
     """Write a page that compares two or more runs; returns its path.
 
-    Raises NoRun if a folder holds no run.
+    Raises OutputError if a folder holds no run.
     """
     _write(target, comparison.build([read(folder) for folder in folders]))
     return target

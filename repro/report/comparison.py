@@ -22,7 +22,7 @@ def build(runs: Sequence[Run]) -> str:
     figures = "".join(map(charts.svg, quantities.overlaid(runs, labels)))
     body = (_head(runs, labels) + _scenes(runs, labels) + _values(runs, labels)
             + page.section("Over time", f'<div class="charts">{figures}</div>' if figures else ""))
-    return page.page("Runs compared", body, ["charts.js"])
+    return page.page("Runs compared", body, ["errors.js", "charts.js"])
 
 
 def short(folders: Sequence[Path]) -> list[str]:
@@ -46,7 +46,7 @@ def _item(k: int, run: Run, label: str) -> str:
 
 def _describe_run(run: Run) -> str:
     last = f" to t = {run.times[-1]:.6g} h" if len(run.times) else ", no row"
-    return f"{run.record.get('scene')}, {run.record.get('status', 'status unknown')}{last}"
+    return f"{run.record['scene']}, {run.record['status']}{last}"
 
 
 def differences(runs: Sequence[Run]) -> list[tuple[str, ...]]:
@@ -54,7 +54,7 @@ def differences(runs: Sequence[Run]) -> list[tuple[str, ...]]:
 
     The value is "-" if a run does not have the key.
     """
-    scenes = [page.flat(run.record.get("tables", {})) for run in runs]
+    scenes = [page.flat(run.record["tables"]) for run in runs]
     keys = dict.fromkeys(key for keys in scenes for key in keys)
     return [(key, *_value_texts(key, scenes)) for key in keys if _differs(key, scenes)]
 

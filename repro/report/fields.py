@@ -14,6 +14,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
+from repro.errors import OutputError
 from repro.fem.transfer import located
 from repro.results import field_files, names
 from repro.results.arrays import ARRAYS
@@ -44,13 +45,13 @@ def index(folder: Path, name: str = "fields.pvd") -> list[tuple[float, Path]]:
 
 def listed_files(folder: Path, name: str = "fields.pvd") -> list[tuple[float, Path]]:
     """(time in h, file) of all listed fields, existing or not; only names that a
-    run uses. Raises ValueError if the list cannot be read."""
+    run uses. Raises OutputError if the list cannot be read."""
     if not (folder / name).exists():
         return []
     try:
         entries = ElementTree.fromstring(read(folder / name, MOST_TABLE)).iter("DataSet")
     except (OSError, ElementTree.ParseError) as error:
-        raise ValueError(f"{folder / name}: it cannot be read: {error}") from error
+        raise OutputError(f"{folder / name}: it cannot be read: {error}") from error
     named = [(float(entry.get("timestep", "nan")), entry.get("file", "")) for entry in entries]
     return [(time, folder / name) for time, name in named if _FILE.fullmatch(name)]
 

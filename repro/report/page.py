@@ -10,22 +10,22 @@ from html import escape
 from importlib import resources
 
 
-def page(title: str, body: str, scripts: Sequence[str]) -> str:
-    """A page with these scripts of the package.
+def page(title: str, body: str, scripts: Sequence[str] = (), style: str = "page.css") -> str:
+    """A page with these scripts and this style of the package.
 
     The browser runs only scripts whose hash is in the policy.
     """
-    style = _content("page.css")
-    code = [_content(name) for name in ("errors.js", *scripts)]
+    rules = _content(style)
+    code = list(map(_content, scripts))
     run = "".join(f"<script>{text}</script>\n" for text in code)
     return (f'<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-            f'<meta http-equiv="Content-Security-Policy" content="{policy(style, code)}">\n'
+            f'<meta http-equiv="Content-Security-Policy" content="{_policy(rules, code)}">\n'
             f'<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-            f"<title>{escape(title)}</title>\n<style>{style}</style>\n</head>\n<body>\n"
+            f"<title>{escape(title)}</title>\n<style>{rules}</style>\n</head>\n<body>\n"
             f'<pre id="errors" class="errors" hidden></pre>\n{body}\n{run}</body>\n</html>\n')
 
 
-def policy(style: str, code: Sequence[str] = ()) -> str:
+def _policy(style: str, code: Sequence[str]) -> str:
     """The content security policy of a page that has this style and these scripts, and loads no
     other file."""
     scripts = " ".join(map(_hash, code)) or "'none'"

@@ -19,7 +19,23 @@ TimeSeries = tuple[np.ndarray, np.ndarray]
 
 @dataclass(frozen=True)
 class Kind:
-    """A chart: its title, the name of its axis without the unit, and its quantities."""
+    """A chart over time.
+
+    Parameters
+    ----------
+    title : str
+        Title of the chart.
+    axis_name : str
+        Name of the vertical axis, without the unit.
+    drawn : tuple of str
+        Names of the columns that it draws, all in the same unit.
+
+    Examples
+    --------
+    >>> from repro.report.quantities import Kind
+    >>> Kind("Head loss", "head", ("head_loss_cm",)).axis
+    'head (cm)'
+    """
 
     title: str
     axis_name: str
@@ -37,7 +53,7 @@ def _middle(run: Run) -> np.ndarray:
 
 
 def _rate(name: str, part: str) -> Quantity:
-    """A part of a substrate's ledger over the length of the step, at the middle of the step."""
+    """Divide a part of a substrate's ledger by the length of the step, at the step's middle."""
     column = f"{name}_{part}_pg_per_m"
 
     def value(run: Run) -> TimeSeries:
@@ -70,12 +86,12 @@ KNOWN = names.KNOWN | {each.name: each for each in DERIVED}
 
 
 def _pair(pattern: str) -> tuple[str, ...]:
-    """The names of a quantity of both substrates, by a pattern."""
+    """Return the names of a quantity of both substrates, by a pattern."""
     return tuple(pattern.format(name) for name in SUBSTRATES)
 
 
 def _ledger(name: str) -> Kind:
-    """The chart of the rates in the ledger of a substrate."""
+    """Make the chart of the rates in the ledger of a substrate."""
     return Kind(f"Ledger: {name}", "rate",
                 tuple(f"{name}_{part}_ug_per_m_per_h" for part in PARTS))
 
@@ -101,7 +117,7 @@ KINDS = (
 
 
 def series(run: Run) -> dict[str, TimeSeries]:
-    """Times (h) and values of all quantities of a run that can be drawn, by name.
+    """Return times (h) and values of all quantities of a run that can be drawn, by name.
 
     Quantities that the run does not model are left out, and so is zero storage.
     """
@@ -117,7 +133,7 @@ def series(run: Run) -> dict[str, TimeSeries]:
 
 
 def charts_of(run: Run) -> list[Chart]:
-    """The charts of one run; none for a single row."""
+    """Make the charts of one run; none for a single row."""
     if len(run.times) < 2:
         return []
     drawable, marks = series(run), contact(run)
@@ -131,7 +147,7 @@ def charts_of(run: Run) -> list[Chart]:
 
 
 def overlaid(runs: Sequence[Run], labels: Sequence[str]) -> list[Chart]:
-    """A chart for each quantity, with one line for each run."""
+    """Make a chart for each quantity, with one line for each run."""
     known, overlays = [series(run) if len(run.times) > 1 else {} for run in runs], []
     for kind in KINDS:
         for name in kind.drawn:
@@ -143,8 +159,7 @@ def overlaid(runs: Sequence[Run], labels: Sequence[str]) -> list[Chart]:
 
 
 def _line(label: str, name: str, known: dict[str, TimeSeries]) -> Line:
-    """The line of a quantity; without points if it is unknown, so that each run keeps its colour.
-    """
+    """Make the line of a quantity. An unknown one has no points: each run keeps its colour."""
     times, values = known.get(name, (np.array([]), np.array([])))
     return Line(label, times, values, dots=name == "remeshed_nodes")
 

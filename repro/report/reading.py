@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-import csv
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
-from repro.results import COLUMNS, LEDGER_COLUMNS, parse_table
+from repro.errors import OutputError
+from repro.results import COLUMNS, parse_table
 from repro.results.files import MOST_TABLE, read_sealed, sha256
 from repro.results.files import read as read_file
 
-
-class NoRun(ValueError):
-    """A folder holds no readable run."""
+Content = TypeVar("Content")
+NEEDED = "the folder of a run is needed or, for a new run, another folder"
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,87 +36,55 @@ class Run:
 def read(folder: Path) -> Run:
     """Read the run in a folder.
 
-    The ``run.json`` of a run that is not running has the SHA-256 of its tables. Raises NoRun if the
-    folder holds no run, or its files have changed since they were written.
+    The ``run.json`` of a run that is not running has the SHA-256 of its tables. Raises OutputError
+    if the folder holds no run, or its files have changed since they were written.
     """
-    record = _read(folder, "run.json", read_sealed)
-    series = _read(folder, "timeseries.csv", lambda path: _series(_table(path, record), record))
+    record = read_record(folder)
     ledger = {}
-    if "ledger.csv" in hashes(record) or (folder / "ledger.csv").exists():
-        ledger = _read(folder, "ledger.csv", lambda path: _ledger(_table(path, record)))
-    return Run(folder, record, series, ledger)
+    if "ledger.csv" in record["sha256"] or (folder / "ledger.csv").exists():
+        ledger = _table(folder, "ledger.csv", record)
+    return Run(folder, record, _table(folder, "timeseries.csv", record), ledger)
 
 
-def hashes(record: dict) -> dict[str, str]:
-    """The SHA-256 of each file in a record, by name; empty while the run is running."""
-    digests = record.get("sha256")
-    return digests if isinstance(digests, dict) else {}
+def read_record(folder: Path, parse: Callable[[Path], dict] = read_sealed) -> dict:
+    """Read ``run.json``. Raises OutputError if it is missing or has changed since it was written.
+    """
+    return _read(folder, "run.json", parse)
 
 
-def require_unchanged(name: str, content: bytes, record: dict) -> None:
-    """Raise ValueError if the record has another SHA-256 for the content of a file."""
-    if name in hashes(record) and hashes(record)[name] != sha256(content):
+def _table(folder: Path, name: str, record: dict) -> dict[str, np.ndarray]:
+    """The columns of a table of the run with this record."""
+    return _read(folder, name, lambda path: parse_table(_unchanged(path, record)))
+
+
+def _unchanged(path: Path, record: dict) -> bytes:
+    """The content of a file. Raises ValueError if the record has another SHA-256 for it."""
+    content = read_file(path, MOST_TABLE)
+    if record["sha256"].get(path.name, sha256(content)) != sha256(content):
         raise ValueError("it is not as it was written: cut short or altered")
+    return content
 
 
 def require_columns(run: Run) -> None:
-    """Raise NoRun if the time series lacks a column of this version."""
+    """Raise OutputError if the time series lacks a column of this version."""
     if absent := set(COLUMNS) - run.series.keys():
-        raise NoRun(f"{run.folder}: timeseries.csv has no column {min(absent)}; a run of this "
-                    "version is needed")
+        raise OutputError(f"{run.folder}: timeseries.csv has no column {min(absent)}; a run of "
+                          "this version is needed")
 
 
 def require_lists(run: Run) -> None:
-    """Raise NoRun if a list of fields has changed since it was written."""
-    names = {"fields.pvd", "fields.sha256"} & hashes(run.record).keys()
-    for name in (name for name in names if (run.folder / name).exists()):
-        _read(run.folder, name, partial(_require_file, record=run.record))
+    """Raise OutputError if a list of fields has changed since it was written."""
+    for name in ("fields.pvd", "fields.sha256"):
+        if (run.folder / name).exists():
+            _read(run.folder, name, lambda path: _unchanged(path, run.record))
 
 
-def _require_file(path: Path, record: dict) -> None:
-    require_unchanged(path.name, read_file(path, MOST_TABLE), record)
-
-
-def _read(folder: Path, name: str, parse):
-    """Read one file of a run. Raises NoRun if it is missing or cannot be read."""
+def _read(folder: Path, name: str, parse: Callable[[Path], Content]) -> Content:
+    """Read one file of a run. Raises OutputError if it is missing or cannot be read."""
     try:
         return parse(folder / name)
     except FileNotFoundError:
-        raise NoRun(f"{folder}: it holds no run: {name} is missing; a folder that `repro run` "
-                    "wrote is needed") from None
-    except (OSError, ValueError, csv.Error) as error:
+        raise OutputError(f"{folder}: it holds no run: {name} is missing; {NEEDED}") from None
+    except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
-        raise NoRun(f"{folder}: {name} cannot be read: {reason}; a folder that `repro run` wrote "
-                    "is needed") from error
-
-
-def _table(path: Path, record: dict) -> dict[str, np.ndarray]:
-    """The columns of a table of the run with this record."""
-    content = read_file(path, MOST_TABLE)
-    require_unchanged(path.name, content, record)
-    return parse_table(content)
-
-
-def _series(series: dict[str, np.ndarray], record: dict) -> dict[str, np.ndarray]:
-    """The time series. Raises ValueError if its times do not ascend, or if it has fewer rows than
-    ``run.json``, which is written later."""
-    _require_finite(series, ["time_h"])
-    count = len(series["time_h"])
-    rows = record.get("rows")
-    if not isinstance(rows, int) or count < rows:
-        raise ValueError(f"it has {count} rows, and run.json tells of {rows}")
-    if (np.diff(series["time_h"]) <= 0).any():
-        raise ValueError("its times do not ascend")
-    return series
-
-
-def _ledger(ledger: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    _require_finite(ledger, LEDGER_COLUMNS)
-    return ledger
-
-
-def _require_finite(table: dict[str, np.ndarray], names: list[str]) -> None:
-    """Raise ValueError if a table lacks one of these columns, or its numbers are not finite."""
-    for name in names:
-        if name not in table or not np.isfinite(table[name]).all():
-            raise ValueError(f"a column {name} of finite numbers is needed")
+        raise OutputError(f"{folder}: {name} cannot be read: {reason}; {NEEDED}") from error

@@ -51,31 +51,29 @@ CONTROLS = """<div class="controls"><label>Field <select id="field"></select></l
 
 
 def build(run: Run) -> str:
-    """The text of the page. Raises ValueError if a file of fields cannot be read."""
+    """The text of the page. Raises OutputError if a file of fields cannot be read."""
     drawn = _charts(run, quantities.charts_of(run))
     packed = _packed(run, len(drawn))
     body = (_head(run) + _fields(run, packed) + drawn
             + f'<div class="pair">{_numbers(run)}{_cost(run)}</div>' + _modelled(run)
             + _provenance(run))
     more = page.data("fields", packed) if packed else ""
-    return page.page(f"{run.record.get('scene')}: a pore", body + more,
-                     ["charts.js", *(["mesh.js", "fields.js"] if packed else [])])
+    scripts = ["errors.js", "charts.js", *(["mesh.js", "fields.js"] if packed else [])]
+    return page.page(f"{run.record['scene']}: a pore", body + more, scripts)
 
 
 def _packed(run: Run, spent: int) -> dict:
-    try:
-        has_unexpanded = "before_expansion.pvd" in _list(run.record.get("files"))
-        before = fields.index(run.folder, "before_expansion.pvd") if has_unexpanded else []
-        return fields.packed(fields.index(run.folder), before, spent)
-    except (ValueError, LookupError, TypeError) as error:
-        raise ValueError(f"{run.folder}: the fields cannot be read: {error!r}") from error
+    before = []
+    if "before_expansion.pvd" in run.record["files"]:
+        before = fields.index(run.folder, "before_expansion.pvd")
+    return fields.packed(fields.index(run.folder), before, spent)
 
 
 def _head(run: Run) -> str:
-    status = str(run.record.get("status") or "status unknown")
+    status = run.record["status"]
     stopped = "" if status == "completed" else " stopped"
-    modelled = [words for name, words in PHYSICS.items() if name in _tables(run)]
-    return (f"<header><h1>{html.escape(str(run.record.get('scene')))}</h1>"
+    modelled = [words for name, words in PHYSICS.items() if name in run.record["tables"]]
+    return (f"<header><h1>{html.escape(run.record['scene'])}</h1>"
             f'<p class="status{stopped}">{html.escape(status[0].upper() + status[1:])}</p>'
             f"{_rows_note(run)}"
             f"{_warnings(run)}"
@@ -92,24 +90,13 @@ def _rows_note(run: Run) -> str:
 
 def _warnings(run: Run) -> str:
     """The list of the warnings of a run; empty without any."""
-    items = "".join(map(_warning, _list(run.record.get("warnings"))))
+    items = "".join(map(_warning, run.record["warnings"]))
     return f'<ul class="warnings" aria-label="warnings">{items}</ul>' if items else ""
 
 
-def _warning(warning: object) -> str:
+def _warning(warning: dict[str, str]) -> str:
     """A warning, with the key of the scene and a text, as an item of a list."""
-    if not isinstance(warning, dict):
-        return f"<li>{html.escape(str(warning))}</li>"
-    key = html.escape(str(warning.get("key")))
-    return f"<li>Warning: <b>{key}</b>: {html.escape(str(warning.get('text')))}</li>"
-
-
-def _tables(run: Run) -> dict:
-    return _table(run.record.get("tables"))
-
-
-def _list(value: object) -> list:
-    return value if isinstance(value, list) else [] if value is None else [value]
+    return f"<li>Warning: <b>{html.escape(warning['key'])}</b>: {html.escape(warning['text'])}</li>"
 
 
 def _sentence(parts: list[str]) -> str:
@@ -118,9 +105,9 @@ def _sentence(parts: list[str]) -> str:
 
 def _assumed(run: Run) -> str:
     """The simplifications of the scene in words."""
-    tables = _tables(run)
+    tables = run.record["tables"]
     assumptions = [words for (part, key, value), words in ASSUMED.items()
-            if _table(tables.get(part)).get(key) == value
+            if tables.get(part, {}).get(key) == value
             and (part != "numerics" or NEEDED[key] in tables)]
     assumptions.insert(0, "a pore in the plane, one aggregate, no detachment")
     return f"Assumed: {'; '.join(assumptions)}."
@@ -128,8 +115,8 @@ def _assumed(run: Run) -> str:
 
 def _numerics(run: Run) -> str:
     """The most important numerical choices in words."""
-    tables = _tables(run)
-    known = _table(tables.get("numerics"))
+    tables = run.record["tables"]
+    known = tables["numerics"]
     choices = [f"{key} {page.format_value(known[key])}".replace("_", "-")
                for key, part in NUMERICS.items()
                if key in known and (part is None or part in tables)]
@@ -140,7 +127,7 @@ def _fields(run: Run, packed: dict) -> str:
     if not packed:
         return ""
     hidden = {True: "", False: " hidden"}
-    controls = CONTROLS.format(aggregate=hidden["aggregate" in _tables(run)],
+    controls = CONTROLS.format(aggregate=hidden["aggregate" in run.record["tables"]],
                                several=hidden[packed["of"] > 1])
     return page.section("Fields and mesh", controls, f'<p class="note">{_field_note(packed)}</p>')
 
@@ -200,7 +187,7 @@ def _value_texts(name: str, values: np.ndarray) -> list[str]:
 
 def _modelled(run: Run) -> str:
     """The scene with a table for each section."""
-    tables = _tables(run)
+    tables = run.record["tables"]
     missing = [name for name in PHYSICS if name not in tables]
     note = f'<p class="note">Not modelled: {", ".join(missing)}.</p>' if missing else ""
     tables_html = "".join(page.table(f"[{name}]", [], _pairs(part))
@@ -216,29 +203,20 @@ def _pairs(part: object) -> list[tuple[str, str]]:
 
 
 def _cost(run: Run) -> str:
-    record, total = run.record, _positive(run.record.get("wall_time_s"))
-    iterations = page.flat(_table(record.get("newton_iterations")))
+    record, total = run.record, run.record["wall_time_s"]
+    iterations = page.flat(record["newton_iterations"])
     counts = [(f"Newton iterations, {name}", value) for name, value in iterations.items() if value]
-    if "growth" in _tables(run) and "remeshes" in record:
+    if "growth" in record["tables"]:
         counts.append(("meshes made anew", record["remeshes"]))
-    total_text = f"<p>{total:.3g} s in all, without this page.</p>" if total else ""
-    bars = _bars(_table(record.get("wall_time_by_stage_s")), total) if total else ""
+    total_text = f"<p>{total:.3g} s in all, without this page.</p>"
+    bars = _bars(record["wall_time_by_stage_s"], total)
     return page.section("Cost", total_text, bars, page.table("", [], counts))
-
-
-def _table(value: object) -> dict:
-    return value if isinstance(value, dict) else {}
-
-
-def _positive(value: object) -> float:
-    """The value if it is a positive, finite number of seconds, else zero."""
-    return float(value) if isinstance(value, int | float) and 0 < value < 1e30 else 0.0
 
 
 def _bars(stages: dict, total: float) -> str:
     """Seconds by stage, the longest first; the lengths are parts of the total. Empty without any.
     """
-    known = [(name, value) for name, value in stages.items() if _positive(value)]
+    known = [(name, value) for name, value in stages.items() if value > 0]
     if not known:
         return ""
     known.sort(key=lambda each: -each[1])
@@ -258,7 +236,7 @@ def _provenance(run: Run) -> str:
     """Versions, the hash of the scene, and the other keys of ``run.json``."""
     record = run.record
     rest = {key: value for key, value in record.items() if key not in OWN_PLACE}
-    versions = [("scene hash", record.get("hash", "unknown")),
-                *page.flat(_table(record.get("versions"))).items()]
+    versions = [("scene hash", record["hash"]),
+                *page.flat(record["versions"]).items()]
     return page.section("Made with", page.table("", [], versions),
                         page.table("Also recorded", [], _pairs(rest)))

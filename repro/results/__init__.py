@@ -16,9 +16,7 @@ from __future__ import annotations
 import csv
 import io
 import json
-import math
 import platform
-from contextlib import suppress
 from functools import cache
 from importlib import metadata
 from pathlib import Path
@@ -75,8 +73,8 @@ def _csv_value(value: object) -> object:
 def read_table(path: Path) -> dict[str, np.ndarray]:
     """The columns of a CSV table that a run has written; an empty field is not-a-number.
 
-    Raises ValueError if a line is cut short or a field is no finite number, and OSError if the file
-    cannot be read.
+    Raises ValueError if a line is cut short or a field is no number, and OSError if the file cannot
+    be read.
     """
     return parse_table(read(path, MOST_TABLE))
 
@@ -85,26 +83,16 @@ def parse_table(content: bytes) -> dict[str, np.ndarray]:
     """The columns of a CSV table, as :func:`read_table` returns them, from the file's content."""
     text = content.decode()
     if not text.endswith("\n"):
-        raise ValueError("its last line is cut short" if text else "it is empty")
+        raise ValueError("it is empty, or its last line is cut short")
     head, *rows = csv.reader(io.StringIO(text))
-    table = [_numbers(row, len(head), line) for line, row in enumerate(rows, 2)]
-    columns = np.array(table, dtype=float).reshape(len(rows), len(head)).T
+    numbers = [list(map(_number, row)) for row in rows]
+    columns = np.array(numbers, dtype=float).reshape(len(rows), len(head)).T
     return dict(zip(head, np.ascontiguousarray(columns)))
 
 
-def _numbers(row: list[str], count: int, line: int) -> list[float]:
-    """The numbers of a line, which must have ``count`` fields."""
-    if len(row) != count:
-        raise ValueError(f"line {line} has {len(row)} fields, where {count} are needed")
-    return [_number(field, line) for field in row]
-
-
-def _number(field: str, line: int) -> float:
-    """The number in a field; only an empty field is not-a-number."""
-    with suppress(ValueError):
-        if not field or math.isfinite(float(field)):
-            return float(field or "nan")
-    raise ValueError(f"line {line} has {field[:40]!r}, where a finite number is needed")
+def _number(field: str) -> float:
+    """The number in a field; an empty field is not-a-number."""
+    return float(field or "nan")
 
 
 def provenance(scene: Scene) -> dict:

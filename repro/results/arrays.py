@@ -26,8 +26,7 @@ class State:
 
     @cached_property
     def strained(self) -> growth.Strained:
-        """The aggregate's deformation since t = 0, at the quadrature points (t, q) of the growth.
-        """
+        """Deformation of the aggregate since t = 0, at the quadrature points (t, q) of growth."""
         mesh = self.pore.mesh
         return self.pore.body.strained(mesh.points[mesh.body])
 
@@ -57,10 +56,30 @@ NEEDS: dict[str, Callable[[State], bool]] = {
 
 @dataclass(frozen=True)
 class Array(Quantity):
-    """An array of a ``.vtu`` file.
+    """An array of a ``.vtu`` file: a quantity of the state of the pore.
 
-    cells: does it have a value per triangle, not per node? body: is it defined only in the
-    aggregate, and NaN in the fluid?
+    Parameters
+    ----------
+    name, words, formula : str
+        As for :class:`Quantity`.
+    value : callable
+        Takes a State and returns an array: (N,) or (N, 2) at nodes, (T,) or (T, 2) in triangles,
+        in the package's own units.
+    label, needs : str
+        As for :class:`Quantity`.
+    yes_no, signed : bool
+        As for :class:`Quantity`.
+    cells : bool
+        True for a value per triangle, False for a value per node.
+    body : bool
+        True if it is defined only in the aggregate; it is NaN in the fluid.
+
+    Examples
+    --------
+    >>> from repro.results.arrays import Array
+    >>> x = Array("x_um", "coordinate x", "x", lambda state: state.pore.mesh.points[:, 0])
+    >>> x.unit.symbol
+    'um'
     """
 
     cells: bool = False
@@ -160,7 +179,7 @@ ARRAYS = (
 
 
 def fields(scene: Scene, pore: Pore, solved: Solved) -> Grid:
-    """The fields of an instant, at nodes or in triangles, named with their units.
+    """Compute the fields of an instant, at nodes or in triangles, named with their units.
 
     Positions are in um. In the fluid biomass is zero, and displacement, theta, J, stress and
     pressure P are NaN; nodes of the interface belong to the aggregate. Stress and P follow from the

@@ -12,6 +12,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
+from repro.errors import OutputError
 from repro.results.files import MOST_DATA
 from repro.results.files import read as read_file
 
@@ -62,13 +63,12 @@ def _add_time(path: Path, time: float) -> None:
 def read(path: Path) -> Grid:
     """Read the grid in a file.
 
-    Raises OSError if the file cannot be read or is longer than MOST_DATA, and ValueError if it
-    contains no grid.
+    Raises OutputError if the file cannot be read, is longer than MOST_DATA, or contains no grid.
     """
     import meshio
 
-    read_file(path, MOST_DATA)
     try:
+        read_file(path, MOST_DATA)
         mesh = meshio.vtu.read(path)
         (cells,) = mesh.cells
         in_cells = {name: values for name, (values,) in mesh.cell_data.items()}
@@ -76,4 +76,4 @@ def read(path: Path) -> Grid:
         return Grid(mesh.points, cells.data, mesh.point_data, in_cells, time)
     except Exception as error:  # meshio has no error of its own for most damages
         why = f"{type(error).__name__}: {error}".removesuffix(": ")
-        raise ValueError(f"{path}: it holds no fields: {why}") from error
+        raise OutputError(f"{path}: it holds no fields: {why}") from error

@@ -51,13 +51,13 @@ def added_resistance(area: ArrayLike, width: ArrayLike, spanned: ArrayLike,
     Parameters
     ----------
     area : array_like
-        Areas of the aggregates, in any unit of area.
+        Areas of the aggregates, in any unit of area and of any shape.
     width : array_like
-        Widths of the pores, in the square root of that unit.
+        Widths of the pores, in the square root of that unit. Its shape broadcasts with the areas.
     spanned : array_like of bool
-        Does the aggregate touch both walls? The three arguments broadcast.
+        True if the aggregate touches both walls. Its shape broadcasts with the areas.
     viscosity_ratio : float
-        lambda of all aggregates.
+        Viscosity of the aggregates over that of water, lambda, without unit.
 
     Returns
     -------
@@ -95,14 +95,16 @@ def added_resistance(area: ArrayLike, width: ArrayLike, spanned: ArrayLike,
 
 
 def known(spanned: bool) -> tuple[float, float]:
-    """The least and the largest A / W^2 in the table."""
+    """Return the least and the largest A / W^2 in the table."""
     shares, _, _ = _table(spanned)
     return float(shares[0]), float(shares[-1])
 
 
 def _law(spanned: bool, share: np.ndarray, ratio: float) -> np.ndarray:
-    """(3, n) r and its bounds at A / W^2 (n,) for one kind of aggregate, interpolated in
-    logarithms: r by monotone cubics, its bounds over r linearly."""
+    """Interpolate (3, n) r and its bounds at A / W^2 (n,) for one kind of aggregate.
+
+    Logarithms are interpolated: those of r by monotone cubics, those of its bounds over r linearly.
+    """
     from scipy.interpolate import PchipInterpolator  # its import takes a quarter of a second
 
     shares, ratios, values = _table(spanned)
@@ -124,8 +126,10 @@ def _refuse(name: str, values: np.ndarray, known: np.ndarray, kind: str) -> None
 
 @cache
 def _table(spanned: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The table of one kind of aggregate: A / W^2 (m,), lambda (l,), and (3, l, m) the logarithms
-    of r and of its bounds over r."""
+    """Read the table of one kind of aggregate.
+
+    It has A / W^2 (m,), lambda (l,), and (3, l, m) the logarithms of r and of its bounds over r.
+    """
     columns = read_table(TABLE)
     rows = columns["spanned"] == spanned
     ratios = np.unique(columns["viscosity_ratio"][rows])

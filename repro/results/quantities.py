@@ -14,8 +14,23 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Unit:
-    """udunits: as UDUNITS (and so CF) writes it; symbol: as readers know it; factor: number
-    of these in the package's own unit of the same kind."""
+    """A unit of reported quantities.
+
+    Parameters
+    ----------
+    udunits : str
+        Its spelling in UDUNITS and CF.
+    symbol : str
+        Its spelling for readers.
+    factor : float
+        How many of this unit are one of the package's own unit of the same kind.
+
+    Examples
+    --------
+    >>> from repro.results.quantities import Unit
+    >>> Unit("cm", "cm", 1e-4).factor  # one um is 1e-4 cm
+    0.0001
+    """
 
     udunits: str
     symbol: str
@@ -51,9 +66,16 @@ class Quantity:
         Parts that the scene must model, like "aggregate and flow": words of ``NEEDS`` in
         :mod:`columns` or :mod:`arrays`. Empty if there are none.
     yes_no : bool
-        Does it stand for yes (1) and no (0)?
+        True if its values 1 and 0 mean yes and no.
     signed : bool
-        May it be negative?
+        True if it may be negative.
+
+    Examples
+    --------
+    >>> from repro.results.quantities import Quantity
+    >>> area = Quantity("area_um2", "area", "W L", lambda width, length: width * length)
+    >>> area.unit.symbol, area.reported(2.0, 3.0)
+    ('um²', 6.0)
     """
 
     name: str
@@ -71,28 +93,28 @@ class Quantity:
         return unit_of(self.name)
 
     def reported(self, *arguments: Any) -> Any:
-        """The value in the unit of the name."""
+        """Return the value in the unit of the name."""
         value = self.value(*arguments)
         return value if self.unit.factor == 1 else self.unit.factor * value
 
 
 def is_modelled(quantity: Quantity, conditions: dict[str, Callable[..., bool]],
                 *arguments: Any) -> bool:
-    """Are all parts modelled that the quantity needs?"""
+    """Return whether all parts are modelled that the quantity needs."""
     needed = quantity.needs.split(" and ") if quantity.needs else []
     return all(conditions[word](*arguments) for word in needed)
 
 
 def ending(name: str) -> str:
-    """The longest ending of a name that is a unit; empty for a pure number."""
+    """Return the longest ending of a name that is a unit; empty for a pure number."""
     return max((each for each in UNITS if name.endswith(each)), key=len, default="")
 
 
 def unit_of(name: str) -> Unit:
-    """The unit at the end of a name."""
+    """Return the unit at the end of a name."""
     return UNITS.get(ending(name), PURE)
 
 
 def plain(name: str) -> str:
-    """The unit as a name spells it ("m/d", "um2"), "1" for a pure number."""
+    """Return the unit as a name spells it ("m/d", "um2"), "1" for a pure number."""
     return ending(name).removeprefix("_").replace("_per_", "/") or "1"

@@ -86,7 +86,7 @@ class Results(Mapping[str, np.ndarray]):
         return self.columns[TIME]
 
     def fields(self, time: float) -> Mapping[str, np.ndarray]:
-        """Fields at a reported time.
+        """Return the fields at a reported time.
 
         Parameters
         ----------
@@ -97,12 +97,20 @@ class Results(Mapping[str, np.ndarray]):
         -------
         mapping of str to array
             ``places_um`` (N, 2), ``triangles`` (T, 3), or (T, 6) if they are quadratic, and the
-            fields by name: (N,) at nodes, (N, 3) for vectors, (T,) in triangles.
+            fields by name: (N,) at nodes, (N, 3) for vectors, (T,) in triangles. Names end in their
+            units.
 
         Raises
         ------
         KeyError
             If the time is not a reported one.
+
+        Examples
+        --------
+        >>> import repro
+        >>> fields = repro.solve("flow_only").fields(0.0)
+        >>> fields["places_um"].shape[1], fields["triangles"].shape[1]
+        (2, 3)
         """
         apart = np.abs(self.time - time)
         if not (apart <= SAME_TIME).any():
@@ -111,16 +119,49 @@ class Results(Mapping[str, np.ndarray]):
         return self._fields[int(apart.argmin())]
 
     def to_pandas(self):
-        """Return the columns as a ``pandas.DataFrame`` indexed by ``time_h``, with their units in
-        ``attrs["units"]``. Raises ImportError if pandas is not installed."""
+        """Return the columns as a ``pandas.DataFrame``.
+
+        Returns
+        -------
+        pandas.DataFrame
+            A row per reported time, indexed by ``time_h``. ``attrs["units"]`` has the unit of each
+            column.
+
+        Raises
+        ------
+        ImportError
+            If pandas is not installed.
+
+        Examples
+        --------
+        >>> import repro
+        >>> repro.solve("flow_only").to_pandas()["mean_velocity_m_per_d"].round(3).tolist()
+        [2.9]
+        """
         frame = _package("pandas").DataFrame(self.columns).set_index(TIME)
         frame.attrs.update(scene=self.name, status=self.status,
                            units={name: unit(name) for name in self.columns})
         return frame
 
     def to_xarray(self):
-        """Return the columns as an ``xarray.Dataset`` over ``time_h``, each with its ``units`` and
-        ``long_name``. Raises ImportError if xarray is not installed."""
+        """Return the columns as an ``xarray.Dataset``.
+
+        Returns
+        -------
+        xarray.Dataset
+            Variables over ``time_h``, each with its ``units`` and its ``long_name``.
+
+        Raises
+        ------
+        ImportError
+            If xarray is not installed.
+
+        Examples
+        --------
+        >>> import repro
+        >>> repro.solve("flow_only").to_xarray()["head_loss_cm"].attrs["units"]
+        'cm'
+        """
         attributes = {name: {"units": names.udunits(name), "long_name": names.words(name)}
                 for name in self.columns}
         columns = {name: (TIME, values, attributes[name]) for name, values in self.columns.items()}
@@ -133,8 +174,10 @@ class Results(Mapping[str, np.ndarray]):
         return f"<Results of {self.name}: {size}, {self.status}>"
 
     def _repr_html_(self) -> str:
-        """HTML for notebooks: key figures, a picture of the last state, and a table with a row per
-        column, at the first and the last times."""
+        """Return HTML for notebooks: key figures, a picture of the last state, and a table.
+
+        The table has a row per column, with its values at the first and the last times.
+        """
         rows = list(range(len(self.time)))
         rows = rows if len(rows) <= 2 * END_TIMES else [*rows[:END_TIMES], *rows[-END_TIMES:]]
         lines = [_html_row(f"{name} ({unit(name)})", column[rows])
@@ -173,7 +216,7 @@ def solve(scene: Source, overrides: Sequence[str] = (), unset: Sequence[str] = (
     scene : Scene, str, path or dict
         A loaded scene, a packaged name, a file, or a dict of tables.
     overrides : sequence of str
-        "KEY=VALUE" texts that set keys of the scene.
+        Texts "KEY=VALUE" that set keys of the scene.
     unset : sequence of str
         Keys to leave out.
 
@@ -210,6 +253,6 @@ def solve(scene: Source, overrides: Sequence[str] = (), unset: Sequence[str] = (
 
 
 def arrays(content: Grid) -> dict[str, np.ndarray]:
-    """The arrays of a grid by name."""
+    """Return the arrays of a grid by name."""
     return {"places_um": content.points[:, :2], "triangles": content.cells, **content.point_data,
             **content.cell_data}

@@ -22,6 +22,7 @@ from repro.preflight.memory import require_memory, require_outline
 from repro.preflight.numbers import evaluate_at_largest
 from repro.preflight.resolved import find_unresolved_flow
 from repro.preflight.simplifications import Caveat
+from repro.report.reading import read_record
 from repro.results.files import is_file, read_json, read_sealed
 from repro.runs import INTERVAL, checkpoint
 from repro.runs.folder import (
@@ -39,7 +40,7 @@ from repro.runs.folder import (
 from repro.runs.integrity import find_damage
 from repro.runs.machine import conditions, differences, require_packages
 from repro.runs.recorder import Recorder, complete_folder, interruption
-from repro.runs.status import COMPLETED, FAILED, INTERRUPTED, RUNNING, is_over, is_unfinished
+from repro.runs.status import COMPLETED, FAILED, INTERRUPTED, RUNNING, is_over
 from repro.scene import (
     KEYS,
     Scene,
@@ -47,7 +48,6 @@ from repro.scene import (
     Source,
     load_scene,
     parse_scene,
-    scene_hash,
     scene_tables,
 )
 from repro.scene.files import key_of, override
@@ -58,10 +58,6 @@ __all__ = ["OutputError", "Recorder", "Watch", "prepare", "resume", "run"]
 ReportedSteps = Iterator[tuple[RestartState, Report | None]]
 #: At most this many differing keys are listed in a message.
 MOST_DESCRIBED = 4
-#: Reason why a folder of results needs a ``run.json``, and the remedy without one.
-RECORD_NEEDED = ("it lists which files there a run has written, without which nothing is "
-                 "overwritten or removed, by --force neither: move the folder away, or name "
-                 "another")
 #: The only key that can be changed after a run has begun.
 END = "growth.end"
 
@@ -157,8 +153,7 @@ def run(scene: Source, folder: str | Path, progress: Progress = ignore_progress,
         if not is_file(folder / PROVENANCE):
             prepare(folder)
             return _run_from_start(recorder, progress, watch)
-        read = read_json if force else read_sealed
-        record = _read_record(folder / PROVENANCE, read, RECORD_NEEDED)
+        record = read_record(folder, read_json if force else read_sealed)
         recorder.run_files = list_written_files(folder, record)
         refuse_links(folder, recorder.run_files)
         if force:
@@ -170,8 +165,11 @@ def run(scene: Source, folder: str | Path, progress: Progress = ignore_progress,
 
 
 def _require(scene: Scene, watch: Watch) -> None:
-    """Raise SceneError if the machine lacks a package or the memory that a scene needs, or if the
-    spline of its outline crosses itself or leaves the pore."""
+    """Raise SceneError if the machine or the outline does not permit a run of the scene.
+
+    The machine may lack a package or memory. The spline of the outline may cross itself or leave
+    the pore.
+    """
     require_packages(scene)
     require_outline(scene)
     require_memory(scene, watch.warn)
@@ -180,7 +178,7 @@ def _require(scene: Scene, watch: Watch) -> None:
 def _refuse_another(recorder: Recorder, record: dict) -> None:
     """Raise OutputError if the folder holds a run of another scene, code or package version."""
     current = results.provenance(recorder.scene) | {"source": recorder.conditions["source"]}
-    previous = record | {"source": _table(record, "conditions").get("source")}
+    previous = record | {"source": record["conditions"]["source"]}
     keys = ("source", "versions") if previous["hash"] == current["hash"] else ("tables",)
     differing = differences({key: previous.get(key) for key in keys},
                             {key: current.get(key) for key in keys})
@@ -203,10 +201,6 @@ def _text(value: object) -> str:
     if isinstance(value, dict):
         return "a section"
     return "not set" if value is None else str(value)
-
-
-def _table(record: dict, key: str) -> dict:
-    return record[key] if isinstance(record.get(key), dict) else {}
 
 
 def resume(folder: str | Path, progress: Progress = ignore_progress,
@@ -257,11 +251,11 @@ def resume(folder: str | Path, progress: Progress = ignore_progress,
     if not is_file(folder / PROVENANCE):
         raise OutputError(f"--resume {folder}: there is no run.json; the folder of a run is needed")
     with locked(folder, watch.patience):
-        record = _read_record(folder / PROVENANCE, read_sealed, "the run.json of a run is needed")
+        record = read_record(folder)
         run_files = list_written_files(folder, record)
         refuse_links(folder, run_files)
-        scene = _scene(record, folder / PROVENANCE)
-        recorder = Recorder(scene, folder, run_files, _table(record, "origin"))
+        scene = parse_scene(record["tables"], record["scene"], str(folder / PROVENANCE))
+        recorder = Recorder(scene, folder, run_files, record["origin"])
         _warn_changed_file(recorder, watch)
         extended = _extended_scene(scene, overrides, str(folder / PROVENANCE))
         if extended == scene:
@@ -294,9 +288,8 @@ def _extend(recorder: Recorder, extended: Scene, overrides: Sequence[str], recor
     _require(extended, watch)
     timing.reset()
     changed = _find_changes(record, recorder, watch)
-    previous_changes = recorder.origin.get("set")
-    previous_changes = previous_changes if isinstance(previous_changes, list) else []
-    changes = [*(entry for entry in previous_changes if key_of(str(entry)) != END), *overrides]
+    earlier = [entry for entry in recorder.origin.get("set", []) if key_of(entry) != END]
+    changes = [*earlier, *overrides]
     changed[END] = [f"{scene.growth.end:g} h" for scene in (recorder.scene, extended)]
     names: tuple[str, ...] = (checkpoint.NEWEST, checkpoint.PREVIOUS)
     if recorder.has_last_state:
@@ -320,16 +313,15 @@ def _extend(recorder: Recorder, extended: Scene, overrides: Sequence[str], recor
 
 def _warn_changed_file(recorder: Recorder, watch: Watch) -> None:
     """Warn if the file from which the scene was read has changed since."""
-    file = recorder.origin.get("file")
-    changes = [recorder.origin.get(key, []) for key in ("set", "unset")]
-    if not isinstance(file, str) or not all(isinstance(entries, list) for entries in changes):
+    origin = recorder.origin
+    if "file" not in origin:
         return
-    with suppress(SceneError, TypeError, AttributeError):  # the file is gone, or no scene now
-        current = load_scene(file, *changes)
+    with suppress(SceneError):  # the file is gone, or no scene now
+        current = load_scene(origin["file"], origin.get("set", ()), origin.get("unset", ()))
         differing = differences(scene_tables(recorder.scene), scene_tables(current))
         if differing:
-            watch.warn(f"{file}: it is not the scene of the run any more: {_describe(differing)}; "
-                       "the run goes on with its own")
+            watch.warn(f"{origin['file']}: it is not the scene of the run any more: "
+                       f"{_describe(differing)}; the run goes on with its own")
 
 
 def _continue(recorder: Recorder, record: dict, progress: Progress, watch: Watch) -> str:
@@ -351,8 +343,10 @@ def _continue(recorder: Recorder, record: dict, progress: Progress, watch: Watch
 
 
 def _is_unchanged(recorder: Recorder, record: dict, watch: Watch) -> bool:
-    """Are all files of a finished run unchanged? Raises OutputError if not, and if there is no
-    checkpoint from which to resume."""
+    """Return whether all files of a finished run are unchanged.
+
+    Raises OutputError if they are not and there is no checkpoint from which to resume.
+    """
     damage = find_damage(recorder.folder, record)
     names = (checkpoint.NEWEST, checkpoint.PREVIOUS)
     if damage and not any(is_file(recorder.folder / name) for name in names):
@@ -374,40 +368,9 @@ def _complete_finished_run(recorder: Recorder, record: dict, watch: Watch) -> st
     return record["status"]
 
 
-def _read_record(path: Path, read: Callable[[Path], dict], accepted: str) -> dict:
-    """Read ``run.json``. Raises OutputError, which ends with ``accepted``, if it is not a run's."""
-    try:
-        record = read(path)
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise OutputError(f"{path}: cannot be read ({reason}); {accepted}") from None
-    if not _is_record(record):
-        raise OutputError(f"{path}: it has no scene or no status; {accepted}")
-    if not (is_over(record["status"]) or is_unfinished(record["status"])):
-        raise OutputError(f"{path}: its status {record['status']!r} is none that a run writes; "
-                          f"{accepted}")
-    return record
-
-
-def _scene(record: dict, path: Path) -> Scene:
-    """The scene of ``run.json``. Raises SceneError, or OutputError if its hash does not match."""
-    scene = parse_scene(record["tables"], record["scene"], str(path))
-    if scene_hash(scene) != record["hash"]:
-        raise OutputError(f"{path}: its scene is not the one that was run: the hash "
-                          f"{record['hash']!r} is of another")
-    return scene
-
-
-def _is_record(record) -> bool:
-    """Does it have the keys that every ``run.json`` has?"""
-    required = {"scene": str, "hash": str, "tables": dict, "status": str}
-    return isinstance(record, dict) and all(
-        isinstance(record.get(key), kind) for key, kind in required.items())
-
-
 def _find_changes(record: dict, recorder: Recorder, watch: Watch) -> dict[str, list]:
     """Find, and warn of, changes since the run began that could change its numbers."""
-    before = {key: _table(record, key) for key in ("versions", "conditions")}
+    before = {key: record[key] for key in ("versions", "conditions")}
     versions = results.provenance(recorder.scene)["versions"]
     after = {"versions": versions, "conditions": conditions()}
     changed = {key: pair for key, pair in differences(before, after).items()
@@ -435,8 +398,10 @@ def _restore(recorder: Recorder, names: Sequence[str], watch: Watch) -> bool:
 
 
 def _run_from_start(recorder: Recorder, progress: Progress, watch: Watch) -> str:
-    """Run from t = 0. The first state is solved before any file is written. Raises SceneError if it
-    cannot be solved."""
+    """Run from t = 0.
+
+    The first state is solved before any file is written. Raises SceneError if it cannot be solved.
+    """
     timing.reset()
     run_steps = steps(recorder.scene)
     try:
@@ -531,8 +496,10 @@ def _emit_warnings(scene_warnings: list[Caveat], watch: Watch) -> None:
 
 
 def find_warnings(scene: Scene, velocity: float | None) -> list[Caveat]:
-    """Find the simplifications of a scene that do not hold; velocity: mean velocity (um/h) at
-    t = 0, None without flow."""
+    """Find the simplifications of a scene that do not hold.
+
+    velocity: mean velocity (um/h) at t = 0, None without flow.
+    """
     try:
         largest, computed = evaluate_at_largest(scene, velocity)
         return [*simplifications.find_warnings(largest, computed), *find_unresolved_flow(scene)]

@@ -39,12 +39,14 @@ FILE_NAME = re.compile("|".join([FIELDS.pattern.removeprefix("fields/"),
 def list_written_files(folder: Path, record: dict) -> set[str]:
     """Names of the files that a run has written, from its ``run.json`` (record) and its SUMS.
 
-    Checkpoints are always included: a run killed at its very end may leave unlisted ones.
+    Checkpoints are always included: a run killed at its very end may leave unlisted ones. Raises
+    OutputError if the record has no list of files.
     """
-    names = record.get("files")
-    names = names if isinstance(names, list) else []
-    names = {name for name in names if isinstance(name, str)}
-    names = {name for name in names if name in RUN_FILES or FIELDS.fullmatch(name)}
+    if not isinstance(record.get("files"), list):
+        raise OutputError(f"{folder}: run.json lists no files of a run; move the folder away, or "
+                          "name another")
+    listed = map(str, record["files"])
+    names = {name for name in listed if name in RUN_FILES or FIELDS.fullmatch(name)}
     if SUMS in names and is_file(folder / SUMS):
         names |= read_sums(folder).keys()
     return names | {PROVENANCE, *CHECKPOINTS}

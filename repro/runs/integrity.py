@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from repro.report.reading import NoRun, Run, hashes, read, require_columns
-from repro.results.files import is_file, read_sealed, sha256_of
-from repro.runs.folder import PROVENANCE, REPORT, read_sums
-from repro.runs.status import RUNNING, is_over, is_unfinished
+from repro.errors import OutputError
+from repro.report.reading import Run, read, read_record, require_columns
+from repro.results.files import is_file, sha256_of
+from repro.runs.folder import REPORT, read_sums
+from repro.runs.status import RUNNING, is_over
 from repro.scene import Scene, scene_hash
 
 
 def read_scene_run(folder: Path, scene: Scene) -> Run:
-    """Read the run of a scene in a folder, finished or not. Raises NoRun if there is none, if it is
-    of another scene, or if its files have changed since they were written."""
+    """Read the run of a scene in a folder, finished or not. Raises OutputError if there is none, if
+    it is of another scene, or if its files have changed since they were written."""
     run = read(folder)
     _require_scene(folder, run.record, scene)
     require_columns(run)
@@ -21,10 +22,9 @@ def read_scene_run(folder: Path, scene: Scene) -> Run:
 
 
 def _require_scene(folder: Path, record: dict, scene: Scene) -> None:
-    """Raise NoRun if a record is of another scene, or has no valid status."""
-    status = str(record.get("status"))
-    if record.get("hash") != scene_hash(scene) or not (is_over(status) or is_unfinished(status)):
-        raise NoRun(f"{folder}: run.json tells of a run of another scene, or has no status")
+    """Raise OutputError if a record is of another scene."""
+    if record["hash"] != scene_hash(scene):
+        raise OutputError(f"{folder}: it holds the run of another scene")
 
 
 def find_defect(folder: Path, scene: Scene) -> str:
@@ -32,20 +32,11 @@ def find_defect(folder: Path, scene: Scene) -> str:
     try:
         record = read_record(folder)
         _require_scene(folder, record, scene)
-    except NoRun as error:
+    except OutputError as error:
         return str(error)
     if not is_over(record["status"]):
         return f"{folder}: the run is not over: {record['status']}"
     return find_damage(folder, record)
-
-
-def read_record(folder: Path) -> dict:
-    """Read ``run.json``. Raises NoRun if it is missing or has changed since it was written."""
-    try:
-        return read_sealed(folder / PROVENANCE)
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise NoRun(f"{folder}: run.json cannot be read: {reason}") from error
 
 
 def find_damage(folder: Path, record: dict) -> str:
@@ -54,7 +45,7 @@ def find_damage(folder: Path, record: dict) -> str:
     ``run.json`` has the SHA-256 of tables and lists, and ``fields.sha256`` those of the fields. A
     missing page is no damage: it is made again. A running run has only the SHA-256 of its fields.
     """
-    expected = hashes(record) | read_sums(folder)
+    expected = record["sha256"] | read_sums(folder)
     if not is_file(folder / REPORT):
         expected.pop(REPORT, None)
     for name, digest in expected.items():
@@ -64,11 +55,9 @@ def find_damage(folder: Path, record: dict) -> str:
 
 
 def read_status(folder: Path) -> str:
-    """Read the status of the run in a folder. Raises NoRun if its files are damaged."""
+    """Read the status of the run in a folder. Raises OutputError if its files are damaged."""
     record = read_record(folder)
-    status = str(record.get("status"))
-    if not (is_over(status) or is_unfinished(status)):
-        raise NoRun(f"{folder}: its status {status!r} is none that a run writes")
+    status = record["status"]
     if status != RUNNING and (damage := find_damage(folder, record)):
-        raise NoRun(damage)
+        raise OutputError(damage)
     return status

@@ -46,21 +46,18 @@ def load_run(folder: str | Path) -> Results:
     >>> results.status
     'completed'
     """
-    try:
-        run = reading.read(Path(folder))
-        reading.require_columns(run)
-        reading.require_lists(run)
-        listed_fields = dict(fields.listed_files(run.folder))
-    except ValueError as error:
-        raise OutputError(str(error)) from None
+    run = reading.read(Path(folder))
+    reading.require_columns(run)
+    reading.require_lists(run)
+    listed_fields = dict(fields.listed_files(run.folder))
     rows = [dict(zip(run.series, map(_none_if_nan, values)))
             for values in np.column_stack(list(run.series.values())).tolist()]
     files = _Files(run.folder, run.times, listed_fields)
-    return Results(str(run.record.get("scene")), rows, files, str(run.record.get("status")))
+    return Results(run.record["scene"], rows, files, run.record["status"])
 
 
 def _none_if_nan(value: float) -> float | None:
-    """A value of a table, or None if it is NaN."""
+    """Replace NaN in a table by None."""
     return None if np.isnan(value) else value
 
 
@@ -92,10 +89,8 @@ class _Files(Sequence[dict[str, np.ndarray]]):
         return (self._read(path) for path in self.files.values() if path.is_file())
 
     def _read(self, path: Path) -> dict[str, np.ndarray]:
-        """The arrays of a file. Raises OutputError if it has changed or cannot be read."""
-        try:
-            if sha256_of(path) != self.sums.get(f"fields/{path.name}"):
-                raise ValueError("the file is not as it was written: cut short or altered")
-            return arrays(field_files.read(path))
-        except (OSError, ValueError) as error:
-            raise OutputError(f"{path}: the fields cannot be read: {error}") from error
+        """Read the arrays of a file. Raises OutputError if it has changed or cannot be read."""
+        if sha256_of(path) != self.sums.get(f"fields/{path.name}"):
+            raise OutputError(f"{path}: the fields are not as they were written: cut short or "
+                              "altered")
+        return arrays(field_files.read(path))

@@ -7,10 +7,8 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from time import perf_counter
 
-import numpy as np
-
 from repro import report, results, timing
-from repro.errors import CheckpointError, Interrupted, OutputError
+from repro.errors import Interrupted
 from repro.march.balance import Ledger
 from repro.march.loop import Report, RestartState, sum_counts
 from repro.march.step_control import StepControl, exceeds_tolerance
@@ -38,7 +36,7 @@ from repro.runs.history import (
     unpack_history,
 )
 from repro.runs.machine import conditions
-from repro.runs.status import RUNNING, is_over, is_unfinished
+from repro.runs.status import RUNNING, is_over
 from repro.scene import Scene
 from repro.scene.units import to_internal
 
@@ -153,7 +151,7 @@ class Recorder:
         """Write the checkpoint, tables, indices and ``run.json``; return the content of the last.
         """
         history = self.history
-        if self.state and is_unfinished(status):
+        if self.state and not is_over(status):
             self._write_checkpoint(self.state)
         self._write("timeseries.csv", results.write_table, results.COLUMNS, history.rows)
         self._write("fields.pvd", results.write_index, history.index)
@@ -259,16 +257,9 @@ class Recorder:
         Raises CheckpointError if the run cannot resume from it.
         """
         plain, arrays = checkpoint.read_checkpoint(path)
-        try:
-            with np.errstate(all="raise", under="ignore"):
-                state = state_arrays.unpack_state(self.scene, plain["state"], arrays)
-                before = unpack_history(plain["record"], arrays)
-                require_fields(self.folder, before)
-        except CheckpointError:
-            raise
-        except Exception as error:  # whatever a forged file may cause
-            reason = " ".join(f"{type(error).__name__}: {error}".split())
-            raise CheckpointError(f"it makes no sense ({reason})") from error
+        state = state_arrays.unpack_state(self.scene, plain["state"], arrays)
+        before = unpack_history(plain["record"], arrays)
+        require_fields(self.folder, before)
         self.state = state
         self.history = before
 
@@ -329,11 +320,8 @@ def complete_folder(folder: Path, record: dict, run_files: set[str]) -> None:
     page cannot be made or written.
     """
     path = claim(folder, REPORT, run_files)
-    try:
-        with file_errors(path):
-            report.write(folder)
-    except ValueError as error:
-        raise OutputError(f"{path}: it cannot be made: {error}") from error
+    with file_errors(path):
+        report.write(folder)
     record = record | {"sha256": record["sha256"] | {REPORT: sha256_of(path)}}
     with file_errors(folder / PROVENANCE), atomic_path(folder / PROVENANCE) as beside:
         results.write_sealed(beside, record)

@@ -16,14 +16,6 @@ RUN_ENDS = (re.compile("the aggregate reaches the pore's (?:up|down)stream end "
             re.compile(f"the aggregate's surface folds in the step from {TIME}: near x = .*"))
 
 
-def is_over(status: str | None) -> bool:
+def is_over(status: str) -> bool:
     """Has the run reached the end of its scene or of the model?"""
-    if status is None:
-        return False
     return status == COMPLETED or any(end.fullmatch(status) for end in RUN_ENDS)
-
-
-def is_unfinished(status: str | None) -> bool:
-    """Is the run still running, interrupted or failed?"""
-    return status is not None and (
-        status in (RUNNING, INTERRUPTED) or status.startswith(FAILED))

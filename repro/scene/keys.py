@@ -34,17 +34,17 @@ from repro.scene.units import (
     POSITIVE_FRACTION,
     UP_TO_1,
     UP_TO_20,
+    Flag,
+    Points,
     SceneError,
+    Times,
     choice,
-    flag,
     number,
-    points,
     quantity,
-    required,
+    scene_key,
     section,
     share,
     timed_quantity,
-    times,
 )
 
 __all__ = ["Scene", "SceneError", "load_scene", "packaged_scenes", "parse_scene", "scene_hash",
@@ -81,12 +81,14 @@ class Aggregate:
     position: float = quantity(
         "0 um", "um", EITHER_SIGN, source=NOT_IN_PAPER,
         about="x of the middle of the half-disc; 0 is the middle of the pore")
-    outline: tuple[tuple[float, float], ...] | None = points(
+    outline: tuple[tuple[float, float], ...] | None = scene_key(
+        Points(),
         about="The seed's surface instead of a half-disc: both ends on the lower wall (y = 0), the "
         "upstream one first; points with y = pore.width are contact with the upper wall",
         source=NOT_IN_PAPER)
-    smooth: bool = flag(about="A spline through the points of outline, or straight lines",
-                        source=NOT_IN_PAPER)
+    smooth: bool = scene_key(
+        Flag(), about="A spline through the points of outline, or straight lines",
+        source=NOT_IN_PAPER)
     inert_fraction: float = number(
         0.0, BELOW_1, source=NOT_IN_PAPER,
         about="Share of X_I in the biomass at t = 0, where X_A + X_I = X_m")
@@ -167,8 +169,9 @@ class Substrate:
         about="Between the times of a table of supply: jumps, or an even change")
     half_saturation: float = quantity(
         "1.0 mg/L", "mg/L", about="K_s of Monod's law", source="(7)-(10), Table 1")
-    diffusivity: float = required(
-        "2.32 cm^2/day", "um^2/h", about="D in water", source="(7)-(8), Table 1")
+    diffusivity: float = quantity(
+        "2.32 cm^2/day", "um^2/h", default=MISSING, about="D in water",
+        source="(7)-(8), Table 1")
     diffusivity_in_aggregate: float = share(
         "1.85 cm^2/day", "um^2/h", "diffusivity", about="D in the aggregate",
         source="2.2, Table 1", default=MISSING)
@@ -270,8 +273,9 @@ class Kinetics:
 class Growth:
     """Sections 2.3 and 3.4, (14)-(29), to the time `end` (h), updates every `time_step` (h)."""
 
-    end: float = required(
-        "19.4 h", "h", NON_NEGATIVE, about="Time at which the run ends", source="Section 4")
+    end: float = quantity(
+        "19.4 h", "h", NON_NEGATIVE, default=MISSING, about="Time at which the run ends",
+        source="Section 4")
     time_step: float = quantity(
         "12 min", "h", source="Section 2, Table 1",
         about="Delta t between shape updates; with numerics.time = \"midpoint\" the first one")
@@ -314,7 +318,7 @@ class Numerics:
     transfer: str = choice("conserving", "linear", "bounded", source="3.5 is linear [E8]",
                            about="How X_A and X_I go to a new mesh")
     extent: str | None = choice(
-        "central", "full", source="3.1",
+        "central", "full", default=None, source="3.1",
         stated='default "central", or "full" where there are substrates and nothing flows, at '
                'times or ever: (26) and (12), which stand for the rest of the pore, need a flow',
         about="Mesh the part around the aggregate, or the whole pore")
@@ -375,10 +379,14 @@ PRESETS: dict[str, dict[str, str | float]] = {
 
 @dataclass(frozen=True)
 class Output:
-    """Times (h) of the requested rows and fields, ascending. None: every step and, with midpoint,
-    every growth.time_step times a power of two that gives 24 or more."""
+    """Times (h) of the requested rows and fields, ascending.
 
-    times: tuple[float, ...] | None = times(
+    None: every step and, with midpoint, every growth.time_step times a power of two that gives 24
+    or more.
+    """
+
+    times: tuple[float, ...] | None = scene_key(
+        Times(),
         source="Figures 4-6",
         about="Times of the rows and fields wanted, which change no step; left out: every step, "
         "with midpoint also every 1/4, 1/2, 1, 2, 4 ... growth.time_step, so that there are 24 or "
@@ -471,7 +479,7 @@ class Scene:
 
     @property
     def stagnant(self) -> bool:
-        """Are there substrates without flow, at any time?"""
+        """Whether there are substrates without flow, at any time."""
         if self.substrates is None or self.flow is None:
             return self.substrates is not None
         velocity = self.flow.mean_velocity
@@ -483,7 +491,7 @@ class Scene:
         return time_tables(self)
 
     def at(self, time: float) -> "Scene":
-        """The scene with the values of its tables at a time (h), after a jump at that time."""
+        """Return the scene with the values of its tables at a time (h), after a jump then."""
         return at_time(self, time) if self.time_tables else self
 
     @cached_property
@@ -492,7 +500,7 @@ class Scene:
         return at_largest(self)
 
     def corner(self, time: float) -> float:
-        """The next time (h) of its tables after ``time``; infinite if there is none."""
+        """Return the next time (h) of its tables after ``time``; infinite if there is none."""
         later = [corner for table in self.time_tables for corner in table.times if corner > time]
         return min(later, default=inf)
 
@@ -595,7 +603,7 @@ def parse_scene(tables: dict, name: str, file: str, changed: Sequence[str] = ())
 
 
 def _to_name(keys: list[str], tables: dict, changed: Sequence[str]) -> str:
-    """The contradicting key to name: the first changed one, else the first one in the tables."""
+    """Choose the contradicting key to name: the first changed one, else the first in a table."""
     for key in keys:
         if any(_within(key, other) or _within(other, key) for other in changed):
             return key
@@ -621,7 +629,7 @@ def _refuse_missing(tables: dict, file: str) -> None:
 
 
 def _with_preset(tables: dict) -> dict:
-    """The tables with the defaults of their preset, "fast" if they name none."""
+    """Return the tables with the defaults of their preset, "fast" if they name none."""
     numerics = tables.get("numerics", {})
     named = numerics.get("preset", "fast") if isinstance(numerics, dict) else None
     if not isinstance(named, str) or named not in PRESETS:
@@ -648,14 +656,14 @@ def scene_hash(scene: Scene) -> str:
 
 
 def _without_later(section: str, table: dict) -> dict:
-    """The table of a section without the keys of `LATER` that have their default."""
+    """Remove the keys of `LATER` that have their default from the table of a section."""
     later = LATER.get(section, {})
     return {key: _without_later(f"{section}.{key}", value) if isinstance(value, dict) else value
             for key, value in table.items() if key not in later or value != later[key]}
 
 
 def _at(tables: dict, key: str, default: object) -> object:
-    """The value at a dotted key."""
+    """Return the value at a dotted key."""
     for part in key.split("."):
         if part not in tables:
             return default

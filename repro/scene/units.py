@@ -18,7 +18,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cache, partial
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 from repro.scene import exact
 from repro.scene.time_table import TimeTable
@@ -76,6 +76,10 @@ class Quantity:
     accepts: Range = POSITIVE
 
     @property
+    def default(self) -> dict:
+        return {"default_factory": partial(self.read, self.example)}
+
+    @property
     def accepted(self) -> str:
         return f"{NOUNS[self.unit]}, {self.accepts.words}"
 
@@ -84,7 +88,7 @@ class Quantity:
         return f'{NOUNS[self.unit]} is needed, such as "{self.example}" ({self.accepts.words})'
 
     def near(self, value: object) -> str:
-        """A plain number with the unit of the example."""
+        """Suggest a plain number with the unit of the example."""
         endless = isinstance(value, int) and abs(value) >= 10**LONGEST
         if isinstance(value, bool) or endless or not isinstance(value, int | float | str):
             return ""
@@ -153,38 +157,27 @@ class Timed(Quantity):
 
 
 @dataclass(frozen=True)
-class Share:
+class Share(Quantity):
     """A quantity, read as a float, or a percentage of that of the key `of`, as a Fraction."""
 
-    absolute: Quantity
-    of: str
-
-    @property
-    def example(self) -> str:
-        return self.absolute.example
+    of: str = ""
 
     @property
     def accepted(self) -> str:
-        return f'{self.absolute.accepted}, or a share of {self.of} such as "80 %"'
+        return f'{super().accepted}, or a share of {self.of} such as "80 %"'
 
     @property
     def requirement(self) -> str:
-        return f'{self.absolute.requirement}, or a share of {self.of} up to "100 %"'
+        return f'{super().requirement}, or a share of {self.of} up to "100 %"'
 
-    def read(self, value: object) -> float | Fraction:
+    def read(self, value: object) -> float | Fraction:  # type: ignore[override]  # or a share
         text = value if isinstance(value, str) and len(value) <= LONGEST else ""
         match = _PERCENT.fullmatch(text)
         if match is None:
-            return self.absolute.read(value)
+            return super().read(value)
         if not 0 < float(match[1]) <= 100:
             raise ValueError("not a share")
         return Fraction(match[1]) / 100
-
-    def write(self, value: float) -> str:
-        return self.absolute.write(value)
-
-    def near(self, value: object) -> str:
-        return self.absolute.near(value)
 
 
 @dataclass(frozen=True)
@@ -195,6 +188,10 @@ class Number:
     accepts: Range = POSITIVE
 
     @property
+    def default(self) -> dict:
+        return {"default": self.example}
+
+    @property
     def accepted(self) -> str:
         return f"a plain number, {self.accepts.words}"
 
@@ -203,7 +200,7 @@ class Number:
         return f"a plain number is needed, such as {self.example:g} ({self.accepts.words})"
 
     def near(self, value: object) -> str:
-        """The number at the start of a text."""
+        """Suggest the number at the start of a text."""
         text = value if isinstance(value, str) and len(value) <= LONGEST else ""
         match = re.match(_DIGITS, text)
         return match[0] if match and _takes(self, float(match[0])) else ""
@@ -222,6 +219,10 @@ class Choice:
     """One of a few words."""
 
     words: tuple[str, ...]
+
+    @property
+    def default(self) -> dict:
+        return {"default": self.words[0]}
 
     @property
     def accepted(self) -> str:
@@ -249,6 +250,7 @@ class Times:
     """A list of one or more times (h), in any order; read in ascending order, each once."""
 
     each = Quantity("h", "5 h", NON_NEGATIVE)
+    default: ClassVar[dict] = {"default": None}
     example = ["5 h", "18 h"]
     accepted = "a list of one or more times, each zero or more"
     requirement = 'a list of times is needed, such as ["5 h", "18 h"] (each zero or more)'
@@ -262,7 +264,7 @@ class Times:
         return [self.each.write(time) for time in value]
 
     def near(self, value: object) -> str:
-        """A single time, in a list."""
+        """Suggest a single time, in a list."""
         accepted = isinstance(value, str) and _takes(self.each, value)
         return f"[{json.dumps(value)}]" if accepted else ""
 
@@ -272,6 +274,7 @@ class Points:
     """A list of points (x, y), um, in their order."""
 
     each = Quantity("um", "4 um", EITHER_SIGN)
+    default: ClassVar[dict] = {"default": None}
     example = [["-5 um", "0 um"], ["0 um", "4 um"], ["5 um", "0 um"]]
     accepted = f"a list of 3 to {MOST_POINTS} points [x, y], each a pair of lengths"
     requirement = f"{accepted}, is needed, such as {json.dumps(example)}"
@@ -297,6 +300,7 @@ class Points:
 class Flag:
     """Yes or no."""
 
+    default: ClassVar[dict] = {"default": False}
     accepted = "true or false"
     requirement = "true or false is needed, without quotes"
 
@@ -309,83 +313,81 @@ class Flag:
         return value
 
     def near(self, value: object) -> str:
-        """The word true or false without its quotes."""
+        """Suggest the word true or false without its quotes."""
         word = value.casefold() if isinstance(value, str) else ""
         return word if word in ("true", "false") else ""
 
 
-Kind = Quantity | Share | Number | Choice | Times | Points | Flag
+Kind = Quantity | Number | Choice | Times | Points | Flag
 
 
-def quantity(text: str, unit: str, accepts: Range = POSITIVE, *, about: str, source: str,
-             stated: str = "", **default):
-    """A value with a unit: `text` is its default, or an example if `default` is set.
+def scene_key(kind: Kind, *, about: str, source: str, stated: str = "", **default):
+    """Declare a key of a scene: a field of a dataclass whose metadata describe the key.
 
-    stated: describes a default that depends on other keys.
+    default: of the field, if it is not that of the kind; stated: describes a default that depends
+    on other keys.
     """
-    default = default or {"default_factory": partial(to_internal, text, unit)}
-    return _key_field(Quantity(unit, text, accepts), about, source, stated, **default)
-
-
-def timed_quantity(text: str, unit: str, accepts: Range = POSITIVE, *, about: str, source: str,
-                   **default):
-    """A value with a unit, like :func:`quantity`, or a table over time."""
-    default = default or {"default_factory": partial(to_internal, text, unit)}
-    return _key_field(Timed(unit, text, accepts), about, source, **default)
-
-
-def points(*, about: str, source: str):
-    """A list of points, or None."""
-    return _key_field(Points(), about, source, default=None)
-
-
-def flag(*, about: str, source: str):
-    """True or false, false by default."""
-    return _key_field(Flag(), about, source, default=False)
-
-
-def required(example: str, unit: str, accepts: Range = POSITIVE, *, about: str, source: str):
-    """A value with a unit that has no default."""
-    return _key_field(Quantity(unit, example, accepts), about, source)
-
-
-def share(text: str, unit: str, of: str, *, about: str, source: str, **default):
-    """A quantity with a default, or a percentage of the key `of`."""
-    default = default or {"default_factory": partial(to_internal, text, unit)}
-    return _key_field(Share(Quantity(unit, text), of), about, source, **default)
-
-
-def number(example: float, accepts: Range = POSITIVE, *, about: str, source: str,
-           stated: str = "", **default):
-    """A plain number; `example` is its default unless `default` is set."""
-    default = default or {"default": example}
-    return _key_field(Number(example, accepts), about, source, stated, **default)
-
-
-def choice(*words: str, about: str, source: str, stated: str = ""):
-    """One of several words, the first by default; stated: describes a default that depends on
-    the rest of the scene."""
-    return _key_field(Choice(words), about, source, stated, default=None if stated else words[0])
-
-
-def times(*, about: str, source: str):
-    """A list of times, or None."""
-    return _key_field(Times(), about, source, default=None)
-
-
-def _key_field(kind: Kind, about: str, source: str, stated: str = "", **default):
     metadata = {"kind": kind, "about": about, "source": source, "stated": stated}
-    return field(metadata=metadata, **default)
+    return field(metadata=metadata, **(default or kind.default))
+
+
+def quantity(text: str, unit: str, accepts: Range = POSITIVE, **described):
+    """Declare a value with a unit: `text` is its default, or an example if `default` is set."""
+    return scene_key(Quantity(unit, text, accepts), **described)
+
+
+def timed_quantity(text: str, unit: str, accepts: Range = POSITIVE, **described):
+    """Declare a value with a unit, like :func:`quantity`, or a table over time."""
+    return scene_key(Timed(unit, text, accepts), **described)
+
+
+def share(text: str, unit: str, of: str, **described):
+    """Declare a value with a unit, like :func:`quantity`, or a share of the key `of`."""
+    return scene_key(Share(unit, text, of=of), **described)
+
+
+def number(example: float, accepts: Range = POSITIVE, **described):
+    """Declare a plain number; `example` is its default unless `default` is set."""
+    return scene_key(Number(example, accepts), **described)
+
+
+def choice(*words: str, **described):
+    """Declare a key of a scene that is one of several words.
+
+    Parameters
+    ----------
+    *words : str
+        The accepted words. The first one is the default.
+    **described : str
+        ``about``, ``source`` and ``stated`` as in :func:`scene_key`, and ``default``.
+
+    Returns
+    -------
+    dataclasses.Field
+        The field of the section's dataclass.
+
+    Examples
+    --------
+    >>> from repro.scene.units import choice
+    >>> choice("steps", "linear", about="Between the times", source="Not in the paper").default
+    'steps'
+    """
+    return scene_key(Choice(words), **described)
 
 
 def section(kind: type, *, about: str, source: str, **default):
-    """A table, whose keys are those of the dataclass `kind`."""
+    """Declare a table, whose keys are those of the dataclass `kind`."""
     default = default or {"default_factory": kind}
     return field(metadata={"section": kind, "about": about, "source": source}, **default)
 
 
 class SceneError(ValueError):
     """A scene is not accepted: one line names the file, key, value and accepted values.
+
+    Parameters
+    ----------
+    message : str
+        The line. Unprintable letters become spaces.
 
     Examples
     --------
@@ -426,7 +428,7 @@ def unlike(kind: Kind, value: object) -> str:
 
 
 def nearest(word: str, words: Iterable[str]) -> str:
-    """The word with similar letters, or with `word` as a part; empty if there is none."""
+    """Return the word with similar letters, or with `word` as a part; empty if there is none."""
     folded, word = {other.casefold(): other for other in words}, word[:60].casefold()
     parts = [other for other in folded if word in other.split("_")]
     matches = difflib.get_close_matches(word, list(folded), n=1) or parts

@@ -22,8 +22,10 @@ Tell = Callable[[dict[str, Any]], None]
 
 @dataclass(frozen=True, eq=False)
 class Swept:
-    """The results of a sweep: ``runs`` extends ``runs.csv``; :func:`repro.load_run` reads one of
-    ``paths``."""
+    """The results of a sweep.
+
+    ``runs`` extends ``runs.csv``. :func:`repro.load_run` reads one of ``paths``.
+    """
 
     source: str
     folder: Path
@@ -41,7 +43,7 @@ class Swept:
         return [run for run in self.runs if not run.is_over]
 
     def label(self, run: table.SweepRun) -> str:
-        """The value of each factor of a run, as text."""
+        """Write the value of each factor of a run."""
         return design.label(self.factors, run.point.values)
 
     def __repr__(self) -> str:
@@ -83,7 +85,7 @@ def sweep(source: Source, vary: Sequence[str], folder: str | Path, overrides: Se
     scheduler : str, optional
         Address of a Dask scheduler whose workers make the runs.
     clogged : float, optional
-        The part of the first conductivity at which a pore counts as clogged.
+        The part of the first conductivity at which a pore counts as clogged, without unit.
     tell : callable, optional
         Receives each event as a dict.
 
@@ -125,7 +127,7 @@ def sweep(source: Source, vary: Sequence[str], folder: str | Path, overrides: Se
 
 
 def _ready(scheduler: str | None, workers: int) -> AbstractContextManager[pool.RunPoints]:
-    """The context that makes runs: processes of this machine, or a cluster."""
+    """Make the context that makes runs: processes of this machine, or a cluster."""
     return cluster.ready(scheduler) if scheduler else pool.ready(workers)
 
 

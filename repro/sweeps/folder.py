@@ -12,11 +12,11 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from repro.errors import OutputError
-from repro.report.reading import NoRun
+from repro.report.reading import read_record
 from repro.results import write_json
 from repro.results.files import atomic_path, is_folder, read_json
 from repro.runs.folder import LOCK, PROVENANCE, find_foreign, folder_errors, locked
-from repro.runs.integrity import find_defect, read_record
+from repro.runs.integrity import find_defect
 from repro.sweeps import single_run
 from repro.sweeps.design import Factor, Point
 
@@ -122,9 +122,5 @@ def _refuse_other_run(folder: Path, point: Point) -> None:
             raise SweepError(f"{folder}: it holds {foreign[0]!r}, which is not of a run; move it "
                              "away")
         return
-    try:
-        record = read_record(folder)
-    except NoRun as error:
-        raise SweepError(f"{error}; move the folder away") from error
-    if record.get("hash") != point.hash:
+    if read_record(folder)["hash"] != point.hash:
         raise SweepError(f"{folder}: it holds the run of another scene; move it away")

@@ -10,7 +10,7 @@ from html import escape
 import numpy as np
 
 from repro.report import charts
-from repro.report.page import policy
+from repro.report import page as html
 from repro.results import write_text
 from repro.results.files import atomic_path
 from repro.results.quantities import Quantity
@@ -18,51 +18,10 @@ from repro.sweeps.design import Factor, label
 from repro.sweeps.folder import Sweep
 from repro.sweeps.table import NUMBERS, SweepRun
 
-#: Viridis, which the colour-blind can distinguish: dark to light on a light page, without its
-#: darkest part on a dark one.
-LIGHT = ("#440154", "#46327e", "#365c8d", "#277f8e", "#1fa187", "#4ab36b", "#86a51a")
-DARK = ("#8d7fe0", "#6f93dd", "#4fa5d0", "#35b7ae", "#5ac883", "#a5d84a", "#fde725")
-LEVELS = len(LIGHT)
+#: Number of colours of a scale, in sweep.css.
+LEVELS = 7
 #: Radius of the dots of runs.
 RADIUS = 4
-
-
-def _levels(colours: tuple[str, ...]) -> str:
-    """The colours as variables of the style."""
-    return " ".join(f"--level{i}: {colour};" for i, colour in enumerate(colours))
-
-
-STYLE = """
-:root { color-scheme: light dark; --ink: #1c1c1c; --soft: #5a5a5a; --line: #d9d9d6; --page: #fff;
-        --bad: #a5330d; LIGHT }
-@media (prefers-color-scheme: dark) {
-  :root { --ink: #ececea; --soft: #a9a9a6; --line: #3a3c40; --page: #15171a; --bad: #ff9b73; DARK }
-}
-body { max-width: 66rem; margin: 0 auto; padding: 1.5rem 1rem 3rem; color: var(--ink);
-       background: var(--page); font: 1rem/1.5 system-ui, sans-serif; overflow-wrap: anywhere; }
-h1 { font-size: 1.5rem; line-height: 1.25; } h2 { font-size: 1.1rem; margin: 2rem 0 .5rem; }
-.note { color: var(--soft); } .bad { color: var(--bad); }
-.pictures { display: grid; gap: 1.5rem;
-            grid-template-columns: repeat(auto-fit, minmax(min(100%, 25rem), 1fr)); }
-figure { margin: 0; } figcaption { color: var(--soft); font-size: .9rem; }
-svg { display: block; width: 100%; max-width: 34rem; height: auto; overflow: visible; }
-svg text { fill: var(--ink); font-size: 10px; } text.y { text-anchor: end; }
-text.x, text.name { text-anchor: middle; }
-.grid { stroke: var(--line); } .tick { stroke: var(--soft); } circle { stroke: var(--page); }
-polyline, polygon { fill: none; stroke-width: 1.5; }
-.key { display: flex; flex-wrap: wrap; gap: .2rem 1rem; padding: 0; list-style: none;
-       font-size: .9rem; }
-.key svg { display: inline-block; width: 1.6rem; height: .7rem; margin-right: .35rem; }
-.wide { overflow-x: auto; }
-.wide td:first-child { position: sticky; left: 0; background: var(--page); }
-table { border-collapse: collapse; font-size: .9rem; font-variant-numeric: tabular-nums; }
-th, td { text-align: right; padding: .25rem .6rem; border-bottom: 1px solid var(--line);
-         overflow-wrap: normal; }
-th { vertical-align: bottom; } td.text, th.text { text-align: left; } a { color: inherit; }
-""".replace("LIGHT", _levels(LIGHT)).replace("DARK", _levels(DARK))
-STYLE += "".join(f".line{i} {{ stroke: var(--level{i}); }} "
-                f".dot{i} {{ fill: var(--level{i}); }}\n"
-                for i in range(LEVELS))
 #: The numbers in the row of a run.
 TABLE_NUMBERS = """end_h clogging_time_h clogging_biomass contact_time_h contact_biomass
 wall_time_s""".split()
@@ -77,24 +36,17 @@ def write(sweep: Sweep, runs: list[SweepRun], clogged: float) -> None:
 def page(sweep: Sweep, runs: list[SweepRun], clogged: float) -> str:
     """The text of the page."""
     finished = sum(run.is_over for run in runs)
-    title = f"Sweep of {escape(sweep.source)}"
+    title = f"Sweep of {sweep.source}"
     varied = "".join(f"<li>{escape(_describe(factor))}</li>" for factor in sweep.factors)
-    return f"""<!DOCTYPE html>
-<html lang="en"><head><meta charset="utf-8"/>
-<meta http-equiv="Content-Security-Policy" content="{policy(STYLE)}"/>
-<meta name="viewport" content="width=device-width, initial-scale=1"/>
-<title>{title}</title><style>{STYLE}</style></head><body>
-<h1>{title}</h1>
+    body = f"""<h1>{escape(title)}</h1>
 <p>{finished} of {len(runs)} runs have come to their end. Varied:</p><ul>{varied}</ul>
 <p class="note">Biomass is the aggregate's area over the pore's. Conductivity is relative to that at
 the start of the run. A pore counts as clogged once it has fallen to {clogged:g}; contact is the
 first row in which the aggregate touches the opposite wall. Values between the rows of a run are
 interpolated; <code>output.times</code> adds rows.</p>
-{_conductivity(sweep, runs)}
-{_clogging(sweep, runs, clogged)}
-<h2>Runs</h2>{_table(sweep, runs)}
-</body></html>
-"""
+{_conductivity(sweep, runs)}{_clogging(sweep, runs, clogged)}
+{html.section("Runs", _table(sweep, runs))}"""
+    return html.page(title, body, style="sweep.css")
 
 
 def _describe(factor: Factor) -> str:
@@ -153,12 +105,16 @@ def _conductivity(sweep: Sweep, runs: list[SweepRun]) -> str:
     """
     plotted = [run for run in runs
              if np.isfinite(run.relative).any() and np.isfinite(run.biomass).any()]
-    head = "<h2>Conductivity against biomass</h2>"
-    if not plotted:
-        return f'{head}<p class="note">No run has both a flow and an aggregate.</p>'
-    figures = "".join(f"<figure>{_coloured(sweep, plotted, k)}</figure>"
-                      for k in range(len(sweep.factors)))
-    return f'{head}<div class="pictures">{figures}</div>'
+    figures = [_coloured(sweep, plotted, k) for k in range(len(sweep.factors)) if plotted]
+    return _pictures("Conductivity against biomass", figures, "a flow and an aggregate")
+
+
+def _pictures(title: str, figures: list[str], needs: str, note: str = "") -> str:
+    """A section of charts; needs: what runs lack if there is no chart."""
+    if not figures:
+        return html.section(title, f'<p class="note">No run has both {needs}.</p>')
+    pictures = "".join(f"<figure>{figure}</figure>" for figure in figures)
+    return html.section(title, note, f'<div class="pictures">{pictures}</div>')
 
 
 def _coloured(sweep: Sweep, plotted: list[SweepRun], k: int) -> str:
@@ -187,13 +143,10 @@ def _clogging(sweep: Sweep, runs: list[SweepRun], clogged: float) -> str:
     """Clogging time against each varied key, coloured by the next one."""
     plotted = [run for run in runs
              if _time(run) > 0 and (run.is_over or run.numbers["clogging_time_h"])]
-    head = "<h2>Clogging time</h2>"
-    if not plotted:
-        return f'{head}<p class="note">No run has both a flow and a length in time.</p>'
-    figures = "".join(f"<figure>{_times(sweep, plotted, k, clogged)}</figure>"
-                      for k in range(len(sweep.factors)))
-    return (f'{head}<p class="note">A hollow triangle stands at the end of a run that was not '
-            f'clogged by then.</p><div class="pictures">{figures}</div>')
+    figures = [_times(sweep, plotted, k, clogged) for k in range(len(sweep.factors)) if plotted]
+    note = ('<p class="note">A hollow triangle stands at the end of a run that was not clogged by '
+            "then.</p>")
+    return _pictures("Clogging time", figures, "a flow and a length in time", note)
 
 
 def _times(sweep: Sweep, plotted: list[SweepRun], k: int, clogged: float) -> str:

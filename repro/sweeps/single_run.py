@@ -16,11 +16,11 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 
 from repro.errors import SimulationError
-from repro.report.reading import NoRun
+from repro.report.reading import read_record
 from repro.results.files import is_file
 from repro.runs.execution import OutputError, Watch, resume, run
 from repro.runs.folder import PROVENANCE
-from repro.runs.integrity import find_damage, read_record
+from repro.runs.integrity import find_damage
 from repro.runs.machine import source_hash
 from repro.runs.status import is_over
 from repro.scene import Scene, SceneError
@@ -39,7 +39,7 @@ def make(scene: Scene, folder: Path, patience: float = 0.0) -> str:
     """
     try:
         return _run_or_resume(scene, folder, Watch(tell=_ignore_event, patience=patience))
-    except (SimulationError, OutputError, SceneError, NoRun) as error:
+    except (SimulationError, OutputError, SceneError) as error:
         return f"failed: {error}"
     except Exception as error:  # a bug is the failure of one run
         last = traceback.extract_tb(error.__traceback__)[-1]

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from repro import results
-from repro.report.reading import NoRun
+from repro.errors import OutputError
 from repro.results.files import atomic_path
 from repro.results.quantities import Quantity
 from repro.runs import status
@@ -102,7 +102,7 @@ def read_runs(sweep: Sweep, statuses: dict[int, str], clogged: float) -> list[Sw
 def _read_run(point: Point, folder: Path, missing_status: str, clogged: float) -> SweepRun:
     try:
         run = read_scene_run(folder, point.scene)
-    except NoRun:
+    except OutputError:
         return _empty_run(point, missing_status)
     if run.record["status"] == status.RUNNING:  # it was killed, and its table may be cut short
         return _empty_run(point, missing_status)

@@ -3,8 +3,6 @@
 --quick runs small versions and writes nothing.
 """
 
-from __future__ import annotations
-
 import argparse
 from importlib import import_module
 

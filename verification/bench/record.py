@@ -21,8 +21,6 @@ Measurement: each round runs all jobs once, so that other loads of the machine a
 speed of a method is the lower envelope of its points, interpolated and extrapolated on logarithmic axes.
 """
 
-from __future__ import annotations
-
 import gc
 import os
 import platform

@@ -5,8 +5,6 @@ compare wall times of one run. Ratios of processor times, which other loads of t
 them.
 """
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Callable, Iterator
 from itertools import cycle, product

@@ -1,8 +1,6 @@
 """Complete runs and single steps: error against time of base, cost of unneeded stages, live memory over many
 steps, and cost against size."""
 
-from __future__ import annotations
-
 import gc
 import tracemalloc
 from dataclasses import replace

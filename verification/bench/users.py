@@ -9,8 +9,6 @@ do, its Laplacian's matrix is read off for Newton's method (:mod:`reference.diff
 transport is solved on right triangles that halve the square cells of their grids.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial

@@ -9,8 +9,6 @@ hardly depend on the time step, on storage of the substrates, or on the meshed p
 The midpoint rule and the presets: order in time, the limit of the paper's updates, an independent solver.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 from unittest import mock
@@ -34,13 +32,13 @@ from verification.problems import meshes, runs
 from verification.problems.channels import NAMES, both
 
 
-@pytest.mark.case(
-    "coupling-no-growth", kind="property",
-    claim="Biomass that neither takes up nor decays leaves the pore fixed, and C the supply",
-    norm="t = 0 against 1 h: arrays of geometry, flow and C that differ in any bit; largest |X_A / X_m - 1|",
-    mutants=("increase-not-taken",), runs_with="paper")
+@pytest.mark.case("coupling-no-growth", kind="property", mutants=("increase-not-taken",), runs_with="paper")
 @parametrize("*changes", runs.EVERY)
 def test_no_growth(changes, record):
+    """Biomass that neither takes up nor decays leaves the pore fixed, and C the supply.
+
+    Norm: t = 0 against 1 h: arrays of geometry, flow and C that differ in any bit; largest |X_A / X_m - 1|.
+    """
     scene = runs.base("1 h", 'kinetics.decay_coefficient="0 1/d"', 'kinetics.maximum_utilization_rate="0 1/d"',
                       *changes)
     first, last = list(simulate(scene))
@@ -76,14 +74,16 @@ PARABOLA = "elements hold the parabola: round-off"
 
 
 @pytest.mark.case(
-    "coupling-clean-channel", kind="exact",
-    claim="A scene without an aggregate is a clean channel: Poiseuille's flow under the head, and C the supply "
-          "everywhere",
-    norm="refinement 1 to 2.8: mean velocity under the head relative to Poiseuille's; largest |C / supply - 1|",
-    mutants=("extent-not-subtracted", "head-on-the-mesh-alone"), references=("poiseuille",), runs_with="paper")
+    "coupling-clean-channel", kind="exact", mutants=("extent-not-subtracted", "head-on-the-mesh-alone"),
+    references=("poiseuille",), runs_with="paper")
 @parametrize("*changes", runs.every(0.3))
 def test_clean_channel(changes, record):
-    """Record the order of linear elements, and the errors of the others."""
+    """A scene without an aggregate is a clean channel: Poiseuille's flow under the head, and C the supply everywhere.
+
+    Norm: refinement 1 to 2.8: mean velocity under the head relative to Poiseuille's; largest |C / supply - 1|.
+
+    Record the order of linear elements, and the errors of the others.
+    """
     if load_scene("base", changes).numerics.order > 1:
         error, lack = _clean(*changes)
         record(at_most("mean velocity", error, 1e-9, PARABOLA))
@@ -102,13 +102,15 @@ def _clean(*changes: str) -> tuple[float, float]:
 
 
 @pytest.mark.case(
-    "coupling-equal-viscosities", kind="property",
-    claim="An aggregate as thin as water, growing, is hydraulically an empty channel",
-    norm="relative difference of the mean velocity from Poiseuille's, and of u from that in an empty channel on the "
-         "same mesh; base from 25 um, 1 h, lambda = 1",
-    mutants=("tau-jumps", "stale-flow", "extent-not-subtracted"), references=("poiseuille",), runs_with="paper")
+    "coupling-equal-viscosities", kind="property", mutants=("tau-jumps", "stale-flow", "extent-not-subtracted"),
+    references=("poiseuille",), runs_with="paper")
 @parametrize("*changes", runs.EVERY)
 def test_equal_viscosities(changes, record):
+    """An aggregate as thin as water, growing, is hydraulically an empty channel.
+
+    Norm: relative difference of the mean velocity from Poiseuille's, and of u from that in an empty channel on the same
+    mesh; base from 25 um, 1 h, lambda = 1.
+    """
     scene = runs.base("1 h", 'aggregate.radius="25 um"', "flow.viscosity_ratio=1.0", *changes)
     first, last = list(simulate(scene))
     grid = last.pore.mesh
@@ -123,13 +125,13 @@ def test_equal_viscosities(changes, record):
                     "else nothing is tested"))
 
 
-@pytest.mark.case(
-    "coupling-stiffness", kind="property",
-    claim="mu_L does not matter without tractions: 0.001 or 10 MPa make the same aggregate",
-    norm="largest difference of any node's place (um) at 1 h",
-    mutants=("modulus-in-the-shape",), runs_with="paper")
+@pytest.mark.case("coupling-stiffness", kind="property", mutants=("modulus-in-the-shape",), runs_with="paper")
 @parametrize("*changes", runs.EVERY)
 def test_stiffness(changes, record):
+    """mu_L does not matter without tractions: 0.001 or 10 MPa make the same aggregate.
+
+    Norm: largest difference of any node's place (um) at 1 h.
+    """
     soft, stiff = (runs.last(runs.base("1 h", f'growth.shear_modulus="{value} MPa"', *changes)).pore
                    for value in (0.001, 10))
     seed = pore.seeded(runs.base("1 h", *changes)).outline.area
@@ -162,30 +164,32 @@ def uniform_growth(hours: tuple[float, ...], most: float, why: str, *changes: st
 
 @pytest.mark.case(
     "coupling-uniform-growth", kind="exact",
-    claim="Where diffusion holds the supply everywhere the aggregate stays a half-disc of exactly exp-growing mass, "
-          "through a remesh",
-    norm="largest relative error of area and mass, every hour to 6 h; largest deviation of the outline from a "
-         "half-disc",
     mutants=("growth-three-percent-low", "euler-biomass", "inert-not-in-the-area", "theta-anew-at-a-remesh",
-             "geometry-of-the-step-before"),
-    runs_with="paper")
+             "geometry-of-the-step-before"), runs_with="paper")
 @parametrize(
-    "hours, most, why, *changes",
+    "*setup",
     {kind: (EVERY_HOUR, *OF_UPDATES, *changes) for kind, changes in runs.every(0.3).items()})
-def test_uniform_growth(hours, most, why, changes, record):
-    record(uniform_growth(hours, most, why, *changes))
+def test_uniform_growth(setup, record):
+    """Where diffusion holds the supply everywhere the aggregate stays a half-disc of exactly exp-growing mass, through
+    a remesh.
+
+    Norm: largest relative error of area and mass, every hour to 6 h; largest deviation of the outline from a half-disc.
+    """
+    record(uniform_growth(*setup))
 
 
 @pytest.mark.case(
     "coupling-curved-uniform-growth", kind="exact",
-    claim="Where diffusion holds the supply everywhere the midpoint rule keeps a half-disc of exactly exp-growing "
-          "mass through remeshes, in few long steps",
-    norm="relative error of area and mass; largest deviation of the outline from a half-disc",
     mutants=("theta-power", "curved-mass-lost", "curved-half-of-the-half"), runs_with="fast",
     omitted="paper: coupling-uniform-growth")
-@parametrize("hours, most, why, *changes", {kind: ((9.0,), *OF_LONG_STEPS, *changes) for kind, changes in LONG.items()})
-def test_curved_uniform_growth(hours, most, why, changes, record):
-    record(uniform_growth(hours, most, why, *changes))
+@parametrize("*setup", {kind: ((9.0,), *OF_LONG_STEPS, *changes) for kind, changes in LONG.items()})
+def test_curved_uniform_growth(setup, record):
+    """Where diffusion holds the supply everywhere the midpoint rule keeps a half-disc of exactly exp-growing mass
+    through remeshes, in few long steps.
+
+    Norm: relative error of area and mass; largest deviation of the outline from a half-disc.
+    """
+    record(uniform_growth(*setup))
 
 
 def _roundness(scene, seed) -> tuple[float, str]:
@@ -207,14 +211,14 @@ def _unround(instant, area: float) -> float:
 POWERS = {"area": 2, "upstream tip": 1, "conductivity": 1}
 
 
-@pytest.mark.case(
-    "coupling-units", kind="property",
-    claim="A pore eight times larger or smaller, with transport to match, grows alike to the last bits: nothing has a "
-          "scale of its own",
-    norm="relative difference at 2 h",
-    mutants=("length-scale",), runs_with="paper")
+@pytest.mark.case("coupling-units", kind="property", mutants=("length-scale",), runs_with="paper")
 @parametrize("*changes", runs.EVERY)
 def test_units(changes, record):
+    """A pore eight times larger or smaller, with transport to match, grows alike to the last bits: nothing has a scale
+    of its own.
+
+    Norm: relative difference at 2 h.
+    """
     scene = runs.base("2 h", *changes)
     reference = runs.numbers(runs.last(scene))
     for factor in (8.0, 0.125):
@@ -232,13 +236,13 @@ FOREIGN = ('pore.width="0.05 mm"', 'pore.length="0.06 cm"', 'aggregate.radius="5
            'growth.time_step="720 s"', 'growth.shear_modulus="10 kPa"')
 
 
-@pytest.mark.case(
-    "coupling-foreign-units", kind="property",
-    claim="A scene written in other units is the same scene, bit for bit",
-    norm="largest difference of any node's place (um), and of C, at 1 h",
-    mutants=("rounded-twice",), runs_with="1 2")
+@pytest.mark.case("coupling-foreign-units", kind="property", mutants=("rounded-twice",), runs_with="1 2")
 @parametrize("*changes", runs.WITH_EXACT)
 def test_foreign_units(changes, record):
+    """A scene written in other units is the same scene, bit for bit.
+
+    Norm: largest difference of any node's place (um), and of C, at 1 h.
+    """
     standard = runs.last(runs.base("1 h", *changes))
     foreign = runs.last(runs.base("60 min", *changes, *FOREIGN))
     pairs = {"places": (standard.pore.mesh.points, foreign.pore.mesh.points),
@@ -248,12 +252,13 @@ def test_foreign_units(changes, record):
 
 
 @pytest.mark.case(
-    "coupling-mirror", kind="property",
-    claim="Without flow an aggregate grows alike to both sides",
-    norm="difference of the tips' distances from the origin, and of C_A left and right, relative",
-    mutants=("one-supply-held", "fixed-beside-the-middle"), runs_with="paper")
+    "coupling-mirror", kind="property", mutants=("one-supply-held", "fixed-beside-the-middle"), runs_with="paper")
 @parametrize("*changes", runs.every(0.5))
 def test_mirror(changes, record):
+    """Without flow an aggregate grows alike to both sides.
+
+    Norm: difference of the tips' distances from the origin, and of C_A left and right, relative.
+    """
     last = runs.last(runs.without_flow(runs.base("8 h", *changes)))
     outline, space = last.pore.outline, last.pore.space
     tips = abs(outline.downstream + outline.upstream) / outline.downstream
@@ -265,14 +270,14 @@ def test_mirror(changes, record):
            at_least("it has grown (area over the seed's)", outline.area / 39.27, 2.0, "else nothing is tested"))
 
 
-@pytest.mark.case(
-    "coupling-reversed", kind="property",
-    claim="Flow from the other side meets the same resistance (Stokes flow is reversible) and, where uptake is of "
-          "first order, loses as much of its substrate (reciprocity of (7), (11) and (12))",
-    norm="relative difference between a lopsided aggregate and its mirror image, refinement 2, t = 0",
-    mutants=("inlet-held",), runs_with="paper")
+@pytest.mark.case("coupling-reversed", kind="property", mutants=("inlet-held",), runs_with="paper")
 @parametrize("*changes", runs.every(0.6, 2.0))
 def test_reversed(changes, record):
+    """Flow from the other side meets the same resistance (Stokes flow is reversible) and, where uptake is of first
+    order, loses as much of its substrate (reciprocity of (7), (11) and (12)).
+
+    Norm: relative difference between a lopsided aggregate and its mirror image, refinement 2, t = 0.
+    """
     forward, mirrored = (_lopsided(sign, *changes) for sign in (1.0, -1.0))
     apart = {name: abs(forward[name] / mirrored[name] - 1) for name in forward}
     record(at_most("conductivity", apart["conductivity"], 3e-4, ERROR),
@@ -313,15 +318,16 @@ SLOWER = (16.0, 8.0, 4.0, 2.0)
 
 
 @pytest.mark.case(
-    "coupling-quasi-steady", kind="property",
-    claim="The paper's transient scheme and quasi-steady substrates make the same aggregate, up to the substrates' "
-          "lag, which is as their storage",
-    norm="relative difference at 0.6 h, and that of C_A at the nodes over the supply; base from 25 um at 2.9 m/d, "
-         "with D, u and X_m over 16 to 2: steady states and growth stay, substrates are 16 to 2 times slower",
-    mutants=("rates-two-percent-low",), runs_with="paper",
+    "coupling-quasi-steady", kind="property", mutants=("rates-two-percent-low",), runs_with="paper",
     omitted="fast, accurate, exact: the transient scheme goes with updates")
 @parametrize("*changes", runs.kinds(0.4))
 def test_quasi_steady(changes, record):
+    """The paper's transient scheme and quasi-steady substrates make the same aggregate, up to the substrates' lag,
+    which is as their storage.
+
+    Norm: relative difference at 0.6 h, and that of C_A at the nodes over the supply; base from 25 um at 2.9 m/d, with
+    D, u and X_m over 16 to 2: steady states and growth stay, substrates are 16 to 2 times slower.
+    """
     errors = refine(_lag, SLOWER, *changes)
     record([study(name, SLOWER, values, 1, "lag: first order in storage over reaction, 2e-4 for base", ceiling=3e-6,
                   band=0.15) for name, values in errors.items()])
@@ -344,15 +350,17 @@ def _slower(factor: float, transport: str, *changes: str):
 
 @pytest.mark.slow
 @pytest.mark.case(
-    "coupling-extent", kind="property",
-    claim="The central mesh with (6) and (26) beyond it is worth the whole pore",
-    norm="t = 0, refinement 2 (linear) and 0.6: conductivity and effluents relative; section means of C along the "
-         "central mesh, over the supply",
-    mutants=("extent-not-subtracted", "inlet-held", "head-on-the-mesh-alone"), runs_with="paper")
+    "coupling-extent", kind="property", mutants=("extent-not-subtracted", "inlet-held", "head-on-the-mesh-alone"),
+    runs_with="paper")
 @parametrize("*changes", {f"R = {radius}, {label}": (f'aggregate.radius="{radius}"', *changes)
                           for radius, labelled in (("5 um", runs.kinds(0.6, 2.0)), ("25 um", runs.every(0.6, 2.0)))
                           for label, changes in labelled.items()})
 def test_extent(changes, record):
+    """The central mesh with (6) and (26) beyond it is worth the whole pore.
+
+    Norm: t = 0, refinement 2 (linear) and 0.6: conductivity and effluents relative; section means of C along the
+    central mesh, over the supply.
+    """
     (central, near), (full, far) = (_solved(f'numerics.extent="{name}"', *changes) for name in ("central", "full"))
     for name, bound in BOUNDS.items():
         record(at_most(name, abs(central[name] / full[name] - 1), *bound))
@@ -395,13 +403,15 @@ def _equal_steps(scene, steps: int) -> np.ndarray:
 
 
 @pytest.mark.case(
-    "coupling-midpoint-order", kind="property",
-    claim="The midpoint rule is of second order in time, with every kind of elements",
-    norm="relative difference between a run and that with half the step; base from a seed of 25 um, 2 h, no remesh",
-    mutants=("curved-rates-of-the-start", "midpoint-rates-of-the-start"), runs_with="fast",
+    "coupling-midpoint-order", kind="property", mutants=("curved-rates-of-the-start", "midpoint-rates-of-the-start"),
+    runs_with="fast",
     omitted="paper: coupling-midpoint-limit; accurate, exact: equal steps know no tolerance: those of fast")
 @pytest.mark.parametrize("elements", runs.ELEMENTS)
 def test_midpoint_order(elements, record):
+    """The midpoint rule is of second order in time, with every kind of elements.
+
+    Norm: relative difference between a run and that with half the step; base from a seed of 25 um, 2 h, no remesh.
+    """
     scene = load_scene("base", (runs.with_preset("fast"), runs.with_elements(elements), "numerics.refinement=0.5",
                                 'aggregate.radius="25 um"'))
     values = np.array([_equal_steps(scene, steps) for steps in RULE_STEPS])
@@ -413,15 +423,15 @@ def test_midpoint_order(elements, record):
 @pytest.mark.slow
 @pytest.mark.case(
     "coupling-midpoint-limit", kind="property",
-    claim="With short steps the paper's shape updates and the midpoint rule come to the same, on the same triangles: "
-          "the loop of updates is of first order in the step, as the geometry is frozen within it and the rates are "
-          "not",
-    norm="relative difference at 3.2 h from a seed of 25 um, base, no remesh",
     mutants=("midpoint-rates-of-the-start", "rates-at-the-start", "stale-flow"), runs_with="paper",
     omitted="fast, accurate, exact: coupling-midpoint-order; their own tolerances would be seen")
 @parametrize("*changes", runs.kinds(0.3, 0.6))
 def test_midpoint_limit(changes, record):
-    """Record the remeshes and the orders."""
+    """With short steps the paper's shape updates and the midpoint rule come to the same, on the same triangles: the
+    loop of updates is of first order in the step, as the geometry is frozen within it and the rates are not.
+
+    Norm: relative difference at 3.2 h from a seed of 25 um, base, no remesh.
+    """
     short = ('numerics.time="midpoint"', "numerics.tolerance=0.00003")
     reports = [runs.last(runs.base("3.2 h", 'aggregate.radius="25 um"', *changes, *how))
              for how in (short, *((f'growth.time_step="{step} h"',) for step in STEPS))]
@@ -447,19 +457,20 @@ def _reference():
 @pytest.mark.slow
 @pytest.mark.case(
     "coupling-presets", kind="cross-code",
-    claim="Each of the eight numbers of base is within 1 % with preset fast, within 0.1 % with accurate, with "
-          "quadratic and with cubic velocities and concentrations, and within 0.01 % with exact",
-    norm="largest difference at 19.2 and 19.4 h to an independent solver, extrapolated in space and time: relative, "
-         "of effluents over the supply",
     mutants=("curved-rates-of-the-start", "fluid-diffusivity", "uptake-without-decay", "cubic-shown-less",
-             "exact-steps-of-accurate"),
-    references=("whole_run",), runs_with="2", omitted="paper, order 1: its error is that of linear elements, see bench")
+             "exact-steps-of-accurate"), references=("whole_run",), runs_with="2",
+    omitted="paper, order 1: its error is that of linear elements, see bench")
 @parametrize(
     "bound, preset, *changes",
     {"fast": (1e-2, "fast"), "accurate": (1e-3, "accurate"),
      "accurate, cubic": (1e-3, "accurate", runs.with_elements("cubic")), "exact": (1e-4, "exact")})
 def test_presets(bound, preset, changes, record):
-    """Record checks of the eight numbers and of the reference."""
+    """Each of the eight numbers of base is within 1 % with preset fast, within 0.1 % with accurate, with quadratic and
+    with cubic velocities and concentrations, and within 0.01 % with exact.
+
+    Norm: largest difference at 19.2 and 19.4 h to an independent solver, extrapolated in space and time: relative, of
+    effluents over the supply.
+    """
     expected, error = _reference()
     record(at_most("the reference itself", error, 5e-5, "half of what is asked of exact"))
     computed = runs.values(TIMES, runs.with_preset(preset), *changes)
@@ -467,18 +478,18 @@ def test_presets(bound, preset, changes, record):
         record(at_most(name, errors.max(), bound, "what the preset is for"))
 
 
-@pytest.mark.case(
-    "coupling-jacobian-reused", kind="property",
-    claim="Newton's methods that use a derivative again come to the same with fewer factorisations",
-    norm="relative difference of the area, the tips and the conductivity at 2 h; factorisations over those of fresh "
-         "derivatives; base from a seed of 25 um",
-    mutants=("newton-never-reused",))
+@pytest.mark.case("coupling-jacobian-reused", kind="property", mutants=("newton-never-reused",))
 @parametrize("*changes", {**{f"{kind}, fast": (runs.with_preset("fast"), runs.with_elements(kind))
                              for kind in runs.ELEMENTS},
                           "linear, paper": (runs.with_preset("paper"),),
                           "quadratic, accurate": (runs.with_preset("accurate"),),
                           "quadratic, exact": (runs.with_preset("exact"),)})
 def test_jacobian_reused(changes, record):
+    """Newton's methods that use a derivative again come to the same with fewer factorisations.
+
+    Norm: relative difference of the area, the tips and the conductivity at 2 h; factorisations over those of fresh
+    derivatives; base from a seed of 25 um.
+    """
     (fresh, fresh_count), (reused, reused_count) = (_factorisations(kind, *changes) for kind in ("fresh", "reused"))
     record(at_most("difference", np.abs(reused / fresh - 1).max(), 1e-8,
                    "Newton's tolerances, 1e-10 and less, times the steps"),

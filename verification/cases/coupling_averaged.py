@@ -6,8 +6,6 @@ long against the width of the pore. Thin aggregates at t = 0 cover a range of Pe
 starved. Supplies that change over time starve an aggregate and let it recover.
 """
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from functools import cache
@@ -38,15 +36,17 @@ RADII, REACH = (5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 33.0), 75.0
 
 @pytest.mark.slow
 @pytest.mark.case(
-    "coupling-averaged-base", kind="cross-code",
-    claim="Under its head base clogs as its averaged pore (FiPy, solve_ivp) does, up to what lubrication and section "
-          "means are worth: a velocity 11 % too high, of which 1 % is left with a half-disc's own loss",
-    norm="largest difference at ten times from 2 to 19.4 h, read off the tables that a run writes: area and velocity "
-         "relative, effluents and section means of C along the mesh over the supply",
-    mutants=("stale-flow", "conductivity-for-velocity"), references=("averaged_pore", "poiseuille", "taylor_hood"),
-    runs_with="1 2", omitted="exact: what is judged is the averaged pore, 1 % off, ten times what accurate may err by")
+    "coupling-averaged-base", kind="cross-code", mutants=("stale-flow", "conductivity-for-velocity"),
+    references=("averaged_pore", "poiseuille", "taylor_hood"), runs_with="1 2",
+    omitted="exact: what is judged is the averaged pore, 1 % off, ten times what accurate may err by")
 @parametrize("*changes", runs.NUMERICS)
 def test_averaged_base(changes, record):
+    """Under its head base clogs as its averaged pore (FiPy, solve_ivp) does, up to what lubrication and section means
+    are worth: a velocity 11 % too high, of which 1 % is left with a half-disc's own loss.
+
+    Norm: largest difference at ten times from 2 to 19.4 h, read off the tables that a run writes: area and velocity
+    relative, effluents and section means of C along the mesh over the supply.
+    """
     scene = runs.base("19.4 h", *changes, times=TIMES)
     instants = runs.reports_of(scene)
     flow, rest = (runs.differences(scene, instants, moments) for moments in _clogged(changes[0]))
@@ -119,15 +119,16 @@ FASTER = (4.0, 16.0, 64.0, 256.0)
 
 
 @pytest.mark.case(
-    "coupling-averaged-mixing", kind="cross-code",
-    claim="What averaging over sections costs in the effluents is, as diffusion becomes fast, the constriction of a "
-          "half-disc in a strip, in closed form",
-    norm="effluents less those of the averaged pore (FiPy); a seed of 20 um at t = 0, refinement 1.5, D the same in "
-         "fluid and biomass and times 4 to 256",
-    mutants=("effluent-at-the-inlet", "inlet-held", "seed-too-thin"),
+    "coupling-averaged-mixing", kind="cross-code", mutants=("effluent-at-the-inlet", "inlet-held", "seed-too-thin"),
     references=("averaged_pore", "poiseuille", "taylor_hood"), runs_with="paper")
 @parametrize("*changes", runs.every(0.5, 1.5))
 def test_averaged_mixing(changes, record):
+    """What averaging over sections costs in the effluents is, as diffusion becomes fast, the constriction of a
+    half-disc in a strip, in closed form.
+
+    Norm: effluents less those of the averaged pore (FiPy); a seed of 20 um at t = 0, refinement 1.5, D the same in
+    fluid and biomass and times 4 to 256.
+    """
     errors = refine(_leaving, FASTER, runs.base("0 h", 'aggregate.radius="20 um"', *changes))
     for name in NAMES:
         record(study(f"effluent {name} (mg/L)", errors["size"], errors[name], 2, SQUARE, ceiling=2.5e-5))
@@ -156,18 +157,19 @@ MIXING_TIMES = (5.0, 10.0, 15.0, 19.4)
 
 @pytest.mark.slow
 @pytest.mark.case(
-    "coupling-averaged-run", kind="cross-code",
-    claim="The whole base run is that of the averaged pore (FiPy, solve_ivp) up to the square of the transverse "
-          "Thiele number, and base itself is where that square puts it",
-    norm="largest difference at 5, 10, 15 and 19.4 h: area relative, effluents and section means of C along the mesh "
-         "over the supply; base at 2.9 m/d, diffusivities times 8 to 64; paper, and accurate with a fifth of its "
-         "tolerance: its own error in time, 4e-5, would be seen",
-    mutants=("rates-two-percent-low",), references=("averaged_pore", "poiseuille", "taylor_hood"), runs_with="1 2",
+    "coupling-averaged-run", kind="cross-code", mutants=("rates-two-percent-low",),
+    references=("averaged_pore", "poiseuille", "taylor_hood"), runs_with="1 2",
     omitted="fast: its own error in time would be seen; exact: accurate has a smaller tolerance here; order 3: "
             "coupling-averaged-refined")
 @pytest.mark.parametrize("preset", ("paper", "accurate"))
 def test_averaged_run(preset, record):
-    """Record checks and studies of one preset."""
+    """The whole base run is that of the averaged pore (FiPy, solve_ivp) up to the square of the transverse Thiele
+    number, and base itself is where that square puts it.
+
+    Norm: largest difference at 5, 10, 15 and 19.4 h: area relative, effluents and section means of C along the mesh
+    over the supply; base at 2.9 m/d, diffusivities times 8 to 64; paper, and accurate with a fifth of its tolerance:
+    its own error in time, 4e-5, would be seen.
+    """
     errors, base = refine(_whole_run, SLOWER, preset), _whole_run(1.0, preset)
     record(studies(errors, dict.fromkeys(APART, (2, SQUARE, 3e-4))))
     for name in APART[:2]:
@@ -189,13 +191,15 @@ COARSE, FINE = (1.0, 12.0, 1), (2.0, 6.0, 2)
 
 @pytest.mark.slow
 @pytest.mark.case(
-    "coupling-averaged-refined", kind="cross-code",
-    claim="The disagreement with the averaged pore is that of the models: it stays when both codes are refined",
-    norm="change of the disagreement, over itself, when mesh, step and FiPy's cells are halved: area, effluents and "
-         "section means of C; 2 h from 20 um at 2.9 m/d",
-    mutants=("rates-at-the-start",), references=("averaged_pore", "poiseuille", "taylor_hood"), runs_with="paper")
+    "coupling-averaged-refined", kind="cross-code", mutants=("rates-at-the-start",),
+    references=("averaged_pore", "poiseuille", "taylor_hood"), runs_with="paper")
 @pytest.mark.parametrize("elements", runs.ELEMENTS)
 def test_averaged_refined(elements, record):
+    """The disagreement with the averaged pore is that of the models: it stays when both codes are refined.
+
+    Norm: change of the disagreement, over itself, when mesh, step and FiPy's cells are halved: area, effluents and
+    section means of C; 2 h from 20 um at 2.9 m/d.
+    """
     coarse, fine = (_piece(elements, *level) for level in (COARSE, FINE))
     record([at_most(name, abs(fine[name] / coarse[name] - 1), 0.01,
                     "error in space 0.1 % of what is lost, in time 0.2 % of an hour's growth") for name in APART])
@@ -218,15 +222,17 @@ THIN_SQUARE = "regular perturbation: the square of the aspect ratio"
 
 @pytest.mark.slow
 @pytest.mark.case(
-    "coupling-averaged-strip", kind="cross-code",
-    claim="Thin aggregates grow as the averaged pore (FiPy, solve_ivp) with the stress-free strip says, starved "
-          "downstream, up to the square of the aspect ratio",
-    norm="largest difference at 0.5 and 1 h: area relative, effluents and section means of C over the supply; seeds "
-         "of 5 um, thickness over half length 1/2 to 1/16, u as that ratio, X_m as its square, so that the averaged "
-         "pore starts alike",
-    mutants=("growth-spread-evenly",), references=("averaged_pore", "poiseuille", "taylor_hood"), runs_with="paper")
+    "coupling-averaged-strip", kind="cross-code", mutants=("growth-spread-evenly",),
+    references=("averaged_pore", "poiseuille", "taylor_hood"), runs_with="paper")
 @pytest.mark.parametrize("elements", runs.ELEMENTS)
 def test_averaged_strip(elements, record):
+    """Thin aggregates grow as the averaged pore (FiPy, solve_ivp) with the stress-free strip says, starved downstream,
+    up to the square of the aspect ratio.
+
+    Norm: largest difference at 0.5 and 1 h: area relative, effluents and section means of C over the supply; seeds of 5
+    um, thickness over half length 1/2 to 1/16, u as that ratio, X_m as its square, so that the averaged pore starts
+    alike.
+    """
     errors = refine(_strip, ASPECTS, elements)
     record(studies(errors, dict.fromkeys(APART, (2, THIN_SQUARE, 4e-4))),
            at_most("ends of the thinnest, relative", errors["ends"][-1], 1.5e-4,
@@ -288,18 +294,18 @@ SLENDER = (0.25, 0.177, 0.125, 0.0884)
 
 @pytest.mark.slow
 @pytest.mark.case(
-    "coupling-averaged-flow", kind="cross-code",
-    claim="The head loss of a long aggregate is that of developed flow in each section, and the next term is that of "
-          "extended lubrication theory, coefficient included",
-    norm="head loss of the whole pore less that of lubrication, over what the latter has more than a clean channel; "
-         "refinement 2.5 over the order of the elements; a bump 8 (1 - s^2)^2 um high in 20 um",
-    mutants=("extent-not-subtracted",), references=("averaged_pore", "layered_channel", "poiseuille", "taylor_hood"),
+    "coupling-averaged-flow", kind="cross-code", mutants=("extent-not-subtracted",),
+    references=("averaged_pore", "layered_channel", "poiseuille", "taylor_hood"),
     omitted="order 1: its own error is as large as what is measured")
 @parametrize("order", {f"order {order}": (order,) for order in (2, 3)})
 def test_averaged_flow(order, record):
-    """Record the coefficient and the order on straight triangles.
+    """The head loss of a long aggregate is that of developed flow in each section, and the next term is that of
+    extended lubrication theory, coefficient included.
 
-    The ends of the bump lie flat on the wall, which arcs would cross.
+    Norm: head loss of the whole pore less that of lubrication, over what the latter has more than a clean channel;
+    refinement 2.5 over the order of the elements; a bump 8 (1 - s^2)^2 um high in 20 um.
+
+    Triangles are straight: the ends of the bump lie flat on the wall, which arcs would cross.
     """
     losses, thin, more = np.array([_losses(order, aspect) for aspect in SLENDER]).T
     clean = poiseuille.head_loss(LENGTH, WIDTH, 1.0, 1.0)
@@ -333,15 +339,16 @@ PECLETS, DENSITIES = (0.1, 1.0, 5.0), (1e6, 3e6, 1e7)
 
 @pytest.mark.slow
 @pytest.mark.case(
-    "coupling-averaged-uptake", kind="cross-code",
-    claim="Around thin aggregates C is the averaged pore's (FiPy) up to the square of the aspect ratio, at Peclet "
-          "0.1, 1, 5 and three densities, from 99 % to 1 % of the acceptor leaving",
-    norm="largest difference of the section means of C_A and C_D along the mesh, over the supply; half-ellipses 5 um "
-         "high, thickness over half length 1/5 to 1/40 (FiPy's cells: its inverse, u: as it, X_m: as its square)",
-    mutants=("inlet-held", "seed-too-thin"), references=("averaged_pore", "poiseuille", "taylor_hood"),
-    runs_with="paper")
+    "coupling-averaged-uptake", kind="cross-code", mutants=("inlet-held", "seed-too-thin"),
+    references=("averaged_pore", "poiseuille", "taylor_hood"), runs_with="paper")
 @pytest.mark.parametrize("elements", runs.ELEMENTS)
 def test_averaged_uptake(elements, record):
+    """Around thin aggregates C is the averaged pore's (FiPy) up to the square of the aspect ratio, at Peclet 0.1, 1, 5
+    and three densities, from 99 % to 1 % of the acceptor leaving.
+
+    Norm: largest difference of the section means of C_A and C_D along the mesh, over the supply; half-ellipses 5 um
+    high, thickness over half length 1/5 to 1/40 (FiPy's cells: its inverse, u: as it, X_m: as its square).
+    """
     errors = refine(_around, UPTAKE_ASPECTS, elements)
     left = errors.pop("left")[-1]
     record(studies(errors, {name: (2, THIN_SQUARE, 1e-3) for name in errors if name != "size"}),
@@ -384,18 +391,18 @@ SUPPLIED = {"steps": {preset: (4e-4, THIELE) for preset in runs.WITH_EXACT},
 @pytest.mark.slow
 @pytest.mark.case(
     "coupling-averaged-supply", kind="cross-code",
-    claim="An aggregate whose donor is taken away for 2.5 h and given back, at once or evenly, starves and recovers "
-          "as its averaged pore (FiPy, solve_ivp) does",
-    norm="largest difference at six times in 7 h, rows at jumps and within steps among them: area relative, effluents "
-         "and section means of C along the mesh over the acceptor's supply; a seed of 20 um in base at 2.9 m/d, "
-         "diffusivities times 64",
     mutants=("supply-of-the-start", "supply-half-way-of-the-start", "supply-a-step-late", "supply-not-yet",
-             "row-of-the-end"),
-    references=("averaged_pore", "poiseuille", "taylor_hood"), runs_with="1 2")
+             "row-of-the-end"), references=("averaged_pore", "poiseuille", "taylor_hood"), runs_with="1 2")
 @parametrize("how, bound, origin, *changes", {f"{how}, {preset}": (how, *bound, *runs.WITH_EXACT[preset])
                                               for how, bounds in SUPPLIED.items() for preset, bound in bounds.items()})
 def test_averaged_supply(how, bound, origin, changes, record):
-    """Record checks of one course of the donor's supply."""
+    """An aggregate whose donor is taken away for 2.5 h and given back, at once or evenly, starves and recovers as its
+    averaged pore (FiPy, solve_ivp) does.
+
+    Norm: largest difference at six times in 7 h, rows at jumps and within steps among them: area relative, effluents
+    and section means of C along the mesh over the acceptor's supply; a seed of 20 um in base at 2.9 m/d, diffusivities
+    times 64.
+    """
     scene, moments = supplied(how, *changes), _fed(how, changes[0])
     worst = runs.differences(scene, runs.reports_of(scene), moments)
     record([at_most(name, worst[name], bound, origin) for name in APART])

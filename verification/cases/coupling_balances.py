@@ -6,8 +6,6 @@ its start. The balance of growth against uptake, and a run with shorter steps, d
 Short runs cover contact with the opposite wall and a wedge that closes (2.3.3).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import replace
 from functools import cache
@@ -37,10 +35,6 @@ LONG = 'growth.time_step="24 min"'
 
 @pytest.mark.case(
     "coupling-ledger", kind="property",
-    claim="Over a whole run with its remeshes substrates and biomass are accounted for to round-off, and the area is "
-          "the biomass over X_m",
-    norm="base to 19.4 h in steps of 24 min: worst step of both substrates' balances and of the biomass', relative; "
-         "X_m times the area over the biomass; largest deviation of the density from X_m",
     mutants=("theta-anew-at-a-remesh", "biomass-interpolated-at-a-remesh", "growth-spread-evenly"), runs_with="paper")
 @parametrize(
     "area, density, remeshes, *changes",
@@ -49,7 +43,14 @@ LONG = 'growth.time_step="24 min"'
         for kind in runs.ELEMENTS[1:]},
      **{kind: (1e-10, 1e-3, 2.0, runs.with_preset(kind)) for kind in runs.QUADRATIC}})
 def test_ledger(area, density, remeshes, changes, record):
-    """Record checks of a run of base. area, density: bounds of their deviations; remeshes: the fewest."""
+    """Over a whole run with its remeshes substrates and biomass are accounted for to round-off, and the area is the
+    biomass over X_m.
+
+    Norm: base to 19.4 h in steps of 24 min: worst step of both substrates' balances and of the biomass', relative; X_m
+    times the area over the biomass; largest deviation of the density from X_m.
+
+    area, density: bounds of their deviations; remeshes: the fewest.
+    """
     scene = runs.base("19.4 h", *changes)
     instants = list(simulate(scene))
     rows, last = _ledgers(instants), instants[-1]
@@ -82,14 +83,17 @@ REFINEMENTS = (0.7, 1.0, 1.4, 2.0)
 
 
 @pytest.mark.case(
-    "coupling-density-restored", kind="property",
-    claim="What a density has of error at a remesh is gone after the next update [E7]: the shape takes up X_m again",
-    norm="a half-disc of 20 um whose density is X_m (1 + 0.1 x / R), remeshed, one step without uptake or decay: L2 "
-         "of (X_A + X_I) / X_m - 1 over it; X_m times the area over the biomass, less 1",
-    mutants=("density-not-worked-off", "theta-anew-at-a-remesh"), runs_with="paper")
+    "coupling-density-restored", kind="property", mutants=("density-not-worked-off", "theta-anew-at-a-remesh"),
+    runs_with="paper")
 @parametrize("*changes", runs.every(0.5))
 def test_density_restored(changes, record):
-    """Record the order of linear elements, and the errors of the others."""
+    """What a density has of error at a remesh is gone after the next update [E7]: the shape takes up X_m again.
+
+    Norm: a half-disc of 20 um whose density is X_m (1 + 0.1 x / R), remeshed, one step without uptake or decay: L2 of
+    (X_A + X_I) / X_m - 1 over it; X_m times the area over the biomass, less 1.
+
+    Record the order of linear elements, and the errors of the others.
+    """
     if runs.base("1 h", *changes).numerics.order > 1:
         error, area = _restored(*changes)
         record(at_most("density", error, 1e-10,
@@ -220,16 +224,18 @@ BALANCED = {**{f"base, {preset}": (_of_base, preset) for preset in ("paper", *ru
 @pytest.mark.slow
 @pytest.mark.case(
     "coupling-one-balance", kind="property",
-    claim="In every step what is supplied leaves, is consumed or stored, what is there is what was and what is made, "
-          "and what is made is what the substrates taken up are worth: to round-off by the midpoint rule, to second "
-          "order by the paper's updates, in whole base to 2e-4 in a step of 12 min",
-    norm="worst ledger step, all at once: |supplied - out - consumed - stored| over supplied, |after - before - made| "
-         "over after, |made - (Y donor - (acceptor - F donor) / d_c)| over the larger of its two terms; base, and a "
-         "pore of 40 um at 2.9 m/d from a seed to 2 h past contact",
     mutants=("biomass-of-the-start-takes-up", "remesh-half-way-unmatched", "masses-of-the-start-kept",
              "flows-of-the-start", "euler-biomass", "rates-at-the-start", "rates-two-percent-low", "decay-leaves-all"))
 @parametrize("judge, *arguments", BALANCED)
 def test_one_balance(judge, arguments, record):
+    """In every step what is supplied leaves, is consumed or stored, what is there is what was and what is made, and
+    what is made is what the substrates taken up are worth: to round-off by the midpoint rule, to second order by the
+    paper's updates, in whole base to 2e-4 in a step of 12 min.
+
+    Norm: worst ledger step, all at once: |supplied - out - consumed - stored| over supplied, |after - before - made|
+    over after, |made - (Y donor - (acceptor - F donor) / d_c)| over the larger of its two terms; base, and a pore of 40
+    um at 2.9 m/d from a seed to 2 h past contact.
+    """
     record(judge(*arguments))
 
 
@@ -240,14 +246,7 @@ IN_A_STEP = 3.0
 
 @pytest.mark.slow
 @pytest.mark.case(
-    "coupling-amounts", kind="property",
-    claim="The amounts in the ledgers are those of ten times shorter steps: to 1 % by preset fast, 0.1 % by accurate "
-          "and 0.01 % by exact in all, to three times that in every step",
-    norm="amounts of both substrates consumed over base, and in its worst step, over those of a run with a hundredth "
-         "of the tolerance, less 1; of that run, of ten times as many steps, the cumulated amounts are interpolated "
-         "at the ends of the steps by a cubic spline; exact: 4 h from a seed of 25 um, with elements as large as in "
-         "fast",
-    mutants=("flows-of-the-start", "curved-rates-of-the-start"), runs_with="2",
+    "coupling-amounts", kind="property", mutants=("flows-of-the-start", "curved-rates-of-the-start"), runs_with="2",
     omitted="paper has no tolerance of its steps")
 @parametrize(
     "preset, end, *changes",
@@ -255,7 +254,13 @@ IN_A_STEP = 3.0
      "exact": ("exact", "4 h", 'aggregate.radius="25 um"', "numerics.refinement=0.2"),
      **{f"fast, {kind}": ("fast", "19.4 h", runs.with_elements(kind)) for kind in ("linear", "cubic")}})
 def test_amounts(preset, end, changes, record):
-    """Record checks of one preset."""
+    """The amounts in the ledgers are those of ten times shorter steps: to 1 % by preset fast, 0.1 % by accurate and
+    0.01 % by exact in all, to three times that in every step.
+
+    Norm: amounts of both substrates consumed over base, and in its worst step, over those of a run with a hundredth of
+    the tolerance, less 1; of that run, of ten times as many steps, the cumulated amounts are interpolated at the ends
+    of the steps by a cubic spline; exact: 4 h from a seed of 25 um, with elements as large as in fast.
+    """
     scene = runs.base(end, runs.with_preset(preset), *changes)
     shorter = runs.base(end, runs.with_preset(preset), *changes, f"numerics.tolerance={scene.numerics.tolerance / 100}")
     (times, amounts), (fine, fine_amounts) = (_cumulated(one) for one in (scene, shorter))
@@ -278,13 +283,14 @@ def _cumulated(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.case(
-    "coupling-contact", kind="property",
-    claim="Through contact the ledgers close, the area stays the biomass over X_m, no film under 2 um is left, and "
-          "the fluid is cut in two",
-    norm="three steps from an aggregate 0.1 um short of closing the pore, 20 um wide",
-    mutants=("films-stay-open", "reprojection-left-out"), runs_with="paper")
+    "coupling-contact", kind="property", mutants=("films-stay-open", "reprojection-left-out"), runs_with="paper")
 @parametrize("*changes", runs.EVERY | {"exact": (runs.with_preset("exact"), "numerics.refinement=0.3")})
 def test_contact(changes, record):
+    """Through contact the ledgers close, the area stays the biomass over X_m, no film under 2 um is left, and the fluid
+    is cut in two.
+
+    Norm: three steps from an aggregate 0.1 um short of closing the pore, 20 um wide.
+    """
     scene = runs.base("0.6 h", 'pore.width="20 um"', 'aggregate.radius="17.9 um"', *changes,
                       times=(0.2, 0.4, 0.6))
     instants = list(simulate(runs.at_velocity(scene, runs.SPEED)))
@@ -302,13 +308,13 @@ def _area(scene: Scene, last: Report, bound: float = 3e-6, origin: str = "J = th
 
 
 @pytest.mark.slow
-@pytest.mark.case(
-    "coupling-wedge", kind="property",
-    claim="Wedges of fluid beside a contact surface close until they have the least contact angle",
-    norm="one step from a disc of 20 um that stands on a chord, the fluid under it at 8 degrees",
-    mutants=("no-wedge-closes", "films-stay-open"), runs_with="paper")
+@pytest.mark.case("coupling-wedge", kind="property", mutants=("no-wedge-closes", "films-stay-open"), runs_with="paper")
 @parametrize("*changes", runs.every(0.6))
 def test_wedge(changes, record):
+    """Wedges of fluid beside a contact surface close until they have the least contact angle.
+
+    Norm: one step from a disc of 20 um that stands on a chord, the fluid under it at 8 degrees.
+    """
     scene = runs.base("0.2 h", *changes)
     instants = list(simulate(scene, _disc(20.0, 19.8, 60 * scene.numerics.geometry)))
     gaps = [_narrowest(scene, instant.pore, BOTTOM) for instant in instants]

@@ -3,8 +3,6 @@
 Under this traction the shape and the flow around it must agree.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 
@@ -48,15 +46,18 @@ def nodal_forces(scene, space: Space) -> tuple[np.ndarray, Flow]:
 
 @pytest.mark.case(
     "coupling-traction-balance", kind="property",
-    claim="What the fluid does to the aggregate the aggregate does to the fluid; no force is left in the fluid; the "
-          "drag is what the ends' pressure and the walls' shear leave over",
-    norm="x-force on the interface against minus that by the aggregate's own triangles, and forces at nodes within "
-         "the fluid, over the largest; drag on a half-disc over head loss times W less wall shear, less 1",
     mutants=("traction-pressure-left-out", "traction-form-mixed", "traction-of-both-phases"), runs_with="paper")
 @parametrize("*changes", {f"{form}, {label}": (f'numerics.interface="{form}"', *changes) for form in FORMS
                           for label, changes in DEFAULT.items()})
 def test_traction_balance(changes, record):
-    """Record the balance at t = 0, and the order of the drag with linear elements and the paper's form."""
+    """What the fluid does to the aggregate the aggregate does to the fluid; no force is left in the fluid; the drag is
+    what the ends' pressure and the walls' shear leave over.
+
+    Norm: x-force on the interface against minus that by the aggregate's own triangles, and forces at nodes within the
+    fluid, over the largest; drag on a half-disc over head loss times W less wall shear, less 1.
+
+    Record the balance at t = 0, and the order of the drag with linear elements and the paper's form.
+    """
     scene = loaded_scene(*changes)
     seed = pore.seeded(scene)
     on, solution = nodal_forces(scene, seed.space)
@@ -111,13 +112,15 @@ def _wall_shear(grid: Mesh, velocity: np.ndarray) -> float:
 
 
 @pytest.mark.case(
-    "coupling-traction-layer", kind="exact",
-    claim="The shear that the fluid exerts on a layer of biomass is that of two viscous layers",
-    norm="x-force on the middle of a layer of biomass, lambda = 2000, over the shear stress of two viscous layers, "
-         "less 1, root mean square over random meshes of a size",
-    mutants=("traction-pressure-left-out", "traction-transposed-gradient"), references=("layered_channel",))
+    "coupling-traction-layer", kind="exact", mutants=("traction-pressure-left-out", "traction-transposed-gradient"),
+    references=("layered_channel",))
 @parametrize("order", combined(flow_cases.ORDERS))
 def test_traction_layer(order, record):
+    """The shear that the fluid exerts on a layer of biomass is that of two viscous layers.
+
+    Norm: x-force on the middle of a layer of biomass, lambda = 2000, over the shear stress of two viscous layers, less
+    1, root mean square over random meshes of a size.
+    """
     if order > 1:
         record(at_most("shear", abs(_shear(Space(flow_cases.long_layer(), order))), 1e-5,
                        "both parabolas are held; what is left of the layer's ends"))
@@ -164,13 +167,14 @@ def _tested(mesh: Mesh, line: np.ndarray, weight: np.ndarray) -> float:
 
 
 @pytest.mark.case(
-    "coupling-traction-base", kind="property",
-    claim="The fluid's forces are small against those of growth (C26): they move base's interface by less than 1e-4",
-    norm="base at 4, 10 and 16 h, steps of 24 min: largest move of the interface by the fluid in the next step, over "
-         "the thickness",
-    mutants=("density-squared", "forces-thousandfold"), runs_with="paper")
+    "coupling-traction-base", kind="property", mutants=("density-squared", "forces-thousandfold"), runs_with="paper")
 @parametrize("*changes", runs.every(0.2, 0.6))
 def test_traction_base(changes, record):
+    """The fluid's forces are small against those of growth (C26): they move base's interface by less than 1e-4.
+
+    Norm: base at 4, 10 and 16 h, steps of 24 min: largest move of the interface by the fluid in the next step, over the
+    thickness.
+    """
     _, *reports = simulate(runs.base("16 h", 'growth.time_step="24 min"', *changes, times=(4, 10, 16)))
     moves = [_next_move(instant, *changes) for instant in reports]
     record(at_most("largest move", max(moves), 1e-4, "0.1 Pa of the fluid on a stiffness of 2 to 10 kPa, some times "
@@ -186,14 +190,15 @@ def _next_move(report: Report, *changes: str) -> float:
 
 
 @pytest.mark.case(
-    "coupling-traction-even", kind="exact",
-    claim="An even pressure of the fluid, five times mu_L and more, moves nothing: the aggregate is incompressible, "
-          "and its P takes the pressure up",
-    norm="largest move of a node, over R; P over mu_L less what it was and the pressure; forces at free nodes less "
-         "those of an even pressure, over the largest",
-    mutants=("traction-pressure-left-out", "forces-pushed"), runs_with="paper")
+    "coupling-traction-even", kind="exact", mutants=("traction-pressure-left-out", "forces-pushed"), runs_with="paper")
 @parametrize("*changes", DEFAULT)
 def test_traction_even(changes, record):
+    """An even pressure of the fluid, five times mu_L and more, moves nothing: the aggregate is incompressible, and its
+    P takes the pressure up.
+
+    Norm: largest move of a node, over R; P over mu_L less what it was and the pressure; forces at free nodes less those
+    of an even pressure, over the largest.
+    """
     scene = loaded_scene(*changes)
     seed = pore.seeded(scene)
     theta = _uneven(seed, 0.002)
@@ -254,12 +259,14 @@ def _moved(factor: float, *changes: str) -> tuple[pore.Pore, pore.Pore, np.ndarr
 @pytest.mark.slow
 @pytest.mark.case(
     "coupling-traction-fixed-point", kind="property",
-    claim="The move is proportional to the force as the force falls, and shape and flow agree in the end",
-    norm="nodes' move by the fluid, over the force's factor and R, against that of the factor below; defect of the "
-         "equilibrium under the forces of the flow around its own shape, and around the shape before",
     mutants=("forces-of-the-first-round", "forces-pushed", "density-squared"), runs_with="paper")
 @parametrize("*changes", DEFAULT)
 def test_traction_fixed_point(changes, record):
+    """The move is proportional to the force as the force falls, and shape and flow agree in the end.
+
+    Norm: nodes' move by the fluid, over the force's factor and R, against that of the factor below; defect of the
+    equilibrium under the forces of the flow around its own shape, and around the shape before.
+    """
     plain = _moved(0.0, *changes)[1].mesh.points
     moves = [(_moved(factor, *changes)[1].mesh.points - plain) / factor for factor in (*FACTORS, 1.0)]
     size = np.abs(moves[-1]).max()
@@ -287,12 +294,10 @@ def _defects(*changes: str) -> tuple[float, float]:
     seed, grown, theta = _moved(FACTORS[-1], *changes)
     nodes, body = seed.mesh.body, seed.body
     constrained_dofs = contact.constrained(len(nodes), seed.mesh.topology.body_loop, seed.wall, seed.fixed)
-    stabilising, defects = None, []
-    if body.shape.geometry == 1:
-        cells = body.shape.cells
-        stabilising = growth.gradient_stabilisation(seed.mesh.points[nodes], cells, np.ones(len(cells)))
+    defects = []
+    stabilisation = growth.STABILISATIONS[body.shape.geometry].on(body, seed.mesh.points[nodes])
     place, pressure = grown.mesh.points[nodes], grown.pressure[seed.mesh.topology.body_corners]
-    rest = growth.System(body, constrained_dofs, stabilising=stabilising).under(theta, place, place, pressure)
+    rest = growth.System(body, constrained_dofs, stabilisation=stabilisation).under(theta, place, place, pressure)
     for around in (grown, seed):
         fluid = traction.Fluid.of(scene)
         forces = traction.forces(fluid, traction.surroundings(fluid.meshing, seed, around), around)
@@ -305,14 +310,14 @@ def _defects(*changes: str) -> tuple[float, float]:
 ANEW = 1.35
 
 
-@pytest.mark.case(
-    "coupling-traction-remeshed", kind="property",
-    claim="Where a new mesh must be made for the flow, its forces go to the aggregate's nodes, sum and moment kept",
-    norm="sum along x and moment of the forces on an outline's nodes against those on the nodes of a new mesh around "
-         "it, and the sum against that on the mesh that followed; relative",
-    mutants=("forces-shared-evenly",), runs_with="paper")
+@pytest.mark.case("coupling-traction-remeshed", kind="property", mutants=("forces-shared-evenly",), runs_with="paper")
 @parametrize("*changes", REMESHED)
 def test_traction_remeshed(changes, record):
+    """Where a new mesh must be made for the flow, its forces go to the aggregate's nodes, sum and moment kept.
+
+    Norm: sum along x and moment of the forces on an outline's nodes against those on the nodes of a new mesh around it,
+    and the sum against that on the mesh that followed; relative.
+    """
     seed, grown, _ = _moved(0.0, *changes)
     coarse = loaded_scene(*changes)
     fine = loaded_scene(*changes, f"numerics.refinement={max(ANEW, 3 * coarse.numerics.refinement)}")

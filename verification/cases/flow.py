@@ -30,8 +30,6 @@ strong form (1) acts in both phases. The stabilisation of linear elements ignore
 it stays consistent to second order. On bent triangles the map (s, t) -> (s, t + BEND s^2) keeps the interface straight.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache
 from types import ModuleType
@@ -78,12 +76,14 @@ def drive(**values) -> Drive:
 
 @pytest.mark.case(
     "flow-poiseuille", kind="exact",
-    claim="In a clean channel the flow is plane Poiseuille's, in both forms of [E2]",
-    norm="L2 of u over the mesh; relative error of the head loss over it, and of the conductivity of a pore of 600 um",
     mutants=("saddle-sign", "tau-linear", "upper-wall-slips", "outlet-free", "unmeshed-forgotten"),
     references=("poiseuille",), runs_with="1", omitted="orders 2, 3: flow-curved-poiseuille")
 @pytest.mark.parametrize("interface", FORMS)
 def test_poiseuille(interface, record):
+    """In a clean channel the flow is plane Poiseuille's, in both forms of [E2].
+
+    Norm: L2 of u over the mesh; relative error of the head loss over it, and of the conductivity of a pore of 600 um.
+    """
     record(studies(refine(_clean, (0.7, 1.25, 2.2, 3.9), interface),
                   {"velocity": (2, SECOND, 3e-4), "head loss": (1, ENDS_FIRST, 6e-3),
                    "conductivity": (1, ENDS_FIRST, 1.5e-3)}))
@@ -112,11 +112,13 @@ PLUG, PLUG_SIZES = 30.0, {8.0: 12, 4.0: 8, 2.0: 4, 1.0: 1}
 
 
 @pytest.mark.case(
-    "flow-plug", kind="exact",
-    claim="Through a plug the Laplacian form keeps Poiseuille's profile and loses lambda times its head there",
-    norm="root mean square over random meshes of a size: L2 of u over the mesh, relative error of the head loss",
-    mutants=("tau-of-water",), references=("poiseuille",), runs_with="1", omitted="orders 2, 3: flow-curved-poiseuille")
+    "flow-plug", kind="exact", mutants=("tau-of-water",), references=("poiseuille",), runs_with="1",
+    omitted="orders 2, 3: flow-curved-poiseuille")
 def test_plug(record):
+    """Through a plug the Laplacian form keeps Poiseuille's profile and loses lambda times its head there.
+
+    Norm: root mean square over random meshes of a size: L2 of u over the mesh, relative error of the head loss.
+    """
     record(studies(refine(_plug_errors, PLUG_SIZES), {
         "velocity": (2, SECOND, 5e-4),
         "head loss": (2, "second order: the plug's inside outweighs the ends", 1e-3)}))
@@ -136,16 +138,17 @@ PARABOLAS = {f"lambda = {ratio:g}, {form}": (ratio, form)
 
 @pytest.mark.case(
     "flow-curved-poiseuille", kind="exact",
-    claim="With quadratic and cubic elements a clean channel, in both forms, and one with a plug of biomass of 2000 "
-          "times the viscosity have the parabola at every node and the loss (6) of each part, on any mesh; the work "
-          "of the inlet is that loss",
-    norm="largest difference over the largest velocity; relative difference of losses",
     mutants=("viscosity-swapped", "loss-per-width", "inlet-parabola", "whole-pore-twice", "outlet-free",
-             "cubic-edge-crossed", "quadratic-stabilised"),
-    references=("poiseuille",), omitted="order 1: flow-poiseuille, flow-plug")
+             "cubic-edge-crossed", "quadratic-stabilised"), references=("poiseuille",),
+    omitted="order 1: flow-poiseuille, flow-plug")
 @parametrize("order, problem", combined(HIGHER, PARABOLAS))
 def test_curved_poiseuille(order, problem, record):
-    """Record errors on six-node triangles with biomass from wall to wall."""
+    """With quadratic and cubic elements a clean channel, in both forms, and one with a plug of biomass of 2000 times
+    the viscosity have the parabola at every node and the loss (6) of each part, on any mesh; the work of the inlet is
+    that loss.
+
+    Norm: largest difference over the largest velocity; relative difference of losses.
+    """
     ratio, interface = problem
     space = meshes.space_on(meshes.plug(CURVED_ENDS, WIDTH, HALF, 8.0, seed=3), order)
     solution = flow.solve(space, drive(mean_velocity=MEAN, viscosity_ratio=ratio), LENGTH, interface=interface)
@@ -180,17 +183,18 @@ LONG, LEFT = 250.0, 2e-6
 
 @pytest.mark.slow
 @pytest.mark.case(
-    "flow-layers", kind="exact",
-    claim="Along a layer of biomass the flow is that of two viscous layers, for lambda from 1 to 1e8, to second order "
-          "with linear elements in both forms and on any mesh with quadratic and cubic ones",
-    norm="middle of a long layer, root mean square over random meshes of a size: L2 of u, of u within the layer "
-         "(relative to that), and relative error of the pressure gradient",
-    mutants=("tau-of-water", "viscosity-swapped"), references=("layered_channel",))
+    "flow-layers", kind="exact", mutants=("tau-of-water", "viscosity-swapped"), references=("layered_channel",))
 @parametrize(
     "order, ratio, interface",
     {**combined({"order 1": 1}, RATIOS, {"laplacian": "laplacian"}),
      **combined({"order 1": 1}, viscous(RATIO), {"traction": "traction"}), **combined(HIGHER, RATIOS, FORMS)})
 def test_layers(order, ratio, interface, record):
+    """Along a layer of biomass the flow is that of two viscous layers, for lambda from 1 to 1e8, to second order with
+    linear elements in both forms and on any mesh with quadratic and cubic ones.
+
+    Norm: middle of a long layer, root mean square over random meshes of a size: L2 of u, of u within the layer
+    (relative to that), and relative error of the pressure gradient.
+    """
     if order == 1:
         record(studies(refine(_layer_errors, DRAWS, ratio, interface), STUDIED[interface]))
     else:
@@ -263,16 +267,16 @@ CUBIC = 0.05
 
 @pytest.mark.slow
 @pytest.mark.case(
-    "flow-permeable-layers", kind="exact",
-    claim="Along a permeable layer the flow is that of a layer with Brinkman's drag: of third order with quadratic "
-          "elements, and twenty times nearer with cubic ones; a layer too tight to be resolved acts as a wall to one "
-          "percent",
-    norm="middle of a long layer, root mean square over random meshes of a size: L2 of u; relative error of the "
-         "pressure gradient",
-    mutants=("drag-in-the-water", "drag-halved"), references=("brinkman_channel",),
-    omitted="linear elements are refused with a permeable body")
+    "flow-permeable-layers", kind="exact", mutants=("drag-in-the-water", "drag-halved"),
+    references=("brinkman_channel",), omitted="linear elements are refused with a permeable body")
 @parametrize("order, interface", combined(HIGHER, FORMS))
 def test_permeable_layers(order, interface, record):
+    """Along a permeable layer the flow is that of a layer with Brinkman's drag: of third order with quadratic elements,
+    and twenty times nearer with cubic ones; a layer too tight to be resolved acts as a wall to one percent.
+
+    Norm: middle of a long layer, root mean square over random meshes of a size: L2 of u; relative error of the pressure
+    gradient.
+    """
     _, second, third, _ = PERMEABLE_SIZES
     if order == 2:
         record(studies(refine(_permeable_layer, PERMEABLE_SIZES, RESOLVED, interface, 2), THIRD))
@@ -295,16 +299,18 @@ LAYER_EXCESS, NEIGHBOURS, FROM_THE_ENDS = {2: 0.18, 3: 0.014}, 0.25**2, 2e-5
 
 
 @pytest.mark.case(
-    "flow-permeable-plug", kind="exact",
-    claim="A permeable body from wall to wall lets through what Brinkman's equation says, with layers on the walls "
-          "that are resolved or are a ten thousandth of an element, and its velocity turns back nowhere",
-    norm="middle of a long plug: relative error of the pressure gradient; least velocity along the pore at a node, "
-         "over the mean",
-    mutants=("drag-halved", "drag-layer-sticks", "drag-layer-slides-freely"), references=("brinkman_channel",),
-    omitted="linear elements are refused with a permeable body")
+    "flow-permeable-plug", kind="exact", mutants=("drag-halved", "drag-layer-sticks", "drag-layer-slides-freely"),
+    references=("brinkman_channel",), omitted="linear elements are refused with a permeable body")
 @parametrize("order, interface", combined(HIGHER, FORMS))
 def test_permeable_plug(order, interface, record):
-    """Record errors of the gradient. Two layers of thickness d take 2 k / (d W) of the loss."""
+    """A permeable body from wall to wall lets through what Brinkman's equation says, with layers on the walls that are
+    resolved or are a ten thousandth of an element, and its velocity turns back nowhere.
+
+    Norm: middle of a long plug: relative error of the pressure gradient; least velocity along the pore at a node, over
+    the mean.
+
+    Two layers of thickness d take 2 k / (d W) of the loss.
+    """
     space = meshes.space_on(meshes.plug((-SPAN - BEYOND, SPAN + BEYOND), WIDTH, SPAN, SPAN_SIZE, meshes.cut), order)
     middle = middle_of(space.mesh, MIDDLE)
     inside = np.unique(space.cells[middle])
@@ -338,14 +344,15 @@ CURVED, BOW = 0.5, 1e-5
 
 
 @pytest.mark.case(
-    "flow-first-rise", kind="exact",
-    claim="At lambda = 1 the head loss rises with lambda by what Poiseuille flow dissipates in a half-disc: to second "
-          "order with linear elements, on a coarse mesh with quadratic and cubic ones",
-    norm="root mean square over meshes of about a size: relative error of d(head loss)/d(lambda) by a central "
-         "difference",
-    mutants=("viscosity-swapped", "loss-per-width"), references=("poiseuille",))
+    "flow-first-rise", kind="exact", mutants=("viscosity-swapped", "loss-per-width"), references=("poiseuille",))
 @parametrize("order, interface", combined(ORDERS, FORMS))
 def test_first_rise(order, interface, record):
+    """At lambda = 1 the head loss rises with lambda by what Poiseuille flow dissipates in a half-disc: to second order
+    with linear elements, on a coarse mesh with quadratic and cubic ones.
+
+    Norm: root mean square over meshes of about a size: relative error of d(head loss)/d(lambda) by a central
+    difference.
+    """
     if order == 1:
         record(studies(refine(_rise_error, RISE_REFINEMENTS, interface, 1), {"rise": (2, RISE_SECOND, 4e-4)}))
         return
@@ -397,29 +404,31 @@ def inclusion(disc: tuple, ratio: float, interface: str):
 
 
 @pytest.mark.case(
-    "flow-inclusion", kind="exact",
-    claim="A viscous disc under pure shear strains as the closed form says, for lambda = 10 and 2000 in both forms",
-    norm="root mean square over random meshes of a size, relative L2 of u and p",
-    mutants=("traction-transposed", "normal-stress-halved"), references=("viscous_inclusion",),
-    omitted="orders 2, 3: flow-inclusion-quadratic")
-@parametrize("disc, ratio, interface", combined(POLYGON, SOFT_AND_STIFF, FORMS))
-def test_inclusion(disc, ratio, interface, record):
-    record(inclusion(disc, ratio, interface))
+    "flow-inclusion", kind="exact", mutants=("traction-transposed", "normal-stress-halved"),
+    references=("viscous_inclusion",), omitted="orders 2, 3: flow-inclusion-quadratic")
+@parametrize("*setup", combined(POLYGON, SOFT_AND_STIFF, FORMS))
+def test_inclusion(setup, record):
+    """A viscous disc under pure shear strains as the closed form says, for lambda = 10 and 2000 in both forms.
+
+    Norm: root mean square over random meshes of a size, relative L2 of u and p.
+    """
+    record(inclusion(*setup))
 
 
 @pytest.mark.slow
 @pytest.mark.case(
-    "flow-inclusion-quadratic", kind="exact",
-    claim="Quadratic and cubic velocities show what the jump of the pressure costs: first order where the disc gives "
-          "way, in both forms; a stiff disc shows the chords of its polygon, second order, or, round, the full order",
-    norm="root mean square over random meshes of a size, relative L2 of u and p",
-    mutants=("normal-stress-halved", "curved-straight-divergence"), references=("viscous_inclusion",),
-    omitted="order 1: flow-inclusion")
+    "flow-inclusion-quadratic", kind="exact", mutants=("normal-stress-halved", "curved-straight-divergence"),
+    references=("viscous_inclusion",), omitted="order 1: flow-inclusion")
 @parametrize(
-    "disc, ratio, interface",
+    "*setup",
     {**combined(POLYGON_2, SOFT_AND_STIFF, {"traction": "traction"}), **combined(ROUND, SOFT_AND_STIFF, FORMS)})
-def test_inclusion_quadratic(disc, ratio, interface, record):
-    record(inclusion(disc, ratio, interface))
+def test_inclusion_quadratic(setup, record):
+    """Quadratic and cubic velocities show what the jump of the pressure costs: first order where the disc gives way, in
+    both forms; a stiff disc shows the chords of its polygon, second order, or, round, the full order.
+
+    Norm: root mean square over random meshes of a size, relative L2 of u and p.
+    """
+    record(inclusion(*setup))
 
 
 def _errors(size: float, draw: int, make_mesh: Callable, how, *arguments) -> dict[str, float]:
@@ -455,40 +464,45 @@ def manufactured(setup: tuple, ratio: float, interface: str):
 
 
 @pytest.mark.case(
-    "flow-manufactured", kind="manufactured",
-    claim="Where nothing jumps but the viscosity all orders are full, for lambda = 10 and 2000 in both forms",
-    norm="root mean square over random meshes of a size, relative L2 of u and p",
-    mutants=("saddle-sign",), references=("manufactured_flow",), omitted="orders 2, 3: flow-manufactured-quadratic")
-@parametrize("setup, ratio, interface", combined(SETUPS, SOFT_AND_STIFF, FORMS))
-def test_manufactured(setup, ratio, interface, record):
-    record(manufactured(setup, ratio, interface))
+    "flow-manufactured", kind="manufactured", mutants=("saddle-sign",), references=("manufactured_flow",),
+    omitted="orders 2, 3: flow-manufactured-quadratic")
+@parametrize("*setup", combined(SETUPS, SOFT_AND_STIFF, FORMS))
+def test_manufactured(setup, record):
+    """Where nothing jumps but the viscosity all orders are full, for lambda = 10 and 2000 in both forms.
+
+    Norm: root mean square over random meshes of a size, relative L2 of u and p.
+    """
+    record(manufactured(*setup))
 
 
 @pytest.mark.slow
 @pytest.mark.case(
-    "flow-manufactured-quadratic", kind="manufactured",
-    claim="The same flow with quadratic velocities is of third order, its pressure of second; with cubic ones of "
-          "fourth, its pressure of third",
-    norm="root mean square over random meshes of a size, relative L2 of u and p",
-    mutants=("traction-transposed", "cubic-lower-degree"), references=("manufactured_flow",),
-    omitted="order 1: flow-manufactured")
-@parametrize("setup, ratio, interface", combined(SETUPS_HIGHER, SOFT_AND_STIFF, FORMS))
-def test_manufactured_quadratic(setup, ratio, interface, record):
-    record(manufactured(setup, ratio, interface))
+    "flow-manufactured-quadratic", kind="manufactured", mutants=("traction-transposed", "cubic-lower-degree"),
+    references=("manufactured_flow",), omitted="order 1: flow-manufactured")
+@parametrize("*setup", combined(SETUPS_HIGHER, SOFT_AND_STIFF, FORMS))
+def test_manufactured_quadratic(setup, record):
+    """The same flow with quadratic velocities is of third order, its pressure of second; with cubic ones of fourth, its
+    pressure of third.
+
+    Norm: root mean square over random meshes of a size, relative L2 of u and p.
+    """
+    record(manufactured(*setup))
 
 
 @pytest.mark.slow
 @pytest.mark.case(
     "flow-curved-manufactured", kind="manufactured",
-    claim="On bent triangles quadratic velocities are of third order and cubic ones of fourth, their pressures of "
-          "second and third, where the viscosity jumps tenfold at a straight interface, in both forms",
-    norm="root mean square over random meshes of a size, relative L2 of u and p",
     mutants=("cubic-edge-crossed", "cubic-slope", "cubic-lower-degree", "curved-straight-divergence",
-             "traction-transposed"),
-    references=("manufactured_flow",), omitted="order 1 has straight triangles: flow-manufactured")
-@parametrize("setup, ratio, interface", combined(SETUPS_BENT, viscous(10.0), FORMS))
-def test_curved_manufactured(setup, ratio, interface, record):
-    record(manufactured(setup, ratio, interface))
+             "traction-transposed"), references=("manufactured_flow",),
+    omitted="order 1 has straight triangles: flow-manufactured")
+@parametrize("*setup", combined(SETUPS_BENT, viscous(10.0), FORMS))
+def test_curved_manufactured(setup, record):
+    """On bent triangles quadratic velocities are of third order and cubic ones of fourth, their pressures of second and
+    third, where the viscosity jumps tenfold at a straight interface, in both forms.
+
+    Norm: root mean square over random meshes of a size, relative L2 of u and p.
+    """
+    record(manufactured(*setup))
 
 
 @cache

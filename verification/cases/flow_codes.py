@@ -20,8 +20,6 @@ good meshes. The bubble has no constant to choose. On stretched triangles, where
 measure, it errs far less.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 
@@ -82,38 +80,33 @@ def half_disc(radius: float, ratio: float, interface: str, orders: dict, bounds:
 
 @pytest.mark.slow
 @pytest.mark.case(
-    "flow-half-disc", kind="cross-code",
-    claim="Around half-discs of 5 and 25 um, lambda = 2000, velocity, pressure and head loss are Taylor-Hood's",
-    norm=NORM,
-    mutants=("viscosity-swapped",), references=("poiseuille", "taylor_hood"), runs_with="1",
-    omitted="orders 2, 3: flow-curved-half-disc")
-@parametrize("radius, ratio, interface, orders, bounds", AROUND)
-def test_half_disc(radius, ratio, interface, orders, bounds, record):
-    record(half_disc(radius, ratio, interface, orders, bounds))
+    "flow-half-disc", kind="cross-code", norm=NORM, mutants=("viscosity-swapped",),
+    references=("poiseuille", "taylor_hood"), runs_with="1", omitted="orders 2, 3: flow-curved-half-disc")
+@parametrize("*setup", AROUND)
+def test_half_disc(setup, record):
+    """Around half-discs of 5 and 25 um, lambda = 2000, velocity, pressure and head loss are Taylor-Hood's."""
+    record(half_disc(*setup))
 
 
 @pytest.mark.slow
 @pytest.mark.case(
-    "flow-half-disc-traction", kind="cross-code",
-    claim="With continuous traction too the flow around a half-disc of 25 um is Taylor-Hood's, lambda = 10 and 2000",
-    norm=NORM,
-    mutants=("traction-transposed",), references=("poiseuille", "taylor_hood"), runs_with="1",
-    omitted="orders 2, 3: flow-curved-half-disc")
-@parametrize("radius, ratio, interface, orders, bounds", AROUND_TRACTION)
-def test_half_disc_traction(radius, ratio, interface, orders, bounds, record):
-    record(half_disc(radius, ratio, interface, orders, bounds))
+    "flow-half-disc-traction", kind="cross-code", norm=NORM, mutants=("traction-transposed",),
+    references=("poiseuille", "taylor_hood"), runs_with="1", omitted="orders 2, 3: flow-curved-half-disc")
+@parametrize("*setup", AROUND_TRACTION)
+def test_half_disc_traction(setup, record):
+    """With continuous traction too the flow around a half-disc of 25 um is Taylor-Hood's, lambda = 10 and 2000."""
+    record(half_disc(*setup))
 
 
 @pytest.mark.slow
 @pytest.mark.case(
-    "flow-film", kind="cross-code",
-    claim="Through the film of 9 um that a half-disc of 41 um leaves open, lambda = 2000, the flow is Taylor-Hood's, "
-          "with elements of every order",
-    norm=NORM,
-    mutants=("viscosity-swapped",), references=("poiseuille", "taylor_hood"))
+    "flow-film", kind="cross-code", norm=NORM, mutants=("viscosity-swapped",), references=("poiseuille", "taylor_hood"))
 @parametrize("order, interface", {"order 1": (1, "laplacian"), **combined(HIGHER, FORMS)})
 def test_film(order, interface, record):
-    """Record differences without orders.
+    """Through the film of 9 um that a half-disc of 41 um leaves open, lambda = 2000, the flow is Taylor-Hood's, with
+    elements of every order.
+
+    Record differences without orders.
 
     Elements grow from the walls of the film to its middle at every refinement, so no single size describes a mesh.
     """
@@ -181,16 +174,18 @@ SOFT = {"laplacian": 5e-4, "traction": 1.5e-3}
 
 @pytest.mark.slow
 @pytest.mark.case(
-    "flow-curved-half-disc", kind="cross-code",
-    claim="Around a half-disc of biomass the whole velocity field and the loss are scikit-fem's, which has a pressure "
-          "of its own on either side: to first order for lambda = 10, under 0.1 % for lambda = 2000, with elements of "
-          "order 2 and 3 in both forms",
-    norm="velocity at the corners of the reference's triangles, root mean square, and the loss, relative",
-    mutants=("viscosity-swapped", "curved-straight-divergence"), references=("poiseuille", "taylor_hood"),
-    omitted="order 1: flow-half-disc, flow-half-disc-traction")
+    "flow-curved-half-disc", kind="cross-code", mutants=("viscosity-swapped", "curved-straight-divergence"),
+    references=("poiseuille", "taylor_hood"), omitted="order 1: flow-half-disc, flow-half-disc-traction")
 @parametrize("ratio, order, interface", combined(flow_cases.viscous(10.0, RATIO), HIGHER, FORMS))
 def test_curved_half_disc(ratio, order, interface, record):
-    """Record orders if the biomass yields, and differences if it is nearly rigid."""
+    """Around a half-disc of biomass the whole velocity field and the loss are scikit-fem's, which has a pressure of its
+    own on either side: to first order for lambda = 10, under 0.1 % for lambda = 2000, with elements of order 2 and 3 in
+    both forms.
+
+    Norm: velocity at the corners of the reference's triangles, root mean square, and the loss, relative.
+
+    Record orders if the biomass yields, and differences if it is nearly rigid.
+    """
     if ratio < RATIO:
         record(studies(refine(_round_errors, ROUND_REFINEMENTS, ratio, order, interface), {
              "head loss": (1, ROUND_JUMP, SOFT[interface]),
@@ -247,14 +242,15 @@ def uncondensed(grid: Mesh, ratio: float, interface: str) -> dict[str, np.ndarra
 
 
 @pytest.mark.case(
-    "flow-bubble", kind="cross-code",
-    claim="The condensed bubble is scikit-fem's MINI element with its bubbles as unknowns, in both forms, and the "
-          "mean velocity of each triangle, bubble included, carries the same flux through every section",
-    norm="largest difference over the largest value; largest relative error of the flux through 25 sections",
-    mutants=("bubble-of-water", "bubble-mean-unweighted", "bubble-block-isotropic"), references=("taylor_hood",),
-    runs_with="1", omitted="the bubble is of linear velocities")
+    "flow-bubble", kind="cross-code", mutants=("bubble-of-water", "bubble-mean-unweighted", "bubble-block-isotropic"),
+    references=("taylor_hood",), runs_with="1", omitted="the bubble is of linear velocities")
 @pytest.mark.parametrize("interface", FORMS)
 def test_bubble(interface, record):
+    """The condensed bubble is scikit-fem's MINI element with its bubbles as unknowns, in both forms, and the mean
+    velocity of each triangle, bubble included, carries the same flux through every section.
+
+    Norm: largest difference over the largest value; largest relative error of the flux through 25 sections.
+    """
     grid = meshes.cut(flow_properties.ENDS, 50.0, 6.0, lambda x, y: (np.abs(x) < 20) & (y < 25), across=(-20.0, 20.0),
                       along=(25.0,), seed=5)
     space = Space(grid, 1)
@@ -269,14 +265,15 @@ def test_bubble(interface, record):
 
 
 @pytest.mark.case(
-    "flow-bubble-layers", kind="exact",
-    claim="The bubble is of second order in velocity and loss and of first in the gradient; it errs as the stabilised "
-          "element with c = 100 does on good triangles, many times less on triangles stretched eightfold",
-    norm="middle of a long layer, lambda = 2000, root mean square over random meshes of a size: L2 of u, of grad u, "
-         "and relative error of the pressure gradient; errors of the stabilised element over the bubble's",
-    mutants=("bubble-of-water", "bubble-tenfold"), references=("layered_channel",), runs_with="1",
-    omitted="the bubble is of linear velocities")
+    "flow-bubble-layers", kind="exact", mutants=("bubble-of-water", "bubble-tenfold"), references=("layered_channel",),
+    runs_with="1", omitted="the bubble is of linear velocities")
 def test_bubble_layers(record):
+    """The bubble is of second order in velocity and loss and of first in the gradient; it errs as the stabilised
+    element with c = 100 does on good triangles, many times less on triangles stretched eightfold.
+
+    Norm: middle of a long layer, lambda = 2000, root mean square over random meshes of a size: L2 of u, of grad u, and
+    relative error of the pressure gradient; errors of the stabilised element over the bubble's.
+    """
     errors, stabilised = (refine(_layer_errors, BUBBLE_DRAWS, element) for element in (BUBBLE, STABILISED))
     record(studies(errors, {"velocity": (2, SECOND, 1e-3), "gradient": (2, SECOND, 1.2e-3),
                             "velocity's gradient": (1, "linear elements: first order in H1", 0.1)}))

@@ -3,8 +3,6 @@
 Element sizes that grow with the distance from the aggregate are compared with one size everywhere.
 """
 
-from __future__ import annotations
-
 from functools import cache
 from itertools import product
 
@@ -52,12 +50,14 @@ DISCS, DROP = {40.0: 0.012, 46.0: 0.008}, 0.003
 
 @pytest.mark.case(
     "flow-sections", kind="property",
-    claim="The same flux passes every section of a pore, plugged or not: to round-off for w = u - tau grad p of "
-          "linear elements and for u itself of quadratic and cubic ones, the outlet included, in both forms",
-    norm="largest relative error of the flux through 25 sections, and through the outlet",
     mutants=("tau-of-water", "carried-by-u-plus", "inlet-not-scaled", "curved-straight-divergence", "inlet-parabola"))
 @parametrize("numerics, interface", EVERY)
 def test_sections(numerics, interface, record):
+    """The same flux passes every section of a pore, plugged or not: to round-off for w = u - tau grad p of linear
+    elements and for u itself of quadratic and cubic ones, the outlet included, in both forms.
+
+    Norm: largest relative error of the flux through 25 sections, and through the outlet.
+    """
     if isinstance(numerics, int):
         plug = meshes.plug(ENDS, WIDTH, 30.0, 3.1 if numerics == 1 else 6.0, meshes.cut)
         record(_carried(meshes.space_on(plug, numerics), interface, "plug", DROP))
@@ -73,7 +73,7 @@ def _carried(space: Space, interface: str, name: str, drop: float):
     why = "(2) tested with linear ramps, round-off"
     if solution.correction is None:
         yield at_most(f"u, {name}", flux_error(space, u), 1e-9, why)
-        out = space.mean_over(space.dofs.outlet, solution.velocity[:, 0])
+        out = space.outlet.mean(solution.velocity[:, 0])
         yield at_most(f"outlet, {name}", abs(out - 1), 1e-11, "(2) tested with a constant, round-off")
     else:
         yield at_most(f"w, {name}", flux_error(space, u - solution.correction[:, None]), 1e-9, why)
@@ -88,21 +88,21 @@ def flux_error(space: Space, carried: np.ndarray) -> float:
     """
     grid = space.mesh
     _, weight, _ = meshes.fine(space)
-    slopes = elements.points(grid.points[grid.cells], elements.table(1, grid.geometry, meshes.FINE)).slopes
+    slopes = elements.mapped(grid.points[grid.cells], elements.table(1, grid.geometry, meshes.FINE))[1]
     carries = np.einsum("tqi,tqia->ta", weight[..., None] * carried, slopes)
     sections = np.linspace(-65.0, 65.0, 25)[:, None]
     ramps = np.clip((sections + 5.0 - grid.points[: grid.corners, 0]) / 10.0, 0.0, 1.0)
     return np.abs(np.einsum("ta,sta->s", carries, ramps[:, grid.triangles]) / grid.width + 1).max()
 
 
-@pytest.mark.case(
-    "flow-energy", kind="property",
-    claim="The work of the inlet is what viscosity and stabilisation dissipate, of order 2 and 3 the head loss times "
-          "the flux, and the flow is linear in its drive",
-    norm="relative difference",
-    mutants=("correction-not-scaled", "loss-per-width"))
+@pytest.mark.case("flow-energy", kind="property", mutants=("correction-not-scaled", "loss-per-width"))
 @parametrize("numerics, interface", EVERY)
 def test_energy(numerics, interface, record):
+    """The work of the inlet is what viscosity and stabilisation dissipate, of order 2 and 3 the head loss times the
+    flux, and the flow is linear in its drive.
+
+    Norm: relative difference.
+    """
     space = _around(25.0, numerics)
     unit = flow.unit_flow(space, RATIO, interface=interface)
     work, dissipated = _power(space, unit, interface)
@@ -130,7 +130,7 @@ def _power(space: Space, unit: flow.UnitFlow, interface: str) -> tuple[float, fl
     upper = np.einsum("tab,ta,tb->", blocks[:, : 2 * count, : 2 * count], moving, moving)
     forces = np.einsum("tij,tj->ti", blocks, np.hstack([moving, pressure]))
     force = np.bincount(cells.ravel(), forces[:, :count].ravel(), space.count)
-    inlet = space.end_nodes(space.dofs.inlet)
+    inlet = space.inlet.nodes
     work = force[inlet] @ unit.velocity[inlet, 0]
     if space.order > 1:
         return work, upper
@@ -139,13 +139,13 @@ def _power(space: Space, unit: flow.UnitFlow, interface: str) -> tuple[float, fl
     return work, upper + np.einsum("t,ti,ti->", tau * grid.areas, slope, slope)
 
 
-@pytest.mark.case(
-    "flow-reversed", kind="property",
-    claim="Flow through a leaning aggregate is its mirror image's flow mirrored, since Stokes flow is reversible",
-    norm="L2 of the difference of both velocities, in the middle and everywhere",
-    mutants=("outlet-free",))
+@pytest.mark.case("flow-reversed", kind="property", mutants=("outlet-free",))
 @parametrize("numerics, interface", EVERY)
 def test_reversed(numerics, interface, record):
+    """Flow through a leaning aggregate is its mirror image's flow mirrored, since Stokes flow is reversible.
+
+    Norm: L2 of the difference of both velocities, in the middle and everywhere.
+    """
     space = _around(25.0, numerics, 0.6, 150.0)
     mirror = Space(_mirrored(space.mesh), space.order)
     forward, back = (flow.unit_flow(way, RATIO, interface=interface).velocity for way in (space, mirror))
@@ -168,14 +168,13 @@ def _mirrored(grid: Mesh) -> Mesh:
 RATIOS = np.array([1.0, 2.0, 10.0, 100.0, 2000.0, 1e5])
 
 
-@pytest.mark.case(
-    "flow-obstacle", kind="property",
-    claim="Viscous biomass never raises the conductivity: the loss rises with lambda, ever more slowly, and with R",
-    norm="head losses for six lambda, over that of the clean channel",
-    mutants=("thin-biomass",))
+@pytest.mark.case("flow-obstacle", kind="property", mutants=("thin-biomass",))
 @parametrize("numerics, interface", EVERY)
 def test_obstacle(numerics, interface, record):
-    """Record the losses of four half-discs."""
+    """Viscous biomass never raises the conductivity: the loss rises with lambda, ever more slowly, and with R.
+
+    Norm: head losses for six lambda, over that of the clean channel.
+    """
     spaces = [_around(radius, numerics) for radius in (5.0, 25.0, 40.0, 46.0)]
     losses = np.array([flow.unit_flow(space, ratio, interface=interface).loss
                        for space, ratio in product(spaces, RATIOS)]).reshape(len(spaces), -1)
@@ -197,13 +196,14 @@ SCHEMES = {"paper": (5e-3, runs.with_preset("paper")), "fast": (5e-3, runs.with_
 
 
 @pytest.mark.case(
-    "flow-graded", kind="property",
-    claim="With one element size everywhere the loss of a half-disc is that of sizes which grow with the distance "
-          "from it, for more than twice the nodes, on straight triangles and on curved ones of order 2 and 3",
-    norm="relative difference of the loss; nodes over those of graded sizes; largest over least edge",
-    mutants=("gradation-ignored", "gradation-not-passed"), runs_with="1 2")
+    "flow-graded", kind="property", mutants=("gradation-ignored", "gradation-not-passed"), runs_with="1 2")
 @parametrize("bound, *numerics", SCHEMES)
 def test_graded(bound, numerics, record):
+    """With one element size everywhere the loss of a half-disc is that of sizes which grow with the distance from it,
+    for more than twice the nodes, on straight triangles and on curved ones of order 2 and 3.
+
+    Norm: relative difference of the loss; nodes over those of graded sizes; largest over least edge.
+    """
     (loss, nodes), (even, many) = (_graded(*numerics, f"numerics.gradation={value}") for value in (0.25, 0.0))
     record(at_most("loss", abs(loss / even - 1), bound,
                    "errors near the aggregate rule: those of the preset's elements there"),
@@ -224,13 +224,15 @@ TIGHT_RUN = ("pore.width=100 um", "aggregate.radius=40 um", "flow.mean_velocity=
 
 @pytest.mark.slow
 @pytest.mark.case(
-    "flow-permeable-run", kind="property",
-    claim="A run whose water must pass an aggregate with layers of 7.5 nm goes on from the film to its end: "
-          "concentrations keep their bounds, the velocity turns back nowhere, head loss is that of a finer mesh",
-    norm="concentrations over the supply; relative difference of the head loss from that of a finer mesh; least "
-         "velocity along the pore in the aggregate over the largest",
-    mutants=("drag-layer-sticks",), runs_with="fast", omitted="the other presets refine what fast has")
+    "flow-permeable-run", kind="property", mutants=("drag-layer-sticks",), runs_with="fast",
+    omitted="the other presets refine what fast has")
 def test_permeable_run(record):
+    """A run whose water must pass an aggregate with layers of 7.5 nm goes on from the film to its end: concentrations
+    keep their bounds, the velocity turns back nowhere, head loss is that of a finer mesh.
+
+    Norm: concentrations over the supply; relative difference of the head loss from that of a finer mesh; least velocity
+    along the pore in the aggregate over the largest.
+    """
     overrides = ["numerics.preset=fast", *TIGHT_RUN]
     instants = list(simulate(load_scene("base", overrides, ["flow.head"])))
     solved = [instant.solved.concentrations for instant in instants]

@@ -13,8 +13,6 @@ The law: stress against its closed form, derivatives against differences, the st
 motions and units do not change growth, and the area is the integral of theta.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -58,15 +56,15 @@ def _supported(size: float, kind: int):
 
 
 @pytest.mark.case(
-    "growth-homogeneous", kind="exact",
-    claim="Uniform growth, free to theta = 2000 and confined to one direction to theta = 36, has the exact shape, "
-          "pressure and stress on any mesh of straight or of curved triangles [E11]; so it has on a mesh that was "
-          "made half way, its material grown before: theta counts from t = 0, whatever shape the search starts from",
-    norm=NORM,
+    "growth-homogeneous", kind="exact", norm=NORM,
     mutants=("theta-power", "third-power", "thickness-forgotten", "stress-across", "theta-since-the-start"),
     references=("neo_hookean",))
 @parametrize("kind", bodies.EVERY)
 def test_homogeneous(kind, record):
+    """Uniform growth, free to theta = 2000 and confined to one direction to theta = 36, has the exact shape, pressure
+    and stress on any mesh of straight or of curved triangles [E11]; so it has on a mesh that was made half way, its
+    material grown before: theta counts from t = 0, whatever shape the search starts from.
+    """
     for name, body, exact in _supported(SIZES[kind], kind):
         for theta in (36.0,) if kind == 3 else (2.0, 36.0, 2000.0):
             if theta < 2000 or name == "free":
@@ -95,14 +93,14 @@ TURN = np.array([[0.0, -1.0], [1.0, 0.0]])
 
 
 @pytest.mark.case(
-    "growth-patch", kind="exact",
-    claim="A body of straight or curved triangles whose rim is held at F X, but for an end that is free to move along "
-          "its normal, has F inside and constant, exact pressure and stress: shears to 3, J from 0.5 to 2000, the end "
-          "on each of the four sides",
-    norm=NORM,
+    "growth-patch", kind="exact", norm=NORM,
     mutants=("theta-power", "untransposed", "thickness-forgotten", "held-short"), references=("neo_hookean",))
 @parametrize("kind", bodies.EVERY)
 def test_patch(kind, record):
+    """A body of straight or curved triangles whose rim is held at F X, but for an end that is free to move along its
+    normal, has F inside and constant, exact pressure and stress: shears to 3, J from 0.5 to 2000, the end on each of
+    the four sides.
+    """
     record([_sheared(kind, np.linalg.matrix_power(TURN, turns), *shear) for turns, shear in enumerate(SHEARS)])
 
 
@@ -130,14 +128,14 @@ LOADED = (([[0.8, -0.6], [0.6, 0.8]], 0.4), ([[1.7, 2.1], [-0.8, 1.1]], -1.3), (
 
 
 @pytest.mark.case(
-    "growth-patch-traction", kind="exact",
-    claim="A body of straight or curved triangles held at F X on three sides and pulled by the traction of F and P on "
-          "the fourth has F and P inside, for any F, turned and sheared, J to 2000, and any P",
-    norm=NORM,
+    "growth-patch-traction", kind="exact", norm=NORM,
     mutants=("theta-power", "third-power", "untransposed", "one-corner-pressure", "forces-pushed", "forces-halved"),
     references=("neo_hookean",))
 @parametrize("kind", bodies.EVERY)
 def test_patch_traction(kind, record):
+    """A body of straight or curved triangles held at F X on three sides and pulled by the traction of F and P on the
+    fourth has F and P inside, for any F, turned and sheared, J to 2000, and any P.
+    """
     record([_pulled(kind, np.array(F), P) for F, P in LOADED])
 
 
@@ -207,13 +205,15 @@ def test_half_cylinder_2000(record):
 
 @pytest.mark.slow
 @pytest.mark.case(
-    "growth-curved-half-cylinder", kind="exact",
-    claim="A curved half-disc that grows by theta(R) becomes the exact half-disc: places to third order, the pressure "
-          "to second, and as well at theta = 2000 as at 36; in scenes of quadratic and of cubic elements",
-    norm="largest relative error of the outline's radius; L2 of positions and of the pressure over the body at t = 0",
-    mutants=("grad-div-dropped", "theta-power"), omitted="order 1: growth-half-cylinder")
+    "growth-curved-half-cylinder", kind="exact", mutants=("grad-div-dropped", "theta-power"),
+    omitted="order 1: growth-half-cylinder")
 @parametrize("kind", bodies.CURVED)
 def test_curved_half_cylinder(kind, record):
+    """A curved half-disc that grows by theta(R) becomes the exact half-disc: places to third order, the pressure to
+    second, and as well at theta = 2000 as at 36; in scenes of quadratic and of cubic elements.
+
+    Norm: largest relative error of the outline's radius; L2 of positions and of the pressure over the body at t = 0.
+    """
     computed = refine(errors, REFINEMENTS[kind], 36.0, kind)
     record(studies(computed, {"place": (around(3, 0.4), "quadratic places: third order in L2", 1e-5),
                            "pressure": (2, "linear pressure: second order in L2", 2e-3)}, ", theta to 36"))
@@ -244,13 +244,14 @@ def _turns(angles: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.case(
-    "growth-stress", kind="exact",
-    claim="The Cauchy stress of any homogeneous F and P is the closed form; it turns with the body (objectivity), "
-          "does not see a turn before the deformation (isotropy), and is symmetric",
-    norm="largest difference over the largest stress, 200 random F with shears to 3 and J to 2000",
-    mutants=("third-power", "thickness-forgotten", "stress-across", "untransposed"), references=("neo_hookean",),
-    runs_with="1 2 3")
+    "growth-stress", kind="exact", mutants=("third-power", "thickness-forgotten", "stress-across", "untransposed"),
+    references=("neo_hookean",), runs_with="1 2 3")
 def test_stress(record):
+    """The Cauchy stress of any homogeneous F and P is the closed form; it turns with the body (objectivity), does not
+    see a turn before the deformation (isotropy), and is symmetric.
+
+    Norm: largest difference over the largest stress, 200 random F with shears to 3 and J to 2000.
+    """
     F, P = admissible()
     exact = np.array([neo_hookean.cauchy(f, p) for f, p in zip(F, P)])
     S, Q = growth.piola(F, P), _turns(np.linspace(0, 6, len(F)))
@@ -275,7 +276,7 @@ def _energy():
 
     def potential(s):
         ahead = F + s * G
-        return growth.energy(ahead) + P * (np.linalg.det(ahead) - 1.3)
+        return neo_hookean.energy(ahead) + P * (np.linalg.det(ahead) - 1.3)
 
     return np.sum(growth.piola(F, P) * G, axis=(1, 2)), potential
 
@@ -318,15 +319,17 @@ def _along(body: Supported, theta, place, pressure, move, push):
 
 @pytest.mark.case(
     "growth-differences", kind="property",
-    claim="Stress is the derivative of the energy, the tangent that of the stress, and the element tangent that of "
-          "the residual: by finite differences",
-    norm="largest difference to central differences, by the step",
     mutants=("third-power", "element-tangent-coefficient", "one-corner-pressure"))
 @parametrize(
     "differentiated, *kind",
     {"energy": (_energy,), "stress": (_stress,),
      **{f"residual, {word}": (_residual, *kind) for word, kind in bodies.EVERY.items()}})
 def test_differences(differentiated, kind, record):
+    """Stress is the derivative of the energy, the tangent that of the stress, and the element tangent that of the
+    residual: by finite differences.
+
+    Norm: largest difference to central differences, by the step.
+    """
     slope, value = differentiated(*kind)
     errors = [largest((value(s) - value(-s)) / (2 * s) - slope) for s in STEPS]
     record(study("difference", STEPS, errors, 2, "central differences: second order"))
@@ -334,12 +337,14 @@ def test_differences(differentiated, kind, record):
 
 @pytest.mark.case(
     "growth-curved-taylor", kind="property",
-    claim="On straight triangles, and on curved ones with their inner edges bent, the element tangent is the "
-          "derivative of the residual and is symmetric",
-    norm="remainder of a first-order Taylor expansion; largest difference",
     mutants=("tangent-without-grad-div", "constraint-sign", "stress-transposed", "element-tangent-coefficient"))
 @parametrize("kind", bodies.EVERY)
 def test_curved_taylor(kind, record):
+    """On straight triangles, and on curved ones with their inner edges bent, the element tangent is the derivative of
+    the residual and is symmetric.
+
+    Norm: remainder of a first-order Taylor expansion; largest difference.
+    """
     grid, side = bodies.rectangle(1.6, 4, kind)
     body = bodies.on_mesh(grid, kind, side["left"], side["bottom"])
     random, theta = np.random.default_rng(6), body.constant(1.4)
@@ -353,13 +358,14 @@ def test_curved_taylor(kind, record):
 
 
 @pytest.mark.case(
-    "growth-stabilisation", kind="exact",
-    claim="On a pressure of constant gradient g the stabilisation of a triangle is |tau| h^2 theta^(2/3) / 12 |g|^2, "
-          "h the diameter of the circle through its corners [E6]",
-    norm="largest relative difference over the triangles of a random mesh",
-    mutants=("stabilisation-power", "stabilisation-too-weak", "circumradius"), runs_with="1",
-    omitted="orders 2, 3: the pressure is not stabilised")
+    "growth-stabilisation", kind="exact", mutants=("stabilisation-power", "stabilisation-too-weak", "circumradius"),
+    runs_with="1", omitted="orders 2, 3: the pressure is not stabilised")
 def test_stabilisation(record):
+    """On a pressure of constant gradient g the stabilisation of a triangle is |tau| h^2 theta^(2/3) / 12 |g|^2, h the
+    diameter of the circle through its corners [E6].
+
+    Norm: largest relative difference over the triangles of a random mesh.
+    """
     grid, _ = bodies.rectangle(1.3, 6)
     points, triangles = grid.points, grid.triangles
     theta, g = np.random.default_rng(7).uniform(1, 2000, len(triangles)), np.array([0.3, -0.7])
@@ -384,14 +390,14 @@ def _theta(x, y):
 ANGLES = np.array([0.4, 1.9, 4.0])
 
 
-@pytest.mark.case(
-    "growth-rigid", kind="property",
-    claim="The nodal forces of any state of a body have no resultant and no moment, and turn with the body by any "
-          "angle, while what they ask of the volume stays (objectivity)",
-    norm="largest sum, over the largest nodal force; largest difference, over the same",
-    mutants=("untransposed",))
+@pytest.mark.case("growth-rigid", kind="property", mutants=("untransposed",))
 @parametrize("kind", bodies.EVERY)
 def test_rigid(kind, record):
+    """The nodal forces of any state of a body have no resultant and no moment, and turn with the body by any angle,
+    while what they ask of the volume stays (objectivity).
+
+    Norm: largest sum, over the largest nodal force; largest difference, over the same.
+    """
     body, _ = bodies.half_disc(1.0 if kind == 1 else 0.5, kind)
     random, x = np.random.default_rng(11), body.reference
     place = 6 * x @ np.array([[1.1, -0.3], [0.6, 0.9]]) + 0.3 * random.standard_normal(x.shape)
@@ -417,14 +423,14 @@ def _forces(body: Supported, place, pressure, theta):
 GROWN = {1: ((0.6, 1.0), (1.0, 15.0), (1.5, 500.0)), 2: ((0.3, 1.0), (0.6, 15.0)), 3: ((0.4, 5.0),)}
 
 
-@pytest.mark.case(
-    "growth-area", kind="property",
-    claim="However unevenly a body grows, it gets the area that was asked for, the integral of theta, to round-off: "
-          "the sum of the rows J = theta, in which the stabilisation cancels (24)",
-    norm="relative difference of the area",
-    mutants=("theta-power", "stabilisation-diagonal"))
+@pytest.mark.case("growth-area", kind="property", mutants=("theta-power", "stabilisation-diagonal"))
 @parametrize("kind", bodies.EVERY)
 def test_area(kind, record):
+    """However unevenly a body grows, it gets the area that was asked for, the integral of theta, to round-off: the sum
+    of the rows J = theta, in which the stabilisation cancels (24).
+
+    Norm: relative difference of the area.
+    """
     for refinement, factor in GROWN[kind]:
         body, _ = bodies.half_disc(refinement, kind)
         random = np.random.default_rng(12).uniform(0.7, 1.4, (len(body.cells), 1))
@@ -435,14 +441,14 @@ def test_area(kind, record):
         record(at_most(f"area, theta to {theta.max():.0f}", abs(computed / expected - 1), 1e-11, NEWTON_ROUND_OFF))
 
 
-@pytest.mark.case(
-    "growth-units", kind="property",
-    claim="In metres for micrometres, on a wall that stands upright, or in a mirror, a body grows to the same shape "
-          "with the same pressure over mu_L",
-    norm="largest difference: of places, carried back, over the radius; of pressures over the largest",
-    mutants=("h-not-squared",))
+@pytest.mark.case("growth-units", kind="property", mutants=("h-not-squared",))
 @parametrize("kind", bodies.EVERY)
 def test_units(kind, record):
+    """In metres for micrometres, on a wall that stands upright, or in a mirror, a body grows to the same shape with the
+    same pressure over mu_L.
+
+    Norm: largest difference: of places, carried back, over the radius; of pressures over the largest.
+    """
     changes = {"in metres": 1e-6 * np.eye(2), "upright": TURN, "mirrored": np.diag([-1.0, 1.0])}
     reference = _changed(np.eye(2), kind)
     for name, change in changes.items():

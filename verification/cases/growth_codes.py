@@ -12,8 +12,6 @@ triangles the order is two (measured: 1.9 and 2.0 between 0.1 and 0.025), and wi
 3/2.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 
@@ -148,13 +146,13 @@ def compared(kind: int, problem: str, ceilings: dict[int, tuple[float, float]], 
 
 @pytest.mark.slow
 @pytest.mark.case(
-    "growth-quadratic-cylinder", kind="cross-code",
-    claim="The half-cylinder grown to theta = 2000, on straight and on curved triangles, agrees with quadratic "
-          "elements of scikit-fem, which have their orders 3 and 2 against the closed form",
-    norm=f"{NORM}; the same of the reference to the closed form",
+    "growth-quadratic-cylinder", kind="cross-code", norm=f"{NORM}; the same of the reference to the closed form",
     mutants=("stabilisation-power", "stabilisation-of-rest"), references=("quadratic_growth",))
 @parametrize("kind", bodies.EVERY)
 def test_quadratic_cylinder(kind, record):
+    """The half-cylinder grown to theta = 2000, on straight and on curved triangles, agrees with quadratic elements of
+    scikit-fem, which have their orders 3 and 2 against the closed form.
+    """
     record(compared(kind, "half-cylinder", {1: (6e-4, 6e-3), 2: (6e-5, 6e-3)}))
     if kind == 1:
         rows = {"places": (3, "quadratic elements", 5e-6), "pressure": (2, "linear elements", 1.2e-3)}
@@ -172,24 +170,24 @@ def _reference_errors(level: int) -> dict[str, float]:
 
 @pytest.mark.slow
 @pytest.mark.case(
-    "growth-uneven", kind="cross-code",
-    claim="A half-disc that grows ten times as much at the front as at the rear, and more above than on the wall, "
-          "agrees with quadratic elements, whatever mu_L is, on straight and on curved triangles",
-    norm=NORM,
-    mutants=("theta-power", "third-power", "stabilisation-sign"), references=("quadratic_growth",))
+    "growth-uneven", kind="cross-code", norm=NORM, mutants=("theta-power", "third-power", "stabilisation-sign"),
+    references=("quadratic_growth",))
 @parametrize("kind", bodies.EVERY)
 def test_uneven(kind, record):
+    """A half-disc that grows ten times as much at the front as at the rear, and more above than on the wall, agrees
+    with quadratic elements, whatever mu_L is, on straight and on curved triangles.
+    """
     record(compared(kind, "uneven", {1: (6e-4, 6e-3), 2: (2e-5, 2.5e-3)}))
 
 
 @pytest.mark.slow
 @pytest.mark.case(
     "growth-between-walls", kind="cross-code",
-    claim="The same half-disc, its arc held at the upper wall on which it slides, agrees with quadratic elements",
     norm=f"{NORM}, also further than a fifth of the radius from the ends of the contact",
     mutants=("held-short", "theta-power"), references=("quadratic_growth",))
 @parametrize("kind", bodies.EVERY)
 def test_between_walls(kind, record):
+    """The same half-disc, its arc held at the upper wall on which it slides, agrees with quadratic elements."""
     record(compared(kind, "between walls", {1: (1e-3, 6e-3), 2: (1e-3, 6e-3)}, "pressure away"))
 
 
@@ -222,15 +220,16 @@ def _errors(size: float, seed: int, kind: int, exact) -> dict[str, float]:
 
 @pytest.mark.slow
 @pytest.mark.case(
-    "growth-manufactured", kind="manufactured",
-    claim="A made-up growth with theta from 1 to 6.5, shears to one and an uneven pressure, held by body force and "
-          "traction, is found at its order, whether the pressure has a slope on the rim or not, on straight and on "
-          "curved triangles",
-    norm="L2 of places and pressure over the body at t = 0, relative, root mean square over three or four random "
-         "meshes a size",
-    mutants=("theta-power", "third-power", "stabilisation-sign"), references=("manufactured_growth",))
+    "growth-manufactured", kind="manufactured", mutants=("theta-power", "third-power", "stabilisation-sign"),
+    references=("manufactured_growth",))
 @parametrize("kind", bodies.EVERY)
 def test_manufactured(kind, record):
+    """A made-up growth with theta from 1 to 6.5, shears to one and an uneven pressure, held by body force and traction,
+    is found at its order, whether the pressure has a slope on the rim or not, on straight and on curved triangles.
+
+    Norm: L2 of places and pressure over the body at t = 0, relative, root mean square over three or four random meshes
+    a size.
+    """
     geometry = min(kind, 2)
     for name, (order, why) in ORDERS[geometry].items():
         exact = manufactured_growth.growth(name)

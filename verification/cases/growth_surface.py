@@ -1,7 +1,5 @@
 """The elastic stretch along the free surface, the limits of its stability, and a run that ends as a fold."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from functools import cache
@@ -66,13 +64,15 @@ def _independent(seed: pore.Pore) -> float:
 
 
 @pytest.mark.case(
-    "growth-surface-stretch", kind="manufactured",
-    claim="The elastic stretch along the free surface converges to that of a smooth map: with order two on curved "
-          "triangles, with order one on straight ones, where J is that of a triangle",
-    norm="root mean square over the free edges, of stretches of size one",
-    mutants=("stretch-of-the-whole", "stretch-of-first-edges"), references=("surface_stretch",))
+    "growth-surface-stretch", kind="manufactured", mutants=("stretch-of-the-whole", "stretch-of-first-edges"),
+    references=("surface_stretch",))
 @pytest.mark.parametrize("elements", ELEMENTS)
 def test_surface_stretch(elements, record):
+    """The elastic stretch along the free surface converges to that of a smooth map: with order two on curved triangles,
+    with order one on straight ones, where J is that of a triangle.
+
+    Norm: root mean square over the free edges, of stretches of size one.
+    """
     order = 1.0 if elements == "linear" else 2.0
     errors = refine(mapped_errors, (1.0, 1.5, 2.2, 3.2), elements)
     record(studies(errors, {"stretch": (around(order), "a chord over its chord is of second order in its middle, J "
@@ -86,13 +86,14 @@ THETAS = (1.5, 1 / CREASE**2, 3.0)
 
 @pytest.mark.case(
     "growth-surface-confined", kind="exact",
-    claim="A plug that grows by theta between the walls has the elastic stretch theta^(-1/2) all along its free "
-          "surfaces, also beyond the limit of creases; where new biomass is born without stress theta counts from "
-          "the last shape",
-    norm="largest difference of stretches",
     mutants=("stretch-of-the-whole", "stretch-since-the-last-shape", "stress-free-stretch-since-t0"))
 @pytest.mark.parametrize("elements", ELEMENTS)
 def test_surface_confined(elements, record):
+    """A plug that grows by theta between the walls has the elastic stretch theta^(-1/2) all along its free surfaces,
+    also beyond the limit of creases; where new biomass is born without stress theta counts from the last shape.
+
+    Norm: largest difference of stretches.
+    """
     for rheology in ("stressed", "stress_free"):
         scene = plugged("fast", f"numerics.elements={elements}", f"growth.new_biomass={rheology}")
         state = pore.seeded(scene)
@@ -113,15 +114,6 @@ def plugged(preset: str, *changes: str) -> Scene:
                                "numerics.refinement=0.3", *changes], ["aggregate.radius"])
 
 
-class Block(growth.System):
-    """The equations of a body with another factor of its stabilisation."""
-
-    gamma = growth.GAMMA
-
-    def _stiffening(self):
-        return self.gamma * self.theta ** (-5 / 3)
-
-
 @cache
 def energy_and_constraint(gamma: float) -> tuple[Callable, Callable]:
     """(energy, constraint), functions of theta, of quadratic places and linear pressures on a block of 1 x 1."""
@@ -131,14 +123,13 @@ def energy_and_constraint(gamma: float) -> tuple[Callable, Callable]:
     last = 2 * len(body.reference)
 
     def matrix(theta: float) -> np.ndarray:
-        system = Block(body, np.zeros_like(body.constrained))
-        system.gamma = gamma
+        system = growth.System(body, np.zeros_like(body.constrained), stabilisation=growth.GradDiv(gamma))
         P = surface_stability.confined_growth_pressure(theta)
         place = body.reference * [1.0, theta]
         system.under(body.constant(theta), place, place, body.resting + P)
         local = system.tangent(place, body.resting + P)
         full_matrix = np.zeros((last + body.corners,) * 2)
-        rows = system.unknowns
+        (rows,) = system.sparse.kinds
         np.add.at(full_matrix, (rows[:, :, None], rows[:, None, :]), local)
         return full_matrix
 
@@ -146,14 +137,16 @@ def energy_and_constraint(gamma: float) -> tuple[Callable, Callable]:
 
 
 @pytest.mark.case(
-    "growth-surface-stability", kind="cross-code",
-    claim="A block that grows between side walls is stable down to Biot's elastic stretch, 0.544: quartic places that "
-          "are exactly divergence-free find it within 1 %; quadratic ones with linear pressures do within 5 %, thanks "
-          "to their stabilisation",
-    norm="elastic stretch at which the least eigenvalue is zero",
-    mutants=("biot-of-a-layer", "grad-div-dropped"), references=("surface_stability",), runs_with="2",
+    "growth-surface-stability", kind="cross-code", mutants=("biot-of-a-layer", "grad-div-dropped"),
+    references=("surface_stability",), runs_with="2",
     omitted="linear elements: their stabilisation is no part of the energy; cubic ones: those of order 2")
 def test_surface_stability(record):
+    """A block that grows between side walls is stable down to Biot's elastic stretch, 0.544: quartic places that are
+    exactly divergence-free find it within 1 %; quadratic ones with linear pressures do within 5 %, thanks to their
+    stabilisation.
+
+    Norm: elastic stretch at which the least eigenvalue is zero.
+    """
     exact = surface_stability.biot()
     computed = surface_stability.critical_stretch(*surface_stability.divergence_free(surface_stability.mesh(4, 4)))
     record(between("divergence-free", computed / exact, 0.99, 1.0 + 1e-4,
@@ -170,13 +163,15 @@ def test_surface_stability(record):
 
 @pytest.mark.slow
 @pytest.mark.case(
-    "growth-fold", kind="exact",
-    claim="A plug that grows alike everywhere between the walls ends as a fold where its area has grown by 3.38; born "
-          "without stress it grows on",
-    norm="area at the end over that at the start", mutants=("fold-never",),
+    "growth-fold", kind="exact", mutants=("fold-never",),
     omitted="orders of elements by themselves: growth-surface-confined; accurate, exact: as fast")
 @pytest.mark.parametrize("preset", ["paper", "fast"])
 def test_fold(preset, record):
+    """A plug that grows alike everywhere between the walls ends as a fold where its area has grown by 3.38; born
+    without stress it grows on.
+
+    Norm: area at the end over that at the start.
+    """
     rate = numbers.fastest_growth(plugged(preset))
     limit = 0.544**-2
     end = f'growth.end="{1.3 * math.log(limit) / rate:.6g} h"'

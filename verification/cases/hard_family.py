@@ -6,8 +6,6 @@ judges the folders. If a run is refused, its advice is applied, and the new run 
 fails.
 """
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Iterator

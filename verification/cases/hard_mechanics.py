@@ -4,8 +4,6 @@ Contact: forced remeshes around it, the least angle, a seed as wide as the pore,
 uneven, far under one, and in one long step.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial

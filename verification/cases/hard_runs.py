@@ -4,8 +4,6 @@ Meshes: fifty remeshes, nearly cocircular points, a poor initial mesh. Runs: tin
 1e5 nodes in one step, random parameters.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache, partial
 

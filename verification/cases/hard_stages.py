@@ -4,8 +4,6 @@ Substrates: starved pores, an exhausted substrate, fronts of zero order, saturat
 speed, viscosity ratios to 1e9, a plug on coarse meshes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from functools import partial
 

@@ -5,8 +5,6 @@ elements without a pressure on their own meshes. Every motion keeps triangles up
 be reversed. The criterion for a remesh is exact.
 """
 
-from __future__ import annotations
-
 from functools import cache
 from itertools import product
 
@@ -42,13 +40,15 @@ LINEAR = "the field is linear: round-off"
 
 
 @pytest.mark.case(
-    "mesh_motion-plug", kind="exact",
-    claim="A plug that slides and stretches along the pore, and a layer that thickens under a wall, stretch the fluid "
-          "beside them linearly; a plug that rests moves nothing; on straight triangles and on curved ones",
-    norm="largest difference of displacement over the aggregate's largest, for gamma = 0.1, 1, 10",
-    mutants=("walls-held", "outlet-moves", "interface-slips", "middles-left-behind"), runs_with="3")
+    "mesh_motion-plug", kind="exact", mutants=("walls-held", "outlet-moves", "interface-slips", "middles-left-behind"),
+    runs_with="3")
 @parametrize("geometry", EITHER)
 def test_plug(geometry, record):
+    """A plug that slides and stretches along the pore, and a layer that thickens under a wall, stretch the fluid beside
+    them linearly; a plug that rests moves nothing; on straight triangles and on curved ones.
+
+    Norm: largest difference of displacement over the aggregate's largest, for gamma = 0.1, 1, 10.
+    """
     grid = _nodes(meshes.plug(ENDS, WIDTH, HALF, 3.0, seed=1), geometry)
     layer = _nodes(meshes.channel(ENDS, WIDTH, 3.0, lambda x, y: y < 12.0, along=(12.0,), seed=2), geometry)
     x, y = grid.points[:, 0], layer.points[:, 1]
@@ -79,14 +79,14 @@ MOTIONS = {"slides": (np.eye(2), (3.0, 1.0)),
            "is stretched": ([[1.5, 0.1], [-0.2, 0.7]], (1.0, -2.0))}
 
 
-@pytest.mark.case(
-    "mesh_motion-pocket", kind="exact",
-    claim="Fluid that an aggregate encloses follows every rigid and every linear motion of it, on straight triangles "
-          "and on curved ones",
-    norm="largest difference of displacement over the aggregate's largest, for gamma = 0.1, 1, 10",
-    mutants=("interface-slips", "stale-fluid"), runs_with="3")
+@pytest.mark.case("mesh_motion-pocket", kind="exact", mutants=("interface-slips", "stale-fluid"), runs_with="3")
 @parametrize("geometry", EITHER)
 def test_pocket(geometry, record):
+    """Fluid that an aggregate encloses follows every rigid and every linear motion of it, on straight triangles and on
+    curved ones.
+
+    Norm: largest difference of displacement over the aggregate's largest, for gamma = 0.1, 1, 10.
+    """
     lines = {"across": (-HALF, -9.0, 9.0, HALF), "along": (8.0, 21.0)}
     grid = _nodes(meshes.channel(ENDS, WIDTH, 2.5, _around_a_pocket, **lines, seed=3), geometry)
     x, y = grid.points.T
@@ -111,14 +111,15 @@ CEILINGS = {0.01: 3e-3, 0.1: 3e-3, 1.0: 2e-3, 10.0: 1.2e-3}
 
 
 @pytest.mark.case(
-    "mesh_motion-waves", kind="exact",
-    claim="Between a plug whose faces are bent by a wave and the ends of the mesh the fluid is displaced as the "
-          "closed form says, for every gamma, sliding along walls and ends, on straight triangles and on curved ones",
-    norm="L2 of the fluid's displacement, relative, root mean square over three random meshes a size",
-    mutants=("gamma-sign", "gamma-inverted", "twice-the-divergence", "walls-held"), references=("sliding_waves",),
-    runs_with="3")
+    "mesh_motion-waves", kind="exact", mutants=("gamma-sign", "gamma-inverted", "twice-the-divergence", "walls-held"),
+    references=("sliding_waves",), runs_with="3")
 @parametrize("geometry", EITHER)
 def test_waves(geometry, record):
+    """Between a plug whose faces are bent by a wave and the ends of the mesh the fluid is displaced as the closed form
+    says, for every gamma, sliding along walls and ends, on straight triangles and on curved ones.
+
+    Norm: L2 of the fluid's displacement, relative, root mean square over three random meshes a size.
+    """
     for gamma, ceiling in CEILINGS.items():
         label = f"gamma = {gamma:g}"
         record(studies(refine(_wave_error, SIZES, gamma, geometry, label),
@@ -153,14 +154,15 @@ SEGMENT_MOTIONS = {"grows": lambda x, y: np.array([x, y]), "slides": lambda x, y
 
 
 @pytest.mark.case(
-    "mesh_motion-half-disc", kind="cross-code",
-    claim="Around a half-disc that grows, or slides along the wall, the fluid is displaced as an independent code "
-          "displaces it, for three gamma, on straight triangles and on curved ones; both codes refined",
-    norm="L2 of the difference of the whole displacement over that of the displacement",
-    mutants=("gamma-sign", "twice-the-divergence", "gamma-inverted"), references=("quadratic_mesh_motion",),
-    runs_with="3")
+    "mesh_motion-half-disc", kind="cross-code", mutants=("gamma-sign", "twice-the-divergence", "gamma-inverted"),
+    references=("quadratic_mesh_motion",), runs_with="3")
 @parametrize("geometry", EITHER)
 def test_half_disc(geometry, record):
+    """Around a half-disc that grows, or slides along the wall, the fluid is displaced as an independent code displaces
+    it, for three gamma, on straight triangles and on curved ones; both codes refined.
+
+    Norm: L2 of the difference of the whole displacement over that of the displacement.
+    """
     for name, gamma in product(SEGMENT_MOTIONS, GAMMAS):
         record(_comparison(geometry, np.pi / 2, LEVELS, name, gamma, 2,
                          "linear elements: second order, no singular corner (mirror images)", f"{name}, "))
@@ -176,13 +178,15 @@ def _comparison(geometry: int, contact: float, levels, motion: str, gamma: float
 
 @pytest.mark.slow
 @pytest.mark.case(
-    "mesh_motion-corner", kind="cross-code",
-    claim="Around an aggregate whose contact angle is 60 degrees the order falls to twice the exponent of the fluid's "
-          "corner of 120 degrees, for three gamma, on straight triangles and on curved ones; both codes refined",
-    norm="L2 of the difference of the whole displacement over that of the displacement",
-    mutants=("gamma-inverted",), references=("quadratic_mesh_motion",), runs_with="3")
+    "mesh_motion-corner", kind="cross-code", mutants=("gamma-inverted",), references=("quadratic_mesh_motion",),
+    runs_with="3")
 @parametrize("geometry", EITHER)
 def test_corner(geometry, record):
+    """Around an aggregate whose contact angle is 60 degrees the order falls to twice the exponent of the fluid's corner
+    of 120 degrees, for three gamma, on straight triangles and on curved ones; both codes refined.
+
+    Norm: L2 of the difference of the whole displacement over that of the displacement.
+    """
     record([_comparison(geometry, CONTACT, CORNER_LEVELS, "grows", gamma,
                       2 * quadratic_mesh_motion.exponent(np.pi - CONTACT, gamma),
                       "2 z, displacement like r^z at the corner") for gamma in GAMMAS])
@@ -228,14 +232,16 @@ STEPS = 18
 
 
 @pytest.mark.case(
-    "mesh_motion-growth", kind="property",
-    claim="A half-disc that doubles its area, or slides by its radius, in 18 steps (under a narrow film: grows by 30 "
-          "%, slides by half of it) turns no triangle over, leaves no gap, and keeps the nodes of walls, inlet and "
-          "outlet on their lines, whether triangles are straight or curved",
-    norm="least area of a triangle over its own at first; area of fluid and biomass, relative; distance from a line",
-    mutants=("stale-fluid", "outlet-moves"), references=("quadratic_mesh_motion",), runs_with="3")
+    "mesh_motion-growth", kind="property", mutants=("stale-fluid", "outlet-moves"),
+    references=("quadratic_mesh_motion",), runs_with="3")
 @parametrize("geometry", EITHER)
 def test_growth(geometry, record):
+    """A half-disc that doubles its area, or slides by its radius, in 18 steps (under a narrow film: grows by 30 %,
+    slides by half of it) turns no triangle over, leaves no gap, and keeps the nodes of walls, inlet and outlet on their
+    lines, whether triangles are straight or curved.
+
+    Norm: least area of a triangle over its own at first; area of fluid and biomass, relative; distance from a line.
+    """
     for radius, factor, way in JOURNEYS:
         for name, stretch, shift in (("grown", factor ** (0.5 / STEPS), 0.0), ("slid", 1.0, way * radius / STEPS)):
             first = _around(radius, geometry)
@@ -276,13 +282,15 @@ STRIDES = (0.08, 0.04, 0.02, 0.01)
 
 
 @pytest.mark.case(
-    "mesh_motion-round-trip", kind="property",
-    claim="There and back, the nodes return to second order in the length of the way, since the way back starts from "
-          "the moved mesh; beside a plug, where the motion is linear, to round-off",
-    norm="root mean square of the nodes' distances from where they started, over the radius, or the largest",
-    mutants=("stale-forms", "stale-fluid"), references=("quadratic_mesh_motion",), runs_with="3")
+    "mesh_motion-round-trip", kind="property", mutants=("stale-forms", "stale-fluid"),
+    references=("quadratic_mesh_motion",), runs_with="3")
 @parametrize("geometry", EITHER)
 def test_round_trip(geometry, record):
+    """There and back, the nodes return to second order in the length of the way, since the way back starts from the
+    moved mesh; beside a plug, where the motion is linear, to round-off.
+
+    Norm: root mean square of the nodes' distances from where they started, over the radius, or the largest.
+    """
     grid = _around(20.0, geometry)
     for name, growth, shift, ceiling in (("grows", 1.0, 0.0, 4e-5), ("slides", 0.0, 20.0, 4e-6)):
         back = [_round_trip(grid, 1 + growth * stride, shift * stride) for stride in STRIDES]
@@ -304,14 +312,15 @@ HALF_BENT = "the map is one to one while it is bent by less than half the height
 
 @pytest.mark.case(
     "mesh_motion-criterion", kind="exact",
-    claim="An equilateral triangle stretched by s has the quality 2 s / (1 + s^2), however it lies; a mesh is remade "
-          "if seven triangles are stretched by more than 3, or one is turned over, and not if six are; a curved "
-          "triangle of the aggregate may be bent, but not so far that it turns over at a node",
-    norm="largest difference of the quality; verdicts on meshes with so many triangles stretched",
     mutants=("more-poor-triangles", "turned-over-accepted", "quality-halved", "remeshed-too-late",
-             "bent-over-accepted"),
-    runs_with="1 2 3")
+             "bent-over-accepted"), runs_with="1 2 3")
 def test_criterion(record):
+    """An equilateral triangle stretched by s has the quality 2 s / (1 + s^2), however it lies; a mesh is remade if
+    seven triangles are stretched by more than 3, or one is turned over, and not if six are; a curved triangle of the
+    aggregate may be bent, but not so far that it turns over at a node.
+
+    Norm: largest difference of the quality; verdicts on meshes with so many triangles stretched.
+    """
     stretch = np.random.default_rng(5).uniform(0.1, 8.0, 50)
     off = largest(_triangles(stretch).quality - 2 * stretch / (1 + stretch**2))
     verdicts = {"six by 3.001": (_stretched(6, 3.001), True, "3.5"),

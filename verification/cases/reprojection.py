@@ -6,8 +6,6 @@ t = 0, pressure and theta. On a new mesh that is longer than the old one, substr
 constant downstream.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -27,15 +25,15 @@ UPDATES = 27
 
 
 @pytest.mark.case(
-    "reprojection-mass", kind="exact",
-    claim="(34) keeps the mass of every node or quadrature point, X_A and X_I alike, over the biomass triangles "
-          "around it and no others",
-    norm="largest relative difference over the aggregate's nodes (linear) or quadrature points; weights of the points "
-         "less those worked out here, over the largest",
-    mutants=("reprojection-left-out", "inverse-ratio", "fluid-triangles-too"))
+    "reprojection-mass", kind="exact", mutants=("reprojection-left-out", "inverse-ratio", "fluid-triangles-too"))
 @parametrize("order", aggregates.EVERY)
 def test_mass(order, record):
-    """Record checks of one update of a half-disc of 20 um with elements of an order."""
+    """(34) keeps the mass of every node or quadrature point, X_A and X_I alike, over the biomass triangles around it
+    and no others.
+
+    Norm: largest relative difference over the aggregate's nodes (linear) or quadrature points; weights of the points
+    less those worked out here, over the largest.
+    """
     def density(x, y):
         return aggregates.DENSITY * (1 + 0.02 * np.sin(0.3 * x + 0.2 * y))
 
@@ -56,13 +54,14 @@ def test_mass(order, record):
 
 @pytest.mark.case(
     "reprojection-half-disc", kind="exact",
-    claim="A half-disc that grows by 8 % an update everywhere stays one, of radius R_0 sqrt(theta), and (34) returns "
-          "its density to X_m in every point, through remeshes as well",
-    norm="largest relative error of radius, density, theta and mass in 27 updates, two remeshes among them",
     mutants=("reprojection-left-out", "inverse-ratio", "theta-forgotten", "extent-kept-too-long"))
 @parametrize("order", aggregates.EVERY)
 def test_half_disc(order, record):
-    """Record checks of 27 updates with elements of an order."""
+    """A half-disc that grows by 8 % an update everywhere stays one, of radius R_0 sqrt(theta), and (34) returns its
+    density to X_m in every point, through remeshes as well.
+
+    Norm: largest relative error of radius, density, theta and mass in 27 updates, two remeshes among them.
+    """
     scene = aggregates.base_scene(order=order)
     state = aggregates.seed(RADIUS, order=order)
     rows: list[dict] = []
@@ -100,13 +99,15 @@ WIDEST = 1.3
 
 @pytest.mark.case(
     "reprojection-growing", kind="property",
-    claim="An aggregate that grows sixfold, seven times faster in front than behind, keeps its biomass to round-off "
-          "through every remesh, restarts theta at J times the density over X_m, and is remeshed in time",
-    norm="biomass less what was made, relative; theta over J less the density over X_m; triangles, and um, by which "
-         "the criteria are missed; all updates",
     mutants=("theta-without-density", "remeshed-too-late", "linear-transfer", "curved-mass-lost"))
 @parametrize("order", aggregates.EVERY)
 def test_growing(order, record):
+    """An aggregate that grows sixfold, seven times faster in front than behind, keeps its biomass to round-off through
+    every remesh, restarts theta at J times the density over X_m, and is remeshed in time.
+
+    Norm: biomass less what was made, relative; theta over J less the density over X_m; triangles, and um, by which the
+    criteria are missed; all updates.
+    """
     rows = _growth_history("conserving", order)
     record(at_most("biomass", largest(rows["drift"]), 1e-12, "round-off"))
     record(at_most("theta after a remesh", rows["restart"].max(), 1e-12, "J times the density over X_m"))
@@ -192,16 +193,18 @@ def _plane(coefficients, x: np.ndarray, y: np.ndarray) -> np.ndarray:
 
 @pytest.mark.case(
     "reprojection-remesh-linear", kind="exact",
-    claim="Through a remesh of an aggregate that was moved linearly, places at t = 0, densities and pressure that are "
-          "linear stay so, and theta is det F times the density over X_m, with every transfer; with higher orders "
-          "both kinds are X_m together, and a share of X_I that is linear stays so",
-    norm="largest relative difference over all nodes or points of the new mesh",
     mutants=("theta-without-density", "kinds-exchanged", "jacobian-inverted", "curved-mass-lost"))
 @parametrize(
     "order, transfer",
     {f"{transfer}, order {order}": (order, transfer) for order, transfers in TRANSFERS.items()
      for transfer in transfers})
 def test_remesh_linear(order, transfer, record):
+    """Through a remesh of an aggregate that was moved linearly, places at t = 0, densities and pressure that are linear
+    stay so, and theta is det F times the density over X_m, with every transfer; with higher orders both kinds are X_m
+    together, and a share of X_I that is linear stays so.
+
+    Norm: largest relative difference over all nodes or points of the new mesh.
+    """
     scene = aggregates.base_scene(f'numerics.transfer="{transfer}"', "numerics.refinement=1.2", order=order)
     kinds = KINDS if order == 1 else SHARES
     new = aggregates.remesh(scene, _moved_linearly(order, kinds))
@@ -240,15 +243,15 @@ def _moved_linearly(order: int, kinds: dict):
 
 @pytest.mark.slow
 @pytest.mark.case(
-    "reprojection-remesh-order", kind="manufactured",
-    claim="A remesh carries a smooth density to second order, with higher orders a smooth share of X_I; the next "
-          "update brings the density back to X_m to second order, and the area to the biomass over X_m exactly",
-    norm="L2 of the density on the new mesh less the exact one, and of the density over X_m less one after an update "
-         "without growth, relative, root mean square over three pairs of meshes a size; area after that update, "
-         "relative",
-    mutants=("theta-without-density", "corners-for-middles"))
+    "reprojection-remesh-order", kind="manufactured", mutants=("theta-without-density", "corners-for-middles"))
 @parametrize("order", aggregates.EVERY)
 def test_remesh_order(order, record):
+    """A remesh carries a smooth density to second order, with higher orders a smooth share of X_I; the next update
+    brings the density back to X_m to second order, and the area to the biomass over X_m exactly.
+
+    Norm: L2 of the density on the new mesh less the exact one, and of the density over X_m less one after an update
+    without growth, relative, root mean square over three pairs of meshes a size; area after that update, relative.
+    """
     if order > 1:
         record(studies(refine(_share_errors, dict.fromkeys(SHARED, len(OLD)), order),
                        {"share of X_I after the remesh": (2, FITTED, 7e-4)}))
@@ -319,12 +322,14 @@ def _density_error(state, exact=aggregates.uniform) -> float:
 
 
 @pytest.mark.case(
-    "reprojection-remesh-arc", kind="exact",
-    claim="Where a remesh splits edges of what was the seed's arc, the new nodes were on it at t = 0, the polygon "
-          "stays what it is, and the next update rounds it",
-    norm="largest relative difference; distance of the interface's nodes from a circle, over that before the update",
-    mutants=("origin-on-the-chord",), runs_with="1", omitted="orders 2, 3 have arcs, which lie on it")
+    "reprojection-remesh-arc", kind="exact", mutants=("origin-on-the-chord",), runs_with="1",
+    omitted="orders 2, 3 have arcs, which lie on it")
 def test_remesh_arc(record):
+    """Where a remesh splits edges of what was the seed's arc, the new nodes were on it at t = 0, the polygon stays what
+    it is, and the next update rounds it.
+
+    Norm: largest relative difference; distance of the interface's nodes from a circle, over that before the update.
+    """
     coarse, fine = (aggregates.base_scene('aggregate.radius="10 um"', f"numerics.refinement={r}") for r in (0.5, 1.0))
     grown = aggregates.expand(coarse, aggregates.seed(10.0, 0.5), 3.0)
     new = aggregates.remesh(fine, grown)
@@ -349,14 +354,15 @@ SPEED, ENDS = 1.2e5, (-40.0, 30.0)
 
 
 @pytest.mark.case(
-    "reprojection-beyond-the-ends", kind="exact",
-    claim="On a mesh that reaches further both substrates follow (26) upstream of the old one, each with its own "
-          "diffusivity, stay constant downstream and are interpolated between; without flow they are the supply "
-          "beyond both ends",
-    norm="largest difference over the supply",
-    mutants=("upstream-reversed", "diffusivity-of-the-acceptor"))
+    "reprojection-beyond-the-ends", kind="exact", mutants=("upstream-reversed", "diffusivity-of-the-acceptor"))
 @parametrize("order", aggregates.EVERY)
 def test_beyond_the_ends(order, record):
+    """On a mesh that reaches further both substrates follow (26) upstream of the old one, each with its own
+    diffusivity, stay constant downstream and are interpolated between; without flow they are the supply beyond both
+    ends.
+
+    Norm: largest difference over the supply.
+    """
     initial = aggregates.seed_around(meshes.seed(10.0, 1.0, order), 1.0, ends=ENDS, order=order)
     old = _exact(np.clip(initial.space.points[:, 0], *ENDS))
     filled = replace(initial, concentrations=Concentrations(*(SUPPLY * old)))

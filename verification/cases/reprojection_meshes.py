@@ -4,8 +4,6 @@ Flux-corrected transport limits the projection: it conserves like the projection
 The common pieces of two meshes, and the projection integrated over them, are compared with shapely's pieces.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -64,11 +62,6 @@ LOCATED = {1: 4e-3, 2: 1e-4, 3: 2e-6}
 
 @pytest.mark.case(
     "reprojection-order", kind="manufactured",
-    claim="No transfer loses the accuracy of linear elements, the limiter leaves linear fields alone, and fields of "
-          "each order are found to their order",
-    norm="L2 of a smooth field, interpolated on one mesh and carried to another, root mean square over three pairs a "
-         "size; largest error of a linear field over nine pairs of meshes, over its range; root mean square error at "
-         "a thousand places of fields of order 1, 2 and 3, and over three meshes a size",
     mutants=("corners-for-middles", "nearest-corner", "bounded-lumped", "bounds-of-one-piece"))
 @parametrize(
     "field, measure, method, *expected",
@@ -78,6 +71,13 @@ LOCATED = {1: 4e-3, 2: 1e-4, 3: 2e-6}
                                             "interpolation: one order more than the elements'", ceiling)
         for k, ceiling in LOCATED.items()}})
 def test_order(field, measure, method, expected, record):
+    """No transfer loses the accuracy of linear elements, the limiter leaves linear fields alone, and fields of each
+    order are found to their order.
+
+    Norm: L2 of a smooth field, interpolated on one mesh and carried to another, root mean square over three pairs a
+    size; largest error of a linear field over nine pairs of meshes, over its range; root mean square error at a
+    thousand places of fields of order 1, 2 and 3, and over three meshes a size.
+    """
     record(studies(refine(measure, SIZES, method), {field: expected}))
     if method is transfer.project_bounded:
         gaps = [_plane_error(transfer.project_bounded(*old, _plane(old)[:, None], *new)[:, 0], new)
@@ -85,14 +85,14 @@ def test_order(field, measure, method, expected, record):
         record(at_most("linear field", max(gaps), 1e-12, "within its bounds at every node: round-off"))
 
 
-@pytest.mark.case(
-    "reprojection-chain", kind="property",
-    claim="Forty remeshes of a steep field keep its integral to round-off and never raise its square by projection; "
-          "by linear interpolation they stay within its bounds and change what it integrates to",
-    norm="change of the integral of a steep field over 40 remeshes, and of its square in each, relative; largest and "
-         "least nodal value",
-    mutants=("linear-transfer",), runs_with="1", omitted=MASSES)
+@pytest.mark.case("reprojection-chain", kind="property", mutants=("linear-transfer",), runs_with="1", omitted=MASSES)
 def test_chain(record):
+    """Forty remeshes of a steep field keep its integral to round-off and never raise its square by projection; by
+    linear interpolation they stay within its bounds and change what it integrates to.
+
+    Norm: change of the integral of a steep field over 40 remeshes, and of its square in each, relative; largest and
+    least nodal value.
+    """
     projected, paper = (_remesh_history(carry, steep) for carry in (transfer.project, sampled))
     rise = (projected["square"][1:] / projected["square"][:-1]).max()
     record(at_most("integral by projection", largest(projected["integral"] - 1), 1e-12, "round-off"))
@@ -134,14 +134,16 @@ FIELDS = {"hill": (steep,), "cylinder": (cylinder,)}
 
 
 @pytest.mark.case(
-    "reprojection-bounded-chain", kind="property",
-    claim="Forty remeshes of a steep field keep its integral to round-off and every value in the range of the first; "
-          "the unlimited projection leaves it, and is hardly more accurate",
-    norm="change of the integral of a hill and of a cylinder (a jump from 0 to 1) over 40 remeshes, relative; by how "
-         "much values leave their range, over it; L2 error over that of the unlimited projection",
-    mutants=("bounded-lumped", "bounded-unlimited", "bounded-one-sided"), runs_with="1", omitted=MASSES)
+    "reprojection-bounded-chain", kind="property", mutants=("bounded-lumped", "bounded-unlimited", "bounded-one-sided"),
+    runs_with="1", omitted=MASSES)
 @parametrize("field", FIELDS)
 def test_bounded_chain(field, record):
+    """Forty remeshes of a steep field keep its integral to round-off and every value in the range of the first; the
+    unlimited projection leaves it, and is hardly more accurate.
+
+    Norm: change of the integral of a hill and of a cylinder (a jump from 0 to 1) over 40 remeshes, relative; by how
+    much values leave their range, over it; L2 error over that of the unlimited projection.
+    """
     limited, free = (_remesh_history(carry, field) for carry in (transfer.project_bounded, transfer.project))
     record(at_most("integral", largest(limited["integral"] - 1), 1e-12, "round-off"))
     record(at_most("outside the range", limited["outside"].max(), 1e-14, "Zalesak's limiter: round-off"))
@@ -156,13 +158,15 @@ DEGREE = 6
 
 
 @pytest.mark.case(
-    "reprojection-supermesh", kind="exact",
-    claim="The common pieces of two meshes are shapely's, cover every triangle of both once, and integrate "
-          "polynomials exactly, for unrelated meshes, shared nodes and edges, equal meshes and slivers",
-    norm="largest difference of the area that two triangles share, and between a triangle and its pieces, over the "
-         "largest area; largest relative error of the integrals of x^a y^b, a + b up to 6",
-    mutants=("clip-two-sides", "fans-cut-short"), references=("galerkin_transfer",), runs_with="1", omitted=MASSES)
+    "reprojection-supermesh", kind="exact", mutants=("clip-two-sides", "fans-cut-short"),
+    references=("galerkin_transfer",), runs_with="1", omitted=MASSES)
 def test_supermesh(record):
+    """The common pieces of two meshes are shapely's, cover every triangle of both once, and integrate polynomials
+    exactly, for unrelated meshes, shared nodes and edges, equal meshes and slivers.
+
+    Norm: largest difference of the area that two triangles share, and between a triangle and its pieces, over the
+    largest area; largest relative error of the integrals of x^a y^b, a + b up to 6.
+    """
     record(each_at_most(runs.worst([_pieces(old, new) for _, old, new in pairs.pairs()]), 1e-12, ROUND_OFF))
 
 
@@ -189,14 +193,15 @@ def _polynomials(pieces: pairs.Grid) -> float:
 
 
 @pytest.mark.case(
-    "reprojection-projection", kind="cross-code",
-    claim="The projection of a random field is that of a dense code on shapely's pieces; it keeps linear fields, the "
-          "field's integral and centre, and what it takes from the square is the square of the difference",
-    norm="largest difference of nodal values over the field's largest; integrals of the field, of the field times x "
-         "and y, and of its square, relative",
-    mutants=("lumped-mass", "corners-for-middles", "contributions-lost"), references=("galerkin_transfer",),
-    runs_with="1", omitted=MASSES)
+    "reprojection-projection", kind="cross-code", mutants=("lumped-mass", "corners-for-middles", "contributions-lost"),
+    references=("galerkin_transfer",), runs_with="1", omitted=MASSES)
 def test_projection(record):
+    """The projection of a random field is that of a dense code on shapely's pieces; it keeps linear fields, the field's
+    integral and centre, and what it takes from the square is the square of the difference.
+
+    Norm: largest difference of nodal values over the field's largest; integrals of the field, of the field times x and
+    y, and of its square, relative.
+    """
     random = np.random.default_rng(6)
     rows = [_projection_errors(old, new, random.uniform(0.0, 1.0, len(old[0]))) for _, old, new in pairs.pairs()]
     record(each_at_most(runs.worst(rows), 1e-11, ROUND_OFF))

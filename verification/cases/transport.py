@@ -5,8 +5,6 @@ solve the full nonlinear equations with a curved flow and a D that jumps at a ha
 through the sides of the mesh are added to the source; everything else is the code's.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 
@@ -81,27 +79,31 @@ def robin(order: int, peclet: float, ends, ceiling: float):
 
 @pytest.mark.case(
     "transport-robin-channel", kind="exact",
-    claim="First-order uptake in a slab under plug flow follows its closed form, (26) upstream included, at Peclet "
-          "0.1, 1, 10, wherever the inlet is put",
-    norm="L2 of C over the mesh, relative; several meshes a size",
     mutants=("fluid-diffusivity", "half-of-the-advection", "no-inlet-flux", "weights-of-the-ends"),
     references=("robin_channel",), runs_with="1", omitted="orders 2, 3: transport-robin-higher")
-@parametrize("order, peclet, ends, ceiling", ROBIN)
-def test_robin_channel(order, peclet, ends, ceiling, record):
-    record(robin(order, peclet, ends, ceiling))
+@parametrize("*setup", ROBIN)
+def test_robin_channel(setup, record):
+    """First-order uptake in a slab under plug flow follows its closed form, (26) upstream included, at Peclet 0.1, 1,
+    10, wherever the inlet is put.
+
+    Norm: L2 of C over the mesh, relative; several meshes a size.
+    """
+    record(robin(*setup))
 
 
 @pytest.mark.slow
 @pytest.mark.case(
     "transport-robin-higher", kind="exact",
-    claim="Quadratic and cubic concentrations follow the closed form of first-order uptake in a slab to third and "
-          "fourth order, the inlet's (11) included, at Peclet 0.1, 1, 10 (cubic: 1, 10)",
-    norm="root mean square of C over the mesh, and C leaving, over the supply",
     mutants=("outlet-forgotten", "fluid-diffusivity", "reaction-evenly-weighted"), references=("robin_channel",),
     omitted="order 1: transport-robin-channel")
-@parametrize("order, peclet, ends, ceiling", ROBIN_HIGHER)
-def test_robin_higher(order, peclet, ends, ceiling, record):
-    record(robin(order, peclet, ends, ceiling))
+@parametrize("*setup", ROBIN_HIGHER)
+def test_robin_higher(setup, record):
+    """Quadratic and cubic concentrations follow the closed form of first-order uptake in a slab to third and fourth
+    order, the inlet's (11) included, at Peclet 0.1, 1, 10 (cubic: 1, 10).
+
+    Norm: root mean square of C over the mesh, and C leaving, over the supply.
+    """
+    record(robin(*setup))
 
 
 def _robin_errors(size: float, number: int, order: int, peclet: float, ends) -> dict[str, float]:
@@ -174,28 +176,28 @@ def first_order(order: int, modulus: float, film: float, ceiling: float, uptake_
 
 
 @pytest.mark.case(
-    "transport-first-order-slab", kind="exact",
-    claim="A slab that takes up kappa C has the profile cosh(phi x / l) and the effectiveness tanh(phi) / phi of "
-          "Thiele's modulus 0.1, 1, 10, and those of its films where it has some",
-    norm=NORM,
+    "transport-first-order-slab", kind="exact", norm=NORM,
     mutants=("decay-demand", "one-supply-held", "quarter-of-a-triangle", "fluid-diffusivity"), references=("slab",),
     omitted="orders 2, 3: transport-first-order-slab-higher")
-@parametrize("order, modulus, film, ceiling, uptake_ceiling", _thiele(1))
-def test_first_order_slab(order, modulus, film, ceiling, uptake_ceiling, record):
-    record(first_order(order, modulus, film, ceiling, uptake_ceiling))
+@parametrize("*setup", _thiele(1))
+def test_first_order_slab(setup, record):
+    """A slab that takes up kappa C has the profile cosh(phi x / l) and the effectiveness tanh(phi) / phi of Thiele's
+    modulus 0.1, 1, 10, and those of its films where it has some.
+    """
+    record(first_order(*setup))
 
 
 @pytest.mark.slow
 @pytest.mark.case(
-    "transport-first-order-slab-higher", kind="exact",
-    claim="With quadratic and cubic elements the slab that takes up kappa C has its profile to third and fourth "
-          "order, and its effectiveness to fourth and sixth",
-    norm=NORM,
+    "transport-first-order-slab-higher", kind="exact", norm=NORM,
     mutants=("reaction-evenly-weighted", "one-supply-held", "fluid-diffusivity"), references=("slab",),
     omitted="order 1: transport-first-order-slab")
-@parametrize("order, modulus, film, ceiling, uptake_ceiling", _thiele(2, 3))
-def test_first_order_slab_higher(order, modulus, film, ceiling, uptake_ceiling, record):
-    record(first_order(order, modulus, film, ceiling, uptake_ceiling))
+@parametrize("*setup", _thiele(2, 3))
+def test_first_order_slab_higher(setup, record):
+    """With quadratic and cubic elements the slab that takes up kappa C has its profile to third and fourth order, and
+    its effectiveness to fourth and sixth.
+    """
+    record(first_order(*setup))
 
 
 def _slab_errors(size: float, number: int, order: int, film: float, sink: float, half_saturation: float, exact,
@@ -263,18 +265,18 @@ def _exhausted(film: float):
 
 
 @pytest.mark.slow
-@pytest.mark.case(
-    "transport-zero-order-slab", kind="exact",
-    claim="Where half saturation is small against the supply, uptake s goes on at its full rate down to the depth of "
-          "penetration sqrt(2 D C_s / s), or that of its films, and nothing is left beyond; on the way there the slab "
-          "follows Monod's first integral",
-    norm="L2 of C over the mesh, relative; depth = what enters a side over s, relative; several meshes a size",
-    mutants=("reaction-in-the-fluid", "decay-demand"))
+@pytest.mark.case("transport-zero-order-slab", kind="exact", mutants=("reaction-in-the-fluid", "decay-demand"))
 @parametrize("judge, *row", {**{label: (_monod, *row) for label, row in MONOD.items()},
                              f"K = {LIMIT[0]:g} to {LIMIT[-1]:g} mg/L, linear": (_limit,),
                              **{f"K = {LEAST:g} mg/L, {label}, linear": (_exhausted, film)
                                 for label, film in (("no films", 0.0), (f"films of {FILM:g} um", FILM))}})
 def test_zero_order_slab(judge, row, record):
+    """Where half saturation is small against the supply, uptake s goes on at its full rate down to the depth of
+    penetration sqrt(2 D C_s / s), or that of its films, and nothing is left beyond; on the way there the slab follows
+    Monod's first integral.
+
+    Norm: L2 of C over the mesh, relative; depth = what enters a side over s, relative; several meshes a size.
+    """
     record(judge(*row))
 
 
@@ -398,28 +400,32 @@ def chosen_concentrations(order: int, peclet: float, inlet: str, ceilings: tuple
 
 @pytest.mark.case(
     "transport-manufactured", kind="manufactured",
-    claim="Chosen concentrations around a half-disc come out of the full equations with second order, at Peclet "
-          "numbers of the pore from 0.1 to 100 and of the elements from 0.002 to 18, with either inlet condition",
-    norm="L2 of each substrate over the mesh, relative",
     mutants=("cross-flow-sign", "exchanged-half-saturation", "fluid-diffusivity", "ratio-on-the-donor-only",
-             "quarter-of-a-triangle"),
-    references=("manufactured_transport",), omitted="orders 2, 3: transport-manufactured-higher")
-@parametrize("order, peclet, inlet, ceilings", _variants(1))
-def test_manufactured(order, peclet, inlet, ceilings, record):
-    record(chosen_concentrations(order, peclet, inlet, ceilings))
+             "quarter-of-a-triangle"), references=("manufactured_transport",),
+    omitted="orders 2, 3: transport-manufactured-higher")
+@parametrize("*setup", _variants(1))
+def test_manufactured(setup, record):
+    """Chosen concentrations around a half-disc come out of the full equations with second order, at Peclet numbers of
+    the pore from 0.1 to 100 and of the elements from 0.002 to 18, with either inlet condition.
+
+    Norm: L2 of each substrate over the mesh, relative.
+    """
+    record(chosen_concentrations(*setup))
 
 
 @pytest.mark.slow
 @pytest.mark.case(
     "transport-manufactured-higher", kind="manufactured",
-    claim="The same with quadratic and cubic elements on curved triangles, at Peclet numbers from 0.1 to 100, with "
-          "either inlet condition: third order, of advection alone fourth; and fourth order",
-    norm="L2 of each substrate over the mesh, relative",
     mutants=("printed-inlet-forgotten", "conserving-cross-flow", "exchanged-half-saturation", "fluid-diffusivity"),
     references=("manufactured_transport",), omitted="order 1: transport-manufactured")
-@parametrize("order, peclet, inlet, ceilings", _variants(2, 3))
-def test_manufactured_higher(order, peclet, inlet, ceilings, record):
-    record(chosen_concentrations(order, peclet, inlet, ceilings))
+@parametrize("*setup", _variants(2, 3))
+def test_manufactured_higher(setup, record):
+    """The same with quadratic and cubic elements on curved triangles, at Peclet numbers from 0.1 to 100, with either
+    inlet condition: third order, of advection alone fourth; and fourth order.
+
+    Norm: L2 of each substrate over the mesh, relative.
+    """
+    record(chosen_concentrations(*setup))
 
 
 def _chosen_errors(refinement: float, number: int, order: int, peclet: float, inlet: str) -> dict[str, float]:

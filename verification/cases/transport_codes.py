@@ -24,8 +24,6 @@ the box biomass,
 are integrated by scipy to 1e-11. The box is followed for five days, by when half of the acceptor is gone.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 
@@ -139,32 +137,35 @@ def collocation(order: int, peclet: float, density: float):
 
 @pytest.mark.case(
     "transport-monod-collocation", kind="cross-code",
-    claim="Dual Monod uptake under plug flow is solve_bvp's at Peclet 0.1, 1, 5 times Thiele numbers 0.6, 1.9, 6, "
-          "from barely touched to starved",
-    norm="L2 of each substrate over the mesh, relative; starved: root mean square over the slab of C_A over its own "
-         "value; several meshes a size",
     mutants=("decay-demand", "no-inlet-flux", "ratio-on-the-donor-only", "reaction-in-the-fluid",
-             "exchanged-substrates"),
-    references=("channel_bvp",), omitted="orders 2, 3: transport-monod-higher")
-@parametrize("order, peclet, density", combined(LINEAR, PECLETS, DENSITIES))
-def test_monod_collocation(order, peclet, density, record):
-    record(collocation(order, peclet, density))
+             "exchanged-substrates"), references=("channel_bvp",), omitted="orders 2, 3: transport-monod-higher")
+@parametrize("*setup", combined(LINEAR, PECLETS, DENSITIES))
+def test_monod_collocation(setup, record):
+    """Dual Monod uptake under plug flow is solve_bvp's at Peclet 0.1, 1, 5 times Thiele numbers 0.6, 1.9, 6, from
+    barely touched to starved.
+
+    Norm: L2 of each substrate over the mesh, relative; starved: root mean square over the slab of C_A over its own
+    value; several meshes a size.
+    """
+    record(collocation(*setup))
 
 
 @pytest.mark.slow
 @pytest.mark.case(
     "transport-monod-higher", kind="cross-code",
-    claim="Dual Monod uptake under plug flow on quadratic and cubic triangles is solve_bvp's, to third and fourth "
-          "order, at Peclet 0.5, 1, 5 (cubic: 1) times Thiele numbers 0.6, 1.9, 6, from barely touched to starved",
-    norm="root mean square over the mesh of both substrates less solve_bvp, over the supply",
     mutants=("uptake-without-decay", "fluid-diffusivity", "reaction-evenly-weighted"), references=("channel_bvp",),
     omitted="order 1: transport-monod-collocation")
 @parametrize(
-    "order, peclet, density",
+    "*setup",
     {**combined({"quadratic": 2}, {"Pe = 0.5": 0.5, "Pe = 1": 1.0, "Pe = 5": 5.0}, DENSITIES),
      **combined({"cubic": 3}, {"Pe = 1": 1.0}, DENSITIES)})
-def test_monod_higher(order, peclet, density, record):
-    record(collocation(order, peclet, density))
+def test_monod_higher(setup, record):
+    """Dual Monod uptake under plug flow on quadratic and cubic triangles is solve_bvp's, to third and fourth order, at
+    Peclet 0.5, 1, 5 (cubic: 1) times Thiele numbers 0.6, 1.9, 6, from barely touched to starved.
+
+    Norm: root mean square over the mesh of both substrates less solve_bvp, over the supply.
+    """
+    record(collocation(*setup))
 
 
 def _distances(size: float, number: int, order: int, peclet: float, density: float, ends, tolerance: float
@@ -234,28 +235,31 @@ def finite_differences(shape: str, order: int, density: float, *ceilings: float)
 
 @pytest.mark.slow
 @pytest.mark.case(
-    "transport-block", kind="cross-code",
-    claim="Diffusion into a block of biomass on a wall is py-pde's, both codes refined together, at Thiele numbers "
-          "0.7, 2.2 and 4.3; with quadratic and cubic elements the transient scheme comes to rest in what py-pde's "
-          "cells come to",
-    norm="root mean square over py-pde's cells over the supply; that of C_D in the biomass over itself; several "
-         "meshes a size",
-    mutants=("one-supply-held", "reaction-in-the-fluid"), references=("diffusion_reaction_pypde",))
-@parametrize("shape, order, density, *ceilings", BLOCKS)
-def test_block(shape, order, density, ceilings, record):
-    record(finite_differences(shape, order, density, *ceilings))
+    "transport-block", kind="cross-code", mutants=("one-supply-held", "reaction-in-the-fluid"),
+    references=("diffusion_reaction_pypde",))
+@parametrize("*setup", BLOCKS)
+def test_block(setup, record):
+    """Diffusion into a block of biomass on a wall is py-pde's, both codes refined together, at Thiele numbers 0.7, 2.2
+    and 4.3; with quadratic and cubic elements the transient scheme comes to rest in what py-pde's cells come to.
+
+    Norm: root mean square over py-pde's cells over the supply; that of C_D in the biomass over itself; several meshes a
+    size.
+    """
+    record(finite_differences(*setup))
 
 
 @pytest.mark.slow
 @pytest.mark.case(
-    "transport-half-disc", kind="cross-code",
-    claim="Diffusion into a half-disc is py-pde's, both codes refined together, at Thiele numbers 0.7, 2.2 and 7; "
-          "with quadratic and cubic elements the transient scheme comes to rest in what py-pde's cells come to",
-    norm="root mean square over py-pde's cells over the supply; that of C_D in the biomass over itself",
-    mutants=("ratio-on-the-donor-only",), references=("diffusion_reaction_pypde",))
-@parametrize("shape, order, density, *ceilings", HALF_DISCS)
-def test_half_disc(shape, order, density, ceilings, record):
-    record(finite_differences(shape, order, density, *ceilings))
+    "transport-half-disc", kind="cross-code", mutants=("ratio-on-the-donor-only",),
+    references=("diffusion_reaction_pypde",))
+@parametrize("*setup", HALF_DISCS)
+def test_half_disc(setup, record):
+    """Diffusion into a half-disc is py-pde's, both codes refined together, at Thiele numbers 0.7, 2.2 and 7; with
+    quadratic and cubic elements the transient scheme comes to rest in what py-pde's cells come to.
+
+    Norm: root mean square over py-pde's cells over the supply; that of C_D in the biomass over itself.
+    """
+    record(finite_differences(*setup))
 
 
 @cache
@@ -346,13 +350,15 @@ IN_TIME = {f"Pe = {peclet:g}, X = {density:g} mg/L, {word}": (ORDERS[word], pecl
 @pytest.mark.slow
 @pytest.mark.case(
     "transport-gear-in-time", kind="cross-code",
-    claim="On a given mesh the modified Gear scheme's concentrations, linear, quadratic and cubic, are those of "
-          "scipy's integrator with scikit-fem's mass matrix, with an error of second order in the step",
-    norm="largest over three times of the root mean square over the nodes, over the supply",
     mutants=("carry-of-bdf2", "backward-euler", "storage-of-the-biomass-alone", "storage-diagonal"),
     references=("monod",))
 @parametrize("order, peclet, density, size, ceiling", IN_TIME)
 def test_gear_in_time(order, peclet, density, size, ceiling, record):
+    """On a given mesh the modified Gear scheme's concentrations, linear, quadratic and cubic, are those of scipy's
+    integrator with scikit-fem's mass matrix, with an error of second order in the step.
+
+    Norm: largest over three times of the root mean square over the nodes, over the supply.
+    """
     trusted = _exact_in_time(size, peclet, density, order)
     errors = refine(lambda steps: {"size": TIMES[0] / steps, **_over_the_supply(
         _computed(size, 0, order, peclet, density, steps) - trusted)}, STEPS)
@@ -400,30 +406,33 @@ def finite_volumes(timed: bool, order: int, peclet: float, density: float):
 
 @pytest.mark.slow
 @pytest.mark.case(
-    "transport-monod-fipy", kind="cross-code",
-    claim="Dual Monod uptake under plug flow is FiPy's, both codes refined together, at Peclet 0.1, 1, 5 times Thiele "
-          "numbers 0.6, 1.9, 6, from barely touched to starved; that of quadratic and cubic elements, on one mesh, is "
-          "what FiPy's cells come to",
-    norm="root mean square over FiPy's cells, at five heights, of each substrate over its supply, and in the starved "
-         "slab over its own value; several meshes a size",
-    mutants=("decay-demand", "no-inlet-flux"), references=("channel_fipy",))
-@parametrize("timed, order, peclet, density", _rows(False))
-def test_monod_fipy(timed, order, peclet, density, record):
-    record(finite_volumes(timed, order, peclet, density))
+    "transport-monod-fipy", kind="cross-code", mutants=("decay-demand", "no-inlet-flux"), references=("channel_fipy",))
+@parametrize("*setup", _rows(False))
+def test_monod_fipy(setup, record):
+    """Dual Monod uptake under plug flow is FiPy's, both codes refined together, at Peclet 0.1, 1, 5 times Thiele
+    numbers 0.6, 1.9, 6, from barely touched to starved; that of quadratic and cubic elements, on one mesh, is what
+    FiPy's cells come to.
+
+    Norm: root mean square over FiPy's cells, at five heights, of each substrate over its supply, and in the starved
+    slab over its own value; several meshes a size.
+    """
+    record(finite_volumes(*setup))
 
 
 @pytest.mark.slow
 @pytest.mark.case(
-    "transport-gear-fipy", kind="cross-code",
-    claim="Transient profiles of both substrates are FiPy's, both codes refined together in space, at Peclet 0.1, 1, "
-          "5 times Thiele numbers 0.6, 1.9, 6; and refined in time, where FiPy's own scheme is of first order; those "
-          "of quadratic and cubic elements, on one mesh, are what FiPy's cells come to",
-    norm="largest over three times of the root mean square over FiPy's cells, at five heights, over the supply; "
-         "several meshes a size",
-    mutants=("storage-of-the-biomass-alone", "storage-diagonal"), references=("channel_fipy",))
-@parametrize("timed, order, peclet, density", _rows(True))
-def test_gear_fipy(timed, order, peclet, density, record):
-    record(finite_volumes(timed, order, peclet, density))
+    "transport-gear-fipy", kind="cross-code", mutants=("storage-of-the-biomass-alone", "storage-diagonal"),
+    references=("channel_fipy",))
+@parametrize("*setup", _rows(True))
+def test_gear_fipy(setup, record):
+    """Transient profiles of both substrates are FiPy's, both codes refined together in space, at Peclet 0.1, 1, 5 times
+    Thiele numbers 0.6, 1.9, 6; and refined in time, where FiPy's own scheme is of first order; those of quadratic and
+    cubic elements, on one mesh, are what FiPy's cells come to.
+
+    Norm: largest over three times of the root mean square over FiPy's cells, at five heights, over the supply; several
+    meshes a size.
+    """
+    record(finite_volumes(*setup))
 
 
 def _from_fipy(size: float, number: int, order: int, peclet: float, density: float, timed: bool) -> dict[str, float]:
@@ -517,27 +526,27 @@ def well_mixed(order: int):
 
 
 @pytest.mark.case(
-    "transport-well-mixed", kind="cross-code",
-    claim="In a closed, well-mixed pore C_A, C_D, X_A and X_I follow the four ordinary equations over days, with an "
-          "error of second order in the step; at constant C the shape updates integrate X_A and X_I exactly",
-    norm=f"{MIXED_NORM}; X at constant C: relative, after five days",
+    "transport-well-mixed", kind="cross-code", norm=f"{MIXED_NORM}; X at constant C: relative, after five days",
     mutants=("inert-fraction", "yield-dropped", "remains-of-the-start", "growth-in-one-increment"),
     references=("monod",), omitted="orders 2, 3: transport-well-mixed-higher")
 @parametrize("order", combined(LINEAR))
 def test_well_mixed(order, record):
+    """In a closed, well-mixed pore C_A, C_D, X_A and X_I follow the four ordinary equations over days, with an error of
+    second order in the step; at constant C the shape updates integrate X_A and X_I exactly.
+    """
     record(well_mixed(order))
 
 
 @pytest.mark.slow
 @pytest.mark.case(
-    "transport-well-mixed-higher", kind="cross-code",
-    claim="With quadratic and cubic concentrations C_A, C_D, X_A and X_I of the well-mixed pore follow the four "
-          "ordinary equations alike",
-    norm=MIXED_NORM,
+    "transport-well-mixed-higher", kind="cross-code", norm=MIXED_NORM,
     mutants=("storage-diagonal", "inert-fraction", "remains-of-the-start"), references=("monod",),
     omitted="order 1: transport-well-mixed")
 @parametrize("order", combined(HIGHER))
 def test_well_mixed_higher(order, record):
+    """With quadratic and cubic concentrations C_A, C_D, X_A and X_I of the well-mixed pore follow the four ordinary
+    equations alike.
+    """
     record(well_mixed(order))
 
 

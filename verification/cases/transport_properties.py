@@ -5,8 +5,6 @@ the midpoint rule takes up substrates with the mean biomass of the step, at stea
 C_D this is the integral of (7)-(10), and the biomass made balances the uptake.
 """
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 from functools import cache
@@ -57,14 +55,16 @@ def _defect(flux) -> float:
 
 @pytest.mark.case(
     "transport-balance", kind="property",
-    claim="Supply in = out + consumed to round-off, with flow and without; with the printed inlet (11) once its "
-          "(u_ave - u_x) C is counted [E4]; and supply in = out + consumed + stored in the transient scheme; with "
-          "linear, quadratic and cubic elements",
-    norm="supplied - out - consumed over supplied; in time, less what is stored",
     mutants=("carried-by-u", "weights-of-the-ends", "ledger-of-backward-euler", "printed-inlet-forgotten",
              "outlet-forgotten"))
 @parametrize("kind", combined(KINDS))
 def test_balance(kind, record):
+    """Supply in = out + consumed to round-off, with flow and without; with the printed inlet (11) once its (u_ave -
+    u_x) C is counted [E4]; and supply in = out + consumed + stored in the transient scheme; with linear, quadratic and
+    cubic elements.
+
+    Norm: supplied - out - consumed over supplied; in time, less what is stored.
+    """
     pores = {"R = 5 um": _solved(kind, 5.0), "R = 40 um": _solved(kind, 40.0),
              "R = 20 um, no flow": _solved(kind, 20.0, speed=None),
              "R = 30 um, printed inlet": _solved(kind, 30.0, speed=SLOW, inlet="mean")}
@@ -85,9 +85,8 @@ def _by_the_printed_inlet(seed, solved) -> list[float]:
     less this.
     """
     space = seed.space
-    edges = space.dofs.inlet
     apart = solved.flow.mean_velocity - solved.flow.velocity[:, 0]
-    weight = space.summed(edges, space.end_loads(edges, apart))
+    weight = space.inlet.assembled(apart)
     return [weight @ field / flux.supplied for field, flux in zip(both(solved.concentrations), solved.fluxes)]
 
 
@@ -101,18 +100,18 @@ def _in_time(seed, solved):
             for name, (supplied, out, consumed, stored) in zip(NAMES, zip(*step.flows))]
 
 
-@pytest.mark.case(
-    "transport-starved", kind="property",
-    claim="Starved pores (0.35 m/d, radius 27 and 42 um, supplies of 0.15 and 10 mg/L) have one steady state, C >= 0, "
-          "that closes the balance to round-off, whatever Newton's method starts from; the transient scheme comes to "
-          "rest in it; with quadratic and cubic elements C is no more below zero than is let pass",
-    norm="least C over the supply; balance as above; largest relative difference between ways to the steady state",
-    mutants=("newton-in-concentrations", "newton-stopped-early"))
+@pytest.mark.case("transport-starved", kind="property", mutants=("newton-in-concentrations", "newton-stopped-early"))
 @parametrize(
     "kind, radius, *supplies",
     {f"R = {row[0]:g} um, supplies {row[1]:g}, {row[2]:g} mg/L, {label}": (kind, *row)
      for (label, kind), row in product(KINDS.items(), STARVED)})
 def test_starved(kind, radius, supplies, record):
+    """Starved pores (0.35 m/d, radius 27 and 42 um, supplies of 0.15 and 10 mg/L) have one steady state, C >= 0, that
+    closes the balance to round-off, whatever Newton's method starts from; the transient scheme comes to rest in it;
+    with quadratic and cubic elements C is no more below zero than is let pass.
+
+    Norm: least C over the supply; balance as above; largest relative difference between ways to the steady state.
+    """
     seed, solved = _solved(kind, radius, *supplies, SLOW)
     computed, linear = both(solved.concentrations), seed.space.order == 1
     least = max(-(field.min() / supply) for field, supply in zip(computed, supplies))
@@ -151,14 +150,14 @@ HALVES = {f"K_s = {half}": half for half in ("1e-2 mg/L", "1e-3 mg/L")}
 LEAST = {"K_s = 1e-5 mg/L": "1e-5 mg/L"}
 
 
-@pytest.mark.case(
-    "transport-proportion", kind="property",
-    claim="Behind a front where the donor is used up, at half saturations of a hundredth of its supply, both are "
-          "taken up in their proportion, with linear, quadratic and cubic elements",
-    norm="consumed acceptor over F times consumed donor, less one",
-    mutants=("unpaired",), runs_with="2 paper")
+@pytest.mark.case("transport-proportion", kind="property", mutants=("unpaired",), runs_with="2 paper")
 @parametrize("half, solved", combined({"K_s = 1e-2 mg/L": "1e-2 mg/L"}, {**SOLVED, **CUBIC}))
 def test_proportion(half, solved, record):
+    """Behind a front where the donor is used up, at half saturations of a hundredth of its supply, both are taken up in
+    their proportion, with linear, quadratic and cubic elements.
+
+    Norm: consumed acceptor over F times consumed donor, less one.
+    """
     record(proportion(half, *solved[0]))
 
 
@@ -170,16 +169,16 @@ def proportion(half: str, *numerics: str) -> Check:
 
 
 @pytest.mark.slow
-@pytest.mark.case(
-    "transport-curved-front", kind="property",
-    claim="Behind a front where the donor is used up, to half saturations of a millionth of the supply, both are "
-          "taken up in their proportion, with linear and quadratic elements (cubic: a ten-thousandth), and what "
-          "leaves is within the presets' accuracy; where a mesh is refused, with the refinement that it names",
-    norm="consumed acceptor over F times consumed donor, less one; difference of effluents over the larger supply, to "
-         "a mesh of refinement 1.3",
-    mutants=("unpaired",), runs_with="2 paper")
+@pytest.mark.case("transport-curved-front", kind="property", mutants=("unpaired",), runs_with="2 paper")
 @parametrize("half, solved", combined(HALVES, {**SOLVED, **CUBIC}) | combined(LEAST, SOLVED))
 def test_curved_front(half, solved, record):
+    """Behind a front where the donor is used up, to half saturations of a millionth of the supply, both are taken up in
+    their proportion, with linear and quadratic elements (cubic: a ten-thousandth), and what leaves is within the
+    presets' accuracy; where a mesh is refused, with the refinement that it names.
+
+    Norm: consumed acceptor over F times consumed donor, less one; difference of effluents over the larger supply, to a
+    mesh of refinement 1.3.
+    """
     numerics, bound = solved
     record(proportion(half, *numerics))
     near, far = _front(half, *numerics), _front(half, FAST, "numerics.refinement=1.3")
@@ -233,13 +232,15 @@ FASTEST = {"quadratic, accurate": ((ACCURATE, runs.with_elements("quadratic"), F
 
 @pytest.mark.slow
 @pytest.mark.case(
-    "transport-curved-peclet", kind="property",
-    claim="In fast water (u W / D to 3e4) the boundary layers that the presets make their elements for are resolved "
-          "to 0.1 %, by accurate with quadratic and with cubic elements, and by fast",
-    norm="difference of effluents, over the supply, and of consumption, relative, to a mesh of refinement 2.5",
-    mutants=("layers-ignored",), omitted="order 1 and paper: linear elements are not made for boundary layers")
+    "transport-curved-peclet", kind="property", mutants=("layers-ignored",),
+    omitted="order 1 and paper: linear elements are not made for boundary layers")
 @parametrize("speed, preset", combined({speed: speed for speed in ("2.9 m/day", "29 m/day", "290 m/day")}, FASTEST))
 def test_curved_peclet(speed, preset, record):
+    """In fast water (u W / D to 3e4) the boundary layers that the presets make their elements for are resolved to 0.1
+    %, by accurate with quadratic and with cubic elements, and by fast.
+
+    Norm: difference of effluents, over the supply, and of consumption, relative, to a mesh of refinement 2.5.
+    """
     numerics, bound, why = preset
     far = _carried(100.0, 60.0, speed, ACCURATE, "numerics.refinement=2.5")
     for name, flux, trusted in zip(NAMES, _carried(100.0, 60.0, speed, *numerics), far):
@@ -257,15 +258,14 @@ HALF_DISCS = {
     "accurate": ((ACCURATE,), CONSERVES, 1e-4, "a tenth of what preset accurate is for")}
 
 
-@pytest.mark.case(
-    "transport-cubic-half-disc", kind="property",
-    claim="Around a half-disc, under the flow of cubic velocities, each substrate is in balance to round-off, and the "
-          "effluents are those of quadratic elements on a mesh twice finer; so are those of the presets, to what they "
-          "are for",
-    norm="(in - out - consumed) over what comes in; difference over the supply to quadratic concentrations",
-    mutants=("cubic-edge-nodes", "outlet-forgotten"))
+@pytest.mark.case("transport-cubic-half-disc", kind="property", mutants=("cubic-edge-nodes", "outlet-forgotten"))
 @parametrize("numerics, round_off, bound, why", HALF_DISCS)
 def test_cubic_half_disc(numerics, round_off, bound, why, record):
+    """Around a half-disc, under the flow of cubic velocities, each substrate is in balance to round-off, and the
+    effluents are those of quadratic elements on a mesh twice finer; so are those of the presets, to what they are for.
+
+    Norm: (in - out - consumed) over what comes in; difference over the supply to quadratic concentrations.
+    """
     far = _carried(50.0, 40.0, "2.9 m/day", *HALF_DISCS["quadratic"][0])
     for name, flux, expected in zip(NAMES, _carried(50.0, 40.0, "2.9 m/day", *numerics), far):
         record(at_most(f"balance, {name}", abs(_defect(flux)), *round_off))
@@ -292,14 +292,16 @@ def _open(numerics: int | str) -> transport.Problem:
 
 @pytest.mark.case(
     "transport-mean-biomass", kind="exact",
-    claim="With the mean biomass of a step of hours, biomass made is Y donor - (acceptor - F donor) / d_c of what is "
-          "taken up, to round-off, wherever concentrations are; at constant ones the uptake is the integral of "
-          "(7)-(10) over the step; and the tangent is the uptake's derivative",
-    norm="biomass made less Y donor - (acceptor - F donor) / d_c, over what is made; uptake at constant C, relative; "
-         "remainder of a first-order Taylor expansion",
     mutants=("biomass-of-the-start", "biomass-half-way", "mean-biomass-constant-in-c"), references=("monod",))
 @parametrize("numerics", combined(MEAN))
 def test_mean_biomass(numerics, record):
+    """With the mean biomass of a step of hours, biomass made is Y donor - (acceptor - F donor) / d_c of what is taken
+    up, to round-off, wherever concentrations are; at constant ones the uptake is the integral of (7)-(10) over the
+    step; and the tangent is the uptake's derivative.
+
+    Norm: biomass made less Y donor - (acceptor - F donor) / d_c, over what is made; uptake at constant C, relative;
+    remainder of a first-order Taylor expansion.
+    """
     problem = _open(numerics)
     for hours in HOURS:
         record(_balanced(problem, hours))

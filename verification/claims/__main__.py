@@ -5,8 +5,6 @@ every verdict must be the same. `--record` writes the file anew, or the named cl
 every claim has a verdict and agrees with the record, 1 if not, and 2 for an unknown claim.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 

@@ -14,8 +14,6 @@ The program runs wide with the preset `exact` and prints its distance from the f
 conductivities and tips are within 0.5 %, distance and bar together, in 60 s of processor time.
 """
 
-from __future__ import annotations
-
 import re
 import time
 from collections.abc import Callable

@@ -10,8 +10,6 @@ C09, C18: times that follow from Table 1 alone, and those of the run.
 Mesh and time-step independence of `base`.
 """
 
-from __future__ import annotations
-
 from math import log
 
 import numpy as np

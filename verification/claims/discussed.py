@@ -14,8 +14,6 @@ from two, and a layer on one wall takes up several percent less.
 C44: the pore as a part of a network.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import gamma
 

@@ -9,8 +9,6 @@ least second order where it is smooth, and at least first order where biomass, w
 The bar of an error, or of a difference between two runs that should agree, may exceed the number.
 """
 
-from __future__ import annotations
-
 import importlib
 import pkgutil
 import re

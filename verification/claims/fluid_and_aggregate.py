@@ -8,8 +8,6 @@ around a force at a point goes as one over the distance. What tears is not a poi
 mean over what of the aggregate lies within a tenth of the pore's width of a place, and told for half and twice that.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -3,15 +3,13 @@
 C37: the small-strain limit of the stresses.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.linalg import eigh
 from skfem import MeshTri
 
 from reference import neo_hookean
-from repro.fem.assembly import mass
 from repro.fem.elements import GRADIENT_DEGREES
+from repro.fem.forms import mass
 from repro.fem.mesh import triangle_areas
 from repro.fem.mesher import generate
 from repro.fem.outline import half_disc as seed
@@ -137,7 +135,7 @@ def stability(body: Supported, factor: float) -> float:
 def stabilised_by(body: Supported, factor: float) -> growth.System:
     """The equations of a body whose stabilisation at t = 0 is multiplied by a factor."""
     plain = growth.gradient_stabilisation(body.reference, body.cells, np.ones(len(body.cells)))
-    return growth.System(body, body.constrained, stabilising=factor * plain)
+    return growth.System(body, body.constrained, stabilisation=growth.PressureGradient(factor * plain))
 
 
 # C25: the expansion, and the factor of an update: 165 of these make it.

@@ -5,8 +5,6 @@ C29, C31: the shapes of base and wide.
 C30, C32, C33: substrates and stresses in the aggregate, over base and wide.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -19,8 +19,6 @@ A level is a context: a scene that a claim loads within `at_level` gets the elem
 `cached` stores results per level.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar

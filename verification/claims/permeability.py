@@ -7,8 +7,6 @@ grows once it spans the pore, and of how sharply the conductivity then falls, is
 not the velocity.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -8,8 +8,6 @@ by more. Columns of linear elements resist by some tenths of a percent more than
 no truncation: the same mesh without biomass tells by how much, and that is taken off.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -122,7 +120,7 @@ def uptake(solved: Solved) -> np.ndarray:
 def end_effect(*changes: str) -> float:
     """Largest change (%) of the uptake with C at the pore's end held at nothing, or at the supply."""
     _, pore, solved = fully_meshed_pore(*changes)
-    outlet = pore.space.end_nodes(pore.space.dofs.outlet)
+    outlet = pore.space.outlet.nodes
     return max(apart(uptake(holding(pore, solved, outlet, part)), uptake(solved)) for part in (0.0, 1.0))
 
 

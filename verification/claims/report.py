@@ -10,8 +10,6 @@ are the values on the sizes of the converged solution, the judged one first, and
 them, or on the meshes of the scheme; null where none fits.
 """
 
-from __future__ import annotations
-
 import textwrap
 from collections import Counter
 from collections.abc import Iterator

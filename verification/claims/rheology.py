@@ -21,8 +21,6 @@ is filled over its length conducts K_clean / lambda with the one and K_clean 12 
 2000 is a permeability of W^2 / (12 lambda), no property of the biomass: it goes as the square of the pore's width.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from shapely.affinity import translate
 

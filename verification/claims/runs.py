@@ -8,8 +8,6 @@ The module also gives the aggregate, the pore and the stresses of a run at a tim
 aggregates of a prescribed shape.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -9,8 +9,6 @@ C23, C24: what reprojection keeps, and what becomes of the mesh.
 C21: the steps of the paper's transient scheme.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -6,8 +6,6 @@ are those of the claims. Variants without a key in a scene (a wrong sign, an exp
 stages of `repro`. ``tests/test_errata.py`` recomputes the quick errata.
 """
 
-from __future__ import annotations
-
 import textwrap
 from collections.abc import Callable
 from dataclasses import dataclass

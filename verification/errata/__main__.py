@@ -1,7 +1,5 @@
 """Rewrite ``reference/ERRATA.md``: `python -m verification.errata`, or print some entries: `... E5 E11`."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """E5, E6, E11, E17: the growing body, against closed forms; E8, E15: fields on a new mesh, and the motion of a mesh."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise, product
@@ -158,7 +156,7 @@ def equilibrium_errors(case: Cylinder, stabilising: np.ndarray) -> tuple[float, 
 
     Raises GrowthError where none is found.
     """
-    system = growth.System(case.body, case.body.constrained, stabilising=stabilising)
+    system = growth.System(case.body, case.body.constrained, stabilisation=growth.PressureGradient(stabilising))
     exact = growth.Equilibrium(case.position, case.pressure, 0)
     solution = growth.reach(system, case.theta, case.theta, exact, case.position)
     worst = np.abs(solution.pressure - case.pressure).max() / np.abs(case.pressure).max()

@@ -1,8 +1,6 @@
 """E2, E10: what the flow's equations leave open; E7, E12, E13, E16: what happens in a step, and what is not printed;
 E20: the point that stays where it is."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from repro.fem.assembly import saddle_system
@@ -120,9 +118,10 @@ def free_outlet(grid: Mesh) -> tuple[np.ndarray, float]:
     constrained = np.zeros((count, 2), bool)
     constrained[topology.walls] = constrained[topology.inlet] = True
     viscosity = np.ones(len(grid.triangles))
-    elements = flow.stokes(space, viscosity, "traction", flow.Stabilised().mobility(grid, viscosity, "traction"))
+    pair = flow.Linear(space, flow.Stabilised().mobility(grid, viscosity, "traction"))
+    elements = flow.stokes(space, viscosity, "traction", pair.lower)
     system = saddle_system(space.cells, space.cells, constrained)
-    solution = system.solve(elements, np.zeros(3 * count), flow.prescribed(space))
+    solution = system.solve(elements, np.zeros(3 * count), pair.prescribed())
     ends = [np.trapezoid(solution[2 * count + nodes], grid.points[nodes, 1])
             for nodes in (topology.inlet, topology.outlet)]
     return solution[: 2 * count].reshape(2, -1).T, float(ends[0] - ends[1]) / grid.width

@@ -1,8 +1,6 @@
 """E1, E3, E4, E9, E14, E18: what is consumed, supplied and balanced; E19, E21-E23: what can be checked of Table 1 and
 of the text without computing anything large."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import atan, cbrt, degrees, exp, log
 

@@ -1,15 +1,15 @@
 """The registry: every verification case, read from the marks of the test functions in ``verification/cases``.
 
 A case is a test function with ``@pytest.mark.case``. Each of its parameter sets is a variant. The fields of the mark
-are those of :class:`Case` up to ``omitted``.
+are those of :class:`Case` up to ``omitted``. The docstring begins with the claim, and its second paragraph is the norm,
+"Norm: ...". A mark that has these fields itself takes precedence.
 """
-
-from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from importlib import import_module
+from inspect import getdoc
 from itertools import product
 from pathlib import Path
 from pkgutil import iter_modules
@@ -57,6 +57,19 @@ class Case:
         The module that it is defined in.
     variants : dict
         {label: test id of pytest}.
+
+    Raises
+    ------
+    ValueError
+        If the kind is unknown, or the claim, the norm or the mutants are missing.
+
+    Examples
+    --------
+    The mark of a test function gives the fields up to ``omitted``:
+
+    >>> from verification.evidence.cases import Case
+    >>> Case("flow-plug", "exact", "a plug slows the flow", "relative error", ("tau-of-water",), runs_with="1").numerics
+    ('1',)
     """
 
     id: str
@@ -91,9 +104,29 @@ class Case:
 
 
 def parametrize(names: str, variants: Mapping[str, tuple]) -> pytest.MarkDecorator:
-    """``pytest.mark.parametrize`` over variants {label: values}, with the labels as ids.
+    """Parametrize a case over a table, whose labels become the ids of the variants.
 
-    A last name with a star, as in "bound, *changes", takes the tuple of the remaining values.
+    Parameters
+    ----------
+    names : str
+        Names of the arguments, separated by ", ". A last name with a star, as in "bound, *changes", takes the tuple of
+        the remaining values.
+    variants : dict
+        The table, {label: values}: a tuple of one value per name.
+
+    Returns
+    -------
+    pytest.MarkDecorator
+        The mark ``pytest.mark.parametrize`` for the test function.
+
+    Examples
+    --------
+    >>> from verification.evidence.cases import parametrize
+    >>> @parametrize("order, bound", {"linear": (1, 1e-2), "quadratic": (2, 1e-4)})
+    ... def test_norm(order, bound, record):
+    ...     ...
+    >>> [variant.id for variant in test_norm.pytestmark[0].args[1]]
+    ['linear', 'quadratic']
     """
     *first, last = names.split(", ")
     rows = {label: (*row[:len(first)], row[len(first):]) if last[0] == "*" else row for label, row in variants.items()}
@@ -102,14 +135,16 @@ def parametrize(names: str, variants: Mapping[str, tuple]) -> pytest.MarkDecorat
 
 
 def combined(*axes: Mapping[str, object]) -> dict[str, tuple]:
-    """{label: values} of every combination of some axes {label: value}."""
+    """Return {label: values} of every combination of some axes {label: value}."""
     rows = [zip(*chosen) for chosen in product(*map(dict.items, axes))]
     return {", ".join(labels): values for labels, values in rows}
 
 
 def label_of(id: str, parameters: str) -> str:
-    """The label of a variant, given the id that pytest makes of its parameters: a table of cases begins it with the
-    id of the case."""
+    """Return the label of a variant, given the id that pytest makes of its parameters.
+
+    A table of cases begins the label with the id of the case.
+    """
     return parameters.removeprefix(f"{id}, ")
 
 
@@ -126,7 +161,7 @@ def cases() -> dict[str, Case]:
 
 
 def _cases_of(function) -> Iterator[Case]:
-    """The cases of a test function: its own, or those of the groups of parameter sets that have a mark themselves."""
+    """Yield the cases of a test function: its own, or one for each group of parameter sets with a mark."""
     marks = getattr(function, "pytestmark", ())
     groups: dict[str, Case] = {}
     for parameters, set_marks in _parameter_sets(marks):
@@ -134,14 +169,22 @@ def _cases_of(function) -> Iterator[Case]:
         if "case" in names:
             id = names["case"].args[0]
             file = Path(function.__code__.co_filename)
-            fresh = Case(id, **names["case"].kwargs, slow="slow" in names, file=file)
+            fields = {**_documented(function), **names["case"].kwargs}
+            fresh = Case(id, **fields, slow="slow" in names, file=file)
             test = f"{file.relative_to(ROOT)}::{function.__name__}" + (f"[{parameters}]" if parameters else "")
             groups.setdefault(id, fresh).variants[label_of(id, parameters)] = test
     yield from groups.values()
 
 
+def _documented(function) -> dict[str, str]:
+    """Read the claim and the norm from the docstring of a test function."""
+    paragraphs = (getdoc(function) or "").split("\n\n")
+    claim, norm = (" ".join(text.split()).removesuffix(".") for text in (*paragraphs, "")[:2])
+    return {"claim": claim, "norm": norm.removeprefix("Norm: ")}
+
+
 def _parameter_sets(marks: Iterable) -> Iterator[tuple[str, list]]:
-    """The ids that pytest makes of the parameters of a function, and the marks that a set of them bears itself."""
+    """Yield the id that pytest makes of each set of parameters of a function, and the marks of this set."""
     axes = [mark.args[1] for mark in marks if mark.name == "parametrize"]
     for chosen in product(*axes):
         ids = [str(getattr(value, "id", value)) for value in chosen]

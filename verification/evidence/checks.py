@@ -5,8 +5,6 @@ meshes or steps. Its orders between neighbours are judged on both sides, because
 unexpected as one below it. Each states the origin of its interval.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import floor, inf, isfinite, log10
@@ -19,7 +17,25 @@ ROUND_OFF = 1e-6
 
 @dataclass(frozen=True)
 class Check:
-    """One number, the interval that it must lie in, and the origin of that interval."""
+    """One number, the interval that it must lie in, and the origin of that interval.
+
+    Parameters
+    ----------
+    quantity : str
+        Name of the number on the pages.
+    value : float
+        The number, in any unit.
+    low, high : float
+        The interval, in the unit of the number; either may be infinite.
+    origin : str
+        The reason for this interval.
+
+    Examples
+    --------
+    >>> from verification.evidence.checks import Check
+    >>> Check("porosity", 0.31, 0.30, 0.32, "two digits of the paper").holds
+    True
+    """
 
     quantity: str
     value: float
@@ -62,39 +78,108 @@ class Check:
         return max(0.0, self.value / bound) if bound else 0.0
 
     def interval(self, digits: int = 6) -> str:
-        """The interval in words. Pages show 3 digits: some bounds are computed, and differ in the last ones."""
+        """Write the interval. Pages show 3 digits: some bounds are computed, and differ in the last ones."""
         if self._two_sided:
             return f"{self.low:.{digits}g} to {self.high:.{digits}g}"
         return f"at most {self.high:.3g}" if isfinite(self.high) else f"at least {self.low:.3g}"
 
 
 def at_most(quantity: str, value: float, bound: float, origin: str) -> Check:
-    """A size, for instance of an error: from zero to a bound."""
+    """Check that a size, for instance of an error, lies between zero and a bound.
+
+    Parameters
+    ----------
+    quantity : str
+        Name of the size on the pages.
+    value : float
+        The size, in any unit.
+    bound : float
+        The largest accepted size, in the same unit.
+    origin : str
+        The reason for this bound.
+
+    Returns
+    -------
+    Check
+        The check, for ``record``. It does not hold for a negative number or NaN.
+
+    Examples
+    --------
+    >>> from verification.evidence.checks import at_most
+    >>> at_most("velocity", 2e-4, 1e-3, "a tenth of the error of the preset fast").holds
+    True
+    """
     return Check(quantity, float(value), 0.0, bound, origin)
 
 
 def at_least(quantity: str, value: float, bound: float, origin: str) -> Check:
-    """A number that must not be under a bound."""
+    """Check that a number is not under a bound.
+
+    Parameters
+    ----------
+    quantity : str
+        Name of the number on the pages.
+    value : float
+        The number, in any unit.
+    bound : float
+        The least accepted number, in the same unit.
+    origin : str
+        The reason for this bound.
+
+    Returns
+    -------
+    Check
+        The check, for ``record``. It does not hold for NaN.
+
+    Examples
+    --------
+    >>> from verification.evidence.checks import at_least
+    >>> at_least("least angle of a triangle (degrees)", 12.0, 20.0, "angles that the mesher promises").holds
+    False
+    """
     return Check(quantity, float(value), bound, inf, origin)
 
 
 def between(quantity: str, value: float, low: float, high: float, origin: str) -> Check:
-    """A number that must lie in a range."""
+    """Check that a number lies in a range.
+
+    Parameters
+    ----------
+    quantity : str
+        Name of the number on the pages.
+    value : float
+        The number, in any unit.
+    low, high : float
+        The ends of the range, in the same unit. They belong to it.
+    origin : str
+        The reason for this range.
+
+    Returns
+    -------
+    Check
+        The check, for ``record``. It does not hold for NaN.
+
+    Examples
+    --------
+    >>> from verification.evidence.checks import between
+    >>> between("doubling time (h)", 3.05, 2.5, 3.5, "the paper says about 3 h").holds
+    True
+    """
     return Check(quantity, float(value), low, high, origin)
 
 
 def each_at_most(values: Mapping[str, float], bound: float, origin: str, suffix: str = "") -> list[Check]:
-    """Sizes by name that have one bound; the suffix ends each name."""
+    """Check sizes by name against one bound; the suffix ends each name."""
     return [at_most(name + suffix, value, bound, origin) for name, value in values.items()]
 
 
 def largest(values: np.ndarray) -> float:
-    """The largest size of some numbers."""
+    """Return the largest absolute value."""
     return float(np.abs(values).max())
 
 
 def rounded(value: float, quantum: float) -> str:
-    """The value to the power of ten at or under ``quantum``; a smaller size reads "under" that power."""
+    """Round to the power of ten at or under ``quantum``; a smaller size reads "under" that power."""
     if not isfinite(value) or quantum <= 0:
         return f"{value:.3g}"
     unit = 10.0 ** floor(log10(quantum))
@@ -113,9 +198,36 @@ BAND = 0.3
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """Errors (k,) on falling sizes (k,). The orders between neighbours must lie from low to high.
+    """Errors on meshes or steps of falling sizes, whose orders must lie in a band.
 
-    The last error must not exceed the ceiling. The origin says why the order is expected.
+    Parameters
+    ----------
+    quantity : str
+        Name of the error on the pages.
+    sizes : (k,) array
+        Sizes of at least four unrelated meshes or steps, falling, in any unit.
+    errors : (k,) array
+        The error on each, in any unit.
+    low, high : float
+        The band of the order between neighbours, without unit.
+    origin : str
+        The reason why this order is expected.
+    ceiling : float
+        The largest accepted last error, in the unit of the errors.
+
+    Raises
+    ------
+    ValueError
+        If there are fewer than four sizes, they do not fall, or the number of errors differs.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from verification.evidence.checks import Study
+    >>> sizes = np.array([8.0, 4.0, 2.0, 1.0])
+    >>> study = Study("velocity", sizes, 0.1 * sizes**2, 1.7, 2.3, "linear elements, in the mean square")
+    >>> study.orders.round(6).tolist(), study.holds
+    ([2.0, 2.0, 2.0], True)
     """
 
     quantity: str
@@ -132,8 +244,10 @@ class Study:
 
     @property
     def orders(self) -> np.ndarray:
-        """(k - 1,) log of the ratio of errors over log of the ratio of sizes; infinite or not-a-number where an error
-        is not positive and finite."""
+        """(k - 1,) log of the ratio of errors over log of the ratio of sizes, without unit.
+
+        It is infinite or not-a-number where an error is not positive and finite.
+        """
         with np.errstate(all="ignore"):
             return np.diff(np.log(self.errors)) / np.diff(np.log(self.sizes))
 
@@ -156,25 +270,90 @@ class Study:
         return f"order {', '.join(f'{order:.1f}' for order in self.orders)}"
 
     def interval(self, digits: int = 3) -> str:
-        """The band, and the ceiling if there is one."""
+        """Write the band, and the ceiling if there is one."""
         band = f"order {self.low:.{digits}g} to {self.high:.{digits}g}"
         return band if self.ceiling == inf else f"{band}; at most {self.ceiling:.3g}"
 
 
 def around(order: float, band: float = BAND) -> tuple[float, float]:
-    """The lowest and the highest order of a band around one."""
+    """Return the lowest and the highest order of a band around one."""
     return order - band, order + band
 
 
 def study(quantity: str, sizes, errors, order: float, origin: str, *, ceiling: float = inf,
           band: float = BAND) -> Study:
-    """A study whose orders are expected within ``band`` of ``order``."""
+    """Judge errors on falling sizes by their order of convergence.
+
+    Parameters
+    ----------
+    quantity : str
+        Name of the error on the pages.
+    sizes : (k,) array_like
+        Sizes of at least four unrelated meshes or steps, falling, in any unit.
+    errors : (k,) array_like
+        The error on each, in any unit.
+    order : float
+        The expected order between neighbours, without unit.
+    origin : str
+        The reason why this order is expected.
+    ceiling : float, optional
+        The largest accepted last error, in the unit of the errors; none by default.
+    band : float, optional
+        The largest difference of an order from the expected one, without unit.
+
+    Returns
+    -------
+    Study
+        The study, for ``record``. An order above the band fails like one below it.
+
+    Raises
+    ------
+    ValueError
+        If there are fewer than four sizes, they do not fall, or the number of errors differs.
+
+    Examples
+    --------
+    >>> from verification.evidence.checks import study
+    >>> study("velocity", [8, 4, 2, 1], [0.64, 0.16, 0.04, 0.01], 2, "linear elements, in the mean square").holds
+    True
+    >>> study("velocity", [8, 4, 2, 1], [0.64, 0.32, 0.16, 0.08], 2, "linear elements, in the mean square").holds
+    False
+    """
     return Study(quantity, np.asarray(sizes, float), np.asarray(errors, float), *around(order, band), origin, ceiling)
 
 
 def studies(errors: Mapping[str, np.ndarray], rows: Mapping[str, tuple], suffix: str = "") -> list[Study]:
-    """Studies of fields from :func:`refine`. rows: {field: (order, or the lowest and the highest order; its origin;
-    ceiling of the last error)}; the suffix ends each name."""
+    """Judge the errors of several fields by their orders of convergence.
+
+    Parameters
+    ----------
+    errors : dict of (k,) array
+        The errors of each field, in any unit, and the sizes of the meshes or steps as "size", as from :func:`refine`.
+    rows : dict of tuple
+        {field: (order, origin)} or {field: (order, origin, ceiling)}, as for :func:`study`. The order may be a pair:
+        the lowest and the highest accepted one.
+    suffix : str, optional
+        Text at the end of each name on the pages.
+
+    Returns
+    -------
+    list of Study
+        A study per field of ``rows``, for ``record``.
+
+    Raises
+    ------
+    ValueError
+        If there are fewer than four sizes, they do not fall, or the number of errors differs.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from verification.evidence.checks import studies
+    >>> sizes = np.array([8.0, 4.0, 2.0, 1.0])
+    >>> errors = {"size": sizes, "velocity": sizes**2, "pressure": sizes}
+    >>> [study.holds for study in studies(errors, {"velocity": (2, "theory"), "pressure": ((0.9, 1.5), "theory")})]
+    [True, True]
+    """
     bands = {name: row[0] if isinstance(row[0], tuple) else around(row[0]) for name, row in rows.items()}
     return [Study(name + suffix, errors["size"], errors[name], *bands[name], *row[1:]) for name, row in rows.items()]
 
@@ -194,7 +373,7 @@ def refine(measure: Callable[..., dict[str, float]], sizes: Iterable[float] | Ma
 
 
 def columns(rows: Sequence[Mapping[str, float]]) -> dict[str, np.ndarray]:
-    """{name: (k,)} of rows {name: number}, all of the same names."""
+    """Return {name: (k,)} of rows {name: number}, all of the same names."""
     return dict(zip(rows[0], np.array([[*row.values()] for row in rows]).T))
 
 
@@ -204,7 +383,7 @@ def _averaged(measure: Callable, size: float, count: int, arguments: tuple) -> d
 
 
 def flat(evidence: Check | Study | Iterable) -> Iterator[Check | Study]:
-    """Checks and studies one by one, from nested lists or generators of them."""
+    """Yield checks and studies one by one, from nested lists or generators of them."""
     if isinstance(evidence, Iterable):
         for part in evidence:
             yield from flat(part)

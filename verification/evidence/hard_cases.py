@@ -4,8 +4,6 @@ Each cell, a case with a preset, is right, refused or wrong; see :mod:`verificat
 preset fast with cubic elements. A case names the parts that a preset may refuse, and ``paper`` may refuse all.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable, Iterator, Mapping
 
 from verification.evidence.results import Result

@@ -6,8 +6,6 @@ the claims of the sections. Every column is derived from the table of modules in
 registries, and no column may lack an entry (:func:`orphans`).
 """
 
-from __future__ import annotations
-
 import re
 import sys
 from dataclasses import dataclass

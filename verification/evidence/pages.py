@@ -5,8 +5,6 @@ run on another machine writes the same files. All of them follow from ``evidence
 run of some cases replaces their entries and leaves the others as recorded.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from itertools import chain, groupby
 from os.path import commonprefix

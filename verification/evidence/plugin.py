@@ -6,8 +6,6 @@ end of a session ``report/live/measured.json`` holds the numbers of the cases th
 written anew, and all other pages stay as recorded.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np
@@ -32,8 +30,10 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_itemcollected(item: pytest.Item) -> None:
-    """Add case and variant to the report, and the id to the keywords of ``-k``. Warnings do not fail a case, because
-    references use other packages."""
+    """Add case and variant to the report, and the id to the keywords of ``-k``.
+
+    Warnings do not fail a case, because references use other packages.
+    """
     mark = item.get_closest_marker("case")
     if mark:
         id = mark.args[0]
@@ -45,7 +45,32 @@ def pytest_itemcollected(item: pytest.Item) -> None:
 
 @pytest.fixture
 def record(request: pytest.FixtureRequest) -> Callable:
-    """Record checks and studies, single ones or nested lists or generators of them."""
+    """Return the function that records the checks and studies of a case.
+
+    The case fails at its end unless it recorded evidence and all of it holds.
+
+    Parameters
+    ----------
+    request : pytest.FixtureRequest
+        The request of pytest, which names the test.
+
+    Returns
+    -------
+    callable
+        ``record(*evidence)`` takes Checks and Studies, single ones or nested lists or generators of them.
+
+    Examples
+    --------
+    A case takes the fixture as an argument. A list replaces it here:
+
+    >>> from verification.evidence.checks import at_most
+    >>> def test_plug(record):
+    ...     record(at_most("velocity", 2e-4, 1e-3, "a tenth of the error of the preset fast"))
+    >>> recorded = []
+    >>> test_plug(recorded.append)
+    >>> [check.holds for check in recorded]
+    [True]
+    """
     recorded = request.node.stash.setdefault(RECORDED, [])
     return lambda *evidence: recorded.extend(flat(evidence))
 

@@ -1,7 +1,5 @@
 """One writer: blocks of text, pictures and tables, as Markdown and for a terminal; and records in JSON."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable
 from contextlib import suppress

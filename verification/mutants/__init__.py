@@ -6,16 +6,33 @@ id, what is wrong with the mutant, the text to change, which must occur once in 
 the tests that catch it. A row without tests is a mutant that cases catch: those that name it in their mark.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
 class Mutant:
-    """A wrong change: ``old``, which occurs once in ``file``, becomes ``new``; ``says`` is what is wrong then.
+    """A wrong change of the code.
 
-    ``tests`` are the test ids of pytest that catch it; empty if cases do.
+    Parameters
+    ----------
+    id : str
+        Name of the mutant, for marks and commands.
+    file : str
+        The file that it changes, from the top of the repository.
+    says : str
+        The error that the change makes.
+    old : str
+        The text to replace. It occurs once in the file.
+    new : str
+        The text that replaces it.
+    tests : tuple of str
+        Test ids of pytest that catch it; empty if cases do.
+
+    Examples
+    --------
+    >>> from verification.mutants import Mutant
+    >>> Mutant("no-gravity", "repro/model/flow.py", "gravity is twice as large", "g", "2 * g").tests
+    ()
     """
 
     id: str
@@ -27,5 +44,25 @@ class Mutant:
 
 
 def changes(file: str, *rows: tuple) -> tuple[Mutant, ...]:
-    """Mutants of one file, a row each: id, what is wrong, the old text, the new text, and the tests that catch it."""
+    """Make the mutants of one file.
+
+    Parameters
+    ----------
+    file : str
+        The file, from the top of the repository.
+    *rows : tuple of str
+        A row per mutant: its id, the error that it makes, the old text, the new text, and the tests that catch it.
+
+    Returns
+    -------
+    tuple of Mutant
+        The mutants, in the order of the rows.
+
+    Examples
+    --------
+    >>> from verification.mutants import changes
+    >>> (mutant,) = changes("repro/model/flow.py", ("more-g", "gravity is twice as large", "g", "2 * g"))
+    >>> mutant.id, mutant.file
+    ('more-g', 'repro/model/flow.py')
+    """
     return tuple(Mutant(id, file, says, old, new, tuple(tests)) for id, says, old, new, *tests in rows)

@@ -113,8 +113,8 @@ MUTANTS = (
         "repro/model/transport.py",
         ("family-effluent-not-weighted",
          "The effluent is the plain mean over the outlet.",
-         "both, dofs.outlet, problem.outflow)",
-         "both, dofs.outlet, 0 * problem.outflow)")),
+         "_end_means(space.outlet, both, problem.outflow)",
+         "_end_means(space.outlet, both, 0 * problem.outflow)")),
     *changes(
         "repro/model/uptake_law.py",
         ("family-half-saturation",

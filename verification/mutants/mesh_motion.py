@@ -41,9 +41,8 @@ MUTANTS = (
         "repro/fem/space.py",
         ("stale-forms",
          "After a mesh has moved the gradients on it are still those of its first place.",
-         "return elements.points(self.mesh.points[self.mesh.cells], self.gradient_table)",
-         'return self.mesh.topology.system(("stale", self.order), lambda: elements.points('
-         "self.mesh.points[self.mesh.cells], self.gradient_table))")),
+         "return self._mapped(self.gradient_table)",
+         'return self.mesh.topology.system(("stale", self.order), lambda: self._mapped(self.gradient_table))')),
     *changes(
         "repro/fem/mesh.py",
         ("bent-over-accepted",

@@ -68,8 +68,8 @@ MUTANTS = (
         "repro/fem/space.py",
         ("fluid-triangles-too",
          "At a node of the interface (34) counts the fluid's triangles too.",
-         "lumped = self.lumped(biomass)",
-         "lumped = self.lumped()")),
+         "lumped = self.space.lumped(mesh.biomass)",
+         "lumped = self.space.lumped()")),
     *changes(
         "repro/model/remeshing.py",
         ("kinds-exchanged",

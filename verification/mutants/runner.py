@@ -7,13 +7,13 @@ A test catches a mutant by an assertion that fails, a check out of its interval 
 ``repro`` defines. Any other error, an ``AttributeError`` for instance, shows a mutant that does not run, and catches
 nothing.
 
-The record of a mutant, in ``report/mutants.json``, has a digest of the mutated file and of the modules that caught it.
-It is stale if one of these files changes, and a change elsewhere leaves it fresh.
+The record of a mutant, in ``report/mutants.json``, has a digest of the mutated file and of the tests that caught it,
+with the functions and constants of their modules that they use. It is stale if one of these changes. A change elsewhere
+leaves it fresh, such as another case in the same module.
 """
 
-from __future__ import annotations
-
 import argparse
+import ast
 import contextlib
 import hashlib
 import os
@@ -25,7 +25,9 @@ import sys
 from collections.abc import Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import cache
 from importlib import import_module
+from itertools import chain
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from xml.etree import ElementTree
@@ -231,9 +233,41 @@ def fresh() -> set[str]:
 
 
 def digest(mutant: Mutant, catchers: Iterable[str]) -> str:
-    """16 hexadecimal digits of the mutated file and of the modules of some cases or tests."""
-    files = {cases()[name].file if name in cases() else ROOT / name.partition("::")[0] for name in catchers}
+    """16 hexadecimal digits of the mutated file and of the code of some cases or tests."""
+    tests = chain.from_iterable(cases()[name].variants.values() if name in cases() else [name] for name in catchers)
     hashed = hashlib.sha256(mutated(mutant).encode())
-    for file in sorted(files):
-        hashed.update(file.read_bytes() if file.is_file() else b"")
+    for test in sorted({test.partition("[")[0] for test in tests}):
+        file, _, function = test.partition("::")
+        text = (ROOT / file).read_text(encoding="utf-8") if (ROOT / file).is_file() else ""
+        hashed.update(code_of(function, text).encode())
     return hashed.hexdigest()[:16]
+
+
+@cache
+def code_of(function: str, text: str) -> str:
+    """The source of a test in the text of its module, and of the functions, classes and assignments there that it uses,
+    directly or through each other. Marks and fixtures of the whole module are among them, imports are not."""
+    used, parts = {function, "pytestmark"}, set()
+    known = _definitions(text)
+    while more := {k for k, (bound, _, _) in enumerate(known) if bound & used} - parts:
+        parts |= more
+        used.update(*(known[k][1] for k in more))
+    return "\n".join(known[k][2] for k in sorted(parts))
+
+
+@cache
+def _definitions(text: str) -> list[tuple[set[str], set[str], str]]:
+    """(names that it binds, words that it contains, source) of every function, class and assignment of a module."""
+    lines, definitions = text.splitlines(), []
+    for part in ast.parse(text).body:
+        if isinstance(part, ast.FunctionDef | ast.ClassDef):
+            bound, first = {part.name}, min([part.lineno, *(each.lineno for each in part.decorator_list)])
+        elif isinstance(part, ast.Assign | ast.AnnAssign | ast.AugAssign):
+            bound, first = {node.id for node in ast.walk(part) if isinstance(node, ast.Name)
+                            and isinstance(node.ctx, ast.Store)}, part.lineno
+        else:
+            continue
+        source = "\n".join(lines[first - 1:part.end_lineno])
+        whole = {"pytestmark"} if "autouse=True" in source else set()
+        definitions.append((bound | whole, {*re.findall(r"\w+", source)}, source))
+    return definitions

@@ -5,8 +5,6 @@ shapes of the fit at one lambda and the test shapes, from which `make figures` d
 if a test shape lies outside the law's bounds.
 """
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

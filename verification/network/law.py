@@ -5,8 +5,6 @@ Fifty shapes that the fit of the law has not seen: half-discs, drawn bodies and 
 sizes, positions, pores, velocities and lambdas drawn at random.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import product
@@ -164,16 +162,17 @@ def page(fit: dict[str, np.ndarray], check: Judged) -> str:
     worst = 100 * np.expm1(np.abs(check.apart))
     return f"""# A law for networks
 
-Made by `python -m verification.network`. What an aggregate of area A adds to the head loss of a pore of width W, for
-models of networks: `repro.added_resistance(area, width, spanned, viscosity_ratio)`.
+Made by `python -m verification.network`. For models of networks,
+`repro.added_resistance(area, width, spanned, viscosity_ratio)` computes the head loss that an aggregate of area A adds
+to a pore of width W.
 
     head loss = 12 nu u_ave / (g W^2) (L + r W),        r = r(A / W^2, lambda, spanned)
 
-r W is the length of empty pore that resists as much as the aggregate adds. Stokes flow is linear and has no length of
-its own, so r depends on neither u_ave nor W, nor on where the aggregate sits, if that is 1.5 W or more from the pore's
-ends. Before contact r hardly depends on lambda until the film is thin; a body that spans the pore has r nearly in
-proportion to lambda - 1: that of a plug with straight ends, (lambda - 1) A / W^2 exactly, less what its rounded ends
-let pass.
+r W is the length of empty pore with the resistance that the aggregate adds. Stokes flow is linear and has no length
+scale, so r depends neither on u_ave nor on W. The position of the aggregate has no effect at 1.5 W or more from the
+pore's ends. Before contact r hardly depends on lambda until the film is thin. For a body that spans the pore, r is
+nearly proportional to lambda - 1: a plug with straight ends has exactly (lambda - 1) A / W^2, and rounded ends reduce
+it.
 
 At lambda = {RATIO:g}, with the bounds of shapes of the same area:
 
@@ -181,21 +180,21 @@ At lambda = {RATIO:g}, with the bounds of shapes of the same area:
 
 {_markdown_table(True)}
 
-The table, `repro/results/network.csv`, has r for half-discs, and after contact the mean of what growth makes in
+The table, `repro/results/network.csv`, has r of half-discs and, after contact, the mean of the plugs grown in
 several runs. The bounds are the least and the largest r over that of the fit's {len(fit["grown"])} shapes, {grown} of
 them grown in pores of 40 to 150 um at 0.5 to 6 m/d and W^2 / 2500 (W in um) to 20 mg/L of both substrates, the others
 drawn: half-discs, bodies from 1 % thinner to 3 % thicker than a half-disc and leaning by up to 5 %, plugs with ends of
-other lengths. Grown plugs are compared with the mean of the other runs. With less substrate the aggregate is thicker
-before contact, as growth is limited by diffusion, and r larger than the bounds say: near contact r doubles where the
-thickness grows by some 5 %.
+other lengths. Grown plugs are compared with the mean of the other runs. With less substrate, diffusion limits
+growth, the aggregate is thicker before contact, and r exceeds the bounds: near contact r doubles if the thickness rises
+by some 5 %.
 
-Judged with {check.count} shapes that the fit has not seen, of sizes, outlines, places, widths, velocities, supplies and
-lambdas drawn at random: {check.inside} are within the bounds; half of them are within {np.median(worst):.1f} % of the
-law, the worst is {worst.max():.0f} % from it.
+The law is judged with {check.count} shapes that are not in the fit. Their sizes, outlines, places, widths, velocities,
+supplies and lambdas are drawn at random. {check.inside} are within the bounds; half of them are
+within {np.median(worst):.1f} % of the law, and the worst is {worst.max():.0f} % from it.
 
 Outside its range (A / W^2 from {_range(False)} before contact and from {_range(True)} after it, lambda from 100 to
 10 000) the function raises `ValueError`. It holds for the paper's viscous aggregate with its own condition on the
-surface [E2]: with true continuity of traction a half-disc resists 0.2 % and a plug 8 to 17 % otherwise.
+surface [E2]. With continuous traction the resistance of a half-disc differs by 0.2 %, that of a plug by 8 to 17 %.
 """
 
 

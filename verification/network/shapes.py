@@ -1,7 +1,5 @@
 """Aggregates whose added resistance gives the law: half-discs, similar drawn bodies, and grown shapes."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 

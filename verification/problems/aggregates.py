@@ -1,7 +1,5 @@
 """Aggregates in states known by construction, and one update of them without flow or substrates."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

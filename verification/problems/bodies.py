@@ -4,8 +4,6 @@ A kind is the order of the elements of a scene. Kind 1 has straight triangles. K
 integrate to degree 6 and 8. The dead loads are f0 and t0 of (20), as nodal forces.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
@@ -168,10 +166,10 @@ def system(body: Supported, position: np.ndarray, pressure: np.ndarray, theta: n
 
     On straight triangles the stabilisation is that of this shape.
     """
-    stabilising = None
+    stabilisation: growth.PressureGradient | growth.GradDiv = growth.GradDiv()
     if body.geometry == 1:
-        stabilising = growth.gradient_stabilisation(position, body.cells, theta[:, 0])
-    equations = growth.System(body, np.zeros_like(body.constrained), stabilising=stabilising)
+        stabilisation = growth.PressureGradient(growth.gradient_stabilisation(position, body.cells, theta[:, 0]))
+    equations = growth.System(body, np.zeros_like(body.constrained), stabilisation=stabilisation)
     equations.under(theta, position, position, pressure)
     return equations
 

@@ -11,8 +11,6 @@ the boundary conditions of :mod:`repro.model.flow` are replaced, and a force may
 because the velocity determines the pressure up to a constant. The mean of the pressure is not compared.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
@@ -184,8 +182,9 @@ def _box_flow(space: Space, pressures: Space, ratio: float, interface: str, exac
     """Velocity (n, 2) and pressure (m,), both at the nodes of their orders."""
     grid = space.mesh
     viscosity = np.where(grid.biomass, ratio, 1.0)
-    mobility = flow.Stabilised().mobility(grid, viscosity, interface) if space.order == 1 else None
-    blocks = flow.stokes(space, viscosity, interface, mobility)
+    tau = flow.Stabilised().mobility(grid, viscosity, interface)
+    lower = flow.Linear(space, tau).lower if space.order == 1 else None
+    blocks = flow.stokes(space, viscosity, interface, lower)
     system = grid.topology.system(("box", space.order), lambda: _constrained_rim(space, pressures))
     fields = _load(space, exact), _without_flux(space, exact(*space.points.T)[0])
     right, value = (np.append(field.T, np.zeros(pressures.count)) for field in fields)

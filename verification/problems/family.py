@@ -6,8 +6,6 @@ Each member is a process of its own: `repro run` with the preset fast and a limi
 `reference/surface_stretch.py` confirms it from the last file of fields.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import resource

@@ -9,8 +9,6 @@ wrong     a check fails, another exception is raised, nothing is measured, or a 
 Every hard case is a verification case whose variants are the presets.
 """
 
-from __future__ import annotations
-
 import re
 import signal
 from collections.abc import Callable, Iterable, Iterator, Sequence

@@ -5,8 +5,6 @@ pores, starved seeds, dense rows, still water or contact. ``scene(seed)`` gives 
 value a text with its unit. Seeds take the kinds of :data:`KINDS` in turn.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

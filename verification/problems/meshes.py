@@ -10,8 +10,6 @@ with a triangle across the curve is refused.
 Fields of order 1, 2 or 3 have norms of their errors and values at points.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import pairwise, product
 

@@ -1,7 +1,5 @@
 """Pairs of meshes of one rectangle, related in every way that a transfer may meet, and norms on them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

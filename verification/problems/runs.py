@@ -1,7 +1,5 @@
 """Runs that cases share, their results, and the averaged pore of :mod:`reference.averaged_pore`."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import fields, is_dataclass, replace
 from operator import itemgetter
@@ -147,7 +145,7 @@ def scaled(section, length: float, time: float):
     changes = {}
     for key in fields(section):
         value, kind = getattr(section, key.name), key.metadata.get("kind")
-        along, during = UNITS.get(getattr(getattr(kind, "absolute", kind), "unit", ""), (0, 0))
+        along, during = UNITS.get(getattr(kind, "unit", ""), (0, 0))
         if is_dataclass(value):
             changes[key.name] = scaled(value, length, time)
         elif key.name == "times" and value:

@@ -11,8 +11,6 @@ last. A run writes its numbers alone, 0.4 kB in `out/runs.jsonl`; the study writ
 numbers are stored under the same scene and source.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache
 from itertools import product

@@ -5,8 +5,6 @@ contact; supplies, the claims about wide that hold with other supplies; and sobo
 
 Each run is stored in `out/runs.jsonl` when it ends; a second call resumes from that file."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections.abc import Callable, Iterator

@@ -25,8 +25,6 @@ fixed. `scipy.stats.sobol_indices` (Saltelli 2010) with N (d + 2) runs in the pr
 and its bootstrap's intervals.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import product

@@ -13,8 +13,6 @@ long after contact as Figure 6, or when the aggregate reaches an end of the pore
 `verification.claims`, with the converged solution at one size, so that numbers have no bars; a claim holds if all of
 its checks about wide hold."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import product

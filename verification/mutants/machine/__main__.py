@@ -1,7 +1,5 @@
 """Run the session: ``python -m verification.mutants.machine``."""
 
-from __future__ import annotations
-
 import argparse
 import contextlib
 import importlib.util

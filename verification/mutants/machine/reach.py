@@ -6,8 +6,6 @@ tests of their files, because several tests can share a fixture; a line that run
 reach its module. This module imports nothing of ``repro/``, in which the mutant is.
 """
 
-from __future__ import annotations
-
 import difflib
 import filecmp
 import json

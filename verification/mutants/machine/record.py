@@ -1,7 +1,5 @@
 """What came of a session, as it is committed: ``report/sampled.json``, a row a mutant, and ``report/sampled.md``."""
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 from collections.abc import Iterable

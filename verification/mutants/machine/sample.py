@@ -9,8 +9,6 @@ Left out are annotations, imports for types, and changes that leave no value at 
 see these, or every test does.
 """
 
-from __future__ import annotations
-
 import ast
 import hashlib
 from collections import Counter, defaultdict

@@ -20,10 +20,8 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
     ("model/gear.py", "still = np.zeros_like(fields), np.zeros_like(biomass), np.zeros((2, 3))",
      "still = np.zeros_like(fields), np.zeros_like(biomass), np.zeros(( 1, 3))"):
         "A row of zeros, added to two rows, is two rows of zeros.",
-    ("model/flow.py", "if velocity.order == 1:", "if velocity.order >= 1:"):
-        "Elements of order 2 and 3 hold the parabola exactly: what is scaled then is scaled by one.",
-    ("model/transport.py", "return state.reshape(2, -1)[:, pieces.cells] @ pieces.values.T",
-     "return state.reshape(2, - 2)[:, pieces.cells] @ pieces.values.T"):
+    ("model/transport.py", "return self._reaction.evaluate(state.reshape(2, -1))",
+     "return self._reaction.evaluate(state.reshape(2, - 2))"):
         "numpy takes any negative length of one axis for the one that is left.",
     ("report/quantities.py", 'is_new_mesh = run.series.get("remeshed", run.times * np.nan) == 1',
      'is_new_mesh = run.series.get("remeshed", run.times * np.nan) >= 1'):
