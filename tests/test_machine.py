@@ -12,6 +12,7 @@ import pytest
 
 import repro
 from repro.cli import main
+from repro.fem import linear
 from repro.march.simulation import simulate
 from repro.preflight import memory
 from repro.preflight.checked import check
@@ -258,3 +259,22 @@ def test_a_command_imports_only_the_modules_that_it_needs(tmp_path, arguments, n
     modules = subprocess.run(command, capture_output=True, text=True, check=True).stderr.split()
     assert {*modules} & (NEVER | SOLVER | FILES) == needed
     assert (tmp_path / "run" / "report.html").exists() is (FILES <= needed)
+
+
+@pytest.mark.parametrize("preset", ["fast", "paper"])
+def test_the_chosen_solver_and_ordering_reach_every_system(preset, monkeypatch):
+    """Flow, transport, growth and mesh motion of a run factorise by no other method."""
+    for package in ("pymetis", "pypardiso"):
+        faults.replace_package(monkeypatch, package)
+    methods = []
+    factorise = linear.Solver._first
+
+    def record_method(solver, method):
+        methods.append(method)
+        return factorise(solver, method)
+
+    monkeypatch.setattr(linear.Solver, "_first", record_method)
+    for _ in simulate(load_scene("base", [f"numerics.preset={preset}", "numerics.solver=pardiso",
+                                          "numerics.ordering=metis", 'growth.end="0.5 h"'])):
+        pass
+    assert len(methods) > 10 and set(methods) == {linear.Method("pardiso", "metis")}

@@ -4,6 +4,7 @@ import ast
 
 import pytest
 
+from repro.results.files import WRITING
 from verification.evidence import pages
 from verification.evidence.cases import cases
 from verification.evidence.writing import ROOT
@@ -100,3 +101,12 @@ def test_the_code_itself_is_not_caught():
     """A case fails because of the mutant, not because the copy lacks something."""
     with runner.copied() as folder:
         assert runner.trial(folder, "growth-stress", cases()["growth-stress"].variants.values()).message == "passes"
+
+
+def test_a_copy_for_a_mutant_leaves_out_files_that_are_being_written(tmp_path, monkeypatch):
+    """Another thread writes the record meanwhile, and its temporary folder disappears during the copy."""
+    (tmp_path / f"{WRITING}record").mkdir()
+    (tmp_path / "README.md").write_text("text")
+    monkeypatch.setattr(runner, "ROOT", tmp_path)
+    with runner.copied() as folder:
+        assert [path.name for path in folder.iterdir()] == ["README.md"]

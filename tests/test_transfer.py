@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from repro.errors import TransferError
 from repro.fem import transfer
-from repro.model import biomass, pore, remeshing
+from repro.model import pore, remeshing
 from repro.model.pore import solve
 from repro.model.remeshing import Remeshing
 from repro.model.transport import OVERSHOOT, UNRESOLVED, Concentrations
@@ -131,7 +131,7 @@ def check_biomass(scene, previous, remeshed):
     else:
         assert remeshed.active.min() >= 0 and remeshed.inert.min() >= 0
     outside = np.setdiff1d(np.arange(len(remeshed.mesh.points)), remeshed.mesh.body)
-    assert not biomass.at_nodes(remeshed.space, after)[outside].any()
+    assert not remeshed.space.integration.to_nodes(after)[outside].any()
 
 
 def check_substrates(scene, remeshed):

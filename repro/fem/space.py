@@ -212,6 +212,22 @@ class Lumped:
         """(T, 3, 3) um2 of (u, v)."""
         return each(self.space.mesh.areas / 3, np.eye(3)[None])
 
+    def to_nodes(self, field: np.ndarray) -> np.ndarray:
+        """(N,) values at the mesh's nodes, from a field (r, 1) at the points; zero in the fluid."""
+        mesh = self.space.mesh
+        nodal = np.zeros(mesh.corners)
+        nodal[mesh.topology.body_corners] = field[:, 0]
+        return mesh.with_middles(nodal)
+
+    def to_points(self, nodal: np.ndarray) -> np.ndarray:
+        """(r, 1) values at the points, from a field (N,) at the mesh's nodes."""
+        return nodal[self.space.reaction.cells]
+
+    def to_growth_points(self, field: np.ndarray) -> np.ndarray:
+        """Return (t, 1) means of a field (r, 1) over the nodes of the triangles (29)."""
+        cells = self.space.mesh.straight.topology.body_cells
+        return field[cells, 0].mean(axis=1, keepdims=True)
+
     def finer(self, degrees: int) -> tuple[Basis, np.ndarray]:
         """Return the same rule for every degree, and the matrix (1, 1) that keeps a density."""
         return self.space.reaction, np.ones((1, 1))
@@ -232,6 +248,31 @@ class Quadrature:
     def mass(self) -> np.ndarray:
         """(T, k, k) um2 of (u, v)."""
         return self.space.at.mass(self.space.at.dx)
+
+    def to_nodes(self, field: np.ndarray) -> np.ndarray:
+        """(N,) values at the mesh's nodes, from a field (r, q) at the points; zero in the fluid.
+
+        A linear function is fitted to the points of each triangle, and a node has the mean over its
+        triangles.
+        """
+        mesh = self.space.mesh
+        nodal = np.zeros(len(mesh.points))
+        corners = elements.values(1, elements.nodes(mesh.geometry))
+        fitted = field @ (corners @ elements.linear_fit(self.space.table)).T
+        cells = mesh.cells[mesh.biomass]
+        count = np.bincount(cells.ravel(), minlength=len(nodal))
+        summed = np.bincount(cells.ravel(), fitted.ravel(), len(nodal))
+        return np.divide(summed, count, out=nodal, where=count > 0)
+
+    def to_points(self, nodal: np.ndarray) -> np.ndarray:
+        """(r, q) values at the points, from a field (N,) at the mesh's nodes."""
+        mesh = self.space.mesh
+        values = elements.values_on(mesh.geometry, self.space.table)
+        return nodal[mesh.cells[mesh.biomass]] @ values.T
+
+    def to_growth_points(self, field: np.ndarray) -> np.ndarray:
+        """Return the field (r, q) itself: growth is integrated at the same points."""
+        return field
 
     def finer(self, degrees: int) -> tuple[Basis, np.ndarray]:
         """Return the functions in the biomass at points of a more exact quadrature.

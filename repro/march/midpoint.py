@@ -171,12 +171,12 @@ def _carry_rates_back(middle: Pore, previous: Pore, half: Expansion, rates: Rate
     """Interpolate rates at the points of a new mesh back to those of the previous mesh."""
     mesh = middle.mesh
     body = previous.mesh.body
-    nodal = np.column_stack([biomass.at_nodes(middle.space, field)
+    nodal = np.column_stack([middle.space.integration.to_nodes(field)
                              for field in (rates.growth, rates.remains)])
     carried = np.zeros((len(previous.mesh.points), 2))
     carried[body] = transfer.interpolate(mesh.points, mesh.cells[mesh.biomass], nodal,
                                          half.position[body])
-    growth, remains = (biomass.at_points(previous.space, column) for column in carried.T)
+    growth, remains = map(previous.space.integration.to_points, carried.T)
     return Rates(growth, remains)
 
 

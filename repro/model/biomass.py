@@ -18,7 +18,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from repro.fem import elements, transfer
+from repro.fem import transfer
 from repro.fem.space import Space
 from repro.fem.transfer import Located
 from repro.model.kinetics import RateLaw, Sink
@@ -27,8 +27,8 @@ from repro.model.transport import Concentrations
 Amounts: TypeAlias = tuple[np.ndarray, ...]
 
 #: Transfers of densities at the nodes of straight triangles, by the values of numerics.transfer.
-TRANSFERS = {"conserving": transfer.project, "bounded": transfer.project_bounded,
-             "linear": transfer.interpolated}
+METHODS = {"conserving": transfer.project, "bounded": transfer.project_bounded,
+           "linear": transfer.interpolated}
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,38 +62,6 @@ def sink(active: np.ndarray | None, duration: float = 0.0) -> Sink | None:
     return None if active is None else Sink(active, duration)
 
 
-def at_nodes(space: Space, field: np.ndarray) -> np.ndarray:
-    """(N,) values at the mesh's nodes of a field (r, q) at the points of the reaction, zero in the
-    fluid. With lumping they are the field's own values; otherwise a linear function is fitted to
-    the points of each triangle, and a node has the mean over its triangles."""
-    mesh = space.mesh
-    pieces = space.reaction
-    nodal = np.zeros(len(mesh.points))
-    if space.order == 1:
-        nodal[pieces.cells[:, 0]] = field[:, 0]
-        return mesh.with_middles(nodal[: mesh.corners])
-    fitted = field @ _fit(space).T
-    cells = mesh.cells[mesh.biomass]
-    count = np.bincount(cells.ravel(), minlength=len(nodal))
-    summed = np.bincount(cells.ravel(), fitted.ravel(), len(nodal))
-    return np.divide(summed, count, out=nodal, where=count > 0)
-
-
-def at_points(space: Space, nodal: np.ndarray) -> np.ndarray:
-    """(r, q) values at the points of the reaction of a field (N,) at the mesh's nodes."""
-    mesh = space.mesh
-    if space.order == 1:
-        return nodal[space.reaction.cells]
-    return nodal[mesh.cells[mesh.biomass]] @ elements.values_on(mesh.geometry, space.table).T
-
-
-def _fit(space: Space) -> np.ndarray:
-    """(g, q) matrix that takes values at a triangle's points to their linear least-squares fit at
-    its nodes."""
-    nodes = elements.values(1, elements.nodes(space.mesh.geometry))
-    return nodes @ elements.linear_fit(space.table)
-
-
 def transfer_amounts(method: str, old: Space, new: Space, at: Located, amounts: Amounts,
                      density: float) -> Amounts:
     """Transfer masses of biomass to a new mesh.
@@ -120,25 +88,31 @@ def transfer_amounts(method: str, old: Space, new: Space, at: Located, amounts: 
     With higher orders the new mesh has the density X_m everywhere, which removes the error of
     J = theta within a triangle. Each amount keeps its share of the biomass and its sum.
     """
-    if old.order == 1:
-        return _linear(method, old, new, amounts)
+    return TRANSFERS[old.order](method, old, new, at, amounts, density)
+
+
+def _by_shares(method: str, old: Space, new: Space, at: Located, amounts: Amounts,
+               density: float) -> Amounts:
+    """Transfer the shares of the biomass; the new mesh has the density X_m everywhere."""
     total = amounts[0] + amounts[1]
-    shares = np.column_stack([at_nodes(old, amount / total) for amount in amounts[1:]])
+    shares = np.column_stack([old.integration.to_nodes(amount / total)
+                              for amount in amounts[1:]])
     nodal = np.zeros((len(new.mesh.points), shares.shape[1]))
     nodal[new.mesh.body] = at.field(shares, old.mesh.cells[old.mesh.biomass], old.mesh.geometry)
-    inside = [np.clip(at_points(new, column), 0.0, 1.0) for column in nodal.T]
+    inside = [np.clip(new.integration.to_points(column), 0.0, 1.0) for column in nodal.T]
     masses = density * new.reaction.dx
     inert = _conserved(inside[0], masses, amounts[1].sum())
     rest = [_scaled(share * masses, amount.sum()) for share, amount in zip(inside[1:], amounts[2:])]
     return (masses * (1 - inert), masses * inert, *rest)
 
 
-def _linear(method: str, old: Space, new: Space, amounts: Amounts) -> Amounts:
+def _by_densities(method: str, old: Space, new: Space, at: Located, amounts: Amounts,
+                  density: float) -> Amounts:
     """Transfer amounts as densities at the nodes of straight triangles, by ``method``."""
     old_nodes = old.reaction.cells[:, 0]
     new_nodes = new.reaction.cells[:, 0]
     densities = np.column_stack([amount[:, 0] / old.reaction.dx[:, 0] for amount in amounts])
-    projected = TRANSFERS[method](
+    projected = METHODS[method](
         old.mesh.points[old_nodes], old.mesh.straight.topology.body_cells, densities,
         new.mesh.points[new_nodes], new.mesh.straight.topology.body_cells)
     return tuple(column[:, None] * new.reaction.dx for column in projected.T)
@@ -156,3 +130,7 @@ def _conserved(share: np.ndarray, weight: np.ndarray, total: float) -> np.ndarra
     room = float(np.vdot(weight, share * (1 - share)))
     deficit = total - float(np.vdot(weight, share))
     return share + deficit / room * share * (1 - share) if abs(deficit) < room else share
+
+
+#: Transfers by the order of the functions.
+TRANSFERS = {1: _by_densities, 2: _by_shares, 3: _by_shares}

@@ -168,9 +168,7 @@ def _at_rest(mechanics: Mechanics, grown: Pore, theta: np.ndarray, start: Pore,
     stressed = mechanics.keys.new_biomass == "stressed"
     last = None if stressed else grown.mesh.points[grown.mesh.body]
     grown = replace(grown, theta=theta, fixed=_fixed_points(mechanics.numerics, grown), last=last)
-    if grown.boundary.geometry == 1:
-        return _close_by_nodes(mechanics, grown, start, forces, search)
-    return _close_by_lines(mechanics, grown, start, forces, search)
+    return CLOSINGS[grown.boundary.geometry](mechanics, grown, start, forces, search)
 
 
 def _close_by_nodes(mechanics: Mechanics, grown: Pore, start: Pore, forces: np.ndarray | None,
@@ -248,6 +246,10 @@ def _refuse_late(gap: float, film: float, search: SearchOptions) -> None:
     """Raise FirstContact if the gap (um) at the first contact is much less than the least film."""
     if gap < search.landing * film:
         raise FirstContact(gap)
+
+
+#: By the geometry of the triangles.
+CLOSINGS = {1: _close_by_nodes, 2: _close_by_lines}
 
 
 def _touch(grown: Pore, shape: Expansion, rule: Clearance, trials: _Trials,

@@ -109,6 +109,12 @@ class Linear:
     velocity: Space
     tau: np.ndarray
 
+    @staticmethod
+    def on(velocity: Space, viscosity: np.ndarray, element: Stabilised | Bubble,
+           interface: str) -> Linear:
+        """The pair with the mobility of an element of linear velocity."""
+        return Linear(velocity, element.mobility(velocity.mesh, viscosity, interface))
+
     @property
     def lower(self) -> np.ndarray:
         """(T, 3, 3) of (tau grad p, grad q)."""
@@ -139,6 +145,12 @@ class TaylorHood:
     velocity: Space
     lower: None = None
 
+    @staticmethod
+    def on(velocity: Space, viscosity: np.ndarray, element: Stabilised | Bubble,
+           interface: str) -> TaylorHood:
+        """The pair, which needs no element of its own."""
+        return TaylorHood(velocity)
+
     def prescribed(self) -> np.ndarray:
         """:func:`prescribed`: these velocities represent the parabola exactly."""
         return prescribed(self.velocity)
@@ -146,6 +158,10 @@ class TaylorHood:
     def unit(self, u: np.ndarray, pressure: np.ndarray, work: float) -> UnitFlow:
         """The flow of a velocity and a pressure; its loss is the work of the inlet."""
         return UnitFlow(u, pressure, None, work)
+
+
+#: By the order of the velocity.
+PAIRS: dict[int, type[Linear] | type[TaylorHood]] = {1: Linear, 2: TaylorHood, 3: TaylorHood}
 
 
 def poiseuille_loss(length: float, width: float) -> float:
@@ -192,9 +208,7 @@ def unit_flow(velocity: Space, viscosity_ratio: float = 1.0, *, interface: str =
     """
     mesh = velocity.mesh
     viscosity = np.where(mesh.biomass, viscosity_ratio, 1.0)
-    pair: Linear | TaylorHood = TaylorHood(velocity)
-    if velocity.order == 1:
-        pair = Linear(velocity, element.mobility(mesh, viscosity, interface))
+    pair = PAIRS[velocity.order].on(velocity, viscosity, element, interface)
     system = mesh.topology.system(("flow", interface, velocity.order),
                                   lambda: _system(velocity, interface))
     if permeability is None:

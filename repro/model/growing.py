@@ -35,10 +35,25 @@ def compute_theta(previous: Pore, grown: Pore, maximum_density: float) -> np.nda
     """
     before = previous.active + previous.inert
     total = grown.active + grown.inert
-    if previous.space.order > 1:
-        return previous.theta * (total / before)
-    more = (total - before) / previous.space.reaction.dx / maximum_density
-    return previous.theta * (1 + at_growth_points(previous.space, more))
+    return previous.theta * GAINS[previous.space.order](previous.space, before, total,
+                                                        maximum_density)
+
+
+def _gain_of_mass(space: Space, before: np.ndarray, total: np.ndarray,
+                  maximum_density: float) -> np.ndarray:
+    """(t, q) factor on theta: that of the mass at each point."""
+    return total / before
+
+
+def _gain_of_area(space: Space, before: np.ndarray, total: np.ndarray,
+                  maximum_density: float) -> np.ndarray:
+    """(t, 1) factor on theta, from the area that the new mass needs at X_m (mg/L)."""
+    more = (total - before) / space.reaction.dx / maximum_density
+    return 1 + space.integration.to_growth_points(more)
+
+
+#: Growth of theta in a step, by the order of the functions.
+GAINS = {1: _gain_of_area, 2: _gain_of_mass, 3: _gain_of_mass}
 
 
 def restart_theta(pore: Pore, maximum_density: float) -> np.ndarray:
@@ -46,13 +61,4 @@ def restart_theta(pore: Pore, maximum_density: float) -> np.ndarray:
     straight triangles the mean density of their nodes (29), on curved ones that of each point."""
     J = pore.body.strained(pore.mesh.points[pore.mesh.body]).J
     density = (pore.active + pore.inert) / pore.space.reaction.dx / maximum_density
-    return J * at_growth_points(pore.space, density)
-
-
-def at_growth_points(space: Space, field: np.ndarray) -> np.ndarray:
-    """(t, q) values at the points where growth is integrated, from a field (r, q) at the points of
-    the reaction: the mean over the nodes of each straight triangle (29); on curved triangles the
-    points are the same, and the field is returned unchanged."""
-    if space.order > 1:
-        return field
-    return field[space.mesh.straight.topology.body_cells, 0].mean(axis=1, keepdims=True)
+    return J * pore.space.integration.to_growth_points(density)

@@ -233,6 +233,11 @@ class PressureGradient:
         """Sub-steps of a growth theta / J (t, q)."""
         return 1
 
+    @staticmethod
+    def degree(order: int) -> int:
+        """Degree of the quadrature of growth: one point of each triangle."""
+        return elements.GRADIENT_DEGREES[1]
+
 
 @dataclass(frozen=True, eq=False)
 class GradDiv:
@@ -251,6 +256,11 @@ class GradDiv:
         """Sub-steps of a growth theta / J (t, q), of at most FACTOR each in most points."""
         apart = np.quantile(np.abs(np.log(growth)), MOST_POINTS)
         return max(1, int(np.ceil(apart / np.log(FACTOR))))
+
+    @staticmethod
+    def degree(order: int) -> int:
+        """Degree of the quadrature of growth: that of the reaction of an order."""
+        return elements.DEGREES[max(2, order)]
 
 
 #: By the geometry of the triangles.

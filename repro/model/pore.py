@@ -10,7 +10,7 @@ from typing import overload
 import numpy as np
 
 from repro.errors import TransportError
-from repro.fem import elements, mesher, sizing
+from repro.fem import mesher, sizing
 from repro.fem.brief import brief
 from repro.fem.linear import Method
 from repro.fem.mesh import Mesh
@@ -164,7 +164,7 @@ def resolution(scene: Scene) -> float:
 
     The speed is the scene's mean velocity, or that of the clean channel under its head.
     """
-    if scene.numerics.order == 1 or scene.flow is None or scene.substrates is None:
+    if not (scene.numerics.follows_layers and scene.flow and scene.substrates):
         return scene.numerics.refinement
     speed = fastest(scene.flow, scene.pore)
     layers = peclet(scene.substrates, scene.pore.width, speed) ** (1 / 3)
@@ -305,12 +305,9 @@ def seeded(scene: Scene, front: float = 1.0, outline: Outline | None = None) -> 
 
 
 def material(space: Space, reference: np.ndarray) -> growth.Body:
-    """The aggregate of a mesh; reference: (n, 2) um, its nodes in the reference configuration.
-    Growth on a straight triangle is integrated at one point."""
+    """The aggregate of a mesh; reference: (n, 2) um, its nodes in the reference configuration."""
     topology = space.mesh.topology
-    degree = elements.DEGREES[max(2, space.order)]
-    if space.mesh.geometry == 1:
-        degree = elements.GRADIENT_DEGREES[1]
+    degree = growth.STABILISATIONS[space.mesh.geometry].degree(space.order)
     shape = growth.Shape(topology.body_cells, len(topology.body_corners), degree, topology.method)
     return growth.Body(shape, reference)
 

@@ -98,7 +98,7 @@ def grade(scene: Scene, pore: Pore) -> Pore | None:
     """The same pore on elements half as large at the aggregate; None if they may not be halved
     again."""
     front = 2 * pore.front
-    if scene.numerics.order == 1 or front > MOST_GRADED:
+    if not scene.numerics.follows_layers or front > MOST_GRADED:
         return None
     if pore.time == 0:
         return seeded(scene, front)
@@ -144,7 +144,7 @@ def _with_elements_of(scene: Scene, pore: Pore) -> Pore:
     """The present state on a new mesh. If the order differs, the biomass is that of t = 0 in the
     present outline."""
     if pore.time == 0:
-        return seeded(scene, pore.front if scene.numerics.order > 1 else 1.0)
+        return seeded(scene, pore.front if scene.numerics.follows_layers else 1.0)
     if scene.numerics.order == pore.space.order:
         return remesh(Remeshing.of(scene), pore, pore, 0.0)[0]
     fresh = replace(seeded(scene, outline=pore.boundary.corners), time=pore.time)
@@ -160,7 +160,7 @@ def _with_linear(scene: Scene) -> Scene | None:
     Linear elements lump the uptake at the nodes: behind a front that is thinner than an element
     their concentrations fall far less below zero than those of higher orders.
     """
-    if scene.numerics.order == 1:
+    if not scene.numerics.follows_layers:
         return None
     refinement = max(1.0, scene.numerics.refinement)
     changes = ["numerics.elements=linear", f"numerics.refinement={refinement!r}"]

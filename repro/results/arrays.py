@@ -8,7 +8,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from repro.model import biomass, flow, growth
+from repro.model import flow, growth
 from repro.model.pore import Pore, Solved
 from repro.model.surface import STRETCH, surface
 from repro.results.field_files import Grid
@@ -114,7 +114,7 @@ def _concentration(name: str, state: State) -> np.ndarray:
 def _density(name: str, state: State) -> np.ndarray:
     space = state.pore.space
     full = space.reaction.dx * state.scene.kinetics.maximum_density
-    return biomass.at_nodes(space, getattr(state.pore, name) / full)
+    return space.integration.to_nodes(getattr(state.pore, name) / full)
 
 
 def _displacement(state: State) -> np.ndarray:

@@ -22,7 +22,9 @@ from tempfile import mkdtemp
 WRITING = ".writing-"
 #: Largest files in bytes: JSON, whose objects take many times its length; a table; the fields of
 #: one time, or a checkpoint. A mesh of a million nodes takes a quarter of the last limit.
-MOST_JSON, MOST_TABLE, MOST_DATA = 2**24, 2**27, 2**30
+MOST_JSON = 2**24
+MOST_TABLE = 2**27
+MOST_DATA = 2**30
 
 
 @contextmanager

@@ -359,6 +359,11 @@ class Numerics:
         return {"linear": 1, "quadratic": 2, "cubic": 3}[self.elements]
 
     @property
+    def follows_layers(self) -> bool:
+        """Are elements made smaller for boundary layers and fronts? Linear ones are the paper's."""
+        return self.elements != "linear"
+
+    @property
     def geometry(self) -> int:
         """1: straight triangles; 2: curved ones, with quadratic maps."""
         return min(self.order, 2)

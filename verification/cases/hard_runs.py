@@ -15,7 +15,7 @@ from repro.fem.outline import FREE, half_disc
 from repro.fem.space import Space
 from repro.march import midpoint
 from repro.march.loop import StepResult
-from repro.model import biomass, flow, pore, remeshing
+from repro.model import flow, pore, remeshing
 from repro.model.pore import Pore
 from repro.model.remeshing import Remeshing
 from repro.model.stages import Stages
@@ -45,7 +45,7 @@ def remeshes(preset: str) -> list:
 
 
 def _conserved(first: Pore, last: Pore) -> list[Check]:
-    before, after = (biomass.at_nodes(one.space, one.inert / (one.active + one.inert))[one.mesh.body]
+    before, after = (one.space.integration.to_nodes(one.inert / (one.active + one.inert))[one.mesh.body]
                      for one in (first, last))
     beyond = max(before.min() - after.min(), after.max() - before.max(), 0.0) / np.ptp(before)
     return [at_most("area, relative change", abs(last.outline.area / first.outline.area - 1), 1e-10,

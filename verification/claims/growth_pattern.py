@@ -50,7 +50,7 @@ def growth_rates(aggregate: Body) -> np.ndarray:
     space, problem = aggregate.pore.space, aggregate.solved.problem
     rates = biomass.rates(space, aggregate.solved.concentrations, problem.law)
     density = aggregate.pore.active / space.reaction.dx / problem.law.constants.maximum_density
-    return biomass.at_nodes(space, density * rates.total)
+    return space.integration.to_nodes(density * rates.total)
 
 
 @claim("C10", "4, Plate 1", "fastest growth on the upgradient side, slowest on the wall between centre and "

@@ -22,7 +22,7 @@ from repro.fem.sizing import ACROSS_AGGREGATE
 from repro.fem.space import Space
 from repro.march import loop, simulation, updates
 from repro.march.loop import Report, RestartState
-from repro.model import biomass, flow, pore, remeshing, transport
+from repro.model import flow, pore, remeshing, transport
 from repro.model.kinetics import Sink
 from repro.model.pore import Pore, Solved, solve
 from repro.model.remeshing import Remeshing
@@ -320,7 +320,7 @@ def solution(scene, grid: Mesh, active: np.ndarray, carried_by_u: bool = False) 
     carrier = replace(flow_field, correction=0 * flow_field.correction) if carried_by_u else flow_field
     space = Space(grid, scene.numerics.order)
     problem = transport.problem(space, carrier, scene.substrates, scene.kinetics, scene.numerics.inlet)
-    sink = Sink(biomass.at_points(space, active) * space.reaction.dx)
+    sink = Sink(space.integration.to_points(active) * space.reaction.dx)
     state = transport.steady(problem, sink)
     return flow_field, transport.fluxes(problem, sink, state)
 

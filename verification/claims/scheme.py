@@ -15,7 +15,7 @@ import numpy as np
 
 from repro.fem.mesh import POOR, POOR_ALLOWED
 from repro.march import updates
-from repro.model import biomass, gear
+from repro.model import gear
 from repro.model.kinetics import Sink, rate_law
 from repro.model.pore import Pore, solve
 from repro.model.stages import Stages
@@ -270,7 +270,7 @@ def node_defect(time: float) -> float:
 def node_masses(pore: Pore) -> tuple[np.ndarray, np.ndarray]:
     """X_A and X_I of the aggregate's nodes, times the areas around them: um2 mg/L."""
     area = pore.space.lumped(pore.mesh.biomass)[pore.mesh.body]
-    return tuple(area * biomass.at_nodes(pore.space, mass / pore.space.reaction.dx)[pore.mesh.body]
+    return tuple(area * pore.space.integration.to_nodes(mass / pore.space.reaction.dx)[pore.mesh.body]
                  for mass in (pore.active, pore.inert))
 
 

@@ -41,7 +41,8 @@ RECORD = REPORT / "mutants.json"
 CATCH = ("assert", "AssertionError", "Failed: ", "repro.")
 #: How the report of a failed fixture begins.
 IN_FIXTURE = re.compile(r'^failed on (setup|teardown) with "')
-NOT_COPIED = (".git", ".venv", "__pycache__", "live", "out", "cache", "dist", "build", "*.egg-info", ".*_cache")
+NOT_COPIED = (".git", ".venv", "__pycache__", "live", "out", "cache", "dist", "build", "*.egg-info", ".*_cache",
+              ".writing-*")
 #: Seconds on the clock. No case takes a tenth of this, but a mutant may run for ever.
 LONGEST = 600.0
 
