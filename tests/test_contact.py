@@ -180,7 +180,7 @@ def test_contact_begins_on_both_sides_of_the_highest_point(plugged):
     wall, lines = contact._first_contact(replace(free, wall=np.where(free.wall == TOP, FREE, free.wall)), FILM)
     (corner,) = np.flatnonzero(wall == TOP)
     upper = [line for line in lines if line.wall == TOP]
-    lengths = {line.direction: contact_lines.advance_of(replace(free, wall=wall), line).length for line in upper}
+    lengths = {line.direction: contact_lines.to_length(replace(free, wall=wall), line) for line in upper}
     apart = free.highest - free.points[corner, 0]
     assert sorted(lengths.values()) == pytest.approx(sorted([FILM - apart, FILM + apart]), abs=1e-9)
     assert all(line.advance == line.least == line.short > 0 for line in upper)
@@ -208,8 +208,8 @@ def test_the_contact_surface_is_the_smallest_that_leaves_enough_fluid(preset):
     for expansion in touching:
         values = clearances(expansion.pore.boundary, rule)
         assert min(values.values()) >= -contact_lines.CLOSE
-        for key, advance in expansion.advances.items():
-            if advance.length > 1.0:
+        for key, length in expansion.advances.items():
+            if length > 1.0:
                 advanced += values[key] <= contact_lines.CLOSE
     assert advanced >= 5
 
@@ -233,8 +233,8 @@ def test_a_trial_starts_from_a_shape_in_which_no_triangle_is_turned_over():
     scene = load_scene("base", ['numerics.preset="fast"'])
     seed = seeded(scene)
     trials = contact._Trials(contact.Mechanics.of(scene), seed, seed, None, True)
-    trials._trials = [contact._Trial(np.zeros(2), seed.mesh.points * [-1.0, 1.0], seed.pressure)]
-    assert np.array_equal(trials._first(seed, np.zeros(2), None).mesh.points, seed.mesh.points)
+    trials._shapes = [(np.zeros(2), seed.mesh.points * [-1.0, 1.0], seed.pressure)]
+    assert np.array_equal(trials._first(seed, np.zeros(2)).mesh.points, seed.mesh.points)
 
 
 @EVERY_ORDER

@@ -57,12 +57,9 @@ class Newton:
     most: int
     modified_newton: bool = False
 
-    def solve(self, system: System[State], iterate: State,
-              factors: Factored | None = None) -> tuple[State, int, bool]:
-        """The last iterate, the number of steps, and whether it converged.
-
-        factors: of the derivative at a similar iterate, for the first step of the modified method.
-        """
+    def solve(self, system: System[State], iterate: State) -> tuple[State, int, bool]:
+        """The last iterate, the number of steps, and whether it converged."""
+        factors: Factored | None = None
         last = np.inf
         for count in range(self.most):
             defect = iterate.defect

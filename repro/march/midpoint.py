@@ -109,7 +109,7 @@ def _expand(stages: Stages, previous: Pore, after: Pore, half: Halfway, part: fl
 
     Contact lines continue at their speed.
     """
-    advances = {key: advance.times(2 * part) for key, advance in half.expansion.advances.items()}
+    advances = {key: 2 * part * arcs for key, arcs in half.expansion.advances.items()}
     guess = _extrapolate_shape(previous, half.expansion, part)
     return stages.expand(previous, after, guess, replace(search, advances=advances))
 

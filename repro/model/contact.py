@@ -11,19 +11,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 
 import numpy as np
 
 from repro.errors import GrowthError, LinearError
-from repro.fem.assembly import Factored
 from repro.fem.division import Division
 from repro.fem.mesh import Mesh
 from repro.fem.outline import BOTTOM, FREE, TOP, Outline
 from repro.fem.space import Space
 from repro.model import contact_lines, growth, traction
 from repro.model.contact_lines import (
-    Advance,
     Clearance,
     Contact,
     FirstContact,
@@ -39,8 +36,6 @@ from repro.scene import Growth, Numerics, Scene
 CONTACT_ROUNDS = 60
 #: Largest number of times that contact lines go back after a trial that fails.
 RETREATS = 6
-#: Defect of the equilibria while contact lines are searched for.
-TRIAL = 1e-5
 #: Rounds of shape and fluid forces.
 FORCE_ROUNDS = 12
 #: Largest move of a node in the last round, over the aggregate's thickness.
@@ -78,15 +73,15 @@ class Expansion:
     pore: with the fluid's nodes not yet moved, on the divided mesh if a contact line lies
     within an arc; iterations: of Newton's method; gap: um, the least distance to the opposite wall
     before films closed; division: of the mesh of the grown pore, None if it is not divided;
-    advances: {(wall, direction): advance} of contact lines along the outline of
-    the grown pore.
+    advances: {(wall, direction): um} by which contact lines have advanced
+    along the outline of the grown pore.
     """
 
     pore: Pore
     iterations: int
     gap: float
     division: Division | None = None
-    advances: Mapping[tuple[int, int], Advance] = field(default_factory=dict)
+    advances: Mapping[tuple[int, int], float] = field(default_factory=dict)
 
     @property
     def position(self) -> np.ndarray:
@@ -182,8 +177,8 @@ def _close_by_nodes(mechanics: Mechanics, grown: Pore, start: Pore, forces: np.n
     gaps: list[float] = []
     for _ in range(CONTACT_ROUNDS):
         last = None if gaps else grown.mesh.points[grown.mesh.body]
-        shape, rest = _equilibrium(mechanics, grown, shape, forces, last=last)
-        iterations += rest.iterations
+        shape, used = _equilibrium(mechanics, grown, shape, forces, last=last)
+        iterations += used
         gaps.append(width - shape.boundary.thickness)
         if not shape.contact:
             _refuse_late(gaps[-1], keys.minimum_film, search)
@@ -197,20 +192,17 @@ def _close_by_nodes(mechanics: Mechanics, grown: Pore, start: Pore, forces: np.n
 
 
 def _equilibrium(mechanics: Mechanics, grown: Pore, start: Pore, forces: np.ndarray | None, *,
-                 last: np.ndarray | None = None, patient: bool = True,
-                 tolerance: float = growth.NEWTON,
-                 factors: Factored | None = None) -> tuple[Pore, growth.Equilibrium]:
+                 last: np.ndarray | None = None, patient: bool = True) -> tuple[Pore, int]:
     """The equilibrium of a grown pore under its theta with the contact of ``start``, searched for
-    from the shape and pressure of ``start``."""
+    from the shape and pressure of ``start``; and Newton's iterations."""
     body, target_J = _strained_from(mechanics.keys, grown, grown.theta)
     nodes = grown.mesh.body
     inside = grown.mesh.topology.body_corners
     locked, target = _constraints(start, mechanics.width)
     rest = growth.equilibrium(body, target_J, start.mesh.points[nodes], start.pressure[inside],
                               locked, target, forces=forces, last=last, patient=patient,
-                              tolerance=tolerance, factors=factors,
                               modified_newton=mechanics.numerics.jacobian == "reused")
-    return _placed(grown, start, rest), rest
+    return _placed(grown, start, rest), rest.iterations
 
 
 def _close_by_lines(mechanics: Mechanics, grown: Pore, start: Pore, forces: np.ndarray | None,
@@ -221,7 +213,7 @@ def _close_by_lines(mechanics: Mechanics, grown: Pore, start: Pore, forces: np.n
     trials = _Trials(mechanics, grown, start, forces, search.patient)
     lines = contact_lines.lines_of(grown.boundary)
     _place_lines(grown.boundary, lines, search)
-    shape = trials.solve(grown.wall, lines, accurate=not grown.contact)
+    shape = trials.solve(grown.wall, lines)
     gap = rule.width - shape.pore.boundary.thickness
     wall = grown.wall
     if not grown.contact and gap < rule.film:
@@ -230,14 +222,13 @@ def _close_by_lines(mechanics: Mechanics, grown: Pore, start: Pore, forces: np.n
     for _ in range(CONTACT_ROUNDS):
         for line in lines:
             line.record(*_clearance(rule, shape.pore.boundary, line))
-        at_rest = all(line.accepted for line in lines)
-        if at_rest and trials.accurate:
+        if all(line.accepted for line in lines):
             rest = replace(shape.pore, fixed=_with_new_surface(shape.pore.boundary))
             return replace(shape, pore=rest, iterations=trials.iterations, gap=gap)
         for line in lines:
             if not line.accepted:
                 line.step()
-        shape = trials.solve(wall, lines, accurate=at_rest)
+        shape = trials.solve(wall, lines)
     raise GrowthError(f"the contact lines still move after {CONTACT_ROUNDS} trials; "
                       "try a shorter growth.time_step")
 
@@ -277,9 +268,10 @@ def _touch(grown: Pore, shape: Expansion, rule: Clearance, trials: _Trials,
 
 
 def _place_lines(outline: Outline, lines: Sequence[Line], search: SearchOptions) -> None:
-    """Start each contact line at its advance in ``search``."""
+    """Start each contact line at its advance in ``search``, but not before its smallest one."""
     for line in lines:
-        contact_lines.place(outline, line, search.advances.get(line.key, Advance(0.0)))
+        length = search.advances.get(line.key, 0.0)
+        line.advance = max(line.least, contact_lines.to_arcs(outline, line, length))
 
 
 def _tip_width(outline: Outline, depth: float) -> float:
@@ -321,53 +313,6 @@ def _clearance(rule: Clearance, outline: Outline, line: Line) -> tuple[float, fl
     return rule.beyond(outline, node, line.direction)
 
 
-@dataclass(frozen=True, eq=False)
-class _Trial:
-    """An equilibrium with contact lines at some advances (arcs): positions (N, 2) um and pressures
-    of all nodes, on the mesh of a division or on the undivided one."""
-
-    advances: np.ndarray
-    points: np.ndarray
-    pressure: np.ndarray
-    division: Division | None = None
-
-    @cached_property
-    def smooth(self) -> tuple[np.ndarray, np.ndarray]:
-        """Positions and pressures on the undivided mesh."""
-        if self.division is None:
-            return self.points, self.pressure
-        corners = self.division.parent.corners
-        return self.division.restricted(self.points), self.pressure[:corners]
-
-    def on(self, other: Division | None, moved: tuple[np.ndarray, np.ndarray]
-           ) -> tuple[np.ndarray, np.ndarray]:
-        """Positions and pressures on the mesh of another division, from those on the undivided mesh
-        after they have ``moved``. If both divide the same arcs, kinks move with the contact lines.
-        """
-        fields = _on_division(other, moved)
-        if self.division is None or not same_arcs(self.division, other):
-            return fields
-        kinks = zip(fields, (self.points, self.pressure), _on_division(self.division, self.smooth))
-        points, pressure = (field + value - smooth for field, value, smooth in kinks)
-        return points, pressure
-
-
-def _on_division(division: Division | None,
-                 fields: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """Positions and pressures on a divided mesh, from those on the undivided one."""
-    if division is None:
-        return fields
-    points, pressure = fields
-    return division.nodal(points), division.at_corners(pressure)
-
-
-def same_arcs(one: Division | None, other: Division | None) -> bool:
-    """Do two divisions of a mesh divide the same arcs, so that their meshes have the same nodes?"""
-    if one is None or other is None:
-        return one is other
-    return np.array_equal(one.arcs, other.arcs)
-
-
 class _Trials:
     """Equilibria of one grown pore with several places of its contact lines.
 
@@ -380,27 +325,24 @@ class _Trials:
         self._grown = grown
         self._forces = forces
         self._patient = patient
-        self._start = _Trial(np.zeros(0), start.mesh.points, start.pressure)
-        self._trials = [self._start]
+        self._start = start.mesh.points, start.pressure
+        self._shapes = [(np.zeros(0), *self._start)]
         self._divided: Division | None = None
         self._shape: growth.Shape | None = None
-        self._factors: Factored | None = None
         self.iterations = 0
-        self.accurate = False
 
-    def solve(self, wall: np.ndarray, lines: Sequence[Line], accurate: bool = False) -> Expansion:
+    def solve(self, wall: np.ndarray, lines: Sequence[Line]) -> Expansion:
         """The equilibrium with walls (M,) of the grown pore's outline and advances of the lines.
 
         If it fails, lines go half of the way back to an advance that was too short. Raises
         GrowthError if that does not help.
         """
-        self.accurate = accurate
         for _ in range(RETREATS):
             try:
                 shape = self._solve(contact_with(wall, lines),
                                     np.array([line.advance for line in lines]))
                 outline = replace(self._grown.boundary, wall=wall)
-                advances = {line.key: contact_lines.advance_of(outline, line) for line in lines}
+                advances = {line.key: contact_lines.to_length(outline, line) for line in lines}
                 return replace(shape, advances=advances)
             except (GrowthError, LinearError) as error:
                 failure = error
@@ -419,22 +361,27 @@ class _Trials:
             self._divided = self._divided.at(contact.t)
         return self._divided
 
-    def _guesses(self, advances: np.ndarray,
-                 division: Division | None) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Positions (N, 2) um and pressures from which a trial may start, the best ones first: the
-        last two shapes, extrapolated in the advance of the line that moves most, then each of
-        them."""
-        first, last = self._trials[0], self._trials[-1]
-        if len(self._trials) == 2 and len(first.advances) == len(advances):
-            line = np.argmax(np.abs(last.advances - first.advances))
-            moved = last.advances[line] - first.advances[line]
-            part = (advances[line] - last.advances[line]) / moved if moved else 0.0
-            part = min(max(part, -1.0), 1.0)
-            points, pressure = (end + part * (end - start)
-                                for start, end in zip(first.smooth, last.smooth))
-            yield last.on(division, (points, pressure))
-        yield last.on(division, last.smooth)
-        yield self._start.on(division, self._start.smooth)
+    def _guesses(self, advances: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """Positions (N, 2) um and pressures from which a trial may start, the best ones first."""
+        ahead = self._ahead(advances)
+        if ahead is not None:
+            yield ahead
+        yield self._shapes[-1][1:]
+        yield self._start
+
+    def _ahead(self, advances: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+        """The last two shapes, extrapolated in the advance of the line that moves most."""
+        last, points, pressure = self._shapes[-1]
+        before, points_before, pressure_before = self._shapes[0]
+        if len(self._shapes) < 2 or len(before) != len(advances):
+            return None
+        line = np.argmax(np.abs(last - before))
+        if last[line] == before[line]:
+            return None
+        part = (advances[line] - last[line]) / (last[line] - before[line])
+        part = min(max(part, -1.0), 1.0)
+        return (points + part * (points - points_before),
+                pressure + part * (pressure - pressure_before))
 
     def _solve(self, contact: Contact, advances: np.ndarray) -> Expansion:
         grown = self._grown
@@ -446,28 +393,28 @@ class _Trials:
             locked = divided(grown, division, contact, self._shape)
             self._shape = locked.body.shape
             forces = None if forces is None else _divided_loads(division, forces)
-        first = self._first(locked, advances, division)
-        tolerance = growth.NEWTON if self.accurate else TRIAL
-        shape, rest = _equilibrium(self._mechanics, locked, first, forces, patient=self._patient,
-                                   tolerance=tolerance, factors=self._factors)
-        self.iterations += rest.iterations
-        self._factors = rest.factors
-        expansion = Expansion(shape, rest.iterations, 0.0, division)
-        trial = _Trial(advances, shape.mesh.points, shape.pressure, division)
-        self._trials = [*self._trials[-1:], trial]
+        first = self._first(locked, advances)
+        shape, iterations = _equilibrium(self._mechanics, locked, first, forces,
+                                         patient=self._patient)
+        self.iterations += iterations
+        expansion = Expansion(shape, iterations, 0.0, division)
+        at_rest = advances, expansion.position, shape.pressure[: grown.mesh.corners]
+        self._shapes = [*self._shapes[-1:], at_rest]
         return expansion
 
-    def _first(self, locked: Pore, advances: np.ndarray, division: Division | None) -> Pore:
+    def _first(self, locked: Pore, advances: np.ndarray) -> Pore:
         """The pore from which a trial starts: the best guess in which no triangle is turned over.
 
         A divided arc may have a kink where its contact begins. The undivided arc rounds it off,
         which can turn a triangle over.
         """
-        guesses = list(self._guesses(advances, division))
-        for points, pressure in guesses:
+        division = self._divided
+        for points, pressure in self._guesses(advances):
+            if division is not None and len(points) < len(locked.mesh.points):
+                points = division.nodal(points)
+                pressure = division.at_corners(pressure)
             if locked.body.strained(points[locked.mesh.body]).J.min() > 0:
-                return replace(locked.moved(points), pressure=pressure)
-        points, pressure = guesses[-1]
+                break
         return replace(locked.moved(points), pressure=pressure)
 
 

@@ -14,7 +14,6 @@ bisection, searches for all lines at once. Each trial is an equilibrium of the a
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -31,16 +30,14 @@ AMPLE = 10.0
 SAME_PLACE = 5e-3
 #: The smallest part of a divided arc; smaller parts are not divided off.
 LEAST_PART = 0.02
-#: The first trial, as a fraction of the way to the farthest point that is too near to the wall: the
-#: clearance times FIRST_RATE, at most FIRST_TRIAL.
-FIRST_RATE = 1.2
-FIRST_TRIAL = 0.65
+#: The first trial, as a fraction of the way to the farthest point that is too near to the wall.
+FIRST_TRIAL = 0.7
 #: The second trial after a first one that went too far, as a fraction of the way back.
 FIRST_RETREAT = 0.2
 #: Factor on secant steps until a trial goes far enough.
 BEYOND = 1.05
 #: Longest step (arcs) until then, if no surface beyond the line is too near.
-LEAST_REACH = 0.25
+LEAST_REACH = 0.5
 #: Secant steps keep this fraction of the interval away from its ends.
 INSIDE = 0.03
 MEET = ("two contact lines meet, with fluid between them that has no way out; "
@@ -50,30 +47,17 @@ PLACES = np.append([0.0, 1e-3], np.linspace(0.0, 1.0, 9)[1:])
 
 
 @dataclass(frozen=True)
-class Advance:
-    """length: um, by which a contact line has advanced along the outline; rise: 1/um, of the
-    clearance with this length, None if it is not known."""
-
-    length: float
-    rise: float | None = None
-
-    def times(self, factor: float) -> Advance:
-        """The advance over another part of the step, at the same speed."""
-        return Advance(factor * self.length, self.rise)
-
-
-@dataclass(frozen=True)
 class SearchOptions:
     """How contact lines are searched for.
 
     landing: the search ends if the film at the first contact is thinner than this fraction of the
     least film; patient: is a failed equilibrium tried again in smaller parts; advances: {(wall,
-    direction): advance} of the first trial.
+    direction): um} of the first trial, along the outline.
     """
 
     landing: float = 0.0
     patient: bool = True
-    advances: Mapping[tuple[int, int], Advance] = field(default_factory=dict)
+    advances: Mapping[tuple[int, int], float] = field(default_factory=dict)
 
 
 class FirstContact(Exception):
@@ -176,8 +160,7 @@ class Line:
     present trial accurate enough; reach: arcs beyond it where the surface is too near; least: the
     smallest advance; short, far: largest advance that is too short and smallest one that is far
     enough; stalls: has the last trial halved neither the interval between these nor the clearance;
-    trials: the last two, as (advance, clearance); rise: of the clearance per arc, None if it is not
-    known.
+    trials: the last two, as (advance, clearance).
     """
 
     wall: int
@@ -191,7 +174,6 @@ class Line:
     far: float = np.inf
     stalls: bool = False
     trials: list[tuple[float, float]] = field(default_factory=list)
-    rise: float | None = None
 
     @property
     def key(self) -> tuple[int, int]:
@@ -208,7 +190,6 @@ class Line:
         too_short = clearance < -CLOSE
         before = self.far - self.short
         worse = len(self.trials) == 2 and abs(clearance) > abs(self.trials[0][1]) / 2
-        self.rise = self._rise() or self.rise
         if too_short:
             self.short = self.advance
             # If another line has moved since, an advance that was far enough may be too short.
@@ -217,7 +198,7 @@ class Line:
             self.far = self.advance
             self.short = min(self.short, self.advance)
         self.stalls = worse and self.far - self.short > before / 2
-        jumps = self.far <= max(next_place(self.short), self.least + LEAST_PART)
+        jumps = self.far <= max(self.short + SAME_PLACE, self.least + LEAST_PART)
         smallest = self.advance <= self.least
         self.accepted = not too_short and (smallest or clearance <= CLOSE or jumps)
 
@@ -238,7 +219,7 @@ class Line:
     def step(self) -> None:
         """Go to the next trial."""
         if self.far == np.inf:
-            most = self.advance + max(FIRST_TRIAL * self.reach, LEAST_REACH)
+            most = self.advance + max(self.reach, LEAST_REACH)
             least = self.advance + LEAST_PART
             self.advance = min(max(self._secant(BEYOND), least), most)
         elif self.stalls:
@@ -246,43 +227,19 @@ class Line:
         else:
             margin = INSIDE * (self.far - self.short)
             self.advance = min(max(self._secant(1.0), self.short + margin), self.far - margin)
-        self.advance = max(self.least, divisible(self.advance))
-        if self.advance <= self.short:
-            self.advance = min(next_place(self.short), self.far)
 
     def _secant(self, factor: float) -> float:
         """The advance at the root of the secant through the last two trials, its step multiplied
         by a factor; with one trial, or if the secant falls, FIRST_TRIAL or FIRST_RETREAT."""
         advance, clearance = self.trials[-1]
-        if self.rise is not None and (len(self.trials) == 1 or self._rise() is not None):
-            return advance - factor * clearance / self.rise
+        if len(self.trials) == 2:
+            before, clearance_before = self.trials[0]
+            rise = (clearance - clearance_before) / (advance - before)
+            if rise > 0:
+                return advance - factor * clearance / rise
         if self.far == np.inf:
-            return advance + min(FIRST_RATE * abs(clearance), FIRST_TRIAL) * self.reach
+            return advance + FIRST_TRIAL * self.reach
         return self.far - FIRST_RETREAT * (self.far - self.short)
-
-    def _rise(self) -> float | None:
-        """The clearance's rise per arc between the last two trials, None if it does not rise."""
-        if len(self.trials) < 2:
-            return None
-        (before, clearance_before), (advance, clearance) = self.trials
-        rise = (clearance - clearance_before) / (advance - before)
-        return rise if rise > 0 else None
-
-
-def divisible(advance: float) -> float:
-    """The nearest advance (arcs) with no part of an arc under LEAST_PART."""
-    nearest = round(advance)
-    apart = advance - nearest
-    if abs(apart) >= LEAST_PART:
-        return advance
-    if abs(apart) < LEAST_PART / 2:
-        return float(nearest)
-    return nearest + math.copysign(LEAST_PART, apart)
-
-
-def next_place(advance: float) -> float:
-    """The least advance (arcs) that counts as another place of a line."""
-    return max(advance + SAME_PLACE, divisible(advance + LEAST_PART))
 
 
 def arc_lengths(outline: Outline, line: Line) -> np.ndarray:
@@ -291,21 +248,10 @@ def arc_lengths(outline: Outline, line: Line) -> np.ndarray:
     return np.linalg.norm(arcs[:, 2] - arcs[:, 0], axis=1)
 
 
-def advance_of(outline: Outline, line: Line) -> Advance:
-    """The advance of a line along its previous outline, um."""
-    lengths = arc_lengths(outline, line)
-    ends = np.concatenate([[0.0], np.cumsum(lengths)])
-    length = float(np.interp(line.advance, np.arange(len(ends)), ends))
-    arc = lengths[min(int(line.advance), len(lengths) - 1)]
-    return Advance(length, None if line.rise is None else line.rise / arc)
-
-
-def place(outline: Outline, line: Line, advance: Advance) -> None:
-    """Start a line at an advance along its previous outline, but not before its smallest one."""
-    line.advance = max(line.least, to_arcs(outline, line, advance.length))
-    if advance.rise is not None:
-        lengths = arc_lengths(outline, line)
-        line.rise = advance.rise * lengths[min(int(line.advance), len(lengths) - 1)]
+def to_length(outline: Outline, line: Line) -> float:
+    """The advance of a line in um along its previous outline."""
+    ends = np.concatenate([[0.0], np.cumsum(arc_lengths(outline, line))])
+    return float(np.interp(line.advance, np.arange(len(ends)), ends))
 
 
 def to_arcs(outline: Outline, line: Line, length: float) -> float:

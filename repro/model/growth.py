@@ -50,8 +50,6 @@ NEWTON = 1e-11
 #: Or at this one, if round-off keeps the residual from falling.
 ROUND_OFF = 1e-8
 MOST_ITERATIONS = 25
-#: Factors of another state are used from this defect on.
-CLOSE_TO_EQUILIBRIUM = 0.05
 #: Halvings in a line search.
 HALVINGS = 8
 #: Sub-steps of a continuation, by ``patient``; an impatient caller shortens its step instead.
@@ -139,12 +137,11 @@ class Body:
 @dataclass(frozen=True, eq=False)
 class Equilibrium:
     """position: (n, 2) um; pressure: (corners,) P / mu_L; iterations: of Newton's method, over all
-    sub-steps; factors: of its last derivative, None without one."""
+    sub-steps."""
 
     position: np.ndarray
     pressure: np.ndarray
     iterations: int
-    factors: Factored | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -334,7 +331,6 @@ class System:
         if forces is not None:
             self.pull[: constrained.size] = forces.T.ravel()
         self.strained = Last(body.strained)
-        self.factors: Factored | None = None
         self.theta = self.target = np.empty(0)
         self.sizes = np.empty(0)
 
@@ -413,14 +409,7 @@ class System:
 
     def factored(self, iterate: Iterate) -> Factored:
         """The derivative, factorised."""
-        self.factors = self.sparse.factored(self.tangent(iterate.position, iterate.pressure))
-        return self.factors
-
-    def reusable(self, factors: Factored | None, iterate: Iterate) -> Factored | None:
-        """Factors of the derivative in another state, if they have the same unknowns and the
-        iterate is close to equilibrium."""
-        same = factors is not None and factors.system is self.sparse
-        return factors if same and iterate.defect <= CLOSE_TO_EQUILIBRIUM else None
+        return self.sparse.factored(self.tangent(iterate.position, iterate.pressure))
 
     def advanced(self, iterate: Iterate, factors: Factored, fresh: bool) -> Iterate:
         """The longest of the steps 1, 1/2, ... with det F > 0 that does not raise the residual
@@ -448,8 +437,7 @@ class System:
 def equilibrium(body: Body, theta: np.ndarray, position: np.ndarray, pressure: np.ndarray,
                 constrained: np.ndarray, prescribed: np.ndarray, *, last: np.ndarray | None = None,
                 forces: np.ndarray | None = None, modified_newton: bool = False,
-                patient: bool = True, tolerance: float = NEWTON,
-                factors: Factored | None = None) -> Equilibrium:
+                patient: bool = True) -> Equilibrium:
     """Solve for the equilibrium of an aggregate under an expansion, (14)-(27).
 
     Parameters
@@ -473,10 +461,6 @@ def equilibrium(body: Body, theta: np.ndarray, position: np.ndarray, pressure: n
         Does Newton's method keep its derivative while the defect falls fast enough?
     patient : bool
         Is an equilibrium that fails tried again in more sub-steps?
-    tolerance : float
-        Largest defect.
-    factors : Factored, optional
-        From an equilibrium of a similar body, for the first step of the modified method.
 
     Returns
     -------
@@ -500,41 +484,37 @@ def equilibrium(body: Body, theta: np.ndarray, position: np.ndarray, pressure: n
     known = position if last is None else last
     parts = method.parts(theta / start)
     system = System(body, constrained, stabilisation=method.on(body, known), forces=forces)
-    first = Equilibrium(position, pressure, 0, factors)
-    return reach(system, start, theta, first, prescribed, parts, modified_newton, patient,
-                 tolerance)
+    first = Equilibrium(position, pressure, 0)
+    return reach(system, start, theta, first, prescribed, parts, modified_newton, patient)
 
 
 def reach(system: System, start: np.ndarray, theta: np.ndarray, first: Equilibrium,
           prescribed: np.ndarray, parts: int = 1, modified_newton: bool = False,
-          patient: bool = True, tolerance: float = NEWTON) -> Equilibrium:
+          patient: bool = True) -> Equilibrium:
     """Solve for equilibrium under theta, from J = ``start`` (t, q), in ``parts`` sub-steps, or in
     more if these fail; see :func:`equilibrium`."""
     failure = ""
     for steps in CONTINUATION[patient]:
         try:
             return _continued(system, start, theta, first, prescribed, parts * steps,
-                              modified_newton, tolerance)
+                              modified_newton)
         except (GrowthError, LinearError) as error:
             failure = str(error)
     raise GrowthError(f"{failure}; try a shorter growth.time_step or a larger numerics.refinement")
 
 
 def _continued(system: System, start: np.ndarray, theta: np.ndarray, first: Equilibrium,
-               prescribed: np.ndarray, steps: int, modified_newton: bool,
-               tolerance: float) -> Equilibrium:
+               prescribed: np.ndarray, steps: int, modified_newton: bool) -> Equilibrium:
     """Newton's method at theta = start (theta / start)^s for s = 1 / steps ... 1."""
-    newton = Newton(tolerance, max(ROUND_OFF, tolerance), MOST_ITERATIONS, modified_newton)
+    newton = Newton(NEWTON, ROUND_OFF, MOST_ITERATIONS, modified_newton)
     solution = first
     for part in np.arange(1, steps + 1) / steps:
         target = first.position + part * (prescribed - first.position)
         iterate = system.under(start * (theta / start) ** part, target, solution.position,
                                solution.pressure)
-        earlier = system.reusable(first.factors, iterate) if modified_newton else None
-        last, count, converged = newton.solve(system, iterate, earlier)
+        last, count, converged = newton.solve(system, iterate)
         if not converged:
             raise GrowthError("Newton's method for the growth stands at a defect of "
                               f"{last.defect:.2g} after {count} iterations")
-        solution = Equilibrium(last.position, last.pressure, solution.iterations + count,
-                               system.factors or first.factors)
+        solution = Equilibrium(last.position, last.pressure, solution.iterations + count)
     return solution
