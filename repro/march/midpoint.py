@@ -24,7 +24,7 @@ from repro.fem.space import Space
 from repro.march.balance import Ledger
 from repro.march.folding import refuse_density, refuse_fold
 from repro.march.loop import InterpolatedState, PoreEnd, StepResult, pore_end, time_before_end
-from repro.model import biomass, contact, pore, remeshing
+from repro.model import biomass, contact, contact_lines, pore, remeshing
 from repro.model.biomass import Rates
 from repro.model.contact import Expansion
 from repro.model.contact_lines import FirstContact, SearchOptions
@@ -94,12 +94,14 @@ def attempt(stages: Stages, previous: Pore, solved: Solved, duration: float,
     expanded = replace(expanded, concentrations=_guess_substrates(solved, half, 1.0))
     new, remeshed = stages.new_mesh(previous, expanded, solved)
     refuse_density(new, stages.remeshing.maximum_density)
+    makes_contact = expanded.contact and not previous.contact
+    speeds = None if makes_contact else contact_lines.speeds(expansion.advances, duration)
+    new = replace(new, line_speeds=speeds)
     flows = _flows(half.solved.substrates.fluxes, duration)
     ledger = Ledger(previous.time, previous.time + duration, *flows, previous.mass,
                     after.mass - previous.mass, new.mass)
     inner = partial(interpolate, stages, previous, solved, half)
     step = StepResult(new, None, ledger, remeshed, expansion.iterations, inner)
-    makes_contact = expanded.contact and not previous.contact
     return Attempt(step, change, (gap, expansion.gap) if makes_contact else None)
 
 
@@ -130,6 +132,7 @@ def solve_halfway(stages: Stages, previous: Pore, solved: Solved, first: Rates, 
     and rates back to the points of the material.
     """
     ahead = replace(grow(previous, first, duration / 2), time=previous.time + duration / 2)
+    search = replace(search, advances=contact_lines.advances_at(previous.line_speeds, duration / 2))
     expansion = stages.expand(previous, ahead, _scale_shape(previous, ahead), search)
     shape = expansion.pore
     mesh = remeshing.moved_mesh(stages.remeshing.meshing, previous, shape)

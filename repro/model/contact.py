@@ -16,10 +16,11 @@ import numpy as np
 
 from repro.errors import GrowthError, LinearError
 from repro.fem.division import Division
+from repro.fem.division import split as division_split
 from repro.fem.mesh import Mesh
 from repro.fem.outline import BOTTOM, FREE, TOP, Outline
 from repro.fem.space import Space
-from repro.model import contact_lines, growth, traction
+from repro.model import contact_lines, contact_newton, growth, traction
 from repro.model.contact_lines import (
     Clearance,
     Contact,
@@ -41,6 +42,8 @@ FORCE_ROUNDS = 12
 #: Largest move of a node in the last round, over the aggregate's thickness.
 FORCE_REST = 1e-8
 PATIENT = SearchOptions()
+import os
+VERBOSE = os.environ.get("VERB")
 #: Lengths of the first contact to both sides of the highest place, over the least film.
 FIRST_LENGTHS = np.array([1.0, 0.5, 0.25])
 
@@ -213,6 +216,11 @@ def _close_by_lines(mechanics: Mechanics, grown: Pore, start: Pore, forces: np.n
     trials = _Trials(mechanics, grown, start, forces, search.patient)
     lines = contact_lines.lines_of(grown.boundary)
     _place_lines(grown.boundary, lines, search)
+    if grown.contact:
+        settled = trials.settle(grown.wall, lines, rule)
+        if settled is not None:
+            rest = replace(settled.pore, fixed=_with_new_surface(settled.pore.boundary))
+            return replace(settled, pore=rest, iterations=trials.iterations)
     shape = trials.solve(grown.wall, lines)
     gap = rule.width - shape.pore.boundary.thickness
     wall = grown.wall
@@ -350,6 +358,172 @@ class _Trials:
                 if not moving:
                     break
         raise failure
+
+    def settle(self, wall: np.ndarray, lines: Sequence[Line], rule: Clearance) -> Expansion | None:
+        """The equilibrium with walls (M,) of the grown pore's outline and with its lines where
+        their clearances vanish; None if Newton's method for both fails, with the lines' advances
+        as before."""
+        advances = [line.advance for line in lines]
+        try:
+            return self._settle(wall, lines, rule)
+        except (GrowthError, LinearError, np.linalg.LinAlgError) as error:
+            for line, advance in zip(lines, advances):
+                line.advance = advance
+            return None
+
+    def _settle(self, wall: np.ndarray, lines: Sequence[Line], rule: Clearance) -> Expansion:
+        """Theta goes to its target in parts, as in :func:`growth.equilibrium`."""
+        grown = self._grown
+        body, target_J = _strained_from(self._mechanics.keys, grown, grown.theta)
+        points, pressure = self._start
+        growing = target_J / body.strained(points[grown.mesh.body]).J
+        parts = growth.GradDiv.parts(growing)
+        for part in range(1, parts + 1):
+            self._grown = replace(grown, theta=grown.theta * growing ** (part / parts - 1))
+            expansion, points, pressure = self._newton(wall, lines, rule, points, pressure,
+                                                       part == parts)
+        self._grown = grown
+        outline = replace(grown.boundary, wall=wall)
+        advances = {line.key: contact_lines.to_length(outline, line) for line in lines}
+        return replace(expansion, advances=advances)
+
+    def _newton(self, wall, lines, rule, points, pressure, last):
+        grown = self._grown
+        locked, division, placed = self._place(wall, lines, rule)
+        if division is not None:
+            points = division.nodal(points)
+            pressure = division.at_corners(pressure)
+        position = points[locked.mesh.body]
+        push = pressure[locked.mesh.topology.body_corners]
+        defect = np.inf
+        for count in range(contact_newton.MOST_ITERATIONS):
+            iterate = placed.system.under(placed.theta, placed.target(position), position, push)
+            clearance = placed.clearances(position)[0]
+            fits = all(map(contact_newton.accepted, lines, clearance))
+            stalled = 0.1 * defect < iterate.defect <= growth.ROUND_OFF
+            if VERBOSE:
+                print("   it", count, f"{iterate.defect:.1e}", clearance, [l.advance for l in lines], fits)
+            if iterate.complete and fits and (iterate.defect <= growth.NEWTON or stalled or not last and iterate.defect < 1e-3):
+                points = locked.mesh.points.copy()
+                points[locked.mesh.body] = position
+                pressure = locked.pressure.copy()
+                pressure[locked.mesh.topology.body_corners] = push
+                shape = replace(locked.moved(points), pressure=pressure)
+                expansion = Expansion(shape, count, 0.0, division)
+                parent = points if division is None else division.restricted(points)
+                self.iterations += count
+                return expansion, parent, pressure[: grown.mesh.corners]
+            defect = iterate.defect
+            factors = placed.system.factored(iterate)
+            lag = iterate.lag
+            n = len(position)
+            carried = np.concatenate([lag[:, 0], lag[:, 1], np.zeros(len(push))])
+            step = factors.solve(-iterate.residual, None if iterate.complete else carried)
+            move = step[: 2 * n].reshape(2, n).T
+            ahead, reach = placed.clearances(position + move)
+            steps = np.zeros(len(lines))
+            columns = {}
+            if not all(map(contact_newton.rests, lines, ahead)):
+                columns = {k: factors.solve(-change(position, push))
+                           for k, change in placed.ahead.items()}
+                moves = {k: column[: 2 * n].reshape(2, n).T for k, column in columns.items()}
+                steps = contact_newton.line_steps(lines, placed, position + move, moves)
+                for k, column in columns.items():
+                    step = step + steps[k] * column
+            start = [line.advance for line in lines]
+            for length in 0.5 ** np.arange(contact_newton.HALVINGS):
+                for k, line in enumerate(lines):
+                    line.advance, line.at_corner = contact_newton.advanced(
+                        replace(line, advance=start[k]), length * steps[k])
+                new = position + length * step[: 2 * n].reshape(2, n).T
+                new_push = push + length * step[2 * n:]
+                again = locked, division, placed
+                if any(line.advance != s for line, s in zip(lines, start)):
+                    again = self._place(wall, lines, rule)
+                    new, new_push = self._carried(locked, division, again, new, new_push)
+                if again[2].system.strained(new).J.min() > 0:
+                    break
+            else:
+                raise GrowthError("turned over")
+            position, push = new, new_push
+            locked, division, placed = again
+        raise GrowthError("no convergence of lines and shape")
+
+    def _carried(self, locked, division, again, position, push):
+        """Carry a shape to another division."""
+        other, other_division, _ = again
+        if division is not None and other_division is not None and np.array_equal(division.arcs, other_division.arcs):
+            return position, push
+        points = locked.mesh.points.copy()
+        points[locked.mesh.body] = position
+        pressure = locked.pressure.copy()
+        pressure[locked.mesh.topology.body_corners] = push
+        if division is not None:
+            points = division.restricted(points)
+            pressure = pressure[: self._grown.mesh.corners]
+        if other_division is not None:
+            points = other_division.nodal(points)
+            pressure = other_division.at_corners(pressure)
+        return points[other.mesh.body], pressure[other.mesh.topology.body_corners]
+
+    def _place(self, wall, lines, rule):
+        grown = self._grown
+        contact = contact_with(wall, lines)
+        locked = replace(grown, wall=contact.wall)
+        division = None
+        forces = self._forces
+        if len(contact.arcs):
+            division = self._division(contact)
+            locked = divided(grown, division, contact, self._shape)
+            self._shape = locked.body.shape
+            forces = None if forces is None else _divided_loads(division, forces)
+        body, theta = _strained_from(self._mechanics.keys, locked, locked.theta)
+        width = rule.width
+        system = growth.System(body, _constraints(locked, width)[0], forces=forces)
+        rim = locked.mesh.topology.body_loop
+
+        def target(position):
+            goal = position.copy()
+            goal[rim[locked.wall == BOTTOM], 1] = 0.0
+            goal[rim[locked.wall == TOP], 1] = width
+            return goal
+
+        def clearances(position):
+            outline = Outline(position[rim], locked.wall, locked.fixed, position[rim], 2)
+            both = [_clearance(rule, outline, line) for line in lines]
+            return np.array([c for c, _ in both]), np.array([r for _, r in both])
+
+        ahead = {}
+        for k, line in enumerate(lines):
+            arc = contact_lines.divided_arc(len(wall), line)
+            where = np.flatnonzero(contact.arcs == arc)
+            if len(where):
+                sign = line.direction
+                ahead[k] = self._ahead_of(locked, division, int(where[0]), sign, system, theta, body)
+        return locked, division, contact_newton.Placed(system, theta, target, ahead, clearances)
+
+    def _ahead_of(self, locked, division, number, sign, system, theta, body):
+        grown = self._grown
+        rows, triangle = division.halves(number)
+        reference = grown.origin if self._mechanics.keys.new_biomass == "stressed" else grown.mesh.points
+        nodes = reference[grown.mesh.cells[triangle.cell]]
+        amount = (grown.theta * grown.body.at.dx)[rows[0]]
+        table = grown.space.table
+
+        def part(t):
+            at = triangle.divided_at(t)
+            moved = body.reference.copy()
+            moved[body.shape.cells[rows]] = at.nodes(nodes)
+            few = growth.Body(growth.Shape(body.shape.cells[rows], body.shape.corners, body.shape.degree), moved)
+            return few, np.stack(division_split(amount, at, table)) / few.at.dx
+
+        def change(position, push):
+            t = division.t[number]
+            eps = contact_newton.SMALL
+            before, after = (system.partial_residual(*part(place), position, push)
+                             for place in (t, t + sign * eps))
+            return (after - before) / eps
+        return change
 
     def _division(self, contact: Contact) -> Division:
         """The division of the contact's arcs; it keeps the connections of the last one if the arcs
