@@ -280,6 +280,9 @@ def _place_lines(outline: Outline, lines: Sequence[Line], search: SearchOptions)
     for line in lines:
         length = search.advances.get(line.key, 0.0)
         line.advance = max(line.least, contact_lines.to_arcs(outline, line, length))
+        if 0 < line.advance < contact_lines.LEAST_PART:
+            line.advance = contact_newton.BESIDE
+            line.at_corner = True
 
 
 def _tip_width(outline: Outline, depth: float) -> float:
@@ -427,14 +430,15 @@ class _Trials:
                 columns = {k: factors.solve(-change(position, push))
                            for k, change in placed.ahead.items()}
                 moves = {k: column[: 2 * n].reshape(2, n).T for k, column in columns.items()}
-                steps = contact_newton.line_steps(lines, placed, position + move, moves)
+                near = count == 0 or iterate.defect < 0.05
+                steps = contact_newton.line_steps(lines, placed, position + move, moves, near, count == 0)
                 for k, column in columns.items():
                     step = step + steps[k] * column
             start = [line.advance for line in lines]
             for length in 0.5 ** np.arange(contact_newton.HALVINGS):
-                for k, line in enumerate(lines):
-                    line.advance, line.at_corner = contact_newton.advanced(
-                        replace(line, advance=start[k]), length * steps[k])
+                for line, advance, ahead in zip(lines, start, length * steps):
+                    line.advance = advance
+                    contact_newton.advance(line, contact_newton.clipped(line, ahead) if ahead else 0.0)
                 new = position + length * step[: 2 * n].reshape(2, n).T
                 new_push = push + length * step[2 * n:]
                 again = locked, division, placed

@@ -176,6 +176,7 @@ class Line:
     stalls: bool = False
     trials: list[tuple[float, float]] = field(default_factory=list)
     at_corner: bool = False
+    floor: float = 0.0
 
     @property
     def key(self) -> tuple[int, int]:

@@ -22,7 +22,7 @@ from repro.model import growth
 from repro.model.contact_lines import CLOSE, FIRST_TRIAL, LEAST_PART, Line
 
 #: Iterations after which the search with whole equilibria takes over.
-MOST_ITERATIONS = 16
+MOST_ITERATIONS = 20
 #: Difference of an advance (arcs) for the derivative of the residual.
 SMALL = 1e-5
 #: Difference of an advance (arcs) for the derivative of the clearance.
@@ -31,6 +31,8 @@ MODEST = 0.02
 LONGEST = 2.0
 #: Lines stop where all clearances are within this.
 AT_REST = CLOSE / 2
+#: A line whose place is at a corner lies at this distance (arcs) beyond it.
+BESIDE = 1.01 * LEAST_PART
 #: Halvings of a step that turns a triangle over.
 HALVINGS = 5
 
@@ -69,42 +71,54 @@ def rests(line: Line, clearance: float) -> bool:
 
 
 def line_steps(lines: Sequence[Line], placed: Placed, position: np.ndarray,
-               moves: dict[int, np.ndarray]) -> np.ndarray:
+               moves: dict[int, np.ndarray], near: bool, first: bool) -> np.ndarray:
     """(L,) arcs, steps of the lines to the root of their clearances.
 
-    moves: (n, 2) um per arc, of the nodes with each line within an arc.
+    moves: (n, 2) um per arc, of the nodes with each line within an arc; near: is the shape so near
+    to its equilibrium that a line at a corner may leave it?
     """
     present, reach = placed.clearances(position)
     steps = np.zeros(len(lines))
     least = np.array([line.least - line.advance for line in lines])
-    for k in range(len(lines)):
-        if k not in moves and present[k] < -AT_REST:
-            steps[k] = max(FIRST_TRIAL * reach[k], 0.1)
-        elif k not in moves and present[k] > AT_REST and least[k] < 0:
-            steps[k] = max(-0.1, least[k])
-    active = [k for k in moves if least[k] < 0 or present[k] < -AT_REST]
+    if near:
+        for k in range(len(lines)):
+            if k not in moves and present[k] < -AT_REST:
+                steps[k] = max(FIRST_TRIAL * reach[k], 0.1) if first else 0.3
+                lines[k].floor = lines[k].advance + BESIDE
+            elif k not in moves and present[k] > AT_REST and least[k] < 0:
+                steps[k] = max(-0.1, least[k])
+    active = [k for k in moves if not rests(lines[k], present[k])]
     rise = {k: (placed.clearances(position + MODEST * moves[k])[0] - present) / MODEST
-            for k in active}
+            for k in moves}
     while active:
         square = np.array([rise[k][active] for k in active]).T
         steps[active] = np.linalg.solve(square, -present[active])
-        back = [k for k in active if steps[k] < least[k]]
-        if not back:
-            break
-        active = [k for k in active if k not in back]
-        for k in back:
-            steps[k] = least[k]
+        ends = [clipped(line, step) for line, step in zip(lines, steps)]
+        stopped = [k for k in active if ends[k] != steps[k]]
+        for k in stopped:
+            steps[k] = ends[k]
             present = present + steps[k] * rise[k]
-    return np.clip(steps, -LONGEST, LONGEST)
+        active = [k for k in active if k not in stopped]
+        if not stopped:
+            break
+    return steps
 
 
-def advanced(line: Line, step: float) -> tuple[float, bool]:
-    """The advance (arcs) of a line after a step, and is its place at a corner?
+def clipped(line: Line, step: float) -> float:
+    """The step of a line, bounded, and to a place that it may have.
 
     A line lies at least LEAST_PART from a corner. If its place is nearer, it lies beyond.
     """
-    place = max(line.advance + step, line.least)
+    place = max(line.advance + min(max(step, -LONGEST), LONGEST), line.least, line.floor)
     corner = round(place)
-    if abs(place - corner) >= LEAST_PART or place == line.least:
-        return place, False
-    return corner + LEAST_PART, True
+    if abs(place - corner) < LEAST_PART and place > line.least:
+        place = corner + BESIDE
+    return place - line.advance
+
+
+def advance(line: Line, step: float) -> None:
+    """Move a line by a step (arcs)."""
+    if step == 0:
+        return
+    line.advance += step
+    line.at_corner = abs(line.advance - round(line.advance) - BESIDE) < 1e-9
