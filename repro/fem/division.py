@@ -66,7 +66,7 @@ class DividedTriangle:
         """(2, 6, ...) at the nodes of both parts, from values (6, ...) at the triangle's nodes."""
         corners = np.stack(self.parts)
         where = np.concatenate([corners, (corners + np.roll(corners, -1, axis=1)) / 2], axis=1)
-        shapes = elements.values(2, where.reshape(-1, 2))
+        shapes = quadratic(where.reshape(-1, 2))
         return np.tensordot(shapes, values, 1).reshape(2, 6, *values.shape[1:])
 
 
@@ -165,7 +165,7 @@ class Division:
             s = triangle.place
             where = np.array([s, (start + s) / 2, (s + end) / 2, (s + opposite) / 2])
             nodes = values[self.parent.cells[triangle.cell]]
-            at, near, far, inner = np.tensordot(elements.values(2, where), nodes, 1)
+            at, near, far, inner = np.tensordot(quadratic(where), nodes, 1)
             places[triangle.arc] = at
             first_halves[triangle.arc] = near if triangle.forward else far
             second_halves[triangle.arc] = far if triangle.forward else near
@@ -265,6 +265,18 @@ class Division:
         return np.vstack([divided, *second_parts])
 
 
+def barycentric(where: np.ndarray) -> np.ndarray:
+    """(q, 3) linear shape functions at points (q, 2) of the unit triangle."""
+    return np.column_stack([1 - where[:, 0] - where[:, 1], where])
+
+
+def quadratic(where: np.ndarray) -> np.ndarray:
+    """(q, 6) quadratic shape functions at points (q, 2) of the unit triangle, as those of
+    :func:`elements.values`, which takes longer for a few points."""
+    linear = barycentric(where)
+    return np.hstack([linear * (2 * linear - 1), 4 * linear * linear[:, [1, 2, 0]]])
+
+
 def split(amount: np.ndarray, triangle: DividedTriangle,
           table: Table) -> tuple[np.ndarray, np.ndarray]:
     """(q,) amounts in both parts of a triangle with amounts (q,)."""
@@ -272,7 +284,7 @@ def split(amount: np.ndarray, triangle: DividedTriangle,
     at_corners = elements.linear_fit(table) @ density
     halves = []
     for corners, share in zip(triangle.parts, (triangle.t, 1 - triangle.t)):
-        fitted = elements.values(1, table.linear @ corners) @ at_corners
+        fitted = barycentric(table.linear @ corners) @ at_corners
         halves.append(share * table.weights * np.clip(fitted, density.min(), density.max()))
     total = halves[0].sum() + halves[1].sum()
     scale = amount.sum() / total if total > 0 else 1.0

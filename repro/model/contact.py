@@ -227,12 +227,19 @@ def _close_by_lines(mechanics: Mechanics, grown: Pore, start: Pore, forces: np.n
     if not grown.contact and gap < rule.film:
         _refuse_late(gap, rule.film, search)
         wall, lines, shape = _touch(grown, shape, rule, trials, search)
+    tried = grown.contact
     for _ in range(CONTACT_ROUNDS):
         for line in lines:
             line.record(*_clearance(rule, shape.pore.boundary, line))
         if all(line.accepted for line in lines):
             rest = replace(shape.pore, fixed=_with_new_surface(shape.pore.boundary))
             return replace(shape, pore=rest, iterations=trials.iterations, gap=gap)
+        if not tried and all(line.accepted or abs(line.trials[-1][1]) < 0.2 for line in lines):
+            tried = True
+            settled = trials.settle(wall, lines, rule)
+            if settled is not None:
+                rest = replace(settled.pore, fixed=_with_new_surface(settled.pore.boundary))
+                return replace(settled, pore=rest, iterations=trials.iterations, gap=gap)
         for line in lines:
             if not line.accepted:
                 line.step()
@@ -378,7 +385,7 @@ class _Trials:
         """Theta goes to its target in parts, as in :func:`growth.equilibrium`."""
         grown = self._grown
         body, target_J = _strained_from(self._mechanics.keys, grown, grown.theta)
-        points, pressure = self._start
+        points, pressure = self._shapes[-1][1:]
         growing = target_J / body.strained(points[grown.mesh.body]).J
         parts = growth.GradDiv.parts(growing)
         for part in range(1, parts + 1):
@@ -431,7 +438,8 @@ class _Trials:
                            for k, change in placed.ahead.items()}
                 moves = {k: column[: 2 * n].reshape(2, n).T for k, column in columns.items()}
                 near = count == 0 or iterate.defect < 0.05
-                steps = contact_newton.line_steps(lines, placed, position + move, moves, near, count == 0)
+                steps = contact_newton.line_steps(lines, placed, position + move, moves, near, count == 0,
+                                                  ahead, reach)
                 for k, column in columns.items():
                     step = step + steps[k] * column
             start = [line.advance for line in lines]
@@ -492,10 +500,13 @@ class _Trials:
             goal[rim[locked.wall == TOP], 1] = width
             return goal
 
-        def clearances(position):
+        ends = {(wall, direction): node for wall in (BOTTOM, TOP)
+                for node, direction in contact_lines.surface_ends(locked.boundary, wall)}
+
+        def clearances(position, numbers=range(len(lines))):
             outline = Outline(position[rim], locked.wall, locked.fixed, position[rim], 2)
-            both = [_clearance(rule, outline, line) for line in lines]
-            return np.array([c for c, _ in both]), np.array([r for _, r in both])
+            return np.array([rule.beyond(outline, ends[lines[k].key], lines[k].direction)
+                             for k in numbers]).T
 
         ahead = {}
         for k, line in enumerate(lines):
@@ -522,10 +533,10 @@ class _Trials:
             return few, np.stack(division_split(amount, at, table)) / few.at.dx
 
         def change(position, push):
-            t = division.t[number]
             eps = contact_newton.SMALL
-            before, after = (system.partial_residual(*part(place), position, push)
-                             for place in (t, t + sign * eps))
+            shape = growth.Shape(body.shape.cells[rows], body.shape.corners, body.shape.degree)
+            before = system.partial_residual(growth.Body(shape, body.reference), theta[rows], position, push)
+            after = system.partial_residual(*part(division.t[number] + sign * eps), position, push)
             return (after - before) / eps
         return change
 

@@ -44,6 +44,7 @@ MEET = ("two contact lines meet, with fluid between them that has no way out; "
         "try a shorter growth.time_step")
 #: Parameters of an arc at which the clearance is computed: the second shows the angle at the line.
 PLACES = np.append([0.0, 1e-3], np.linspace(0.0, 1.0, 9)[1:])
+AT_PLACES = parabola(PLACES)
 
 
 @dataclass(frozen=True)
@@ -118,7 +119,7 @@ class Clearance:
     def _places(self, arcs: np.ndarray, outwards: float) -> tuple[np.ndarray, np.ndarray]:
         """(K,) arcs from the line, and (K, 2) um the points there: PLACES of each arc, and the
         points where the rule changes from the angle to the film."""
-        points = np.einsum("sa,kai->ksi", parabola(PLACES), arcs)
+        points = AT_PLACES @ arcs
         place = np.arange(len(arcs))[:, None] + PLACES
         beyond = outwards * (points[..., 0] - arcs[0, 0, 0]) - self.film / np.tan(self.angle)
         arc, k = np.nonzero(beyond[:, :-1] * beyond[:, 1:] < 0)

@@ -71,13 +71,12 @@ def rests(line: Line, clearance: float) -> bool:
 
 
 def line_steps(lines: Sequence[Line], placed: Placed, position: np.ndarray,
-               moves: dict[int, np.ndarray], near: bool, first: bool) -> np.ndarray:
+               moves: dict[int, np.ndarray], near: bool, first: bool, present, reach) -> np.ndarray:
     """(L,) arcs, steps of the lines to the root of their clearances.
 
     moves: (n, 2) um per arc, of the nodes with each line within an arc; near: is the shape so near
     to its equilibrium that a line at a corner may leave it?
     """
-    present, reach = placed.clearances(position)
     steps = np.zeros(len(lines))
     least = np.array([line.least - line.advance for line in lines])
     if near:
@@ -88,8 +87,12 @@ def line_steps(lines: Sequence[Line], placed: Placed, position: np.ndarray,
             elif k not in moves and present[k] > AT_REST and least[k] < 0:
                 steps[k] = max(-0.1, least[k])
     active = [k for k in moves if not rests(lines[k], present[k])]
-    rise = {k: (placed.clearances(position + MODEST * moves[k])[0] - present) / MODEST
-            for k in moves}
+    numbers = list(active)
+    rise = {}
+    for k in active:
+        rise[k] = np.zeros(len(lines))
+        moved = placed.clearances(position + MODEST * moves[k], numbers)[0]
+        rise[k][numbers] = (moved - present[numbers]) / MODEST
     while active:
         square = np.array([rise[k][active] for k in active]).T
         steps[active] = np.linalg.solve(square, -present[active])
