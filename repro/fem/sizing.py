@@ -25,9 +25,9 @@ ALONG_INTERFACE = 600.0
 GRADATION = 0.25
 #: An interface edge is split if it is longer than the element size by this factor.
 SPLIT = 1.4
-#: After contact, two free arcs are merged if together they are shorter than the element size by this
-#: factor, and if the merged arc departs from them by at most MERGED_APART of its length.
-MERGED = 0.7
+#: After contact, two free arcs are merged if together they are shorter than the element size times
+#: this, and if the merged arc departs from them by at most MERGED_APART of its length.
+MERGED = 0.5
 MERGED_APART = 1e-3
 #: Largest number of distances between points and sources in memory at once.
 DISTANCES = 2**20
@@ -102,9 +102,15 @@ def _contact_sizes(outline: Outline, sizing: Sizing) -> np.ndarray | float:
     top = outline.wall == TOP
     if sizing.contact == inf or not top.any():
         return inf
+    return sizing.contact + GRADATION * _from_lines(outline)
+
+
+def _from_lines(outline: Outline) -> np.ndarray:
+    """(M,) um, distance to the nearest contact line with the opposite wall, of which there is one.
+    """
+    top = outline.wall == TOP
     lines = outline.points[top & ~(np.roll(top, 1) & np.roll(top, -1))]
-    distance = np.linalg.norm(outline.points[:, None] - lines, axis=2).min(axis=1)
-    return sizing.contact + GRADATION * distance
+    return np.linalg.norm(outline.points[:, None] - lines, axis=2).min(axis=1)
 
 
 def too_coarse(outline: Outline, sizing: Sizing) -> bool:
@@ -187,16 +193,16 @@ def split(outline: Outline, sizing: Sizing) -> Outline:
 
 
 def merged(outline: Outline, sizing: Sizing) -> Outline:
-    """The outline with pairs of free arcs merged that are short against :func:`interface_sizes`,
-    and do not end at a contact line with the opposite wall.
+    """The outline with pairs of free arcs merged that are short against :func:`interface_sizes`
+    and against their distance from the contact lines with the opposite wall.
 
     Its area stays exactly, its shape within MERGED_APART of an arc's length.
     """
     polygon = outline.corners
-    sizes = interface_sizes(polygon, sizing)
+    sizes = np.minimum(MERGED * interface_sizes(polygon, sizing),
+                       GRADATION * _from_lines(polygon))
     length = polygon.edge_lengths()
-    lines = (outline.edge_wall == FREE) & (outline.arcs(outline.wall)[:, [0, 2]] == TOP).any(axis=1)
-    free = (outline.edge_wall == FREE) & ~lines
+    free = outline.edge_wall == FREE
     points = outline.arcs(outline.points)
     origins = outline.arcs(outline.origin)
     kept = np.ones(len(outline.points), bool)
@@ -205,7 +211,7 @@ def merged(outline: Outline, sizing: Sizing) -> Outline:
     arc = 0
     while arc < len(free) - 1:
         pair = slice(arc, arc + 2)
-        short = length[pair].sum() < MERGED * sizes[pair].min()
+        short = length[pair].sum() < sizes[arc: arc + 3].min()
         step = 1
         if short and free[pair].all() and not polygon.fixed[arc + 1]:
             part, weights = _middle_of_two(*length[pair])

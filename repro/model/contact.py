@@ -11,16 +11,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
 from repro.errors import GrowthError, LinearError
 from repro.fem.division import Division
-from repro.fem.division import split as division_split
 from repro.fem.mesh import Mesh
 from repro.fem.outline import BOTTOM, FREE, TOP, Outline
 from repro.fem.space import Space
-from repro.model import contact_lines, contact_newton, growth, traction
+from repro.model import contact_lines, growth, traction
 from repro.model.contact_lines import (
     Clearance,
     Contact,
@@ -29,6 +29,7 @@ from repro.model.contact_lines import (
     SearchOptions,
     contact_with,
 )
+from repro.model.contact_newton import BESIDE, Coupled, Placed
 from repro.model.pore import Pore, material
 from repro.model.traction import Fluid
 from repro.scene import Growth, Numerics, Scene
@@ -42,8 +43,10 @@ FORCE_ROUNDS = 12
 #: Largest move of a node in the last round, over the aggregate's thickness.
 FORCE_REST = 1e-8
 PATIENT = SearchOptions()
-import os
-VERBOSE = os.environ.get("VERB")
+#: Defect at which a part of theta but the last counts as reached.
+PARTLY = 1e-3
+#: Clearances of the first contact at which Newton's method takes over from the search.
+CLOSE_ENOUGH = 0.2
 #: Lengths of the first contact to both sides of the highest place, over the least film.
 FIRST_LENGTHS = np.array([1.0, 0.5, 0.25])
 
@@ -219,8 +222,7 @@ def _close_by_lines(mechanics: Mechanics, grown: Pore, start: Pore, forces: np.n
     if grown.contact:
         settled = trials.settle(grown.wall, lines, rule)
         if settled is not None:
-            rest = replace(settled.pore, fixed=_with_new_surface(settled.pore.boundary))
-            return replace(settled, pore=rest, iterations=trials.iterations)
+            return settled
     shape = trials.solve(grown.wall, lines)
     gap = rule.width - shape.pore.boundary.thickness
     wall = grown.wall
@@ -234,12 +236,12 @@ def _close_by_lines(mechanics: Mechanics, grown: Pore, start: Pore, forces: np.n
         if all(line.accepted for line in lines):
             rest = replace(shape.pore, fixed=_with_new_surface(shape.pore.boundary))
             return replace(shape, pore=rest, iterations=trials.iterations, gap=gap)
-        if not tried and all(line.accepted or abs(line.trials[-1][1]) < 0.2 for line in lines):
+        if not tried and all(abs(line.trials[-1][1]) < CLOSE_ENOUGH or line.accepted
+                             for line in lines):
             tried = True
             settled = trials.settle(wall, lines, rule)
             if settled is not None:
-                rest = replace(settled.pore, fixed=_with_new_surface(settled.pore.boundary))
-                return replace(settled, pore=rest, iterations=trials.iterations, gap=gap)
+                return replace(settled, gap=gap)
         for line in lines:
             if not line.accepted:
                 line.step()
@@ -288,7 +290,7 @@ def _place_lines(outline: Outline, lines: Sequence[Line], search: SearchOptions)
         length = search.advances.get(line.key, 0.0)
         line.advance = max(line.least, contact_lines.to_arcs(outline, line, length))
         if 0 < line.advance < contact_lines.LEAST_PART:
-            line.advance = contact_newton.BESIDE
+            line.advance = BESIDE
             line.at_corner = True
 
 
@@ -359,9 +361,7 @@ class _Trials:
             try:
                 shape = self._solve(contact_with(wall, lines),
                                     np.array([line.advance for line in lines]))
-                outline = replace(self._grown.boundary, wall=wall)
-                advances = {line.key: contact_lines.to_length(outline, line) for line in lines}
-                return replace(shape, advances=advances)
+                return replace(shape, advances=self._lengths(wall, lines))
             except (GrowthError, LinearError) as error:
                 failure = error
                 moving = [line for line in lines if line.retreat()]
@@ -370,175 +370,60 @@ class _Trials:
         raise failure
 
     def settle(self, wall: np.ndarray, lines: Sequence[Line], rule: Clearance) -> Expansion | None:
-        """The equilibrium with walls (M,) of the grown pore's outline and with its lines where
-        their clearances vanish; None if Newton's method for both fails, with the lines' advances
-        as before."""
-        advances = [line.advance for line in lines]
-        try:
-            return self._settle(wall, lines, rule)
-        except (GrowthError, LinearError, np.linalg.LinAlgError) as error:
-            for line, advance in zip(lines, advances):
-                line.advance = advance
-            return None
+        """The equilibrium with walls (M,) of the grown pore's outline and with lines at the roots
+        of their clearances; None, and the lines where they were, if Newton's method for both fails.
 
-    def _settle(self, wall: np.ndarray, lines: Sequence[Line], rule: Clearance) -> Expansion:
-        """Theta goes to its target in parts, as in :func:`growth.equilibrium`."""
+        Theta goes to its target in parts, as in :func:`growth.equilibrium`.
+        """
+        start = [line.advance for line in lines]
         grown = self._grown
         body, target_J = _strained_from(self._mechanics.keys, grown, grown.theta)
-        points, pressure = self._shapes[-1][1:]
-        growing = target_J / body.strained(points[grown.mesh.body]).J
-        parts = growth.GradDiv.parts(growing)
-        for part in range(1, parts + 1):
-            self._grown = replace(grown, theta=grown.theta * growing ** (part / parts - 1))
-            expansion, points, pressure = self._newton(wall, lines, rule, points, pressure,
-                                                       part == parts)
-        self._grown = grown
-        outline = replace(grown.boundary, wall=wall)
-        advances = {line.key: contact_lines.to_length(outline, line) for line in lines}
-        return replace(expansion, advances=advances)
+        points, pressures = self._shapes[-1][1:]
+        J = body.strained(points[grown.mesh.body]).J
+        try:
+            for part in _parts(target_J / J):
+                theta = grown.theta * (J / target_J) ** (1 - part)
+                partly = replace(grown, theta=theta)
+                coupled = Coupled(partial(self._place, partly, wall, lines, rule), lines, points,
+                                  pressures)
+                coupled.solve(growth.NEWTON if part == 1 else PARTLY)
+                self.iterations += coupled.iterations
+                points, pressures = coupled.placed.on_parent(coupled.position, coupled.pressure)
+        except (GrowthError, LinearError, np.linalg.LinAlgError):
+            for line, advance in zip(lines, start):
+                line.advance = advance
+            return None
+        placed = coupled.placed
+        points, pressures = placed.on_mesh(coupled.position, coupled.pressure)
+        shape = replace(placed.pore.moved(points), pressure=pressures)
+        rest = replace(shape, fixed=_with_new_surface(shape.boundary))
+        return Expansion(rest, self.iterations, 0.0, placed.division, self._lengths(wall, lines))
 
-    def _newton(self, wall, lines, rule, points, pressure, last):
-        grown = self._grown
-        locked, division, placed = self._place(wall, lines, rule)
-        if division is not None:
-            points = division.nodal(points)
-            pressure = division.at_corners(pressure)
-        position = points[locked.mesh.body]
-        push = pressure[locked.mesh.topology.body_corners]
-        defect = np.inf
-        for count in range(contact_newton.MOST_ITERATIONS):
-            iterate = placed.system.under(placed.theta, placed.target(position), position, push)
-            clearance = placed.clearances(position)[0]
-            fits = all(map(contact_newton.accepted, lines, clearance))
-            stalled = 0.1 * defect < iterate.defect <= growth.ROUND_OFF
-            if VERBOSE:
-                print("   it", count, f"{iterate.defect:.1e}", clearance, [l.advance for l in lines], fits)
-            if iterate.complete and fits and (iterate.defect <= growth.NEWTON or stalled or not last and iterate.defect < 1e-3):
-                points = locked.mesh.points.copy()
-                points[locked.mesh.body] = position
-                pressure = locked.pressure.copy()
-                pressure[locked.mesh.topology.body_corners] = push
-                shape = replace(locked.moved(points), pressure=pressure)
-                expansion = Expansion(shape, count, 0.0, division)
-                parent = points if division is None else division.restricted(points)
-                self.iterations += count
-                return expansion, parent, pressure[: grown.mesh.corners]
-            defect = iterate.defect
-            factors = placed.system.factored(iterate)
-            lag = iterate.lag
-            n = len(position)
-            carried = np.concatenate([lag[:, 0], lag[:, 1], np.zeros(len(push))])
-            step = factors.solve(-iterate.residual, None if iterate.complete else carried)
-            move = step[: 2 * n].reshape(2, n).T
-            ahead, reach = placed.clearances(position + move)
-            steps = np.zeros(len(lines))
-            columns = {}
-            if not all(map(contact_newton.rests, lines, ahead)):
-                columns = {k: factors.solve(-change(position, push))
-                           for k, change in placed.ahead.items()}
-                moves = {k: column[: 2 * n].reshape(2, n).T for k, column in columns.items()}
-                near = count == 0 or iterate.defect < 0.05
-                steps = contact_newton.line_steps(lines, placed, position + move, moves, near, count == 0,
-                                                  ahead, reach)
-                for k, column in columns.items():
-                    step = step + steps[k] * column
-            start = [line.advance for line in lines]
-            for length in 0.5 ** np.arange(contact_newton.HALVINGS):
-                for line, advance, ahead in zip(lines, start, length * steps):
-                    line.advance = advance
-                    contact_newton.advance(line, contact_newton.clipped(line, ahead) if ahead else 0.0)
-                new = position + length * step[: 2 * n].reshape(2, n).T
-                new_push = push + length * step[2 * n:]
-                again = locked, division, placed
-                if any(line.advance != s for line, s in zip(lines, start)):
-                    again = self._place(wall, lines, rule)
-                    new, new_push = self._carried(locked, division, again, new, new_push)
-                if again[2].system.strained(new).J.min() > 0:
-                    break
-            else:
-                raise GrowthError("turned over")
-            position, push = new, new_push
-            locked, division, placed = again
-        raise GrowthError("no convergence of lines and shape")
+    def _lengths(self, wall: np.ndarray, lines: Sequence[Line]) -> dict[tuple[int, int], float]:
+        """{(wall, direction): um} by which lines have advanced."""
+        outline = replace(self._grown.boundary, wall=wall)
+        return {line.key: contact_lines.to_length(outline, line) for line in lines}
 
-    def _carried(self, locked, division, again, position, push):
-        """Carry a shape to another division."""
-        other, other_division, _ = again
-        if division is not None and other_division is not None and np.array_equal(division.arcs, other_division.arcs):
-            return position, push
-        points = locked.mesh.points.copy()
-        points[locked.mesh.body] = position
-        pressure = locked.pressure.copy()
-        pressure[locked.mesh.topology.body_corners] = push
-        if division is not None:
-            points = division.restricted(points)
-            pressure = pressure[: self._grown.mesh.corners]
-        if other_division is not None:
-            points = other_division.nodal(points)
-            pressure = other_division.at_corners(pressure)
-        return points[other.mesh.body], pressure[other.mesh.topology.body_corners]
+    def _place(self, grown: Pore, wall: np.ndarray, lines: Sequence[Line],
+               rule: Clearance) -> Placed:
+        """A grown pore with lines at their advances."""
+        locked, division, forces = self._locked(grown, contact_with(wall, lines))
+        keys = self._mechanics.keys
+        body, theta = _strained_from(keys, locked, locked.theta)
+        reference = grown.origin if keys.new_biomass == "stressed" else grown.mesh.points
+        system = growth.System(body, _constraints(locked, rule.width)[0], forces=forces)
+        return Placed(grown, locked, division, reference, system, theta, rule)
 
-    def _place(self, wall, lines, rule):
-        grown = self._grown
-        contact = contact_with(wall, lines)
-        locked = replace(grown, wall=contact.wall)
-        division = None
+    def _locked(self, grown: Pore, contact: Contact) -> tuple[Pore, Division | None,
+                                                              np.ndarray | None]:
+        """A grown pore with a contact, its division, and the forces on its nodes."""
+        if not len(contact.arcs):
+            return replace(grown, wall=contact.wall), None, self._forces
+        division = self._division(contact)
+        locked = divided(grown, division, contact, self._shape)
+        self._shape = locked.body.shape
         forces = self._forces
-        if len(contact.arcs):
-            division = self._division(contact)
-            locked = divided(grown, division, contact, self._shape)
-            self._shape = locked.body.shape
-            forces = None if forces is None else _divided_loads(division, forces)
-        body, theta = _strained_from(self._mechanics.keys, locked, locked.theta)
-        width = rule.width
-        system = growth.System(body, _constraints(locked, width)[0], forces=forces)
-        rim = locked.mesh.topology.body_loop
-
-        def target(position):
-            goal = position.copy()
-            goal[rim[locked.wall == BOTTOM], 1] = 0.0
-            goal[rim[locked.wall == TOP], 1] = width
-            return goal
-
-        ends = {(wall, direction): node for wall in (BOTTOM, TOP)
-                for node, direction in contact_lines.surface_ends(locked.boundary, wall)}
-
-        def clearances(position, numbers=range(len(lines))):
-            outline = Outline(position[rim], locked.wall, locked.fixed, position[rim], 2)
-            return np.array([rule.beyond(outline, ends[lines[k].key], lines[k].direction)
-                             for k in numbers]).T
-
-        ahead = {}
-        for k, line in enumerate(lines):
-            arc = contact_lines.divided_arc(len(wall), line)
-            where = np.flatnonzero(contact.arcs == arc)
-            if len(where):
-                sign = line.direction
-                ahead[k] = self._ahead_of(locked, division, int(where[0]), sign, system, theta, body)
-        return locked, division, contact_newton.Placed(system, theta, target, ahead, clearances)
-
-    def _ahead_of(self, locked, division, number, sign, system, theta, body):
-        grown = self._grown
-        rows, triangle = division.halves(number)
-        reference = grown.origin if self._mechanics.keys.new_biomass == "stressed" else grown.mesh.points
-        nodes = reference[grown.mesh.cells[triangle.cell]]
-        amount = (grown.theta * grown.body.at.dx)[rows[0]]
-        table = grown.space.table
-
-        def part(t):
-            at = triangle.divided_at(t)
-            moved = body.reference.copy()
-            moved[body.shape.cells[rows]] = at.nodes(nodes)
-            few = growth.Body(growth.Shape(body.shape.cells[rows], body.shape.corners, body.shape.degree), moved)
-            return few, np.stack(division_split(amount, at, table)) / few.at.dx
-
-        def change(position, push):
-            eps = contact_newton.SMALL
-            shape = growth.Shape(body.shape.cells[rows], body.shape.corners, body.shape.degree)
-            before = system.partial_residual(growth.Body(shape, body.reference), theta[rows], position, push)
-            after = system.partial_residual(*part(division.t[number] + sign * eps), position, push)
-            return (after - before) / eps
-        return change
+        return locked, division, None if forces is None else _divided_loads(division, forces)
 
     def _division(self, contact: Contact) -> Division:
         """The division of the contact's arcs; it keeps the connections of the last one if the arcs
@@ -574,14 +459,7 @@ class _Trials:
 
     def _solve(self, contact: Contact, advances: np.ndarray) -> Expansion:
         grown = self._grown
-        forces = self._forces
-        division = None
-        locked = replace(grown, wall=contact.wall)
-        if len(contact.arcs):
-            division = self._division(contact)
-            locked = divided(grown, division, contact, self._shape)
-            self._shape = locked.body.shape
-            forces = None if forces is None else _divided_loads(division, forces)
+        locked, division, forces = self._locked(grown, contact)
         first = self._first(locked, advances)
         shape, iterations = _equilibrium(self._mechanics, locked, first, forces,
                                          patient=self._patient)
@@ -605,6 +483,12 @@ class _Trials:
             if locked.body.strained(points[locked.mesh.body]).J.min() > 0:
                 break
         return replace(locked.moved(points), pressure=pressure)
+
+
+def _parts(growing: np.ndarray) -> np.ndarray:
+    """The parts of a growth theta / J (t, q), up to 1."""
+    count = growth.GradDiv.parts(growing)
+    return np.arange(1, count + 1) / count
 
 
 def divided(grown: Pore, division: Division, contact: Contact,
