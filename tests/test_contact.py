@@ -7,14 +7,15 @@ import numpy as np
 import pytest
 
 from repro.errors import SimulationError
+from repro.fem import sizing
 from repro.fem.division import Division
-from repro.fem.outline import BOTTOM, FREE, TOP, Outline, polygon
+from repro.fem.outline import BOTTOM, FREE, TOP, Outline, parabola, polygon
 from repro.fem.space import Space
 from repro.march import simulation
 from repro.march.simulation import simulate
-from repro.model import contact, contact_lines
+from repro.model import contact, contact_lines, contact_newton
 from repro.model.contact_lines import Clearance, Contact, surface_ends
-from repro.model.pore import initial_outline, seeded
+from repro.model.pore import initial_outline, seeded, sized
 from repro.scene import load_scene
 from tests.strategies import EVERY_ORDER, coarse_base, mirrored, plug
 
@@ -155,6 +156,89 @@ def test_a_division_also_divides_the_reference_of_strain(plugged, division):
     assert parted.unstrained == pytest.approx(1.01 * division.mesh.points[division.mesh.body], rel=1e-13)
 
 
+def grown_lines(pore, advance):
+    """Lines of a pore, those of the upper wall advanced by so many arcs."""
+    lines = contact_lines.lines_of(pore.boundary)
+    for line in lines:
+        line.advance = advance if line.wall == TOP else 0.0
+    return lines
+
+
+def expanded_by(scene, pore, factor, guess=None):
+    """The new shape of a pore whose biomass has grown by a factor."""
+    return contact.expand(contact.Mechanics.of(scene), pore, factor * pore.theta, guess)
+
+
+@pytest.mark.parametrize("rheology", ["stressed", "stress_free"])
+def test_the_residual_changes_with_a_line_as_its_slope_says(plugged, rheology):
+    """The difference quotient over the entire aggregate agrees with that over the triangles beside the line."""
+    scene, pore = plugged
+    scene = load_scene(scene, [f"growth.new_biomass={rheology}"])
+    rule = Clearance(scene.pore.width, scene.growth.minimum_film, scene.growth.minimum_contact_angle)
+    trials = contact._Trials(contact.Mechanics.of(scene), pore, pore, None, True)
+    here, there = (trials._place(pore, pore.wall, grown_lines(pore, advance), rule) for advance in (0.4, 0.4 + 1e-6))
+    position, pressure = here.divided(pore.mesh.points, 0.3 + 0 * pore.pressure)
+    position = position + 0.01 * np.sin(position)
+    at_rest, moved = (placed.system.under(placed.theta, position, position, pressure).residual
+                      for placed in (here, there))
+    slopes = [here.slope(line, position, pressure) for line in grown_lines(pore, 0.4) if line.wall == TOP]
+    assert len(slopes) == 2 and all(np.abs(slope).max() > 0.1 for slope in slopes)
+    assert sum(slopes) == pytest.approx((moved - at_rest) / 1e-6, abs=2e-4 * np.abs(slopes).max())
+
+
+def test_newton_and_search_place_the_lines_alike(plugged, monkeypatch):
+    """Both accept clearances of up to CLOSE, which a line passes in about CLOSE film / tan(angle), 0.013 um; at corners
+    a line errs by LEAST_PART of an arc."""
+    scene, pore = plugged
+    counts = []
+    solve = contact.growth.equilibrium
+    monkeypatch.setattr(contact.growth, "equilibrium", lambda *a, **k: counts.append(1) or solve(*a, **k))
+    by_newton = expanded_by(scene, pore, 1.03)
+    assert not counts and by_newton.iterations <= contact_newton.MOST_ITERATIONS
+    without_newton(monkeypatch)
+    by_search = expanded_by(scene, pore, 1.03)
+    assert len(counts) > 1
+    arc = contact_lines.arc_lengths(pore.boundary, contact_lines.lines_of(pore.boundary)[-1]).max()
+    for key, length in by_search.advances.items():
+        assert by_newton.advances[key] == pytest.approx(length, abs=0.05 + contact_newton.BESIDE * arc)
+    assert sum(by_search.advances.values()) > 0.5
+    assert by_newton.pore.boundary.area == pytest.approx(by_search.pore.boundary.area, rel=1e-6)
+
+
+def test_the_search_takes_over_from_newton(plugged, monkeypatch):
+    scene, pore = plugged
+    monkeypatch.setattr(contact_newton, "MOST_ITERATIONS", 1)
+    expansion = expanded_by(scene, pore, 1.03)
+    rule = Clearance(scene.pore.width, scene.growth.minimum_film, scene.growth.minimum_contact_angle)
+    assert min(clearances(expansion.pore.boundary, rule).values()) >= -contact_lines.CLOSE
+
+
+def test_lines_start_from_their_speeds(plugged):
+    """A pore keeps the speeds of its lines over the last step; at these speeds they repeat their advance."""
+    pore = plugged[1]
+    assert pore.line_speeds.shape == (2, 2) and (pore.line_speeds >= 0).all() and pore.line_speeds[1].max() > 0
+    advances = contact_lines.advances_at(pore.line_speeds, 0.5)
+    assert advances[TOP, -1] == pore.line_speeds[1, 1] / 2 and advances[BOTTOM, 1] == pore.line_speeds[0, 0] / 2
+    assert contact_lines.speeds(advances, 0.5) == pytest.approx(pore.line_speeds)
+    assert contact_lines.speeds({(BOTTOM, 1): 1.0}, 0.5) is None and contact_lines.advances_at(None, 1.0) == {}
+
+
+def test_merged_arcs_keep_area_shape_and_contact(plugged):
+    """Arcs that are four times too short merge in pairs."""
+    outline = sizing.halved(sizing.halved(plugged[1].boundary, np.full(len(plugged[1].wall) // 2, True)),
+                            np.full(len(plugged[1].wall), True))
+    merged = sizing.merged(outline, sized(plugged[0]))
+    assert merged.area == pytest.approx(outline.area, rel=1e-13)
+    assert (merged.edge_wall == FREE).sum() < 0.9 * (outline.edge_wall == FREE).sum()
+    for wall in (BOTTOM, TOP):
+        assert np.array_equal(merged.points[merged.wall == wall], outline.points[outline.wall == wall])
+    assert merged.points[merged.fixed].tolist() == outline.points[outline.fixed].tolist()
+    curve = (parabola(np.linspace(0, 1, 401)) @ merged.arcs(merged.points)).reshape(-1, 2)
+    apart = [np.linalg.norm(curve - point, axis=1).min() for point in outline.points]
+    assert max(apart) < (sizing.MERGED_APART + 0.5 / 400) * 2 * merged.edge_lengths().max()
+    assert sizing.merged(outline, replace(sized(plugged[0]), refinement=1e3)).points.shape == outline.points.shape
+
+
 def test_loads_do_the_same_work_on_a_divided_mesh(division):
     """Gathered boundary loads agree in every displacement of the parent, divided loads in constant and linear ones."""
     draw = np.random.default_rng(1)
@@ -186,9 +270,17 @@ def test_contact_begins_on_both_sides_of_the_highest_point(plugged):
     assert all(line.advance == line.least == line.short > 0 for line in upper)
 
 
-@pytest.mark.parametrize("preset", ["fast", pytest.param("accurate", marks=pytest.mark.thorough)])
-def test_the_contact_surface_is_the_smallest_that_leaves_enough_fluid(preset):
+def without_newton(monkeypatch):
+    """The search with whole equilibria places all contact lines."""
+    monkeypatch.setattr(contact._Trials, "settle", lambda *_: None)
+
+
+@pytest.mark.parametrize("method, preset", [("newton", "fast"), ("search", "fast"),
+                                            pytest.param("newton", "accurate", marks=pytest.mark.thorough)])
+def test_the_contact_surface_is_the_smallest_that_leaves_enough_fluid(method, preset, monkeypatch):
     """After every step no clearance is negative, and lines that have advanced have zero clearance."""
+    if method == "search":
+        without_newton(monkeypatch)
     scene = load_scene("wide", [f"numerics.preset={preset}", 'pore.width="25 um"', 'growth.end="18.5 h"'])
     keys = scene.growth
     rule = Clearance(scene.pore.width, keys.minimum_film, keys.minimum_contact_angle)

@@ -28,6 +28,7 @@ SPLIT = 1.4
 #: After contact, two free arcs are merged if together they are shorter than the element size times
 #: this, and if the merged arc departs from them by at most MERGED_APART of its length.
 MERGED = 0.5
+MERGED_AWAY = 0.6
 MERGED_APART = 1e-3
 #: Largest number of distances between points and sources in memory at once.
 DISTANCES = 2**20
@@ -200,7 +201,7 @@ def merged(outline: Outline, sizing: Sizing) -> Outline:
     """
     polygon = outline.corners
     sizes = np.minimum(MERGED * interface_sizes(polygon, sizing),
-                       GRADATION * _from_lines(polygon))
+                       MERGED_AWAY * _from_lines(polygon))
     length = polygon.edge_lengths()
     free = outline.edge_wall == FREE
     points = outline.arcs(outline.points)
