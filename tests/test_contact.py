@@ -1,13 +1,14 @@
 """Films and wedges that close (2.3.3): nodes of straight edges, and contact lines anywhere on arcs."""
 
 import dataclasses
+import signal
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from repro.errors import SimulationError
-from repro.fem import sizing
+from repro.errors import Interrupted, SimulationError
+from repro.fem import linear, sizing
 from repro.fem.division import Division
 from repro.fem.outline import BOTTOM, FREE, TOP, Outline, parabola, polygon
 from repro.fem.space import Space
@@ -16,7 +17,9 @@ from repro.march.simulation import simulate
 from repro.model import contact, contact_lines, contact_newton
 from repro.model.contact_lines import Clearance, Contact, surface_ends
 from repro.model.pore import initial_outline, seeded, sized
+from repro.runs.execution import Watch, resume, run
 from repro.scene import load_scene
+from tests.shell import files
 from tests.strategies import EVERY_ORDER, coarse_base, mirrored, plug
 
 FILM, ANGLE = 2.0, np.radians(16.7)
@@ -213,6 +216,32 @@ def test_the_search_takes_over_from_newton(plugged, monkeypatch):
     assert min(clearances(expansion.pore.boundary, rule).values()) >= -contact_lines.CLOSE
 
 
+def test_a_run_stops_within_a_step_in_contact(plugged, tmp_path):
+    """At most three systems (motion of the mesh, flow, substrates) are factorised between two
+    polls. A run that stops there goes on as if it had not."""
+    scene = load_scene(plugged[0], ['growth.end="16 h"', 'output.times=["16 h"]'])
+    since = []
+    polls = []
+
+    def stop():
+        polls.append(len(since))
+        since.clear()
+        return signal.SIGTERM if len(polls) == stop_at else 0
+
+    stop_at = 0
+    factorised = linear.factorised
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(linear, "factorised", lambda *arguments: since.append(1) or factorised(*arguments))
+        run(scene, tmp_path / "whole", watch=Watch(stop_within=stop))
+    assert len(polls) > 50 and max(polls) <= 3
+    stop_at = len(polls) - 10
+    polls.clear()
+    with pytest.raises(Interrupted, match="interrupted by signal 15 at t = 1"):
+        run(scene, tmp_path / "stopped", watch=Watch(stop_within=stop))
+    assert resume(tmp_path / "stopped") == "completed"
+    assert files(tmp_path / "stopped") == files(tmp_path / "whole")
+
+
 def test_lines_start_from_their_speeds(plugged):
     """A pore keeps the speeds of its lines over the last step; at these speeds they repeat their advance."""
     pore = plugged[1]
@@ -233,6 +262,10 @@ def test_merged_arcs_keep_area_shape_and_contact(plugged):
     for wall in (BOTTOM, TOP):
         assert np.array_equal(merged.points[merged.wall == wall], outline.points[outline.wall == wall])
     assert merged.points[merged.fixed].tolist() == outline.points[outline.fixed].tolist()
+    for corners in (outline.corners, merged.corners):
+        beside = [corners.edge_lengths()[node - (direction < 0)] for node, direction in surface_ends(corners, TOP)]
+        assert beside == pytest.approx([merged.corners.edge_lengths()[node - (direction < 0)]
+                                        for node, direction in surface_ends(merged.corners, TOP)], rel=1e-12)
     curve = (parabola(np.linspace(0, 1, 401)) @ merged.arcs(merged.points)).reshape(-1, 2)
     apart = [np.linalg.norm(curve - point, axis=1).min() for point in outline.points]
     assert max(apart) < (sizing.MERGED_APART + 0.5 / 400) * 2 * merged.edge_lengths().max()

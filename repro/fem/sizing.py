@@ -26,9 +26,10 @@ GRADATION = 0.25
 #: An interface edge is split if it is longer than the element size by this factor.
 SPLIT = 1.4
 #: After contact, two free arcs are merged if together they are shorter than the element size times
-#: this, and if the merged arc departs from them by at most MERGED_APART of its length.
+#: MERGED and the distance from the contact lines times MERGED_AWAY over the refinement, and if the
+#: merged arc departs from them by at most MERGED_APART of its length.
 MERGED = 0.5
-MERGED_AWAY = 0.6
+MERGED_AWAY = 0.12
 MERGED_APART = 1e-3
 #: Largest number of distances between points and sources in memory at once.
 DISTANCES = 2**20
@@ -201,7 +202,7 @@ def merged(outline: Outline, sizing: Sizing) -> Outline:
     """
     polygon = outline.corners
     sizes = np.minimum(MERGED * interface_sizes(polygon, sizing),
-                       MERGED_AWAY * _from_lines(polygon))
+                       MERGED_AWAY / sizing.refinement * _from_lines(polygon))
     length = polygon.edge_lengths()
     free = outline.edge_wall == FREE
     points = outline.arcs(outline.points)

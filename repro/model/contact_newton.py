@@ -21,11 +21,12 @@ from repro.errors import GrowthError
 from repro.fem import division as dividing
 from repro.fem.assembly import Factored
 from repro.fem.division import Division
-from repro.fem.newton import STALLED
+from repro.fem.newton import REQUIRED_REDUCTION, STALLED
 from repro.fem.outline import BOTTOM, TOP, Outline
 from repro.model import contact_lines, growth
 from repro.model.contact_lines import CLOSE, FIRST_TRIAL, LEAST_PART, Clearance, Line
 from repro.model.pore import Pore
+from repro.polling import poll
 from repro.scene import needed
 
 #: Iterations after which the search with whole equilibria takes over.
@@ -163,12 +164,14 @@ class Coupled:
         self.placed = place()
         self.position, self.pressure = self.placed.divided(points, pressures)
         self.iterations = 0
+        self._factors: Factored | None = None
 
     def solve(self, tolerance: float = growth.NEWTON) -> None:
         """Solve to a defect of ``tolerance``, or to round-off. Raises GrowthError if there is no
         convergence."""
         last = np.inf
         while True:
+            poll()
             at = self.placed
             iterate = at.system.under(at.theta, at.target(self.position), self.position,
                                       self.pressure)
@@ -179,6 +182,8 @@ class Coupled:
                 raise GrowthError("Newton's method for the contact lines stands at a defect of "
                                   f"{iterate.defect:.2g} after {MOST_ITERATIONS} iterations; "
                                   "try a shorter growth.time_step")
+            if iterate.defect > REQUIRED_REDUCTION * last:
+                self._factors = None
             last = iterate.defect
             self._step(iterate)
             self.iterations += 1
@@ -193,7 +198,7 @@ class Coupled:
         """Make one step of shape and lines, with det F > 0."""
         lag = iterate.lag
         carried = np.concatenate([lag[:, 0], lag[:, 1], np.zeros(len(self.pressure))])
-        factors = self.placed.system.factored(iterate)
+        factors = self._factors or self.placed.system.factored(iterate)
         change = factors.solve(-iterate.residual, carried)
         steps, change = self._with_lines(iterate, factors, change)
         start = [(line.advance, line.at_corner) for line in self._lines]
@@ -207,6 +212,7 @@ class Coupled:
             if not placed.same_arcs(self.placed):
                 position, pressure = placed.divided(*self.placed.on_parent(position, pressure))
             if placed.system.strained(position).J.min() > 0:
+                self._factors = factors if placed is self.placed else None
                 self.placed = placed
                 self.position = position
                 self.pressure = pressure
