@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 from repro.errors import Interrupted, SimulationError
-from repro.fem import linear, sizing
+from repro.fem import linear
 from repro.fem.division import Division
-from repro.fem.outline import BOTTOM, FREE, TOP, Outline, parabola, polygon
+from repro.fem.outline import BOTTOM, FREE, TOP, Outline, polygon
 from repro.fem.space import Space
 from repro.march import simulation
 from repro.march.simulation import simulate
 from repro.model import contact, contact_lines, contact_newton
 from repro.model.contact_lines import Clearance, Contact, surface_ends
-from repro.model.pore import initial_outline, seeded, sized
+from repro.model.pore import initial_outline, seeded
 from repro.runs.execution import Watch, resume, run
 from repro.scene import load_scene
 from tests.shell import files
@@ -250,26 +250,6 @@ def test_lines_start_from_their_speeds(plugged):
     assert advances[TOP, -1] == pore.line_speeds[1, 1] / 2 and advances[BOTTOM, 1] == pore.line_speeds[0, 0] / 2
     assert contact_lines.speeds(advances, 0.5) == pytest.approx(pore.line_speeds)
     assert contact_lines.speeds({(BOTTOM, 1): 1.0}, 0.5) is None and contact_lines.advances_at(None, 1.0) == {}
-
-
-def test_merged_arcs_keep_area_shape_and_contact(plugged):
-    """Arcs that are four times too short merge in pairs."""
-    outline = sizing.halved(sizing.halved(plugged[1].boundary, np.full(len(plugged[1].wall) // 2, True)),
-                            np.full(len(plugged[1].wall), True))
-    merged = sizing.merged(outline, sized(plugged[0]))
-    assert merged.area == pytest.approx(outline.area, rel=1e-13)
-    assert (merged.edge_wall == FREE).sum() < 0.9 * (outline.edge_wall == FREE).sum()
-    for wall in (BOTTOM, TOP):
-        assert np.array_equal(merged.points[merged.wall == wall], outline.points[outline.wall == wall])
-    assert merged.points[merged.fixed].tolist() == outline.points[outline.fixed].tolist()
-    for corners in (outline.corners, merged.corners):
-        beside = [corners.edge_lengths()[node - (direction < 0)] for node, direction in surface_ends(corners, TOP)]
-        assert beside == pytest.approx([merged.corners.edge_lengths()[node - (direction < 0)]
-                                        for node, direction in surface_ends(merged.corners, TOP)], rel=1e-12)
-    curve = (parabola(np.linspace(0, 1, 401)) @ merged.arcs(merged.points)).reshape(-1, 2)
-    apart = [np.linalg.norm(curve - point, axis=1).min() for point in outline.points]
-    assert max(apart) < (sizing.MERGED_APART + 0.5 / 400) * 2 * merged.edge_lengths().max()
-    assert sizing.merged(outline, replace(sized(plugged[0]), refinement=1e3)).points.shape == outline.points.shape
 
 
 def test_loads_do_the_same_work_on_a_divided_mesh(division):

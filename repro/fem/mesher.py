@@ -53,8 +53,6 @@ def generate(outline: Outline | None, ends: tuple[float, float], sizing: Sizing,
     if outline is None:
         straight = around(None, ends, sizing, method)
         return (straight if geometry == 1 else curved(straight, None)), None
-    if geometry == 2 and (outline.wall == TOP).any():
-        outline = sizes_of.merged(outline, sizing)
     for _ in range(HALVINGS):
         outline = sizes_of.split(outline, sizing)
         check_outline(outline.corners, ends, sizing.width)

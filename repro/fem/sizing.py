@@ -11,7 +11,7 @@ from math import inf
 import numpy as np
 from numpy.typing import ArrayLike
 
-from repro.fem.outline import FREE, TOP, Outline, parabola, polygon_area, slopes
+from repro.fem.outline import FREE, TOP, Outline, parabola, slopes
 
 #: Elements across the pore's width, across the aggregate's thickness and across the narrowest film.
 ACROSS_PORE = 14.0
@@ -25,12 +25,6 @@ ALONG_INTERFACE = 600.0
 GRADATION = 0.25
 #: An interface edge is split if it is longer than the element size by this factor.
 SPLIT = 1.4
-#: After contact, two free arcs are merged if together they are shorter than the element size times
-#: MERGED and the distance from the contact lines times MERGED_AWAY over the refinement, and if the
-#: merged arc departs from them by at most MERGED_APART of its length.
-MERGED = 0.5
-MERGED_AWAY = 0.12
-MERGED_APART = 1e-3
 #: Largest number of distances between points and sources in memory at once.
 DISTANCES = 2**20
 
@@ -104,15 +98,9 @@ def _contact_sizes(outline: Outline, sizing: Sizing) -> np.ndarray | float:
     top = outline.wall == TOP
     if sizing.contact == inf or not top.any():
         return inf
-    return sizing.contact + GRADATION * _from_lines(outline)
-
-
-def _from_lines(outline: Outline) -> np.ndarray:
-    """(M,) um, distance to the nearest contact line with the opposite wall, of which there is one.
-    """
-    top = outline.wall == TOP
     lines = outline.points[top & ~(np.roll(top, 1) & np.roll(top, -1))]
-    return np.linalg.norm(outline.points[:, None] - lines, axis=2).min(axis=1)
+    distance = np.linalg.norm(outline.points[:, None] - lines, axis=2).min(axis=1)
+    return sizing.contact + GRADATION * distance
 
 
 def too_coarse(outline: Outline, sizing: Sizing) -> bool:
@@ -192,67 +180,6 @@ def split(outline: Outline, sizing: Sizing) -> Outline:
             pieces.append((np.full(parts, keep[0]), np.arange(parts) / parts))
     edges, t = zip(*pieces)
     return placed(outline, np.concatenate(edges), np.concatenate(t), sizing.seed)
-
-
-def merged(outline: Outline, sizing: Sizing) -> Outline:
-    """The outline with pairs of free arcs merged that are short against :func:`interface_sizes`
-    and against their distance from the contact lines with the opposite wall.
-
-    Its area stays exactly, its shape within MERGED_APART of an arc's length.
-    """
-    polygon = outline.corners
-    sizes = np.minimum(MERGED * interface_sizes(polygon, sizing),
-                       MERGED_AWAY / sizing.refinement * _from_lines(polygon))
-    length = polygon.edge_lengths()
-    free = outline.edge_wall == FREE
-    points = outline.arcs(outline.points)
-    origins = outline.arcs(outline.origin)
-    kept = np.ones(len(outline.points), bool)
-    place = outline.points.copy()
-    origin = outline.origin.copy()
-    arc = 0
-    while arc < len(free) - 1:
-        pair = slice(arc, arc + 2)
-        short = length[pair].sum() < sizes[arc: arc + 3].min()
-        step = 1
-        if short and free[pair].all() and not polygon.fixed[arc + 1]:
-            part, weights = _middle_of_two(*length[pair])
-            middle = _keep_area(points[pair], weights @ points[arc + part])
-            if middle is not None:
-                place[2 * arc + 1] = middle
-                origin[2 * arc + 1] = weights @ origins[arc + part]
-                kept[2 * arc + 2: 2 * arc + 4] = False
-                step = 2
-        arc += step
-    return Outline(place[kept], outline.wall[kept], outline.fixed[kept], origin[kept], 2)
-
-
-def _middle_of_two(first: float, second: float) -> tuple[int, np.ndarray]:
-    """Which of two arcs of these lengths (um) has the middle of both, and (3,) weights there."""
-    half = (first + second) / 2
-    if first >= half:
-        return 0, parabola(np.array(half / first))
-    return 1, parabola(np.array(1 - half / second))
-
-
-def _keep_area(arcs: np.ndarray, middle: np.ndarray) -> np.ndarray | None:
-    """(2,) um the middle of the arc that replaces two arcs (2, 3, 2), moved so that the area stays;
-    None if the shape would change too much."""
-    a, b = arcs[0, 0], arcs[1, 2]
-    chord = b - a
-    length = np.hypot(*chord)
-    along = chord / length
-    outwards = np.array([along[1], -along[0]])
-    area = polygon_area(np.array([a, arcs[0, 2], b]))
-    for start, bend, end in arcs:
-        bow = bend - (start + end) / 2
-        area += 2 / 3 * (bow[0] * (end - start)[1] - bow[1] * (end - start)[0])
-    shift = 1.5 * area / length - (middle - (a + b) / 2) @ outwards
-    middle = middle + shift * outwards
-    new = parabola(np.linspace(0, 1, 33)) @ np.array([a, middle, b]) - a
-    old = arcs.reshape(-1, 2)[[1, 2, 4]] - a
-    apart = np.interp(old @ along, new @ along, new @ outwards) - old @ outwards
-    return middle if np.abs(apart).max() <= MERGED_APART * length else None
 
 
 def halved(outline: Outline, cut: np.ndarray) -> Outline:

@@ -181,18 +181,6 @@ MUTANTS = (
          "line.advance <= line.least or clearance <= np.inf)",
          f"{SMALLEST_CONTACT}[newton-fast]")),
     *changes(
-        "repro/fem/sizing.py",
-        ("merged-arcs-lose-area",
-         "An arc that replaces two leaves out what they enclose.",
-         "shift = 1.5 * area / length - (middle - (a + b) / 2) @ outwards",
-         "shift = 0.0 * area / length",
-         f"{CONTACT_TESTS}merged_arcs_keep_area_shape_and_contact"),
-        ("arcs-merge-beside-contact-lines",
-         "Arcs beside a contact line merge as others do.",
-         "MERGED_AWAY / sizing.refinement * _from_lines(polygon)",
-         "np.inf + 0 * _from_lines(polygon)",
-         f"{CONTACT_TESTS}merged_arcs_keep_area_shape_and_contact")),
-    *changes(
         "repro/runs/execution.py",
         ("deaf-within-steps",
          "A signal waits for the end of a step.",
