@@ -14,6 +14,7 @@ at the start as in a step; flow and substrates are solved for.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -30,6 +31,7 @@ from repro.model.contact import Expansion
 from repro.model.contact_lines import FirstContact, SearchOptions
 from repro.model.growing import grow
 from repro.model.pore import Pore, Solved
+from repro.model.remeshing import GeneratedMesh
 from repro.model.stages import Stages
 from repro.model.transport import Concentrations, Flows, Fluxes
 
@@ -54,7 +56,8 @@ class Halfway:
 
     duration: h, of the entire step; first: rates at its start; expansion: the aggregate half way;
     solved: flow and substrates half way; rates: half way, at the points of the mesh at the start;
-    produced: growth of active and of inert biomass over the entire step, um2 mg/L.
+    produced: growth of active and of inert biomass over the entire step, um2 mg/L; generated: the
+    mesh that was generated half way, if any.
     """
 
     duration: float
@@ -63,6 +66,7 @@ class Halfway:
     solved: Solved
     rates: Rates
     produced: tuple[float, float]
+    generated: tuple[GeneratedMesh, ...]
 
 
 def attempt(stages: Stages, previous: Pore, solved: Solved, duration: float,
@@ -97,7 +101,10 @@ def attempt(stages: Stages, previous: Pore, solved: Solved, duration: float,
     flows = _flows(half.solved.substrates.fluxes, duration)
     ledger = Ledger(previous.time, previous.time + duration, *flows, previous.mass,
                     after.mass - previous.mass, new.mass)
-    inner = partial(interpolate, stages, previous, solved, half)
+    generated = half.generated
+    if remeshed:
+        generated = (*generated, GeneratedMesh(expanded, new))
+    inner = partial(interpolate, stages, previous, solved, half, generated)
     step = StepResult(new, None, ledger, remeshed, expansion.iterations, inner)
     makes_contact = expanded.contact and not previous.contact
     return Attempt(step, change, (gap, expansion.gap) if makes_contact else None)
@@ -148,13 +155,17 @@ def solve_halfway(stages: Stages, previous: Pore, solved: Solved, first: Rates, 
         rates = _carry_rates_back(middle, previous, expansion, rates)
     active_growth = float((after.active - middle.active).sum())
     inert_growth = float((after.inert - middle.inert).sum())
-    return Halfway(duration, first, expansion, solution, rates, (active_growth, inert_growth))
+    generated = () if mesh else (GeneratedMesh(shape, middle),)
+    return Halfway(duration, first, expansion, solution, rates, (active_growth, inert_growth),
+                   generated)
 
 
 def interpolate(stages: Stages, previous: Pore, solved: Solved, half: Halfway,
-                time: float) -> InterpolatedState:
+                generated: Sequence[GeneratedMesh], time: float) -> InterpolatedState:
     """Interpolate the pore to a time (h) within a step, and solve there.
 
+    If the moved mesh is not acceptable, the nearest of the meshes that the step has generated
+    replaces it.
     Raises StageError if a stage fails.
     """
     part = (time - previous.time) / half.duration
@@ -163,7 +174,8 @@ def interpolate(stages: Stages, previous: Pore, solved: Solved, half: Halfway,
     after = replace(grow(previous, mean, part * half.duration), time=time)
     expanded = _expand(stages, previous, after, half, part, contact.PATIENT).pore
     expanded = replace(expanded, concentrations=_guess_substrates(solved, half, part))
-    inner, _ = stages.new_mesh(previous, expanded, solved)
+    nearest = sorted(generated, key=lambda each: abs(each.shape.time - time))
+    inner, _ = stages.new_mesh(previous, expanded, solved, nearest)
     return InterpolatedState(*remeshing.solve_graded(stages.scene, inner))
 
 
