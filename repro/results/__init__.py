@@ -34,7 +34,7 @@ __all__ = ["COLUMNS", "LEDGER_COLUMNS", "fields", "ledger_row", "row"]
 
 #: Factor from um/h to m/d.
 M_PER_D = UNITS["_m_per_d"].factor
-PACKAGES = ("numpy", "scipy", "scikit-fem", "meshio", "mmgpy", "shapely", "pint")
+PACKAGES = ("numpy", "scipy", "scikit-fem", "mmgpy", "shapely", "pint")
 
 
 def write_text(path: Path, text: str) -> None:
@@ -106,8 +106,13 @@ def provenance(scene: Scene) -> dict:
 
 @cache
 def version(package: str) -> str:
-    """The version of an installed package; it is read from the disk once."""
-    return metadata.version(package)
+    """The version of an installed package; it is read from the disk once.
+
+    The version is a line of the metadata. metadata.version() parses all of them, which takes a
+    hundred times as long.
+    """
+    text = metadata.distribution(package).read_text("METADATA") or ""
+    return text.partition("\nVersion: ")[2].partition("\n")[0]
 
 
 def write_json(path: Path, content: dict) -> None:
