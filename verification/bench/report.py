@@ -159,7 +159,7 @@ def _commands(part: dict) -> Iterator[dict]:
     rows = {row["method"]: row for row in part.get("rows", ())}
     for preset, most in MOST_OVER_FEW_ROWS.items() if rows else ():
         yield verdict(f"base: a run in {preset} with all of its rows over one with two", f"at most {most:g} times",
-                      _ratio, rows[preset], "over_few_rows", most)
+                      _ratio, rows.get(preset, {}), "over_few_rows", most)
     if "fast" in rows:
         yield verdict("repro run base in fast, as typed, over the import of its packages",
                       f"at most {MOST_OVER_IMPORTS:g} times", _ratio, rows["fast"], "over_imports", MOST_OVER_IMPORTS)
