@@ -8,11 +8,9 @@ import pytest
 
 from reference import (
     neo_hookean,
-    quadratic_growth,
     quadratic_mesh_motion,
     robin_channel,
     slab,
-    taylor_hood,
 )
 
 GAMMAS = pytest.mark.parametrize("gamma", [0.1, 1.0, 10.0])
@@ -87,35 +85,3 @@ def test_the_monod_slab_obeys_its_equation(half_saturation, film):
     assert BIOMASS * first_and_second(c, inside, 1e-2)[1] == pytest.approx(uptake_rate, rel=1e-2)
     assert BIOMASS * first_and_second(c, HALF - 1e-3, 5e-4)[0] == pytest.approx(6e5 * depth, rel=1e-3)
     assert c(HALF + film) == pytest.approx(SUPPLY) and least < 1e-5
-
-
-@pytest.mark.parametrize("interface", ["laplacian", "traction"])
-def test_taylor_hoods_flow_without_a_jump_is_poiseuilles(interface):
-    """Straight triangles represent the parabola exactly. Curved ones leave the error of quadratic elements, of third
-    order in their size: at least order 2.5 between two coarse meshes (2.9 and 3.0 or more were seen; a first bound of 3
-    was too tight for coarse meshes). The loss is right to 1e-5 (1.2e-6 was seen)."""
-    width, ends = 40.0, (-60.0, 60.0)
-    errors = []
-    for level in (0, 1):
-        solution = taylor_hood.stokes(taylor_hood.half_disc(width, ends, 12.0, level, corner=0), 1.0, interface)
-        y = solution.points[:, 1]
-        exact = np.column_stack([6 * y * (width - y) / width**2, np.zeros(len(y))])
-        errors.append(np.abs(solution.velocity - exact).max())
-        assert solution.loss == pytest.approx(12 * (ends[1] - ends[0]) / width**2, rel=1e-5)
-    assert 0 < 2**2.5 * errors[1] < errors[0]
-
-
-def test_quadratic_growth_of_a_half_disc_is_the_closed_form():
-    """theta = 4 everywhere doubles every distance and leaves one pressure, which no edge of the mesh disturbs. A wall
-    at 15 um keeps the nodes between the ends of a contact at its height."""
-    mesh = quadratic_growth.half_disc(10.0, 4)
-    free = quadratic_growth.grow(mesh, lambda x, y: np.full_like(x, 4.0), 4.0)
-    assert free.place == pytest.approx(2 * mesh.doflocs, abs=1e-12)
-    assert np.ptp(free.pressure) < 1e-12
-    inside = free.at(np.array([0.0, 3.0]), np.array([5.0, 4.0]))[0]
-    assert inside == pytest.approx(np.array([[0, 10], [6, 8]]), abs=1e-9)
-    contact = quadratic_growth.Contact(np.pi / 4, 3 * np.pi / 4, 15.0)
-    pressed = quadratic_growth.grow(mesh, lambda x, y: np.full_like(x, 4.0), 4.0, contact=contact)
-    angle = np.arctan2(*mesh.doflocs[::-1])
-    on = np.isclose(np.hypot(*mesh.doflocs), 10.0, atol=0.1) & (angle > 0.8) & (angle < 2.3)
-    assert pressed.place[1, on] == pytest.approx(15.0, abs=1e-12)
