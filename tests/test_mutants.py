@@ -13,7 +13,6 @@ OF_CASES, OF_TESTS = map(runner.caught_by, ("cases", "tests"))
 #: One mutant from each of five stages, caught by cases of less than a second, and one caught by a test.
 TRIED = ("inlet-not-scaled", "yield-dropped", "stress-transposed", "lumped-mass", "interface-slips",
          "pickles-read")
-PLUG, OTHER = "flow-plug", "flow-poiseuille"
 
 
 @pytest.mark.parametrize("id", KNOWN)
