@@ -1,4 +1,4 @@
-"""Field files are read back as written, and a file without fields is refused."""
+"""A file of fields that is damaged, or without fields, is refused; and what is written is valid VTK."""
 
 import numpy as np
 import pytest
