@@ -1,0 +1,69 @@
+"""Closed forms and manufactured fields of the references obey their equations, by finite differences.
+
+The cases that compare them with `repro` judge the other codes (FiPy, py-pde, collocation, scikit-fem) and the dense
+transfer.
+"""
+import numpy as np
+import pytest
+
+from reference import (
+    neo_hookean,
+    quadratic_mesh_motion,
+    robin_channel,
+)
+
+GAMMAS = pytest.mark.parametrize("gamma", [0.1, 1.0, 10.0])
+STEP = 1e-4
+
+
+def derivatives(field, x, y, h=STEP):
+    """(gradient (n, ..., 2), Laplacian (n, ...)) of a field (n, ...) of points by central differences."""
+    centre, east, west, north, south = (field(x + a, y + b) for a, b in ((0, 0), (h, 0), (-h, 0), (0, h), (0, -h)))
+    return np.stack([east - west, north - south], axis=-1) / (2 * h), (east + west + north + south - 4 * centre) / h**2
+
+
+def first_and_second(function, x, step=1e-3):
+    """(first, second) derivative of a function of x."""
+    gradient, laplace = derivatives(lambda x, _: function(x), x, 0.0, step)
+    return gradient[..., 0], laplace
+
+
+def test_the_cylinder_is_in_equilibrium_and_free_on_its_rim():
+    """theta = a + c (R / R_0)^2: d sigma_rr / dr = (sigma_tt - sigma_rr) / r, and sigma_rr = 0 where R = R_0."""
+    law, R = (12.0, 24.0, 20.0), np.linspace(1.0, 20.0, 400)
+    r, P = neo_hookean.cylinder_radius(R, *law), neo_hookean.cylinder_pressure(R, *law)
+    theta, hoop = 12.0 + 24.0 * (R / 20.0) ** 2, r / R
+    sigma = np.array([neo_hookean.cauchy(np.diag([t / h, h]), p) for t, h, p in zip(theta, hoop, P)])
+    expected = (sigma[:, 1, 1] - sigma[:, 0, 0]) / r
+    assert abs(sigma[-1, 0, 0]) < 1e-14
+    assert np.gradient(sigma[:, 0, 0], r, edge_order=2) == pytest.approx(expected, abs=1e-3 * np.abs(expected).max())
+
+
+@GAMMAS
+def test_the_corner_exponent_makes_the_displacement_vanish_on_the_fixed_side(gamma):
+    """kappa s^z - z s conj(s)^(z-1) = B conj(s)^z with a real B. For a large gamma, z is the Laplace operator's
+    pi / (2 w)."""
+    w = np.radians(120)
+    z, s = quadratic_mesh_motion.exponent(w, gamma), np.exp(1j * w)
+    B = ((1 + 2 * gamma) * s**z - z * s * np.conj(s) ** (z - 1)) / np.conj(s) ** z
+    assert abs(B.imag) < 1e-10 and 0.5 < z < 1
+    assert quadratic_mesh_motion.exponent(w, 1e9) == pytest.approx(0.75)
+
+
+WATER, BIOMASS = 9e6, 7e6
+HALF, SUPPLY = 40.0, 10.0
+
+
+def test_the_robin_channel_obeys_its_equation_and_its_conditions():
+    """The strip, (26) upstream, the flux u C_s at any inlet, and a zero gradient downstream."""
+    def c(x):
+        return robin_channel.strip(x, 1e5, SUPPLY, WATER, BIOMASS, 2e4, HALF)
+
+    inside, upstream = np.linspace(1.0, 39.0, 20), np.array([-300.0, -30.0, -1.0])
+    gradient, curvature = first_and_second(c, inside)
+    assert BIOMASS * curvature == pytest.approx(1e5 * gradient + 2e4 * c(inside), rel=1e-4)
+    inflow = 1e5 * c(upstream) - WATER * first_and_second(c, upstream, STEP)[0]
+    assert inflow == pytest.approx(np.full(3, 1e5 * SUPPLY), rel=1e-6)
+    before, after, last = first_and_second(c, np.array([-1e-3, 1e-3, HALF - 1e-3]), STEP)[0]
+    assert abs(BIOMASS * last) < 1e5 and c(60.0) == c(HALF)
+    assert WATER * before == pytest.approx(BIOMASS * after, rel=1e-3)
