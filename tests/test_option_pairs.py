@@ -11,7 +11,7 @@ import pytest
 
 from repro.fem import elements
 from repro.model import flow, pore, traction
-from repro.scene import load_scene
+from repro.scene import SceneError, load_scene
 from tests.strategies import ORDERS
 
 #: An aggregate that leans downstream, beside the middle of the pore.
@@ -88,6 +88,11 @@ def test_substrates_are_conserved(body, interface, order):
     _, _, solution = solved(body, interface, order)
     for flux in solution.fluxes:
         assert flux.consumed > 0 and flux.out + flux.consumed == pytest.approx(flux.supplied, rel=1e-9)
+
+
+def test_a_permeable_body_under_fluid_forces_is_refused():
+    with pytest.raises(SceneError, match='growth.fluid_forces = "included": "neglected" is needed with flow.biomass'):
+        solved("permeable", "laplacian", 2, "growth.fluid_forces=included")
 
 
 @pytest.mark.parametrize("interface, order", [*product(INTERFACES, (2, 3))])

@@ -8,6 +8,7 @@ import pytest
 
 from reference import (
     neo_hookean,
+    quadratic_growth,
     quadratic_mesh_motion,
     robin_channel,
 )
@@ -67,3 +68,19 @@ def test_the_robin_channel_obeys_its_equation_and_its_conditions():
     before, after, last = first_and_second(c, np.array([-1e-3, 1e-3, HALF - 1e-3]), STEP)[0]
     assert abs(BIOMASS * last) < 1e5 and c(60.0) == c(HALF)
     assert WATER * before == pytest.approx(BIOMASS * after, rel=1e-3)
+
+
+def test_quadratic_growth_of_a_half_disc_is_the_closed_form():
+    """theta = 4 everywhere doubles every distance and leaves one pressure, which no edge of the mesh disturbs. A wall
+    at 15 um keeps the nodes between the ends of a contact at its height."""
+    mesh = quadratic_growth.half_disc(10.0, 4)
+    free = quadratic_growth.grow(mesh, lambda x, y: np.full_like(x, 4.0), 4.0)
+    assert free.place == pytest.approx(2 * mesh.doflocs, abs=1e-12)
+    assert np.ptp(free.pressure) < 1e-12
+    inside = free.at(np.array([0.0, 3.0]), np.array([5.0, 4.0]))[0]
+    assert inside == pytest.approx(np.array([[0, 10], [6, 8]]), abs=1e-9)
+    contact = quadratic_growth.Contact(np.pi / 4, 3 * np.pi / 4, 15.0)
+    pressed = quadratic_growth.grow(mesh, lambda x, y: np.full_like(x, 4.0), 4.0, contact=contact)
+    angle = np.arctan2(*mesh.doflocs[::-1])
+    on = np.isclose(np.hypot(*mesh.doflocs), 10.0, atol=0.1) & (angle > 0.8) & (angle < 2.3)
+    assert pressed.place[1, on] == pytest.approx(15.0, abs=1e-12)
