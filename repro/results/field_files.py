@@ -1,15 +1,11 @@
-"""Fields as VTK's XML files of unstructured grids (``.vtu``).
+"""Fields as VTK's XML files of unstructured grids (``.vtu``), written and read with meshio.
 
-Arrays are compressed by zlib, in base64; ParaView, PyVista, VTK and meshio read these files. An
-array's text is the count of its blocks, the length of a block and of the last one, the lengths of
-the compressed blocks, and then these blocks. This module writes one block, and reads any number.
+Arrays are compressed by zlib, in base64; ParaView, PyVista and VTK read these files. meshio is
+imported with the first file, because many commands neither write nor read one.
 """
 
 from __future__ import annotations
 
-import zlib
-from base64 import b64decode, b64encode
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from xml.etree import ElementTree
@@ -22,15 +18,8 @@ from repro.results.files import read as read_file
 
 #: The name by which VTK's readers know the time of a grid.
 TIME = "TimeValue"
-#: VTK's number of a triangle, by its number of nodes.
-CELL_TYPES = {3: 5, 6: 22}
-#: NumPy's types by VTK's names.
-TYPES = {"Float64": "<f8", "Int64": "<i8", "UInt8": "|u1"}
-NAMES = {kind: name for name, kind in TYPES.items()}
-#: The default level of zlib, 6, saves 2 % of a file's length and takes 1.4 times the time.
-LEVEL = 1
-FORM = {"type": "UnstructuredGrid", "version": "0.1", "byte_order": "LittleEndian",
-        "header_type": "UInt32", "compressor": "vtkZLibDataCompressor"}
+#: meshio's name of a triangle, by its number of nodes.
+CELL_TYPES = {3: "triangle", 6: "triangle6"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,32 +40,24 @@ class Grid:
 
 def write(path: Path, grid: Grid) -> None:
     """Write a grid. Raises OSError if the file cannot be written."""
-    count, nodes = grid.cells.shape
-    connections = {"connectivity": grid.cells.ravel(),
-                   "offsets": nodes * np.arange(1, count + 1),
-                   "types": np.full(count, CELL_TYPES[nodes], np.uint8)}
-    sections = {"Points": {"Points": grid.points}, "Cells": connections,
-                "PointData": grid.point_data, "CellData": grid.cell_data}
-    form = " ".join(f'{name}="{value}"' for name, value in FORM.items())
-    lines = ['<?xml version="1.0"?>', f"<VTKFile {form}>", "<UnstructuredGrid>",
-             f'<FieldData><DataArray type="Float64" Name="{TIME}" NumberOfTuples="1" '
-             f'format="ascii">{float(grid.time)!r}</DataArray></FieldData>',
-             f'<Piece NumberOfPoints="{len(grid.points)}" NumberOfCells="{count}">']
-    for section, arrays in sections.items():
-        lines += [f"<{section}>", *map(_element, arrays, arrays.values()), f"</{section}>"]
-    lines += ["</Piece>", "</UnstructuredGrid>", "</VTKFile>", ""]
-    path.write_text("\n".join(lines), encoding="utf-8", newline="")
+    import meshio
+
+    cells = [(CELL_TYPES[grid.cells.shape[1]], grid.cells)]
+    in_cells = {name: [values] for name, values in grid.cell_data.items()}
+    mesh = meshio.Mesh(grid.points, cells, dict(grid.point_data), in_cells)
+    meshio.vtu.write(path, mesh, header_type="UInt32")
+    _add_time(path, grid.time)
 
 
-def _element(name: str, values: np.ndarray) -> str:
-    """The XML element of an array (N,) or (N, components)."""
-    little = values.astype(values.dtype.newbyteorder("<"), copy=False)
-    content = little.tobytes()
-    compressed = zlib.compress(content, LEVEL)
-    header = np.array([1, len(content), len(content), len(compressed)], "<u4").tobytes()
-    components = f' NumberOfComponents="{values.shape[1]}"' if values.ndim == 2 else ""
-    return (f'<DataArray type="{NAMES[little.dtype.str]}" Name="{name}"{components} '
-            f'format="binary">{(b64encode(header) + b64encode(compressed)).decode()}</DataArray>')
+def _add_time(path: Path, time: float) -> None:
+    """Add the time (h) to a file; meshio reads field data and does not write them."""
+    tree = ElementTree.parse(path)
+    fields = ElementTree.Element("FieldData")
+    value = ElementTree.SubElement(fields, "DataArray", type="Float64", Name=TIME,
+                                   NumberOfTuples="1", format="ascii")
+    value.text = repr(float(time))
+    tree.getroot()[0].insert(0, fields)
+    tree.write(path, encoding="utf-8", xml_declaration=True)
 
 
 def read(path: Path) -> Grid:
@@ -84,45 +65,15 @@ def read(path: Path) -> Grid:
 
     Raises OutputError if the file cannot be read, is longer than MOST_DATA, or contains no grid.
     """
+    import meshio
+
     try:
-        root = ElementTree.fromstring(read_file(path, MOST_DATA))
-        if root.attrib != FORM:
-            raise ValueError("its form is another one")
-        return _grid(root[0])
-    except Exception as error:  # XML, zlib and NumPy have errors of their own for each damage
+        read_file(path, MOST_DATA)
+        mesh = meshio.vtu.read(path)
+        (cells,) = mesh.cells
+        in_cells = {name: values for name, (values,) in mesh.cell_data.items()}
+        time = float(mesh.field_data[TIME][0])
+        return Grid(mesh.points, cells.data, mesh.point_data, in_cells, time)
+    except Exception as error:  # meshio has no error of its own for most damages
         why = f"{type(error).__name__}: {error}".removesuffix(": ")
         raise OutputError(f"{path}: it holds no fields: {why}") from error
-
-
-def _grid(element: ElementTree.Element) -> Grid:
-    """The grid of an element ``UnstructuredGrid``."""
-    times = {each.get("Name"): each.text for each in element.iterfind("FieldData/DataArray")}
-    piece = element.find("Piece")
-    count, cells = (int(piece.get(f"NumberOf{name}")) for name in ("Points", "Cells"))
-    sections = {section: dict(_arrays(piece.find(section), size)) for section, size in
-                (("Points", count), ("Cells", cells), ("PointData", count), ("CellData", cells))}
-    points = sections["Points"]["Points"]
-    triangles = sections["Cells"]["connectivity"]
-    if points.shape != (count, 3) or triangles.shape[1] not in CELL_TYPES:
-        raise ValueError("its points or triangles have another shape")
-    return Grid(points, triangles, sections["PointData"], sections["CellData"], float(times[TIME]))
-
-
-def _arrays(section: ElementTree.Element, count: int) -> Iterator[tuple[str, np.ndarray]]:
-    """Names and arrays (count,) or (count, components) of a section."""
-    for element in section:
-        values = np.frombuffer(_content(element.text.strip()), TYPES[element.get("type")])
-        name = element.get("Name")
-        components = element.get("NumberOfComponents", -1 if name == "connectivity" else 0)
-        shape = (count, int(components)) if components else (count,)
-        yield name, values.reshape(shape).copy()
-
-
-def _content(text: str) -> bytes:
-    """The bytes of an array from its text."""
-    blocks = int(np.frombuffer(b64decode(text[:8])[:4], "<u4")[0])
-    length = 4 * -(-4 * (3 + blocks) // 3)
-    sizes = np.frombuffer(b64decode(text[:length]), "<u4")[3:]
-    compressed = b64decode(text[length:])
-    ends = np.cumsum(sizes)
-    return b"".join(zlib.decompress(compressed[end - size:end]) for size, end in zip(sizes, ends))
