@@ -25,7 +25,7 @@ REQUIRED = 0.95
 JUDGED, SLOWER = "fast", "accurate"
 RUNS = 200  # of the sweep
 SINGLE = 10  # runs before the sweep, and after it
-PACKAGES = "numpy, scipy.sparse.linalg, skfem, mmgpy, shapely"  # that a run needs
+PACKAGES = "numpy, scipy.sparse.linalg, skfem, mmgpy, shapely, meshio"  # that a run needs
 WIDTHS = "48:52 um"  # nearly the same run each time
 
 

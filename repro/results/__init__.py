@@ -34,7 +34,7 @@ __all__ = ["COLUMNS", "LEDGER_COLUMNS", "fields", "ledger_row", "row"]
 
 #: Factor from um/h to m/d.
 M_PER_D = UNITS["_m_per_d"].factor
-PACKAGES = ("numpy", "scipy", "scikit-fem", "mmgpy", "shapely", "pint")
+PACKAGES = ("numpy", "scipy", "scikit-fem", "meshio", "mmgpy", "shapely", "pint")
 
 
 def write_text(path: Path, text: str) -> None:

@@ -5,6 +5,8 @@ The server that forks the process of each run imports this module.
 
 import gc
 
+import meshio
+
 from repro import results
 from repro.runs.machine import conditions
 from repro.scene import load_scene
@@ -14,4 +16,4 @@ results.provenance(load_scene("flow_only"))
 conditions()
 gc.freeze()  # the collector skips imported objects, so that no process copies them
 
-__all__ = ["single_run"]
+__all__ = ["meshio", "single_run"]

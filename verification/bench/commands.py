@@ -15,7 +15,7 @@ from repro.march.simulation import simulate
 from repro.scene import load_scene
 from verification.bench.record import clock
 
-PACKAGES = "numpy, scipy.sparse.linalg, skfem, mmgpy, shapely"
+PACKAGES = "numpy, scipy.sparse.linalg, skfem, mmgpy, shapely, meshio"
 PRESETS = ("paper", "fast", "accurate", "exact")
 #: Rows of the short list, which the other points of base have too.
 FEW = 'output.times=["19.2 h", "19.4 h"]'
