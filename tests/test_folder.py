@@ -19,7 +19,7 @@ from repro.runs import checkpoint
 from repro.runs.checkpoint import LAST, NEWEST, PREVIOUS
 from repro.runs.execution import Watch, resume, run
 from repro.runs.folder import LOCK, SUMS
-from repro.runs.loading import load_run
+from repro.runs.scripts import load_run
 from repro.scene import load_scene, parse_scene, scene_tables
 from tests.pages import cached_run
 from tests.shell import (
