@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
@@ -20,8 +21,8 @@ PANELS = (("conductivity_m_per_d",), ("thickness_um",),
           ("effluent_acceptor_mg_per_L", "effluent_donor_mg_per_L"))
 #: Width of a figure, height of a panel of curves, and room above and below a field, in inches.
 WIDTH, PANEL, ROOM = 7.0, 1.9, 1.2
-#: Frames of a film per second; resolution of its frames, dots per inch.
-FRAMES_PER_SECOND, RESOLUTION = 8, 110
+#: Time of a frame of a film, ms; resolution, dots per inch.
+FRAME, RESOLUTION = 120, 110
 OUTLINE = "#d7191c"
 #: Nodes of the straight triangles that draw a triangle, by its number of nodes.
 PARTS = {3: [[0, 1, 2]], 6: [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]]}
@@ -69,6 +70,8 @@ def _draw_panel(ax: Any, results: Results, columns: Sequence[str]) -> None:
     marker = "o" if len(results.time) == 1 else ""
     for name in columns:
         ax.plot(results.time, results[name], marker=marker, label=names.KNOWN[name].label)
+    if marker:
+        ax.set_xticks(results.time)
     many = len(columns) > 1
     ax.set_ylabel(f"{_common(columns)}\n({names.unit(columns[0]) or '1'})")
     ax.grid(alpha=0.3)
@@ -87,31 +90,26 @@ def _common(columns: Sequence[str]) -> str:
 
 
 def field(fields: Mapping[str, np.ndarray], name: str, title: str, ax: Any = None,
-          limits: tuple[float, float] | None = None) -> Any:
+          limits: np.ndarray | None = None, box: np.ndarray | None = None) -> Any:
     """Draw a field with the outline of the aggregate and a colour bar; returns the axes.
 
-    Vectors are drawn by their lengths. limits: values of the first and last colour, by default the
-    least and the largest value.
+    Vectors are drawn by their lengths. limits: values of the first and last colour; box: lower left
+    and upper right corner (um). By default, they fit the field.
     """
-    points = fields["places_um"]
     values = magnitude(fields[name])
+    limits = value_range(values) if limits is None else limits
+    (left, bottom), (right, top) = corners(fields) if box is None else box
     if ax is None:
-        ax = _axes(points)
-    image = _image(ax, fields, values, limits or value_range(values))
+        height = 0.75 * WIDTH * (top - bottom) / (right - left) + ROOM
+        _, ax = pyplot().subplots(figsize=(WIDTH, height), layout="constrained")
+    image = _image(ax, fields, values)
+    image.set_clim(*limits)
     _draw_outline(ax, fields)
-    label = names.with_unit(name)
-    ax.figure.colorbar(image, cax=ax.inset_axes([1.02, 0, 0.02, 1]), label=label)
-    ax.set(xlabel="x (µm)", ylabel="y (µm)", aspect="equal", facecolor="0.85",
-           xlim=_span(points[:, 0]), ylim=_span(points[:, 1]))
-    ax.set_title(title, loc="left")
-    return ax
-
-
-def _axes(points: np.ndarray) -> Any:
-    """Axes in a new figure with the proportions of a mesh."""
-    along, across = np.ptp(points, axis=0)
-    height = 0.75 * WIDTH * across / along + ROOM
-    _, ax = pyplot().subplots(figsize=(WIDTH, height), layout="constrained")
+    bar = ax.figure.colorbar(image, cax=ax.inset_axes([1.02, 0, 0.02, 1]))
+    bar.formatter.set_powerlimits((-3, 4))
+    ax.set(xlabel="x (um)", ylabel="y (um)", aspect="equal", facecolor="0.85",
+           xlim=(left, right), ylim=(bottom, top))
+    ax.set_title(f"{title}: {names.with_unit(name)}", loc="left")
     return ax
 
 
@@ -120,17 +118,18 @@ def magnitude(values: np.ndarray) -> np.ndarray:
     return np.linalg.norm(values, axis=1) if values.ndim == 2 else values
 
 
-def value_range(values: np.ndarray) -> tuple[float, float]:
-    """The least and the largest value, without NaN."""
-    return float(np.nanmin(values)), float(np.nanmax(values))
+def value_range(values: np.ndarray) -> np.ndarray:
+    """(2,) the least and the largest value, without NaN."""
+    return np.array([np.nanmin(values), np.nanmax(values)])
 
 
-def _span(coordinates: np.ndarray) -> tuple[float, float]:
-    return coordinates.min(), coordinates.max()
+def corners(fields: Mapping[str, np.ndarray]) -> np.ndarray:
+    """(2, 2) lower left and upper right corner of a mesh, um."""
+    points = fields["places_um"]
+    return np.array([points.min(axis=0), points.max(axis=0)])
 
 
-def _image(ax: Any, fields: Mapping[str, np.ndarray], values: np.ndarray,
-           limits: tuple[float, float]) -> Any:
+def _image(ax: Any, fields: Mapping[str, np.ndarray], values: np.ndarray) -> Any:
     """Draw values at nodes smoothly, and values in triangles as they are; NaN stays empty."""
     cells = fields["triangles"]
     parts = np.array(PARTS[cells.shape[1]])
@@ -141,9 +140,7 @@ def _image(ax: Any, fields: Mapping[str, np.ndarray], values: np.ndarray,
     missing = np.isnan(colours) if in_triangles else np.isnan(colours[triangles]).any(axis=1)
     kind = {"facecolors": colours[~missing]} if in_triangles else {"shading": "gouraud"}
     at_nodes = () if in_triangles else (np.nan_to_num(colours),)
-    image = ax.tripcolor(x, y, *at_nodes, triangles=triangles[~missing], rasterized=True, **kind)
-    image.set_clim(*limits)
-    return image
+    return ax.tripcolor(x, y, *at_nodes, triangles=triangles[~missing], rasterized=True, **kind)
 
 
 def _draw_outline(ax: Any, fields: Mapping[str, np.ndarray]) -> None:
@@ -162,20 +159,47 @@ def _draw_outline(ax: Any, fields: Mapping[str, np.ndarray]) -> None:
 
 
 def film(results: Results, name: str, file: Path, ax: Any = None) -> Any:
-    """Write the fields of all rows as an animated GIF, with one scale of colours; returns the axes.
+    """Write the fields of all rows as an animated GIF; returns the axes with the last one.
+
+    Colours and the view are the same in all frames.
     """
-    frames = [results.fields(time) for time in results.time]
-    bounds = np.array([value_range(magnitude(each[name])) for each in frames])
-    limits = (float(bounds[:, 0].min()), float(bounds[:, 1].max()))
-    if ax is None:
-        ax = _axes(frames[0]["places_um"])
-    writer = import_module("matplotlib.animation").PillowWriter(fps=FRAMES_PER_SECOND)
-    with atomic_path(file) as beside, writer.saving(ax.figure, beside, RESOLUTION):
-        for time, fields in zip(results.time, frames):
+    rows = [(time, results.fields(time)) for time in results.time]
+    bounds = np.array([value_range(magnitude(fields[name])) for _, fields in rows])
+    boxes = np.array([corners(fields) for _, fields in rows])
+    limits = np.array([bounds[:, 0].min(), bounds[:, 1].max()])
+    box = np.array([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
+    images = []
+    for time, fields in rows:
+        if ax is not None:
             ax.clear()
-            field(fields, name, heading(results, time), ax, limits)
-            writer.grab_frame()
+        ax = field(fields, name, heading(results, time), ax, limits, box)
+        images.append(_frame(ax.figure))
+    with atomic_path(file) as beside:
+        images[0].save(beside, format="GIF", save_all=True, append_images=images[1:],
+                       duration=FRAME, loop=0)
     return ax
+
+
+def _frame(figure: Any) -> Any:
+    """The picture of a figure, in the colours of a film; later frames keep its layout."""
+    image = import_module("PIL.Image")
+    content = io.BytesIO()
+    figure.savefig(content, format="png", dpi=RESOLUTION)
+    figure.set_layout_engine("none")
+    palette = image.new("P", (1, 1))
+    palette.putpalette(_palette().tobytes())
+    return image.open(content).convert("RGB").quantize(palette=palette, dither=0)
+
+
+def _palette() -> np.ndarray:
+    """(256, 3) colours of a film: those of the fields, greys, and shades of the outline."""
+    map_colours = pyplot().get_cmap()(np.linspace(0, 1, 216))[:, :3]
+    greys = np.repeat(np.linspace(0, 1, 32)[:, None], 3, axis=1)
+    outline = np.array(import_module("matplotlib.colors").to_rgb(OUTLINE))
+    shades = [outline + share * (map_colours[k] - outline)
+              for k in (0, 71, 143, 215) for share in (0, 0.5)]
+    colours = np.vstack([map_colours, greys, shades])
+    return (255 * colours).round().astype(np.uint8)
 
 
 def heading(results: Results, time: float) -> str:
