@@ -24,16 +24,17 @@ WIDTH, PANEL, ROOM = 7.0, 1.9, 1.2
 #: Time of a frame of a film, ms; resolution, dots per inch.
 FRAME, RESOLUTION = 120, 110
 OUTLINE = "#d7191c"
+PYPLOT = "matplotlib.pyplot"
 #: Nodes of the straight triangles that draw a triangle, by its number of nodes.
 PARTS = {3: [[0, 1, 2]], 6: [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]]}
 #: Nodes along each edge of a triangle, by its number of nodes.
 EDGES = {3: [[0, 1], [1, 2], [2, 0]], 6: [[0, 3, 1], [1, 4, 2], [2, 5, 0]]}
 
 
-def pyplot():
-    """Import matplotlib.pyplot. Raises ImportError with the extra to install."""
+def optional(module: str) -> Any:
+    """Import a module of matplotlib or Pillow. Raises ImportError with the extra to install."""
     try:
-        return import_module("matplotlib.pyplot")
+        return import_module(module)
     except ImportError:
         raise ImportError("the package matplotlib is not installed; "
                           "pip install 'dupin2001-repro[figures]'") from None
@@ -60,8 +61,8 @@ def curves(results: Results, drawn: Sequence[tuple[str, ...]], ax: Any = None) -
 
 def _panels(count: int) -> list[Any]:
     size = (WIDTH, PANEL * count + 0.8)
-    _, axes = pyplot().subplots(count, sharex=True, squeeze=False, figsize=size,
-                                layout="constrained")
+    _, axes = optional(PYPLOT).subplots(count, sharex=True, squeeze=False, figsize=size,
+                                        layout="constrained")
     return list(axes[:, 0])
 
 
@@ -101,7 +102,7 @@ def field(fields: Mapping[str, np.ndarray], name: str, title: str, ax: Any = Non
     (left, bottom), (right, top) = corners(fields) if box is None else box
     if ax is None:
         height = 0.75 * WIDTH * (top - bottom) / (right - left) + ROOM
-        _, ax = pyplot().subplots(figsize=(WIDTH, height), layout="constrained")
+        _, ax = optional(PYPLOT).subplots(figsize=(WIDTH, height), layout="constrained")
     image = _image(ax, fields, values)
     image.set_clim(*limits)
     _draw_outline(ax, fields)
@@ -154,7 +155,7 @@ def _draw_outline(ax: Any, fields: Mapping[str, np.ndarray]) -> None:
     edge = edge.ravel()
     shared = (np.bincount(edge[inside], minlength=edge.max() + 1) == 1) & (np.bincount(edge) == 2)
     lines = fields["places_um"][edges[inside & shared[edge]]]
-    collection = import_module("matplotlib.collections").LineCollection
+    collection = optional("matplotlib.collections").LineCollection
     ax.add_collection(collection(lines, colors=OUTLINE, linewidths=1.5, capstyle="round"))
 
 
@@ -182,7 +183,7 @@ def film(results: Results, name: str, file: Path, ax: Any = None) -> Any:
 
 def _frame(figure: Any) -> Any:
     """The picture of a figure, in the colours of a film; later frames keep its layout."""
-    image = import_module("PIL.Image")
+    image = optional("PIL.Image")
     content = io.BytesIO()
     figure.savefig(content, format="png", dpi=RESOLUTION)
     figure.set_layout_engine("none")
@@ -193,9 +194,9 @@ def _frame(figure: Any) -> Any:
 
 def _palette() -> np.ndarray:
     """(256, 3) colours of a film: those of the fields, greys, and shades of the outline."""
-    map_colours = pyplot().get_cmap()(np.linspace(0, 1, 216))[:, :3]
+    map_colours = optional(PYPLOT).get_cmap()(np.linspace(0, 1, 216))[:, :3]
     greys = np.repeat(np.linspace(0, 1, 32)[:, None], 3, axis=1)
-    outline = np.array(import_module("matplotlib.colors").to_rgb(OUTLINE))
+    outline = np.array(optional("matplotlib.colors").to_rgb(OUTLINE))
     shades = [outline + share * (map_colours[k] - outline)
               for k in (0, 71, 143, 215) for share in (0, 0.5)]
     colours = np.vstack([map_colours, greys, shades])

@@ -202,8 +202,11 @@ class Results(Mapping[str, np.ndarray]):
         return drawing.field(fields, self._field(name, fields), title, ax)
 
     def _panels(self) -> list[tuple[str, ...]]:
-        """Columns of each panel of curves that the scene has."""
-        return [panel for panel in drawing.PANELS if set(panel) <= set(self.columns)]
+        """Find the columns of each panel of curves. Raises KeyError if the scene has none."""
+        panels = [panel for panel in drawing.PANELS if set(panel) <= set(self.columns)]
+        if not panels:
+            raise KeyError("this scene has no curves of flow, growth or uptake; name a column")
+        return panels
 
     def _field(self, name: str, fields: Mapping[str, np.ndarray]) -> str:
         """Full name of a field. Raises KeyError, with the nearest name, if there is none."""
