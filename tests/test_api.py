@@ -51,7 +51,7 @@ def test_results_lack_quantities_that_are_not_modelled():
 
 
 def test_another_time_is_refused_by_the_nearest(solved):
-    with pytest.raises(KeyError, match="0.55 h: not a reported time; the nearest rows are at 0.4 and 0.6 h, of 4 from 0 to 0.6 h"):
+    with pytest.raises(KeyError, match="0.55 h: not .* the nearest rows are at 0.4 and 0.6 h, of 4 from 0 to 0.6 h"):
         solved.fields(0.55)
 
 

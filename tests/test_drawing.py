@@ -102,7 +102,8 @@ def test_matplotlib_is_an_extra(results, monkeypatch, tmp_path, capsys):
 
 
 def test_the_command_draws_the_same(results, tmp_path, capsys):
-    for arguments, draw in (([], results.plot()[0]), (["acceptor", "--time", "0.2"], results.plot("acceptor", time=0.2))):
+    pictures = ([], results.plot()[0]), (["acceptor", "--time", "0.2"], results.plot("acceptor", time=0.2))
+    for arguments, draw in pictures:
         out = tmp_path / "picture.png"
         assert main(["plot", str(results.folder), *arguments, "--out", str(out)]) == 0
         expected = io.BytesIO()
