@@ -69,7 +69,7 @@ def run(scene: Source, folder: str | Path, overrides: Sequence[str] = (), *,
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     results = repro.run("flow_only", folder)
     >>> results.status, results["conductivity_m_per_d"].round(1).tolist()
-    ('completed', [174.0])
+    ('completed', [174.6])
     """
     loaded = load_scene(scene, overrides, unset=unset)
     origin = origin_of(scene, overrides, unset) if isinstance(scene, (str, Path)) else None
