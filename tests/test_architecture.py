@@ -24,7 +24,8 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 RUNTIME = PROJECT["project"]["dependencies"]
 EXTRAS = PROJECT["project"]["optional-dependencies"]
 LOCKS = [(ROOT / name).read_text(encoding="utf-8")
-         for name in ("requirements.lock", "verification/mutants/machine/requirements.lock", ".ci/crate.lock", ".ci/oldest.lock")]
+         for name in ("requirements.lock", "verification/mutants/machine/requirements.lock", ".ci/crate.lock",
+                      ".ci/oldest.lock")]
 PIN = re.compile(r"^([a-z0-9-]+)==(\d+(?:\.\d+)*)", re.M)
 ADDRESS = re.compile(r"//|file:|index|--find-links|(^|\s)/\w", re.M)
 

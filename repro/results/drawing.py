@@ -47,7 +47,7 @@ def full_name(name: str, known: Sequence[str]) -> str:
     return matching[0] if matching else ""
 
 
-def curves(results: Results, drawn: Sequence[tuple[str, ...]], ax: Any = None) -> list[Any]:
+def curves(results: Results, drawn: Sequence[Sequence[str]], ax: Any = None) -> list[Any]:
     """Draw columns over time, a panel for each tuple of names; returns the axes of the panels."""
     axes = _panels(len(drawn)) if ax is None else list(np.ravel(ax))
     if len(axes) != len(drawn):
