@@ -194,7 +194,8 @@ class Results(Mapping[str, np.ndarray]):
             if time is not None:
                 raise ValueError(f"time: {column or 'a plot without a name'} is drawn over all "
                                  "times; the name of a field is needed")
-            axes = drawing.curves(self, [(column,)] if column else self._panels(), ax)
+            panels: Sequence[Sequence[str]] = [(column,)] if column else self._panels()
+            axes = drawing.curves(self, panels, ax)
             return axes[0] if column else axes
         fields = self._fields[row] if row >= 0 else {}
         title = drawing.heading(self, self.time[row]) if row >= 0 else ""
