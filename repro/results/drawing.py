@@ -17,8 +17,9 @@ if TYPE_CHECKING:
     from repro.results.tables import Results
 
 #: The panels of curves, each with columns in one unit; a panel without columns is left out.
-PANELS = (("conductivity_m_per_d",), ("thickness_um",),
-          ("effluent_acceptor_mg_per_L", "effluent_donor_mg_per_L"))
+PANELS: tuple[tuple[str, ...], ...] = (
+    ("conductivity_m_per_d",), ("thickness_um",),
+    ("effluent_acceptor_mg_per_L", "effluent_donor_mg_per_L"))
 #: Width of a figure, height of a panel of curves, and room above and below a field, in inches.
 WIDTH, PANEL, ROOM = 7.0, 1.9, 1.2
 #: Time of a frame of a film, ms; resolution, dots per inch.
