@@ -35,7 +35,7 @@ def test_a_text_that_is_no_range_or_list_is_refused_in_one_line(text):
     with pytest.raises(SceneError) as refused:
         parse(text)
     message = str(refused.value)
-    assert message.startswith("--vary ") and "needed" in message and "\n" not in message and text[:10] in message
+    assert message.startswith("vary ") and "needed" in message and "\n" not in message and text[:10] in message
 
 
 @given(RANGES, SPACINGS, st.integers(2, 50))
