@@ -10,7 +10,7 @@ Ten lines of use; ``docs/tutorial.md`` of the repository has more:
     results = repro.solve(scene)                            # rows of timeseries.csv, as arrays
     print(results["conductivity_m_per_d"], results.units["conductivity_m_per_d"])
     results = repro.run(scene, "runs/base")                 # the same as files, and a page
-    results.plot("acceptor", time=3)                        # results.plot(), results.to_pandas()
+    repro.load_run("runs/base").plot("acceptor", time=3)    # and .plot(), .animate(), .to_pandas()
     repro.sweep(scene, ["pore.width=50 um, 60 um"], "sweep")
 
 Functions; every argument after these is given by its name:
