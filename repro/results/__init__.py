@@ -5,6 +5,7 @@
     arrays        quantities of the fields
     names         words and units of all quantities, by name
     tables        results in Python
+    drawing       curves, fields and films with matplotlib
     netcdf        the time series as NetCDF
 
 Writers use :func:`repro.results.files.atomic_path`, so that a file is complete or absent. An empty
