@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from repro.errors import Interrupted, SimulationError
+from repro.errors import GrowthError, Interrupted, SimulationError
 from repro.fem import linear
 from repro.fem.division import Division
 from repro.fem.outline import BOTTOM, FREE, TOP, Outline, polygon
 from repro.fem.space import Space
-from repro.march import simulation
+from repro.march import midpoint, simulation
 from repro.march.simulation import simulate
 from repro.model import contact, contact_lines, contact_newton
 from repro.model.contact_lines import Clearance, Contact, surface_ends
@@ -240,6 +240,39 @@ def test_a_run_stops_within_a_step_in_contact(plugged, tmp_path):
         run(scene, tmp_path / "stopped", watch=Watch(stop_within=stop))
     assert resume(tmp_path / "stopped") == "completed"
     assert files(tmp_path / "stopped") == files(tmp_path / "whole")
+
+
+def rows_at(scene, times):
+    """The rows of a scene at given times (h)."""
+    return [*simulate(load_scene(scene, [f"output.times={[f'{time!r} h' for time in times]}"]))][1:]
+
+
+@pytest.mark.parametrize("width, end, count", [
+    (25, 17.0, 6), *(pytest.param(*pore, 50, marks=pytest.mark.thorough)
+                     for pore in ((100, 45.0), (25, 18.0), (40, 24.0), (60, 32.0)))])
+def test_rows_through_contact_decide_nothing(width, end, count):
+    """A run arrives, and ends in the same state to the last bit, whichever rows are asked for."""
+    scene = load_scene("wide", ["numerics.preset=fast", f'pore.width="{width} um"', f'growth.end="{end} h"'])
+    drawn = np.random.default_rng(width).uniform(0.8 * end, end, count)
+    last, = rows_at(scene, [end])
+    *_, same = rows_at(scene, [*sorted(map(float, drawn)), end])
+    assert last.pore.contact and np.array_equal(same.pore.mesh.points, last.pore.mesh.points)
+    assert np.array_equal(same.pore.active, last.pore.active)
+
+
+def test_a_row_that_cannot_be_interpolated_is_reached_by_steps_of_its_own(plugged, monkeypatch):
+    scene = load_scene(plugged[0], ['growth.end="16 h"'])
+    expected = rows_at(scene, [15.3, 15.9])
+
+    def fail(*_):
+        raise GrowthError("no equilibrium")
+
+    monkeypatch.setattr(midpoint, "_interpolate", fail)
+    reached = rows_at(scene, [15.3, 15.9])
+    for one, other in zip(reached, expected):
+        assert one.pore.time == other.pore.time
+        assert one.pore.boundary.area == pytest.approx(other.pore.boundary.area, rel=2e-3)
+        assert one.solved.flow.conductivity == pytest.approx(other.solved.flow.conductivity, rel=0.02)
 
 
 def test_lines_start_from_their_speeds(plugged):

@@ -19,6 +19,7 @@ from functools import partial
 
 import numpy as np
 
+from repro.errors import RunEnd, StageError
 from repro.fem import transfer
 from repro.fem.space import Space
 from repro.march.balance import Ledger
@@ -33,6 +34,10 @@ from repro.model.pore import Pore, Solved
 from repro.model.remeshing import GeneratedMesh
 from repro.model.stages import Stages
 from repro.model.transport import Concentrations, Flows, Fluxes
+from repro.scene import needed
+
+#: Numbers of steps to a row that cannot be interpolated.
+OWN_STEPS = (1, 2, 4)
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,10 +172,39 @@ def interpolate(stages: Stages, previous: Pore, solved: Solved, half: Halfway,
                 time: float) -> InterpolatedState:
     """Interpolate the pore to a time (h) within a step, and solve there.
 
+    If that fails, steps of their own lead from the start of the step to the time: the step may have
+    passed a state in which its extrapolation does not help. Raises StageError if they fail too.
+    """
+    try:
+        return _interpolate(stages, previous, solved, half, time)
+    except (StageError, FloatingPointError) as error:
+        failure: Exception = error
+    for count in OWN_STEPS:
+        try:
+            return _approach(stages, previous, solved, time, count)
+        except (RunEnd, StageError, FloatingPointError) as error:
+            failure = error
+    raise failure
+
+
+def _approach(stages: Stages, previous: Pore, solved: Solved, time: float,
+              count: int) -> InterpolatedState:
+    """Make a number of equal steps to a time (h)."""
+    duration = (time - previous.time) / count
+    start = previous
+    for _ in range(count):
+        step = needed(attempt(stages, start, solved, duration).step, "a step to the row")
+        start, solved = remeshing.solve_graded(stages.scene, step.pore)
+        start = replace(start, concentrations=solved.concentrations)
+    return InterpolatedState(replace(start, time=time), solved)
+
+
+def _interpolate(stages: Stages, previous: Pore, solved: Solved, half: Halfway,
+                 time: float) -> InterpolatedState:
+    """Interpolate in the way of the step.
+
     If the moved mesh is not acceptable, the nearest of the meshes that the step has generated
     replaces it.
-
-    Raises StageError if a stage fails.
     """
     part = (time - previous.time) / half.duration
     mean = Rates((1 - part) * half.first.growth + part * half.rates.growth,

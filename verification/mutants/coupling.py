@@ -181,6 +181,13 @@ MUTANTS = (
          "line.advance <= line.least or clearance <= np.inf)",
          f"{SMALLEST_CONTACT}[newton-fast]")),
     *changes(
+        "repro/march/midpoint.py",
+        ("rows-decide-whether-a-run-arrives",
+         "A row that cannot be interpolated ends the run.",
+         "OWN_STEPS = (1, 2, 4)",
+         "OWN_STEPS = ()",
+         f"{CONTACT_TESTS}a_row_that_cannot_be_interpolated_is_reached_by_steps_of_its_own")),
+    *changes(
         "repro/runs/execution.py",
         ("deaf-within-steps",
          "A signal waits for the end of a step.",
