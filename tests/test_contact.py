@@ -261,7 +261,7 @@ def test_rows_through_contact_decide_nothing(width, end, count):
 
 
 def test_a_row_that_cannot_be_interpolated_is_reached_by_steps_of_its_own(plugged, monkeypatch):
-    scene = load_scene(plugged[0], ['growth.end="16 h"'])
+    scene = plugged[0]
     expected = rows_at(scene, [15.3, 15.9])
 
     def fail(*_):
