@@ -220,9 +220,9 @@ def _close_by_lines(mechanics: Mechanics, grown: Pore, start: Pore, forces: np.n
     lines = contact_lines.lines_of(grown.boundary)
     _place_lines(grown.boundary, lines, search)
     if grown.contact:
-        settled = trials.settle(grown.wall, lines, rule)
-        if settled is not None:
-            return settled
+        expansion = trials.settle(grown.wall, lines, rule)
+        if expansion is not None:
+            return expansion
     shape = trials.solve(grown.wall, lines)
     gap = rule.width - shape.pore.boundary.thickness
     wall = grown.wall
@@ -239,9 +239,9 @@ def _close_by_lines(mechanics: Mechanics, grown: Pore, start: Pore, forces: np.n
         if not tried and all(abs(line.trials[-1][1]) < CLOSE_ENOUGH or line.accepted
                              for line in lines):
             tried = True
-            settled = trials.settle(wall, lines, rule)
-            if settled is not None:
-                return replace(settled, gap=gap)
+            expansion = trials.settle(wall, lines, rule)
+            if expansion is not None:
+                return replace(expansion, gap=gap)
         for line in lines:
             if not line.accepted:
                 line.step()
