@@ -372,7 +372,8 @@ class System:
         at = body.strained(position)
         P = body.pressures.evaluate(pressure)
         P += self.stabilisation.gamma * theta ** (-5 / 3) * (at.J - theta)
-        forces = self._forces(at.piola(P), body.at.weighted)
+        stress = at.piola(P)
+        forces = self._forces(stress, body.at.weighted)
         gap = body.pressures.load(body.at.dx * (at.J - theta))
         return np.concatenate([body.at.assemble(forces), body.pressures.assemble(gap)])
 

@@ -181,6 +181,13 @@ MUTANTS = (
          "line.advance <= line.least or clearance <= np.inf)",
          f"{SMALLEST_CONTACT}[newton-fast]")),
     *changes(
+        "repro/runs/state_arrays.py",
+        ("line-speeds-dropped",
+         "A checkpoint holds no speeds of contact lines.",
+         'OPTIONAL = ("last", "line_speeds")',
+         'OPTIONAL = ("last",)',
+         f"{CONTACT_TESTS}a_run_stops_within_a_step_in_contact")),
+    *changes(
         "repro/march/midpoint.py",
         ("rows-decide-whether-a-run-arrives",
          "A row that cannot be interpolated ends the run.",
