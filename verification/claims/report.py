@@ -173,6 +173,8 @@ def summary(rows: list[Row]) -> str:
         "arithmetic of Table 1 are not among them."))
 
 
+#: Since when a definition must be dated before its first value; some older ones were written with their values.
+RULE_SINCE = "2026-11-24"
 COMMITTED, OTHERS = (Path(__file__).parent / name for name in ("claims.json", "other_definitions.json"))
 #: Numbers this small are the round-off of exact ones, which differs between machines; so do last digits.
 ROUND_OFF, LAST_DIGITS = 1e-9, 1e-9
@@ -201,12 +203,14 @@ def entry(row: Row) -> dict:
 
 def stamped(entry: dict, known: dict | None, now: str) -> dict:
     """The entry with the time of its first value: the recorded one while the definition is the same, else now (UTC).
-    Raises ClaimError for a definition that is not dated before its first value, or not after those of another one."""
+    Raises ClaimError for a definition that is not dated before its first value, or not after those of another one; for
+    a new claim not after RULE_SINCE."""
     if known and _definition(entry) == _definition(known):
         return {**entry, "first_value": known["first_value"]}
-    if not (known["first_value"] if known else "") < entry["defined"] < now:
-        raise ClaimError(f"{entry['id']}: defined anew, and {entry['defined']} is not between the values of the other "
-                         f"definition and {now}")
+    before = known["first_value"] if known else RULE_SINCE
+    if not before < entry["defined"] < now:
+        raise ClaimError(f"{entry['id']}: defined anew, and {entry['defined']} is not between {before} and {now}: a "
+                         "definition is dated before its first value, and after those of another definition")
     return {**entry, "first_value": now}
 
 
