@@ -56,7 +56,7 @@ def stream(state: State) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 @style.styled
 def main() -> None:
     """Draw and write the picture. Rounding of its colours halves the size of the file."""
-    figure = draw(*runs.folders([runs.BASE, *figure_6.RUNS]))
+    figure = draw(*runs.folders([runs.BASE, runs.WIDE_CONVERGED]))
     figure.set_dpi(PIXELS_WIDE / style.PAGE)
     style.lay_out(figure)
     figure.canvas.draw()

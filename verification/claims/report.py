@@ -295,13 +295,13 @@ def flips(entry: dict) -> list[Flip]:
 
 def _moved(check: dict) -> list[tuple[float, float]]:
     """The bounds of a check, one of them moved by the bar; none where that has no end."""
-    low, high = _ends(check["tolerance"])
-    first, last = _ends(check)
+    low, high = ends(check["tolerance"])
+    first, last = ends(check)
     half = 0.5 * (last - first)
     return [(low - half, high), (low + half, high), (low, high - half), (low, high + half)] if isfinite(half) else []
 
 
-def _ends(recorded: dict) -> tuple[float, float]:
+def ends(recorded: dict) -> tuple[float, float]:
     """The ends of a recorded interval, in which an open end is null."""
     return -inf if recorded["low"] is None else recorded["low"], inf if recorded["high"] is None else recorded["high"]
 
@@ -309,5 +309,5 @@ def _ends(recorded: dict) -> tuple[float, float]:
 def _verdict_with(entry: dict, number: int, bounds: tuple[float, float]) -> str:
     """The verdict with other bounds of one check."""
     outcomes = [check["outcome"] for check in entry["checks"]]
-    outcomes[number] = outcome_of(_ends(entry["checks"][number]), bounds)
+    outcomes[number] = outcome_of(ends(entry["checks"][number]), bounds)
     return verdict_of(set(outcomes), bool(entry["change"]), bool(entry["rounding"]))
