@@ -18,8 +18,9 @@ TITLE = "Plate 2. One expansion of the aggregate and the deformation of the mesh
 RUNS = (runs.BASE,)
 CLAIMS = ("C08", "C11", "C24", "C31")
 
-#: Factor by which the arrows are longer than the displacements, and the least distance (um) of two of them in (a).
-LENGTHENED, APART = 5, 7.0
+#: Factors by which the arrows are longer than the displacements in (b) and in (a), and the least distance (um) of two
+#: of them in (a).
+LENGTHENED, FAR, APART = 5, 15, 7.0
 
 
 @style.styled
@@ -35,7 +36,7 @@ def draw(folder: Path) -> Figure:
     _meshed_part(meshed_part, before, after)
     colours = _close_up(near, before, after)
     figure.colorbar(colours, ax=[meshed_part, near], location="right", label="expansion θ since t = 0 (–)", aspect=40)
-    meshed_part.set_title("meshed part")
+    meshed_part.set_title(f"meshed part, displacements × {FAR}")
     near.set_title(f"aggregate: shape before (dashed) and after (line), displacements × {LENGTHENED}")
     style.number_panels(meshed_part, near)
     return figure
@@ -48,7 +49,7 @@ def _meshed_part(axes: Axes, before: State, after: State) -> None:
     nodes, moved_to = displaced(before, after)
     start = before.points[nodes]
     few = scattered(start)
-    _arrows(axes, start[few], moved_to[few])
+    _arrows(axes, start[few], moved_to[few], FAR)
 
 
 def _close_up(axes: Axes, before: State, after: State) -> TriMesh:
@@ -60,7 +61,7 @@ def _close_up(axes: Axes, before: State, after: State) -> TriMesh:
     axes.triplot(after.triangulation, color=style.BLACK, linewidth=0.35, alpha=0.7, zorder=3)
     style.aggregate(axes, before.rim, filled=False, edgecolor="white", linestyle="--", linewidth=1.0, zorder=4)
     nodes, moved_to = displaced(before, after)
-    _arrows(axes, before.points[nodes], moved_to)
+    _arrows(axes, before.points[nodes], moved_to, LENGTHENED)
     return colours
 
 
@@ -70,9 +71,9 @@ def _theta(axes: Axes, after: State) -> TriMesh:
     return axes.tripcolor(after.aggregate, after.cells["theta"][after.biomass], cmap=style.MAP, zorder=1)
 
 
-def _arrows(axes: Axes, start: np.ndarray, end: np.ndarray) -> None:
-    """Arrows LENGTHENED times as long as the displacements from start (K, 2) to end."""
-    axes.quiver(*start.T, *(LENGTHENED * (end - start)).T, color=style.RED, angles="xy", scale_units="xy", scale=1,
+def _arrows(axes: Axes, start: np.ndarray, end: np.ndarray, factor: float) -> None:
+    """Arrows ``factor`` times as long as the displacements from start (K, 2) to end."""
+    axes.quiver(*start.T, *(factor * (end - start)).T, color=style.RED, angles="xy", scale_units="xy", scale=1,
                 width=0.0018, headwidth=4, headlength=5, zorder=5)
 
 

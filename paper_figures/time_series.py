@@ -38,8 +38,9 @@ def draw(base: Path, wide: Path) -> Figure:
                 axes.plot(table["time_h"], table[column.format("donor")], color=colour, linestyle="--")
         axes.set(title=title, ylabel=unit, yscale="log" if log else "linear")
         for time, value in PRINTED.get(column, ()):
-            axes.scatter(time, value, marker="x", s=36, color=style.BLACK, linewidths=1.4, zorder=3)
-            axes.annotate(f"{value:g}", (time, value), (5, 3), textcoords="offset points")
+            axes.scatter(time, value, marker="x", s=36, color=style.BLACK, linewidths=1.4, zorder=3,
+                         clip_on=False)
+            axes.annotate(f"{value:g}", (time, value), (6, -11), textcoords="offset points")
         if not log:
             axes.set_ylim(0)
         for time in _contact_times(base, wide):

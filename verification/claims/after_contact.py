@@ -8,7 +8,7 @@ contact, which closes by entire edges of the outline, with the numbers derived f
 peak lies beside the ends of the contact surface, where stresses have no limit. The bar of a tiny change exceeds it.
 
 A second list has the numbers of base whose bars exceed 0.2 %, the limit that its velocities, effluents, uptake and
-concentrations meet. The replication note prints both lists, the second with the reason for each kind.
+concentrations meet. The register of the claims prints both lists, the second with the reason for each kind.
 
 The program runs wide with the preset `exact` and prints its distance from the finest recorded size. It says whether
 conductivities and tips are within 0.5 %, distance and bar together, in 60 s of processor time.
