@@ -1,4 +1,4 @@
-"""The pictures in the README and in the replication note: Base near its end and the outlines of Wide, and three figures.
+"""The pictures in README and replication note: Base near its end with the outlines of Wide, and three figures.
 
 `python -m paper_figures.overview` writes them as PNG files into `paper_figures`, which are committed. `make figures`
 does not change them.

@@ -1492,4 +1492,18 @@ MUTANTS = (
          "    return max(previous.time, previous.time + duration)\n",
          f"{STEPPING}a_shape_leans_as_the_flow_at_the_end_of_its_step_pushes[updates]",
          f"{STEPPING}a_shape_leans_as_the_flow_at_the_end_of_its_step_pushes[midpoint]")),
+    *changes(
+        "verification/claims/report.py",
+        ("first-value-undated",
+         "A new claim may have any date before its first value.",
+         'before = known["first_value"] if known else RULE_SINCE',
+         'before = known["first_value"] if known else ""',
+         "tests/test_claims.py::test_a_definition_without_a_date_before_its_values_is_refused")),
+    *changes(
+        "paper_figures/replication.py",
+        ("register-of-last-definitions",
+         "The register shows the verdict of the last definition of a claim.",
+         "first, *later = claims_record.definitions(claim)",
+         "*later, first = claims_record.definitions(claim)",
+         "tests/test_published.py::test_the_note_and_the_register_have_the_computed_numbers")),
 )
