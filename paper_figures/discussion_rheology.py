@@ -67,7 +67,9 @@ def _changes(axes: Axes, folders: tuple[Path, ...]) -> None:
         reference = np.interp(table["time_h"], plain["time_h"], plain["conductivity_m_per_d"])
         axes.plot(table["time_h"], 100 * (table["conductivity_m_per_d"] / reference - 1), color=colour, label=label)
     axes.axhline(0.0, color=COLOURS[0], linewidth=0.8)
-    axes.set(title="change of the conductivity at the same time", xlabel="time (h)", ylabel="%", xlim=(0, None))
+    contact_time = min(contact(folders[0]), float(plain["time_h"][-1]))
+    axes.set(title="change of the conductivity at the same time", xlabel="time (h)", ylabel="%",
+             xlim=(contact_time - AROUND, None))
     axes.set_yscale("symlog", linthresh=1.0)
     style.grid(axes)
 

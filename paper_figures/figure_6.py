@@ -37,14 +37,14 @@ PER_EDGE = 8
 @style.styled
 def draw(*folders: Path) -> Figure:
     """Outlines every EVERY hours with each supply, coloured by time."""
-    figure = style.figure(6.3)
+    figure = style.figure(5.6)
     panels = figure.subplots(len(folders), 1)
     every = [states.every(folder, EVERY) for folder in folders]
     colours = scale(max(drawn[-1].time for drawn in every), EVERY)
     reach = span(sum(every, []))
     for axes, drawn, supply in zip(panels, every, SUPPLIES):
         fill(axes, drawn, colours, reach)
-        axes.set_title(f"supply of {supply} K_s" + (" (assumed for all other figures)" if supply == 10 else ""))
+        axes.set_title(f"supply of {supply} K$_s$" + (", assumed for all other figures" if supply == 10 else ""))
     for axes in panels[:-1]:
         axes.set_xlabel("")
     style.number_panels(*panels)
@@ -79,7 +79,7 @@ def fill(axes: Axes, drawn: list[State], colours: ScalarMappable, reach: tuple[f
     for state in reversed(drawn):
         style.aggregate(axes, smooth(state.rim, state.width), facecolor=colours.to_rgba(state.time), edgecolor="white",
                         linewidth=0.9)
-    first, high = min(s.rim[:, 0].min() for s in drawn), 0.5 * drawn[0].width
+    first, high = reach[0] + MARGIN, 0.5 * drawn[0].width
     style.arrow(axes, (first - 0.95 * MARGIN, high), (first - 0.2 * MARGIN, high), 8, 1.4)
     axes.text(first - 0.9 * MARGIN, high + 4, "flow", color=style.BLUE, ha="left", va="bottom", fontsize=7)
 
