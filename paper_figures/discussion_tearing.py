@@ -53,10 +53,10 @@ def agreed(run: tuple[str, ...], forced: bool) -> np.ndarray:
     """The rows of a stress history whose locations agree with those on larger elements, (m, 4)."""
     rows = stress_history(run, forced)
     with at_level(COARSER):
-        others = stress_history(run, forced)
-    count = min(len(rows), len(others))
-    rows, others = rows[:count], others[:count]
-    apart = np.hypot(*(rows[:, 1:3] - others[:, 1:3]).T)
+        coarser = stress_history(run, forced)
+    count = min(len(rows), len(coarser))
+    rows = rows[:count]
+    apart = np.hypot(*(rows[:, 1:3] - coarser[:count, 1:3]).T)
     return rows[apart <= APART * load_packaged(*run).pore.width]
 
 

@@ -1499,11 +1499,4 @@ MUTANTS = (
          'before = known["first_value"] if known else RULE_SINCE',
          'before = known["first_value"] if known else ""',
          "tests/test_claims.py::test_a_definition_without_a_date_before_its_values_is_refused")),
-    *changes(
-        "paper_figures/replication.py",
-        ("register-of-last-definitions",
-         "The register shows the verdict of the last definition of a claim.",
-         "first, *later = claims_record.definitions(claim)",
-         "*later, first = claims_record.definitions(claim)",
-         "tests/test_published.py::test_the_note_and_the_register_have_the_computed_numbers")),
 )
