@@ -2,7 +2,7 @@
 Not in the paper.
 
 The stress is a mean over a tenth of the pore's width, since a largest value in a point does not exist (C40, C46). A
-location is drawn if two sizes of elements agree on it within this distance."""
+location is drawn if two sizes of elements agree on it within a tenth of the width, and of the aggregate's length."""
 
 from __future__ import annotations
 
@@ -36,8 +36,9 @@ PASCAL = 1e6  # Pa in one MPa
 
 @cached
 def stress_history(run: tuple[str, ...], forced: bool) -> np.ndarray:
-    """Largest principal stress (Pa), its location (um) and the time (h) of every second row after t = 0, (n, 4), with
-    or without the fluid's forces. The history ends where shape and flow do not converge."""
+    """Largest principal stress (Pa), its location (um), the time (h) and the length (um) of the aggregate in every
+    second row after t = 0, (n, 5), with or without the fluid's forces. The history ends where shape and flow do not
+    converge."""
     rows = []
     for body in bodies(run)[:0:-2][::-1]:
         try:
@@ -45,19 +46,20 @@ def stress_history(run: tuple[str, ...], forced: bool) -> np.ndarray:
         except GrowthError:
             break
         modulus = PASCAL * body.scene.growth.shear_modulus
-        rows.append((modulus * largest.value, largest.x, largest.y, body.pore.time))
-    return np.array(rows).reshape(-1, 4)
+        rows.append((modulus * largest.value, largest.x, largest.y, body.pore.time,
+                     body.outline.downstream - body.outline.upstream))
+    return np.array(rows).reshape(-1, 5)
 
 
 def agreed(run: tuple[str, ...], forced: bool) -> np.ndarray:
-    """The rows of a stress history whose locations agree with those on larger elements, (m, 4)."""
+    """The rows of a stress history whose locations agree with those on larger elements, (m, 5)."""
     rows = stress_history(run, forced)
     with at_level(COARSER):
         coarser = stress_history(run, forced)
     count = min(len(rows), len(coarser))
     rows = rows[:count]
     apart = np.hypot(*(rows[:, 1:3] - coarser[:count, 1:3]).T)
-    return rows[apart <= APART * load_packaged(*run).pore.width]
+    return rows[apart <= APART * np.minimum(load_packaged(*run).pore.width, rows[:, 4])]
 
 
 @style.styled
@@ -81,12 +83,12 @@ def draw() -> Figure:
 def _sizes(axes: Axes) -> None:
     for run, colour in zip(RUN_OVERRIDES, COLOURS):
         for forced, line in ((False, "-"), (True, "--")):
-            size, _, _, hours = stress_history(run, forced).T
+            size, _, _, hours, _ = stress_history(run, forced).T
             axes.plot(hours, size, line, color=colour)
     handles = [Line2D([], [], color=colour, label=name) for name, colour in zip(NAMES, COLOURS)]
     handles += [Line2D([], [], color=style.BLACK, linestyle=line, label=label)
                 for line, label in (("-", "growth only"), ("--", "with the fluid's forces"))]
-    axes.legend(handles=handles, loc="upper left")
+    axes.legend(handles=handles, loc="lower right")
     axes.set(title="largest principal stress, mean over a tenth of the width", xlabel="time (h)", ylabel="Pa",
              yscale="log", xlim=(0, None))
     style.grid(axes)
@@ -101,7 +103,7 @@ def _places(axes: Axes, colours: ScalarMappable, forced: bool) -> None:
     axes.set_anchor("W")
     for body in outlined:
         style.aggregate(axes, _rim(body), filled=False, edgecolor=colours.to_rgba(body.pore.time), linewidth=0.7)
-    _, x, y, hours = agreed(RUN_OVERRIDES[1], forced).T
+    _, x, y, hours, _ = agreed(RUN_OVERRIDES[1], forced).T
     axes.scatter(x, y, c=colours.to_rgba(hours), s=16, edgecolors="black", linewidths=0.4, zorder=5)
 
 
@@ -118,12 +120,12 @@ def caption() -> str:
         ends = [(*stress_history(each, False)[-1, [0, 3]], name) for name, each in zip(NAMES, RUN_OVERRIDES)]
         last = bodies(run)[-1].pore.time
     peaks = "; ".join(f"{name} {value:.3g} Pa at {hours:g} h" for value, hours, name in ends)
-    size, _, _, hours = forced[-1]
+    size, _, _, hours, _ = forced[-1]
     note = ("" if hours == last else " Later the head that drives the constant velocity bends the plug so far that "
                                      "shape and flow do not converge.")
     return (f"(a) Largest principal stress in the mean over a tenth of the pore's width: {peaks}. (b) Its location in "
             f"Wide ({figure_6.ASSUMED}), with outlines every {EVERY:g} h. Only locations that converge are shown: "
-            f"those that agree within this distance on elements {PAIRED[1]:.3g} and {PAIRED[2]:.3g} times as large as "
-            f"those of the preset `accurate`, {drawn[0]} rows. (c) The same aggregates in equilibrium with the "
-            f"fluid's forces, {drawn[1]} rows: {size:.3g} Pa instead of {without[len(forced) - 1, 0]:.3g} Pa at "
-            f"{hours:g} h.{note}")
+            "those that agree within this distance, and a tenth of the length of the aggregate, on elements "
+            f"{PAIRED[1]:.3g} and {PAIRED[2]:.3g} times as large as those of the preset `accurate`, {drawn[0]} rows. "
+            f"(c) The same aggregates in equilibrium with the fluid's forces, {drawn[1]} rows: {size:.3g} Pa instead "
+            f"of {without[len(forced) - 1, 0]:.3g} Pa at {hours:g} h.{note}")
