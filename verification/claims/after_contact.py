@@ -37,7 +37,7 @@ NOT_OF_BASE = ("C19", "C41")
 KINDS = {
     "a place, known to the element in which it is": r"C10",
     "a small difference of two halves, or of two runs or solutions, which takes the errors of both in parts of itself":
-        r"C11|C36|C42|.*(born stress-free|deviation|law's r|changed by the fluid)",
+        r"C11|C36|C42|C63|.*(born stress-free|deviation|law's r|changed by the fluid)",
     "a Sherwood number, over the drop from the supply to the interface, small against the supply, and ratios less one":
         r"C39|C47",
     "a peak of stress or strain, beside the corner of interface and wall or in one element, and ratios of such":

@@ -89,7 +89,8 @@ SUPPLIES, SIZE = (5.0, 10.0, 20.0, 40.0), 2**0.5
 END = 120.0
 #: Claims that read this run but are not judged again, since they compare it with other models; with the reasons.
 LEFT_OUT = {"C32": "compares two ways for biomass to be born", "C41": "changes the rheology and the walls",
-            "C46": "compares its stresses with and without the fluid's forces"}
+            "C46": "compares its stresses with and without the fluid's forces",
+            "C63": "compares its shapes with and without them"}
 #: Hours before it reaches an end of the pore at which an aggregate is still clear of it.
 MARGIN = 0.1
 #: Whole hours that wide goes on after contact: 45 h for Figure 6's own 10 K_s.
