@@ -39,7 +39,7 @@ FOLDER = Path(__file__).parent
 ROOT = FOLDER.parent
 #: The texts, each with its template.
 NOTE, REGISTER = (FOLDER / name for name in ("replication.md", "register.md"))
-TEMPLATES = {text: text.with_name(f"{text.stem}_template.md") for text in (NOTE, REGISTER)}
+TEMPLATES = {text: text.with_stem(f"{text.stem}_template") for text in (NOTE, REGISTER)}
 REPORT = ROOT / "verification" / "report"
 FIELD = re.compile(r"\{\{(.+?)\}\}")
 #: Names of the verdicts in the templates, and what the register quotes of a claim beside its numbers.
