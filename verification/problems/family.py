@@ -2,28 +2,30 @@
 
     python -m verification.problems.family --first 0 --count 20 --limit 120
 
-Each member is a process of its own: `repro run` with the preset fast and a limit of processor time. A fold counts if
-`reference/surface_stretch.py` confirms it from the last file of fields.
+Each member runs with the preset fast and a limit of processor time. A fold counts if `reference/surface_stretch.py`
+confirms it from the last file of fields.
 """
 
 import argparse
 import json
-import resource
-import subprocess
 import sys
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from time import process_time
 
 import numpy as np
 
 from reference import surface_stretch
+from repro.errors import SimulationError
 from repro.march.folding import CREASING
 from repro.preflight import numbers
 from repro.results import field_files, read_table
+from repro.runs.execution import run
 from repro.runs.status import COMPLETED
-from repro.scene import load_scene
+from repro.scene import Scene, load_scene
 from verification.evidence.writing import REPORT
+from verification.problems.hard import TooLong, limited
 
 SEED, MEMBERS = 28, 100
 RECORD = REPORT / "live" / "family.jsonl"
@@ -32,6 +34,8 @@ PAST_CONTACT, LONGEST = 3.0, 200.0
 #: Times of the rows over the end.
 ROWS = (0.2, 0.4, 0.6, 0.8, 1.0)
 DRIVES = ("head", "0.3 m/day", "10 m/day")
+#: Verdicts. The last two are errors.
+ARRIVES, PORE_END, FOLD, UNCONFIRMED, FAILED = ("end", "pore's end", "fold", "fold, not confirmed", "failed")
 
 
 @dataclass(frozen=True)
@@ -55,20 +59,22 @@ class Member:
                 f'aggregate.radius="{self.seed:.4g} um"', *flow,
                 *(f'substrates.{name}.supply="{self.supply:.4g} mg/L"' for name in ("acceptor", "donor"))]
 
-    def words(self, end: float, *changes: str) -> list[str]:
-        """Flags of the command line for a run to ``end`` (h)."""
-        rows = ", ".join(f'"{part * end:.6g} h"' for part in ROWS)
-        sets = [*self.sets, f'growth.end="{end:.6g} h"', f"output.times=[{rows}]", *changes]
-        unset = ["--unset", "flow.mean_velocity"] if self.drive == "head" else []
-        return [*unset, *(word for change in sets for word in ("--set", change))]
+    def scene(self, *changes: str) -> Scene:
+        """The scene with changes; without an end among them it ends at 1000 h."""
+        sets = [*self.sets, 'growth.end="1000 h"', *changes]
+        return load_scene("wide", sets, ["flow.mean_velocity"] if self.drive == "head" else [])
 
     @property
     def end(self) -> float:
         """End of the run, h."""
-        unset = ["flow.mean_velocity"] if self.drive == "head" else []
-        scene = load_scene("wide", [*self.sets, 'growth.end="1000 h"'], unset)
-        contact = numbers.at_end(scene).contact
+        contact = numbers.at_end(self.scene()).contact
         return LONGEST if contact is None else PAST_CONTACT * contact
+
+    @property
+    def duration(self) -> list[str]:
+        """Changes that set the end and the times of rows."""
+        rows = ", ".join(f'"{part * self.end:.6g} h"' for part in ROWS)
+        return [f'growth.end="{self.end:.6g} h"', f"output.times=[{rows}]"]
 
 
 def draw_member(number: int) -> Member:
@@ -79,36 +85,38 @@ def draw_member(number: int) -> Member:
                   DRIVES[draw.integers(3)])
 
 
-def run_member(member: Member, limit: int, *changes: str) -> dict:
-    """Run a member, and judge its end."""
-    end = member.end
+def run_member(member: Member, limit: float, *changes: str) -> dict:
+    """Run a member, and judge its end. limit: s of processor time."""
+    scene = member.scene(*member.duration, *changes)
+    start = process_time()
     with TemporaryDirectory() as temporary:
         folder = Path(temporary) / "run"
-        words = ["run", "wide", "--quiet", "--out", str(folder), *member.words(end, *changes)]
-        child = subprocess.run([sys.executable, "-m", "repro", *words],
-                               capture_output=True, text=True, check=False,
-                               preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (limit, limit + 5)))
-        return {**vars(member), "end_h": end, "exit": child.returncode, **_outcome(folder, child)}
+        try:
+            with limited(limit):
+                status = run(scene, folder)
+            judged = judge(folder, status)
+        except (SimulationError, TooLong) as error:
+            judged = {"verdict": FAILED, "status": str(error)}
+        return {**vars(member), "end_h": scene.growth.end, **judged, **_course(folder),
+                "processor_s": round(process_time() - start, 1)}
 
 
-def _outcome(folder: Path, child: subprocess.CompletedProcess) -> dict:
-    """Status, time (h), least stretch and verdict of the run in a folder."""
+def judge(folder: Path, status: str) -> dict:
+    """Verdict, status, and for a fold the stretch that confirms it."""
+    if "folds" not in status:
+        return {"verdict": ARRIVES if status == COMPLETED else PORE_END, "status": status}
+    confirmed = confirmed_stretch(folder)
+    return {"verdict": FOLD if confirmed < CREASING else UNCONFIRMED, "status": status, "confirmed": confirmed}
+
+
+def _course(folder: Path) -> dict:
+    """Times (h) and least stretches of the rows, and whether the last one has contact. Empty without rows."""
     try:
-        record = json.loads((folder / "run.json").read_text(encoding="utf-8"))
         table = read_table(folder / "timeseries.csv")
     except (OSError, ValueError):
-        return {"verdict": "too long" if child.returncode < 0 else "failed", "status": child.stderr.strip()}
-    column = float(table["surface_stretch_min"][-1])
-    outcome = {"status": record["status"], "time_h": float(table["time_h"][-1]), "stretch": column,
-               "contact": bool(table["contact"][-1]), "seconds": record["wall_time_s"],
-               "times_h": table["time_h"].tolist(), "stretches": table["surface_stretch_min"].tolist()}
-    if child.returncode:
-        return {"verdict": "too long" if child.returncode < 0 else "failed", **outcome}
-    if "folds" not in record["status"]:
-        return {"verdict": "end" if record["status"] == COMPLETED else "pore's end", **outcome}
-    confirmed = confirmed_stretch(folder)
-    verdict = "fold" if confirmed < CREASING else "fold, not confirmed"
-    return {"verdict": verdict, "confirmed": confirmed, **outcome}
+        return {}
+    return {"contact": bool(table["contact"][-1]), "times_h": table["time_h"].tolist(),
+            "stretches": table["surface_stretch_min"].tolist()}
 
 
 def confirmed_stretch(folder: Path) -> float:
@@ -132,7 +140,7 @@ def main() -> int:
     bad = 0
     for number in range(options.first, options.first + options.count):
         row = run_member(draw_member(number), options.limit, *options.set)
-        bad += row["verdict"] not in ("end", "pore's end", "fold")
+        bad += row["verdict"] in (UNCONFIRMED, FAILED)
         print(json.dumps(row), flush=True)
         with options.record.open("a", encoding="utf-8") as file:
             file.write(json.dumps(row) + "\n")

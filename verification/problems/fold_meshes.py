@@ -19,8 +19,8 @@ from repro.march.loop import PoreEnd, RestartState
 from repro.model import remeshing
 from repro.model.remeshing import Remeshing
 from repro.model.surface import surface
-from repro.scene import Scene, load_scene
-from verification.problems.family import Member, draw_member
+from repro.scene import Scene
+from verification.problems.family import draw_member
 from verification.problems.hard import TooLong, limited
 
 #: Least stretch at which runs on other meshes begin: smooth surfaces, long before the first crease.
@@ -28,13 +28,6 @@ BEGUN = 0.75
 MESHES = {"fast, refinement 0.15": ("numerics.refinement=0.15",), "fast, refinement 0.3": ("numerics.refinement=0.3",),
           "accurate": ("numerics.preset=accurate",)}
 STRESS_FREE = "growth.new_biomass=stress_free"
-
-
-def scene_of(member: Member, *changes: str) -> Scene:
-    """The scene of a member, without rows before its end."""
-    end = f"{member.end:.6g} h"
-    sets = [*member.sets, f'growth.end="{end}"', f'output.times=["{end}"]', *changes]
-    return load_scene("wide", sets, ["flow.mean_velocity"] if member.drive == "head" else [])
 
 
 def follow(scene: Scene, limit: float, state: RestartState | None = None) -> tuple[dict, RestartState | None]:
@@ -60,13 +53,13 @@ def on_mesh_of(scene: Scene, state: RestartState) -> RestartState:
 def study(number: int, limit: float) -> dict[str, object]:
     """The ends of all runs of a member. Those on other meshes are left out if the stretch stays above BEGUN."""
     member = draw_member(number)
-    first, before = follow(scene_of(member), limit)
+    first, before = follow(member.scene(*member.duration), limit)
     ends: dict[str, object] = {"number": number, "fast": first}
     if before is not None and first["stretch"] <= BEGUN:
         for name, changes in MESHES.items():
-            scene = scene_of(member, *changes)
+            scene = member.scene(*member.duration, *changes)
             ends[name], _ = follow(scene, 4 * limit, on_mesh_of(scene, before))
-    ends["stress_free"], _ = follow(scene_of(member, STRESS_FREE), limit)
+    ends["stress_free"], _ = follow(member.scene(*member.duration, STRESS_FREE), limit)
     return ends
 
 
