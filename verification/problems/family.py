@@ -1,6 +1,6 @@
 """Practical pores, drawn by seed, far past contact. Each reaches its end, the pore's end, or a confirmed fold.
 
-    python -m verification.problems.family --first 0 --count 20 --limit 120
+    python -m verification.problems.family 17 18 --limit 60     # these members; all of them without numbers
 
 Each member runs with the preset fast and a limit of processor time. A fold counts if `reference/surface_stretch.py`
 confirms it from the last file of fields.
@@ -9,6 +9,7 @@ confirms it from the last file of fields.
 import argparse
 import json
 import sys
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -24,11 +25,11 @@ from repro.results import field_files, read_table
 from repro.runs.execution import run
 from repro.runs.status import COMPLETED
 from repro.scene import Scene, load_scene
-from verification.evidence.writing import REPORT
+from verification.evidence.writing import REPORT, markdown, table
 from verification.problems.hard import TooLong, limited
 
 SEED, MEMBERS = 28, 100
-RECORD = REPORT / "live" / "family.jsonl"
+RECORD = REPORT / "pores.jsonl"
 #: The end over the time to contact in growth at the supply, and the end (h) without contact.
 PAST_CONTACT, LONGEST = 3.0, 200.0
 #: Times of the rows over the end.
@@ -97,8 +98,8 @@ def run_member(member: Member, limit: float, *changes: str) -> dict:
             judged = judge(folder, status)
         except (SimulationError, TooLong) as error:
             judged = {"verdict": FAILED, "status": str(error)}
-        return {**vars(member), "end_h": scene.growth.end, **judged, **_course(folder),
-                "processor_s": round(process_time() - start, 1)}
+        processor = round(process_time() - start, 1)
+        return {**vars(member), "end_h": scene.growth.end, **judged, **_course(folder), "processor_s": processor}
 
 
 def judge(folder: Path, status: str) -> dict:
@@ -128,24 +129,42 @@ def confirmed_stretch(folder: Path) -> float:
     return float(surface_stretch.least(stretch, distance))
 
 
-def main() -> int:
-    """Run members one after the other, and add a line for each to the record. Return 1 if one has failed."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    for name, default in (("first", 0), ("count", MEMBERS), ("limit", 120)):
-        parser.add_argument(f"--{name}", type=int, default=default)
-    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE")
-    parser.add_argument("--record", type=Path, default=RECORD)
-    options = parser.parse_args()
-    options.record.parent.mkdir(parents=True, exist_ok=True)
+def read_record() -> dict[int, dict]:
+    """Recorded rows by number. The last row of a member counts."""
+    rows = (json.loads(line) for line in RECORD.read_text(encoding="utf-8").splitlines())
+    return dict(sorted((row["number"], row) for row in rows))
+
+
+def page(rows: dict[int, dict]) -> str:
+    """Markdown: how many members end in each way, and a table of all folds."""
+    verdicts = Counter(row["verdict"] for row in rows.values())
+    counts = ", ".join(f"{verdict}: {count}" for verdict, count in verdicts.most_common())
+    folds = [row for row in rows.values() if row["verdict"] == FOLD]
+    cells = [(str(row["number"]), f"{row['width']:.0f}", f"{row['seed']:.0f}", f"{row['supply']:.2g}", row["drive"],
+              f"{row['times_h'][-1]:.3g}", "yes" if row["contact"] else "no", f"{row['stretches'][-1]:.3f}",
+              f"{row['confirmed']:.3f}") for row in sorted(folds, key=lambda row: row["width"])]
+    head = ("member", "width (um)", "seed (um)", "supply (mg/L)", "drive", "fold (h)", "contact before it",
+            "least stretch", "independent stretch")
+    return (f"# Pores of the family\n\nWritten by `python -m verification.problems.family`. {len(rows)} of {MEMBERS} "
+            f"pores: {counts}.\n\n{markdown([table(head, cells)])}\n")
+
+
+def main(numbers: list[int], limit: float) -> int:
+    """Run members, and add a line for each to the record. Return 1 if one has failed."""
     bad = 0
-    for number in range(options.first, options.first + options.count):
-        row = run_member(draw_member(number), options.limit, *options.set)
+    for number in numbers:
+        row = run_member(draw_member(number), limit)
         bad += row["verdict"] in (UNCONFIRMED, FAILED)
         print(json.dumps(row), flush=True)
-        with options.record.open("a", encoding="utf-8") as file:
+        with RECORD.open("a", encoding="utf-8") as file:
             file.write(json.dumps(row) + "\n")
+    RECORD.with_suffix(".md").write_text(page(read_record()), encoding="utf-8")
     return int(bad > 0)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("numbers", type=int, nargs="*", default=range(MEMBERS))
+    parser.add_argument("--limit", type=float, default=120.0)
+    options = parser.parse_args()
+    sys.exit(main(options.numbers, options.limit))
