@@ -18,6 +18,7 @@ from repro.march.loop import InterpolatedState, RestartState, Scheme, StepResult
 from repro.march.step_control import StepControl
 from repro.model import contact
 from repro.model.pore import seeded, solve
+from repro.model.stages import Stages
 from repro.model.surface import BIOT, CREASE, surface
 from repro.preflight.numbers import evaluate_at_largest
 from repro.preflight.simplifications import find_warnings
@@ -138,6 +139,22 @@ def test_no_row_has_a_density_out_of_bounds(theta, kind, factor):
         ending, rows = continue_run(theta, advance)
         assert type(ending) is kind and not rows
         assert kind is repro.Fold or f"{factor:.2g} X_m, out of 0.5 to 2" in str(ending)
+
+
+@pytest.mark.parametrize("numerics", [
+    ("numerics.preset=paper",), ("numerics.preset=paper", "numerics.transport=gear"), ("numerics.preset=fast",)])
+def test_every_scheme_refuses_an_aggregate_that_collapses(numerics, monkeypatch):
+    """No row follows t = 0 if each new mesh leaves the biomass 0.4 times its area."""
+    def collapse(stages, *arguments):
+        after, remeshed = new_mesh(stages, *arguments)
+        return after.moved(after.mesh.points * [1.0, 0.4]), remeshed
+
+    new_mesh = Stages.new_mesh
+    monkeypatch.setattr(Stages, "new_mesh", collapse)
+    rows = []
+    with pytest.raises(SimulationError, match=r"the density of biomass comes to 2\.[45]"):
+        rows.extend(repro.simulate(load_scene("base", [*numerics, 'growth.end="1 h"'])))
+    assert [row.pore.time for row in rows] == [0.0]
 
 
 @pytest.mark.parametrize("status, over", [
