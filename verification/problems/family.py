@@ -13,7 +13,6 @@ from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from time import process_time
 
 import numpy as np
 
@@ -89,7 +88,6 @@ def draw_member(number: int) -> Member:
 def run_member(member: Member, limit: float, *changes: str) -> dict:
     """Run a member, and judge its end. limit: s of processor time."""
     scene = member.scene(*member.duration, *changes)
-    start = process_time()
     with TemporaryDirectory() as temporary:
         folder = Path(temporary) / "run"
         try:
@@ -98,8 +96,7 @@ def run_member(member: Member, limit: float, *changes: str) -> dict:
             judged = judge(folder, status)
         except (SimulationError, TooLong) as error:
             judged = {"verdict": FAILED, "status": str(error)}
-        processor = round(process_time() - start, 1)
-        return {**vars(member), "end_h": scene.growth.end, **judged, **_course(folder), "processor_s": processor}
+        return {**vars(member), "end_h": scene.growth.end, **judged, **_course(folder)}
 
 
 def judge(folder: Path, status: str) -> dict:
