@@ -17,9 +17,10 @@ GAUSS, WEIGHTS = np.polynomial.legendre.leggauss(3)
 def surface_stretch(points, cells, aggregate, before):
     """Compute (stretch, distance, midpoints) of the free edges, (e, 2), (e,) and (e, 2).
 
-    The columns of the stretch are its mean over an edge and its value in the middle. The distance is that to the nearer end of the free surface, along it and relative to its length. points: (N, 2);
-    cells: (T, 3 or 6), corners counterclockwise, then the midpoints of the edges 01, 12 and 20; aggregate: (T,) True
-    in the aggregate; before: (N, 2) positions at t = 0.
+    The columns of the stretch are its mean over an edge and its value in the middle. The distance is that to the nearer
+    end of the free surface, along it and relative to its length. points: (N, 2); cells: (T, 3 or 6), corners
+    counterclockwise, then the midpoints of the edges 01, 12 and 20; aggregate: (T,) True in the aggregate; before:
+    (N, 2) positions at t = 0.
     """
     ends = np.sort(cells[:, EDGES[:, :2]], axis=2)
     fluid_edges = {tuple(pair) for pair in ends[~aggregate].reshape(-1, 2).tolist()}
@@ -49,7 +50,7 @@ def _along(start, free, points, cells, before):
 
 
 def _edge(present, before, local):
-    """((mean, middle) elastic stretch, length, middle) of an edge of a triangle with nodes (3 or 6, 2) now and at t = 0."""
+    """((mean, middle) stretch, length, middle) of an edge of a triangle with nodes (3 or 6, 2) now and at t = 0."""
     first, last = CORNERS[EDGES[local, :2]]
     places = first + (GAUSS[:, None] + 1) / 2 * (last - first)
     shape_gradients = _shape_gradients(len(present), places)
