@@ -29,6 +29,7 @@ from repro.runs.status import is_over
 from repro.scene import load_scene
 from tests.shell import files, lasting_record, read_record, state
 from tests.test_resume import in_parts
+from verification.problems import family
 
 SETS = ('numerics.preset="fast"', "numerics.refinement=0.3", 'pore.width="20 um"', 'growth.end="6 h"',
         'aggregate.outline=[["-10 um", "0 um"], ["-10 um", "20 um"], ["10 um", "20 um"], ["10 um", "0 um"]]',
@@ -47,8 +48,9 @@ def warned(folder):
 
 
 def test_a_fold_ends_a_run(tmp_path, capsys):
-    """The last state is written; it lies above Biot's limit by less than the shortest step. The exit status is 0. The
-    warning appears once, when creases begin. The same command and --resume leave the run unchanged."""
+    """The last state is written; it lies above Biot's limit by less than the shortest step. The independent stretches
+    confirm it. The exit status is 0. The warning appears once, when creases begin. The same command and --resume leave
+    the run unchanged."""
     words = [part for change in SETS for part in ("--set", change)]
     command = ["run", "base", "--unset", "aggregate.radius", *words, "--out", str(tmp_path / "run")]
     assert main(command) == 0
@@ -60,6 +62,7 @@ def test_a_fold_ends_a_run(tmp_path, capsys):
     status = read_record(folder)["status"]
     assert status.startswith(f"the aggregate's surface folds in the step from t = {table['time_h'][-1]:g} h: near x = ")
     assert "a finer mesh does not help" in status and 'growth.new_biomass = "stress_free" does' in status
+    assert family.judge(folder, status)["verdict"] == family.FOLD
     (text,) = warned(folder)
     assert [line.partition("growth.new_biomass: ")[2] for line in messages] == [text]
     begun = float(text.split()[3])
