@@ -17,8 +17,8 @@ CLAIMS = ("C48", "C49")
 
 #: Titles of the drives. A head has the gradient of Base.
 DRIVES = {"head": "head of Base", "0.3 m/day": "0.3 m/d", "10 m/day": "10 m/d"}
-#: Markers of runs without a fold.
-OTHERS = {family.ARRIVES: ("o", "reaches its end"), family.PORE_END: ("s", "reaches an end of the pore")}
+#: Markers of verdicts other than a fold.
+MARKERS = {family.ARRIVES: ("o", "reaches its end"), family.PORE_END: ("s", "reaches an end of the pore")}
 TIMES = LogNorm(20.0, 500.0)
 
 
@@ -43,7 +43,7 @@ def draw() -> Figure:
 
 
 def _panel(axes: Axes, rows: list[dict]) -> None:
-    for verdict, (marker, label) in OTHERS.items():
+    for verdict, (marker, label) in MARKERS.items():
         width, supply = _places(rows, verdict)
         axes.plot(width, supply, marker, color=style.FAINT, markerfacecolor="none", markersize=4, label=label)
     width, supply = _places(rows, family.FOLD)
