@@ -68,6 +68,5 @@ def caption() -> str:
     return (f"{len(rows)} pores drawn at random, 24 widths long, with seeds of 0.1 to 0.35 widths, each run in `fast` "
             f"for three times the earliest possible time of contact. In {len(folds)} of them growth compresses the "
             f"surface of the aggregate until it folds, after {min(times):.3g} to {max(times):.3g} h; the narrowest of "
-            f"these is {min(row['width'] for row in folds):.0f} µm wide. Base (to 19.4 h) and Wide (to 45 h) do not "
-            "fold. The rows are those of `verification/report/pores.jsonl`, which "
-            "`python -m verification.problems.family` writes.")
+            f"these is {min(row['width'] for row in folds):.0f} µm wide. Stars mark Base and Wide. The rows are those "
+            "of `verification/report/pores.jsonl`, which `python -m verification.problems.family` writes.")

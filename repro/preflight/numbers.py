@@ -159,7 +159,7 @@ def rim_stretch(scene: Scene, uptake: float) -> float:
     uptake: uptake of biomass at the supply over the inflow of the substrate, per area, 1/um2.
     """
     scarcer = min(uptakes(scene), key=lambda each: each.depth)
-    rate = max(0.0, fastest_growth(scene))
+    rate = max(fastest_growth(scene), 0.0)
     step = scene.growth.end / STEPS
     start = at_start(scene).area
     touching = scene.pore.width - film(scene)
