@@ -25,8 +25,9 @@ from verification.problems.hard import TooLong, limited
 
 #: Least stretch at which runs on other meshes begin: smooth surfaces, long before the first crease.
 BEGUN = 0.75
-MESHES = {"fast, refinement 0.15": ("numerics.refinement=0.15",), "fast, refinement 0.3": ("numerics.refinement=0.3",),
-          "accurate": ("numerics.preset=accurate",)}
+#: Below a refinement of 0.4 the sizes do not depend on it.
+MESHES = {"fast, refinement 0.45": ("numerics.refinement=0.45",), "accurate": ("numerics.preset=accurate",),
+          "accurate, refinement 0.7": ("numerics.preset=accurate", "numerics.refinement=0.7")}
 STRESS_FREE = "growth.new_biomass=stress_free"
 
 
