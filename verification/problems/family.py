@@ -67,7 +67,7 @@ class Member:
     def scene(self, *changes: str) -> Scene:
         """The scene with changes; without an end among them it ends at 1000 h."""
         sets = [*self.sets, 'growth.end="1000 h"', *changes]
-        return load_scene("wide", sets, ["flow.mean_velocity"] if self.drive == "head" else [])
+        return load_scene("wide", sets, unset=["flow.mean_velocity"] if self.drive == "head" else [])
 
     @property
     def end(self) -> float:
