@@ -29,6 +29,7 @@ CACHE_KEYS = "tests/test_cache_keys.py::test_"
 DEEPEST = "tests/test_deepest_level.py::test_elements_are_halved_as_often_as_a_front_needs"
 FOLD = "tests/test_fold.py::test_"
 OVER = f"{FOLD}a_fold_ends_a_run"
+EXPECTED = f"{FOLD}check_expects_a_fold_of_a_starved_core"
 READERS = "tests/test_vtk.py::test_every_reader_reads_what_was_computed"
 
 MUTANTS = (
@@ -78,10 +79,27 @@ MUTANTS = (
     *changes(
         "repro/preflight/simplifications.py",
         ("fold-expected-early",
-         "check expects a fold however little the rim has outgrown the core.",
-         "and excess > FOLD_EXCESS)",
-         "and excess > -1.0)",
-         f"{FOLD}check_expects_a_fold_according_to_the_rule[changes3-False]")),
+         "check expects a fold however little the rim is compressed.",
+         "if stretch < FOLD_EXPECTED:",
+         "if stretch < 1.0:",
+         f"{EXPECTED}[changes2-12500.0-False]")),
+    *changes(
+        "repro/preflight/numbers.py",
+        ("rim-fed-without-end",
+         "The estimate of the rim's stretch forgets that the inflow limits the uptake.",
+         "fed /= max(1.0, uptake * fed)",
+         "pass",
+         f"{EXPECTED}[changes0-12500.0-True]"),
+        ("rim-squeezed-everywhere",
+         "After contact the estimate compresses the rim of a fed core too.",
+         "elif touching > 2 * scarcer.depth:",
+         "else:",
+         f"{EXPECTED}[changes4-416667.0-False]"),
+        ("rim-grows-freely",
+         "The estimate compresses the rim by its growth, not by the root of it.",
+         "math.exp(-0.5 * grown",
+         "math.exp(-grown",
+         f"{FOLD}the_estimate_of_the_rim_is_that_of_a_thin_ring")),
     *changes(
         "repro/model/surface.py",
         ("stretch-beside-the-line",
