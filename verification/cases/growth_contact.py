@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from reference import contact_growth, quadratic_growth
+from reference import contact_growth
 from repro.fem.outline import TOP
 from repro.model import contact, pore
 from repro.model.contact_lines import FirstContact
