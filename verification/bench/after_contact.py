@@ -81,9 +81,9 @@ def reference(sizes: Sequence[float], times: Sequence[float], changes: Sequence[
     """The package's own values on its finest level, and the change of each from the level before."""
     finest, before = (numbers(times, times[-1], (*changes, *converged(size)))[0] for size in sizes)
     change = np.abs(before / finest - 1)
-    return {"reference": f"the package itself with elements and steps {sizes[0]:.2g} times those of the preset accurate "
-                         f"(small elements beside contact lines); from {sizes[1]:.2g} times on the numbers change by at "
-                         f"most {change.max():.1e}",
+    return {"reference": f"the package itself with elements and steps {sizes[0]:.2g} times those of the preset "
+                         f"accurate (small elements beside contact lines); from {sizes[1]:.2g} times on the numbers "
+                         f"change by at most {change.max():.1e}",
             "reference_source": source_hash(), "reference_values": finest.tolist(),
             "reference_changes": change.tolist()}
 
