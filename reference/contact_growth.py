@@ -43,7 +43,7 @@ class Walls:
 
 @dataclass(frozen=True, eq=False)
 class Touching:
-    """An aggregate in contact: the angles (rad) of its contact lines at t = 0, downstream first, and its equilibrium."""
+    """An aggregate in contact: the angles (rad) at t = 0 of its contact lines, downstream first; its equilibrium."""
 
     angles: np.ndarray
     equilibrium: Equilibrium

@@ -153,8 +153,8 @@ IN_STEPS = (2, 4, 8, 16)
                   runs_with="2 fast accurate", omitted="1: nodes that join at once in a long step join too many; "
                   "3: the same triangles and quadratic displacements")
 def test_contact_does_not_depend_on_steps(record):
-    """The contact surface depends on the growth alone, not on the number of steps that lead to it: contact adds no error
-    in time.
+    """The contact surface depends on the growth alone, not on the number of steps that lead to it: contact adds no
+    error in time.
 
     Norm: the largest difference of a contact line between 2, 4, 8 and 16 steps, over the accuracy of the search.
     """
