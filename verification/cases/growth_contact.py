@@ -19,7 +19,7 @@ from scipy.optimize import brentq
 from reference import contact_growth
 from repro.fem.outline import TOP
 from repro.model import contact, pore
-from repro.model.contact_lines import CLOSE, LEAST_PART, FirstContact
+from repro.model.contact_lines import FirstContact
 from repro.scene import load_scene
 from verification.cases.growth_codes import FRONT, _uneven
 from verification.evidence.cases import parametrize
@@ -45,8 +45,8 @@ def reference_solution(level: int) -> contact_growth.Touching:
                                before and before.equilibrium)
 
 
-def grown(elements: str, refinement: float, steps: int = STEPS) -> contact.Expansion:
-    """The package's aggregate in contact, after some steps from the first contact on."""
+def grown(elements: str, refinement: float) -> contact.Expansion:
+    """The package's aggregate in contact."""
     scene = load_scene("wide", [f"numerics.preset={'paper' if elements == 'linear' else 'accurate'}",
                                 f"numerics.elements={elements}", f"numerics.refinement={refinement}",
                                 f'pore.width="{HEIGHT} um"', f'aggregate.radius="{bodies.RADIUS} um"'])
@@ -54,7 +54,7 @@ def grown(elements: str, refinement: float, steps: int = STEPS) -> contact.Expan
     where, _ = meshes.quadrature_points(seed.body.reference[seed.body.shape.cells], seed.body.shape.table)
     theta = _uneven(*np.moveaxis(where, 2, 0))
     first, expansion = _first_contact(mechanics, seed, theta)
-    for part in first + (1 - first) * np.arange(1, steps + 1) / steps:
+    for part in first + (1 - first) * np.arange(1, STEPS + 1) / STEPS:
         before = _touching(seed, expansion)
         shape = replace(before.moved(expansion.position), pressure=expansion.pore.pressure[: seed.mesh.corners])
         expansion = contact.expand(mechanics, before, theta**part, shape)
@@ -142,26 +142,3 @@ def test_contact_lines(elements, record):
             record(at_most(name, errors[name][-1], 1e-2, "the error of the preset fast after contact"))
     for name in ("tips", "outline"):
         record(at_most(name, errors[name][-1], 1e-3, "a tenth of the error of the preset fast"))
-
-
-#: Steps from the first contact to the end.
-IN_STEPS = (2, 4, 8, 16)
-
-
-@pytest.mark.slow
-@pytest.mark.case("growth-contact-steps", kind="property", mutants=("contact-lines-accepted-early",),
-                  runs_with="2 fast accurate", omitted="1: nodes that join at once in a long step join too many; "
-                  "3: the same triangles and quadratic displacements")
-def test_contact_does_not_depend_on_steps(record):
-    """The contact surface depends on the growth alone, not on the number of steps that lead to it: contact adds no
-    error in time.
-
-    Norm: the largest difference of a contact line between 2, 4, 8 and 16 steps, over the accuracy of the search.
-    """
-    rims = [grown("quadratic", 0.45, steps).pore.boundary for steps in IN_STEPS]
-    ends = np.array([rim.points[np.flatnonzero(rim.wall == TOP)[[0, -1]], 0] for rim in rims])
-    arcs = np.linalg.norm(np.diff(rims[0].points[::2], axis=0), axis=1).max()
-    accuracy = CLOSE * WALLS.film / WALLS.slope + LEAST_PART * arcs
-    record(at_most("contact lines, over the accuracy of the search", np.ptp(ends, axis=0).max() / accuracy, 2.0,
-                   "each of two lines errs by one: the clearance that counts as zero, and a part of an arc that is too "
-                   "small to be divided off"))

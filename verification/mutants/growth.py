@@ -116,11 +116,7 @@ MUTANTS = (
         ("half-angle",
          "Wedges beside a contact line close at half of the least slope.",
          "np.minimum(self.film, np.tan(self.angle) * distance)",
-         "np.minimum(self.film, 0.5 * np.tan(self.angle) * distance)"),
-        ("contact-lines-accepted-early",
-         "A contact line stops where the gap is up to a fifth larger than required.",
-         "self.accepted = not too_short and (smallest or clearance <= CLOSE or jumps)",
-         "self.accepted = not too_short and (smallest or clearance <= 100 * CLOSE or jumps)")),
+         "np.minimum(self.film, 0.5 * np.tan(self.angle) * distance)")),
     *changes(
         "repro/march/folding.py",
         ("fold-never",
