@@ -265,7 +265,11 @@ MUTANTS = (
         ("exact-steps-of-accurate",
          "The preset exact has the tolerance of accurate.",
          '"tolerance": 0.00025,',
-         '"tolerance": 0.001,')),
+         '"tolerance": 0.001,'),
+        ("fast-too-coarse",
+         "The preset fast has elements that are 1.7 times as large.",
+         '"refinement": 0.2, "tolerance": 0.0075,',
+         '"refinement": 0.12, "tolerance": 0.0075,')),
     *changes(
         "repro/model/traction.py",
         ("traction-pressure-left-out",
