@@ -198,7 +198,7 @@ def _equilibrium(mechanics: Mechanics, grown: Pore, start: Pore, forces: np.ndar
     body, target_J = _strained_from(mechanics.keys, grown, grown.theta)
     nodes = grown.mesh.body
     inside = grown.mesh.topology.body_corners
-    locked, target = _constraints(start, mechanics.width)
+    locked, target = _constraints(mechanics, grown, start)
     rest = growth.equilibrium(body, target_J, start.mesh.points[nodes], start.pressure[inside],
                               locked, target, forces=forces, last=last, patient=patient,
                               modified_newton=mechanics.numerics.jacobian == "reused")
@@ -474,15 +474,21 @@ def _placed(grown: Pore, start: Pore, rest: growth.Equilibrium) -> Pore:
     return replace(start.moved(points), pressure=pressure)
 
 
-def _constraints(shape: Pore, width: float) -> tuple[np.ndarray, np.ndarray]:
+def _constraints(mechanics: Mechanics, grown: Pore,
+                 shape: Pore) -> tuple[np.ndarray, np.ndarray]:
     """(n, 2) True where a coordinate is prescribed: x at fixed points, y on the walls (2.3.3); and
-    (n, 2) um, its prescribed value."""
+    (n, 2) um, its prescribed value. On a bonded wall all points are fixed that lay on the lower
+    wall before the step, where they lay."""
     rim = shape.mesh.topology.body_loop
-    position = shape.mesh.points[shape.mesh.body]
-    target = position.copy()
+    before = grown.mesh.points[grown.mesh.body]
+    fixed = shape.fixed
+    if mechanics.keys.wall == "bonded":
+        fixed = fixed | (before[rim, 1] == 0.0)
+    target = shape.mesh.points[shape.mesh.body].copy()
+    target[rim[fixed], 0] = before[rim[fixed], 0]
     target[rim[shape.wall == BOTTOM], 1] = 0.0
-    target[rim[shape.wall == TOP], 1] = width
-    return constrained(len(position), rim, shape.wall, shape.fixed), target
+    target[rim[shape.wall == TOP], 1] = mechanics.width
+    return constrained(len(target), rim, shape.wall, fixed), target
 
 
 def constrained(count: int, rim: np.ndarray, wall: np.ndarray, fixed: np.ndarray) -> np.ndarray:
