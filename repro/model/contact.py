@@ -564,6 +564,6 @@ def _closing_run(outline: Outline, gap: np.ndarray, line: int, step: int, film: 
     nearer = np.abs(apart) <= np.abs(x[walk] - x[other])
     if outline.wall[other] != outline.wall[line]:
         nearer = np.ones(len(walk), bool)
-    along = np.sign(x[line] - x[line - step]) * apart
+    along = np.sign(x[line] - x[(line - step) % count]) * apart
     thin = (nearer & (gaps < 0)) | (gaps < np.minimum(film, slope * along))
     return walk[: np.flatnonzero(thin)[-1] + 1] if thin.any() else walk[:0]
