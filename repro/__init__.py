@@ -29,6 +29,7 @@ Sections of the paper and their modules, which name the equations that they solv
     2.3, 3.4  growth           (14)-(27)    repro.model.growth
     3.4  biomass               (28)-(34)    repro.model.biomass, .growing
     2.3.2  fluid forces        (20), (22)   repro.model.traction
+    5    adhesion, tearing                  repro.model.adhesion, repro.march.detachment
     2.3.3  contact                          repro.model.contact, .contact_lines
          limits of the surface              repro.model.surface
     3.5  mesh motion           (35)         repro.model.mesh_motion
@@ -65,6 +66,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from repro.errors import OutputError, SimulationError
+    from repro.march.detachment import Detachment
     from repro.march.folding import Fold
     from repro.march.loop import PoreEnd
     from repro.march.simulation import simulate
@@ -80,7 +82,7 @@ if TYPE_CHECKING:
 else:
     #: The module of each public name, imported on first use: importing the solver takes half a
     #: second.
-    _MODULES = {"Fold": "march.folding", "OutputError": "errors",
+    _MODULES = {"Detachment": "march.detachment", "Fold": "march.folding", "OutputError": "errors",
                 "PoreEnd": "march.loop", "Results": "results.tables",
                 "Scene": "scene", "SceneError": "scene", "SimulationError": "errors",
                 "added_resistance": "results.network", "check": "preflight.checked",
@@ -98,6 +100,6 @@ else:
     def __dir__() -> list[str]:
         return sorted(__all__)
 
-__all__ = ["Fold", "OutputError", "PoreEnd", "Results", "Scene", "SceneError", "SimulationError",
+__all__ = ["Detachment", "Fold", "OutputError", "PoreEnd", "Results", "Scene", "SceneError", "SimulationError",
            "added_resistance", "check", "load_run", "load_scene", "resume", "run", "simulate",
            "solve", "sweep"]

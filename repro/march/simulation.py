@@ -53,6 +53,9 @@ def simulate(scene: Source, shape: Shape | None = None,
         After the last Report, if the aggregate reaches an end of the pore.
     Fold
         After the last Report, if the surface of the aggregate folds.
+    Detachment
+        After the last Report, if a wall must bear more than ``growth.bonding_strength``, or the
+        aggregate more than ``growth.tensile_strength``.
 
     Examples
     --------
