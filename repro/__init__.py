@@ -100,6 +100,6 @@ else:
     def __dir__() -> list[str]:
         return sorted(__all__)
 
-__all__ = ["Detachment", "Fold", "OutputError", "PoreEnd", "Results", "Scene", "SceneError", "SimulationError",
-           "added_resistance", "check", "load_run", "load_scene", "resume", "run", "simulate",
-           "solve", "sweep"]
+__all__ = ["Detachment", "Fold", "OutputError", "PoreEnd", "Results", "Scene", "SceneError",
+           "SimulationError", "added_resistance", "check", "load_run", "load_scene", "resume",
+           "run", "simulate", "solve", "sweep"]

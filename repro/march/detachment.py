@@ -23,10 +23,10 @@ class Detachment(RunEnd):
     Examples
     --------
     >>> import repro
-    >>> changes = ["growth.wall=bonded", 'growth.bonding_strength="1 kPa"', 'growth.end="3 h"',
-    ...            "numerics.preset=fast"]
+    >>> changes = ["growth.wall=bonded", 'growth.bonding_strength="1 kPa"', "numerics.preset=fast"]
+    >>> reports = repro.simulate(repro.load_scene("base", changes))
     >>> try:
-    ...     times = [report.pore.time for report in repro.simulate(repro.load_scene("base", changes))]
+    ...     times = [report.pore.time for report in reports]
     ... except repro.Detachment as end:
     ...     print(str(end)[:25])
     the aggregate detaches at
@@ -49,7 +49,8 @@ def detachment(scene: Scene, pore: Pore, solved: Solved) -> Detachment | None:
     return None
 
 
-def _ended(pore: Pore, verb: str, peak: Peak, subject: str, key: str, strength: float) -> Detachment:
+def _ended(pore: Pore, verb: str, peak: Peak, subject: str, key: str,
+           strength: float) -> Detachment:
     return Detachment(f"the aggregate {verb} at t = {pore.time:g} h: near x = {peak.x:.4g}, y = "
                       f"{peak.y:.4g} um {subject} {peak.value:.3g} MPa, in the mean over "
                       f"pore.width / 20; {key} is {strength:g} MPa")

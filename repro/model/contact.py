@@ -38,6 +38,9 @@ CONTACT_ROUNDS = 60
 RETREATS = 6
 #: Rounds of shape and fluid forces.
 FORCE_ROUNDS = 12
+#: Rounds after which contact lines keep their places: a search may end at another place within its
+#: tolerance.
+SETTLING_ROUNDS = 4
 #: Largest move of a node in the last round, over the aggregate's thickness.
 FORCE_REST = 1e-8
 PATIENT = SearchOptions()
@@ -133,12 +136,14 @@ def expand(mechanics: Mechanics, grown: Pore, theta: np.ndarray, guess: Pore | N
     around = traction.surroundings(fluid.meshing, grown, grown)
     last = Expansion(grown, 0, 0.0)
     iterations = 0
-    for _ in range(FORCE_ROUNDS):
+    for number in range(FORCE_ROUNDS):
+        around = traction.follow(fluid.meshing, around, last.pore)
         forces = traction.forces(fluid, around, last.pore)
         if last.division is not None:
             forces = _gathered(last.division, forces)
         shape = _at_rest(mechanics, grown, theta, start, forces, search)
-        search = replace(search, advances=shape.advances)
+        settled = number + 1 >= SETTLING_ROUNDS
+        search = replace(search, advances=shape.advances, settled=settled)
         iterations += shape.iterations
         moved = np.abs(shape.position - last.position).max()
         if moved <= FORCE_REST * shape.pore.boundary.thickness:
@@ -222,7 +227,7 @@ def _close_by_lines(mechanics: Mechanics, grown: Pore, start: Pore, forces: np.n
     for _ in range(CONTACT_ROUNDS):
         for line in lines:
             line.record(*_clearance(rule, shape.pore.boundary, line))
-        if all(line.accepted for line in lines):
+        if search.settled or all(line.accepted for line in lines):
             rest = replace(shape.pore, fixed=_with_new_surface(shape.pore.boundary))
             return replace(shape, pore=rest, iterations=trials.iterations, gap=gap)
         for line in lines:

@@ -24,11 +24,10 @@ traction on its surface, but in its volume the body force
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from repro.errors import GrowthError
 from repro.fem import elements, transfer
 from repro.fem.mesh import Mesh
 from repro.fem.space import Space
@@ -83,29 +82,39 @@ def surroundings(meshing: Meshing, before: Pore, shaped: Pore) -> Surroundings:
     if mesh is not None:
         nodes = np.arange(len(mesh.body))[:, None]
         return Surroundings(mesh, nodes, np.ones(nodes.shape))
+    return _generated(meshing, shaped)
+
+
+def _generated(meshing: Meshing, shaped: Pore) -> Surroundings:
+    """A new mesh around a shape."""
     mesh, _ = meshing.generate(shaped.outline)
     cells = shaped.mesh.topology.body_cells
     at = transfer.located(shaped.mesh.points[shaped.mesh.body], cells, mesh.points[mesh.body])
     return Surroundings(mesh, cells[at.triangle], elements.values(mesh.geometry, at.local))
 
 
-def forces(fluid: Fluid, around: Surroundings, shaped: Pore) -> np.ndarray:
-    """(n, 2) um: nodal forces over mu_L on ``shaped.mesh.body`` by the flow around that shape."""
+def follow(meshing: Meshing, around: Surroundings, shaped: Pore) -> Surroundings:
+    """The mesh ``around``, moved to another shape, or a new one if this turns a triangle over."""
     mesh = around.mesh
     positions = shaped.mesh.points[shaped.mesh.body]
     places = np.einsum("ka,kai->ki", around.share, positions[around.nodes])
-    if np.abs(places - mesh.points[mesh.body]).max() > ROUND_OFF * mesh.width:
-        mesh = fluid.meshing.move(mesh, places)
+    if np.abs(places - mesh.points[mesh.body]).max() <= ROUND_OFF * mesh.width:
+        return around
+    mesh = meshing.move(mesh, places)
     if mesh.areas.min() <= 0 or mesh.turned_over().any():
-        raise GrowthError("the fluid's forces move the aggregate so far that the mesh around it "
-                          "turns over; try a shorter growth.time_step, or "
-                          'growth.fluid_forces = "neglected"')
+        return _generated(meshing, shaped)
+    return replace(around, mesh=mesh)
+
+
+def forces(fluid: Fluid, around: Surroundings, shaped: Pore) -> np.ndarray:
+    """(n, 2) um: nodal forces over mu_L on ``shaped.mesh.body`` by the flow around that shape."""
+    mesh = around.mesh
     drive = at_time(fluid.drive, shaped.time)
     numerics = fluid.meshing.numerics
     space = Space(mesh, shaped.space.order)
     flow_field = pore.solve_flow(space, drive, fluid.meshing.channel.length, numerics)
     on = on_aggregate(space, flow_field, drive, numerics.interface)[mesh.body]
-    total = np.zeros_like(positions)
+    total = np.zeros((len(shaped.mesh.body), 2))
     np.add.at(total, around.nodes, around.share[..., None] * on[:, None])
     return MPA_PER_UM * drive.density * drive.gravity / fluid.shear_modulus * total
 
