@@ -42,8 +42,9 @@ RADII = (10.0, 5.0, 2.5, 1.25)
 def test_half_cylinder(changes, record):
     """Force and moment of the water on a small half-disc are those on a half-cylinder in shear flow along a wall.
 
-    Norm: drag, lift and moment of a half-disc of radius R in a pore 50 um wide, lambda = 1e7, less those of a rigid
-    half-cylinder in u = g (y - y^2 / W), over the drag, and over drag times R.
+    Norm: drag and moment of a half-disc of radius R in a pore 50 um wide, lambda = 1e7, less those of a rigid
+    half-cylinder in u = g (y - y^2 / W), over the drag, and over drag times R; lift over that of the head at x = 0
+    alone, less 1.
 
     The other wall adds a term in (R / W)^2.
     """
@@ -55,7 +56,7 @@ def test_half_cylinder(changes, record):
         return
     record(study("drag", sizes, errors[:, 0], 2, "the other wall reflects the disturbance: (R / W)^2", band=0.4),
            study("moment", sizes, errors[:, 2], 2, "the other wall reflects the disturbance: (R / W)^2", band=0.4),
-           at_most("lift", errors[:, 1].max(), 1e-4, "none but that of the head at x = 0, by symmetry"))
+           at_most("lift", errors[:, 1].max(), 1e-4, "that of the head at x = 0, by symmetry"))
 
 
 def _load_errors(radius: float, *changes: str) -> tuple[float, float, float]:
@@ -69,7 +70,7 @@ def _load_errors(radius: float, *changes: str) -> tuple[float, float, float]:
     scale = traction.MPA_PER_UM * drive.density * drive.kinematic_viscosity * shear * radius
     along, _, moment = half_cylinder.solved(radius / WIDTH).load()
     middle = traction.MPA_PER_UM * drive.density * drive.gravity * solved.flow.meshed_loss / 2
-    return (abs(load.x / scale - along) / along, abs(load.y + middle * 2 * radius) / scale / along,
+    return (abs(load.x / scale - along) / along, abs(load.y / (middle * 2 * radius) + 1),
             abs(load.moment / scale / radius - moment) / along)
 
 
@@ -118,8 +119,8 @@ def test_balance(wall, changes, record):
         record(at_most("along the wall, beside one point", np.sort(along)[-2] / along.max(), 1e-5,
                        "one point keeps a contact surface in place"))
     else:
-        record(at_least("along the wall, in the mean over the most", along.mean() / along.max(), 0.01,
-                        "every point is bonded"))
+        record(at_least("points that hold along the wall", np.mean(along > 1e-3 * along.max()), 0.5,
+                        "every point is bonded; the shear may vanish at some"))
 
 
 def _plug(half: float, *changes: str):
@@ -128,7 +129,7 @@ def _plug(half: float, *changes: str):
 
 
 @pytest.mark.case(
-    "coupling-adhesion-plug", kind="exact", mutants=("pull-is-push", "means-over-the-width", "stress-of-one-corner"),
+    "coupling-adhesion-plug", kind="exact", mutants=("pull-is-push", "stress-over-the-modulus"),
     runs_with="paper")
 @parametrize("*changes", KINDS)
 def test_plug(changes, record):
@@ -147,11 +148,9 @@ def test_plug(changes, record):
                         "F is constant: Newton's tolerance"))
 
 
-SEEPING = ('flow.biomass="brinkman"', 'flow.permeability="1e-14 m^2"')
-
-
 @pytest.mark.case(
-    "coupling-seepage-plug", kind="exact", mutants=("drag-of-the-fluid", "drag-over-twice"))
+    "coupling-seepage-plug", kind="exact", mutants=("drag-left-to-the-surface", "drag-over-twice"),
+    omitted="1: permeable aggregates have higher orders")
 @parametrize("*changes", CURVED)
 def test_seepage(changes, record):
     """Water that seeps evenly through a plug, held at its upstream end on walls without friction, stretches it by a
@@ -160,28 +159,27 @@ def test_seepage(changes, record):
     Norm: sum of the drag over rho nu u / k times the area, less 1; P less the linear stress, over the largest, in the
     middle half of the plug; largest move over the width.
     """
-    scene = _plug(60.0, *changes, *SEEPING)
+    scene = _plug(60.0, *changes, 'flow.biomass="brinkman"', 'flow.permeability="1e-14 m^2"')
     seed = pore.seeded(scene)
     solved = water(scene, seed)
     drive = scene.flow
     density = drive.kinematic_viscosity / drive.gravity / drive.permeability * solved.flow.mean_velocity
     on = traction.on_aggregate(seed.space, solved.flow, drive, scene.numerics.interface)[seed.mesh.body]
     total = abs(on[:, 0].sum() / density / (120.0 * WIDTH) - 1)
-    forces = 0.1 * on / (density * 120.0)
     place = seed.mesh.points[seed.mesh.body]
-    prescribed = np.column_stack([place[:, 0] == -60.0, (place[:, 1] == 0.0) | (place[:, 1] == WIDTH)])
+    prescribed = np.column_stack([place[:, 0] < -60.0 + 1e-9, (place[:, 1] == 0.0) | (place[:, 1] == WIDTH)])
     inside = seed.mesh.topology.body_corners
-    rest = growth.equilibrium(seed.body, seed.theta, place, 0 * seed.pressure[inside], prescribed, place, forces=forces)
+    rest = growth.equilibrium(seed.body, seed.theta, place, 0 * seed.pressure[inside], prescribed, place,
+                              forces=0.1 * on / (density * 120.0))
     x = seed.mesh.points[inside, 0]
-    middle = np.abs(x) < 30.0
-    linear = 0.1 * (60.0 - x) / 120.0
-    record(at_most("sum of the drag", total, 0.01, "layers on the walls, widened to a sixth of an element, carry less"),
-           at_most("stress", largest((rest.pressure - linear)[middle]) / 0.1, 0.01,
+    linear = (60.0 - x) / 120.0
+    record(at_most("sum of the drag", total, 1e-10, "the same flux through every section: round-off"),
+           at_most("stress", largest((10 * rest.pressure - linear)[np.abs(x) < 30.0]), 0.01,
                    "the flow becomes even within the pore's width of the ends, and in the layers"),
            at_most("move", largest(rest.position - place) / WIDTH, 1e-3, "the load is a gradient but for the layers"))
 
 
-LONG, HIGH = 100.0, 10.0
+LONG, HIGH, MIDDLE = 150.0, 10.0, 15.0
 
 
 @pytest.mark.case(
@@ -201,9 +199,9 @@ def test_bonded_slab(changes, record):
     guess = _pushed(seed, 5.0)
     shape = contact.expand(contact.Mechanics.of(scene), seed, theta * seed.theta, guess).pore
     x, y = shape.outline.points.T
-    free = (shape.wall == FREE) & (np.abs(x) < LONG / 4)
+    free = (shape.wall == FREE) & (np.abs(x) < MIDDLE)
     middles = shape.mesh.points[shape.mesh.triangles[shape.mesh.biomass]].mean(axis=1)
-    near = np.abs(middles[:, 0]) < LONG / 4
+    near = np.abs(middles[:, 0]) < MIDDLE
     sigma = adhesion.stress(scene, shape)[near] / scene.growth.shear_modulus
     expected = theta ** (-2 / 3) * (1 / theta - theta)
     size = abs(expected)
@@ -212,7 +210,7 @@ def test_bonded_slab(changes, record):
     record(each_at_most({"height": largest(y[free] / (theta * HIGH) - 1),
                          "stress xx": largest(sigma[..., 0] - expected) / size,
                          "stress yy": largest(sigma[..., 1]) / size}, 1e-3,
-                        "end effects decay as exp(-a distance / height) with a over 1: 1e-3 at 7 heights"),
+                        "ends of a bonded layer fade as exp(-a distance / height), a = cos a = 0.739: 2e-4 here"),
            at_most("move along the wall", largest(moved), 1e-9, "prescribed"))
 
 
@@ -237,7 +235,7 @@ SIZES = (0.35, 0.5, 0.7, 1.0)
 
 @pytest.mark.slow
 @pytest.mark.case(
-    "coupling-bonded-traction", kind="property", mutants=("means-over-the-width",), omitted="linear ones: the balance")
+    "coupling-bonded-traction", kind="property", mutants=("traction-at-a-point",), omitted="1, 3: the balance")
 @parametrize("*changes", {"quadratic": (runs.with_elements("quadratic"),)})
 def test_bonded_traction(changes, record):
     """What a bonded wall must bear converges with the mesh, although the stress at the contact line is singular.
