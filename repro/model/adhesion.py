@@ -33,7 +33,7 @@ from repro.scene import Scene, at_time
 #: The length of the means, over the pore's width.
 LENGTH = 1 / 20
 #: Parts of an arc on a wall, for the means of its traction.
-PARTS = 16
+PARTS = 64
 
 
 @dataclass(frozen=True)

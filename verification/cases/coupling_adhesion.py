@@ -90,7 +90,7 @@ def _at_rest(wall: str, *changes: str) -> tuple:
 
 @pytest.mark.case(
     "coupling-adhesion-balance", kind="property",
-    mutants=("walls-push-with-the-water", "bonded-slides", "pressure-of-corners-unstiffened"), runs_with="paper")
+    mutants=("walls-push-with-the-water", "pressure-unstiffened"), runs_with="paper")
 @parametrize("wall, *changes", {f"{wall}, {kind}": (wall, *changes) for wall in ("sliding", "bonded")
                                 for kind, changes in KINDS.items()})
 def test_balance(wall, changes, record):

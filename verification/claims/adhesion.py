@@ -100,8 +100,8 @@ def seeping(run: Run, width: float) -> tuple[Run, Run]:
     return permeable, (*permeable, FORCED)
 
 
-@claim("C53", "5", "the action of water on a poroelastic aggregate as body forces may lead to differences, depending on "
-       "the conditions", fine=COMPARED, beside=(), date=DEFINED)
+@claim("C53", "5", "the action of water on a poroelastic aggregate as body forces may lead to differences, depending "
+       "on the conditions", fine=COMPARED, beside=(), date=DEFINED)
 def body_forces() -> Finding:
     """Drag within a permeable aggregate, acting on its shape or not: wide, a plug at constant velocity, at 40 h, where
     one difference must exceed a few percent; and base at 19.2 h, at constant head, where none may."""
