@@ -132,21 +132,6 @@ def test_no_imports_form_a_circle():
     assert "repro.fem.elements" in circle(sources | {"repro.fem.elements": again})
 
 
-@pytest.mark.parametrize("module, source", [
-    ("reference.slab", "def f():\n    from repro import flow"),
-    ("repro.cli.main", "import importlib\nimportlib.import_module('reference.poiseuille')"),
-    ("verification.audit", "import numpy, pickle"),
-    ("repro.fem.mesh", "from repro.scene import Scene"),
-    ("repro.fem.mesh", "from ..scene import keys"),
-    ("repro.scene.keys", "def f():\n    from repro.fem.mesh import Mesh"),
-    ("repro.results.__init__", "from ..check import numbers"),
-    ("repro.runs.folder", "from repro import solve"),
-    ("repro.utils", "from repro import errors"),
-])
-def test_the_rules_detect_a_trespass(module, source):
-    assert [name for name, _ in trespasses({module: source})] == [module]
-
-
 @pytest.mark.parametrize("folder", FOLDERS)
 def test_every_import_is_declared(folder):
     """`repro` needs only the runtime dependencies and `paper_figures` one extra; the others may use all extras."""

@@ -4,7 +4,6 @@ import errno
 import os
 import signal
 import sys
-from contextlib import suppress
 from hashlib import sha256
 from pathlib import Path
 
@@ -159,22 +158,6 @@ def test_temporary_files_of_a_killed_run_are_removed(out, short):
     assert resume(out) == "completed"
     assert files(out) == files(cached_run(short)) | {".writing-thesis00/thesis.tex": b"half"}
     assert [path.name for path in out.rglob(".writing-*")] == [".writing-thesis00"]
-
-
-def test_no_link_is_written_through(tmp_path):
-    """The targets of links with the names of temporary files stay unchanged."""
-    victim, out = tmp_path / "thesis.tex", tmp_path / "run"
-    victim.write_text("years of work")
-    names = [f".{name}.part" for name in ("run.json", "timeseries.csv", NEWEST, "report.html", "fields.pvd")]
-    names += [f"fields/.part-fields_{k:04d}.vtu" for k in range(9)]
-
-    def plant(event):
-        for name in names:
-            with suppress(FileExistsError):
-                (out / name).symlink_to(victim)
-
-    assert run(load_scene("base", BRIEF), out, watch=Watch(tell=plant, interval=0.0)) == "completed"
-    assert victim.read_text() == "years of work" and not (out / "timeseries.csv").is_symlink()
 
 
 @pytest.mark.parametrize("make", [lambda lock: lock.symlink_to("elsewhere"), lambda lock: lock.write_text("mine"),

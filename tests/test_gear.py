@@ -19,7 +19,6 @@ from tests.strategies import EVERY_ORDER, ORDERS
 SECOND = 1 / 3600
 
 
-
 def coarse(order):
     """Return the numerics of a coarse mesh."""
     return {"refinement": 0.5 if order == 1 else 0.25, "transport": "gear", "elements": ORDERS[order]}
@@ -198,13 +197,3 @@ def test_gears_method_bounds_undershoots_by_each_substrates_supply(order):
     assert [consumed.min(), consumed.max()] == pytest.approx([-5e-3, -5e-3], rel=1e-6)
     with pytest.raises(TransportError, match="the acceptor becomes negative"):
         gear.advance(drained, nothing, nothing, start, 10.05e-6)
-
-
-def test_gears_steps_are_scaled_by_the_larger_of_content_and_supply():
-    """The acceptor's supply has fallen, the donor's has risen."""
-    _, problem = case.__wrapped__()
-    start = transport.supplied_everywhere(problem)
-    start = replace(start, acceptor=3 * start.acceptor, donor=start.donor / 2)
-    nothing = np.zeros_like(problem.space.reaction.dx)
-    scale = gear._started(problem, nothing, nothing, start)[0].scale
-    assert scale.ravel().tolist() == [3 * problem.both[0].supply, problem.both[1].supply]

@@ -168,7 +168,7 @@ def verdicts(rows: list[dict]) -> Block:
 
 
 def blocks(name: str, part: dict) -> list[Block]:
-    """The blocks of a part with all its points, for a terminal."""
+    """The blocks of a part with all its points."""
     description = "; ".join(f"{key}: {part[key]}" for key in ("error", "reference", "repeats") if key in part)
     return [Block("heading", f"{name}: {part['title']}"), Block("text", description),
             table(("method", "", "seconds and errors"), _rows(part))]
