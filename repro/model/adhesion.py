@@ -1,5 +1,5 @@
-"""What keeps an aggregate on its walls (section 5): tractions of the walls, forces of the fluid, and
-the largest tensile stress.
+"""What keeps an aggregate on its walls (section 5): tractions of the walls, forces of the fluid,
+and the largest tensile stress.
 
 The equilibrium (22) tested with the nodal functions gives the forces that the walls exert on the
 aggregate: the forces of the stress less those of the fluid, at the nodes on a wall. On a bonded
@@ -64,8 +64,8 @@ def stress(scene: Scene, pore: Pore) -> np.ndarray:
 
 
 def fluid_forces(scene: Scene, pore: Pore, solved: Solved) -> np.ndarray:
-    """(n, 2) MPa um, forces of the water on the aggregate's nodes, none of them on a wall's own
-    part beside a contact line."""
+    """(n, 2) MPa um, forces of the water on the aggregate's nodes, without those on the wall beside
+    a contact line."""
     drive = at_time(scene.flow, pore.time)
     of_head = traction.on_aggregate(pore.space, solved.flow, drive, scene.numerics.interface)
     if drive.permeability is None:
@@ -168,12 +168,12 @@ class _Surface:
         values, slopes = self._at((points + 1) / 2)
         dx = self.x[self.nodes] @ slopes.T * (weights / 2)
         local = np.einsum("eq,qa,qb->eab", dx, values, values)
-        own, index = np.unique(self.nodes, return_inverse=True)
+        surface_nodes, index = np.unique(self.nodes, return_inverse=True)
         index = index.reshape(self.nodes.shape)
-        mass = np.zeros((len(own), len(own)))
+        mass = np.zeros((len(surface_nodes), len(surface_nodes)))
         np.add.at(mass, (index[:, :, None], index[:, None, :]), local)
         density = np.zeros(len(forces))
-        density[own] = np.linalg.solve(mass, forces[own])
+        density[surface_nodes] = np.linalg.solve(mass, forces[surface_nodes])
         return density
 
     def _places(self) -> np.ndarray:
@@ -209,10 +209,10 @@ class _Surface:
     def point_means(self, forces: np.ndarray, width: float) -> np.ndarray:
         """(w,) means of forces (N,) at single points of the surface."""
         starts, length = self._windows(width)
-        own = np.unique(self.nodes)
-        x = self.x[own]
+        surface_nodes = np.unique(self.nodes)
+        x = self.x[surface_nodes]
         within = (x >= starts[:, None]) & (x <= starts[:, None] + length)
-        return within @ forces[own] / length
+        return within @ forces[surface_nodes] / length
 
 
 def tensile_peak(scene: Scene, pore: Pore) -> Peak:

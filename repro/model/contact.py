@@ -142,8 +142,8 @@ def expand(mechanics: Mechanics, grown: Pore, theta: np.ndarray, guess: Pore | N
         if last.division is not None:
             forces = _gathered(last.division, forces)
         shape = _at_rest(mechanics, grown, theta, start, forces, search)
-        settled = number + 1 >= SETTLING_ROUNDS
-        search = replace(search, advances=shape.advances, settled=settled)
+        stationary = number + 1 >= SETTLING_ROUNDS
+        search = replace(search, advances=shape.advances, stationary=stationary)
         iterations += shape.iterations
         moved = np.abs(shape.position - last.position).max()
         if moved <= FORCE_REST * shape.pore.boundary.thickness:
@@ -227,7 +227,7 @@ def _close_by_lines(mechanics: Mechanics, grown: Pore, start: Pore, forces: np.n
     for _ in range(CONTACT_ROUNDS):
         for line in lines:
             line.record(*_clearance(rule, shape.pore.boundary, line))
-        if search.settled or all(line.accepted for line in lines):
+        if search.stationary or all(line.accepted for line in lines):
             rest = replace(shape.pore, fixed=_with_new_surface(shape.pore.boundary))
             return replace(shape, pore=rest, iterations=trials.iterations, gap=gap)
         for line in lines:

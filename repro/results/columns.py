@@ -26,9 +26,9 @@ NEEDS: dict[str, Callable[[Scene, Report], bool]] = {
 
 def _has_adhesion(growth: Growth) -> bool:
     """Does a scene ask for what keeps the aggregate on its walls? Strain counts from t = 0."""
-    asked = (growth.wall == "bonded", growth.fluid_forces == "included",
+    requested = (growth.wall == "bonded", growth.fluid_forces == "included",
              growth.bonding_strength is not None, growth.tensile_strength is not None)
-    return any(asked) and growth.new_biomass == "stressed"
+    return any(requested) and growth.new_biomass == "stressed"
 
 
 def _both(pattern: str, words: str, formula: str, value: Callable,
