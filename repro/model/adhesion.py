@@ -27,8 +27,9 @@ import numpy as np
 from repro.fem import elements
 from repro.fem.outline import BOTTOM, TOP, parabola
 from repro.model import flow, growth, traction
+from repro.model.flow import Flow
 from repro.model.pore import Pore, Solved
-from repro.scene import Scene, at_time
+from repro.scene import Scene, at_time, needed
 
 #: The length of the means, over the pore's width.
 LENGTH = 1 / 20
@@ -66,14 +67,15 @@ def stress(scene: Scene, pore: Pore) -> np.ndarray:
 def fluid_forces(scene: Scene, pore: Pore, solved: Solved) -> np.ndarray:
     """(n, 2) MPa um, forces of the water on the aggregate's nodes, without those on the wall beside
     a contact line."""
-    drive = at_time(scene.flow, pore.time)
-    of_head = traction.on_aggregate(pore.space, solved.flow, drive, scene.numerics.interface)
+    drive = at_time(needed(scene.flow, "[flow]"), pore.time)
+    water = needed(solved.flow, "a solution of the flow")
+    of_head = traction.on_aggregate(pore.space, water, drive, scene.numerics.interface)
     if drive.permeability is None:
-        of_head = of_head + _beside_contact(pore, solved)
+        of_head = of_head + _beside_contact(pore, water)
     return traction.MPA_PER_UM * drive.density * drive.gravity * of_head[pore.mesh.body]
 
 
-def _beside_contact(pore: Pore, solved: Solved) -> np.ndarray:
+def _beside_contact(pore: Pore, water: Flow) -> np.ndarray:
     """(N, 2) um2 of head: nodal forces of the fluid's edges on walls that end at contact lines,
     which the nodal forces of its triangles include; their pressure alone, since the water rests in
     such a corner."""
@@ -82,7 +84,7 @@ def _beside_contact(pore: Pore, solved: Solved) -> np.ndarray:
     outline = pore.boundary
     ends = np.zeros(len(mesh.points), bool)
     ends[mesh.loop[outline.contact_ends]] = True
-    head = flow.pressure_space(pore.space).to_mesh(solved.flow.head)
+    head = flow.pressure_space(pore.space).to_mesh(water.head)
     for side in range(3):
         beside = ends[mesh.triangles].any(axis=1)
         cells = mesh.cells[~mesh.biomass & mesh.on_wall(side) & beside]
@@ -101,7 +103,7 @@ def fluid_load(scene: Scene, pore: Pore, solved: Solved) -> Load:
     on = outline.points[outline.wall == BOTTOM, 0]
     x, y = (pore.mesh.points[pore.mesh.body] - [(on.min() + on.max()) / 2, 0.0]).T
     moment = float(x @ forces[:, 1] - y @ forces[:, 0])
-    return Load(*forces.sum(axis=0).tolist(), moment)
+    return Load(float(forces[:, 0].sum()), float(forces[:, 1].sum()), moment)
 
 
 def wall_forces(scene: Scene, pore: Pore, solved: Solved) -> np.ndarray:
