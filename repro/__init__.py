@@ -27,8 +27,8 @@ Functions; every argument after these is given by its name:
     added_resistance(area, width, spanned)  a law for models of pore networks
 
 Errors: ``SceneError`` (a scene is refused), ``OutputError`` (a folder or file is refused),
-``SimulationError`` (a stage fails), ``TypeError`` (an argument is refused). ``PoreEnd`` and
-``Fold`` are ends of the model, which only ``simulate`` raises.
+``SimulationError`` (a stage fails), ``TypeError`` (an argument is refused). ``PoreEnd``,
+``Fold`` and ``Detachment`` are ends of the model, which only ``simulate`` raises.
 
 Sections of the paper and their modules, which name the equations that they solve:
 
