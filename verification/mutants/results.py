@@ -432,8 +432,8 @@ MUTANTS = (
          "tests/test_sweep.py::test_unfinished_runs_of_a_sweep_are_made_again"),
         ("half-a-fold",
          "A status that is cut off after the time of a fold is one.",
-         ": near x = .*",
-         ".*",
+         "folds in the step from {TIME}: near x = .*",
+         "folds in the step from {TIME}.*",
          f"{FOLD}the_status_of_a_fold_is_a_full_sentence"
          "[the aggregate's surface folds in the step from t = 5.24 h-False]")),
     *changes(
@@ -1314,8 +1314,8 @@ MUTANTS = (
         "repro/model/traction.py",
         ("forces-laplacian",
          "Forces on the aggregate take the Laplacian form, whatever the flow's is.",
-         "nodal(space, flow_field, viscosity, numerics.interface)",
-         'nodal(space, flow_field, viscosity, "laplacian")',
+         "on_aggregate(space, flow_field, drive, numerics.interface)",
+         'on_aggregate(space, flow_field, drive, "laplacian")',
          f"{PAIRS}the_force_on_the_aggregate_comes_through_every_section_of_the_fluid"),
         ("cubic-forces-laplacian",
          "With cubic elements forces take the Laplacian form.",
