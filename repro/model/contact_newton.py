@@ -22,7 +22,7 @@ from repro.fem import division as dividing
 from repro.fem.assembly import Factored
 from repro.fem.division import Division
 from repro.fem.newton import REQUIRED_REDUCTION, STALLED
-from repro.fem.outline import BOTTOM, TOP, Outline
+from repro.fem.outline import Outline
 from repro.model import contact_lines, growth
 from repro.model.contact_lines import CLOSE, FIRST_TRIAL, LEAST_PART, Clearance, Line
 from repro.model.pore import Pore
@@ -56,8 +56,8 @@ class Placed:
 
     grown: the pore before its expansion; pore: the same on the divided mesh, with its contact;
     division: None if no arc is divided; reference: (N, 2) um, where strain counts from, at the
-    nodes of the grown pore; system: of the equilibrium; theta: (t, q) expansion; rule: for the free
-    surface.
+    nodes of the grown pore; system: of the equilibrium; theta: (t, q) expansion; target: (n, 2) um,
+    with the prescribed coordinates; rule: for the free surface.
     """
 
     grown: Pore
@@ -66,15 +66,8 @@ class Placed:
     reference: np.ndarray
     system: growth.System
     theta: np.ndarray
+    target: np.ndarray
     rule: Clearance
-
-    def target(self, position: np.ndarray) -> np.ndarray:
-        """(n, 2) um, positions with contact surfaces on their walls."""
-        rim = self.pore.mesh.topology.body_loop
-        target = position.copy()
-        target[rim[self.pore.wall == BOTTOM], 1] = 0.0
-        target[rim[self.pore.wall == TOP], 1] = self.rule.width
-        return target
 
     def clearances(self, position: np.ndarray, lines: Sequence[Line]) -> np.ndarray:
         """(2, L) clearance and reach beyond lines, at positions (n, 2) um."""
@@ -173,8 +166,7 @@ class Coupled:
         while True:
             poll()
             at = self.placed
-            iterate = at.system.under(at.theta, at.target(self.position), self.position,
-                                      self.pressure)
+            iterate = at.system.under(at.theta, at.target, self.position, self.pressure)
             stalled = STALLED * last < iterate.defect <= growth.ROUND_OFF
             if iterate.complete and (iterate.defect <= tolerance or stalled) and self._accepts():
                 return
