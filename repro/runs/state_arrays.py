@@ -37,7 +37,10 @@ def pack_state(scene: Scene, state: RestartState) -> tuple[dict, Arrays]:
     arrays = {name: getattr(pore.mesh, name) for name in OF_MESH}
     arrays |= {name: getattr(pore, name) for name in OF_PORE}
     arrays["reference"] = pore.body.reference
-    arrays |= {name: getattr(pore, name) for name in OPTIONAL if getattr(pore, name) is not None}
+    if pore.last is not None:
+        arrays["last"] = pore.last
+    if pore.line_speeds is not None:
+        arrays["line_speeds"] = pore.line_speeds
     if guess:
         arrays |= {name: getattr(guess, name) for name in OF_GUESS}
     plain = {"scene": scene_hash(scene), "time_h": pore.time, "pace": asdict(state.step_control),

@@ -73,8 +73,8 @@ MUTANTS = (
         "repro/runs/state_arrays.py",
         ("last-shape-dropped",
          "A checkpoint holds no last shape.",
-         'OPTIONAL = ("last", "line_speeds")',
-         'OPTIONAL = ("line_speeds",)',
+         "if pore.last is not None:",
+         "if False:",
          f"{FOLD}a_run_stopped_after_every_step_equals_the_uninterrupted_run[stress_free]")),
     *changes(
         "repro/preflight/simplifications.py",
