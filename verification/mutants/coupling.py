@@ -189,13 +189,6 @@ MUTANTS = (
          "line.advance <= line.least or clearance <= np.inf)",
          f"{SMALLEST_CONTACT}[newton-fast]")),
     *changes(
-        "repro/runs/state_arrays.py",
-        ("line-speeds-dropped",
-         "A checkpoint holds no speeds of contact lines.",
-         "if pore.line_speeds is not None:",
-         "if False:",
-         f"{CONTACT_TESTS}a_run_stops_within_a_step_in_contact")),
-    *changes(
         "repro/march/midpoint.py",
         ("rows-decide-whether-a-run-arrives",
          "A row that cannot be interpolated ends the run.",
