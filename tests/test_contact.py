@@ -13,11 +13,14 @@ from repro.fem.division import Division
 from repro.fem.outline import BOTTOM, FREE, TOP, Outline, polygon
 from repro.fem.space import Space
 from repro.march import midpoint, simulation
+from repro.march.loop import RestartState
 from repro.march.simulation import simulate
+from repro.march.step_control import StepControl
 from repro.model import contact, contact_lines, contact_newton
 from repro.model.contact_lines import Clearance, Contact, surface_ends
 from repro.model.pore import initial_outline, seeded
 from repro.runs.execution import Watch, resume, run
+from repro.runs.state_arrays import pack_state, unpack_state
 from repro.scene import load_scene
 from tests.shell import files
 from tests.strategies import EVERY_ORDER, coarse_base, mirrored, plug
@@ -282,6 +285,8 @@ def test_lines_start_from_their_speeds(plugged):
     advances = contact_lines.advances_at(pore.line_speeds, 0.5)
     assert advances[TOP, -1] == pore.line_speeds[1, 1] / 2 and advances[BOTTOM, 1] == pore.line_speeds[0, 0] / 2
     assert contact_lines.speeds(advances, 0.5) == pytest.approx(pore.line_speeds)
+    kept = unpack_state(plugged[0], *pack_state(plugged[0], RestartState(pore, StepControl(1.0))))
+    assert np.array_equal(kept.pore.line_speeds, pore.line_speeds)
     assert contact_lines.speeds({(BOTTOM, 1): 1.0}, 0.5) is None and contact_lines.advances_at(None, 1.0) == {}
 
 
