@@ -343,19 +343,20 @@ def solve(scene: Scene, pore: Pore, over: float = 0.0) -> Solved:
     problem = transport.problem(pore.space, carried, scene.substrates, scene.kinetics,
                                 numerics.inlet, numerics.jacobian == "reused")
     sink = biomass.sink(pore.active if scene.kinetics else None, over)
-    if numerics.transport == "gear":
-        state = gear.settle(problem, sink, pore.concentrations)
-    else:
-        if carried:
-            refuse_no_supply(peclet(scene.substrates, scene.pore.width, carried.mean_velocity))
-        state = transport.steady(problem, sink, pore.concentrations)
+    state = pore.concentrations
+    if numerics.transport != "gear" and carried:
+        refuse_no_supply(peclet(scene.substrates, scene.pore.width, carried.mean_velocity))
+    if numerics.transport == "gear" or not (problem.law is None or problem.law.both.monotone):
+        state = gear.settle(problem, sink, state)
+    if numerics.transport != "gear":
+        state = transport.steady(problem, sink, state)
     return Solved(carried, problem, state, transport.fluxes(problem, sink, state))
 
 
 def peclet(substrates: Substrates, width: float, speed: float) -> float:
     """u W / D with the smaller diffusivity, for a width (um) and a mean velocity (um/h)."""
     slowest = min(min(s.diffusivity, s.diffusivity_in_aggregate)
-                  for s in (substrates.acceptor, substrates.donor))
+                  for s in substrates.modelled.values())
     return speed * width / slowest
 
 

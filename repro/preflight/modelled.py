@@ -69,9 +69,13 @@ def _slowed_by(flow: Flow) -> str:
 
 def _substrates(scene: Scene) -> Iterator[str]:
     carried = "advection and diffusion" if scene.flow else "diffusion"
-    acceptor = _over_time(scene.substrates.acceptor.supply, 1.0, "mg/L")
-    donor = _over_time(scene.substrates.donor.supply, 1.0, "mg/L")
-    yield f"{carried} of acceptor ({acceptor}) and donor ({donor}), (7)-(8)"
+    supplies = {name: f"{name} ({_over_time(kind.supply, 1.0, 'mg/L')})"
+                for name, kind in scene.substrates.modelled.items()}
+    equations = {"acceptor": "(7)", "donor": "(8)"}
+    numbers = "-".join(equations[name] for name in supplies)
+    yield f"{carried} of {' and '.join(supplies.values())}, {numbers}"
+    if len(supplies) == 1:
+        yield "one substrate: the other is assumed not to limit"
     if scene.flow:
         yield "(11) at the inlet, (12) at the outlet, (13) on the walls"
     else:
@@ -92,9 +96,17 @@ def _over_time(value: float | TimeTable, factor: float, unit: str) -> str:
 
 
 def _kinetics(scene: Scene) -> Iterator[str]:
-    yield f"{scene.kinetics.law} uptake by the aggregate, (7)-(8)"
+    law = scene.kinetics.law
+    one = len(scene.substrates.modelled) == 1
+    yield f"{'Monod' if one and law == 'dual Monod' else law} uptake by the aggregate, (7)-(8)"
+    if law == "Haldane":
+        yield ("of several solutions, the one that is reached in time from the profile in the "
+               "last shape, or from the supply at t = 0")
     if scene.growth:
         yield "growth and decay of active, gain of inert biomass, (9)-(10)"
+        yield {"with acceptor": "decay in proportion to m_A: none without acceptor",
+               "unlimited": "decay also without acceptor, where its oxygen demand is not met"
+               }[scene.kinetics.decay]
 
 
 def _growth(scene: Scene) -> Iterator[str]:
