@@ -146,7 +146,7 @@ def make_biomass(stages: Stages, previous: Pore, solved: Solved,
     first = biomass.rates(previous.space, start, stages.law)
     guess = grow(previous, first, duration)
     try:
-        end = transport.steady(problem, Sink(guess.active), start)
+        end = gear.steady(problem, Sink(guess.active), start)
     except Unresolved as error:
         ahead = replace(guess, time=time_before_end(previous, duration))
         raise remeshing.advise(stages.scene, ahead, error) from None

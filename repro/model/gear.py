@@ -36,6 +36,7 @@ from repro.errors import TransportError
 from repro.fem import linear
 from repro.fem.assembly import ElementSystem
 from repro.fem.space import Space
+from repro.model import transport
 from repro.model.kinetics import Sink
 from repro.model.transport import (
     UNRESOLVED,
@@ -194,7 +195,8 @@ def settle(problem: Problem, sink: Sink | None, guess: Concentrations | None) ->
     Notes
     -----
     The transient does not matter (3.3.2): the steps are backward Euler's and grow to LONG as fast
-    as SETTLING permits.
+    as SETTLING permits. With a law that is not monotone it decides which state is reached: changes
+    are FASTER times smaller, and a step grows as its rate of change falls.
     """
     start = _nearer(problem, guess)
     if not (problem.inflow.any() or problem.system.constrained.any()):
@@ -203,18 +205,34 @@ def settle(problem: Problem, sink: Sink | None, guess: Concentrations | None) ->
     active = nothing if sink is None else sink.active
     system, level = _started(problem, active, nothing, start, living=False)
     system = replace(system, watched=np.ones(problem.space.count, bool))
+    monotone = problem.law is None or problem.law.both.monotone
+    most = SETTLING if monotone else SETTLING / FASTER
     step = LONG
-    last = np.inf
+    last = rate = np.inf
     for count in range(1, MOST_STEPS + 1):
-        new, change = _accepted(system, level, step, SETTLING, "while the profiles settle",
-                                1 / FASTER)
+        new, change = _accepted(system, level, step, most, "while the profiles settle", 1 / FASTER)
         if new.step >= LONG and change <= STEADY * (1 - change / last):
             return concentrations(problem.substrates, new.fields, count)
         level = _level(new.fields, level.biomass)
-        step = min(FASTER * new.step, LONG)
+        before = rate
+        rate = max(change, STEADY) / new.step
+        faster = FASTER if monotone else max(1 / FASTER, min(FASTER, before / rate))
+        step = min(faster * new.step, LONG)
         last = change
     raise TransportError(f"the profiles still change by {change:.2g} of the supply a step after "
                          f'{MOST_STEPS} steps; try numerics.transport = "quasi_steady"')
+
+
+def steady(problem: Problem, sink: Sink | None, guess: Concentrations | None) -> Concentrations:
+    """Solve for steady concentrations; of several ones, those that are reached from the guess.
+
+    With a law of uptake that is not monotone several states may be steady. :func:`settle` then
+    leads to one of them, with the biomass at rest, and Newton's method starts from there.
+    Parameters, result and errors are those of :func:`repro.model.transport.steady`.
+    """
+    if problem.law is not None and not problem.law.both.monotone:
+        guess = settle(problem, sink, guess)
+    return transport.steady(problem, sink, guess)
 
 
 def _nearer(problem: Problem, guess: Concentrations | None) -> Concentrations:

@@ -343,13 +343,12 @@ def solve(scene: Scene, pore: Pore, over: float = 0.0) -> Solved:
     problem = transport.problem(pore.space, carried, scene.substrates, scene.kinetics,
                                 numerics.inlet, numerics.jacobian == "reused")
     sink = biomass.sink(pore.active if scene.kinetics else None, over)
-    state = pore.concentrations
-    if numerics.transport != "gear" and carried:
-        refuse_no_supply(peclet(scene.substrates, scene.pore.width, carried.mean_velocity))
-    if numerics.transport == "gear" or not (problem.law is None or problem.law.both.monotone):
-        state = gear.settle(problem, sink, state)
-    if numerics.transport != "gear":
-        state = transport.steady(problem, sink, state)
+    if numerics.transport == "gear":
+        state = gear.settle(problem, sink, pore.concentrations)
+    else:
+        if carried:
+            refuse_no_supply(peclet(scene.substrates, scene.pore.width, carried.mean_velocity))
+        state = gear.steady(problem, sink, pore.concentrations)
     return Solved(carried, problem, state, transport.fluxes(problem, sink, state))
 
 

@@ -46,7 +46,7 @@ class UptakeLaw:
 
     half_saturation: Any
 
-    #: Does m(C) never decrease? Then the steady concentrations are unique.
+    #: Does m(C) never decrease? If it does, several concentrations may be steady.
     monotone: ClassVar[bool] = True
 
     @classmethod

@@ -71,9 +71,7 @@ def _substrates(scene: Scene) -> Iterator[str]:
     carried = "advection and diffusion" if scene.flow else "diffusion"
     supplies = {name: f"{name} ({_over_time(kind.supply, 1.0, 'mg/L')})"
                 for name, kind in scene.substrates.modelled.items()}
-    equations = {"acceptor": "(7)", "donor": "(8)"}
-    numbers = "-".join(equations[name] for name in supplies)
-    yield f"{carried} of {' and '.join(supplies.values())}, {numbers}"
+    yield f"{carried} of {' and '.join(supplies.values())}, {_equations(scene)}"
     if len(supplies) == 1:
         yield "one substrate: the other is assumed not to limit"
     if scene.flow:
@@ -83,6 +81,11 @@ def _substrates(scene: Scene) -> Iterator[str]:
                "closed": "closed ends"}[scene.substrates.boundary]
     yield {"quasi_steady": "at rest in each shape",
            "gear": "followed in time (3.3, Gear)"}[scene.numerics.transport]
+
+
+def _equations(scene: Scene) -> str:
+    numbers = {"acceptor": "(7)", "donor": "(8)"}
+    return "-".join(numbers[name] for name in scene.substrates.modelled)
 
 
 def _over_time(value: float | TimeTable, factor: float, unit: str) -> str:
@@ -98,7 +101,8 @@ def _over_time(value: float | TimeTable, factor: float, unit: str) -> str:
 def _kinetics(scene: Scene) -> Iterator[str]:
     law = scene.kinetics.law
     one = len(scene.substrates.modelled) == 1
-    yield f"{'Monod' if one and law == 'dual Monod' else law} uptake by the aggregate, (7)-(8)"
+    name = law.removeprefix("dual ") if one else law
+    yield f"{name} uptake by the aggregate, {_equations(scene)}"
     if law == "Haldane":
         yield ("of several solutions, the one that is reached in time from the profile in the "
                "last shape, or from the supply at t = 0")

@@ -16,8 +16,8 @@ SUBSTRATES = ("acceptor", "donor")
 #: Parts that a quantity may need: does a report have them?
 NEEDS: dict[str, Callable[[Scene, Report], bool]] = {
     "flow": lambda scene, at: at.solved.flow is not None,
-    "acceptor": lambda scene, at: _models("acceptor", scene),
-    "donor": lambda scene, at: _models("donor", scene),
+    "acceptor": lambda scene, at: _solved("acceptor", at),
+    "donor": lambda scene, at: _solved("donor", at),
     "aggregate": lambda scene, at: at.pore.outline is not None,
     "biomass": lambda scene, at: at.pore.outline is not None and scene.kinetics is not None,
     "growth": lambda scene, at: at.pore.outline is not None and scene.growth is not None}
@@ -30,8 +30,8 @@ def _both(pattern: str, words: str, formula: str, value: Callable,
                      name, signed=signed) for k, name in enumerate(SUBSTRATES)]
 
 
-def _models(name: str, scene: Scene) -> bool:
-    return scene.substrates is not None and name in scene.substrates.modelled
+def _solved(name: str, at: Report) -> bool:
+    return getattr(at.solved.concentrations, name, None) is not None
 
 
 def _least(k: int, scene: Scene, at: Report) -> float:
@@ -189,7 +189,8 @@ LEDGER = (
 
 COLUMNS = [each.name for each in SERIES]
 #: Parts that a column of a ledger may need: does a scene have them?
-LEDGER_NEEDS = {name: partial(_models, name) for name in SUBSTRATES}
+LEDGER_NEEDS: dict[str, Callable[..., bool]] = {
+    name: lambda scene, name=name: name in scene.substrates.modelled for name in SUBSTRATES}
 LEDGER_COLUMNS = [each.name for each in LEDGER]
 
 

@@ -73,7 +73,8 @@ def _pore(scene: Scene, plain: dict, arrays: Arrays) -> Pore:
     space = Space(mesh, numerics.order)
     guess = None
     if plain["guess"] is not None:
-        guess = Concentrations(*map(arrays.get, OF_GUESS), plain["guess"])
+        acceptor, donor = map(arrays.get, OF_GUESS)
+        guess = Concentrations(acceptor, donor, plain["guess"])
     return Pore(time=plain["time_h"], space=space, body=material(space, arrays["reference"]),
                 concentrations=guess, front=plain["front"], last=arrays.get("last"),
                 **{name: arrays[name] for name in OF_PORE})
