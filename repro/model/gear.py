@@ -214,10 +214,11 @@ def settle(problem: Problem, sink: Sink | None, guess: Concentrations | None) ->
         if new.step >= LONG and change <= STEADY * (1 - change / last):
             return concentrations(problem.substrates, new.fields, count)
         level = _level(new.fields, level.biomass)
-        before = rate
-        rate = max(change, STEADY) / new.step
-        faster = FASTER if monotone else max(1 / FASTER, min(FASTER, before / rate))
+        faster = FASTER
+        if not monotone and change > STEADY:
+            faster = max(1 / FASTER, min(FASTER, rate * new.step / change))
         step = min(faster * new.step, LONG)
+        rate = change / new.step
         last = change
     raise TransportError(f"the profiles still change by {change:.2g} of the supply a step after "
                          f'{MOST_STEPS} steps; try numerics.transport = "quasi_steady"')

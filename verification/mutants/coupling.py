@@ -62,8 +62,8 @@ MUTANTS = (
         "repro/model/kinetics.py",
         ("decay-leaves-all",
          "all that decays is left as X_I (10)",
-         "return m_a * constants.decay_coefficient * (1 - constants.degradable_fraction)",
-         "return m_a * constants.decay_coefficient")),
+         "return decay * (1 - self.constants.degradable_fraction)",
+         "return decay")),
     *changes(
         "repro/model/contact.py",
         ("films-stay-open",
