@@ -4,6 +4,8 @@ VENV := .venv
 BIN := $(VENV)/bin/python
 STAMP := $(VENV)/.installed
 CRATE := build/crate/.installed
+OLDEST := build/oldest/.installed
+OLDEST_TESTS := tests/test_python_calls.py tests/test_drawing.py tests/test_field_files.py tests/test_linear.py
 PIP := $(BIN) -m pip install -q --disable-pip-version-check
 
 export MPLBACKEND := Agg
@@ -12,7 +14,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
-.PHONY: help env figures check-manifest claims sensitivity verify verify-fast mutants mutants-sampled test test-thorough lint bench crate clean
+.PHONY: help env figures check-manifest claims sensitivity verify verify-fast mutants mutants-sampled test test-thorough oldest lint bench crate clean
 
 help:
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/\1|\2/p' Makefile | awk -F'|' '{ printf "  make %-16s %s\n", $$1, $$2 }'
@@ -25,7 +27,7 @@ figures: $(STAMP) ## run the paper's simulations and draw its figures into paper
 check-manifest: $(STAMP) ## compare the data behind the figures with the committed manifest
 	@$(BIN) -m paper_figures.manifest
 
-claims: $(STAMP) ## judge the paper's claims by computed numbers, and write the replication note
+claims: $(STAMP) ## judge the paper's claims by computed numbers, and write the note and the register
 	@$(BIN) -m verification.claims
 	@$(BIN) -m paper_figures.replication
 
@@ -50,6 +52,9 @@ test: $(STAMP) ## run the tests and the quick verification cases on all cores
 
 test-thorough: $(STAMP) ## the same with more random examples, and the slow tests
 	@HYPOTHESIS_PROFILE=thorough $(BIN) -m pytest tests verification -n logical --dist worksteal -m "not slow"
+
+oldest: $(OLDEST) ## run quick tests with the oldest accepted versions of the dependencies
+	@$(dir $(OLDEST))bin/python -m pytest $(OLDEST_TESTS)
 
 lint: $(STAMP) ## check style and types with ruff and mypy
 	@$(BIN) -m ruff check .
@@ -88,4 +93,12 @@ $(CRATE): .ci/crate.lock
 	@rm -f $@
 	@"$(PYTHON)" -m venv --clear $(@D)
 	@$(@D)/bin/python -m pip install -q --disable-pip-version-check --require-hashes --only-binary :all: -r .ci/crate.lock
+	@touch $@
+
+# `make oldest` installs the lower bounds of the dependencies in a separate environment, for Python 3.11.
+$(OLDEST): .ci/oldest.lock pyproject.toml
+	@rm -f $@
+	@"$(PYTHON)" -m venv --clear $(@D)
+	@$(@D)/bin/python -m pip install -q --disable-pip-version-check --require-hashes --only-binary :all: -r .ci/oldest.lock
+	@$(@D)/bin/python -m pip install -q --disable-pip-version-check --no-deps --no-build-isolation -e .
 	@touch $@

@@ -214,7 +214,8 @@ def test_a_balance_of_round_off_is_not_a_defect(order, name, k):
     other = ("acceptor", "donor")[1 - k]
     elements = f"numerics.elements={ORDERS[order]}", f"numerics.refinement={0.5 / order}"
     scene = load_scene("base", [*elements, 'pore.length="200 um"', 'growth.end="12 min"',
-                               'kinetics.decay_coefficient="0 1/d"', f'substrates.{other}.supply="0 mg/L"'], ["flow"])
+                               'kinetics.decay_coefficient="0 1/d"', f'substrates.{other}.supply="0 mg/L"'],
+                       unset=["flow"])
     first, last = simulate(scene)
     problem, flux = first.solved.problem, first.solved.fluxes[k]
     block = slice(k * problem.space.count, (k + 1) * problem.space.count)
@@ -235,7 +236,7 @@ def test_a_demand_of_round_off_is_not_a_defect():
     sums bound it by 1e-6 of the floor."""
     scene = load_scene("base", ["numerics.preset=paper", "numerics.refinement=0.5", "numerics.transport=gear",
                                'pore.length="100 um"', "substrates.boundary=closed", "aggregate.radius=15 um",
-                               'growth.end="16 h"', 'growth.time_step="2 h"'], ["flow"])
+                               'growth.end="16 h"', 'growth.time_step="2 h"'], unset=["flow"])
     instants = list(simulate(scene))
     (ledger,) = instants[-1].ledgers
     assert ledger.consumed[0] < 1e-12 * ledger.biomass_before

@@ -15,8 +15,8 @@ from numpydoc import validate
 import repro
 from tests.test_architecture import ROOT, modules
 
-USERS = [f"repro.{name}" for name in repro.__all__]
-METHODS = [f"repro.Results.{name}" for name in ("fields", "to_pandas", "to_xarray")]
+USERS = [f"repro.{name}" for name in dir(repro)]
+METHODS = [f"repro.Results.{name}" for name in ("animate", "fields", "plot", "to_pandas", "to_xarray")]
 #: Functions and classes that CONTRIBUTING.md names, and the classes of the entries of the lists that it names.
 CONTRIBUTORS = [
     "repro.timing.timed", "repro.errors.StageError", "repro.fem.space.Space",

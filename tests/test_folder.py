@@ -18,7 +18,7 @@ from repro.runs import checkpoint
 from repro.runs.checkpoint import LAST, NEWEST, PREVIOUS
 from repro.runs.execution import Watch, resume, run
 from repro.runs.folder import LOCK, SUMS
-from repro.runs.loading import load_run
+from repro.runs.scripts import load_run
 from repro.scene import load_scene, parse_scene, scene_tables
 from tests.pages import cached_run
 from tests.shell import (
@@ -194,7 +194,7 @@ def test_a_full_disk_is_reported_with_the_file_and_nothing_is_lost(short, tmp_pa
         if event["event"] == "checkpoint" and event["time_h"] > 0.5:
             monkeypatch.setattr(module, name, full)
 
-    with pytest.raises(OutputError, match=f"{file}: No space left on device; .* go on with --resume"):
+    with pytest.raises(OutputError, match=f"{file}: No space left on device; .* go on with repro.resume"):
         run(short, out, watch=Watch(tell=fill, interval=0.0))
     assert not [path for path in out.rglob("*") if "part" in path.name] and not (out / LOCK).exists()
     assert len(load_run(out).time) > 1

@@ -144,7 +144,7 @@ def test_without_flow_the_ends_of_the_pore_hold_the_supply(preset, method):
     """Far from the aggregate diffusion is one-dimensional: C falls linearly from the end of the pore, at 300 um, where
     half of the uptake enters. At 1.5 W the transverse profile has decayed to exp(-1.5 pi) of a drop of 1 mg/L."""
     scene = load_scene("base", ["aggregate.radius=20 um", "growth.end=0.2 h", f"numerics.preset={preset}",
-                               "numerics.time=updates", f"numerics.transport={method}"], ["flow"])
+                               "numerics.time=updates", f"numerics.transport={method}"], unset=["flow"])
     first = next(simulate(scene))
     state, space = first.solved.concentrations, first.pore.space
     x = np.abs(space.points[:, 0])
@@ -166,7 +166,7 @@ def test_the_defect_of_biomass_at_an_exhausted_substrate_is_accepted(step):
                "kinetics.maximum_utilization_rate=12 1/day", "kinetics.maximum_density=1.009e4 mg/L",
                "numerics.preset=fast", "numerics.time=updates", "numerics.transport=gear",
                f"growth.time_step={step}", 'growth.end="0.34 h"']
-    *_, last = simulate(load_scene("base", changes, ["flow"]))
+    *_, last = simulate(load_scene("base", changes, unset=["flow"]))
     assert last.pore.time == 0.34 and last.solved.concentrations.donor.max() < 0.01
 
 
@@ -178,7 +178,7 @@ def test_a_substrate_may_be_used_up_to_nothing(changes, unset):
     """Without supply, or in a closed pore with an aggregate, the acceptor falls until it underflows. The run continues,
     biomass no longer grows, and the donor remains."""
     starved = load_scene("base", ["numerics.preset=paper", "numerics.transport=gear", "numerics.refinement=0.4",
-                                  *changes], unset)
+                                  *changes], unset=unset)
     *_, before, last = simulate(starved)
     left = last.solved.concentrations
     assert 0 <= left.acceptor.min() and left.acceptor.max() < np.finfo(float).tiny and left.donor.min() > 1

@@ -43,7 +43,7 @@ def test_every_key_that_takes_a_table_follows_its_sections_interpolation(key):
     table = json.dumps([[time, TIMED[key].write(value)] for time, value in (("0 h", 2.0), ("1 h", 6.0), ("4 h", 3.0))])
     without = ["flow.head"] if name == "mean_velocity" else []
     for word, expected in (("steps", [2, 2, 6, 6, 3]), ("linear", [2, 4, 6, 5, 3])):
-        loaded = load_scene("base", [f"{key}={table}", f"{section}.interpolation={word}"], without)
+        loaded = load_scene("base", [f"{key}={table}", f"{section}.interpolation={word}"], unset=without)
         assert [attrgetter(key)(loaded.at(time)) for time in (0, 0.5, 1, 2, 9)] == pytest.approx(expected, rel=1e-15)
         assert attrgetter(key)(loaded.largest) == 6 and [loaded.corner(time) for time in (0, 1, 4)] == [1, 4, inf]
 
@@ -88,7 +88,7 @@ def test_a_row_within_a_step_has_the_supply_of_its_time(preset):
 def test_the_supply_of_a_rising_velocity_is_its_integral(way):
     """The mean is 2 m/day, to round-off, for steps of any length."""
     loaded = load_scene("base", ['flow.mean_velocity=[["0 h", "1 m/day"], ["0.5 h", "3 m/day"]]', 'growth.end="0.5 h"',
-                               "flow.interpolation=linear", f"numerics.{way}"], ["flow.head"])
+                               "flow.interpolation=linear", f"numerics.{way}"], unset=["flow.head"])
     total_supply = np.sum([step.supplied for instant in simulate(loaded) for step in instant.ledgers], axis=0)
     assert total_supply == pytest.approx(np.full(2, 2e6 / 24 * 0.5 * 50 * 10), rel=1e-9)
 
@@ -102,7 +102,7 @@ def test_a_table_is_judged_by_its_extreme():
     judgement, expected = map(evaluate_at_largest, (loaded, plain), speeds)
     assert judgement[0] == plain and [number.start for number in judgement[1]] == pytest.approx(
         [number.start for number in expected[1]], rel=1e-12)
-    report = check(loaded, "base")
+    report = check(loaded)
     assert "0 to 20 mg/L, in steps, the last from 0.5 h" in dict(report.modelled)["substrates"]
 
 

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from verification import audit
-from verification.bench import report, runs
+from verification.bench import after_contact, report, runs
 from verification.bench.record import points
 from verification.evidence import hard_cases
 from verification.evidence.writing import Block, load, markdown, table
@@ -37,12 +37,16 @@ def blocks(records: dict[str, dict]) -> Iterator[Block]:
 def summary(records: dict[str, dict]) -> Iterator[Block]:
     """Yield the blocks of the README: the presets on base, and the diagram of all methods."""
     yield report.machine(records["bench"]["machine"])
-    yield table(PRESETS, (row[:4] for row in _presets(records["bench"]["parts"]["base"])))
+    parts = records["bench"]["parts"]
+    typed = {row["method"]: f"{row['seconds']:.2f}" for row in parts.get("command", {}).get("rows", ())}
+    rows = ((*row[:2], typed.get(row[0], report.NOT_MEASURED), *row[2:4]) for row in _presets(parts["base"]))
+    yield table((*PRESETS[:2], "command as typed (s)", *PRESETS[2:]), rows)
     yield PICTURE
 
 
-PRESETS = ("preset", "time (s)", "faster than paper", "largest error")
+PRESETS = ("preset", "solver (s)", "faster than paper", "largest error")
 PICTURE = Block("picture", "bench_base.svg: error against time of the whole base run")
+WIDE_PICTURE = Block("picture", "bench_wide.svg: error against time of wide at 39.3 h, after contact")
 
 
 def _bench(record: dict) -> Iterator[Block]:
@@ -51,7 +55,19 @@ def _bench(record: dict) -> Iterator[Block]:
     yield PICTURE
     yield Block("text", f"The presets on base. Error: {part['error']}. Reference: {part['reference']}.")
     yield table((*PRESETS, *QUANTITIES), _presets(part))
+    if "wide" in record["parts"]:
+        yield from _after_contact(record["parts"]["wide"])
     yield report.verdicts(record["verdicts"])
+
+
+def _after_contact(part: dict) -> Iterator[Block]:
+    """Yield the diagram of wide after contact, and the errors of the presets."""
+    yield WIDE_PICTURE
+    yield Block("text", f"{part['title']}. Error: {part['error']}. Reference: {part['reference']}.")
+    yield table(("preset", "time (s)", *after_contact.NUMBERS), (
+        (line["method"].split()[1], f"{line['points'][0]['seconds']:.2f}",
+         *(f"{100 * error:.2g} %" for error in line["points"][0]["errors"][after_contact.TIMES.index(
+             after_contact.DRAWN)])) for line in part["lines"] if line["method"] in runs.PRESETS))
 
 
 def paper_point(part: dict) -> dict:

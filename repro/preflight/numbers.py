@@ -24,6 +24,9 @@ from repro.scene import Scene, Substrate, at_largest, at_time
 STEPS = 2000
 #: The largest exponent of growth in a step.
 LARGEST = 50.0
+#: Exponent of the compression of a rim over that of its growth, after contact, if the core
+#: starves. Fitted to 25 pores (docs/design.md).
+SQUEEZE = 0.03
 
 
 @dataclass(frozen=True)
@@ -80,16 +83,21 @@ def at_end(scene: Scene) -> Sizes:
     rate = max(0.0, fastest_growth(scene))  # a decaying aggregate is no larger than at the start
     layer = depth(scene)
     step = scene.growth.end / STEPS
-    full = scene.pore.width * scene.pore.length
+    width = scene.pore.width
+    full = width * scene.pore.length
+    thin = width - film(scene)
+    area = current.area
+    thickness = current.thickness
+    contact = current.contact
     for k in range(STEPS):  # as a half-disc of the same area
-        exposed = math.pi * current.thickness if current.contact is None else 2 * scene.pore.width
-        share = min(1.0, layer * exposed / current.area)
-        area = min(full, current.area * math.exp(min(LARGEST, rate * share * step)))
-        touches = math.sqrt(2 * area / math.pi) >= scene.pore.width - film(scene)
-        contact = current.contact
-        if touches and contact is None:
+        exposed = math.pi * thickness if contact is None else 2 * width
+        share = min(1.0, layer * exposed / area)
+        area = min(full, area * math.exp(min(LARGEST, rate * share * step)))
+        radius = math.sqrt(2 * area / math.pi)
+        thickness = min(radius, width)
+        if radius >= thin and contact is None:
             contact = (k + 1) * step
-        current = sizes(scene, area, contact)
+    current = sizes(scene, area, contact)
     return replace(current, reach=current.reach + offset)
 
 
@@ -148,6 +156,32 @@ def uptakes(scene: Scene) -> Iterator[Uptake]:
 def depth(scene: Scene) -> float:
     """Depth (um) that the scarcer substrate reaches in biomass with the largest uptake."""
     return min(uptake.depth for uptake in uptakes(scene))
+
+
+def rim_stretch(scene: Scene, uptake: float) -> float:
+    """Estimate of the elastic stretch along the rim of a half-disc at growth.end (docs/scope.md).
+
+    uptake: uptake of biomass at the supply over the inflow of the substrate, per area, 1/um2.
+    """
+    scarcer = min(uptakes(scene), key=lambda each: each.depth)
+    rate = max(fastest_growth(scene), 0.0)
+    step = scene.growth.end / STEPS
+    start = at_start(scene).area
+    touching = scene.pore.width - film(scene)
+    spanning = math.pi / 2 * touching**2
+    area, grown, squeezed = start, 0.0, 0.0
+    for _ in range(STEPS):
+        arc = math.pi * min(math.sqrt(2 * area / math.pi), touching)
+        fed = min(area, scarcer.depth * arc)
+        fed /= max(1.0, uptake * fed)
+        rim = min(area, max(fed, scarcer.layer * arc))
+        growth = min(LARGEST, rate * step * fed / rim)
+        if area < spanning:
+            grown += growth
+            area *= math.exp(growth * rim / area)
+        elif touching > 2 * scarcer.depth:
+            squeezed += growth
+    return math.sqrt(area / start) * math.exp(-0.5 * grown - SQUEEZE * squeezed)
 
 
 def numbers(scene: Scene, speed: float | None) -> list[Number]:

@@ -19,6 +19,7 @@ from math import inf
 from pathlib import Path
 from typing import NamedTuple
 
+from repro.scene.arguments import typed
 from repro.scene.files import key_of, leave_out, override, packaged_scenes, read_tables
 from repro.scene.needed import MissingError, needed
 from repro.scene.reading import Place, dotted, entries, read_table, toml, write_table
@@ -320,8 +321,19 @@ class Growth:
         "2 um", "um", source="2.3.3, Table 1",
         about="A film of fluid to the opposite wall closes when it is thinner than this")
     fluid_forces: str = choice(
-        "neglected", "included", about="The fluid's traction on the aggregate",
-        source="(20), (22), 2.3.3")
+        "neglected", "included", source="(20), (22), 2.3.3; section 5",
+        about="The fluid's traction on the aggregate, or its drag within a permeable one")
+    wall: str = choice(
+        "sliding", "bonded", source="2.3.3",
+        about="What touches the lower wall slides along it, or stays where it has touched it")
+    bonding_strength: float | None = quantity(
+        "1e-3 MPa", "MPa", default=None, source="Section 5, without a value",
+        about="The run ends if a wall must bear more to keep the aggregate, in the mean over "
+              "pore.width / 20")
+    tensile_strength: float | None = quantity(
+        "0.01 MPa", "MPa", default=None, source="Section 5, without a value",
+        about="The run ends if the largest tensile stress exceeds it, in the mean within "
+              "pore.width / 20")
     new_biomass: str = choice(
         "stressed", "stress_free", source="2.3, section 5",
         about="Strain counts from t = 0 (2.3), or new biomass is born without (section 5)")
@@ -553,6 +565,7 @@ class Scene:
 LATER: dict[str, dict[str, object]] = {
     "aggregate": {"position": "0.0 um", "smooth": False, "inert_fraction": 0.0},
     "flow": {"interpolation": "steps", "biomass": "viscous"},
+    "growth": {"wall": "sliding"},
     "numerics": {"contact_elements": 0.0},
     "substrates.acceptor": {"interpolation": "steps"},
     "substrates.donor": {"interpolation": "steps", "inhibition_constant": "100.0 mg/L"},
@@ -563,12 +576,14 @@ Source = Scene | str | Path | dict
 KEYS = tuple(dotted(Scene))  # every dotted key of a scene, its sections among them
 
 
-def load_scene(source: Source, overrides: Sequence[str] = (), unset: Sequence[str] = ()) -> Scene:
+@typed
+def load_scene(scene: Source, overrides: Sequence[str] = (), *,
+               unset: Sequence[str] = ()) -> Scene:
     """Load a scene, with changes.
 
     Parameters
     ----------
-    source : Scene, str, Path or dict
+    scene : Scene, str, Path or dict
         A TOML file, the name of a packaged scene, a dict of tables like those of a file, or a
         loaded scene.
     overrides : sequence of str, optional
@@ -585,6 +600,8 @@ def load_scene(source: Source, overrides: Sequence[str] = (), unset: Sequence[st
     ------
     SceneError
         If the scene is not accepted: names the file, key, value and accepted values.
+    TypeError
+        If an argument has a wrong type: names the argument.
 
     Examples
     --------
@@ -593,10 +610,10 @@ def load_scene(source: Source, overrides: Sequence[str] = (), unset: Sequence[st
     >>> scene.pore.width, scene.flow
     (60.0, None)
     """
-    if isinstance(source, Scene) and not (overrides or unset):
-        return source
-    file = label(source)
-    tables = load_tables(source, overrides, unset)
+    if isinstance(scene, Scene) and not (overrides or unset):
+        return scene
+    file = label(scene)
+    tables = load_tables(scene, overrides, unset)
     return parse_scene(tables, Path(file).stem, file, [key_of(entry) for entry in overrides])
 
 

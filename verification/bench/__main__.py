@@ -10,7 +10,8 @@ from verification.bench import record, report
 from verification.evidence.writing import markdown, save
 
 #: Modules of the parts, imported when a part runs.
-PARTS = {"box": "users", "channel": "users", "base": "runs", "size": "runs", "scenes": "runs", "memory": "runs"}
+PARTS = {"box": "users", "channel": "users", "base": "runs", "command": "commands", "size": "runs", "scenes": "runs",
+         "memory": "runs", "wide": "after_contact"}
 
 
 def main(arguments: list[str] | None = None) -> dict:

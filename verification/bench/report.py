@@ -11,9 +11,10 @@ from itertools import cycle, product
 from math import inf
 from pathlib import Path
 
+import numpy as np
 from matplotlib.figure import Figure
 
-from verification.bench import runs
+from verification.bench import after_contact, runs
 from verification.bench.record import envelope, points, reading
 from verification.evidence.writing import Block, table
 
@@ -25,6 +26,9 @@ OTHER_CODES, TIMES_FASTER = ("fipy", "py-pde, compiled"), 10.0
 FLOORS = {"from 2500 nodes on": (1.5, 1500, inf), "at 600 nodes": (2.0, 499, 1500)}
 #: Time that a scene may use beyond its own stages, over that of the complete model.
 EXCESS = 0.1
+#: Largest processor time of a run with all of its rows, over that with two.
+MOST_OVER_FEW_ROWS = {"fast": 2.0, "accurate": 1.5, "exact": 1.5}
+MOST_OVER_IMPORTS = 2.0
 NOT_MEASURED = "not measured"
 
 
@@ -32,7 +36,8 @@ def judged(record: dict) -> list[dict]:
     """All verdicts of a record; what it has not measured neither holds nor fails."""
     parts = defaultdict(dict, record["parts"])
     return [*_base(parts["base"]), *_other_codes(parts), *_steps(parts["size"]), *_scenes(parts["scenes"]),
-            *_memory(parts["memory"])]
+            *_memory(parts["memory"]), *_commands(parts["command"]),
+            *(_after_contact(parts["wide"]) if parts["wide"] else ())]
 
 
 def verdict(claim: str, required: str, measure: Callable[..., tuple[str, bool]], *arguments) -> dict:
@@ -149,6 +154,37 @@ def _flat(part: dict, method: str) -> tuple[str, bool]:
     row = {row["method"]: row for row in part["rows"]}[method]
     description = f"{row['slope']:.0f} bytes a step over {row['steps']} steps; {row['bound']:.0f} allowed"
     return description, row["slope"] <= row["bound"]
+
+
+def _after_contact(part: dict) -> Iterator[dict]:
+    for preset, aim in after_contact.AIMS.items():
+        hours = ", ".join(f"{time:g}" for time in after_contact.TIMES)
+        yield verdict(f"wide at {hours} h: conductivity, tips and length of contact in {preset}",
+                      f"at most {100 * aim:g} %, with the reference's own change", _converged, part, preset, aim)
+
+
+def _converged(part: dict, preset: str, aim: float) -> tuple[str, bool]:
+    """The largest error of each number over the times; the number holds if error and reference's change do together."""
+    errors = np.array(points(part, f"preset {preset}")[0]["errors"])
+    changes = np.array(part["reference_changes"])
+    listed = ", ".join(f"{name} {100 * error:.2g} %" for name, error in
+                       zip(after_contact.NUMBERS, errors.max(axis=0)))
+    return f"{listed}; reference changes by {100 * changes.max():.2g} %", bool((errors + changes).max() <= aim)
+
+
+def _commands(part: dict) -> Iterator[dict]:
+    """Verdicts on a user's own runs; none before they are measured."""
+    rows = {row["method"]: row for row in part.get("rows", ())}
+    for preset, most in MOST_OVER_FEW_ROWS.items() if rows else ():
+        yield verdict(f"base: a run in {preset} with all of its rows over one with two", f"at most {most:g} times",
+                      _ratio, rows.get(preset, {}), "over_few_rows", most)
+    if "fast" in rows:
+        yield verdict("repro run base in fast, as typed, over the import of its packages",
+                      f"at most {MOST_OVER_IMPORTS:g} times", _ratio, rows["fast"], "over_imports", MOST_OVER_IMPORTS)
+
+
+def _ratio(row: dict, key: str, most: float) -> tuple[str, bool]:
+    return f"{row[key]:.2f} times (processor time)", row[key] <= most
 
 
 WORDS = {True: "holds", False: "does not hold", None: NOT_MEASURED}
