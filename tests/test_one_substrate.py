@@ -35,7 +35,7 @@ def test_one_substrate_is_the_limit_of_an_excess_of_the_other(name, scheme):
     """The other one at 1e9 times its half saturation has m = 1 - 1e-9. The rows agree to 1e-7, and those of the absent
     one are empty. The oxygen demand closes, with the demand that the absent one would meet."""
     absent = OTHER[name]
-    alone = load_scene("base", SCHEMES[scheme], [f"substrates.{absent}"])
+    alone = load_scene("base", SCHEMES[scheme], unset=[f"substrates.{absent}"])
     excess = load_scene("base", [*SCHEMES[scheme], f'substrates.{absent}.supply="1e9 mg/L"'])
     reports = list(simulate(alone))
     row = results.row(alone, reports[-1])
@@ -76,7 +76,8 @@ def test_unlimited_decay_goes_on_without_acceptor(scheme):
 def test_a_run_of_one_substrate_is_written_and_resumed(tmp_path):
     """The files have empty columns for the absent one. A run that is made longer writes the files of a long one."""
     changes = ["numerics.preset=paper", "numerics.refinement=0.5"]
-    short, long = (load_scene("base", [*changes, f"growth.end={end} h"], ["substrates.acceptor"]) for end in (0.4, 1))
+    short, long = (load_scene("base", [*changes, f"growth.end={end} h"], unset=["substrates.acceptor"])
+                   for end in (0.4, 1))
     run(short, tmp_path / "run")
     resume(tmp_path / "run", overrides=["growth.end=1 h"])
     run(long, tmp_path / "long")
@@ -92,7 +93,7 @@ def test_a_run_of_one_substrate_is_written_and_resumed(tmp_path):
 def test_a_solution_of_one_substrate_costs_at_most_0_6_of_two(name):
     """Processor time of assembly and solution at more than 2500 nodes, the least of five, in turns."""
     both = load_scene("base", ["aggregate.radius=20 um", "numerics.preset=accurate", "numerics.refinement=0.85"],
-                      ["growth"])
+                      unset=["growth"])
     one = load_scene(both, unset=[f"substrates.{OTHER[name]}"])
     seed = pore.seeded(both)
     carried = pore.solve(both, seed).flow
