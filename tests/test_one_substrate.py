@@ -11,6 +11,7 @@ from repro.march.balance import LARGEST, Limits, accepted_demand, oxygen_demand
 from repro.march.simulation import simulate
 from repro.model import pore, transport
 from repro.model.kinetics import Sink
+from repro.preflight.modelled import describe_model
 from repro.runs.execution import resume, run
 from repro.scene import load_scene
 from tests.shell import files
@@ -87,6 +88,17 @@ def test_a_run_of_one_substrate_is_written_and_resumed(tmp_path):
     assert {key for key, value in ledger.items() if value == ""} == {key for key in ledger if "acceptor" in key}
     assert float(ledger["donor_consumed_pg_per_m"]) > 0
     assert "acceptor_min_mg_per_L" not in repro.load_run(tmp_path / "run")
+
+
+def test_check_states_what_is_assumed():
+    """One substrate, several solutions, and decay; the paper's scene has its own decay and neither of the others."""
+    changes = ["kinetics.law=Haldane", "kinetics.decay=unlimited"]
+    changed = dict(describe_model(load_scene("base", changes, unset=["substrates.acceptor"])))
+    paper = dict(describe_model(load_scene("base")))
+    stated = {"one substrate: the other is assumed not to limit": "substrates", "of several solutions": "kinetics",
+              "its oxygen demand is not met": "kinetics"}
+    assert all(text in changed[section] and text not in paper[section] for text, section in stated.items())
+    assert "none without acceptor" in paper["kinetics"]
 
 
 @pytest.mark.parametrize("name", OTHER)
