@@ -84,7 +84,7 @@ REFUSED = {
     "[growth] takes end,": ["growth.detachment=1 1/day"],
     f"; detachment {SCOPED}": ["growth.detachment=1 1/day", "detachment_rate=1 1/day"],
     f"; depth {SCOPED}": ["pore.depth=50 um"],
-    f"; inhibition {SCOPED}": ["kinetics.inhibition=5 mg/L"],
+    "did you mean substrates.donor.inhibition_constant?": ["kinetics.inhibition_constant=5 mg/L"],
     f"; temperature {SCOPED}": ["kinetics.Temperature=20"],
     "one aggregate is modelled, see docs/scope.md: a table [": ["aggregate=[{radius=\"5 um\"}, {}]"],
     "; give mg/L (in water 1 ppm is about 1 mg/L, 1 ppb about 1 ug/L)": [
@@ -192,8 +192,11 @@ def test_an_entry_that_conflicts_with_the_scene_is_refused(source, overrides, pa
 @pytest.mark.parametrize("text, part", [
     ('[flow]\nhead = "1e-3 cm"\nbiomass = "brinkman"\npermeability = "1e-15 m^2"\n[numerics]\npreset = "fast"\n',
      'flow.biomass = "brinkman": "viscous" is needed without'),
-    ("[substrates.acceptor]\n", "substrates.donor is missing: it is needed beside substrates.acceptor; "),
-    ("[aggregate]\n[substrates.donor]\n", "not to limit is supplied at many times its half_saturation"),
+    ('[aggregate]\n[substrates.acceptor]\n[kinetics]\nlaw = "Haldane"\n',
+     'kinetics.law = "Haldane": [substrates.donor], which inhibits, is needed'),
+    ('[aggregate]\n[substrates.donor]\ninhibition_constant = "5 mg/L"\n', 'kinetics.law = "Haldane" is needed with it'),
+    ('[aggregate]\n[substrates.donor]\nsupply = "0.5 mg/L"\n[kinetics]\nlaw = "zero order"\n',
+     'substrates.donor.supply = "0.5 mg/L": half_saturation (1 mg/L) or more is needed'),
     ('[substrates]\n[growth]\nend = "1 h"\n', ": [aggregate] and [substrates] are needed"),
     ('[aggregate]\n[substrates]\n[growth]\nend = "1 h"\nfluid_forces = "included"\n', "without [flow]"),
     ('[pore]\nwidth = "4 um"\n[aggregate]\n', 'pore.width = "4 um": more than aggregate.radius (5 um)'),

@@ -91,8 +91,8 @@ def _cells(scene: Scene, value: dict[str, float]) -> Iterator[Caveat]:
 
 def _diffusivities(scene: Scene) -> Iterator[Caveat]:
     """Warn if only one of two related values of Table 1 is changed."""
-    for name in ("acceptor", "donor") if scene.substrates and scene.aggregate else ():
-        substrate = getattr(scene.substrates, name)
+    kinds = scene.substrates.modelled if scene.substrates and scene.aggregate else {}
+    for name, substrate in kinds.items():
         table = type(substrate)(supply=substrate.supply)
         inside = substrate.diffusivity_in_aggregate
         if substrate.diffusivity != table.diffusivity and inside == table.diffusivity_in_aggregate:

@@ -14,7 +14,7 @@ SCOPE = "docs/scope.md"
 #: Words in the keys of other models.
 NOT_MODELLED = frozenset({
     "attachment", "detachment", "erosion", "sloughing", "depth", "dimension", "dimensions",
-    "inhibition", "temperature",
+    "temperature",
 })
 
 
