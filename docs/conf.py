@@ -31,6 +31,7 @@ autodoc_typehints = "none"
 html_theme = "furo"
 html_title = "Biological clogging of a pore, reproduced"
 html_static_path = ["site/static"]
+html_css_files = ["site.css"]
 html_copy_source = False
 html_show_sourcelink = False
 html_additional_pages = {"index": "redirect.html"}

@@ -12,7 +12,7 @@ def visit_inline(translator, node: nodes.math) -> None:
 
 def visit_block(translator, node: nodes.math_block) -> None:
     """Write a displayed formula with its number."""
-    number = node.get("label")
+    number = node.get("label", "").removeprefix("eq-").replace("-", ")-(")
     label = f'<span class="equation-number">({number})</span>' if number else ""
     translator.body.append(f'<div class="math"{_anchor(node)}>{convert(node.astext(), display="block")}{label}</div>')
     raise nodes.SkipNode
