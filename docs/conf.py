@@ -32,6 +32,7 @@ html_theme = "furo"
 html_title = "Biological clogging of a pore, reproduced"
 html_static_path = ["site/static"]
 html_css_files = ["site.css"]
+html_js_files = ["tables.js"]
 html_copy_source = False
 html_show_sourcelink = False
 html_additional_pages = {"index": "redirect.html"}
