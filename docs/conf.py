@@ -3,23 +3,26 @@
 The source folder is the repository, so that a link between two pages is the same in a checkout and on the site.
 """
 
+import os
 import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path[:0] = [str(ROOT), str(ROOT / "docs" / "site")]
+os.environ.pop("MPLBACKEND", None)  # notebooks show their figures inline
 
 project = "dupin2001-repro"
 author = "the dupin2001-repro authors"
 copyright = f"2026, {author}"
 root_doc = "docs/index"
 include_patterns = [
-    "README.md", "CHANGELOG.md", "CONTRIBUTING.md", "docs/**.md", "paper_figures/replication.md",
+    "README.md", "CHANGELOG.md", "CONTRIBUTING.md", "docs/**.md", "docs/examples/*.py", "paper_figures/replication.md",
     "reference/ERRATA.md", "verification/report/*.md", "verification/sensitivity/sensitivity.md",
 ]
 exclude_patterns = ["docs/_build", "build", "**/.*"]
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.autosummary", "numpydoc", "sphinx_design", "mathml"]
-source_suffix = {".md": "myst-nb"}
+source_suffix = {".md": "myst-nb", ".py": "myst-nb"}
+nb_custom_formats = {".py": ["jupytext.reads", {"fmt": "py:percent"}]}
 myst_enable_extensions = ["dollarmath", "colon_fence", "deflist"]
 myst_heading_anchors = 4
 nb_execution_mode = "force"
