@@ -11,7 +11,7 @@ from scipy.optimize import least_squares
 
 import repro
 
-TRUE_RATE = 9.3                    # mg/mg/day
+TRUE_RATE = 9.3                    # 1/day
 TIMES = np.arange(2.0, 17.0, 2.0)  # h
 NOISE = 0.01
 SCENE = ["numerics.preset=fast", 'growth.end="16 h"', f'output.times={[f"{time:g} h" for time in TIMES]}']
@@ -19,8 +19,8 @@ SCENE = ["numerics.preset=fast", 'growth.end="16 h"', f'output.times={[f"{time:g
 
 # %%
 def conductivity(rate: float) -> np.ndarray:
-    """(T,) m/day, the conductivity of base at TIMES with a utilization rate (mg/mg/day)."""
-    results = repro.solve("base", [*SCENE, f'kinetics.maximum_utilization="{rate!r} mg/mg/day"'])
+    """(T,) m/day, the conductivity of base at TIMES with a utilization rate (1/day)."""
+    results = repro.solve("base", [*SCENE, f'kinetics.maximum_utilization_rate="{rate!r} 1/day"'])
     return np.interp(TIMES, results.time, results["conductivity_m_per_d"])
 
 
@@ -40,13 +40,13 @@ def residuals(rate: np.ndarray) -> np.ndarray:
 fit = least_squares(residuals, [8.0], diff_step=0.01)
 error = float(np.linalg.inv(fit.jac.T @ fit.jac)[0, 0] ** 0.5)
 low, high = fit.x[0] - 2 * error, fit.x[0] + 2 * error
-print(f"k = {fit.x[0]:.3f} mg/mg/day, between {low:.3f} and {high:.3f} (two standard errors), after {fit.nfev} fits")
+print(f"k = {fit.x[0]:.3f} 1/day, between {low:.3f} and {high:.3f} (two standard errors), after {fit.nfev} fits")
 assert low < TRUE_RATE < high
 
 # %%
 figure, axes = plt.subplots(figsize=(6, 3), layout="constrained")
 axes.plot(TIMES, measured, "k.", label="made data")
-axes.plot(TIMES, conductivity(float(fit.x[0])), label=f"k = {fit.x[0]:.2f} mg/mg/day")
+axes.plot(TIMES, conductivity(float(fit.x[0])), label=f"k = {fit.x[0]:.2f} 1/day")
 axes.set(xlabel="time (h)", ylabel="conductivity (m/day)")
 axes.legend()
 plt.show()
