@@ -1,8 +1,8 @@
 # %% [markdown]
 # # A pore of your own, with a supply that stops
 #
-# A scene is a TOML file or a dict. Each section that is present switches its physics on. Here the supply of the acceptor
-# stops after 12 h: a table of times and values takes the place of a value.
+# A scene is a TOML file or a dict. Each section that is present switches its physics on. Here the supply of the
+# acceptor stops after 12 h: a table of times and values takes the place of a value.
 
 # %%
 import matplotlib.pyplot as plt

@@ -255,7 +255,7 @@ def _fold(scene: Scene) -> Iterator[Caveat]:
         yield Caveat("growth.end", f"the run may end before {scene.growth.end:g} h, as a fold: the "
                      f"supply reaches {depth:.3g} um into an aggregate of up to "
                      f"{end.thickness:.3g} um, so that its rim compresses itself until no smooth "
-                     "shape is left (docs/scope.md). Of 10 pores judged so, 4 folded and 3 came "
+                     "shape is left (`repro docs scope`). Of 10 pores judged so, 4 folded and 3 came "
                      "close; of 12 others none did")
 
 
