@@ -11,7 +11,8 @@ SCRIPTS = sorted(path.stem for path in (ROOT / "docs" / "examples").glob("*.py")
 LONG = {"calibrate", "sweep"}
 
 
-@pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.thorough] * (name in LONG)) for name in SCRIPTS])
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.thorough] * (name in LONG)) for name in SCRIPTS])
 def test_an_example_runs(name, monkeypatch, tmp_path):
     monkeypatch.setenv("MPLBACKEND", "Agg")
     monkeypatch.chdir(tmp_path)
