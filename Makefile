@@ -5,6 +5,8 @@ BIN := $(VENV)/bin/python
 STAMP := $(VENV)/.installed
 CRATE := build/crate/.installed
 SITE := build/docs/.installed
+OLDEST := build/oldest/.installed
+OLDEST_TESTS := tests/test_python_calls.py tests/test_drawing.py tests/test_field_files.py tests/test_linear.py
 PIP := $(BIN) -m pip install -q --disable-pip-version-check
 
 export MPLBACKEND := Agg
@@ -13,7 +15,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
-.PHONY: help env figures check-manifest claims sensitivity verify verify-fast mutants mutants-sampled test test-thorough lint bench crate docs clean
+.PHONY: help env figures check-manifest claims sensitivity verify verify-fast mutants mutants-sampled test test-thorough oldest lint bench crate docs clean
 
 help:
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/\1|\2/p' Makefile | awk -F'|' '{ printf "  make %-16s %s\n", $$1, $$2 }'
@@ -51,6 +53,9 @@ test: $(STAMP) ## run the tests and the quick verification cases on all cores
 
 test-thorough: $(STAMP) ## the same with more random examples, and the slow tests
 	@HYPOTHESIS_PROFILE=thorough $(BIN) -m pytest tests verification -n logical --dist worksteal -m "not slow"
+
+oldest: $(OLDEST) ## run quick tests with the oldest accepted versions of the dependencies
+	@$(dir $(OLDEST))bin/python -m pytest $(OLDEST_TESTS)
 
 lint: $(STAMP) ## check style and types with ruff and mypy
 	@$(BIN) -m ruff check .
@@ -101,4 +106,12 @@ $(SITE): .ci/docs.lock $(STAMP)
 	@"$(PYTHON)" -m venv --clear $(@D)
 	@$(@D)/bin/python -m pip install -q --disable-pip-version-check --require-hashes --only-binary :all: -r .ci/docs.lock
 	@echo "import site; site.addsitedir('$$($(BIN) -c 'import sysconfig; print(sysconfig.get_path("purelib"))')')" > "$$($(@D)/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')/package.pth"
+	@touch $@
+
+# `make oldest` installs the lower bounds of the dependencies in a separate environment, for Python 3.11.
+$(OLDEST): .ci/oldest.lock pyproject.toml
+	@rm -f $@
+	@"$(PYTHON)" -m venv --clear $(@D)
+	@$(@D)/bin/python -m pip install -q --disable-pip-version-check --require-hashes --only-binary :all: -r .ci/oldest.lock
+	@$(@D)/bin/python -m pip install -q --disable-pip-version-check --no-deps --no-build-isolation -e .
 	@touch $@

@@ -19,6 +19,8 @@ from xml.etree import ElementTree
 
 import meshio
 import numpy as np
+from skfem import ElementTriP2
+from skfem.quadrature import get_quadrature
 
 UNITS = {"um": 1.0, "cm": 1e4, "h": 1.0, "min": 1 / 60, "mg/L": 1.0, "1/day": 1 / 24, "m/day": 1e6 / 24,
          "cm^2/day": 1e8 / 24, "cm^2/s": 3.6e11, "m/s^2": 3600**2 * 1e6, "m^2": 1e12, "deg": np.pi / 180, "MPa": 1.0}
@@ -163,35 +165,12 @@ class Scene:
         return number(self.tables["growth"]["end"])
 
 
-def _triangle_rule(n: int = 4) -> tuple[np.ndarray, np.ndarray]:
-    """Points (q, 2) and weights (q,) on the unit triangle, exact to degree 2 n - 2."""
-    points, weights = np.polynomial.legendre.leggauss(n)
-    u = 0.5 * (points + 1)
-    across, up = (axis.ravel() for axis in np.meshgrid(u, u))
-    weight = np.outer(weights, weights).ravel() / 4 * (1 - up)
-    return np.column_stack([across * (1 - up), up]), weight
-
-
-def _shapes(at: np.ndarray) -> np.ndarray:
-    """Quadratic shape functions (q, 6): corners, then midpoints of sides, in VTK's order."""
-    second, third = at.T
-    first = 1 - second - third
-    return np.stack([first * (2 * first - 1), second * (2 * second - 1), third * (2 * third - 1), 4 * first * second,
-                     4 * second * third, 4 * third * first], axis=1)
-
-
-def _shape_gradients(at: np.ndarray) -> np.ndarray:
-    """Derivatives (q, 6, 2) of the shape functions by the two coordinates of the unit triangle."""
-    second, third = at.T
-    first = 1 - second - third
-    zero = 0 * first
-    by_second = [1 - 4 * first, 4 * second - 1, zero, 4 * (first - second), 4 * third, -4 * third]
-    by_third = [1 - 4 * first, zero, 4 * third - 1, -4 * second, 4 * second, 4 * (first - third)]
-    return np.stack([np.stack(by_second, axis=1), np.stack(by_third, axis=1)], axis=2)
-
-
-POINTS, WEIGHTS = _triangle_rule()
-SHAPES, SHAPE_GRADIENTS = _shapes(POINTS), _shape_gradients(POINTS)
+POINTS, WEIGHTS = get_quadrature(ElementTriP2, 8)
+_FUNCTIONS = [ElementTriP2().lbasis(POINTS, number) for number in range(6)]
+#: Quadratic functions (q, 6) at the points of the quadrature, corners and then midpoints of sides as in VTK, and their
+#: derivatives (q, 6, 2) by the coordinates of the unit triangle.
+SHAPES = np.stack([values for values, _ in _FUNCTIONS], axis=1)
+SHAPE_GRADIENTS = np.stack([gradients.T for _, gradients in _FUNCTIONS], axis=1)
 LINE, LINE_WEIGHTS = np.polynomial.legendre.leggauss(4)
 ALONG = np.stack([LINE * (LINE - 1) / 2, LINE * (LINE + 1) / 2, 1 - LINE**2], axis=1)
 SIDES = ((0, 1, 3), (1, 2, 4), (2, 0, 5))

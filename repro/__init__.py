@@ -9,11 +9,26 @@ Ten lines of use; ``docs/tutorial.md`` of the repository has more:
     print(repro.check(scene))                               # expected model, mesh and cost
     results = repro.solve(scene)                            # rows of timeseries.csv, as arrays
     print(results["conductivity_m_per_d"], results.units["conductivity_m_per_d"])
-    repro.run(scene, "runs/base")                           # the same as files, and a page
-    results = repro.load_run("runs/base")                   # ... and back; results.to_pandas()
+    results = repro.run(scene, "runs/base")                 # the same as files, and a page
+    repro.load_run("runs/base").plot("acceptor", time=3)    # and .plot(), .animate(), .to_pandas()
     repro.sweep(scene, ["pore.width=50 um, 60 um"], "sweep")
 
-``simulate(scene)`` yields the full state at every reported time, in um, h, mg/L.
+Functions; every argument after these is given by its name:
+
+    load_scene(scene, overrides)            a scene: sections, keys, units
+    check(scene, overrides)                 its model, mesh, numbers, warnings and cost
+    solve(scene, overrides)                 Results in memory
+    run(scene, folder, overrides)           the same Results, written to a folder
+    resume(folder, overrides)               continue a run, or extend it to a later end
+    load_run(folder)                        Results of a run in a folder
+    compare(folders, file)                  a page that compares runs
+    sweep(scene, vary, folder, overrides)   runs with varied keys, their tables and page
+    simulate(scene, overrides)              the full state at every row, in um, h, mg/L
+    added_resistance(area, width, spanned)  a law for models of pore networks
+
+Errors: ``SceneError`` (a scene is refused), ``OutputError`` (a folder or file is refused),
+``SimulationError`` (a stage fails), ``TypeError`` (an argument is refused). ``PoreEnd`` and
+``Fold`` are ends of the model, which only ``simulate`` raises.
 
 Sections of the paper and their modules, which name the equations that they solve:
 
@@ -64,16 +79,18 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from repro.errors import OutputError, SimulationError
-    from repro.march.folding import Fold
-    from repro.march.loop import PoreEnd
+    from repro.errors import OutputError as OutputError
+    from repro.errors import SimulationError as SimulationError
+    from repro.march.folding import Fold as Fold
+    from repro.march.loop import PoreEnd as PoreEnd
     from repro.march.simulation import simulate
     from repro.preflight.checked import check
+    from repro.report import compare
     from repro.results.network import added_resistance
     from repro.results.tables import Results, solve
-    from repro.runs.execution import resume, run
-    from repro.runs.loading import load_run
-    from repro.scene import Scene, SceneError, load_scene
+    from repro.runs.scripts import load_run, resume, run
+    from repro.scene import Scene, load_scene
+    from repro.scene import SceneError as SceneError
     from repro.sweeps.driver import sweep
 
     __version__: str
@@ -84,9 +101,9 @@ else:
                 "PoreEnd": "march.loop", "Results": "results.tables",
                 "Scene": "scene", "SceneError": "scene", "SimulationError": "errors",
                 "added_resistance": "results.network", "check": "preflight.checked",
-                "load_run": "runs.loading", "load_scene": "scene", "resume": "runs.execution",
-                "run": "runs.execution", "simulate": "march.simulation", "solve": "results.tables",
-                "sweep": "sweeps.driver"}
+                "compare": "report", "load_run": "runs.scripts", "load_scene": "scene",
+                "resume": "runs.scripts", "run": "runs.scripts", "simulate": "march.simulation",
+                "solve": "results.tables", "sweep": "sweeps.driver"}
 
     def __getattr__(name: str):
         if name == "__version__":
@@ -96,8 +113,8 @@ else:
         return getattr(import_module(f"{__name__}.{_MODULES[name]}"), name)
 
     def __dir__() -> list[str]:
-        return sorted(__all__)
+        return sorted(_MODULES)
 
-__all__ = ["Fold", "OutputError", "PoreEnd", "Results", "Scene", "SceneError", "SimulationError",
-           "added_resistance", "check", "load_run", "load_scene", "resume", "run", "simulate",
-           "solve", "sweep"]
+#: ``help`` lists these; errors are in the text above, so that functions come before them.
+__all__ = ["Results", "Scene", "added_resistance", "check", "compare", "load_run", "load_scene",
+           "resume", "run", "simulate", "solve", "sweep"]

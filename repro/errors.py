@@ -1,8 +1,22 @@
 """Errors of the package: numerical failures by stage, ends of a run, and failures of files.
 
 :func:`repro.march.loop.stopping` adds the time to a failure, and :mod:`repro.model.advice` the keys
-of a scene that help.
+of a scene that help. A refusal is worded for the command line; its ``str`` for Python.
 """
+
+import re
+
+#: Arguments of Python for options of the command line; others have the name of the option.
+ARGUMENTS = {"--out": "folder", "--set": "overrides", "--force": "force=True",
+             "--resume": "repro.resume"}
+OPTION = re.compile(r"(?<![\w'\"-])--(?:out|set|unset|force|resume|vary|samples|seed|scheduler)\b")
+
+
+class Refusal(Exception):
+    """Input or a folder is refused. ``args[0]`` names options, ``str`` names arguments instead."""
+
+    def __str__(self) -> str:
+        return OPTION.sub(lambda match: ARGUMENTS.get(match[0], match[0][2:]), super().__str__())
 
 
 class StageError(RuntimeError):
@@ -111,7 +125,7 @@ class SimulationError(RuntimeError):
     """
 
 
-class OutputError(RuntimeError):
+class OutputError(Refusal, RuntimeError):
     """A folder or a file of results cannot be read or written; the message says which and why.
 
     Examples

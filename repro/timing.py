@@ -1,9 +1,10 @@
-"""Wall time by stage, for ``run.json`` and the benchmarks."""
+"""Wall time by stage, for ``run.json`` and the benchmarks; a bar of progress."""
 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import wraps
 from time import perf_counter
 from typing import ParamSpec, TypeVar
@@ -11,6 +12,7 @@ from typing import ParamSpec, TypeVar
 Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
 Function = Callable[Arguments, Result]
+BAR = "{percentage:3.0f}%|{bar}| {n:.4g} of {total:.4g} {unit} [{elapsed} < {remaining}]"
 
 #: Seconds by stage since the last :func:`reset`; nested calls count in both stages.
 seconds: defaultdict[str, float] = defaultdict(float)
@@ -53,3 +55,24 @@ def timed(stage: str) -> Callable[[Function[Arguments, Result]], Function[Argume
                 seconds[stage] += perf_counter() - start
         return wrapper
     return decorate
+
+
+@contextmanager
+def progress_bar(shown: bool, unit: str) -> Iterator[Callable[[float, float], None]]:
+    """Yield a function that shows (reached, total), by ``tqdm.auto`` in scripts and notebooks.
+
+    Without a bar, tqdm is not imported.
+    """
+    if not shown:
+        yield lambda reached, total: None
+        return
+    from tqdm.auto import tqdm
+
+    with tqdm(total=1.0, unit=unit, bar_format=BAR) as bar:
+        def show(reached: float, total: float) -> None:
+            if total and total != bar.total:
+                bar.reset(total)
+            bar.n = reached if total else bar.total
+            bar.refresh()
+
+        yield show

@@ -13,12 +13,6 @@ def area(corners):
     return 0.5 * ((bx - ax) * (cy - ay) - (by - ay) * (cx - ax))
 
 
-def diameter(corners):
-    """Diameter of the circumscribed circle: a / sin(alpha), with the angle alpha opposite to the side a."""
-    a, b, c = (math.dist(corners[i], corners[j]) for i, j in ((1, 2), (2, 0), (0, 1)))
-    return a / math.sin(math.acos((b * b + c * c - a * a) / (2 * b * c)))
-
-
 def mass(points, triangles, field):
     """Integral of a linear field: the area of each triangle times the mean of its three values."""
     return math.fsum(area(points[t]) * math.fsum(field[t]) / 3 for t in triangles)

@@ -239,5 +239,5 @@ def scene(radius="5 um", width="50 um", acceptor="10 mg/L", donor="10 mg/L", vel
 def coarse_base(order, *changes, unset=()):
     """(scene, its seed): base with coarse elements of an order, and supplies that differ."""
     scene = load_scene("base", ['substrates.acceptor.supply="9 mg/L"', 'substrates.donor.supply="4 mg/L"',
-                                "numerics.refinement=0.3", f"numerics.elements={ORDERS[order]}", *changes], unset)
+                                "numerics.refinement=0.3", f"numerics.elements={ORDERS[order]}", *changes], unset=unset)
     return scene, pore.seeded(scene)

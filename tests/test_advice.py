@@ -53,7 +53,7 @@ def drawn(seed):
 
 
 def warnings(changes):
-    scene = load_scene("base", changes, ["flow.head"])
+    scene = load_scene("base", changes, unset=["flow.head"])
     return simplifications.find_warnings(*numbers.evaluate_at_largest(scene, pore.fastest(scene.flow, scene.pore)))
 
 

@@ -24,7 +24,8 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 RUNTIME = PROJECT["project"]["dependencies"]
 EXTRAS = PROJECT["project"]["optional-dependencies"]
 LOCKS = [(ROOT / name).read_text(encoding="utf-8")
-         for name in ("requirements.lock", "verification/mutants/machine/requirements.lock", ".ci/crate.lock")]
+         for name in ("requirements.lock", "verification/mutants/machine/requirements.lock", ".ci/crate.lock",
+                      ".ci/oldest.lock")]
 PIN = re.compile(r"^([a-z0-9-]+)==(\d+(?:\.\d+)*)", re.M)
 ADDRESS = re.compile(r"//|file:|index|--find-links|(^|\s)/\w", re.M)
 
@@ -132,21 +133,6 @@ def test_no_imports_form_a_circle():
     assert "repro.fem.elements" in circle(sources | {"repro.fem.elements": again})
 
 
-@pytest.mark.parametrize("module, source", [
-    ("reference.slab", "def f():\n    from repro import flow"),
-    ("repro.cli.main", "import importlib\nimportlib.import_module('reference.poiseuille')"),
-    ("verification.audit", "import numpy, pickle"),
-    ("repro.fem.mesh", "from repro.scene import Scene"),
-    ("repro.fem.mesh", "from ..scene import keys"),
-    ("repro.scene.keys", "def f():\n    from repro.fem.mesh import Mesh"),
-    ("repro.results.__init__", "from ..check import numbers"),
-    ("repro.runs.folder", "from repro import solve"),
-    ("repro.utils", "from repro import errors"),
-])
-def test_the_rules_detect_a_trespass(module, source):
-    assert [name for name, _ in trespasses({module: source})] == [module]
-
-
 @pytest.mark.parametrize("folder", FOLDERS)
 def test_every_import_is_declared(folder):
     """`repro` needs only the runtime dependencies and `paper_figures` one extra; the others may use all extras."""
@@ -158,7 +144,7 @@ def test_every_import_is_declared(folder):
     assert names and used <= {*map(normal, RUNTIME + extras)}
 
 
-@pytest.mark.parametrize("lock", LOCKS, ids=["all", "mutants", "crate"])
+@pytest.mark.parametrize("lock", LOCKS, ids=["all", "mutants", "crate", "oldest"])
 def test_the_lock_holds_hashes_and_no_address(lock):
     """Pip itself checks that every line is a pin with its hashes."""
     assert 0 < len(PIN.findall(lock)) <= lock.count("--hash=sha256:") and not ADDRESS.search(lock)
@@ -173,3 +159,10 @@ def test_the_lock_pins_every_direct_dependency_within_its_bounds(lock, requireme
     for requirement in requirements:
         pins = [version(pinned) for name, pinned in PIN.findall(lock) if name == normal(requirement)]
         assert pins and min(pins) >= version(re.search(r">=([\d.]+)$", requirement)[1]), requirement
+
+
+def test_the_lower_bounds_are_the_oldest_versions_tested():
+    """The lock of `make oldest` pins each dependency at its bound."""
+    pinned = dict(PIN.findall(LOCKS[3]))
+    bounds = {normal(each): re.search(r">=([\d.]+)$", each)[1] for each in RUNTIME + EXTRAS["figures"]}
+    assert bounds.items() <= pinned.items()

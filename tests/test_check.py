@@ -36,7 +36,7 @@ def examine(name, *overrides, speed=None):
                                              ("wide", ("numerics.preset=accurate",))])
 def test_the_mesh_is_that_of_the_run(name, overrides):
     scene = load_scene(name, overrides)
-    report, grid = check(scene, name), next(simulate(scene)).pore.mesh
+    report, grid = check(scene), next(simulate(scene)).pore.mesh
     assert (report.nodes, report.triangles) == (len(grid.points), len(grid.biomass))
 
 
@@ -192,7 +192,7 @@ def test_a_trial_takes_few_steps_however_short_they_are(monkeypatch):
 def test_the_estimate_is_right_within_a_factor_of_three(name, preset):
     """The best of three estimates counts, because other work disturbs the machine. The run follows right after them."""
     scene = load_scene(name, [f"numerics.preset={preset}"])
-    estimates = [check(scene, name).cost.seconds for _ in range(3)]
+    estimates = [check(scene).cost.seconds for _ in range(3)]
     start = time.perf_counter()
     for _ in simulate(scene):
         pass

@@ -4,6 +4,7 @@ import io
 import os
 import shutil
 from hashlib import sha256
+from zipfile import BadZipFile
 
 import numpy as np
 import pytest
@@ -35,8 +36,8 @@ def saved(request, tmp_path_factory):
     def keep(event):
         if event["event"] == "checkpoint":
             content = (folder / NEWEST).read_bytes()
-            arrays = decode(content)[1]
-            contents.extend([content] * bool(len(arrays["pending"]) and len(arrays["ledgers"])))
+            plain, _ = decode(content)
+            contents.extend([content] * bool(plain["state"]["ledgers"] and plain["record"]["ledgers"]))
 
     run(scene, folder, watch=Watch(tell=keep, interval=0.0))
     return scene, folder, contents[0]
@@ -73,7 +74,7 @@ def test_one_changed_bit_is_refused(saved, tmp_path):
     """The test changes the last bit of the first number of the first array."""
     content = bytearray(saved[2])
     content[content.index(b"points.npy") + 200] ^= 1
-    with pytest.raises(CheckpointError, match="^.*checksum.*$"):
+    with pytest.raises((CheckpointError, BadZipFile), match="^.*checksum.*$"):
         restored(saved, bytes(content), tmp_path / "altered")
 
 
@@ -136,7 +137,7 @@ def test_other_files_are_refused(content):
 
 def test_a_checkpoint_of_another_format_or_scene_is_refused_in_one_line(saved, tmp_path):
     old = checkpoint.KIND + b"2 " + saved[2].removeprefix(checkpoint.MAGIC)
-    with pytest.raises(CheckpointError, match="^its format is not 5: another version wrote it$"):
+    with pytest.raises(CheckpointError, match="^its format is not 6: another version wrote it$"):
         restored(saved, old, tmp_path / "x")
     with pytest.raises(CheckpointError, match="another scene"):
         restored((load_scene("flow_only"), *saved[1:]), saved[2], tmp_path / "x")

@@ -45,33 +45,6 @@ def test_each_verdict_follows_from_the_checks_and_their_bars(checks, words, verd
     assert verdict in VERDICTS and len(VERDICTS) == 6
 
 
-@pytest.mark.parametrize("finding, excerpt", [
-    (Finding((SATISFIED, FAILED)), "no reason"),
-    (Finding((DOUBTED_FAILURE,)), "no reason"),
-    (Finding(()), "nothing is checked"),
-    (Finding((replace(SATISFIED, value=math.nan),), reason="why"), "not a number"),
-    (Finding((SATISFIED, GOOD)), "no error bar"),
-])
-def test_a_verdict_needs_numbers_bars_and_a_reason(finding, excerpt):
-    with pytest.raises(ClaimError, match=excerpt):
-        print(finding.verdict)
-
-
-@pytest.mark.parametrize("text, printed", [
-    ("1.5", (1.45, 1.55)), ("4.19", (4.185, 4.195)), ("110", (109.5, 110.5)), ("~60", (55, 65)), ("~5.8", (5.75, 5.85)),
-    ("<0.5", None), ("about the same", None)])
-def test_a_printed_number_is_an_interval_and_words_are_none(text, printed):
-    assert claims.interval(text) == (printed and pytest.approx(printed))
-
-
-def test_a_claim_that_is_not_judged_has_no_checks_and_one_level():
-    claim = claims.Claim("C00", "5", "it could be", Finding, unjudged="nothing could contradict it")
-    assert claim.verdict(Finding(())) == NOT_JUDGED and claim.levels == (claim.judged,)
-    assert report.Row("C00", claim, Finding(()), NOT_JUDGED).reason == "nothing could contradict it"
-    with pytest.raises(ClaimError, match="not judged has checks"):
-        claim.verdict(Finding((SATISFIED,)))
-
-
 # The committed record.
 @pytest.fixture(scope="module")
 def record():
@@ -130,15 +103,6 @@ DEFINED = {"id": "C01", "defined": "2030-01-02 10:00", "checks": [
 OTHER = {**DEFINED, "checks": [{**DEFINED["checks"][0], "quantity": "speed of another shape"}]}
 
 
-def test_a_first_value_is_stamped_once_per_definition():
-    """A value at another hour is of the same definition."""
-    known = report.stamped(DEFINED, None, "2030-01-02 10:01")
-    again = {**DEFINED, "checks": [{**DEFINED["checks"][0], "quantity": "speed at 4 h"}]}
-    assert report.stamped(again, known, "2030-02-01 00:00")["first_value"] == "2030-01-02 10:01"
-    anew = {**OTHER, "defined": "2030-01-02 10:02"}
-    assert report.stamped(anew, known, "2030-01-02 10:03")["first_value"] == "2030-01-02 10:03"
-
-
 @pytest.mark.parametrize("entry, known, now", [
     (DEFINED, None, "2030-01-02 09:59"),
     (OTHER, {**DEFINED, "first_value": "2030-01-02 10:01"}, "2030-01-02 10:03"),
@@ -147,17 +111,6 @@ def test_a_first_value_is_stamped_once_per_definition():
 def test_a_definition_without_a_date_before_its_values_is_refused(entry, known, now):
     with pytest.raises(ClaimError, match="C01: defined anew"):
         report.stamped(entry, known, now)
-
-
-def test_a_printed_value_counts_once_however_many_checks_judge_it(record):
-    """C05 judges one value at three distances. With the state of E12, four of seven values lie in their digits."""
-    assert sum(check["paper"] == "~7" for entry in record for check in entry["checks"]) == 3
-    outcomes = report.distinct(record)
-    assert len(outcomes) == 7 and sum(outcome == claims.HOLDS for outcome in outcomes.values()) == 4
-    checks = [{"paper": "2.9", "paper_low": 2.85, "rests_on": claims.PREDICTED, "outcome": outcome}
-              for outcome in (claims.HOLDS, claims.REACHES_OVER, claims.FAILS)]
-    for number, outcome in enumerate((claims.HOLDS, claims.REACHES_OVER, claims.FAILS), 1):
-        assert report.distinct([{"id": "C01", "checks": checks[:number]}]) == {("C01", "2.9"): outcome}
 
 
 def test_no_recorded_verdict_flips_to_its_opposite(record):

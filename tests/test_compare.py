@@ -1,7 +1,5 @@
 """Comparisons of runs: their charts, the reported differences, and refusals."""
 
-import html
-import json
 import os
 import re
 import shutil
@@ -16,7 +14,6 @@ from repro.cli import main
 from repro.report import comparison, quantities
 from repro.report.reading import Run, read
 from tests.faults import limit_memory
-from tests.pages import Page
 from tests.shell import flip, read_record, refusal, rewrite
 
 
@@ -25,24 +22,6 @@ def page(fast, paper, tmp_path):
     target = tmp_path / "both.html"
     assert main(["compare", str(fast), str(paper), "--out", str(target)]) == 0
     return target.read_text(encoding="utf-8")
-
-
-def test_a_comparison_has_one_line_per_run(page, fast, paper):
-    """The chart of each quantity has the lines of the runs' pages, labelled by run, to the six digits that a pointer
-    shows."""
-    expected, alone = {}, {kind.title for kind in quantities.KINDS if len(kind.drawn) == 1}
-    for out in (fast, paper):
-        for chart in quantities.charts_of(read(out)):
-            for line in chart.lines:
-                title = chart.title if chart.title in alone else f"{chart.title}: {line.label}"
-                known = np.isfinite(line.values)
-                expected.setdefault(title, []).append((str(out), line.times[known], line.values[known]))
-    assert re.findall("<figcaption>(.*?)<", page) == list(expected) and Page(page).outside == []
-    drawn = [json.loads(html.unescape(data))["lines"] for data in re.findall('data-chart="([^"]*)"', page)]
-    for lines, curves in zip(drawn, expected.values(), strict=True):
-        for line, (label, times, values) in zip(lines, curves, strict=True):
-            assert line["label"] == label
-            assert line["t"] == pytest.approx(times, rel=1e-5) and line["y"] == pytest.approx(values, rel=1e-5)
 
 
 def test_differences_of_scenes_are_listed_key_by_key(fast, paper, flow_only):

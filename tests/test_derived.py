@@ -31,7 +31,7 @@ def late_instant(order):
     """(scene, Report) after several steps, a new mesh and contact."""
     scene = load_scene("base", [f"numerics.elements={ORDERS[order]}",
                                 f"numerics.refinement={0.7 if order == 1 else 0.3}", *SETS])
-    *_, last = simulate(scene, SHAPE)
+    *_, last = simulate(scene, shape=SHAPE)
     assert last.pore.contact and last.remeshes and len(last.ledgers) > 1, "otherwise the tests would show little"
     return scene, last
 
@@ -389,7 +389,7 @@ def test_mass_lost_by_a_new_mesh_is_not_production(time):
     shows. Linear elements interpolate masses [E8]."""
     scene = load_scene("base", ["numerics.refinement=0.5", "numerics.transfer=linear", f"numerics.time={time}",
                                 'pore.width="20 um"', 'growth.end="0.4 h"', "flow.head=1e-2 cm"])
-    instants = list(simulate(scene, SHAPE))
+    instants = list(simulate(scene, shape=SHAPE))
     assert any(instant.remeshes for instant in instants)
     for instant in instants:
         if instant.remeshes:

@@ -38,7 +38,7 @@ def spanning(permeability, out, height):
     return next(simulate(load_scene("base", [
         "numerics.preset=fast", "pore.width=100 um", f"aggregate.outline={outline}", "flow.mean_velocity=5.06 m/day",
         "flow.biomass=brinkman", f"flow.permeability={permeability} m^2", "growth.end=0 h"],
-        ["flow.head", "aggregate.radius"])))
+        unset=["flow.head", "aggregate.radius"])))
 
 
 def dome(permeability):

@@ -36,7 +36,7 @@ SETS = ('numerics.preset="fast"', "numerics.refinement=0.3", 'pore.width="20 um"
 
 @cache
 def plug(*changes):
-    return load_scene("base", [*SETS, *changes], ["aggregate.radius"])
+    return load_scene("base", [*SETS, *changes], unset=["aggregate.radius"])
 
 
 def warned(folder):

@@ -4,7 +4,6 @@ import errno
 import os
 import signal
 import sys
-from contextlib import suppress
 from hashlib import sha256
 from pathlib import Path
 
@@ -19,7 +18,7 @@ from repro.runs import checkpoint
 from repro.runs.checkpoint import LAST, NEWEST, PREVIOUS
 from repro.runs.execution import Watch, resume, run
 from repro.runs.folder import LOCK, SUMS
-from repro.runs.loading import load_run
+from repro.runs.scripts import load_run
 from repro.scene import load_scene, parse_scene, scene_tables
 from tests.pages import cached_run
 from tests.shell import (
@@ -161,22 +160,6 @@ def test_temporary_files_of_a_killed_run_are_removed(out, short):
     assert [path.name for path in out.rglob(".writing-*")] == [".writing-thesis00"]
 
 
-def test_no_link_is_written_through(tmp_path):
-    """The targets of links with the names of temporary files stay unchanged."""
-    victim, out = tmp_path / "thesis.tex", tmp_path / "run"
-    victim.write_text("years of work")
-    names = [f".{name}.part" for name in ("run.json", "timeseries.csv", NEWEST, "report.html", "fields.pvd")]
-    names += [f"fields/.part-fields_{k:04d}.vtu" for k in range(9)]
-
-    def plant(event):
-        for name in names:
-            with suppress(FileExistsError):
-                (out / name).symlink_to(victim)
-
-    assert run(load_scene("base", BRIEF), out, watch=Watch(tell=plant, interval=0.0)) == "completed"
-    assert victim.read_text() == "years of work" and not (out / "timeseries.csv").is_symlink()
-
-
 @pytest.mark.parametrize("make", [lambda lock: lock.symlink_to("elsewhere"), lambda lock: lock.write_text("mine"),
                                   os.mkfifo, os.mkdir])
 def test_a_foreign_lock_is_left_alone(tmp_path, capsys, make):
@@ -211,7 +194,7 @@ def test_a_full_disk_is_reported_with_the_file_and_nothing_is_lost(short, tmp_pa
         if event["event"] == "checkpoint" and event["time_h"] > 0.5:
             monkeypatch.setattr(module, name, full)
 
-    with pytest.raises(OutputError, match=f"{file}: No space left on device; .* go on with --resume"):
+    with pytest.raises(OutputError, match=f"{file}: No space left on device; .* go on with repro.resume"):
         run(short, out, watch=Watch(tell=fill, interval=0.0))
     assert not [path for path in out.rglob("*") if "part" in path.name] and not (out / LOCK).exists()
     assert len(load_run(out).time) > 1

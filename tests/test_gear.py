@@ -19,7 +19,6 @@ from tests.strategies import EVERY_ORDER, ORDERS
 SECOND = 1 / 3600
 
 
-
 def coarse(order):
     """Return the numerics of a coarse mesh."""
     return {"refinement": 0.5 if order == 1 else 0.25, "transport": "gear", "elements": ORDERS[order]}
@@ -145,7 +144,7 @@ def test_without_flow_the_ends_of_the_pore_hold_the_supply(preset, method):
     """Far from the aggregate diffusion is one-dimensional: C falls linearly from the end of the pore, at 300 um, where
     half of the uptake enters. At 1.5 W the transverse profile has decayed to exp(-1.5 pi) of a drop of 1 mg/L."""
     scene = load_scene("base", ["aggregate.radius=20 um", "growth.end=0.2 h", f"numerics.preset={preset}",
-                               "numerics.time=updates", f"numerics.transport={method}"], ["flow"])
+                               "numerics.time=updates", f"numerics.transport={method}"], unset=["flow"])
     first = next(simulate(scene))
     state, space = first.solved.concentrations, first.pore.space
     x = np.abs(space.points[:, 0])
@@ -167,7 +166,7 @@ def test_the_defect_of_biomass_at_an_exhausted_substrate_is_accepted(step):
                "kinetics.maximum_utilization_rate=12 1/day", "kinetics.maximum_density=1.009e4 mg/L",
                "numerics.preset=fast", "numerics.time=updates", "numerics.transport=gear",
                f"growth.time_step={step}", 'growth.end="0.34 h"']
-    *_, last = simulate(load_scene("base", changes, ["flow"]))
+    *_, last = simulate(load_scene("base", changes, unset=["flow"]))
     assert last.pore.time == 0.34 and last.solved.concentrations.donor.max() < 0.01
 
 
@@ -179,7 +178,7 @@ def test_a_substrate_may_be_used_up_to_nothing(changes, unset):
     """Without supply, or in a closed pore with an aggregate, the acceptor falls until it underflows. The run continues,
     biomass no longer grows, and the donor remains."""
     starved = load_scene("base", ["numerics.preset=paper", "numerics.transport=gear", "numerics.refinement=0.4",
-                                  *changes], unset)
+                                  *changes], unset=unset)
     *_, before, last = simulate(starved)
     left = last.solved.concentrations
     assert 0 <= left.acceptor.min() and left.acceptor.max() < np.finfo(float).tiny and left.donor.min() > 1
@@ -198,13 +197,3 @@ def test_gears_method_bounds_undershoots_by_each_substrates_supply(order):
     assert [consumed.min(), consumed.max()] == pytest.approx([-5e-3, -5e-3], rel=1e-6)
     with pytest.raises(TransportError, match="the acceptor becomes negative"):
         gear.advance(drained, nothing, nothing, start, 10.05e-6)
-
-
-def test_gears_steps_are_scaled_by_the_larger_of_content_and_supply():
-    """The acceptor's supply has fallen, the donor's has risen."""
-    _, problem = case.__wrapped__()
-    start = transport.supplied_everywhere(problem)
-    start = replace(start, acceptor=3 * start.acceptor, donor=start.donor / 2)
-    nothing = np.zeros_like(problem.space.reaction.dx)
-    scale = gear._started(problem, nothing, nothing, start)[0].scale
-    assert scale.ravel().tolist() == [3 * problem.both[0].supply, problem.both[1].supply]

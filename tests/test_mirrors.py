@@ -36,7 +36,7 @@ def test_a_run_ends_at_either_end_of_the_pore_and_names_it(time, from_end, momen
 def scene_with_outline(name, points, *changes):
     """A scene with an outline."""
     text = ", ".join(f'["{x!r} um", "{y!r} um"]' for x, y in points.tolist())
-    return load_scene(name, [f"aggregate.outline=[{text}]", *changes], ["aggregate.radius"])
+    return load_scene(name, [f"aggregate.outline=[{text}]", *changes], unset=["aggregate.radius"])
 
 
 def judge(scene, speed):

@@ -10,7 +10,6 @@ import pytest
 
 from repro.errors import SimulationError
 from repro.fem import mesher, sizing
-from repro.march.loop import PoreEnd
 from repro.march.simulation import simulate
 from repro.model import pore
 from repro.preflight import memory
@@ -190,11 +189,3 @@ def test_check_estimates_a_large_mesh_instead_of_making_it(monkeypatch):
     mesh = pore.seeded(fine).mesh
     assert report.nodes == pytest.approx(len(mesh.points), rel=0.5)
     assert report.triangles == pytest.approx(len(mesh.biomass), rel=0.5)
-
-
-def test_an_aggregate_at_the_end_of_its_pore_is_no_failure():
-    """The run ends at once, with its first row."""
-    steps = simulate(scene([(-299.98, 0), (-280, 20), (-260, 0)]))
-    assert next(steps).pore.time == 0
-    with pytest.raises(PoreEnd, match="reaches the pore's upstream end at t = 0 h"):
-        next(steps)

@@ -30,7 +30,7 @@ def solved(body, interface, order, *changes):
     scene = load_scene("base", [
         f"aggregate.outline={POINTS}", f"numerics.elements={ORDERS[order]}", f"numerics.interface={interface}",
         f"numerics.refinement={0.5 if order == 1 else 0.2}",
-        "growth.shear_modulus=1e-3 MPa", *BODIES[body], *changes], ["aggregate.radius"])
+        "growth.shear_modulus=1e-3 MPa", *BODIES[body], *changes], unset=["aggregate.radius"])
     state = pore.seeded(scene)
     return scene, state, pore.solve(scene, state)
 

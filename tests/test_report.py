@@ -6,7 +6,6 @@ import re
 import runpy
 import shutil
 from pathlib import Path
-from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -294,22 +293,6 @@ def test_each_frame_has_the_aggregate_of_its_own_time(tmp_path, monkeypatch):
     packed = fields.packed(entries)
     for k, frame in enumerate(packed["frames"]):
         assert (decode_numbers(packed["meshes"][frame["mesh"]]["body"], "<u1") == np.roll(region, k)).all()
-
-
-def test_pages_of_many_meshes_keep_to_their_size(fast, tmp_path, monkeypatch):
-    """Forty meshes use more than half of the available bytes of the page, and never more than all. Bytes of charts are
-    not available."""
-    points, cells = regular_grid(monkeypatch, 2500)
-    region = (points[cells[:, 0], 0] > 50).astype(float)
-    entries = [(float(k), tmp_path / f"{k}.vtu") for k in range(40)]
-    for k, (_, path) in enumerate(entries):
-        write_fields(path, points, np.roll(cells, k, axis=0), {"head_cm": points[:, 0]}, np.roll(region, k))
-    for used in (0, 1_000_000):
-        available = fields.MOST_BYTES - used
-        assert 0.5 * available < len(json.dumps(fields.packed(entries, spent=used))) <= available < 3e6 - 200e3
-    monkeypatch.setattr(fields, "packed", Mock(wraps=fields.packed))
-    text = run_page.build(read(fast))
-    assert fields.packed.call_args.args[2] > 0.9 * sum(map(len, re.findall("<figure.*?</figure>", text, re.S))) > 1e4
 
 
 def test_a_value_that_is_not_finite_has_no_level():

@@ -1,7 +1,6 @@
 """Runs that were interrupted, killed or have failed resume, with the same results to the last bit."""
 
 import json
-import os
 import random
 import re
 import signal
@@ -28,7 +27,6 @@ from repro.runs.checkpoint import NEWEST, PREVIOUS
 from repro.runs.execution import Watch, resume, run
 from repro.scene import load_scene
 from tests import faults
-from tests.faults import limit_memory
 from tests.pages import cached_run
 from tests.shell import (
     BRIEF,
@@ -81,7 +79,6 @@ THOROUGH_SCENES = {
 }
 
 
-PORE_END = "the aggregate reaches the pore's upstream end at t = 3 h"
 SCENE = load_scene("base", BRIEF)
 
 
@@ -236,19 +233,6 @@ def test_check_reports_an_unfinished_run(tmp_path, capsys):
     assert "timeseries.csv is not as it was written" in refusal(tmp_path, capsys, "check", tmp_path / "run")
     with pytest.raises(SystemExit):
         main(["check", str(tmp_path / "run"), "--set", "growth.end=5 h"])
-
-
-@pytest.mark.parametrize("spoil", [lambda path: (path.unlink(), os.mkfifo(path)),
-                                   lambda path: os.truncate(path, 3 * 2**30)])
-def test_a_record_that_is_no_file_or_too_long_is_refused_unread(tmp_path, capsys, spoil):
-    """The command neither waits for a pipe nor reads 3 GB."""
-    out = Path(copytree(cached_run(SCENE), tmp_path / "run"))
-    spoil(out / "run.json")
-    for arguments in (["check"], ["run", "--resume"], ["run", "base", *flags(*BRIEF), "--out"]):
-        with limit_memory(2**28):
-            assert main([*arguments, str(out)]) == 2
-        message = capsys.readouterr().err
-        assert message.count("\n") == 1 and str(out) in message
 
 
 def test_an_altered_checkpoint_is_refused_and_the_previous_one_is_used(tmp_path, capsys):

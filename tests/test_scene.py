@@ -19,7 +19,7 @@ from tests.test_scene_text import parsed
 def refusal(source, *overrides, unset=()) -> str:
     """The message of the SceneError, which is one line of limited length."""
     with pytest.raises(SceneError) as caught:
-        load_scene(source, overrides, unset)
+        load_scene(source, overrides, unset=unset)
     message = str(caught.value)
     assert message.isprintable() and len(message) < 500 and "Traceback" not in message
     return message
@@ -104,13 +104,13 @@ def test_a_value_cannot_set_another_key():
 
 def test_unset_removes_keys_and_sections():
     base = load_scene("base")
-    driven = load_scene("base", ["flow.mean_velocity=1 m/day"], ["flow.head"])
+    driven = load_scene("base", ["flow.mean_velocity=1 m/day"], unset=["flow.head"])
     assert (driven.flow.head, driven.flow.mean_velocity) == (None, pytest.approx(1e6 / 24))
-    assert load_scene("base", (), ["substrates.donor.supply", " substrates . acceptor.supply "]) == base
-    at_rest = load_scene("base", (), ["flow", "growth"])
+    assert load_scene("base", (), unset=["substrates.donor.supply", " substrates . acceptor.supply "]) == base
+    at_rest = load_scene("base", (), unset=["flow", "growth"])
     assert at_rest.flow is None and at_rest.growth is None and at_rest.kinetics == base.kinetics
-    assert load_scene("base", ["flow.head=10 um"], ["flow.head"]) == base
-    assert load_scene("base", ["flow.head=1 cm"], ["flow"]).flow.head == 10_000
+    assert load_scene("base", ["flow.head=10 um"], unset=["flow.head"]) == base
+    assert load_scene("base", ["flow.head=1 cm"], unset=["flow"]).flow.head == 10_000
 
 
 # ---------------------------------------------------------------- units and pint

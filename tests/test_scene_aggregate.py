@@ -1,12 +1,9 @@
 """[aggregate]: position and outline of the seed; points that are no outline are refused."""
 import json
-import math
 import tomllib
 from dataclasses import replace
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from repro.march.simulation import shaped
 from repro.scene import load_scene, packaged_scenes, parse_scene, scene_hash, scene_tables
@@ -55,18 +52,6 @@ def test_a_shape_replaces_the_outline_alone(aggregate):
     """All other keys of the scene stay, including those of the seed."""
     changed = shaped(scene_of(inert_fraction=0.3, **aggregate), [(-5.0, 0.0), (-4.0, 3.0), (6.0, 4.0), (5.0, 0.0)])
     assert changed == scene_of(outline=BUMP, inert_fraction=0.3, smooth=aggregate.get("smooth", False))
-
-
-@given(st.lists(st.floats(1.1, 49.9), min_size=1, max_size=9), st.floats(-100, 100))
-def test_points_visible_from_the_wall_are_an_outline(sizes, middle):
-    """The points lie around a point of the wall, in the order of their angles."""
-    points = [[f"{middle - 60!r} um", "0.0 um"], [f"{middle + 60!r} um", "0.0 um"]]
-    for number, size in enumerate(sizes):
-        angle = 0.2 + 0.3 * number
-        points.insert(1, [f"{middle + size * math.cos(angle)!r} um", f"{size * math.sin(angle)!r} um"])
-    scene = scene_of(outline=points)
-    assert scene_tables(scene)["aggregate"]["outline"] == points
-    assert parse_scene(scene_tables(scene), "mine", "again") == scene
 
 
 LIST = "a list of 3 to 1000 points [x, y], each a pair of lengths, is needed, such as"

@@ -5,8 +5,6 @@ from operator import attrgetter
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from repro.march import updates
 from repro.march.simulation import simulate
@@ -45,20 +43,9 @@ def test_every_key_that_takes_a_table_follows_its_sections_interpolation(key):
     table = json.dumps([[time, TIMED[key].write(value)] for time, value in (("0 h", 2.0), ("1 h", 6.0), ("4 h", 3.0))])
     without = ["flow.head"] if name == "mean_velocity" else []
     for word, expected in (("steps", [2, 2, 6, 6, 3]), ("linear", [2, 4, 6, 5, 3])):
-        loaded = load_scene("base", [f"{key}={table}", f"{section}.interpolation={word}"], without)
+        loaded = load_scene("base", [f"{key}={table}", f"{section}.interpolation={word}"], unset=without)
         assert [attrgetter(key)(loaded.at(time)) for time in (0, 0.5, 1, 2, 9)] == pytest.approx(expected, rel=1e-15)
         assert attrgetter(key)(loaded.largest) == 6 and [loaded.corner(time) for time in (0, 1, 4)] == [1, 4, inf]
-
-
-@given(st.lists(st.floats(0.01, 10.0), min_size=1, max_size=5), st.lists(st.floats(0.0, 9.0), min_size=6, max_size=6),
-       st.floats(0.0, 60.0))
-def test_a_table_is_interpolated_between_its_times(gaps, values, time):
-    """It agrees with numpy's interpolation, or is the last value at or before the time."""
-    times = (0.0, *np.cumsum(gaps).tolist())
-    steps, linear = (TimeTable(times, tuple(values[: len(times)]), kind) for kind in (False, True))
-    assert linear.at(time) == pytest.approx(np.interp(time, times, linear.values), rel=1e-9, abs=1e-12)
-    assert steps.at(time) == steps.values[np.searchsorted(times, time, side="right") - 1]
-    assert steps.values == tuple(map(steps.at, times)) == tuple(map(linear.at, times))
 
 
 def test_a_scene_at_a_time_has_numbers_for_tables():
@@ -69,24 +56,6 @@ def test_a_scene_at_a_time_has_numbers_for_tables():
     assert [loaded.corner(time) for time in (0.0, 0.3, 0.35, 0.4, 0.5)] == [0.3, 0.4, 0.4, 0.5, inf]
     plain = load_scene("base")
     assert plain.at(3.0) is plain and plain.largest is plain and plain.corner(0.0) == inf
-
-
-@pytest.mark.parametrize("changes", [(), ('numerics.preset="paper"',), ('numerics.preset="paper"',
-                                                                       'numerics.transport="gear"')])
-def test_steps_end_at_jumps_and_rows_there_have_the_new_values(changes):
-    """The donor's effluent is zero from 0.3 h on and at most 20 mg/L from 0.5 h on. Without a donor nothing grows, and
-    the biomass decays."""
-    times = 'output.times=["0.29 h", "0.3 h", "0.4 h", "0.5 h", "0.8 h"]'
-    loaded = load_scene("base", [*SHORT, times, *changes])
-    rows = list(simulate(loaded))
-    ends = [step.end for instant in rows for step in instant.ledgers]
-    assert {0.3, 0.5} <= set(ends)
-    donor = [instant.solved.fluxes[1].effluent for instant in rows]
-    assert donor[2:4] == pytest.approx([0.0, 0.0], abs=1e-6) and min(donor[:2]) > 9.8 and 19 < min(donor[4:]) < 20
-    mass = np.log([instant.pore.mass for instant in rows])
-    rise, law = np.diff(mass) / np.diff([instant.pore.time for instant in rows]), loaded.kinetics
-    assert rise[2] == pytest.approx(rise[3], rel=1e-3) and min(rise[0], rise[4]) > 0
-    assert rise[2] == pytest.approx(-law.decay_coefficient * law.degradable_fraction * 10 / 11, rel=2e-2)
 
 
 def test_updates_end_at_every_multiple_and_at_all_times_of_all_tables():
@@ -119,7 +88,7 @@ def test_a_row_within_a_step_has_the_supply_of_its_time(preset):
 def test_the_supply_of_a_rising_velocity_is_its_integral(way):
     """The mean is 2 m/day, to round-off, for steps of any length."""
     loaded = load_scene("base", ['flow.mean_velocity=[["0 h", "1 m/day"], ["0.5 h", "3 m/day"]]', 'growth.end="0.5 h"',
-                               "flow.interpolation=linear", f"numerics.{way}"], ["flow.head"])
+                               "flow.interpolation=linear", f"numerics.{way}"], unset=["flow.head"])
     total_supply = np.sum([step.supplied for instant in simulate(loaded) for step in instant.ledgers], axis=0)
     assert total_supply == pytest.approx(np.full(2, 2e6 / 24 * 0.5 * 50 * 10), rel=1e-9)
 
@@ -133,7 +102,7 @@ def test_a_table_is_judged_by_its_extreme():
     judgement, expected = map(evaluate_at_largest, (loaded, plain), speeds)
     assert judgement[0] == plain and [number.start for number in judgement[1]] == pytest.approx(
         [number.start for number in expected[1]], rel=1e-12)
-    report = check(loaded, "base")
+    report = check(loaded)
     assert "0 to 20 mg/L, in steps, the last from 0.5 h" in dict(report.modelled)["substrates"]
 
 

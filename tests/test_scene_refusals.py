@@ -255,12 +255,12 @@ PAIRS = [
     (*OUTLINED, "pore.length=9 um", "|x| < half of pore.length (9 um) at point 1",
      "more than twice |x| of point 1 (-5 um, 0 um) of aggregate.outline is needed"),
     (*OUTLINED, "aggregate.radius=9 um", "aggregate.radius (9 um) is given too; one of them is accepted, not both "
-     "(--unset aggregate.radius leaves that out)", "(--unset aggregate.outline leaves that out)"),
+     "(unset aggregate.radius leaves that out)", "(unset aggregate.outline leaves that out)"),
     (*OUTLINED, "aggregate.position=9 um", "aggregate.position (9 um) is given too",
      "0 um is needed with aggregate.outline"),
     ("initial_mesh", "flow.head=1 cm", "flow.mean_velocity=1 m/day",
-     "flow.mean_velocity (1 m/day) is given too; one of them is accepted, not both (--unset flow.mean_velocity leaves",
-     "flow.head (10000 um) is given too; one of them is accepted, not both (--unset flow.head leaves that out)"),
+     "flow.mean_velocity (1 m/day) is given too; one of them is accepted, not both (unset flow.mean_velocity leaves",
+     "flow.head (10000 um) is given too; one of them is accepted, not both (unset flow.head leaves that out)"),
     ("initial_mesh", "flow.mean_velocity=0 m/day", "substrates.boundary=open; numerics.transport=quasi_steady",
      'greater than zero is needed, or numerics.transport = "gear"', '"gear" is needed with flow.mean_velocity = 0'),
     ("initial_mesh", "substrates.boundary=closed", "flow.head=1 cm", '"open" is needed with [flow]',
@@ -414,7 +414,7 @@ def test_a_file_that_is_not_utf_8_is_refused(tmp_path):
 
 
 def test_a_wrong_unset_is_refused_with_a_hint():
-    expected = 'base: --unset "flow.haed": the scene does not set it (did you mean flow.head?)'
+    expected = 'base: unset "flow.haed": the scene does not set it (did you mean flow.head?)'
     assert refusal("base", unset=["flow.haed"]) == expected
     for key in ("flow.mean_velocity", "", "flow.head.deep", ".", "a" * 9000):
         assert "the scene does not set it" in refusal("base", unset=[key])

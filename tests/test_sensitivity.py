@@ -53,26 +53,6 @@ class Law:
         return [*map(self.get, scenes)]
 
 
-def test_elasticities_of_a_power_law():
-    """The elasticity of x^3 at 1 % is 3 within its bar."""
-    elasticities = rounding.elasticities(Law(lambda x, size: {"n": 7 * x["k"] ** 3 * x["X_m"] ** -0.5}), "base")["n"]
-    assert elasticities["k"]["elasticity"] == pytest.approx(3, abs=1e-3) and elasticities["k"]["resolved"]
-    assert abs(elasticities["k"]["elasticity"] - 3) <= elasticities["k"]["bar"]
-    assert elasticities["X_m"]["by_10_percent"] == pytest.approx([100 * (1.1**-0.5 - 1), 100 * (0.9**-0.5 - 1)])
-    assert elasticities["Y"]["elasticity"] == 0 and "head" in elasticities and "u_ave" not in elasticities
-
-
-def test_the_interval_of_a_value_is_the_sum_of_all_roundings(monkeypatch):
-    """A closed form takes the extremes at the corners instead."""
-    low, high = sensitivity.in_closed_form(lambda a, b, c: a - b * c, (2.38, 0.005), (0.61, 0.005), (1.42, 0.005))
-    assert (low, high) == pytest.approx((2.375 - 0.615 * 1.425, 2.385 - 0.605 * 1.415))
-    content = {"rounding": {"k": 0.01, "Y": 0.02}, "elasticities": {"n": {
-        "k": {"elasticity": -3.0}, "Y": {"elasticity": 2.0}, "X_m": {"elasticity": 99.0}}}}
-    monkeypatch.setattr(sensitivity, "record", lambda: content)
-    assert sensitivity.interval("n", 10.0) == pytest.approx((9.3, 10.7))
-    assert sensitivity.interval("other", 10.0) is None and sensitivity.verified_set() == ""
-
-
 # A set of inputs is reached if it is within the rounding, and the complete bar of each number is in its interval.
 def numbers(effluent):
     """The numbers of section 4 in the middle of their intervals, except the effluent."""
@@ -107,17 +87,6 @@ def test_a_set_is_reached_if_it_is_within_the_rounding_and_fits_with_its_bars(la
     result = rounding.one_set(Law(law), elasticities)
     assert (result["share_of_the_rounding"] <= 1, result["misfit_in_half_intervals"] <= 1) == (within, fits)
     assert result["reached"] is (within and fits)
-
-
-def test_a_set_that_reaches_nothing_is_described_as_the_nearest(monkeypatch):
-    """A set that reaches all numbers is the only one that counts."""
-    one_set = {"reached": False, "share_of_the_rounding": 5.0, "inputs": {"k": 9.35}, "numbers": {"velocity": 1.47},
-               "bars": {"velocity": 0.001}}
-    monkeypatch.setattr(sensitivity, "record", lambda: {"one_set": one_set})
-    assert sensitivity.verified_set() == ""
-    assert "5.0 times the rounding; the nearest: with k 9.35" in sensitivity.nearest_set()
-    one_set["reached"] = True
-    assert sensitivity.nearest_set() == "" and sensitivity.verified_set().startswith("with k 9.35 a run gives")
 
 
 # The committed record.

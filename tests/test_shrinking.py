@@ -39,20 +39,6 @@ def folders(sweep):
     return [sweep / row["folder"] for row in rows(sweep / "runs.csv")]
 
 
-def test_a_decaying_aggregate_shrinks_and_the_pore_conducts_more(decayed):
-    """Rows agree with the masses of the ledger. Faster decay gives a smaller aggregate."""
-    series = [read_table(folder / "timeseries.csv") for folder in folders(decayed)]
-    for row, folder in zip(series, folders(decayed)):
-        ledger = read_table(folder / "ledger.csv")
-        assert (np.diff(row["aggregate_area_um2"]) < 0).all() and (np.diff(row["thickness_um"]) < 0).all()
-        assert (np.diff(row["conductivity_m_per_d"]) > 0).all() and (np.diff(row["inert_fraction"]) > 0).all()
-        assert (ledger["biomass_made_pg_per_m"] < 0).all() and not row["contact"].any()
-        remaining = ledger["biomass_after_pg_per_m"][-1] / ledger["biomass_before_pg_per_m"][0]
-        assert row["aggregate_area_um2"][-1] / row["aggregate_area_um2"][0] == pytest.approx(remaining, rel=1e-6)
-    slow, fast = (row["aggregate_area_um2"][-1] / row["aggregate_area_um2"][0] for row in series)
-    assert fast < 0.9 * slow
-
-
 def summarize(decayed):
     """The sweep, and the summaries of its runs from the functions that write its files."""
     factors = [parse(VARIED)]

@@ -13,9 +13,6 @@ from skfem import Mesh as SkfemMesh
 import repro
 from repro.fem.mesh import Mesh, Topology
 from repro.fem.space import Space
-from repro.march.simulation import simulate
-from repro.scene import load_scene
-from tests import faults
 from tests.strategies import ORDERS, meshed, seed
 
 geometries = pytest.mark.parametrize("geometry", [1, 2])
@@ -79,41 +76,6 @@ def test_a_mesh_with_other_points_has_new_caches(geometry):
         assert alike(moved.topology.dofs(order), fresh.topology.dofs(order))
         assert differences(Space(moved, order), Space(fresh, order)) == []
     assert mesh.moved(points).points is points
-
-
-def scenes(*changes):
-    """A short run of the paper's scheme and one of curved triangles."""
-    common = ("numerics.refinement=0.5", 'aggregate.radius="20 um"', *changes)
-    return (load_scene("base", ('growth.end="48 min"', *common)),
-            load_scene("base", ('numerics.preset="fast"', 'growth.end="1 h"', 'output.times=["0.3 h", "0.6 h", "1 h"]',
-                                *common)))
-
-
-def numbers(instant):
-    """All numbers that a report has."""
-    state, solved = instant.pore, instant.solved
-    return (state.time, state.mesh.points, state.mesh.cells, state.active, state.inert, state.theta, state.pressure,
-            solved.concentrations.acceptor, solved.concentrations.donor, solved.flow.velocity, solved.flow.head_loss)
-
-
-OTHER_PACKAGES = 'numerics.ordering="metis"', 'numerics.solver="pardiso"'
-
-
-@pytest.mark.parametrize("which", [0, 1], ids=["paper", "fast"])
-def test_runs_in_turns_do_not_affect_each_other(which, monkeypatch):
-    """Two runs, which differ in the packages that order and solve linear systems, take their steps in turns in one
-    process. Each equals its separate run to the last bit; the two runs differ in the last bits."""
-    ordering, _ = (faults.replace_package(monkeypatch, package) for package in ("pymetis", "pypardiso"))
-    pair = scenes()[which], scenes(*OTHER_PACKAGES)[which]
-    alone = [tuple(map(numbers, simulate(scene))) for scene in pair]
-    called = len(ordering.calls)
-    turns = list(zip(*map(simulate, pair), strict=True))
-    together = [tuple(map(numbers, instants)) for instants in zip(*turns)]
-    assert len(together[0]) >= 3 and all(map(alike, alone, together))
-    assert called > 0 and len(ordering.calls) == 2 * called, "each run orders its own systems, and no other's"
-    assert not alike(alone[0][-1], alone[1][-1]), "else the order of the unknowns would not show"
-    for one, other in zip(alone[0][-1][1:], alone[1][-1][1:]):
-        assert np.allclose(one, other, rtol=1e-6, atol=1e-6 * np.abs(one).max())
 
 
 def test_states_are_immutable():

@@ -14,11 +14,12 @@ import pytest
 from repro import timing
 from repro.errors import GrowthError, SimulationError, Unresolved
 from repro.fem import linear
+from repro.fem.outline import FREE, TOP
 from repro.march import midpoint, simulation, step_control, stepping, updates
 from repro.march.midpoint import Attempt
 from repro.march.simulation import simulate
 from repro.march.step_control import EXCESS, StepControl, exceeds_tolerance
-from repro.model import contact, pore
+from repro.model import contact, pore, remeshing
 from repro.model.pore import solve
 from repro.model.stages import Stages
 from repro.scene import load_scene
@@ -94,6 +95,53 @@ def test_rows_within_steps_are_of_second_order():
         shorter = midpoint.attempt(Stages.of(scene), state, solved, 0.37 * hours).step.pore
         differences.append(numbers(row.pore, row.solved) - numbers(shorter, pore.solve(scene, shorter)))
     assert np.abs(np.log2(np.divide(differences[:-1], differences[1:])) - 3).max() < 0.35
+
+
+@pytest.fixture
+def long_step():
+    """Base in `fast` and its step from 1.6 to 9.6 h, which generates meshes half way and at its end."""
+    scene = load_scene("base", (FAST,))
+    state = next(state for state, _ in simulation.steps(scene) if state.pore.time > 1)
+    pore, solved = remeshing.solve_graded(scene, state.pore)
+    return midpoint.attempt(Stages.of(scene), replace(pore, concentrations=solved.concentrations), solved, 8.0).step
+
+
+def test_a_row_uses_the_meshes_of_its_step(long_step, monkeypatch):
+    """No mesh is generated for a row. Biomass and shape are those of a row on a mesh of its own to round-off, and the
+    velocity to 1e-3, which is a tenth of the preset's accuracy (2.5e-4 is measured)."""
+    times, made, remesh = (5.0, 6.5, 9.0), [], remeshing.remesh
+    with monkeypatch.context() as patch:
+        patch.setattr(remeshing, "remesh", lambda *arguments: made.append(1) or remesh(*arguments))
+        rows = [long_step.within(time) for time in times]
+    assert made == []
+    monkeypatch.setattr(remeshing, "_on_generated", lambda *_: None)
+    for row, time in zip(rows, times):
+        own = long_step.within(time)
+        meshes = [one.pore.mesh for one in (row, own)]
+        assert len(meshes[0].points) != len(meshes[1].points) and meshes[0].acceptable()
+        one, other = numbers(row.pore, row.solved), numbers(own.pore, own.solved)
+        assert one[:3] == pytest.approx(other[:3], rel=1e-10)
+        assert row.solved.flow.mean_velocity == pytest.approx(own.solved.flow.mean_velocity, rel=1e-3)
+        assert abs(row.pore.composition(3e4)[0] / own.pore.composition(3e4)[0] - 1) < 1e-10
+
+
+def test_a_mesh_generated_for_another_contact_is_not_used(long_step):
+    """The contact of a mesh's own shape decides."""
+    stages, previous, _, half = long_step.within.args
+    generated = half.generated[0]
+    touching = replace(generated.shape, wall=np.where(generated.shape.wall == FREE, TOP, generated.shape.wall))
+    other = replace(generated, shape=touching)
+    on_mesh = [remeshing._on_generated(stages.remeshing, each, generated.shape) for each in (generated, other)]
+    assert on_mesh[0] is not None and on_mesh[1] is None
+
+
+def test_the_guess_of_a_shape_is_exact_where_it_is_known(long_step):
+    """At the start, half way and at the end of a step."""
+    _, previous, _, half = long_step.within.args
+    body = previous.mesh.body
+    for part, known in ((0.0, previous.mesh.points), (0.5, half.expansion.position), (1.0, half.end.position)):
+        guess = midpoint._guess_shape(previous, half, part)
+        assert guess.mesh.points[body] == pytest.approx(known[body], abs=1e-10)
 
 
 def numbers(state, solved):

@@ -22,18 +22,14 @@ import pytest
 import repro
 from repro import cli, results
 from repro.cli import main
-from repro.report import charts
 from repro.runs import execution
-from repro.runs.integrity import find_damage
 from repro.runs.machine import THREADS
-from repro.scene import load_scene
 from repro.sweeps import page, pool, single_run, table
-from repro.sweeps.design import Point, grid, latin, parse, points
+from repro.sweeps.design import grid, latin, parse, points
 from repro.sweeps.folder import Sweep
 from tests import shell
-from tests.faults import limit_memory
 from tests.pages import HOSTILE, check_alone
-from tests.shell import flip, read_record, rewrite, rows
+from tests.shell import read_record, rewrite, rows
 from tests.strategies import number
 from tests.test_sweep_cluster import until
 
@@ -332,21 +328,6 @@ def test_output_of_c_code_does_not_reach_the_user(tmp_path, capfd):
     assert end.recv() == "failed: KeyError: 'x' (noisy.py, line 6)" and capfd.readouterr() == ("", "")
 
 
-@pytest.mark.parametrize("name", ["runs/{run}/notes.txt", "runs/{run}/fields/mine.vtu", "runs/.part-{run}/notes.txt"])
-@pytest.mark.parametrize("spoil", ["failed", pytest.param("damaged", marks=pytest.mark.thorough)])
-def test_foreign_files_beside_a_run_stay(copied, monkeypatch, name, spoil):
-    """The run is repeated because it has failed or is damaged."""
-    monkeypatch.setattr(pool, "ready", in_this_process)
-    run = (copied / rows(copied / "runs.csv")[2]["folder"])
-    rewrite(run, status="failed: so") if spoil == "failed" else flip(run / "timeseries.csv")
-    foreign = copied / name.format(run=run.name)
-    foreign.parent.mkdir(exist_ok=True)
-    foreign.write_text("years of work")
-    assert sweep(copied, *VARY, *SHORT, "--quiet") == 3
-    assert foreign.read_text() == "years of work"
-    assert rows(copied / "runs.csv")[2]["status"] == "completed" and not find_damage(run, read_record(run))
-
-
 @pytest.mark.parametrize("arrange, why", [
     (lambda out, run: run.mkdir(parents=True) or (run / "thesis.tex").write_text("work"), "it holds 'thesis.tex'"),
     (lambda out, run: (out / "runs").symlink_to(out.parent), "runs: it is a link, or no folder"),
@@ -358,33 +339,6 @@ def test_foreign_folders_and_links_are_refused(tmp_path, capsys, arrange, why):
     (tmp_path / "sweep").mkdir()
     arrange(tmp_path / "sweep", tmp_path / "sweep" / "runs" / points("base", [], factors, grid(factors))[0].name)
     assert why in refused(tmp_path / "sweep", capsys, "--vary", "pore.width=48 um, 50 um")
-
-
-@pytest.mark.parametrize("name", ["sweep.json", "run.json", "timeseries.csv",
-                                  pytest.param("ledger.csv", marks=pytest.mark.thorough)])
-@pytest.mark.parametrize("spoil", [lambda path: (path.unlink(), os.mkfifo(path)),
-                                   lambda path: os.truncate(path, 3 * 2**30)])
-def test_pipes_and_files_of_gigabytes_do_not_stop_a_sweep(copied, capsys, monkeypatch, name, spoil):
-    """They are refused, or made again if they belong to a run; the sweep neither waits for them nor reads them."""
-    monkeypatch.setattr(pool, "ready", in_this_process)
-    run = copied / rows(copied / "runs.csv")[2]["folder"]
-    spoil(copied / name if name == "sweep.json" else run / name)
-    with limit_memory(2**28):
-        status = sweep(copied, *VARY, *SHORT, "--quiet")
-    message = capsys.readouterr().err
-    if name in ("sweep.json", "run.json"):
-        assert status == 2 and message.count("\n") == 1 and name in message
-    else:
-        assert status == 3 and (run / name).is_fifo() == (f"{run / name}: it is a link, or no regular" in message)
-
-
-def test_an_altered_cell_of_a_run_does_not_reach_the_table(copied, monkeypatch):
-    """The run is made again."""
-    monkeypatch.setattr(pool, "ready", in_this_process)
-    table_before = (copied / "table.csv").read_bytes()
-    flip(copied / rows(copied / "runs.csv")[2]["folder"] / "timeseries.csv", -20)
-    assert sweep(copied, *VARY, *SHORT, "--quiet") == 3
-    assert (copied / "table.csv").read_bytes() == table_before
 
 
 def start_sweep(out, *arguments):
@@ -413,19 +367,6 @@ def test_a_signal_ends_a_sweep_quietly(tmp_path, how, ends, word):
     assert status == ends and stderr.startswith(f"repro: {word}; "), stderr
     assert command in stderr and stderr.count("\n") == 1, stderr
     assert (out / "table.csv").exists() and (out / "summary.html").exists()
-
-
-@pytest.mark.thorough
-@pytest.mark.parametrize("how, ends", [(signal.SIGINT, 130), (signal.SIGKILL, -signal.SIGKILL)])
-def test_an_interrupted_sweep_is_continued(tmp_path, how, ends):
-    """After the same command every run exists once."""
-    out, arguments = tmp_path / "sweep", ["--vary", "pore.width=48 um, 50 um, 52 um", "--workers", "2",
-                                          "--set", 'growth.end="10 h"']
-    status, stderr = cut_off(out, how, *arguments)
-    assert status == ends and "Traceback" not in stderr
-    assert sweep(out, *arguments) == 0
-    assert [row["status"] for row in rows(out / "runs.csv")] == ["completed"] * 3
-    assert len(list((out / "runs").iterdir())) == 3
 
 
 def sweep_of(folder, widths):
@@ -492,22 +433,3 @@ def test_the_default_seed_of_a_hypercube_is_0():
     """The help states this."""
     options = cli._parser().parse_args(["sweep", "base", "--vary", "pore.width=1:2 um:log", "--out", "x"])
     assert options.seed == 0
-
-
-def test_words_are_centred_in_equal_parts_of_an_axis():
-    factor = parse('numerics.preset="fast", "accurate", "exact"')
-    axis = page._across(factor, [])
-    ticks = charts.ticks(axis)
-    assert [text for _, text in ticks] == ["fast", "accurate", "exact"]
-    parts = [(axis(value) - charts.LEFT) / (charts.WIDTH - charts.LEFT - charts.RIGHT) for value, _ in ticks]
-    assert parts == pytest.approx([1 / 6, 3 / 6, 5 / 6])
-
-
-@pytest.mark.parametrize("status, word", [("failed: TransportError: at t = 3 h", "failed"), ("completed", "completed"),
-                                          ("not run", "not run")])
-def test_the_table_of_a_sweep_has_the_status_of_a_run(status, word):
-    """The table has one word; the reason is in the run's folder."""
-    point = Point(1, ("40 um",), load_scene("flow_only"))
-    empty = table.SweepRun(point, status, *[np.zeros(0)] * 3, dict.fromkeys(table.COLUMNS))
-    row = page._row(Sweep(Path("s"), "base", (parse("pore.width=40 um, 50 um"),), (point,)), empty)
-    assert re.search(r'<td class="text[ a-z]*">([^<]*)</td></tr>$', row)[1] == word

@@ -35,7 +35,7 @@ def test_a_text_that_is_no_range_or_list_is_refused_in_one_line(text):
     with pytest.raises(SceneError) as refused:
         parse(text)
     message = str(refused.value)
-    assert message.startswith("--vary ") and "needed" in message and "\n" not in message and text[:10] in message
+    assert message.startswith("vary ") and "needed" in message and "\n" not in message and text[:10] in message
 
 
 @given(RANGES, SPACINGS, st.integers(2, 50))
@@ -77,8 +77,8 @@ def test_a_design_follows_from_its_seed():
 
 @pytest.mark.parametrize("build, part", [
     (lambda: latin([parse("pore.width=1:2 um:log:3")], 5, 0), "leave :3 out"),
-    (lambda: latin([parse("pore.width=1:2 um:log")], 0, 0), "--samples 0"),
-    (lambda: latin([parse("pore.width=1:2 um:log")], MOST_POINTS + 1, 0), "--samples 10001"),
+    (lambda: latin([parse("pore.width=1:2 um:log")], 0, 0), "samples 0"),
+    (lambda: latin([parse("pore.width=1:2 um:log")], MOST_POINTS + 1, 0), "samples 10001"),
     (lambda: grid([parse("pore.width=1:2 um:log")]), "pore.width: how many values is needed"),
     (lambda: grid([parse(f"pore.{key}=1:2 um:log:101") for key in ("width", "length")]), f"at most {MOST_POINTS} run")])
 def test_an_impossible_hypercube_or_grid_is_refused(build, part):
@@ -114,10 +114,10 @@ def test_varying_one_of_the_pair_replaces_the_other_and_keeps_the_rest():
     (["pore.width=50 s"], [], 'run 1 .pore.width = 50 s.: base: pore.width = "50.0 s": a length is needed'),
     (["numerics.preset=fast, best"], [], "run 2 .*preset"),
     (["pore.width=50 um, 50.0 um"], [], "run 2 .*same scene as run 1"),
-    (["pore.width=50 um", "pore.width=60 um"], [], "one --vary"),
+    (["pore.width=50 um", "pore.width=60 um"], [], "one vary"),
     (["flow.head=1 um", "flow.mean_velocity=1 m/day"], [], "exclude each other"),
-    (["flow.head=1 um"], ['flow.head="2 um"'], "--set of flow.head"),
-    (["flow.head=1 um"], ['flow.mean_velocity="2 m/day"'], "--set of flow.head or flow.mean_velocity"),
+    (["flow.head=1 um"], ['flow.head="2 um"'], "overrides of flow.head"),
+    (["flow.head=1 um"], ['flow.mean_velocity="2 m/day"'], "overrides of flow.head or flow.mean_velocity"),
 ])
 def test_an_impossible_run_is_refused_before_any_is_made(varied, sets, part):
     with pytest.raises(SceneError, match=part):

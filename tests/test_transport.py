@@ -16,7 +16,6 @@ from repro.model import biomass, pore, transport
 from repro.model.kinetics import Sink
 from repro.model.pore import solve
 from repro.model.transport import Concentrations
-from repro.scene import parse_scene, scene_tables
 from tests.strategies import EVERY_ORDER, ORDERS, coarse_base, scene, space_of
 from tests.test_derived import integrate_over_end, node_coordinates
 
@@ -137,17 +136,6 @@ def test_a_half_saturation_below_round_off_is_solved_or_refused_as_a_front(order
         assert "the mesh is too coarse for the front in the aggregate" in str(solution)
 
 
-def test_an_update_that_meets_an_unresolved_front_gives_advice_that_was_tried():
-    """The front follows a jump of the supply at the end of a step, and no refinement helps."""
-    model = scene("30 um", "100 um", "1 mg/L", "10 mg/L", "0.5 m/day", growth={"end": "1 h", "time_step": "0.4 h"})
-    tables = scene_tables(model)
-    tables["substrates"]["acceptor"] |= {"supply": [["0 h", "1e5 mg/L"], ["0.4 h", "1 mg/L"]],
-                                         "half_saturation": "1e-30 mg/L"}
-    tables["numerics"] |= {"refinement": 0.2}
-    with pytest.raises(SimulationError, match="from t = 0 h, in transport: .*numerics.refinement up to 0.6 does not"):
-        list(simulate(parse_scene(tables, "test", "test.toml")))
-
-
 def test_an_update_whose_biomass_meets_an_unresolved_front_gives_advice_that_was_tried(monkeypatch):
     """The front is that of the biomass at the end of the step."""
     model = scene("5 um", velocity="1 m/day", growth={"end": "1 h", "time_step": "0.5 h"}, numerics={"refinement": 0.4})
@@ -198,19 +186,6 @@ def test_a_concentration_may_leave_its_bounds_by_the_documented_part(order):
         state[k * problem.space.count + 7] *= part
         with nullcontext() if accepted else pytest.raises(Unresolved, match=("acceptor", "donor")[k]):
             transport._checked(problem, state, 1)
-
-
-@EVERY_ORDER
-def test_continuation_in_half_saturations_reaches_the_same_state(order):
-    """Newton's method reaches the same state from the supply and through larger half saturations, one above its supply.
-    """
-    scene, pore = coarse_base(order, 'substrates.acceptor.half_saturation="1e-3 mg/L"',
-                      'substrates.donor.half_saturation="30 mg/L"')
-    problem = solve(scene, pore).problem
-    sink = biomass.sink(pore.active)
-    computed, _ = transport._newton(transport.Balance(problem, sink), problem.supply)
-    eased, _ = transport._eased(problem, sink, problem.supply)
-    assert eased == pytest.approx(computed, rel=1e-9)
 
 
 @pytest.mark.parametrize("order", [2, 3])

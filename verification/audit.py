@@ -24,7 +24,7 @@ from verification.bench.record import machine
 from verification.claims import runs
 from verification.claims.runs import BASE, PLATES, UPDATE
 from verification.evidence.checks import columns
-from verification.evidence.writing import Block, plain, save, table
+from verification.evidence.writing import Block, markdown, save, table
 from verification.switches import CHOICES, PLOTTED, Course, Switch, state
 
 RECORD = Path(__file__).parent / "report" / "audit.json"
@@ -47,7 +47,7 @@ def main() -> int:
     rows = [{**row, "resolved": resolved(row["effect"], row.get("noise", noise["effect"]))} for row in rows]
     record = {"machine": machine(), "method": METHOD, "rows": rows}
     save(record, RECORD)
-    print(plain(blocks(record)))
+    print(markdown(blocks(record)))
     return 0
 
 

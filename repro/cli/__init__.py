@@ -12,14 +12,14 @@ import shlex
 import sys
 from contextlib import suppress
 
-from repro.cli import check, compare, docs, run, scene, sweep
-from repro.errors import Interrupted, OutputError, SimulationError
+from repro.cli import check, compare, docs, plot, run, scene, sweep
+from repro.errors import Interrupted, OutputError, Refusal, SimulationError
 from repro.runs.progress import in_json, printable, say
 from repro.scene import SceneError
 
 #: The modules of the commands. Each has ``add(commands)``, which adds its parser with
 #: ``set_defaults(call=...)``; ``call`` takes the parsed arguments and returns the exit status.
-COMMANDS = (run, scene, check, compare, sweep, docs)
+COMMANDS = (run, scene, check, plot, compare, sweep, docs)
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -41,10 +41,11 @@ def main(arguments: list[str] | None = None) -> int:
 
 def _fail(options, message, status: int) -> int:
     """Print an error, with --json also as an object; return the exit status."""
+    text = message.args[0] if isinstance(message, Refusal) else str(message)
     if getattr(options, "json", False):
         with suppress(OutputError):  # standard error still has the message
-            in_json({"event": "error", "exit_status": status, "message": str(message)})
-    say(f"repro: {printable(str(message))}", to_stderr=True)
+            in_json({"event": "error", "exit_status": status, "message": text})
+    say(f"repro: {printable(text)}", to_stderr=True)
     return status
 
 

@@ -31,10 +31,10 @@ def call(options) -> int:
     folder = Path(options.scene)
     if options.scene not in packaged_scenes() and folder.is_dir():
         return _check_run(options, folder)
-    scene = load_scene(options.scene, options.set, options.unset)
+    load_scene(options.scene, options.set, unset=options.unset)  # before the slow import
     from repro.preflight.checked import check, report
 
-    checked = check(scene, options.scene)
+    checked = check(options.scene, options.set, unset=options.unset)
     say(json.dumps(checked.tables(), indent=2) if options.json else report(checked))
     return 0
 

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from repro.cli.arguments import path
-from repro.errors import OutputError
 from repro.runs.progress import say
 
 
@@ -26,22 +23,6 @@ def call(options) -> int:
     """Write the page of the runs."""
     from repro import report
 
-    if len(options.runs) < 2:
-        raise OutputError(f"compare {options.runs[0]}: two runs or more are needed")
-    _check(options.out)
-    try:
-        report.compare(options.runs, options.out)
-    except OSError as error:
-        raise OutputError(f"--out {options.out}: {error.strerror or error}; a file that can be "
-                          "written is needed") from error
+    report.compare(options.runs, options.out)
     say(f"{len(options.runs)} runs compared in {options.out}")
     return 0
-
-
-def _check(out: Path) -> None:
-    """Refuse a target that could overwrite a file of a run."""
-    if out.suffix != ".html":
-        raise OutputError(f"--out {out}: a file name that ends in .html is needed")
-    if (out.parent / "run.json").exists():
-        raise OutputError(f"--out {out}: {out.parent} is the folder of a run; a file elsewhere is "
-                          "needed")

@@ -7,13 +7,12 @@ from __future__ import annotations
 
 import argparse
 import math
-import os
 from typing import TYPE_CHECKING
 
 from repro.cli.arguments import add_scene, path
 from repro.errors import SimulationError
 from repro.runs import INTERVAL, interrupts, progress
-from repro.scene import Scene, load_scene, packaged_scenes
+from repro.scene import Scene, load_scene
 from repro.scene.files import key_of
 
 if TYPE_CHECKING:
@@ -72,7 +71,7 @@ def call(options) -> int:
                        "or --force is accepted with it, and no --set but of growth.end")
     if not options.resume and not (options.scene and options.out):
         options.refuse("SCENE and --out DIR are needed, or --resume DIR")
-    scene = None if options.resume else load_scene(options.scene, options.set, options.unset)
+    scene = None if options.resume else load_scene(options.scene, options.set, unset=options.unset)
     from repro.runs.execution import Watch
 
     events = progress.display_events(options.quiet, options.json)
@@ -87,16 +86,10 @@ def call(options) -> int:
 
 def _run(options, scene: Scene | None, watch: Watch) -> None:
     """Run the scene, or resume the run if there is no scene."""
-    from repro.runs.execution import resume, run
+    from repro.runs.execution import origin_of, resume, run
 
     if scene is None:
-        resume(options.resume, watch=watch, overrides=options.set)
+        resume(options.resume, options.set, watch=watch)
     else:
-        run(scene, options.out, watch=watch, force=options.force, origin=_origin(options))
-
-
-def _origin(options) -> dict:
-    """The origin of the scene for ``run.json``: a packaged name or a path, and its changes."""
-    packaged = options.scene in packaged_scenes()
-    file = options.scene if packaged else os.path.abspath(options.scene)
-    return {"file": file, "set": options.set, "unset": options.unset}
+        origin = origin_of(options.scene, options.set, options.unset)
+        run(scene, options.out, watch=watch, force=options.force, origin=origin)

@@ -80,7 +80,7 @@ def call(options) -> int:
     from repro.sweeps.driver import sweep
 
     with _end_on_signals(options.command_line), _display_events(options.quiet) as tell:
-        swept = sweep(options.scene, options.vary, options.out, options.set, options.unset,
+        swept = sweep(options.scene, options.vary, options.out, options.set, unset=options.unset,
                       samples=options.samples, seed=options.seed, workers=options.workers,
                       scheduler=options.scheduler, clogged=options.clogged, tell=tell)
     return _report(swept)

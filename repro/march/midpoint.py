@@ -30,6 +30,7 @@ from repro.model.contact import Expansion
 from repro.model.contact_lines import FirstContact, SearchOptions
 from repro.model.growing import grow
 from repro.model.pore import Pore, Solved
+from repro.model.remeshing import GeneratedMesh
 from repro.model.stages import Stages
 from repro.model.transport import Concentrations, Flows, Fluxes
 
@@ -54,7 +55,9 @@ class Halfway:
 
     duration: h, of the entire step; first: rates at its start; expansion: the aggregate half way;
     solved: flow and substrates half way; rates: half way, at the points of the mesh at the start;
-    produced: growth of active and of inert biomass over the entire step, um2 mg/L.
+    produced: growth of active and of inert biomass over the entire step, um2 mg/L; generated:
+    meshes that the step has generated so far; end: the aggregate at the end, None before it is
+    known.
     """
 
     duration: float
@@ -63,6 +66,8 @@ class Halfway:
     solved: Solved
     rates: Rates
     produced: tuple[float, float]
+    generated: tuple[GeneratedMesh, ...]
+    end: Expansion | None = None
 
 
 def attempt(stages: Stages, previous: Pore, solved: Solved, duration: float,
@@ -93,11 +98,13 @@ def attempt(stages: Stages, previous: Pore, solved: Solved, duration: float,
     refuse_fold(previous, expanded)
     expanded = replace(expanded, concentrations=_guess_substrates(solved, half, 1.0))
     new, remeshed = stages.new_mesh(previous, expanded, solved)
+    generated = (GeneratedMesh(expanded, new),) if remeshed else ()
     refuse_density(new, stages.remeshing.maximum_density)
     flows = _flows(half.solved.substrates.fluxes, duration)
     ledger = Ledger(previous.time, previous.time + duration, *flows, previous.mass,
                     after.mass - previous.mass, new.mass)
-    inner = partial(interpolate, stages, previous, solved, half)
+    known = replace(half, generated=half.generated + generated, end=expansion)
+    inner = partial(interpolate, stages, previous, solved, known)
     step = StepResult(new, None, ledger, remeshed, expansion.iterations, inner)
     makes_contact = expanded.contact and not previous.contact
     return Attempt(step, change, (gap, expansion.gap) if makes_contact else None)
@@ -105,12 +112,12 @@ def attempt(stages: Stages, previous: Pore, solved: Solved, duration: float,
 
 def _expand(stages: Stages, previous: Pore, after: Pore, half: Halfway, part: float,
             search: SearchOptions) -> Expansion:
-    """Equilibrium of the aggregate at a part of the step, starting from the extrapolated half step.
+    """Equilibrium of the aggregate at a part of the step, starting from its known shapes.
 
     Contact lines continue at their speed.
     """
     advances = {key: 2 * part * arcs for key, arcs in half.expansion.advances.items()}
-    guess = _extrapolate_shape(previous, half.expansion, part)
+    guess = _guess_shape(previous, half, part)
     return stages.expand(previous, after, guess, replace(search, advances=advances))
 
 
@@ -148,12 +155,17 @@ def solve_halfway(stages: Stages, previous: Pore, solved: Solved, first: Rates, 
         rates = _carry_rates_back(middle, previous, expansion, rates)
     active_growth = float((after.active - middle.active).sum())
     inert_growth = float((after.inert - middle.inert).sum())
-    return Halfway(duration, first, expansion, solution, rates, (active_growth, inert_growth))
+    generated = () if mesh else (GeneratedMesh(shape, middle),)
+    return Halfway(duration, first, expansion, solution, rates, (active_growth, inert_growth),
+                   generated)
 
 
 def interpolate(stages: Stages, previous: Pore, solved: Solved, half: Halfway,
                 time: float) -> InterpolatedState:
     """Interpolate the pore to a time (h) within a step, and solve there.
+
+    If the moved mesh is not acceptable, the nearest of the meshes that the step has generated
+    replaces it.
 
     Raises StageError if a stage fails.
     """
@@ -163,7 +175,8 @@ def interpolate(stages: Stages, previous: Pore, solved: Solved, half: Halfway,
     after = replace(grow(previous, mean, part * half.duration), time=time)
     expanded = _expand(stages, previous, after, half, part, contact.PATIENT).pore
     expanded = replace(expanded, concentrations=_guess_substrates(solved, half, part))
-    inner, _ = stages.new_mesh(previous, expanded, solved)
+    nearest = sorted(half.generated, key=lambda each: abs(each.shape.time - time))
+    inner, _ = stages.new_mesh(previous, expanded, solved, nearest)
     return InterpolatedState(*remeshing.solve_graded(stages.scene, inner))
 
 
@@ -224,11 +237,21 @@ def _scale_shape(previous: Pore, after: Pore) -> Pore:
     return _place_body(after, fixed + (previous.mesh.points - fixed) * scale)
 
 
-def _extrapolate_shape(previous: Pore, half: Expansion, part: float) -> Pore:
-    """Initial guess of the shape at a part of the step, extrapolated from its first half."""
+def _guess_shape(previous: Pore, half: Halfway, part: float) -> Pore:
+    """Initial guess of the shape at a part of the step.
+
+    It is extrapolated from the first half, or interpolated in start, half way and end if the end is
+    known.
+    """
+    known = [(2 * part, half.expansion)]
+    if half.end is not None:
+        known = [(4 * part * (1 - part), half.expansion), (part * (2 * part - 1), half.end)]
     corners = previous.mesh.corners
-    push = previous.pressure + 2 * part * (half.pore.pressure[:corners] - previous.pressure)
-    points = previous.mesh.points + 2 * part * (half.position - previous.mesh.points)
+    push = previous.pressure
+    points = previous.mesh.points
+    for weight, shape in known:
+        push = push + weight * (shape.pore.pressure[:corners] - previous.pressure)
+        points = points + weight * (shape.position - previous.mesh.points)
     return _place_body(replace(previous, pressure=push), points)
 
 

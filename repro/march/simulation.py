@@ -12,6 +12,7 @@ from repro.march import loop, stepping, updates
 from repro.march.loop import Report, RestartState, Scheme
 from repro.march.step_control import STRETCH
 from repro.scene import Scene, Source, load_scene, parse_scene, scene_tables
+from repro.scene.arguments import typed
 
 #: Points (x, y), um.
 Shape = Sequence[tuple[float, float]] | np.ndarray
@@ -20,8 +21,9 @@ Shape = Sequence[tuple[float, float]] | np.ndarray
 SCHEMES = {"updates": updates.SCHEME, "midpoint": stepping.SCHEME}
 
 
-def simulate(scene: Source, shape: Shape | None = None,
-             state: RestartState | None = None) -> Iterator[Report]:
+@typed
+def simulate(scene: Source, overrides: Sequence[str] = (), *, unset: Sequence[str] = (),
+             shape: Shape | None = None, state: RestartState | None = None) -> Iterator[Report]:
     """Simulate a scene, and yield a Report at t = 0 and at each reported time.
 
     Reported times are ``output.times``, or the ends of all steps. A Report has the attributes
@@ -32,6 +34,10 @@ def simulate(scene: Source, shape: Shape | None = None,
     ----------
     scene : Scene, str, Path or dict
         A loaded scene, the name of a packaged scene, a TOML file, or a dict of tables.
+    overrides : sequence of str, optional
+        Changes of the scene, as for :func:`repro.load_scene`.
+    unset : sequence of str, optional
+        Keys or sections of the scene to leave out.
     shape : (K, 2) sequence of float, optional
         Boundary of the aggregate at t = 0, points (x, y) in um from the upstream to the downstream
         end on the lower wall. It replaces the shape of the scene (see ``aggregate.outline``).
@@ -57,11 +63,11 @@ def simulate(scene: Source, shape: Shape | None = None,
     Examples
     --------
     >>> import repro
-    >>> scene = repro.load_scene("base", ['growth.end="1 h"', 'output.times=["0 h", "1 h"]'])
-    >>> [report.pore.time for report in repro.simulate(scene)]
+    >>> changes = ['growth.end="1 h"', 'output.times=["0 h", "1 h"]']
+    >>> [report.pore.time for report in repro.simulate("base", changes)]
     [0.0, 1.0]
     """
-    scene = load_scene(scene)
+    scene = load_scene(scene, overrides, unset=unset)
     if shape is not None:
         scene = shaped(scene, shape)
     return (report for _, report in steps(scene, state) if report)

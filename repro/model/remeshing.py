@@ -3,13 +3,16 @@ which the fields are transferred."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from repro.errors import StageError, Unresolved, UnresolvedWithAdvice
 from repro.fem import sizing, transfer
 from repro.fem.mesh import Mesh
+from repro.fem.outline import FREE
 from repro.fem.space import Space
 from repro.fem.transfer import Located
 from repro.model import biomass, growing
@@ -47,7 +50,25 @@ class Remeshing:
         return cls(Meshing.of(scene), scene.numerics.transfer, kinetics.maximum_density, substrates)
 
 
-def new_mesh(rules: Remeshing, previous: Pore, expanded: Pore, speed: float) -> tuple[Pore, bool]:
+@dataclass(frozen=True, eq=False)
+class GeneratedMesh:
+    """A mesh that a step has generated.
+
+    shape: the aggregate for which it was generated, on the mesh at the step's start; pore: the same
+    aggregate on the generated mesh.
+    """
+
+    shape: Pore
+    pore: Pore
+
+    @cached_property
+    def at(self) -> Located:
+        """The generated mesh's aggregate in the triangles of the mesh at the step's start."""
+        return _located_in(self.shape, self.pore.mesh)
+
+
+def new_mesh(rules: Remeshing, previous: Pore, expanded: Pore, speed: float,
+             generated: Sequence[GeneratedMesh] = ()) -> tuple[Pore, bool]:
     """Give an expanded aggregate a mesh: the present one, moved with it, or a new one.
 
     Parameters
@@ -59,12 +80,15 @@ def new_mesh(rules: Remeshing, previous: Pore, expanded: Pore, speed: float) -> 
         The new shape; the fluid's nodes are still in their old positions.
     speed : float
         Mean velocity, um/h, for the substrates beyond the old mesh's ends.
+    generated : sequence of GeneratedMesh, optional
+        Meshes of the same step. If one of them, moved with its aggregate, is acceptable, no other
+        mesh is generated.
 
     Returns
     -------
     pore : Pore
     remeshed : bool
-        Is the mesh new?
+        Is the mesh not the present one?
 
     Notes
     -----
@@ -75,7 +99,39 @@ def new_mesh(rules: Remeshing, previous: Pore, expanded: Pore, speed: float) -> 
     mesh = moved_mesh(rules.meshing, previous, expanded)
     if mesh is not None:
         return replace(expanded, space=Space(mesh, previous.space.order)), False
+    for each in generated:
+        pore = _on_generated(rules, each, expanded)
+        if pore is not None:
+            return pore, True
     return remesh(rules, previous, expanded, speed)[0], True
+
+
+def _on_generated(rules: Remeshing, generated: GeneratedMesh, expanded: Pore) -> Pore | None:
+    """An expanded aggregate on a mesh that its step has generated for another shape, moved with its
+    material; None if the contact differs or the moved mesh is not acceptable."""
+    shape, start = generated.shape, generated.pore
+    old = expanded.mesh
+    if old.topology is not shape.mesh.topology or not _same_contact(expanded, shape):
+        return None
+    points = start.mesh.points.copy()
+    points[start.mesh.body] = generated.at.field(old.points, old.cells[old.biomass], old.geometry)
+    on_wall = start.mesh.loop[start.wall != FREE]
+    points[on_wall, 1] = start.mesh.points[on_wall, 1]
+    mesh = moved_mesh(rules.meshing, start, start.moved(points))
+    if mesh is None:
+        return None
+    target = replace(start, space=Space(mesh, start.space.order))
+    return _transferred(rules, expanded, target, generated.at)[0]
+
+
+def _same_contact(first: Pore, second: Pore) -> bool:
+    return first.boundary.same_contact(second.boundary)
+
+
+def _located_in(pore: Pore, mesh: Mesh) -> Located:
+    """The aggregate's nodes of a mesh in the biomass triangles of a pore of the same shape."""
+    old = pore.mesh
+    return transfer.located(old.points, old.cells[old.biomass], mesh.points[mesh.body])
 
 
 def solve_graded(scene: Scene, pore: Pore) -> tuple[Pore, Solved]:
@@ -220,20 +276,29 @@ def remesh(rules: Remeshing, previous: Pore, expanded: Pore, speed: float,
     so that the next update removes the error of the constraint and it does not accumulate [E7].
     """
     mesh, outline = rules.meshing.generate(expanded.boundary, expanded.front)
-    old = expanded.mesh
     new = Space(mesh, expanded.space.order)
-    at = transfer.located(old.points, old.cells[old.biomass], mesh.points[mesh.body])
+    at = _located_in(expanded, mesh)
     body = _material(new, expanded, outline.origin, at)
-    active, inert, *rest = biomass.transfer_amounts(
-        rules.transfer, expanded.space, new, at, (expanded.active, expanded.inert, *amounts),
-        rules.maximum_density)
     supplied = at_time(rules.substrates, expanded.time if speed else 0.0)
     substrates = transfer_substrates(supplied, previous.space, new, expanded.concentrations, speed)
+    target = replace(expanded, space=new, wall=outline.wall, fixed=outline.fixed, body=body,
+                     concentrations=substrates)
+    return _transferred(rules, expanded, target, at, amounts)
+
+
+def _transferred(rules: Remeshing, expanded: Pore, target: Pore, at: Located,
+                 amounts: Amounts = ()) -> tuple[Pore, Amounts]:
+    """The pore ``target``, of the same shape on another mesh, with the biomass, the pressure and
+    the last shape of an expanded aggregate, and further amounts; ``at``: its nodes' places."""
+    old = expanded.mesh
+    active, inert, *rest = biomass.transfer_amounts(
+        rules.transfer, expanded.space, target.space, at,
+        (expanded.active, expanded.inert, *amounts), rules.maximum_density)
     last = expanded.last
     if last is not None:
         last = at.field(last, old.topology.body_cells, old.geometry)
-    pore = Pore(expanded.time, new, outline.wall, outline.fixed, active, inert, np.empty(0), body,
-                _pressure(mesh, expanded, at), substrates, expanded.front, last)
+    pore = replace(target, time=expanded.time, active=active, inert=inert,
+                   pressure=_pressure(target.mesh, expanded, at), last=last)
     return replace(pore, theta=growing.restart_theta(pore, rules.maximum_density)), tuple(rest)
 
 

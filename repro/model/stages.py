@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from repro.model import biomass, contact, growing, remeshing
@@ -10,7 +11,7 @@ from repro.model.contact import Expansion, Mechanics
 from repro.model.contact_lines import SearchOptions
 from repro.model.kinetics import RateLaw, rate_law
 from repro.model.pore import Pore, Solved
-from repro.model.remeshing import Remeshing
+from repro.model.remeshing import GeneratedMesh, Remeshing
 from repro.scene import Growth, Scene
 
 
@@ -45,6 +46,8 @@ class Stages:
         theta = growing.compute_theta(previous, grown, self.remeshing.maximum_density)
         return contact.expand(self.mechanics, grown, theta, guess, search)
 
-    def new_mesh(self, previous: Pore, expanded: Pore, solved: Solved) -> tuple[Pore, bool]:
+    def new_mesh(self, previous: Pore, expanded: Pore, solved: Solved,
+                 generated: Sequence[GeneratedMesh] = ()) -> tuple[Pore, bool]:
         """Give an expanded aggregate a mesh, by :func:`remeshing.new_mesh`."""
-        return remeshing.new_mesh(self.remeshing, previous, expanded, solved.mean_velocity)
+        return remeshing.new_mesh(self.remeshing, previous, expanded, solved.mean_velocity,
+                                  generated)

@@ -11,7 +11,7 @@ Hohlfeld and Mahadevan, Phys. Rev. Lett. 106, 2011) and is unstable to waves of 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property, lru_cache
 
 import numpy as np
 
@@ -65,6 +65,7 @@ class Surface:
         return x, y
 
 
+@lru_cache(maxsize=2)  # a row uses that of its own pore and that of the last step's
 def surface(pore: Pore) -> Surface:
     """The free surface of a pore's aggregate, with its stretch since the configuration from which
     strain counts."""
@@ -84,8 +85,14 @@ def surface(pore: Pore) -> Surface:
 def _expansion(nodes: np.ndarray, local: np.ndarray) -> np.ndarray:
     """(edges,) area of triangles with nodes (edges, 3 or 6, 2) um over that of the unit triangle,
     at the middles of their edges ``local`` (edges,)."""
-    bends = elements.derivatives(1 if nodes.shape[1] == 3 else 2, MIDDLES)
+    bends = _bends(1 if nodes.shape[1] == 3 else 2)
     return elements.determinant(np.einsum("eai,eak->eik", nodes, bends[local]))
+
+
+@cache
+def _bends(geometry: int) -> np.ndarray:
+    """(3, k, 2) derivatives of the map's functions at the middles of the edges."""
+    return elements.derivatives(geometry, MIDDLES)
 
 
 def _lengths(nodes: np.ndarray, local: np.ndarray) -> np.ndarray:

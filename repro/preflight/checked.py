@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 
 from repro.errors import SimulationError
@@ -18,6 +18,7 @@ from repro.preflight.numbers import Number, evaluate_at_largest
 from repro.preflight.resolved import find_unresolved_flow
 from repro.preflight.simplifications import Caveat, find_warnings, warn_missed_tolerance
 from repro.scene import Scene, Source, label, load_scene
+from repro.scene.arguments import typed
 from repro.scene.units import SceneError
 
 WIDTH = 110
@@ -56,15 +57,19 @@ class SceneCheck:
         return {**asdict(self), "modelled": dict(self.modelled)}
 
 
-def check(scene: Source, file: str = "") -> SceneCheck:
+@typed
+def check(scene: Source, overrides: Sequence[str] = (), *,
+          unset: Sequence[str] = ()) -> SceneCheck:
     """Check a scene before it is run.
 
     Parameters
     ----------
     scene : Scene, str, Path or dict
         A loaded scene, a TOML file, the name of a packaged scene, or a dict of tables.
-    file : str, optional
-        Name of the scene in error messages.
+    overrides : sequence of str, optional
+        Changes of the scene, as for :func:`repro.load_scene`.
+    unset : sequence of str, optional
+        Keys or sections of the scene to leave out.
 
     Returns
     -------
@@ -84,8 +89,8 @@ def check(scene: Source, file: str = "") -> SceneCheck:
     >>> repro.check("flow_only").warnings
     []
     """
-    file = file or label(scene)
-    scene = load_scene(scene)
+    file = label(scene)
+    scene = load_scene(scene, overrides, unset=unset)
     memory_warnings: list[str] = []
     require_outline(scene)
     require_memory(scene, memory_warnings.append)

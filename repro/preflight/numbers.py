@@ -80,16 +80,21 @@ def at_end(scene: Scene) -> Sizes:
     rate = max(0.0, fastest_growth(scene))  # a decaying aggregate is no larger than at the start
     layer = depth(scene)
     step = scene.growth.end / STEPS
-    full = scene.pore.width * scene.pore.length
+    width = scene.pore.width
+    full = width * scene.pore.length
+    thin = width - film(scene)
+    area = current.area
+    thickness = current.thickness
+    contact = current.contact
     for k in range(STEPS):  # as a half-disc of the same area
-        exposed = math.pi * current.thickness if current.contact is None else 2 * scene.pore.width
-        share = min(1.0, layer * exposed / current.area)
-        area = min(full, current.area * math.exp(min(LARGEST, rate * share * step)))
-        touches = math.sqrt(2 * area / math.pi) >= scene.pore.width - film(scene)
-        contact = current.contact
-        if touches and contact is None:
+        exposed = math.pi * thickness if contact is None else 2 * width
+        share = min(1.0, layer * exposed / area)
+        area = min(full, area * math.exp(min(LARGEST, rate * share * step)))
+        radius = math.sqrt(2 * area / math.pi)
+        thickness = min(radius, width)
+        if radius >= thin and contact is None:
             contact = (k + 1) * step
-        current = sizes(scene, area, contact)
+    current = sizes(scene, area, contact)
     return replace(current, reach=current.reach + offset)
 
 

@@ -14,10 +14,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from repro.errors import OutputError
 from repro.report import comparison, run_page
 from repro.report.reading import read
 from repro.results import write_text
 from repro.results.files import atomic_path
+from repro.scene.arguments import typed
 
 __all__ = ["compare", "write"]
 
@@ -32,12 +34,53 @@ def write(folder: Path) -> Path:
     return target
 
 
-def compare(folders: Sequence[Path], target: Path) -> Path:
-    """Write a page that compares two or more runs; returns its path.
+@typed
+def compare(folders: Sequence[str | Path], file: str | Path) -> Path:
+    """Write a page that compares two or more runs.
 
-    Raises OutputError if a folder holds no run.
+    Parameters
+    ----------
+    folders : sequence of str or Path
+        Folders of the runs; the others are compared with the first.
+    file : str or Path
+        The page to write; its name ends in .html.
+
+    Returns
+    -------
+    Path
+        The path of the page.
+
+    Raises
+    ------
+    OutputError
+        If there are fewer than two folders, one holds no run, or the page cannot be written there.
+    TypeError
+        If an argument has a wrong type: names the argument.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import repro
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     runs = [repro.run("flow_only", f"{folder}/{width}", [f'pore.width="{width} um"']).folder
+    ...             for width in (40, 50)]
+    ...     print(repro.compare(runs, f"{folder}/both.html").name)
+    both.html
     """
-    _write(target, comparison.build([read(folder) for folder in folders]))
+    target = Path(file)
+    if len(folders) < 2:
+        raise OutputError("compare: two runs or more are needed")
+    if target.suffix != ".html":
+        raise OutputError(f"{target}: a file name that ends in .html is needed")
+    if (target.parent / "run.json").exists():
+        raise OutputError(f"{target}: {target.parent} is the folder of a run; a file elsewhere is "
+                          "needed")
+    text = comparison.build([read(Path(folder)) for folder in folders])
+    try:
+        _write(target, text)
+    except OSError as error:
+        raise OutputError(f"{target}: {error.strerror or error}; a file that can be written is "
+                          "needed") from error
     return target
 
 

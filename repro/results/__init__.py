@@ -5,6 +5,7 @@
     arrays        quantities of the fields
     names         words and units of all quantities, by name
     tables        results in Python
+    drawing       curves, fields and films with matplotlib
     netcdf        the time series as NetCDF
 
 Writers use :func:`repro.results.files.atomic_path`, so that a file is complete or absent. An empty
@@ -106,8 +107,13 @@ def provenance(scene: Scene) -> dict:
 
 @cache
 def version(package: str) -> str:
-    """The version of an installed package; it is read from the disk once."""
-    return metadata.version(package)
+    """The version of an installed package; it is read from the disk once.
+
+    The version is a line of the metadata. metadata.version() parses all of them, which takes a
+    hundred times as long.
+    """
+    text = metadata.distribution(package).read_text("METADATA") or ""
+    return text.partition("\nVersion: ")[2].partition("\n")[0]
 
 
 def write_json(path: Path, content: dict) -> None:

@@ -57,6 +57,8 @@ def figure(fields: Mapping[str, np.ndarray], time: float) -> str:
 
 def png(fields: Mapping[str, np.ndarray], values: np.ndarray) -> bytes:
     """Values (N,) at the nodes of a run's fields as the bytes of a PNG, upstream on the left."""
+    from scipy import ndimage
+
     points = fields["places_um"]
     cells = fields["triangles"]
     x, y = _pixels(points)
@@ -64,11 +66,12 @@ def png(fields: Mapping[str, np.ndarray], values: np.ndarray) -> bytes:
     inside = np.zeros(len(points))
     inside[cells[fields["region"] > 0.5]] = 1.0
     interpolated = interpolate(points, cells, np.column_stack([values, inside]), places)
-    shades, body = interpolated.T.reshape(2, len(y), len(x))
+    shades, shares = interpolated.T.reshape(2, len(y), len(x))
+    body = shares > 0.999
     least = values.min()
     span = values.max() - least or 1.0
     levels = np.clip((shades - least) / span * (LEVELS - 1), 0, LEVELS - 1).astype(np.uint8)
-    levels[_edges(body > 0.999)] = LEVELS
+    levels[body & ~ndimage.binary_erosion(body, border_value=1)] = LEVELS
     return _encoded(levels[::-1])
 
 
@@ -79,13 +82,6 @@ def _pixels(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     counts = np.maximum(1, np.round((high - low) / size)).astype(int)
     x, y = (a + (np.arange(n) + 0.5) * (b - a) / n for a, b, n in zip(low, high, counts))
     return x, y
-
-
-def _edges(inside: np.ndarray) -> np.ndarray:
-    """Pixels inside that have a neighbour outside: above, below or beside."""
-    padded = np.pad(inside, 1, mode="edge")
-    all_in = padded[2:, 1:-1] & padded[:-2, 1:-1] & padded[1:-1, 2:] & padded[1:-1, :-2]
-    return inside & ~all_in
 
 
 def _encoded(levels: np.ndarray) -> bytes:

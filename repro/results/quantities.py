@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 
@@ -110,6 +111,7 @@ def ending(name: str) -> str:
     return max((each for each in UNITS if name.endswith(each)), key=len, default="")
 
 
+@cache
 def unit_of(name: str) -> Unit:
     """Return the unit at the end of a name."""
     return UNITS.get(ending(name), PURE)

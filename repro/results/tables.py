@@ -6,6 +6,8 @@ import difflib
 from collections.abc import Iterator, Mapping, Sequence
 from html import escape
 from importlib import import_module
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -13,11 +15,13 @@ from repro import results
 from repro.errors import RunEnd
 from repro.march.loop import SAME_TIME
 from repro.march.simulation import simulate
-from repro.results import names, picture
+from repro.results import drawing, names, picture
 from repro.results.field_files import Grid
 from repro.results.netcdf import TIME
 from repro.results.quantities import plain as unit
 from repro.scene import Source, load_scene
+from repro.scene.arguments import typed
+from repro.timing import progress_bar
 
 #: Number of first and of last times in the table of a notebook.
 END_TIMES = 5
@@ -36,6 +40,8 @@ class Results(Mapping[str, np.ndarray]):
         Fields of each row, as :meth:`fields` returns them.
     status : str
         How the run ended.
+    folder : Path, optional
+        Folder of the run; None if it is not on the disk.
 
     Notes
     -----
@@ -50,7 +56,8 @@ class Results(Mapping[str, np.ndarray]):
     """
 
     def __init__(self, name: str, rows: list[dict[str, float | None]],
-                 fields: Sequence[Mapping[str, np.ndarray]], status: str):
+                 fields: Sequence[Mapping[str, np.ndarray]], status: str,
+                 folder: Path | None = None):
         self.columns: dict[str, np.ndarray] = {}
         for key in results.COLUMNS:
             values = [row[key] for row in rows]
@@ -59,6 +66,7 @@ class Results(Mapping[str, np.ndarray]):
                                               for value in values])
         self.name = name
         self.status = status
+        self.folder = folder
         self._fields = fields
 
     def __getitem__(self, name: str) -> np.ndarray:
@@ -85,13 +93,19 @@ class Results(Mapping[str, np.ndarray]):
         """Reported times, h."""
         return self.columns[TIME]
 
-    def fields(self, time: float) -> Mapping[str, np.ndarray]:
+    def _ipython_key_completions_(self) -> list[str]:
+        """Names of columns that IPython offers."""
+        return list(self.columns)
+
+    def fields(self, time: float, method: str | None = None) -> Mapping[str, np.ndarray]:
         """Return the fields at a reported time.
 
         Parameters
         ----------
         time : float
             Hours.
+        method : str, optional
+            "nearest" takes the nearest row; by default, the time must be that of a row.
 
         Returns
         -------
@@ -103,7 +117,9 @@ class Results(Mapping[str, np.ndarray]):
         Raises
         ------
         KeyError
-            If the time is not a reported one.
+            If the time is not a reported one: names the rows beside it.
+        ValueError
+            If the method is another one.
 
         Examples
         --------
@@ -112,11 +128,137 @@ class Results(Mapping[str, np.ndarray]):
         >>> fields["places_um"].shape[1], fields["triangles"].shape[1]
         (2, 3)
         """
+        return self._fields[self._row(time, method)]
+
+    def _row(self, time: float, method: str | None) -> int:
+        """Find the row at, or nearest to, a time (h)."""
+        if method not in (None, "nearest"):
+            raise ValueError(f'method: None or "nearest" is needed, not {method!r}')
         apart = np.abs(self.time - time)
-        if not (apart <= SAME_TIME).any():
-            near = f"the nearest is {self.time[apart.argmin()]} h" if len(apart) else "none is"
-            raise KeyError(f"{time} h: not a reported time; {near}")
-        return self._fields[int(apart.argmin())]
+        if len(apart) and (apart.min() <= SAME_TIME or method and np.isfinite(time)):
+            return int(apart.argmin())
+        raise KeyError(f"{time} h: not a reported time; {self._rows_beside(time)}")
+
+    def _rows_beside(self, time: float) -> str:
+        """Say which rows exist: all times, or the nearest ones before and after a time (h)."""
+        count = len(self.time)
+        if not count:
+            return "there is no row"
+        after = int(np.searchsorted(self.time, time))
+        beside = self.time[max(after - 1, 0):after + 1]
+        near = " and ".join(f"{each:.6g}" for each in beside)
+        return (f"the nearest rows are at {near} h, of {count} from {self.time[0]:.6g} to "
+                f'{self.time[-1]:.6g} h; method="nearest" takes the nearest')
+
+    @typed
+    def plot(self, name: str | None = None, *, time: float | None = None, ax: Any = None) -> Any:
+        r"""Draw the run with matplotlib: curves over time, one column, or a field.
+
+        Parameters
+        ----------
+        name : str, optional
+            A column or a field, with its unit or without. By default, the curves of conductivity,
+            thickness and effluents are drawn that the scene has.
+        time : float, optional
+            Time of the field in hours; the nearest row is drawn, by default the last one.
+        ax : matplotlib.axes.Axes or list of these, optional
+            Axes to draw in, by default those of a new figure. Curves need as many as they have
+            panels.
+
+        Returns
+        -------
+        matplotlib.axes.Axes or list of these
+            The axes; a list of panels if there is no name.
+
+        Raises
+        ------
+        ImportError
+            If matplotlib is not installed; names the extra to install.
+        KeyError
+            If the run has no column and no field of this name.
+        ValueError
+            If a time is given without a field, or ``ax`` has another number of axes.
+
+        Examples
+        --------
+        >>> import repro
+        >>> results = repro.solve("base", ['growth.end="1 h"'])
+        >>> [panel.get_ylabel() for panel in results.plot()]
+        ['conductivity\n(m/day)', 'thickness\n(um)', 'effluent\n(mg/L)']
+        >>> results.plot("acceptor", time=0.5).get_title(loc="left")
+        'base, t = 0.6 h'
+        """
+        row = len(self.time) - 1 if time is None else self._row(time, "nearest")
+        column = drawing.full_name(name or "", list(self.columns))
+        if name is None or column:
+            if time is not None:
+                raise ValueError(f"time: {column or 'a plot without a name'} is drawn over all "
+                                 "times; the name of a field is needed")
+            panels: Sequence[Sequence[str]] = [(column,)] if column else self._panels()
+            axes = drawing.curves(self, panels, ax)
+            return axes[0] if column else axes
+        fields = self._fields[row] if row >= 0 else {}
+        title = drawing.heading(self, self.time[row]) if row >= 0 else ""
+        return drawing.field(fields, self._field(name, fields), title, ax)
+
+    def _panels(self) -> list[tuple[str, ...]]:
+        """Find the columns of each panel of curves. Raises KeyError if the scene has none."""
+        panels = [panel for panel in drawing.PANELS if set(panel) <= set(self.columns)]
+        if not panels:
+            raise KeyError("this scene has no curves of flow, growth or uptake; name a column")
+        return panels
+
+    def _field(self, name: str, fields: Mapping[str, np.ndarray]) -> str:
+        """Full name of a field. Raises KeyError, with the nearest name, if there is none."""
+        drawn = [each for each in fields if each not in ("places_um", "triangles")]
+        field = drawing.full_name(name, drawn)
+        if not field:
+            near = difflib.get_close_matches(name, [*self.columns, *drawn], n=1, cutoff=0.5)
+            meant = f"; did you mean {near[0]}?" if near else ""
+            raise KeyError(f"{name}: this run has no such column or field{meant}")
+        return field
+
+    @typed
+    def animate(self, name: str, file: str | Path, *, ax: Any = None) -> Any:
+        """Write a field at all reported times as a film, with one scale of colours.
+
+        Parameters
+        ----------
+        name : str
+            A field, with its unit or without.
+        file : str or Path
+            File to write; it ends in .gif.
+        ax : matplotlib.axes.Axes, optional
+            Axes to draw in, by default those of a new figure.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            The axes with the last time.
+
+        Raises
+        ------
+        ImportError
+            If matplotlib is not installed; names the extra to install.
+        KeyError
+            If the run has no field of this name.
+        ValueError
+            If the name of the file ends otherwise.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> import repro
+        >>> results = repro.solve("base", ['growth.end="0.4 h"'])
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     axes = results.animate("acceptor", f"{folder}/film.gif")
+        >>> axes.get_title(loc="left")
+        'base, t = 0.4 h'
+        """
+        if Path(file).suffix != ".gif":
+            raise ValueError(f"file: {file}: a file name that ends in .gif is needed")
+        fields = self._fields[-1] if len(self.time) else {}
+        return drawing.film(self, self._field(name, fields), Path(file), ax)
 
     def to_pandas(self):
         """Return the columns as a ``pandas.DataFrame``.
@@ -208,7 +350,9 @@ def _package(name: str):
         raise ImportError(f"the package {name} is not installed; pip install {name}") from None
 
 
-def solve(scene: Source, overrides: Sequence[str] = (), unset: Sequence[str] = ()) -> Results:
+@typed
+def solve(scene: Source, overrides: Sequence[str] = (), *, unset: Sequence[str] = (),
+          progress: bool = False) -> Results:
     """Run a scene and keep its rows and fields in memory.
 
     Parameters
@@ -219,6 +363,8 @@ def solve(scene: Source, overrides: Sequence[str] = (), unset: Sequence[str] = (
         Texts "KEY=VALUE" that set keys of the scene.
     unset : sequence of str
         Keys to leave out.
+    progress : bool, optional
+        Show a bar of the simulated time (h), by ``tqdm.auto``.
 
     Returns
     -------
@@ -231,6 +377,8 @@ def solve(scene: Source, overrides: Sequence[str] = (), unset: Sequence[str] = (
         If the scene is not accepted.
     SimulationError
         If a stage fails.
+    TypeError
+        If an argument has a wrong type: names the argument.
 
     Examples
     --------
@@ -239,16 +387,19 @@ def solve(scene: Source, overrides: Sequence[str] = (), unset: Sequence[str] = (
     >>> results.units["conductivity_m_per_d"]
     'm/d'
     """
-    scene = load_scene(scene, overrides, unset)
+    scene = load_scene(scene, overrides, unset=unset)
+    duration = scene.growth.end if scene.growth else 0.0
     rows = []
     fields = []
     status = "completed"
-    try:
-        for instant in simulate(scene):
-            rows.append(results.row(scene, instant))
-            fields.append(arrays(results.fields(scene, instant.pore, instant.solved)))
-    except RunEnd as end:
-        status = str(end)
+    with progress_bar(progress, "h") as show:
+        try:
+            for instant in simulate(scene):
+                rows.append(results.row(scene, instant))
+                fields.append(arrays(results.fields(scene, instant.pore, instant.solved)))
+                show(instant.pore.time, duration)
+        except RunEnd as end:
+            status = str(end)
     return Results(scene.name, rows, fields, status)
 
 

@@ -7,7 +7,7 @@
     checkpoint    checkpoint files
     folder        the run's own files in its folder
     integrity     checks files by their SHA-256
-    loading       reads the results
+    scripts       the functions of Python: run, resume, load
     status, machine, progress, interrupts
 """
 

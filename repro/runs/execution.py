@@ -1,10 +1,11 @@
-"""Run a scene into a folder, or resume the run in a folder.
+"""Run a scene into a folder, or resume the run in a folder, for the functions of ``scripts``.
 
 Rows and fields are written as they are computed.
 """
 
 from __future__ import annotations
 
+import os
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
@@ -47,6 +48,7 @@ from repro.scene import (
     SceneError,
     Source,
     load_scene,
+    packaged_scenes,
     parse_scene,
     scene_tables,
 )
@@ -104,46 +106,12 @@ def run(scene: Source, folder: str | Path, progress: Progress = ignore_progress,
     """Run a scene and write its results to a folder.
 
     If the folder already holds a run of the same scene, code and package versions, that run is
-    resumed; a finished run is left unchanged.
+    resumed; a finished run is left unchanged. Returns how the run ended.
 
-    Parameters
-    ----------
-    scene : Scene, str, Path or dict
-        A loaded scene, a TOML file, the name of a packaged scene, or a dict of tables.
-    folder : str or Path
-        Folder for the results. It is created if it does not exist.
-    progress : callable, optional
-        Called with the simulated time (h) after each step.
-    watch : Watch, optional
-        Receives events, sets the interval (s) between checkpoints, and can stop the run.
-    force : bool, optional
-        Remove the files of any run in the folder first.
-    origin : dict, optional
-        The ``file`` of the scene and the changes ``set`` and ``unset``, for ``run.json``.
-
-    Returns
-    -------
-    str
-        How the run ended: "completed", or where the model itself ended it.
-
-    Raises
-    ------
-    SceneError
-        If the scene is not accepted, or the machine lacks a package or the memory that it needs.
-    OutputError
-        If the folder holds anything else, cannot be used, or is used by another run.
-    SimulationError
-        If a stage fails. All results so far are written, and :func:`resume` continues the run.
-    Interrupted
-        If ``watch.stop`` asks the run to stop. All results so far are written.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> import repro
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     repro.run("flow_only", folder)
-    'completed'
+    progress: called with the simulated time (h) after each step; force: remove the files of any run
+    in the folder first; origin: for ``run.json``, from :func:`origin_of`. Raises the errors of
+    :func:`repro.run`, and Interrupted if ``watch.stop`` asks the run to stop; all results so far
+    are written.
     """
     scene = load_scene(scene)
     folder = Path(folder)
@@ -162,6 +130,12 @@ def run(scene: Source, folder: str | Path, progress: Progress = ignore_progress,
         _refuse_another(recorder, record)
         prepare(folder, recorder.run_files)
         return _continue(recorder, record, progress, watch)
+
+
+def origin_of(scene: str | Path, overrides: Sequence[str], unset: Sequence[str]) -> dict:
+    """Describe the origin of a scene for ``run.json``: a packaged name or a path, and changes."""
+    file = scene if scene in packaged_scenes() else os.path.abspath(scene)
+    return {"file": file, "set": list(overrides), "unset": list(unset)}
 
 
 def _require(scene: Scene, watch: Watch) -> None:
@@ -203,53 +177,16 @@ def _text(value: object) -> str:
     return "not set" if value is None else str(value)
 
 
-def resume(folder: str | Path, progress: Progress = ignore_progress,
-           watch: Watch = DEFAULT_WATCH, *, overrides: Sequence[str] = ()) -> str:
-    """Resume a run that was interrupted, was killed or has failed, or make a run longer.
+def resume(folder: str | Path, overrides: Sequence[str] = (), progress: Progress = ignore_progress,
+           watch: Watch = DEFAULT_WATCH) -> str:
+    """Resume the run in a folder, or make it longer; returns how it ended.
 
-    The results are equal, bit for bit, to those of an uninterrupted run. A warning is issued if
-    package versions have changed or a checkpoint cannot be used.
-
-    Parameters
-    ----------
-    folder : str or Path
-        Folder of the run.
-    progress : callable, optional
-        Called with the simulated time (h) after each step.
-    watch : Watch, optional
-        Receives events, sets the interval (s) between checkpoints, and can stop the run.
-    overrides : sequence of str, optional
-        A later end, such as ``['growth.end="30 h"']``. No other key can be changed. The longer run
-        equals a run that had this end from its start.
-
-    Returns
-    -------
-    str
-        How the run ended. The status of a finished run is returned at once.
-
-    Raises
-    ------
-    OutputError
-        If the folder holds no run, cannot be used, or is used by another run.
-    SceneError
-        If the new end is not later, or the machine lacks a package or the memory needed.
-    SimulationError
-        If a stage fails.
-    Interrupted
-        If ``watch.stop`` asks the run to stop.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> import repro
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     _ = repro.run("flow_only", folder)
-    ...     repro.resume(folder)
-    'completed'
+    The arguments and errors are those of :func:`repro.resume` and :func:`run`. A warning is issued
+    if package versions have changed or a checkpoint cannot be used.
     """
     folder = Path(folder)
     if not is_file(folder / PROVENANCE):
-        raise OutputError(f"--resume {folder}: there is no run.json; the folder of a run is needed")
+        raise OutputError(f"{folder}: there is no run.json; the folder of a run is needed")
     with locked(folder, watch.patience):
         record = read_record(folder)
         run_files = list_written_files(folder, record)
@@ -317,7 +254,7 @@ def _warn_changed_file(recorder: Recorder, watch: Watch) -> None:
     if "file" not in origin:
         return
     with suppress(SceneError):  # the file is gone, or no scene now
-        current = load_scene(origin["file"], origin.get("set", ()), origin.get("unset", ()))
+        current = load_scene(origin["file"], origin.get("set", ()), unset=origin.get("unset", ()))
         differing = differences(scene_tables(recorder.scene), scene_tables(current))
         if differing:
             watch.warn(f"{origin['file']}: it is not the scene of the run any more: "

@@ -2,22 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import numpy as np
-
-from repro import results
 from repro.errors import CheckpointError
 from repro.results.files import is_file, sha256_of
 from repro.results.quantities import Quantity
-from repro.runs.checkpoint import Arrays
 
 #: Rows of a table, each a list of numbers or None.
 Table = list[list]
-#: The columns of each table of a history.
-TABLES = {"rows": results.COLUMNS, "ledgers": results.LEDGER_COLUMNS}
 
 
 @dataclass
@@ -66,42 +59,10 @@ def fields_name(kind: str, number: int) -> str:
     return f"fields/{kind}_{number:04d}.vtu"
 
 
-def pack_history(history: History) -> tuple[dict, Arrays]:
-    """Convert a history to values for JSON, and the numbers of its tables as arrays."""
-    values = vars(history)
-    plain = {name: value for name, value in values.items() if name not in TABLES}
-    arrays = {name: _numbers(values[name], columns) for name, columns in TABLES.items()}
-    return plain, arrays | {"integers": _integers(history.rows)}
-
-
-def _numbers(rows: Table, columns: list[str]) -> np.ndarray:
-    """(R, C) the numbers of a table, NaN for None."""
-    flat = [math.nan if value is None else value for row in rows for value in row]
-    return np.array(flat, dtype=float).reshape(len(rows), len(columns))
-
-
-def _integers(rows: Table) -> np.ndarray:
-    """(R, C) True for integers, which are written without a decimal point."""
-    return np.array([[isinstance(value, int) for value in row] for row in rows], dtype=bool)
-
-
-def unpack_history(plain: dict, arrays: Arrays) -> History:
-    """Invert :func:`pack_history`."""
-    ledgers = arrays["ledgers"]
+def restore_history(plain: dict) -> History:
+    """The history of ``vars(history)`` after a round trip through JSON."""
     pairs = {name: list(map(tuple, plain[name])) for name in ("index", "before")}
-    return History(rows=_table(arrays["rows"], arrays["integers"]),
-                  ledgers=_table(ledgers, np.zeros_like(ledgers, dtype=bool)), **plain | pairs)
-
-
-def _table(numbers: np.ndarray, integers: np.ndarray) -> Table:
-    """The rows of a table from its numbers and a mask of its integers."""
-    return [list(map(_value, *row)) for row in zip(numbers.tolist(), integers.tolist())]
-
-
-def _value(number: float, is_integer: bool):
-    if math.isnan(number):
-        return None
-    return int(number) if is_integer else number
+    return History(**plain | pairs)
 
 
 def require_fields(folder: Path, history: History) -> None:

@@ -21,14 +21,14 @@ from repro.scene import Scene, SceneError
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 #: The packages that compute the numbers of a run.
 ROOMS = ("scene", "fem", "model", "march", "results")
-#: A docstring that fills its lines, a comment, or another string, which may look like either.
+#: A comment, or a string, which may look like one. Each alternative begins with a fixed character.
 REMARK = re.compile(r"""
-    (?P<indent>^[ ]*)r?\"{3}(?:[^\\]|\\.)*?\"{3}[ ]*$
-    | [ ]*\#[^\n]*
-    | (?P<string> (?P<quote>\"{3}|'{3})(?:[^\\]|\\.)*?(?P=quote)
-                | \"(?:[^"\\\n]|\\.)*\" | '(?:[^'\\\n]|\\.)*' )
-    """, re.VERBOSE | re.MULTILINE | re.DOTALL)
-EMPTY = re.compile(r"\n\s*\n")
+    \#[^\n]*
+    | \"{3}[^"\\]*(?:(?:\\.|\"{1,2}(?!\"))[^"\\]*)*\"{3}
+    | '{3}[^'\\]*(?:(?:\\.|'{1,2}(?!'))[^'\\]*)*'{3}
+    | \"[^"\\\n]*(?:\\.[^"\\\n]*)*\"
+    | '[^'\\\n]*(?:\\.[^'\\\n]*)*'
+    """, re.VERBOSE | re.DOTALL)
 #: {(key of numerics, choice): the optional package that it needs}
 OPTIONAL = {("ordering", "metis"): "pymetis", ("solver", "pardiso"): "pypardiso"}
 
@@ -56,13 +56,21 @@ def source_hash() -> str:
 
 def statements(source: str) -> str:
     """Source text without comments and empty lines, with ``...`` for each docstring."""
-    return EMPTY.sub("\n", REMARK.sub(_without_remark, source)).strip()
+    lines = REMARK.sub(_without_remark, source).split("\n")
+    return "\n".join(line.rstrip() for line in lines if line.strip())
 
 
 def _without_remark(match: re.Match) -> str:
-    if match["indent"] is not None:
-        return f"{match['indent']}..."
-    return match["string"] or ""
+    """A comment becomes empty, a string that fills its lines an ellipsis."""
+    text = match[0]
+    if text.startswith("#"):
+        return ""
+    source = match.string
+    start = source.rfind("\n", 0, match.start()) + 1
+    fills = source[start:match.start()].isspace() or start == match.start()
+    end = source.find("\n", match.end())
+    fills = fills and not source[match.end():end].strip()
+    return "..." if fills and text.startswith('"""') else text
 
 
 def conditions() -> dict:

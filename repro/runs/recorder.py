@@ -31,9 +31,8 @@ from repro.runs.history import (
     COUNTS,
     History,
     fields_name,
-    pack_history,
     require_fields,
-    unpack_history,
+    restore_history,
 )
 from repro.runs.machine import conditions
 from repro.runs.status import RUNNING, is_over
@@ -258,7 +257,7 @@ class Recorder:
         """
         plain, arrays = checkpoint.read_checkpoint(path)
         state = state_arrays.unpack_state(self.scene, plain["state"], arrays)
-        before = unpack_history(plain["record"], arrays)
+        before = restore_history(plain["record"])
         require_fields(self.folder, before)
         self.state = state
         self.history = before
@@ -296,8 +295,7 @@ def pack_checkpoint(scene: Scene, state: RestartState,
                     history: History) -> tuple[dict, checkpoint.Arrays]:
     """Pack a state and a history for a checkpoint."""
     state_values, arrays = state_arrays.pack_state(scene, state)
-    history_values, tables = pack_history(history)
-    return {"state": state_values, "record": history_values}, arrays | tables
+    return {"state": state_values, "record": vars(history)}, arrays
 
 
 def _unwritten_files(scene: Scene) -> set[str]:

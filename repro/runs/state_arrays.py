@@ -7,8 +7,7 @@ they belong to the scene.
 from __future__ import annotations
 
 from dataclasses import asdict, astuple
-
-import numpy as np
+from typing import Any
 
 from repro.errors import CheckpointError
 from repro.fem.linear import Method
@@ -40,33 +39,28 @@ def pack_state(scene: Scene, state: RestartState) -> tuple[dict, Arrays]:
         arrays["last"] = pore.last
     if guess:
         arrays |= {name: getattr(guess, name) for name in OF_GUESS}
-    arrays["pending"] = np.array([_numbers(ledger) for ledger in state.ledgers], dtype=float)
     plain = {"scene": scene_hash(scene), "time_h": pore.time, "pace": asdict(state.step_control),
              "ends_um": [float(x) for x in pore.mesh.ends], "front": float(pore.front),
              "guess": guess.iterations if guess else None, "remeshes": int(state.remeshes),
-             "iterations": state.iterations, "row_h": float(state.row)}
+             "iterations": state.iterations, "row_h": float(state.row),
+             "ledgers": list(map(astuple, state.ledgers))}
     return plain, arrays
-
-
-def _numbers(ledger: Ledger) -> list[float]:
-    """The numbers of a ledger in the order of its fields, with pairs flattened."""
-    return [float(value) for part in astuple(ledger) for value in np.atleast_1d(part)]
 
 
 def unpack_state(scene: Scene, plain: dict, arrays: Arrays) -> RestartState:
     """Invert :func:`pack_state`. Raises CheckpointError if the state is of another scene."""
     if plain["scene"] != scene_hash(scene):
         raise CheckpointError("it is of another scene")
-    ledgers = tuple(map(_ledger, arrays["pending"].tolist()))
+    ledgers = tuple(map(_ledger, plain["ledgers"]))
     step_control = StepControl(**plain["pace"])
     return RestartState(_pore(scene, plain, arrays), step_control, ledgers, plain["remeshes"],
                         plain["iterations"], plain["row_h"])
 
 
-def _ledger(row: list[float]) -> Ledger:
-    """Invert :func:`_numbers`."""
-    supplied, out, consumed, stored = zip(row[2:10:2], row[3:10:2])
-    return Ledger(row[0], row[1], supplied, out, consumed, stored, *row[10:])
+def _ledger(parts: list) -> Ledger:
+    """A ledger from its fields; JSON has lists for the pairs of acceptor and donor."""
+    values: list[Any] = [tuple(part) if isinstance(part, list) else part for part in parts]
+    return Ledger(*values)
 
 
 def _pore(scene: Scene, plain: dict, arrays: Arrays) -> Pore:

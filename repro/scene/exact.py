@@ -1,16 +1,14 @@
-"""Common units of scenes as exact fractions of SI units, and their products.
+"""Symbols of common units as exact fractions of SI units, and their products.
 
-:mod:`repro.scene.units` converts all other units with pint, whose import takes half a second. A
-test compares each factor with that of pint.
+:mod:`repro.scene.units` converts all other units, names such as "micrometers" among them, with
+pint, whose import takes half a second. A test compares each factor with that of pint.
 """
 import re
 from fractions import Fraction
 from typing import NamedTuple
 
-SHORT = {"": 0, "n": -9, "u": -6, "\u00b5": -6, "\u03bc": -6, "m": -3, "c": -2, "d": -1, "h": 2,
-         "k": 3, "M": 6, "G": 9}
-LONG = {"": 0, "nano": -9, "micro": -6, "milli": -3, "centi": -2, "deci": -1, "hecto": 2, "kilo": 3,
-        "mega": 6, "giga": 9}
+PREFIXES = {"": 0, "n": -9, "u": -6, "\u00b5": -6, "\u03bc": -6, "m": -3, "c": -2, "d": -1,
+            "h": 2, "k": 3, "M": 6, "G": 9}
 PI = Fraction("3.1415926535897932384626433832795028841971693993751")  # as many digits as pint's
 FACTOR = re.compile(r"(?P<sign>[*/ ]*)(?P<name>[^\W\d_]+)(?:(?:\^|\*\*)(?P<power>-?[1-9]))?")
 
@@ -31,10 +29,10 @@ class Unit(NamedTuple):
         return Unit(self.size * other.size, *(a + b for a, b in zip(self[1:], other[1:])))
 
 
-def _prefixed(names: str, unit: Unit, prefixes: dict[str, int]) -> dict[str, Unit]:
+def _prefixed(names: str, unit: Unit) -> dict[str, Unit]:
     """Every name with every prefix."""
     return {prefix + name: unit._replace(size=unit.size * Fraction(10) ** power)
-            for name in names.split() for prefix, power in prefixes.items()}
+            for name in names.split() for prefix, power in PREFIXES.items()}
 
 
 def _plain(names: str, unit: Unit) -> dict[str, Unit]:
@@ -45,29 +43,19 @@ METER = Unit(Fraction(1), length=1)
 GRAM = Unit(Fraction(1, 1000), mass=1)
 SECOND = Unit(Fraction(1), time=1)
 LITER = Unit(Fraction(1, 1000), length=3)
-NEWTON = Unit(Fraction(1), length=1, mass=1, time=-2)
 PASCAL = Unit(Fraction(1), length=-1, mass=1, time=-2)
 DAY = SECOND._replace(size=Fraction(86_400))
 #: Every known spelling.
 UNITS: dict[str, Unit] = {
-    **_prefixed("m", METER, SHORT),
-    **_prefixed("meter meters metre metres", METER, LONG),
+    **_prefixed("m", METER),
     **_plain("micron microns", METER._replace(size=Fraction(1, 10**6))),
-    **_prefixed("g", GRAM, SHORT),
-    **_prefixed("gram grams", GRAM, LONG),
-    **_prefixed("L l", LITER, SHORT),
-    **_prefixed("liter liters litre litres", LITER, LONG),
-    **_prefixed("s", SECOND, SHORT),
-    **_prefixed("second seconds", SECOND, LONG),
-    **_plain("sec", SECOND),
+    **_prefixed("g", GRAM),
+    **_prefixed("L l", LITER),
+    **_prefixed("s", SECOND),
     **_plain("min minute minutes", SECOND._replace(size=Fraction(60))),
     **_plain("h hr hour hours", SECOND._replace(size=Fraction(3600))),
     **_plain("d day days", DAY),
-    **_plain("week weeks", DAY._replace(size=7 * DAY.size)),
-    **_plain("yr year years", DAY._replace(size=Fraction(1461, 4) * DAY.size)),
-    **_prefixed("N", NEWTON, SHORT),
-    **_prefixed("Pa", PASCAL, SHORT),
-    **_prefixed("pascal pascals", PASCAL, LONG),
+    **_prefixed("Pa", PASCAL),
     **_plain("bar", PASCAL._replace(size=Fraction(100_000))),
     **_plain("mbar", PASCAL._replace(size=Fraction(100))),
     **_plain("rad radian radians", Unit(Fraction(1))),

@@ -19,6 +19,7 @@ from math import inf
 from pathlib import Path
 from typing import ClassVar, NamedTuple
 
+from repro.scene.arguments import typed
 from repro.scene.files import key_of, leave_out, override, packaged_scenes, read_tables
 from repro.scene.needed import MissingError, needed
 from repro.scene.reading import Place, dotted, entries, read_table, toml, write_table
@@ -531,12 +532,14 @@ Source = Scene | str | Path | dict
 KEYS = tuple(dotted(Scene))  # every dotted key of a scene, its sections among them
 
 
-def load_scene(source: Source, overrides: Sequence[str] = (), unset: Sequence[str] = ()) -> Scene:
+@typed
+def load_scene(scene: Source, overrides: Sequence[str] = (), *,
+               unset: Sequence[str] = ()) -> Scene:
     """Load a scene, with changes.
 
     Parameters
     ----------
-    source : Scene, str, Path or dict
+    scene : Scene, str, Path or dict
         A TOML file, the name of a packaged scene, a dict of tables like those of a file, or a
         loaded scene.
     overrides : sequence of str, optional
@@ -553,6 +556,8 @@ def load_scene(source: Source, overrides: Sequence[str] = (), unset: Sequence[st
     ------
     SceneError
         If the scene is not accepted: names the file, key, value and accepted values.
+    TypeError
+        If an argument has a wrong type: names the argument.
 
     Examples
     --------
@@ -561,10 +566,10 @@ def load_scene(source: Source, overrides: Sequence[str] = (), unset: Sequence[st
     >>> scene.pore.width, scene.flow
     (60.0, None)
     """
-    if isinstance(source, Scene) and not (overrides or unset):
-        return source
-    file = label(source)
-    tables = load_tables(source, overrides, unset)
+    if isinstance(scene, Scene) and not (overrides or unset):
+        return scene
+    file = label(scene)
+    tables = load_tables(scene, overrides, unset)
     return parse_scene(tables, Path(file).stem, file, [key_of(entry) for entry in overrides])
 
 

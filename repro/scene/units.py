@@ -20,6 +20,7 @@ from fractions import Fraction
 from functools import cache, partial
 from typing import ClassVar, NamedTuple
 
+from repro.errors import Refusal
 from repro.scene import exact
 from repro.scene.time_table import TimeTable
 
@@ -381,7 +382,7 @@ def section(kind: type, *, about: str, source: str, **default):
     return field(metadata={"section": kind, "about": about, "source": source}, **default)
 
 
-class SceneError(ValueError):
+class SceneError(Refusal, ValueError):
     """A scene is not accepted: one line names the file, key, value and accepted values.
 
     Parameters

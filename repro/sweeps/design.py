@@ -245,7 +245,7 @@ def _scene(source: str, tables: dict, factors: list[Factor], values: tuple,
     try:
         return parse_scene(tables, Path(source).stem, source)
     except SceneError as error:
-        raise SceneError(f"{run_label}: {error}") from None
+        raise SceneError(f"{run_label}: {error.args[0]}") from None
 
 
 def label(factors: list[Factor], values: tuple) -> str:

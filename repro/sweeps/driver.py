@@ -11,8 +11,10 @@ from typing import Any
 from repro.runs.folder import folder_errors
 from repro.runs.machine import require_packages
 from repro.scene import Source, label
+from repro.scene.arguments import typed
 from repro.sweeps import cluster, design, page, pool, table
 from repro.sweeps.folder import Sweep, SweepError, lock_folder
+from repro.timing import progress_bar
 
 #: The part of the first conductivity at which a pore counts as clogged.
 CLOGGED = 0.1
@@ -51,21 +53,18 @@ class Swept:
                 f"runs done, in {self.folder}>")
 
 
-def ignore_event(event: dict[str, Any]) -> None:
-    """Ignore an event."""
-
-
-def sweep(source: Source, vary: Sequence[str], folder: str | Path, overrides: Sequence[str] = (),
-          unset: Sequence[str] = (), *, samples: int | None = None, seed: int = 0,
+@typed
+def sweep(scene: Source, vary: Sequence[str], folder: str | Path, overrides: Sequence[str] = (), *,
+          unset: Sequence[str] = (), samples: int | None = None, seed: int = 0,
           workers: int | None = None, scheduler: str | None = None, clogged: float = CLOGGED,
-          tell: Tell = ignore_event) -> Swept:
+          progress: bool = False, tell: Tell | None = None) -> Swept:
     """Run a scene many times with varied keys, and write tables and a page.
 
     Finished runs in the folder are not repeated. A run that fails has a status that says so.
 
     Parameters
     ----------
-    source : Scene, str, Path or dict
+    scene : Scene, str, Path or dict
         A loaded scene, a TOML file, the name of a packaged scene, or a dict of tables.
     vary : sequence of str
         A range or a list for each varied key, such as ``"flow.mean_velocity=0.3:30 m/day:log:8"``
@@ -86,6 +85,8 @@ def sweep(source: Source, vary: Sequence[str], folder: str | Path, overrides: Se
         Address of a Dask scheduler whose workers make the runs.
     clogged : float, optional
         The part of the first conductivity at which a pore counts as clogged, without unit.
+    progress : bool, optional
+        Show a bar of the finished runs, by ``tqdm.auto``.
     tell : callable, optional
         Receives each event as a dict.
 
@@ -100,6 +101,8 @@ def sweep(source: Source, vary: Sequence[str], folder: str | Path, overrides: Se
         If a scene is not accepted.
     OutputError
         If the folder cannot be used, or the scheduler does not answer.
+    TypeError
+        If an argument has a wrong type: names the argument. Nothing is written.
 
     Examples
     --------
@@ -114,13 +117,18 @@ def sweep(source: Source, vary: Sequence[str], folder: str | Path, overrides: Se
     factors = [design.parse(text) for text in vary]
     combinations = design.grid(factors) if samples is None else design.latin(factors, samples, seed)
     with _ready(scheduler, min(workers or pool.cores(), len(combinations))) as run_points:
-        points = design.points(source, list(overrides), factors, combinations, unset)
+        points = design.points(scene, list(overrides), factors, combinations, unset)
         for point in points if scheduler is None else ():
             require_packages(point.scene)
-        plan = Sweep(Path(folder), label(source), factors, points)
-        with lock_folder(plan):
+        plan = Sweep(Path(folder), label(scene), factors, points)
+        with lock_folder(plan), progress_bar(progress, "runs") as show:
+            def report(event: dict[str, Any]) -> None:
+                show(event["done"], event["total"])
+                if tell:
+                    tell(event)
+
             try:
-                _run_missing(plan, run_points, statuses, tell)
+                _run_missing(plan, run_points, statuses, report)
             finally:
                 swept_runs = _write_results(plan, statuses, clogged)
     return Swept(plan.source, plan.folder, factors, swept_runs)

@@ -14,7 +14,8 @@
 Further keys of the parts: points of base "errors" (of the eight numbers, the larger of both times); base "wide"
 [{"preset", "seconds", "cpu", "steps", "end"}] and, kept from one benchmark to the next, "reference_values"
 [time][number]; size, whose points have no error, "nodes", "stages" {stage: s} and "ratio" (to the floor); scenes "rows"
-[{"scene", "method", "seconds", "cpu", "stages", "took", "unneeded"}]; memory "rows" [{"method", "steps", "slope",
+[{"scene", "method", "seconds", "cpu", "stages", "took", "unneeded"}]; command "rows" [{"method", "seconds", "cpu",
+"imports", "over_imports", "over_few_rows"}]; memory "rows" [{"method", "steps", "slope",
 "bound"}]. A part that does not run again keeps its entries. Not-a-number is never written.
 
 Measurement: each round runs all jobs once, so that other loads of the machine affect all jobs alike. Reading: the best

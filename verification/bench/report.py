@@ -25,6 +25,9 @@ OTHER_CODES, TIMES_FASTER = ("fipy", "py-pde, compiled"), 10.0
 FLOORS = {"from 2500 nodes on": (1.5, 1500, inf), "at 600 nodes": (2.0, 499, 1500)}
 #: Time that a scene may use beyond its own stages, over that of the complete model.
 EXCESS = 0.1
+#: Largest processor time of a run with all of its rows, over that with two.
+MOST_OVER_FEW_ROWS = {"fast": 2.0, "accurate": 1.5, "exact": 1.5}
+MOST_OVER_IMPORTS = 2.0
 NOT_MEASURED = "not measured"
 
 
@@ -32,7 +35,7 @@ def judged(record: dict) -> list[dict]:
     """All verdicts of a record; what it has not measured neither holds nor fails."""
     parts = defaultdict(dict, record["parts"])
     return [*_base(parts["base"]), *_other_codes(parts), *_steps(parts["size"]), *_scenes(parts["scenes"]),
-            *_memory(parts["memory"])]
+            *_memory(parts["memory"]), *_commands(parts["command"])]
 
 
 def verdict(claim: str, required: str, measure: Callable[..., tuple[str, bool]], *arguments) -> dict:
@@ -151,6 +154,21 @@ def _flat(part: dict, method: str) -> tuple[str, bool]:
     return description, row["slope"] <= row["bound"]
 
 
+def _commands(part: dict) -> Iterator[dict]:
+    """Verdicts on a user's own runs; none before they are measured."""
+    rows = {row["method"]: row for row in part.get("rows", ())}
+    for preset, most in MOST_OVER_FEW_ROWS.items() if rows else ():
+        yield verdict(f"base: a run in {preset} with all of its rows over one with two", f"at most {most:g} times",
+                      _ratio, rows.get(preset, {}), "over_few_rows", most)
+    if "fast" in rows:
+        yield verdict("repro run base in fast, as typed, over the import of its packages",
+                      f"at most {MOST_OVER_IMPORTS:g} times", _ratio, rows["fast"], "over_imports", MOST_OVER_IMPORTS)
+
+
+def _ratio(row: dict, key: str, most: float) -> tuple[str, bool]:
+    return f"{row[key]:.2f} times (processor time)", row[key] <= most
+
+
 WORDS = {True: "holds", False: "does not hold", None: NOT_MEASURED}
 
 
@@ -168,7 +186,7 @@ def verdicts(rows: list[dict]) -> Block:
 
 
 def blocks(name: str, part: dict) -> list[Block]:
-    """The blocks of a part with all its points, for a terminal."""
+    """The blocks of a part with all its points."""
     description = "; ".join(f"{key}: {part[key]}" for key in ("error", "reference", "repeats") if key in part)
     return [Block("heading", f"{name}: {part['title']}"), Block("text", description),
             table(("method", "", "seconds and errors"), _rows(part))]

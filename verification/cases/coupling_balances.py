@@ -316,7 +316,7 @@ def test_wedge(changes, record):
     Norm: one step from a disc of 20 um that stands on a chord, the fluid under it at 8 degrees.
     """
     scene = runs.base("0.2 h", *changes)
-    instants = list(simulate(scene, _disc(20.0, 19.8, 60 * scene.numerics.geometry)))
+    instants = list(simulate(scene, shape=_disc(20.0, 19.8, 60 * scene.numerics.geometry)))
     gaps = [_narrowest(scene, instant.pore, BOTTOM) for instant in instants]
     error = CLOSE if scene.numerics.geometry == 2 else 1e-9
     record(at_most("narrowest gap over the least allowed, seed", gaps[0], 0.9, "8 degrees are under 16.7"),

@@ -234,14 +234,15 @@ def test_permeable_run(record):
     along the pore in the aggregate over the largest.
     """
     overrides = ["numerics.preset=fast", *TIGHT_RUN]
-    instants = list(simulate(load_scene("base", overrides, ["flow.head"])))
+    instants = list(simulate(load_scene("base", overrides, unset=["flow.head"])))
     solved = [instant.solved.concentrations for instant in instants]
     largest = max(max(each.acceptor.max(), each.donor.max()) for each in solved)
     record(at_most("largest concentration", largest / 10.0, 1.01, "half of what a solution may overshoot by"))
     end, solution = instants[-1].pore, instants[-1].solved.flow
     along = solution.velocity[np.unique(end.space.cells[end.mesh.biomass]), 0]
     record(at_least("least velocity", along.min() / along.max(), -0.01, "no node of a line of elements overshoots"))
-    scene = load_scene("base", [*overrides, "numerics.refinement=0.6", "numerics.contact_elements=10"], ["flow.head"])
+    scene = load_scene("base", [*overrides, "numerics.refinement=0.6", "numerics.contact_elements=10"],
+                       unset=["flow.head"])
     fine_mesh, _ = pore.Meshing.of(scene).generate(end.boundary)
     finer = pore.solve_flow(Space(fine_mesh, 3), scene.flow, scene.pore.length, scene.numerics)
     record(at_most("head loss", abs(solution.head_loss / finer.head_loss - 1), 0.01, "what fast is for: 1 %"))

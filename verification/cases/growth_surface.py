@@ -111,7 +111,7 @@ def plugged(preset: str, *changes: str) -> Scene:
     corners = "[[\"-10 um\", \"0 um\"], [\"-10 um\", \"20 um\"], [\"10 um\", \"20 um\"], [\"10 um\", \"0 um\"]]"
     supplies = [f'substrates.{name}.supply="1e6 mg/L"' for name in ("acceptor", "donor")]
     return load_scene("base", [*NUMERICS[preset], 'pore.width="20 um"', f"aggregate.outline={corners}", *supplies,
-                               "numerics.refinement=0.3", *changes], ["aggregate.radius"])
+                               "numerics.refinement=0.3", *changes], unset=["aggregate.radius"])
 
 
 @cache

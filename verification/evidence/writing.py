@@ -1,4 +1,4 @@
-"""One writer: blocks of text, pictures and tables, as Markdown and for a terminal; and records in JSON."""
+"""One writer: blocks of text, pictures and tables, as Markdown; and records in JSON."""
 
 import json
 from collections.abc import Iterable
@@ -56,18 +56,6 @@ def _markdown(block: Block, level: int, pictures: str) -> str:
 def markdown_row(row: Row) -> str:
     """A row of a table."""
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |"
-
-
-def plain(blocks: Iterable[Block]) -> str:
-    """For a terminal: tables in columns."""
-    return "\n".join(line for block in blocks for line in _plain(block))
-
-
-def _plain(block: Block) -> list[str]:
-    if block.kind != "table":
-        return [block.text]
-    widths = [max(map(len, column)) for column in zip(*block.rows)]
-    return ["  ".join(map(str.ljust, row, widths)).rstrip() for row in block.rows]
 
 
 def load(file: Path, empty: Any = None) -> Any:

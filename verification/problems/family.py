@@ -66,7 +66,7 @@ class Member:
     def end(self) -> float:
         """End of the run, h."""
         unset = ["flow.mean_velocity"] if self.drive == "head" else []
-        scene = load_scene("wide", [*self.sets, 'growth.end="1000 h"'], unset)
+        scene = load_scene("wide", [*self.sets, 'growth.end="1000 h"'], unset=unset)
         contact = numbers.at_end(scene).contact
         return LONGEST if contact is None else PAST_CONTACT * contact
 

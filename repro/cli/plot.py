@@ -1,0 +1,53 @@
+"""``repro plot FOLDER [FIELD] [--time HOURS] --out FILE``: draw a run in a file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from repro.cli.arguments import path
+from repro.errors import OutputError
+from repro.runs.progress import say
+
+
+def add(commands) -> None:
+    """Add the parser of this command."""
+    command = commands.add_parser(
+        "plot", help="draw curves, a field or a film of a run",
+        description="Draw the curves of a run over time. With the name of a column, draw its "
+        "curve; with that of a field, such as acceptor, draw the field at a time, or at all times "
+        "as a film if FILE ends in .gif. It needs matplotlib.")
+    command.add_argument("folder", metavar="FOLDER", type=path, help="folder of a run")
+    command.add_argument("field", metavar="FIELD", nargs="?",
+                         help="a field or a column, with or without its unit")
+    command.add_argument("--time", metavar="HOURS", type=float,
+                         help="time of the field; the nearest row is drawn (default: the last)")
+    command.add_argument("--out", metavar="FILE", type=path, required=True,
+                         help="file to write: .png, .pdf, .svg, or .gif for a film")
+    command.set_defaults(call=call)
+
+
+def call(options) -> int:
+    """Write the picture or the film."""
+    from repro.runs.scripts import load_run
+
+    results = load_run(options.folder)
+    try:
+        if options.out.suffix == ".gif":
+            if options.field is None or options.time is not None:
+                raise OutputError(f"{options.out}: a film needs FIELD, and no --time")
+            results.animate(options.field, options.out)
+        else:
+            _save(results.plot(options.field, time=options.time), options.out)
+    except (ImportError, KeyError, ValueError) as error:
+        raise OutputError(str(error.args[0])) from error
+    say(f"{options.folder}: drawn in {options.out}")
+    return 0
+
+
+def _save(axes, out: Path) -> None:
+    """Save the figure of one or of several axes."""
+    from repro.results.files import atomic_path
+
+    figure = (axes[0] if isinstance(axes, list) else axes).figure
+    with atomic_path(out) as beside:
+        figure.savefig(beside, dpi=150)

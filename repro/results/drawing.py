@@ -1,0 +1,209 @@
+"""Curves, fields and films of a run with matplotlib, an optional package."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping, Sequence
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from repro.results import names
+from repro.results.files import atomic_path
+
+if TYPE_CHECKING:
+    from repro.results.tables import Results
+
+#: The panels of curves, each with columns in one unit; a panel without columns is left out.
+PANELS: tuple[tuple[str, ...], ...] = (
+    ("conductivity_m_per_d",), ("thickness_um",),
+    ("effluent_acceptor_mg_per_L", "effluent_donor_mg_per_L"))
+#: Width of a figure, height of a panel of curves, and room above and below a field, in inches.
+WIDTH, PANEL, ROOM = 7.0, 1.9, 1.2
+#: Time of a frame of a film, ms; resolution, dots per inch.
+FRAME, RESOLUTION = 120, 110
+OUTLINE = "#d7191c"
+PYPLOT = "matplotlib.pyplot"
+#: Nodes of the straight triangles that draw a triangle, by its number of nodes.
+PARTS = {3: [[0, 1, 2]], 6: [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]]}
+#: Nodes along each edge of a triangle, by its number of nodes.
+EDGES = {3: [[0, 1], [1, 2], [2, 0]], 6: [[0, 3, 1], [1, 4, 2], [2, 5, 0]]}
+
+
+def optional(module: str) -> Any:
+    """Import a module of matplotlib or Pillow. Raises ImportError with the extra to install."""
+    try:
+        return import_module(module)
+    except ImportError:
+        raise ImportError("the package matplotlib is not installed; "
+                          "pip install 'dupin2001-repro[figures]'") from None
+
+
+def full_name(name: str, known: Sequence[str]) -> str:
+    """The known name that is equal to a name, or is without its unit; empty if there is none."""
+    matching = [each for each in known
+                if name in (each, each.removesuffix(names.ending(each)))]
+    return matching[0] if matching else ""
+
+
+def curves(results: Results, drawn: Sequence[Sequence[str]], ax: Any = None) -> list[Any]:
+    """Draw columns over time, a panel for each tuple of names; returns the axes of the panels."""
+    axes = _panels(len(drawn)) if ax is None else list(np.ravel(ax))
+    if len(axes) != len(drawn):
+        raise ValueError(f"ax: {len(drawn)} axes are needed, not {len(axes)}")
+    for panel, columns in zip(axes, drawn):
+        _draw_panel(panel, results, columns)
+    axes[-1].set_xlabel("time (h)")
+    axes[0].set_title(results.name, loc="left")
+    return axes
+
+
+def _panels(count: int) -> list[Any]:
+    size = (WIDTH, PANEL * count + 0.8)
+    _, axes = optional(PYPLOT).subplots(count, sharex=True, squeeze=False, figsize=size,
+                                        layout="constrained")
+    return list(axes[:, 0])
+
+
+def _draw_panel(ax: Any, results: Results, columns: Sequence[str]) -> None:
+    """Draw columns in one unit, and the time of contact; a point if there is one row."""
+    marker = "o" if len(results.time) == 1 else ""
+    for name in columns:
+        ax.plot(results.time, results[name], marker=marker, label=names.KNOWN[name].label)
+    if marker:
+        ax.set_xticks(results.time)
+    many = len(columns) > 1
+    ax.set_ylabel(f"{_common(columns)}\n({names.unit(columns[0]) or '1'})")
+    ax.grid(alpha=0.3)
+    touching = results.time[results["contact"] == 1] if "contact" in results else []
+    if len(touching):
+        ax.axvline(touching[0], color="0.4", linestyle=":", label="contact with the wall")
+    if many or len(touching):
+        ax.legend(frameon=False, fontsize="small")
+
+
+def _common(columns: Sequence[str]) -> str:
+    """The label of a column, or the common part of the names of several columns."""
+    if len(columns) == 1:
+        return names.KNOWN[columns[0]].label or names.words(columns[0])
+    return columns[0].partition("_")[0]
+
+
+def field(fields: Mapping[str, np.ndarray], name: str, title: str, ax: Any = None,
+          limits: np.ndarray | None = None, box: np.ndarray | None = None) -> Any:
+    """Draw a field with the outline of the aggregate and a colour bar; returns the axes.
+
+    Vectors are drawn by their lengths. limits: values of the first and last colour; box: lower left
+    and upper right corner (um). By default, they fit the field.
+    """
+    values = magnitude(fields[name])
+    limits = value_range(values) if limits is None else limits
+    (left, bottom), (right, top) = corners(fields) if box is None else box
+    if ax is None:
+        height = 0.75 * WIDTH * (top - bottom) / (right - left) + ROOM
+        _, ax = optional(PYPLOT).subplots(figsize=(WIDTH, height), layout="constrained")
+    image = _image(ax, fields, values)
+    image.set_clim(*limits)
+    _draw_outline(ax, fields)
+    bar = ax.figure.colorbar(image, cax=ax.inset_axes([1.02, 0, 0.02, 1]))
+    bar.formatter.set_powerlimits((-3, 4))
+    ax.set(xlabel="x (um)", ylabel="y (um)", aspect="equal", facecolor="0.85",
+           xlim=(left, right), ylim=(bottom, top))
+    ax.set_title(f"{title}: {names.with_unit(name)}", loc="left")
+    return ax
+
+
+def magnitude(values: np.ndarray) -> np.ndarray:
+    """(N,) values, or the lengths of vectors (N, 3)."""
+    return np.linalg.norm(values, axis=1) if values.ndim == 2 else values
+
+
+def value_range(values: np.ndarray) -> np.ndarray:
+    """(2,) the least and the largest value, without NaN."""
+    return np.array([np.nanmin(values), np.nanmax(values)])
+
+
+def corners(fields: Mapping[str, np.ndarray]) -> np.ndarray:
+    """(2, 2) lower left and upper right corner of a mesh, um."""
+    points = fields["places_um"]
+    return np.array([points.min(axis=0), points.max(axis=0)])
+
+
+def _image(ax: Any, fields: Mapping[str, np.ndarray], values: np.ndarray) -> Any:
+    """Draw values at nodes smoothly, and values in triangles as they are; NaN stays empty."""
+    cells = fields["triangles"]
+    parts = np.array(PARTS[cells.shape[1]])
+    triangles = cells[:, parts].reshape(-1, 3)
+    x, y = fields["places_um"].T
+    in_triangles = len(values) == len(cells)
+    colours = np.repeat(values, len(parts)) if in_triangles else values
+    missing = np.isnan(colours) if in_triangles else np.isnan(colours[triangles]).any(axis=1)
+    kind = {"facecolors": colours[~missing]} if in_triangles else {"shading": "gouraud"}
+    at_nodes = () if in_triangles else (np.nan_to_num(colours),)
+    return ax.tripcolor(x, y, *at_nodes, triangles=triangles[~missing], rasterized=True, **kind)
+
+
+def _draw_outline(ax: Any, fields: Mapping[str, np.ndarray]) -> None:
+    """Draw the edges that the aggregate shares with the fluid."""
+    cells = fields["triangles"]
+    edges = cells[:, EDGES[cells.shape[1]]]
+    inside = np.repeat(fields["region"] > 0.5, 3)
+    edges = edges.reshape(-1, edges.shape[2])
+    ends = np.sort(edges[:, [0, -1]], axis=1)
+    _, edge = np.unique(ends, axis=0, return_inverse=True)
+    edge = edge.ravel()
+    shared = (np.bincount(edge[inside], minlength=edge.max() + 1) == 1) & (np.bincount(edge) == 2)
+    lines = fields["places_um"][edges[inside & shared[edge]]]
+    collection = optional("matplotlib.collections").LineCollection
+    ax.add_collection(collection(lines, colors=OUTLINE, linewidths=1.5, capstyle="round"))
+
+
+def film(results: Results, name: str, file: Path, ax: Any = None) -> Any:
+    """Write the fields of all rows as an animated GIF; returns the axes with the last one.
+
+    Colours and the view are the same in all frames.
+    """
+    rows = [(time, results.fields(time)) for time in results.time]
+    bounds = np.array([value_range(magnitude(fields[name])) for _, fields in rows])
+    boxes = np.array([corners(fields) for _, fields in rows])
+    limits = np.array([bounds[:, 0].min(), bounds[:, 1].max()])
+    box = np.array([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
+    images = []
+    for time, fields in rows:
+        if ax is not None:
+            ax.clear()
+        ax = field(fields, name, heading(results, time), ax, limits, box)
+        images.append(_frame(ax.figure))
+    with atomic_path(file) as beside:
+        images[0].save(beside, format="GIF", save_all=True, append_images=images[1:],
+                       duration=FRAME, loop=0)
+    return ax
+
+
+def _frame(figure: Any) -> Any:
+    """The picture of a figure, in the colours of a film; later frames keep its layout."""
+    image = optional("PIL.Image")
+    content = io.BytesIO()
+    figure.savefig(content, format="png", dpi=RESOLUTION)
+    figure.set_layout_engine("none")
+    palette = image.new("P", (1, 1))
+    palette.putpalette(_palette().tobytes())
+    return image.open(content).convert("RGB").quantize(palette=palette, dither=0)
+
+
+def _palette() -> np.ndarray:
+    """(256, 3) colours of a film: those of the fields, greys, and shades of the outline."""
+    map_colours = optional(PYPLOT).get_cmap()(np.linspace(0, 1, 216))[:, :3]
+    greys = np.repeat(np.linspace(0, 1, 32)[:, None], 3, axis=1)
+    outline = np.array(optional("matplotlib.colors").to_rgb(OUTLINE))
+    shades = [outline + share * (map_colours[k] - outline)
+              for k in (0, 71, 143, 215) for share in (0, 0.5)]
+    colours = np.vstack([map_colours, greys, shades])
+    return (255 * colours).round().astype(np.uint8)
+
+
+def heading(results: Results, time: float) -> str:
+    """The name of a scene and a time (h)."""
+    return f"{results.name}, t = {time:.4g} h"

@@ -1,0 +1,72 @@
+"""Refuse arguments of a wrong type by their names, before a function does anything."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Sequence
+from functools import cache, wraps
+from numbers import Integral, Real
+from types import NoneType, UnionType
+from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+#: Kinds of numbers that an annotation stands for, NumPy's among them.
+NUMBERS: dict[object, type] = {float: Real, int: Integral}
+#: Characters of a refused value in a message.
+LONGEST_VALUE = 60
+
+
+def typed(function: Function) -> Function:
+    """Check the types of arguments by the annotations of their parameters.
+
+    The decorated function raises TypeError, in one line, for the first argument of a wrong type.
+    """
+    parameters = tuple(inspect.signature(function).parameters)
+    hints = cache(lambda: get_type_hints(function))
+
+    @wraps(function)
+    def call(*arguments, **keywords):
+        for name, value in (*zip(parameters, arguments), *keywords.items()):
+            if name in hints() and not _accepts(hints()[name], value):
+                kinds = _words(hints()[name])
+                raise TypeError(f"{function.__name__}: {name}: {kinds} is needed, not "
+                                f"{_short(value)}")
+        return function(*arguments, **keywords)
+
+    return call  # type: ignore[return-value]  # it has the parameters of the function
+
+
+def _accepts(hint: Any, value: object) -> bool:
+    """Does a value have the type of an annotation? Only texts are checked within sequences."""
+    if _is_union(hint):
+        return any(_accepts(each, value) for each in get_args(hint))
+    if hint is Any:
+        return True
+    kind = get_origin(hint) or hint
+    if kind is Sequence:
+        if not isinstance(value, Sequence) or isinstance(value, (str, bytes)):
+            return False
+        return str not in get_args(hint) or all(isinstance(each, str) for each in value)
+    return isinstance(value, NUMBERS.get(kind, kind))
+
+
+def _is_union(hint: Any) -> bool:
+    return get_origin(hint) in (Union, UnionType)
+
+
+def _words(hint: Any) -> str:
+    """The accepted types of an annotation, such as "str or Path"."""
+    if _is_union(hint):
+        return " or ".join(_words(each) for each in get_args(hint) if each is not NoneType)
+    if get_origin(hint) is Sequence:
+        return f"a list of {_words(get_args(hint)[0])}"
+    return getattr(hint, "__name__", str(hint))
+
+
+def _short(value: object) -> str:
+    """A value on one line, without its address."""
+    text = repr(value)
+    if " at 0x" in text:
+        text = f"a {type(value).__name__}"
+    text = " ".join(text.split())
+    return text if len(text) <= LONGEST_VALUE else text[:LONGEST_VALUE - 3] + "..."

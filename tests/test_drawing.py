@@ -1,0 +1,125 @@
+"""Pictures of results: curves, fields with the outline of the aggregate, films, and the command that draws them."""
+
+import io
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from PIL import Image, ImageSequence
+
+import repro
+from repro.cli import main
+from tests import faults
+from tests.shell import refusal
+
+CONTACT = ['numerics.preset="fast"', 'aggregate.radius="17.98 um"', 'pore.width="20 um"', 'growth.end="0.6 h"']
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    return repro.run("base", tmp_path_factory.mktemp("run"), CONTACT)
+
+
+@pytest.fixture(autouse=True)
+def close_figures():
+    yield
+    plt.close("all")
+
+
+def test_curves_are_the_columns_with_the_time_of_contact(results):
+    axes = results.plot()
+    names = ["conductivity_m_per_d", "thickness_um", "effluent_acceptor_mg_per_L", "effluent_donor_mg_per_L"]
+    lines = [axes[0].lines[0], axes[1].lines[0], *axes[2].lines[:2]]
+    assert all(np.array_equal(line.get_ydata(), results[name]) for line, name in zip(lines, names))
+    contact = results.time[results["contact"] == 1][0]
+    assert [set(axis.lines[-1].get_xdata()) for axis in axes] == [{contact}] * 3
+    assert [len(axis.lines) for axis in axes] == [2, 2, 3] and axes[0].get_ylabel() == "conductivity\n(m/day)"
+
+
+def test_axes_are_accepted_and_returned(results):
+    _, (one, two) = plt.subplots(2)
+    assert results.plot("thickness", ax=one) is one and results.plot("acceptor", ax=two) is two
+    assert len(one.lines) == 2 and len(plt.get_fignums()) == 1
+    with pytest.raises(ValueError, match="ax: 3 axes are needed, not 1"):
+        results.plot(ax=one)
+    with pytest.raises(ValueError, match="time: thickness_um is drawn over all times; the name of a field is needed"):
+        results.plot("thickness", time=0.2)
+
+
+@pytest.mark.parametrize("elements", ["linear", "quadratic"])
+@pytest.mark.parametrize("name", ["acceptor", "velocity_m_per_d", "J", "pressure"])
+def test_a_field_has_its_colours_and_the_outline(elements, name):
+    """The outline lies on the interface: ends on the wall, top at the thickness, a chain without gaps."""
+    run = repro.solve("base", ["numerics.preset=fast", f"numerics.elements={elements}", "growth.end=0.2 h"])
+    ax = run.plot(name, time=0.25)
+    fields = run.fields(0.2)
+    values = next(fields[each] for each in fields if each.startswith(name))
+    values = np.linalg.norm(values, axis=1) if values.ndim == 2 else values
+    image, outline = ax.collections
+    assert image.get_clim() == (np.nanmin(values), np.nanmax(values))
+    lines = np.array(outline.get_segments())
+    ends = lines[:, [0, -1]].reshape(-1, 2)
+    places, counts = np.unique(ends, axis=0, return_counts=True)
+    assert np.sort(counts).tolist() == [1, 1] + [2] * (len(lines) - 1)
+    tips = [[run["upstream_um"][-1], 0], [run["downstream_um"][-1], 0]]
+    assert np.allclose(sorted(places[counts == 1].tolist()), tips, atol=1e-6)
+    assert lines[..., 1].max() == pytest.approx(run["thickness_um"][-1])
+    assert ax.get_title(loc="left").startswith("base, t = 0.2 h: ") and ax.child_axes
+
+
+def test_a_film_has_every_row_in_one_view_and_one_palette(results, tmp_path):
+    """The pixels of the colour bar and of the axes do not change."""
+    ax = results.animate("donor", tmp_path / "film.gif")
+    with Image.open(tmp_path / "film.gif") as film:
+        frames = np.array([np.asarray(frame.convert("RGB")) for frame in ImageSequence.Iterator(film)])
+    assert len(frames) == len(results.time) and ax.get_title(loc="left").startswith("base, t = 0.6 h")
+    width = frames.shape[2]
+    right = frames[:, :, int(0.93 * width):]
+    assert (right == right[0]).all() and len(np.unique(right[0].reshape(-1, 3), axis=0)) > 50
+    assert (frames[0] != frames[-1]).any()
+
+
+@pytest.mark.parametrize("call, error, message", [
+    (lambda run, file: run.animate("donor", file.with_suffix(".mp4")), ValueError, "a file name that ends in .gif"),
+    (lambda run, file: run.animate("doner", file), KeyError, "no such column or field; did you mean donor"),
+    (lambda run, file: run.plot("doner"), KeyError, "no such column or field; did you mean donor"),
+    (lambda run, file: run.plot("acceptor", time="1"), TypeError, "plot: time: float is needed, not '1'"),
+    (lambda run, file: repro.solve({"pore": {"width": "50 um"}}).plot(), KeyError, "no curves of flow"),
+])
+def test_a_wrong_request_is_refused_and_nothing_is_written(results, tmp_path, call, error, message):
+    with pytest.raises(error, match=message):
+        call(results, tmp_path / "film.gif")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_matplotlib_is_an_extra(results, monkeypatch, tmp_path, capsys):
+    faults.remove_package(monkeypatch, "matplotlib.pyplot")
+    message = "the package matplotlib is not installed; pip install 'dupin2001-repro[figures]'"
+    for draw in (results.plot, lambda: results.plot("donor"), lambda: results.animate("donor", tmp_path / "film.gif")):
+        with pytest.raises(ImportError) as caught:
+            draw()
+        assert str(caught.value) == message
+    assert message in refusal(tmp_path, capsys, "plot", results.folder, "--out", tmp_path / "curves.png")
+
+
+def test_the_command_draws_the_same(results, tmp_path, capsys):
+    pictures = ([], results.plot()[0]), (["acceptor", "--time", "0.2"], results.plot("acceptor", time=0.2))
+    for arguments, draw in pictures:
+        out = tmp_path / "picture.png"
+        assert main(["plot", str(results.folder), *arguments, "--out", str(out)]) == 0
+        expected = io.BytesIO()
+        draw.figure.savefig(expected, dpi=150)
+        expected.seek(0)
+        assert np.array_equal(plt.imread(out), plt.imread(expected)) and str(out) in capsys.readouterr().out
+    assert main(["plot", str(results.folder), "donor", "--out", str(tmp_path / "film.gif")]) == 0
+    with Image.open(tmp_path / "film.gif") as film:
+        assert film.n_frames == len(results.time)
+
+
+@pytest.mark.parametrize("arguments, message", [
+    (["doner", "--out", "x.png"], "did you mean donor"), (["--out", "x.gif"], "a film needs FIELD, and no --time"),
+    (["donor", "--time", "1", "--out", "x.gif"], "no --time"), (["--out", "x.txt"], "is not supported"),
+    (["thickness", "--time", "1", "--out", "x.png"], "time: thickness_um is drawn over all times")])
+def test_the_command_refuses_in_one_line(results, tmp_path, capsys, monkeypatch, arguments, message):
+    monkeypatch.chdir(tmp_path)
+    assert message in refusal(tmp_path, capsys, "plot", results.folder, *arguments) and not list(tmp_path.iterdir())
