@@ -15,11 +15,13 @@ import pytest
 
 import paper_figures
 from paper_figures import replication
+from repro import check
 from repro.scene import load_scene, parse_scene
 from tests.blocks import ROOT, blocks, execute, is_repro, is_target, printed_lines
 from tests.test_architecture import source_files
 from verification.claims import EXPECTED
 from verification.claims.report import counted
+from verification.evidence.cases import STAGES, cases
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 
@@ -103,10 +105,10 @@ def test_every_block_is_of_a_kind_that_is_executed():
     """Only the README and the tutorial have blocks. The README begins with two commands, a picture and a scene."""
     assert {block.language for block in BLOCKS} <= {"", "console", "sh", "python", "toml"}
     assert all(is_repro(words) or is_target(words) for block in BLOCKS for words in block.commands)
-    pages = [page for page in (ROOT / "docs").glob("*.md") if page != TUTORIAL]
+    pages = [page for page in (ROOT / "docs").glob("*.md") if page not in (TUTORIAL, ROOT / "docs" / "index.md")]
     assert len(pages) >= 3 and [page.name for page in pages if "```" in page.read_text(encoding="utf-8")] == []
     readme = PAGE.read_text(encoding="utf-8")
-    assert len(readme.encode()) < 12_000 and readme.index("overview.png") < readme.index("make env") < 2_500
+    assert len(readme.encode()) < 8_500 and readme.index("overview.png") < readme.index("make env") < 2_500
 
 
 def test_the_examples_of_the_readme_run(tmp_path, capsys, monkeypatch):
@@ -145,6 +147,40 @@ def test_the_examples_of_the_tutorial_run(tmp_path, capsys, monkeypatch):
     assert (tmp_path / "runs" / "narrow" / "timeseries.csv").exists()
     assert (tmp_path / "oxygen.png").stat().st_size > 1000
     assert "WARNING" not in printed[3] and "WARNING growth.end" in printed[4]
+
+
+def test_the_examples_of_the_how_to_pages_run(tmp_path, capsys, monkeypatch):
+    """With a run of base to 1 h as runs/mine. test_sweep_cluster has clusters; PyVista reads and does not draw."""
+    monkeypatch.chdir(tmp_path)
+    assert execute(["repro", "run", "base", "--out", "runs/mine", "--set", 'growth.end="1 h"'], capsys)[0] == 0
+    seen = set()
+    for page in sorted((ROOT / "docs" / "howto").glob("*.md")):
+        for block in blocks(page):
+            seen.add(block.language)
+            for words in block.commands:
+                if "--scheduler" not in words and words[0] != "dask":
+                    assert execute(words, capsys)[0] == 0, words
+            if block.language == "toml":
+                assert "spline through 5 points" in str(check(tomllib.loads(block.text)))
+            elif block.language == "python":
+                names: dict = {}
+                exec(compile(block.text.replace("mesh.plot(", "drawn = dict("), str(page), "exec"), names)
+                assert names["drawn"]["scalars"] in names["mesh"].array_names
+    assert seen == {"console", "toml", "python"}
+
+
+def test_the_page_of_the_model_names_existing_cases_and_each_equation():
+    """Names of modules and errata are tested with those of all texts."""
+    page = text("docs/model.md")
+    named = set(re.findall(rf"`((?:{'|'.join(STAGES)})-[\w-]+)`", page))
+    assert named <= set(cases()) and len(named) > 40
+    labels = re.findall(r"\(eq-([\d-]+)\)$", page, re.M)
+    ranges = [[int(number) for number in label.split("-")] for label in labels]
+    assert {number for ends in ranges for number in range(ends[0], ends[-1] + 1)} == {*range(1, 35)}
+    assert "(35)" in page
+    relative = [name for row in re.findall(r"`repro\.model\.\w+`(?:, `\.\w+`)+", page)
+                for name in re.findall(r"`\.(\w+)`", row)]
+    assert relative and all(is_module(f"repro.model.{name}") for name in relative)
 
 
 # Texts refer to existing files, modules, statements and errata.

@@ -35,10 +35,8 @@ print(f"area: {area[0]:.0f} um2 at t = 0, {area[-1]:.0f} um2 at {results.time[-1
 # Growth nearly stops with the supply.
 
 # %%
-figure, axes = plt.subplots(figsize=(6, 3), layout="constrained")
-axes.plot(results.time, area, marker=".")
+axes = results.plot("aggregate_area")
 axes.axvline(12, linestyle=":", color="gray")
-axes.set(xlabel="time (h)", ylabel="area of the aggregate (um2)")
 plt.show()
 
 before = results.time <= 12

@@ -13,9 +13,8 @@ import matplotlib.pyplot as plt
 import repro
 
 folder = Path(tempfile.mkdtemp()) / "sweep"
-swept = repro.sweep(
-    "base", ["flow.head=0.5e-3 cm, 1e-3 cm, 2e-3 cm", "pore.width=40 um, 50 um"], folder,
-    ['numerics.preset="fast"', 'growth.end="12 h"'])
+swept = repro.sweep("base", ["flow.head=0.5e-3 cm, 1e-3 cm, 2e-3 cm", "pore.width=40 um, 50 um"], folder,
+                    ['numerics.preset="fast"', 'growth.end="12 h"'])
 print(swept)
 
 # %% [markdown]
@@ -29,9 +28,9 @@ print(", ".join(rows[0]))
 # %%
 figure, axes = plt.subplots(figsize=(6, 3.5), layout="constrained")
 for run, path in zip(swept.runs, swept.paths):
-    results = repro.load_run(path)
-    axes.plot(results.time, results["conductivity_m_per_d"], label=swept.label(run))
-axes.set(xlabel="time (h)", ylabel="conductivity (m/day)", yscale="log")
+    repro.load_run(path).plot("conductivity", ax=axes)
+    axes.lines[-1].set_label(swept.label(run))
+axes.set(title="", yscale="log")
 axes.legend(fontsize="small")
 plt.show()
 assert not swept.failed
