@@ -28,7 +28,7 @@ figures: $(STAMP) ## run the paper's simulations and draw its figures into paper
 check-manifest: $(STAMP) ## compare the data behind the figures with the committed manifest
 	@$(BIN) -m paper_figures.manifest
 
-claims: $(STAMP) ## judge the paper's claims by computed numbers, and write the replication note
+claims: $(STAMP) ## judge the paper's claims by computed numbers, and write the note and the register
 	@$(BIN) -m verification.claims
 	@$(BIN) -m paper_figures.replication
 

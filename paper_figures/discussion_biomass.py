@@ -9,13 +9,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from paper_figures import runs, states, style
+from paper_figures import figure_6, runs, states, style
 from verification.claims import discussed
 from verification.claims.discussed import LAYERS
 from verification.claims.permeability import clean, layered_share
 
 TITLE = "Addition. The same biomass as an aggregate and as layers"
-RUNS = (runs.WIDE,)
+RUNS = (runs.WIDE_CONVERGED,)
 CLAIMS = ("C38", "C45")
 COMPUTED = ("C45",)
 
@@ -54,7 +54,7 @@ def _uptake(axes: Axes, folder: Path) -> None:
     axes.plot(filled(table), discussed.shares(table), color=style.RED, label="aggregate")
     for walls, (label, linestyle) in WALLS.items():
         shares = [discussed.in_the_model(part, walls) for part in UPTAKE_SHARES[1:]]
-        axes.plot(UPTAKE_SHARES, [0.0, *shares], linestyle + ".", markersize=3, color=style.BLUE, label=label)
+        axes.plot(UPTAKE_SHARES, [0.0, *shares], linestyle, marker=".", markersize=3, color=style.BLUE, label=label)
     axes.set(title="share of the acceptor that is taken up", xlim=(0, UPTAKE_SHARES[-1]), ylim=(0, 1.03))
 
 
@@ -70,10 +70,16 @@ def caption(folder: Path) -> str:
     part, scene = float(filled(table)[-1]), runs.WIDE.load()
     falls = table["conductivity_m_per_d"][0] / table["conductivity_m_per_d"][-1]
     layers = 1 / layered_share(scene.flow.viscosity_ratio, part, 1)
-    return (f"The aggregate of Wide (red) from 0 to {table['time_h'][-1]:g} h, and layers of uniform thickness over "
-            "the whole pore (blue), against the biomass. The conductivity with layers is that of parallel flow in "
-            "closed form; the model computes their uptake. At the end of the run the aggregate fills "
-            f"{100 * part:.1f} % of the pore, whose conductivity has fallen by a factor of {falls:.3g}; a layer of the "
-            f"same biomass reduces it by a factor of {layers:.2g}. Porosity does not determine permeability. (b) The "
-            f"mean velocity and the supply are the same. At the end the aggregate takes up "
-            f"{100 * discussed.shares(table)[-1]:.0f} % of the acceptor.")
+    ratio = scene.flow.viscosity_ratio
+    ends = [layered_share(ratio, float(CONDUCTIVITY_SHARES[-1]), walls) for walls in WALLS]
+    return (f"The aggregate of Wide (red) from 0 to {table['time_h'][-1]:g} h ({figure_6.ASSUMED}), and layers of "
+            "uniform thickness over the whole pore (blue), against the biomass. (a) The conductivity with layers is "
+            "that of parallel flow in closed form. With layers on both walls it ends at 1 / lambda = "
+            f"{1 / ratio:.1g}, that of a pore full of biomass ({ends[1]:.2g} at the last point); a layer on one wall "
+            f"ends at 4 / lambda = {4 / ratio:.1g} ({ends[0]:.2g}): its face slips on the last film of water, and a "
+            "channel that is free on one side conducts four times as well as one that sticks to both walls. Only when "
+            "that film is thinner than W / lambda does it fall to 1 / lambda, too. At the end of the run the "
+            f"aggregate fills {100 * part:.1f} % of the pore, whose conductivity has fallen by a factor of "
+            f"{falls:.3g}; a layer of the same biomass reduces it by a factor of {layers:.2g}. Porosity does not "
+            "determine permeability. (b) The model computes the uptake, with the same mean velocity and supply. At "
+            f"the end the aggregate takes up {100 * discussed.shares(table)[-1]:.0f} % of the acceptor.")

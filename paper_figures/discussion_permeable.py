@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from paper_figures import runs, states, style
+from paper_figures import figure_6, runs, states, style
 
 TITLE = "Addition. A permeable body instead of a pseudoviscosity"
 RUNS = (runs.WIDE_FAST, *runs.PERMEABLE)
@@ -54,9 +54,9 @@ def caption(*folders: Path) -> str:
     columns = [conductivity_at(states.series(folder), REPORTED_HOURS) for folder in folders]
     conductivities = "; ".join("{:.3g}, {:.3g}, {:.3g} m/d at {:g} h".format(*row)
                                for row in zip(*columns, REPORTED_HOURS))
-    return ("Wide with the raised viscosity of the paper (black) and with Brinkman's drag for permeabilities of "
-            f"{runs.PERMEABILITIES[0]:.2g} m² (red) and W²/(12 λ) = {runs.PERMEABILITIES[1]:.2g} m² (dashed). With the "
-            "latter, a pore filled over its length has the same conductivity as with the raised viscosity. (a) "
-            f"Conductivity: {conductivities}. (b) The same over that with the raised viscosity. While the pore is open "
-            "the water flows around the aggregate and the law has no effect. After that, the permeability of the "
-            "biomass determines the conductivity of film and plug. Dotted: contact.")
+    return (f"Wide ({figure_6.ASSUMED}) with the raised viscosity of the paper (black) and with Brinkman's drag for "
+            f"permeabilities of {runs.PERMEABILITIES[0]:.2g} m² (red) and W²/(12 λ) = {runs.PERMEABILITIES[1]:.2g} m² "
+            "(dashed). With the latter, a pore filled over its length has the same conductivity as with the raised "
+            f"viscosity. (a) Conductivity: {conductivities}. (b) The same over that with the raised viscosity. While "
+            "the pore is open the water flows around the aggregate and the law has no effect. After that, the "
+            "permeability of the biomass determines the conductivity of film and plug. Dotted: contact.")

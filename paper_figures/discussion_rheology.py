@@ -23,11 +23,12 @@ AROUND = 4.0
 
 @style.styled
 def draw(*folders: Path) -> Figure:
-    """The last outlines, and the conductivity around contact; each run has a colour."""
-    figure = style.figure(4.9)
-    panels = figure.subplot_mosaic([["outlines"], ["conductivity"]], height_ratios=[1, 1.1])
+    """The last outlines, the conductivity around contact, and its changes; each run has a colour."""
+    figure = style.figure(7.0)
+    panels = figure.subplot_mosaic([["outlines"], ["conductivity"], ["changes"]], height_ratios=[1, 1, 1.2])
     _outlines(panels["outlines"], folders)
     _conductivity(panels["conductivity"], folders)
+    _changes(panels["changes"], folders)
     panels["conductivity"].legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
     style.number_panels(*panels.values())
     return figure
@@ -57,12 +58,29 @@ def _conductivity(axes: Axes, folders: tuple[Path, ...]) -> None:
     style.grid(axes)
 
 
+def _changes(axes: Axes, folders: tuple[Path, ...]) -> None:
+    """Change of the conductivity (%) against the paper's choice at the same time, on a scale that is linear up to 1 "
+    "%."""
+    plain = states.series(folders[0])
+    for folder, label, colour in zip(folders[1:], LABELS[1:], COLOURS[1:]):
+        table = states.series(folder)
+        reference = np.interp(table["time_h"], plain["time_h"], plain["conductivity_m_per_d"])
+        axes.plot(table["time_h"], 100 * (table["conductivity_m_per_d"] / reference - 1), color=colour, label=label)
+    axes.axhline(0.0, color=COLOURS[0], linewidth=0.8)
+    contact_time = min(contact(folders[0]), float(plain["time_h"][-1]))
+    axes.set(title="change of the conductivity at the same time", xlabel="time (h)", ylabel="%",
+             xlim=(contact_time - AROUND, None))
+    axes.set_yscale("symlog", linthresh=1.0)
+    style.grid(axes)
+
+
 def caption(*folders: Path) -> str:
     """Caption, with the first rows in contact and the last conductivities."""
     tables = [states.series(folder) for folder in folders]
     results = "; ".join(f"{label}: {contact(folder):g} h and {table['conductivity_m_per_d'][-1]:.3g} m/d"
                      for label, folder, table in zip(LABELS, folders, tables))
-    return (f"Wide to {tables[0]['time_h'][-1]:g} h with one change at a time: new biomass is stress-free (section 5), "
-            "the fixed midpoints of the contact surfaces are chosen anew at every update, or the least film or contact "
-            "angle of 2.3.3 is halved or doubled. (a) The last outlines; (b) the conductivity around contact. "
-            f"First row in contact, and conductivity at the end: {results}.")
+    return (f"Wide ({figure_6.ASSUMED}) to {tables[0]['time_h'][-1]:g} h with one change at a time: new biomass is "
+            "stress-free (section 5), the fixed midpoints of the contact surfaces are chosen anew at every update, or "
+            "the least film or contact angle of 2.3.3 is halved or doubled. (a) The last outlines; (b) the "
+            "conductivity around contact; (c) its change in percent, linear up to 1 % and logarithmic beyond; the "
+            f"peaks are contact at another time. First row in contact, and conductivity at the end: {results}.")

@@ -89,8 +89,9 @@ def _closing(axes: Axes, scene: Scene) -> None:
     axes.plot(line + steps, width - np.minimum(film, np.tan(angle) * steps), "--", color=style.BLUE)
     right = joins & (outline.points[:, 0] > 0)
     axes.plot(*outline.points[right].T, "o", color=style.RED, markersize=3.5)
-    axes.plot(line, width, "o", color=style.BLACK, markersize=4)
+    axes.plot(line, width, "|", color=style.BLUE, markersize=11, markeredgewidth=1.8)
     axes.set_title("contact with the other wall")
+    axes.text(line, width + 1.2, "contact line", color="white", ha="left", va="center")
     axes.text(line - 2.5, width - 3, "these nodes join the wall", color=style.RED, va="center")
     axes.text(line - 2.5, width - 6.5, f"least gap: {film:g} µm,\n{np.degrees(angle):.1f}° at the contact", va="center",
               color=style.BLUE)
@@ -109,9 +110,9 @@ def caption() -> str:
     scene = runs.BASE.load()
     film, angle = scene.growth.minimum_film, np.degrees(scene.growth.minimum_contact_angle)
     return (f"Drawn by the code that the model uses. (a) A pore {scene.pore.length:g} µm long and "
-            f"{scene.pore.width:g} µm wide (Base) with an aggregate on its lower wall; water enters on the left with a "
-            "parabolic velocity. (b) Fluid Ω_F and biomass Ω_B, their interface Γ_B-F, the walls Γ_w, and the contact "
-            "surface Γ_B-w (red), on which the aggregate slides; its midpoint, the origin, is fixed. The half-disc is "
-            f"{THICKNESS * scene.pore.width:g} µm thick, the seed of the runs {scene.aggregate.radius:g} µm. "
-            f"(c) At the opposite wall, fluid thinner than {film:g} µm, or than a wedge of {angle:.1f}° beside the "
-            "contact (dashed), closes. The nodes in red join the wall next.")
+            f"{scene.pore.width:g} µm wide (Base) with an aggregate on its lower wall; water enters on the left with "
+            "a parabolic velocity. (b) Fluid Ω_F and biomass Ω_B, their interface Γ_B-F, the walls Γ_w, and the "
+            "contact surface Γ_B-w (red), on which the aggregate slides; its midpoint (black dot), the origin, is "
+            f"fixed. The half-disc is {THICKNESS * scene.pore.width:g} µm thick, the seed of the runs "
+            f"{scene.aggregate.radius:g} µm. (c) At the opposite wall, fluid thinner than {film:g} µm, or than a "
+            f"wedge of {angle:.1f}° beside the contact line (dashed), closes. The nodes in red join the wall next.")

@@ -1,4 +1,4 @@
-"""Figure 6: outlines of the aggregate of Wide."""
+"""Figure 6: outlines of the aggregate of Wide, with three supplies, since the paper prints none."""
 
 from __future__ import annotations
 
@@ -14,11 +14,16 @@ from scipy.interpolate import CubicSpline
 from shapely import Polygon
 
 from paper_figures import runs, states, style
+from paper_figures.states import State
 from verification.claims.runs import upstream_part
 from verification.store import provenance
 
 TITLE = "Figure 6. Outlines of an aggregate that meets the opposite wall"
-RUNS = (runs.WIDE_CONVERGED,)
+RUNS = (runs.SUPPLIED[5], runs.WIDE_CONVERGED, runs.SUPPLIED[40])
+#: Supplies of the runs, K_s of both substrates. The paper prints none.
+SUPPLIES = (5, 10, 40)
+#: For captions of figures with Wide.
+ASSUMED = "the paper prints no supply for it, and 10 K_s of both substrates is assumed"
 CLAIMS = ("C12", "C25", "C29", "C31")
 
 #: Hours between outlines.
@@ -30,29 +35,53 @@ PER_EDGE = 8
 
 
 @style.styled
-def draw(folder: Path) -> Figure:
-    """Outlines every EVERY hours, coloured by time."""
-    figure = style.figure(2.75)
-    outlines(figure.subplots(), folder)
+def draw(*folders: Path) -> Figure:
+    """Outlines every EVERY hours with each supply, coloured by time."""
+    figure = style.figure(5.6)
+    panels = figure.subplots(len(folders), 1)
+    every = [states.every(folder, EVERY) for folder in folders]
+    colours = scale(max(drawn[-1].time for drawn in every), EVERY)
+    reach = span(sum(every, []))
+    for axes, drawn, supply in zip(panels, every, SUPPLIES):
+        fill(axes, drawn, colours, reach)
+        axes.set_title(f"supply of {supply} K$_s$" + (", assumed for all other figures" if supply == 10 else ""))
+    for axes in panels[:-1]:
+        axes.set_xlabel("")
+    style.number_panels(*panels)
+    figure.colorbar(colours, ax=list(panels), location="right", label="time (h)", aspect=40,
+                    ticks=EVERY * np.arange(1 + round(colours.norm.vmax / EVERY - 0.5)))
     return figure
 
 
 def outlines(axes: Axes, folder: Path, hours: float | None = None) -> None:
-    """Draw the outlines of a run every ``hours`` hours (default EVERY) in its channel, the latest at the back, with a
-    colour scale of their times."""
+    """Draw the outlines of a run every ``hours`` hours (default EVERY) with a colour scale of their times."""
     hours = hours or EVERY
-    states_drawn = states.every(folder, hours)
-    first, last = min(s.rim[:, 0].min() for s in states_drawn), max(s.rim[:, 0].max() for s in states_drawn)
-    style.pore(axes, (first - MARGIN, last + MARGIN), states_drawn[0].width, 2.5)
-    norm = BoundaryNorm(hours * (np.arange(len(states_drawn) + 1) - 0.5), 256)
-    colours = ScalarMappable(norm, matplotlib.colormaps["viridis_r"])
-    for state in reversed(states_drawn):
+    drawn = states.every(folder, hours)
+    colours = scale(drawn[-1].time, hours)
+    fill(axes, drawn, colours, span(drawn))
+    style.colour_bar(colours, axes, "time (h)", ticks=[s.time for s in drawn])
+
+
+def scale(last: float, hours: float) -> ScalarMappable:
+    """The colour of each multiple of ``hours`` up to the last time."""
+    norm = BoundaryNorm(hours * (np.arange(round(last / hours) + 2) - 0.5), 256)
+    return ScalarMappable(norm, matplotlib.colormaps["viridis_r"])
+
+
+def span(drawn: list[State]) -> tuple[float, float]:
+    """x (um) from the first to the last outline, with MARGIN on both sides."""
+    return min(s.rim[:, 0].min() for s in drawn) - MARGIN, max(s.rim[:, 0].max() for s in drawn) + MARGIN
+
+
+def fill(axes: Axes, drawn: list[State], colours: ScalarMappable, reach: tuple[float, float]) -> None:
+    """Draw outlines in their channel over a range of x, the latest at the back."""
+    style.pore(axes, reach, drawn[0].width, 2.5)
+    for state in reversed(drawn):
         style.aggregate(axes, smooth(state.rim, state.width), facecolor=colours.to_rgba(state.time), edgecolor="white",
                         linewidth=0.9)
-    high = 0.5 * states_drawn[0].width
+    first, high = reach[0] + MARGIN, 0.5 * drawn[0].width
     style.arrow(axes, (first - 0.95 * MARGIN, high), (first - 0.2 * MARGIN, high), 8, 1.4)
     axes.text(first - 0.9 * MARGIN, high + 4, "flow", color=style.BLUE, ha="left", va="bottom", fontsize=7)
-    style.colour_bar(colours, axes, "time (h)", ticks=[s.time for s in states_drawn])
 
 
 def smooth(rim: np.ndarray, width: float) -> np.ndarray:
@@ -79,17 +108,32 @@ def upstream_share(folder: Path) -> float:
     return upstream_part(*(Polygon(state.rim) for state in states.every(folder, EVERY)[-2:]))
 
 
-def caption(folder: Path) -> str:
-    """Caption, with the time of contact and the end of the run."""
-    table, states_drawn = states.series(folder), states.every(folder, EVERY)
+def caption(*folders: Path) -> str:
+    """Caption, with the times of contact and the ends of the runs."""
+    drawn = states.every(folders[0], EVERY)
+    velocity = states.series(folders[0])["mean_velocity_m_per_d"][0]
+    results = "; ".join(f"({letter}) {supply} K_s: {_course(folder)}"
+                        for letter, supply, folder in zip("abc", SUPPLIES, folders))
+    return (f"The aggregate of Wide every {EVERY:g} h, between the walls of a pore {drawn[0].width:.0f} µm wide at a "
+            f"constant mean velocity of {velocity:.1f} m/d, from left to right. The paper prints no supply for its "
+            "Figure 6, and no times or places of tips from which to infer one: 10 K_s of both substrates is assumed "
+            f"elsewhere. {results}. The panel with 10 K_s shows the converged solution by which the claims are judged "
+            "(preset `accurate`), the others the preset `fast`, none of them the paper's scheme. Between the walls a "
+            f"spline joins the nodes of the outline. {_endings(folders)}")
+
+
+def _course(folder: Path) -> str:
+    """Contact, tips at the end, and the share of the last growth that is upstream."""
+    table = states.series(folder)
     hours, contact_time = table["time_h"], states.contact(folder)
-    contact = (f"It touches the opposite wall between {hours[hours < contact_time][-1]:g} and {contact_time:g} h"
-               if np.isfinite(contact_time) else "It does not reach the opposite wall")
-    velocity = table["mean_velocity_m_per_d"][0]
-    return (f"The aggregate of Wide every {EVERY:g} h from 0 to {states_drawn[-1].time:g} h, between the walls of a "
-            f"pore {states_drawn[0].width:.0f} µm wide at a constant mean velocity of {velocity:.1f} m/d, from left to "
-            f"right. {contact} and spans x from {table['upstream_um'][-1]:.0f} to "
-            f"{table['downstream_um'][-1]:.0f} µm at the end. Of the area newly covered between the last two outlines, "
-            f"{100 * upstream_share(folder):.1f} % lies upstream of the seed's centre. The figure shows the converged "
-            f"solution by which the claims are judged (preset `accurate`), not the paper's scheme. Between the walls a "
-            f"spline joins the outline's nodes. The run ended at {hours[-1]:g} h: {provenance(folder)['status']}.")
+    contact = (f"contact between {hours[hours < contact_time][-1]:g} and {contact_time:g} h"
+               if np.isfinite(contact_time) else "no contact")
+    return (f"{contact}, from {table['upstream_um'][-1]:.0f} to {table['downstream_um'][-1]:.0f} µm at {hours[-1]:g} "
+            f"h; {100 * upstream_share(folder):.1f} % of the area newly covered between the last two outlines lies "
+            "upstream of the seed's centre")
+
+
+def _endings(folders: tuple[Path, ...]) -> str:
+    """How the runs ended."""
+    endings = dict.fromkeys(provenance(folder)["status"] for folder in folders)
+    return f"The runs ended: {', '.join(endings)}."

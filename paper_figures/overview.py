@@ -1,7 +1,7 @@
-"""The picture in the README: Base near its end and the outlines of Wide.
+"""The pictures in README and replication note: Base near its end with the outlines of Wide, and three figures.
 
-`python -m paper_figures.overview` writes `paper_figures/overview.png`, which is committed. `make figures` does not
-change it.
+`python -m paper_figures.overview` writes them as PNG files into `paper_figures`, which are committed. `make figures`
+does not change them.
 """
 
 from __future__ import annotations
@@ -13,25 +13,26 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.image import imsave
 
-from paper_figures import figure_6, runs, states, style
+from paper_figures import discussion_biomass, figure_6, runs, states, style, time_series
 from paper_figures.states import State
 
-CLAIMS = ("C35", *figure_6.CLAIMS)
-TARGET = Path(__file__).parent / "overview.png"
+#: Figures of the note.
+IN_NOTE = {"time_series": time_series, "discussion_biomass": discussion_biomass, "figure_6": figure_6}
+FOLDER = Path(__file__).parent
 PIXELS_WIDE, SHADES = 1600, 31
 STREAMLINES = 10
 
 
 @style.styled
 def draw(base: Path, wide: Path) -> Figure:
-    """Substrate and streamlines around the aggregate of Base, and the outlines of Wide."""
+    """Substrate and streamlines around the aggregate of Base, and the outlines of Wide, whose supply is assumed."""
     figure = style.figure(5.5)
     above, below = figure.subplots(2, 1, height_ratios=[1, 1.08])
     state, (shaped, _) = states.last(base, "before_expansion"), states.last_step(base)
     _substrate(above, state)
     above.set_title(f"Base: electron acceptor and streamlines around the aggregate shaped at {shaped:g} h")
     figure_6.outlines(below, wide)
-    below.set_title(f"Wide: outlines every {figure_6.EVERY:g} h")
+    below.set_title(f"Wide: outlines every {figure_6.EVERY:g} h, with an assumed supply of 10 K$_s$")
     return figure
 
 
@@ -55,13 +56,19 @@ def stream(state: State) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 @style.styled
 def main() -> None:
-    """Draw and write the picture. Rounding of its colours halves the size of the file."""
-    figure = draw(*runs.folders([runs.BASE, *figure_6.RUNS]))
+    """Draw and write the pictures."""
+    _write(draw(*runs.folders([runs.BASE, runs.WIDE_CONVERGED])), "overview")
+    for name, module in IN_NOTE.items():
+        _write(module.draw(*runs.folders(module.RUNS)), name)
+
+
+def _write(figure: Figure, name: str) -> None:
+    """Write a picture. Rounding of its colours halves the size of the file."""
     figure.set_dpi(PIXELS_WIDE / style.PAGE)
     style.lay_out(figure)
     figure.canvas.draw()
     shades = np.asarray(figure.canvas.buffer_rgba()) / 255
-    imsave(TARGET, np.round(shades * SHADES) / SHADES, metadata={"Software": None})
+    imsave(FOLDER / f"{name}.png", np.round(shades * SHADES) / SHADES, metadata={"Software": None})
 
 
 if __name__ == "__main__":

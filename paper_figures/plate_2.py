@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import TriMesh
 from matplotlib.figure import Figure
 from matplotlib.tri import Triangulation
 
@@ -17,8 +18,9 @@ TITLE = "Plate 2. One expansion of the aggregate and the deformation of the mesh
 RUNS = (runs.BASE,)
 CLAIMS = ("C08", "C11", "C24", "C31")
 
-#: Factor by which the arrows are longer than the displacements.
-LENGTHENED = 5
+#: Factors by which the arrows are longer than the displacements in (b) and in (a), and the least distance (um) of two
+#: of them in (a).
+LENGTHENED, FAR, APART = 5, 15, 7.0
 
 
 @style.styled
@@ -31,30 +33,57 @@ def draw(folder: Path) -> Figure:
     reach = 1.18 * np.abs(after.rim[:, 0]).max()
     style.channel(near, (-reach, reach), after.width, 0.5)
     near.set_ylim(-0.5, min(after.width + 0.5, 1.2 * after.rim[:, 1].max()))
-    for axes, boldness in ((meshed_part, 0.6), (near, 1.0)):
-        colours = _expansion(axes, before, after, boldness)
+    _meshed_part(meshed_part, before, after)
+    colours = _close_up(near, before, after)
     figure.colorbar(colours, ax=[meshed_part, near], location="right", label="expansion θ since t = 0 (–)", aspect=40)
-    meshed_part.set_title("meshed part")
+    meshed_part.set_title(f"meshed part, displacements × {FAR}")
     near.set_title(f"aggregate: shape before (dashed) and after (line), displacements × {LENGTHENED}")
     style.number_panels(meshed_part, near)
     return figure
 
 
-def _expansion(axes: Axes, before: State, after: State, boldness: float):
-    """Draw theta in colour, both meshes, both outlines and the arrows; return the colours for a colour bar."""
-    theta = after.cells["theta"][after.biomass]
-    colours = axes.tripcolor(after.aggregate, theta, cmap=style.MAP, zorder=1)
+def _meshed_part(axes: Axes, before: State, after: State) -> None:
+    """Theta in colour, the new mesh, and arrows that are APART."""
+    _theta(axes, after)
+    axes.triplot(after.triangulation, color=style.FAINT, linewidth=0.3, zorder=2)
     nodes, moved_to = displaced(before, after)
+    start = before.points[nodes]
+    few = scattered(start)
+    _arrows(axes, start[few], moved_to[few], FAR)
+
+
+def _close_up(axes: Axes, before: State, after: State) -> TriMesh:
+    """Theta in colour, both meshes, both outlines and all arrows; return the colours for a colour bar."""
+    colours = _theta(axes, after)
     if same_mesh(before, after):
         axes.triplot(Triangulation(*before.points.T, before.triangles[~before.biomass]), color=style.SKY,
-                     linewidth=0.5 * boldness, zorder=2)
-    axes.triplot(after.triangulation, color=style.BLACK, linewidth=0.35 * boldness, alpha=0.7, zorder=3)
-    style.aggregate(axes, before.rim, filled=False, edgecolor="white", linestyle="--", linewidth=boldness, zorder=4)
-    style.aggregate(axes, after.rim, filled=False, linewidth=1.2 * boldness, zorder=4)
-    start = before.points[nodes]
-    axes.quiver(*start.T, *(LENGTHENED * (moved_to - start)).T, color=style.RED, angles="xy", scale_units="xy", scale=1,
-                width=0.0016 * boldness, headwidth=4, headlength=5, zorder=5)
+                     linewidth=0.5, zorder=2)
+    axes.triplot(after.triangulation, color=style.BLACK, linewidth=0.35, alpha=0.7, zorder=3)
+    style.aggregate(axes, before.rim, filled=False, edgecolor="white", linestyle="--", linewidth=1.0, zorder=4)
+    nodes, moved_to = displaced(before, after)
+    _arrows(axes, before.points[nodes], moved_to, LENGTHENED)
     return colours
+
+
+def _theta(axes: Axes, after: State) -> TriMesh:
+    """Theta in colour within the new outline."""
+    style.aggregate(axes, after.rim, filled=False, zorder=4)
+    return axes.tripcolor(after.aggregate, after.cells["theta"][after.biomass], cmap=style.MAP, zorder=1)
+
+
+def _arrows(axes: Axes, start: np.ndarray, end: np.ndarray, factor: float) -> None:
+    """Arrows ``factor`` times as long as the displacements from start (K, 2) to end."""
+    axes.quiver(*start.T, *(factor * (end - start)).T, color=style.RED, angles="xy", scale_units="xy", scale=1,
+                width=0.0018, headwidth=4, headlength=5, zorder=5)
+
+
+def scattered(points: np.ndarray) -> np.ndarray:
+    """Numbers of points (K, 2), each APART (um) or more from those before it."""
+    chosen: list[int] = []
+    for number, point in enumerate(points):
+        if all(np.hypot(*(points[other] - point)) >= APART for other in chosen):
+            chosen.append(number)
+    return np.array(chosen)
 
 
 def same_mesh(before: State, after: State) -> bool:
@@ -82,10 +111,12 @@ def caption(folder: Path) -> str:
     nodes, moved_to = displaced(before, after)
     largest = np.linalg.norm(moved_to - before.points[nodes], axis=1).max()
     theta = after.cells["theta"][after.biomass]
-    mesh = ("The mesh of the fluid before the expansion is blue, the mesh after it black" if same_mesh(before, after)
-            else "This step includes a remesh, so that only the new mesh and the aggregate's displacements are shown")
+    mesh = ("In (b) the mesh of the fluid before the expansion is blue, the mesh after it black"
+            if same_mesh(before, after) else
+            "This step includes a remesh, so that only the new mesh and the aggregate's displacements are shown")
     return (f"Growth in Base from {shaped:g} to {end:g} h expands the aggregate from the dashed outline to the full "
-            f"one. Red arrows are displacements times {LENGTHENED} (the largest is {largest:.2f} µm). {mesh}. "
-            f"Colour: expansion since t = 0, from {theta.min():.1f} to {theta.max():.1f}. The meshed part is "
-            f"{np.ptp(after.ends):.0f} µm long, the aggregate reaches {-after.rim[:, 0].min():.2f} µm upstream and "
-            f"{after.rim[:, 0].max():.2f} µm downstream of the seed's centre.")
+            f"one. Red arrows are displacements times {LENGTHENED} (the largest is {largest:.2f} µm), in (a) those of "
+            f"nodes {APART:g} µm apart. {mesh}. Colour: expansion since t = 0, from {theta.min():.1f} to "
+            f"{theta.max():.1f}. The meshed part is {np.ptp(after.ends):.0f} µm long, the aggregate reaches "
+            f"{-after.rim[:, 0].min():.2f} µm upstream and {after.rim[:, 0].max():.2f} µm downstream of the seed's "
+            "centre.")

@@ -1,6 +1,7 @@
-"""The replication note, `replication.md`: `replication_template.md` with the numbers of the committed records.
+"""The replication note, `replication.md`, and the register of the claims, `register.md`: their templates with the
+numbers of the committed records.
 
-`python -m paper_figures.replication` fills in the fields `{{...}}` of the template from the committed records of
+`python -m paper_figures.replication` fills in the fields `{{...}}` of the templates from the committed records of
 `make claims` (`verification/claims/claims.json`), `make verify`, `make bench` and `make sensitivity`, the errata and
 the citation. A field names a claim and its quantity, `{{C01 | mean velocity at t = 0 (m/d) | .2f}}`; the format "off"
 gives the difference from the printed number. `{{C15 | contradicted}}` gives C15 and fails if the verdict is another.
@@ -8,6 +9,7 @@ gives the difference from the printed number. `{{C15 | contradicted}}` gives C15
 
 from __future__ import annotations
 
+import csv
 import json
 import re
 import textwrap
@@ -15,25 +17,18 @@ from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 
-from paper_figures import FIGURES, manifest, overview
+from paper_figures import FIGURES, manifest
 from paper_figures.claims import STATEMENTS
-from paper_figures.claims import verdicts as verdicts_in_words
 from repro.results import write_text
 from verification import sensitivity, speed
 from verification.bench import runs
 from verification.bench.record import points
 from verification.claims import (
-    CHANGED,
-    CONTRADICTED,
     FAILS,
     HOLDS,
-    NOT_JUDGED,
     PREDICTED,
     REACHES_OVER,
-    REPRODUCED,
-    UNDECIDED,
     VERDICTS,
-    WITHIN_ROUNDING,
     after_contact,
 )
 from verification.claims import report as claims_record
@@ -42,14 +37,14 @@ from verification.sensitivity.wide import LEFT_OUT, verdicts
 
 FOLDER = Path(__file__).parent
 ROOT = FOLDER.parent
-NOTE, TEMPLATE = (FOLDER / name for name in ("replication.md", "replication_template.md"))
+#: The texts, each with its template.
+NOTE, REGISTER = (FOLDER / name for name in ("replication.md", "register.md"))
+TEMPLATES = {text: text.with_stem(f"{text.stem}_template") for text in (NOTE, REGISTER)}
 REPORT = ROOT / "verification" / "report"
 FIELD = re.compile(r"\{\{(.+?)\}\}")
-#: Names of the verdicts in the template, and the explanations that the note gives for each verdict.
+#: Names of the verdicts in the templates, and what the register quotes of a claim beside its numbers.
 NAMES = dict(zip(VERDICTS, ("reproduced", "rounding", "changed", "contradicted", "undecided", "unjudged")))
-WHY = {WITHIN_ROUNDING: (("As printed", "reason"), ("Inputs", "rounding")), CHANGED: (("Changed", "change"),),
-       CONTRADICTED: (("Why not", "reason"),), UNDECIDED: (("Why", "reason"),),
-       NOT_JUDGED: (("Why", "reason"), ("Computed", "note"))}
+WHY = {"Changed": "change", "Why not": "reason", "Inputs": "rounding", "Note": "note", "Not varied": "fixed"}
 WIDTH = 120
 
 
@@ -68,7 +63,7 @@ def fields(known: dict) -> dict[str, Callable[[], str]]:
             "base.bars": lambda: _bars_of_base(claims),
             "inputs.set": _set_of_inputs,
             "table.values": lambda: "\n".join(map(_value, _printed(claims))),
-            "overview.claims": lambda: "; ".join(f"{id} {verdicts_in_words()[id]}" for id in overview.CLAIMS),
+            "table.claims": lambda: "\n".join(map(_claim, claims)), "sentences": _sentences,
             "table.figures": lambda: "\n".join(map(_figure, FIGURES)),
             "environment": lambda: _environment(known["environment"])}
 
@@ -140,18 +135,13 @@ def _about() -> dict[str, Callable[[], str]]:
             "version": lambda: value("version"), "licence": lambda: value("license")}
 
 
-def _with(claims: list[dict], verdict: str) -> list[dict]:
-    """The claims that count with a given verdict, that of their first definition."""
-    return [claim for claim in claims if claims_record.counted(claim)["verdict"] == verdict]
-
-
 def _verdicts(claims: list[dict]) -> dict[str, Callable[[], str]]:
+    """Counts of the verdicts, that of the first definition of each claim, and of the printed values."""
     outcomes = [*claims_record.distinct(claims).values()]
-    counts = {f"claims.{name}": lambda verdict=verdict: str(len(_with(claims, verdict)))
+    verdicts_counted = [claims_record.counted(claim)["verdict"] for claim in claims]
+    counts = {f"claims.{name}": lambda verdict=verdict: str(verdicts_counted.count(verdict))
               for verdict, name in NAMES.items()}
-    lists = {f"list.{name}": lambda verdict=verdict: "\n".join(map(_entry, _with(claims, verdict))) or "None."
-             for verdict, name in NAMES.items()}
-    return {**counts, **lists, "claims.anew": lambda: _defined_anew(claims),
+    return {**counts, "claims.anew": lambda: _defined_anew(claims),
             "claims.total": lambda: str(len(claims)), "paper.total": lambda: str(len(outcomes)),
             "paper.within": lambda: str(outcomes.count(HOLDS)), "paper.outside": lambda: str(outcomes.count(FAILS)),
             "paper.open": lambda: str(outcomes.count(REACHES_OVER))}
@@ -176,14 +166,34 @@ def _span(low: float | None, high: float | None) -> str:
     return "-" if low is None or high is None else f"{low:.4g} to {high:.4g}"
 
 
-def _entry(claim: dict) -> str:
-    """A claim in the list of its verdict, with the explanation."""
+def _claim(claim: dict) -> str:
+    """A row of the register: a claim with its verdict, its numbers and their widths, by its first definition, and its
+    later definitions."""
     first, *later = claims_record.definitions(claim)
-    words = [f"*{word}:* {first[key].rstrip('.')}" for word, key in WHY.get(first["verdict"], ())]
-    words += [f"Here: {check['quantity']}, {check['value']:.4g}" for check in first["checks"][:1]
-              if first["verdict"] == REPRODUCED]
-    anew = [f"*Defined anew* on {each['defined']}, after values had been seen: {each['verdict']}" for each in later]
-    return ". ".join((f"- **{claim['id']}** ({claim['where']}): {claim['claim']}", *words, *anew)) + "."
+    words = [f"*{word}:* {first[key]}" for word, key in WHY.items() if first.get(key)]
+    for each in later:
+        numbers = "; ".join(map(_number, each["checks"]))
+        words.append(f"*Defined anew* on {each['defined']}, after values had been seen: {each['verdict']}; {numbers}")
+    return markdown_row((f"**{claim['id']}**", claim["where"], claim["claim"], first["verdict"],
+                         "<br>".join(map(_number, first["checks"])) or "-", "<br>".join(words) or "-"))
+
+
+def _number(check: dict) -> str:
+    """A number of a claim with its widths and its outcome."""
+    accepted = claims_record.spanned(claims_record.ends(check["tolerance"]))
+    widths = {"numerics": (check["low"], check["high"]),
+              "inputs": (check.get("input_low"), check.get("input_high")),
+              "scheme of 2001": check.get("scheme_2001") or (None, None)}
+    spans = [f"{name} {_span(*pair)}" for name, pair in widths.items() if None not in pair]
+    return (f"{check['quantity']}: paper {check['paper']}, here {check['value']:.4g} ({'; '.join(spans)}); accepted "
+            f"{accepted}: {check['outcome']}")
+
+
+def _sentences() -> str:
+    """How many sentences of the paper the table lists, and how many nothing covers."""
+    with (ROOT / "verification" / "claims" / "sentences.csv").open(encoding="utf-8", newline="") as lines:
+        rows = list(csv.DictReader(lines))
+    return f"{len(rows)} sentences, {sum(bool(row['why']) for row in rows)} of them not judged"
 
 
 def _defined_anew(claims: list[dict]) -> str:
@@ -282,9 +292,11 @@ def _of_claim(claims: dict[str, dict], id: str, quantity: str, form: str = "") -
 
 
 def main() -> None:
-    """Write the replication note."""
-    write_text(NOTE, fill_template(TEMPLATE.read_text(encoding="utf-8"), read_records()))
-    print(f"{NOTE}: written")
+    """Write the replication note and the register."""
+    known = read_records()
+    for text, template in TEMPLATES.items():
+        write_text(text, fill_template(template.read_text(encoding="utf-8"), known))
+        print(f"{text}: written")
 
 
 if __name__ == "__main__":

@@ -8,10 +8,10 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from paper_figures import runs, states, style
+from paper_figures import figure_6, runs, states, style
 
 TITLE = "Addition. Both runs against time"
-RUNS = (runs.BASE, runs.WIDE)
+RUNS = (runs.BASE, runs.WIDE_CONVERGED)
 CLAIMS = ("C01", "C02", "C03", "C04", "C09", "C16", "C17", "C30")
 
 NAMES, COLOURS = ("Base", "Wide"), (style.BLUE, style.RED)
@@ -21,6 +21,8 @@ CURVES = (("conductivity_m_per_d", "hydraulic conductivity of the pore", "m/d", 
           ("mean_velocity_m_per_d", "mean velocity", "m/d", False),
           ("effluent_{}_mg_per_L", "effluent concentrations", "mg/L", False),
           ("aggregate_area_um2", "area of the aggregate", "µm²", True))
+#: Time (h) and value that the paper prints of Base, by column.
+PRINTED = {"mean_velocity_m_per_d": ((0.0, 2.9), (19.4, 1.5)), "effluent_{}_mg_per_L": ((19.4, 4.19), (19.4, 6.13))}
 
 
 @style.styled
@@ -35,6 +37,10 @@ def draw(base: Path, wide: Path) -> Figure:
             if "{}" in column:
                 axes.plot(table["time_h"], table[column.format("donor")], color=colour, linestyle="--")
         axes.set(title=title, ylabel=unit, yscale="log" if log else "linear")
+        for time, value in PRINTED.get(column, ()):
+            axes.scatter(time, value, marker="x", s=36, color=style.BLACK, linewidths=1.4, zorder=3,
+                         clip_on=False)
+            axes.annotate(f"{value:g}", (time, value), (6, -11), textcoords="offset points")
         if not log:
             axes.set_ylim(0)
         for time in _contact_times(base, wide):
@@ -60,7 +66,9 @@ def caption(base: Path, wide: Path) -> str:
     falls = [t["conductivity_m_per_d"][0] / t["conductivity_m_per_d"][-1] for t in tables]
     contact = " and ".join(f"{time:g} h" for time in _contact_times(base, wide))
     dotted = f" The dotted line marks contact with the opposite wall in Wide, at {contact}." if contact else ""
-    return (f"Base (blue, constant head, to {tables[0]['time_h'][-1]:g} h) and Wide (red, constant mean velocity, to "
-            f"{tables[1]['time_h'][-1]:g} h). (a) Hydraulic conductivity of the whole pore, which falls by a factor of "
-            f"{falls[0]:.3g} in Base and {falls[1]:.3g} in Wide; (b) mean velocity; (c) flow-weighted concentrations "
-            f"of acceptor (full) and donor (dashed) at the outlet; (d) area of the aggregate.{dotted}")
+    return (f"Base (blue, constant head, to {tables[0]['time_h'][-1]:g} h, in the paper's scheme) and Wide (red, "
+            f"constant mean velocity, to {tables[1]['time_h'][-1]:g} h, in the converged solution; "
+            f"{figure_6.ASSUMED}). Crosses: the values that the paper prints of Base; at 19.4 h it plots the shape of "
+            f"19.2 h (E12). (a) Hydraulic conductivity of the whole pore, which falls by a factor of {falls[0]:.3g} "
+            f"in Base and {falls[1]:.3g} in Wide; (b) mean velocity; (c) flow-weighted concentrations of acceptor "
+            f"(full) and donor (dashed) at the outlet; (d) area of the aggregate.{dotted}")

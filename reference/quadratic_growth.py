@@ -107,10 +107,10 @@ def half_disc(radius, rings, towards=(), times=0):
     """MeshTri2 of ``rings`` rings with 4k edges on the k-th; the arc has a node at every multiple of 45 degrees. The
     mesh is refined ``times`` times at the angles ``towards`` of the arc."""
     tips = radius * np.column_stack([np.cos(towards), np.sin(towards)])
-    return curved(refined(_rings(radius, rings), radius, tips, times), radius)
+    return curved(refined(in_rings(radius, rings), radius, tips, times), radius)
 
 
-def _rings(radius, rings):
+def in_rings(radius, rings):
     """Straight triangles between the rings."""
     parts = [(k / rings, i / (4 * k)) for k in range(1, rings + 1) for i in range(4 * k + 1)]
     r, turn = np.array([(0.0, 0.0), *parts]).T
@@ -147,8 +147,12 @@ def _unknowns(basis):
 
 
 def _interpolate(basis, lower, start):
-    """A solution on another mesh, at the nodes of this one."""
+    """A solution on another mesh, at the nodes of this one; if only the nodes of this mesh have moved, that at the
+    same nodes."""
     place = np.zeros(basis.N)
+    if np.array_equal(basis.mesh.t, start.mesh.t):
+        place[_unknowns(basis)] = start.place
+        return place, start.pressure
     place[_unknowns(basis)] = start.at(*basis.mesh.doflocs)[0].T
     return place, start.at(*lower.doflocs)[1]
 

@@ -2,8 +2,9 @@
 
 The position X(x) at t = 0 is a field on the present triangles, straight or curved. A surface with the unit tangent s
 has the stretch 1 / |grad X s|. The material has the volume ratio J = 1 / det(grad X). The elastic stretch is
-det(grad X)^(1/2) / |grad X s|. It is evaluated at three Gauss points of each edge between the aggregate and the fluid,
-and averaged over the edge.
+det(grad X)^(1/2) / |grad X s|. It is evaluated at three Gauss points of each edge between the aggregate and the fluid.
+The second of them is the middle of the edge. The mean over the edge differs from the value there where the stretch
+varies within an edge, so their difference shows how well the mesh resolves it.
 """
 import numpy as np
 
@@ -14,11 +15,12 @@ GAUSS, WEIGHTS = np.polynomial.legendre.leggauss(3)
 
 
 def surface_stretch(points, cells, aggregate, before):
-    """Compute (stretch, distance, midpoints) of the free edges, (e,), (e,) and (e, 2).
+    """Compute (stretch, distance, midpoints) of the free edges, (e, 2), (e,) and (e, 2).
 
-    The distance is that to the nearer end of the free surface, along it and relative to its length. points: (N, 2);
-    cells: (T, 3 or 6), corners counterclockwise, then the midpoints of the edges 01, 12 and 20; aggregate: (T,) True
-    in the aggregate; before: (N, 2) positions at t = 0.
+    The columns of the stretch are its mean over an edge and its value in the middle. The distance is that to the nearer
+    end of the free surface, along it and relative to its length. points: (N, 2); cells: (T, 3 or 6), corners
+    counterclockwise, then the midpoints of the edges 01, 12 and 20; aggregate: (T,) True in the aggregate; before:
+    (N, 2) positions at t = 0.
     """
     ends = np.sort(cells[:, EDGES[:, :2]], axis=2)
     fluid_edges = {tuple(pair) for pair in ends[~aggregate].reshape(-1, 2).tolist()}
@@ -30,12 +32,12 @@ def surface_stretch(points, cells, aggregate, before):
     edges = []
     for start in free.keys() - {int(cells[cell, EDGES[local, 1]]) for cell, local in free.values()}:
         edges += _along(start, free, points, cells, before)
-    stretch, distance, x, y = np.array(edges).T
-    return stretch, distance, np.column_stack([x, y])
+    columns = np.array(edges)
+    return columns[:, :2], columns[:, 2], columns[:, 3:]
 
 
 def _along(start, free, points, cells, before):
-    """(stretch, distance, x, y) of each edge from one contact line to the next."""
+    """(mean stretch, stretch in the middle, distance, x, y) of each edge from one contact line to the next."""
     edges = []
     while start in free:
         edges.append(free[start])
@@ -44,11 +46,11 @@ def _along(start, free, points, cells, before):
     length = np.array([value[1] for value in values])
     along = np.cumsum(length) - length / 2
     nearer = np.minimum(along, length.sum() - along) / length.sum()
-    return [(value[0], distance, *value[2]) for value, distance in zip(values, nearer)]
+    return [(*value[0], distance, *value[2]) for value, distance in zip(values, nearer)]
 
 
 def _edge(present, before, local):
-    """(mean elastic stretch, length, middle) of an edge of a triangle with nodes (3 or 6, 2) now and at t = 0."""
+    """((mean, middle) stretch, length, middle) of an edge of a triangle with nodes (3 or 6, 2) now and at t = 0."""
     first, last = CORNERS[EDGES[local, :2]]
     places = first + (GAUSS[:, None] + 1) / 2 * (last - first)
     shape_gradients = _shape_gradients(len(present), places)
@@ -61,7 +63,7 @@ def _edge(present, before, local):
     stretch = np.sqrt(np.linalg.det(gradient)) / stretched
     weight = WEIGHTS / 2 * speed
     middle = present[EDGES[local, 2]] if len(present) == 6 else present[EDGES[local, :2]].mean(axis=0)
-    return weight @ stretch / weight.sum(), weight.sum(), middle
+    return (weight @ stretch / weight.sum(), stretch[1]), weight.sum(), middle
 
 
 def _shape_gradients(count, places):
@@ -78,5 +80,6 @@ def _shape_gradients(count, places):
 
 
 def least(stretch, distance, beside=0.05):
-    """The least stretch of edges farther from contact lines than ``beside`` of the surface's length."""
-    return stretch[distance > beside].min()
+    """(2,) least mean, and least value in the middle, of edges farther from contact lines than ``beside`` of the
+    surface's length."""
+    return stretch[distance > beside].min(axis=0)

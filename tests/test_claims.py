@@ -86,16 +86,12 @@ def test_a_claim_counts_with_its_first_definition(record):
     assert [report.counted(anew[id])["verdict"] for id in ("C13", "C39", "C41")] == [CONTRADICTED] * 3
 
 
-#: Since when a definition must be dated before its first value; some older ones were written with their values.
-RULE_SINCE = "2026-11-24"
-
-
 def test_a_definition_is_dated_before_its_first_value(record):
     """No definition in the record is later than its first value, and none of the rule's time is as late."""
     for entry in record:
         for definition in report.definitions(entry):
             times = definition["defined"], definition["first_value"]
-            assert times[0] < times[1] or times[0] == times[1] < RULE_SINCE, entry["id"]
+            assert times[0] < times[1] or times[0] == times[1] < report.RULE_SINCE, entry["id"]
 
 
 DEFINED = {"id": "C01", "defined": "2030-01-02 10:00", "checks": [
@@ -105,6 +101,7 @@ OTHER = {**DEFINED, "checks": [{**DEFINED["checks"][0], "quantity": "speed of an
 
 @pytest.mark.parametrize("entry, known, now", [
     (DEFINED, None, "2030-01-02 09:59"),
+    ({**DEFINED, "defined": claims.SET}, None, "2030-01-02 10:01"),
     (OTHER, {**DEFINED, "first_value": "2030-01-02 10:01"}, "2030-01-02 10:03"),
     ({**OTHER, "defined": "2030-01-02 10:04"}, {**DEFINED, "first_value": "2030-01-02 10:01"}, "2030-01-02 10:03"),
 ])

@@ -18,7 +18,9 @@ from repro.march.loop import InterpolatedState, RestartState, Scheme, StepResult
 from repro.march.step_control import StepControl
 from repro.model import contact
 from repro.model.pore import seeded, solve
+from repro.model.stages import Stages
 from repro.model.surface import BIOT, CREASE, surface
+from repro.preflight import numbers
 from repro.preflight.numbers import evaluate_at_largest
 from repro.preflight.simplifications import find_warnings
 from repro.results import read_table
@@ -27,6 +29,7 @@ from repro.runs.status import is_over
 from repro.scene import load_scene
 from tests.shell import files, lasting_record, read_record, state
 from tests.test_resume import in_parts
+from verification.problems import family
 
 SETS = ('numerics.preset="fast"', "numerics.refinement=0.3", 'pore.width="20 um"', 'growth.end="6 h"',
         'aggregate.outline=[["-10 um", "0 um"], ["-10 um", "20 um"], ["10 um", "20 um"], ["10 um", "0 um"]]',
@@ -45,8 +48,9 @@ def warned(folder):
 
 
 def test_a_fold_ends_a_run(tmp_path, capsys):
-    """The last state is written; it lies above Biot's limit by less than the shortest step. The exit status is 0. The
-    warning appears once, when creases begin. The same command and --resume leave the run unchanged."""
+    """The last state is written; it lies above Biot's limit by less than the shortest step. The independent stretches
+    confirm it. The exit status is 0. The warning appears once, when creases begin. The same command and --resume leave
+    the run unchanged."""
     words = [part for change in SETS for part in ("--set", change)]
     command = ["run", "base", "--unset", "aggregate.radius", *words, "--out", str(tmp_path / "run")]
     assert main(command) == 0
@@ -58,6 +62,7 @@ def test_a_fold_ends_a_run(tmp_path, capsys):
     status = read_record(folder)["status"]
     assert status.startswith(f"the aggregate's surface folds in the step from t = {table['time_h'][-1]:g} h: near x = ")
     assert "a finer mesh does not help" in status and 'growth.new_biomass = "stress_free" does' in status
+    assert family.judge(folder, status)["verdict"] == family.FOLD
     (text,) = warned(folder)
     assert [line.partition("growth.new_biomass: ")[2] for line in messages] == [text]
     begun = float(text.split()[3])
@@ -140,6 +145,22 @@ def test_no_row_has_a_density_out_of_bounds(theta, kind, factor):
         assert kind is repro.Fold or f"{factor:.2g} X_m, out of 0.5 to 2" in str(ending)
 
 
+@pytest.mark.parametrize("numerics", [
+    ("numerics.preset=paper",), ("numerics.preset=paper", "numerics.transport=gear"), ("numerics.preset=fast",)])
+def test_every_scheme_refuses_an_aggregate_that_collapses(numerics, monkeypatch):
+    """No row follows t = 0 if each new mesh leaves the biomass 0.4 times its area."""
+    def collapse(stages, *arguments):
+        after, remeshed = new_mesh(stages, *arguments)
+        return after.moved(after.mesh.points * [1.0, 0.4]), remeshed
+
+    new_mesh = Stages.new_mesh
+    monkeypatch.setattr(Stages, "new_mesh", collapse)
+    rows = []
+    with pytest.raises(SimulationError, match=r"the density of biomass comes to 2\.[45]"):
+        rows.extend(repro.simulate(load_scene("base", [*numerics, 'growth.end="1 h"'])))
+    assert [row.pore.time for row in rows] == [0.0]
+
+
 @pytest.mark.parametrize("status, over", [
     ("the aggregate's surface folds in the step from t = 5.24 h: near x = 1, y = 2 um", True),
     ("the aggregate's surface folds in the step from t = 5.24 h", False),
@@ -166,13 +187,23 @@ STARVED = ('numerics.preset="fast"', 'pore.length="2.4 mm"', 'aggregate.radius="
            'flow.mean_velocity="0.3 m/day"', 'growth.end="90 h"')
 
 
-@pytest.mark.parametrize("changes, expected", [
-    ((), True), (("growth.new_biomass=stress_free",), False), (('pore.width="79 um"',), False),
-    (('growth.end="32 h"',), False), (('substrates.acceptor.supply="20 mg/L"',
-                                       'substrates.donor.supply="20 mg/L"'), False)])
-def test_check_expects_a_fold_according_to_the_rule(changes, expected):
-    """The rule excludes narrow pores, short runs, and a supply that reaches through the aggregate."""
+@pytest.mark.parametrize("changes, speed, expected", [
+    ((), 12500.0, True), (("growth.new_biomass=stress_free",), 12500.0, False),
+    (('growth.end="32 h"',), 12500.0, False), (('flow.mean_velocity="10 m/day"',), 416667.0, False),
+    (('flow.mean_velocity="10 m/day"', 'growth.end="900 h"'), 416667.0, False)])
+def test_check_expects_a_fold_of_a_starved_core(changes, speed, expected):
+    """Not in a short run, nor where the flow supplies the core, however long after contact the run ends."""
     scene = load_scene("wide", [*STARVED, *changes])
-    warnings = find_warnings(*evaluate_at_largest(scene, 12500.0))
+    warnings = find_warnings(*evaluate_at_largest(scene, speed))
     messages = [warning.text for warning in warnings if "as a fold" in warning.text]
     assert len(messages) == expected and all("76.2 um into" in text for text in messages)
+
+
+def test_the_estimate_of_the_rim_is_that_of_a_thin_ring():
+    """A ring of the depth d of the supply grows by exp(mu t) on a core that does not. The radius rises by mu d t."""
+    both = [f'substrates.{name}.{key}="{value} mg/L"' for name in ("acceptor", "donor")
+            for key, value in (("supply", 0.5), ("half_saturation", 1e-3))]
+    scene = load_scene("wide", [*STARVED, *both, 'aggregate.radius="40 um"', 'growth.end="10 h"'])
+    exponent = 10 * numbers.fastest_growth(scene)
+    exact = (1 + exponent * numbers.depth(scene) / 40) * np.exp(-exponent / 2)
+    assert numbers.rim_stretch(scene, 0.0) == pytest.approx(exact, rel=2e-3)

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from verification import audit
-from verification.bench import report, runs
+from verification.bench import after_contact, report, runs
 from verification.bench.record import points
 from verification.evidence import hard_cases
 from verification.evidence.writing import Block, load, markdown, table
@@ -46,6 +46,7 @@ def summary(records: dict[str, dict]) -> Iterator[Block]:
 
 PRESETS = ("preset", "solver (s)", "faster than paper", "largest error")
 PICTURE = Block("picture", "bench_base.svg: error against time of the whole base run")
+WIDE_PICTURE = Block("picture", "bench_wide.svg: error against time of wide at 39.3 h, after contact")
 
 
 def _bench(record: dict) -> Iterator[Block]:
@@ -54,7 +55,19 @@ def _bench(record: dict) -> Iterator[Block]:
     yield PICTURE
     yield Block("text", f"The presets on base. Error: {part['error']}. Reference: {part['reference']}.")
     yield table((*PRESETS, *QUANTITIES), _presets(part))
+    if "wide" in record["parts"]:
+        yield from _after_contact(record["parts"]["wide"])
     yield report.verdicts(record["verdicts"])
+
+
+def _after_contact(part: dict) -> Iterator[Block]:
+    """Yield the diagram of wide after contact, and the errors of the presets."""
+    yield WIDE_PICTURE
+    yield Block("text", f"{part['title']}. Error: {part['error']}. Reference: {part['reference']}.")
+    yield table(("preset", "time (s)", *after_contact.NUMBERS), (
+        (line["method"].split()[1], f"{line['points'][0]['seconds']:.2f}",
+         *(f"{100 * error:.2g} %" for error in line["points"][0]["errors"][after_contact.TIMES.index(
+             after_contact.DRAWN)])) for line in part["lines"] if line["method"] in runs.PRESETS))
 
 
 def paper_point(part: dict) -> dict:

@@ -14,8 +14,8 @@ from repro.errors import GrowthError, MeshError, RunEnd
 from repro.model.pore import Pore
 from repro.model.surface import BIOT, CREASE, surface
 
-#: The surface folds if no equilibrium exists and the last stretch is below this. Meshes of two
-#: presets and refinements stop at 0.64 to 0.66 (docs/design.md): a crease begins within a step.
+#: The surface folds if no equilibrium exists and the last stretch is below this, 5 % above CREASE:
+#: the stretch varies by up to 6 % within an edge, and runs stop at up to 0.66 (docs/design.md).
 CREASING = 0.68
 #: Accepted range of the density at a node, over X_m.
 DENSITIES = 0.5, 2.0

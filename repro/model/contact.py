@@ -38,6 +38,9 @@ CONTACT_ROUNDS = 60
 RETREATS = 6
 #: Rounds of shape and fluid forces.
 FORCE_ROUNDS = 12
+#: Rounds after which contact lines keep their places: a search may end at another place within its
+#: tolerance.
+SETTLING_ROUNDS = 4
 #: Largest move of a node in the last round, over the aggregate's thickness.
 FORCE_REST = 1e-8
 PATIENT = SearchOptions()
@@ -133,12 +136,14 @@ def expand(mechanics: Mechanics, grown: Pore, theta: np.ndarray, guess: Pore | N
     around = traction.surroundings(fluid.meshing, grown, grown)
     last = Expansion(grown, 0, 0.0)
     iterations = 0
-    for _ in range(FORCE_ROUNDS):
+    for number in range(FORCE_ROUNDS):
+        around = traction.follow(fluid.meshing, around, last.pore)
         forces = traction.forces(fluid, around, last.pore)
         if last.division is not None:
             forces = _gathered(last.division, forces)
         shape = _at_rest(mechanics, grown, theta, start, forces, search)
-        search = replace(search, advances=shape.advances)
+        stationary = number + 1 >= SETTLING_ROUNDS
+        search = replace(search, advances=shape.advances, stationary=stationary)
         iterations += shape.iterations
         moved = np.abs(shape.position - last.position).max()
         if moved <= FORCE_REST * shape.pore.boundary.thickness:
@@ -198,7 +203,7 @@ def _equilibrium(mechanics: Mechanics, grown: Pore, start: Pore, forces: np.ndar
     body, target_J = _strained_from(mechanics.keys, grown, grown.theta)
     nodes = grown.mesh.body
     inside = grown.mesh.topology.body_corners
-    locked, target = _constraints(start, mechanics.width)
+    locked, target = _constraints(mechanics, grown, start)
     rest = growth.equilibrium(body, target_J, start.mesh.points[nodes], start.pressure[inside],
                               locked, target, forces=forces, last=last, patient=patient,
                               modified_newton=mechanics.numerics.jacobian == "reused")
@@ -222,7 +227,7 @@ def _close_by_lines(mechanics: Mechanics, grown: Pore, start: Pore, forces: np.n
     for _ in range(CONTACT_ROUNDS):
         for line in lines:
             line.record(*_clearance(rule, shape.pore.boundary, line))
-        if all(line.accepted for line in lines):
+        if search.stationary or all(line.accepted for line in lines):
             rest = replace(shape.pore, fixed=_with_new_surface(shape.pore.boundary))
             return replace(shape, pore=rest, iterations=trials.iterations, gap=gap)
         for line in lines:
@@ -474,15 +479,21 @@ def _placed(grown: Pore, start: Pore, rest: growth.Equilibrium) -> Pore:
     return replace(start.moved(points), pressure=pressure)
 
 
-def _constraints(shape: Pore, width: float) -> tuple[np.ndarray, np.ndarray]:
+def _constraints(mechanics: Mechanics, grown: Pore,
+                 shape: Pore) -> tuple[np.ndarray, np.ndarray]:
     """(n, 2) True where a coordinate is prescribed: x at fixed points, y on the walls (2.3.3); and
-    (n, 2) um, its prescribed value."""
+    (n, 2) um, its prescribed value. On a bonded wall all points are fixed that lay on the lower
+    wall before the step, where they lay."""
     rim = shape.mesh.topology.body_loop
-    position = shape.mesh.points[shape.mesh.body]
-    target = position.copy()
+    before = grown.mesh.points[grown.mesh.body]
+    fixed = shape.fixed
+    if mechanics.keys.wall == "bonded":
+        fixed = fixed | (before[rim, 1] == 0.0)
+    target = shape.mesh.points[shape.mesh.body].copy()
+    target[rim[fixed], 0] = before[rim[fixed], 0]
     target[rim[shape.wall == BOTTOM], 1] = 0.0
-    target[rim[shape.wall == TOP], 1] = width
-    return constrained(len(position), rim, shape.wall, shape.fixed), target
+    target[rim[shape.wall == TOP], 1] = mechanics.width
+    return constrained(len(target), rim, shape.wall, fixed), target
 
 
 def constrained(count: int, rim: np.ndarray, wall: np.ndarray, fixed: np.ndarray) -> np.ndarray:
@@ -558,6 +569,6 @@ def _closing_run(outline: Outline, gap: np.ndarray, line: int, step: int, film: 
     nearer = np.abs(apart) <= np.abs(x[walk] - x[other])
     if outline.wall[other] != outline.wall[line]:
         nearer = np.ones(len(walk), bool)
-    along = np.sign(x[line] - x[line - step]) * apart
+    along = np.sign(x[line] - x[(line - step) % count]) * apart
     thin = (nearer & (gaps < 0)) | (gaps < np.minimum(film, slope * along))
     return walk[: np.flatnonzero(thin)[-1] + 1] if thin.any() else walk[:0]

@@ -51,11 +51,13 @@ class SearchOptions:
     """How contact lines are searched for.
 
     landing: the search ends if the film at the first contact is thinner than this fraction of the
-    least film; patient: is a failed equilibrium tried again in smaller parts; advances: {(wall,
-    direction): um} of the first trial, along the outline.
+    least film; stationary: do lines stay at their first trial; patient: is a failed equilibrium
+    tried again in smaller parts; advances: {(wall, direction): um} of the first trial, along the
+    outline.
     """
 
     landing: float = 0.0
+    stationary: bool = False
     patient: bool = True
     advances: Mapping[tuple[int, int], float] = field(default_factory=dict)
 

@@ -178,6 +178,17 @@ class Strained:
         return self.A[..., None, None] * self.F + volumetric[..., None, None] * self.H
 
 
+def internal_forces(body: Body, theta: np.ndarray, position: np.ndarray,
+                    pressure: np.ndarray) -> np.ndarray:
+    """(n, 2) um, nodal forces of the stress over mu_L under theta (t, q), at positions (n, 2) um
+    and pressures (corners,): those that hold the aggregate there."""
+    system = System(body, np.zeros(position.shape, bool))
+    if body.shape.geometry == 1:
+        system.stabilisation = PressureGradient.on(body, position)
+    forces = system.under(theta, position, position, pressure).residual
+    return forces[: position.size].reshape(2, -1).T
+
+
 def piola(F: np.ndarray, P: np.ndarray) -> np.ndarray:
     """:meth:`Strained.piola` of F (..., 2, 2)."""
     return Strained(F).piola(P)

@@ -103,6 +103,11 @@ def _growth(scene: Scene) -> Iterator[str]:
            "biomass, (14)-(29)")
     yield f"films under {growth.minimum_film:g} um close (2.3.3)"
     yield f"fluid forces {growth.fluid_forces}"
+    yield f"the lower wall {growth.wall}"
+    for key in ("bonding_strength", "tensile_strength"):
+        strength = getattr(growth, key)
+        if strength is not None:
+            yield f"{key.replace('_', ' ')} {strength:g} MPa"
     yield {"stressed": "strain since t = 0",
            "stress_free": "new biomass without stress (section 5)"}[growth.new_biomass]
 

@@ -24,6 +24,9 @@ from repro.scene import Scene, Substrate, at_largest, at_time
 STEPS = 2000
 #: The largest exponent of growth in a step.
 LARGEST = 50.0
+#: Exponent of the compression of a rim over that of its growth, after contact, if the core
+#: starves. Fitted to 25 pores (docs/design.md).
+SQUEEZE = 0.03
 
 
 @dataclass(frozen=True)
@@ -153,6 +156,32 @@ def uptakes(scene: Scene) -> Iterator[Uptake]:
 def depth(scene: Scene) -> float:
     """Depth (um) that the scarcer substrate reaches in biomass with the largest uptake."""
     return min(uptake.depth for uptake in uptakes(scene))
+
+
+def rim_stretch(scene: Scene, uptake: float) -> float:
+    """Estimate of the elastic stretch along the rim of a half-disc at growth.end (docs/scope.md).
+
+    uptake: uptake of biomass at the supply over the inflow of the substrate, per area, 1/um2.
+    """
+    scarcer = min(uptakes(scene), key=lambda each: each.depth)
+    rate = max(fastest_growth(scene), 0.0)
+    step = scene.growth.end / STEPS
+    start = at_start(scene).area
+    touching = scene.pore.width - film(scene)
+    spanning = math.pi / 2 * touching**2
+    area, grown, squeezed = start, 0.0, 0.0
+    for _ in range(STEPS):
+        arc = math.pi * min(math.sqrt(2 * area / math.pi), touching)
+        fed = min(area, scarcer.depth * arc)
+        fed /= max(1.0, uptake * fed)
+        rim = min(area, max(fed, scarcer.layer * arc))
+        growth = min(LARGEST, rate * step * fed / rim)
+        if area < spanning:
+            grown += growth
+            area *= math.exp(growth * rim / area)
+        elif touching > 2 * scarcer.depth:
+            squeezed += growth
+    return math.sqrt(area / start) * math.exp(-0.5 * grown - SQUEEZE * squeezed)
 
 
 def numbers(scene: Scene, speed: float | None) -> list[Number]:

@@ -8,7 +8,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from repro.model import flow, growth
+from repro.model import adhesion, flow, growth
 from repro.model.pore import Pore, Solved
 from repro.model.surface import STRETCH, surface
 from repro.results.field_files import Grid
@@ -33,10 +33,7 @@ class State:
     @cached_property
     def stress(self) -> np.ndarray:
         """(t, q, 4) MPa, components xx, yy, zz, xy in the same points."""
-        mesh = self.pore.mesh
-        linear = self.pore.body.shape.table.linear
-        pressure = self.pore.pressure[mesh.triangles[mesh.biomass]] @ linear.T
-        return self.scene.growth.shear_modulus * growth.cauchy(self.strained.F, pressure)
+        return adhesion.stress(self.scene, self.pore)
 
     def mean(self, value: np.ndarray) -> np.ndarray:
         """(t,) means of values (t, q) over each of the aggregate's triangles at t = 0."""

@@ -8,9 +8,10 @@ from functools import partial
 from repro.march import balance
 from repro.march.balance import Ledger
 from repro.march.loop import Report
+from repro.model import adhesion
 from repro.model.surface import BESIDE, BIOT, CREASE, STRETCH, surface
 from repro.results.quantities import Quantity, is_modelled
-from repro.scene import Scene
+from repro.scene import Growth, Scene
 
 SUBSTRATES = ("acceptor", "donor")
 #: Parts that a quantity may need: does a report have them?
@@ -19,7 +20,15 @@ NEEDS: dict[str, Callable[[Scene, Report], bool]] = {
     "substrates": lambda scene, at: at.solved.concentrations is not None,
     "aggregate": lambda scene, at: at.pore.outline is not None,
     "biomass": lambda scene, at: at.pore.outline is not None and scene.kinetics is not None,
-    "growth": lambda scene, at: at.pore.outline is not None and scene.growth is not None}
+    "growth": lambda scene, at: at.pore.outline is not None and scene.growth is not None,
+    "adhesion": lambda scene, at: scene.growth is not None and _has_adhesion(scene.growth)}
+
+
+def _has_adhesion(growth: Growth) -> bool:
+    """Does a scene ask for what keeps the aggregate on its walls? Strain counts from t = 0."""
+    requested = (growth.wall == "bonded", growth.fluid_forces == "included",
+             growth.bonding_strength is not None, growth.tensile_strength is not None)
+    return any(requested) and growth.new_biomass == "stressed"
 
 
 def _both(pattern: str, words: str, formula: str, value: Callable,
@@ -65,6 +74,20 @@ def _substrate_balance(k: int, scene: Scene, at: Report) -> float:
 def _of_steps(defect: Callable[[Ledger], float], at: Report) -> float:
     """The worst defect of the steps since the last row."""
     return _worst([defect(ledger) for ledger in at.ledgers])
+
+
+def _peak(name: str, words: str, formula: str, label: str, peak: Callable) -> list[Quantity]:
+    """The largest mean of a stress, and its place."""
+    return [Quantity(f"{name}_MPa", words, formula, lambda scene, at: peak(scene, at).value, label,
+                     "adhesion", signed=True),
+            *(Quantity(f"{name}_{axis}_um", f"place of the {words}, {axis}",
+                       f"middle of the mean that is the {words}",
+                       lambda scene, at, axis=axis: getattr(peak(scene, at), axis),
+                       f"{axis} of {label}", "adhesion", signed=axis == "x") for axis in "xy")]
+
+
+def _load(part: str, scene: Scene, at: Report) -> float:
+    return getattr(adhesion.fluid_load(scene, at.pore, at.solved), part)
 
 
 def _composition(index: int, scene: Scene, at: Report) -> float:
@@ -139,6 +162,22 @@ SERIES = (
                "middle of the edge with the least elastic stretch along the free surface",
                lambda scene, at, k=k: surface(at.pore).place[k], f"{axis} of least stretch",
                "growth", signed=True) for k, axis in enumerate("xy")),
+    *_peak("wall_traction_max", "largest traction that a wall must bear",
+           "largest (max(pull, 0)^2 + shear^2)^(1/2), means over W / 20 along the contact surface",
+           "wall traction",
+           lambda scene, at: adhesion.wall_peak(scene, at.pore, at.solved)),
+    *_peak("tensile_stress_max", "largest tensile stress of the aggregate",
+           "largest eigenvalue of the Cauchy stress, in the mean over the triangles whose middles "
+           "are within W / 20 of one", "tensile stress",
+           lambda scene, at: adhesion.tensile_peak(scene, at.pore)),
+    *(Quantity(f"fluid_force_{axis}_uN_per_m", f"force of the fluid on the aggregate, {axis}",
+               "integral of the water's stress over the interface, or of its drag over a permeable "
+               "aggregate; the head is zero at the outlet of the meshed part",
+               partial(_load, axis), f"force {axis}", "adhesion and flow", signed=True)
+      for axis in "xy"),
+    Quantity("fluid_moment_nN", "moment of the fluid on the aggregate, per depth",
+             "integral of x f_y - y f_x, x from the middle of the contact with the lower wall",
+             partial(_load, "moment"), "moment", "adhesion and flow", signed=True),
     Quantity("nodes", "nodes of the mesh", "corners, and middles of the sides of curved triangles",
              lambda scene, at: len(at.pore.mesh.points), "nodes"),
     Quantity("remeshed", "mesh made anew", "1 where a step since the last row made a new mesh",

@@ -185,8 +185,8 @@ class Results(Mapping[str, np.ndarray]):
         >>> results = repro.solve("base", ['growth.end="1 h"'])
         >>> [panel.get_ylabel() for panel in results.plot()]
         ['conductivity\n(m/day)', 'thickness\n(um)', 'effluent\n(mg/L)']
-        >>> results.plot("acceptor", time=0.5).get_title(loc="left")
-        'base, t = 0.6 h'
+        >>> results.plot("acceptor", time=0.58).get_title(loc="left")
+        'base, t = 0.6 h: acceptor (mg/L)'
         """
         row = len(self.time) - 1 if time is None else self._row(time, "nearest")
         column = drawing.full_name(name or "", list(self.columns))
@@ -253,7 +253,7 @@ class Results(Mapping[str, np.ndarray]):
         >>> with tempfile.TemporaryDirectory() as folder:
         ...     axes = results.animate("acceptor", f"{folder}/film.gif")
         >>> axes.get_title(loc="left")
-        'base, t = 0.4 h'
+        'base, t = 0.4 h: acceptor (mg/L)'
         """
         if Path(file).suffix != ".gif":
             raise ValueError(f"file: {file}: a file name that ends in .gif is needed")

@@ -290,8 +290,19 @@ class Growth:
         "2 um", "um", source="2.3.3, Table 1",
         about="A film of fluid to the opposite wall closes when it is thinner than this")
     fluid_forces: str = choice(
-        "neglected", "included", about="The fluid's traction on the aggregate",
-        source="(20), (22), 2.3.3")
+        "neglected", "included", source="(20), (22), 2.3.3; section 5",
+        about="The fluid's traction on the aggregate, or its drag within a permeable one")
+    wall: str = choice(
+        "sliding", "bonded", source="2.3.3",
+        about="What touches the lower wall slides along it, or stays where it has touched it")
+    bonding_strength: float | None = quantity(
+        "1e-3 MPa", "MPa", default=None, source="Section 5, without a value",
+        about="The run ends if a wall must bear more to keep the aggregate, in the mean over "
+              "pore.width / 20")
+    tensile_strength: float | None = quantity(
+        "0.01 MPa", "MPa", default=None, source="Section 5, without a value",
+        about="The run ends if the largest tensile stress exceeds it, in the mean within "
+              "pore.width / 20")
     new_biomass: str = choice(
         "stressed", "stress_free", source="2.3, section 5",
         about="Strain counts from t = 0 (2.3), or new biomass is born without (section 5)")
@@ -523,6 +534,7 @@ class Scene:
 LATER: dict[str, dict[str, object]] = {
     "aggregate": {"position": "0.0 um", "smooth": False, "inert_fraction": 0.0},
     "flow": {"interpolation": "steps", "biomass": "viscous"},
+    "growth": {"wall": "sliding"},
     "numerics": {"contact_elements": 0.0},
     "substrates.acceptor": {"interpolation": "steps"},
     "substrates.donor": {"interpolation": "steps"},

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from repro.scene.time_table import TimeTable
 
 if TYPE_CHECKING:
-    from repro.scene import Aggregate, Flow, Kinetics, Pore, Scene, Substrate
+    from repro.scene import Aggregate, Flow, Growth, Kinetics, Pore, Scene, Substrate
 
 _NO_STATE = "nothing is supplied, so that no state is steady"
 _UNSTEADY = f', or numerics.transport = "gear": {_NO_STATE}'
@@ -233,11 +233,6 @@ def _biomass_rules(scene: "Scene", drive: "Flow") -> Rules:
         "numerics.elements": requirement,
         "numerics.preset": f'numerics.elements = {requirement}',
     }
-    forces = scene.growth is not None and scene.growth.fluid_forces == "included"
-    yield drag and forces, {
-        "growth.fluid_forces": '"neglected" is needed with flow.biomass = "brinkman"',
-        "flow.biomass": '"viscous" is needed with growth.fluid_forces = "included"',
-    }
 
 
 def _in_words(value: Driven, unit: str, factor: float = 1.0) -> str:
@@ -280,6 +275,7 @@ def _growth_rules(scene: "Scene") -> Rules:
         yield from _demand_rules(scene.kinetics)
     if scene.growth:
         yield from _step_rules(scene.growth.end, scene.growth.time_step)
+        yield from _strength_rules(scene.growth)
     if scene.growth and scene.growth.fluid_forces == "included":
         yield from _force_rules(scene)
     film = scene.growth.minimum_film if scene.growth else 0.0
@@ -307,6 +303,16 @@ def _step_rules(end: float, step: float) -> Rules:
         "growth.time_step": f"growth.end ({end:g} h) over {MOST_STEPS} or more is needed",
         "growth.end": f"at most {MOST_STEPS} times growth.time_step ({step:g} h) is needed",
     }
+
+
+def _strength_rules(growth: "Growth") -> Rules:
+    for key in ("bonding_strength", "tensile_strength"):
+        strength = getattr(growth, key)
+        yield strength is not None and growth.new_biomass == "stress_free", {
+            f"growth.{key}": 'growth.new_biomass = "stressed" is needed with it, since the stress '
+                             "counts from t = 0",
+            "growth.new_biomass": f'"stressed" is needed with growth.{key} = {strength} MPa',
+        }
 
 
 def _force_rules(scene: "Scene") -> Rules:

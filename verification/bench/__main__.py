@@ -11,7 +11,7 @@ from verification.evidence.writing import markdown, save
 
 #: Modules of the parts, imported when a part runs.
 PARTS = {"box": "users", "channel": "users", "base": "runs", "command": "commands", "size": "runs", "scenes": "runs",
-         "memory": "runs"}
+         "memory": "runs", "wide": "after_contact"}
 
 
 def main(arguments: list[str] | None = None) -> dict:

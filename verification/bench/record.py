@@ -16,7 +16,9 @@ Further keys of the parts: points of base "errors" (of the eight numbers, the la
 [time][number]; size, whose points have no error, "nodes", "stages" {stage: s} and "ratio" (to the floor); scenes "rows"
 [{"scene", "method", "seconds", "cpu", "stages", "took", "unneeded"}]; command "rows" [{"method", "seconds", "cpu",
 "imports", "over_imports", "over_few_rows"}]; memory "rows" [{"method", "steps", "slope",
-"bound"}]. A part that does not run again keeps its entries. Not-a-number is never written.
+"bound"}]; wide points "errors" [time][number], "reference_changes" [time][number] of the reference from a coarser one,
+and "reference_source", the hash of the source that computed it, for which it is kept. A part that does not run again
+keeps its entries. Not-a-number is never written.
 
 Measurement: each round runs all jobs once, so that other loads of the machine affect all jobs alike. Reading: the best
 speed of a method is the lower envelope of its points, interpolated and extrapolated on logarithmic axes.

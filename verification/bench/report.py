@@ -11,9 +11,10 @@ from itertools import cycle, product
 from math import inf
 from pathlib import Path
 
+import numpy as np
 from matplotlib.figure import Figure
 
-from verification.bench import runs
+from verification.bench import after_contact, runs
 from verification.bench.record import envelope, points, reading
 from verification.evidence.writing import Block, table
 
@@ -35,7 +36,8 @@ def judged(record: dict) -> list[dict]:
     """All verdicts of a record; what it has not measured neither holds nor fails."""
     parts = defaultdict(dict, record["parts"])
     return [*_base(parts["base"]), *_other_codes(parts), *_steps(parts["size"]), *_scenes(parts["scenes"]),
-            *_memory(parts["memory"]), *_commands(parts["command"])]
+            *_memory(parts["memory"]), *_commands(parts["command"]),
+            *(_after_contact(parts["wide"]) if parts["wide"] else ())]
 
 
 def verdict(claim: str, required: str, measure: Callable[..., tuple[str, bool]], *arguments) -> dict:
@@ -152,6 +154,22 @@ def _flat(part: dict, method: str) -> tuple[str, bool]:
     row = {row["method"]: row for row in part["rows"]}[method]
     description = f"{row['slope']:.0f} bytes a step over {row['steps']} steps; {row['bound']:.0f} allowed"
     return description, row["slope"] <= row["bound"]
+
+
+def _after_contact(part: dict) -> Iterator[dict]:
+    for preset, aim in after_contact.AIMS.items():
+        hours = ", ".join(f"{time:g}" for time in after_contact.TIMES)
+        yield verdict(f"wide at {hours} h: conductivity, tips and length of contact in {preset}",
+                      f"at most {100 * aim:g} %, with the reference's own change", _converged, part, preset, aim)
+
+
+def _converged(part: dict, preset: str, aim: float) -> tuple[str, bool]:
+    """The largest error of each number over the times; the number holds if error and reference's change do together."""
+    errors = np.array(points(part, f"preset {preset}")[0]["errors"])
+    changes = np.array(part["reference_changes"])
+    listed = ", ".join(f"{name} {100 * error:.2g} %" for name, error in
+                       zip(after_contact.NUMBERS, errors.max(axis=0)))
+    return f"{listed}; reference changes by {100 * changes.max():.2g} %", bool((errors + changes).max() <= aim)
 
 
 def _commands(part: dict) -> Iterator[dict]:

@@ -8,7 +8,7 @@ contact, which closes by entire edges of the outline, with the numbers derived f
 peak lies beside the ends of the contact surface, where stresses have no limit. The bar of a tiny change exceeds it.
 
 A second list has the numbers of base whose bars exceed 0.2 %, the limit that its velocities, effluents, uptake and
-concentrations meet. The replication note prints both lists, the second with the reason for each kind.
+concentrations meet. The register of the claims prints both lists, the second with the reason for each kind.
 
 The program runs wide with the preset `exact` and prints its distance from the finest recorded size. It says whether
 conductivities and tips are within 0.5 %, distance and bar together, in 60 s of processor time.
@@ -37,7 +37,7 @@ NOT_OF_BASE = ("C19", "C41")
 KINDS = {
     "a place, known to the element in which it is": r"C10",
     "a small difference of two halves, or of two runs or solutions, which takes the errors of both in parts of itself":
-        r"C11|C36|C42|.*(born stress-free|deviation|law's r|changed by the fluid)",
+        r"C11|C36|C42|C63|.*(born stress-free|deviation|law's r|changed by the fluid)",
     "a Sherwood number, over the drop from the supply to the interface, small against the supply, and ratios less one":
         r"C39|C47",
     "a peak of stress or strain, beside the corner of interface and wall or in one element, and ratios of such":

@@ -151,7 +151,7 @@ RADII, REACHES = (5.0, 10.0, 20.0, 30.0), (0.25, 0.5, 1.0, 1.5)
 
 
 @claim("C19", "3.1", "meshing to min(5 R, 1 W) from the aggregate suffices", about=OF_SCHEME, sizes=BESIDE, steps=ALONE,
-       fixed="the shapes are given, and no step is made")
+       fixed="the shapes are given, and no step is made", date="2026-11-22 18:19")
 def truncation() -> Finding:
     """Conductivity, and effluents at one mean velocity, of half-discs of X_m meshed to parts of min(5 R, W), against
     the whole pore meshed, on nested meshes whose clean part resists alike."""
@@ -164,8 +164,7 @@ def truncation() -> Finding:
     return Finding(checks, reason="what is cut off matters by more than that",
                    note="Errors (%) of conductivity/acceptor effluent/donor effluent at parts of min(5 R, W): "
                    f"{table}. That is without what the elements of the clean part add to the resistance, which is no "
-                   "truncation. Changed on 2026-11-22 after these values had been seen: the "
-                   "converged solution judged, where these elements add nothing; the verdict was the same.")
+                   "truncation.")
 
 
 def _listed(errors: np.ndarray) -> str:

@@ -173,6 +173,8 @@ def summary(rows: list[Row]) -> str:
         "arithmetic of Table 1 are not among them."))
 
 
+#: Since when a definition must be dated before its first value; some older ones were written with their values.
+RULE_SINCE = "2026-11-24"
 COMMITTED, OTHERS = (Path(__file__).parent / name for name in ("claims.json", "other_definitions.json"))
 #: Numbers this small are the round-off of exact ones, which differs between machines; so do last digits.
 ROUND_OFF, LAST_DIGITS = 1e-9, 1e-9
@@ -201,12 +203,14 @@ def entry(row: Row) -> dict:
 
 def stamped(entry: dict, known: dict | None, now: str) -> dict:
     """The entry with the time of its first value: the recorded one while the definition is the same, else now (UTC).
-    Raises ClaimError for a definition that is not dated before its first value, or not after those of another one."""
+    Raises ClaimError for a definition that is not dated before its first value, or not after those of another one; for
+    a new claim not after RULE_SINCE."""
     if known and _definition(entry) == _definition(known):
         return {**entry, "first_value": known["first_value"]}
-    if not (known["first_value"] if known else "") < entry["defined"] < now:
-        raise ClaimError(f"{entry['id']}: defined anew, and {entry['defined']} is not between the values of the other "
-                         f"definition and {now}")
+    before = known["first_value"] if known else RULE_SINCE
+    if not before < entry["defined"] < now:
+        raise ClaimError(f"{entry['id']}: defined anew, and {entry['defined']} is not between {before} and {now}: a "
+                         "definition is dated before its first value, and after those of another definition")
     return {**entry, "first_value": now}
 
 
@@ -291,13 +295,13 @@ def flips(entry: dict) -> list[Flip]:
 
 def _moved(check: dict) -> list[tuple[float, float]]:
     """The bounds of a check, one of them moved by the bar; none where that has no end."""
-    low, high = _ends(check["tolerance"])
-    first, last = _ends(check)
+    low, high = ends(check["tolerance"])
+    first, last = ends(check)
     half = 0.5 * (last - first)
     return [(low - half, high), (low + half, high), (low, high - half), (low, high + half)] if isfinite(half) else []
 
 
-def _ends(recorded: dict) -> tuple[float, float]:
+def ends(recorded: dict) -> tuple[float, float]:
     """The ends of a recorded interval, in which an open end is null."""
     return -inf if recorded["low"] is None else recorded["low"], inf if recorded["high"] is None else recorded["high"]
 
@@ -305,5 +309,5 @@ def _ends(recorded: dict) -> tuple[float, float]:
 def _verdict_with(entry: dict, number: int, bounds: tuple[float, float]) -> str:
     """The verdict with other bounds of one check."""
     outcomes = [check["outcome"] for check in entry["checks"]]
-    outcomes[number] = outcome_of(_ends(entry["checks"][number]), bounds)
+    outcomes[number] = outcome_of(ends(entry["checks"][number]), bounds)
     return verdict_of(set(outcomes), bool(entry["change"]), bool(entry["rounding"]))

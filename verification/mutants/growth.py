@@ -112,6 +112,12 @@ MUTANTS = (
          'last = None if stressed else grown.mesh.points[grown.mesh.body]',
          "last = None")),
     *changes(
+        "repro/model/contact_lines.py",
+        ("half-angle",
+         "Wedges beside a contact line close at half of the least slope.",
+         "np.minimum(self.film, np.tan(self.angle) * distance)",
+         "np.minimum(self.film, 0.5 * np.tan(self.angle) * distance)")),
+    *changes(
         "repro/march/folding.py",
         ("fold-never",
          "no limit of the stretch ends a run",

@@ -29,6 +29,7 @@ CACHE_KEYS = "tests/test_cache_keys.py::test_"
 DEEPEST = "tests/test_deepest_level.py::test_elements_are_halved_as_often_as_a_front_needs"
 FOLD = "tests/test_fold.py::test_"
 OVER = f"{FOLD}a_fold_ends_a_run"
+EXPECTED = f"{FOLD}check_expects_a_fold_of_a_starved_core"
 READERS = "tests/test_vtk.py::test_every_reader_reads_what_was_computed"
 
 MUTANTS = (
@@ -78,10 +79,27 @@ MUTANTS = (
     *changes(
         "repro/preflight/simplifications.py",
         ("fold-expected-early",
-         "check expects a fold however little the rim has outgrown the core.",
-         "and excess > FOLD_EXCESS)",
-         "and excess > -1.0)",
-         f"{FOLD}check_expects_a_fold_according_to_the_rule[changes3-False]")),
+         "check expects a fold however little the rim is compressed.",
+         "if stretch < FOLD_EXPECTED:",
+         "if stretch < 1.0:",
+         f"{EXPECTED}[changes2-12500.0-False]")),
+    *changes(
+        "repro/preflight/numbers.py",
+        ("rim-fed-without-end",
+         "The estimate of the rim's stretch forgets that the inflow limits the uptake.",
+         "fed /= max(1.0, uptake * fed)",
+         "pass",
+         f"{EXPECTED}[changes0-12500.0-True]"),
+        ("rim-squeezed-everywhere",
+         "After contact the estimate compresses the rim of a fed core too.",
+         "elif touching > 2 * scarcer.depth:",
+         "else:",
+         f"{EXPECTED}[changes4-416667.0-False]"),
+        ("rim-grows-freely",
+         "The estimate compresses the rim by its growth, not by the root of it.",
+         "math.exp(-0.5 * grown",
+         "math.exp(-grown",
+         f"{FOLD}the_estimate_of_the_rim_is_that_of_a_thin_ring")),
     *changes(
         "repro/model/surface.py",
         ("stretch-beside-the-line",
@@ -414,8 +432,8 @@ MUTANTS = (
          "tests/test_sweep.py::test_unfinished_runs_of_a_sweep_are_made_again"),
         ("half-a-fold",
          "A status that is cut off after the time of a fold is one.",
-         ": near x = .*",
-         ".*",
+         "folds in the step from {TIME}: near x = .*",
+         "folds in the step from {TIME}.*",
          f"{FOLD}the_status_of_a_fold_is_a_full_sentence"
          "[the aggregate's surface folds in the step from t = 5.24 h-False]")),
     *changes(
@@ -1296,8 +1314,8 @@ MUTANTS = (
         "repro/model/traction.py",
         ("forces-laplacian",
          "Forces on the aggregate take the Laplacian form, whatever the flow's is.",
-         "nodal(space, flow_field, viscosity, numerics.interface)",
-         'nodal(space, flow_field, viscosity, "laplacian")',
+         "on_aggregate(space, flow_field, drive, numerics.interface)",
+         'on_aggregate(space, flow_field, drive, "laplacian")',
          f"{PAIRS}the_force_on_the_aggregate_comes_through_every_section_of_the_fluid"),
         ("cubic-forces-laplacian",
          "With cubic elements forces take the Laplacian form.",
@@ -1547,4 +1565,11 @@ MUTANTS = (
          "    return max(previous.time, previous.time + duration)\n",
          f"{STEPPING}a_shape_leans_as_the_flow_at_the_end_of_its_step_pushes[updates]",
          f"{STEPPING}a_shape_leans_as_the_flow_at_the_end_of_its_step_pushes[midpoint]")),
+    *changes(
+        "verification/claims/report.py",
+        ("first-value-undated",
+         "A new claim may have any date before its first value.",
+         'before = known["first_value"] if known else RULE_SINCE',
+         'before = known["first_value"] if known else ""',
+         "tests/test_claims.py::test_a_definition_without_a_date_before_its_values_is_refused")),
 )

@@ -8,6 +8,7 @@ import numpy as np
 
 from reference import averaged_pore, whole_run
 from repro import results
+from repro.fem.outline import TOP
 from repro.march import midpoint, updates
 from repro.march.balance import Ledger
 from repro.march.loop import Report, StepResult
@@ -102,6 +103,14 @@ def numbers(instant: Report) -> dict[str, float]:
     outline = instant.pore.outline
     return {"area": outline.area, "upstream tip": outline.upstream,
             "conductivity": instant.solved.flow.conductivity}
+
+
+def after_contact(instant: Report) -> dict[str, float]:
+    """Conductivity, tips, and the length of contact with the opposite wall (zero without contact) at an instant."""
+    outline = instant.pore.boundary
+    on = outline.points[outline.wall == TOP, 0]
+    return {"conductivity (m/d)": M_PER_D * instant.solved.flow.conductivity, "upstream tip (um)": outline.upstream,
+            "downstream tip (um)": outline.downstream, "length of contact (um)": float(np.ptp(on)) if len(on) else 0.0}
 
 
 def without_flow(scene: Scene) -> Scene:

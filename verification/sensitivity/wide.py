@@ -22,15 +22,13 @@ import numpy as np
 import shapely
 
 from repro.errors import RunEnd
-from repro.fem.outline import TOP
 from repro.march import simulation
-from repro.march.loop import Report, RestartState
-from repro.results import M_PER_D
+from repro.march.loop import RestartState
 from verification.claims import CLAIMS, Finding, evaluate
 from verification.claims.evaluate import MESH_ORDERS, unnumbered
-from verification.claims.growth_pattern import contact_length
 from verification.claims.levels import CONVERGED, Level, at_level, converged, forget
 from verification.claims.runs import WIDE, bodies, ending, polygon, series
+from verification.problems import runs as problems
 from verification.sensitivity.rounding import OF, Row, Runs, column, load_varied, touching
 from verification.uncertainty import estimate
 
@@ -52,16 +50,10 @@ def of_after(scene) -> Row:
     after = [instant for _, instant in simulation.steps(scene) if instant and instant.pore.contact]
     if len(after) != len(HOURS):
         raise LookupError(f"{len(after)} of {len(HOURS)} rows are after contact")
-    table = np.array([_row(each) for each in after])
+    table = np.array([[*problems.after_contact(each).values()] for each in after])
     means = np.exp(np.log(np.abs(table)).mean(axis=0))
     rows = zip(KINDS, (means, table[HOURS.index(LATER)], table[-1]))
     return {f"{kind} {name}": float(abs(value)) for kind, row in rows for name, value in zip(REQUIRED_BARS, row)}
-
-
-def _row(report: Report) -> list[float]:
-    """Numbers of a report in the order of REQUIRED_BARS."""
-    outline, conductivity = report.pore.boundary, M_PER_D * report.solved.flow.conductivity
-    return [conductivity, outline.upstream, outline.downstream, contact_length(outline, TOP)]
 
 
 OF["after contact"] = of_after
@@ -89,7 +81,8 @@ SUPPLIES, SIZE = (5.0, 10.0, 20.0, 40.0), 2**0.5
 END = 120.0
 #: Claims that read this run but are not judged again, since they compare it with other models; with the reasons.
 LEFT_OUT = {"C32": "compares two ways for biomass to be born", "C41": "changes the rheology and the walls",
-            "C46": "compares its stresses with and without the fluid's forces"}
+            "C46": "compares its stresses with and without the fluid's forces",
+            "C63": "compares its shapes with and without them"}
 #: Hours before it reaches an end of the pore at which an aggregate is still clear of it.
 MARGIN = 0.1
 #: Whole hours that wide goes on after contact: 45 h for Figure 6's own 10 K_s.

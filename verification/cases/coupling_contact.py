@@ -1,0 +1,66 @@
+"""Runs after contact with the opposite wall, against runs of the package itself on finer levels.
+
+The presets aim at 1, 0.2 and 0.05 %. A level is the preset accurate with elements and steps of a size, and with small
+elements beside contact lines (:mod:`verification.claims.levels`).
+
+Two limits are wider than the aims, for two reasons. The displacement is singular like the root of the distance at a
+contact line (:mod:`verification.cases.growth_contact`), so the length of contact converges with the first order of the
+elements there. A contact surface that grows requires a new mesh in every step, and meshes are unrelated. In equal steps
+from 17.2 to 18 h in the pore of 25 um (elements of accurate), 2, 4, 8 and 16 steps gave conductivities of 0.42846,
+0.42899, 0.42927 and 0.43025 m/d: they scatter by a tenth of a percent and more, and show no order in time.
+"""
+from functools import cache
+
+import pytest
+
+from repro.scene import load_scene
+from verification.claims.levels import converged
+from verification.claims.runs import until
+from verification.evidence.cases import parametrize
+from verification.evidence.checks import at_most
+from verification.problems.runs import QUADRATIC, after_contact, reports_of, with_preset
+
+#: Times (h) after contact, sizes of the two finest levels, and presets, by width of the pore (um). In the wider pore
+#: sizes of 1 and sqrt(2) were tried first: the length of contact changes by 0.27 % between them, more than KNOWN.
+PORES = {25: ((17.5, 18.0, 19.0), (0.5, 2**-0.5), QUADRATIC), 40: ((22.5, 24.0, 26.0), (2**-0.5, 1.0), QUADRATIC[:2])}
+LENGTH = "length of contact (um)"
+#: Relative errors that presets aim at, and those that are accepted: of conductivity and tips, of the length of contact.
+AIMS = {"fast": 0.01, "accurate": 0.002, "exact": 0.0005}
+ACCEPTED = {"fast": (0.01, 0.02), "accurate": (0.002, 0.005), "exact": (0.002, 0.005)}
+#: Largest change of the reference between its two levels: of conductivity and tips, of the length of contact.
+KNOWN = (0.0015, 0.002)
+
+
+@cache
+def numbers(width: int, *changes: str) -> tuple[dict[str, float], ...]:
+    """Conductivity, tips and length of contact at the times of a pore."""
+    scene = load_scene("wide", [f'pore.width="{width} um"', *changes, *until(*PORES[width][0])])
+    return tuple(map(after_contact, reports_of(scene)))
+
+
+def errors(computed, expected) -> dict[str, float]:
+    """The largest relative difference of each number over the times."""
+    return {name: max(abs(row[name] / other[name] - 1) for row, other in zip(computed, expected))
+            for name in expected[0]}
+
+
+@pytest.mark.slow
+@pytest.mark.case(
+    "coupling-after-contact", kind="property", mutants=("fast-too-coarse",), runs_with="2 fast accurate exact",
+    omitted="paper, order 1: nodes join the wall one by one, see growth-contact-lines; 3: its cost")
+@parametrize("width", {f"{width} um": (width,) for width in PORES})
+def test_after_contact(width, record):
+    """After contact, conductivity, tips and length of contact agree with those on finer levels of elements and steps.
+
+    Norm: the largest relative difference over three times.
+    """
+    finest, before = (numbers(width, *converged(size)) for size in PORES[width][1])
+    for name, change in errors(before, finest).items():
+        record(at_most(f"{name}, change of the reference", change, KNOWN[name == LENGTH],
+                       "less than the errors that are accepted below"))
+    for preset in PORES[width][2]:
+        for name, error in errors(numbers(width, with_preset(preset)), finest).items():
+            limit = ACCEPTED[preset][name == LENGTH]
+            origin = f"the aim of {preset}" if limit == AIMS[preset] else (
+                f"the aim is {100 * AIMS[preset]:g} %: missed, for singular lines and unrelated meshes")
+            record(at_most(f"{name}, {preset}", error, limit, origin))

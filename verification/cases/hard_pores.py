@@ -1,0 +1,38 @@
+"""Practical pores, drawn by seed, far past contact. Each reaches its end, the pore's end, or a fold that an independent
+computation from its files confirms.
+
+`pytest "verification/cases/hard_pores.py::test_pore[pore 17]"` runs one of them.
+"""
+
+import json
+
+import pytest
+
+from verification.evidence.checks import at_most
+from verification.problems import family
+
+#: Processor time (s) of one run.
+LIMIT = 120.0
+#: Cheap members, in ``make test``. Their surfaces are compressed to 0.97 and 0.93. ``make verify`` runs the others too.
+QUICK = (2, 58)
+REST = tuple(number for number in range(family.MEMBERS) if number not in QUICK)
+#: Fields of the mark that both cases share.
+COMMON = {
+    "kind": "property",
+    "claim": "Practical pores drawn by seed, 25 to 200 um wide, run far past contact: each reaches its end, the pore's "
+             "end, or a fold that an independent stretch from its files confirms",
+    "norm": "members that stop otherwise, or whose fold is not confirmed",
+    "mutants": ("hard-fold-unfounded",), "references": ("surface_stretch",), "runs_with": "2 fast",
+    "omitted": "other presets: fold_meshes continues runs that fold on other meshes"}
+MARKS = {QUICK: (pytest.mark.case("hard-pores", **COMMON),),
+         REST: (pytest.mark.case("hard-pores-rest", **COMMON), pytest.mark.slow)}
+
+
+@pytest.mark.parametrize("number", [pytest.param(number, id=f"pore {number}", marks=marks)
+                                    for numbers, marks in MARKS.items() for number in numbers])
+def test_pore(number, record):
+    """Run a member. A failure shows its row of the record."""
+    row = family.run_member(family.draw_member(number), LIMIT)
+    print(json.dumps(row))
+    failed = row["verdict"] in (family.UNCONFIRMED, family.FAILED)
+    record(at_most(f"{row['verdict']}: {row['status'][:300]}" if failed else "failures", failed, 0, "see the claim"))

@@ -1,0 +1,189 @@
+"""C60-C65: what the paper assumes on the way, or cites, and does not compute.
+
+C60: what perfect symmetry would cost, against what the discretization costs. C61: the profiles at t = 0. C62: decay
+without oxygen. C63: an aggregate that bends with the flow and returns. C64: an aggregate that stays thin. C65: the
+loading of its surface.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from repro.model import biomass, contact, gear
+from repro.model.kinetics import Sink
+from repro.model.transport import Concentrations
+from verification.claims import (
+    FEW,
+    FEW_WORDS,
+    OF_SCHEME,
+    TRANSPORT,
+    TRANSPORT_WORDS,
+    Finding,
+    at_most,
+    claim,
+    without_limit,
+)
+from verification.claims.fluid_and_aggregate import STATES, pressed
+from verification.claims.growth_pattern import biomass_rates, halves
+from verification.claims.levels import ABOUT_WIDE, ALONE, BESIDE, CONVERGED, Level, at_level
+from verification.claims.permeability import clean, decay_share
+from verification.claims.runs import (
+    BASE,
+    END,
+    PLOTTED,
+    SUBSTRATES,
+    UPDATE,
+    WIDE,
+    Body,
+    Run,
+    at,
+    bodies,
+    body,
+    grown,
+    load_packaged,
+    polygon,
+    series,
+    solved_pore,
+    uncovered,
+)
+from verification.problems.channels import both, pair
+
+
+@claim("C60", "4", "errors created by assuming perfect symmetry are of the order of a few percent, less than the error "
+       "due to discretization", about=OF_SCHEME, sizes=BESIDE, date="2026-11-25 22:44")
+def symmetry() -> Finding:
+    """Upstream half of base at 19.4 h in the paper's scheme: extent, growth rate and area. The error of symmetry takes
+    the mean of both halves for the upstream one; the error due to discretization is its distance from the converged
+    solution. The paper prints no mesh: a statement about its error holds if it holds on all meshes and steps here."""
+    rows = sides()
+    with at_level(Level(CONVERGED, 1.0)):
+        exact = sides()
+    checks = []
+    for name, (up, down) in rows.items():
+        symmetric = 100 * abs(0.5 * (up + down) / up - 1)
+        discretized = 100 * abs(up / exact[name][0] - 1)
+        checks += [at_most(f"{name} of the upstream half, error of symmetry (%)", "a few percent", symmetric,
+                           100 * FEW, FEW_WORDS),
+                   at_most(f"{name} of the upstream half, error of symmetry over that of discretization",
+                           "less than the error due to discretization", symmetric / discretized, 1.0, "the words")]
+    return Finding(tuple(map(without_limit, checks)),
+                   reason="on meshes as fine as ours the discretization costs less than perfect symmetry would; the "
+                          "mesh of the paper is not printed")
+
+
+def sides() -> dict[str, tuple[float, float]]:
+    """Extent (um) and area (um2) upstream and downstream of the seed's centre in base at 19.4 h, and the growth rates
+    (um2/h) of both halves in the shape of 19.2 h."""
+    row, after = at(BASE, END), body(BASE, END)
+    before = Body(load_packaged(*BASE), *grown(BASE, PLOTTED))
+    return {"extent": (-row["upstream_um"], row["downstream_um"]), "area": tuple(halves(after, after.areas)),
+            "growth rate": tuple(biomass_rates(before))}
+
+
+@claim("C61", "2.2", "at t = 0, C = C_supply throughout the entire pore", about=OF_SCHEME, sizes=BESIDE, steps=ALONE,
+       fixed="the first update of 12 min is asked", date="2026-11-25 22:44")
+def first_profiles() -> Finding:
+    """The first shape update of base by the transient scheme, from C_supply everywhere and from settled profiles, from
+    which our runs begin: concentrations at its end, and biomass made. If they agree to the paper's accuracy, the
+    condition is no part of the results."""
+    pore, solved = solved_pore(BASE, 0.0)
+    supplies = pair("supply", solved.problem.substrates)
+    uniform = Concentrations(*(np.full(len(solved.concentrations.acceptor), supply) for supply in supplies))
+    settled = gear.settle(solved.problem, Sink(pore.active), solved.concentrations)
+    ends = [gear.advance(solved.problem, pore.active, pore.inert, start, UPDATE) for start in (uniform, settled)]
+    apart = [np.abs(one - other).max() / supply
+             for one, other, supply in zip(*(both(end.concentrations) for end in ends), supplies)]
+    made = [float((end.active + end.inert - pore.active - pore.inert).sum()) for end in ends]
+    checks = (*(at_most(f"{name} after 12 min, from C_supply and from settled profiles: apart (% of the supply)",
+                        "C = C_supply", 100 * value, 100 * TRANSPORT, TRANSPORT_WORDS)
+                for name, value in zip(SUBSTRATES, apart)),
+              at_most("biomass made in 12 min, the same: change (%)", "C = C_supply", 100 * abs(made[0] / made[1] - 1),
+                      100 * TRANSPORT, TRANSPORT_WORDS))
+    return Finding(tuple(map(without_limit, checks)), reason="the first update remembers how it began")
+
+
+@claim("C62", "2.2", "oxygen is always present, so that the model without anaerobic decay describes decay sufficiently "
+       "well", date="2026-11-25 22:44", **ABOUT_WIDE)
+def anaerobic_decay() -> Finding:
+    """Biomass that decay at the full aerobic rate b, whatever the oxygen, would have taken from base and wide besides
+    what (9) takes, over the biomass at the end: the paper's anaerobic decay is slower, so that this is the most."""
+    checks = tuple(at_most(f"{run[0]}: biomass that decay at its full rate would take besides (% of the biomass)",
+                           "sufficiently well", 100 * decay_left_out(run), 100 * FEW, FEW_WORDS)
+                   for run in (BASE, WIDE))
+    return Finding(checks, reason="behind the front, where the acceptor is used up, the model lets biomass live that "
+                   "decay at the aerobic rate would take")
+
+
+def decay_left_out(run: Run) -> float:
+    """f_d b int (1 - m_A) X_A dV dt over the biomass at the end of a run, by the trapezoidal rule between its rows."""
+    rates = np.array([_decay_left_out(each) for each in bodies(run)])
+    last = bodies(run)[-1].pore
+    return float(np.trapezoid(rates, series(*run)["time_h"]) / (last.active.sum() + last.inert.sum()))
+
+
+def _decay_left_out(aggregate: Body) -> float:
+    """f_d b int (1 - m_A) X_A dV, um2 mg/L/h."""
+    pore, constants = aggregate.pore, aggregate.solved.problem.law.constants
+    remains = biomass.rates(pore.space, aggregate.solved.concentrations, aggregate.solved.problem.law).remains
+    decayed = remains / (1 - constants.degradable_fraction)
+    return constants.degradable_fraction * float((pore.active * (constants.decay_coefficient - decayed)).sum())
+
+
+@claim("C63", "2.3.1", "aggregates bend with the flow and regain their original position when the flow is stopped: "
+       "stresses depend on the initial and final positions and not on the path", date="2026-11-25 22:44", **ABOUT_WIDE)
+def returning() -> Finding:
+    """An aggregate at rest without the fluid's forces, then with them, then without them again: base at 19.4 h, wide at
+    30 h, with a film left, and wide at 40 h, a plug. The area that only one outline covers, after the return over under
+    the flow. An aggregate that joins the wall where the flow presses it there does not return."""
+    checks, notes = [], []
+    for run, hour in STATES:
+        rest = released(body(run, hour))
+        bent = pressed(rest)
+        outlines = [polygon(each.outline) for each in (rest, bent, released(bent))]
+        moved, left = (uncovered(outlines[0], other) for other in outlines[1:])
+        name = f"{run[0]}, {hour:g} h"
+        checks.append(at_most(f"{name}: outlines apart after the flow has stopped, over those under the flow", "regain",
+                              left / moved, 0.01, "a hundredth of the way"))
+        notes.append(f"{name} {moved:.2g} %")
+    return Finding(tuple(map(without_limit, checks)), reason="where the flow presses the aggregate to a wall, it stays",
+                   note=f"Area that only one of the outlines with and without the flow covers: {', '.join(notes)}.")
+
+
+def released(aggregate: Body) -> Body:
+    """The same aggregate at rest without the fluid's forces."""
+    still = replace(aggregate.scene, growth=replace(aggregate.scene.growth, fluid_forces="neglected"))
+    at_rest = contact.expand(contact.Mechanics.of(still), aggregate.pore, aggregate.pore.theta).pore
+    return Body(still, at_rest, aggregate.solved)
+
+
+#: Thickness over the pore's width up to which the scheme of Chen et al. (1996a) worked.
+THIN = 0.2
+
+
+@claim("C64", "1", "aggregates no thicker than 10-20 % of the width of the channels do not address permeability "
+       "reduction", date="2026-11-25 22:44", **ABOUT_WIDE)
+def thin_aggregates() -> Finding:
+    """By how much the conductivities of base and wide have fallen below that of the clean pore when the aggregate is a
+    fifth of the width thick."""
+    checks = tuple(at_most(f"{run[0]}: fall of the conductivity with the thickness at 20 % of the width (%)",
+                           "did not address", 100 * (1 - reduced_to(run, THIN)), 100 * FEW, FEW_WORDS)
+                   for run in (BASE, WIDE))
+    return Finding(checks, reason="a thin aggregate already reduces the permeability")
+
+
+def reduced_to(run: Run, part: float) -> float:
+    """K / K_clean of a run when its aggregate is a part of the pore's width thick."""
+    scene, rows = load_packaged(*run), series(*run)
+    thickness = rows["thickness_um"] / scene.pore.width
+    return float(np.interp(part, thickness, rows["conductivity_m_per_d"])) / (24e-6 * clean(scene))
+
+
+@claim("C65", "1", "at high values of the normalized surface loading a biofilm tends to be continuous, at low values "
+       "only patchy growth is sustained", date="2026-11-25 22:44",
+       unjudged="the paper cites a review of data; its model is seeded with one aggregate and neglects attachment, so "
+                "that no loading could make it continuous or patchy")
+def loading() -> Finding:
+    """Flux of donor into base's aggregate over the flux with which synthesis just balances decay."""
+    balance = 1 / decay_share(body(BASE, PLOTTED))
+    return Finding((), note=f"At 19.2 h the flux of substrate into the aggregate of base is {balance:.0f} times that "
+                   "with which synthesis balances decay: the loading is high, and the seed stays an aggregate.")

@@ -1,0 +1,108 @@
+"""C48, C49: up to where the smooth shape of the aggregate has the least energy, and whether the expansion that the
+paper expects comes before that ends.
+
+Both are judged in three scenes: base under its constant head to 76 h (C43), wide, and a pore as wide as wide's, four
+times as long, with a seed of 10 um and a tenth of the velocity. The supply of 10 mg/L is the same in all of them. When
+the definitions were written, the slow pore was known to end as a fold with a stretch of 0.64 to 0.66; the expansions
+were not known.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from repro.errors import RunEnd
+from repro.march import simulation
+from repro.march.loop import Report
+from repro.model.surface import CREASE, surface
+from verification.claims import Finding, PaperCheck, at_least, between, claim, without_limit
+from verification.claims.growth_mechanics import TOTAL
+from verification.claims.levels import BESIDE_PAIRS, PAIRED, cached
+from verification.claims.permeability import CLOSING
+from verification.claims.runs import WIDE, Run, body_of, load_packaged, until
+
+#: A wide, slow pore, in which the rim grows on a starved core.
+SLOW = ("wide", 'pore.length="2.4 mm"', 'aggregate.radius="10 um"', 'flow.mean_velocity="0.3 m/day"',
+        *until(*range(3, 91, 3)))
+SCENES: dict[str, Run] = {"base": CLOSING, "wide": WIDE, "slow pore": SLOW}
+#: When both definitions were written.
+DEFINED = "2026-11-25 22:42"
+
+
+@dataclass(frozen=True)
+class Course:
+    """A run by its rows: hours (n,), least elastic stretch of the free surface (n,), largest expansion of a triangle
+    (n,), the largest over the smallest in the last row, and the message of the RunEnd that ended the run, or ""."""
+
+    hours: np.ndarray
+    stretch: np.ndarray
+    expansion: np.ndarray
+    spread: float
+    ended: str
+
+
+@cached
+def course(*run: str) -> Course:
+    """Compute a run to its end, which may be a fold."""
+    scene = load_packaged(*run)
+    reports: list[Report] = []
+    ended = ""
+    try:
+        reports.extend(report for _, report in simulation.steps(scene) if report)
+    except RunEnd as end:
+        ended = str(end)
+    stretch = np.array([surface(report.pore).least for report in reports])
+    means = [body_of(scene, report).mean(report.pore.theta) for report in reports]
+    return Course(np.array([report.pore.time for report in reports]), stretch, np.array([m.max() for m in means]),
+                  float(means[-1].max() / means[-1].min()), ended)
+
+
+def smooth_expansion(run: Course) -> float:
+    """The largest expansion while the least stretch is at least CREASE; expansions grow exponentially between rows."""
+    below = np.flatnonzero(run.stretch < CREASE)
+    if not len(below):
+        return float(run.expansion.max())
+    rows = slice(below[0] - 1, below[0] + 1)
+    return float(np.exp(np.interp(-CREASE, -run.stretch[rows], np.log(run.expansion[rows]))))
+
+
+@claim("C48", "5", "the deterministic approach leads to biological masses with a smooth outer surface, since the "
+       "potential energy of the aggregate is kept to a minimum", fine=PAIRED, beside=BESIDE_PAIRS, date=DEFINED)
+def smooth_surface() -> Finding:
+    """The least elastic stretch along the free surface, in all rows of each scene. Under 0.647 a crease has less energy
+    than the smooth surface of a neo-Hookean body (Hohlfeld and Mahadevan 2011; Hong, Zhao and Suo 2009), and the
+    smooth shape is no minimum. The statement has no conditions, so it must hold in every scene."""
+    return Finding(tuple(_least(name) for name in SCENES), reason=_ends(), note=_stretches)
+
+
+def _least(name: str) -> PaperCheck:
+    return without_limit(at_least(f"{name}: least elastic stretch along the free surface", "smooth, at least energy",
+                                  course(*SCENES[name]).stretch.min(), CREASE, "under it a crease has less energy"))
+
+
+@claim("C49", "2.3.1", "expansion by up to 2000, after a couple of days, can be handled, also where the aggregate "
+       "grows unevenly", fine=PAIRED, beside=BESIDE_PAIRS, date=DEFINED)
+def uneven_expansion() -> Finding:
+    """The largest expansion of a triangle in wide and in the slow pore, as long as the smooth surface has the least
+    energy (C48), and the time at which it is 2000. The deformation is handled if both pores reach 2000 so."""
+    checks = []
+    for name in ("wide", "slow pore"):
+        run = course(*SCENES[name])
+        reached = float(np.interp(np.log(TOTAL), np.log(np.maximum.accumulate(run.expansion)), run.hours, right=np.inf))
+        checks += [at_least(f"{name}: largest expansion under a smooth surface of least energy", "up to 2000",
+                            smooth_expansion(run), TOTAL, "as stated"),
+                   between(f"{name}: time at which the expansion is 2000 (h)", "a couple of days", reached, 24, 72,
+                           "one to three days, as in C25")]
+    return Finding(tuple(map(without_limit, checks)), reason=_ends(), note=_stretches)
+
+
+def _ends() -> str:
+    """How the scenes end that do not come to their last row."""
+    ends = "; ".join(f"{name}: {run.ended}" for name in SCENES if (run := course(*SCENES[name])).ended)
+    return f"growth compresses the surface of a rim that grows on a starved core. {ends}"
+
+
+def _stretches() -> str:
+    parts = [f"{name} to {run.hours[-1]:.3g} h: stretch {run.stretch.min():.3f}, expansion {run.expansion.max():.3g}, "
+             f"{run.spread:.3g} times the smallest one" for name in SCENES for run in [course(*SCENES[name])]]
+    return "; ".join(parts) + "."

@@ -1,0 +1,82 @@
+"""Where runs of the family stop on other meshes, and how they go on with stress-free biomass.
+
+    python -m verification.problems.fold_meshes 12 13 41 --limit 60
+
+A member runs with the preset fast. Its last state above BEGUN continues on each of MESHES. Another preset has another
+time tolerance too. With stress-free biomass the member runs from t = 0. Each run has a limit of processor time. A line
+of the record names the member, the end of each run, its time (h), and the least stretch of its last state.
+"""
+
+import argparse
+import json
+from collections.abc import Iterable
+from pathlib import Path
+
+from repro.errors import SimulationError
+from repro.march import simulation
+from repro.march.folding import Fold
+from repro.march.loop import PoreEnd, RestartState
+from repro.model import remeshing
+from repro.model.remeshing import Remeshing
+from repro.model.surface import surface
+from repro.scene import Scene
+from verification.problems.family import draw_member
+from verification.problems.hard import TooLong, limited
+
+#: Least stretch at which runs on other meshes begin: smooth surfaces, long before the first crease.
+BEGUN = 0.75
+#: Below a refinement of 0.4 the sizes do not depend on it.
+MESHES = {"fast, refinement 0.45": ("numerics.refinement=0.45",), "accurate": ("numerics.preset=accurate",),
+          "accurate, refinement 0.7": ("numerics.preset=accurate", "numerics.refinement=0.7")}
+STRESS_FREE = "growth.new_biomass=stress_free"
+
+
+def follow(scene: Scene, limit: float, state: RestartState | None = None) -> tuple[dict, RestartState | None]:
+    """(end, time and least stretch) of a run, and its last state with a stretch above BEGUN."""
+    last, before, end = state, state, "end"
+    try:
+        with limited(limit):
+            for last, _ in simulation.steps(scene, state):
+                if surface(last.pore).least > BEGUN:
+                    before = last
+    except (Fold, PoreEnd, SimulationError, TooLong) as error:
+        end = f"{type(error).__name__}: {error}"
+    reached = {"time_h": last.pore.time, "stretch": surface(last.pore).least} if last else {}
+    return {"end": end, **reached}, before
+
+
+def on_mesh_of(scene: Scene, state: RestartState) -> RestartState:
+    """The state in a new mesh of a scene."""
+    pore = remeshing.remesh(Remeshing.of(scene), state.pore, state.pore, 0.0)[0]
+    return RestartState(pore, state.step_control)
+
+
+def study(number: int, limit: float) -> dict[str, object]:
+    """The ends of all runs of a member. Those on other meshes are left out if the stretch stays above BEGUN."""
+    member = draw_member(number)
+    first, before = follow(member.scene(*member.duration), limit)
+    ends: dict[str, object] = {"number": number, "fast": first}
+    if before is not None and first["stretch"] <= BEGUN:
+        for name, changes in MESHES.items():
+            scene = member.scene(*member.duration, *changes)
+            ends[name], _ = follow(scene, 4 * limit, on_mesh_of(scene, before))
+    ends["stress_free"], _ = follow(member.scene(*member.duration, STRESS_FREE), limit)
+    return ends
+
+
+def main(numbers: Iterable[int], limit: float, record: Path) -> None:
+    """Print a line for each member, and add it to the record."""
+    for number in numbers:
+        line = json.dumps(study(number, limit))
+        print(line, flush=True)
+        with record.open("a", encoding="utf-8") as file:
+            file.write(line + "\n")
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("numbers", type=int, nargs="+")
+    parser.add_argument("--limit", type=float, default=60.0)
+    parser.add_argument("--record", type=Path, required=True)
+    options = parser.parse_args()
+    main(options.numbers, options.limit, options.record)
