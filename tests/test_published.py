@@ -53,18 +53,6 @@ def test_the_templates_have_no_number_that_a_run_computes():
         assert set(re.findall(r"\d+\.\d+", plain)) <= {"2.9", "1.5", "4.19", "6.13", "1.6", "19.2", "19.4"}
 
 
-<<<<<<< HEAD
-def test_every_claim_and_erratum_is_in_the_note(record):
-    """Each claim appears once, in the list of its verdict; contradicted and undecided claims have a reason. Counts of
-    verdicts agree with the record."""
-    kinds = ("reproduced", "rounding", "changed", "contradicted", "undecided", "unjudged")
-    by_kind = {kind: re.findall(r"^- \*\*(C\d\d)\*\*", replication.fill_template(f"{{{{list.{kind}}}}}", record), re.M)
-             for kind in kinds}
-    assert sorted(sum(by_kind.values(), [])) == list(EXPECTED)
-    unreproduced = {*by_kind["contradicted"], *by_kind["undecided"], *by_kind["unjudged"]}
-    assert all(counted(claim)["reason"] for claim in record["claims"] if claim["id"] in unreproduced)
-    for name in ("README.md", "paper_figures/replication.md", "docs/scope.md", "codecheck.yml"):
-=======
 #: Words and pictures of the note at most: what is read in five minutes. Words are what spaces part.
 WORDS, PICTURES = 1800, 4
 
@@ -96,8 +84,7 @@ def test_every_claim_and_erratum_is_in_the_register(record):
         assert first["reason"] or kind not in ("contradicted", "undecided", "unjudged")
         assert all(check["quantity"] in rows[claim["id"]][4] for check in first["checks"])
     for name in ("README.md", "paper_figures/replication.md", "paper_figures/register.md", "docs/scope.md",
-                 "codecheck.author.yml"):
->>>>>>> main
+                 "codecheck.yml"):
         counts = re.findall(r"\b(\d+) (?:claims )?(?:are )?(reproduced|contradicted|undecided)\b", text(name))
         assert all(int(count) == len(by_kind[kind]) for count, kind in counts), name
     assert set(by_kind["contradicted"]) <= set(STATEMENT.findall(replication.NOTE.read_text(encoding="utf-8")))

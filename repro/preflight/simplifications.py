@@ -247,17 +247,10 @@ def _fold(scene: Scene, value: dict[str, float]) -> Iterator[Caveat]:
     stretch = numbers.rim_stretch(scene, uptake / numbers.at_start(scene).area)
     if stretch < FOLD_EXPECTED:
         yield Caveat("growth.end", f"the run may end before {scene.growth.end:g} h, as a fold: the "
-<<<<<<< HEAD
-                     f"supply reaches {depth:.3g} um into an aggregate of up to "
-                     f"{end.thickness:.3g} um, so that its rim compresses itself until no smooth "
-                     "shape is left (`repro docs scope`). Of 10 pores judged so, 4 folded and 3 came "
-                     "close; of 12 others none did")
-=======
                      f"supply reaches {numbers.depth(scene):.3g} um into an aggregate of up to "
                      f"{numbers.at_end(scene).thickness:.3g} um, so that its rim may compress "
                      f"itself to an elastic stretch of {stretch:.2f} or less (estimate, "
-                     "docs/scope.md)")
->>>>>>> main
+                     "`repro docs scope`)")
 
 
 def warn_crease(pore: Pore) -> Iterator[Caveat]:
