@@ -17,7 +17,7 @@ copyright = f"2026, {author}"
 root_doc = "docs/index"
 include_patterns = [
     "README.md", "CHANGELOG.md", "CONTRIBUTING.md", "docs/**.md", "docs/examples/*.py", "paper_figures/replication.md",
-    "reference/ERRATA.md", "verification/report/*.md", "verification/sensitivity/sensitivity.md",
+    "paper_figures/register.md", "reference/ERRATA.md", "verification/report/*.md", "verification/sensitivity/sensitivity.md",
 ]
 exclude_patterns = ["docs/_build", "build", "**/.*"]
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.autosummary", "numpydoc", "sphinx_design", "mathml"]
@@ -25,6 +25,7 @@ source_suffix = {".md": "myst-nb", ".py": "myst-nb"}
 nb_custom_formats = {".py": ["jupytext.reads", {"fmt": "py:percent"}]}
 myst_enable_extensions = ["dollarmath", "colon_fence", "deflist"]
 myst_heading_anchors = 4
+myst_title_to_header = True
 nb_execution_mode = "force"
 nb_execution_raise_on_error = True
 nb_execution_timeout = 120
@@ -36,6 +37,7 @@ html_title = "Biological clogging of a pore, reproduced"
 html_static_path = ["site/static"]
 html_css_files = ["site.css"]
 html_js_files = ["tables.js"]
+html_domain_indices = False
 html_copy_source = False
 html_show_sourcelink = False
 html_additional_pages = {"index": "redirect.html"}
