@@ -9,6 +9,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path[:0] = [str(ROOT), str(ROOT / "docs" / "site")]
+os.environ["PYTHONPATH"] = str(ROOT)
 os.environ.pop("MPLBACKEND", None)  # notebooks show their figures inline
 
 project = "dupin2001-repro"
