@@ -18,7 +18,8 @@ copyright = f"2026, {author}"
 root_doc = "docs/index"
 include_patterns = [
     "README.md", "CHANGELOG.md", "CONTRIBUTING.md", "docs/**.md", "docs/examples/*.py", "paper_figures/replication.md",
-    "paper_figures/register.md", "reference/ERRATA.md", "verification/report/*.md", "verification/sensitivity/sensitivity.md",
+    "paper_figures/register.md", "reference/ERRATA.md", "verification/report/*.md",
+    "verification/sensitivity/sensitivity.md",
 ]
 exclude_patterns = ["docs/_build", "build", "**/.*"]
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.autosummary", "numpydoc", "sphinx_design", "mathml"]

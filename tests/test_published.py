@@ -14,6 +14,7 @@ import matplotlib.pyplot as plt
 import pytest
 
 import paper_figures
+import repro
 from paper_figures import replication
 from repro import check
 from repro.scene import load_scene, parse_scene
@@ -128,7 +129,8 @@ BLOCKS = blocks(PAGE)
 
 
 def test_every_block_is_of_a_kind_that_is_executed():
-    """Besides pages that the site executes, only README and tutorial have blocks. The README begins with two commands, a picture and a scene."""
+    """Besides pages that the site executes, only README and tutorial have blocks. The README begins with two commands, a
+    picture and a scene."""
     assert {block.language for block in BLOCKS} <= {"", "console", "sh", "python", "toml"}
     assert all(is_repro(words) or is_target(words) for block in BLOCKS for words in block.commands)
     others = {"tutorial.md", "index.md", "figures.md"}
@@ -194,6 +196,15 @@ def test_the_examples_of_the_how_to_pages_run(tmp_path, capsys, monkeypatch):
                 exec(compile(block.text.replace("mesh.plot(", "drawn = dict("), str(page), "exec"), names)
                 assert names["drawn"]["scalars"] in names["mesh"].array_names
     assert seen == {"console", "toml", "python"}
+
+
+def test_the_reference_lists_all_public_names_and_files(fast):
+    """Those of the package, and the files of a run; a run that ends has no checkpoint of its last step."""
+    directives = re.findall(r"^\.\. auto(?:function|class|exception):: (\w+)$", text("docs/reference/api.md"), re.M)
+    assert {*directives} == {*repro.__all__, "SceneError", "OutputError", "SimulationError", "PoreEnd", "Fold"}
+    listed = set(re.findall(r"`([\w.]+)`", text("docs/reference/files.md").partition("## A sweep")[0]))
+    written = {path.name for path in fast.iterdir() if path.is_file()}
+    assert written <= listed and {"run.json", "ledger.csv", "report.html"} <= written
 
 
 def test_the_page_of_the_model_names_existing_cases_and_each_equation():
