@@ -129,8 +129,8 @@ BLOCKS = blocks(PAGE)
 
 
 def test_every_block_is_of_a_kind_that_is_executed():
-    """Besides pages that the site executes, only README and tutorial have blocks. The README begins with two commands, a
-    picture and a scene."""
+    """Besides pages that the site executes, only README and tutorial have blocks. The README begins with two
+    commands, a picture and a scene."""
     assert {block.language for block in BLOCKS} <= {"", "console", "sh", "python", "toml"}
     assert all(is_repro(words) or is_target(words) for block in BLOCKS for words in block.commands)
     others = {"tutorial.md", "index.md", "figures.md"}
