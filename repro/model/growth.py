@@ -377,6 +377,17 @@ class System:
         gap -= np.einsum("tab,tb->ta", self.stabilisation.matrices, local)
         return self._summed(self._forces(at.piola(P), self.body.at.weighted), gap) - self.pull
 
+    def partial_residual(self, body: Body, theta: np.ndarray, position: np.ndarray,
+                         pressure: np.ndarray) -> np.ndarray:
+        """(2n + corners,) residual of a few curved triangles, ``body``, under theta (r, q)."""
+        at = body.strained(position)
+        P = body.pressures.evaluate(pressure)
+        P += self.stabilisation.gamma * theta ** (-5 / 3) * (at.J - theta)
+        stress = at.piola(P)
+        forces = self._forces(stress, body.at.weighted)
+        gap = body.pressures.load(body.at.dx * (at.J - theta))
+        return np.concatenate([body.at.assemble(forces), body.pressures.assemble(gap)])
+
     def _sizes(self, position: np.ndarray) -> np.ndarray:
         """Sizes of the terms of the residual."""
         at = self.strained(position)

@@ -53,7 +53,9 @@ class Pore:
     body: the aggregate as it was at t = 0; pressure: (corners,) P / mu_L; concentrations: the last
     known ones, None before the first; front: divisor of the element sizes at the aggregate, for a
     front of the substrates in it; last: (n, 2) um, the aggregate's nodes in the shape from which
-    strain counts, None for the shape of t = 0.
+    strain counts, None for the shape of t = 0; line_speeds: (2, 2) um/h, of the contact lines with
+    the lower and the upper wall, that with free surface after it on the loop and that with free
+    surface before it, None if they are not known.
     """
 
     time: float
@@ -68,6 +70,7 @@ class Pore:
     concentrations: Concentrations | None = None
     front: float = 1.0
     last: np.ndarray | None = None
+    line_speeds: np.ndarray | None = None
 
     @property
     def unstrained(self) -> np.ndarray:
