@@ -30,7 +30,7 @@ myst_heading_anchors = 4
 myst_title_to_header = True
 nb_execution_mode = "force"
 nb_execution_raise_on_error = True
-nb_execution_timeout = 120
+nb_execution_timeout = 600  # s of wall time: a loaded machine may stall
 numpydoc_show_class_members = False
 autodoc_typehints = "none"
 
