@@ -250,7 +250,7 @@ def _fold(scene: Scene, value: dict[str, float]) -> Iterator[Caveat]:
                      f"supply reaches {numbers.depth(scene):.3g} um into an aggregate of up to "
                      f"{numbers.at_end(scene).thickness:.3g} um, so that its rim may compress "
                      f"itself to an elastic stretch of {stretch:.2f} or less (estimate, "
-                     "docs/scope.md)")
+                     "`repro docs scope`)")
 
 
 def warn_crease(pore: Pore) -> Iterator[Caveat]:
