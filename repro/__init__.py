@@ -44,8 +44,9 @@ Sections of the paper and their modules, which name the equations that they solv
     2.3, 3.4  growth           (14)-(27)    repro.model.growth
     3.4  biomass               (28)-(34)    repro.model.biomass, .growing
     2.3.2  fluid forces        (20), (22)   repro.model.traction
-    5    adhesion, tearing                  repro.model.adhesion, repro.march.detachment
-    2.3.3  contact                          repro.model.contact, .contact_lines
+    2.3.3  contact                          repro.model.contact, .contact_lines, .contact_newton
+    5    adhesion, tearing                  repro.model.adhesion
+         the end as a detachment            repro.march.detachment
          limits of the surface              repro.model.surface
     3.5  mesh motion           (35)         repro.model.mesh_motion
     3.1, 3.5  remeshing                     repro.model.remeshing
