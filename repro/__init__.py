@@ -46,14 +46,13 @@ Sections of the paper and their modules, which name the equations that they solv
     2.3.2  fluid forces        (20), (22)   repro.model.traction
     2.3.3  contact                          repro.model.contact, .contact_lines, .contact_newton
     5    adhesion, tearing                  repro.model.adhesion
-         the end as a detachment            repro.march.detachment
          limits of the surface              repro.model.surface
     3.5  mesh motion           (35)         repro.model.mesh_motion
     3.1, 3.5  remeshing                     repro.model.remeshing
     2    state of the pore                  repro.model.pore, .stages (the parts of a step)
     2    coupling, 3.3                      repro.march.updates (the paper's shape updates)
          error control (not the paper's)    repro.march.midpoint, .stepping, .step_control
-         the end as a fold                  repro.march.folding
+         the end as a fold                  repro.march.folding, .detachment
          the loop of both                   repro.march.loop, .simulation
     4, 5  results, a law for networks       repro.results, .columns, .arrays, .tables, .network
 
