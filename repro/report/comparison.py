@@ -11,6 +11,7 @@ import numpy as np
 from repro.report import charts, page, quantities
 from repro.report.reading import Run
 from repro.results import names
+from repro.scene.units import alike
 
 #: Columns without a value between rows, and defects, which are round-off.
 NOT_COMPARED = {"time_h", "nodes", *names.DEFECTS, *names.YES_NO}
@@ -61,7 +62,7 @@ def differences(runs: Sequence[Run]) -> list[tuple[str, ...]]:
 
 def _differs(key: str, scenes: Sequence[dict[str, object]]) -> bool:
     """Does the value of a key in any scene differ from that in the first one?"""
-    return any(keys.get(key) != scenes[0].get(key) for keys in scenes)
+    return not all(alike(keys.get(key), scenes[0].get(key)) for keys in scenes)
 
 
 def _value_texts(key: str, scenes: Sequence[dict[str, object]]) -> list[str]:
