@@ -115,6 +115,35 @@ def field(fields: Mapping[str, np.ndarray], name: str, title: str, ax: Any = Non
     return ax
 
 
+def against(frame: Any, factors: Sequence[Any], name: str, title: str, ax: Any = None) -> Any:
+    """Draw a column of the runs of a sweep against the first varied key, a line for each
+    combination of the others; returns the axes.
+
+    frame: a ``pandas.DataFrame`` with a row for each run; factors: the varied keys.
+    """
+    if ax is None:
+        _, ax = optional(PYPLOT).subplots(figsize=(WIDTH, 2 * PANEL), layout="constrained")
+    first, *others = factors
+    columns = [factor.column for factor in others]
+    groups = frame.groupby(columns, sort=False) if columns else [((), frame)]
+    for values, group in groups:
+        label = ", ".join(f"{factor.key} = {factor.short(value)}"
+                          for factor, value in zip(others, values))
+        ordered = group.sort_values(first.column) if first.numeric else group
+        ax.plot(ordered[first.column], ordered[name], marker="o", label=label or None)
+    if first.spacing == "log":
+        ax.set_xscale("log")
+    ax.set(xlabel=f"{first.key} ({first.unit})" if first.unit else first.key,
+           ylabel=names.with_unit(name))
+    if not frame[name].notna().any():
+        ax.text(0.5, 0.5, "in no run", transform=ax.transAxes, ha="center")
+    if others:
+        ax.legend(frameon=False, fontsize="small")
+    ax.set_title(title, loc="left")
+    ax.grid(alpha=0.3)
+    return ax
+
+
 def magnitude(values: np.ndarray) -> np.ndarray:
     """(N,) values, or the lengths of vectors (N, 3)."""
     return np.linalg.norm(values, axis=1) if values.ndim == 2 else values

@@ -280,7 +280,7 @@ class Results(Mapping[str, np.ndarray]):
         >>> repro.solve("flow_only").to_pandas()["mean_velocity_m_per_d"].round(3).tolist()
         [2.9]
         """
-        frame = _package("pandas").DataFrame(self.columns).set_index(TIME)
+        frame = package("pandas").DataFrame(self.columns).set_index(TIME)
         frame.attrs.update(scene=self.name, status=self.status,
                            units={name: unit(name) for name in self.columns})
         return frame
@@ -309,7 +309,7 @@ class Results(Mapping[str, np.ndarray]):
         columns = {name: (TIME, values, attributes[name]) for name, values in self.columns.items()}
         times = {TIME: columns.pop(TIME)}
         about = {"scene": self.name, "status": self.status}
-        return _package("xarray").Dataset(columns, times, about)
+        return package("xarray").Dataset(columns, times, about)
 
     def __repr__(self) -> str:
         size = f"{len(self.time)} rows, {len(self)} columns"
@@ -342,7 +342,7 @@ def _html_row(head: str, values: np.ndarray) -> str:
     return f"<tr><th>{escape(head)}</th>{cells}</tr>"
 
 
-def _package(name: str):
+def package(name: str):
     """Import an optional package. Raises ImportError, in one line, if it is not installed."""
     try:
         return import_module(name)
