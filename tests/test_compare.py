@@ -123,11 +123,14 @@ def test_a_run_at_work_may_have_more_rows_than_its_record(fast, tmp_path):
 
 
 def test_runs_are_compared_under_their_own_names_with_signs():
-    """The first run is not the first by name. A tip further upstream, at a smaller x, is a decrease."""
+    """The first run is not the first by name. A tip further upstream, at a smaller x, is a decrease in
+    um. A value of ten times another one or more is written as a factor."""
     runs = []
     for name, scale in (("zeta", 1.0), ("alpha", 1.5), ("mu", 0.5)):
         series = {column: scale * (1.0 + k + np.array([0.1, 0.4])) for k, column in enumerate(results.COLUMNS)}
-        series |= {"time_h": np.array([0.0, 3.0]), "upstream_um": scale * np.array([-5.0, -8.0])}
+        low = scale * np.array([-5.0, -8.0])
+        series |= {"time_h": np.array([0.0, 3.0]), "upstream_um": low, "acceptor_min_mg_per_L": low,
+                   "donor_min_mg_per_L": np.array([1.0, 2.0 if scale == 1 else 44.8])}
         record = {"scene": name, "status": "completed", "tables": {"factor": 1.0 + (scale < 1)}}
         runs.append(Run(Path("runs") / name, record, series, {}))
     labels = comparison.short([run.folder for run in runs])
@@ -141,5 +144,8 @@ def test_runs_are_compared_under_their_own_names_with_signs():
     values = page_text[page_text.index("Values at the common last time"):]
     heads = re.findall('<th scope="col" class="value">([^<]*)', values)
     assert heads == ["zeta", "alpha", "difference", "mu", "difference"]
-    (row,) = re.findall("<tr><td>upstream end of the aggregate.*?</tr>", page_text)
-    assert re.findall('class="value">([^<]*)<', row) == ["-8", "-12", "-50 %", "-4", "+50 %"]
+    for name, expected in (("upstream end of the aggregate", ["-8", "-12", "-4 um", "-4", "+4 um"]),
+                           ("least acceptor concentration", ["-8", "-12", "-50 %", "-4", "+50 %"]),
+                           ("least donor concentration", ["2", "44.8", "22.4 times", "44.8", "22.4 times"])):
+        (row,) = re.findall(f"<tr><td>{name}.*?</tr>", page_text)
+        assert re.findall('class="value">([^<]*)<', row) == expected

@@ -131,7 +131,8 @@ REFUSED = {
         f'{DONOR}=[["0 h", "1 mg/L"], ["2 h", "{value}"]]' for value in ("1 um", "-1 mg/L")],
     "entry 1 of a table must be a time": [
         f"{DONOR}={value}" for value in ('[["0 mg/L", "1 h"]]', '[["0 h"]]', '["0 h", "1 mg/L"]')],
-    'or a list of [time, value] pairs such as [["0 h", "10 mg/L"], ["5 h", "10 mg/L"]] (did you mean "3 mg/L"?)': [f"{DONOR}=3"],
+    'or a list of [time, value] pairs such as [["0 h", "10 mg/L"], ["5 h", "10 mg/L"]] (did you mean "3 mg/L"?)': [
+        f"{DONOR}=3"],
     "flow.head (10 um) is given too": ['flow.mean_velocity=[["0 h", "1 m/day"]]'],
     '"steps" is needed where no table': ["flow.interpolation=linear", "substrates.acceptor.interpolation=linear"],
     # times

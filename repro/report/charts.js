@@ -24,7 +24,7 @@ function nearest(times, time) {
 // Linear between a line's own times; null before the first, after the last and beside a gap.
 function valueAt(line, time) {
   const k = line.t.findIndex(own => own >= time);
-  if (k < 0 || line.t[k] === time) return k < 0 ? null : line.y[k];
+  if (k < 0 || line.t[k] === time) return k < 0 ? null : line.y[line.t.lastIndexOf(time)]; // after a jump
   if (k === 0 || line.y[k] === null || line.y[k - 1] === null) return null;
   return line.y[k - 1] + (time - line.t[k - 1]) / (line.t[k] - line.t[k - 1]) * (line.y[k] - line.y[k - 1]);
 }

@@ -12,6 +12,7 @@ import numpy as np
 
 from repro.results import names
 from repro.results.files import atomic_path
+from repro.results.jumps import with_jumps
 
 if TYPE_CHECKING:
     from repro.results.tables import Results
@@ -71,7 +72,8 @@ def _draw_panel(ax: Any, results: Results, columns: Sequence[str]) -> None:
     """Draw columns in one unit, and the time of contact; a point if there is one row."""
     marker = "o" if len(results.time) == 1 else ""
     for name in columns:
-        ax.plot(results.time, results[name], marker=marker, label=names.KNOWN[name].label)
+        times, values = with_jumps(name, results.time, results[name], results.tables)
+        ax.plot(times, values, marker=marker, label=names.KNOWN[name].label)
     if marker:
         ax.set_xticks(results.time)
     many = len(columns) > 1

@@ -9,8 +9,6 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from repro.results import drawing
 from repro.results.quantities import unit_of
 from repro.results.tables import package
@@ -69,10 +67,8 @@ class Swept:
             If pandas is not installed.
         """
         columns = table.run_columns(self.factors, self.runs)
-        numeric = {*table.COLUMNS, *table.FINAL}
-        columns = {name: np.array(values, float) if name in numeric else values
-                   for name, values in columns.items()}
-        return package("pandas").DataFrame(columns).set_index("run")
+        kinds = dict.fromkeys({*table.COLUMNS, *table.FINAL}, float)
+        return package("pandas").DataFrame(columns).astype(kinds).set_index("run")
 
     def to_xarray(self):
         """Return the events and last values of the runs as an ``xarray.Dataset``.

@@ -22,7 +22,6 @@ from repro.runs.integrity import read_scene_run
 from repro.sweeps.design import Factor, Point
 from repro.sweeps.folder import Sweep
 
-
 #: Lines of a printed list of runs.
 SHOWN = 10
 
