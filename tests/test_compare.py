@@ -123,14 +123,13 @@ def test_a_run_at_work_may_have_more_rows_than_its_record(fast, tmp_path):
 
 
 def test_runs_are_compared_under_their_own_names_with_signs():
-    """The first run is not the first by name. A tip further upstream, at a smaller x, is a decrease in
-    um. A value of ten times another one or more is written as a factor."""
+    """The first run is not the first by name. A tip further upstream, at a smaller x, is a decrease, in
+    um."""
     runs = []
     for name, scale in (("zeta", 1.0), ("alpha", 1.5), ("mu", 0.5)):
         series = {column: scale * (1.0 + k + np.array([0.1, 0.4])) for k, column in enumerate(results.COLUMNS)}
         low = scale * np.array([-5.0, -8.0])
-        series |= {"time_h": np.array([0.0, 3.0]), "upstream_um": low, "acceptor_min_mg_per_L": low,
-                   "donor_min_mg_per_L": np.array([1.0, 2.0 if scale == 1 else 44.8])}
+        series |= {"time_h": np.array([0.0, 3.0]), "upstream_um": low, "acceptor_min_mg_per_L": low}
         record = {"scene": name, "status": "completed", "tables": {"factor": 1.0 + (scale < 1)}}
         runs.append(Run(Path("runs") / name, record, series, {}))
     labels = comparison.short([run.folder for run in runs])
@@ -145,7 +144,18 @@ def test_runs_are_compared_under_their_own_names_with_signs():
     heads = re.findall('<th scope="col" class="value">([^<]*)', values)
     assert heads == ["zeta", "alpha", "difference", "mu", "difference"]
     for name, expected in (("upstream end of the aggregate", ["-8", "-12", "-4 um", "-4", "+4 um"]),
-                           ("least acceptor concentration", ["-8", "-12", "-50 %", "-4", "+50 %"]),
-                           ("least donor concentration", ["2", "44.8", "22.4 times", "44.8", "22.4 times"])):
+                           ("least acceptor concentration", ["-8", "-12", "-50 %", "-4", "+50 %"])):
         (row,) = re.findall(f"<tr><td>{name}.*?</tr>", page_text)
         assert re.findall('class="value">([^<]*)<', row) == expected
+
+
+@pytest.mark.parametrize("first, value, expected", [
+    (2.0, 44.8, "22.4 times"), (-2.0, 20.0, "-10 times"), (2.0, 19.98, "+899 %"), (-2.0, 1.0, "+150 %"),
+    (0.0, 1.0, "-"), (2.0, 2.0, "0")])
+def test_a_large_difference_is_a_factor(first, value, expected):
+    """From ten times on, no percentage is written."""
+    series = {"time_h": np.array([0.0]), "conductivity_m_per_d": np.array([first])}
+    runs = [Run(Path(name), {"scene": "x", "status": "completed", "tables": {}},
+                series | {"conductivity_m_per_d": np.array([one])}, {}) for name, one in (("a", first), ("b", value))]
+    row = re.findall("<tr><td>conductivity.*?</tr>", comparison.build(runs))[0]
+    assert re.findall('class="value">([^<]*)<', row)[-1] == expected
