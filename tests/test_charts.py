@@ -95,7 +95,8 @@ def test_charts_draw_gaps_constants_and_single_points():
 
 
 @pytest.mark.parametrize("times, expected", [
-    ([0, 1, 2, 3], ([0, 1, 2, 2, 3], [5, 4, 4, 2, 1])), ([0, 1.5, 2.5, 3], ([0, 1.5, 2, 2, 2.5, 3], [5, 4, 4, 2, 2, 1])),
+    ([0, 1, 2, 3], ([0, 1, 2, 2, 3], [5, 4, 4, 2, 1])),
+    ([0, 1.5, 2.5, 3], ([0, 1.5, 2, 2, 2.5, 3], [5, 4, 4, 2, 2, 1])),
     ([0, 0.5, 1, 1.5], ([0, 0.5, 1, 1.5], [5, 4, 2, 1]))])
 def test_a_jump_of_a_supply_is_drawn_as_a_jump(times, expected):
     """Concentrations at rest keep the value of the last row before. Nothing else jumps, and no linear table does."""
