@@ -415,7 +415,8 @@ def test_a_sweep_converts_to_tables_and_pictures(tmp_path):
     coordinates of a hypercube."""
     pandas, xarray = map(pytest.importorskip, ("pandas", "xarray"))
     changes = ["growth.end=1 h", "numerics.refinement=0.3"]
-    swept = repro.sweep("base", ["pore.width=48 um, 50 um", "flow.viscosity_ratio=100, 2000"], tmp_path, changes, workers=2)
+    varied = ["pore.width=48 um, 50 um", "flow.viscosity_ratio=100, 2000"]
+    swept = repro.sweep("base", varied, tmp_path, changes, workers=2)
     frame, array = swept.to_pandas(), swept.to_xarray()
     written = pandas.read_csv(tmp_path / "runs.csv", index_col="run")
     pandas.testing.assert_frame_equal(frame, written, check_dtype=False, rtol=1e-15)
