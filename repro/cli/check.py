@@ -9,7 +9,7 @@ import json
 from pathlib import Path
 
 from repro.cli.arguments import add_scene
-from repro.runs.progress import say
+from repro.runs.progress import say, while_checking
 from repro.scene import load_scene, packaged_scenes
 
 
@@ -32,9 +32,10 @@ def call(options) -> int:
     if options.scene not in packaged_scenes() and folder.is_dir():
         return _check_run(options, folder)
     load_scene(options.scene, options.set, unset=options.unset)  # before the slow import
-    from repro.preflight.checked import check, report
+    with while_checking(options.scene):
+        from repro.preflight.checked import check, report
 
-    checked = check(options.scene, options.set, unset=options.unset)
+        checked = check(options.scene, options.set, unset=options.unset)
     say(json.dumps(checked.tables(), indent=2) if options.json else report(checked))
     return 0
 

@@ -50,7 +50,7 @@ def schedule(scene: Scene) -> tuple[list[float], set[float]]:
     ends = [0.0]
     while end - ends[-1] > SAME_TIME:
         ends.append(next_time(scene.growth, ends[-1], scene.corner(ends[-1])))
-    return ends, {0.0, *(scene.output.times or ends)}
+    return ends, {0.0, *(scene.requested_times or ends)}
 
 
 def next_time(growth: Growth, time: float, corner: float) -> float:

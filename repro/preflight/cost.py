@@ -85,7 +85,7 @@ def run_trial(scene: Scene, nodes: int) -> Trial:
     if scene.growth:
         end = min(scene.growth.end, FIRST_STEPS * scene.growth.time_step)
         scene = replace(scene, growth=replace(scene.growth, end=end),
-                        output=replace(scene.output, times=(end,)))
+                        output=replace(scene.output, times=(end,), every=None))
     clock = [perf_counter()]
     run = _until_the_end(iterate_steps(scene))
     first = needed(next(run)[1], "the first row")

@@ -142,7 +142,7 @@ def _numerics(scene: Scene) -> Iterator[str]:
 
 
 def _output(scene: Scene) -> Iterator[str]:
-    times = scene.output.times
+    times = scene.requested_times
     if times is None:
         yield _every_step(scene) if scene.growth else "one row and fields at t = 0"
     else:

@@ -17,6 +17,7 @@ import numpy as np
 import shapely
 
 from repro.scene import Scene, SceneError
+from repro.scene.units import alike
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 #: The packages that compute the numbers of a run.
@@ -100,6 +101,6 @@ def differences(before: dict, after: dict) -> dict[str, list]:
         old, new = before.get(key), after.get(key)
         if isinstance(old, dict) and isinstance(new, dict):
             changes |= {f"{key}.{nested}": pair for nested, pair in differences(old, new).items()}
-        elif old != new:
+        elif not alike(old, new):
             changes[key] = [old, new]
     return changes

@@ -119,6 +119,22 @@ def in_lines() -> Iterator[Tell]:
 
 
 @contextmanager
+def while_checking(scene: str) -> Iterator[None]:
+    """Print a line after each LONGEST (s) of a check."""
+    begun = printed_at = monotonic()
+
+    def tick() -> None:
+        nonlocal printed_at
+        if monotonic() - printed_at > LONGEST - TICK:
+            printed_at = monotonic()
+            say(f"{printable(scene)}: first state and steps are computed, {printed_at - begun:.0f} s",
+                to_stderr=True)
+
+    with _call_regularly(tick):
+        yield
+
+
+@contextmanager
 def _call_regularly(tick: Callable[[], None]) -> Iterator[None]:
     """Call a function every TICK s, also during a step."""
     finished = Event()

@@ -127,7 +127,7 @@ class Recorder:
 
     def _add_fields(self, instant: Report) -> None:
         self._write_fields(self.history.index, "fields", instant.pore, instant.solved)
-        if instant.before and self.scene.output.times:
+        if instant.before and self.scene.requested_times:
             self._write_fields(self.history.before, "before_expansion", *instant.before)
 
     def _write_fields(self, index: list, kind: str, pore, solved) -> None:
@@ -302,7 +302,7 @@ def _unwritten_files(scene: Scene) -> set[str]:
     """Names of the optional files that a run of this scene does not write."""
     optional = {"timeseries.nc": scene.output.timeseries != "netcdf",
               "ledger.csv": scene.growth is None, checkpoint.LAST: scene.growth is None,
-              "before_expansion.pvd": not scene.output.times}
+              "before_expansion.pvd": not scene.requested_times}
     return {name for name, is_absent in optional.items() if is_absent}
 
 

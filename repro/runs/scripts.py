@@ -180,7 +180,8 @@ def load_run(folder: str | Path) -> Results:
     rows = [dict(zip(run.series, map(_none_if_nan, values)))
             for values in np.column_stack(list(run.series.values())).tolist()]
     files = _Files(run.folder, run.times, listed_fields)
-    return Results(run.record["scene"], rows, files, run.record["status"], Path(folder))
+    return Results(run.record["scene"], rows, files, run.record["status"], Path(folder),
+                   run.record["tables"])
 
 
 def _none_if_nan(value: float) -> float | None:

@@ -1525,8 +1525,8 @@ MUTANTS = (
         "repro/scene/keys.py",
         ("hash-without-output",
          "The hash of a scene leaves out what is written.",
-         "for key, table in scene_tables(scene).items()}\n    canonical",
-         'for key, table in scene_tables(scene).items()\n              if key != "output"}\n    canonical',
+         "for key, table in write_table(scene).items()}\n    canonical",
+         'for key, table in write_table(scene).items()\n              if key != "output"}\n    canonical',
          f"{CACHE_KEYS}every_value_of_a_scene_counts_in_its_hash")),
     *changes(
         "repro/results/network.py",
