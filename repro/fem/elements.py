@@ -61,9 +61,11 @@ def derivatives(order: int, where: np.ndarray) -> np.ndarray:
 
 
 def quadrature(degree: int) -> tuple[np.ndarray, np.ndarray]:
-    """Points (q, 2) of the unit triangle and their weights (q,), exact for polynomials of a degree:
-    scikit-fem's rules, and the centroid for a degree of one or less, where scikit-fem takes three
-    points."""
+    """Points (q, 2) of the unit triangle and their weights (q,), exact for polynomials of a degree.
+
+    The rules are those of scikit-fem. A degree of one or less needs only the centroid, where
+    scikit-fem takes three points.
+    """
     if degree <= 1:
         return np.full((1, 2), 1 / 3), np.full(1, 0.5)
     where, weights = get_quadrature_tri(degree)
@@ -112,8 +114,10 @@ def values_on(order: int, of: Table) -> np.ndarray:
 
 @cache
 def linear_fit(of: Table) -> np.ndarray:
-    """(3, q) least-squares fit of a linear function: from values at the points of a table to those
-    at the corners."""
+    """(3, q) matrix of the least-squares fit of a linear function.
+
+    It takes values at the points of a table to values at the corners.
+    """
     return np.linalg.pinv(of.linear)
 
 
@@ -127,8 +131,11 @@ def edge_table(order: int) -> tuple[np.ndarray, np.ndarray]:
 
 @cache
 def side_table(order: int, geometry: int, side: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(p, k) shape functions of a triangle at the quadrature points of its side 01, 12 or 20, the
-    weights (p,), and (p, g) the derivatives along the side of those that map the triangle."""
+    """Shape functions (p, k) of a triangle at the quadrature points of its side 01, 12 or 20.
+
+    Also returns the weights (p,) and the derivatives (p, g), along the side, of the functions that
+    map the triangle.
+    """
     (s,), weights = get_quadrature_line(EDGE_DEGREES[order])
     corners = nodes(1)
     direction = corners[NEXT[side]] - corners[side]
@@ -163,8 +170,10 @@ def jacobian(corners: np.ndarray, bends: np.ndarray) -> np.ndarray:
 
 
 def mapped(corners: np.ndarray, of: Table) -> tuple[np.ndarray, np.ndarray]:
-    """Weights (T, q) um2 of the points on triangles with nodes (T, g, 2) um, none of them turned
-    over, and gradients (T, q, 2, k) 1/um of the functions."""
+    """Weights (T, q) um2 of the points, and gradients (T, q, 2, k) 1/um of the functions.
+
+    corners: (T, g, 2) um, nodes of triangles, none of which is turned over.
+    """
     J = jacobian(corners, of.bends)
     det = determinant(J)
     turned = inverse_transpose(J, det)
