@@ -76,7 +76,7 @@ class Unresolved(TransportError):
 
 
 class UnresolvedWithAdvice(Unresolved):
-    """Unresolved; the message names a refinement that resolves the front, or says that none does."""
+    """Unresolved, with the refinement that resolves the front or the statement that none does."""
 
 
 class GrowthError(StageError):

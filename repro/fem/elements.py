@@ -42,12 +42,12 @@ def evaluated(order: int, where: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     places = np.ascontiguousarray(where.T)
     count = len(element.doflocs)
     values = np.empty((len(where), count))
-    slopes = np.empty((len(where), count, 2))
+    gradients = np.empty((len(where), count, 2))
     for k in range(count):
         value, gradient = element.lbasis(places, k)
         values[:, k] = value
-        slopes[:, k, 0], slopes[:, k, 1] = gradient
-    return values, slopes
+        gradients[:, k, 0], gradients[:, k, 1] = gradient
+    return values, gradients
 
 
 def values(order: int, where: np.ndarray) -> np.ndarray:
@@ -76,15 +76,16 @@ def quadrature(degree: int) -> tuple[np.ndarray, np.ndarray]:
 class Table:
     """Functions of an order at quadrature points of the unit triangle.
 
-    weights: (q,); values: (q, k), slopes: (q, k, 2) of the functions; shape: (q, g), bends:
-    (q, g, 2) of the functions that map the triangle; linear: (q, 3) barycentric coordinates.
+    weights: (q,); values: (q, k), derivatives: (q, k, 2) of the functions; shape: (q, g), and
+    map_derivatives: (q, g, 2), of the functions that map the triangle; linear: (q, 3) barycentric
+    coordinates.
     """
 
     weights: np.ndarray
     values: np.ndarray
-    slopes: np.ndarray
+    derivatives: np.ndarray
     shape: np.ndarray
-    bends: np.ndarray
+    map_derivatives: np.ndarray
     linear: np.ndarray
 
 
@@ -163,10 +164,12 @@ def inverse_transpose(matrix: np.ndarray, det: np.ndarray) -> np.ndarray:
     return cofactors / det[..., None, None]
 
 
-def jacobian(corners: np.ndarray, bends: np.ndarray) -> np.ndarray:
-    """(T, q, 2, 2) d x_i / d (s, t)_k of triangles with nodes (T, g, 2); bends: (q, g, 2), as those
-    of a :class:`Table`."""
-    return by_component(corners.transpose(2, 0, 1)[:, None] @ bends.transpose(2, 1, 0))
+def jacobian(corners: np.ndarray, map_derivatives: np.ndarray) -> np.ndarray:
+    """(T, q, 2, 2) d x_i / d (s, t)_k of triangles with nodes (T, g, 2).
+
+    map_derivatives: (q, g, 2), as in a :class:`Table`.
+    """
+    return by_component(corners.transpose(2, 0, 1)[:, None] @ map_derivatives.transpose(2, 1, 0))
 
 
 def mapped(corners: np.ndarray, of: Table) -> tuple[np.ndarray, np.ndarray]:
@@ -174,16 +177,16 @@ def mapped(corners: np.ndarray, of: Table) -> tuple[np.ndarray, np.ndarray]:
 
     corners: (T, g, 2) um, nodes of triangles, none of which is turned over.
     """
-    J = jacobian(corners, of.bends)
+    J = jacobian(corners, of.map_derivatives)
     det = determinant(J)
     turned = inverse_transpose(J, det)
     # Few products of large matrices.
     by_point = np.swapaxes(turned, 0, 1).reshape(len(of.weights), -1, 2)
-    by_function = by_point @ np.swapaxes(of.slopes, 1, 2)
+    by_function = by_point @ np.swapaxes(of.derivatives, 1, 2)
     gradients = by_function.reshape(len(of.weights), len(corners), 2, -1)
     return det * of.weights, np.ascontiguousarray(np.swapaxes(gradients, 0, 1))
 
 
 def weights(corners: np.ndarray, of: Table) -> np.ndarray:
     """(T, q) um2, the weights dx without the gradients."""
-    return determinant(jacobian(corners, of.bends)) * of.weights
+    return determinant(jacobian(corners, of.map_derivatives)) * of.weights

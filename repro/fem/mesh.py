@@ -409,7 +409,7 @@ class Mesh:
         selected: the triangles to test, all by default.
         """
         corners = self.points[self.cells[selected]]
-        J = elements.jacobian(corners, checked_bends(self.geometry))
+        J = elements.jacobian(corners, checked_map_derivatives(self.geometry))
         return elements.determinant(J).min(axis=1) <= 0
 
     def strained_arcs(self) -> np.ndarray:
@@ -435,10 +435,11 @@ class Mesh:
 
 
 @cache
-def checked_bends(geometry: int) -> np.ndarray:
+def checked_map_derivatives(geometry: int) -> np.ndarray:
     """Derivatives of the maps' shape functions at a triangle's nodes and quadrature points."""
     of = elements.table(geometry, geometry, elements.GRADIENT_DEGREES[geometry])
-    return np.concatenate([elements.derivatives(geometry, elements.nodes(geometry)), of.bends])
+    at_nodes = elements.derivatives(geometry, elements.nodes(geometry))
+    return np.concatenate([at_nodes, of.map_derivatives])
 
 
 def triangle_areas(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:

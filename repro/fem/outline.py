@@ -144,7 +144,7 @@ def parabola(t: np.ndarray) -> np.ndarray:
     return np.stack([(1 - t) * (1 - 2 * t), 4 * t * (1 - t), t * (2 * t - 1)], axis=-1)
 
 
-def slopes(nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def arc_derivatives(nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """First derivative by t at t = 0 and second derivative of arcs with nodes (M, 3, ...)."""
     first, middle, last = np.moveaxis(nodes, 1, 0)
     return -3 * first + 4 * middle - last, 4 * (first - 2 * middle + last)

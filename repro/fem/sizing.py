@@ -11,7 +11,7 @@ from math import inf
 import numpy as np
 from numpy.typing import ArrayLike
 
-from repro.fem.outline import FREE, TOP, Outline, parabola, slopes
+from repro.fem.outline import FREE, TOP, Outline, arc_derivatives, parabola
 
 #: Elements across the pore's width, across the aggregate's thickness and across the narrowest film.
 ACROSS_PORE = 14.0
@@ -227,9 +227,9 @@ def _parameters(nodes: np.ndarray, x: np.ndarray) -> np.ndarray:
     """(K,) t in [0, 1] at which arcs along the wall, nodes at (K, 3) um, reach x (K,); the first is
     zero."""
     t = (x - nodes[:, 0]) / (nodes[:, 2] - nodes[:, 0])
-    slope, bend = slopes(nodes)
+    first, second = arc_derivatives(nodes)
     for _ in range(6):
-        t = t - (np.einsum("ka,ka->k", parabola(t), nodes) - x) / (slope + bend * t)
+        t = t - (np.einsum("ka,ka->k", parabola(t), nodes) - x) / (first + second * t)
     t = np.clip(t, 0.0, 1.0)
     t[0] = 0.0
     return t

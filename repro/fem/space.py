@@ -229,7 +229,7 @@ class Lumped:
         return field[cells, 0].mean(axis=1, keepdims=True)
 
     def finer(self, degrees: int) -> tuple[Basis, np.ndarray]:
-        """Return the same points for every degree, and the identity (1, 1), which keeps a density."""
+        """Return the same points for every degree, and the identity (1, 1) for densities."""
         return self.space.reaction, np.ones((1, 1))
 
 

@@ -29,7 +29,7 @@ from repro.errors import NotCovered, OriginFolded
 from repro.fem import elements, linear
 from repro.fem.assembly import ElementSystem
 from repro.fem.forms import mass
-from repro.fem.mesh import Mesh, checked_bends, triangle_areas
+from repro.fem.mesh import Mesh, checked_map_derivatives, triangle_areas
 from repro.timing import timed
 
 #: The common pieces of two meshes must cover both to this relative accuracy.
@@ -95,9 +95,9 @@ def _inverted(nodes: np.ndarray, where: np.ndarray, geometry: int) -> np.ndarray
     for _ in range(NEWTON_STEPS):
         guess = local[rest]
         corners = nodes[rest]
-        values, slopes = elements.evaluated(2, guess)
+        values, gradients = elements.evaluated(2, guess)
         apart = (values[:, None] @ corners)[:, 0] - where[rest]
-        J = np.swapaxes(corners, 1, 2) @ slopes
+        J = np.swapaxes(corners, 1, 2) @ gradients
         det = elements.determinant(J)
         det = np.where(np.abs(det) > 1e-12 * np.abs(det).max(), det, np.inf)
         ds = J[:, 1, 1] * apart[:, 0] - J[:, 0, 1] * apart[:, 1]
@@ -153,9 +153,9 @@ def unfolded(mesh: Mesh, origin: np.ndarray) -> np.ndarray:
     OriginFolded if that does not suffice.
     """
     cells = mesh.cells[mesh.biomass]
-    bends = checked_bends(mesh.geometry)
+    derivatives = checked_map_derivatives(mesh.geometry)
     for _ in range(3):
-        det = elements.determinant(elements.jacobian(origin[cells], bends))
+        det = elements.determinant(elements.jacobian(origin[cells], derivatives))
         bad = cells[det.min(axis=1) <= (FOLD * det.max(axis=1) if mesh.geometry == 2 else 0.0)]
         if len(bad) == 0:
             return origin

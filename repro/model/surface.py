@@ -85,12 +85,12 @@ def surface(pore: Pore) -> Surface:
 def _expansion(nodes: np.ndarray, local: np.ndarray) -> np.ndarray:
     """(edges,) area of triangles with nodes (edges, 3 or 6, 2) um over that of the unit triangle,
     at the middles of their edges ``local`` (edges,)."""
-    bends = _bends(1 if nodes.shape[1] == 3 else 2)
-    return elements.determinant(np.einsum("eai,eak->eik", nodes, bends[local]))
+    derivatives = _map_derivatives(1 if nodes.shape[1] == 3 else 2)
+    return elements.determinant(np.einsum("eai,eak->eik", nodes, derivatives[local]))
 
 
 @cache
-def _bends(geometry: int) -> np.ndarray:
+def _map_derivatives(geometry: int) -> np.ndarray:
     """(3, k, 2) derivatives of the map's functions at the middles of the edges."""
     return elements.derivatives(geometry, MIDDLES)
 
