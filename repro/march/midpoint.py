@@ -33,7 +33,7 @@ from repro.model.growing import grow
 from repro.model.pore import Pore, Solved
 from repro.model.remeshing import GeneratedMesh
 from repro.model.stages import Stages
-from repro.model.transport import Concentrations, Flows, Fluxes
+from repro.model.transport import Concentrations, Flows, Fluxes, integrated
 from repro.scene import needed
 
 #: Numbers of steps to a row that cannot be interpolated.
@@ -109,8 +109,8 @@ def attempt(stages: Stages, previous: Pore, solved: Solved, duration: float,
     speeds = None if makes_contact else contact_lines.speeds(expansion.advances, duration)
     new = replace(new, line_speeds=speeds)
     flows = _flows(half.solved.substrates.fluxes, duration)
-    ledger = Ledger(previous.time, previous.time + duration, *flows, previous.mass,
-                    after.mass - previous.mass, new.mass)
+    ledger = Ledger(previous.time, previous.time + duration, *flows[:4], previous.mass,
+                    after.mass - previous.mass, new.mass, flows.unmet)
     known = replace(half, generated=half.generated + generated, end=expansion)
     inner = partial(interpolate, stages, previous, solved, known)
     step = StepResult(new, None, ledger, remeshed, expansion.iterations, inner)
@@ -130,10 +130,9 @@ def _expand(stages: Stages, previous: Pore, after: Pore, half: Halfway, part: fl
 
 def _flows(fluxes: tuple[Fluxes, Fluxes], duration: float) -> Flows:
     """Integrate the fluxes of acceptor and donor over a step (h)."""
-    acceptor, donor = ((duration * flux.supplied, duration * flux.out, duration * flux.consumed)
-                       for flux in fluxes)
-    supplied, out, consumed = zip(acceptor, donor)
-    return Flows(supplied, out, consumed, stored=(0.0, 0.0))
+    acceptor, donor = ((duration * flux.supplied, duration * flux.out, duration * flux.consumed,
+                        duration * flux.unmet) for flux in fluxes)
+    return integrated(acceptor, donor)
 
 
 def solve_halfway(stages: Stages, previous: Pore, solved: Solved, first: Rates, duration: float,
@@ -256,13 +255,12 @@ def _extrapolate_substrates(first: Concentrations, second: Concentrations,
     If the extrapolation is negative anywhere, the guess is the solution half way. If the mesh has
     changed half way, the guess is the solution at the start.
     """
-    if len(second.acceptor) != len(first.acceptor):
+    if second.fields.shape != first.fields.shape:
         return first
-    acceptor = first.acceptor + 2 * part * (second.acceptor - first.acceptor)
-    donor = first.donor + 2 * part * (second.donor - first.donor)
-    if min(acceptor.min(), donor.min()) < 0:
+    fields = first.fields + 2 * part * (second.fields - first.fields)
+    if fields.min() < 0:
         return second
-    return replace(first, acceptor=acceptor, donor=donor)
+    return first.with_fields(fields)
 
 
 def _scale_shape(previous: Pore, after: Pore) -> Pore:

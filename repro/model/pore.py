@@ -353,14 +353,14 @@ def solve(scene: Scene, pore: Pore, over: float = 0.0) -> Solved:
     else:
         if carried:
             refuse_no_supply(peclet(scene.substrates, scene.pore.width, carried.mean_velocity))
-        state = transport.steady(problem, sink, pore.concentrations)
+        state = gear.steady(problem, sink, pore.concentrations)
     return Solved(carried, problem, state, transport.fluxes(problem, sink, state))
 
 
 def peclet(substrates: Substrates, width: float, speed: float) -> float:
     """u W / D with the smaller diffusivity, for a width (um) and a mean velocity (um/h)."""
     slowest = min(min(s.diffusivity, s.diffusivity_in_aggregate)
-                  for s in (substrates.acceptor, substrates.donor))
+                  for s in substrates.modelled.values())
     return speed * width / slowest
 
 

@@ -41,10 +41,15 @@ class State:
         return (value * dx).sum(axis=1) / dx.sum(axis=1)
 
 
+def _has(name: str, state: State) -> bool:
+    return getattr(state.solved.concentrations, name, None) is not None
+
+
 #: Parts that an array may need: does a state have them?
 NEEDS: dict[str, Callable[[State], bool]] = {
     "flow": lambda state: state.solved.flow is not None,
-    "substrates": lambda state: state.solved.concentrations is not None,
+    "acceptor": lambda state: _has("acceptor", state),
+    "donor": lambda state: _has("donor", state),
     "biomass": lambda state: state.scene.kinetics is not None,
     "growth": lambda state: state.scene.growth is not None,
     "stress": lambda state: bool(state.scene.growth)
@@ -145,7 +150,7 @@ ARRAYS = (
     Array("head_cm", "head", "phi (1)-(5), zero in the mean over the outlet of the meshed part",
           _head, needs="flow", signed=True),
     *(Array(f"{name}_mg_per_L", name, "C (7)-(13)", partial(_concentration, name),
-            needs="substrates", signed=True) for name in ("acceptor", "donor")),
+            needs=name, signed=True) for name in ("acceptor", "donor")),
     Array("active_biomass", "active biomass over X_m", f"X_A / X_m: {_FITTED}; zero in the fluid",
           partial(_density, "active"), needs="biomass", signed=True),
     Array("inert_biomass", "inert biomass over X_m", f"X_I / X_m: {_FITTED}; zero in the fluid",

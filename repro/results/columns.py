@@ -17,7 +17,8 @@ SUBSTRATES = ("acceptor", "donor")
 #: Parts that a quantity may need: does a report have them?
 NEEDS: dict[str, Callable[[Scene, Report], bool]] = {
     "flow": lambda scene, at: at.solved.flow is not None,
-    "substrates": lambda scene, at: at.solved.concentrations is not None,
+    "acceptor": lambda scene, at: _solved("acceptor", at),
+    "donor": lambda scene, at: _solved("donor", at),
     "aggregate": lambda scene, at: at.pore.outline is not None,
     "biomass": lambda scene, at: at.pore.outline is not None and scene.kinetics is not None,
     "growth": lambda scene, at: at.pore.outline is not None and scene.growth is not None,
@@ -35,7 +36,11 @@ def _both(pattern: str, words: str, formula: str, value: Callable,
           signed: bool = True) -> list[Quantity]:
     """A quantity for each of acceptor and donor, whose names replace {} in the texts."""
     return [Quantity(pattern.format(name), words.format(name), formula, partial(value, k), name,
-                     "substrates", signed=signed) for k, name in enumerate(SUBSTRATES)]
+                     name, signed=signed) for k, name in enumerate(SUBSTRATES)]
+
+
+def _solved(name: str, at: Report) -> bool:
+    return getattr(at.solved.concentrations, name, None) is not None
 
 
 def _least(k: int, scene: Scene, at: Report) -> float:
@@ -44,7 +49,7 @@ def _least(k: int, scene: Scene, at: Report) -> float:
 
 def _overshoot(k: int, scene: Scene, at: Report) -> float:
     """mg/L; with Gear, over the largest supply: the pore may contain water of earlier supplies."""
-    supply = at.solved.problem.both[k].supply
+    supply = getattr(at.solved.problem.substrates, SUBSTRATES[k]).supply
     if scene.numerics.transport == "gear":
         supply = getattr(scene.largest.substrates, SUBSTRATES[k]).supply
     return max(0.0, float(getattr(at.solved.concentrations, SUBSTRATES[k]).max()) - supply)
@@ -60,7 +65,8 @@ def _substrate_balance(k: int, scene: Scene, at: Report) -> float:
     instant."""
     gear = scene.numerics.transport == "gear"
     problem = at.solved.problem
-    room = problem.both[k].supply * float(problem.space.at.dx.sum()) if gear else 0.0
+    supply = getattr(problem.substrates, SUBSTRATES[k]).supply
+    room = supply * float(problem.space.at.dx.sum()) if gear else 0.0
     largest = getattr(scene.largest.substrates, SUBSTRATES[k]).supply
     floor = balance.floor(problem, k, largest)
     defects = [balance.substrate(ledger, k, max(room, floor * (ledger.end - ledger.start)))
@@ -192,7 +198,9 @@ PARTS = {"supplied": ("supplied", "supply times the flow through the inlet, over
          "out": ("leaving", "integral of u_x C over the outlet, over the step"),
          "consumed": ("taken up", "uptake (7)-(8) over the aggregate and the step"),
          "stored": ("stored", "what the meshed part holds more at the step's end; zero where "
-                              "substrates are quasi-steady")}
+                              "substrates are quasi-steady"),
+         "unmet": ("unmet", "demand of decay without acceptor over the aggregate and the step, "
+                            "with kinetics.decay = unlimited; else zero")}
 
 #: Columns of ``ledger.csv``: value takes the scene and a Ledger. Per metre of depth, 1 um2 mg/L is
 #: 1 pg/m.
@@ -200,7 +208,7 @@ LEDGER = (
     Quantity("start_h", "start of the step", "t", lambda scene, step: step.start),
     Quantity("end_h", "end of the step", "t", lambda scene, step: step.end),
     *(Quantity(f"{name}_{part}_pg_per_m", f"{name} {label}", formula,
-               lambda scene, step, part=part, k=k: getattr(step, part)[k], label,
+               lambda scene, step, part=part, k=k: getattr(step, part)[k], label, name,
                signed=True)
       for k, name in enumerate(SUBSTRATES) for part, (label, formula) in PARTS.items()),
     Quantity("biomass_before_pg_per_m", "biomass at the step's start",
@@ -219,6 +227,9 @@ LEDGER = (
 )
 
 COLUMNS = [each.name for each in SERIES]
+#: Parts that a column of a ledger may need: does a scene have them?
+LEDGER_NEEDS: dict[str, Callable[..., bool]] = {
+    name: lambda scene, name=name: name in scene.substrates.modelled for name in SUBSTRATES}
 LEDGER_COLUMNS = [each.name for each in LEDGER]
 
 
@@ -228,6 +239,7 @@ def row(scene: Scene, instant: Report) -> dict[str, float | None]:
             if is_modelled(each, NEEDS, scene, instant) else None for each in SERIES}
 
 
-def ledger_row(scene: Scene, ledger: Ledger) -> list[float]:
+def ledger_row(scene: Scene, ledger: Ledger) -> list[float | None]:
     """One row of ``ledger.csv``: a step's balances per metre of depth."""
-    return [each.reported(scene, ledger) for each in LEDGER]
+    return [each.reported(scene, ledger) if is_modelled(each, LEDGER_NEEDS, scene) else None
+            for each in LEDGER]

@@ -42,7 +42,8 @@ def pack_state(scene: Scene, state: RestartState) -> tuple[dict, Arrays]:
     if pore.line_speeds is not None:
         arrays["line_speeds"] = pore.line_speeds
     if guess:
-        arrays |= {name: getattr(guess, name) for name in OF_GUESS}
+        fields = {name: getattr(guess, name) for name in OF_GUESS}
+        arrays |= {name: field for name, field in fields.items() if field is not None}
     plain = {"scene": scene_hash(scene), "time_h": pore.time, "pace": asdict(state.step_control),
              "ends_um": [float(x) for x in pore.mesh.ends], "front": float(pore.front),
              "guess": guess.iterations if guess else None, "remeshes": int(state.remeshes),
@@ -76,7 +77,8 @@ def _pore(scene: Scene, plain: dict, arrays: Arrays) -> Pore:
     space = Space(mesh, numerics.order)
     guess = None
     if plain["guess"] is not None:
-        guess = Concentrations(arrays["acceptor"], arrays["donor"], plain["guess"])
+        acceptor, donor = map(arrays.get, OF_GUESS)
+        guess = Concentrations(acceptor, donor, plain["guess"])
     return Pore(time=plain["time_h"], space=space, body=material(space, arrays["reference"]),
                 concentrations=guess, front=plain["front"],
                 **{name: arrays[name] for name in OF_PORE},
