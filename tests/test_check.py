@@ -210,7 +210,7 @@ def test_the_modelled_physics_follow_the_sections():
     assert "radius 7 um on the lower wall at x = -40 um; 30 % of it inert at t = 0" in words["aggregate"]
     assert "a shape update every 21 min" in words["numerics"]
     bare = dict(describe_model(load_scene("initial_mesh", ["substrates={}", "growth.end=1 h", "numerics.extent=full"])))
-    assert bare["flow"] == "no flow: pure diffusion" and "supply held at both ends" in bare["substrates"]
+    assert bare["flow"] == "no flow: pure diffusion" and "supply prescribed at both ends" in bare["substrates"]
     assert "as a whole" in bare["pore"] and "(9)-(10)" in bare["kinetics"]
     outline = 'aggregate={outline=[["-5 um", "0 um"], ["1 um", "9 um"], ["6 um", "0 um"]], smooth=true}'
     transient = load_scene("base", ["numerics.transport=gear", "growth.new_biomass=stress_free", outline])
