@@ -19,14 +19,14 @@ from repro.scene import SceneError, load_scene, parse_scene
 #: {pattern of a warning: the settings that it advises}.
 ADVICE = {
     r"numerics\.refinement = ([\d.e+]+) would resolve it": "numerics.refinement={}",
-    r'"gear" with numerics\.time = "updates" follows': ("numerics.time=updates", "numerics.transport=gear"),
-    r'"included" takes it in$': "growth.fluid_forces=included",
+    r'"gear" with numerics\.time = "updates" integrates': ("numerics.time=updates", "numerics.transport=gear"),
+    r'"included" models it$': "growth.fluid_forces=included",
     r'"included" with growth\.new_biomass = "stressed"': (
         "growth.new_biomass=stressed", "growth.fluid_forces=included"),
-    r'or take numerics\.time = "midpoint"': "numerics.time=midpoint",
+    r'or numerics\.time = "midpoint"': "numerics.time=midpoint",
     r'"80 %" keeps their ratio': "substrates.{key}=80 %",
 }
-NO_SETTING = ("no refinement up to 20", "no setting takes it in")
+NO_SETTING = ("no refinement up to 20", "no setting models it")
 
 
 def drawn(seed):

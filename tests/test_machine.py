@@ -212,8 +212,8 @@ def test_a_limit_of_file_sizes_ends_a_run_in_one_line(tmp_path, most, which):
     arguments = [*SHORT, "--set", 'growth.end="0.4 h"', "--out", str(tmp_path / "run"), "--quiet"]
     status, message = limited("RLIMIT_FSIZE", most, *arguments)
     assert status == 2 and f"{which}File too large" in message and message.count("\n") == 1, message
-    assert message.endswith("and go on with --resume\n" if (tmp_path / "run" / "run.json").exists() else
-                            "and give the same command again\n")
+    assert message.endswith("and use --resume\n" if (tmp_path / "run" / "run.json").exists() else
+                            "and repeat the command\n")
     unfinished = ("writing", "part", "vtu") if "fields" in which else ("writing", "part")
     assert not [name for name in files(tmp_path / "run") if any(word in name for word in unfinished)]
     assert main(["run", *(["--resume", str(tmp_path / "run"), "--quiet"] if which else arguments)]) == 0

@@ -364,7 +364,7 @@ def test_a_signal_ends_a_sweep_quietly(tmp_path, how, ends, word):
     """It prints one line with the command that continues it, and writes the tables of its runs so far."""
     out = tmp_path / "sweep"
     status, stderr = cut_off(out, how, "--vary", "pore.width=48 um, 50 um", "--workers", "1", "--quiet")
-    command = f"repro sweep base --out {out} --vary 'pore.width=48 um, 50 um' --workers 1 --quiet goes on with it"
+    command = f"repro sweep base --out {out} --vary 'pore.width=48 um, 50 um' --workers 1 --quiet continues the sweep"
     assert status == ends and stderr.startswith(f"repro: {word}; "), stderr
     assert command in stderr and stderr.count("\n") == 1, stderr
     assert (out / "table.csv").exists() and (out / "summary.html").exists()

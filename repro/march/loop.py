@@ -323,7 +323,7 @@ def sum_counts(*counts: dict[str, int]) -> dict[str, int]:
 
 
 def pore_end(channel: Channel, pore: Pore, elements: float) -> str:
-    """Say which end of the pore the aggregate has reached; empty if it has reached none.
+    """Message with the end of the pore that the aggregate has reached; empty if none.
 
     elements: distance from an end that counts as reached, in elements of the fluid.
     """

@@ -48,9 +48,9 @@ MB = 1e6
 
 
 def expected_nodes(scene: Scene) -> float:
-    """Estimated nodes, midside nodes included, of the first or the last mesh if that is larger.
+    """Estimate the nodes of the larger of the first and the last mesh, including midside nodes.
 
-    No mesh is generated.
+    It generates no mesh.
     """
     expected = [first_nodes(scene)]
     if scene.growth:
@@ -136,9 +136,9 @@ def require_outline(scene: Scene) -> None:
 
 
 def require_memory(scene: Scene, warn: Callable[[str], None]) -> None:
-    """Warn of a run that may need more than half of the free memory.
+    """Warn if a run may need more than half of the free memory.
 
-    Raises SceneError if it would need more than all of it.
+    Raises SceneError if it needs more than the free memory.
     """
     free = free_bytes()
     expected = expected_bytes(scene)
@@ -190,7 +190,7 @@ def _groups(root: Path) -> Iterator[float]:
 
 
 def _remaining(group: Path) -> float:
-    """Remaining memory of a control group; cached files can be evicted."""
+    """Remaining memory (bytes) of a control group; cached files count as free."""
     for limit, used, reclaimable in (("memory.max", "memory.current", "inactive_file"),
                                    ("memory.limit_in_bytes", "memory.usage_in_bytes",
                                     "total_inactive_file")):

@@ -1,5 +1,4 @@
-"""Packages that a run needs, and the conditions that its numbers may depend on besides its scene.
-"""
+"""Packages that a run needs, and the conditions on which its numbers depend besides the scene."""
 
 from __future__ import annotations
 
@@ -62,7 +61,7 @@ def statements(source: str) -> str:
 
 
 def _without_remark(match: re.Match) -> str:
-    """A comment becomes empty, a string that fills its lines an ellipsis."""
+    """Replace a comment by nothing, and a string that fills its lines by an ellipsis."""
     text = match[0]
     if text.startswith("#"):
         return ""
@@ -75,8 +74,7 @@ def _without_remark(match: re.Match) -> str:
 
 
 def conditions() -> dict:
-    """The conditions of a run, for ``run.json``. Runs under equal conditions are equal bit for bit.
-    """
+    """Conditions of a run, for ``run.json``; equal conditions give equal bits."""
     built: Any = np.show_config(mode="dicts")
     blas = built["Build Dependencies"]["blas"]
     return {"system": platform.system(), "machine": platform.machine(),

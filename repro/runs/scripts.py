@@ -219,6 +219,6 @@ class _Files(Sequence[dict[str, np.ndarray]]):
     def _read(self, path: Path) -> dict[str, np.ndarray]:
         """Read the arrays of a file. Raises OutputError if it has changed or cannot be read."""
         if sha256_of(path) != self.sums.get(f"fields/{path.name}"):
-            raise OutputError(f"{path}: the fields are not as they were written: cut short or "
-                              "altered")
+            raise OutputError(f"{path}: the fields are cut short or altered since they were "
+                              "written")
         return arrays(field_files.read(path))

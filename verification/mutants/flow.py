@@ -150,9 +150,9 @@ MUTANTS = (
         "repro/fem/elements.py",
         ("cubic-slope",
          "The two nodes of a cubic element's first edge exchange the derivatives of their functions.",
-         "slopes[:, k, 0], slopes[:, k, 1] = gradient",
+         "gradients[:, k, 0], gradients[:, k, 1] = gradient",
          "at = 7 - k if order == 3 and k in (3, 4) else k\n"
-         "        slopes[:, at, 0], slopes[:, at, 1] = gradient"),
+         "        gradients[:, at, 0], gradients[:, at, 1] = gradient"),
         ("quadrature-of-degree-2",
          "Products of quadratic functions are integrated by a rule of degree 2.",
          "\nDEGREES = {1: 2, 2: 6, 3: 8}",
