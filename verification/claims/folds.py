@@ -1,5 +1,5 @@
-"""C48, C49: up to where the smooth shape of the aggregate has the least energy, and whether the expansion that the
-paper expects comes before that ends.
+"""C48, C49: the range in which the smooth shape of the aggregate has the least energy, and whether the aggregate
+reaches the expansion that the paper expects within this range.
 
 Both are judged in three scenes: base under its constant head to 76 h (C43), wide, and a pore as wide as wide's, four
 times as long, with a seed of 10 um and a tenth of the velocity. The supply of 10 mg/L is the same in all of them. When
@@ -99,7 +99,7 @@ def uneven_expansion() -> Finding:
 
 
 def _ends() -> str:
-    """How the scenes end that do not come to their last row."""
+    """Describe the ends of the scenes that stop before their last row."""
     ends = "; ".join(f"{name}: {run.ended}" for name in SCENES if (run := course(*SCENES[name])).ended)
     return f"growth compresses the surface of a rim that grows on a starved core. {ends}"
 
