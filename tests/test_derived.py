@@ -383,8 +383,8 @@ def test_a_leak_in_the_middle_of_three_steps_is_reported_with_its_sign(column, l
     steps = [dict(zip(results.LEDGER_COLUMNS, results.ledger_row(scene, ledger))) for ledger in instant.ledgers]
     expected = [0.0, leak if column == "oxygen_demand_balance" else 0.0, 0.0]
     assert [step["oxygen_demand_balance"] for step in steps] == pytest.approx(expected, rel=1e-9, abs=1e-12)
-    table = {name: np.array([0.0, value]) for name, value in row.items()}
-    (chart,) = [chart for chart in quantities.charts_of(Run(None, {}, table, {})) if "balances" in chart.title]
+    table = {name: np.array([0.0, value], float) for name, value in row.items()}
+    (chart,) = [chart for chart in quantities.charts_of(Run(None, {"tables": {}}, table, {})) if "balances" in chart.title]
     label = column.removesuffix("_balance").replace("_", " ")
     (line,) = [line for line in chart.lines if line.label == label]
     assert line.values[-1] == pytest.approx(leak, rel=1e-9) and "relative defect" in chart.axis
@@ -415,11 +415,11 @@ def test_every_column_of_the_ledger_is_its_own():
     """Each column of a step's row is its own part of the ledger."""
     scene, instant = late_instant(1)
     step = replace(instant.ledgers[0], start=1.0, end=2.0, supplied=(3.0, 4.0), out=(5.0, 6.0), consumed=(7.0, 8.0),
-                   stored=(9.0, 10.0), biomass_before=11.0, biomass_made=12.0, biomass_after=13.0)
+                   stored=(9.0, 10.0), biomass_before=11.0, biomass_made=12.0, biomass_after=13.0, unmet=(14.0, 15.0))
     row = dict(zip(results.LEDGER_COLUMNS, results.ledger_row(scene, step)))
     row.pop("oxygen_demand_balance")  # tests/test_balances.py
     names = [f"{name}_{part}" for part in ("supplied", "out", "consumed", "stored") for name in ("acceptor", "donor")]
-    names += ["biomass_before", "biomass_made", "biomass_after"]
+    names += ["biomass_before", "biomass_made", "biomass_after", "acceptor_unmet", "donor_unmet"]
     assert row == {"start_h": 1, "end_h": 2} | {f"{name}_pg_per_m": k for k, name in enumerate(names, 3)}
 
 
@@ -429,7 +429,7 @@ def distinct_run():
     series |= {"time_h": np.array([0.0, 1.0, 3.0]), "remeshed": np.array([0.0, 1.0, 0.0])}
     ledger = {name: 50.0 + k + np.array([0.0, 0.5]) for k, name in enumerate(results.LEDGER_COLUMNS)}
     ledger |= {"start_h": np.array([0.0, 1.0]), "end_h": np.array([1.0, 3.0])}
-    return Run(None, {}, series, ledger)
+    return Run(None, {"tables": {}}, series, ledger)
 
 
 def test_every_line_of_every_chart_is_the_column_that_it_names():

@@ -194,7 +194,7 @@ def test_a_full_disk_is_reported_with_the_file_and_nothing_is_lost(short, tmp_pa
         if event["event"] == "checkpoint" and event["time_h"] > 0.5:
             monkeypatch.setattr(module, name, full)
 
-    with pytest.raises(OutputError, match=f"{file}: No space left on device; .* go on with repro.resume"):
+    with pytest.raises(OutputError, match=f"{file}: No space left on device; .* use repro.resume"):
         run(short, out, watch=Watch(tell=fill, interval=0.0))
     assert not [path for path in out.rglob("*") if "part" in path.name] and not (out / LOCK).exists()
     assert len(load_run(out).time) > 1
@@ -208,7 +208,7 @@ def test_the_name_of_a_scene_is_no_path(tmp_path, capsys, monkeypatch, name):
     """A run of any scene name writes into its folder and prints one line."""
     monkeypatch.chdir(tmp_path)
     scene = parse_scene(scene_tables(load_scene("flow_only")), name, "scene.toml")
-    monkeypatch.setattr("repro.cli.run.load_scene", lambda *_: scene)
+    monkeypatch.setattr("repro.cli.run.load_scene", lambda *_, **__: scene)
     assert main(["run", "x", "--out", "run"]) == 0
     line = capsys.readouterr().out
     assert line.count("\n") == 1 and line.strip("\n").isprintable() and read_record(tmp_path / "run")["scene"] == name

@@ -111,7 +111,7 @@ def test_the_command_makes_a_run_longer(tmp_path, capsys):
     command = ["run", "base", "--set", "numerics.preset=fast", "--set"]
     assert main([*command, "growth.end=5 h", "--out", out]) == 0
     assert main([*command, "growth.end=6 h", "--out", out]) == 2
-    assert "growth.end (5.0 h there, now 6.0 h); give a new folder (--resume makes a run longer)" in (
+    assert "growth.end (5 h there, now 6 h); give a new folder (--resume makes a run longer)" in (
         capsys.readouterr().err)
     assert main(["run", "--resume", out, "--set", "growth.end=6 h"]) == 0
     assert read_record(tmp_path / "run")["origin"]["set"] == ["numerics.preset=fast", "growth.end=6 h"]

@@ -50,6 +50,7 @@ def test_numbers_are_those_of_the_first_and_the_last_row(request, name):
     cells = {html.unescape(label): first_last for label, *first_last in lines}
     series = results.read_table(out / "timeseries.csv")
     times = series.pop("time_h")
+    series = {name: values for name, values in series.items() if np.isfinite(values).any()}
     kind = {"fast": "Quadratic triangles, drawn curved", "paper": "Linear triangles"}[name]
     record = read(out).record
     for expected in (kind, f"{record['wall_time_s']:.3g} s in all", '<td>width</td><td class="value">50 um<',

@@ -202,7 +202,7 @@ def test_rows_have_the_inputs_of_their_runs(tmp_path):
         (one,) = [each for each in runs if each["run"] == row["run"]]
         scene = read_record(out / one["folder"])["tables"]
         assert float(row["pore.width_um"]) == number(scene["pore"]["width"])
-        velocity = number(scene["flow"]["mean_velocity"]) * 24e-6
+        velocity = number(scene["flow"]["mean_velocity"])
         columns = {"flow.mean_velocity_m_per_day", "mean_velocity_m_per_d"} & row.keys()
         assert [float(row[name]) for name in columns] == pytest.approx([velocity] * len(columns), rel=1e-12)
     assert "mean_velocity_m_per_d" in table_rows[0]
@@ -461,7 +461,7 @@ def test_marks_of_the_page_have_the_colour_of_their_key(tmp_path):
     numbers_of = [dict.fromkeys(table.COLUMNS) | {"clogging_time_h": time} for time in (5.0, 5.0, None, 5.0, 5.0, None)]
     runs = [table.SweepRun(one, "completed", course, course, course, each) for one, each in zip(designed, numbers_of)]
     runs[5] = replace(runs[5], status="failed: x")
-    times = page.page(Sweep(tmp_path, "flow_only", factors, designed), runs, 0.3).split("<h2>Clogging time")[1]
+    times = page.page(Sweep(tmp_path, "flow_only", factors, designed), runs, 0.3).split("<h2>Clogging time")[1].split("<h2>")[0]
     figures = re.findall("<figure>.*?</figure>", times, re.S)
     for figure, key in zip(figures, ("flow.viscosity_ratio", "pore.width"), strict=True):
         named = dict(re.findall(r'class="line(.)" points="0,5 24,5"/></svg>([^<]*)</li>', figure))

@@ -38,12 +38,14 @@ NOT_OF_BASE = ("C19", "C41")
 KINDS = {
     "a place, known to the element in which it is": r"C10",
     "a small difference of two halves, or of two runs or solutions, which takes the errors of both in parts of itself":
-        r"C11|C36|C42|C63|.*(born stress-free|deviation|law's r|changed by the fluid)",
+        r"C11|C36|C42|C53|C63|C64|.*(born stress-free|deviation|law's r|changed by the fluid)",
     "a Sherwood number, over the drop from the supply to the interface, small against the supply, and ratios less one":
         r"C39|C47",
     "a peak of stress or strain, beside the corner of interface and wall or in one element, and ratios of such":
         r".*(stress|strain)",
     "a share of less than 1 %, made of what the fluid does to a body 2000 times as viscous": r"C35",
+    "a body that is bound to its wall, whose stress is singular at the corners": r"C50|C52",
+    "a rim of few elements just before it folds": r"C48|C49",
     "after base's own contact, whose first shape closes by whole edges of the outline": r"C43"}
 #: Limits for conductivities and tips in the preset `exact`: percent, and seconds of processor time.
 EXACT, SECONDS = 0.5, 60.0

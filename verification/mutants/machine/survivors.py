@@ -17,8 +17,8 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
         "Bubble has no fields and is not compared, nor a key of anything: it is called.",
     ("model/flow.py", "@dataclass(frozen=True, eq=False) class Bubble:", "class Bubble:"):
         "Bubble has no fields: what the decorator makes of it, but for the text that shows it, a class has by itself.",
-    ("model/gear.py", "still = np.zeros_like(fields), np.zeros_like(biomass), np.zeros((2, 3))",
-     "still = np.zeros_like(fields), np.zeros_like(biomass), np.zeros(( 1, 3))"):
+    ("model/gear.py", "still = np.zeros_like(fields), np.zeros_like(biomass), np.zeros((2, 4))",
+     "still = np.zeros_like(fields), np.zeros_like(biomass), np.zeros(( 1, 4))"):
         "A row of zeros, added to two rows, is two rows of zeros.",
     ("model/transport.py", "return self._reaction.evaluate(state.reshape(2, -1))",
      "return self._reaction.evaluate(state.reshape(2, - 2))"):
