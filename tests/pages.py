@@ -44,7 +44,8 @@ AXES = {"Conductivity": "(m/day)", "Mean velocity": "(m/day)", "Head loss": "(cm
          "Concentrations above the supply": "(mg/L)", "Area of the aggregate": "(um²)",
          "Extent of the aggregate": "(um)"}
 LEDGERS = {f"Ledger: {name}": {"supplied": f"{name}_supplied_pg_per_m", "leaving": f"{name}_out_pg_per_m",
-                               "taken up": f"{name}_consumed_pg_per_m", "stored": f"{name}_stored_pg_per_m"}
+                               "taken up": f"{name}_consumed_pg_per_m", "stored": f"{name}_stored_pg_per_m",
+                               "unmet": f"{name}_unmet_pg_per_m"}
            for name in ("acceptor", "donor")}
 
 

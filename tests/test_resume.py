@@ -218,7 +218,7 @@ def test_only_force_repeats_a_damaged_run(tmp_path, capsys):
     flip(out / "timeseries.csv")
     for arguments in (["--resume"], command):
         message = refusal(tmp_path, capsys, "run", *arguments, out)
-        assert "--force with its scene makes the run anew" in message
+        assert "run the scene again with --force" in message
     flip(out / "run.json", 40)
     assert main(["run", *command, str(out), "--force", "--quiet"]) == 0
     assert matches_uninterrupted(SCENE, out)

@@ -85,7 +85,7 @@ def _independent(seed: pore.Pore, shape: str) -> dict[str, float]:
 
 @pytest.mark.case(
     "growth-surface-stretch", kind="manufactured", mutants=("stretch-of-the-whole", "stretch-of-first-edges"),
-    references=("surface_stretch",))
+    references=("surface_stretch",), runs_with="1 2 3")
 @pytest.mark.parametrize("shape", MAPS)
 @pytest.mark.parametrize("elements", ELEMENTS)
 def test_surface_stretch(elements, shape, record):

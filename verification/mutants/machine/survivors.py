@@ -20,8 +20,8 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
     ("model/gear.py", "still = np.zeros_like(fields), np.zeros_like(biomass), np.zeros((2, 4))",
      "still = np.zeros_like(fields), np.zeros_like(biomass), np.zeros(( 1, 4))"):
         "A row of zeros, added to two rows, is two rows of zeros.",
-    ("model/transport.py", "return self._reaction.evaluate(state.reshape(2, -1))",
-     "return self._reaction.evaluate(state.reshape(2, - 2))"):
+    ("model/transport.py", "return self._reaction.evaluate(state.reshape(len(self.problem.both), -1))",
+     "return self._reaction.evaluate(state.reshape(len(self.problem.both), - 2))"):
         "numpy takes any negative length of one axis for the one that is left.",
     ("report/quantities.py", 'is_new_mesh = run.series.get("remeshed", run.times * np.nan) == 1',
      'is_new_mesh = run.series.get("remeshed", run.times * np.nan) >= 1'):
