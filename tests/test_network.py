@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import repro
-from repro.results.network import TABLE, known
+from repro.results.network import CONTACT, TABLE, known
 from verification.network import __main__ as command
 from verification.network import law, shapes
 from verification.network.shapes import RATIOS
@@ -99,23 +99,77 @@ def test_a_pore_twice_as_wide_takes_four_times_the_area():
 
 
 @pytest.mark.parametrize("area, spanned, ratio, message", [
-    (0.0, False, LAMBDA, "area / width^2 = 0 is not known for a half-disc before contact (spanned=False); 0.003927 "),
-    (1.6, False, LAMBDA, "area / width^2 = 1.6 is not known for a half-disc"),
-    (1.4, True, LAMBDA, "area / width^2 = 1.4 is not known for a plug (spanned=True); 1.6 to 4.5 is accepted"),
-    (5.0, True, LAMBDA, "area / width^2 = 5 "), (float("nan"), True, LAMBDA, "area / width^2 = nan "),
-    (1.0, False, 99.0, "viscosity_ratio = 99 is not known for an aggregate; 100 to 1e+04 is accepted"),
+    (1.6, False, LAMBDA, "throat 1: area / width^2 before contact (spanned=False) = 1.6 is not known; 0 to 1.509 is "),
+    (1.4, True, LAMBDA, "throat 1: area / width^2 of a plug (spanned=True) = 1.4 is not known; 1.41 to 4.5 is "),
+    (5.0, True, LAMBDA, "throat 1: area / width^2 of a plug (spanned=True) = 5 "),
+    (float("nan"), True, LAMBDA, "throat 1: area / width^2 of a plug (spanned=True) = nan "),
+    (-1.0, None, LAMBDA, "throat 1: area / width^2 = -1 is not known; 0 to 4.5 is accepted"),
+    (5.0, None, LAMBDA, "throat 1: area / width^2 = 5 "),
+    (1.0, False, 99.0, "viscosity_ratio = 99 is not known; 100 to 1e+04 is accepted"),
     (1.0, False, 1.1e4, "viscosity_ratio = 11000 "), (1.0, False, float("nan"), "viscosity_ratio = nan ")])
 def test_arguments_outside_of_the_table_are_refused(area, spanned, ratio, message):
-    """The message is one line."""
+    """The message is one line and has the index of the throat. With outside="nan" that throat alone has no result."""
+    areas = [1.0 + bool(spanned), area]
     with pytest.raises(ValueError) as error:
-        repro.added_resistance([area, 1.0 + spanned], 1.0, spanned, ratio)
+        repro.added_resistance(areas, 1.0, spanned, ratio)
     assert str(error.value).startswith(f"added_resistance: {message}") and "\n" not in str(error.value)
+    if ratio == LAMBDA:
+        without = np.isnan(repro.added_resistance(areas, 1.0, spanned, ratio, outside="nan"))
+        assert without.tolist() == [[False, True]] * 3
 
 
 @pytest.mark.parametrize("width", [0.0, -50.0, float("nan")])
 def test_a_pore_without_width_is_refused(width):
-    with pytest.raises(ValueError, match="^added_resistance: width is not known; more than zero is accepted$"):
-        repro.added_resistance(2500.0, [100.0, width], False)
+    areas, widths = np.full((2, 2), 2500.0), [[100.0, 100.0], [width, 100.0]]
+    with pytest.raises(ValueError, match=r"^added_resistance: throat 1, 0: width = .* is not known; more than zero is"):
+        repro.added_resistance(areas, widths, False)
+    without = np.isnan(repro.added_resistance(areas, widths, outside="nan").length)
+    assert without.tolist() == [[False, False], [True, False]]
+    with pytest.raises(ValueError, match="^added_resistance: outside = 'skip' is not known; 'raise' or 'nan' is acc"):
+        repro.added_resistance(areas, 100.0, outside="skip")
+
+
+def test_an_empty_pore_adds_nothing_and_thin_bodies_follow_half_discs():
+    """Below the table's first thickness, 0.05 W, the law is within 0.4 % of half-discs and continuous."""
+    assert (np.array(repro.added_resistance(0.0, 50.0)) == 0).all()
+    for thickness in (0.01, 0.025, 0.04):
+        one = shapes.sample(shapes.half_disc(thickness), (100.0, LAMBDA))
+        for ratio, length in zip(one.ratios, one.lengths):
+            assert repro.added_resistance(one.share, 1.0, False, ratio).length == pytest.approx(length, rel=4e-3)
+    first = known(False)[0]
+    below, above = (np.array(repro.added_resistance(first * (1 + side), 1.0)) for side in (-1e-9, 1e-9))
+    assert below == pytest.approx(above, rel=1e-7)
+
+
+def test_the_area_decides_the_contact():
+    """Without `spanned` the law is that of the kind that the area has; near contact its bounds include both kinds."""
+    share = np.array([0.002, 0.5, 1.3, 1.45, 1.5, 1.52, 1.58, 1.61, 4.5])
+    by_area = np.array(repro.added_resistance(share, 1.0))
+    kinds = share > known(False)[1]
+    assert by_area[0] == pytest.approx(repro.added_resistance(share, 1.0, kinds).length, rel=1e-12)
+    either = (share >= CONTACT[0]) & (share <= CONTACT[1])
+    open_film = np.array(repro.added_resistance(np.minimum(share[either], known(False)[1]), 1.0, False))
+    plug = np.array(repro.added_resistance(share[either], 1.0, True))
+    assert by_area[1, either] == pytest.approx(open_film[1], rel=1e-12)
+    assert by_area[2, either] == pytest.approx(plug[2], rel=1e-12)
+    alone = np.array(repro.added_resistance(share[~either], 1.0, kinds[~either]))
+    assert by_area[:, ~either] == pytest.approx(alone, rel=1e-12)
+
+
+@pytest.mark.parametrize("contact_is_given", [False, True])
+def test_shapes_near_contact_are_within_the_bounds(contact_is_given):
+    """Those of the fit and those that it has not seen, with contact and without it."""
+    outside, kinds = [], []
+    for unseen in (False, True):
+        columns = law.read(unseen)
+        near = (columns["area_over_width2"] >= CONTACT[0]) & (columns["area_over_width2"] <= CONTACT[1])
+        for _, _, spanned, ratio, share, length in zip(*(columns[name][near] for name in law.COLUMNS)):
+            one = repro.added_resistance(share, 1.0, bool(spanned) if contact_is_given else None, ratio)
+            kinds.append(spanned)
+            if not one.least <= length <= one.most:
+                outside.append((share, ratio, length / one.length))
+    assert outside == []
+    assert kinds.count(1) >= 10 and kinds.count(0) >= 10
 
 
 def test_the_page_shows_the_present_table():

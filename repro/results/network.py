@@ -29,7 +29,19 @@ from numpy.typing import ArrayLike
 from repro.results import read_table
 
 TABLE = Path(__file__).with_name("network.csv")
-KINDS = ("a half-disc before contact (spanned=False)", "a plug (spanned=True)")
+SHARE = "area / width^2"
+OUTSIDE = ("raise", "nan")
+#: A / W^2 between which an aggregate may touch both walls or not. A film of 2 um closes under a
+#: half-disc of 1.42 W^2 in a pore of 40 um, and of 1.53 W^2 in one of 150 um.
+CONTACT = (1.41, 1.6)
+#: r / A of a half-disc falls by this factor times its thickness over W, within 0.4 % between
+#: thicknesses of 0.01 and 0.05 W, for lambda of 100 to 10 000.
+THINNER = 1.25
+#: A plug resists like one with straight ends that is shorter by this length, over W.
+ROUNDED = 0.4
+#: Per A / W^2 below 1.6, the lower bound of plugs falls by this part of r: contact surfaces that
+#: have just formed are short. With 0.9, one of the fit's shapes was below it by 0.2 %.
+EARLY = 1.25
 
 
 class AddedResistance(NamedTuple):
@@ -44,20 +56,25 @@ class AddedResistance(NamedTuple):
     most: np.ndarray
 
 
-def added_resistance(area: ArrayLike, width: ArrayLike, spanned: ArrayLike,
-                     viscosity_ratio: float = 2000.0) -> AddedResistance:
+def added_resistance(area: ArrayLike, width: ArrayLike, spanned: ArrayLike | None = None,
+                     viscosity_ratio: float = 2000.0, *, outside: str = "raise") -> AddedResistance:
     """Resistance that aggregates add to pores, as a length of empty pore over W.
 
     Parameters
     ----------
     area : array_like
-        Areas of the aggregates, in any unit of area and of any shape.
+        Areas of the aggregates, in any unit of area and of any shape; zero in an empty pore.
     width : array_like
         Widths of the pores, in the square root of that unit. Its shape broadcasts with the areas.
-    spanned : array_like of bool
-        True if the aggregate touches both walls. Its shape broadcasts with the areas.
+    spanned : array_like of bool, optional
+        True if the aggregate touches both walls. Its shape broadcasts with the areas. By default
+        the area decides: an aggregate of more than 1.51 width^2 touches both walls. From 1.41 to
+        1.6 width^2 the bounds then include shapes with contact and without it.
     viscosity_ratio : float
         Viscosity of the aggregates over that of water, lambda, without unit.
+    outside : {"raise", "nan"}
+        A pore outside the law's range raises an error with its index, or its results are
+        not-a-number.
 
     Returns
     -------
@@ -67,8 +84,8 @@ def added_resistance(area: ArrayLike, width: ArrayLike, spanned: ArrayLike,
     Raises
     ------
     ValueError
-        If a width is not positive, or area / width^2 or viscosity_ratio is outside the table: 0.004
-        to 1.5 before contact, 1.6 to 4.5 after it, lambda 100 to 10 000. An empty pore is outside.
+        If a width is not positive, or area / width^2 or viscosity_ratio is outside the law's range:
+        0 to 1.5 before contact, 1.41 to 4.5 after it, lambda 100 to 10 000.
 
     Notes
     -----
@@ -78,19 +95,35 @@ def added_resistance(area: ArrayLike, width: ArrayLike, spanned: ArrayLike,
     Examples
     --------
     >>> import repro
-    >>> added = repro.added_resistance(500.0, 50.0, False)
-    >>> bool(added.least <= added.length <= added.most)
+    >>> added = repro.added_resistance([0.0, 500.0, 4000.0, 9000.0], 50.0)
+    >>> bool((added.least <= added.length).all() and (added.length <= added.most).all())
     True
     """
-    width = np.asarray(width, float)
-    if not (width > 0).all():
-        raise ValueError("added_resistance: width is not known; more than zero is accepted")
-    share = np.asarray(area, float) / width**2
-    share, spanned = np.broadcast_arrays(share, np.asarray(spanned, bool))
-    results = np.empty((3, *share.shape))
+    ratio = float(viscosity_ratio)
+    ratios, last, largest = _table(False)[1], known(False)[1], known(True)[1]
+    check = Check("added_resistance", outside)
+    Check("added_resistance", "raise").within("viscosity_ratio", ratio, ratios[0], ratios[-1])
+    share, widths = _shares(area, width)
+    touches = share > last if spanned is None else np.asarray(spanned, bool)
+    share, widths, touches = np.broadcast_arrays(share, widths, touches)
+    is_known = check.positive("width", widths)
+    if spanned is None:
+        is_known &= check.within(SHARE, share, 0.0, largest, is_known)
+    else:
+        is_known &= check.within(f"{SHARE} before contact (spanned=False)", share, 0.0, last,
+                                 is_known & ~touches)
+        is_known &= check.within(f"{SHARE} of a plug (spanned=True)", share, CONTACT[0], largest,
+                                 is_known & touches)
+    results = np.full((3, *share.shape), np.nan)
     for kind in (False, True):
-        is_kind = spanned == kind
-        results[:, is_kind] = _law(kind, share[is_kind], viscosity_ratio)
+        selected = is_known & (touches == kind)
+        results[:, selected] = _law(kind, share[selected], ratio)
+    if spanned is None:
+        either = is_known & (share >= CONTACT[0]) & (share <= CONTACT[1])
+        kinds = [_law(kind, np.minimum(share[either], (last, largest)[kind]), ratio)
+                 for kind in (False, True)]
+        results[1, either] = np.min(kinds, axis=0)[1]
+        results[2, either] = np.max(kinds, axis=0)[2]
     return AddedResistance(*results)
 
 
@@ -98,6 +131,44 @@ def known(spanned: bool) -> tuple[float, float]:
     """Return the least and the largest A / W^2 in the table."""
     shares, _, _ = _table(spanned)
     return float(shares[0]), float(shares[-1])
+
+
+class Check(NamedTuple):
+    """What a law does with throats outside its range. function: its name; outside: as there."""
+
+    function: str
+    outside: str
+
+    def within(self, name: str, values: ArrayLike, low: float, high: float,
+               where: ArrayLike = True) -> np.ndarray:
+        """Return where values are in a range, or not to be checked."""
+        values = np.asarray(values, float)
+        is_known = (values >= low) & (values <= high) | ~np.asarray(where)
+        return self._checked(name, values, is_known, f"{low:.4g} to {high:.4g}")
+
+    def positive(self, name: str, values: np.ndarray) -> np.ndarray:
+        """Return where values are more than zero and finite."""
+        is_known = (values > 0) & np.isfinite(values)
+        return self._checked(name, values, is_known, "more than zero")
+
+    def _checked(self, name: str, values: np.ndarray, is_known: np.ndarray,
+                 accepted: str) -> np.ndarray:
+        """Return ``is_known``. Raises ValueError for the first value that is not known."""
+        if self.outside not in OUTSIDE:
+            raise ValueError(f"{self.function}: outside = {self.outside!r} is not known; "
+                             "'raise' or 'nan' is accepted")
+        if self.outside == "raise" and not is_known.all():
+            index = tuple(map(int, np.argwhere(~is_known)[0]))
+            throat = f"throat {', '.join(map(str, index))}: " if index else ""
+            raise ValueError(f"{self.function}: {throat}{name} = {values[index]:.6g} is not known; "
+                             f"{accepted} is accepted")
+        return is_known
+
+
+def _shares(area: ArrayLike, width: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
+    """Broadcast A / W^2 and W; A / W^2 is not-a-number where W is not positive."""
+    area, width = np.broadcast_arrays(np.asarray(area, float), np.asarray(width, float))
+    return area / np.where(width > 0, width, np.nan)**2, width
 
 
 def _law(spanned: bool, share: np.ndarray, ratio: float) -> np.ndarray:
@@ -108,20 +179,30 @@ def _law(spanned: bool, share: np.ndarray, ratio: float) -> np.ndarray:
     from scipy.interpolate import PchipInterpolator  # its import takes a quarter of a second
 
     shares, ratios, values = _table(spanned)
-    _refuse("viscosity_ratio", np.array([ratio]), ratios, "an aggregate")
-    _refuse("area / width^2", share, shares, KINDS[spanned])
     length, *bounds = PchipInterpolator(np.log(ratios), values, axis=1)(np.log(ratio))
-    place, nodes = np.log(share), np.log(shares)
+    inside = np.maximum(share, shares[0])
+    place, nodes = np.log(inside), np.log(shares)
     length = PchipInterpolator(nodes, length)(place)
-    return np.exp([length, *(length + np.interp(place, nodes, bound) for bound in bounds)])
+    rows = np.exp([length, *(length + np.interp(place, nodes, bound) for bound in bounds)])
+    return rows * (_early_plug(share, inside) if spanned else _thin_body(share, inside))
 
 
-def _refuse(name: str, values: np.ndarray, known: np.ndarray, kind: str) -> None:
-    """Raise ValueError for values outside the table, and for not-a-number."""
-    outside = values[~((values >= known[0]) & (values <= known[-1]))]
-    if outside.size:
-        raise ValueError(f"added_resistance: {name} = {outside.flat[0]:.6g} is not known for "
-                         f"{kind}; {known[0]:.4g} to {known[-1]:.4g} is accepted")
+def _thin_body(share: np.ndarray, inside: np.ndarray) -> np.ndarray:
+    """r at A / W^2 over that at the first area of the table, for thinner half-discs.
+
+    They are in a shear flow, where r is proportional to the area. Its profile is a parabola, which
+    reduces r / A in proportion to the thickness.
+    """
+    thickness, first = np.sqrt(2 * share / np.pi), np.sqrt(2 * inside / np.pi)
+    return share / inside * (1 + THINNER * (first - thickness))
+
+
+def _early_plug(share: np.ndarray, inside: np.ndarray) -> np.ndarray:
+    """(3, n) r and its bounds at A / W^2 over those at the first area of the table, for plugs that
+    have just touched both walls."""
+    factor = (share - ROUNDED) / (inside - ROUNDED)
+    return factor * np.stack([np.ones_like(share), 1 - EARLY * (inside - share),
+                              np.ones_like(share)])
 
 
 @cache
