@@ -86,7 +86,7 @@ if TYPE_CHECKING:
     from repro.march.simulation import simulate
     from repro.preflight.checked import check
     from repro.report import compare
-    from repro.results.network import added_resistance
+    from repro.results.network import added_resistance, uptake
     from repro.results.tables import Results, solve
     from repro.runs.scripts import load_run, resume, run
     from repro.scene import Scene, load_scene
@@ -103,7 +103,7 @@ else:
                 "added_resistance": "results.network", "check": "preflight.checked",
                 "compare": "report", "load_run": "runs.scripts", "load_scene": "scene",
                 "resume": "runs.scripts", "run": "runs.scripts", "simulate": "march.simulation",
-                "solve": "results.tables", "sweep": "sweeps.driver"}
+                "solve": "results.tables", "sweep": "sweeps.driver", "uptake": "results.network"}
 
     def __getattr__(name: str):
         if name == "__version__":
@@ -117,4 +117,4 @@ else:
 
 #: ``help`` lists these; errors are in the text above, so that functions come before them.
 __all__ = ["Results", "Scene", "added_resistance", "check", "compare", "load_run", "load_scene",
-           "resume", "run", "simulate", "solve", "sweep"]
+           "resume", "run", "simulate", "solve", "sweep", "uptake"]

@@ -1,4 +1,4 @@
-"""A law for networks: the hydraulic resistance that an aggregate adds to a pore (section 5).
+"""Laws for networks: the resistance that an aggregate adds to a pore, and its uptake (section 5).
 
 A network model knows the area A of the aggregate in a pore of width W and needs the pore's head
 loss. Stokes flow is linear, so the mean velocity drops out; W is the only length, so areas count in
@@ -19,6 +19,7 @@ shapes: 1 % thinner or 3 % thicker than a half-disc, or leaning by 5 %.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
@@ -26,7 +27,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from repro.model.kinetics import RateLaw, decay_demand, rate_law
 from repro.results import read_table
+from repro.scene import load_scene
 
 TABLE = Path(__file__).with_name("network.csv")
 SHARE = "area / width^2"
@@ -42,6 +45,30 @@ ROUNDED = 0.4
 #: Per A / W^2 below 1.6, the lower bound of plugs falls by this part of r: contact surfaces that
 #: have just formed are short. With 0.9, one of the fit's shapes was below it by 0.2 %.
 EARLY = 1.25
+
+
+class Transport(NamedTuple):
+    """Constants of the uptake: S = sherwood (A / W^2)^power, P = plug Pe (A / W^2)^plug_power."""
+
+    sherwood: float
+    power: float
+    plug: float
+    plug_power: float
+
+
+#: Of half-discs, and of aggregates that touch both walls.
+TRANSPORTS = Transport(8.91, 0.43, 1.01, 0.5), Transport(129.0, 0.0, 0.364, 0.8)
+#: Relative bound of the uptake: of any aggregate; and before contact, per (Pe A / W^2)^2 of the
+#: donor, since boundary layers form beside a thick body in a fast flow. With 0.03 and 0.0008, which
+#: supplies over 2 mg/L suggested, three of the fit's states were outside; with
+#: 0.05 and 0.0015 one of 50 other states, a thin body in water of 0.35 mg/L (5.9 %).
+UPTAKE_BOUND, FAST_BOUND = 0.07, 1.5e-3
+#: Ranges of the uptake: widths (um), mean velocities (m/d) and supplies (mg/L).
+WIDTHS, FASTEST, LARGEST_SUPPLY = (40.0, 150.0), 10.0, 20.0
+#: Halvings of the interval of the donor's uptake, and of that of the acceptor's for decay, which
+#: is a few per cent of its uptake.
+HALVINGS, DECAY_HALVINGS = 24, 12
+UM_PER_HOUR = 1e6 / 24  # in 1 m/d
 
 
 class AddedResistance(NamedTuple):
@@ -127,6 +154,159 @@ def added_resistance(area: ArrayLike, width: ArrayLike, spanned: ArrayLike | Non
     return AddedResistance(*results)
 
 
+class Uptake(NamedTuple):
+    """What aggregates in throats take up, per metre of depth.
+
+    acceptor, donor: pg/m/h; growth: of the area, um^2/h, by (9) and (10); bound: relative error of
+    acceptor and donor. All have the shape of the areas.
+    """
+
+    acceptor: np.ndarray
+    donor: np.ndarray
+    growth: np.ndarray
+    bound: np.ndarray
+
+
+def uptake(area: ArrayLike, width: ArrayLike, velocity: ArrayLike, acceptor: ArrayLike,
+           donor: ArrayLike, *, outside: str = "raise") -> Uptake:
+    """Uptake of both substrates by aggregates in throats, and the growth that follows from it.
+
+    Parameters
+    ----------
+    area : array_like
+        Areas of the aggregates, um^2; zero in an empty throat. All arguments broadcast.
+    width : array_like
+        Widths of the throats, um.
+    velocity : array_like
+        Mean velocities in the throats, m/d.
+    acceptor, donor : array_like
+        Supplies: concentrations in the water that enters the throats, mg/L.
+    outside : {"raise", "nan"}
+        As for :func:`added_resistance`.
+
+    Returns
+    -------
+    Uptake
+        Arrays of the broadcast shape.
+
+    Raises
+    ------
+    ValueError
+        If a throat is outside the law's range: area / width^2 to 4.5, width 40 to 150 um, velocity
+        to 10 m/d, supplies to 20 mg/L.
+
+    Notes
+    -----
+    The kinetics and diffusivities are those of Table 1, with X_A = X_m and steady profiles. The
+    effluent of a throat has the supply less uptake / (velocity width).
+
+    Examples
+    --------
+    >>> import repro
+    >>> taken = repro.uptake([0.0, 500.0, 4000.0], 50.0, 1.0, 8.0, 5.0)
+    >>> bool(taken.growth[0] == 0 and (taken.growth[1:] > 0).all())
+    True
+    """
+    check = Check("uptake", outside)
+    area, width, velocity, *supplies = np.broadcast_arrays(
+        *(np.asarray(values, float) for values in (area, width, velocity, acceptor, donor)))
+    is_known = check.within("width", width, *WIDTHS)
+    share = area / np.where(is_known, width, np.nan)**2
+    is_known &= check.within(SHARE, share, 0.0, known(True)[1], is_known)
+    is_known &= check.within("velocity", velocity, 0.0, FASTEST)
+    for name, supply in zip(("acceptor", "donor"), supplies):
+        is_known &= check.within(name, supply, 0.0, LARGEST_SUPPLY)
+    results = np.full((4, *share.shape), np.nan)
+    results[:, is_known] = 0.0
+    takes = is_known & (area > 0) & (velocity > 0) & (supplies[0] > 0) & (supplies[1] > 0)
+    throats = Throats(area[takes], share[takes], velocity[takes] * width[takes] * UM_PER_HOUR,
+                      np.stack([supply[takes] for supply in supplies]))
+    results[:3, takes] = throats.uptake()
+    results[3, takes] = throats.bound()
+    return Uptake(*results)
+
+
+class Throats(NamedTuple):
+    """Throats with aggregates. area: (n,) um2; share: (n,) A / W^2; inflow: (n,) u_ave W, um2/h;
+    supplies: (2, n) mg/L of acceptor and donor.
+    """
+
+    area: np.ndarray
+    share: np.ndarray
+    inflow: np.ndarray
+    supplies: np.ndarray
+
+    def uptake(self) -> np.ndarray:
+        """(3, n) uptake of acceptor and donor, um2 mg/L/h, and growth of the area, um2/h.
+
+        Two unknowns, one inside the other: the uptake of the acceptor follows from that of the
+        donor, by which both concentrations in the aggregate fall.
+        """
+        law, _, density = _constants()
+        active = density * self.area
+        ratio, decay = law.constants.acceptor_to_donor_ratio, decay_demand(law.constants)
+        limit = self.inflow * self.supplies[0]
+
+        def acceptor(taken: np.ndarray) -> np.ndarray:
+            need = ratio * taken
+            most = need + np.minimum(active * decay, np.maximum(limit - need, 0.0))
+            return _balance(need, most, DECAY_HALVINGS, lambda trial: (
+                need + active * law.uptake(self.concentration(0, trial), 0.0 * trial)[0]))
+
+        def donor(trial: np.ndarray) -> np.ndarray:
+            c_acceptor = self.concentration(0, acceptor(trial))
+            return active * law.uptake(c_acceptor, self.concentration(1, trial))[1]
+
+        most = np.minimum(limit / ratio, self.inflow * self.supplies[1])
+        taken = _balance(np.zeros_like(most), most, HALVINGS, donor)
+        both = acceptor(taken)
+        decayed = (both - ratio * taken) / law.constants.decay_oxygen_demand
+        growth = (law.constants.yield_coefficient * taken - decayed) / density
+        return np.stack([both, taken, growth])
+
+    def concentration(self, substrate: int, taken: np.ndarray) -> np.ndarray:
+        """(n,) mg/L in the aggregates that take up (n,) um2 mg/L/h of acceptor (0) or donor (1)."""
+        _, diffusivities, _ = _constants()
+        sherwood, power, plug, plug_power = self.transport()
+        supply, diffusivity = self.supplies[substrate], diffusivities[substrate]
+        is_plug = plug * self.inflow / diffusivity * self.share**plug_power
+        used = np.clip(taken / (self.inflow * supply), 1e-12, 1 - 1e-12)
+        mean = (1 - used - is_plug * used / np.log1p(-used)) / (1 + is_plug)
+        resistance = 1 / (sherwood * self.share**power * diffusivity)
+        return np.maximum(supply * mean - taken * resistance, 0.0)
+
+    def transport(self) -> np.ndarray:
+        """(4, n) the constants of each aggregate."""
+        before, after = (np.array(kind)[:, None] for kind in TRANSPORTS)
+        return np.where(self._spanned(), after, before)
+
+    def bound(self) -> np.ndarray:
+        """(n,) relative bound of the uptakes."""
+        peclet = self.inflow / _constants()[1][1]
+        return UPTAKE_BOUND + np.where(self._spanned(), 0.0, FAST_BOUND * (peclet * self.share)**2)
+
+    def _spanned(self) -> np.ndarray:
+        return self.share > known(False)[1]
+
+
+def _balance(low: np.ndarray, high: np.ndarray, halvings: int, rate: Callable) -> np.ndarray:
+    """(n,) x between low and high with rate(x) = x, for a rate that falls with x."""
+    for _ in range(halvings):
+        middle = 0.5 * (low + high)
+        exceeds = rate(middle) > middle
+        low, high = np.where(exceeds, middle, low), np.where(exceeds, high, middle)
+    return 0.5 * (low + high)
+
+
+@cache
+def _constants() -> tuple[RateLaw, tuple[float, float], float]:
+    """Rates, diffusivities of acceptor and donor in the aggregate (um2/h), X_m: those of Table 1."""
+    scene = load_scene("base")
+    both = scene.substrates.acceptor, scene.substrates.donor
+    acceptor, donor = (substrate.diffusivity_in_aggregate for substrate in both)
+    return rate_law(scene.substrates, scene.kinetics), (acceptor, donor), scene.kinetics.maximum_density
+
+
 def known(spanned: bool) -> tuple[float, float]:
     """Return the least and the largest A / W^2 in the table."""
     shares, _, _ = _table(spanned)
@@ -198,8 +378,10 @@ def _thin_body(share: np.ndarray, inside: np.ndarray) -> np.ndarray:
 
 
 def _early_plug(share: np.ndarray, inside: np.ndarray) -> np.ndarray:
-    """(3, n) r and its bounds at A / W^2 over those at the first area of the table, for plugs that
-    have just touched both walls."""
+    """(3, n) r and its bounds at A / W^2 over those at the first area of the table.
+
+    Plugs with less area have just touched both walls.
+    """
     factor = (share - ROUNDED) / (inside - ROUNDED)
     return factor * np.stack([np.ones_like(share), 1 - EARLY * (inside - share),
                               np.ones_like(share)])
