@@ -368,7 +368,7 @@ def _law(spanned: bool, share: np.ndarray, ratio: float) -> np.ndarray:
 
 
 def _thin_body(share: np.ndarray, inside: np.ndarray) -> np.ndarray:
-    """r at A / W^2 over that at the first area of the table, for thinner half-discs.
+    """R at A / W^2 over that at the first area of the table, for thinner half-discs.
 
     They are in a shear flow, where r is proportional to the area. Its profile is a parabola, which
     reduces r / A in proportion to the thickness.

@@ -100,13 +100,13 @@ class Lattice:
         raise RuntimeError(f"the concentrations of the network do not rest after {SWEEPS} sweeps")
 
 
-def advance(lattice: Lattice) -> list[State]:
-    """States at the starts of all steps and at the end."""
+def advance(lattice: Lattice, count: int = STEPS) -> list[State]:
+    """States at the starts of some steps and at the end of the last."""
     area, step, states = lattice.seeds, HOURS / STEPS, []
-    for number in range(STEPS):
+    for number in range(count):
         state, growth = lattice.state(number * step, area)
         states.append(state)
         _, middle = lattice.state((number + 0.5) * step, area * np.exp(0.5 * step * growth / area))
         half = area * np.exp(0.5 * step * growth / area)
         area = area * np.exp(step * middle / half)
-    return [*states, lattice.state(HOURS, area)[0]]
+    return [*states, lattice.state(count * step, area)[0]]

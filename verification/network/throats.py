@@ -46,8 +46,7 @@ def scene(history: dict[str, np.ndarray]) -> repro.Scene:
     return repro.load_scene({
         "pore": {"width": f"{width} um", "length": f"{LENGTH} um"}, "aggregate": {"radius": f"{radius} um"},
         "flow": {"head": over_time("head", "um"), "interpolation": "linear"},
-        "substrates": {"interpolation": "linear",
-                       **{name: {"supply": over_time(name, "mg/L")} for name in SUBSTRATES}},
+        "substrates": {name: {"supply": over_time(name, "mg/L"), "interpolation": "linear"} for name in SUBSTRATES},
         "growth": {}}, (*shapes.QUICK, *until(*(int(hour) for hour in hours))))
 
 

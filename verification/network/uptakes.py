@@ -1,7 +1,7 @@
 """Uptake of both substrates by aggregates in throats, from whole solutions: the fit of the law of uptake, and the
 shapes and states that test it."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import product
 from pathlib import Path
 from typing import NamedTuple
@@ -58,12 +58,12 @@ def states(part: int) -> Iterator[State]:
     for _ in range(DISCS[part]):
         width = _log(random, WIDTHS)
         body = shapes.half_disc(random.uniform(*THICKNESSES), width, 0.0, shapes.QUICK)
-        yield _solved(body, False, part, random)
+        yield solved(body, *_drawn(random), False, part)
     bodies = [body for run in RUNS.get(part, ()) for body in _grown(run)]
     if part == FIRST_TEST:
         bodies = [bodies[k] for k in np.linspace(0, len(bodies) - 1, NEW_GROWN).astype(int)]
     for body, _ in product(bodies, range(STATES if part == FIT else 1)):
-        yield _solved(body, True, part, random)
+        yield solved(body, *_drawn(random), True, part)
 
 
 def read(part: int) -> dict[str, np.ndarray]:
@@ -97,18 +97,22 @@ def _grown(run: Growth) -> Iterator[Pore]:
             yield instant.pore
 
 
-def _solved(body: Pore, grown: bool, part: int, random: np.random.Generator) -> State:
-    """The uptake of an aggregate at a drawn state."""
-    width, velocity = body.mesh.width, _log(random, VELOCITIES)
-    supplies = [_log(random, SUPPLIES) for _ in SUBSTRATES]
+def solved(body: Pore, velocity: float, supplies: Sequence[float], grown: bool = False, part: int = FIT) -> State:
+    """The uptake of an aggregate at a mean velocity (m/d) and supplies of acceptor and donor (mg/L)."""
+    width = body.mesh.width
     tables = shapes.tables(width, {"radius": f"{0.1 * width} um"}, velocity)
     tables["substrates"] = {name: {"supply": f"{supply} mg/L"} for name, supply in zip(SUBSTRATES, supplies)}
     scene = load_scene({**tables, "growth": {"end": "0 h"}}, shapes.QUICK)
     if not grown:
         body = pore.seeded(scene, outline=body.boundary)
-    fluxes = pore.solve(scene, body).substrates.fluxes
+    acceptor, donor = pore.solve(scene, body).substrates.fluxes
     return State(part, int(grown), int(body.contact), body.boundary.area, width, velocity, *supplies,
-                 *(flux.consumed for flux in fluxes))
+                 acceptor.consumed, donor.consumed)
+
+
+def _drawn(random: np.random.Generator) -> tuple[float, list[float]]:
+    """A velocity, and supplies of both substrates."""
+    return _log(random, VELOCITIES), [_log(random, SUPPLIES) for _ in SUBSTRATES]
 
 
 def _log(random: np.random.Generator, limits: tuple[float, float]) -> float:
