@@ -4,6 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin/python
 STAMP := $(VENV)/.installed
 CRATE := build/crate/.installed
+SITE := build/docs/.installed
 OLDEST := build/oldest/.installed
 OLDEST_TESTS := tests/test_python_calls.py tests/test_drawing.py tests/test_field_files.py tests/test_linear.py
 PIP := $(BIN) -m pip install -q --disable-pip-version-check
@@ -14,7 +15,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
-.PHONY: help env figures check-manifest claims sensitivity verify verify-fast mutants mutants-sampled test test-thorough oldest lint bench crate clean
+.PHONY: help env figures check-manifest claims sensitivity verify verify-fast mutants mutants-sampled test test-thorough oldest lint bench crate docs clean
 
 help:
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/\1|\2/p' Makefile | awk -F'|' '{ printf "  make %-16s %s\n", $$1, $$2 }'
@@ -72,8 +73,12 @@ crate: $(STAMP) $(CRATE) ## pack scenes, code, environment, figures and claims a
 	@$(BIN) -m paper_figures.crate
 	@$(dir $(CRATE))bin/python .ci/crate_check.py paper_figures/out/crate
 
+docs: $(STAMP) $(SITE) ## build the site into docs/_build/html, without network
+	@$(dir $(SITE))bin/python -m sphinx -q -W --keep-going -b html -c docs . docs/_build/html
+	@echo "docs/_build/html/index.html"
+
 clean: ## remove .venv and all generated files
-	@rm -rf $(VENV) paper_figures/out paper_figures/cache build dist *.egg-info .pytest_cache .ruff_cache .mypy_cache .hypothesis
+	@rm -rf $(VENV) paper_figures/out paper_figures/cache build docs/_build dist *.egg-info .pytest_cache .ruff_cache .mypy_cache .hypothesis
 	@find . -name .git -prune -o -type d -name __pycache__ -prune -exec rm -rf {} +
 
 # The stamp is written last: an interrupted or failed install leaves none, and the next make starts from scratch.
@@ -93,6 +98,14 @@ $(CRATE): .ci/crate.lock
 	@rm -f $@
 	@"$(PYTHON)" -m venv --clear $(@D)
 	@$(@D)/bin/python -m pip install -q --disable-pip-version-check --require-hashes --only-binary :all: -r .ci/crate.lock
+	@touch $@
+
+# The site is built in an environment of its own, which also sees the packages of .venv.
+$(SITE): .ci/docs.lock $(STAMP)
+	@rm -f $@
+	@"$(PYTHON)" -m venv --clear $(@D)
+	@$(@D)/bin/python -m pip install -q --disable-pip-version-check --require-hashes --only-binary :all: -r .ci/docs.lock
+	@echo "import site; site.addsitedir('$$($(BIN) -c 'import sysconfig; print(sysconfig.get_path("purelib"))')')" > "$$($(@D)/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')/package.pth"
 	@touch $@
 
 # `make oldest` installs the lower bounds of the dependencies in a separate environment, for Python 3.11.

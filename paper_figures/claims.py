@@ -42,6 +42,10 @@ STATEMENTS = {
     "C47": "a mass transfer coefficient cannot be set a priori, since it depends on geometry and flow",
     "C48": "the surface is smooth, since the energy of the aggregate is minimal",
     "C49": "expansion by 2000 can be handled, also where the aggregate grows unevenly",
+    "C50": "biomass bound to the wall distorts the geometry highly",
+    "C51": "finite elements would not perform well there",
+    "C52": "the adhesion required stems from fluid flow and from the conditions at the wall",
+    "C53": "body forces in a porous aggregate may make a difference, depending on the conditions",
 }
 
 

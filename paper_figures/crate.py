@@ -27,7 +27,7 @@ METADATA = "ro-crate-metadata.json"
 #: Contents of the crate besides the figures: folders, without generated files, and files.
 FOLDERS = ("docs", "paper_figures", "reference", "repro", "tests", "verification")
 FILES = ("CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md", "LICENSE", "MANIFEST.in", "Makefile", "README.md",
-         "codecheck.author.yml", "pyproject.toml", "requirements.lock")
+         "codecheck.yml", "pyproject.toml", "requirements.lock")
 GENERATED = {"__pycache__", "out", "cache", "live", "pictures"}
 NAME = "dupin2001-repro"
 WORKFLOW = "paper_figures/__main__.py"

@@ -27,8 +27,8 @@ Functions; every argument after these is given by its name:
     added_resistance(area, width, spanned)  a law for models of pore networks
 
 Errors: ``SceneError`` (a scene is refused), ``OutputError`` (a folder or file is refused),
-``SimulationError`` (a stage fails), ``TypeError`` (an argument is refused). ``PoreEnd`` and
-``Fold`` are ends of the model, which only ``simulate`` raises.
+``SimulationError`` (a stage fails), ``TypeError`` (an argument is refused). ``PoreEnd``,
+``Fold`` and ``Detachment`` are ends of the model, which only ``simulate`` raises.
 
 Sections of the paper and their modules, which name the equations that they solve:
 
@@ -44,6 +44,7 @@ Sections of the paper and their modules, which name the equations that they solv
     2.3, 3.4  growth           (14)-(27)    repro.model.growth
     3.4  biomass               (28)-(34)    repro.model.biomass, .growing
     2.3.2  fluid forces        (20), (22)   repro.model.traction
+    5    adhesion, tearing                  repro.model.adhesion, repro.march.detachment
     2.3.3  contact                          repro.model.contact, .contact_lines
          limits of the surface              repro.model.surface
     3.5  mesh motion           (35)         repro.model.mesh_motion
@@ -81,6 +82,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from repro.errors import OutputError as OutputError
     from repro.errors import SimulationError as SimulationError
+    from repro.march.detachment import Detachment as Detachment
     from repro.march.folding import Fold as Fold
     from repro.march.loop import PoreEnd as PoreEnd
     from repro.march.simulation import simulate
@@ -97,7 +99,7 @@ if TYPE_CHECKING:
 else:
     #: The module of each public name, imported on first use: importing the solver takes half a
     #: second.
-    _MODULES = {"Fold": "march.folding", "OutputError": "errors",
+    _MODULES = {"Detachment": "march.detachment", "Fold": "march.folding", "OutputError": "errors",
                 "PoreEnd": "march.loop", "Results": "results.tables",
                 "Scene": "scene", "SceneError": "scene", "SimulationError": "errors",
                 "added_resistance": "results.network", "check": "preflight.checked",

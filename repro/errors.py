@@ -105,7 +105,7 @@ class BalanceError(StageError):
 
 
 class RunEnd(Exception):
-    """The model ends before ``growth.end``, without a failure: Fold or PoreEnd."""
+    """The model ends before ``growth.end``, without a failure: Detachment, Fold or PoreEnd."""
 
 
 class SimulationError(RuntimeError):

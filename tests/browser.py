@@ -17,7 +17,8 @@ PATIENCE = 60.0  # s for an answer
 
 
 class Browser:
-    """One page that shows files, runs scripts and takes keys; ``requests`` are the addresses that it loads."""
+    """One page that shows files, runs scripts and takes keys; ``requests`` are the addresses that it loads, and
+    ``errors`` what its console and its scripts report."""
 
     def __enter__(self):
         self.home = tempfile.mkdtemp()
@@ -27,11 +28,12 @@ class Browser:
                                         stderr=subprocess.DEVNULL)
         self.pending = b""
         self.requests = []
+        self.errors = []
         self.count = 0
         self.session = None
         target = self.call("Target.createTarget", url="about:blank")["targetId"]
         self.session = self.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
-        for domain in ("Page", "Network", "Runtime"):
+        for domain in ("Page", "Network", "Runtime", "Log"):
             self.call(f"{domain}.enable")
         return self
 
@@ -53,7 +55,7 @@ class Browser:
                 return reply["result"]
 
     def _next(self) -> dict:
-        """Return the next message; record the address if it is a request."""
+        """Return the next message; record the address of a request, and an error of the page."""
         end = time.monotonic() + PATIENCE
         while b"\0" not in self.pending:
             ready = select.select([self.process.stdout], [], [], max(0.0, end - time.monotonic()))[0]
@@ -61,8 +63,12 @@ class Browser:
             self.pending += self.process.stdout.read(1 << 20)
         text, _, self.pending = self.pending.partition(b"\0")
         message = json.loads(text)
-        if message.get("method") == "Network.requestWillBeSent":
-            self.requests.append(message["params"]["request"]["url"])
+        match message:
+            case {"method": "Network.requestWillBeSent", "params": {"request": {"url": address}}}:
+                self.requests.append(address)
+            case ({"method": "Runtime.exceptionThrown"} | {"params": {"entry": {"level": "error"}}}
+                  | {"method": "Runtime.consoleAPICalled", "params": {"type": "error"}}):
+                self.errors.append(message["params"])
         return message
 
     def show(self, path: Path, fragment: str = "", width: int = 1200, height: int = 900, dark: bool = False) -> None:
@@ -87,6 +93,7 @@ class Browser:
 
     def press(self, key: str) -> None:
         """Press and release a key, such as ArrowLeft."""
-        codes = {"ArrowLeft": 37, "Home": 36, "Tab": 9}
-        for kind in ("rawKeyDown", "keyUp"):
-            self.call("Input.dispatchKeyEvent", type=kind, key=key, code=key, windowsVirtualKeyCode=codes[key])
+        codes = {"ArrowLeft": 37, "Home": 36, "Tab": 9, "Enter": 13}
+        text = {"text": "\r"} if key == "Enter" else {}
+        for kind in ("keyDown" if text else "rawKeyDown", "keyUp"):
+            self.call("Input.dispatchKeyEvent", type=kind, key=key, code=key, windowsVirtualKeyCode=codes[key], **text)

@@ -131,7 +131,9 @@ def test_a_loaded_run_equals_the_solved_one(solved, tmp_path):
     """Rows, the table and fields agree to the last bit, also in a folder without fields."""
     repro.run(load_scene("base", SHORT), str(tmp_path))
     loaded, table = repro.load_run(tmp_path), results.read_table(tmp_path / "timeseries.csv")
-    assert list(loaded) == list(solved) == list(table) == results.COLUMNS and loaded.units == solved.units
+    assert list(table) == results.COLUMNS and loaded.units == solved.units
+    table = {name: column for name, column in table.items() if not np.isnan(column).all()}
+    assert list(loaded) == list(solved) == list(table)
     assert repr(loaded) == repr(solved) and solved.status == "completed"
     assert np.array_equal(solved.time, solved["time_h"]) and solved.time[-1] == 0.6
     assert same_arrays(loaded, solved) and same_arrays(table, solved)

@@ -1,21 +1,28 @@
 """Films and wedges that close (2.3.3): nodes of straight edges, and contact lines anywhere on arcs."""
 
 import dataclasses
+import signal
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from repro.errors import SimulationError
+from repro.errors import GrowthError, Interrupted, SimulationError
+from repro.fem import linear
 from repro.fem.division import Division
 from repro.fem.outline import BOTTOM, FREE, TOP, Outline, polygon
 from repro.fem.space import Space
-from repro.march import simulation
+from repro.march import midpoint, simulation
+from repro.march.loop import RestartState
 from repro.march.simulation import simulate
-from repro.model import contact, contact_lines
+from repro.march.step_control import StepControl
+from repro.model import contact, contact_lines, contact_newton
 from repro.model.contact_lines import Clearance, Contact, surface_ends
 from repro.model.pore import initial_outline, seeded
+from repro.runs.execution import Watch, resume, run
+from repro.runs.state_arrays import pack_state, unpack_state
 from repro.scene import load_scene
+from tests.shell import files
 from tests.strategies import EVERY_ORDER, coarse_base, mirrored, plug
 
 FILM, ANGLE = 2.0, np.radians(16.7)
@@ -155,6 +162,134 @@ def test_a_division_also_divides_the_reference_of_strain(plugged, division):
     assert parted.unstrained == pytest.approx(1.01 * division.mesh.points[division.mesh.body], rel=1e-13)
 
 
+def grown_lines(pore, advance):
+    """Lines of a pore, those of the upper wall advanced by so many arcs."""
+    lines = contact_lines.lines_of(pore.boundary)
+    for line in lines:
+        line.advance = advance if line.wall == TOP else 0.0
+    return lines
+
+
+def expanded_by(scene, pore, factor, guess=None):
+    """The new shape of a pore whose biomass has grown by a factor."""
+    return contact.expand(contact.Mechanics.of(scene), pore, factor * pore.theta, guess)
+
+
+@pytest.mark.parametrize("rheology", ["stressed", "stress_free"])
+def test_the_residual_changes_with_a_line_as_its_slope_says(plugged, rheology):
+    """The difference quotient over the entire aggregate agrees with that over the triangles beside the line."""
+    scene, pore = plugged
+    scene = load_scene(scene, [f"growth.new_biomass={rheology}"])
+    rule = Clearance(scene.pore.width, scene.growth.minimum_film, scene.growth.minimum_contact_angle)
+    trials = contact._Trials(contact.Mechanics.of(scene), pore, pore, None, True)
+    here, there = (trials._place(pore, pore.wall, grown_lines(pore, advance), rule) for advance in (0.4, 0.4 + 1e-6))
+    position, pressure = here.divided(pore.mesh.points, 0.3 + 0 * pore.pressure)
+    position = position + 0.01 * np.sin(position)
+    at_rest, moved = (placed.system.under(placed.theta, position, position, pressure).residual
+                      for placed in (here, there))
+    slopes = [here.slope(line, position, pressure) for line in grown_lines(pore, 0.4) if line.wall == TOP]
+    assert len(slopes) == 2 and all(np.abs(slope).max() > 0.1 for slope in slopes)
+    assert sum(slopes) == pytest.approx((moved - at_rest) / 1e-6, abs=2e-4 * np.abs(slopes).max())
+
+
+def test_newton_and_search_place_the_lines_alike(plugged, monkeypatch):
+    """Both accept clearances of up to CLOSE, which a line passes in about CLOSE film / tan(angle), 0.013 um; at corners
+    a line errs by LEAST_PART of an arc."""
+    scene, pore = plugged
+    counts = []
+    solve = contact.growth.equilibrium
+    monkeypatch.setattr(contact.growth, "equilibrium", lambda *a, **k: counts.append(1) or solve(*a, **k))
+    by_newton = expanded_by(scene, pore, 1.03)
+    assert not counts and by_newton.iterations <= contact_newton.MOST_ITERATIONS
+    without_newton(monkeypatch)
+    by_search = expanded_by(scene, pore, 1.03)
+    assert len(counts) > 1
+    arc = contact_lines.arc_lengths(pore.boundary, contact_lines.lines_of(pore.boundary)[-1]).max()
+    for key, length in by_search.advances.items():
+        assert by_newton.advances[key] == pytest.approx(length, abs=0.05 + contact_newton.BESIDE * arc)
+    assert sum(by_search.advances.values()) > 0.5
+    assert by_newton.pore.boundary.area == pytest.approx(by_search.pore.boundary.area, rel=1e-6)
+
+
+def test_the_search_takes_over_from_newton(plugged, monkeypatch):
+    scene, pore = plugged
+    monkeypatch.setattr(contact_newton, "MOST_ITERATIONS", 1)
+    expansion = expanded_by(scene, pore, 1.03)
+    rule = Clearance(scene.pore.width, scene.growth.minimum_film, scene.growth.minimum_contact_angle)
+    assert min(clearances(expansion.pore.boundary, rule).values()) >= -contact_lines.CLOSE
+
+
+def test_a_run_stops_within_a_step_in_contact(plugged, tmp_path):
+    """At most three systems (motion of the mesh, flow, substrates) are factorised between two
+    polls. A run that stops there goes on as if it had not."""
+    scene = plugged[0]
+    since = []
+    polls = []
+
+    def stop():
+        polls.append(len(since))
+        since.clear()
+        return signal.SIGTERM if len(polls) == stop_at else 0
+
+    stop_at = 0
+    factorised = linear.factorised
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(linear, "factorised", lambda *arguments: since.append(1) or factorised(*arguments))
+        run(scene, tmp_path / "whole", watch=Watch(stop_within=stop))
+    assert len(polls) > 50 and max(polls) <= 3
+    stop_at = len(polls) - 10
+    polls.clear()
+    with pytest.raises(Interrupted, match="interrupted by signal 15 at t = 1"):
+        run(scene, tmp_path / "stopped", watch=Watch(stop_within=stop))
+    assert resume(tmp_path / "stopped") == "completed"
+    assert files(tmp_path / "stopped") == files(tmp_path / "whole")
+
+
+def rows_at(scene, times):
+    """The rows of a scene at given times (h)."""
+    return [*simulate(load_scene(scene, [f"output.times={[f'{time!r} h' for time in times]}"]))][1:]
+
+
+@pytest.mark.parametrize("width, end, count", [
+    (25, 17.0, 6), *(pytest.param(*pore, 50, marks=pytest.mark.thorough)
+                     for pore in ((100, 45.0), (25, 18.0), (40, 24.0), (60, 32.0)))])
+def test_rows_through_contact_decide_nothing(width, end, count):
+    """A run arrives, and ends in the same state to the last bit, whichever rows are asked for."""
+    scene = load_scene("wide", ["numerics.preset=fast", f'pore.width="{width} um"', f'growth.end="{end} h"'])
+    drawn = np.random.default_rng(width).uniform(0.8 * end, end, count)
+    last, = rows_at(scene, [end])
+    *_, same = rows_at(scene, [*sorted(map(float, drawn)), end])
+    assert last.pore.contact and np.array_equal(same.pore.mesh.points, last.pore.mesh.points)
+    assert np.array_equal(same.pore.active, last.pore.active)
+
+
+def test_a_row_that_cannot_be_interpolated_is_reached_by_steps_of_its_own(plugged, monkeypatch):
+    scene = plugged[0]
+    expected = rows_at(scene, [15.3, 15.9])
+
+    def fail(*_):
+        raise GrowthError("no equilibrium")
+
+    monkeypatch.setattr(midpoint, "_interpolate", fail)
+    reached = rows_at(scene, [15.3, 15.9])
+    for one, other in zip(reached, expected):
+        assert one.pore.time == other.pore.time
+        assert one.pore.boundary.area == pytest.approx(other.pore.boundary.area, rel=2e-3)
+        assert one.solved.flow.conductivity == pytest.approx(other.solved.flow.conductivity, rel=0.02)
+
+
+def test_lines_start_from_their_speeds(plugged):
+    """A pore keeps the speeds of its lines over the last step; at these speeds they repeat their advance."""
+    pore = plugged[1]
+    assert pore.line_speeds.shape == (2, 2) and (pore.line_speeds >= 0).all() and pore.line_speeds[1].max() > 0
+    advances = contact_lines.advances_at(pore.line_speeds, 0.5)
+    assert advances[TOP, -1] == pore.line_speeds[1, 1] / 2 and advances[BOTTOM, 1] == pore.line_speeds[0, 0] / 2
+    assert contact_lines.speeds(advances, 0.5) == pytest.approx(pore.line_speeds)
+    kept = unpack_state(plugged[0], *pack_state(plugged[0], RestartState(pore, StepControl(1.0))))
+    assert np.array_equal(kept.pore.line_speeds, pore.line_speeds)
+    assert contact_lines.speeds({(BOTTOM, 1): 1.0}, 0.5) is None and contact_lines.advances_at(None, 1.0) == {}
+
+
 def test_loads_do_the_same_work_on_a_divided_mesh(division):
     """Gathered boundary loads agree in every displacement of the parent, divided loads in constant and linear ones."""
     draw = np.random.default_rng(1)
@@ -186,9 +321,17 @@ def test_contact_begins_on_both_sides_of_the_highest_point(plugged):
     assert all(line.advance == line.least == line.short > 0 for line in upper)
 
 
-@pytest.mark.parametrize("preset", ["fast", pytest.param("accurate", marks=pytest.mark.thorough)])
-def test_the_contact_surface_is_the_smallest_that_leaves_enough_fluid(preset):
+def without_newton(monkeypatch):
+    """The search with whole equilibria places all contact lines."""
+    monkeypatch.setattr(contact._Trials, "settle", lambda *_: None)
+
+
+@pytest.mark.parametrize("method, preset", [("newton", "fast"), ("search", "fast"),
+                                            pytest.param("newton", "accurate", marks=pytest.mark.thorough)])
+def test_the_contact_surface_is_the_smallest_that_leaves_enough_fluid(method, preset, monkeypatch):
     """After every step no clearance is negative, and lines that have advanced have zero clearance."""
+    if method == "search":
+        without_newton(monkeypatch)
     scene = load_scene("wide", [f"numerics.preset={preset}", 'pore.width="25 um"', 'growth.end="18.5 h"'])
     keys = scene.growth
     rule = Clearance(scene.pore.width, keys.minimum_film, keys.minimum_contact_angle)

@@ -33,7 +33,7 @@ def test_the_rates_are_those_of_the_paper(scene, acceptor, donor):
     q = np.array(law(scene).uptake(acceptor, donor))
     assert q == pytest.approx((-F1, -F2), rel=1e-13, abs=1e-300)
     assert law(scene).growth_rate(acceptor, donor) == pytest.approx(F3, rel=1e-12, abs=1e-17)
-    assert law(scene).inert_rate(acceptor) == pytest.approx(F4, rel=1e-13, abs=1e-17)
+    assert law(scene).inert_rate(acceptor, donor) == pytest.approx(F4, rel=1e-13, abs=1e-17)
     rises = np.array([extended_uptake((0.0, above[1]), scene)[0, 1], extended_uptake((above[0], 0.0), scene)[1, 1]])
     expected = q + np.minimum([acceptor, donor], 0.0) * rises
     assert extended_uptake((acceptor, donor), scene)[:, 0] == pytest.approx(expected, rel=1e-13) and rises.min() >= 0

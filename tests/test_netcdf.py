@@ -13,7 +13,7 @@ from tests.pages import run
 from tests.shell import flags, interrupt_run, refusal
 
 SETS = ['numerics.preset="fast"', 'growth.end="1 h"', 'growth.time_step="1 min"', 'output.timeseries="netcdf"']
-UNITS = {"m d-1", "mg L-1", "um2", "um", "cm", "h", "1"}
+UNITS = {"m d-1", "mg L-1", "um2", "um", "cm", "h", "MPa", "uN m-1", "nN", "1"}
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,7 @@ import pytest
 
 from repro.fem import elements
 from repro.model import flow, pore, traction
-from repro.scene import SceneError, load_scene
+from repro.scene import load_scene
 from tests.strategies import ORDERS
 
 #: An aggregate that leans downstream, beside the middle of the pore.
@@ -90,9 +90,17 @@ def test_substrates_are_conserved(body, interface, order):
         assert flux.consumed > 0 and flux.out + flux.consumed == pytest.approx(flux.supplied, rel=1e-9)
 
 
-def test_a_permeable_body_under_fluid_forces_is_refused():
-    with pytest.raises(SceneError, match='growth.fluid_forces = "included": "neglected" is needed with flow.biomass'):
-        solved("permeable", "laplacian", 2, "growth.fluid_forces=included")
+@pytest.mark.parametrize("order", (2, 3))
+def test_the_force_on_a_permeable_body_is_the_drag_in_it(order):
+    """nu / (g k) times the integral of u over the body, by another quadrature than the forces have."""
+    scene, state, solution = solved("permeable", "laplacian", order, "growth.fluid_forces=included")
+    drive, body = scene.flow, state.mesh.biomass
+    of = elements.table(order, state.mesh.geometry, 10)
+    dx = elements.weights(state.mesh.points[state.mesh.cells[body]], of)
+    drag = np.einsum("tq,qa,tai->i", dx, of.values, solution.flow.velocity[state.space.cells[body]])
+    expected = drive.kinematic_viscosity / drive.gravity / drive.permeability * drag
+    computed = traction.on_aggregate(state.space, solution.flow, drive, "laplacian").sum(axis=0)
+    assert computed == pytest.approx(expected, rel=1e-9) and expected[0] > 0
 
 
 @pytest.mark.parametrize("interface, order", [*product(INTERFACES, (2, 3))])

@@ -14,12 +14,15 @@ import matplotlib.pyplot as plt
 import pytest
 
 import paper_figures
+import repro
 from paper_figures import replication
+from repro import check
 from repro.scene import load_scene, parse_scene
 from tests.blocks import ROOT, blocks, execute, is_repro, is_target, printed_lines
 from tests.test_architecture import source_files
 from verification.claims import EXPECTED
 from verification.claims.report import counted
+from verification.evidence.cases import STAGES, cases
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 
@@ -82,7 +85,7 @@ def test_every_claim_and_erratum_is_in_the_register(record):
         assert first["reason"] or kind not in ("contradicted", "undecided", "unjudged")
         assert all(check["quantity"] in rows[claim["id"]][4] for check in first["checks"])
     for name in ("README.md", "paper_figures/replication.md", "paper_figures/register.md", "docs/scope.md",
-                 "codecheck.author.yml"):
+                 "codecheck.yml"):
         counts = re.findall(r"\b(\d+) (?:claims )?(?:are )?(reproduced|contradicted|undecided)\b", text(name))
         assert all(int(count) == len(by_kind[kind]) for count, kind in counts), name
     assert set(by_kind["contradicted"]) <= set(STATEMENT.findall(replication.NOTE.read_text(encoding="utf-8")))
@@ -91,10 +94,11 @@ def test_every_claim_and_erratum_is_in_the_register(record):
 
 
 def test_the_codecheck_lists_what_make_figures_makes():
-    content = text("codecheck.author.yml")
+    content = text("codecheck.yml")
     listed = re.findall(r"^  - file: (\S+)$", content, re.M)
-    expected = [f"paper_figures/out/{name}.pdf" for name in paper_figures.FIGURES] + ["paper_figures/out/manifest.json"]
-    assert listed == expected
+    figures = [f"paper_figures/out/{name}.pdf" for name in paper_figures.FIGURES] + ["paper_figures/out/manifest.json"]
+    assert listed[: len(figures)] == figures
+    assert all((ROOT / record).is_file() for record in listed[len(figures):]) and len(listed) > len(figures)
     title = replication.NOTE.read_text(encoding="utf-8").partition("\n")[0].removeprefix("# ")
     assert f'title: "{title}"' in content
 
@@ -125,13 +129,15 @@ BLOCKS = blocks(PAGE)
 
 
 def test_every_block_is_of_a_kind_that_is_executed():
-    """Only the README and the tutorial have blocks. The README begins with two commands, a picture and a scene."""
+    """Besides pages that the site executes, only README and tutorial have blocks. The README begins with two
+    commands, a picture and a scene."""
     assert {block.language for block in BLOCKS} <= {"", "console", "sh", "python", "toml"}
     assert all(is_repro(words) or is_target(words) for block in BLOCKS for words in block.commands)
-    pages = [page for page in (ROOT / "docs").glob("*.md") if page != TUTORIAL]
+    others = {"tutorial.md", "index.md", "figures.md"}
+    pages = [page for page in (ROOT / "docs").glob("*.md") if page.name not in others]
     assert len(pages) >= 3 and [page.name for page in pages if "```" in page.read_text(encoding="utf-8")] == []
     readme = PAGE.read_text(encoding="utf-8")
-    assert len(readme.encode()) < 12_000 and readme.index("overview.png") < readme.index("make env") < 2_500
+    assert len(readme.encode()) < 8_500 and readme.index("overview.png") < readme.index("make env") < 2_500
 
 
 def test_the_examples_of_the_readme_run(tmp_path, capsys, monkeypatch):
@@ -165,18 +171,61 @@ def test_the_examples_of_the_tutorial_run(tmp_path, capsys, monkeypatch):
             statuses.append(status)
             assert [err.strip()] == printed_lines(block) if status else printed_lines(block) == [], err
     plt.close("all")
-    assert statuses == [0, 0, 0, 0, 0, 0, 2, 0, 0, 0, 0]
+    assert statuses == [0, 0, 0, 0, 0, 0, 2, 0, 0, 0, 0, 0]
     assert load_scene("mine.toml").pore == load_scene("base").pore
     assert (tmp_path / "runs" / "narrow" / "timeseries.csv").exists()
     assert (tmp_path / "oxygen.png").stat().st_size > 1000
     assert "WARNING" not in printed[3] and "WARNING growth.end" in printed[4]
 
 
+def test_the_examples_of_the_how_to_pages_run(tmp_path, capsys, monkeypatch):
+    """With a run of base to 1 h as runs/mine. test_sweep_cluster has clusters; PyVista reads and does not draw."""
+    monkeypatch.chdir(tmp_path)
+    assert execute(["repro", "run", "base", "--out", "runs/mine", "--set", 'growth.end="1 h"'], capsys)[0] == 0
+    seen = set()
+    for page in sorted((ROOT / "docs" / "howto").glob("*.md")):
+        for block in blocks(page):
+            seen.add(block.language)
+            for words in block.commands:
+                if "--scheduler" not in words and words[0] != "dask":
+                    assert execute(words, capsys)[0] == 0, words
+            if block.language == "toml":
+                assert "spline through 5 points" in str(check(tomllib.loads(block.text)))
+            elif block.language == "python":
+                names: dict = {}
+                exec(compile(block.text.replace("mesh.plot(", "drawn = dict("), str(page), "exec"), names)
+                assert names["drawn"]["scalars"] in names["mesh"].array_names
+    assert seen == {"console", "toml", "python"}
+
+
+def test_the_reference_lists_all_public_names_and_files(fast):
+    """Those of the package, and the files of a run; a run that ends has no checkpoint of its last step."""
+    directives = re.findall(r"^\.\. auto(?:function|class|exception):: (\w+)$", text("docs/reference/api.md"), re.M)
+    assert {*directives} == {*repro.__all__, "SceneError", "OutputError", "SimulationError", "PoreEnd", "Fold"}
+    listed = set(re.findall(r"`([\w.]+)`", text("docs/reference/files.md").partition("## A sweep")[0]))
+    written = {path.name for path in fast.iterdir() if path.is_file()}
+    assert written <= listed and {"run.json", "ledger.csv", "report.html"} <= written
+
+
+def test_the_page_of_the_model_names_existing_cases_and_each_equation():
+    """Names of modules and errata are tested with those of all texts."""
+    page = text("docs/model.md")
+    named = set(re.findall(rf"`((?:{'|'.join(STAGES)})-[\w-]+)`", page))
+    assert named <= set(cases()) and len(named) > 40
+    labels = re.findall(r"\(eq-([\d-]+)\)$", page, re.M)
+    ranges = [[int(number) for number in label.split("-")] for label in labels]
+    assert {number for ends in ranges for number in range(ends[0], ends[-1] + 1)} == {*range(1, 35)}
+    assert "(35)" in page
+    relative = [name for row in re.findall(r"`repro\.model\.\w+`(?:, `\.\w+`)+", page)
+                for name in re.findall(r"`\.(\w+)`", row)]
+    assert relative and all(is_module(f"repro.model.{name}") for name in relative)
+
+
 # Texts refer to existing files, modules, statements and errata.
 FOLDERS = ("repro", "reference", "verification", "docs", "paper_figures", "tests")
-PAGES = ("README.md", "CONTRIBUTING.md", "Makefile", "codecheck.author.yml", "CITATION.cff", "MANIFEST.in")
+PAGES = ("README.md", "CONTRIBUTING.md", "Makefile", "codecheck.yml", "CITATION.cff", "MANIFEST.in")
 #: Files that commands make, and placeholders for names.
-GENERATED = {"claims.md", "codecheck.yml", "paper_figures/out/manifest.json"}
+GENERATED = {"claims.md", "paper_figures/out/manifest.json"}
 PLACEHOLDER = re.compile(r"(?<![A-Za-z])(NAME|STAGE|N|ID)(?![A-Za-z])")
 ENDINGS = r"(?:py|md|toml|json|yml|yaml|cff|lock|css|js|svg)"
 #: The path of a file in the repository, or the name of a page.

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from repro.cli import main
 from repro.scene import PRESETS, Scene, files, load_scene, load_tables, packaged_scenes, parse_scene, scene_tables
 from repro.scene.reading import SCOPE, toml
 from tests.blocks import ROOT
@@ -13,7 +14,7 @@ from tests.test_scene_text import fields
 
 LENGTH = 'a length is needed, such as "100 um" (greater than zero)'
 DEEP = ".".join("a" * 20_000)
-SCOPED = "is not modelled, see docs/scope.md"
+SCOPED = "is not modelled, see `repro docs scope`"
 DONOR = "substrates.donor.supply"
 MOLES = "; moles need a molar mass, which is not known here: give milligrams"
 
@@ -84,9 +85,9 @@ REFUSED = {
     "[growth] takes end,": ["growth.detachment=1 1/day"],
     f"; detachment {SCOPED}": ["growth.detachment=1 1/day", "detachment_rate=1 1/day"],
     f"; depth {SCOPED}": ["pore.depth=50 um"],
-    f"; inhibition {SCOPED}": ["kinetics.inhibition=5 mg/L"],
+    "did you mean substrates.donor.inhibition_constant?": ["kinetics.inhibition_constant=5 mg/L"],
     f"; temperature {SCOPED}": ["kinetics.Temperature=20"],
-    "one aggregate is modelled, see docs/scope.md: a table [": ["aggregate=[{radius=\"5 um\"}, {}]"],
+    "one aggregate is modelled, see `repro docs scope`: a table [": ["aggregate=[{radius=\"5 um\"}, {}]"],
     "; give mg/L (in water 1 ppm is about 1 mg/L, 1 ppb about 1 ug/L)": [
         "substrates.donor.supply=20 ppm", "kinetics.maximum_density=20ppb"],
     MOLES: [
@@ -168,8 +169,8 @@ def test_every_key_refuses_values_of_another_kind():
      'flow.biomass = "viscous" is needed with it'),
     ("base", ["flow.biomass=brinkman", "flow.permeability=1e-15 m^2"],
      'flow.biomass = "brinkman": numerics.elements = "quadratic" or "cubic" is needed'),
-    ("base", ["numerics.preset=fast", "flow.biomass=brinkman", "flow.permeability=1e-15 m^2",
-              "growth.fluid_forces=included"], '"neglected" is needed with flow.biomass = "brinkman"'),
+    ("base", ["growth.new_biomass=stress_free", "growth.bonding_strength=1 kPa"],
+     'growth.bonding_strength = "1 kPa": growth.new_biomass = "stressed" is needed with it'),
     ("base", ["numerics.preset=fast", "flow.biomass=brinkman", "flow.permeability=2.49e-20 m^2"],
      'flow.permeability = "2.49e-20 m^2": "2.5e-20 m^2" or more is needed in a pore 50 um wide'),
     ("base", ["kinetics.donor_oxygen_demand=0.8", "kinetics.acceptor_to_donor_ratio=1.52"],
@@ -192,15 +193,18 @@ def test_an_entry_that_conflicts_with_the_scene_is_refused(source, overrides, pa
 @pytest.mark.parametrize("text, part", [
     ('[flow]\nhead = "1e-3 cm"\nbiomass = "brinkman"\npermeability = "1e-15 m^2"\n[numerics]\npreset = "fast"\n',
      'flow.biomass = "brinkman": "viscous" is needed without'),
-    ("[substrates.acceptor]\n", "substrates.donor is missing: it is needed beside substrates.acceptor; "),
-    ("[aggregate]\n[substrates.donor]\n", "not to limit is supplied at many times its half_saturation"),
+    ('[aggregate]\n[substrates.acceptor]\n[kinetics]\nlaw = "Haldane"\n',
+     'kinetics.law = "Haldane": [substrates.donor], which inhibits, is needed'),
+    ('[aggregate]\n[substrates.donor]\ninhibition_constant = "5 mg/L"\n', 'kinetics.law = "Haldane" is needed with it'),
+    ('[aggregate]\n[substrates.donor]\nsupply = "0.5 mg/L"\n[kinetics]\nlaw = "zero order"\n',
+     'substrates.donor.supply = "0.5 mg/L": half_saturation (1 mg/L) or more is needed'),
     ('[substrates]\n[growth]\nend = "1 h"\n', ": [aggregate] and [substrates] are needed"),
     ('[aggregate]\n[substrates]\n[growth]\nend = "1 h"\nfluid_forces = "included"\n', "without [flow]"),
     ('[pore]\nwidth = "4 um"\n[aggregate]\n', 'pore.width = "4 um": more than aggregate.radius (5 um)'),
     ('[aggregate]\n[substrates]\n[growth]\nend = "1e9 h"\n',
      'growth.end = "1e9 h": at most 100000 times growth.time_step (0.2 h)'),
     ('[[aggregate]]\nradius = "5 um"\n[[aggregate]]\nradius = "6 um"\n',
-     "one aggregate is modelled, see docs/scope.md"),
+     "one aggregate is modelled, see `repro docs scope`"),
 ])
 def test_a_file_is_refused_by_its_own_key(tmp_path, text, part):
     """This includes a shown default that conflicts with a key that is set."""
@@ -304,7 +308,7 @@ def test_the_key_that_was_set_is_named(tmp_path, source, first, second, of_first
 
 
 @pytest.mark.parametrize("override, unsaid", [
-    *((override, ("mg/L", "docs/scope.md")) for override in (
+    *((override, ("mg/L", "`repro docs scope`")) for override in (
         "growth.minimum_contact_angle=3 ppm", "growth.shear_modulus=1 MPaz", "pore.depht=5 um", "numerics=[{}]",
         "pore.width=5 M/s")),
     *((override, ("did you mean",)) for override in (
@@ -315,8 +319,12 @@ def test_hints_are_given_only_if_they_help(override, unsaid):
     assert not [hint for hint in unsaid if hint in message]
 
 
-def test_the_page_on_scope_exists():
-    assert (ROOT / SCOPE).is_file()
+def test_the_page_that_refusals_cite_is_printed(capsys):
+    """The command prints the page of the repository, which the package contains."""
+    command = SCOPE.strip("`").split()
+    assert main(command[1:]) == 0
+    assert capsys.readouterr().out == (ROOT / "docs" / "scope.md").read_text(encoding="utf-8")
+    assert main(["docs"]) == 0 and "quantities" in capsys.readouterr().out
 
 
 # ---------------------------------------------------------------- files

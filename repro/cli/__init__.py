@@ -12,14 +12,14 @@ import shlex
 import sys
 from contextlib import suppress
 
-from repro.cli import check, compare, plot, run, scene, sweep
+from repro.cli import check, compare, docs, plot, run, scene, sweep
 from repro.errors import Interrupted, OutputError, Refusal, SimulationError
 from repro.runs.progress import in_json, printable, say
 from repro.scene import SceneError
 
 #: The modules of the commands. Each has ``add(commands)``, which adds its parser with
 #: ``set_defaults(call=...)``; ``call`` takes the parsed arguments and returns the exit status.
-COMMANDS = (run, scene, check, plot, compare, sweep)
+COMMANDS = (run, scene, check, plot, compare, sweep, docs)
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -29,7 +29,7 @@ STATUS = """exit status:
        last good state, and what to change
   2    wrong input, or the folder cannot be used: another run's or not a run's, not writable, disk
        full, in use
-  130  interrupted (SIGINT, Ctrl-C); 143 terminated (SIGTERM): the step in hand is finished, results
+  130  interrupted (SIGINT, Ctrl-C); 143 terminated (SIGTERM): the step in hand is given up, results
        and checkpoint are written, and --resume goes on from there; a second signal, after a second
        or more, stops at once"""
 
@@ -77,7 +77,7 @@ def call(options) -> int:
     events = progress.display_events(options.quiet, options.json)
     with interrupts.catch_signals() as stop, events as tell:
         try:
-            _run(options, scene, Watch(tell, options.checkpoint, stop))
+            _run(options, scene, Watch(tell, options.checkpoint, stop, stop))
         except MemoryError as error:  # outside the steps, whose errors say more
             raise SimulationError(f"out of memory ({error}); try a smaller "
                                   "numerics.refinement") from error

@@ -58,6 +58,17 @@ class DividedTriangle:
         start, end, opposite = self.corners
         return np.array([start, self.place, opposite]), np.array([self.place, end, opposite])
 
+    def divided_at(self, t: float) -> DividedTriangle:
+        """The triangle with its arc divided at another t."""
+        return replace(self, t=t if self.forward else 1 - t)
+
+    def nodes(self, values: np.ndarray) -> np.ndarray:
+        """(2, 6, ...) at the nodes of both parts, from values (6, ...) at the triangle's nodes."""
+        corners = np.stack(self.parts)
+        where = np.concatenate([corners, (corners + np.roll(corners, -1, axis=1)) / 2], axis=1)
+        shapes = quadratic(where.reshape(-1, 2))
+        return np.tensordot(shapes, values, 1).reshape(2, 6, *values.shape[1:])
+
 
 @dataclass(frozen=True, eq=False)
 class Division:
@@ -154,7 +165,7 @@ class Division:
             s = triangle.place
             where = np.array([s, (start + s) / 2, (s + end) / 2, (s + opposite) / 2])
             nodes = values[self.parent.cells[triangle.cell]]
-            at, near, far, inner = np.tensordot(elements.values(2, where), nodes, 1)
+            at, near, far, inner = np.tensordot(quadratic(where), nodes, 1)
             places[triangle.arc] = at
             first_halves[triangle.arc] = near if triangle.forward else far
             second_halves[triangle.arc] = far if triangle.forward else near
@@ -221,6 +232,14 @@ class Division:
             np.add.at(gathered, arc_nodes, weights.T @ loads[nodes])
         return gathered
 
+    def halves(self, arc: int) -> tuple[np.ndarray, DividedTriangle]:
+        """(2,) rows of both parts of the aggregate's triangle beside the divided arc number
+        ``arc``, and this triangle."""
+        inside = [triangle for triangle in self.triangles if self.parent.biomass[triangle.cell]]
+        number = next(k for k, triangle in enumerate(inside) if triangle.arc == arc)
+        first = np.count_nonzero(self.parent.biomass[: inside[number].cell])
+        return np.array([first, np.count_nonzero(self.parent.biomass) + number]), inside[number]
+
     def amounts(self, amounts: np.ndarray, table: Table) -> np.ndarray:
         """(r + d, q) amounts at the quadrature points of the divided aggregate.
 
@@ -241,19 +260,31 @@ class Division:
         for triangle in self.triangles:
             if self.parent.biomass[triangle.cell]:
                 row = rows[triangle.cell]
-                divided[row], second = _split(amounts[row], triangle, table)
+                divided[row], second = split(amounts[row], triangle, table)
                 second_parts.append(second)
         return np.vstack([divided, *second_parts])
 
 
-def _split(amount: np.ndarray, triangle: DividedTriangle,
-           table: Table) -> tuple[np.ndarray, np.ndarray]:
+def barycentric(where: np.ndarray) -> np.ndarray:
+    """(q, 3) linear shape functions at points (q, 2) of the unit triangle."""
+    return np.column_stack([1 - where[:, 0] - where[:, 1], where])
+
+
+def quadratic(where: np.ndarray) -> np.ndarray:
+    """(q, 6) quadratic shape functions at points (q, 2) of the unit triangle, as those of
+    :func:`elements.values`, which takes longer for a few points."""
+    linear = barycentric(where)
+    return np.hstack([linear * (2 * linear - 1), 4 * linear * linear[:, [1, 2, 0]]])
+
+
+def split(amount: np.ndarray, triangle: DividedTriangle,
+          table: Table) -> tuple[np.ndarray, np.ndarray]:
     """(q,) amounts in both parts of a triangle with amounts (q,)."""
     density = amount / table.weights
     at_corners = elements.linear_fit(table) @ density
     halves = []
     for corners, share in zip(triangle.parts, (triangle.t, 1 - triangle.t)):
-        fitted = elements.values(1, table.linear @ corners) @ at_corners
+        fitted = barycentric(table.linear @ corners) @ at_corners
         halves.append(share * table.weights * np.clip(fitted, density.min(), density.max()))
     total = halves[0].sum() + halves[1].sum()
     scale = amount.sum() / total if total > 0 else 1.0

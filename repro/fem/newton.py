@@ -12,6 +12,7 @@ from typing import Protocol, TypeVar
 import numpy as np
 
 from repro.fem.assembly import Factored
+from repro.polling import poll
 
 #: The modified method keeps a factorisation while each step reduces the defect by this factor.
 REQUIRED_REDUCTION = 0.01
@@ -62,6 +63,7 @@ class Newton:
         factors: Factored | None = None
         last = np.inf
         for count in range(self.most):
+            poll()
             defect = iterate.defect
             stalled = STALLED * last < defect <= self.round_off
             if iterate.complete and (defect <= self.tolerance or stalled):

@@ -88,6 +88,12 @@ class Outline:
             return self.wall[1::2]
         return np.where(self.wall == np.roll(self.wall, -1), self.wall, FREE)
 
+    @property
+    def contact_ends(self) -> np.ndarray:
+        """(M,) True at the ends of the contact surfaces."""
+        on = self.wall != FREE
+        return on & ~(np.roll(on, 1) & np.roll(on, -1))
+
     def edge_lengths(self) -> np.ndarray:
         """Length (um) of the straight line from each node to the next."""
         return np.linalg.norm(np.roll(self.points, -1, axis=0) - self.points, axis=1)

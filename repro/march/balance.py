@@ -16,7 +16,7 @@ from repro.errors import BalanceError
 from repro.model.pore import Pore
 from repro.model.transport import Problem
 from repro.model.uptake_law import uptake_law
-from repro.scene import Kinetics, Numerics, Scene, Substrates, at_largest
+from repro.scene import Kinetics, Numerics, Scene, Substrate, Substrates, at_largest
 
 #: Largest accepted defect.
 LARGEST = 1e-6
@@ -31,7 +31,8 @@ ROUND_OFF = 1e-13
 
 @dataclass(frozen=True)
 class Ledger:
-    """Mass balance of one step per unit depth (um2 mg/L = 1e-12 g/m): substrates, then biomass."""
+    """Mass balance of one step per unit depth (um2 mg/L = 1e-12 g/m): substrates, then biomass,
+    then the unmet demand of both substrates (:mod:`repro.model.kinetics`)."""
 
     start: float
     end: float
@@ -42,6 +43,7 @@ class Ledger:
     biomass_before: float
     biomass_made: float
     biomass_after: float
+    unmet: tuple[float, float] = (0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +79,7 @@ def floor(problem: Problem, k: int, supply: float) -> float:
     (mg/L).
     """
     n = problem.space.count
+    k -= problem.substrates.places.start
     terms = problem.magnitude.data[slice(*problem.magnitude.indptr[[k * n, k * n + n]])]
     return float(np.finfo(float).eps / LARGEST * supply * terms.sum())
 
@@ -93,9 +96,9 @@ def biomass(ledger: Ledger) -> float:
 
 
 def demand_terms(kinetics: Kinetics, ledger: Ledger) -> tuple[float, float]:
-    """Biomass grown and decayed, um2 mg/L, from the consumed substrates (7)-(10): Y donor, and
-    (acceptor - F donor) / d_c."""
-    acceptor, donor = ledger.consumed
+    """Biomass grown and decayed, um2 mg/L, from the consumed substrates and the unmet demand
+    (7)-(10): Y donor, and (acceptor - F donor) / d_c."""
+    acceptor, donor = (used + unmet for used, unmet in zip(ledger.consumed, ledger.unmet))
     return (kinetics.yield_coefficient * donor,
             (acceptor - kinetics.acceptor_to_donor_ratio * donor) / kinetics.decay_oxygen_demand)
 
@@ -122,8 +125,9 @@ def refuse(limits: Limits, after: Pore, ledger: Ledger) -> None:
     numerics = limits.numerics
     defects = {}
     if numerics.inlet != "mean":
-        for k, name in enumerate(("acceptor", "donor")):
-            defects[name] = substrate(ledger, k, _exchanged(limits, after, ledger, k))
+        for name, kind in limits.substrates.modelled.items():
+            exchanged = _exchanged(limits, after, ledger, kind)
+            defects[name] = substrate(ledger, ("acceptor", "donor").index(name), exchanged)
     if numerics.transfer != "linear":
         defects["biomass"] = biomass(ledger)
     wrong = {name: part for name, part in defects.items() if not abs(part) <= LARGEST}
@@ -153,7 +157,7 @@ def accepted_demand(limits: Limits, ledger: Ledger) -> float:
     kinetics = limits.kinetics
     scale = demand_scale(kinetics, ledger)
     fastest = (kinetics.maximum_utilization_rate * kinetics.yield_coefficient
-               + kinetics.decay_coefficient)
+               + kinetics.decay_coefficient) * _largest_fraction(limits.substrates, kinetics)
     part = fastest * (ledger.end - ledger.start)
     if limits.numerics.transport == "gear":
         steepness = _steepness(limits.substrates, kinetics)
@@ -163,26 +167,31 @@ def accepted_demand(limits: Limits, ledger: Ledger) -> float:
 
 def _steepness(both: Substrates, kinetics: Kinetics) -> float:
     """Change of m_A + m_D for a change of both concentrations by their supplies; at least one."""
+    kinds = both.modelled.values()
     laws = uptake_law(both, kinetics)
-    supplies = both.acceptor.supply, both.donor.supply
-    return max(1.0, sum(law.proportional(supply) for law, supply in zip(laws, supplies)))
+    return max(1.0, sum(law.proportional(kind.supply) for law, kind in zip(laws, kinds)))
+
+
+def _largest_fraction(both: Substrates, kinetics: Kinetics) -> float:
+    """Bound of m_A m_D; at least one."""
+    kinds = both.modelled.values()
+    laws = uptake_law(both, kinetics)
+    return float(np.prod([max(1.0, law.largest(kind.supply)) for law, kind in zip(laws, kinds)]))
 
 
 def _turned_over(kinetics: Kinetics, ledger: Ledger) -> float:
     """Turnover in a step, as biomass, um2 mg/L: the sum of all terms of its oxygen demand."""
-    acceptor, donor = ledger.consumed
+    acceptor, donor = (used + unmet for used, unmet in zip(ledger.consumed, ledger.unmet))
     demand = kinetics.decay_oxygen_demand
     of_donor = kinetics.acceptor_to_donor_ratio / demand + kinetics.yield_coefficient
     return acceptor / demand + abs(ledger.biomass_made) + of_donor * donor
 
 
-def _exchanged(limits: Limits, after: Pore, ledger: Ledger, k: int) -> float:
+def _exchanged(limits: Limits, after: Pore, ledger: Ledger, kind: Substrate) -> float:
     """Amount exchanged other than by flow, um2 mg/L, to which the defect is compared.
 
     It is the diffusion in a step, and with Gear's method at least the content of the mesh.
     """
-    both = limits.substrates
-    kind = (both.acceptor, both.donor)[k]
     fastest = max(kind.diffusivity, kind.diffusivity_in_aggregate)
     exchanged = (ledger.end - ledger.start) * fastest * kind.supply
     if limits.numerics.transport != "gear":

@@ -22,6 +22,7 @@ from repro.fem.brief import brief
 from repro.fem.sizing import ACROSS_PORE
 from repro.march import balance
 from repro.march.balance import Ledger, Limits
+from repro.march.detachment import detachment
 from repro.march.folding import folding, refuse_density
 from repro.march.step_control import StepControl
 from repro.model.advice import with_advice
@@ -163,7 +164,8 @@ def steps(scene: Scene, scheme: Scheme,
     """Yield the state after every step from t = 0 or ``state`` on, with a Report if one is due.
 
     Raises SimulationError if a stage fails. After the last Report, raises PoreEnd if the aggregate
-    reaches an end of the pore, and Fold if its surface folds.
+    reaches an end of the pore, Fold if its surface folds, and Detachment if it leaves a wall or
+    tears.
     """
     first = state is None
     with stopping(state.pore.time if state else 0.0):
@@ -186,9 +188,10 @@ def _grow(stages: Stages, scheme: Scheme, state: RestartState,
     density = stages.remeshing.maximum_density
     pore = replace(state.pore, concentrations=solved.concentrations)
     refuse_end(scene.pore, pore, 1.0 if pore.time > 0 else 0.1)
+    failure = detachment(scene, pore, solved)
     rows = row_times(scheme, stages.growth, scene.output)
     limits = Limits.of(scene)
-    while stages.growth.end - pore.time > SAME_TIME:
+    while failure is None and stages.growth.end - pore.time > SAME_TIME:
         try:
             with stopping(pore.time), folding(pore, state.time):
                 step, after, control = scheme.advance(stages, pore, solved, state.step_control)
@@ -210,13 +213,17 @@ def _grow(stages: Stages, scheme: Scheme, state: RestartState,
         state = _after_step(state, step, solved, control)
         pore = replace(state.pore, concentrations=solved.concentrations)
         row = _row_time_at(rows, pore.time)
-        if scene.output.times is None or row is not None or pore_end(scene.pore, pore, 1.0):
+        failure = detachment(scene, pore, solved)
+        ends = failure or pore_end(scene.pore, pore, 1.0)
+        if scene.output.times is None or row is not None or ends:
             reported = pore if row is None else replace(pore, time=row)
             yield mark_reported(state, pore.time), make_report(state, reported, solved, step.before)
             state = mark_reported(state, pore.time)
         else:
             yield state, None
         refuse_end(scene.pore, pore, 1.0)
+    if failure:
+        raise failure
 
 
 def row_times(scheme: Scheme, growth: Growth | None, output: Output) -> tuple[float, ...]:

@@ -19,12 +19,13 @@ from functools import partial
 
 import numpy as np
 
+from repro.errors import RunEnd, StageError
 from repro.fem import transfer
 from repro.fem.space import Space
 from repro.march.balance import Ledger
 from repro.march.folding import refuse_density, refuse_fold
 from repro.march.loop import InterpolatedState, PoreEnd, StepResult, pore_end, time_before_end
-from repro.model import biomass, contact, pore, remeshing
+from repro.model import biomass, contact, contact_lines, pore, remeshing
 from repro.model.biomass import Rates
 from repro.model.contact import Expansion
 from repro.model.contact_lines import FirstContact, SearchOptions
@@ -32,7 +33,11 @@ from repro.model.growing import grow
 from repro.model.pore import Pore, Solved
 from repro.model.remeshing import GeneratedMesh
 from repro.model.stages import Stages
-from repro.model.transport import Concentrations, Flows, Fluxes
+from repro.model.transport import Concentrations, Flows, Fluxes, integrated
+from repro.scene import needed
+
+#: Numbers of steps to a row that cannot be interpolated.
+OWN_STEPS = (1, 2, 4)
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,13 +105,15 @@ def attempt(stages: Stages, previous: Pore, solved: Solved, duration: float,
     new, remeshed = stages.new_mesh(previous, expanded, solved)
     generated = (GeneratedMesh(expanded, new),) if remeshed else ()
     refuse_density(new, stages.remeshing.maximum_density)
+    makes_contact = expanded.contact and not previous.contact
+    speeds = None if makes_contact else contact_lines.speeds(expansion.advances, duration)
+    new = replace(new, line_speeds=speeds)
     flows = _flows(half.solved.substrates.fluxes, duration)
-    ledger = Ledger(previous.time, previous.time + duration, *flows, previous.mass,
-                    after.mass - previous.mass, new.mass)
+    ledger = Ledger(previous.time, previous.time + duration, *flows[:4], previous.mass,
+                    after.mass - previous.mass, new.mass, flows.unmet)
     known = replace(half, generated=half.generated + generated, end=expansion)
     inner = partial(interpolate, stages, previous, solved, known)
     step = StepResult(new, None, ledger, remeshed, expansion.iterations, inner)
-    makes_contact = expanded.contact and not previous.contact
     return Attempt(step, change, (gap, expansion.gap) if makes_contact else None)
 
 
@@ -123,10 +130,9 @@ def _expand(stages: Stages, previous: Pore, after: Pore, half: Halfway, part: fl
 
 def _flows(fluxes: tuple[Fluxes, Fluxes], duration: float) -> Flows:
     """Integrate the fluxes of acceptor and donor over a step (h)."""
-    acceptor, donor = ((duration * flux.supplied, duration * flux.out, duration * flux.consumed)
-                       for flux in fluxes)
-    supplied, out, consumed = zip(acceptor, donor)
-    return Flows(supplied, out, consumed, stored=(0.0, 0.0))
+    acceptor, donor = ((duration * flux.supplied, duration * flux.out, duration * flux.consumed,
+                        duration * flux.unmet) for flux in fluxes)
+    return integrated(acceptor, donor)
 
 
 def solve_halfway(stages: Stages, previous: Pore, solved: Solved, first: Rates, duration: float,
@@ -137,6 +143,7 @@ def solve_halfway(stages: Stages, previous: Pore, solved: Solved, first: Rates, 
     and rates back to the points of the material.
     """
     ahead = replace(grow(previous, first, duration / 2), time=previous.time + duration / 2)
+    search = replace(search, advances=contact_lines.advances_at(previous.line_speeds, duration / 2))
     expansion = stages.expand(previous, ahead, _scale_shape(previous, ahead), search)
     shape = expansion.pore
     mesh = remeshing.moved_mesh(stages.remeshing.meshing, previous, shape)
@@ -164,10 +171,39 @@ def interpolate(stages: Stages, previous: Pore, solved: Solved, half: Halfway,
                 time: float) -> InterpolatedState:
     """Interpolate the pore to a time (h) within a step, and solve there.
 
+    If that fails, steps of their own lead from the start of the step to the time: the step may have
+    passed a state in which its extrapolation does not help. Raises StageError if they fail too.
+    """
+    try:
+        return _interpolate(stages, previous, solved, half, time)
+    except (StageError, FloatingPointError) as error:
+        failure: Exception = error
+    for count in OWN_STEPS:
+        try:
+            return _approach(stages, previous, solved, time, count)
+        except (RunEnd, StageError, FloatingPointError) as error:
+            failure = error
+    raise failure
+
+
+def _approach(stages: Stages, previous: Pore, solved: Solved, time: float,
+              count: int) -> InterpolatedState:
+    """Make a number of equal steps to a time (h)."""
+    duration = (time - previous.time) / count
+    start = previous
+    for _ in range(count):
+        step = needed(attempt(stages, start, solved, duration).step, "a step to the row")
+        start, solved = remeshing.solve_graded(stages.scene, step.pore)
+        start = replace(start, concentrations=solved.concentrations)
+    return InterpolatedState(replace(start, time=time), solved)
+
+
+def _interpolate(stages: Stages, previous: Pore, solved: Solved, half: Halfway,
+                 time: float) -> InterpolatedState:
+    """Interpolate in the way of the step.
+
     If the moved mesh is not acceptable, the nearest of the meshes that the step has generated
     replaces it.
-
-    Raises StageError if a stage fails.
     """
     part = (time - previous.time) / half.duration
     mean = Rates((1 - part) * half.first.growth + part * half.rates.growth,
@@ -219,13 +255,12 @@ def _extrapolate_substrates(first: Concentrations, second: Concentrations,
     If the extrapolation is negative anywhere, the guess is the solution half way. If the mesh has
     changed half way, the guess is the solution at the start.
     """
-    if len(second.acceptor) != len(first.acceptor):
+    if second.fields.shape != first.fields.shape:
         return first
-    acceptor = first.acceptor + 2 * part * (second.acceptor - first.acceptor)
-    donor = first.donor + 2 * part * (second.donor - first.donor)
-    if min(acceptor.min(), donor.min()) < 0:
+    fields = first.fields + 2 * part * (second.fields - first.fields)
+    if fields.min() < 0:
         return second
-    return replace(first, acceptor=acceptor, donor=donor)
+    return first.with_fields(fields)
 
 
 def _scale_shape(previous: Pore, after: Pore) -> Pore:

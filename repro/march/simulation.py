@@ -59,6 +59,9 @@ def simulate(scene: Source, overrides: Sequence[str] = (), *, unset: Sequence[st
         After the last Report, if the aggregate reaches an end of the pore.
     Fold
         After the last Report, if the surface of the aggregate folds.
+    Detachment
+        After the last Report, if a wall must bear more than ``growth.bonding_strength``, or the
+        aggregate more than ``growth.tensile_strength``.
 
     Examples
     --------

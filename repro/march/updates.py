@@ -32,7 +32,7 @@ from repro.model.growing import grow
 from repro.model.kinetics import Sink
 from repro.model.pore import Pore, Solved
 from repro.model.stages import Stages
-from repro.model.transport import Concentrations, Flows, Fluxes
+from repro.model.transport import Concentrations, Flows, Fluxes, integrated
 from repro.scene import Growth, Scene
 
 #: A time this close to a multiple of growth.time_step, relative to it, is that multiple.
@@ -109,8 +109,8 @@ def step(stages: Stages, previous: Pore, solved: Solved, duration: float) -> Ste
     refuse_fold(previous, expanded)
     expanded = replace(expanded, concentrations=end)
     after, remeshed = stages.new_mesh(previous, expanded, solved)
-    ledger = Ledger(previous.time, previous.time + duration, *flows, previous.mass,
-                    grown.mass - previous.mass, after.mass)
+    ledger = Ledger(previous.time, previous.time + duration, *flows[:4], previous.mass,
+                    grown.mass - previous.mass, after.mass, flows.unmet)
     last = replace(grown, time=previous.time + duration), replace(solved, concentrations=end)
     return StepResult(after, last, ledger, remeshed, expansion.iterations, within)
 
@@ -146,7 +146,7 @@ def make_biomass(stages: Stages, previous: Pore, solved: Solved,
     first = biomass.rates(previous.space, start, stages.law)
     guess = grow(previous, first, duration)
     try:
-        end = transport.steady(problem, Sink(guess.active), start)
+        end = gear.steady(problem, Sink(guess.active), start)
     except Unresolved as error:
         ahead = replace(guess, time=time_before_end(previous, duration))
         raise remeshing.advise(stages.scene, ahead, error) from None
@@ -161,9 +161,9 @@ def _mean_flows(before: Sequence[Fluxes], after: Sequence[Fluxes], duration: flo
     """Integrate the fluxes of acceptor and donor over a step (h) by the trapezoidal rule."""
     acceptor, donor = (
         (duration * (a.supplied + b.supplied) / 2, duration * (a.out + b.out) / 2,
-         duration * (a.consumed + b.consumed) / 2) for a, b in zip(before, after))
-    supplied, out, consumed = zip(acceptor, donor)
-    return Flows(supplied, out, consumed, stored=(0.0, 0.0))
+         duration * (a.consumed + b.consumed) / 2, duration * (a.unmet + b.unmet) / 2)
+        for a, b in zip(before, after))
+    return integrated(acceptor, donor)
 
 
 #: The paper's scheme.

@@ -47,9 +47,8 @@ class Rates:
 def rates(space: Space, state: Concentrations, law: RateLaw) -> Rates:
     """The rates (9)-(10) at the points of the reaction."""
     pieces = space.reaction
-    both = np.stack([state.acceptor, state.donor])
-    acceptor, donor = both[:, pieces.cells] @ pieces.values.T
-    return Rates(law.growth_rate(acceptor, donor), law.inert_rate(acceptor))
+    concentrations = state.fields[:, pieces.cells] @ pieces.values.T
+    return Rates(law.growth_rate(*concentrations), law.inert_rate(*concentrations))
 
 
 def change(first: Rates, second: Rates, weight: np.ndarray) -> float:

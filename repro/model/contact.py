@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
@@ -28,6 +29,7 @@ from repro.model.contact_lines import (
     SearchOptions,
     contact_with,
 )
+from repro.model.contact_newton import BESIDE, Coupled, Placed
 from repro.model.pore import Pore, material
 from repro.model.traction import Fluid
 from repro.scene import Growth, Numerics, Scene
@@ -38,9 +40,16 @@ CONTACT_ROUNDS = 60
 RETREATS = 6
 #: Rounds of shape and fluid forces.
 FORCE_ROUNDS = 12
+#: Rounds after which contact lines keep their places: a search may end at another place within its
+#: tolerance.
+SETTLING_ROUNDS = 4
 #: Largest move of a node in the last round, over the aggregate's thickness.
 FORCE_REST = 1e-8
 PATIENT = SearchOptions()
+#: Defect at which a part of theta but the last counts as reached.
+PARTLY = 1e-3
+#: Clearances of the first contact at which Newton's method takes over from the search.
+CLOSE_ENOUGH = 0.2
 #: Lengths of the first contact to both sides of the highest place, over the least film.
 FIRST_LENGTHS = np.array([1.0, 0.5, 0.25])
 
@@ -133,12 +142,14 @@ def expand(mechanics: Mechanics, grown: Pore, theta: np.ndarray, guess: Pore | N
     around = traction.surroundings(fluid.meshing, grown, grown)
     last = Expansion(grown, 0, 0.0)
     iterations = 0
-    for _ in range(FORCE_ROUNDS):
+    for number in range(FORCE_ROUNDS):
+        around = traction.follow(fluid.meshing, around, last.pore)
         forces = traction.forces(fluid, around, last.pore)
         if last.division is not None:
             forces = _gathered(last.division, forces)
         shape = _at_rest(mechanics, grown, theta, start, forces, search)
-        search = replace(search, advances=shape.advances)
+        stationary = number + 1 >= SETTLING_ROUNDS
+        search = replace(search, advances=shape.advances, stationary=stationary)
         iterations += shape.iterations
         moved = np.abs(shape.position - last.position).max()
         if moved <= FORCE_REST * shape.pore.boundary.thickness:
@@ -198,7 +209,7 @@ def _equilibrium(mechanics: Mechanics, grown: Pore, start: Pore, forces: np.ndar
     body, target_J = _strained_from(mechanics.keys, grown, grown.theta)
     nodes = grown.mesh.body
     inside = grown.mesh.topology.body_corners
-    locked, target = _constraints(start, mechanics.width)
+    locked, target = _constraints(mechanics, grown, start)
     rest = growth.equilibrium(body, target_J, start.mesh.points[nodes], start.pressure[inside],
                               locked, target, forces=forces, last=last, patient=patient,
                               modified_newton=mechanics.numerics.jacobian == "reused")
@@ -213,18 +224,29 @@ def _close_by_lines(mechanics: Mechanics, grown: Pore, start: Pore, forces: np.n
     trials = _Trials(mechanics, grown, start, forces, search.patient)
     lines = contact_lines.lines_of(grown.boundary)
     _place_lines(grown.boundary, lines, search)
+    if grown.contact:
+        expansion = trials.settle(grown.wall, lines, rule)
+        if expansion is not None:
+            return expansion
     shape = trials.solve(grown.wall, lines)
     gap = rule.width - shape.pore.boundary.thickness
     wall = grown.wall
     if not grown.contact and gap < rule.film:
         _refuse_late(gap, rule.film, search)
         wall, lines, shape = _touch(grown, shape, rule, trials, search)
+    tried = grown.contact
     for _ in range(CONTACT_ROUNDS):
         for line in lines:
             line.record(*_clearance(rule, shape.pore.boundary, line))
-        if all(line.accepted for line in lines):
+        if search.stationary or all(line.accepted for line in lines):
             rest = replace(shape.pore, fixed=_with_new_surface(shape.pore.boundary))
             return replace(shape, pore=rest, iterations=trials.iterations, gap=gap)
+        if not tried and all(abs(line.trials[-1][1]) < CLOSE_ENOUGH or line.accepted
+                             for line in lines):
+            tried = True
+            expansion = trials.settle(wall, lines, rule)
+            if expansion is not None:
+                return replace(expansion, gap=gap)
         for line in lines:
             if not line.accepted:
                 line.step()
@@ -272,6 +294,9 @@ def _place_lines(outline: Outline, lines: Sequence[Line], search: SearchOptions)
     for line in lines:
         length = search.advances.get(line.key, 0.0)
         line.advance = max(line.least, contact_lines.to_arcs(outline, line, length))
+        if 0 < line.advance < contact_lines.LEAST_PART:
+            line.advance = BESIDE
+            line.at_corner = True
 
 
 def _tip_width(outline: Outline, depth: float) -> float:
@@ -341,15 +366,70 @@ class _Trials:
             try:
                 shape = self._solve(contact_with(wall, lines),
                                     np.array([line.advance for line in lines]))
-                outline = replace(self._grown.boundary, wall=wall)
-                advances = {line.key: contact_lines.to_length(outline, line) for line in lines}
-                return replace(shape, advances=advances)
+                return replace(shape, advances=self._lengths(wall, lines))
             except (GrowthError, LinearError) as error:
                 failure = error
                 moving = [line for line in lines if line.retreat()]
                 if not moving:
                     break
         raise failure
+
+    def settle(self, wall: np.ndarray, lines: Sequence[Line], rule: Clearance) -> Expansion | None:
+        """The equilibrium with walls (M,) of the grown pore's outline and with lines at the roots
+        of their clearances; None, and the lines where they were, if Newton's method for both fails.
+
+        Theta goes to its target in parts, as in :func:`growth.equilibrium`.
+        """
+        start = [line.advance for line in lines]
+        grown = self._grown
+        body, target_J = _strained_from(self._mechanics.keys, grown, grown.theta)
+        points, pressures = self._shapes[-1][1:]
+        J = body.strained(points[grown.mesh.body]).J
+        try:
+            for part in _parts(target_J / J):
+                theta = grown.theta * (J / target_J) ** (1 - part)
+                partly = replace(grown, theta=theta)
+                coupled = Coupled(partial(self._place, partly, wall, lines, rule), lines, points,
+                                  pressures)
+                coupled.solve(growth.NEWTON if part == 1 else PARTLY)
+                self.iterations += coupled.iterations
+                points, pressures = coupled.placed.on_parent(coupled.position, coupled.pressure)
+        except (GrowthError, LinearError, np.linalg.LinAlgError):
+            for line, advance in zip(lines, start):
+                line.advance = advance
+            return None
+        placed = coupled.placed
+        points, pressures = placed.on_mesh(coupled.position, coupled.pressure)
+        shape = replace(placed.pore.moved(points), pressure=pressures)
+        rest = replace(shape, fixed=_with_new_surface(shape.boundary))
+        return Expansion(rest, self.iterations, 0.0, placed.division, self._lengths(wall, lines))
+
+    def _lengths(self, wall: np.ndarray, lines: Sequence[Line]) -> dict[tuple[int, int], float]:
+        """{(wall, direction): um} by which lines have advanced."""
+        outline = replace(self._grown.boundary, wall=wall)
+        return {line.key: contact_lines.to_length(outline, line) for line in lines}
+
+    def _place(self, grown: Pore, wall: np.ndarray, lines: Sequence[Line],
+               rule: Clearance) -> Placed:
+        """A grown pore with lines at their advances."""
+        locked, division, forces = self._locked(grown, contact_with(wall, lines))
+        keys = self._mechanics.keys
+        body, theta = _strained_from(keys, locked, locked.theta)
+        reference = grown.origin if keys.new_biomass == "stressed" else grown.mesh.points
+        prescribed, target = _constraints(self._mechanics, locked, locked)
+        system = growth.System(body, prescribed, forces=forces)
+        return Placed(grown, locked, division, reference, system, theta, target, rule)
+
+    def _locked(self, grown: Pore, contact: Contact) -> tuple[Pore, Division | None,
+                                                              np.ndarray | None]:
+        """A grown pore with a contact, its division, and the forces on its nodes."""
+        if not len(contact.arcs):
+            return replace(grown, wall=contact.wall), None, self._forces
+        division = self._division(contact)
+        locked = divided(grown, division, contact, self._shape)
+        self._shape = locked.body.shape
+        forces = self._forces
+        return locked, division, None if forces is None else _divided_loads(division, forces)
 
     def _division(self, contact: Contact) -> Division:
         """The division of the contact's arcs; it keeps the connections of the last one if the arcs
@@ -385,14 +465,7 @@ class _Trials:
 
     def _solve(self, contact: Contact, advances: np.ndarray) -> Expansion:
         grown = self._grown
-        forces = self._forces
-        division = None
-        locked = replace(grown, wall=contact.wall)
-        if len(contact.arcs):
-            division = self._division(contact)
-            locked = divided(grown, division, contact, self._shape)
-            self._shape = locked.body.shape
-            forces = None if forces is None else _divided_loads(division, forces)
+        locked, division, forces = self._locked(grown, contact)
         first = self._first(locked, advances)
         shape, iterations = _equilibrium(self._mechanics, locked, first, forces,
                                          patient=self._patient)
@@ -416,6 +489,12 @@ class _Trials:
             if locked.body.strained(points[locked.mesh.body]).J.min() > 0:
                 break
         return replace(locked.moved(points), pressure=pressure)
+
+
+def _parts(growing: np.ndarray) -> np.ndarray:
+    """The parts of a growth theta / J (t, q), up to 1."""
+    count = growth.GradDiv.parts(growing)
+    return np.arange(1, count + 1) / count
 
 
 def divided(grown: Pore, division: Division, contact: Contact,
@@ -474,15 +553,21 @@ def _placed(grown: Pore, start: Pore, rest: growth.Equilibrium) -> Pore:
     return replace(start.moved(points), pressure=pressure)
 
 
-def _constraints(shape: Pore, width: float) -> tuple[np.ndarray, np.ndarray]:
+def _constraints(mechanics: Mechanics, grown: Pore,
+                 shape: Pore) -> tuple[np.ndarray, np.ndarray]:
     """(n, 2) True where a coordinate is prescribed: x at fixed points, y on the walls (2.3.3); and
-    (n, 2) um, its prescribed value."""
+    (n, 2) um, its prescribed value. On a bonded wall all points are fixed that lay on the lower
+    wall before the step, where they lay."""
     rim = shape.mesh.topology.body_loop
-    position = shape.mesh.points[shape.mesh.body]
-    target = position.copy()
+    before = grown.mesh.points[grown.mesh.body]
+    fixed = shape.fixed
+    if mechanics.keys.wall == "bonded":
+        fixed = fixed | (before[rim, 1] == 0.0)
+    target = shape.mesh.points[shape.mesh.body].copy()
+    target[rim[fixed], 0] = before[rim[fixed], 0]
     target[rim[shape.wall == BOTTOM], 1] = 0.0
-    target[rim[shape.wall == TOP], 1] = width
-    return constrained(len(position), rim, shape.wall, shape.fixed), target
+    target[rim[shape.wall == TOP], 1] = mechanics.width
+    return constrained(len(target), rim, shape.wall, fixed), target
 
 
 def constrained(count: int, rim: np.ndarray, wall: np.ndarray, fixed: np.ndarray) -> np.ndarray:
@@ -558,6 +643,6 @@ def _closing_run(outline: Outline, gap: np.ndarray, line: int, step: int, film: 
     nearer = np.abs(apart) <= np.abs(x[walk] - x[other])
     if outline.wall[other] != outline.wall[line]:
         nearer = np.ones(len(walk), bool)
-    along = np.sign(x[line] - x[line - step]) * apart
+    along = np.sign(x[line] - x[(line - step) % count]) * apart
     thin = (nearer & (gaps < 0)) | (gaps < np.minimum(film, slope * along))
     return walk[: np.flatnonzero(thin)[-1] + 1] if thin.any() else walk[:0]

@@ -44,6 +44,7 @@ MEET = ("two contact lines meet, with fluid between them that has no way out; "
         "try a shorter growth.time_step")
 #: Parameters of an arc at which the clearance is computed: the second shows the angle at the line.
 PLACES = np.append([0.0, 1e-3], np.linspace(0.0, 1.0, 9)[1:])
+AT_PLACES = parabola(PLACES)
 
 
 @dataclass(frozen=True)
@@ -51,11 +52,13 @@ class SearchOptions:
     """How contact lines are searched for.
 
     landing: the search ends if the film at the first contact is thinner than this fraction of the
-    least film; patient: is a failed equilibrium tried again in smaller parts; advances: {(wall,
-    direction): um} of the first trial, along the outline.
+    least film; stationary: do lines stay at their first trial; patient: is a failed equilibrium
+    tried again in smaller parts; advances: {(wall, direction): um} of the first trial, along the
+    outline.
     """
 
     landing: float = 0.0
+    stationary: bool = False
     patient: bool = True
     advances: Mapping[tuple[int, int], float] = field(default_factory=dict)
 
@@ -118,7 +121,7 @@ class Clearance:
     def _places(self, arcs: np.ndarray, outwards: float) -> tuple[np.ndarray, np.ndarray]:
         """(K,) arcs from the line, and (K, 2) um the points there: PLACES of each arc, and the
         points where the rule changes from the angle to the film."""
-        points = np.einsum("sa,kai->ksi", parabola(PLACES), arcs)
+        points = AT_PLACES @ arcs
         place = np.arange(len(arcs))[:, None] + PLACES
         beyond = outwards * (points[..., 0] - arcs[0, 0, 0]) - self.film / np.tan(self.angle)
         arc, k = np.nonzero(beyond[:, :-1] * beyond[:, 1:] < 0)
@@ -160,7 +163,8 @@ class Line:
     present trial accurate enough; reach: arcs beyond it where the surface is too near; least: the
     smallest advance; short, far: largest advance that is too short and smallest one that is far
     enough; stalls: has the last trial halved neither the interval between these nor the clearance;
-    trials: the last two, as (advance, clearance).
+    trials: the last two, as (advance, clearance); at_corner: is the line just beyond a corner of
+    the outline, because its place is closer to the corner than LEAST_PART?
     """
 
     wall: int
@@ -174,6 +178,8 @@ class Line:
     far: float = np.inf
     stalls: bool = False
     trials: list[tuple[float, float]] = field(default_factory=list)
+    at_corner: bool = False
+    floor: float = 0.0
 
     @property
     def key(self) -> tuple[int, int]:
@@ -260,6 +266,25 @@ def to_arcs(outline: Outline, line: Line, length: float) -> float:
     return float(np.interp(length, ends, np.arange(len(ends))))
 
 
+def speeds(advances: Mapping[tuple[int, int], float], duration: float) -> np.ndarray | None:
+    """(2, 2) um/h, speeds of lines that have advanced (um) in a duration (h), by wall and
+    direction; None without lines of the upper wall."""
+    if not any(wall == TOP for wall, _ in advances):
+        return None
+    by_line = np.zeros((2, 2))
+    for (wall, direction), length in advances.items():
+        by_line[wall - 1, (1 - direction) // 2] = length / duration
+    return by_line
+
+
+def advances_at(by_line: np.ndarray | None, duration: float) -> dict[tuple[int, int], float]:
+    """{(wall, direction): um} by which lines advance in a duration (h) at their :func:`speeds`."""
+    if by_line is None:
+        return {}
+    return {(wall, direction): float(by_line[wall - 1, (1 - direction) // 2] * duration)
+            for wall in (BOTTOM, TOP) for direction in (1, -1)}
+
+
 def lines_of(outline: Outline) -> list[Line]:
     """All contact lines of an outline, those of the lower wall first."""
     return [Line(wall, node, direction) for wall in (BOTTOM, TOP)
@@ -281,6 +306,13 @@ class Contact:
     second: np.ndarray
 
 
+def divided_arc(outline_nodes: int, line: Line) -> int:
+    """Number of the arc of an outline with so many nodes in which a line lies."""
+    arcs = int(np.floor(line.advance))
+    along = arcs if line.direction == 1 else -arcs - 1
+    return (line.node // 2 + along) % (outline_nodes // 2)
+
+
 def contact_with(wall: np.ndarray, lines: Sequence[Line]) -> Contact:
     """The contact of walls (M,) after lines have advanced."""
     joined = wall.copy()
@@ -297,7 +329,7 @@ def contact_with(wall: np.ndarray, lines: Sequence[Line]) -> Contact:
         joined[nodes[:-1]] = line.wall
         if LEAST_PART <= t <= 1 - LEAST_PART:
             forward = line.direction == 1
-            number = (line.node // 2 + (arcs if forward else -arcs - 1)) % (count // 2)
+            number = divided_arc(count, line)
             if number in cuts:
                 raise GrowthError(MEET)
             cuts[number] = ((t, line.wall, FREE) if forward else (1 - t, FREE, line.wall))

@@ -36,13 +36,15 @@ from repro.errors import TransportError
 from repro.fem import linear
 from repro.fem.assembly import ElementSystem
 from repro.fem.space import Space
+from repro.model import transport
 from repro.model.kinetics import Sink
 from repro.model.transport import (
     UNRESOLVED,
     Concentrations,
     Flows,
     Problem,
-    both_ends,
+    concentrations,
+    coupled_system,
     supplied_everywhere,
 )
 from repro.timing import timed
@@ -79,9 +81,10 @@ Rate: TypeAlias = np.ndarray | float
 
 @dataclass(frozen=True, eq=False)
 class Level:
-    """One time level: fields (2, n) C_A, C_D (mg/L); biomass (2, r, q): rise of ln X_A since the
-    start, and X_I (um2 mg/L); flows (2, 3): each substrate supplied, out and consumed since the
-    start (um2 mg/L); the increments of all three in the last step, and its size (h)."""
+    """One time level: fields (s, n) of the modelled substrates (mg/L); biomass (2, r, q): rise
+    of ln X_A since the start, and X_I (um2 mg/L); flows (2, 4): acceptor and donor supplied,
+    out, consumed and their unmet demand since the start (um2 mg/L); the increments of all three
+    in the last step, and its size (h)."""
 
     fields: np.ndarray
     biomass: np.ndarray
@@ -138,9 +141,7 @@ class System:
     @cached_property
     def sparse(self) -> ElementSystem:
         """One substrate's unknowns: all triangles, then the pieces of biomass."""
-        constrained = bool(self.problem.system.constrained.any())
-        return self.space.mesh.topology.system(("gear", self.space.order, constrained),
-                                               lambda: _sparse(self.space, constrained))
+        return coupled_system(self.space, bool(self.problem.system.constrained.any()), 1)
 
     @cached_property
     def storage(self) -> np.ndarray:
@@ -148,10 +149,9 @@ class System:
         return self.space.integration.mass()
 
     @cached_property
-    def rows(self) -> tuple[Row, Row]:
-        """The equations of acceptor and donor."""
-        acceptor, donor = (self._row(s) for s in (0, 1))
-        return acceptor, donor
+    def rows(self) -> tuple[Row, ...]:
+        """The equations of the modelled substrates."""
+        return tuple(map(self._row, range(len(self.problem.both))))
 
     def _row(self, s: int) -> Row:
         problem = self.problem
@@ -167,13 +167,6 @@ class System:
         size = self.space.count
         rows, columns = (part.ravel() for part in linear.pairs(self.space.cells))
         return sp.csc_matrix((self.storage.ravel(), (rows, columns)), shape=(size, size))
-
-
-def _sparse(space: Space, ends_constrained: bool) -> ElementSystem:
-    constrained = np.zeros(space.count, bool)
-    constrained[both_ends(space)] = ends_constrained
-    return ElementSystem((space.cells, space.reaction.cells), space.dofs.places, constrained,
-                         space.mesh.topology.method)
 
 
 @timed("transport")
@@ -202,7 +195,8 @@ def settle(problem: Problem, sink: Sink | None, guess: Concentrations | None) ->
     Notes
     -----
     The transient does not matter (3.3.2): the steps are backward Euler's and grow to LONG as fast
-    as SETTLING permits.
+    as SETTLING permits. With a law that is not monotone it decides which state is reached: changes
+    are FASTER times smaller, and a step grows as its rate of change falls.
     """
     start = _nearer(problem, guess)
     if not (problem.inflow.any() or problem.system.constrained.any()):
@@ -211,19 +205,35 @@ def settle(problem: Problem, sink: Sink | None, guess: Concentrations | None) ->
     active = nothing if sink is None else sink.active
     system, level = _started(problem, active, nothing, start, living=False)
     system = replace(system, watched=np.ones(problem.space.count, bool))
+    monotone = problem.law is None or problem.law.both.monotone
+    most = SETTLING if monotone else SETTLING / FASTER
     step = LONG
-    last = np.inf
+    last = rate = np.inf
     for count in range(1, MOST_STEPS + 1):
-        new, change = _accepted(system, level, step, SETTLING, "while the profiles settle",
-                                1 / FASTER)
+        new, change = _accepted(system, level, step, most, "while the profiles settle", 1 / FASTER)
         if new.step >= LONG and change <= STEADY * (1 - change / last):
-            acceptor, donor = new.fields
-            return Concentrations(acceptor, donor, count)
+            return concentrations(problem.substrates, new.fields, count)
         level = _level(new.fields, level.biomass)
-        step = min(FASTER * new.step, LONG)
+        faster = FASTER
+        if not monotone and change > STEADY:
+            faster = max(1 / FASTER, min(FASTER, rate * new.step / change))
+        step = min(faster * new.step, LONG)
+        rate = change / new.step
         last = change
     raise TransportError(f"the profiles still change by {change:.2g} of the supply a step after "
                          f'{MOST_STEPS} steps; try numerics.transport = "quasi_steady"')
+
+
+def steady(problem: Problem, sink: Sink | None, guess: Concentrations | None) -> Concentrations:
+    """Solve for steady concentrations; of several ones, those that are reached from the guess.
+
+    With a law of uptake that is not monotone several states may be steady. :func:`settle` then
+    leads to one of them, with the biomass at rest, and Newton's method starts from there.
+    Parameters, result and errors are those of :func:`repro.model.transport.steady`.
+    """
+    if problem.law is not None and not problem.law.both.monotone:
+        guess = settle(problem, sink, guess)
+    return transport.steady(problem, sink, guess)
 
 
 def _nearer(problem: Problem, guess: Concentrations | None) -> Concentrations:
@@ -233,7 +243,7 @@ def _nearer(problem: Problem, guess: Concentrations | None) -> Concentrations:
     supplied = supplied_everywhere(problem)
     if guess is None:
         return supplied
-    change = np.abs(np.concatenate([guess.acceptor, guess.donor]) - problem.supply)
+    change = np.abs(guess.fields.ravel() - problem.supply)
     jumps = problem.system.constrained & (change > SETTLING * problem.supply)
     return supplied if jumps.any() else guess
 
@@ -283,17 +293,19 @@ def advance(problem: Problem, active: np.ndarray, inert: np.ndarray, start: Conc
         steps.append(float(level.step))
         left -= level.step
         step = fixed_step or level.step * min(LONGER, _factor(tolerance, size))
-    stored = (system.mass @ (level.fields - before).T).sum(axis=0)
-    flows = Flows(*((float(a), float(d)) for a, d in (*level.flows.T, stored)))
+    stored = np.zeros(2)
+    stored[problem.substrates.places] = (system.mass @ (level.fields - before).T).sum(axis=0)
+    supplied, out, consumed, unmet = level.flows.T
+    flows = Flows(*((float(a), float(d)) for a, d in (supplied, out, consumed, stored, unmet)))
     growth, remains = level.biomass
-    end = Concentrations(level.fields[0], level.fields[1], len(steps))
+    end = concentrations(problem.substrates, level.fields, len(steps))
     return Advance(active * np.exp(growth), remains, end, flows, tuple(steps))
 
 
 def _started(problem: Problem, active: np.ndarray, inert: np.ndarray, start: Concentrations,
              living: bool = True, simultaneous: bool = False) -> tuple[System, Level]:
     """The system and its first time level."""
-    fields = np.stack([start.acceptor, start.donor])
+    fields = start.fields
     largest = np.maximum([s.supply for s in problem.both], fields.max(axis=1))
     scale = np.where(largest > 0, largest, 1.0)[:, None]
     watched = np.zeros(problem.space.count, bool)
@@ -304,8 +316,8 @@ def _started(problem: Problem, active: np.ndarray, inert: np.ndarray, start: Con
 
 def _level(fields: np.ndarray, biomass: np.ndarray) -> Level:
     """The first time level, without increments."""
-    still = np.zeros_like(fields), np.zeros_like(biomass), np.zeros((2, 3))
-    return Level(fields, biomass, np.zeros((2, 3)), *still)
+    still = np.zeros_like(fields), np.zeros_like(biomass), np.zeros((2, 4))
+    return Level(fields, biomass, np.zeros((2, 4)), *still)
 
 
 def _accepted(system: System, level: Level, step: float, tolerance: float, when: str,
@@ -337,7 +349,7 @@ def _tried(system: System, level: Level, step: float,
 
 
 def _lowest(problem: Problem) -> np.ndarray:
-    """(2, 1) least accepted concentrations, mg/L."""
+    """(s, 1) least accepted concentrations, mg/L."""
     return np.array([[-BELOW_ZERO[problem.space.order] * s.supply] for s in problem.both])
 
 
@@ -353,14 +365,14 @@ def _too_short(system: System, new: Level, difference: np.ndarray, when: str) ->
     species, node = divmod(int(np.argmin(wrong)), system.space.count)
     x, y = system.space.points[node]
     why = "becomes negative" if negative else "does not follow its prediction"
-    name = ("acceptor", "donor")[species]
+    name = list(system.problem.substrates.modelled)[species]
     return TransportError(f"the {name} {why} at x = {x:.4g}, y = {y:.4g} um {when}, even in steps "
                           f"of {3600 * SHORTEST:g} s; try a larger numerics.refinement")
 
 
 def _corrected(system: System, level: Level, step: float,
                positive: bool) -> tuple[Level, np.ndarray]:
-    """One step, and |C - C*| over the scale (2, n); positive: by backward Euler with the positive
+    """One step, and |C - C*| over the scale (s, n); positive: by backward Euler with the positive
     form of the sink."""
     ratio = step / level.step
     carry, weight = (0.0, 1.0) if positive else _formula(ratio)
@@ -369,18 +381,21 @@ def _corrected(system: System, level: Level, step: float,
     predicted = fields.copy()
     field_rise = carry * level.field_rise
     biomass_rise = carry * level.biomass_rise
-    flux = np.empty((2, 3))
+    flux = np.zeros((2, 4))
+    first = system.problem.substrates.places.start
     rise = level.biomass[0] + biomass_rise[0] + interval * _rates(system, fields)[0]
     active = system.active * np.exp(rise)
-    for s in (0, 1):
+    for s in range(len(fields)):
         other_fields = predicted if system.simultaneous else fields
-        fields[s], flux[s] = _solved(system, s, interval, level.fields[s] + field_rise[s],
-                                     *_sink(system, active, other_fields, s, positive))
+        past = level.fields[s] + field_rise[s]
+        sink = _sink(system, active, other_fields, s, positive)
+        fields[s], flux[first + s, :3] = _solved(system, s, interval, past, *sink)
     field_rise = fields - level.fields
     growth, remains = _rates(system, fields)
     biomass_rise[0] += interval * growth
     rise = level.biomass[0] + biomass_rise[0]
     biomass_rise[1] += interval * system.active * np.exp(rise) * remains
+    flux[:, 3] = _unmet(system, system.active * np.exp(rise), fields)
     flow_rise = carry * level.flow_rise + interval * flux
     new = Level(fields, level.biomass + biomass_rise, level.flows + flow_rise, field_rise,
                 biomass_rise, flow_rise, step)
@@ -397,8 +412,16 @@ def _rates(system: System, fields: np.ndarray) -> tuple[Rate, Rate]:
     problem = system.problem
     if not system.living or problem.law is None:
         return 0.0, 0.0
-    acceptor, donor = system.space.reaction.evaluate(fields)
-    return problem.law.growth_rate(acceptor, donor), problem.law.inert_rate(acceptor)
+    values = system.space.reaction.evaluate(fields)
+    return problem.law.growth_rate(*values), problem.law.inert_rate(*values)
+
+
+def _unmet(system: System, active: np.ndarray, fields: np.ndarray) -> np.ndarray:
+    """(2,) um2 mg/L/h, the unmet demand of acceptor and donor."""
+    law = system.problem.law
+    if law is None:
+        return np.zeros(2)
+    return Sink(active).unmet(law.both.fraction(system.space.reaction.evaluate(fields)), law)
 
 
 def _sink(system: System, active: np.ndarray, fields: np.ndarray, s: int,
@@ -408,9 +431,9 @@ def _sink(system: System, active: np.ndarray, fields: np.ndarray, s: int,
     law = system.problem.law
     if law is None:
         return np.zeros_like(active), np.zeros_like(active)
-    concentrations = system.space.reaction.evaluate(fields)
-    substrate = concentrations[s]
-    uptake, slope = law.own_uptake(s, *concentrations)
+    values = system.space.reaction.evaluate(fields)
+    substrate = values[s]
+    uptake, slope = law.own_uptake(s, *values)
     if positive:
         tiny = np.finfo(float).tiny
         secant = np.where(substrate > tiny, uptake / np.maximum(substrate, tiny), slope)

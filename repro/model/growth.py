@@ -178,6 +178,17 @@ class Strained:
         return self.A[..., None, None] * self.F + volumetric[..., None, None] * self.H
 
 
+def internal_forces(body: Body, theta: np.ndarray, position: np.ndarray,
+                    pressure: np.ndarray) -> np.ndarray:
+    """(n, 2) um, nodal forces of the stress over mu_L under theta (t, q), at positions (n, 2) um
+    and pressures (corners,): those that hold the aggregate there."""
+    system = System(body, np.zeros(position.shape, bool))
+    if body.shape.geometry == 1:
+        system.stabilisation = PressureGradient.on(body, position)
+    forces = system.under(theta, position, position, pressure).residual
+    return forces[: position.size].reshape(2, -1).T
+
+
 def piola(F: np.ndarray, P: np.ndarray) -> np.ndarray:
     """:meth:`Strained.piola` of F (..., 2, 2)."""
     return Strained(F).piola(P)
@@ -365,6 +376,17 @@ class System:
         local = pressure[self.body.shape.triangles]
         gap -= np.einsum("tab,tb->ta", self.stabilisation.matrices, local)
         return self._summed(self._forces(at.piola(P), self.body.at.weighted), gap) - self.pull
+
+    def partial_residual(self, body: Body, theta: np.ndarray, position: np.ndarray,
+                         pressure: np.ndarray) -> np.ndarray:
+        """(2n + corners,) residual of a few curved triangles, ``body``, under theta (r, q)."""
+        at = body.strained(position)
+        P = body.pressures.evaluate(pressure)
+        P += self.stabilisation.gamma * theta ** (-5 / 3) * (at.J - theta)
+        stress = at.piola(P)
+        forces = self._forces(stress, body.at.weighted)
+        gap = body.pressures.load(body.at.dx * (at.J - theta))
+        return np.concatenate([body.at.assemble(forces), body.pressures.assemble(gap)])
 
     def _sizes(self, position: np.ndarray) -> np.ndarray:
         """Sizes of the terms of the residual."""

@@ -9,6 +9,15 @@ With the fractions m_A(C_A) and m_D(C_D) of a law of uptake (:mod:`repro.model.u
 1.5138. So, for all fractions, F3 + F4 = -Y F2 + (F1 - F F2) / d_c: donor becomes biomass, and decay
 takes up acceptor.
 
+A substrate that the scene does not model does not limit: its fraction is 1, and it has no equation.
+With kinetics.decay = "unlimited", biomass also decays where m_A is below 1, at a further rate
+
+    F3: -X_A (1 - m_A) b        F4: X_A (1 - m_A) b (1 - f_d)
+
+The demand that no modelled substrate meets is *unmet*: that of a substrate that is not modelled,
+and the d_c f_d b (1 - m_A) X_A of the further decay. The identity above holds with the unmet demand
+added to -F1 and -F2.
+
 Uptake and growth are functions of max(C, 0). Only the linearisation of the transient scheme uses
 the extension of a law below zero: the uptake of a substrate continues linearly below zero in its
 own concentration and takes the other one as zero.
@@ -17,6 +26,7 @@ own concentration and takes the other one as zero.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -33,46 +43,73 @@ class RateLaw:
     constants : Kinetics
         k, Y, b, f_d, d_c and F.
     both : UptakeLaw
-        The law of uptake of acceptor and donor at once.
+        The law of uptake of the modelled substrates at once.
+    modelled : slice
+        Their places in (acceptor, donor).
+
+    Notes
+    -----
+    Concentrations are those of the modelled substrates, in this order, arrays or numbers, mg/L.
     """
 
     constants: Kinetics
     both: UptakeLaw
+    modelled: slice
 
-    def fractions(self, acceptor: Values, donor: Values) -> tuple[Values, Values]:
-        """m_A and m_D at C_A and C_D (mg/L), arrays or numbers."""
-        of_acceptor, of_donor = self.both
-        return of_acceptor.fraction(acceptor), of_donor.fraction(donor)
+    def fractions(self, *concentrations: Values) -> tuple[Any, Any]:
+        """m_A and m_D; 1 for a substrate that is not modelled."""
+        pair: list[Any] = [np.ones_like(concentrations[0])] * 2
+        pair[self.modelled] = [law.fraction(c) for law, c in zip(self.both, concentrations)]
+        return pair[0], pair[1]
 
-    def uptake(self, acceptor: Values, donor: Values) -> tuple[Values, Values]:
-        """-F1 / X_A and -F2 / X_A at C_A and C_D (mg/L)."""
-        return self.uptake_at(*self.fractions(acceptor, donor))
+    def completed(self, fractions: np.ndarray) -> np.ndarray:
+        """(2, ...) m_A and m_D, from the fractions of the modelled substrates."""
+        if len(fractions) == 2:
+            return fractions
+        pair = np.ones((2, *fractions.shape[1:]))
+        pair[self.modelled] = fractions
+        return pair
 
-    def growth_rate(self, acceptor: Values, donor: Values) -> Values:
-        """F3 / X_A, net growth of active biomass (9), at C_A and C_D (mg/L)."""
-        m_a, m_d = self.fractions(acceptor, donor)
-        return m_a * self.growth_per_acceptor(m_d)
+    def uptake(self, *concentrations: Values) -> tuple[Values, Values]:
+        """-F1 / X_A and -F2 / X_A."""
+        return self.uptake_at(*self.fractions(*concentrations))
 
-    def inert_rate(self, acceptor: Values) -> Values:
-        """F4 / X_A, inert remains of decay (10), at C_A (mg/L)."""
-        of_acceptor, _ = self.both
-        m_a = of_acceptor.fraction(acceptor)
-        constants = self.constants
-        return m_a * constants.decay_coefficient * (1 - constants.degradable_fraction)
+    def growth_rate(self, *concentrations: Values) -> Values:
+        """F3 / X_A, net growth of active biomass (9)."""
+        return self.growth_at(*self.fractions(*concentrations))
+
+    def inert_rate(self, *concentrations: Values) -> Values:
+        """F4 / X_A, inert remains of decay (10)."""
+        m_a, _ = self.fractions(*concentrations)
+        decay = m_a * self.constants.decay_coefficient + self.further_decay * (1 - m_a)
+        return decay * (1 - self.constants.degradable_fraction)
+
+    def growth_at(self, m_a: Values, m_d: Values) -> Values:
+        """F3 / X_A at the fractions."""
+        return m_a * self.growth_per_acceptor(m_d) - self.further_decay * (1 - m_a)
 
     def uptake_at(self, m_a: Values, m_d: Values) -> tuple[Values, Values]:
         """-F1 / X_A and -F2 / X_A at the fractions."""
         return m_a * self.per_acceptor(m_d), self.per_donor(m_a) * m_d
 
-    def own_uptake(self, substrate: int, acceptor: Values, donor: Values) -> tuple[Values, Values]:
-        """Uptake of the acceptor (0) or the donor (1) at C_A and C_D, extended below zero in that
-        substrate's concentration, and its derivative by this concentration."""
-        concentration, other = (acceptor, donor) if substrate == 0 else (donor, acceptor)
-        laws = tuple(self.both)
-        fraction, slope = laws[substrate].extended(concentration)
-        of_other = laws[1 - substrate].fraction(other)
-        per_own = self.per_acceptor(of_other) if substrate == 0 else self.per_donor(of_other)
+    def own_uptake(self, substrate: int, *concentrations: Values) -> tuple[Values, Values]:
+        """Uptake of a modelled substrate, extended below zero in its concentration, and the
+        derivative by this concentration; substrate: its place among the modelled ones."""
+        fraction, slope = tuple(self.both)[substrate].extended(concentrations[substrate])
+        m_a, m_d = self.fractions(*concentrations)
+        is_acceptor = self.modelled.start + substrate == 0
+        per_own = self.per_acceptor(m_d) if is_acceptor else self.per_donor(m_a)
         return fraction * per_own, slope * per_own
+
+    def unmet_at(self, m_a: Values, m_d: Values) -> np.ndarray:
+        """(2, ...) the demand of acceptor and donor that no modelled substrate meets, per active
+        biomass (1/h)."""
+        unmet = np.stack(self.uptake_at(m_a, m_d))
+        unmet[self.modelled] = 0.0
+        constants = self.constants
+        per_decay = constants.decay_oxygen_demand * constants.degradable_fraction
+        unmet[0] += per_decay * self.further_decay * (1 - m_a)
+        return unmet
 
     def uptake_slopes(self, m_a: np.ndarray, m_d: np.ndarray) -> np.ndarray:
         """(2, 2, ...) derivatives of :meth:`uptake_at` by m_A and m_D."""
@@ -82,7 +119,8 @@ class RateLaw:
 
     def growth_slopes(self, m_a: np.ndarray, m_d: np.ndarray) -> np.ndarray:
         """(2, ...) derivatives of F3 / X_A by m_A and m_D."""
-        return np.stack([self.growth_per_acceptor(m_d), self.fastest_growth * m_a])
+        by_acceptor = self.growth_per_acceptor(m_d) + self.further_decay
+        return np.stack([by_acceptor, self.fastest_growth * m_a])
 
     def per_acceptor(self, m_d: Values) -> Values:
         """-F1 / X_A per m_A: k F m_D + d_c f_d b."""
@@ -94,8 +132,13 @@ class RateLaw:
         return self.constants.maximum_utilization_rate * m_a
 
     def growth_per_acceptor(self, m_d: Values) -> Values:
-        """F3 / X_A per m_A: k Y m_D - b."""
+        """F3 / X_A per m_A, without the further decay: k Y m_D - b."""
         return self.fastest_growth * m_d - self.constants.decay_coefficient
+
+    @property
+    def further_decay(self) -> float:
+        """The decay (1/h) without acceptor: b if decay is unlimited, else 0."""
+        return self.constants.decay_coefficient if self.constants.decay == "unlimited" else 0.0
 
     @property
     def fastest_growth(self) -> float:
@@ -105,7 +148,7 @@ class RateLaw:
 
 def rate_law(substrates: Substrates, kinetics: Kinetics) -> RateLaw:
     """The rates of a scene."""
-    return RateLaw(kinetics, uptake_law(substrates, kinetics))
+    return RateLaw(kinetics, uptake_law(substrates, kinetics), substrates.places)
 
 
 def decay_demand(kinetics: Kinetics) -> float:
@@ -146,33 +189,42 @@ class Sink:
     it grows, or zero. Over a time the mean mass takes up substrates. It grows at the rates of the
     concentrations being solved for, so that uptake and growth are one integral.
 
-    All methods are functions of the fractions m_A and m_D, (2, r, q).
+    All methods are functions of the fractions of the modelled substrates, (s, r, q).
     """
 
     active: np.ndarray
     duration: float = 0.0
 
     def _exponent(self, fractions: np.ndarray, law: RateLaw) -> np.ndarray:
-        """(r, q) growth of ln X_A over the time."""
-        m_a, m_d = fractions
-        return self.duration * m_a * law.growth_per_acceptor(m_d)
+        """(r, q) growth of ln X_A over the time, at m_A and m_D."""
+        return self.duration * law.growth_at(*fractions)
+
+    def _mass(self, fractions: np.ndarray, law: RateLaw) -> np.ndarray:
+        """(r, q) um2 mg/L, the active mass, or its mean over the time, at m_A and m_D."""
+        if self.duration == 0:
+            return self.active
+        return self.active * mean_growth(self._exponent(fractions, law))
 
     def uptake(self, fractions: np.ndarray, law: RateLaw) -> np.ndarray:
-        """(r, 2, q) um2 mg/L/h, uptake of the acceptor and of the donor."""
-        mass = self.active
-        if self.duration > 0:
-            mass = self.active * mean_growth(self._exponent(fractions, law))
-        return mass[:, None] * np.stack(law.uptake_at(*fractions), axis=1)
+        """(r, s, q) um2 mg/L/h, uptake of the modelled substrates."""
+        pair = law.completed(fractions)
+        rates = law.uptake_at(*pair)[law.modelled]
+        return self._mass(pair, law)[:, None] * np.stack(rates, axis=1)
+
+    def unmet(self, fractions: np.ndarray, law: RateLaw) -> np.ndarray:
+        """(2,) um2 mg/L/h, the unmet demand of acceptor and donor."""
+        pair = law.completed(fractions)
+        return (self._mass(pair, law) * law.unmet_at(*pair)).sum(axis=(1, 2))
 
     def slopes(self, fractions: np.ndarray, law: RateLaw) -> np.ndarray:
-        """(2, 2, r, q) um2 mg/L/h, derivatives of :meth:`uptake`, of acceptor and donor, by m_A and
-        m_D."""
-        by = law.uptake_slopes(*fractions)
-        if self.duration == 0:
-            return self.active * by
-        exponent = self._exponent(fractions, law)
-        mean = mean_growth(exponent)
-        rise = mean_growth_slope(exponent, mean)
-        growth = self.duration * law.growth_slopes(*fractions)
-        rates = np.stack(law.uptake_at(*fractions))
-        return self.active * (mean * by + rise * rates[:, None] * growth[None])
+        """(s, s, r, q) um2 mg/L/h, derivatives of :meth:`uptake` by the fractions."""
+        pair = law.completed(fractions)
+        by = law.uptake_slopes(*pair)
+        if self.duration > 0:
+            exponent = self._exponent(pair, law)
+            mean = mean_growth(exponent)
+            rise = mean_growth_slope(exponent, mean)
+            growth = self.duration * law.growth_slopes(*pair)
+            rates = np.stack(law.uptake_at(*pair))
+            by = mean * by + rise * rates[:, None] * growth[None]
+        return self.active * by[law.modelled, law.modelled]

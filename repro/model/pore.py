@@ -53,7 +53,9 @@ class Pore:
     body: the aggregate as it was at t = 0; pressure: (corners,) P / mu_L; concentrations: the last
     known ones, None before the first; front: divisor of the element sizes at the aggregate, for a
     front of the substrates in it; last: (n, 2) um, the aggregate's nodes in the shape from which
-    strain counts, None for the shape of t = 0.
+    strain counts, None for the shape of t = 0; line_speeds: (2, 2) um/h, of the contact lines with
+    the lower and the upper wall, that with free surface after it on the loop and that with free
+    surface before it, None if they are not known.
     """
 
     time: float
@@ -68,6 +70,7 @@ class Pore:
     concentrations: Concentrations | None = None
     front: float = 1.0
     last: np.ndarray | None = None
+    line_speeds: np.ndarray | None = None
 
     @property
     def unstrained(self) -> np.ndarray:
@@ -298,6 +301,8 @@ def seeded(scene: Scene, front: float = 1.0, outline: Outline | None = None) -> 
     inert = total * (scene.aggregate.inert_fraction if scene.aggregate else 0.0)
     wall = outline.wall if outline else np.empty(0, int)
     fixed = outline.fixed if outline else np.empty(0, bool)
+    if outline and scene.growth and scene.growth.wall == "bonded":
+        fixed = fixed | outline.contact_ends
     body = material(space, mesh.points[mesh.body])
     theta = np.ones((np.count_nonzero(mesh.biomass), len(body.shape.table.weights)))
     return Pore(0.0, space, wall, fixed, total - inert, inert, theta, body,
@@ -348,14 +353,14 @@ def solve(scene: Scene, pore: Pore, over: float = 0.0) -> Solved:
     else:
         if carried:
             refuse_no_supply(peclet(scene.substrates, scene.pore.width, carried.mean_velocity))
-        state = transport.steady(problem, sink, pore.concentrations)
+        state = gear.steady(problem, sink, pore.concentrations)
     return Solved(carried, problem, state, transport.fluxes(problem, sink, state))
 
 
 def peclet(substrates: Substrates, width: float, speed: float) -> float:
     """u W / D with the smaller diffusivity, for a width (um) and a mean velocity (um/h)."""
     slowest = min(min(s.diffusivity, s.diffusivity_in_aggregate)
-                  for s in (substrates.acceptor, substrates.donor))
+                  for s in substrates.modelled.values())
     return speed * width / slowest
 
 

@@ -19,7 +19,7 @@ from repro.model import biomass, growing
 from repro.model.biomass import Amounts
 from repro.model.growth import Body
 from repro.model.pore import Meshing, Pore, Solved, material, resolution, seeded, solve
-from repro.model.transport import UNRESOLVED, Concentrations
+from repro.model.transport import UNRESOLVED, Concentrations, concentrations
 from repro.scene import Scene, SceneError, Substrate, Substrates, at_time, load_scene
 
 #: A front of the substrates divides element sizes at the aggregate by at most this.
@@ -230,8 +230,8 @@ def _has_margin(solved: Solved) -> bool:
     """Do concentrations fall below zero by at most half of the accepted amount?"""
     state = solved.substrates.concentrations
     kinds = solved.substrates.problem.both
-    fields = (state.acceptor, state.donor)
-    return all(field.min() >= -0.5 * UNRESOLVED * s.supply for field, s in zip(fields, kinds))
+    return all(field.min() >= -0.5 * UNRESOLVED * s.supply
+               for field, s in zip(state.fields, kinds))
 
 
 def moved_mesh(meshing: Meshing, previous: Pore, expanded: Pore) -> Mesh | None:
@@ -336,11 +336,11 @@ def transfer_substrates(supplied: Substrates, old: Space, new: Space, state: Con
     first, last = old.mesh.ends
     clipped = np.column_stack([np.clip(x, first, last), new.points[:, 1]])
     at = transfer.located(old.mesh.points, old.mesh.cells, clipped)
-    fields = at.field(np.column_stack([state.acceptor, state.donor]), old.cells, old.order)
-    kinds = supplied.acceptor, supplied.donor
-    acceptor, donor = (_beyond(field, substrate, x, old.mesh.ends, speed)
-                       for field, substrate in zip(fields.T, kinds))
-    return Concentrations(acceptor, donor)
+    fields = at.field(state.fields.T, old.cells, old.order)
+    kinds = supplied.modelled.values()
+    new_fields = [_beyond(field, substrate, x, old.mesh.ends, speed)
+                  for field, substrate in zip(fields.T, kinds)]
+    return concentrations(supplied, np.stack(new_fields))
 
 
 def _beyond(field: np.ndarray, substrate: Substrate, x: np.ndarray, ends: tuple[float, float],

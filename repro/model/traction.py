@@ -1,4 +1,4 @@
-"""The fluid's traction on the aggregate, the t0 of (20) and (22): an option, which 2.3.3 neglects.
+"""The fluid's forces on the aggregate, t0 and f0 of (20) and (22): an option, which 2.3.3 neglects.
 
 The momentum balance of the fluid's triangles, tested with the nodal functions of the interface,
 gives the force on the fluid there; its opposite acts on the aggregate (consistent nodal forces).
@@ -14,15 +14,20 @@ interface and div u = 0. At a contact line the force along the wall includes the
 edge of wall; the force across it acts on the wall, where the aggregate's y is constrained. The zero
 of the head does not matter: a uniform pressure has no effect on an incompressible body that touches
 only walls and fluid.
+
+Water within a permeable aggregate (section 5, :mod:`repro.model.brinkman`) takes over the stress of
+the water outside at the interface, and passes it to the biomass by its drag: the biomass has no
+traction on its surface, but in its volume the body force
+
+    f0 = rho nu u / k
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from repro.errors import GrowthError
 from repro.fem import elements, transfer
 from repro.fem.mesh import Mesh
 from repro.fem.space import Space
@@ -77,32 +82,65 @@ def surroundings(meshing: Meshing, before: Pore, shaped: Pore) -> Surroundings:
     if mesh is not None:
         nodes = np.arange(len(mesh.body))[:, None]
         return Surroundings(mesh, nodes, np.ones(nodes.shape))
+    return _generated(meshing, shaped)
+
+
+def _generated(meshing: Meshing, shaped: Pore) -> Surroundings:
+    """A new mesh around a shape."""
     mesh, _ = meshing.generate(shaped.outline)
     cells = shaped.mesh.topology.body_cells
     at = transfer.located(shaped.mesh.points[shaped.mesh.body], cells, mesh.points[mesh.body])
     return Surroundings(mesh, cells[at.triangle], elements.values(mesh.geometry, at.local))
 
 
-def forces(fluid: Fluid, around: Surroundings, shaped: Pore) -> np.ndarray:
-    """(n, 2) um: nodal forces over mu_L on ``shaped.mesh.body`` by the flow around that shape."""
+def follow(meshing: Meshing, around: Surroundings, shaped: Pore) -> Surroundings:
+    """The mesh ``around``, moved to another shape, or a new one if this turns a triangle over."""
     mesh = around.mesh
     positions = shaped.mesh.points[shaped.mesh.body]
     places = np.einsum("ka,kai->ki", around.share, positions[around.nodes])
-    if np.abs(places - mesh.points[mesh.body]).max() > ROUND_OFF * mesh.width:
-        mesh = fluid.meshing.move(mesh, places)
+    if np.abs(places - mesh.points[mesh.body]).max() <= ROUND_OFF * mesh.width:
+        return around
+    mesh = meshing.move(mesh, places)
     if mesh.areas.min() <= 0 or mesh.turned_over().any():
-        raise GrowthError("the fluid's forces move the aggregate so far that the mesh around it "
-                          "turns over; try a shorter growth.time_step, or "
-                          'growth.fluid_forces = "neglected"')
+        return _generated(meshing, shaped)
+    return replace(around, mesh=mesh)
+
+
+def forces(fluid: Fluid, around: Surroundings, shaped: Pore) -> np.ndarray:
+    """(n, 2) um: nodal forces over mu_L on ``shaped.mesh.body`` by the flow around that shape."""
+    mesh = around.mesh
     drive = at_time(fluid.drive, shaped.time)
     numerics = fluid.meshing.numerics
     space = Space(mesh, shaped.space.order)
     flow_field = pore.solve_flow(space, drive, fluid.meshing.channel.length, numerics)
-    viscosity = drive.kinematic_viscosity / drive.gravity
-    on = nodal(space, flow_field, viscosity, numerics.interface)[mesh.body]
-    total = np.zeros_like(positions)
+    on = on_aggregate(space, flow_field, drive, numerics.interface)[mesh.body]
+    total = np.zeros((len(shaped.mesh.body), 2))
     np.add.at(total, around.nodes, around.share[..., None] * on[:, None])
     return MPA_PER_UM * drive.density * drive.gravity / fluid.shear_modulus * total
+
+
+def on_aggregate(space: Space, solution: Flow, drive: Drive, interface: str) -> np.ndarray:
+    """(N, 2) um2 of head: forces of the water on the aggregate at all nodes, over rho g; traction
+    on its surface, or the drag within a permeable one."""
+    viscosity = drive.kinematic_viscosity / drive.gravity
+    if drive.permeability is None:
+        return nodal(space, solution, viscosity, interface)
+    return seepage(space, solution, viscosity / drive.permeability)
+
+
+def seepage(space: Space, solution: Flow, drag: float) -> np.ndarray:
+    """(N, 2) um2 of head: forces of Darcy's drag within the aggregate, the f0 of (20), over rho g.
+
+    drag: nu_water / (g k), h/um.
+    """
+    mesh = space.mesh
+    cells = mesh.cells[mesh.biomass]
+    velocity = solution.velocity[space.cells[mesh.biomass]]
+    functions = elements.values_on(mesh.geometry, space.table)
+    of_water = np.einsum("tq,qb,tbi->tqi", space.at.dx[mesh.biomass], space.at.values, velocity)
+    local = drag * np.einsum("tqi,qa->tai", of_water, functions)
+    return np.column_stack([np.bincount(cells.ravel(), local[..., i].ravel(), len(mesh.points))
+                            for i in (0, 1)])
 
 
 def nodal(space: Space, solution: Flow, viscosity: float, interface: str) -> np.ndarray:

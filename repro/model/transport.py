@@ -19,6 +19,7 @@ C_supply, or nothing passes them ("closed"). With u_ave for the inlet's u_x, (11
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -65,17 +66,17 @@ FINER = 3
 @brief
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """Both substrates in one geometry, with n nodes in all and k a triangle.
+    """The s = 1 or 2 modelled substrates in one geometry, with n nodes in all and k a triangle.
 
-    matrices: (T, k, k) um2/h of each, without uptake; operator: (2n, 2n) of both, not coupled, and
-    magnitude: its absolute entries; source: (2n,) um2 mg/L/h; inflow, outflow: (n,) um2/h,
-    integrals of u_x N_i over an end; system: of both, coupled where there is biomass; law: None
+    matrices: (T, k, k) um2/h of each, without uptake; operator: (sn, sn) of all, not coupled, and
+    magnitude: its absolute entries; source: (sn,) um2 mg/L/h; inflow, outflow: (n,) um2/h,
+    integrals of u_x N_i over an end; system: of all, coupled where there is biomass; law: None
     without biomass; modified_newton: does Newton's method keep its derivative while the defect
     falls fast enough?
     """
 
     space: Space
-    matrices: tuple[np.ndarray, np.ndarray]
+    matrices: tuple[np.ndarray, ...]
     operator: sp.csc_matrix
     magnitude: sp.csc_matrix
     source: np.ndarray
@@ -92,9 +93,9 @@ class Problem:
         return self.space.mesh
 
     @property
-    def both(self) -> tuple[Substrate, Substrate]:
-        """Acceptor and donor, as the scene describes them."""
-        return self.substrates.acceptor, self.substrates.donor
+    def both(self) -> tuple[Substrate, ...]:
+        """The modelled substrates, as the scene describes them, the acceptor first."""
+        return tuple(self.substrates.modelled.values())
 
     @property
     def rate_law(self) -> RateLaw:
@@ -103,24 +104,44 @@ class Problem:
 
     @property
     def supply(self) -> np.ndarray:
-        """(2n,) mg/L, of the acceptor at all nodes, then of the donor."""
+        """(sn,) mg/L, of one substrate at all nodes, then of the other."""
         return np.repeat([s.supply for s in self.both], self.space.count)
 
 
 @brief
 @dataclass(frozen=True, eq=False)
 class Concentrations:
-    """C_A and C_D (n,) mg/L at the nodes of their space, and the iterations that they took."""
+    """C_A and C_D (n,) mg/L at the nodes of their space, None for a substrate that is not modelled,
+    and the iterations that they took."""
 
-    acceptor: np.ndarray
-    donor: np.ndarray
+    acceptor: np.ndarray | None
+    donor: np.ndarray | None
     iterations: int = 0
+
+    @property
+    def fields(self) -> np.ndarray:
+        """(s, n) mg/L, of the modelled substrates."""
+        return np.stack([field for field in (self.acceptor, self.donor) if field is not None])
+
+    def with_fields(self, fields: np.ndarray) -> Concentrations:
+        """The same substrates with other fields (s, n)."""
+        rows = iter(fields)
+        acceptor, donor = (None if field is None else next(rows)
+                           for field in (self.acceptor, self.donor))
+        return replace(self, acceptor=acceptor, donor=donor)
+
+
+def concentrations(substrates: Substrates, fields: np.ndarray,
+                   iterations: int = 0) -> Concentrations:
+    """The concentrations of the modelled substrates from their fields (s, n), mg/L."""
+    named = dict(zip(substrates.modelled, fields))
+    return Concentrations(named.get("acceptor"), named.get("donor"), iterations)
 
 
 @timed("transport")
 def problem(space: Space, flow: Flow | None, substrates: Substrates, kinetics: Kinetics | None,
             inlet: str = "local", modified_newton: bool = False) -> Problem:
-    """Assemble the linear parts of both substrates' equations in one geometry.
+    """Assemble the linear parts of the substrates' equations in one geometry.
 
     Parameters
     ----------
@@ -141,19 +162,19 @@ def problem(space: Space, flow: Flow | None, substrates: Substrates, kinetics: K
     Problem
     """
     topology = space.mesh.topology
-    kinds = substrates.acceptor, substrates.donor
+    kinds = tuple(substrates.modelled.values())
+    count = len(kinds)
     carried, source, inflow, outflow = _through(space, flow, inlet)
-    acceptor, donor = (diffusion(space, kind) + carried for kind in kinds)
+    matrices = tuple(diffusion(space, kind) + carried for kind in kinds)
     constrained = flow is None and substrates.boundary == "open"
-    apart = topology.system(("both", space.order), lambda: _apart(space))
-    operator = apart.matrix((acceptor, donor))
-    system = topology.system(("transport", space.order, constrained),
-                             lambda: _system(space, constrained))
+    apart = topology.system(("both", space.order, count), lambda: _apart(space, count))
+    operator = apart.matrix(matrices)
+    system = coupled_system(space, constrained, count)
     magnitude = copy(operator)
     magnitude.data = np.abs(operator.data)
     sources = np.concatenate([kind.supply * source for kind in kinds])
     law = None if kinetics is None else rate_law(substrates, kinetics)
-    return Problem(space, (acceptor, donor), operator, magnitude, sources, inflow, outflow, system,
+    return Problem(space, matrices, operator, magnitude, sources, inflow, outflow, system,
                    substrates, law, modified_newton)
 
 
@@ -243,24 +264,34 @@ def _add_at(matrices: np.ndarray, beside: tuple[np.ndarray, np.ndarray],
     np.add.at(matrices, (owner[:, None, None], place[:, :, None], place[:, None, :]), blocks)
 
 
-def _apart(space: Space) -> ElementSystem:
-    """Acceptor, then donor of all nodes in their own order, without their uptake."""
-    count = 2 * space.count
-    return ElementSystem((space.cells, space.count + space.cells), np.arange(count),
-                         np.zeros(count, bool), space.mesh.topology.method)
+def _apart(space: Space, count: int) -> ElementSystem:
+    """``count`` substrates, one after the other, of all nodes in their own order, without their
+    uptake."""
+    size = count * space.count
+    return ElementSystem(_shifted(space.cells, space, count), np.arange(size),
+                         np.zeros(size, bool), space.mesh.topology.method)
 
 
-def _system(space: Space, ends_constrained: bool) -> ElementSystem:
-    """Acceptor and donor of a node side by side, nodes in elimination order: their own triangles,
-    then both together on the pieces of biomass, where the uptake couples them."""
+def _shifted(cells: np.ndarray, space: Space, count: int) -> tuple[np.ndarray, ...]:
+    """Cells of nodes as unknowns of each of ``count`` substrates."""
+    return tuple(k * space.count + cells for k in range(count))
+
+
+def coupled_system(space: Space, constrained: bool, count: int) -> ElementSystem:
+    """``count`` substrates; constrained: does the supply apply at the ends?"""
+    return space.mesh.topology.system(("transport", space.order, constrained, count),
+                                      lambda: _system(space, constrained, count))
+
+
+def _system(space: Space, ends_constrained: bool, count: int) -> ElementSystem:
+    """The substrates of a node side by side, nodes in elimination order: their own triangles, then
+    all together on the pieces of biomass, where the uptake couples them."""
     constrained = np.zeros(space.count, bool)
     constrained[both_ends(space)] = ends_constrained
-    pieces = space.reaction.cells
-    both = np.concatenate([pieces, space.count + pieces], axis=1)
-    rank = np.concatenate([space.dofs.places, space.dofs.places + 0.5])
-    return ElementSystem((space.cells, space.count + space.cells, both), rank,
-                         np.tile(constrained, 2),
-                         space.mesh.topology.method)
+    coupled = np.concatenate(_shifted(space.reaction.cells, space, count), axis=1)
+    rank = np.concatenate([space.dofs.places + 0.5 * k for k in range(count)])
+    return ElementSystem((*_shifted(space.cells, space, count), coupled), rank,
+                         np.tile(constrained, count), space.mesh.topology.method)
 
 
 def both_ends(space: Space) -> np.ndarray:
@@ -270,13 +301,12 @@ def both_ends(space: Space) -> np.ndarray:
 
 def supplied_everywhere(problem: Problem) -> Concentrations:
     """C = C_supply in the whole pore, the state at t = 0 (2.2)."""
-    acceptor, donor = problem.supply.reshape(2, -1)
-    return Concentrations(acceptor, donor)
+    return concentrations(problem.substrates, problem.supply.reshape(len(problem.both), -1))
 
 
 @dataclass(frozen=True, eq=False)
 class Iterate:
-    """Both concentrations (2n,); the saturations (2, r, q) about which the uptake is linearised;
+    """All concentrations (sn,); the saturations (s, r, q) about which the uptake is linearised;
     the residual at the concentrations and the size of its terms, um2 mg/L/h; consistent: do the
     saturations follow from the concentrations?"""
 
@@ -316,8 +346,8 @@ class Balance:
         return self.problem.space.reaction
 
     def at(self, state: np.ndarray) -> np.ndarray:
-        """(2, r, q) C_A and C_D in the points of the reaction."""
-        return self._reaction.evaluate(state.reshape(2, -1))
+        """(s, r, q) concentrations in the points of the reaction."""
+        return self._reaction.evaluate(state.reshape(len(self.problem.both), -1))
 
     @property
     def _present_sink(self) -> Sink:
@@ -329,16 +359,19 @@ class Balance:
 
     @property
     def _both(self) -> UptakeLaw:
-        """The law of uptake of both substrates."""
+        """The law of uptake of the modelled substrates."""
         return self._law.both
 
     def uptake(self, state: np.ndarray) -> np.ndarray:
-        """(r, 2, q) um2 mg/L/h."""
-        fractions = self._both.fraction(self.at(state))
-        return self._present_sink.uptake(fractions, self._law)
+        """(r, s, q) um2 mg/L/h."""
+        return self._present_sink.uptake(self._both.fraction(self.at(state)), self._law)
+
+    def unmet(self, state: np.ndarray) -> np.ndarray:
+        """(2,) um2 mg/L/h, the unmet demand of acceptor and donor."""
+        return self._present_sink.unmet(self._both.fraction(self.at(state)), self._law)
 
     def residual(self, state: np.ndarray, loads: np.ndarray | None = None) -> np.ndarray:
-        """(2n,) um2 mg/L/h for C_A, then C_D, of all nodes (2n,), mg/L; loads: the uptake, if it is
+        """(sn,) um2 mg/L/h for all nodes and substrates (sn,), mg/L; loads: the uptake, if it is
         known."""
         residual = self.problem.operator @ state - self.problem.source
         if self.sink is None:
@@ -346,7 +379,7 @@ class Balance:
         return residual + self._reaction.assembled(self.uptake(state) if loads is None else loads)
 
     def sizes(self, state: np.ndarray, loads: np.ndarray | None = None) -> np.ndarray:
-        """Sizes (2n,) of the terms of the residual, all taken as positive; loads: the uptake, if it
+        """Sizes (sn,) of the terms of the residual, all taken as positive; loads: the uptake, if it
         is known."""
         sizes = self.problem.magnitude @ np.abs(state) + np.abs(self.problem.source)
         if self.sink is None:
@@ -355,18 +388,18 @@ class Balance:
         return sizes + self._reaction.assemble(np.abs(loads) @ np.abs(self._reaction.values))
 
     def _slopes(self, state: np.ndarray, saturations: np.ndarray) -> np.ndarray:
-        """(2, r, q) ds/dC at the saturations; zero where there is no substrate."""
+        """(s, r, q) ds/dC at the saturations; zero where there is no substrate."""
         empty = (saturations <= 0) & (self.at(state) <= 0)
         return np.where(empty, 0.0, self._both.saturation_slope(saturations))
 
     def _uptake_slopes(self, saturations: np.ndarray) -> np.ndarray:
-        """(2, 2, r, q) derivatives of the uptake by the saturations."""
+        """(s, s, r, q) derivatives of the uptake by the saturations."""
         fractions, slopes = self._both.at_saturation(saturations)
         return self._present_sink.slopes(fractions, self._law) * slopes
 
     def tangent(self, state: np.ndarray,
                 saturations: np.ndarray | None = None) -> tuple[np.ndarray, ...]:
-        """Element matrices, um2/h, of the residual's derivative: both substrates, then uptake."""
+        """Element matrices, um2/h, of the residual's derivative: each substrate, then uptake."""
         if self.sink is None:
             return *self.problem.matrices, self._coupled(None)
         if saturations is None:
@@ -375,16 +408,17 @@ class Balance:
         return *self.problem.matrices, self._coupled(by)
 
     def _coupled(self, slopes: np.ndarray | None) -> np.ndarray:
-        """(r, 2k, 2k) um2/h from the derivatives (2, 2, r, q) of uptake i by concentration j."""
+        """(r, sk, sk) um2/h from the derivatives (s, s, r, q) of uptake i by concentration j."""
         count, k = self._reaction.cells.shape
+        size = len(self.problem.both) * k
         if slopes is None:
-            return np.zeros((count, 2 * k, 2 * k))
+            return np.zeros((count, size, size))
         blocks = self._reaction.mass(slopes)
-        return blocks.transpose(2, 0, 3, 1, 4).reshape(count, 2 * k, 2 * k)
+        return blocks.transpose(2, 0, 3, 1, 4).reshape(count, size, size)
 
     def begun(self, state: np.ndarray) -> Iterate:
         """The first iterate."""
-        saturations = np.zeros((2, 1, 1))
+        saturations = np.zeros((len(self.problem.both), 1, 1))
         if self.sink is not None:
             saturations = self._both.saturation(self.at(state))
         return Iterate(state, saturations, self.residual(state), self.sizes(state),
@@ -408,7 +442,7 @@ class Balance:
         return self._resaturated(iterate, new, concentrations)
 
     def _linearised(self, iterate: Iterate) -> np.ndarray:
-        """(2n,) the residual, with the uptake linearised about the saturations."""
+        """(sn,) the residual, with the uptake linearised about the saturations."""
         if self.sink is None or iterate.consistent:
             return iterate.residual
         about = iterate.saturations
@@ -418,7 +452,7 @@ class Balance:
         return self.residual(iterate.state, loads)
 
     def _predicted(self, iterate: Iterate, state: np.ndarray) -> np.ndarray:
-        """(2, r, q) saturations at other concentrations by the linearisation."""
+        """(s, r, q) saturations at other concentrations by the linearisation."""
         about = np.minimum(iterate.saturations, LARGEST_SATURATION)
         apart = self.at(state) - self._both.concentration(about)
         return about + self._slopes(iterate.state, about) * apart
@@ -441,7 +475,7 @@ class Balance:
 @timed("transport")
 def steady(problem: Problem, sink: Sink | None,
            guess: Concentrations | None = None) -> Concentrations:
-    """Solve for steady concentrations, by Newton's method on both substrates at once.
+    """Solve for steady concentrations, by Newton's method on all substrates at once.
 
     Parameters
     ----------
@@ -468,16 +502,19 @@ def steady(problem: Problem, sink: Sink | None,
     Notes
     -----
     If the method fails, often behind a sharp front, it starts again from the supply with the half
-    saturations at the supply, and lowers them to their values by a factor of ten at a time.
+    saturations at the supply, and lowers them to their values by a factor of ten at a time. It does
+    not if the law is not monotone: several solutions may exist, and the one near the guess is due.
     """
     if problem.law is None:
         sink = None
     supply = problem.supply
-    state = supply.copy() if guess is None else np.concatenate([guess.acceptor, guess.donor])
+    state = supply.copy() if guess is None else guess.fields.flatten()
     state[problem.system.constrained] = supply[problem.system.constrained]
     try:
         state, count = _newton(Balance(problem, sink), state)
     except TransportError:
+        if problem.law is not None and not problem.law.both.monotone:
+            raise
         state, count = _eased(problem, sink, supply)
     solution = _checked(problem, state, count)
     if sink is not None:
@@ -486,7 +523,7 @@ def steady(problem: Problem, sink: Sink | None,
 
 
 def _newton(balance: Balance, state: np.ndarray) -> tuple[np.ndarray, int]:
-    """(2n,) the solution by Newton's method from a start, and its number of iterations."""
+    """(sn,) the solution by Newton's method from a start, and its number of iterations."""
     newton = Newton(NEWTON, ROUND_OFF, MOST_ITERATIONS, balance.problem.modified_newton)
     try:
         last, count, converged = newton.solve(balance, balance.begun(state))
@@ -520,13 +557,13 @@ def _eased(problem: Problem, sink: Sink | None, state: np.ndarray) -> tuple[np.n
 
 def _checked(problem: Problem, state: np.ndarray, iterations: int) -> Concentrations:
     """The solution. Raises Unresolved where it leaves the range from zero to the supply."""
-    for name, field, substrate in zip(("acceptor", "donor"), state.reshape(2, -1), problem.both):
+    fields = state.reshape(len(problem.both), -1)
+    for field, (name, substrate) in zip(fields, problem.substrates.modelled.items()):
         if field.min() < -UNRESOLVED * substrate.supply:
             raise _outside(problem, name, field, int(field.argmin()), substrate)
         if field.max() / HIGHEST[problem.space.order] > substrate.supply:
             raise _outside(problem, name, field, int(field.argmax()), substrate)
-    acceptor, donor = state.reshape(2, -1)
-    return Concentrations(acceptor, donor, iterations)
+    return concentrations(problem.substrates, fields, iterations)
 
 
 def _refuse_unresolved(problem: Problem, sink: Sink, state: Concentrations) -> None:
@@ -538,15 +575,17 @@ def _refuse_unresolved(problem: Problem, sink: Sink, state: Concentrations) -> N
 
 
 def quadrature_error(problem: Problem, sink: Sink, state: Concentrations) -> float:
-    """Relative difference of the donor's uptake between the quadrature and a finer one, at the same
-    concentrations; the density of the biomass is linear in each triangle and does not grow."""
+    """Relative difference of the uptake of the donor (of the acceptor, if it is alone) between the
+    quadrature and a finer one, at the same concentrations; the density of the biomass is linear in
+    each triangle and does not grow."""
     reaction = problem.space.reaction
     finer, fit = problem.space.integration.finer(FINER)
-    both = np.stack([state.acceptor, state.donor])
-    _, rate = problem.rate_law.uptake(*finer.evaluate(both))
+    law = problem.rate_law
+    rate = law.uptake(*finer.evaluate(state.fields))[law.modelled][-1]
     masses = sink.active / reaction.dx @ fit * finer.dx
     exact = float(np.vdot(masses, rate))
-    quadrature = float(Balance(problem, Sink(sink.active)).uptake(both.ravel())[:, 1].sum())
+    loads = Balance(problem, Sink(sink.active)).uptake(state.fields.ravel())
+    quadrature = float(loads[:, -1].sum())
     return abs(exact - quadrature) / quadrature if quadrature else 0.0
 
 
@@ -559,47 +598,59 @@ def _outside(problem: Problem, name: str, field: np.ndarray, node: int,
 
 @dataclass(frozen=True)
 class Fluxes:
-    """Rates of one substrate per um of depth (um2 mg/L/h): supplied, out and consumed; and its
+    """Rates of one substrate per um of depth (um2 mg/L/h): supplied, out and consumed; its
     flow-weighted concentrations (mg/L) at the meshed inlet and the outlet, the mean over the end
-    without flow."""
+    without flow; and its unmet demand. All but the last are zero if it is not modelled."""
 
     supplied: float
     out: float
     consumed: float
     inlet: float
     effluent: float
+    unmet: float = 0.0
 
 
 class Flows(NamedTuple):
-    """Amounts of acceptor and donor in the balance of a step, um2 mg/L."""
+    """Amounts of acceptor and donor in the balance of a step, and their unmet demand, um2 mg/L."""
 
     supplied: tuple[float, float]
     out: tuple[float, float]
     consumed: tuple[float, float]
     stored: tuple[float, float]
+    unmet: tuple[float, float] = (0.0, 0.0)
+
+
+def integrated(acceptor: Sequence[float], donor: Sequence[float]) -> Flows:
+    """Flows of substrates at rest, from what of each is supplied, out, consumed and unmet."""
+    supplied, out, consumed, unmet = zip(acceptor, donor)
+    return Flows(supplied, out, consumed, (0.0, 0.0), unmet)
 
 
 def fluxes(problem: Problem, sink: Sink | None, state: Concentrations) -> tuple[Fluxes, Fluxes]:
     """Ledger of the acceptor and of the donor in one geometry: supplied and out from the ends,
     consumed from the uptake at the state."""
     space = problem.space
-    both = np.stack([state.acceptor, state.donor])
+    both = state.fields
     out = both @ problem.outflow
-    consumed = np.zeros(2)
+    consumed = np.zeros(len(both))
+    rows = np.zeros((2, 6))
     if sink is not None and problem.law is not None:
-        consumed = Balance(problem, sink).uptake(both.ravel()).sum(axis=(0, 2))
-    supplied = problem.source.reshape(2, -1).sum(axis=1)
+        balance = Balance(problem, sink)
+        consumed = balance.uptake(both.ravel()).sum(axis=(0, 2))
+        rows[:, 5] = balance.unmet(both.ravel())
+    supplied = problem.source.reshape(len(both), -1).sum(axis=1)
     if problem.system.constrained.any():
-        through = (problem.operator @ both.ravel()).reshape(2, -1)
+        through = (problem.operator @ both.ravel()).reshape(len(both), -1)
         supplied = through[:, both_ends(space)].sum(axis=1)
     enters = _end_means(space.inlet, both, problem.inflow)
     leaves = _end_means(space.outlet, both, problem.outflow)
-    acceptor, donor = np.column_stack([supplied, out, consumed, enters, leaves]).tolist()
+    rows[problem.substrates.places, :5] = np.column_stack([supplied, out, consumed, enters, leaves])
+    acceptor, donor = rows.tolist()
     return Fluxes(*acceptor), Fluxes(*donor)
 
 
 def _end_means(end: End, both: np.ndarray, load: np.ndarray) -> np.ndarray:
-    """(2,) mg/L, weighted with the flow through an end, plain where nothing flows."""
+    """(s,) mg/L, weighted with the flow through an end, plain where nothing flows."""
     if not load.any():
         load = end.assembled(np.ones(end.count))
     return both @ load / load.sum()

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
-from typing import Any, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
@@ -45,6 +45,9 @@ class UptakeLaw:
     """
 
     half_saturation: Any
+
+    #: Does m(C) never decrease? If it does, several concentrations may be steady.
+    monotone: ClassVar[bool] = True
 
     @classmethod
     def constants(cls, substrate: Substrate) -> tuple[float, ...]:
@@ -251,10 +254,86 @@ class Monod(UptakeLaw):
         return saturation, 1.0
 
 
+@dataclass(frozen=True, eq=False)
+class Haldane(UptakeLaw):
+    """Haldane's law, m = C / (K + C + C^2 / K_i): the donor inhibits its own uptake.
+
+    inhibition: K_i, mg/L; infinite for the acceptor, whose law is Monod's. m has its maximum, 1 /
+    (1 + 2 (K / K_i)^1/2), at C = (K K_i)^1/2, and decreases beyond.
+    """
+
+    inhibition: Any
+    monotone: ClassVar[bool] = False
+
+    @classmethod
+    def constants(cls, substrate: Substrate) -> tuple[float, ...]:
+        """Return K and K_i (mg/L)."""
+        return substrate.half_saturation, getattr(substrate, "inhibition_constant", np.inf)
+
+    def _denominator(self, positive: Values) -> Values:
+        return self.half_saturation + positive + positive**2 / self.inhibition
+
+    def fraction(self, concentration: Values) -> Values:
+        """Return C / (K + C + C^2 / K_i)."""
+        positive = np.maximum(concentration, 0.0)
+        return positive / self._denominator(positive)
+
+    def slope(self, concentration: Values) -> Values:
+        """Return (K - C^2 / K_i) / (K + C + C^2 / K_i)^2, L/mg; negative beyond the maximum."""
+        positive = np.maximum(concentration, 0.0)
+        rise = self.half_saturation - positive**2 / self.inhibition
+        return rise / self._denominator(positive) ** 2
+
+    def largest(self, supply: float) -> float:
+        """Return m at the maximum, for any supply."""
+        return 1 / (1 + 2 * np.sqrt(self.half_saturation / self.inhibition))
+
+    def saturates(self, supply: float) -> bool:
+        """Return True for a supply above K."""
+        return supply > self.half_saturation
+
+
+class FirstOrder(UptakeLaw):
+    """Uptake of first order, m = C / K, without a bound: the limit of Monod's law far below K."""
+
+    def fraction(self, concentration: Values) -> Values:
+        """Return C / K."""
+        return np.maximum(concentration, 0.0) / self.half_saturation
+
+    def slope(self, concentration: Values) -> Values:
+        """Return 1 / K, L/mg."""
+        return np.ones_like(concentration) / self.half_saturation
+
+    def largest(self, supply: float) -> float:
+        """Return supply / K."""
+        return supply / self.half_saturation
+
+    def saturates(self, supply: float) -> bool:
+        """Return False."""
+        return False
+
+
+class ZeroOrder(Monod):
+    """Uptake of zero order, the limit K -> 0 of Monod's law: K is K_s times LIMIT.
+
+    A flux into a layer that uses up C then differs from the limit by the part LIMIT K_s / C of it,
+    times a logarithm: below 1e-4 for supplies of K_s or more.
+    """
+
+    #: K over the scene's K_s.
+    LIMIT: ClassVar[float] = 1e-5
+
+    @classmethod
+    def constants(cls, substrate: Substrate) -> tuple[float, ...]:
+        """Return K (mg/L)."""
+        return (cls.LIMIT * substrate.half_saturation,)
+
+
 #: Laws by the values of `kinetics.law`.
-LAWS: dict[str, type[UptakeLaw]] = {"dual Monod": Monod}
+LAWS: dict[str, type[UptakeLaw]] = {"dual Monod": Monod, "Haldane": Haldane,
+                                    "first order": FirstOrder, "zero order": ZeroOrder}
 
 
 def uptake_law(substrates: Substrates, kinetics: Kinetics) -> UptakeLaw:
-    """Make a scene's law of uptake of acceptor and donor."""
-    return LAWS[kinetics.law].of(substrates.acceptor, substrates.donor)
+    """Make a scene's law of uptake of its substrates."""
+    return LAWS[kinetics.law].of(*substrates.modelled.values())

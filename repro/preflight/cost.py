@@ -33,8 +33,8 @@ ReportedStep: TypeAlias = tuple[RestartState, Report | None]
 
 #: Cost of a later step over the first one: new meshes, and larger ones.
 REMESHING = 1.5
-#: Cost of a step in contact, with many rounds of closing films and a new mesh.
-IN_CONTACT = 15.0
+#: Cost of a step in contact, whose contact lines move and whose stages both have new meshes.
+IN_CONTACT = 4.0
 #: Cost of a row within a step: one of the step's two equilibria and solutions.
 ROW = 0.5
 #: Length of a midpoint step at tolerance 0.01, times the growth rate; it scales with the root of

@@ -69,9 +69,11 @@ def _slowed_by(flow: Flow) -> str:
 
 def _substrates(scene: Scene) -> Iterator[str]:
     carried = "advection and diffusion" if scene.flow else "diffusion"
-    acceptor = _over_time(scene.substrates.acceptor.supply, 1.0, "mg/L")
-    donor = _over_time(scene.substrates.donor.supply, 1.0, "mg/L")
-    yield f"{carried} of acceptor ({acceptor}) and donor ({donor}), (7)-(8)"
+    supplies = {name: f"{name} ({_over_time(kind.supply, 1.0, 'mg/L')})"
+                for name, kind in scene.substrates.modelled.items()}
+    yield f"{carried} of {' and '.join(supplies.values())}, {_equations(scene)}"
+    if len(supplies) == 1:
+        yield "one substrate: the other is assumed not to limit"
     if scene.flow:
         yield "(11) at the inlet, (12) at the outlet, (13) on the walls"
     else:
@@ -79,6 +81,11 @@ def _substrates(scene: Scene) -> Iterator[str]:
                "closed": "closed ends"}[scene.substrates.boundary]
     yield {"quasi_steady": "at rest in each shape",
            "gear": "followed in time (3.3, Gear)"}[scene.numerics.transport]
+
+
+def _equations(scene: Scene) -> str:
+    numbers = {"acceptor": "(7)", "donor": "(8)"}
+    return "-".join(numbers[name] for name in scene.substrates.modelled)
 
 
 def _over_time(value: float | TimeTable, factor: float, unit: str) -> str:
@@ -92,9 +99,18 @@ def _over_time(value: float | TimeTable, factor: float, unit: str) -> str:
 
 
 def _kinetics(scene: Scene) -> Iterator[str]:
-    yield f"{scene.kinetics.law} uptake by the aggregate, (7)-(8)"
+    law = scene.kinetics.law
+    one = len(scene.substrates.modelled) == 1
+    name = law.removeprefix("dual ") if one else law
+    yield f"{name} uptake by the aggregate, {_equations(scene)}"
+    if law == "Haldane":
+        yield ("of several solutions, the one that is reached in time from the profile in the "
+               "last shape, or from the supply at t = 0")
     if scene.growth:
         yield "growth and decay of active, gain of inert biomass, (9)-(10)"
+        yield {"with acceptor": "decay in proportion to m_A: none without acceptor",
+               "unlimited": "decay also without acceptor, where its oxygen demand is not met"
+               }[scene.kinetics.decay]
 
 
 def _growth(scene: Scene) -> Iterator[str]:
@@ -103,6 +119,11 @@ def _growth(scene: Scene) -> Iterator[str]:
            "biomass, (14)-(29)")
     yield f"films under {growth.minimum_film:g} um close (2.3.3)"
     yield f"fluid forces {growth.fluid_forces}"
+    yield f"the lower wall {growth.wall}"
+    for key in ("bonding_strength", "tensile_strength"):
+        strength = getattr(growth, key)
+        if strength is not None:
+            yield f"{key.replace('_', ' ')} {strength:g} MPa"
     yield {"stressed": "strain since t = 0",
            "stress_free": "new biomass without stress (section 5)"}[growth.new_biomass]
 

@@ -103,8 +103,8 @@ def at_end(scene: Scene) -> Sizes:
 
 def fastest_growth(scene: Scene) -> float:
     """F3 / X_A (1/h) at the concentrations of the supply (9)."""
-    supply = (scene.substrates.acceptor.supply, scene.substrates.donor.supply)
-    return float(rate_law(scene.substrates, scene.kinetics).growth_rate(*supply))
+    supplies = [kind.supply for kind in scene.substrates.modelled.values()]
+    return float(rate_law(scene.substrates, scene.kinetics).growth_rate(*supplies))
 
 
 @dataclass(frozen=True)
@@ -141,16 +141,16 @@ class Uptake:
 
 
 def uptakes(scene: Scene) -> Iterator[Uptake]:
-    """Uptake of acceptor and donor, (7)-(8)."""
-    both = scene.substrates
-    rates = rate_law(both, scene.kinetics)
-    of_acceptor, of_donor = rates.both
-    density = scene.kinetics.maximum_density
-    largest_acceptor = of_acceptor.largest(both.acceptor.supply)
-    largest_donor = of_donor.largest(both.donor.supply)
-    rate = rates.per_acceptor(largest_donor) * density
-    yield Uptake("acceptor", both.acceptor, of_acceptor, rate)
-    yield Uptake("donor", both.donor, of_donor, rates.per_donor(largest_acceptor) * density)
+    """Uptake of the modelled substrates, (7)-(8)."""
+    kinds = scene.substrates.modelled
+    rates = rate_law(scene.substrates, scene.kinetics)
+    laws = dict(zip(kinds, rates.both))
+    largest = {name: laws[name].largest(kind.supply) for name, kind in kinds.items()}
+    per_fraction = {"acceptor": rates.per_acceptor(largest.get("donor", 1.0)),
+                    "donor": rates.per_donor(largest.get("acceptor", 1.0))}
+    for name, kind in kinds.items():
+        rate = per_fraction[name] * scene.kinetics.maximum_density
+        yield Uptake(name, kind, laws[name], rate)
 
 
 def depth(scene: Scene) -> float:
@@ -213,8 +213,7 @@ def evaluate_at_largest(scene: Scene, velocity: float | None) -> tuple[Scene, li
 
 
 def _transported(scene: Scene, speed: float) -> Iterator[Number]:
-    kinds = {"acceptor": scene.substrates.acceptor, "donor": scene.substrates.donor}
-    for name, substrate in kinds.items():
+    for name, substrate in scene.substrates.modelled.items():
         value = speed * scene.pore.width / substrate.diffusivity
         yield Number(f"Peclet, {name}", value, None, "u W / D, D in water")
     yield Number("cell Peclet", 1.5 * speed * sized(scene).largest / slowest(scene), None,
@@ -223,8 +222,8 @@ def _transported(scene: Scene, speed: float) -> Iterator[Number]:
 
 def slowest(scene: Scene) -> float:
     """The smallest diffusivity (um2/h)."""
-    kinds = (scene.substrates.acceptor, scene.substrates.donor)
-    return min(min(s.diffusivity, s.diffusivity_in_aggregate) for s in kinds)
+    return min(min(kind.diffusivity, kind.diffusivity_in_aggregate)
+               for kind in scene.substrates.modelled.values())
 
 
 def _taken_up(scene: Scene, speed: float | None) -> Iterator[Number]:

@@ -91,8 +91,8 @@ def _cells(scene: Scene, value: dict[str, float]) -> Iterator[Caveat]:
 
 def _diffusivities(scene: Scene) -> Iterator[Caveat]:
     """Warn if only one of two related values of Table 1 is changed."""
-    for name in ("acceptor", "donor") if scene.substrates and scene.aggregate else ():
-        substrate = getattr(scene.substrates, name)
+    kinds = scene.substrates.modelled if scene.substrates and scene.aggregate else {}
+    for name, substrate in kinds.items():
         table = type(substrate)(supply=substrate.supply)
         inside = substrate.diffusivity_in_aggregate
         if substrate.diffusivity != table.diffusivity and inside == table.diffusivity_in_aggregate:
@@ -250,7 +250,7 @@ def _fold(scene: Scene, value: dict[str, float]) -> Iterator[Caveat]:
                      f"supply reaches {numbers.depth(scene):.3g} um into an aggregate of up to "
                      f"{numbers.at_end(scene).thickness:.3g} um, so that its rim may compress "
                      f"itself to an elastic stretch of {stretch:.2f} or less (estimate, "
-                     "docs/scope.md)")
+                     "`repro docs scope`)")
 
 
 def warn_crease(pore: Pore) -> Iterator[Caveat]:

@@ -13,7 +13,7 @@ from repro.results import names
 #: The physics of each section of a scene.
 PHYSICS = {
     "flow": "Stokes flow through pore and aggregate (2.1)",
-    "substrates": "two substrates, an electron acceptor and a donor (2.2)",
+    "substrates": "electron acceptor and donor, or one of them (2.2)",
     "aggregate": "an aggregate of biomass on the lower wall",
     "kinetics": "uptake, growth and decay (2.2)",
     "growth": "growth of the aggregate as a neo-Hookean body (2.3)",

@@ -8,7 +8,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from repro.model import flow, growth
+from repro.model import adhesion, flow, growth
 from repro.model.pore import Pore, Solved
 from repro.model.surface import STRETCH, surface
 from repro.results.field_files import Grid
@@ -33,10 +33,7 @@ class State:
     @cached_property
     def stress(self) -> np.ndarray:
         """(t, q, 4) MPa, components xx, yy, zz, xy in the same points."""
-        mesh = self.pore.mesh
-        linear = self.pore.body.shape.table.linear
-        pressure = self.pore.pressure[mesh.triangles[mesh.biomass]] @ linear.T
-        return self.scene.growth.shear_modulus * growth.cauchy(self.strained.F, pressure)
+        return adhesion.stress(self.scene, self.pore)
 
     def mean(self, value: np.ndarray) -> np.ndarray:
         """(t,) means of values (t, q) over each of the aggregate's triangles at t = 0."""
@@ -44,10 +41,15 @@ class State:
         return (value * dx).sum(axis=1) / dx.sum(axis=1)
 
 
+def _has(name: str, state: State) -> bool:
+    return getattr(state.solved.concentrations, name, None) is not None
+
+
 #: Parts that an array may need: does a state have them?
 NEEDS: dict[str, Callable[[State], bool]] = {
     "flow": lambda state: state.solved.flow is not None,
-    "substrates": lambda state: state.solved.concentrations is not None,
+    "acceptor": lambda state: _has("acceptor", state),
+    "donor": lambda state: _has("donor", state),
     "biomass": lambda state: state.scene.kinetics is not None,
     "growth": lambda state: state.scene.growth is not None,
     "stress": lambda state: bool(state.scene.growth)
@@ -148,7 +150,7 @@ ARRAYS = (
     Array("head_cm", "head", "phi (1)-(5), zero in the mean over the outlet of the meshed part",
           _head, needs="flow", signed=True),
     *(Array(f"{name}_mg_per_L", name, "C (7)-(13)", partial(_concentration, name),
-            needs="substrates", signed=True) for name in ("acceptor", "donor")),
+            needs=name, signed=True) for name in ("acceptor", "donor")),
     Array("active_biomass", "active biomass over X_m", f"X_A / X_m: {_FITTED}; zero in the fluid",
           partial(_density, "active"), needs="biomass", signed=True),
     Array("inert_biomass", "inert biomass over X_m", f"X_I / X_m: {_FITTED}; zero in the fluid",

@@ -8,25 +8,39 @@ from functools import partial
 from repro.march import balance
 from repro.march.balance import Ledger
 from repro.march.loop import Report
+from repro.model import adhesion
 from repro.model.surface import BESIDE, BIOT, CREASE, STRETCH, surface
 from repro.results.quantities import Quantity, is_modelled
-from repro.scene import Scene
+from repro.scene import Growth, Scene
 
 SUBSTRATES = ("acceptor", "donor")
 #: Parts that a quantity may need: does a report have them?
 NEEDS: dict[str, Callable[[Scene, Report], bool]] = {
     "flow": lambda scene, at: at.solved.flow is not None,
-    "substrates": lambda scene, at: at.solved.concentrations is not None,
+    "acceptor": lambda scene, at: _solved("acceptor", at),
+    "donor": lambda scene, at: _solved("donor", at),
     "aggregate": lambda scene, at: at.pore.outline is not None,
     "biomass": lambda scene, at: at.pore.outline is not None and scene.kinetics is not None,
-    "growth": lambda scene, at: at.pore.outline is not None and scene.growth is not None}
+    "growth": lambda scene, at: at.pore.outline is not None and scene.growth is not None,
+    "adhesion": lambda scene, at: scene.growth is not None and _has_adhesion(scene.growth)}
+
+
+def _has_adhesion(growth: Growth) -> bool:
+    """Does a scene ask for what keeps the aggregate on its walls? Strain counts from t = 0."""
+    requested = (growth.wall == "bonded", growth.fluid_forces == "included",
+             growth.bonding_strength is not None, growth.tensile_strength is not None)
+    return any(requested) and growth.new_biomass == "stressed"
 
 
 def _both(pattern: str, words: str, formula: str, value: Callable,
           signed: bool = True) -> list[Quantity]:
     """A quantity for each of acceptor and donor, whose names replace {} in the texts."""
     return [Quantity(pattern.format(name), words.format(name), formula, partial(value, k), name,
-                     "substrates", signed=signed) for k, name in enumerate(SUBSTRATES)]
+                     name, signed=signed) for k, name in enumerate(SUBSTRATES)]
+
+
+def _solved(name: str, at: Report) -> bool:
+    return getattr(at.solved.concentrations, name, None) is not None
 
 
 def _least(k: int, scene: Scene, at: Report) -> float:
@@ -35,7 +49,7 @@ def _least(k: int, scene: Scene, at: Report) -> float:
 
 def _overshoot(k: int, scene: Scene, at: Report) -> float:
     """mg/L; with Gear, over the largest supply: the pore may contain water of earlier supplies."""
-    supply = at.solved.problem.both[k].supply
+    supply = getattr(at.solved.problem.substrates, SUBSTRATES[k]).supply
     if scene.numerics.transport == "gear":
         supply = getattr(scene.largest.substrates, SUBSTRATES[k]).supply
     return max(0.0, float(getattr(at.solved.concentrations, SUBSTRATES[k]).max()) - supply)
@@ -51,7 +65,8 @@ def _substrate_balance(k: int, scene: Scene, at: Report) -> float:
     instant."""
     gear = scene.numerics.transport == "gear"
     problem = at.solved.problem
-    room = problem.both[k].supply * float(problem.space.at.dx.sum()) if gear else 0.0
+    supply = getattr(problem.substrates, SUBSTRATES[k]).supply
+    room = supply * float(problem.space.at.dx.sum()) if gear else 0.0
     largest = getattr(scene.largest.substrates, SUBSTRATES[k]).supply
     floor = balance.floor(problem, k, largest)
     defects = [balance.substrate(ledger, k, max(room, floor * (ledger.end - ledger.start)))
@@ -65,6 +80,20 @@ def _substrate_balance(k: int, scene: Scene, at: Report) -> float:
 def _of_steps(defect: Callable[[Ledger], float], at: Report) -> float:
     """The worst defect of the steps since the last row."""
     return _worst([defect(ledger) for ledger in at.ledgers])
+
+
+def _peak(name: str, words: str, formula: str, label: str, peak: Callable) -> list[Quantity]:
+    """The largest mean of a stress, and its place."""
+    return [Quantity(f"{name}_MPa", words, formula, lambda scene, at: peak(scene, at).value, label,
+                     "adhesion", signed=True),
+            *(Quantity(f"{name}_{axis}_um", f"place of the {words}, {axis}",
+                       f"middle of the mean that is the {words}",
+                       lambda scene, at, axis=axis: getattr(peak(scene, at), axis),
+                       f"{axis} of {label}", "adhesion", signed=axis == "x") for axis in "xy")]
+
+
+def _load(part: str, scene: Scene, at: Report) -> float:
+    return getattr(adhesion.fluid_load(scene, at.pore, at.solved), part)
 
 
 def _composition(index: int, scene: Scene, at: Report) -> float:
@@ -139,6 +168,22 @@ SERIES = (
                "middle of the edge with the least elastic stretch along the free surface",
                lambda scene, at, k=k: surface(at.pore).place[k], f"{axis} of least stretch",
                "growth", signed=True) for k, axis in enumerate("xy")),
+    *_peak("wall_traction_max", "largest traction that a wall must bear",
+           "largest (max(pull, 0)^2 + shear^2)^(1/2), means over W / 20 along the contact surface",
+           "wall traction",
+           lambda scene, at: adhesion.wall_peak(scene, at.pore, at.solved)),
+    *_peak("tensile_stress_max", "largest tensile stress of the aggregate",
+           "largest eigenvalue of the Cauchy stress, in the mean over the triangles whose middles "
+           "are within W / 20 of one", "tensile stress",
+           lambda scene, at: adhesion.tensile_peak(scene, at.pore)),
+    *(Quantity(f"fluid_force_{axis}_uN_per_m", f"force of the fluid on the aggregate, {axis}",
+               "integral of the water's stress over the interface, or of its drag over a permeable "
+               "aggregate; the head is zero at the outlet of the meshed part",
+               partial(_load, axis), f"force {axis}", "adhesion and flow", signed=True)
+      for axis in "xy"),
+    Quantity("fluid_moment_nN", "moment of the fluid on the aggregate, per depth",
+             "integral of x f_y - y f_x, x from the middle of the contact with the lower wall",
+             partial(_load, "moment"), "moment", "adhesion and flow", signed=True),
     Quantity("nodes", "nodes of the mesh", "corners, and middles of the sides of curved triangles",
              lambda scene, at: len(at.pore.mesh.points), "nodes"),
     Quantity("remeshed", "mesh made anew", "1 where a step since the last row made a new mesh",
@@ -153,7 +198,9 @@ PARTS = {"supplied": ("supplied", "supply times the flow through the inlet, over
          "out": ("leaving", "integral of u_x C over the outlet, over the step"),
          "consumed": ("taken up", "uptake (7)-(8) over the aggregate and the step"),
          "stored": ("stored", "what the meshed part holds more at the step's end; zero where "
-                              "substrates are quasi-steady")}
+                              "substrates are quasi-steady"),
+         "unmet": ("unmet", "demand of decay without acceptor over the aggregate and the step, "
+                            "with kinetics.decay = unlimited; else zero")}
 
 #: Columns of ``ledger.csv``: value takes the scene and a Ledger. Per metre of depth, 1 um2 mg/L is
 #: 1 pg/m.
@@ -161,7 +208,7 @@ LEDGER = (
     Quantity("start_h", "start of the step", "t", lambda scene, step: step.start),
     Quantity("end_h", "end of the step", "t", lambda scene, step: step.end),
     *(Quantity(f"{name}_{part}_pg_per_m", f"{name} {label}", formula,
-               lambda scene, step, part=part, k=k: getattr(step, part)[k], label,
+               lambda scene, step, part=part, k=k: getattr(step, part)[k], label, name,
                signed=True)
       for k, name in enumerate(SUBSTRATES) for part, (label, formula) in PARTS.items()),
     Quantity("biomass_before_pg_per_m", "biomass at the step's start",
@@ -180,6 +227,9 @@ LEDGER = (
 )
 
 COLUMNS = [each.name for each in SERIES]
+#: Parts that a column of a ledger may need: does a scene have them?
+LEDGER_NEEDS: dict[str, Callable[..., bool]] = {
+    name: lambda scene, name=name: name in scene.substrates.modelled for name in SUBSTRATES}
 LEDGER_COLUMNS = [each.name for each in LEDGER]
 
 
@@ -189,6 +239,7 @@ def row(scene: Scene, instant: Report) -> dict[str, float | None]:
             if is_modelled(each, NEEDS, scene, instant) else None for each in SERIES}
 
 
-def ledger_row(scene: Scene, ledger: Ledger) -> list[float]:
+def ledger_row(scene: Scene, ledger: Ledger) -> list[float | None]:
     """One row of ``ledger.csv``: a step's balances per metre of depth."""
-    return [each.reported(scene, ledger) for each in LEDGER]
+    return [each.reported(scene, ledger) if is_modelled(each, LEDGER_NEEDS, scene) else None
+            for each in LEDGER]

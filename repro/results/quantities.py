@@ -43,7 +43,8 @@ UNITS = {"_m_per_d": Unit("m d-1", "m/day", 24e-6), "_mg_per_L": Unit("mg L-1", 
          "_pg_per_m": Unit("pg m-1", "pg/m"), "_ug_per_m": Unit("ug m-1", "ug/m", 1e-6),
          "_ug_per_m_per_h": Unit("ug m-1 h-1", "ug/m/h", 1e-6), "_um2": Unit("um2", "um²"),
          "_um": Unit("um", "um"), "_cm": Unit("cm", "cm", 1e-4), "_h": Unit("h", "h"),
-         "_s": Unit("s", "s"), "_MPa": Unit("MPa", "MPa")}
+         "_s": Unit("s", "s"), "_MPa": Unit("MPa", "MPa"),
+         "_uN_per_m": Unit("uN m-1", "uN/m", 1e6), "_nN": Unit("nN", "nN", 1e3)}
 PURE = Unit("1", "")
 
 

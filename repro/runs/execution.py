@@ -18,6 +18,7 @@ from repro import results, timing
 from repro.errors import CheckpointError, Interrupted, OutputError, RunEnd, SimulationError
 from repro.march.loop import Report, RestartState
 from repro.march.simulation import ends_soon, same_rows, steps
+from repro.polling import polling
 from repro.preflight import simplifications
 from repro.preflight.memory import require_memory, require_outline
 from repro.preflight.numbers import evaluate_at_largest
@@ -84,13 +85,15 @@ class Watch:
     """How a run reports and when it stops.
 
     tell: receives each event; interval: wall time (s) between checkpoints; stop: returns the number
-    of a signal that asks the run to stop, or 0; patience: how long (s) to wait for another process
-    that uses the folder.
+    of a signal that asks the run to stop after a step, or 0; stop_within: the same, for a stop
+    within a step, whose work is lost; patience: how long (s) to wait for another process that uses
+    the folder.
     """
 
     tell: Callable[[dict], None] = issue_warnings
     interval: float = INTERVAL
     stop: Callable[[], int] = lambda: 0
+    stop_within: Callable[[], int] = lambda: 0
     patience: float = 0.0
 
     def warn(self, message: str) -> None:
@@ -383,8 +386,13 @@ def _finish(recorder: Recorder, status: str, watch: Watch) -> str:
 def _simulate(recorder: Recorder, run_steps: ReportedSteps, progress: Progress,
               watch: Watch) -> str:
     """Record every step from the recorder's state on; return how the run ended."""
+    def check() -> None:
+        if recorder.state and (number := watch.stop_within()):
+            raise interruption(recorder, number)
+
     try:
-        _record_steps(recorder, run_steps, progress, watch)
+        with polling(check):
+            _record_steps(recorder, run_steps, progress, watch)
     except RunEnd as end:
         if not recorder.has_last_state:
             recorder.save_last_state()

@@ -24,6 +24,8 @@ from repro.scene import Scene, scene_hash
 #: Arrays of the mesh and of the pore, by the names of their fields.
 OF_MESH = ("points", "cells", "biomass", "loop")
 OF_PORE = ("wall", "fixed", "active", "inert", "theta", "pressure")
+#: Arrays of the pore that may be absent.
+OPTIONAL = ("last", "line_speeds")
 #: Arrays of the concentrations from which Newton's method starts.
 OF_GUESS = ("acceptor", "donor")
 
@@ -37,8 +39,11 @@ def pack_state(scene: Scene, state: RestartState) -> tuple[dict, Arrays]:
     arrays["reference"] = pore.body.reference
     if pore.last is not None:
         arrays["last"] = pore.last
+    if pore.line_speeds is not None:
+        arrays["line_speeds"] = pore.line_speeds
     if guess:
-        arrays |= {name: getattr(guess, name) for name in OF_GUESS}
+        fields = {name: getattr(guess, name) for name in OF_GUESS}
+        arrays |= {name: field for name, field in fields.items() if field is not None}
     plain = {"scene": scene_hash(scene), "time_h": pore.time, "pace": asdict(state.step_control),
              "ends_um": [float(x) for x in pore.mesh.ends], "front": float(pore.front),
              "guess": guess.iterations if guess else None, "remeshes": int(state.remeshes),
@@ -72,7 +77,9 @@ def _pore(scene: Scene, plain: dict, arrays: Arrays) -> Pore:
     space = Space(mesh, numerics.order)
     guess = None
     if plain["guess"] is not None:
-        guess = Concentrations(arrays["acceptor"], arrays["donor"], plain["guess"])
+        acceptor, donor = map(arrays.get, OF_GUESS)
+        guess = Concentrations(acceptor, donor, plain["guess"])
     return Pore(time=plain["time_h"], space=space, body=material(space, arrays["reference"]),
-                concentrations=guess, front=plain["front"], last=arrays.get("last"),
-                **{name: arrays[name] for name in OF_PORE})
+                concentrations=guess, front=plain["front"],
+                **{name: arrays[name] for name in OF_PORE},
+                **{name: arrays.get(name) for name in OPTIONAL})

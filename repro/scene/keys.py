@@ -17,7 +17,7 @@ from fractions import Fraction
 from functools import cached_property
 from math import inf
 from pathlib import Path
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
 from repro.scene.arguments import typed
 from repro.scene.files import key_of, leave_out, override, packaged_scenes, read_tables
@@ -198,28 +198,53 @@ class Acceptor(Substrate):
 
 @dataclass(frozen=True, kw_only=True)
 class Donor(Substrate):
-    """The electron donor, phenol: C_D, K_sD, D_D."""
+    """The electron donor, phenol: C_D, K_sD, D_D; K_i (mg/L) of Haldane's law."""
 
     diffusivity: float = quantity(
         "1.01 cm^2/day", "um^2/h", about="D_D in water", source="(8), Table 1")
     diffusivity_in_aggregate: float = share(
         "0.81 cm^2/day", "um^2/h", "diffusivity", about="D_D in the aggregate",
         source="2.2 (80 % of that in water), Table 1")
+    inhibition_constant: float = quantity(
+        "100 mg/L", "mg/L", about="K_i of Haldane's law, with kinetics.law = \"Haldane\"",
+        source=NOT_IN_PAPER)
 
 
 @dataclass(frozen=True)
 class Substrates:
     """Section 2.2, (7)-(8).
 
-    `boundary`: without flow the pore's ends hold the supply, or let nothing pass.
+    `acceptor`, `donor`: both by default; with one of them alone the other is None, and does not
+    limit. `boundary`: without flow the pore's ends hold the supply, or let nothing pass.
     """
 
-    acceptor: Substrate = section(
-        Acceptor, about="The electron acceptor, oxygen", source="(7), Table 1")
-    donor: Substrate = section(Donor, about="The electron donor, phenol", source="(8), Table 1")
+    acceptor: Acceptor | None = section(
+        Acceptor, default=None, source="(7), Table 1",
+        about="The electron acceptor, oxygen; left out beside [substrates.donor]: it does not "
+              "limit")
+    donor: Donor | None = section(
+        Donor, default=None, source="(8), Table 1",
+        about="The electron donor, phenol; left out beside [substrates.acceptor]: it does not "
+              "limit")
     boundary: str = choice(
         "open", "closed", source=NOT_IN_PAPER,
         about="Without [flow] the pore's ends hold the supply, or let nothing pass")
+
+    def __post_init__(self):
+        if self.acceptor is None and self.donor is None:
+            object.__setattr__(self, "acceptor", Acceptor())
+            object.__setattr__(self, "donor", Donor())
+
+    @property
+    def modelled(self) -> dict[str, Substrate]:
+        """The substrates by their names, the acceptor first."""
+        pair = {"acceptor": self.acceptor, "donor": self.donor}
+        return {name: substrate for name, substrate in pair.items() if substrate is not None}
+
+    @property
+    def places(self) -> slice:
+        """The places of the substrates in (acceptor, donor)."""
+        return slice(int(self.acceptor is None), 1 + int(self.donor is not None))
 
 
 @dataclass(frozen=True)
@@ -229,8 +254,14 @@ class Kinetics:
     Rates are in 1/h, the density in mg/L, the others in mg/mg. `law` names the law of uptake.
     """
 
-    law: ClassVar[str] = "dual Monod"
-
+    law: str = choice(
+        "dual Monod", "Haldane", "first order", "zero order", source="(7)-(10) have dual Monod",
+        about="m of each substrate: C / (C + K_s); for the donor C / (K_s + C + C^2 / K_i); "
+              "C / K_s; or 1 where there is any (K_s over 100000)")
+    decay: str = choice(
+        "with acceptor", "unlimited", source="(9)-(10) have m_A",
+        about="Decay in proportion to m_A, none without acceptor; or b everywhere, whose oxygen "
+              "demand is met in proportion to m_A")
     maximum_utilization_rate: float = quantity(
         "9.3 1/day", "1/h", NON_NEGATIVE, source="(7)-(9), Table 1",
         about="k, mg of donor per mg of active biomass and time")
@@ -290,8 +321,19 @@ class Growth:
         "2 um", "um", source="2.3.3, Table 1",
         about="A film of fluid to the opposite wall closes when it is thinner than this")
     fluid_forces: str = choice(
-        "neglected", "included", about="The fluid's traction on the aggregate",
-        source="(20), (22), 2.3.3")
+        "neglected", "included", source="(20), (22), 2.3.3; section 5",
+        about="The fluid's traction on the aggregate, or its drag within a permeable one")
+    wall: str = choice(
+        "sliding", "bonded", source="2.3.3",
+        about="What touches the lower wall slides along it, or stays where it has touched it")
+    bonding_strength: float | None = quantity(
+        "1e-3 MPa", "MPa", default=None, source="Section 5, without a value",
+        about="The run ends if a wall must bear more to keep the aggregate, in the mean over "
+              "pore.width / 20")
+    tensile_strength: float | None = quantity(
+        "0.01 MPa", "MPa", default=None, source="Section 5, without a value",
+        about="The run ends if the largest tensile stress exceeds it, in the mean within "
+              "pore.width / 20")
     new_biomass: str = choice(
         "stressed", "stress_free", source="2.3, section 5",
         about="Strain counts from t = 0 (2.3), or new biomass is born without (section 5)")
@@ -523,9 +565,11 @@ class Scene:
 LATER: dict[str, dict[str, object]] = {
     "aggregate": {"position": "0.0 um", "smooth": False, "inert_fraction": 0.0},
     "flow": {"interpolation": "steps", "biomass": "viscous"},
+    "growth": {"wall": "sliding"},
     "numerics": {"contact_elements": 0.0},
     "substrates.acceptor": {"interpolation": "steps"},
-    "substrates.donor": {"interpolation": "steps"},
+    "substrates.donor": {"interpolation": "steps", "inhibition_constant": "100.0 mg/L"},
+    "kinetics": {"law": "dual Monod", "decay": "with acceptor"},
 }
 #: A scene, or its source: a file, a packaged name, a dict of tables.
 Source = Scene | str | Path | dict
@@ -626,16 +670,10 @@ def _within(key: str, section: str) -> bool:
 
 
 def _refuse_missing(tables: dict, file: str) -> None:
-    """Raise SceneError if there is no section, or one substrate without the other."""
+    """Raise SceneError if there is no section."""
     if not tables:
         sections = ", ".join(f"[{key}]" for key in entries(Scene))
         raise SceneError(f"{file}: an empty scene: one section or more is needed of {sections}")
-    substrates = tables.get("substrates")
-    for key, other in (("acceptor", "donor"), ("donor", "acceptor")):
-        if isinstance(substrates, dict) and other in substrates and key not in substrates:
-            requirement = (f"it is needed beside substrates.{other}; one that is not to limit is "
-                      'supplied at many times its half_saturation, such as supply = "1000 mg/L"')
-            raise Place(file, f"substrates.{key}").refuse(MISSING, requirement)
 
 
 def _with_preset(tables: dict) -> dict:

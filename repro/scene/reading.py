@@ -10,11 +10,11 @@ from dataclasses import MISSING, Field, dataclass, fields, replace
 from repro.scene.units import Refused, SceneError, nearest, unlike
 
 LONGEST_KEY = 60  # characters of a key in a message
-SCOPE = "docs/scope.md"
+SCOPE = "`repro docs scope`"
 #: Words in the keys of other models.
 NOT_MODELLED = frozenset({
     "attachment", "detachment", "erosion", "sloughing", "depth", "dimension", "dimensions",
-    "inhibition", "temperature",
+    "temperature",
 })
 
 

@@ -7,7 +7,16 @@ from typing import TYPE_CHECKING
 from repro.scene.time_table import TimeTable
 
 if TYPE_CHECKING:
-    from repro.scene import Aggregate, Flow, Kinetics, Pore, Scene, Substrate
+    from repro.scene import (
+        Aggregate,
+        Flow,
+        Growth,
+        Kinetics,
+        Pore,
+        Scene,
+        Substrate,
+        Substrates,
+    )
 
 _NO_STATE = "nothing is supplied, so that no state is steady"
 _UNSTEADY = f', or numerics.transport = "gear": {_NO_STATE}'
@@ -15,6 +24,7 @@ MOST_STEPS = 100_000  # shape updates of a run
 SHORTEST_STEP = 1e-6  # h: times closer than 1e-9 h are equal
 FINEST = 1e-3  # of the width: the smallest seed, edge of an outline, and gap between two edges
 NEAREST = 1e-4  # of the width: from a point of an outline to a wall that it does not touch
+INHIBITION = 100.0  # mg/L: the default of K_i
 TIGHTEST = 1e-11  # of the square of the width: the smallest permeability
 #: Options that only linear elements have, and their values for all others.
 HIGHER_ORDER = {"transfer": "conserving", "flow_element": "stabilised"}
@@ -233,11 +243,6 @@ def _biomass_rules(scene: "Scene", drive: "Flow") -> Rules:
         "numerics.elements": requirement,
         "numerics.preset": f'numerics.elements = {requirement}',
     }
-    forces = scene.growth is not None and scene.growth.fluid_forces == "included"
-    yield drag and forces, {
-        "growth.fluid_forces": '"neglected" is needed with flow.biomass = "brinkman"',
-        "flow.biomass": '"viscous" is needed with growth.fluid_forces = "included"',
-    }
 
 
 def _in_words(value: Driven, unit: str, factor: float = 1.0) -> str:
@@ -254,11 +259,9 @@ def _table_rules(section: str, part: "Flow | Substrate", values: tuple[Driven, .
 
 
 def _boundary_rules(scene: "Scene") -> Rules:
-    for name in ("acceptor", "donor"):
-        inside = getattr(scene.substrates, name).diffusivity_in_aggregate
+    for name, part in scene.substrates.modelled.items():
         key = f"substrates.{name}.diffusivity_in_aggregate"
-        yield inside <= 0, {key: "greater than zero is needed"}
-        part = getattr(scene.substrates, name)
+        yield part.diffusivity_in_aggregate <= 0, {key: "greater than zero is needed"}
         yield from _table_rules(f"substrates.{name}", part, (part.supply,))
     closed = scene.substrates.boundary == "closed"
     yield closed and scene.flow is not None, {
@@ -278,8 +281,10 @@ def _growth_rules(scene: "Scene") -> Rules:
     yield alone and scene.growth is not None, {"growth": requirement}
     if scene.kinetics:
         yield from _demand_rules(scene.kinetics)
+        yield from _law_rules(scene.kinetics.law, scene.substrates)
     if scene.growth:
         yield from _step_rules(scene.growth.end, scene.growth.time_step)
+        yield from _strength_rules(scene.growth)
     if scene.growth and scene.growth.fluid_forces == "included":
         yield from _force_rules(scene)
     film = scene.growth.minimum_film if scene.growth else 0.0
@@ -301,12 +306,43 @@ def _demand_rules(law: "Kinetics") -> Rules:
     }
 
 
+def _law_rules(law: str, substrates: "Substrates") -> Rules:
+    donor = substrates.donor
+    yield law == "Haldane" and donor is None, {
+        "kinetics.law": '[substrates.donor], which inhibits, is needed with "Haldane"',
+        "substrates.acceptor": '[substrates.donor] is needed with kinetics.law = "Haldane"',
+    }
+    changed = donor is not None and donor.inhibition_constant != INHIBITION
+    yield law != "Haldane" and changed, {
+        "substrates.donor.inhibition_constant": 'kinetics.law = "Haldane" is needed with it',
+        "kinetics.law": '"Haldane" is needed with substrates.donor.inhibition_constant',
+    }
+    for name, part in substrates.modelled.items():
+        largest = part.supply.largest if isinstance(part.supply, TimeTable) else part.supply
+        yield law == "zero order" and 0 < largest < part.half_saturation, {
+            f"substrates.{name}.half_saturation": f"at most the supply ({largest:g} mg/L) is "
+                                                  'needed with kinetics.law = "zero order"',
+            f"substrates.{name}.supply": f"half_saturation ({part.half_saturation:g} mg/L) or "
+                                         'more is needed with kinetics.law = "zero order"',
+        }
+
+
 def _step_rules(end: float, step: float) -> Rules:
     yield step < SHORTEST_STEP, {"growth.time_step": f"{SHORTEST_STEP:g} h or more is needed"}
     yield end > MOST_STEPS * step, {
         "growth.time_step": f"growth.end ({end:g} h) over {MOST_STEPS} or more is needed",
         "growth.end": f"at most {MOST_STEPS} times growth.time_step ({step:g} h) is needed",
     }
+
+
+def _strength_rules(growth: "Growth") -> Rules:
+    for key in ("bonding_strength", "tensile_strength"):
+        strength = getattr(growth, key)
+        yield strength is not None and growth.new_biomass == "stress_free", {
+            f"growth.{key}": 'growth.new_biomass = "stressed" is needed with it, since the stress '
+                             "counts from t = 0",
+            "growth.new_biomass": f'"stressed" is needed with growth.{key} = {strength} MPa',
+        }
 
 
 def _force_rules(scene: "Scene") -> Rules:

@@ -123,17 +123,24 @@ def wide() -> list[dict]:
 
 SCENES_REPEATS = 31
 FLOW, SUBSTRATES = {"flow": {"head": "1e-3 cm"}}, {"substrates": {}}
-#: Sections of each scene; the stages that it needs, of those that are timed.
-SCENES = {"whole": ({**FLOW, **SUBSTRATES, "growth": {"end": "2.4 h"}}, {"flow", "transport"}),
+GROWTH, CLEAN, DONOR = {"growth": {"end": "2.4 h"}}, {"aggregate": None}, {"substrates": {"donor": {}}}
+#: Sections of each scene, None where it has none; the stages that it needs, of those that are timed.
+SCENES = {"whole": ({**FLOW, **SUBSTRATES, **GROWTH}, {"flow", "transport"}),
           "frozen shape": ({**FLOW, **SUBSTRATES}, {"flow", "transport"}),
-          "flow only": (FLOW, {"flow"}), "transport only": (SUBSTRATES, {"transport"})}
+          "flow only": (FLOW, {"flow"}), "transport only": (SUBSTRATES, {"transport"}),
+          "growth without flow": ({**SUBSTRATES, **GROWTH}, {"transport"}),
+          "one substrate": ({**FLOW, **DONOR, **GROWTH}, {"flow", "transport"}),
+          "one substrate at rest": (DONOR, {"transport"}),
+          "clean channel": ({**CLEAN, **FLOW}, {"flow"}),
+          "clean channel with substrates": ({**CLEAN, **FLOW, **SUBSTRATES}, {"flow", "transport"}),
+          "mesh only": ({}, set())}
 
 
 def scenes_part(quick: bool) -> dict:
     """Time of a first solution, which must contain the stages of the scene alone.
 
-    Base with a seed of 20 um, unchanged, without growth (frozen shape), without flow, and without substrates. The time
-    includes the mesh.
+    Base with a seed of 20 um, unchanged, without growth (frozen shape), and without other parts. The time includes the
+    mesh.
     """
     repeats = 3 if quick else SCENES_REPEATS
     jobs = {(f"preset {preset}", name): partial(first, preset, name) for preset in problems.PRESETS for name in SCENES}
@@ -143,10 +150,16 @@ def scenes_part(quick: bool) -> dict:
             "repeats": repeats}
 
 
+def scene_of(preset: str, sections: dict) -> dict:
+    """Tables of a scene of SCENES in a preset."""
+    tables = {"pore": {"width": "50 um"}, "aggregate": {"radius": "20 um"}, "numerics": {"preset": preset}, **sections}
+    return {name: table for name, table in tables.items() if table is not None}
+
+
 def first(preset: str, name: str) -> dict:
     """Measure the first report of a run of one of SCENES: mesh and solution."""
     sections, needed = SCENES[name]
-    tables = {"pore": {"width": "50 um"}, "aggregate": {"radius": "20 um"}, "numerics": {"preset": preset}, **sections}
+    tables = scene_of(preset, sections)
     timing.reset()
     start = perf_counter()
     next(simulate(tables))

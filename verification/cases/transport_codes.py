@@ -555,7 +555,7 @@ def _constant_supply() -> float:
     acceptor, donor = 400.0, 900.0
     law = kinetics.rate_law(CLOSED, SLOW_LAW)
     growth = law.growth_rate(acceptor, donor)
-    remains = law.inert_rate(acceptor)
+    remains = law.inert_rate(acceptor, donor)
     active, inert = 3e4, 0.0
     for _ in range(600):
         active, inert = kinetics.grow(active, inert, growth, remains, 0.2)

@@ -81,7 +81,7 @@ def _estimate(varied: dict[float, Level], values: dict[Level, float], formal: tu
 Outcome = tuple[Numbers, Finding | None] | str
 
 #: Runs as long as that of wide which a claim makes of its own at each of its levels; C32 reads those of C41.
-RUNS = {"C41": 5.5, "C42": 1, "C43": 1.5}
+RUNS = {"C41": 5.5, "C42": 1, "C43": 1.5, "C53": 4}
 #: The run of base over that of wide, and what a run takes on the largest elements.
 OF_BASE, LEAST = 0.1, 0.15
 

@@ -125,6 +125,7 @@ def stability(body: Supported, factor: float) -> float:
     """Least eigenvalue of B K^-1 B^T + factor C against the pressure's mass matrix, at t = 0 (dense)."""
     n, of = body.corners, stabilised_by(body, factor)
     numbered = np.argsort(of.sparse.order)
+    of.under(np.ones_like(of.strained(body.reference).J), body.reference, body.reference, body.resting)
     matrix = of.sparse.matrix(of.tangent(body.reference, body.resting)).toarray()[np.ix_(numbered, numbered)]
     M = np.zeros((n, n))
     np.add.at(M, (body.cells[:, :, None], body.cells[:, None, :]), mass(areas(body)))

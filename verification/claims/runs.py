@@ -167,7 +167,8 @@ def contact_time(*run: str) -> float:
 def ledger(*run: str) -> Columns:
     """Columns of ``ledger.csv``, of all steps."""
     computed = history(*run)
-    steps = np.array([results.ledger_row(computed.scene, step) for each in computed.instants for step in each.ledgers])
+    steps = np.array([results.ledger_row(computed.scene, step) for each in computed.instants for step in each.ledgers],
+                     dtype=float)
     return dict(zip(results.LEDGER_COLUMNS, steps.T))
 
 

@@ -99,7 +99,7 @@ def electron_defect(law) -> float:
     scene = load_packaged(*BASE)
     weight, acceptor, donor = plotted_biomass()
     present = rate_law(scene.substrates, scene.kinetics)
-    rates = present.growth_rate(acceptor, donor) + present.inert_rate(acceptor)
+    rates = present.growth_rate(acceptor, donor) + present.inert_rate(acceptor, donor)
     oxygen, spent = acceptor_and_donor_uptake(law)
     return 1 + (scene.kinetics.decay_oxygen_demand * weight @ rates - COD * spent) / oxygen
 

@@ -373,8 +373,8 @@ def refine(measure: Callable[..., dict[str, float]], sizes: Iterable[float] | Ma
 
 
 def columns(rows: Sequence[Mapping[str, float]]) -> dict[str, np.ndarray]:
-    """Return {name: (k,)} of rows {name: number}, all of the same names."""
-    return dict(zip(rows[0], np.array([[*row.values()] for row in rows]).T))
+    """Return {name: (k,)} of rows {name: number}, all of the same names; None becomes NaN."""
+    return dict(zip(rows[0], np.array([[*row.values()] for row in rows], dtype=float).T))
 
 
 def _averaged(measure: Callable, size: float, count: int, arguments: tuple) -> dict[str, float]:

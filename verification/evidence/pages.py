@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping
 from itertools import chain, groupby
 from os.path import commonprefix
 
-from verification.evidence import hard_cases, matrix
+from verification.evidence import convergence, hard_cases, matrix
 from verification.evidence.cases import NUMERICS, Case, cases
 from verification.evidence.results import PASSES, Result
 from verification.evidence.writing import REPORT, Block, link, load, markdown, save, table
@@ -37,6 +37,8 @@ def write(results: Iterable[Result]) -> None:
     records = {**load(RECORD, {}), **{result.id: entry(result) for result in complete}}
     save({id: records[id] for id in known if id in records}, RECORD)
     hard_cases.record(complete)
+    for stage, cases_of_stage in studies(recorded()).items():
+        convergence.draw(cases_of_stage, REPORT / f"{stage}.svg")
     for name, text in texts(recorded()).items():
         (REPORT / name).write_text(text, encoding="utf-8")
 
@@ -45,7 +47,16 @@ def entry(result: Result) -> dict:
     """The record of a case: verdict, how many numbers it judged, the errors that stopped variants, and the table."""
     stopped = [f"{label}: {error}" if label else error for label, error in result.errors.items()]
     return {"verdict": result.verdict, "numbers": len(result.measured), "errors": stopped,
-            "table": grouped(hard_cases.lines(result.cells.values()) if result.cells else lines(result))}
+            "table": grouped(hard_cases.lines(result.cells.values()) if result.cells else lines(result)),
+            "studies": convergence.series(result)}
+
+
+def studies(records: Mapping[str, Mapping]) -> dict[str, dict[str, dict]]:
+    """{stage: {case: its series}} of the cases whose records have series."""
+    by_stage = {stage: of_stage(stage, records) for stage in TITLES}
+    series = {stage: {id: record["studies"] for id, record in chosen.items() if record.get("studies")}
+              for stage, chosen in by_stage.items()}
+    return {stage: chosen for stage, chosen in series.items() if chosen}
 
 
 def lines(result: Result) -> list[tuple[str, str, str, bool]]:
@@ -84,9 +95,16 @@ def texts(records: Mapping[str, Mapping]) -> dict[str, str]:
     for stage, title in TITLES.items():
         chosen = of_stage(stage, records)
         articles = [article(cases()[id], record) for id, record in chosen.items()]
-        pages[f"{stage}.md"] = title, [Block("text", summary(chosen.values())), *chain.from_iterable(articles)]
-    written = {name: f"# {title}\n\n{markdown(blocks, 2)}\n" for name, (title, blocks) in pages.items()}
+        head = [Block("text", summary(chosen.values())), *picture(stage, records)]
+        pages[f"{stage}.md"] = title, [*head, *chain.from_iterable(articles)]
+    written = {name: f"# {title}\n\n{markdown(blocks, 2, '.')}\n" for name, (title, blocks) in pages.items()}
     return {**written, "matrix.md": matrix.text()}
+
+
+def picture(stage: str, records: Mapping[str, Mapping]) -> list[Block]:
+    """The picture of convergence of a stage, if cases have series."""
+    caption = "errors against sizes of meshes or steps, a panel a case; dashed: the expected order"
+    return [Block("picture", f"{stage}.svg: {caption}")] if stage in studies(records) else []
 
 
 def of_stage(stage: str, records: Mapping[str, Mapping]) -> dict[str, Mapping]:
@@ -124,8 +142,10 @@ def _index_row(case: Case, record: Mapping) -> tuple:
 
 
 def article(case: Case, record: Mapping) -> list[Block]:
-    """A case: its claim, verdict and norm, and a table of quantities, intervals and their origins."""
-    about = f"**{record['verdict']}**. {case.claim} ({case.kind}). Norm: {case.norm}."
+    """A case: its claim, verdict, norm, references and mutants, and a table of quantities, intervals and origins."""
+    references = f" References: {', '.join(case.references)}." if case.references else ""
+    about = (f"**{record['verdict']}**. {case.claim} ({case.kind}). Norm: {case.norm}.{references} "
+             f"Must fail with: {', '.join(case.mutants)}.")
     stopped = [Block("text", f"Stopped by an error: {error}") for error in record["errors"]]
     head = ("quantities", "expected", "origin", "hold")
     judged = [table(head, record["table"])] if record["table"] else []

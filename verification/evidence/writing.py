@@ -7,6 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import matplotlib
+from matplotlib.figure import Figure
+
 from repro.results import write_text
 from repro.results.files import atomic_path
 
@@ -69,6 +72,12 @@ def save(record: Any, file: Path) -> None:
     file.parent.mkdir(parents=True, exist_ok=True)
     with atomic_path(file) as beside:
         write_text(beside, text + "\n")
+
+
+def saved_figure(figure: Figure, target: Path) -> None:
+    """Save a figure as SVG. The same data give the same bytes."""
+    with matplotlib.rc_context({"svg.hashsalt": "verification", "svg.fonttype": "none"}):
+        figure.savefig(target, format="svg", metadata={"Date": None, "Creator": None})
 
 
 def lines(file: Path) -> list[dict]:

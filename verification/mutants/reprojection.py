@@ -82,8 +82,8 @@ MUTANTS = (
          "np.exp(-speed * before / substrate.diffusivity)"),
         ("diffusivity-of-the-acceptor",
          "Beyond the old inlet the donor spreads with the acceptor's diffusivity.",
-         "(_beyond(field, substrate, x, old.mesh.ends, speed)\n",
-         "(_beyond(field, replace(substrate, diffusivity=both.acceptor.diffusivity), x, old.mesh.ends, speed)\n")),
+         "[_beyond(field, substrate, x, old.mesh.ends, speed)\n",
+         "[_beyond(field, replace(substrate, diffusivity=supplied.acceptor.diffusivity), x, old.mesh.ends, speed)\n")),
     *changes(
         "repro/fem/sizing.py",
         ("extent-kept-too-long",

@@ -20,7 +20,7 @@ import numpy as np
 from repro.fem.assembly import ElementSystem, saddle_system
 from repro.fem.mesh import Mesh
 from repro.fem.space import Space
-from repro.model import flow, transport
+from repro.model import flow, gear, transport
 from repro.model.kinetics import Sink
 from repro.scene import load_scene
 from verification.problems import meshes
@@ -87,20 +87,20 @@ def uniform_masses(space: Space, density: float) -> np.ndarray:
     return density * space.reaction.dx
 
 
-def steady(problem: transport.Problem, density: float) -> transport.Concentrations:
+def steady(problem: transport.Problem, density: float, guess=None) -> transport.Concentrations:
     """Steady concentrations over biomass of a uniform density (mg/L).
 
     Orders 2 and 3 take one more step of Newton's method. The method stops where no row errs by more than 1e-13 of its
     terms. At Peclet 0.1 and little uptake this may be 1e-8 of the supply, more than the error of the mesh.
     """
     sink = Sink(uniform_masses(problem.space, density))
-    concentrations = transport.steady(problem, sink)
+    concentrations = gear.steady(problem, sink, guess)
     if problem.space.order == 1:
         return concentrations
     balance = transport.Balance(problem, sink)
     state = both(concentrations).ravel()
     state = state + problem.system.solve(balance.tangent(state), -balance.residual(state))
-    return transport.Concentrations(*state.reshape(2, -1))
+    return concentrations.with_fields(state.reshape(-1, problem.space.count))
 
 
 def decay_demand(law) -> float:
@@ -136,8 +136,8 @@ def length(space: Space, size: float) -> float:
 
 
 def both(state: transport.Concentrations) -> np.ndarray:
-    """(2, n) C_A and C_D."""
-    return np.stack([state.acceptor, state.donor])
+    """(s, n) C of the modelled substrates: (2, n) C_A and C_D."""
+    return state.fields
 
 
 def in_points(space: Space) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from repro.results import write_json, write_text
 from verification import sensitivity
 from verification.claims import interval
-from verification.evidence.writing import Block, markdown, table
+from verification.evidence.writing import Block, markdown, saved_figure, table
 from verification.sensitivity import rounding, wide
 from verification.sensitivity.rounding import INPUTS, ROUNDED, Input, Runs, load_varied
 
@@ -46,12 +46,6 @@ def write(record: dict, target: Path = TARGET, outlines: Path = OUTLINES) -> Non
     of_supplies(record["supplies"], outlines)
 
 
-def _saved(figure: Figure, target: Path) -> None:
-    """Save a figure; the same record gives the same bytes."""
-    with matplotlib.rc_context({"svg.hashsalt": "sensitivity", "svg.fonttype": "none"}):
-        figure.savefig(target, format="svg", metadata={"Date": None, "Creator": None})
-
-
 def of_supplies(by_supply: dict[str, dict], target: Path) -> None:
     """Draw the outlines of wide every 5 h, one supply per row, the latest at the back."""
     figure = Figure(figsize=(9, 1.7 * len(by_supply)), layout="constrained")
@@ -65,7 +59,7 @@ def of_supplies(by_supply: dict[str, dict], target: Path) -> None:
         axes.set_title(f"{supply} K_s: every 5 h to {last:g} h; contact at {known['contact_time']:.1f} h", loc="left",
                        fontsize=10)
     axes.set_xlabel("x (um); the fluid comes from the left")
-    _saved(figure, target)
+    saved_figure(figure, target)
 
 
 def _places(text: str) -> np.ndarray:
@@ -90,7 +84,7 @@ def tornado(record: dict, target: Path) -> None:
             _bars(axes, name, value, resolved)
     figure.suptitle("Half a unit of the last printed digit of an input: upwards (orange), downwards (blue); hatched: "
                     "not resolved", fontsize=10)
-    _saved(figure, target)
+    saved_figure(figure, target)
 
 
 def _bars(axes: Axes, name: str, value: float, resolved: bool) -> None:

@@ -1,0 +1,56 @@
+"""Detachment of the aggregate (section 5): an end of the model, not a failure.
+
+See :mod:`repro.model.adhesion`. The state at the end of a step is tested, and the run ends with it:
+the model has no law for what happens to pieces that come off.
+"""
+
+from __future__ import annotations
+
+from repro.errors import RunEnd
+from repro.model import adhesion
+from repro.model.adhesion import Peak
+from repro.model.pore import Pore, Solved
+from repro.scene import Scene
+
+
+class Detachment(RunEnd):
+    """The aggregate detaches from a wall, or tears.
+
+    :func:`repro.simulate` raises it after the last Report. It is an end of the model, not a
+    failure: the message names the time (h), the place (um), the stress there and the strength that
+    it exceeds. It needs ``growth.bonding_strength`` or ``growth.tensile_strength``.
+
+    Examples
+    --------
+    >>> import repro
+    >>> changes = ["growth.wall=bonded", 'growth.bonding_strength="1 kPa"', "numerics.preset=fast"]
+    >>> reports = repro.simulate(repro.load_scene("base", changes))
+    >>> try:
+    ...     times = [report.pore.time for report in reports]
+    ... except repro.Detachment as end:
+    ...     print(str(end)[:25])
+    the aggregate detaches at
+    """
+
+
+def detachment(scene: Scene, pore: Pore, solved: Solved) -> Detachment | None:
+    """The Detachment of a pore at the end of a step; None if its bonds and its biomass last."""
+    growth = scene.growing.growth
+    if growth.bonding_strength is not None:
+        peak = adhesion.wall_peak(scene, pore, solved)
+        if peak.value > growth.bonding_strength:
+            return _ended(pore, "detaches", peak, "its wall must bear", "growth.bonding_strength",
+                          growth.bonding_strength)
+    if growth.tensile_strength is not None:
+        peak = adhesion.tensile_peak(scene, pore)
+        if peak.value > growth.tensile_strength:
+            return _ended(pore, "tears", peak, "its tensile stress is", "growth.tensile_strength",
+                          growth.tensile_strength)
+    return None
+
+
+def _ended(pore: Pore, verb: str, peak: Peak, subject: str, key: str,
+           strength: float) -> Detachment:
+    return Detachment(f"the aggregate {verb} at t = {pore.time:g} h: near x = {peak.x:.4g}, y = "
+                      f"{peak.y:.4g} um {subject} {peak.value:.3g} MPa, in the mean over "
+                      f"pore.width / 20; {key} is {strength:g} MPa")

@@ -1,0 +1,240 @@
+"""What keeps an aggregate on its walls (section 5): tractions of the walls, forces of the fluid,
+and the largest tensile stress.
+
+The equilibrium (22) tested with the nodal functions gives the forces that the walls exert on the
+aggregate: the forces of the stress less those of the fluid, at the nodes on a wall. On a bonded
+wall, and across any wall, they are a traction t, here the one whose consistent nodal forces they
+are. Along a wall that slides each contact surface is kept in place by one point. A wall bears, at a
+place x along it,
+
+    ((max(pull, 0))^2 + shear^2)^(1/2)
+
+with the means of the pull, from the aggregate into the wall, and of the shear over a length of W /
+20 around x. The stress at a contact line may be singular, and so may the force at a point: only a
+mean over a length converges as the mesh is refined. The tensile stress likewise is a mean over the
+triangles within W / 20 of a place.
+
+Without ``growth.fluid_forces`` the equilibrium has no forces of the fluid, and walls bear the
+stress of growth alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from repro.fem import elements
+from repro.fem.outline import BOTTOM, TOP, parabola
+from repro.model import flow, growth, traction
+from repro.model.flow import Flow
+from repro.model.pore import Pore, Solved
+from repro.scene import Scene, at_time, needed
+
+#: The length of the means, over the pore's width.
+LENGTH = 1 / 20
+#: Parts of an arc on a wall, for the means of its traction.
+PARTS = 64
+
+
+@dataclass(frozen=True)
+class Peak:
+    """The largest mean of a stress: value (MPa), and its place x, y (um)."""
+
+    value: float
+    x: float
+    y: float
+
+
+@dataclass(frozen=True)
+class Load:
+    """Force x, y (MPa um) of the fluid on the aggregate, and its moment about the middle of the
+    contact with the lower wall, counterclockwise (MPa um2); per depth."""
+
+    x: float
+    y: float
+    moment: float
+
+
+def stress(scene: Scene, pore: Pore) -> np.ndarray:
+    """(t, q, 4) MPa, Cauchy stress xx, yy, zz, xy at the points where growth is integrated."""
+    mesh = pore.mesh
+    strained = pore.body.strained(mesh.points[mesh.body])
+    pressure = pore.pressure[mesh.triangles[mesh.biomass]] @ pore.body.shape.table.linear.T
+    return scene.growing.growth.shear_modulus * growth.cauchy(strained.F, pressure)
+
+
+def fluid_forces(scene: Scene, pore: Pore, solved: Solved) -> np.ndarray:
+    """(n, 2) MPa um, forces of the water on the aggregate's nodes, without those on the wall beside
+    a contact line."""
+    drive = at_time(needed(scene.flow, "[flow]"), pore.time)
+    water = needed(solved.flow, "a solution of the flow")
+    of_head = traction.on_aggregate(pore.space, water, drive, scene.numerics.interface)
+    if drive.permeability is None:
+        of_head = of_head + _beside_contact(pore, water)
+    return traction.MPA_PER_UM * drive.density * drive.gravity * of_head[pore.mesh.body]
+
+
+def _beside_contact(pore: Pore, water: Flow) -> np.ndarray:
+    """(N, 2) um2 of head: nodal forces of the fluid's edges on walls that end at contact lines,
+    which the nodal forces of its triangles include; their pressure alone, since the water rests in
+    such a corner."""
+    mesh = pore.mesh
+    forces = np.zeros_like(mesh.points)
+    outline = pore.boundary
+    ends = np.zeros(len(mesh.points), bool)
+    ends[mesh.loop[outline.contact_ends]] = True
+    head = flow.pressure_space(pore.space).to_mesh(water.head)
+    for side in range(3):
+        beside = ends[mesh.triangles].any(axis=1)
+        cells = mesh.cells[~mesh.biomass & mesh.on_wall(side) & beside]
+        values, weights, along = elements.side_table(mesh.geometry, mesh.geometry, side)
+        dx = np.abs(mesh.points[cells, 0] @ along.T) * weights
+        loads = (dx * (head[cells] @ values.T)) @ values
+        up = np.where(mesh.points[cells[:, side], 1] == 0.0, 1.0, -1.0)
+        np.add.at(forces[:, 1], cells, up[:, None] * loads * ends[cells])
+    return forces
+
+
+def fluid_load(scene: Scene, pore: Pore, solved: Solved) -> Load:
+    """The force and the moment of the water on the aggregate."""
+    forces = fluid_forces(scene, pore, solved)
+    outline = pore.boundary
+    on = outline.points[outline.wall == BOTTOM, 0]
+    x, y = (pore.mesh.points[pore.mesh.body] - [(on.min() + on.max()) / 2, 0.0]).T
+    moment = float(x @ forces[:, 1] - y @ forces[:, 0])
+    return Load(float(forces[:, 0].sum()), float(forces[:, 1].sum()), moment)
+
+
+def wall_forces(scene: Scene, pore: Pore, solved: Solved) -> np.ndarray:
+    """(n, 2) MPa um, forces of the walls on the aggregate's nodes, and the defect of the
+    equilibrium at all others."""
+    mesh = pore.mesh
+    inside = pore.pressure[mesh.topology.body_corners]
+    forces = growth.internal_forces(pore.body, pore.theta, mesh.points[mesh.body], inside)
+    forces = scene.growing.growth.shear_modulus * forces
+    if scene.growing.growth.fluid_forces == "included" and pore.time > 0:
+        forces = forces - fluid_forces(scene, pore, solved)
+    return forces
+
+
+def wall_peak(scene: Scene, pore: Pore, solved: Solved) -> Peak:
+    """The most that a wall must bear, and where."""
+    forces = np.zeros_like(pore.mesh.points)
+    forces[pore.mesh.body] = wall_forces(scene, pore, solved)
+    walls = [wall for wall in (BOTTOM, TOP) if (pore.boundary.edge_wall == wall).any()]
+    bonded = scene.growing.growth.wall == "bonded"
+    peaks = [_peak_on(pore, wall, forces, bonded and wall == BOTTOM) for wall in walls]
+    return max(peaks, key=lambda peak: peak.value)
+
+
+def _peak_on(pore: Pore, wall: int, forces: np.ndarray, bonded: bool) -> Peak:
+    """The most that one wall must bear."""
+    outline = pore.boundary
+    edges = np.flatnonzero(outline.edge_wall == wall)
+    x = outline.arcs(outline.points[:, 0])[edges]
+    order = np.argsort(x.min(axis=1))
+    nodes = outline.arcs(pore.mesh.loop)[edges][order].astype(int)
+    if outline.geometry == 1:
+        nodes = nodes[:, [0, 2]]
+    nodes = nodes[:, ::-1] if wall == TOP else nodes
+    surface = _Surface(pore.mesh.points[:, 0], nodes)
+    inward = 1.0 if wall == TOP else -1.0
+    pull = surface.means(surface.density(inward * forces[:, 1]), pore.mesh.width)
+    if bonded:
+        shear = surface.means(surface.density(forces[:, 0]), pore.mesh.width)
+    else:
+        shear = surface.point_means(forces[:, 0], pore.mesh.width)
+    bears = np.hypot(np.maximum(pull, 0.0), shear)
+    worst = int(bears.argmax())
+    middle = surface.middles(pore.mesh.width)[worst]
+    return Peak(float(bears[worst]), float(middle), pore.mesh.width if wall == TOP else 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class _Surface:
+    """A contact surface: x (N,) um of a mesh's nodes; nodes (e, 2 or 3) of its edges, along x."""
+
+    x: np.ndarray
+    nodes: np.ndarray
+
+    def _at(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(s, k) functions of an edge's nodes at s in [0, 1], and their derivatives."""
+        if self.nodes.shape[1] == 2:
+            return np.stack([1 - s, s], axis=-1), np.stack([0 * s - 1, 0 * s + 1], axis=-1)
+        return parabola(s), np.stack([4 * s - 3, 4 - 8 * s, 4 * s - 1], axis=-1)
+
+    def density(self, forces: np.ndarray) -> np.ndarray:
+        """(N,) traction at the nodes of the surface, from nodal forces (N,) per depth."""
+        points, weights = np.polynomial.legendre.leggauss(4)
+        values, slopes = self._at((points + 1) / 2)
+        dx = self.x[self.nodes] @ slopes.T * (weights / 2)
+        local = np.einsum("eq,qa,qb->eab", dx, values, values)
+        surface_nodes, index = np.unique(self.nodes, return_inverse=True)
+        index = index.reshape(self.nodes.shape)
+        mass = np.zeros((len(surface_nodes), len(surface_nodes)))
+        np.add.at(mass, (index[:, :, None], index[:, None, :]), local)
+        density = np.zeros(len(forces))
+        density[surface_nodes] = np.linalg.solve(mass, forces[surface_nodes])
+        return density
+
+    def _places(self) -> np.ndarray:
+        """(e PARTS + 1,) um, places along the surface."""
+        values, _ = self._at(np.arange(PARTS) / PARTS)
+        return np.append((self.x[self.nodes] @ values.T).ravel(), self.x[self.nodes[-1, -1]])
+
+    def _windows(self, width: float) -> tuple[np.ndarray, float]:
+        """Starts (w,) um and length (um) of the means: all of a surface that is shorter."""
+        places = self._places()
+        length = min(LENGTH * width, places[-1] - places[0])
+        starts = np.concatenate([places, places - length])
+        inside = (starts >= places[0]) & (starts <= places[-1] - length)
+        return np.append(starts[inside], places[0]), length
+
+    def middles(self, width: float) -> np.ndarray:
+        """(w,) um, middles of the means."""
+        starts, length = self._windows(width)
+        return starts + length / 2
+
+    def means(self, density: np.ndarray, width: float) -> np.ndarray:
+        """(w,) means of a traction (N,). Simpson's rule is exact for its parts of edges."""
+        s = np.arange(2 * PARTS + 1) / (2 * PARTS)
+        values, slopes = self._at(s)
+        along = (density[self.nodes] @ values.T) * (self.x[self.nodes] @ slopes.T)
+        parts = (along[:, :-1:2] + 4 * along[:, 1::2] + along[:, 2::2]) / (6 * PARTS)
+        total = np.append(0.0, np.cumsum(parts))
+        starts, length = self._windows(width)
+        places = self._places()
+        ahead = np.interp(starts + length, places, total)
+        return (ahead - np.interp(starts, places, total)) / length
+
+    def point_means(self, forces: np.ndarray, width: float) -> np.ndarray:
+        """(w,) means of forces (N,) at single points of the surface."""
+        starts, length = self._windows(width)
+        surface_nodes = np.unique(self.nodes)
+        x = self.x[surface_nodes]
+        within = (x >= starts[:, None]) & (x <= starts[:, None] + length)
+        return within @ forces[surface_nodes] / length
+
+
+def tensile_peak(scene: Scene, pore: Pore) -> Peak:
+    """The largest principal stress, in the mean over the triangles within W / 20 of one, and where.
+
+    A triangle is within a distance if its middle is.
+    """
+    from scipy.spatial import KDTree  # few scenes need it
+
+    mesh = pore.mesh
+    areas = mesh.areas[mesh.biomass]
+    middles = mesh.points[mesh.triangles[mesh.biomass]].mean(axis=1)
+    dx = pore.body.at.dx * pore.body.strained(mesh.points[mesh.body]).J
+    sums = np.einsum("tq,tqk->tk", dx, stress(scene, pore))
+    tree = KDTree(middles)
+    near = tree.sparse_distance_matrix(tree, LENGTH * mesh.width, output_type="coo_matrix")
+    means = np.zeros_like(sums)
+    weight = np.zeros(len(areas))
+    np.add.at(means, near.row, sums[near.col])
+    np.add.at(weight, near.row, dx.sum(axis=1)[near.col])
+    largest = growth.largest_principal(means / weight[:, None])
+    worst = int(largest.argmax())
+    return Peak(float(largest[worst]), *middles[worst].tolist())

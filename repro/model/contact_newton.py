@@ -1,0 +1,290 @@
+"""Newton's method for the shape of an aggregate and the places of its contact lines at once.
+
+The unknowns are positions, pressures and the advance s of each contact line. The equations are the
+equilibrium, R = 0, and the clearance beyond each line, c = 0 (2.3.3). A line at its least advance
+stays there while its clearance is not negative. With the derivative K of R by the shape, the shape
+moves by K^-1 (-dR/ds) with a line: one more solution with the factors of K. dR/ds is a difference
+quotient over the triangles beside the line, dc/ds one over the moved outline.
+
+The clearance is a minimum over the free surface, and jumps where a film closes. The method may
+therefore fail. The search with whole equilibria (:mod:`repro.model.contact_lines`) then takes over.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from repro.errors import GrowthError
+from repro.fem import division as dividing
+from repro.fem.assembly import Factored
+from repro.fem.division import Division
+from repro.fem.newton import REQUIRED_REDUCTION, STALLED
+from repro.fem.outline import Outline
+from repro.model import contact_lines, growth
+from repro.model.contact_lines import CLOSE, FIRST_TRIAL, LEAST_PART, Clearance, Line
+from repro.model.pore import Pore
+from repro.polling import poll
+from repro.scene import needed
+
+#: Iterations after which the search with whole equilibria takes over.
+MOST_ITERATIONS = 20
+#: Differences of an advance (arcs) for the derivatives of residual and clearance.
+SMALL = 1e-5
+MODEST = 0.02
+#: Longest step (arcs) of a line.
+LONGEST = 2.0
+#: Lines do not move while all clearances are within this.
+AT_REST = CLOSE / 2
+#: Largest clearance of a line whose place is at a corner.
+AT_CORNER = 0.05
+#: A line whose place is at a corner lies at this distance (arcs) beyond it.
+BESIDE = 1.01 * LEAST_PART
+#: Advance (arcs) from a corner of a line that is not at rest there.
+DEPARTURE = 0.3
+#: A line leaves a corner if the shape's defect is smaller than this.
+NEAR = 0.05
+#: Halvings of a step that turns a triangle over.
+HALVINGS = 5
+
+
+@dataclass(frozen=True, eq=False)
+class Placed:
+    """An aggregate with its contact lines at a place.
+
+    grown: the pore before its expansion; pore: the same on the divided mesh, with its contact;
+    division: None if no arc is divided; reference: (N, 2) um, where strain counts from, at the
+    nodes of the grown pore; system: of the equilibrium; theta: (t, q) expansion; target: (n, 2) um,
+    with the prescribed coordinates; rule: for the free surface.
+    """
+
+    grown: Pore
+    pore: Pore
+    division: Division | None
+    reference: np.ndarray
+    system: growth.System
+    theta: np.ndarray
+    target: np.ndarray
+    rule: Clearance
+
+    def clearances(self, position: np.ndarray, lines: Sequence[Line]) -> np.ndarray:
+        """(2, L) clearance and reach beyond lines, at positions (n, 2) um."""
+        pore = self.pore
+        points = position[pore.mesh.topology.body_loop]
+        outline = Outline(points, pore.wall, pore.fixed, points, 2)
+        return np.array([self.rule.beyond(outline, self._end(line), line.direction)
+                         for line in lines]).T
+
+    def _end(self, line: Line) -> int:
+        """Node of the outline at a line."""
+        ends = contact_lines.surface_ends(self.pore.boundary, line.wall)
+        return next(node for node, direction in ends if direction == line.direction)
+
+    def within_arc(self, line: Line) -> bool:
+        """Does a line divide an arc?"""
+        return self.division is not None and self._arc(line) in self.division.arcs
+
+    def _arc(self, line: Line) -> int:
+        return contact_lines.divided_arc(len(self.grown.wall), line)
+
+    def slope(self, line: Line, position: np.ndarray, pressure: np.ndarray) -> np.ndarray:
+        """(2n + corners,) derivative of the residual by the advance (arcs) of a line within an
+        arc, at constant nodal values."""
+        division = needed(self.division, "a divided arc")
+        number = int(np.searchsorted(division.arcs, self._arc(line)))
+        rows, triangle = division.halves(number)
+        body = self.system.body
+        shape = growth.Shape(body.shape.cells[rows], body.shape.corners, body.shape.degree)
+        moved = triangle.divided_at(division.t[number] + SMALL * line.direction)
+        nodes = self.reference[self.grown.mesh.cells[triangle.cell]]
+        reference = body.reference.copy()
+        reference[shape.cells] = moved.nodes(nodes)
+        after = growth.Body(shape, reference)
+        amount = (self.grown.theta * self.grown.body.at.dx)[rows[0]]
+        parts = dividing.split(amount, moved, self.grown.space.table)
+        change = (self.system.partial_residual(after, np.stack(parts) / after.at.dx, position,
+                                               pressure)
+                  - self.system.partial_residual(growth.Body(shape, body.reference),
+                                                 self.theta[rows], position, pressure))
+        return change / SMALL
+
+    def on_parent(self, position: np.ndarray,
+                  pressure: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(N, 2) um and (corners,) at the nodes of the grown pore's mesh, from positions (n, 2) and
+        pressures of the divided aggregate."""
+        points, pressures = self.on_mesh(position, pressure)
+        if self.division is None:
+            return points, pressures
+        return self.division.restricted(points), pressures[: self.grown.mesh.corners]
+
+    def on_mesh(self, position: np.ndarray,
+                pressure: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Positions and pressures at all nodes of the divided mesh."""
+        mesh = self.pore.mesh
+        points = mesh.points.copy()
+        points[mesh.body] = position
+        pressures = self.pore.pressure.copy()
+        pressures[mesh.topology.body_corners] = pressure
+        return points, pressures
+
+    def divided(self, points: np.ndarray,
+                pressures: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Invert :meth:`on_parent`."""
+        if self.division is not None:
+            points = self.division.nodal(points)
+            pressures = self.division.at_corners(pressures)
+        mesh = self.pore.mesh
+        return points[mesh.body], pressures[mesh.topology.body_corners]
+
+    def same_arcs(self, other: Placed) -> bool:
+        """Are the same arcs divided?"""
+        if self.division is None or other.division is None:
+            return self.division is other.division
+        return np.array_equal(self.division.arcs, other.division.arcs)
+
+
+class Coupled:
+    """Newton's method for the shape and the lines of an aggregate."""
+
+    def __init__(self, place: Callable[[], Placed], lines: Sequence[Line], points: np.ndarray,
+                 pressures: np.ndarray):
+        """place: the aggregate with the lines at their present advances; points: (N, 2) um, and
+        pressures: (corners,), from which to start, at the nodes of the grown pore."""
+        self._place = place
+        self._lines = lines
+        self.placed = place()
+        self.position, self.pressure = self.placed.divided(points, pressures)
+        self.iterations = 0
+        self._factors: Factored | None = None
+
+    def solve(self, tolerance: float = growth.NEWTON) -> None:
+        """Solve to a defect of ``tolerance``, or to round-off. Raises GrowthError if there is no
+        convergence."""
+        last = np.inf
+        while True:
+            poll()
+            at = self.placed
+            iterate = at.system.under(at.theta, at.target, self.position, self.pressure)
+            stalled = STALLED * last < iterate.defect <= growth.ROUND_OFF
+            if iterate.complete and (iterate.defect <= tolerance or stalled) and self._accepts():
+                return
+            if self.iterations == MOST_ITERATIONS:
+                raise GrowthError("Newton's method for the contact lines stands at a defect of "
+                                  f"{iterate.defect:.2g} after {MOST_ITERATIONS} iterations; "
+                                  "try a shorter growth.time_step")
+            if iterate.defect > REQUIRED_REDUCTION * last:
+                self._factors = None
+            last = iterate.defect
+            self._step(iterate)
+            self.iterations += 1
+
+    def _accepts(self) -> bool:
+        """Are all lines where they should be?"""
+        clearances, _ = self.placed.clearances(self.position, self._lines)
+        return all(_fits(line, clearance, CLOSE)
+                   for line, clearance in zip(self._lines, clearances))
+
+    def _step(self, iterate: growth.Iterate) -> None:
+        """Make one step of shape and lines, with det F > 0."""
+        lag = iterate.lag
+        carried = np.concatenate([lag[:, 0], lag[:, 1], np.zeros(len(self.pressure))])
+        factors = self._factors or self.placed.system.factored(iterate)
+        change = factors.solve(-iterate.residual, carried)
+        steps, change = self._with_lines(iterate, factors, change)
+        start = [(line.advance, line.at_corner) for line in self._lines]
+        for length in 0.5 ** np.arange(HALVINGS):
+            for line, before, step in zip(self._lines, start, steps):
+                line.advance, line.at_corner = before
+                _advance(line, length * step)
+            position = self.position + length * _nodal(change, self.position)
+            pressure = self.pressure + length * change[self.position.size:]
+            placed = self._place() if steps.any() else self.placed
+            if not placed.same_arcs(self.placed):
+                position, pressure = placed.divided(*self.placed.on_parent(position, pressure))
+            if placed.system.strained(position).J.min() > 0:
+                self._factors = factors if placed is self.placed else None
+                self.placed = placed
+                self.position = position
+                self.pressure = pressure
+                return
+        raise GrowthError("no step of contact lines keeps det F > 0; "
+                          "try a shorter growth.time_step")
+
+    def _with_lines(self, iterate: growth.Iterate, factors: Factored,
+                    change: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(L,) arcs, steps of the lines, and the change of all unknowns with these steps, from that
+        without."""
+        ahead = self.position + _nodal(change, self.position)
+        clearances, reaches = self.placed.clearances(ahead, self._lines)
+        steps = np.zeros(len(self._lines))
+        moving = [k for k, line in enumerate(self._lines)
+                  if not _fits(line, clearances[k], AT_REST)]
+        within = [k for k in moving if self.placed.within_arc(self._lines[k])]
+        if self.iterations == 0 or iterate.defect < NEAR:
+            for k in set(moving) - set(within):
+                reach = FIRST_TRIAL * reaches[k] if self.iterations == 0 else DEPARTURE
+                steps[k] = _leave_corner(self._lines[k], clearances[k], reach)
+        if within:
+            slopes = {k: factors.solve(-self.placed.slope(self._lines[k], self.position,
+                                                          self.pressure)) for k in within}
+            moves = {k: _nodal(slope, self.position) for k, slope in slopes.items()}
+            steps[within] = self._to_roots(ahead, moves, clearances[within])
+            change = change + sum(steps[k] * slopes[k] for k in within)
+        return steps, change
+
+    def _to_roots(self, position: np.ndarray, moves: dict[int, np.ndarray],
+                  clearances: np.ndarray) -> np.ndarray:
+        """Steps (arcs) of the lines with ``moves`` (n, 2) um per arc, to the roots of their
+        clearances. A line that is stopped on its way leaves the others to reach theirs."""
+        lines = [self._lines[k] for k in moves]
+        rises = np.array([self.placed.clearances(position + MODEST * move, lines)[0] - clearances
+                          for move in moves.values()]).T / MODEST
+        steps = np.zeros(len(lines))
+        free = np.ones(len(lines), bool)
+        while free.any():
+            rest = clearances + rises[:, ~free] @ steps[~free]
+            steps[free] = np.linalg.solve(rises[np.ix_(free, free)], -rest[free])
+            ends = np.array([_allowed(line, step) for line, step in zip(lines, steps)])
+            stopped = free & (ends != steps)
+            if not stopped.any():
+                break
+            steps[stopped] = ends[stopped]
+            free &= ~stopped
+        return steps
+
+
+def _nodal(change: np.ndarray, position: np.ndarray) -> np.ndarray:
+    """(n, 2) um, the part of a change of all unknowns that moves the nodes."""
+    return change[: position.size].reshape(2, -1).T
+
+
+def _fits(line: Line, clearance: float, close: float) -> bool:
+    """Is a line at its place? One beside a corner is as near to it as may be."""
+    most = AT_CORNER if line.at_corner else close
+    return clearance >= -close and (line.advance <= line.least or clearance <= most)
+
+
+def _leave_corner(line: Line, clearance: float, reach: float) -> float:
+    """The step (arcs) of a line that is not at rest at a corner."""
+    if clearance > 0:
+        return max(-DEPARTURE, line.least - line.advance)
+    line.floor = line.advance + BESIDE
+    return min(max(reach, DEPARTURE), LONGEST)
+
+
+def _allowed(line: Line, step: float) -> float:
+    """The step of a line to an allowed place: at least LEAST_PART from a corner."""
+    place = max(line.advance + min(max(step, -LONGEST), LONGEST), line.least, line.floor)
+    corner = round(place)
+    if abs(place - corner) < LEAST_PART and place > line.least:
+        place = corner + BESIDE
+    return place - line.advance
+
+
+def _advance(line: Line, step: float) -> None:
+    """Move a line by a step (arcs), to an allowed place."""
+    if step:
+        line.advance += _allowed(line, step)
+        line.at_corner = abs(line.advance - round(line.advance) - BESIDE) < 1e-9

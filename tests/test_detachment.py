@@ -1,0 +1,92 @@
+"""What walls and biomass must bear: means of tractions; strengths that end a run; scenes without them."""
+import json
+
+import numpy as np
+import pytest
+
+import repro
+from repro import results
+from repro.cli import main
+from repro.model import adhesion
+from repro.runs.status import is_over
+from repro.scene import load_scene
+
+FAST = ["numerics.preset=fast", "growth.wall=bonded"]
+SPARSE = [*FAST, 'output.times=["0 h", "6 h"]', 'growth.end="6 h"']
+
+
+@pytest.mark.parametrize("count", (2, 3))
+def test_means_of_a_traction_are_those_of_its_integral(count):
+    """A linear traction on edges of unequal lengths, from its consistent nodal forces; the means over 5 of 18 um."""
+    x = np.sort(np.random.default_rng(count).uniform(0.0, 18.0, 7))
+    x[[0, -1]] = 0.0, 18.0
+    nodes = np.array([range(k, k + count) for k in range(0, 7 - count + 1, count - 1)])
+    if count == 3:
+        x[1::2] = (x[:-1:2] + x[2::2]) / 2
+    surface = adhesion._Surface(x, nodes)
+    points, weights = np.polynomial.legendre.leggauss(6)
+    forces = np.zeros(7)
+    for edge in nodes:
+        length = x[edge[-1]] - x[edge[0]]
+        s = (points + 1) / 2
+        hats = [np.prod([(s - b) / (a - b) for b in np.linspace(0, 1, count) if b != a], axis=0)
+                for a in np.linspace(0, 1, count)]
+        forces[edge] += [length / 2 * weights @ (hat * (3 - 0.2 * (x[edge[0]] + s * length))) for hat in hats]
+    middles = surface.middles(100.0)
+    # A mean ends within a part of an edge, where its integral is taken as linear.
+    error = 2 / 5 * (x[nodes[:, -1]] - x[nodes[:, 0]]).max() ** 2 / adhesion.PARTS**2 * 0.2 / 8
+    assert surface.means(surface.density(forces), 100.0) == pytest.approx(3 - 0.2 * middles, abs=error)
+    assert middles.min() == pytest.approx(2.5) and middles.max() == pytest.approx(15.5)
+    point = np.where(np.arange(7) == 3, 10.0, 0.0)
+    assert surface.point_means(point, 100.0).max() == pytest.approx(2.0)
+    assert surface.means(surface.density(forces), 1e4) == pytest.approx([1.2, 1.2, 1.2])
+
+
+@pytest.mark.parametrize("key, strength, verb, column", [
+    ("bonding_strength", 0.002, "detaches", "wall_traction_max"),
+    ("tensile_strength", 5e-4, "tears", "tensile_stress_max")])
+def test_a_run_ends_where_a_strength_is_exceeded(key, strength, verb, column):
+    """The last row is the first with more, and is there although no row was due; the status names place and time."""
+    every = repro.solve("base", [*FAST, 'growth.end="6 h"', f"growth.{key}={strength} MPa"])
+    values = every[f"{column}_MPa"]
+    assert values[-1] > strength
+    sparse = repro.solve("base", [*SPARSE, f"growth.{key}={strength} MPa"])
+    x, y = (sparse[f"{column}_{axis}_um"][-1] for axis in "xy")
+    assert sparse.status == every.status and is_over(every.status)
+    where = f"near x = {x:.4g}, y = {y:.4g} um"
+    assert sparse.status.startswith(f"the aggregate {verb} at t = {sparse['time_h'][-1]:g} h: {where}")
+    assert f"growth.{key} is {strength:g} MPa" in sparse.status
+    assert len(sparse["time_h"]) == 2 and sparse["time_h"][-1] == every["time_h"][-1]
+
+
+def test_an_ended_run_is_complete_and_is_not_continued(tmp_path, capsys):
+    out = tmp_path / "run"
+    change = ["--set", "growth.bonding_strength=2 kPa", "--set", 'growth.end="3 h"']
+    sets = [word for entry in FAST for word in ("--set", entry)]
+    assert main(["run", "base", "--out", str(out), "--quiet", *sets, *change]) == 0
+    status = json.loads((out / "run.json").read_text())["status"]
+    assert status.startswith("the aggregate detaches at t = ")
+    rows = (out / "timeseries.csv").read_bytes()
+    assert main(["run", "--resume", str(out), "--quiet"]) == 0
+    assert (out / "timeseries.csv").read_bytes() == rows
+    main(["run", "--resume", str(out), "--quiet", "--set", 'growth.end="4 h"'])
+    assert json.loads((out / "run.json").read_text())["status"] == status
+
+
+def test_a_bonded_run_resumes_bit_for_bit(tmp_path):
+    """What lies on the wall stays there through meshes and steps."""
+    repro.run(load_scene("base", [*FAST, 'growth.end="3 h"']), tmp_path / "a")
+    repro.resume(tmp_path / "a", overrides=['growth.end="5.6 h"'])
+    repro.run(load_scene("base", [*FAST, 'growth.end="5.6 h"']), tmp_path / "b")
+    one, other = (repro.load_run(tmp_path / name) for name in "ab")
+    for name in ("time_h", "thickness_um", "downstream_um", "wall_traction_max_MPa", "fluid_moment_nN"):
+        assert one[name][-1] == other[name][-1]
+
+
+def test_a_scene_without_these_keys_computes_none_of_it(monkeypatch):
+    for name in ("wall_peak", "tensile_peak", "fluid_load"):
+        monkeypatch.setattr(adhesion, name, None)
+    scene = load_scene("base", ['growth.end="0.4 h"'])
+    *_, last = repro.simulate(scene)
+    row = results.row(scene, last)
+    assert row["wall_traction_max_MPa"] is None and row["fluid_force_x_uN_per_m"] is None

@@ -1,0 +1,122 @@
+"""Scenes that need less of the kinetics: one substrate alone, and decay that goes on without acceptor."""
+import csv
+from time import process_time
+
+import numpy as np
+import pytest
+
+import repro
+from repro import results
+from repro.march.balance import LARGEST, Limits, accepted_demand, oxygen_demand
+from repro.march.simulation import simulate
+from repro.model import pore, transport
+from repro.model.kinetics import Sink
+from repro.preflight.modelled import describe_model
+from repro.runs.execution import resume, run
+from repro.scene import load_scene
+from tests.shell import files
+
+SCHEMES = {"midpoint": ["numerics.preset=fast", 'growth.end="2 h"'],
+           "updates": ["numerics.preset=paper", "numerics.refinement=0.5", 'growth.end="1 h"'],
+           "gear": ["numerics.preset=paper", "numerics.refinement=0.5", "numerics.transport=gear",
+                    'growth.end="0.4 h"']}
+OTHER = {"acceptor": "donor", "donor": "acceptor"}
+
+
+def demand_defects(scene, reports):
+    """Of every step: the defect of the oxygen demand over the accepted one."""
+    limits = Limits.of(scene)
+    return [abs(oxygen_demand(scene.kinetics, ledger)) / accepted_demand(limits, ledger)
+            for report in reports for ledger in report.ledgers]
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("name", OTHER)
+def test_one_substrate_is_the_limit_of_an_excess_of_the_other(name, scheme):
+    """The other one at 1e9 times its half saturation has m = 1 - 1e-9. The rows agree to 1e-7, and those of the absent
+    one are empty. The oxygen demand closes, with the demand that the absent one would meet."""
+    absent = OTHER[name]
+    alone = load_scene("base", SCHEMES[scheme], unset=[f"substrates.{absent}"])
+    excess = load_scene("base", [*SCHEMES[scheme], f'substrates.{absent}.supply="1e9 mg/L"'])
+    reports = list(simulate(alone))
+    row = results.row(alone, reports[-1])
+    other = results.row(excess, list(simulate(excess))[-1])
+    assert {key for key in row if row[key] is None} == {key for key in row if absent in key} | {
+        key for key in other if other[key] is None}
+    compared = ["conductivity_m_per_d", "aggregate_area_um2", "inert_fraction", f"{name}_min_mg_per_L",
+                f"effluent_{name}_mg_per_L"]
+    assert [row[key] for key in compared] == pytest.approx([other[key] for key in compared], rel=1e-7)
+    assert max(demand_defects(alone, reports)) <= 1
+    assert f"{absent}_mg_per_L" not in results.fields(alone, reports[-1].pore, reports[-1].solved).points
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_unlimited_decay_goes_on_without_acceptor(scheme):
+    """Without a supply of acceptor nothing grows. With kinetics.decay unlimited X_A falls as exp(-b t), and 1 - f_d of
+    that stays as X_I; its oxygen demand is unmet, and the demand closes. Decay with acceptor changes nothing."""
+    starved = [*SCHEMES[scheme], 'substrates.acceptor.supply="0 mg/L"']
+    scene = load_scene("base", [*starved, "kinetics.decay=unlimited"])
+    reports = list(simulate(scene))
+    b, f_d = scene.kinetics.decay_coefficient, scene.kinetics.degradable_fraction
+    active = np.exp(-b * scene.growth.end)
+    inert = (1 - f_d) * (1 - active)
+    row = results.row(scene, reports[-1])
+    first = results.row(scene, reports[0])
+    steps = 1e-3 if scheme == "gear" else 1e-9  # Gear's first steps are of first order
+    assert row["inert_fraction"] == pytest.approx(inert / (active + inert), rel=steps)
+    lost = row["aggregate_area_um2"] / first["aggregate_area_um2"]
+    assert lost == pytest.approx(active + inert, abs=1e-5)
+    assert max(demand_defects(scene, reports)) <= 1 and row["acceptor_balance"] == pytest.approx(0, abs=LARGEST)
+    unmet = sum(ledger.unmet[0] for report in reports for ledger in report.ledgers)
+    degraded = reports[0].pore.mass * (1 - active) * f_d
+    assert unmet == pytest.approx(scene.kinetics.decay_oxygen_demand * degraded, rel=max(steps, 1e-6))
+    limited = list(simulate(load_scene("base", starved)))[-1]
+    assert limited.pore.mass == reports[0].pore.mass and limited.pore.inert.sum() == 0
+
+
+def test_a_run_of_one_substrate_is_written_and_resumed(tmp_path):
+    """The files have empty columns for the absent one. A run that is made longer writes the files of a long one."""
+    changes = ["numerics.preset=paper", "numerics.refinement=0.5"]
+    short, long = (load_scene("base", [*changes, f"growth.end={end} h"], unset=["substrates.acceptor"])
+                   for end in (0.4, 1))
+    run(short, tmp_path / "run")
+    resume(tmp_path / "run", overrides=["growth.end=1 h"])
+    run(long, tmp_path / "long")
+    assert files(tmp_path / "run") == files(tmp_path / "long")
+    with open(tmp_path / "run" / "ledger.csv", encoding="utf-8") as file:
+        ledger = next(csv.DictReader(line for line in file if not line.startswith("#")))
+    assert {key for key, value in ledger.items() if value == ""} == {key for key in ledger if "acceptor" in key}
+    assert float(ledger["donor_consumed_pg_per_m"]) > 0
+    assert "acceptor_min_mg_per_L" not in repro.load_run(tmp_path / "run")
+
+
+def test_check_states_what_is_assumed():
+    """One substrate, several solutions, and decay; the paper's scene has its own decay and neither of the others."""
+    changes = ["kinetics.law=Haldane", "kinetics.decay=unlimited"]
+    changed = dict(describe_model(load_scene("base", changes, unset=["substrates.acceptor"])))
+    paper = dict(describe_model(load_scene("base")))
+    stated = {"one substrate: the other is assumed not to limit": "substrates", "of several solutions": "kinetics",
+              "its oxygen demand is not met": "kinetics"}
+    assert all(text in changed[section] and text not in paper[section] for text, section in stated.items())
+    assert "none without acceptor" in paper["kinetics"]
+
+
+@pytest.mark.parametrize("name", OTHER)
+def test_a_solution_of_one_substrate_costs_at_most_0_6_of_two(name):
+    """Processor time of assembly and solution at more than 2500 nodes, the least of five, in turns."""
+    both = load_scene("base", ["aggregate.radius=20 um", "numerics.preset=accurate", "numerics.refinement=0.85"],
+                      unset=["growth"])
+    one = load_scene(both, unset=[f"substrates.{OTHER[name]}"])
+    seed = pore.seeded(both)
+    carried = pore.solve(both, seed).flow
+    assert seed.space.count > 2500
+
+    def seconds(scene):
+        start = process_time()
+        equations = transport.problem(seed.space, carried, scene.substrates, scene.kinetics, modified_newton=True)
+        transport.fluxes(equations, Sink(seed.active), transport.steady(equations, Sink(seed.active)))
+        return process_time() - start
+
+    times = np.array([[seconds(scene) for scene in (one, both)] for _ in range(6)][1:])
+    least = times.min(axis=0)
+    assert least[0] <= 0.6 * least[1], least

@@ -1,0 +1,115 @@
+"""The site in a real browser: pages load nothing from elsewhere, and links, search, tables, keys and widths work.
+
+`make docs` builds it; without a build or a browser these tests are skipped.
+"""
+
+import re
+import time
+from functools import cache
+from html import unescape
+from urllib.parse import unquote, urldefrag
+
+import pytest
+
+from tests import browser
+from tests.blocks import ROOT
+
+SITE = ROOT / "docs" / "_build" / "html"
+PAGES = sorted(path for path in SITE.rglob("*.html") if "_static" not in path.parts and path != SITE / "index.html")
+REGISTER = SITE / "verification" / "report" / "REPORT.html"
+pytestmark = [pytest.mark.thorough, pytest.mark.skipif(browser.CHROMIUM is None, reason="Chromium is not installed"),
+              pytest.mark.skipif(not PAGES, reason="make docs has built no site")]
+
+
+@pytest.fixture(scope="module")
+def window():
+    with browser.Browser() as chromium:
+        yield chromium
+
+
+def settled(window, script):
+    """Return the value of a script in the page as soon as it is true; fail after 20 s."""
+    end = time.monotonic() + 20
+    while not (value := window.run(script)):
+        assert time.monotonic() < end, script
+        time.sleep(0.05)
+    return value
+
+
+@pytest.mark.parametrize("width, dark", [(1200, False), (380, True)])
+def test_every_page_opens_without_an_error_and_loads_nothing_from_elsewhere(window, width, dark):
+    """No page is wider than its window, and it follows the dark mode of the system."""
+    assert len(PAGES) > 40
+    for page in PAGES:
+        window.errors.clear()
+        window.show(page, width=width, dark=dark)
+        assert window.errors == [], page
+        assert [url for url in window.requests if not url.startswith(("file:", "data:"))] == [], page
+        assert window.run("document.documentElement.scrollWidth") <= width, page
+        colour = window.run("getComputedStyle(document.body).backgroundColor")
+        assert (max(map(int, re.findall(r"\d+", colour)[:3])) < 128) == dark, page
+        assert window.run("[...document.images].every(image => image.naturalWidth > 0 && image.alt)"), page
+
+
+@cache
+def content(page):
+    return page.read_text(encoding="utf-8")
+
+
+def test_links_lead_to_existing_places():
+    """Every link to a file of the site leads to a file, and its fragment to an element."""
+    checked = 0
+    for page in PAGES:
+        for link in re.findall(r'<a [^>]*href="([^"]+)"', content(page)):
+            name, fragment = urldefrag(unescape(link))
+            if not re.match(r"\w+:", name):
+                target = (page.parent / unquote(name)).resolve() if name else page
+                assert target.is_file(), (page, link)
+                assert not fragment or f'id="{unquote(fragment)}"' in content(target), (page, link)
+                checked += 1
+    assert checked > 1000
+
+
+def test_the_root_leads_to_the_start(window):
+    window.show(SITE / "index.html")
+    assert settled(window, "location.pathname.endsWith('/docs/index.html')")
+
+
+def test_the_search_finds_pages(window):
+    window.show(SITE / "search.html", "?q=neo-Hookean")
+    assert settled(window, "document.querySelectorAll('#search-results li a').length") >= 2
+    window.show(SITE / "search.html", "?q=zzzznothing")
+    assert settled(window, "/did not match/.test(document.getElementById('search-results').innerText)")
+
+
+ROWS = "[...document.querySelectorAll('article table')].at(-1).tBodies[0].rows"
+
+
+def test_a_table_sorts_by_keys_and_filters_its_rows(window):
+    """The table of cases: Enter on a heading sorts upwards and then downwards; each word of the filter must occur."""
+    window.show(REGISTER)
+    window.run("[...document.querySelectorAll('article table')].at(-1).tHead.rows[0].cells[3].focus()")
+    numbers = f"[...{ROWS}].map(row => Number(row.cells[3].innerText))"
+    for factor in (1, -1):
+        window.press("Enter")
+        values = [factor * value for value in window.run(numbers)]
+        assert len(values) > 100 and values == sorted(values) and values[0] < values[-1]
+    window.run("field = [...document.querySelectorAll('.table-filter')].at(-1);"
+               "field.value = 'flow exact'; field.dispatchEvent(new Event('input'))")
+    shown = window.run(f"[...{ROWS}].filter(row => row.offsetParent).map(row => row.innerText)")
+    assert 3 < len(shown) < 50 and all("flow" in row and "exact" in row for row in shown)
+
+
+def test_the_keyboard_alone_opens_a_page(window):
+    """Tab reaches, in turn, links with visible focus, the search, and a link of the contents; Enter opens it."""
+    window.show(SITE / "docs" / "index.html")
+    places = []
+    for _ in range(40):
+        window.press("Tab")
+        places.append(window.run("document.activeElement.name || document.activeElement.getAttribute('href') || ''"))
+        if places[-1].endswith("tutorial.html"):
+            break
+    assert "q" in places and places[-1].endswith("tutorial.html")
+    assert window.run("getComputedStyle(document.activeElement).outlineStyle") != "none"
+    window.press("Enter")
+    assert settled(window, "location.pathname.endsWith('/docs/tutorial.html')")

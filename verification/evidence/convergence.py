@@ -1,0 +1,59 @@
+"""Pictures of convergence, ``verification/report/STAGE.svg``: a panel a case, with the errors of its studies.
+
+The series are those of ``evidence.json``, to two digits. A dashed line through the last error of a quantity has the
+order in the middle of its band.
+"""
+
+from collections.abc import Mapping
+from itertools import zip_longest
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from verification.evidence.checks import Study
+from verification.evidence.results import Result
+from verification.evidence.writing import saved_figure
+
+COLUMNS = 3
+MOST_NAMED = 5  # quantities in a legend
+
+
+def series(result: Result) -> dict[str, list[list[float]]]:
+    """{quantity: [sizes, errors, [the order in the middle of the band]]} of the studies of a case."""
+    studies = [part for part in result.measured if isinstance(part, Study) and (part.errors > 0).all()]
+    return {study.quantity: [_two_digits(study.sizes), _two_digits(study.errors), [(study.low + study.high) / 2]]
+            for study in studies}
+
+
+def _two_digits(values: np.ndarray) -> list[float]:
+    return [float(f"{value:.1e}") for value in values if np.isfinite(value)]
+
+
+def draw(cases: Mapping[str, Mapping[str, list]], target: Path) -> None:
+    """Write the picture of the series of some cases: {case: {quantity: series}}."""
+    rows = -(-len(cases) // COLUMNS)
+    figure = Figure(figsize=(9, 2.5 * rows + 0.2), layout="constrained")
+    axes = figure.subplots(rows, COLUMNS, squeeze=False).ravel()
+    for axis, case in zip_longest(axes, cases):
+        if case is None:
+            axis.remove()
+        else:
+            _panel(axis, case, cases[case])
+    saved_figure(figure, target)
+
+
+def _panel(axis, case: str, studies: Mapping[str, list]) -> None:
+    """Draw the studies of a case; those of one quantity, up to a comma, have one colour and one entry."""
+    names = list(dict.fromkeys(quantity.partition(",")[0] for quantity in studies))
+    named: set[str] = set()
+    for quantity, (sizes, errors, (order,)) in studies.items():
+        name = quantity.partition(",")[0]
+        color = f"C{names.index(name) % 10}"
+        label = name if name not in named and len(named) < MOST_NAMED else None
+        axis.loglog(sizes, errors, ".-", color=color, lw=0.8, ms=4, label=label)
+        axis.loglog(sizes, errors[-1] * (np.array(sizes) / sizes[-1]) ** order, "--", color=color, lw=0.4, alpha=0.6)
+        named.add(name)
+    axis.set_title(case, fontsize=8)
+    axis.tick_params(labelsize=6, which="both")
+    axis.legend(fontsize=5)
