@@ -227,8 +227,10 @@ def uptake(area: ArrayLike, width: ArrayLike, velocity: ArrayLike, acceptor: Arr
 
 
 class Throats(NamedTuple):
-    """Throats with aggregates. area: (n,) um2; share: (n,) A / W^2; inflow: (n,) u_ave W, um2/h;
-    supplies: (2, n) mg/L of acceptor and donor.
+    """Throats with aggregates.
+
+    area: (n,) um2; share: (n,) A / W^2; inflow: (n,) u_ave W, um2/h; supplies: (2, n) mg/L of
+    acceptor and donor.
     """
 
     area: np.ndarray
