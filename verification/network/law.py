@@ -196,7 +196,8 @@ The table has A / W^2 from {_range(False)} before contact and from {_range(True)
 10 000. Thinner bodies follow half-discs, an empty pore adds nothing, and plugs of 1.41 to 1.6 have a wider lower bound.
 Without `spanned` the area decides the contact, and from 1.41 to 1.6 the bounds include both kinds. Elsewhere the
 function raises `ValueError` with the index of the throat; with `outside="nan"` that throat has no result. It holds
-for the paper's viscous aggregate with its own condition on the surface [E2]. With continuous traction the resistance of a half-disc differs by 0.2 %, that of a plug by 8 to 17 %.
+for the paper's viscous aggregate with its own condition on the surface [E2]. With continuous traction the
+resistance of a half-disc differs by 0.2 %, that of a plug by 8 to 17 %.
 
 ## Uptake
 
