@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import repro
-from repro.results.network import CONTACT, TABLE, known
+from repro.results.network import CONTACT, TABLE, TRANSPORTS, UPTAKE_BOUND, known
 from verification.network import __main__ as command
 from verification.network import law, shapes, throats, uptakes
 from verification.network.shapes import RATIOS
@@ -172,13 +172,20 @@ def test_shapes_near_contact_are_within_the_bounds(contact_is_given):
     assert kinds.count(1) >= 10 and kinds.count(0) >= 10
 
 
+def test_the_constants_of_the_uptake_are_those_of_the_fit():
+    """A fit to the committed states from another start, to three digits; and the bound, from its largest error."""
+    states = uptakes.read(uptakes.FIT)
+    assert uptakes.fitted(states) == TRANSPORTS
+    assert uptakes.bound(states, TRANSPORTS) == UPTAKE_BOUND
+
+
 def test_uptakes_outside_of_the_fit_are_within_the_bound():
-    """Fifty half-discs that neither fit nor bound have seen; of the first fifty states too, since the bound was widened
-    for one of them."""
-    assert uptakes.judged(uptakes.SECOND_TEST) == (50, 50)
-    assert uptakes.judged(uptakes.FIRST_TEST) == (50, 50)
-    apart, bound = uptakes.deviations(uptakes.read(uptakes.SECOND_TEST))
-    assert np.median(np.abs(apart)) < 0.01 and np.median(bound) < 0.1
+    """Fifty half-discs and grown shapes of another seed, before contact and after it."""
+    states = uptakes.read(uptakes.NEW)
+    apart, bound = uptakes.judged()
+    assert len(apart) == 50 and (apart <= bound).all()
+    assert states["grown"].sum() >= 20 and states["spanned"].sum() >= 5
+    assert np.median(apart) < 0.01 and np.median(bound) < 0.1
 
 
 def test_uptake_of_a_new_state():

@@ -56,13 +56,12 @@ class Transport(NamedTuple):
     plug_power: float
 
 
-#: Of half-discs, and of aggregates that touch both walls.
+#: Before and after contact, as ``python -m verification.network uptake`` fits them.
 TRANSPORTS = Transport(8.91, 0.43, 1.01, 0.5), Transport(129.0, 0.0, 0.364, 0.8)
-#: Relative bound of the uptake: of any aggregate; and before contact, per (Pe A / W^2)^2 of the
-#: donor, since boundary layers form beside a thick body in a fast flow. With 0.03 and 0.0008, which
-#: supplies over 2 mg/L suggested, three of the fit's states were outside; with
-#: 0.05 and 0.0015 one of 50 other states, a thin body in water of 0.35 mg/L (5.9 %).
-UPTAKE_BOUND, FAST_BOUND = 0.07, 1.5e-3
+#: Relative bound of the uptake, of any aggregate: 1.25 times the largest error of the fit. Before
+#: contact it rises with the square of Pe A / W^2 of the donor by this factor, since boundary layers
+#: form beside a thick body in a fast flow.
+UPTAKE_BOUND, FAST = 0.07, 0.02
 #: Ranges of the uptake: widths (um), mean velocities (m/d) and supplies (mg/L).
 WIDTHS, FASTEST, LARGEST_SUPPLY = (40.0, 150.0), 10.0, 20.0
 #: Halvings of the interval of the donor's uptake, and of that of the acceptor's for decay, which
@@ -219,8 +218,7 @@ def uptake(area: ArrayLike, width: ArrayLike, velocity: ArrayLike, acceptor: Arr
     results = np.full((4, *share.shape), np.nan)
     results[:, is_known] = 0.0
     takes = is_known & (area > 0) & (velocity > 0) & (supplies[0] > 0) & (supplies[1] > 0)
-    throats = Throats(area[takes], share[takes], velocity[takes] * width[takes] * UM_PER_HOUR,
-                      np.stack([supply[takes] for supply in supplies]))
+    throats = throats_of(*(values[takes] for values in (area, width, velocity, *supplies)))
     results[:3, takes] = throats.uptake()
     results[3, takes] = throats.bound()
     return Uptake(*results)
@@ -230,13 +228,14 @@ class Throats(NamedTuple):
     """Throats with aggregates.
 
     area: (n,) um2; share: (n,) A / W^2; inflow: (n,) u_ave W, um2/h; supplies: (2, n) mg/L of
-    acceptor and donor.
+    acceptor and donor; transports: constants before contact and after it.
     """
 
     area: np.ndarray
     share: np.ndarray
     inflow: np.ndarray
     supplies: np.ndarray
+    transports: tuple[Transport, Transport] = TRANSPORTS
 
     def uptake(self) -> np.ndarray:
         """(3, n) uptake of acceptor and donor, um2 mg/L/h, and growth of the area, um2/h.
@@ -279,16 +278,27 @@ class Throats(NamedTuple):
 
     def transport(self) -> np.ndarray:
         """(4, n) the constants of each aggregate."""
-        before, after = (np.array(kind)[:, None] for kind in TRANSPORTS)
+        before, after = (np.array(kind)[:, None] for kind in self.transports)
         return np.where(self._spanned(), after, before)
 
     def bound(self) -> np.ndarray:
         """(n,) relative bound of the uptakes."""
+        return UPTAKE_BOUND * self.spread()
+
+    def spread(self) -> np.ndarray:
+        """(n,) bound over its least value."""
         peclet = self.inflow / _constants()[1][1]
-        return UPTAKE_BOUND + np.where(self._spanned(), 0.0, FAST_BOUND * (peclet * self.share)**2)
+        return 1 + np.where(self._spanned(), 0.0, FAST * (peclet * self.share)**2)
 
     def _spanned(self) -> np.ndarray:
         return self.share > known(False)[1]
+
+
+def throats_of(area: np.ndarray, width: np.ndarray, velocity: np.ndarray, acceptor: np.ndarray,
+               donor: np.ndarray) -> Throats:
+    """Throats of the (n,) arguments of :func:`uptake`."""
+    inflow = velocity * width * UM_PER_HOUR
+    return Throats(area, area / width**2, inflow, np.stack([acceptor, donor]))
 
 
 def _balance(low: np.ndarray, high: np.ndarray, halvings: int, rate: Callable) -> np.ndarray:
