@@ -9,7 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import least_squares
 
-from repro.errors import Fold, PoreEnd
+from repro.march.folding import Fold
+from repro.march.loop import PoreEnd
 from repro.march.simulation import simulate
 from repro.model import pore
 from repro.model.pore import Pore
@@ -28,7 +29,7 @@ VELOCITIES, SUPPLIES, WIDTHS, THICKNESSES = (1e-4, 10.0), (0.2, 20.0), (40.0, 15
 FIT, NEW = 0, 1
 SEEDS = {FIT: 20261126, NEW: 20261201}
 #: Of each part: half-discs, runs whose shapes it uses, states at each shape.
-HALF_DISCS, RUNS, STATES = {FIT: 300, NEW: 25}, {FIT: 6, NEW: 3}, {FIT: 3, NEW: 1}
+HALF_DISCS, RUNS, STATES = {FIT: 120, NEW: 25}, {FIT: 4, NEW: 2}, {FIT: 3, NEW: 1}
 #: Each shape of a run is larger than the one before by this factor; the largest over W^2; and the shapes of NEW, evenly
 #: from all of its runs.
 APART, LARGEST, NEW_GROWN = 1.2, 4.5, 25
