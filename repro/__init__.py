@@ -44,15 +44,15 @@ Sections of the paper and their modules, which name the equations that they solv
     2.3, 3.4  growth           (14)-(27)    repro.model.growth
     3.4  biomass               (28)-(34)    repro.model.biomass, .growing
     2.3.2  fluid forces        (20), (22)   repro.model.traction
-    5    adhesion, tearing                  repro.model.adhesion, repro.march.detachment
-    2.3.3  contact                          repro.model.contact, .contact_lines
+    2.3.3  contact                          repro.model.contact, .contact_lines, .contact_newton
+    5    adhesion, tearing                  repro.model.adhesion
          limits of the surface              repro.model.surface
     3.5  mesh motion           (35)         repro.model.mesh_motion
     3.1, 3.5  remeshing                     repro.model.remeshing
     2    state of the pore                  repro.model.pore, .stages (the parts of a step)
     2    coupling, 3.3                      repro.march.updates (the paper's shape updates)
          error control (not the paper's)    repro.march.midpoint, .stepping, .step_control
-         the end as a fold                  repro.march.folding
+         the end as a fold                  repro.march.folding, .detachment
          the loop of both                   repro.march.loop, .simulation
     4, 5  results, a law for networks       repro.results, .columns, .arrays, .tables, .network
 
