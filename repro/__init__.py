@@ -24,7 +24,8 @@ Functions; every argument after these is given by its name:
     compare(folders, file)                  a page that compares runs
     sweep(scene, vary, folder, overrides)   runs with varied keys, their tables and page
     simulate(scene, overrides)              the full state at every row, in um, h, mg/L
-    added_resistance(area, width, spanned)  a law for models of pore networks
+    added_resistance(area, width, spanned)  resistance of an aggregate in a throat
+    uptake(area, width, velocity, acceptor, donor)  of both substrates by an aggregate in a throat
 
 Errors: ``SceneError`` (a scene is refused), ``OutputError`` (a folder or file is refused),
 ``SimulationError`` (a stage fails), ``TypeError`` (an argument is refused). ``PoreEnd``,
@@ -54,7 +55,7 @@ Sections of the paper and their modules, which name the equations that they solv
          error control (not the paper's)    repro.march.midpoint, .stepping, .step_control
          the end as a fold                  repro.march.folding, .detachment
          the loop of both                   repro.march.loop, .simulation
-    4, 5  results, a law for networks       repro.results, .columns, .arrays, .tables, .network
+    4, 5  results, laws for networks        repro.results, .columns, .arrays, .tables, .network
 
 Data flow:
 
