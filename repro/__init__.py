@@ -24,7 +24,8 @@ Functions; every argument after these is given by its name:
     compare(folders, file)                  a page that compares runs
     sweep(scene, vary, folder, overrides)   runs with varied keys, their tables and page
     simulate(scene, overrides)              the full state at every row, in um, h, mg/L
-    added_resistance(area, width, spanned)  a law for models of pore networks
+    added_resistance(area, width, spanned)  resistance of an aggregate in a throat
+    uptake(area, width, velocity, acceptor, donor)  of both substrates by an aggregate in a throat
 
 Errors: ``SceneError`` (a scene is refused), ``OutputError`` (a folder or file is refused),
 ``SimulationError`` (a stage fails), ``TypeError`` (an argument is refused). ``PoreEnd``,
@@ -44,17 +45,17 @@ Sections of the paper and their modules, which name the equations that they solv
     2.3, 3.4  growth           (14)-(27)    repro.model.growth
     3.4  biomass               (28)-(34)    repro.model.biomass, .growing
     2.3.2  fluid forces        (20), (22)   repro.model.traction
-    5    adhesion, tearing                  repro.model.adhesion, repro.march.detachment
-    2.3.3  contact                          repro.model.contact, .contact_lines
+    2.3.3  contact                          repro.model.contact, .contact_lines, .contact_newton
+    5    adhesion, tearing                  repro.model.adhesion
          limits of the surface              repro.model.surface
     3.5  mesh motion           (35)         repro.model.mesh_motion
     3.1, 3.5  remeshing                     repro.model.remeshing
     2    state of the pore                  repro.model.pore, .stages (the parts of a step)
     2    coupling, 3.3                      repro.march.updates (the paper's shape updates)
          error control (not the paper's)    repro.march.midpoint, .stepping, .step_control
-         the end as a fold                  repro.march.folding
+         the end as a fold                  repro.march.folding, .detachment
          the loop of both                   repro.march.loop, .simulation
-    4, 5  results, a law for networks       repro.results, .columns, .arrays, .tables, .network
+    4, 5  results, laws for networks        repro.results, .columns, .arrays, .tables, .network
 
 Data flow:
 

@@ -1,7 +1,8 @@
 """Errors of the package: numerical failures by stage, ends of a run, and failures of files.
 
-:func:`repro.march.loop.stopping` adds the time to a failure, and :mod:`repro.model.advice` the keys
-of a scene that help. A refusal is worded for the command line; its ``str`` for Python.
+:func:`repro.march.loop.stopping` adds the time to a failure, and :mod:`repro.model.advice` adds the
+keys of a scene that help. The message of a refusal names options of the command line; its ``str``
+names arguments of Python.
 """
 
 import re
@@ -13,7 +14,7 @@ OPTION = re.compile(r"(?<![\w'\"-])--(?:out|set|unset|force|resume|vary|samples|
 
 
 class Refusal(Exception):
-    """Input or a folder is refused. ``args[0]`` names options, ``str`` names arguments instead."""
+    """Input or a folder is refused. ``args[0]`` names options; ``str`` names Python arguments."""
 
     def __str__(self) -> str:
         return OPTION.sub(lambda match: ARGUMENTS.get(match[0], match[0][2:]), super().__str__())
@@ -75,7 +76,7 @@ class Unresolved(TransportError):
 
 
 class UnresolvedWithAdvice(Unresolved):
-    """The same, with a refinement that resolves the front, or the statement that none does."""
+    """Unresolved, with the refinement that resolves the front or the statement that none does."""
 
 
 class GrowthError(StageError):

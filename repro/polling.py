@@ -1,7 +1,7 @@
-"""Polls within a step, so that a signal need not wait for its end.
+"""Poll within a step, so that a signal does not have to wait for the end of the step.
 
-Newton's method polls at each iteration. A check that is set may raise an exception, which ends the
-step; the state before the step stays as it is.
+Newton's method polls at each iteration. A check may raise an exception, which ends the step; the
+state before the step stays unchanged.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ _checks: list[Callable[[], None]] = []
 
 
 def poll() -> None:
-    """Make all checks that are set."""
+    """Call all active checks."""
     for check in _checks:
         check()
 
 
 @contextmanager
 def polling(check: Callable[[], None]) -> Iterator[None]:
-    """Set a check within a context.
+    """Make a check active within a context.
 
     Examples
     --------

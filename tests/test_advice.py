@@ -13,20 +13,20 @@ from repro.fem.linear import factorised
 from repro.march.simulation import simulate
 from repro.model import pore, remeshing
 from repro.model.transport import Concentrations
-from repro.preflight import numbers, simplifications
-from repro.scene import load_scene, parse_scene
+from repro.preflight import memory, numbers, simplifications
+from repro.scene import SceneError, load_scene, parse_scene
 
 #: {pattern of a warning: the settings that it advises}.
 ADVICE = {
     r"numerics\.refinement = ([\d.e+]+) would resolve it": "numerics.refinement={}",
-    r'"gear" with numerics\.time = "updates" follows': ("numerics.time=updates", "numerics.transport=gear"),
-    r'"included" takes it in$': "growth.fluid_forces=included",
+    r'"gear" with numerics\.time = "updates" integrates': ("numerics.time=updates", "numerics.transport=gear"),
+    r'"included" models it$': "growth.fluid_forces=included",
     r'"included" with growth\.new_biomass = "stressed"': (
         "growth.new_biomass=stressed", "growth.fluid_forces=included"),
-    r'or take numerics\.time = "midpoint"': "numerics.time=midpoint",
+    r'or numerics\.time = "midpoint"': "numerics.time=midpoint",
     r'"80 %" keeps their ratio': "substrates.{key}=80 %",
 }
-NO_SETTING = ("no refinement up to 20", "no setting takes it in")
+NO_SETTING = ("no refinement up to 20", "no setting models it")
 
 
 def drawn(seed):
@@ -82,6 +82,30 @@ def test_the_advice_of_check_is_accepted_and_helps():
             assert not any(again.key == warned.key and again.text.startswith(start)
                            for again in warnings([*changes, *more])), (seed, warned)
     assert kinds >= {*NO_SETTING, "numerics.refinement", "numerics.transport", "growth.fluid_forces"}
+
+
+def test_the_advice_against_a_lack_of_memory_is_accepted_and_helps(monkeypatch):
+    """In 200 scenes the refinement that a refusal names is accepted without a warning, or none of a quarter or more of
+    the refinement is."""
+    outcomes = set()
+    for seed in range(200):
+        scene = load_scene("base", [*drawn(seed), "numerics.refinement=5"], unset=["flow.head"])
+        try:
+            free = memory.expected_bytes(scene) / random.Random(seed).choice((1.1, 3, 30))
+        except ArithmeticError:  # the run itself reports it
+            continue
+        monkeypatch.setattr(memory, "free_bytes", lambda free=free: free)
+        with pytest.raises(SceneError) as refused:
+            memory.require_memory(scene, pytest.fail)
+        named = re.search(r"numerics\.refinement = ([\d.]+) needs at most half", str(refused.value))
+        outcomes.add(bool(named))
+        tried = float(named[1]) if named else 0.25 * scene.numerics.refinement
+        coarser = load_scene(scene, [f"numerics.refinement={tried!r}"])
+        if named:
+            memory.require_memory(coarser, pytest.fail)
+        else:
+            assert memory.expected_bytes(coarser) > 0.49 * free and "no numerics.refinement" in str(refused.value)
+    assert outcomes == {True, False}
 
 
 @pytest.mark.parametrize("radius, start", [(20, "t = 0 h"), (12, r"t = 2\.\d+ h")])

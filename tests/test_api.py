@@ -157,7 +157,7 @@ def test_missing_fields_are_refused_and_none_replaces_another(solved, tmp_path):
     (tmp_path / "fields/fields_0003.vtu").write_text("<VTKFile")
     assert "<img" not in loaded._repr_html_()
     for time, message in ((0.2, "fields_0001.vtu: the fields of 0.2 h are missing"),
-                       (0.6, "fields_0003.vtu: the fields are not as they were written")):
+                       (0.6, "fields_0003.vtu: the fields are cut short or altered")):
         with pytest.raises(OutputError, match=message):
             loaded.fields(time)
     (tmp_path / "fields.pvd").unlink()

@@ -80,12 +80,22 @@ def test_the_picture_is_the_field(window, runs, name):
 def test_the_keyboard_alone_is_enough(window, runs):
     """Tab reaches every control, which is native and shows its focus. The slider has its keys."""
     last = show(window, runs["fast"])
-    controls = ["field", "lines", "outline", "fixed", "whole", "play", "frame", "summary"]
-    assert window.run("document.querySelectorAll('select, input, button, summary').length") == len(controls)
-    for control in controls:
+    controls = ["field", "lines", "outline", "fixed", "whole", "save", "play", "frame"]
+    assert window.run("document.querySelectorAll('select, input, button, summary').length") == len(controls) + 1
+    charts = int(window.run("document.documentElement.dataset.charts"))
+    for control in [*controls, "picture", *["svg"] * charts, "summary"]:
         window.press("Tab")
         assert window.run("document.activeElement.id || document.activeElement.localName") == control
         assert window.run("getComputedStyle(document.activeElement).outlineStyle") == "solid", control
+    window.run("document.getElementById('picture').focus()")
+    for key in ("ArrowUp", "ArrowLeft"):
+        window.press(key)
+        assert "um: Acceptor" in window.run("document.getElementById('probe').textContent")
+    window.run("document.querySelector('.chart > svg').focus()")
+    window.press("ArrowLeft")
+    assert " h: " in window.run("document.querySelector('.chart output').textContent")
+    window.run("document.getElementById('fixed').click()")
+    last = picture(window)
     window.run("document.getElementById('frame').focus()")
     window.press("ArrowLeft")
     before = picture(window)

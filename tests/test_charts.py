@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 from repro.report import charts
+from repro.results.jumps import with_jumps
+from repro.scene import load_scene, scene_tables
 from tests.pages import first_group
 
 ROUNDED = 0.11  # largest error of a difference of two positions, each rounded to 0.1
@@ -90,6 +92,28 @@ def test_charts_draw_gaps_constants_and_single_points():
     for constant in (0.0, 2.9, -3.0, 1e-30, 1e30):
         flat = drawn(chart([constant] * 3))
         assert np.ptp(flat[:, 1]) == 0 and charts.TOP <= flat[0, 1] <= charts.HEIGHT - charts.BOTTOM
+
+
+@pytest.mark.parametrize("times, expected", [
+    ([0, 1, 2, 3], ([0, 1, 2, 2, 3], [5, 4, 4, 2, 1])),
+    ([0, 1.5, 2.5, 3], ([0, 1.5, 2, 2, 2.5, 3], [5, 4, 4, 2, 2, 1])),
+    ([0, 0.5, 1, 1.5], ([0, 0.5, 1, 1.5], [5, 4, 2, 1]))])
+def test_a_jump_of_a_supply_is_drawn_as_a_jump(times, expected):
+    """Concentrations at rest keep the value of the last row before. Nothing else jumps, and no linear table does."""
+    supply = 'substrates.donor.supply=[["0 h", "9 mg/L"], ["1 h", "9 g/m3"], ["2 h", "3 mg/L"]]'
+    values = np.array([5.0, 4.0, 2.0, 1.0])
+
+    def curve(name, *more):
+        tables = scene_tables(load_scene("base", [supply, *more]))
+        return [column.tolist() for column in with_jumps(name, np.array(times, float), values, tables)]
+
+    assert curve("effluent_donor_mg_per_L") == list(expected)
+    unchanged = [list(times), values.tolist()]
+    assert curve("thickness_um") == curve("mean_velocity_m_per_d") == unchanged
+    assert curve("effluent_donor_mg_per_L", "substrates.donor.interpolation=linear") == unchanged
+    assert curve("effluent_donor_mg_per_L", "numerics.transport=gear") == unchanged
+    head = 'flow.head=[["0 h", "1e-3 cm"], ["2 h", "2e-3 cm"]]'
+    assert curve("mean_velocity_m_per_d", head) == list(expected)
 
 
 def test_many_points_are_thinned_with_both_ends():

@@ -210,7 +210,7 @@ def test_the_modelled_physics_follow_the_sections():
     assert "radius 7 um on the lower wall at x = -40 um; 30 % of it inert at t = 0" in words["aggregate"]
     assert "a shape update every 21 min" in words["numerics"]
     bare = dict(describe_model(load_scene("initial_mesh", ["substrates={}", "growth.end=1 h", "numerics.extent=full"])))
-    assert bare["flow"] == "no flow: pure diffusion" and "supply held at both ends" in bare["substrates"]
+    assert bare["flow"] == "no flow: pure diffusion" and "supply prescribed at both ends" in bare["substrates"]
     assert "as a whole" in bare["pore"] and "(9)-(10)" in bare["kinetics"]
     outline = 'aggregate={outline=[["-5 um", "0 um"], ["1 um", "9 um"], ["6 um", "0 um"]], smooth=true}'
     transient = load_scene("base", ["numerics.transport=gear", "growth.new_biomass=stress_free", outline])
@@ -234,7 +234,7 @@ def test_check_describes_values_over_time():
 @pytest.mark.parametrize("key, name, changes, excerpt", [
     ("pore.length", "wide", [], "ends by growth.end (reach 298 of 300 um)"),
     ("pore.length", "flow_only", ["aggregate.radius=40 um", "pore.length=200 um"], "from the start (reach 40 of 100"),
-    ("numerics.refinement", "base", FEW[1:], "= 0.76 um thick, thinner than"),
+    ("numerics.refinement", "base", FEW[1:], "= 0.76 um, thinner than"),
     ("growth.end", "wide", [], "is expected from 31.2 h on, long before 45 h"),
     ("growth.time_step", "base", ["growth.time_step=0.6 h"], "grows by 11 % in a shape update, above 10 %"),
     ("substrates.donor.diffusivity_in_aggregate", "base", ["substrates.donor.diffusivity=2 cm^2/day"], "40.5 % of")])
@@ -248,7 +248,7 @@ def test_a_warning_states_its_numbers(key, name, changes, excerpt):
                                            (7100.0, "118 min"), (7300.0, "2 h"), (9000.0, "2 h"), (90000.0, "25 h")])
 def test_the_duration_of_a_run_has_a_suitable_unit(seconds, duration):
     first, *_ = checked._cost(cost.Cost(7, seconds, 256.0))
-    assert first == f"Cost, roughly: {duration} (7 steps), writing not counted; 256 MB besides the program"
+    assert first == f"Cost, roughly: {duration} (7 steps) without writing files; 256 MB in addition to the program"
 
 
 def test_check_prints_a_report_and_exits_with_zero(capsys):

@@ -31,7 +31,7 @@ def test_differences_of_scenes_are_listed_key_by_key(fast, paper, flow_only):
                      "numerics.refinement": ["0.2", "1"], "numerics.tolerance": ["0.0075", "0.01"],
                      "numerics.jacobian": ["reused", "fresh"]}
     differences = dict((key, values) for key, *values in comparison.differences([read(paper), read(flow_only)]))
-    assert {"growth.end": ["1 h", "-"], "flow.mean_velocity": ["-", "120833 um/h"]}.items() <= differences.items()
+    assert {"growth.end": ["1 h", "-"], "flow.mean_velocity": ["-", "2.9 m/day"]}.items() <= differences.items()
     assert comparison.differences([read(fast), read(fast)]) == []
 
 
@@ -123,11 +123,13 @@ def test_a_run_at_work_may_have_more_rows_than_its_record(fast, tmp_path):
 
 
 def test_runs_are_compared_under_their_own_names_with_signs():
-    """The first run is not the first by name. A tip further upstream, at a smaller x, is a decrease."""
+    """The first run is not the first by name. A tip further upstream, at a smaller x, is a decrease, in
+    um."""
     runs = []
     for name, scale in (("zeta", 1.0), ("alpha", 1.5), ("mu", 0.5)):
         series = {column: scale * (1.0 + k + np.array([0.1, 0.4])) for k, column in enumerate(results.COLUMNS)}
-        series |= {"time_h": np.array([0.0, 3.0]), "upstream_um": scale * np.array([-5.0, -8.0])}
+        low = scale * np.array([-5.0, -8.0])
+        series |= {"time_h": np.array([0.0, 3.0]), "upstream_um": low, "acceptor_min_mg_per_L": low}
         record = {"scene": name, "status": "completed", "tables": {"factor": 1.0 + (scale < 1)}}
         runs.append(Run(Path("runs") / name, record, series, {}))
     labels = comparison.short([run.folder for run in runs])
@@ -141,5 +143,19 @@ def test_runs_are_compared_under_their_own_names_with_signs():
     values = page_text[page_text.index("Values at the common last time"):]
     heads = re.findall('<th scope="col" class="value">([^<]*)', values)
     assert heads == ["zeta", "alpha", "difference", "mu", "difference"]
-    (row,) = re.findall("<tr><td>upstream end of the aggregate.*?</tr>", page_text)
-    assert re.findall('class="value">([^<]*)<', row) == ["-8", "-12", "-50 %", "-4", "+50 %"]
+    for name, expected in (("upstream end of the aggregate", ["-8", "-12", "-4 um", "-4", "+4 um"]),
+                           ("least acceptor concentration", ["-8", "-12", "-50 %", "-4", "+50 %"])):
+        (row,) = re.findall(f"<tr><td>{name}.*?</tr>", page_text)
+        assert re.findall('class="value">([^<]*)<', row) == expected
+
+
+@pytest.mark.parametrize("first, value, expected", [
+    (2.0, 44.8, "22.4 times"), (-2.0, 20.0, "-10 times"), (2.0, 19.98, "+899 %"), (-2.0, 1.0, "+150 %"),
+    (0.0, 1.0, "-"), (2.0, 2.0, "0")])
+def test_a_large_difference_is_a_factor(first, value, expected):
+    """From ten times on, no percentage is written."""
+    series = {"time_h": np.array([0.0]), "conductivity_m_per_d": np.array([first])}
+    runs = [Run(Path(name), {"scene": "x", "status": "completed", "tables": {}},
+                series | {"conductivity_m_per_d": np.array([one])}, {}) for name, one in (("a", first), ("b", value))]
+    row = re.findall("<tr><td>conductivity.*?</tr>", comparison.build(runs))[0]
+    assert re.findall('class="value">([^<]*)<', row)[-1] == expected

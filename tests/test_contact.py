@@ -50,7 +50,7 @@ def joins(outline, width=100.0):
 NONE = [FREE] * 6
 
 
-@pytest.mark.parametrize("name, outline, wanted", [
+@pytest.mark.parametrize("name, outline, expected", [
     ("a wedge of 11 degrees closes", beside_contact(1.0, 0.2), [0, 0, 0, BOTTOM, 0, 0]),
     ("a wedge of 16.6 degrees closes", beside_contact(1.0, np.tan(np.radians(16.6))), [0, 0, 0, BOTTOM, 0, 0]),
     ("a wedge of 16.8 degrees stays", beside_contact(1.0, np.tan(np.radians(16.8))), NONE),
@@ -66,10 +66,10 @@ NONE = [FREE] * 6
     ("a wedge under the upper wall closes", beside_upper_contact(0.2), [0, 0, 0, TOP, 0, 0, 0]),
     ("a wide one stays, though a film of 1.2 um", beside_upper_contact(1.2), [FREE] * 7),
 ])
-def test_nodes_close_beside_a_contact_surface(name, outline, wanted):
+def test_nodes_close_beside_a_contact_surface(name, outline, expected):
     """The minimum angle is 16.7 degrees, and the minimum film is 2 um (Table 1)."""
-    assert joins(outline) == wanted
-    assert joins(mirrored(outline)) == wanted[::-1]
+    assert joins(outline) == expected
+    assert joins(mirrored(outline)) == expected[::-1]
 
 
 RULE = Clearance(20.0, FILM, ANGLE)

@@ -195,7 +195,7 @@ def test_check_expects_a_fold_of_a_starved_core(changes, speed, expected):
     """Not in a short run, nor where the flow supplies the core, however long after contact the run ends."""
     scene = load_scene("wide", [*STARVED, *changes])
     warnings = find_warnings(*evaluate_at_largest(scene, speed))
-    messages = [warning.text for warning in warnings if "as a fold" in warning.text]
+    messages = [warning.text for warning in warnings if "surface may fold" in warning.text]
     assert len(messages) == expected and all("76.2 um into" in text for text in messages)
 
 

@@ -97,7 +97,7 @@ def test_foreign_files_are_not_replaced(out, capsys):
     mine = out / "fields" / f"fields_{count:04d}.vtu"
     mine.write_text("years of work")
     message = refusal(mine, capsys, "run", "--resume", out, "--quiet")
-    assert f"{mine}: it is there, and this run has not written it" in message
+    assert f"{mine}: it exists, and this run has not written it" in message
     mine.unlink()
     assert resume_run(out) == 0
 
@@ -119,7 +119,7 @@ def test_a_checkpoint_that_is_no_file_is_refused(out, capsys, make):
     """A pipe, a folder or a device does not hang the run."""
     (out / NEWEST).unlink()
     make(out / NEWEST)
-    assert f"{out / NEWEST}: it is a link, or no regular file" in refusal(
+    assert f"{out / NEWEST}: it is not a regular file" in refusal(
         out / "fields", capsys, "run", "--resume", out)
 
 
@@ -131,7 +131,7 @@ def test_altered_fields_are_reported_and_computed_again(out, short, capsys, cont
     path.unlink() if content is None else path.write_bytes(content)
     assert resume_run(out) == 0
     *refusals, last = capsys.readouterr().err.splitlines()
-    assert ["fields_0000.vtu is not as it was written" in line for line in refusals] == [True, True]
+    assert ["fields_0000.vtu is missing, cut short or altered" in line for line in refusals] == [True, True]
     assert "starts again from t = 0" in last and matches_uninterrupted(short, out)
 
 

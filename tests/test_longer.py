@@ -83,17 +83,17 @@ def test_a_finished_run_keeps_one_checkpoint(tmp_path):
     assert not any((with_growth / name).exists() for name in (NEWEST, PREVIOUS))
     assert not (without_growth / LAST).exists() and LAST not in read_record(without_growth)["files"]
     (with_growth / LAST).unlink()
-    with pytest.warns(UserWarning, match="no checkpoint to go on from; it starts again from t = 0"):
+    with pytest.warns(UserWarning, match="no checkpoint to resume from; the run starts again from t = 0"):
         resume(with_growth, overrides=["growth.end=3 h"])
     assert read_record(with_growth)["origin"].get("set") == ["growth.end=3 h"]
     assert same(with_growth, cached_run(scene("fast")))
 
 
 @pytest.mark.parametrize("entry, expected", [
-    ("growth.end=1 h", "growth.end = 1 h: 2 h were asked for before; a later time is needed"),
+    ("growth.end=1 h", "growth.end = 1 h: the run already has the end 2 h; give a later one"),
     ("growth.end=2 um", "growth.end = \"2 um\": a time"),
     ("growth.end=1e9 h", "growth.end = \"1e9 h\": at most 100000 times growth.time_step"),
-    ("pore.width=3 um", "growth.end alone can be changed of a run that has begun"),
+    ("pore.width=3 um", "a run can change growth.end only"),
 ])
 def test_an_entry_without_a_later_end_is_refused(entry, expected):
     """The folder does not change."""
@@ -111,13 +111,13 @@ def test_the_command_makes_a_run_longer(tmp_path, capsys):
     command = ["run", "base", "--set", "numerics.preset=fast", "--set"]
     assert main([*command, "growth.end=5 h", "--out", out]) == 0
     assert main([*command, "growth.end=6 h", "--out", out]) == 2
-    assert "growth.end (5.0 h there, now 6.0 h); a new folder is needed (--resume makes a run longer)" in (
+    assert "growth.end (5.0 h there, now 6.0 h); give a new folder (--resume makes a run longer)" in (
         capsys.readouterr().err)
     assert main(["run", "--resume", out, "--set", "growth.end=6 h"]) == 0
     assert read_record(tmp_path / "run")["origin"]["set"] == ["numerics.preset=fast", "growth.end=6 h"]
     capsys.readouterr()
     assert main(["run", "--resume", out, "--set", "growth.end=360 min"]) == 0
-    assert "before this: nothing to do" in capsys.readouterr().out
+    assert "already finished" in capsys.readouterr().out
     assert main([*command, "growth.end=6 h", "--out", out]) == 0
     assert main(["run", "flow_only", "--out", str(tmp_path / "still")]) == 0
     assert main(["run", "--resume", str(tmp_path / "still"), "--set", "growth.end=5 h"]) == 2

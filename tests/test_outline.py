@@ -23,7 +23,7 @@ def test_the_interface_consists_of_the_edges_at_the_fluid():
 def test_slopes_of_arcs_are_those_of_their_parabolas():
     """An arc follows from its value, slope and second derivative at its start, to round-off, at every t."""
     nodes = np.random.default_rng(7).uniform(-9.0, 9.0, (5, 3, 2))
-    first, second = of.slopes(nodes)
+    first, second = of.arc_derivatives(nodes)
     for t in (0.3, 0.5, 1.0):
         assert nodes[:, 0] + t * first + 0.5 * t**2 * second == pytest.approx(of.parabola(t) @ nodes, abs=1e-12)
 

@@ -80,12 +80,12 @@ def test_the_page_leaves_out_physics_that_is_not_modelled(flow_only, fast):
         assert words in head and words not in text
 
 
-@pytest.mark.parametrize("transport, extent, wanted", [("quasi_steady", "full", [True, False]),
-                                                       ("gear", "central", [False, True])])
-def test_the_assumptions_follow_from_the_scene(transport, extent, wanted):
+@pytest.mark.parametrize("transport, extent, expected", [("quasi_steady", "full", [True, False]),
+                                                         ("gear", "central", [False, True])])
+def test_the_assumptions_follow_from_the_scene(transport, extent, expected):
     scene = load_scene("base", [f"numerics.transport={transport}", f"numerics.extent={extent}"])
     sentence = run_page._assumed(Run(Path(), {"tables": scene_tables(scene)}, {}, {}))
-    assert [words in sentence for words in ("substrates at rest", "a clean channel outside")] == wanted
+    assert [words in sentence for words in ("substrates at rest", "a clean channel outside")] == expected
 
 
 def test_each_frame_is_drawn_on_its_own_mesh(fast, paper):

@@ -163,7 +163,7 @@ def test_strided_arrays_are_copied():
 @pytest.mark.parametrize("arguments", [["run", "--resume"], ["run", "base", *flags(*BRIEF), "--force", "--out"]],
                          ids=["go on", "anew"])
 @pytest.mark.parametrize("content, why", [
-    (None, "there is no run.json|it holds 'thesis.tex', which is not of a run; a new or empty folder"),
+    (None, "there is no run.json|it contains 'thesis.tex', which is not of a run; give a new folder"),
     ("[" * 100_000, "run.json cannot be read"), ("null", "run.json cannot be read: it is not a JSON object"),
     ('{"files": "thesis.tex"}', "run.json cannot be read: its checksum is wrong|run.json lists no files of a run")])
 def test_a_folder_without_a_run_is_refused(tmp_path, capsys, content, why, arguments):
@@ -184,7 +184,7 @@ def test_a_damaged_finished_run_resumes_from_its_remaining_checkpoint(tmp_path, 
     flip(out / "timeseries.csv")
     assert resume_run(out) == 0
     message = capsys.readouterr().err
-    assert "timeseries.csv is not as it was written" in message and "goes on from its checkpoint" in message
+    assert "timeseries.csv is missing, cut short or altered" in message and "resumes from its checkpoint" in message
     assert matches_uninterrupted(SCENE, out) and read_record(out)["status"] == "completed"
 
 
@@ -193,7 +193,7 @@ def test_every_bit_of_a_finished_run_is_checked(tmp_path, capsys):
     2. A missing page is made again."""
     uninterrupted, command = cached_run(SCENE), ["base", *flags(*BRIEF), "--out"]
     assert main(["check", str(uninterrupted)]) == 0
-    assert "completed; its files are as they were written" in capsys.readouterr().out
+    assert "completed; its files are unchanged" in capsys.readouterr().out
     names = [str(path.relative_to(uninterrupted)) for path in uninterrupted.rglob("*") if path.is_file()]
     changes = [(name, flip) for name in names]
     changes += [(name, lambda path: path.unlink()) for name in names if name not in ("report.html", "run.json")]
@@ -230,7 +230,7 @@ def test_check_reports_an_unfinished_run(tmp_path, capsys):
     assert main(["check", str(tmp_path / "run"), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["status"] == "interrupted"
     flip(tmp_path / "run" / "timeseries.csv")
-    assert "timeseries.csv is not as it was written" in refusal(tmp_path, capsys, "check", tmp_path / "run")
+    assert "timeseries.csv is missing, cut short or altered" in refusal(tmp_path, capsys, "check", tmp_path / "run")
     with pytest.raises(SystemExit):
         main(["check", str(tmp_path / "run"), "--set", "growth.end=5 h"])
 
@@ -250,7 +250,7 @@ def test_an_altered_checkpoint_is_refused_and_the_previous_one_is_used(tmp_path,
 def test_a_change_of_versions_is_reported_and_recorded(tmp_path, monkeypatch):
     interrupt_run(SCENE, tmp_path)
     faults.replace_version(monkeypatch, "scipy")
-    with pytest.warns(UserWarning, match="versions.scipy .* now 0.0.; .* to the last bit"):
+    with pytest.warns(UserWarning, match="versions.scipy .* now 0.0.; the results may differ"):
         resume(tmp_path)
     (entry,) = read_record(tmp_path)["resumes"]
     assert entry["changed"]["versions.scipy"][1] == "0.0" and len(entry["changed"]) == 1
@@ -311,8 +311,8 @@ def test_a_run_ended_by_a_signal_resumes(tmp_path, number, status):
     wait_for((tmp_path / "fields" / "fields_0002.vtu").exists, process)
     process.send_signal(number)
     message = process.communicate(timeout=60)[1]
-    assert process.returncode == status and message.endswith("goes on from there\n")
-    assert f" at t = {float(rows(tmp_path / 'timeseries.csv')[-1]['time_h']):g} h; what" in message
+    assert process.returncode == status and message.endswith("continues the run\n")
+    assert f" at t = {float(rows(tmp_path / 'timeseries.csv')[-1]['time_h']):g} h; the results" in message
     assert "Traceback" not in message and read_record(tmp_path)["status"] == "interrupted"
     assert len((tmp_path / "timeseries.csv").read_text().splitlines()) > 3
     assert resume(tmp_path) == "completed" and matches_uninterrupted(load_scene("base", ["growth.end=1.6 h"]), tmp_path)

@@ -33,7 +33,7 @@ def test_a_finished_run_is_left_unchanged(tmp_path, capsys):
     for repeated in (arguments, ["run", "--resume", str(tmp_path / "run")]):
         capsys.readouterr()
         assert main(repeated) == 0
-        assert "completed, before this: nothing to do" in capsys.readouterr().out and state(tmp_path / "run") == before
+        assert "completed, already finished" in capsys.readouterr().out and state(tmp_path / "run") == before
 
 
 def test_the_defect_of_an_incomplete_run_is_reported(tmp_path):
@@ -49,7 +49,7 @@ def test_an_interrupted_run_is_resumed(tmp_path, capsys):
     """It starts from its checkpoint, with the bits of the uninterrupted run."""
     interrupt_run(SCENE, tmp_path / "run")
     pages.run(tmp_path, "base", *BRIEF)
-    assert "goes on from t = " in capsys.readouterr().err
+    assert "resumes from t = " in capsys.readouterr().err
     assert matches_uninterrupted(SCENE, tmp_path / "run")
     assert read_record(tmp_path / "run")["resumes"][0]["time_h"] > 0
 
@@ -59,7 +59,7 @@ def test_another_scene_is_refused_with_its_differences(tmp_path, capsys):
     out = tmp_path / "run"
     interrupt_run(SCENE, out)
     message = refusal(tmp_path, capsys, "run", "base", *flags(*BRIEF, "growth.end=4 h"), "--out", out)
-    assert "growth.end (3.0 h there, now 4.0 h)" in message and "--force" in message
+    assert "growth.end (3 h there, now 4 h)" in message and "--force" in message
     message = refusal(tmp_path, capsys, "run", "flow_only", "--out", out)
     assert "flow.mean_velocity (not set there" in message and "growth (a section there, now not set)" in message
 
@@ -72,7 +72,7 @@ def test_other_versions_are_refused_with_their_differences(tmp_path, capsys, mon
     faults.replace_version(monkeypatch, "scipy")
     for name in ("run", "done"):
         message = refusal(tmp_path, capsys, "run", "base", *SETS, "--out", tmp_path / name)
-        assert "the run there is another one: " in message and "source (" in message and "versions.scipy (" in message
+        assert "it contains another run: " in message and "source (" in message and "versions.scipy (" in message
 
 
 def test_a_forced_run_removes_only_the_listed_files(tmp_path):
@@ -111,10 +111,10 @@ def test_a_resume_reports_a_changed_scene_file(tmp_path, capsys, monkeypatch):
     out = pages.run(tmp_path, "mine.toml", "pore.length=500 um", options=["--unset", "substrates"])
     monkeypatch.chdir(out)
     text = scene.read_text()
-    differs = f"{scene}: it is not the scene of the run any more: pore.width (50.0 um there, now 60.0 um)"
+    differs = f"{scene}: it has changed since the run began: pore.width (50 um there, now 60 um)"
     for content, expected in ((text, ""), (text.replace("50 um", "60 um"), differs), ("not toml", ""), (None, "")):
         scene.unlink() if content is None else scene.write_text(content)
         assert resume_run(out) == 0
         message = capsys.readouterr().err
         assert expected in message and message.count("\n") == bool(expected)
-    assert read_record(out)["tables"]["pore"]["width"] == "50.0 um"
+    assert read_record(out)["tables"]["pore"]["width"] == "50 um"

@@ -11,6 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from repro.march.simulation import simulate
+from repro.runs.machine import differences
 from repro.scene import SceneError, exact, load_scene, parse_scene, scene_hash, scene_tables, units
 from repro.scene.text import scene_text
 from tests.test_scene_text import parsed
@@ -154,6 +156,55 @@ def converted(convert, text, unit):
                                                ("14.5 psi", "MPa", 0.09997398075094124)])
 def test_units_that_pint_alone_knows_are_accepted(text, unit, value):
     assert units.to_internal(text, unit) == value
+
+
+@pytest.mark.parametrize("text, unit, value", [
+    ("5 g/m3", "mg/L", 5), ("5 g/m³", "mg/L", 5), ("5 mg L-1", "mg/L", 5), ("5 mg·L⁻¹", "mg/L", 5),
+    ("1e-9 m2/s", "um^2/h", 3.6e6), ("1e-9 m²/s", "um^2/h", 3.6e6), ("24 d-1", "1/h", 1), ("24 d−1", "1/h", 1),
+    ("1 m s-2", "um/h^2", 1.296e13), ("1 ft2/s", "um^2/h", 334450944000000)])
+def test_units_are_accepted_as_papers_write_them(text, unit, value):
+    assert units.to_internal(text, unit) == value
+
+
+@given(st.floats(1e-12, 1e12), st.sampled_from([
+    ("um/h", "m/day"), ("um/h^2", "m s-2"), ("rad", "deg"), ("1/h", "1/day"), ("um^2/h", "cm^2/day"), ("um", "ft")]))
+def test_a_value_in_another_unit_reads_back_bit_by_bit(value, pair):
+    assert units.to_internal(units.in_unit(value, *pair), pair[0]) == value
+
+
+def test_a_scene_is_shown_in_the_units_of_its_text():
+    """Keys that the text leaves out have those of their example. The hash does not depend on units."""
+    written = ["flow.gravity=9810 mm/s2", "substrates.donor.supply=[['0 h', '10 g/m³'], ['2 h', '5 mg/L']]"]
+    scene = load_scene("base", written)
+    assert scene.flow.gravity == load_scene("base").flow.gravity
+    tables = scene_tables(scene)
+    assert tables["flow"]["gravity"] == "9810 mm/s2" and tables["flow"]["kinematic_viscosity"] == "0.01003 cm^2/s"
+    assert tables["substrates"]["donor"]["supply"][0] == ["0.0 h", "10 g/m3"]
+    assert tables["substrates"]["acceptor"]["diffusivity_in_aggregate"] == "1.85 cm^2/day"
+    other = load_scene("base", [written[1]])
+    assert scene == other and scene_hash(scene) == scene_hash(other)
+    assert not differences(tables, scene_tables(other))
+    assert list(differences(tables, scene_tables(load_scene(other, ["pore.width=51 um"])))) == ["pore.width"]
+
+
+# ---------------------------------------------------------------- times of rows
+
+
+@pytest.mark.parametrize("entries, times", [
+    (["output.every=0.1 h"], (0, 0.1, 0.2, 0.3, 0.35)),
+    (["output.every=0.1 h", "output.times=[\"0.25 h\", \"0.2 h\"]"], (0, 0.1, 0.2, 0.25, 0.3, 0.35)),
+    (["output.every=0.35 h"], (0, 0.35)), (["output.every=1 h"], (0, 0.35))])
+@pytest.mark.parametrize("scheme", ["updates", "midpoint"])
+def test_rows_at_an_interval(entries, times, scheme):
+    """They end with growth.end, and output.times adds others."""
+    changes = ["growth.end=0.35 h", "numerics.refinement=0.3", f"numerics.time={scheme}", *entries]
+    assert tuple(report.pore.time for report in simulate("base", changes)) == times
+
+
+def test_an_interval_with_too_many_rows_is_refused():
+    assert load_scene("base", ["output.every=0.00194 h"]).output.every == 0.00194
+    with pytest.raises(SceneError, match="output.every = .*0.00194 h or more is needed: at most 10000 rows"):
+        load_scene("base", ["output.every=0.0019 h"])
 
 
 # ---------------------------------------------------------------- values implied by other keys

@@ -1,4 +1,5 @@
 """Scenes that are refused: one line names file, key, value and the accepted values."""
+import subprocess
 import time
 import tomllib
 from pathlib import Path
@@ -131,7 +132,8 @@ REFUSED = {
         f'{DONOR}=[["0 h", "1 mg/L"], ["2 h", "{value}"]]' for value in ("1 um", "-1 mg/L")],
     "entry 1 of a table must be a time": [
         f"{DONOR}={value}" for value in ('[["0 mg/L", "1 h"]]', '[["0 h"]]', '["0 h", "1 mg/L"]')],
-    'or a table such as [["0 h", "10 mg/L"], ["5 h", "10 mg/L"]] (did you mean "3 mg/L"?)': [f"{DONOR}=3"],
+    'or a list of [time, value] pairs such as [["0 h", "10 mg/L"], ["5 h", "10 mg/L"]] (did you mean "3 mg/L"?)': [
+        f"{DONOR}=3"],
     "flow.head (10 um) is given too": ['flow.mean_velocity=[["0 h", "1 m/day"]]'],
     '"steps" is needed where no table': ["flow.interpolation=linear", "substrates.acceptor.interpolation=linear"],
     # times
@@ -413,7 +415,16 @@ def test_a_large_file_is_refused_unread(tmp_path):
 
 
 def test_a_file_that_is_not_utf_8_is_refused(tmp_path):
-    assert "not UTF-8 text (at byte 3)" in refusal(write_scene(tmp_path, "# µ", "latin-1"))
+    """The message has a command that makes it a scene."""
+    for encoding in ("latin-1", "utf-16"):
+        path = write_scene(tmp_path, '# µ\n[pore]\nwidth = "60 µm"', encoding)
+        message = refusal(path)
+        assert f"not UTF-8 text (at byte {1 if encoding == 'utf-16' else 3})" in message
+        assert "saved with the encoding UTF-8 of the editor" in message
+        command = message.rpartition("converted by: ")[2]
+        converted = subprocess.run([*command.split(), str(path)], capture_output=True, check=True).stdout
+        path.write_bytes(converted)
+        assert load_scene(path).pore.width == 60
 
 
 def test_a_wrong_unset_is_refused_with_a_hint():

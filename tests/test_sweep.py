@@ -24,6 +24,7 @@ from repro import cli, results
 from repro.cli import main
 from repro.runs import execution
 from repro.runs.machine import THREADS
+from repro.runs.status import is_fold
 from repro.sweeps import page, pool, single_run, table
 from repro.sweeps.design import grid, latin, parse, points
 from repro.sweeps.folder import Sweep
@@ -344,7 +345,7 @@ def test_foreign_folders_and_links_are_refused(tmp_path, capsys, arrange, why):
 def start_sweep(out, *arguments):
     """Start `repro sweep base`."""
     command = [sys.executable, "-m", "repro", "sweep", "base", "--out", str(out), *arguments]
-    return subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    return subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True)
 
 
 def cut_off(out, how, *arguments):
@@ -353,7 +354,7 @@ def cut_off(out, how, *arguments):
     No process of it remains, since each would hold its standard error open."""
     process = start_sweep(out, *arguments)
     until(lambda: list(out.glob("runs/0*/fields/*.vtu")))
-    process.send_signal(how)
+    os.killpg(process.pid, how)  # as Ctrl-C does
     stderr = process.communicate(timeout=20)[1]
     return process.returncode, stderr
 
@@ -363,7 +364,7 @@ def test_a_signal_ends_a_sweep_quietly(tmp_path, how, ends, word):
     """It prints one line with the command that continues it, and writes the tables of its runs so far."""
     out = tmp_path / "sweep"
     status, stderr = cut_off(out, how, "--vary", "pore.width=48 um, 50 um", "--workers", "1", "--quiet")
-    command = f"repro sweep base --out {out} --vary 'pore.width=48 um, 50 um' --workers 1 --quiet goes on with it"
+    command = f"repro sweep base --out {out} --vary 'pore.width=48 um, 50 um' --workers 1 --quiet continues the sweep"
     assert status == ends and stderr.startswith(f"repro: {word}; "), stderr
     assert command in stderr and stderr.count("\n") == 1, stderr
     assert (out / "table.csv").exists() and (out / "summary.html").exists()
@@ -407,6 +408,49 @@ def test_rows_of_a_run_that_failed_are_in_the_table(tmp_path):
     record_end(swept, swept.points[1], "failed: x")
     table.write(swept, table.read_runs(swept, {}, 0.1))
     assert [row["run"] for row in rows(tmp_path / "table.csv")] == ["2"]
+
+
+def test_a_sweep_converts_to_tables_and_pictures(tmp_path):
+    """The columns are those of runs.csv, with the last row of each run. Varied keys are dimensions of a grid, and
+    coordinates of a hypercube."""
+    pandas, xarray = map(pytest.importorskip, ("pandas", "xarray"))
+    changes = ["growth.end=1 h", "numerics.refinement=0.3"]
+    varied = ["pore.width=48 um, 50 um", "flow.viscosity_ratio=100, 2000"]
+    swept = repro.sweep("base", varied, tmp_path, changes, workers=2)
+    frame, array = swept.to_pandas(), swept.to_xarray()
+    written = pandas.read_csv(tmp_path / "runs.csv", index_col="run")
+    pandas.testing.assert_frame_equal(frame, written, check_dtype=False, rtol=1e-15)
+    for run, path in zip(swept.runs, swept.paths):
+        last = {name: float(value) for name, value in rows(path / "timeseries.csv")[-1].items() if value}
+        assert {name: frame.loc[run.point.index, name] for name in last if name != "time_h"} == {
+            name: value for name, value in last.items() if name != "time_h"}
+        at = array.sel({"pore.width": run.point.values[0], "flow.viscosity_ratio": run.point.values[1]})
+        assert float(at["conductivity_m_per_d"]) == last["conductivity_m_per_d"] and at["end_h"] == 1
+    assert array.sizes == {"pore.width": 2, "flow.viscosity_ratio": 2} and array["pore.width"].attrs["units"] == "um"
+    assert isinstance(array, xarray.Dataset) and array["conductivity_m_per_d"].attrs["units"] == "m/day"
+    for run in (swept.runs[3], swept.runs[1]):
+        swept.runs.remove(run)
+    assert swept.to_xarray().sizes == {"pore.width": 2, "flow.viscosity_ratio": 1}
+    swept.runs.extend(3 * swept.runs + swept.runs[:1])
+    assert swept.to_xarray().sizes == {"run": 9}
+    assert repr(swept.runs).count("\n") == 8 and repr(swept.runs).startswith("<run 1 (48.0, 100.0): completed, to 1 h>")
+    swept.runs.extend(swept.runs[:2])
+    assert repr(swept.runs).splitlines()[9:] == ["... and 2 more"]
+    axes = swept.plot("conductivity")
+    assert [line.get_label() for line in axes.lines] == ["flow.viscosity_ratio = 100"]
+    assert axes.get_xlabel() == "pore.width (um)" and "m/day" in axes.get_ylabel()
+    with pytest.raises(KeyError, match="porosity: runs.csv has end_h, "):
+        swept.plot("porosity")
+
+
+def test_events_of_a_run():
+    """Half of the conductivity is reached between rows; a fold has the time of the last row."""
+    folded = table.RunSeries(np.array([0.0, 1.0, 2.0]), np.array([1.0, 0.8, 0.2]), np.zeros(3), np.zeros(3, bool), 1.0,
+                             0.1, folded=True)
+    value = {number.name: number.reported(folded) for number in table.NUMBERS}
+    assert value["half_conductivity_time_h"] == pytest.approx(1 + np.log(1.6) / np.log(4))
+    assert value["fold_time_h"] == 2 and np.isnan(value["contact_time_h"]) and np.isnan(value["clogging_time_h"])
+    assert is_fold("the aggregate's surface folds in the step from t = 2 h: near x = 3 um") and not is_fold("completed")
 
 
 def test_marks_of_the_page_have_the_colour_of_their_key(tmp_path):

@@ -39,7 +39,7 @@ class Store(ABC):
 
     @abstractmethod
     def keep(self, key: str, result: Any) -> None:
-        """Take over a result that was computed."""
+        """Store a computed result."""
 
     def get(self, scene: Scene) -> Any:
         """The result of a scene."""
@@ -70,7 +70,7 @@ class Folders(Store):
         self.folder = folder
 
     def path(self, scene: Scene) -> Path:
-        """Where the run of a scene is or will be."""
+        """The folder of a scene's run, which may not exist yet."""
         return self.folder / key_of(scene)
 
     def find(self, key: str) -> Path | None:
@@ -115,7 +115,7 @@ class Numbers(Store):
         return self.known.get(key)
 
     def keep(self, key: str, result: dict[str, float]) -> None:
-        """Know them from now on."""
+        """Store the numbers in memory."""
         self.known[key] = result
 
 
@@ -127,7 +127,7 @@ def _append_numbers(numbers: Callable[[Scene], dict[str, float]], file: Path, sc
 
 
 class Memory:
-    """What functions return in this process, by their arguments and by the present value of a context."""
+    """Results of functions in this process, by their arguments and the present context."""
 
     def __init__(self, context: Callable[[], Hashable]):
         self._context = context

@@ -80,7 +80,7 @@ CHOICES = {
     "midpoint": Switch("steps in time", "updates of 12 min", "midpoint, tolerance 0.01", 'numerics.time="midpoint"',
                        False, "first order in the step against second"),
 }
-#: Numbers that the paper does not print [E13]: {key: (symbol, our value, alternatives)}.
+#: Parameters that the paper does not print [E13]: {key: (symbol, our value, alternatives)}.
 _NUMBERS = {"flow_stabilisation": ("c", 100, (25, 50, 200, 400)), "mesh_compressibility": ("gamma", 1, (0.1, 10)),
             "refinement": ("refinement", 1, (0.7, 1.4))}
 NUMBERS = [Switch(word, f"{printed_value:g}", f"{value:g}", f"numerics.{key}={value}", False)
@@ -181,8 +181,9 @@ def near(columns: Columns, name: str, times) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """A run of steps or a seed of its own. seconds: of processor time; columns: those of :func:`told`, of t = 0 and
-    each update; plotted: the state at 19.2 h, or the last before."""
+    """A run with steps or a seed of its own. seconds: processor time; columns: those of :func:`run_columns`, at t = 0
+    and after each update; plotted: the state at 19.2 h, or the last one before.
+    """
 
     seconds: float
     columns: Columns

@@ -36,7 +36,7 @@ def main(arguments: list[str] | None = None) -> int:
     except Interrupted as error:
         return _fail(options, error, 128 + error.signal)
     except KeyboardInterrupt:
-        return _fail(options, "interrupted; what was computed is written", 130)
+        return _fail(options, "interrupted; the results so far are written", 130)
 
 
 def _fail(options, message, status: int) -> int:

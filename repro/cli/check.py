@@ -9,20 +9,21 @@ import json
 from pathlib import Path
 
 from repro.cli.arguments import add_scene
-from repro.runs.progress import say
+from repro.runs.progress import say, while_checking
 from repro.scene import load_scene, packaged_scenes
 
 
 def add(commands) -> None:
     """Add the parser of this command."""
     command = commands.add_parser(
-        "check", help="validate a scene and say what a run of it will be, or check a run's files",
-        description="Validate a scene; say what it models, its mesh, its dimensionless numbers, "
-        "where a simplification does not hold, and what a run costs. Exit status: 0 where it can "
-        "be run, with warnings or without, 2 where not. Of the folder of a run: are its files as "
-        "they were written, by their SHA-256? Exit status: 0 where they are, 2 where not.")
+        "check", help="validate a scene and describe its run, or check the files of a run",
+        description="Validate a scene, and print its model, its first mesh, its dimensionless "
+        "numbers, a warning for each simplification that does not hold, and the cost of a run. "
+        "Exit status: 0 if the scene can be run, with or without warnings; 2 if not. If SCENE is "
+        "the folder of a run, compare the SHA-256 of its files with the recorded ones instead. "
+        "Exit status: 0 if all files are unchanged; 2 if not.")
     add_scene(command)
-    command.add_argument("--json", action="store_true", help="for machines")
+    command.add_argument("--json", action="store_true", help="print the result as JSON")
     command.set_defaults(call=call, refuse=command.error)
 
 
@@ -32,9 +33,10 @@ def call(options) -> int:
     if options.scene not in packaged_scenes() and folder.is_dir():
         return _check_run(options, folder)
     load_scene(options.scene, options.set, unset=options.unset)  # before the slow import
-    from repro.preflight.checked import check, report
+    with while_checking(options.scene):
+        from repro.preflight.checked import check, report
 
-    checked = check(options.scene, options.set, unset=options.unset)
+        checked = check(options.scene, options.set, unset=options.unset)
     say(json.dumps(checked.tables(), indent=2) if options.json else report(checked))
     return 0
 
@@ -45,11 +47,11 @@ def _check_run(options, folder: Path) -> int:
     from repro.runs.status import is_over
 
     if options.set or options.unset:
-        options.refuse("no --set or --unset is accepted with the folder of a run")
+        options.refuse("--set and --unset change a scene; the folder of a run accepts neither")
     status = read_status(folder)
-    files = "its files are as they were written"
+    files = "its files are unchanged"
     if not is_over(status):
-        files += f", and repro run --resume {folder} goes on with it"
+        files += f"; repro run --resume {folder} continues the run"
     record = {"folder": str(folder), "status": status, "unchanged": True}
     say(json.dumps(record, indent=2) if options.json else f"{folder}: {status}; {files}")
     return 0

@@ -13,9 +13,9 @@ def add(commands) -> None:
     """Add the parser of this command."""
     command = commands.add_parser(
         "plot", help="draw curves, a field or a film of a run",
-        description="Draw the curves of a run over time. With the name of a column, draw its "
-        "curve; with that of a field, such as acceptor, draw the field at a time, or at all times "
-        "as a film if FILE ends in .gif. It needs matplotlib.")
+        description="Without FIELD, draw the curves of a run over time. If FIELD is a column, draw "
+        "its curve. If FIELD is a field, such as acceptor, draw it at one time, or at all times as "
+        "a film if FILE ends in .gif. Drawing needs matplotlib.")
     command.add_argument("folder", metavar="FOLDER", type=path, help="folder of a run")
     command.add_argument("field", metavar="FIELD", nargs="?",
                          help="a field or a column, with or without its unit")
@@ -34,7 +34,7 @@ def call(options) -> int:
     try:
         if options.out.suffix == ".gif":
             if options.field is None or options.time is not None:
-                raise OutputError(f"{options.out}: a film needs FIELD, and no --time")
+                raise OutputError(f"{options.out}: a film needs FIELD and accepts no --time")
             results.animate(options.field, options.out)
         else:
             _save(results.plot(options.field, time=options.time), options.out)

@@ -19,36 +19,35 @@ if TYPE_CHECKING:
     from repro.runs.execution import Watch
 
 DESCRIPTION = """\
-Run a scene and write its results, or resume a run that was interrupted or killed: the results are
-the same to the last bit. If DIR already holds a run of the same scene, that run is resumed; a
-finished run is left unchanged. --resume DIR --set growth.end="30 h" makes a run longer: it then
-equals a run that had this end from its start."""
+Run a scene and write its results, or resume a run that was interrupted or killed. A resumed run has
+the same results as an uninterrupted one, to the last bit. If DIR already contains a run of the same
+scene, that run is resumed; a finished run is left unchanged. --resume DIR --set growth.end="30 h"
+makes a run longer: it then equals a run that had this end from its start."""
 STATUS = """exit status:
-  0    the end of the scene, or of the model, is reached, now or before
+  0    the run has reached the end of the scene or of the model
   1    a stage failed; the message names the simulated time, the stage, the reason, the file of the
-       last good state, and what to change
-  2    wrong input, or the folder cannot be used: another run's or not a run's, not writable, disk
-       full, in use
-  130  interrupted (SIGINT, Ctrl-C); 143 terminated (SIGTERM): the step in hand is given up, results
-       and checkpoint are written, and --resume goes on from there; a second signal, after a second
-       or more, stops at once"""
+       last good state, and a change to try
+  2    the input is wrong, or the folder cannot be used: it contains another run or other files, it
+       is not writable, another process uses it, or the disk is full
+  130  interrupted (SIGINT, Ctrl-C), or 143, terminated (SIGTERM): the present step is discarded,
+       the results so far and a checkpoint are written, and --resume continues the run; a second
+       signal, after a second or more, ends the process at once"""
 
 
 def add(commands) -> None:
     """Add the parser of this command."""
     command = commands.add_parser(
-        "run", help="run a scene, or go on with a run", description=DESCRIPTION, epilog=STATUS,
+        "run", help="run a scene, or resume a run", description=DESCRIPTION, epilog=STATUS,
         formatter_class=argparse.RawDescriptionHelpFormatter)
     add_scene(command, nargs="?")
     command.add_argument("--out", metavar="DIR", type=path, help="folder for the results")
     command.add_argument("--resume", metavar="DIR", type=path,
                          help="resume the run in this folder")
     command.add_argument("--force", action="store_true",
-                         help="remove the files of the run in DIR, as its run.json lists them, and "
-                         "start again")
+                         help="remove the files that the run.json in DIR lists, and start again")
     command.add_argument("--checkpoint", metavar="SECONDS", type=_seconds, default=INTERVAL,
-                         help="interval at which a checkpoint and the results so far are written "
-                         "(default: %(default)g)")
+                         help="wall time after which a checkpoint and the results so far are "
+                         "written again (default: %(default)g)")
     command.add_argument("--quiet", action="store_true", help="print only warnings and errors")
     command.add_argument("--json", action="store_true",
                          help="print each event as one line of JSON")
@@ -67,10 +66,10 @@ def call(options) -> int:
     conflicting = [options.scene, options.unset, options.out, options.force]
     conflicting += [entry for entry in options.set if key_of(entry) != "growth.end"]
     if options.resume and any(conflicting):
-        options.refuse("--resume takes the scene from the run's folder: no SCENE, --unset, --out "
-                       "or --force is accepted with it, and no --set but of growth.end")
+        options.refuse("--resume reads the scene from the run's folder: SCENE, --unset, --out and "
+                       "--force are not accepted with it, and --set can change growth.end only")
     if not options.resume and not (options.scene and options.out):
-        options.refuse("SCENE and --out DIR are needed, or --resume DIR")
+        options.refuse("give SCENE and --out DIR, or --resume DIR")
     scene = None if options.resume else load_scene(options.scene, options.set, unset=options.unset)
     from repro.runs.execution import Watch
 
@@ -78,7 +77,7 @@ def call(options) -> int:
     with interrupts.catch_signals() as stop, events as tell:
         try:
             _run(options, scene, Watch(tell, options.checkpoint, stop, stop))
-        except MemoryError as error:  # outside the steps, whose errors say more
+        except MemoryError as error:  # not within a step, which reports its own
             raise SimulationError(f"out of memory ({error}); try a smaller "
                                   "numerics.refinement") from error
     return 0

@@ -13,11 +13,11 @@ from repro.scene.text import scene_text, titles
 def add(commands) -> None:
     """Add the parser of this command."""
     command = commands.add_parser(
-        "scene", help="write a scene out with every key, commented",
-        description="Write a scene to the standard output, with every key it could have: "
-        "repro scene base > mine.toml. Without SCENE, list the packaged ones.")
+        "scene", help="print a scene with every key and its explanation",
+        description="Print a scene with every key that a scene can have, for example: "
+        "repro scene base > mine.toml. Without SCENE, list the packaged scenes.")
     command.add_argument("scene", metavar="SCENE", nargs="?",
-                         help="a packaged scene, or a TOML file (do not write onto the file)")
+                         help="a packaged scene, or a TOML file (do not redirect the output to it)")
     add_changes(command)
     command.set_defaults(call=call)
 

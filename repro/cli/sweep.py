@@ -20,15 +20,15 @@ from repro.runs.progress import say
 if TYPE_CHECKING:
     from repro.sweeps.driver import Swept, Tell
 
-#: Exit status where some runs have failed.
+#: Exit status if some runs have failed.
 SOME_FAILED = 3
 EPILOG = """\
---vary has two forms: a range KEY=a:b UNIT:linear|log:N, and a list KEY=VALUE, VALUE, ...; several
-of them make a grid. With --samples, which draws a Latin hypercube, a range is KEY=a:b
-UNIT:linear|log. Varying flow.head replaces flow.mean_velocity, and vice versa. The same command
-continues a sweep that was cut off: it makes the missing runs, and repeats failed ones. On a cluster
-DIR must be on a file system that all workers share. Exit status: 0 every run is finished, 3 some
-have failed, 2 wrong input, 130 interrupted, 143 terminated."""
+--vary takes a range KEY=a:b UNIT:linear|log:N or a list KEY=VALUE, VALUE, ... Several --vary make a
+grid. With --samples a range has no N: KEY=a:b UNIT:linear|log. Varying flow.head replaces
+flow.mean_velocity, and vice versa. The same command continues an interrupted sweep: it makes the
+missing runs and repeats the failed ones. On a cluster, DIR must be on a file system that all
+workers share. Exit status: 0 if every run has finished, 3 if some have failed, 2 if the input is
+wrong, 130 if interrupted, 143 if terminated."""
 
 
 def add(commands) -> None:
@@ -38,40 +38,40 @@ def add(commands) -> None:
         description="Run a scene many times with varied keys, on all cores.")
     add_scene(command)
     command.add_argument("--vary", metavar="KEY=...", action="append", required=True,
-                         help='"flow.mean_velocity=0.3:30 m/day:log:8" or '
+                         help='key and values: "flow.mean_velocity=0.3:30 m/day:log:8" or '
                          '"pore.width=50 um, 60 um"; may be repeated')
     command.add_argument("--samples", metavar="N", type=int,
-                         help="a Latin hypercube of N runs instead of a grid")
+                         help="draw N runs from a Latin hypercube instead of a grid")
     command.add_argument("--seed", metavar="S", type=_natural_number, default=0,
-                         help="seed of the Latin hypercube (0)")
+                         help="seed of the Latin hypercube (default: 0)")
     command.add_argument("--out", metavar="DIR", type=path, required=True,
-                         help="folder for runs, tables and page")
+                         help="folder for the runs, their tables and their page")
     command.add_argument("--workers", metavar="N", type=_positive_number,
-                         help="parallel runs (all cores)")
+                         help="number of parallel runs (default: one per core)")
     command.add_argument("--scheduler", metavar="tcp://HOST:PORT",
-                         help="a Dask scheduler whose workers make the runs")
+                         help="address of a Dask scheduler whose workers make the runs")
     command.add_argument("--clogged", metavar="PART", type=_fraction, default=0.1,
-                         help="part of the first conductivity at which a pore counts as clogged "
-                         "(0.1)")
-    command.add_argument("--quiet", action="store_true", help="no progress")
+                         help="fraction of the first conductivity at which a pore counts as "
+                         "clogged (default: 0.1)")
+    command.add_argument("--quiet", action="store_true", help="do not show progress")
     command.set_defaults(call=call)
 
 
 def _natural_number(text: str) -> int:
     if int(text) < 0:
-        raise argparse.ArgumentTypeError("zero or more is needed")
+        raise argparse.ArgumentTypeError("an integer, zero or more, is needed")
     return int(text)
 
 
 def _positive_number(text: str) -> int:
     if int(text) < 1:
-        raise argparse.ArgumentTypeError("one or more is needed")
+        raise argparse.ArgumentTypeError("an integer, one or more, is needed")
     return int(text)
 
 
 def _fraction(text: str) -> float:
     if not 0 < float(text) < 1:
-        raise argparse.ArgumentTypeError("between 0 and 1 is needed")
+        raise argparse.ArgumentTypeError("a number between 0 and 1 is needed")
     return float(text)
 
 
@@ -88,13 +88,15 @@ def call(options) -> int:
 
 @contextmanager
 def _end_on_signals(command: str) -> Iterator[None]:
-    """End the sweep on Ctrl-C or SIGTERM, with a message that gives the command to continue it. A
-    second signal ends the process at once."""
+    """End the sweep on Ctrl-C or SIGTERM; the message gives the command that continues it.
+
+    A second signal ends the process at once.
+    """
     def end(number: int, frame) -> None:
         signal.signal(number, signal.SIG_DFL)
         cause = "interrupted" if number == signal.SIGINT else "terminated"
-        raise Interrupted(f"{cause}; what was computed is written, and {command} goes on with it",
-                          number)
+        raise Interrupted(f"{cause}; the results so far are written, and {command} continues the "
+                          "sweep", number)
 
     handlers = {number: signal.getsignal(number) for number in STOP_SIGNALS}
     for number in handlers:

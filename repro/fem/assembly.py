@@ -64,7 +64,7 @@ class ElementSystem:
         self.indptr = starts.astype(np.int32)
         self._pattern = sp.csc_matrix((np.zeros(len(self.indices)), self.indices, self.indptr),
                                       shape=(self.count, self.count))
-        self._pattern.has_canonical_format = True  # spares a check of every filled matrix
+        self._pattern.has_canonical_format = True  # avoids a check of every filled matrix
 
     def matrix(self, elements: Parts) -> sp.csc_matrix:
         """K between the free unknowns, in elimination order."""

@@ -199,7 +199,7 @@ class Division:
     def divided_loads(self, loads: np.ndarray) -> np.ndarray:
         """Nodal loads on the divided mesh, from those on the parent's nodes (N, 2).
 
-        The load of the middle of an arc counts as that of a traction which is uniform along it.
+        The load at the middle of an arc counts as that of a uniform traction on the arc.
         """
         corners = self.parent.corners
         loop = self.parent.loop
@@ -216,8 +216,10 @@ class Division:
         return np.concatenate([old_loads[:corners], middle / 4, old_loads[corners:], half, inside])
 
     def gathered_loads(self, loads: np.ndarray) -> np.ndarray:
-        """(N, 2) nodal loads on the parent's nodes that do the same work as loads on all nodes of
-        the divided mesh, in every displacement of the parent."""
+        """(N, 2) nodal loads on the parent's nodes, from loads on all nodes of the divided mesh.
+
+        Both do the same work in every displacement of the parent.
+        """
         corners = self.parent.corners
         first_middle = corners + len(self.arcs)
         last_middle = first_middle + len(self.parent.points) - corners
@@ -233,8 +235,7 @@ class Division:
         return gathered
 
     def halves(self, arc: int) -> tuple[np.ndarray, DividedTriangle]:
-        """(2,) rows of both parts of the aggregate's triangle beside the divided arc number
-        ``arc``, and this triangle."""
+        """(2,) rows of both parts of the triangle at the divided arc ``arc``, and the triangle."""
         inside = [triangle for triangle in self.triangles if self.parent.biomass[triangle.cell]]
         number = next(k for k, triangle in enumerate(inside) if triangle.arc == arc)
         first = np.count_nonzero(self.parent.biomass[: inside[number].cell])
@@ -271,8 +272,10 @@ def barycentric(where: np.ndarray) -> np.ndarray:
 
 
 def quadratic(where: np.ndarray) -> np.ndarray:
-    """(q, 6) quadratic shape functions at points (q, 2) of the unit triangle, as those of
-    :func:`elements.values`, which takes longer for a few points."""
+    """(q, 6) quadratic shape functions at points (q, 2) of the unit triangle.
+
+    :func:`elements.values` gives the same, but takes longer for a few points.
+    """
     linear = barycentric(where)
     return np.hstack([linear * (2 * linear - 1), 4 * linear * linear[:, [1, 2, 0]]])
 

@@ -42,12 +42,12 @@ def evaluated(order: int, where: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     places = np.ascontiguousarray(where.T)
     count = len(element.doflocs)
     values = np.empty((len(where), count))
-    slopes = np.empty((len(where), count, 2))
+    gradients = np.empty((len(where), count, 2))
     for k in range(count):
         value, gradient = element.lbasis(places, k)
         values[:, k] = value
-        slopes[:, k, 0], slopes[:, k, 1] = gradient
-    return values, slopes
+        gradients[:, k, 0], gradients[:, k, 1] = gradient
+    return values, gradients
 
 
 def values(order: int, where: np.ndarray) -> np.ndarray:
@@ -61,9 +61,11 @@ def derivatives(order: int, where: np.ndarray) -> np.ndarray:
 
 
 def quadrature(degree: int) -> tuple[np.ndarray, np.ndarray]:
-    """Points (q, 2) of the unit triangle and their weights (q,), exact for polynomials of a degree:
-    scikit-fem's rules, and the centroid for a degree of one or less, where scikit-fem takes three
-    points."""
+    """Points (q, 2) of the unit triangle and their weights (q,), exact for polynomials of a degree.
+
+    The rules are those of scikit-fem. A degree of one or less needs only the centroid, where
+    scikit-fem takes three points.
+    """
     if degree <= 1:
         return np.full((1, 2), 1 / 3), np.full(1, 0.5)
     where, weights = get_quadrature_tri(degree)
@@ -74,15 +76,16 @@ def quadrature(degree: int) -> tuple[np.ndarray, np.ndarray]:
 class Table:
     """Functions of an order at quadrature points of the unit triangle.
 
-    weights: (q,); values: (q, k), slopes: (q, k, 2) of the functions; shape: (q, g), bends:
-    (q, g, 2) of the functions that map the triangle; linear: (q, 3) barycentric coordinates.
+    weights: (q,); values: (q, k), derivatives: (q, k, 2) of the functions; shape: (q, g), and
+    map_derivatives: (q, g, 2), of the functions that map the triangle; linear: (q, 3) barycentric
+    coordinates.
     """
 
     weights: np.ndarray
     values: np.ndarray
-    slopes: np.ndarray
+    derivatives: np.ndarray
     shape: np.ndarray
-    bends: np.ndarray
+    map_derivatives: np.ndarray
     linear: np.ndarray
 
 
@@ -112,8 +115,10 @@ def values_on(order: int, of: Table) -> np.ndarray:
 
 @cache
 def linear_fit(of: Table) -> np.ndarray:
-    """(3, q) least-squares fit of a linear function: from values at the points of a table to those
-    at the corners."""
+    """(3, q) matrix of the least-squares fit of a linear function.
+
+    It takes values at the points of a table to values at the corners.
+    """
     return np.linalg.pinv(of.linear)
 
 
@@ -127,8 +132,11 @@ def edge_table(order: int) -> tuple[np.ndarray, np.ndarray]:
 
 @cache
 def side_table(order: int, geometry: int, side: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(p, k) shape functions of a triangle at the quadrature points of its side 01, 12 or 20, the
-    weights (p,), and (p, g) the derivatives along the side of those that map the triangle."""
+    """Shape functions (p, k) of a triangle at the quadrature points of its side 01, 12 or 20.
+
+    Also returns the weights (p,) and the derivatives (p, g), along the side, of the functions that
+    map the triangle.
+    """
     (s,), weights = get_quadrature_line(EDGE_DEGREES[order])
     corners = nodes(1)
     direction = corners[NEXT[side]] - corners[side]
@@ -156,25 +164,29 @@ def inverse_transpose(matrix: np.ndarray, det: np.ndarray) -> np.ndarray:
     return cofactors / det[..., None, None]
 
 
-def jacobian(corners: np.ndarray, bends: np.ndarray) -> np.ndarray:
-    """(T, q, 2, 2) d x_i / d (s, t)_k of triangles with nodes (T, g, 2); bends: (q, g, 2), as those
-    of a :class:`Table`."""
-    return by_component(corners.transpose(2, 0, 1)[:, None] @ bends.transpose(2, 1, 0))
+def jacobian(corners: np.ndarray, map_derivatives: np.ndarray) -> np.ndarray:
+    """(T, q, 2, 2) d x_i / d (s, t)_k of triangles with nodes (T, g, 2).
+
+    map_derivatives: (q, g, 2), as in a :class:`Table`.
+    """
+    return by_component(corners.transpose(2, 0, 1)[:, None] @ map_derivatives.transpose(2, 1, 0))
 
 
 def mapped(corners: np.ndarray, of: Table) -> tuple[np.ndarray, np.ndarray]:
-    """Weights (T, q) um2 of the points on triangles with nodes (T, g, 2) um, none of them turned
-    over, and gradients (T, q, 2, k) 1/um of the functions."""
-    J = jacobian(corners, of.bends)
+    """Weights (T, q) um2 of the points, and gradients (T, q, 2, k) 1/um of the functions.
+
+    corners: (T, g, 2) um, nodes of triangles, none of which is turned over.
+    """
+    J = jacobian(corners, of.map_derivatives)
     det = determinant(J)
     turned = inverse_transpose(J, det)
     # Few products of large matrices.
     by_point = np.swapaxes(turned, 0, 1).reshape(len(of.weights), -1, 2)
-    by_function = by_point @ np.swapaxes(of.slopes, 1, 2)
+    by_function = by_point @ np.swapaxes(of.derivatives, 1, 2)
     gradients = by_function.reshape(len(of.weights), len(corners), 2, -1)
     return det * of.weights, np.ascontiguousarray(np.swapaxes(gradients, 0, 1))
 
 
 def weights(corners: np.ndarray, of: Table) -> np.ndarray:
     """(T, q) um2, the weights dx without the gradients."""
-    return determinant(jacobian(corners, of.bends)) * of.weights
+    return determinant(jacobian(corners, of.map_derivatives)) * of.weights

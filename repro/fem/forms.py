@@ -1,6 +1,6 @@
 """Weak forms as sums over tabulated points.
 
-A :class:`Basis` has the functions of a space at the quadrature points. A stage writes the
+A :class:`Basis` has the functions of a space at the quadrature points. A stage computes the
 coefficient, flux or stress of a term at these points, times dx. A form multiplies it by the test
 functions v and the trial functions u, and sums over the points of each triangle:
 

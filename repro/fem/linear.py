@@ -1,10 +1,10 @@
 """Sparse linear systems: order nodes once, factor without pivoting, check the residual.
 
-SuperLU orders and factors. Its minimum-degree ordering is of the graph of *nodes*, whose unknowns
-are numbered together; its symmetric mode takes pivots on the diagonal. This is two to five times
-faster than SciPy's default, and safe as long as pressure blocks are negative definite. The residual
-is checked and the solution refined once. If that does not suffice, the system is factored again
-with partial pivoting.
+SuperLU orders and factors. It orders the graph of *nodes* by minimum degree, and the unknowns of a
+node are numbered together. Its symmetric mode takes pivots on the diagonal. This is two to five
+times faster than SciPy's default, and safe as long as pressure blocks are negative definite. The
+solver checks the residual and refines the solution once. If that does not suffice, it factors the
+system again with partial pivoting.
 
 Optional packages are faster on large meshes: METIS (package pymetis) orders nodes by nested
 dissection, PARDISO (package pypardiso) factors. A :class:`Method` selects them; a mesh passes it to

@@ -1,9 +1,9 @@
 """Triangles of the meshed part of the pore (3.1): one mesh for fluid and biomass.
 
 A curved triangle has six nodes: corners, then the middles of the edges 01, 12 and 20
-(isoparametric). A :class:`Topology` has the properties that depend only on the connections, and
-stays while the mesh moves. A :class:`Mesh` computes those that depend on the coordinates of the
-nodes once; its nodes never change.
+(isoparametric). A :class:`Topology` has the properties that depend only on the connections; a mesh
+that moves keeps it. A :class:`Mesh` computes the properties that depend on the coordinates of its
+nodes once, because its nodes never change.
 """
 
 from __future__ import annotations
@@ -255,7 +255,7 @@ def _along(topology: Topology, line: np.ndarray, order: int) -> np.ndarray:
 
 
 def _on_walls(topology: Topology, order: int) -> np.ndarray:
-    """Nodes of both walls: those of edges of one triangle only, between corners of one wall."""
+    """Nodes of both walls: those of edges with one triangle, between corners of one wall."""
     if order == 1:
         return topology.walls
     on = np.zeros(topology.corners, bool)
@@ -268,8 +268,10 @@ def _on_walls(topology: Topology, order: int) -> np.ndarray:
 
 
 def _across(topology: Topology) -> np.ndarray:
-    """(E,) True where both corners of an edge are on the inlet, or both on the outlet. An end that
-    is one edge long joins both walls."""
+    """(E,) True where both corners of an edge are on the inlet, or both on the outlet.
+
+    If the inlet or the outlet is a single edge, this edge joins both walls.
+    """
     lines = [np.isin(topology.edges, line) for line in (topology.inlet, topology.outlet)]
     return np.any(np.all(lines, axis=2), axis=0)
 
@@ -407,12 +409,11 @@ class Mesh:
         selected: the triangles to test, all by default.
         """
         corners = self.points[self.cells[selected]]
-        J = elements.jacobian(corners, checked_bends(self.geometry))
+        J = elements.jacobian(corners, checked_map_derivatives(self.geometry))
         return elements.determinant(J).min(axis=1) <= 0
 
     def strained_arcs(self) -> np.ndarray:
-        """(M,) True where the curved triangle beside an edge of the aggregate's boundary is turned
-        over."""
+        """(M,) True where the curved triangle beside an edge of the boundary is turned over."""
         if self.geometry == 1:
             return np.zeros(len(self.loop), bool)
         return np.isin(self.loop[1::2], self.cells[self.turned_over(), 3:])
@@ -434,10 +435,11 @@ class Mesh:
 
 
 @cache
-def checked_bends(geometry: int) -> np.ndarray:
+def checked_map_derivatives(geometry: int) -> np.ndarray:
     """Derivatives of the maps' shape functions at a triangle's nodes and quadrature points."""
     of = elements.table(geometry, geometry, elements.GRADIENT_DEGREES[geometry])
-    return np.concatenate([elements.derivatives(geometry, elements.nodes(geometry)), of.bends])
+    at_nodes = elements.derivatives(geometry, elements.nodes(geometry))
+    return np.concatenate([at_nodes, of.map_derivatives])
 
 
 def triangle_areas(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:

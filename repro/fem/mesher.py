@@ -1,4 +1,4 @@
-"""Mesh generation (3.1): nodes of boundary, interface and contact first, then Mmg fills the inside.
+"""Mesh generation (3.1): place nodes on boundary, interface and contact; Mmg fills the inside.
 
 Mmg (through mmgpy) starts from a constrained Delaunay triangulation (shapely) and keeps all
 prescribed edges.
@@ -29,7 +29,7 @@ from repro.timing import timed
 FIRST_PASS = 2.0
 #: Mmg's own limit on the ratio of adjacent edges.
 HGRAD = 1.5
-#: A triangle has its nodes on a line where its area is under this, times its longest edge squared.
+#: Nodes of a triangle lie on a line if its area is below this times its longest edge squared.
 SLIVER = 1e-12
 #: Rounds in which arcs that bend too much for the triangles beside them are halved.
 HALVINGS = 6
@@ -206,7 +206,7 @@ def _fill(points: np.ndarray, polygons: list[Polygon],
     except MeshError:
         raise
     except RuntimeError as error:
-        raise MeshError(f"no mesh could be made: {error}") from error
+        raise MeshError(f"no mesh can be generated: {error}") from error
 
 
 def _mmg(points: np.ndarray, triangles: np.ndarray, region: np.ndarray, rim: np.ndarray,
@@ -318,7 +318,7 @@ def _flip(points: np.ndarray, triangles: np.ndarray, biomass: np.ndarray, corner
 
 def _exchange(points: np.ndarray, triangles: np.ndarray, one: int, edge: int) -> None:
     """Exchange, in place, an edge of a triangle for the other diagonal of the quadrilateral that
-    the triangle forms with its neighbour; not where a new triangle would be turned over."""
+    it forms with its neighbour, unless a new triangle is then turned over."""
     c, a, b = np.roll(triangles[one], -edge)
     sharing = np.flatnonzero((triangles == a).any(axis=1) & (triangles == c).any(axis=1))
     beside = int(sharing[sharing != one][0])

@@ -59,7 +59,7 @@ class Outline:
         return self._extremes[3]
 
     def same_contact(self, other: Outline) -> bool:
-        """Do the nodes of both outlines, one by one, touch the same walls?"""
+        """Does each node touch the same wall in both outlines?"""
         return np.array_equal(self.wall, other.wall)
 
     @cached_property
@@ -99,8 +99,10 @@ class Outline:
         return np.linalg.norm(np.roll(self.points, -1, axis=0) - self.points, axis=1)
 
     def interface_edges(self) -> np.ndarray:
-        """(M,) True where the line from node i to node i + 1 borders the fluid: its ends are not
-        both on one wall."""
+        """(M,) True where the line from node i to node i + 1 borders the fluid.
+
+        Its ends are then not both on one wall.
+        """
         return (self.wall == FREE) | (self.wall != np.roll(self.wall, -1))
 
     def arcs(self, values: np.ndarray) -> np.ndarray:
@@ -119,8 +121,10 @@ class Outline:
         return float(x.min()), float(x.max()), float(y.max()), float(x[y.argmax()])
 
     def _peaks(self) -> np.ndarray:
-        """(K, 2) um, where x or y of an arc is stationary within it. From its middle on, t from -1
-        to 1, an arc is m + t (b - a) / 2 + t^2 (a - 2 m + b) / 2."""
+        """(K, 2) um, points within an arc at which x or y is stationary.
+
+        With t from -1 to 1, an arc is m + t (b - a) / 2 + t^2 (a - 2 m + b) / 2.
+        """
         a, m, b = self.arcs(self.points).transpose(1, 0, 2)
         along = b - a
         bend = a - 2 * m + b
@@ -140,8 +144,8 @@ def parabola(t: np.ndarray) -> np.ndarray:
     return np.stack([(1 - t) * (1 - 2 * t), 4 * t * (1 - t), t * (2 * t - 1)], axis=-1)
 
 
-def slopes(nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """First derivative by t at t = 0, and the second one, of arcs with nodes (M, 3, ...)."""
+def arc_derivatives(nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """First derivative by t at t = 0 and second derivative of arcs with nodes (M, 3, ...)."""
     first, middle, last = np.moveaxis(nodes, 1, 0)
     return -3 * first + 4 * middle - last, 4 * (first - 2 * middle + last)
 
@@ -206,8 +210,8 @@ def _graded_to_corners(rim: np.ndarray, width: float, least: float) -> np.ndarra
 
     At a sharp tip the water's velocity gradient grows as the distance to the power of -1/2, and the
     error of the head loss falls with the first power of the element size there. Strain in a notch
-    grows alike. Where the aggregate spans the pore the water passes through it, and its contact
-    lines count as tips.
+    grows in the same way. If the aggregate spans the pore, the water passes through it, and its
+    contact lines count as tips.
     """
     way = np.diff(rim, axis=0)
     angle = np.arctan2(way[:, 1], way[:, 0])

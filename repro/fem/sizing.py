@@ -11,7 +11,7 @@ from math import inf
 import numpy as np
 from numpy.typing import ArrayLike
 
-from repro.fem.outline import FREE, TOP, Outline, parabola, slopes
+from repro.fem.outline import FREE, TOP, Outline, arc_derivatives, parabola
 
 #: Elements across the pore's width, across the aggregate's thickness and across the narrowest film.
 ACROSS_PORE = 14.0
@@ -104,7 +104,7 @@ def _contact_sizes(outline: Outline, sizing: Sizing) -> np.ndarray | float:
 
 
 def too_coarse(outline: Outline, sizing: Sizing) -> bool:
-    """Is an interface edge twice longer than a new mesh would have it?"""
+    """Is an interface edge more than twice as long as in a new mesh?"""
     sizes = interface_sizes(outline, sizing)
     size = 0.5 * (sizes + np.roll(sizes, -1))
     return bool((outline.interface_edges() & (outline.edge_lengths() > 2 * SPLIT * size)).any())
@@ -113,8 +113,8 @@ def too_coarse(outline: Outline, sizing: Sizing) -> bool:
 def film_sizes(outline: Outline, sizing: Sizing) -> np.ndarray:
     """(M,) element size (um) in the fluid between each node and the opposite wall.
 
-    It is a tenth of the film's thickness, and no less than that of the thinnest resolved film,
-    since thinner films close.
+    It is a tenth of the film's thickness, but at least the size in the thinnest resolved film,
+    because thinner films close.
     """
     if (outline.wall == TOP).any():
         return np.full(len(outline.points), np.inf)
@@ -127,7 +127,7 @@ def size_sources(outline: Outline, sizing: Sizing) -> tuple[np.ndarray, np.ndarr
 
     The points are the interface nodes and, across the fluid, points on the opposite wall, so that a
     film has elements of one size. Short interface edges are never merged, so the elements around
-    them are as small.
+    them are small too.
     """
     free = outline.wall == FREE
     near = interface_sizes(outline, sizing)[free]
@@ -163,9 +163,8 @@ def _nearest_size(where: np.ndarray, sources: np.ndarray, sizes: np.ndarray,
 def split(outline: Outline, sizing: Sizing) -> Outline:
     """The same curve with corners spaced by :func:`interface_sizes`.
 
-    Interface edges are split into equal parts, which changes neither shape nor area, and never
-    merged. Contact surfaces are straight, so all their nodes except ends and fixed points are
-    placed anew.
+    Interface edges are split into equal parts and never merged, so shape and area stay unchanged.
+    Contact surfaces are straight. They get new nodes, except at their ends and fixed points.
     """
     polygon = outline.corners
     sizes = interface_sizes(polygon, sizing)
@@ -228,9 +227,9 @@ def _parameters(nodes: np.ndarray, x: np.ndarray) -> np.ndarray:
     """(K,) t in [0, 1] at which arcs along the wall, nodes at (K, 3) um, reach x (K,); the first is
     zero."""
     t = (x - nodes[:, 0]) / (nodes[:, 2] - nodes[:, 0])
-    slope, bend = slopes(nodes)
+    first, second = arc_derivatives(nodes)
     for _ in range(6):
-        t = t - (np.einsum("ka,ka->k", parabola(t), nodes) - x) / (slope + bend * t)
+        t = t - (np.einsum("ka,ka->k", parabola(t), nodes) - x) / (first + second * t)
     t = np.clip(t, 0.0, 1.0)
     t[0] = 0.0
     return t
@@ -239,8 +238,8 @@ def _parameters(nodes: np.ndarray, x: np.ndarray) -> np.ndarray:
 def placed(outline: Outline, edge: np.ndarray, t: np.ndarray, seed: float | None = None) -> Outline:
     """Place nodes (K,), each at t in [0, 1) of an edge; t = 0 is the edge's first corner.
 
-    seed: as in :class:`Sizing`. Origins, at time zero, between two nodes of the seed's arc lie on
-    that arc: a straight edge of the present outline was round at t = 0, and the elastic stress
+    seed: as in :class:`Sizing`. A new node between two nodes of the seed's arc gets an origin on
+    that arc. A straight edge of the present outline was round at time zero, and the elastic stress
     makes it round again at the next update.
     """
     first = t == 0
@@ -260,8 +259,10 @@ def placed(outline: Outline, edge: np.ndarray, t: np.ndarray, seed: float | None
 
 
 def _on_arc(places: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Places (K, 2) between two points each, moved to the arc around the origin where both points
-    are equally far from it."""
+    """Move points (K, 2), each between two others, to the arc around the origin through these.
+
+    If there is no arc through both, or the point is on the wall, it does not move.
+    """
     radius = np.hypot(*first.T)
     distance = np.hypot(*places.T)
     arc = np.isclose(radius, np.hypot(*second.T), rtol=1e-9, atol=0) & (places[:, 1] > 0)

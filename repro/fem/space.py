@@ -202,7 +202,7 @@ class Lumped:
     space: Space
 
     def reaction(self) -> Basis:
-        """Return the nodes of the biomass, each with the function that is one there."""
+        """Return the nodes of the biomass, each with its nodal function."""
         mesh = self.space.mesh
         lumped = self.space.lumped(mesh.biomass)
         nodes = mesh.topology.body_corners
@@ -229,7 +229,7 @@ class Lumped:
         return field[cells, 0].mean(axis=1, keepdims=True)
 
     def finer(self, degrees: int) -> tuple[Basis, np.ndarray]:
-        """Return the same rule for every degree, and the matrix (1, 1) that keeps a density."""
+        """Return the same points for every degree, and the identity (1, 1) for densities."""
         return self.space.reaction, np.ones((1, 1))
 
 

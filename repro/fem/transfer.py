@@ -6,16 +6,16 @@ projection
 
     (X_new, N_i) = (X_old, N_i)  for every new N_i,
 
-integrated exactly over the common pieces of both meshes. It keeps the total, constants and linear
-fields to round-off as long as both meshes cover the same polygon, and may overshoot where a field
-is steep. The bounded transfer is the same, limited by flux-corrected transport (Zalesak 1979;
+integrated exactly over the common pieces of both meshes. If both meshes cover the same polygon,
+it keeps the total, constants and linear fields to round-off. It may overshoot where a field is
+steep. The bounded transfer is the same, limited by flux-corrected transport (Zalesak 1979;
 Kuzmin 2012): with m_ij the mass matrix, m_i its row sums and b_i = (X_old, N_i), the projection is
 
     m_i X_i = b_i + sum_j f_ij,        f_ij = m_ij (X_i - X_j) = -f_ji
 
 where b_i / m_i is a mean of the old field around node i, bounded by its values there. Each f_ij is
 multiplied by the largest alpha_ij = alpha_ji from 0 to 1 that Zalesak's limiter allows. This keeps
-the total, and exceeds no bound.
+the total and all bounds.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from repro.errors import NotCovered, OriginFolded
 from repro.fem import elements, linear
 from repro.fem.assembly import ElementSystem
 from repro.fem.forms import mass
-from repro.fem.mesh import Mesh, checked_bends, triangle_areas
+from repro.fem.mesh import Mesh, checked_map_derivatives, triangle_areas
 from repro.timing import timed
 
 #: The common pieces of two meshes must cover both to this relative accuracy.
@@ -95,9 +95,9 @@ def _inverted(nodes: np.ndarray, where: np.ndarray, geometry: int) -> np.ndarray
     for _ in range(NEWTON_STEPS):
         guess = local[rest]
         corners = nodes[rest]
-        values, slopes = elements.evaluated(2, guess)
+        values, gradients = elements.evaluated(2, guess)
         apart = (values[:, None] @ corners)[:, 0] - where[rest]
-        J = np.swapaxes(corners, 1, 2) @ slopes
+        J = np.swapaxes(corners, 1, 2) @ gradients
         det = elements.determinant(J)
         det = np.where(np.abs(det) > 1e-12 * np.abs(det).max(), det, np.inf)
         ds = J[:, 1, 1] * apart[:, 0] - J[:, 0, 1] * apart[:, 1]
@@ -133,8 +133,10 @@ def barycentric(corners: np.ndarray, where: np.ndarray) -> np.ndarray:
 
 def interpolate(points: np.ndarray, cells: np.ndarray, fields: np.ndarray,
                 where: np.ndarray) -> np.ndarray:
-    """(K, m) values at places (K, 2) of fields (N, m) at the mesh's nodes: the paper's transfer,
-    bounded on straight triangles."""
+    """(K, m) values at points (K, 2) of fields (N, m) at the mesh's nodes.
+
+    This is the paper's transfer; on straight triangles it is bounded.
+    """
     return located(points, cells, where).field(fields, cells, 1 if cells.shape[1] == 3 else 2)
 
 
@@ -151,9 +153,9 @@ def unfolded(mesh: Mesh, origin: np.ndarray) -> np.ndarray:
     OriginFolded if that does not suffice.
     """
     cells = mesh.cells[mesh.biomass]
-    bends = checked_bends(mesh.geometry)
+    derivatives = checked_map_derivatives(mesh.geometry)
     for _ in range(3):
-        det = elements.determinant(elements.jacobian(origin[cells], bends))
+        det = elements.determinant(elements.jacobian(origin[cells], derivatives))
         bad = cells[det.min(axis=1) <= (FOLD * det.max(axis=1) if mesh.geometry == 2 else 0.0)]
         if len(bad) == 0:
             return origin
@@ -170,8 +172,8 @@ def unfolded(mesh: Mesh, origin: np.ndarray) -> np.ndarray:
 
 def supermesh(points: np.ndarray, triangles: np.ndarray, new_points: np.ndarray,
               new_triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Common pieces of two meshes: (p, 3, 2) corners of triangles, and the old and the new triangle
-    (p,) that holds each."""
+    """Common pieces of two meshes: corners (p, 3, 2), and the old and the new triangle (p,) around
+    each piece."""
     boxes = shapely.STRtree(shapely.polygons(points[triangles]))
     new, old = boxes.query(shapely.polygons(new_points[new_triangles]))
     pieces = clip(points[triangles[old]], new_points[new_triangles[new]])
@@ -229,7 +231,7 @@ def project(points: np.ndarray, triangles: np.ndarray, fields: np.ndarray,
 
 def project_bounded(points: np.ndarray, triangles: np.ndarray, fields: np.ndarray,
                     new_points: np.ndarray, new_triangles: np.ndarray) -> np.ndarray:
-    """Like :func:`project`; the old values around a node bound each field there."""
+    """Like :func:`project`, but the old values around a node bound each field there."""
     pieces = _pieces(points, triangles, new_points, new_triangles)
     right = _loads(pieces, points, triangles, fields, new_points, new_triangles)
     projected = _solve_mass(new_points, new_triangles, right)
@@ -257,8 +259,11 @@ def _edges(triangles: np.ndarray, areas: np.ndarray) -> tuple[np.ndarray, np.nda
 
 def _bounds(pieces: Pieces, triangles: np.ndarray, fields: np.ndarray,
             new_triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Least and largest old nodal value (K, m) in the old triangles that share area with those of
-    each new node."""
+    """Bounds (K, m) of each field at the new nodes.
+
+    They are the least and the largest old nodal value in the old triangles that overlap the new
+    triangles of a node.
+    """
     shape = (new_triangles.max() + 1, fields.shape[1])
     least = np.full(shape, np.inf)
     most = np.full(shape, -np.inf)

@@ -2,7 +2,7 @@
 
 Defects are relative. A positive defect means that too much was supplied or made. If the amounts
 are of the size of round-off, the defect is relative to a floor: round-off divided by LARGEST.
-A step closes to round-off, apart from the exceptions of :func:`refuse`. Any other defect is an
+Except for the options that :func:`refuse` lists, a step closes to round-off. A larger defect is an
 error of the code or of its use.
 """
 
@@ -48,7 +48,7 @@ class Ledger:
 
 @dataclass(frozen=True, eq=False)
 class Limits:
-    """What the accepted defects of a run depend on.
+    """Data of a scene that set the accepted defects of a run.
 
     width: um, of the pore; substrates: with their largest supplies.
     """
@@ -180,7 +180,7 @@ def _largest_fraction(both: Substrates, kinetics: Kinetics) -> float:
 
 
 def _turned_over(kinetics: Kinetics, ledger: Ledger) -> float:
-    """Turnover in a step, as biomass, um2 mg/L: the sum of all terms of its oxygen demand."""
+    """Turnover in a step (um2 mg/L of biomass): the sum of all terms of its oxygen demand."""
     acceptor, donor = (used + unmet for used, unmet in zip(ledger.consumed, ledger.unmet))
     demand = kinetics.decay_oxygen_demand
     of_donor = kinetics.acceptor_to_donor_ratio / demand + kinetics.yield_coefficient

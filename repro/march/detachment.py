@@ -1,7 +1,7 @@
 """Detachment of the aggregate (section 5): an end of the model, not a failure.
 
-See :mod:`repro.model.adhesion`. The state at the end of a step is tested, and the run ends with it:
-the model has no law for what happens to pieces that come off.
+See :mod:`repro.model.adhesion`. Each step tests the state at its end. The run ends with a
+detachment, because the model has no law for detached pieces.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class Detachment(RunEnd):
 
 
 def detachment(scene: Scene, pore: Pore, solved: Solved) -> Detachment | None:
-    """The Detachment of a pore at the end of a step; None if its bonds and its biomass last."""
+    """Detachment of a pore at the end of a step; None if no strength is exceeded."""
     growth = scene.growing.growth
     if growth.bonding_strength is not None:
         peak = adhesion.wall_peak(scene, pore, solved)

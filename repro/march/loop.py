@@ -29,7 +29,7 @@ from repro.model.advice import with_advice
 from repro.model.pore import Pore, Solved, seeded
 from repro.model.remeshing import solve_graded
 from repro.model.stages import Stages
-from repro.scene import Growth, Output, Scene
+from repro.scene import Growth, Scene
 from repro.scene import Pore as Channel
 
 
@@ -129,7 +129,7 @@ class Scheme:
     advance(stages, pore, solved, step_control): makes one step, and returns its StepResult, the
     solution after it and the step control of the next one. The length of the step does not depend
     on ``growth.end`` or on the requested rows; a step that passes ``growth.end`` is cut there.
-    rows(growth): times (h) of rows besides the ends of steps, without ``output.times``; first:
+    rows(growth): times (h) of rows besides the ends of steps, without requested ones; first:
     length of the first attempted step, as a multiple of growth.time_step; ends(scene): times (h) at
     which steps end, if known in advance.
     """
@@ -189,7 +189,8 @@ def _grow(stages: Stages, scheme: Scheme, state: RestartState,
     pore = replace(state.pore, concentrations=solved.concentrations)
     refuse_end(scene.pore, pore, 1.0 if pore.time > 0 else 0.1)
     failure = detachment(scene, pore, solved)
-    rows = row_times(scheme, stages.growth, scene.output)
+    requested = scene.requested_times
+    rows = row_times(scheme, scene)
     limits = Limits.of(scene)
     while failure is None and stages.growth.end - pore.time > SAME_TIME:
         try:
@@ -215,7 +216,7 @@ def _grow(stages: Stages, scheme: Scheme, state: RestartState,
         row = _row_time_at(rows, pore.time)
         failure = detachment(scene, pore, solved)
         ends = failure or pore_end(scene.pore, pore, 1.0)
-        if scene.output.times is None or row is not None or ends:
+        if requested is None or row is not None or ends:
             reported = pore if row is None else replace(pore, time=row)
             yield mark_reported(state, pore.time), make_report(state, reported, solved, step.before)
             state = mark_reported(state, pore.time)
@@ -226,11 +227,12 @@ def _grow(stages: Stages, scheme: Scheme, state: RestartState,
         raise failure
 
 
-def row_times(scheme: Scheme, growth: Growth | None, output: Output) -> tuple[float, ...]:
-    """Return the times (h) of rows after t = 0, ascending: ``output.times``, or the scheme's."""
-    if growth is None:
+def row_times(scheme: Scheme, scene: Scene) -> tuple[float, ...]:
+    """Return the times (h) of rows after t = 0, ascending: those of [output], or the scheme's."""
+    if scene.growth is None:
         return ()
-    return scheme.rows(growth) if output.times is None else output.times
+    requested = scene.requested_times
+    return scheme.rows(scene.growth) if requested is None else requested
 
 
 def _row_time_at(rows: tuple[float, ...], time: float) -> float | None:
@@ -321,7 +323,7 @@ def sum_counts(*counts: dict[str, int]) -> dict[str, int]:
 
 
 def pore_end(channel: Channel, pore: Pore, elements: float) -> str:
-    """Say which end of the pore the aggregate has reached; empty if it has reached none.
+    """Message with the end of the pore that the aggregate has reached; empty if none.
 
     elements: distance from an end that counts as reached, in elements of the fluid.
     """

@@ -6,10 +6,10 @@ a mass M that grows by e^z. These rates integrate (9)-(10) over the entire step.
 in a step are then one integral, and both balances close to round-off.
 
 Within the step, at the part s of its length h, (9)-(10) are integrated over s h with the rates
-(1 - s) k_1 + s k_2 of the start and of half way. This is the rule's own interpolation: it is also
-of second order, and its end has k_2 over h, as the step does (Hairer, Norsett and Wanner, Solving
-Ordinary Differential Equations I, section II.6). Shape, contact and mesh follow from those
-at the start as in a step; flow and substrates are solved for.
+(1 - s) k_1 + s k_2 of the start and of half way. This interpolation is of second order too,
+and at its end it equals the step, k_2 over h (Hairer, Norsett and Wanner, Solving Ordinary
+Differential Equations I, section II.6). Shape, contact and mesh follow from those at the start as
+in a step; flow and substrates are solved for.
 """
 
 from __future__ import annotations
@@ -171,8 +171,8 @@ def interpolate(stages: Stages, previous: Pore, solved: Solved, half: Halfway,
                 time: float) -> InterpolatedState:
     """Interpolate the pore to a time (h) within a step, and solve there.
 
-    If that fails, steps of their own lead from the start of the step to the time: the step may have
-    passed a state in which its extrapolation does not help. Raises StageError if they fail too.
+    If that fails, several equal steps lead from the start of the step to the time. Each of them has
+    a better initial guess than the entire step. Raises StageError if they fail too.
     """
     try:
         return _interpolate(stages, previous, solved, half, time)
@@ -200,7 +200,7 @@ def _approach(stages: Stages, previous: Pore, solved: Solved, time: float,
 
 def _interpolate(stages: Stages, previous: Pore, solved: Solved, half: Halfway,
                  time: float) -> InterpolatedState:
-    """Interpolate in the way of the step.
+    """Interpolate as the step itself advances.
 
     If the moved mesh is not acceptable, the nearest of the meshes that the step has generated
     replaces it.

@@ -103,7 +103,7 @@ def same_rows(one: Scene, other: Scene, time: float) -> bool:
 
 def row_times(scene: Scene) -> tuple[float, ...]:
     """Return the times (h) of rows after t = 0: :func:`repro.march.loop.row_times`."""
-    return loop.row_times(_scheme(scene), scene.growth, scene.output)
+    return loop.row_times(_scheme(scene), scene)
 
 
 def rows_within(scene: Scene) -> set[float]:

@@ -55,7 +55,7 @@ def allowed_ratio(estimate: float, tolerance: float, largest: float = FASTER) ->
 
 
 def exceeds_tolerance(control: StepControl, tolerance: float) -> bool:
-    """Is the estimate of the last step too large? A step of the least length is accepted anyway."""
+    """Does the last step miss the tolerance? A step of the least length may, and is accepted."""
     return control.estimate > EXCESS * tolerance * (1 + 1e-9)
 
 

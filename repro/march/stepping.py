@@ -39,7 +39,7 @@ FIRST = 8.0
 SHORTEST = 1e-3
 #: Least number of rows after t = 0 without ``output.times``.
 LEAST = 24
-#: A step that makes contact leaves at least this part of the minimum film.
+#: Least film after a step that makes contact, over the minimum film.
 LANDED = 0.999
 
 
@@ -155,7 +155,7 @@ def _halve_elements(stages: Stages, previous: Pore) -> tuple[Pore, Solved] | Non
 
 
 def _solve_after(stages: Stages, step: StepResult) -> tuple[StepResult, Solved]:
-    """Solve after a step, on a mesh graded to a sharp front if one needs it."""
+    """Solve after a step. A sharp front gets a graded mesh if it needs one."""
     after, solved = remeshing.solve_graded(stages.scene, step.pore)
     if after is not step.pore:
         step = replace(step, pore=contiguous(after), remeshed=True)

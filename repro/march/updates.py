@@ -35,7 +35,7 @@ from repro.model.stages import Stages
 from repro.model.transport import Concentrations, Flows, Fluxes, integrated
 from repro.scene import Growth, Scene
 
-#: A time this close to a multiple of growth.time_step, relative to it, is that multiple.
+#: A time that differs from a multiple of growth.time_step by less than this fraction equals it.
 ON_GRID = 1e-3
 
 
@@ -50,7 +50,7 @@ def schedule(scene: Scene) -> tuple[list[float], set[float]]:
     ends = [0.0]
     while end - ends[-1] > SAME_TIME:
         ends.append(next_time(scene.growth, ends[-1], scene.corner(ends[-1])))
-    return ends, {0.0, *(scene.output.times or ends)}
+    return ends, {0.0, *(scene.requested_times or ends)}
 
 
 def next_time(growth: Growth, time: float, corner: float) -> float:
@@ -116,7 +116,7 @@ def step(stages: Stages, previous: Pore, solved: Solved, duration: float) -> Ste
 
 
 def _solve_midway(scene: Scene, previous: Pore, solved: Solved, duration: float) -> Solved:
-    """Solution at the start of a step, with the supplies and the drive of its middle.
+    """Solve at the start of a step with the supplies and the drive of its middle.
 
     If no table of the scene changes in the step, this is ``solved``.
     """

@@ -1,18 +1,17 @@
-"""What keeps an aggregate on its walls (section 5): tractions of the walls, forces of the fluid,
-and the largest tensile stress.
+"""Wall tractions, fluid forces and the largest tensile stress of an aggregate (section 5).
 
-The equilibrium (22) tested with the nodal functions gives the forces that the walls exert on the
-aggregate: the forces of the stress less those of the fluid, at the nodes on a wall. On a bonded
-wall, and across any wall, they are a traction t, here the one whose consistent nodal forces they
-are. Along a wall that slides each contact surface is kept in place by one point. A wall bears, at a
-place x along it,
+The equilibrium (22), tested with the nodal functions, gives the forces of the walls on the
+aggregate: at a node on a wall, the force of the stress minus that of the fluid. They are the
+consistent nodal forces of a traction t, on a bonded wall in both directions, on a sliding wall
+across it. Along a sliding wall, one point keeps each contact surface in place. At x along it, a
+wall bears
 
     ((max(pull, 0))^2 + shear^2)^(1/2)
 
 with the means of the pull, from the aggregate into the wall, and of the shear over a length of W /
-20 around x. The stress at a contact line may be singular, and so may the force at a point: only a
-mean over a length converges as the mesh is refined. The tensile stress likewise is a mean over the
-triangles within W / 20 of a place.
+20 around x. The stress at a contact line may be singular, and so may the force at a point. A mean
+over a length converges as the mesh is refined. The tensile stress is a mean too, over the triangles
+within W / 20 of a point.
 
 Without ``growth.fluid_forces`` the equilibrium has no forces of the fluid, and walls bear the
 stress of growth alone.
@@ -39,7 +38,7 @@ PARTS = 64
 
 @dataclass(frozen=True)
 class Peak:
-    """The largest mean of a stress: value (MPa), and its place x, y (um)."""
+    """Largest mean of a stress: its value (MPa) and its coordinates x, y (um)."""
 
     value: float
     x: float
@@ -76,9 +75,11 @@ def fluid_forces(scene: Scene, pore: Pore, solved: Solved) -> np.ndarray:
 
 
 def _beside_contact(pore: Pore, water: Flow) -> np.ndarray:
-    """(N, 2) um2 of head: nodal forces of the fluid's edges on walls that end at contact lines,
-    which the nodal forces of its triangles include; their pressure alone, since the water rests in
-    such a corner."""
+    """(N, 2) um2 of head: nodal forces of the fluid's wall edges that end at contact lines.
+
+    The nodal forces of the fluid's triangles include them. Only the pressure counts, because the
+    water in this corner is at rest.
+    """
     mesh = pore.mesh
     forces = np.zeros_like(mesh.points)
     outline = pore.boundary
@@ -107,8 +108,10 @@ def fluid_load(scene: Scene, pore: Pore, solved: Solved) -> Load:
 
 
 def wall_forces(scene: Scene, pore: Pore, solved: Solved) -> np.ndarray:
-    """(n, 2) MPa um, forces of the walls on the aggregate's nodes, and the defect of the
-    equilibrium at all others."""
+    """(n, 2) MPa um, forces of the walls on the aggregate's nodes.
+
+    At the other nodes they are the defect of the equilibrium.
+    """
     mesh = pore.mesh
     inside = pore.pressure[mesh.topology.body_corners]
     forces = growth.internal_forces(pore.body, pore.theta, mesh.points[mesh.body], inside)
@@ -119,7 +122,7 @@ def wall_forces(scene: Scene, pore: Pore, solved: Solved) -> np.ndarray:
 
 
 def wall_peak(scene: Scene, pore: Pore, solved: Solved) -> Peak:
-    """The most that a wall must bear, and where."""
+    """Largest mean stress that a wall bears, with its coordinates."""
     forces = np.zeros_like(pore.mesh.points)
     forces[pore.mesh.body] = wall_forces(scene, pore, solved)
     walls = [wall for wall in (BOTTOM, TOP) if (pore.boundary.edge_wall == wall).any()]
@@ -129,7 +132,7 @@ def wall_peak(scene: Scene, pore: Pore, solved: Solved) -> Peak:
 
 
 def _peak_on(pore: Pore, wall: int, forces: np.ndarray, bonded: bool) -> Peak:
-    """The most that one wall must bear."""
+    """Largest mean stress that one wall bears, with its coordinates."""
     outline = pore.boundary
     edges = np.flatnonzero(outline.edge_wall == wall)
     x = outline.arcs(outline.points[:, 0])[edges]
@@ -184,7 +187,7 @@ class _Surface:
         return np.append((self.x[self.nodes] @ values.T).ravel(), self.x[self.nodes[-1, -1]])
 
     def _windows(self, width: float) -> tuple[np.ndarray, float]:
-        """Starts (w,) um and length (um) of the means: all of a surface that is shorter."""
+        """Starts (w,) um and length (um) of the means; a shorter surface has one mean."""
         places = self._places()
         length = min(LENGTH * width, places[-1] - places[0])
         starts = np.concatenate([places, places - length])
@@ -218,9 +221,9 @@ class _Surface:
 
 
 def tensile_peak(scene: Scene, pore: Pore) -> Peak:
-    """The largest principal stress, in the mean over the triangles within W / 20 of one, and where.
+    """Largest mean of the principal stress over the triangles within W / 20 of a triangle.
 
-    A triangle is within a distance if its middle is.
+    The distance is that between the middles of the triangles.
     """
     from scipy.spatial import KDTree  # few scenes need it
 

@@ -40,8 +40,8 @@ CONTACT_ROUNDS = 60
 RETREATS = 6
 #: Rounds of shape and fluid forces.
 FORCE_ROUNDS = 12
-#: Rounds after which contact lines keep their places: a search may end at another place within its
-#: tolerance.
+#: Rounds after which contact lines stay in place. A new search could move them within its tolerance
+#: again.
 SETTLING_ROUNDS = 4
 #: Largest move of a node in the last round, over the aggregate's thickness.
 FORCE_REST = 1e-8
@@ -56,7 +56,7 @@ FIRST_LENGTHS = np.array([1.0, 0.5, 0.25])
 
 @dataclass(frozen=True, eq=False)
 class Mechanics:
-    """What the shape of a grown aggregate depends on.
+    """Data from which the shape of a grown aggregate is computed.
 
     width: um, of the pore; keys: section [growth] of the scene; numerics: fixed points and Newton's
     method; fluid: its forces on the aggregate, None if they are neglected.
@@ -179,8 +179,10 @@ def _at_rest(mechanics: Mechanics, grown: Pore, theta: np.ndarray, start: Pore,
 
 def _close_by_nodes(mechanics: Mechanics, grown: Pore, start: Pore, forces: np.ndarray | None,
                     search: SearchOptions) -> Expansion:
-    """The shape after all nodes at too thin films or wedges have joined the wall. Nodes join after
-    each equilibrium, until no film or wedge is too thin."""
+    """Compute the shape in which no film and no wedge is too thin.
+
+    After each equilibrium, the nodes at a film or a wedge that is too thin join the wall.
+    """
     keys = mechanics.keys
     width = mechanics.width
     shape = replace(grown, space=start.space, pressure=start.pressure)
@@ -204,8 +206,10 @@ def _close_by_nodes(mechanics: Mechanics, grown: Pore, start: Pore, forces: np.n
 
 def _equilibrium(mechanics: Mechanics, grown: Pore, start: Pore, forces: np.ndarray | None, *,
                  last: np.ndarray | None = None, patient: bool = True) -> tuple[Pore, int]:
-    """The equilibrium of a grown pore under its theta with the contact of ``start``, searched for
-    from the shape and pressure of ``start``; and Newton's iterations."""
+    """Equilibrium of a grown pore under its theta, and the count of Newton iterations.
+
+    ``start`` has the contact, and the shape and pressure from which Newton's method starts.
+    """
     body, target_J = _strained_from(mechanics.keys, grown, grown.theta)
     nodes = grown.mesh.body
     inside = grown.mesh.topology.body_corners
@@ -359,7 +363,7 @@ class _Trials:
     def solve(self, wall: np.ndarray, lines: Sequence[Line]) -> Expansion:
         """The equilibrium with walls (M,) of the grown pore's outline and advances of the lines.
 
-        If it fails, lines go half of the way back to an advance that was too short. Raises
+        If it fails, the lines retreat half way to an advance that was too short. Raises
         GrowthError if that does not help.
         """
         for _ in range(RETREATS):
@@ -375,10 +379,10 @@ class _Trials:
         raise failure
 
     def settle(self, wall: np.ndarray, lines: Sequence[Line], rule: Clearance) -> Expansion | None:
-        """The equilibrium with walls (M,) of the grown pore's outline and with lines at the roots
-        of their clearances; None, and the lines where they were, if Newton's method for both fails.
+        """Equilibrium with walls (M,) of the grown pore's outline and lines at zero clearance.
 
-        Theta goes to its target in parts, as in :func:`growth.equilibrium`.
+        Newton's method solves for shape and lines at once. If it fails, the result is None and the
+        lines stay unchanged. Theta goes to its target in parts, as in :func:`growth.equilibrium`.
         """
         start = [line.advance for line in lines]
         grown = self._grown
@@ -534,9 +538,11 @@ def _divided_loads(division: Division, loads: np.ndarray) -> np.ndarray:
 
 
 def _strained_from(keys: Growth, grown: Pore, theta: np.ndarray) -> tuple[growth.Body, np.ndarray]:
-    """The configuration from which strain counts, of t = 0 or the present one (section 5), and the
-    expansion since then. Since the present one it is theta / J, which removes the error of
-    J = theta and so keeps the area from drifting away from the mass."""
+    """Configuration from which strain counts, and the expansion since then.
+
+    It is that of t = 0 or the present one (section 5). Since the present one the expansion is
+    theta / J. This removes the error of J = theta, so the area follows the mass without drift.
+    """
     if keys.new_biomass == "stressed":
         return grown.body, theta
     position = grown.mesh.points[grown.mesh.body]
@@ -555,9 +561,11 @@ def _placed(grown: Pore, start: Pore, rest: growth.Equilibrium) -> Pore:
 
 def _constraints(mechanics: Mechanics, grown: Pore,
                  shape: Pore) -> tuple[np.ndarray, np.ndarray]:
-    """(n, 2) True where a coordinate is prescribed: x at fixed points, y on the walls (2.3.3); and
-    (n, 2) um, its prescribed value. On a bonded wall all points are fixed that lay on the lower
-    wall before the step, where they lay."""
+    """(n, 2) True where a coordinate is prescribed, and (n, 2) um, its prescribed value.
+
+    x is prescribed at fixed points, y on the walls (2.3.3). If the wall is bonded, every point that
+    lay on the lower wall before the step keeps its position.
+    """
     rim = shape.mesh.topology.body_loop
     before = grown.mesh.points[grown.mesh.body]
     fixed = shape.fixed
@@ -629,8 +637,7 @@ def closing_nodes(outline: Outline, width: float, film: float, angle: float) -> 
 
 def _closing_run(outline: Outline, gap: np.ndarray, line: int, step: int, film: float,
                  slope: float) -> np.ndarray:
-    """Free nodes from a contact line outwards, up to the last with too little fluid between it and
-    the wall."""
+    """Free nodes from a contact line outwards, up to the last one too close to the wall."""
     count = len(gap)
     walk = (line + step * np.arange(1, count)) % count
     reach = np.flatnonzero(outline.wall[walk] != FREE)[0]

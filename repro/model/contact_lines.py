@@ -1,4 +1,4 @@
-"""Where contact lines lie on the aggregate's boundary (2.3.3), for curved triangles.
+"""Positions of the contact lines on the aggregate's boundary (2.3.3), for curved triangles.
 
 A contact line is the end of a contact surface. Its advance is the number of arcs of the boundary
 that have joined the wall beyond its previous position; a fraction divides an arc. The clearance
@@ -6,10 +6,10 @@ beyond a line is the smallest value on the free surface of
 
     gap / min(film, tan(angle) d) - 1
 
-at the distance d from the line along the wall. A film or a wedge is too thin where it is negative.
+at the distance d from the line along the wall. If it is negative, a film or a wedge is too thin.
 The contact surface is the smallest one without a negative clearance, so each line advances until
-its clearance vanishes. The secant method, safeguarded by
-bisection, searches for all lines at once. Each trial is an equilibrium of the aggregate.
+its clearance vanishes. The secant method, safeguarded by bisection, searches for all lines at once.
+Each trial is an equilibrium of the aggregate.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ from repro.fem.outline import BOTTOM, FREE, TOP, Outline, parabola
 CLOSE = 2e-3
 #: Upper bound of the clearance, and its value if no free surface faces the wall.
 AMPLE = 10.0
-#: Two advances closer than this (arcs) count as one: the clearance jumps between them.
+#: If two advances are closer than this (arcs), the clearance jumps between them.
 SAME_PLACE = 5e-3
-#: The smallest part of a divided arc; smaller parts are not divided off.
+#: Smallest part of a divided arc (arcs).
 LEAST_PART = 0.02
 #: The first trial, as a fraction of the way to the farthest point that is too near to the wall.
 FIRST_TRIAL = 0.7
@@ -40,7 +40,7 @@ BEYOND = 1.05
 LEAST_REACH = 0.5
 #: Secant steps keep this fraction of the interval away from its ends.
 INSIDE = 0.03
-MEET = ("two contact lines meet, with fluid between them that has no way out; "
+MEET = ("two contact lines meet and trap fluid between them; "
         "try a shorter growth.time_step")
 #: Parameters of an arc at which the clearance is computed: the second shows the angle at the line.
 PLACES = np.append([0.0, 1e-3], np.linspace(0.0, 1.0, 9)[1:])

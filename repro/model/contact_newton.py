@@ -1,10 +1,10 @@
-"""Newton's method for the shape of an aggregate and the places of its contact lines at once.
+"""Newton's method for an aggregate's shape and the positions of its contact lines together.
 
 The unknowns are positions, pressures and the advance s of each contact line. The equations are the
 equilibrium, R = 0, and the clearance beyond each line, c = 0 (2.3.3). A line at its least advance
-stays there while its clearance is not negative. With the derivative K of R by the shape, the shape
-moves by K^-1 (-dR/ds) with a line: one more solution with the factors of K. dR/ds is a difference
-quotient over the triangles beside the line, dc/ds one over the moved outline.
+stays there while its clearance is not negative. K is the derivative of R by the shape. If a line
+advances, the shape moves by K^-1 (-dR/ds), one more solution with the factors of K. dR/ds is a
+difference quotient over the triangles beside the line; dc/ds is one over the moved outline.
 
 The clearance is a minimum over the free surface, and jumps where a film closes. The method may
 therefore fail. The search with whole equilibria (:mod:`repro.model.contact_lines`) then takes over.
@@ -214,8 +214,10 @@ class Coupled:
 
     def _with_lines(self, iterate: growth.Iterate, factors: Factored,
                     change: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(L,) arcs, steps of the lines, and the change of all unknowns with these steps, from that
-        without."""
+        """(L,) arcs, steps of the lines, and the change of all unknowns that includes these steps.
+
+        change: without the steps.
+        """
         ahead = self.position + _nodal(change, self.position)
         clearances, reaches = self.placed.clearances(ahead, self._lines)
         steps = np.zeros(len(self._lines))
@@ -236,8 +238,10 @@ class Coupled:
 
     def _to_roots(self, position: np.ndarray, moves: dict[int, np.ndarray],
                   clearances: np.ndarray) -> np.ndarray:
-        """Steps (arcs) of the lines with ``moves`` (n, 2) um per arc, to the roots of their
-        clearances. A line that is stopped on its way leaves the others to reach theirs."""
+        """Steps (arcs) of the lines to the roots of their clearances; moves: (n, 2) um per arc.
+
+        If a line stops before its root, the other lines still reach theirs.
+        """
         lines = [self._lines[k] for k in moves]
         rises = np.array([self.placed.clearances(position + MODEST * move, lines)[0] - clearances
                           for move in moves.values()]).T / MODEST
@@ -261,7 +265,7 @@ def _nodal(change: np.ndarray, position: np.ndarray) -> np.ndarray:
 
 
 def _fits(line: Line, clearance: float, close: float) -> bool:
-    """Is a line at its place? One beside a corner is as near to it as may be."""
+    """Is a line in place? A line beside a corner is in place at the smallest allowed distance."""
     most = AT_CORNER if line.at_corner else close
     return clearance >= -close and (line.advance <= line.least or clearance <= most)
 

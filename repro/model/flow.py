@@ -19,11 +19,11 @@ divergence-free for every linear q: w carries the substrates.
 
 Linear velocities with a bubble b = 27 L1 L2 L3 in each triangle (MINI: Arnold, Brezzi and Fortin
 1984) need no stabilisation. A linear function has a constant gradient, and the integral of grad b
-is zero: the bubbles' coefficients beta do not meet the linear part in a(u, v), and the test with b
-alone is A beta = -(integral of b) grad p, with A the bubble's 2 x 2 block of a. Put into the second
-line, this is the same system with tau = (integral of b)^2 / |tau| A^-1, and w = u - tau grad p is
-the mean velocity in the triangle, bubble included. With g_i = grad L_i and G = sum g_i g_i^T, the
-integral of b is 9/20 |tau|, that of grad b grad b^T is 81/20 |tau| G, and so
+is zero. Therefore a(u, v) does not couple the bubbles' coefficients beta to the linear part, and
+the test with b is A beta = -(integral of b) grad p, with A the bubble's 2 x 2 block of a. With this
+beta the second line is that of the same system with tau = (integral of b)^2 / |tau| A^-1, and
+w = u - tau grad p is the mean velocity in the triangle, bubble included. With g_i = grad L_i and
+G = sum g_i g_i^T, the integral of b is 9/20 |tau|, that of grad b grad b^T is 81/20 |tau| G, and so
 
     tau = 1 / (20 nu_r) (tr G)^-1         "laplacian"
        or 1 / (20 nu_r) (tr G + G)^-1     "traction"
@@ -79,7 +79,7 @@ class UnitFlow:
 
 @dataclass(frozen=True, eq=False)
 class Stabilised:
-    """Linear velocity and pressure: c of tau = h^2 / (c nu_r), as the paper has it."""
+    """Linear velocity and pressure with the paper's stabilisation; c: of tau = h^2 / (c nu_r)."""
 
     constant: float = 100.0
 
@@ -148,7 +148,7 @@ class TaylorHood:
     @staticmethod
     def on(velocity: Space, viscosity: np.ndarray, element: Stabilised | Bubble,
            interface: str) -> TaylorHood:
-        """The pair, which needs no element of its own."""
+        """The pair; it ignores the element of linear velocities."""
         return TaylorHood(velocity)
 
     def prescribed(self) -> np.ndarray:

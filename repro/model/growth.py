@@ -1,7 +1,7 @@
 """Growth mechanics (2.3, 3.4): the aggregate as an incompressible neo-Hookean body that grows.
 
 Plane strain, from the configuration of t = 0: F = d phi / d X, J = det F, tr C = F : F + 1.
-Stationary in phi and P is
+The equilibrium makes this potential stationary in phi and P:
 
     Pi = integral of mu/2 (J^(-2/3) tr C - 3) + P (J - theta) dV
          - 1/2 sum_tau integral of h^2/(12 mu_tau) |grad P|^2 dv
@@ -20,9 +20,9 @@ and the modulus is the incremental one there, mu_tau = mu_L theta^(-2/3); in ref
 the stabilisation grows as J^(5/3). It is kept fixed while an equilibrium is sought.
 
 *Curved triangles*, quadratic displacements (Taylor-Hood): no term in |grad P|^2, but P + gamma
-theta^(-5/3) (J - theta) for P in S. This grad-div stabilisation vanishes where J = theta. It is
-needed: at a given shape the energy of plane expansion is J^(1/3) + J^(-2/3) / 2, which is concave,
-so that modes of J that the linear pressure does not constrain would grow.
+theta^(-5/3) (J - theta) for P in S. This grad-div stabilisation vanishes where J = theta. Without
+it, modes of J that the linear pressure does not constrain would grow: at a constant shape the
+energy of plane expansion, J^(1/3) + J^(-2/3) / 2, is concave.
 """
 
 from __future__ import annotations
@@ -54,8 +54,8 @@ MOST_ITERATIONS = 25
 HALVINGS = 8
 #: Sub-steps of a continuation, by ``patient``; an impatient caller shortens its step instead.
 CONTINUATION = {True: (1, 8, 64), False: (1,)}
-#: gamma: the energy's curvature in J is -2/9 J^(-5/3) and less, so that one makes it convex with
-#: room to spare.
+#: gamma: the energy's curvature in J is -2/9 J^(-5/3) and less, so one makes it convex with a
+#: margin.
 GAMMA = 1.0
 #: On curved triangles theta goes to its target in parts of at most this factor: a longer step of
 #: Newton's method may end in another equilibrium, with a wrinkled surface.
@@ -181,7 +181,7 @@ class Strained:
 def internal_forces(body: Body, theta: np.ndarray, position: np.ndarray,
                     pressure: np.ndarray) -> np.ndarray:
     """(n, 2) um, nodal forces of the stress over mu_L under theta (t, q), at positions (n, 2) um
-    and pressures (corners,): those that hold the aggregate there."""
+    and pressures (corners,). Equal external forces keep the aggregate there."""
     system = System(body, np.zeros(position.shape, bool))
     if body.shape.geometry == 1:
         system.stabilisation = PressureGradient.on(body, position)
@@ -312,7 +312,7 @@ class Iterate:
 
     @property
     def complete(self) -> bool:
-        """Do prescribed coordinates have their values?"""
+        """Do the prescribed coordinates have their values?"""
         return not self.lag.any()
 
     @property

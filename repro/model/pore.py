@@ -1,4 +1,4 @@
-"""The state of a pore at an instant, and the flow and the substrates in its geometry."""
+"""The state of a pore at one time, and the flow and the substrates in its geometry."""
 
 from __future__ import annotations
 
@@ -53,9 +53,9 @@ class Pore:
     body: the aggregate as it was at t = 0; pressure: (corners,) P / mu_L; concentrations: the last
     known ones, None before the first; front: divisor of the element sizes at the aggregate, for a
     front of the substrates in it; last: (n, 2) um, the aggregate's nodes in the shape from which
-    strain counts, None for the shape of t = 0; line_speeds: (2, 2) um/h, of the contact lines with
-    the lower and the upper wall, that with free surface after it on the loop and that with free
-    surface before it, None if they are not known.
+    strain counts, None for the shape of t = 0; line_speeds: (2, 2) um/h, speeds of the contact
+    lines, None if unknown: a row for the lower and the upper wall, with the line before the free
+    surface on the loop first and the line after it second.
     """
 
     time: float
@@ -126,7 +126,7 @@ class Pore:
 
 @dataclass(frozen=True, eq=False)
 class SolvedSubstrates:
-    """The substrates in the geometry of a pore; none of the parts is optional."""
+    """The substrates in the geometry of a pore. No part is optional."""
 
     problem: Problem
     concentrations: Concentrations

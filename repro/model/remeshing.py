@@ -1,5 +1,7 @@
-"""The mesh of the next step (3.1, 3.5): the present one, moved with the aggregate, or a new one, to
-which the fields are transferred."""
+"""The mesh of the next step (3.1, 3.5).
+
+The present mesh moves with the aggregate, or the fields are transferred to a new mesh.
+"""
 
 from __future__ import annotations
 
@@ -32,7 +34,7 @@ MOST_REFINED = 20.0
 
 @dataclass(frozen=True, eq=False)
 class Remeshing:
-    """How the mesh of a growing aggregate follows it, and what fields on a new mesh depend on.
+    """Rules by which the mesh follows a growing aggregate and fields pass to a new mesh.
 
     meshing: of the scene; transfer: method of :func:`biomass.transfer_amounts`; maximum_density:
     X_m, mg/L; substrates: section of the scene, whose supplies may be tables over time.
@@ -235,7 +237,7 @@ def _has_margin(solved: Solved) -> bool:
 
 
 def moved_mesh(meshing: Meshing, previous: Pore, expanded: Pore) -> Mesh | None:
-    """The mesh, moved with the aggregate; None where a new mesh is due."""
+    """The mesh, moved with the aggregate; None if a new mesh is needed."""
     outline = expanded.boundary
     mesh = previous.mesh
     channel = meshing.channel
@@ -288,8 +290,10 @@ def remesh(rules: Remeshing, previous: Pore, expanded: Pore, speed: float,
 
 def _transferred(rules: Remeshing, expanded: Pore, target: Pore, at: Located,
                  amounts: Amounts = ()) -> tuple[Pore, Amounts]:
-    """The pore ``target``, of the same shape on another mesh, with the biomass, the pressure and
-    the last shape of an expanded aggregate, and further amounts; ``at``: its nodes' places."""
+    """Transfer biomass, pressure, last shape and further amounts to the mesh of ``target``.
+
+    target: a pore of the same shape on another mesh; at: its aggregate's nodes in the old mesh.
+    """
     old = expanded.mesh
     active, inert, *rest = biomass.transfer_amounts(
         rules.transfer, expanded.space, target.space, at,

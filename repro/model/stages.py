@@ -1,4 +1,4 @@
-"""The parts of a scene that the stages of a step take, resolved once: none of them is optional."""
+"""The parts of a scene that the stages of a step use, resolved once. No part is optional."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""The elastic stretch along the aggregate's free surface, and where the model's equilibrium ends.
+"""The elastic stretch along the aggregate's free surface, and the limits of a smooth equilibrium.
 
 It is the stretch of a material line along the surface, since the configuration from which strain
-counts, over J^(1/2): division by J^(1/2) removes the growth, which causes no stress by itself. At
-given J the energy (17) is, in the plane, that of an incompressible neo-Hookean solid, whose free
+counts, over J^(1/2). This division removes the growth, which causes no stress by itself. At a
+constant J, the energy (17) in the plane is that of an incompressible neo-Hookean solid. Its free
 surface creases where this stretch falls to 0.647 (Hong, Zhao and Suo, Appl. Phys. Lett. 95, 2009;
 Hohlfeld and Mahadevan, Phys. Rev. Lett. 106, 2011) and is unstable to waves of every length at
 0.544 (Biot, Appl. Sci. Res. A 12, 1963). ``docs/scope.md`` derives both for this energy.
@@ -85,12 +85,12 @@ def surface(pore: Pore) -> Surface:
 def _expansion(nodes: np.ndarray, local: np.ndarray) -> np.ndarray:
     """(edges,) area of triangles with nodes (edges, 3 or 6, 2) um over that of the unit triangle,
     at the middles of their edges ``local`` (edges,)."""
-    bends = _bends(1 if nodes.shape[1] == 3 else 2)
-    return elements.determinant(np.einsum("eai,eak->eik", nodes, bends[local]))
+    derivatives = _map_derivatives(1 if nodes.shape[1] == 3 else 2)
+    return elements.determinant(np.einsum("eai,eak->eik", nodes, derivatives[local]))
 
 
 @cache
-def _bends(geometry: int) -> np.ndarray:
+def _map_derivatives(geometry: int) -> np.ndarray:
     """(3, k, 2) derivatives of the map's functions at the middles of the edges."""
     return elements.derivatives(geometry, MIDDLES)
 

@@ -1,4 +1,4 @@
-"""The fluid's forces on the aggregate, t0 and f0 of (20) and (22): an option, which 2.3.3 neglects.
+"""Optional forces of the fluid on the aggregate, t0 and f0 of (20) and (22); 2.3.3 neglects them.
 
 The momentum balance of the fluid's triangles, tested with the nodal functions of the interface,
 gives the force on the fluid there; its opposite acts on the aggregate (consistent nodal forces).
@@ -9,15 +9,15 @@ With head phi and velocity u,
 
 or rho nu (grad u + grad u^T) in the traction form [E2]. It is the form of the scene's flow, so that
 the forces on the aggregate, the walls and the ends add up to zero, to round-off. If hardly any
-water flows through the aggregate both forms give the same traction: u is about zero along the
-interface and div u = 0. At a contact line the force along the wall includes the shear of half an
-edge of wall; the force across it acts on the wall, where the aggregate's y is constrained. The zero
-of the head does not matter: a uniform pressure has no effect on an incompressible body that touches
-only walls and fluid.
+water flows through the aggregate, both forms give the same traction, because u is about zero along
+the interface and div u = 0. At a contact line the force along the wall includes the shear of half
+an edge of wall. The force across it acts on the wall, where the aggregate's y is constrained. The
+zero of the head does not matter, because a uniform pressure has no effect on an incompressible body
+that touches only walls and fluid.
 
 Water within a permeable aggregate (section 5, :mod:`repro.model.brinkman`) takes over the stress of
-the water outside at the interface, and passes it to the biomass by its drag: the biomass has no
-traction on its surface, but in its volume the body force
+the water outside at the interface, and passes it to the biomass by its drag. The biomass has no
+traction on its surface; in its volume it has the body force
 
     f0 = rho nu u / k
 """
@@ -59,7 +59,7 @@ class Surroundings:
 
 @dataclass(frozen=True, eq=False)
 class Fluid:
-    """What the fluid's forces on an aggregate depend on.
+    """Data from which the fluid's forces on an aggregate are computed.
 
     meshing: of the scene; drive: section [flow], whose head or mean velocity may be a table over
     time; shear_modulus: mu_L, MPa.
@@ -77,7 +77,7 @@ class Fluid:
 
 
 def surroundings(meshing: Meshing, before: Pore, shaped: Pore) -> Surroundings:
-    """The mesh of ``before``, moved with the aggregate, or a new one where one is due."""
+    """The mesh of ``before``, moved with the aggregate, or a new one if needed."""
     mesh = before.mesh if shaped is before else remeshing.moved_mesh(meshing, before, shaped)
     if mesh is not None:
         nodes = np.arange(len(mesh.body))[:, None]

@@ -22,7 +22,7 @@ from repro.scene.arguments import typed
 from repro.scene.units import SceneError
 
 WIDTH = 110
-#: A check makes no larger mesh: it estimates the number of nodes.
+#: Largest mesh (nodes) that a check generates. For a larger one it estimates the nodes.
 MOST_MESHED = 20_000
 #: Nodes per triangle, by the geometry of the triangles.
 PER_TRIANGLE = {1: 0.5, 2: 2.0}
@@ -30,10 +30,10 @@ PER_TRIANGLE = {1: 0.5, 2: 2.0}
 
 @dataclass(frozen=True)
 class SceneCheck:
-    """The result of :func:`check`; ``print`` shows it.
+    """Result of :func:`check`; ``print`` shows it.
 
     modelled: (section, words); nodes, triangles: of the first mesh, with six nodes for each curved
-    triangle; estimated: are these numbers estimates, because the mesh is too large for a check?
+    triangle; estimated: True if these numbers are estimates because the mesh is too large to make.
     """
 
     scene: str
@@ -121,8 +121,8 @@ def _mesh_size(scene: Scene, estimated: bool) -> tuple[int, int]:
 
 
 def report(checked: SceneCheck) -> str:
-    """Write a check in words."""
-    lines = [f"{checked.scene}: can be run", "", "What is modelled"]
+    """Format a check as text."""
+    lines = [f"{checked.scene}: can be run", "", "Model"]
     for section, words in checked.modelled:
         lines += _item(section, words)
     nodes = f"about {checked.nodes}" if checked.estimated else f"{checked.nodes}"
@@ -140,12 +140,12 @@ def _item(name: str, words: str) -> list[str]:
 
 def _cost(estimate: Cost) -> Iterator[str]:
     steps = f"{estimate.steps} steps" if estimate.steps else "no step"
-    yield (f"Cost, roughly: {_seconds(estimate.seconds)} ({steps}), writing not counted; "
-           f"{estimate.memory:.0f} MB besides the program")
-    explanation = ("The first state and steps were computed and timed, times the number of expected"
-                   " steps; a step in contact with the opposite wall counts "
-                   f"{cost.IN_CONTACT:g} times. Right within a factor of three in the paper's "
-                   "pores.")
+    yield (f"Cost, roughly: {_seconds(estimate.seconds)} ({steps}) without writing files; "
+           f"{estimate.memory:.0f} MB in addition to the program")
+    explanation = ("The time of the first state and steps is measured, and multiplied by the "
+                   "expected number of steps. A step in contact with the opposite wall counts "
+                   f"{cost.IN_CONTACT:g} times. The estimate is right within a factor of three in "
+                   "the paper's pores.")
     yield from textwrap.wrap(explanation, WIDTH, initial_indent="  ", subsequent_indent="  ")
 
 
@@ -170,7 +170,7 @@ def _numbers(computed: list[Number]) -> Iterator[str]:
 
 def _warnings(warnings: list[Caveat]) -> Iterator[str]:
     if not warnings:
-        yield "No simplification that is checked is out of its range."
+        yield "All checked simplifications hold."
     for caveat in warnings:
         yield from textwrap.wrap(f"WARNING {caveat.key}: {caveat.text}.", WIDTH + 2,
                                  subsequent_indent="  ")

@@ -4,9 +4,9 @@
                             x one step x REMESHING
 
 The first step of the midpoint rule is growth.time_step; it doubles up to the length that the
-tolerance allows. Rows are those within steps. The factors are fitted to the packaged scenes, where
-the estimate is right within a factor of three. Memory is the amount that a run requires before it
-begins.
+tolerance allows. Only rows within steps count. The factors are fitted to the packaged scenes, where
+the estimate is right within a factor of three. The estimated memory is the amount that must be free
+when a run begins.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ def run_trial(scene: Scene, nodes: int) -> Trial:
     if scene.growth:
         end = min(scene.growth.end, FIRST_STEPS * scene.growth.time_step)
         scene = replace(scene, growth=replace(scene.growth, end=end),
-                        output=replace(scene.output, times=(end,)))
+                        output=replace(scene.output, times=(end,), every=None))
     clock = [perf_counter()]
     run = _until_the_end(iterate_steps(scene))
     first = needed(next(run)[1], "the first row")
@@ -101,7 +101,7 @@ def run_trial(scene: Scene, nodes: int) -> Trial:
 
 
 def _until_the_end(run: Iterator[ReportedStep]) -> Iterator[ReportedStep]:
-    """The steps of a run until its end or that of the model."""
+    """Yield the steps of a run until the scene or the model ends."""
     try:
         yield from run
     except RunEnd:

@@ -16,6 +16,7 @@ import math
 import os
 from collections.abc import Callable, Iterator
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -40,14 +41,16 @@ PER_CORNER = 4.0
 PIECES = 16
 #: A run that needs more than this part of the free memory causes a warning.
 WARNED = 0.5
+#: Factors of a refinement that are tried for a run that does not fit; coarser meshes resolve little.
+COARSER = (0.7, 0.5, 0.35, 0.25)
 HEXAGON = math.sqrt(3) / 2
 MB = 1e6
 
 
 def expected_nodes(scene: Scene) -> float:
-    """Estimated nodes, midside nodes included, of the first or the last mesh if that is larger.
+    """Estimate the nodes of the larger of the first and the last mesh, including midside nodes.
 
-    No mesh is generated.
+    It generates no mesh.
     """
     expected = [first_nodes(scene)]
     if scene.growth:
@@ -133,18 +136,28 @@ def require_outline(scene: Scene) -> None:
 
 
 def require_memory(scene: Scene, warn: Callable[[str], None]) -> None:
-    """Warn of a run that may need more than half of the free memory.
+    """Warn if a run may need more than half of the free memory.
 
-    Raises SceneError if it would need more than all of it.
+    Raises SceneError if it needs more than the free memory.
     """
     free = free_bytes()
     expected = expected_bytes(scene)
     need = (f"about {expected / MB:.0f} MB of memory are needed ({expected_nodes(scene):.0f} "
             f"nodes), {free / MB:.0f} MB are free")
     if expected > free:
-        raise SceneError(f"{scene.name}: {need}; a smaller numerics.refinement is needed")
+        raise SceneError(f"{scene.name}: {need}; {_fitting(scene, free)}")
     if expected > WARNED * free:
         warn(f"{scene.name}: {need}")
+
+
+def _fitting(scene: Scene, free: float) -> str:
+    """Name the largest refinement of those tried that fits into the free memory, in bytes."""
+    for factor in COARSER:
+        refinement = float(f"{scene.numerics.refinement * factor:.2g}")
+        coarser = replace(scene, numerics=replace(scene.numerics, refinement=refinement))
+        if expected_bytes(coarser) <= WARNED * free:
+            return f"numerics.refinement = {refinement:g} needs at most half of them"
+    return "no numerics.refinement that resolves the pore fits; a smaller pore is needed"
 
 
 def free_bytes(root: Path = Path("/")) -> float:
@@ -177,7 +190,7 @@ def _groups(root: Path) -> Iterator[float]:
 
 
 def _remaining(group: Path) -> float:
-    """Remaining memory of a control group; cached files can be evicted."""
+    """Remaining memory (bytes) of a control group; cached files count as free."""
     for limit, used, reclaimable in (("memory.max", "memory.current", "inactive_file"),
                                    ("memory.limit_in_bytes", "memory.usage_in_bytes",
                                     "total_inactive_file")):

@@ -12,8 +12,8 @@ LEFT_OUT = {
     "aggregate": "no aggregate: a clean channel",
     "flow": "no flow: pure diffusion",
     "substrates": "no substrates: no transport is assembled",
-    "kinetics": "no uptake: it takes substrates and an aggregate",
-    "growth": "no growth: the state at t = 0 alone",
+    "kinetics": "no uptake, which needs substrates and an aggregate",
+    "growth": "no growth: only the state at t = 0",
 }
 
 
@@ -77,10 +77,10 @@ def _substrates(scene: Scene) -> Iterator[str]:
     if scene.flow:
         yield "(11) at the inlet, (12) at the outlet, (13) on the walls"
     else:
-        yield {"open": "the supply held at both ends",
+        yield {"open": "the supply prescribed at both ends",
                "closed": "closed ends"}[scene.substrates.boundary]
-    yield {"quasi_steady": "at rest in each shape",
-           "gear": "followed in time (3.3, Gear)"}[scene.numerics.transport]
+    yield {"quasi_steady": "steady in each shape",
+           "gear": "integrated in time (3.3, Gear)"}[scene.numerics.transport]
 
 
 def _equations(scene: Scene) -> str:
@@ -142,11 +142,11 @@ def _numerics(scene: Scene) -> Iterator[str]:
 
 
 def _output(scene: Scene) -> Iterator[str]:
-    times = scene.output.times
+    times = scene.requested_times
     if times is None:
         yield _every_step(scene) if scene.growth else "one row and fields at t = 0"
     else:
-        yield f"rows and fields at {len({0.0, *times})} times, t = 0 among them"
+        yield f"rows and fields at {len({0.0, *times})} times, including t = 0"
 
 
 def _every_step(scene: Scene) -> str:

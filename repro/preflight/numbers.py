@@ -52,7 +52,7 @@ class Sizes:
 
 
 def sizes(scene: Scene, area: float, contact: float | None = None) -> Sizes:
-    """A half-disc as long as it fits into the pore, then a plug from wall to wall."""
+    """Sizes of a half-disc of an area (um2), or of a plug if the half-disc exceeds the pore."""
     width = scene.pore.width
     radius = math.sqrt(2 * area / math.pi)
     if radius <= width:
@@ -110,7 +110,7 @@ def fastest_growth(scene: Scene) -> float:
 @dataclass(frozen=True)
 class Uptake:
     """Uptake of one substrate: its name, its description, its law, and q X_m (mg/L/h), the uptake
-    per its own fraction m where the other substrate is in excess."""
+    per its own fraction m if the other substrate is in excess."""
 
     name: str
     substrate: Substrate

@@ -21,9 +21,9 @@ MOST_COMPARED = 30_000
 
 
 def find_unresolved_flow(scene: Scene) -> Iterator[Caveat]:
-    """Warn of the error of the head loss at t = 0, with a refinement that resolves the flow.
+    """Warn if the head loss at t = 0 depends on the mesh; name a refinement that resolves the flow.
 
-    Yields nothing if the flow is resolved or no outline is drawn.
+    Yields nothing if the flow is resolved or the scene has no outline.
     """
     if scene.flow is None or scene.aggregate is None or scene.aggregate.outline is None:
         return
@@ -32,9 +32,9 @@ def find_unresolved_flow(scene: Scene) -> Iterator[Caveat]:
         return
     first = losses[0][1]
     expected = 2 * losses[-1][1] - losses[-2][1]
-    yield Caveat("numerics.refinement", f"the head loss at t = 0 is {1e-4 * first:.4g} cm, and "
-                 f"about {1e-4 * expected:.4g} cm ({100 * (expected / first - 1):+.2g} %) are "
-                 f"expected of finer meshes; {_advice(losses)}")
+    yield Caveat("numerics.refinement", f"the head loss at t = 0 is {1e-4 * first:.4g} cm; "
+                 f"finer meshes are expected to give about {1e-4 * expected:.4g} cm "
+                 f"({100 * (expected / first - 1):+.2g} %); {_advice(losses)}")
 
 
 def _advice(losses: list[tuple[float, float]]) -> str:

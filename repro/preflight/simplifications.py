@@ -22,15 +22,16 @@ REYNOLDS = 0.1
 #: Linear elements may overshoot where a concentration changes within an element of a cell Peclet
 #: number above this.
 CELL_PECLET = 2.0
-#: Largest share by which quasi-steady substrates lag behind the growth.
+#: Largest ratio of the time of transport to that of growth for quasi-steady substrates.
 LAG = 0.05
 #: Largest ratio of the transit time of water to the time of growth for profiles at rest in each
-#: shape. From a pore full of the supply, a seed of 20 um in base makes in 6 h 0.5, 2, 4, 7 and 19 %
-#: less biomass than with Gear's method at ratios of 0.009, 0.027, 0.05, 0.09 and 0.28.
+#: shape. In base, a seed of 20 um in a pore full of the supply makes 0.5, 2, 4, 7 and 19 % less
+#: biomass in 6 h than with Gear's method at ratios of 0.009, 0.027, 0.05, 0.09 and 0.28.
 TRANSIT = 0.05
 #: Largest strain of the aggregate, roughly, due to the neglected forces.
 STRAIN = 0.01
-#: Largest growth in a shape update, which errs by about half of it with the rates at its start.
+#: Largest growth in a shape update. The update uses the rates at its start and errs by about half
+#: of the growth.
 GROWTH_IN_A_STEP = 0.1
 #: The bound on the time of contact is 10 % early in the paper's pores. An end later than this many
 #: times the bound is long after contact.
@@ -74,9 +75,9 @@ def find_warnings(scene: Scene, computed: list[Number]) -> list[Caveat]:
 def _inertia(value: dict[str, float]) -> Iterator[Caveat]:
     reynolds = value.get("Reynolds", 0.0)
     if reynolds > REYNOLDS:
-        yield Caveat("flow", f"the Reynolds number is {reynolds:.2g}, above {REYNOLDS:g}: the "
-                     "inertia that Stokes flow (1) leaves out is of this share of the viscous "
-                     "forces")
+        yield Caveat("flow", f"the Reynolds number is {reynolds:.2g}, above {REYNOLDS:g}: "
+                     "Stokes flow (1) neglects inertia, which is about this fraction of the "
+                     "viscous forces")
 
 
 def _cells(scene: Scene, value: dict[str, float]) -> Iterator[Caveat]:
@@ -96,38 +97,39 @@ def _diffusivities(scene: Scene) -> Iterator[Caveat]:
         table = type(substrate)(supply=substrate.supply)
         inside = substrate.diffusivity_in_aggregate
         if substrate.diffusivity != table.diffusivity and inside == table.diffusivity_in_aggregate:
-            yield Caveat(f"substrates.{name}.diffusivity_in_aggregate", "it is still that of Table "
-                         f"1, {100 * inside / substrate.diffusivity:.3g} % of the diffusivity in "
-                         'water, which was changed; "80 %" keeps their ratio (2.2)')
+            yield Caveat(f"substrates.{name}.diffusivity_in_aggregate", "it still has the "
+                         f"value of Table 1, now {100 * inside / substrate.diffusivity:.3g} % of "
+                         'the changed diffusivity in water; "80 %" keeps their ratio (2.2)')
 
 
 def _demand(law: Kinetics) -> Iterator[Caveat]:
-    """Warn if Y or d_c is changed, and F = COD - Y d_c (7) is not."""
+    """Warn if Y or d_c is changed but F = COD - Y d_c (7) is not."""
     table = Kinetics()
     product = law.yield_coefficient * law.decay_oxygen_demand
     table_product = table.yield_coefficient * table.decay_oxygen_demand
     is_changed = law.donor_oxygen_demand is None and product != table_product
     if is_changed and law.acceptor_to_donor_ratio == table.acceptor_to_donor_ratio:
-        yield Caveat("kinetics.acceptor_to_donor_ratio", f"F is still {RATIO:g} of Table 1, while "
-                     f"Y d_c is {product:.3g} and no longer {table_product:.3g}: F = COD - Y d_c "
-                     "(7); with donor_oxygen_demand (COD) in its place it follows")
+        yield Caveat("kinetics.acceptor_to_donor_ratio", f"F still has the value of Table 1, "
+                     f"{RATIO:g}, but Y d_c has changed from {table_product:.3g} to {product:.3g}, "
+                     "and F = COD - Y d_c (7); replace F by donor_oxygen_demand (COD), from which "
+                     "it is computed")
 
 
 def _lag(scene: Scene, value: dict[str, float]) -> Iterator[Caveat]:
     lag = value["transport over growth time"]
     if scene.numerics.transport == "quasi_steady" and lag > LAG:
         yield Caveat("numerics.transport", f"transport takes {lag:.2g} of the time of growth, "
-                     f"above {LAG:g}: quasi-steady substrates are off by about this share; "
-                     '"gear" with numerics.time = "updates" follows them in time')
+                     f"above {LAG:g}: quasi-steady substrates err by about this fraction; "
+                     '"gear" with numerics.time = "updates" integrates them in time')
 
 
 def _transit(value: dict[str, float]) -> Iterator[Caveat]:
     transit = value.get("transit over growth time", 0.0)
     if transit > TRANSIT:
         yield Caveat("flow", f"water takes {transit:.2g} of the time of growth to pass the pore, "
-                     f"above {TRANSIT:g}: profiles come to rest in each shape (3.3.2), and what "
-                     "was in the pore before is lost to the biomass, which may be off by this "
-                     "share")
+                     f"above {TRANSIT:g}: steady profiles in each shape (3.3.2) ignore the "
+                     "substrates that the pore contained before, so the biomass may err by this "
+                     "fraction")
 
 
 def _forces(scene: Scene, computed: list[Number]) -> Iterator[Caveat]:
@@ -135,18 +137,18 @@ def _forces(scene: Scene, computed: list[Number]) -> Iterator[Caveat]:
             if number.name == "fluid stress over modulus"]
     strain = max(stresses, default=0.0)
     if scene.growth.fluid_forces == "neglected" and strain > STRAIN:
-        yield Caveat("growth.fluid_forces", f"the fluid's stress comes to {strain:.2g} of mu_L, "
-                     f"above {STRAIN:g}: neglected (2.3.3), it would strain the aggregate by about "
-                     f"this much; {_included(scene)}")
+        yield Caveat("growth.fluid_forces", f"the fluid's stress reaches {strain:.2g} of mu_L, "
+                     f"above {STRAIN:g}: it strains the aggregate by about this fraction, and the "
+                     f"scene neglects it (2.3.3); {_included(scene)}")
 
 
 def _included(scene: Scene) -> str:
     """Name the setting that includes fluid forces, if there is one."""
     if scene.flow and scene.flow.biomass == "brinkman":
-        return 'no setting takes it in with flow.biomass = "brinkman"'
+        return 'no setting models it with flow.biomass = "brinkman"'
     if scene.growth.new_biomass == "stress_free":
-        return '"included" with growth.new_biomass = "stressed" takes it in'
-    return '"included" takes it in'
+        return '"included" with growth.new_biomass = "stressed" models it'
+    return '"included" models it'
 
 
 def _fronts(scene: Scene) -> Iterator[Caveat]:
@@ -158,9 +160,9 @@ def _fronts(scene: Scene) -> Iterator[Caveat]:
             zero_order = uptake.law.saturates(uptake.substrate.supply)
             kind = "zero-order front" if zero_order else "layer of first-order uptake"
             yield Caveat("numerics.refinement", f"the {uptake.name} is used up in a {kind} "
-                         f"(D K_s / (q X_m))^1/2 = {layer:.2g} um thick, thinner than the "
-                         f"{nodes:.2g} um between nodes in the aggregate (a run judges its front "
-                         "by what it solves)" + _resolving(resolution(scene) * nodes / layer))
+                         f"of thickness (D K_s / (q X_m))^1/2 = {layer:.2g} um, thinner than the "
+                         f"{nodes:.2g} um between nodes in the aggregate (a run checks the front "
+                         "in its solution)" + _resolving(resolution(scene) * nodes / layer))
 
 
 def _interface_size(scene: Scene) -> float:
@@ -181,10 +183,10 @@ def _drag_layer(scene: Scene) -> Iterator[Caveat]:
     loss = 3 * (root - permeability / thickness) / gap
     if loss > FILM_LOSS:
         accepted = root / (1 - FILM_LOSS * gap / (3 * root))
-        yield Caveat("flow.permeability", f"the flow along the aggregate fades in it over its "
-                     f"root, {root:.2g} um, which elements of {size:.2g} um widen to "
-                     f"{thickness:.2g} um: the narrowest film, {gap:.2g} um, may let through "
-                     f"{100 * loss:.2g} % less" + _resolving(resolution(scene) * thickness
+        yield Caveat("flow.permeability", f"the flow fades in the aggregate over the root of "
+                     f"the permeability, {root:.2g} um, which elements of {size:.2g} um widen to "
+                     f"{thickness:.2g} um: the flow through the narrowest film, {gap:.2g} um, may "
+                     f"be {100 * loss:.2g} % too small" + _resolving(resolution(scene) * thickness
                                                              / accepted))
 
 
@@ -203,9 +205,9 @@ def _seed_film(scene: Scene) -> Iterator[Caveat]:
     nodes = sizing.ACROSS_FILM * resolution(scene) * share * scene.numerics.order
     if nodes < ACROSS_FILM:
         key = "aggregate.radius" if scene.aggregate.outline is None else "aggregate.outline"
-        yield Caveat(key, f"the film over the seed is {gap:.2g} um thin and "
-                     f"resolved by {nodes:.2g} distances between nodes, under {ACROSS_FILM:g}: its "
-                     "flow is a matter of the mesh; films are resolved as if they were "
+        yield Caveat(key, f"the film over the seed, {gap:.2g} um, spans only "
+                     f"{nodes:.2g} distances between nodes, under {ACROSS_FILM:g}: its flow "
+                     "depends on the mesh, whose elements are sized for films of at least "
                      f"{film(scene):g} um (2.3.3)")
 
 
@@ -216,16 +218,16 @@ def _ends(scene: Scene) -> Iterator[Caveat]:
         when = "by growth.end" if end.reach > numbers.at_start(scene).reach else "from the start"
         yield Caveat("pore.length", f"the aggregate may come within {free:.3g} um of the pore's "
                      f"ends {when} (reach {end.reach:.3g} of {scene.pore.length / 2:g} um): the "
-                     "inlet's and the outlet's conditions (3.1, (11)-(12)) are then too near, and "
-                     "at the end itself the run is over")
+                     "conditions at inlet and outlet (3.1, (11)-(12)) are then too near, and the "
+                     "run stops if the aggregate reaches an end")
 
 
 def _steps(scene: Scene) -> Iterator[Caveat]:
     grown = numbers.fastest_growth(scene) * scene.growth.time_step
     if scene.numerics.time == "updates" and grown > GROWTH_IN_A_STEP:
         yield Caveat("growth.time_step", f"the aggregate grows by {100 * grown:.2g} % in a shape "
-                     f"update, above {100 * GROWTH_IN_A_STEP:g} %: its rates are those of the "
-                     'shape before; shorten it, or take numerics.time = "midpoint"')
+                     f"update, above {100 * GROWTH_IN_A_STEP:g} %: it uses the rates at "
+                     'its start; choose a shorter one, or numerics.time = "midpoint"')
 
 
 def warn_missed_tolerance(scene: Scene, worst: float, count: str = "") -> Iterator[Caveat]:
@@ -240,17 +242,17 @@ def warn_missed_tolerance(scene: Scene, worst: float, count: str = "") -> Iterat
 
 
 def _fold(scene: Scene, value: dict[str, float]) -> Iterator[Caveat]:
-    """Warn if a rim that grows on a starved core is expected to compress itself into a fold."""
+    """Warn if growth is expected to compress the rim around a starved core into a fold."""
     if scene.growth.new_biomass != "stressed":
         return
     uptake = max(value.get(f"Damkoehler, {name}", 0.0) for name in ("acceptor", "donor"))
     stretch = numbers.rim_stretch(scene, uptake / numbers.at_start(scene).area)
     if stretch < FOLD_EXPECTED:
-        yield Caveat("growth.end", f"the run may end before {scene.growth.end:g} h, as a fold: the "
-                     f"supply reaches {numbers.depth(scene):.3g} um into an aggregate of up to "
-                     f"{numbers.at_end(scene).thickness:.3g} um, so that its rim may compress "
-                     f"itself to an elastic stretch of {stretch:.2f} or less (estimate, "
-                     "`repro docs scope`)")
+        yield Caveat("growth.end", f"the surface may fold, which ends the run, before "
+                     f"{scene.growth.end:g} h: the supply reaches {numbers.depth(scene):.3g} um "
+                     f"into an aggregate of up to {numbers.at_end(scene).thickness:.3g} um, and "
+                     f"growth may compress the rim to an elastic stretch of {stretch:.2f} or less "
+                     "(estimate, `repro docs scope`)")
 
 
 def warn_crease(pore: Pore) -> Iterator[Caveat]:
@@ -262,13 +264,14 @@ def warn_crease(pore: Pore) -> Iterator[Caveat]:
     yield Caveat(CREASED, f"from t = {pore.time:.4g} h on growth compresses the aggregate's "
                  f"surface near x = {x:.4g}, y = {y:.4g} um to an elastic stretch of "
                  f"{crease.least:.3f}, below {CREASE:g}: a crease there would lower the energy, "
-                 "and the smooth shape is that of a surface without flaws; "
-                 '"stress_free" does not come to this')
+                 "and only a surface without flaws stays smooth; "
+                 '"stress_free" avoids this')
 
 
 def _contact(scene: Scene) -> Iterator[Caveat]:
     contact = numbers.at_end(scene).contact
     if contact is not None and scene.growth.end > AFTER_CONTACT * contact:
         yield Caveat("growth.end", f"contact with the opposite wall is expected from {contact:.3g} "
-                     f"h on, long before {scene.growth.end:g} h: from then on which nodes join the "
-                     "wall (2.3.3) is a rule, and conductivity is known to a few percent")
+                     f"h on, long before {scene.growth.end:g} h: then conductivity (2.3.3) is "
+                     'accurate to a few percent with numerics.elements = "linear" (preset '
+                     "paper), and to 1 % with curved triangles (preset fast)")

@@ -24,7 +24,7 @@ function nearest(times, time) {
 // Linear between a line's own times; null before the first, after the last and beside a gap.
 function valueAt(line, time) {
   const k = line.t.findIndex(own => own >= time);
-  if (k < 0 || line.t[k] === time) return k < 0 ? null : line.y[k];
+  if (k < 0 || line.t[k] === time) return k < 0 ? null : line.y[line.t.lastIndexOf(time)]; // after a jump
   if (k === 0 || line.y[k] === null || line.y[k - 1] === null) return null;
   return line.y[k - 1] + (time - line.t[k - 1]) / (line.t[k] - line.t[k - 1]) * (line.y[k] - line.y[k - 1]);
 }
@@ -46,6 +46,7 @@ function tell(chart, time) {
   const times = lines.map(line => line.t[nearest(line.t, time)]), at = times[nearest(times, time)];
   chart.output.textContent = `${rounded(at)} h: ` + lines.map(line =>
     (lines.length > 1 ? line.label + " " : "") + rounded(valueAt(line, at))).join(", ");
+  chart.at = at;
   mark(chart, at);
 }
 
@@ -58,11 +59,22 @@ function tellNothing(chart) {
   chart.output.textContent = "\u00a0";
   chart.now.setAttribute("visibility", "hidden");
 }
+// The arrow keys choose the time before or after the one that is shown, Enter its fields.
+function step(chart, event) {
+  const times = [...new Set(chart.content.lines.flatMap(line => line.t))].sort((a, b) => a - b);
+  const k = nearest(times, chart.at ?? times[0]), by = { ArrowLeft: -1, ArrowRight: 1, Enter: 0 }[event.key];
+  if (by === undefined) return;
+  event.preventDefault();
+  tell(chart, times[Math.min(times.length - 1, Math.max(0, k + by))]);
+  if (!by) document.dispatchEvent(new CustomEvent("timechosen", { detail: chart.at }));
+}
 for (const chart of charts) {
+  chart.drawing.setAttribute("tabindex", "0");
   chart.drawing.addEventListener("pointermove", event => tell(chart, timeUnder(chart, event)));
   chart.drawing.addEventListener("pointerleave", () => {
     if (present === null) tellNothing(chart); else tell(chart, present);
   });
+  chart.drawing.addEventListener("keydown", event => step(chart, event));
   chart.drawing.addEventListener("click", event => {
     document.dispatchEvent(new CustomEvent("timechosen", { detail: timeUnder(chart, event) }));
   });

@@ -11,7 +11,12 @@ import numpy as np
 from repro.report import charts, page, quantities
 from repro.report.reading import Run
 from repro.results import names
+from repro.scene.units import alike
 
+#: Columns that are positions, of which a percentage means nothing.
+COORDINATES = {name for name in names.KNOWN if name.endswith(("stream_um", "_x_um", "_y_um"))}
+#: A value of this many times another one is not a percentage any more.
+TIMES = 10.0
 #: Columns without a value between rows, and defects, which are round-off.
 NOT_COMPARED = {"time_h", "nodes", *names.DEFECTS, *names.YES_NO}
 
@@ -61,7 +66,7 @@ def differences(runs: Sequence[Run]) -> list[tuple[str, ...]]:
 
 def _differs(key: str, scenes: Sequence[dict[str, object]]) -> bool:
     """Does the value of a key in any scene differ from that in the first one?"""
-    return any(keys.get(key) != scenes[0].get(key) for keys in scenes)
+    return not all(alike(keys.get(key), scenes[0].get(key)) for keys in scenes)
 
 
 def _value_texts(key: str, scenes: Sequence[dict[str, object]]) -> list[str]:
@@ -102,20 +107,21 @@ def _values(runs: Sequence[Run], labels: Sequence[str]) -> str:
     if time is None:
         return ""
     head = ["", labels[0], *(text for label in labels[1:] for text in (label, "difference"))]
-    rows = [(names.with_unit(name), *_row(run_values))
+    rows = [(names.with_unit(name), *_row(run_values, name in COORDINATES))
             for name, run_values in values(runs, time).items()
             if run_values != [None] * len(runs)]
     note = (f'<p class="note">At t = {time:.6g} h, the last time that every run has reached, '
-            "linear between rows. Differences are relative to the first run.</p>")
+            "linear between rows. Differences are relative to the first run; those of coordinates "
+            "are in um.</p>")
     return page.section("Values at the common last time", note, page.table("", head, rows))
 
 
-def _row(run_values: Sequence[float | None]) -> list[str]:
+def _row(run_values: Sequence[float | None], is_coordinate: bool) -> list[str]:
     """The value of the first run, then that of each other run with its difference."""
     first, *other_values = run_values
     texts = [_text(first)]
     for value in other_values:
-        texts += [_text(value), _text_difference(first, value)]
+        texts += [_text(value), _text_difference(first, value, is_coordinate)]
     return texts
 
 
@@ -123,7 +129,15 @@ def _text(value: float | None) -> str:
     return "-" if value is None else charts.number(value)
 
 
-def _text_difference(first: float | None, value: float | None) -> str:
-    if first is None or value is None or (first == 0 and value != 0):
+def _text_difference(first: float | None, value: float | None, is_coordinate: bool) -> str:
+    if first is None or value is None:
         return "-"
-    return "0" if value == first else f"{100 * (value - first) / abs(first):+.3g} %"
+    if value == first:
+        return "0"
+    if is_coordinate:
+        return f"{value - first:+.3g} um"
+    if first == 0:
+        return "-"
+    if abs(value) >= TIMES * abs(first):
+        return f"{value / first:.3g} times"
+    return f"{100 * (value - first) / abs(first):+.3g} %"

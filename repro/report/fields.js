@@ -2,7 +2,7 @@
 "use strict";
 const data = JSON.parse(document.getElementById("fields").textContent);
 const part = Object.fromEntries(["picture", "field", "frame", "now", "probe", "lines", "outline", "whole", "fixed",
-  "play"].map(id => [id, document.getElementById(id)]));
+  "play", "save"].map(id => [id, document.getElementById(id)]));
 
 function rangeOf(field, frame) {
   const pairs = (part.fixed.checked ? data.frames : [frame]).map(each => each.values[field.name])
@@ -10,6 +10,13 @@ function rangeOf(field, frame) {
   const low = Math.min(...pairs.map(pair => pair[0])), high = Math.max(...pairs.map(pair => pair[1]));
   if (!isFinite(low)) return [0, 0];
   return high - low > 1e-9 * Math.max(Math.abs(low), Math.abs(high)) ? [low, high] : [low, low];  // round-off is none
+}
+
+// Where a value stands between the first and the last colour: logarithmic from two decades on, over four at most.
+function shareOf(low, high) {
+  if (!(low > 0 && high >= 100 * low)) return { least: low, log: false, at: value => (value - low) / (high - low) };
+  const least = Math.max(low, 1e-4 * high), decades = Math.log(high / least);
+  return { least, log: true, at: value => Math.log(Math.max(value, least) / least) / decades };
 }
 
 function boxOf(points) {
@@ -51,14 +58,18 @@ function draw() {
   const pen = part.picture.getContext("2d"), all = filled(mesh, pixels, values, field.at === "node", ...size);
   pen.putImageData(image(all, low, high, ...size), Math.round(edge.left * ratio), Math.round(edge.top * ratio));
   pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+  pen.globalCompositeOperation = "destination-over"; // a saved picture has the colour of the page
+  pen.fillStyle = ink("--back"); pen.fillRect(0, 0, wide, tall + edge.top + edge.bottom);
+  pen.globalCompositeOperation = "source-over";
   pen.font = "12px system-ui, sans-serif";
   if (part.lines.checked) trace(pen, mesh.edges, places, "rgba(128,128,128,.55)", 0.7);
   if (part.outline.checked)
     for (const [colour, width] of [["#ffffff", 3], ["#000000", 1.2]]) trace(pen, mesh.rim, places, colour, width);
   axes(pen, box, place, tall);
   const long = Math.min(420, room);
-  bar(pen, field, low, high, edge.left + Math.max(0, across - long) / 2, edge.top + tall + 52, long);
-  drawn = { all, size, ratio, edge, scale, tall, box, field };
+  bar(pen, field, low, high, all.some(isNaN), edge.left + Math.max(0, across - long) / 2, edge.top + tall + 52, long);
+  drawn = { all, size, ratio, edge, scale, tall, across, box, field };
+  cross(pen);
   describe(frame, field, low, high);
 }
 
@@ -68,8 +79,9 @@ function ink(name) { return getComputedStyle(document.documentElement).getProper
 function image(all, low, high, width, height) {
   const pixels = new ImageData(width, height), colours = new Uint32Array(pixels.data.buffer);
   const dark = matchMedia("(prefers-color-scheme: dark)").matches, none = dark ? 0xff363128 : 0xffe8e4e0;
+  const shares = shareOf(low, high);
   for (let k = 0; k < all.length; k++) {
-    const share = high > low ? (all[k] - low) / (high - low) : 0.5;
+    const share = isNaN(all[k]) ? NaN : high > low ? shares.at(all[k]) : 0.5;
     colours[k] = isNaN(share) ? none : TABLE[Math.round(Math.max(0, Math.min(1, share)) * 255)];
   }
   return pixels;
@@ -115,8 +127,19 @@ function axes(pen, box, place, tall) {
   pen.textAlign = "center"; pen.fillText("y (um)", 0, 0); pen.restore();
 }
 
-function bar(pen, field, low, high, left, top, width) {
-  const name = field.label + (field.unit ? ` (${field.unit})` : "");
+// The values beside the bar: round ones, or powers of ten.
+function barTicks(low, high, shares) {
+  if (!shares.log) return roundTicks(low, high, 4);
+  const ticks = [];
+  for (let power = Math.ceil(Math.log10(low)); 10 ** power <= high; power++) ticks.push(10 ** power);
+  return ticks;
+}
+
+function bar(pen, field, least, high, grey, left, top, width) {
+  const shares = shareOf(least, high), low = shares.least;
+  const why = field.body ? "not defined in the fluid" : "not meshed at this time";
+  const name = field.label + (field.unit ? ` (${field.unit})` : "") + (shares.log ? ", log scale" : "")
+    + (grey ? `; grey: ${why}` : "");
   pen.fillStyle = ink("--text"); pen.textAlign = "left"; pen.textBaseline = "top";
   if (!(high > low)) return void pen.fillText(`${name}: ${rounded(low)} everywhere`, left, top);
   for (let k = 0; k < width; k++) {
@@ -124,10 +147,11 @@ function bar(pen, field, low, high, left, top, width) {
     pen.fillRect(left + k, top, 1.5, 12);
   }
   pen.fillStyle = ink("--text");
-  const text = value => rounded(Math.abs(value) < 1e-12 * (high - low) ? 0 : value);
-  const wide = value => pen.measureText(text(value)).width, place = value => left + (value - low) / (high - low) * width;
+  const text = value => (value === low && low > least ? "\u2264 " : "")
+    + rounded(Math.abs(value) < 1e-12 * (high - low) ? 0 : value);
+  const wide = value => pen.measureText(text(value)).width, place = value => left + shares.at(value) * width;
   const first = left + wide(low) + 8, last = left + width - wide(high) - 8; // the ends are exact
-  const between = roundTicks(low, high, 4).filter(value =>
+  const between = barTicks(low, high, shares).filter(value =>
     place(value) - wide(value) / 2 > first && place(value) + wide(value) / 2 < last);
   for (const value of [low, ...between, high]) {
     const x = place(value);
@@ -154,13 +178,49 @@ function describe(frame, field, low, high) {
 }
 
 function probe(event) {
-  const { all, size, ratio, edge, scale, tall, box, field } = drawn, frame = part.picture.getBoundingClientRect();
-  const across = event.clientX - frame.left - edge.left, down = event.clientY - frame.top - edge.top;
+  const frame = part.picture.getBoundingClientRect();
+  read(event.clientX - frame.left - drawn.edge.left, event.clientY - frame.top - drawn.edge.top);
+}
+
+// Shows the value at a place, in pixels from the upper left corner of the field.
+function read(across, down) {
+  const { all, size, ratio, scale, tall, box, field } = drawn;
   const inside = across >= 0 && down >= 0 && across * ratio < size[0] && down * ratio < size[1];
   const value = inside ? all[Math.floor(down * ratio) * size[0] + Math.floor(across * ratio)] : NaN;
   const x = (box[0] + across / scale).toFixed(1), y = (box[2] + (tall - down) / scale).toFixed(1);
   const words = isNaN(value) ? "none here" : `${field.label} ${rounded(value)} ${field.unit}`;
   part.probe.textContent = inside ? `x = ${x} um, y = ${y} um: ${words}` : "\u00a0";
+}
+
+// The place that the arrow keys move, as shares of the field's width and height; null before the first key.
+let cursor = null;
+const STEPS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
+function move(event) {
+  if (!STEPS[event.key]) return;
+  event.preventDefault();
+  const size = event.shiftKey ? 0.1 : 0.02, within = value => Math.min(0.999, Math.max(0.001, value));
+  cursor = cursor ? cursor.map((value, k) => within(value + size * STEPS[event.key][k])) : [0.5, 0.5];
+  draw();
+  read(cursor[0] * drawn.across, cursor[1] * drawn.tall);
+}
+
+function cross(pen) {
+  if (!cursor) return;
+  const x = drawn.edge.left + cursor[0] * drawn.across, y = drawn.edge.top + cursor[1] * drawn.tall;
+  for (const [colour, width] of [["#ffffff", 3], ["#000000", 1.2]]) {
+    pen.strokeStyle = colour; pen.lineWidth = width;
+    pen.beginPath(); pen.moveTo(x - 7, y); pen.lineTo(x + 7, y); pen.moveTo(x, y - 7); pen.lineTo(x, y + 7); pen.stroke();
+  }
+}
+
+function save() {
+  part.picture.toBlob(content => {
+    const link = document.createElement("a"), frame = data.frames[part.frame.value];
+    link.href = URL.createObjectURL(content);
+    link.download = `${part.field.value}_${rounded(frame.time)}h.png`;
+    link.click();
+    URL.revokeObjectURL(link.href);
+  });
 }
 
 // A fragment such as #frame=3&field=theta chooses the frame and the field.
@@ -180,9 +240,13 @@ function play() {
 
 for (const field of data.fields) part.field.add(new Option(field.label, field.name));
 part.frame.max = data.frames.length - 1;
-part.frame.value = data.frames.length - 1;
+part.field.value = data.start.field;
+part.frame.value = data.start.frame;
 for (const id of ["field", "frame", "lines", "outline", "whole", "fixed"]) part[id].addEventListener("input", draw);
 part.play.addEventListener("click", play);
+part.save.addEventListener("click", save);
+part.picture.addEventListener("keydown", move);
+part.picture.addEventListener("blur", () => { cursor = null; draw(); });
 part.picture.addEventListener("pointermove", probe);
 part.picture.addEventListener("pointerleave", () => { part.probe.textContent = "\u00a0"; });
 document.addEventListener("timechosen", event => {

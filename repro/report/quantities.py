@@ -11,6 +11,7 @@ from repro.report.charts import Chart, Line
 from repro.report.reading import Run
 from repro.results import names
 from repro.results.columns import PARTS, SUBSTRATES
+from repro.results.jumps import with_jumps
 from repro.results.quantities import Quantity
 
 #: Times (h) and values.
@@ -122,7 +123,9 @@ def series(run: Run) -> dict[str, TimeSeries]:
     Quantities that the run does not model are left out, and so is zero storage.
     """
     drawable: dict[str, TimeSeries] = {}
-    drawable |= {name: (run.times, values) for name, values in run.series.items()}
+    tables = run.record["tables"]
+    drawable |= {name: with_jumps(name, run.times, values, tables)
+                 for name, values in run.series.items()}
     steps = len(run.ledger["end_h"]) if run.ledger else 0
     for quantity in DERIVED:
         if steps or quantity.name == "remeshed_nodes":

@@ -41,13 +41,14 @@ NUMERICS = {"preset": None, "elements": None, "refinement": None, "transport": "
 CONTROLS = """<div class="controls"><label>Field <select id="field"></select></label>
 <label><input type="checkbox" id="lines"> mesh</label>
 <label{aggregate}><input type="checkbox" id="outline" checked> outline of the aggregate</label>
-<label{several}><input type="checkbox" id="fixed" checked> one colour scale for all times</label>
-<label{several}><input type="checkbox" id="whole" checked> one frame for all times</label></div>
+<label{several}><input type="checkbox" id="fixed"> one colour scale for all times</label>
+<label{several}><input type="checkbox" id="whole" checked> one frame for all times</label>
+<button type="button" id="save">Save the picture</button></div>
 <div class="time"{several}><button type="button" id="play">Play</button>
 <input type="range" id="frame" min="0" value="0" step="1" aria-label="time">\
 <output id="now"></output></div>
-<div class="scroll"><canvas id="picture" role="img"></canvas></div>\
-<output id="probe">&nbsp;</output>"""
+<div class="scroll"><canvas id="picture" role="img" tabindex="0"></canvas></div>\
+<output id="probe" aria-live="polite">&nbsp;</output>"""
 
 
 def build(run: Run) -> str:
@@ -66,7 +67,19 @@ def _packed(run: Run, spent: int) -> dict:
     before = []
     if "before_expansion.pvd" in run.record["files"]:
         before = fields.index(run.folder, "before_expansion.pvd")
-    return fields.packed(fields.index(run.folder), before, spent)
+    packed = fields.packed(fields.index(run.folder), before, spent)
+    return packed | {"start": _first_shown(packed, quantities.contact(run))} if packed else {}
+
+
+def _first_shown(packed: dict, contact: list[float]) -> dict[str, str | int]:
+    """The field and the frame that the page opens with: the acceptor at the last time before
+    contact, or at the end."""
+    names_shown = [field["name"] for field in packed["fields"]]
+    first = "acceptor_mg_per_L"
+    before = [k for k, frame in enumerate(packed["frames"])
+              if not contact or frame["time"] < contact[0]]
+    return {"field": first if first in names_shown else names_shown[0],
+            "frame": before[-1] if before else len(packed["frames"]) - 1}
 
 
 def _head(run: Run) -> str:
@@ -141,9 +154,18 @@ def _field_note(packed: dict) -> str:
     note += (f"; {_times_note(len(packed['frames']) - unexpanded, packed['of'])}"
              f"{', those grown and not yet expanded besides' if unexpanded else ''}. Values are "
              "rounded to 1/65534 of their range; the .vtu files have every time and digit.")
+    note += (" Colours span the values that are shown, on a logarithmic scale from a factor of 100 "
+             f"on, over four decades at most. Grey{_grey(packed)}.")
+    return note + (" Point at the picture for a value, or focus it and press the arrow keys."
+                   + (" Arrow keys also move the slider." if packed["of"] > 1 else ""))
+
+
+def _grey(packed: dict) -> str:
+    """The areas without a value in words."""
+    areas = " is the part of the pore that is not meshed at that time"
     if any(field["body"] for field in packed["fields"]):
-        note += " Fields of the aggregate alone leave the fluid grey."
-    return note + (" Arrow keys move the slider." if packed["of"] > 1 else "")
+        areas += ", and the fluid where a field exists in the aggregate alone"
+    return areas
 
 
 def _times_note(count: int, total: int) -> str:
@@ -156,7 +178,8 @@ def _times_note(count: int, total: int) -> str:
 def _charts(run: Run, drawn: list[charts.Chart]) -> str:
     if not drawn:
         return ""
-    note = "Point at a chart for its values; a click shows the fields of that time."
+    note = ("Point at a chart for its values, or focus it and press the arrow keys; a click or Enter "
+            "shows the fields of that time.")
     if touching := quantities.contact(run):
         note += f" Dotted: contact with the opposite wall, t = {touching[0]:.6g} h."
     if len(run.times) > charts.MOST_POINTS:

@@ -12,6 +12,7 @@ import numpy as np
 
 from repro.results import names
 from repro.results.files import atomic_path
+from repro.results.jumps import with_jumps
 
 if TYPE_CHECKING:
     from repro.results.tables import Results
@@ -71,7 +72,8 @@ def _draw_panel(ax: Any, results: Results, columns: Sequence[str]) -> None:
     """Draw columns in one unit, and the time of contact; a point if there is one row."""
     marker = "o" if len(results.time) == 1 else ""
     for name in columns:
-        ax.plot(results.time, results[name], marker=marker, label=names.KNOWN[name].label)
+        times, values = with_jumps(name, results.time, results[name], results.tables)
+        ax.plot(times, values, marker=marker, label=names.KNOWN[name].label)
     if marker:
         ax.set_xticks(results.time)
     many = len(columns) > 1
@@ -112,6 +114,35 @@ def field(fields: Mapping[str, np.ndarray], name: str, title: str, ax: Any = Non
     ax.set(xlabel="x (um)", ylabel="y (um)", aspect="equal", facecolor="0.85",
            xlim=(left, right), ylim=(bottom, top))
     ax.set_title(f"{title}: {names.with_unit(name)}", loc="left")
+    return ax
+
+
+def against(frame: Any, factors: Sequence[Any], name: str, title: str, ax: Any = None) -> Any:
+    """Draw a column of the runs of a sweep against the first varied key, a line for each
+    combination of the others; returns the axes.
+
+    frame: a ``pandas.DataFrame`` with a row for each run; factors: the varied keys.
+    """
+    if ax is None:
+        _, ax = optional(PYPLOT).subplots(figsize=(WIDTH, 2 * PANEL), layout="constrained")
+    first, *others = factors
+    columns = [factor.column for factor in others]
+    groups = frame.groupby(columns, sort=False) if columns else [((), frame)]
+    for values, group in groups:
+        label = ", ".join(f"{factor.key} = {factor.short(value)}"
+                          for factor, value in zip(others, values))
+        ordered = group.sort_values(first.column) if first.numeric else group
+        ax.plot(ordered[first.column], ordered[name], marker="o", label=label or None)
+    if first.spacing == "log":
+        ax.set_xscale("log")
+    ax.set(xlabel=f"{first.key} ({first.unit})" if first.unit else first.key,
+           ylabel=names.with_unit(name))
+    if not frame[name].notna().any():
+        ax.text(0.5, 0.5, "in no run", transform=ax.transAxes, ha="center")
+    if others:
+        ax.legend(frameon=False, fontsize="small")
+    ax.set_title(title, loc="left")
+    ax.grid(alpha=0.3)
     return ax
 
 

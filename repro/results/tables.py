@@ -19,7 +19,7 @@ from repro.results import drawing, names, picture
 from repro.results.field_files import Grid
 from repro.results.netcdf import TIME
 from repro.results.quantities import plain as unit
-from repro.scene import Source, load_scene
+from repro.scene import Source, load_scene, scene_tables
 from repro.scene.arguments import typed
 from repro.timing import progress_bar
 
@@ -42,6 +42,8 @@ class Results(Mapping[str, np.ndarray]):
         How the run ended.
     folder : Path, optional
         Folder of the run; None if it is not on the disk.
+    tables : mapping, optional
+        Tables of the scene, with units; curves jump where its tables over time do.
 
     Notes
     -----
@@ -57,7 +59,7 @@ class Results(Mapping[str, np.ndarray]):
 
     def __init__(self, name: str, rows: list[dict[str, float | None]],
                  fields: Sequence[Mapping[str, np.ndarray]], status: str,
-                 folder: Path | None = None):
+                 folder: Path | None = None, tables: Mapping[str, dict] | None = None):
         self.columns: dict[str, np.ndarray] = {}
         for key in results.COLUMNS:
             values = [row[key] for row in rows]
@@ -67,6 +69,7 @@ class Results(Mapping[str, np.ndarray]):
         self.name = name
         self.status = status
         self.folder = folder
+        self.tables = tables or {}
         self._fields = fields
 
     def __getitem__(self, name: str) -> np.ndarray:
@@ -280,7 +283,7 @@ class Results(Mapping[str, np.ndarray]):
         >>> repro.solve("flow_only").to_pandas()["mean_velocity_m_per_d"].round(3).tolist()
         [2.9]
         """
-        frame = _package("pandas").DataFrame(self.columns).set_index(TIME)
+        frame = package("pandas").DataFrame(self.columns).set_index(TIME)
         frame.attrs.update(scene=self.name, status=self.status,
                            units={name: unit(name) for name in self.columns})
         return frame
@@ -309,7 +312,7 @@ class Results(Mapping[str, np.ndarray]):
         columns = {name: (TIME, values, attributes[name]) for name, values in self.columns.items()}
         times = {TIME: columns.pop(TIME)}
         about = {"scene": self.name, "status": self.status}
-        return _package("xarray").Dataset(columns, times, about)
+        return package("xarray").Dataset(columns, times, about)
 
     def __repr__(self) -> str:
         size = f"{len(self.time)} rows, {len(self)} columns"
@@ -342,7 +345,7 @@ def _html_row(head: str, values: np.ndarray) -> str:
     return f"<tr><th>{escape(head)}</th>{cells}</tr>"
 
 
-def _package(name: str):
+def package(name: str):
     """Import an optional package. Raises ImportError, in one line, if it is not installed."""
     try:
         return import_module(name)
@@ -400,7 +403,7 @@ def solve(scene: Source, overrides: Sequence[str] = (), *, unset: Sequence[str] 
                 show(instant.pore.time, duration)
         except RunEnd as end:
             status = str(end)
-    return Results(scene.name, rows, fields, status)
+    return Results(scene.name, rows, fields, status, tables=scene_tables(scene))
 
 
 def arrays(content: Grid) -> dict[str, np.ndarray]:

@@ -49,7 +49,7 @@ def decode(content: bytes) -> tuple[dict, Arrays]:
     if header.startswith(KIND) and not header.startswith(MAGIC):
         raise CheckpointError(f"its format is not {FORMAT.decode()}: another version wrote it")
     if not header.startswith(MAGIC):
-        raise CheckpointError("it does not begin as a checkpoint does")
+        raise CheckpointError("it does not begin like a checkpoint")
     if header != MAGIC + sha256(body).encode():
         raise CheckpointError("its checksum is wrong: it was cut short or altered")
     with np.load(io.BytesIO(body), allow_pickle=False) as file:
@@ -60,7 +60,7 @@ def decode(content: bytes) -> tuple[dict, Arrays]:
 def read_checkpoint(path: Path) -> tuple[dict, Arrays]:
     """Decode a checkpoint file. Raises CheckpointError if it cannot be read or has changed."""
     if not is_file(path):
-        raise CheckpointError("it is no regular file")
+        raise CheckpointError("it is not a regular file")
     try:
         return decode(read(path, MOST_DATA))
     except OSError as error:

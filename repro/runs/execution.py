@@ -144,7 +144,7 @@ def origin_of(scene: str | Path, overrides: Sequence[str], unset: Sequence[str])
 def _require(scene: Scene, watch: Watch) -> None:
     """Raise SceneError if the machine or the outline does not permit a run of the scene.
 
-    The machine may lack a package or memory. The spline of the outline may cross itself or leave
+    The machine may lack a package or memory, or the spline of the outline may cross itself or leave
     the pore.
     """
     require_packages(scene)
@@ -162,8 +162,8 @@ def _refuse_another(recorder: Recorder, record: dict) -> None:
     if differing:
         longer = " (--resume makes a run longer)" if list(differing) == [f"tables.{END}"] else ""
         raise OutputError(
-            f"--out {recorder.folder}: the run there is another one: {_describe(differing)}; a new "
-            f"folder is needed{longer}, or --force, which removes the files of that run")
+            f"--out {recorder.folder}: it contains another run: {_describe(differing)}; give a new "
+            f"folder{longer}, or --force, which removes the files of that run")
 
 
 def _describe(differing: dict[str, list]) -> str:
@@ -208,17 +208,17 @@ def _extended_scene(scene: Scene, overrides: Sequence[str], file: str) -> Scene:
     if not overrides:
         return scene
     if scene.growth is None:
-        raise SceneError(f"{file}: its scene has no [growth], which alone takes time")
+        raise SceneError(f"{file}: its scene has no [growth], so it has no end to change")
     tables = scene_tables(scene)
     for entry in overrides:
         if key_of(entry) != END:
-            raise SceneError(f"{file}: --set {entry}: {END} alone can be changed of a run that has "
-                             "begun; a new folder is needed for another scene")
+            raise SceneError(f"{file}: --set {entry}: a run can change {END} only; run another "
+                             "scene in a new folder")
         override(tables, entry, file, KEYS)
     extended = parse_scene(tables, scene.name, file, [END])
     if extended.growth.end < scene.growth.end:
-        raise SceneError(f"{file}: {END} = {extended.growth.end:g} h: {scene.growth.end:g} h were "
-                         "asked for before; a later time is needed")
+        raise SceneError(f"{file}: {END} = {extended.growth.end:g} h: the run already has the end "
+                         f"{scene.growth.end:g} h; give a later one")
     return extended
 
 
@@ -238,7 +238,7 @@ def _extend(recorder: Recorder, extended: Scene, overrides: Sequence[str], recor
         remove_temporary(recorder.folder)
         is_restored = _restore(recorder, names, watch)
     if is_restored and not same_rows(recorder.scene, extended, recorder.time):
-        recorder.forget()  # the end sets the times of rows: a longer run has others
+        recorder.forget()  # a longer run has rows at other times
         is_restored = False
     recorder.history.resumes.append({"time_h": recorder.time, "changed": changed})
     if not is_restored:
@@ -256,12 +256,12 @@ def _warn_changed_file(recorder: Recorder, watch: Watch) -> None:
     origin = recorder.origin
     if "file" not in origin:
         return
-    with suppress(SceneError):  # the file is gone, or no scene now
+    with suppress(SceneError):  # the file is missing or no longer a scene
         current = load_scene(origin["file"], origin.get("set", ()), unset=origin.get("unset", ()))
         differing = differences(scene_tables(recorder.scene), scene_tables(current))
         if differing:
-            watch.warn(f"{origin['file']}: it is not the scene of the run any more: "
-                       f"{_describe(differing)}; the run goes on with its own")
+            watch.warn(f"{origin['file']}: it has changed since the run began: "
+                       f"{_describe(differing)}; the run continues with its own scene")
 
 
 def _continue(recorder: Recorder, record: dict, progress: Progress, watch: Watch) -> str:
@@ -290,10 +290,10 @@ def _is_unchanged(recorder: Recorder, record: dict, watch: Watch) -> bool:
     damage = find_damage(recorder.folder, record)
     names = (checkpoint.NEWEST, checkpoint.PREVIOUS)
     if damage and not any(is_file(recorder.folder / name) for name in names):
-        raise OutputError(f"{damage}; there is no checkpoint to go on from: --force with its scene "
-                          "makes the run anew")
+        raise OutputError(f"{damage}; there is no checkpoint to resume from; run the scene again "
+                          "with --force")
     if damage:
-        watch.warn(f"{damage}; it goes on from its checkpoint")
+        watch.warn(f"{damage}; the run resumes from its checkpoint")
     return not damage
 
 
@@ -309,7 +309,7 @@ def _complete_finished_run(recorder: Recorder, record: dict, watch: Watch) -> st
 
 
 def _find_changes(record: dict, recorder: Recorder, watch: Watch) -> dict[str, list]:
-    """Find, and warn of, changes since the run began that could change its numbers."""
+    """Find changes since the run began that could change its numbers, and warn of them."""
     before = {key: record[key] for key in ("versions", "conditions")}
     versions = results.provenance(recorder.scene)["versions"]
     after = {"versions": versions, "conditions": conditions()}
@@ -317,8 +317,8 @@ def _find_changes(record: dict, recorder: Recorder, watch: Watch) -> dict[str, l
                if not key.startswith("conditions.threads")}
     if changed:
         pairs = [f"{key} ({old} before, now {new})" for key, (old, new) in changed.items()]
-        watch.warn(f"{recorder.folder}: not as it was when the run began: {', '.join(pairs)}; the "
-                   "result need not be that of an uninterrupted run to the last bit")
+        watch.warn(f"{recorder.folder}: changed since the run began: {', '.join(pairs)}; the "
+                   "results may differ from those of an uninterrupted run")
     return changed
 
 
@@ -332,8 +332,8 @@ def _restore(recorder: Recorder, names: Sequence[str], watch: Watch) -> bool:
                 return True
             except CheckpointError as error:
                 path.replace(recorder.folder / checkpoint.REFUSED)
-                watch.warn(f"{path}: refused: {error}; it is {checkpoint.REFUSED} now")
-    watch.warn(f"{recorder.folder}: no checkpoint to go on from; it starts again from t = 0")
+                watch.warn(f"{path}: refused: {error}; renamed to {checkpoint.REFUSED}")
+    watch.warn(f"{recorder.folder}: no checkpoint to resume from; the run starts again from t = 0")
     return False
 
 
@@ -407,12 +407,12 @@ def _simulate(recorder: Recorder, run_steps: ReportedSteps, progress: Progress,
 def _record_steps(recorder: Recorder, run_steps: ReportedSteps, progress: Progress,
                   watch: Watch) -> None:
     saved_at = perf_counter()
-    for state, instant in run_steps:
+    for state, reported in run_steps:
         remeshes = recorder.remeshes
         contact = recorder.contact
         steps_before = recorder.steps if recorder.state else -1
-        recorder.add(state, instant)
-        if instant and len(recorder.history.rows) == 1:
+        recorder.add(state, reported)
+        if reported and len(recorder.history.rows) == 1:
             _warn(recorder, recorder.scene, recorder.first_velocity, watch)
         _emit_warnings(recorder.find_crease(), watch)
         if not recorder.has_last_state and ends_soon(recorder.scene, state):
@@ -449,7 +449,7 @@ def find_warnings(scene: Scene, velocity: float | None) -> list[Caveat]:
         largest, computed = evaluate_at_largest(scene, velocity)
         return [*simplifications.find_warnings(largest, computed), *find_unresolved_flow(scene)]
     except ArithmeticError as error:
-        return [Caveat("scene", f"its dimensionless numbers cannot be worked out ({error})")]
+        return [Caveat("scene", f"its dimensionless numbers cannot be computed ({error})")]
 
 
 def _emit_step(recorder: Recorder, remeshed: bool, contact: bool, watch: Watch) -> None:

@@ -67,15 +67,15 @@ def read_sums(folder: Path) -> dict[str, str]:
 
 
 def prepare(folder: Path, run_files: Collection[str] = ()) -> None:
-    """Make the folder of a run; run_files: the files of an earlier run in it.
+    """Create the folder of a run; run_files: the files of an earlier run in it.
 
-    Raises OutputError if the folder holds any other file, or cannot be made.
+    Raises OutputError if the folder contains any other file, or cannot be created.
     """
     with folder_errors(folder):
         foreign = find_foreign(folder, run_files) if folder.exists() else []
         if foreign:
-            raise OutputError(f"--out {folder}: it holds {foreign[0]!r}, which is not of a run; "
-                              "a new or empty folder, or one of an earlier run, is accepted")
+            raise OutputError(f"--out {folder}: it contains {foreign[0]!r}, which is not of a "
+                              "run; give a new folder, an empty one, or the folder of a run")
         (folder / "fields").mkdir(parents=True, exist_ok=True)
 
 
@@ -94,12 +94,12 @@ def find_foreign(folder: Path, run_files: Collection[str] = ()) -> list[str]:
 def refuse_links(folder: Path, run_files: Collection[str]) -> None:
     """Raise OutputError if a name that a run writes to is a link, or not a regular file."""
     if os.path.lexists(folder / "fields") and not is_folder(folder / "fields"):
-        raise OutputError(f"{folder / 'fields'}: it is no folder, or a link to one; a run's own "
-                          "folder is needed there: move the files of the run into one")
+        raise OutputError(f"{folder / 'fields'}: it is a file or a link, and a run needs a folder "
+                          "of its own there: move the files of the run into one")
     for name in sorted({*run_files, *RUN_FILES}):
         if os.path.lexists(folder / name) and not is_file(folder / name):
-            raise OutputError(f"{folder / name}: it is a link, or no regular file, and so not of a "
-                              "run; move it away")
+            raise OutputError(f"{folder / name}: it is not a regular file, so no run has written "
+                              "it; move it away")
 
 
 def refuse_foreign(folder: Path, run_files: Collection[str]) -> None:
@@ -111,7 +111,7 @@ def refuse_foreign(folder: Path, run_files: Collection[str]) -> None:
 
 
 def remove(folder: Path, names: Collection[str]) -> None:
-    """Remove files of a run by their names in its folder; keep everything but regular files."""
+    """Remove files of a run by their names in its folder, if they are regular files."""
     with folder_errors(folder):
         inside = is_folder(folder / "fields")
         for name in names:
@@ -133,7 +133,7 @@ def _remove_temporary(temporary: Path) -> None:
     for file in temporary.iterdir():
         if FILE_NAME.fullmatch(file.name) and is_file(file):
             file.unlink()
-    with suppress(OSError):  # it holds another file
+    with suppress(OSError):  # it contains another file
         temporary.rmdir()
 
 
@@ -155,9 +155,9 @@ def file_errors(path: Path) -> Iterator[None]:
         yield
     except OSError as error:
         resumable = path.name != PROVENANCE or is_file(path)
-        advice = "go on with --resume" if resumable else "give the same command again"
-        raise OutputError(f"{path}: {error.strerror or error}; what was written before is whole: "
-                          f"make room, or give leave to write, and {advice}") from error
+        advice = "use --resume" if resumable else "repeat the command"
+        raise OutputError(f"{path}: {error.strerror or error}; all earlier results are complete; "
+                          f"free space or permit writing, and {advice}") from error
 
 
 def claim(folder: Path, name: str, run_files: set[str]) -> Path:
@@ -166,15 +166,15 @@ def claim(folder: Path, name: str, run_files: set[str]) -> Path:
     Raises OutputError if a file of that name exists that the run has not written.
     """
     if name not in run_files and os.path.lexists(folder / name):
-        raise OutputError(f"{folder / name}: it is there, and this run has not written it; move it "
-                          "away, and go on with --resume")
+        raise OutputError(f"{folder / name}: it exists, and this run has not written it; move it "
+                          "away, and use --resume")
     run_files.add(name)
     return folder / name
 
 
 @contextmanager
 def locked(folder: Path, patience: float = 0.0) -> Iterator[None]:
-    """Lock a folder, which is made if it does not exist.
+    """Lock a folder; create it if it does not exist.
 
     The kernel releases the lock when the process ends for any reason. Raises OutputError if another
     process has the lock for longer than `patience` seconds.
@@ -188,8 +188,8 @@ def locked(folder: Path, patience: float = 0.0) -> Iterator[None]:
         try:
             lock.acquire()
         except Timeout:
-            raise OutputError(f"--out {folder}: another process is writing there; another folder "
-                              "is needed, or that process's end") from None
+            raise OutputError(f"--out {folder}: another process is writing there; wait for its "
+                              "end, or give another folder") from None
     try:
         yield
     finally:
@@ -201,4 +201,4 @@ def locked(folder: Path, patience: float = 0.0) -> Iterator[None]:
 def _refuse_another_lock(path: Path) -> None:
     """Raise OSError if the path of the lock is a file with content, or not a regular file."""
     if os.path.lexists(path) and not (is_file(path) and path.stat().st_size == 0):
-        raise FileExistsError(errno.EEXIST, f"{path.name} is there and is no lock")
+        raise FileExistsError(errno.EEXIST, f"{path.name} exists and is not a lock")

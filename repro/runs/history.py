@@ -60,7 +60,7 @@ def fields_name(kind: str, number: int) -> str:
 
 
 def restore_history(plain: dict) -> History:
-    """The history of ``vars(history)`` after a round trip through JSON."""
+    """Restore a History from ``vars(history)`` after a round trip through JSON."""
     pairs = {name: list(map(tuple, plain[name])) for name in ("index", "before")}
     return History(**plain | pairs)
 
@@ -69,4 +69,4 @@ def require_fields(folder: Path, history: History) -> None:
     """Raise CheckpointError if the SHA-256 of a fields file is not the one in the history."""
     for name, expected in history.hashes.items():
         if not is_file(folder / name) or sha256_of(folder / name) != expected:
-            raise CheckpointError(f"{name} is not as it was written: missing, cut short or altered")
+            raise CheckpointError(f"{name} is missing, cut short or altered since it was written")

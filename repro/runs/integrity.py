@@ -13,8 +13,11 @@ from repro.scene import Scene, scene_hash
 
 
 def read_scene_run(folder: Path, scene: Scene) -> Run:
-    """Read the run of a scene in a folder, finished or not. Raises OutputError if there is none, if
-    it is of another scene, or if its files have changed since they were written."""
+    """Read the run of a scene in a folder, finished or not.
+
+    Raises OutputError if the folder contains no run or a run of another scene, or if its files have
+    changed since they were written.
+    """
     run = read(folder)
     _require_scene(folder, run.record, scene)
     require_columns(run)
@@ -28,14 +31,14 @@ def _require_scene(folder: Path, record: dict, scene: Scene) -> None:
 
 
 def find_defect(folder: Path, scene: Scene) -> str:
-    """Say why a folder does not hold a finished, complete run of a scene; empty if it does."""
+    """Reason why a folder has no finished, complete run of a scene; empty if it has one."""
     try:
         record = read_record(folder)
         _require_scene(folder, record, scene)
     except OutputError as error:
         return str(error)
     if not is_over(record["status"]):
-        return f"{folder}: the run is not over: {record['status']}"
+        return f"{folder}: the run has not finished: {record['status']}"
     return find_damage(folder, record)
 
 
@@ -43,14 +46,15 @@ def find_damage(folder: Path, record: dict) -> str:
     """Name a file of a run that has changed since it was written; empty if none has.
 
     ``run.json`` has the SHA-256 of tables and lists, and ``fields.sha256`` those of the fields. A
-    missing page is no damage: it is made again. A running run has only the SHA-256 of its fields.
+    missing page is no damage: it can be written again. A running run has only the SHA-256 of its
+    fields.
     """
     expected = record["sha256"] | read_sums(folder)
     if not is_file(folder / REPORT):
         expected.pop(REPORT, None)
     for name, digest in expected.items():
         if not is_file(folder / name) or sha256_of(folder / name) != digest:
-            return f"{folder}: {name} is not as it was written: missing, cut short or altered"
+            return f"{folder}: {name} is missing, cut short or altered since it was written"
     return ""
 
 

@@ -1,5 +1,4 @@
-"""Packages that a run needs, and the conditions that its numbers may depend on besides its scene.
-"""
+"""Packages that a run needs, and the conditions on which its numbers depend besides the scene."""
 
 from __future__ import annotations
 
@@ -17,6 +16,7 @@ import numpy as np
 import shapely
 
 from repro.scene import Scene, SceneError
+from repro.scene.units import alike
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 #: The packages that compute the numbers of a run.
@@ -61,7 +61,7 @@ def statements(source: str) -> str:
 
 
 def _without_remark(match: re.Match) -> str:
-    """A comment becomes empty, a string that fills its lines an ellipsis."""
+    """Replace a comment by nothing, and a string that fills its lines by an ellipsis."""
     text = match[0]
     if text.startswith("#"):
         return ""
@@ -74,8 +74,7 @@ def _without_remark(match: re.Match) -> str:
 
 
 def conditions() -> dict:
-    """The conditions of a run, for ``run.json``. Runs under equal conditions are equal bit for bit.
-    """
+    """Conditions of a run, for ``run.json``; equal conditions give equal bits."""
     built: Any = np.show_config(mode="dicts")
     blas = built["Build Dependencies"]["blas"]
     return {"system": platform.system(), "machine": platform.machine(),
@@ -100,6 +99,6 @@ def differences(before: dict, after: dict) -> dict[str, list]:
         old, new = before.get(key), after.get(key)
         if isinstance(old, dict) and isinstance(new, dict):
             changes |= {f"{key}.{nested}": pair for nested, pair in differences(old, new).items()}
-        elif old != new:
+        elif not alike(old, new):
             changes[key] = [old, new]
     return changes

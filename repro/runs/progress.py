@@ -85,7 +85,7 @@ def _warning(event: dict) -> str:
 def in_lines() -> Iterator[Tell]:
     """Print a line after each tenth of the simulated time, after a silence, and at the end.
 
-    The silence is a fiftieth of the wall time, between SILENCE and LONGEST (s), so that a log is
+    The silence is a fiftieth of the wall time, between SILENCE and LONGEST (s), which keeps a log
     short.
     """
     begun = printed_at = monotonic()
@@ -119,6 +119,22 @@ def in_lines() -> Iterator[Tell]:
 
 
 @contextmanager
+def while_checking(scene: str) -> Iterator[None]:
+    """Print a line after each LONGEST (s) of a check."""
+    begun = printed_at = monotonic()
+
+    def tick() -> None:
+        nonlocal printed_at
+        if monotonic() - printed_at > LONGEST - TICK:
+            printed_at = monotonic()
+            say(f"{printable(scene)}: first state and steps are computed, {printed_at - begun:.0f} s",
+                to_stderr=True)
+
+    with _call_regularly(tick):
+        yield
+
+
+@contextmanager
 def _call_regularly(tick: Callable[[], None]) -> Iterator[None]:
     """Call a function every TICK s, also during a step."""
     finished = Event()
@@ -139,10 +155,10 @@ def _call_regularly(tick: Callable[[], None]) -> Iterator[None]:
 def _report_start_and_end(event: dict, say_aside: Callable[[str], None]) -> None:
     """Report that a run resumes, and how it ended."""
     if event["event"] == "start" and event["from_h"] > 0:
-        say_aside(f"{printable(event['scene'])}: goes on from t = {event['from_h']:g} h, "
+        say_aside(f"{printable(event['scene'])}: resumes from t = {event['from_h']:g} h, "
               f"step {event['step']}")
     if event["event"] == "end" and not event["status"].startswith(("failed", "interrupted")):
-        suffix = "" if event["changed"] else ", before this: nothing to do"
+        suffix = "" if event["changed"] else ", already finished"
         say(f"{printable(event['scene'])}: {event['status']}{suffix}; results in {event['folder']}")
 
 
@@ -151,7 +167,7 @@ def on_a_terminal() -> Iterator[Tell]:
     """Show a bar with simulated time, steps, remeshes, contact, and the remaining time."""
     from tqdm import tqdm
 
-    # with another miniters the bar waits for as much simulated time as in the first steps
+    # any other miniters delays the bar by as much simulated time as the first steps take
     with tqdm(total=1.0, bar_format=WIDE, dynamic_ncols=True, delay=1e-3, miniters=0) as bar:
         def tell(event: dict) -> None:
             if event["event"] == "start":

@@ -90,15 +90,15 @@ class Recorder:
         velocity = self.history.rows[0][results.COLUMNS.index("mean_velocity_m_per_d")]
         return None if velocity is None else to_internal(f"{velocity!r} m/day", "um/h")
 
-    def add(self, state: RestartState, instant: Report | None) -> None:
+    def add(self, state: RestartState, reported: Report | None) -> None:
         """Add one step: the state after it and, if it is reported, its row and fields."""
-        if instant:
-            self._add_fields(instant)
-            row = results.row(self.scene, instant)
+        if reported:
+            self._add_fields(reported)
+            row = results.row(self.scene, reported)
             self.history.rows.append([row[name] for name in results.COLUMNS])
-            self.history.ledgers += self._ledger_rows(instant.ledgers)
-            self.history.remeshes += int(instant.remeshes)
-            self.history.iterations = sum_counts(self.history.iterations, instant.iterations)
+            self.history.ledgers += self._ledger_rows(reported.ledgers)
+            self.history.remeshes += int(reported.remeshes)
+            self.history.iterations = sum_counts(self.history.iterations, reported.iterations)
         if self.state and state.step_control != self.state.step_control:
             self._count_missed_tolerance(state.step_control)
         self.state = state
@@ -125,10 +125,10 @@ class Recorder:
         count = f" in {self.history.missed} of {self.steps} steps"
         return list(warn_missed_tolerance(self.scene, self.history.worst, count))
 
-    def _add_fields(self, instant: Report) -> None:
-        self._write_fields(self.history.index, "fields", instant.pore, instant.solved)
-        if instant.before and self.scene.output.times:
-            self._write_fields(self.history.before, "before_expansion", *instant.before)
+    def _add_fields(self, reported: Report) -> None:
+        self._write_fields(self.history.index, "fields", reported.pore, reported.solved)
+        if reported.before and self.scene.requested_times:
+            self._write_fields(self.history.before, "before_expansion", *reported.before)
 
     def _write_fields(self, index: list, kind: str, pore, solved) -> None:
         name = fields_name(kind, len(index))
@@ -147,7 +147,7 @@ class Recorder:
             sums.write(sum_line(name, self.history.hashes[name]))
 
     def save(self, status: str) -> dict:
-        """Write the checkpoint, tables, indices and ``run.json``; return the content of the last.
+        """Write the checkpoint, tables, indices and ``run.json``; return the last one.
         """
         history = self.history
         if self.state and not is_over(status):
@@ -284,7 +284,7 @@ class Recorder:
     def describe_last_state(self) -> str:
         """Say where the last good state is."""
         if not self.state:
-            return "there is no state before it"
+            return "there is no earlier state"
         index = self.history.index
         fields_text = f"; fields of t = {index[-1][0]:g} h: {index[-1][1]}" if index else ""
         path = self.folder / checkpoint.NEWEST
@@ -302,7 +302,7 @@ def _unwritten_files(scene: Scene) -> set[str]:
     """Names of the optional files that a run of this scene does not write."""
     optional = {"timeseries.nc": scene.output.timeseries != "netcdf",
               "ledger.csv": scene.growth is None, checkpoint.LAST: scene.growth is None,
-              "before_expansion.pvd": not scene.output.times}
+              "before_expansion.pvd": not scene.requested_times}
     return {name for name, is_absent in optional.items() if is_absent}
 
 
@@ -329,6 +329,6 @@ def complete_folder(folder: Path, record: dict, run_files: set[str]) -> None:
 
 def interruption(recorder: Recorder, number: int) -> Interrupted:
     """The exception to raise when a signal asks the run to stop."""
-    return Interrupted(f"interrupted by signal {number} at t = {recorder.time:g} h; what was "
-                       f"computed is written, and --resume {recorder.folder} goes on from there",
-                       number)
+    return Interrupted(f"interrupted by signal {number} at t = {recorder.time:g} h; the "
+                       f"results so far are written, and --resume {recorder.folder} continues the "
+                       "run", number)

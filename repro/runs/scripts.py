@@ -180,7 +180,8 @@ def load_run(folder: str | Path) -> Results:
     rows = [dict(zip(run.series, map(_none_if_nan, values)))
             for values in np.column_stack(list(run.series.values())).tolist()]
     files = _Files(run.folder, run.times, listed_fields)
-    return Results(run.record["scene"], rows, files, run.record["status"], Path(folder))
+    return Results(run.record["scene"], rows, files, run.record["status"], Path(folder),
+                   run.record["tables"])
 
 
 def _none_if_nan(value: float) -> float | None:
@@ -218,6 +219,6 @@ class _Files(Sequence[dict[str, np.ndarray]]):
     def _read(self, path: Path) -> dict[str, np.ndarray]:
         """Read the arrays of a file. Raises OutputError if it has changed or cannot be read."""
         if sha256_of(path) != self.sums.get(f"fields/{path.name}"):
-            raise OutputError(f"{path}: the fields are not as they were written: cut short or "
-                              "altered")
+            raise OutputError(f"{path}: the fields are cut short or altered since they were "
+                              "written")
         return arrays(field_files.read(path))

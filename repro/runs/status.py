@@ -17,6 +17,11 @@ RUN_ENDS = (re.compile("the aggregate reaches the pore's (?:up|down)stream end "
             re.compile(f"the aggregate (?:detaches|tears) at {TIME}: near x = .*"))
 
 
+def is_fold(status: str) -> bool:
+    """Has the model ended the run as a fold?"""
+    return bool(RUN_ENDS[1].fullmatch(status))
+
+
 def is_over(status: str) -> bool:
     """Has the run reached the end of its scene or of the model?"""
     return status == COMPLETED or any(end.fullmatch(status) for end in RUN_ENDS)

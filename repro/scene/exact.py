@@ -10,7 +10,7 @@ from typing import NamedTuple
 PREFIXES = {"": 0, "n": -9, "u": -6, "\u00b5": -6, "\u03bc": -6, "m": -3, "c": -2, "d": -1,
             "h": 2, "k": 3, "M": 6, "G": 9}
 PI = Fraction("3.1415926535897932384626433832795028841971693993751")  # as many digits as pint's
-FACTOR = re.compile(r"(?P<sign>[*/ ]*)(?P<name>[^\W\d_]+)(?:(?:\^|\*\*)(?P<power>-?[1-9]))?")
+FACTOR = re.compile(r"(?P<sign>[*/ ]*)(?P<name>[^\W\d_]+)(?:(?:\^|\*\*)?(?P<power>-?[1-9]))?")
 
 
 class Unit(NamedTuple):
@@ -66,7 +66,7 @@ UNITS: dict[str, Unit] = {
 def conversion(from_unit: str, unit: str) -> Fraction | None:
     """Factor from `from_unit` to `unit`; None if either contains a unit that is not listed here.
 
-    Both are products and quotients like "mg/L", "1/day", "m^2 s^-1". Raises ValueError if
+    Both are products and quotients like "mg/L", "1/day", "m^2 s^-1", "m2 s-1". Raises ValueError if
     their dimensions differ.
     """
     one = _product(from_unit)

@@ -2,6 +2,7 @@
 import os
 import re
 import tomllib
+from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from importlib import resources
 from pathlib import Path
 
@@ -39,7 +40,13 @@ def read_text(file: str) -> str:
         return _content(file).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise SceneError(f"{file}: not UTF-8 text (at byte {error.start + 1}); "
-                         "a scene is a TOML file") from None
+                         "a scene is a TOML file, saved with the encoding UTF-8 of the editor, or "
+                         f"converted by: iconv -f {_encoding(error.object)} -t UTF-8") from None
+
+
+def _encoding(content: bytes) -> str:
+    """The probable encoding of a text that is not UTF-8."""
+    return "UTF-16" if content[:2] in (BOM_UTF16_LE, BOM_UTF16_BE) else "WINDOWS-1252"
 
 
 def _content(file: str) -> bytes:

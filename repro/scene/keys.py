@@ -12,10 +12,10 @@ import hashlib
 import json
 from collections.abc import Sequence
 from copy import deepcopy
-from dataclasses import MISSING, dataclass, replace
+from dataclasses import MISSING, dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
-from math import inf
+from math import ceil, inf
 from pathlib import Path
 from typing import NamedTuple
 
@@ -46,6 +46,7 @@ from repro.scene.units import (
     section,
     share,
     timed_quantity,
+    units_of,
 )
 
 __all__ = ["Scene", "SceneError", "load_scene", "packaged_scenes", "parse_scene", "scene_hash",
@@ -427,10 +428,10 @@ PRESETS: dict[str, dict[str, str | float]] = {
 
 @dataclass(frozen=True)
 class Output:
-    """Times (h) of the requested rows and fields, ascending.
+    """Times (h) of the requested rows and fields, ascending, and their interval.
 
-    None: every step and, with midpoint, every growth.time_step times a power of two that gives 24
-    or more.
+    Both None: every step and, with midpoint, every growth.time_step times a power of two that gives
+    24 or more.
     """
 
     times: tuple[float, ...] | None = scene_key(
@@ -439,9 +440,22 @@ class Output:
         about="Times of the rows and fields wanted, which change no step; left out: every step, "
         "with midpoint also every 1/4, 1/2, 1, 2, 4 ... growth.time_step, so that there are 24 or "
         "more after t = 0")
+    every: float | None = quantity(
+        "1 h", "h", default=None, source=NOT_IN_PAPER,
+        about="Interval of rows and fields from t = 0 on, with a last one at growth.end; times "
+        "adds others")
     timeseries: str = choice(
         "csv", "netcdf", source=NOT_IN_PAPER,
         about="timeseries.csv alone, or timeseries.nc besides, which needs the package xarray")
+
+
+    def requested(self, end: float) -> tuple[float, ...] | None:
+        """Return the requested times (h), ascending, to the time `end`; None: every step."""
+        if self.every is None:
+            return self.times
+        count = ceil(end / self.every - 1e-9)
+        intervals = (round(number * self.every, 12) for number in range(count))
+        return tuple(sorted({*intervals, end, *(self.times or ())}))
 
 
 class GrowingSections(NamedTuple):
@@ -479,6 +493,8 @@ class Scene:
         Discretisation and solvers.
     output : Output
         Times (h) of rows and fields.
+    units : dict of str
+        The units of the scene's text by dotted key, for its display.
 
     Examples
     --------
@@ -512,6 +528,7 @@ class Scene:
               "alone")
     numerics: Numerics = section(Numerics, about="How it is solved", source="Section 3")
     output: Output = section(Output, about="What is written", source=NOT_IN_PAPER)
+    units: dict[str, str] = field(default_factory=dict, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         if self.numerics.extent is None:
@@ -546,6 +563,11 @@ class Scene:
     def largest(self) -> "Scene":
         """The scene with the largest value of each table."""
         return at_largest(self)
+
+    @property
+    def requested_times(self) -> tuple[float, ...] | None:
+        """The times (h) of rows by [output], ascending; None: every step."""
+        return self.output.requested(self.growth.end if self.growth else 0.0)
 
     def corner(self, time: float) -> float:
         """Return the next time (h) of its tables after ``time``; infinite if there is none."""
@@ -647,7 +669,8 @@ def parse_scene(tables: dict, name: str, file: str, changed: Sequence[str] = ())
     _refuse_missing(tables, file)
     if "substrates" in tables and "aggregate" in tables:
         tables = {"kinetics": {}, **tables}
-    scene = read_table(Scene, _with_preset(tables), Place(file, known=KEYS), name=name)
+    scene = read_table(Scene, _with_preset(tables), Place(file, known=KEYS), name=name,
+                       units=units_of(tables))
     for broken, requirement in rules(scene):
         if broken:
             key = _to_name(list(requirement), tables, changed)
@@ -686,11 +709,11 @@ def _with_preset(tables: dict) -> dict:
 
 
 def scene_tables(scene: Scene) -> dict:
-    """Write the scene as TOML tables with all defaults.
+    """Write the scene as TOML tables with all defaults, in the units of its text.
 
     `parse_scene` reads them back as an equal scene, bit by bit.
     """
-    return write_table(scene)
+    return write_table(scene, scene.units)
 
 
 def scene_hash(scene: Scene) -> str:
@@ -698,7 +721,7 @@ def scene_hash(scene: Scene) -> str:
 
     A key of `LATER` counts if it differs from its default, so that recorded hashes stay valid.
     """
-    tables = {key: _without_later(key, table) for key, table in scene_tables(scene).items()}
+    tables = {key: _without_later(key, table) for key, table in write_table(scene).items()}
     canonical = json.dumps(tables, sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.sha256(canonical.encode()).hexdigest()[:16]
 

@@ -4,10 +4,10 @@ A refusal is one line that names the file, the key, the value, the accepted valu
 one, the nearest accepted value.
 """
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, Field, dataclass, fields, replace
 
-from repro.scene.units import Refused, SceneError, nearest, unlike
+from repro.scene.units import Quantity, Refused, SceneError, nearest, unlike
 
 LONGEST_KEY = 60  # characters of a key in a message
 SCOPE = "`repro docs scope`"
@@ -82,15 +82,27 @@ def _read_entry(entry: Field, value: object, place: Place):
         raise place.refuse(value, kind.requirement + hint) from None
 
 
-def write_table(part) -> dict:
-    """Write a dataclass as a TOML table with units, without fields that are None."""
+def write_table(part, units: Mapping[str, str] | None = None, above: str = "") -> dict:
+    """Write a dataclass as a TOML table with units, without fields that are None.
+
+    units: of dotted keys; other keys have the unit of their example. None: all have the internal
+    units. above: the dotted key of the table, with a dot at its end.
+    """
     table = {}
     for key, entry in entries(type(part)).items():
         value = getattr(part, key)
         if value is not None:
-            write = entry.metadata["kind"].write if "kind" in entry.metadata else write_table
-            table[key] = write(value)
+            table[key] = _write_entry(entry, value, units, above + key)
     return table
+
+
+def _write_entry(entry: Field, value, units: Mapping[str, str] | None, key: str):
+    if "section" in entry.metadata:
+        return write_table(value, units, f"{key}.")
+    kind = entry.metadata["kind"]
+    if units is None or not isinstance(kind, Quantity):
+        return kind.write(value)
+    return kind.write(value, units.get(key, kind.usual_unit))
 
 
 def toml(tables: dict, above: str = "") -> str:

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 _NO_STATE = "nothing is supplied, so that no state is steady"
 _UNSTEADY = f', or numerics.transport = "gear": {_NO_STATE}'
 MOST_STEPS = 100_000  # shape updates of a run
+MOST_ROWS = 10_000  # of output.every
 SHORTEST_STEP = 1e-6  # h: times closer than 1e-9 h are equal
 FINEST = 1e-3  # of the width: the smallest seed, edge of an outline, and gap between two edges
 NEAREST = 1e-4  # of the width: from a point of an outline to a wall that it does not touch
@@ -393,6 +394,9 @@ def _output_rules(scene: "Scene") -> Rules:
     if scene.growth:
         requirements["growth.end"] = f"{last:g} h or more, the last of output.times, is needed"
     yield last > end, requirements
+    shortest = max(end / MOST_ROWS, SHORTEST_STEP)
+    requirement = f"{shortest:.3g} h or more is needed: at most {MOST_ROWS} rows are accepted"
+    yield (scene.output.every or math.inf) < shortest, {"output.every": requirement}
     missing = scene.output.timeseries == "netcdf" and find_spec("xarray") is None
     requirement = '"csv" is needed, or the package xarray: pip install xarray'
     yield missing, {"output.timeseries": requirement}

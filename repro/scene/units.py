@@ -16,6 +16,7 @@ import math
 import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
+from decimal import Decimal
 from fractions import Fraction
 from functools import cache, partial
 from typing import ClassVar, NamedTuple
@@ -40,8 +41,11 @@ ANGLES = ("deg", "degree", "degrees", "rad", "radian", "radians")  # to pint "pp
 LONGEST = 80  # characters of a value with its unit
 MOST_POINTS = 1000  # of an outline
 _DIGITS = r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
-_FACTOR = r"[A-Za-z\u00b5\u03bc]+(?:(?:\^|\*\*)-?[1-9])?"
+_FACTOR = r"[A-Za-z\u00b5\u03bc]+(?:(?:\^|\*\*)?-?[1-9])?"
 _UNIT = rf"(?:1? ?/ ?)?{_FACTOR}(?:(?: ?[*/] ?| ){_FACTOR})*"
+#: Signs of printed units, as a keyboard writes them.
+_PRINTED = str.maketrans("\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079\u207b\u2212\u00b7\u22c5",
+                         "0123456789--**")
 _PERCENT = re.compile(rf"({_DIGITS}) *%")
 _QUANTITY = re.compile(rf"({_DIGITS}) *({_UNIT})")
 _MOLES = re.compile(r"[0-9 /](?:[num\u00b5\u03bc]|milli|micro|nano)?"
@@ -99,8 +103,14 @@ class Quantity:
     def read(self, value: object) -> float:
         return _within(self.accepts, to_internal(value, self.unit))
 
-    def write(self, value: float) -> str:
-        return f"{float(value)!r} {self.unit}"
+    def write(self, value: float, unit: str = "") -> str:
+        """Write a value in the internal unit, or in another one."""
+        return in_unit(value, self.unit, unit) if unit else f"{float(value)!r} {self.unit}"
+
+    @property
+    def usual_unit(self) -> str:
+        """The unit of the example."""
+        return _parts(self.example)[1]
 
 
 class Refused(ValueError):
@@ -115,11 +125,12 @@ class Timed(Quantity):
 
     @property
     def accepted(self) -> str:
-        return f"{super().accepted}; or a table of times, ascending from 0 h, and values"
+        return (f"{super().accepted}; or a list of [time, value] pairs from 0 h on, such as "
+                f"{self._table}")
 
     @property
     def requirement(self) -> str:
-        return f"{super().requirement}, or a table such as {self._table}"
+        return f"{super().requirement}, or a list of [time, value] pairs such as {self._table}"
 
     @property
     def _table(self) -> str:
@@ -150,10 +161,10 @@ class Timed(Quantity):
             raise Refused(f"entry {number} of a table must be a time of zero or more and "
                           f'{super().accepted}, such as ["5 h", "{self.example}"]') from None
 
-    def write(self, value):
+    def write(self, value, unit=""):
         if not isinstance(value, TimeTable):
-            return super().write(value)
-        return [[self.clock.write(time), super(Timed, self).write(one)]
+            return super().write(value, unit)
+        return [[self.clock.write(time), super(Timed, self).write(one, unit)]
                 for time, one in zip(value.times, value.values)]
 
 
@@ -409,13 +420,55 @@ def to_internal(value: object, unit: str) -> float:
 
     Raises ValueError or OverflowError if the text is not a quantity of this kind.
     """
-    match = _QUANTITY.fullmatch(value) if isinstance(value, str) and len(value) <= LONGEST else None
-    if match is None:
-        raise ValueError("not a number with a unit")
-    digits, factor = match[1], _conversion(match[2], unit)
+    digits, from_unit = _parts(value)
+    factor = _conversion(from_unit, unit)
     if not math.isfinite(float(digits)):
         raise OverflowError("too large")
     return float(Fraction(digits) * factor) if float(digits) else 0.0
+
+
+def _parts(value: object) -> tuple[str, str]:
+    """Split a number with a unit into its digits and the unit. Raises ValueError for others."""
+    text = value.translate(_PRINTED) if isinstance(value, str) and len(value) <= LONGEST else ""
+    match = _QUANTITY.fullmatch(text)
+    if match is None:
+        raise ValueError("not a number with a unit")
+    return match[1], match[2]
+
+
+def in_unit(value: float, unit: str, to_unit: str) -> str:
+    """Write a number in the internal `unit` with another unit, so that it reads back unchanged."""
+    converted = Fraction(value) / _conversion(to_unit, unit)
+    texts = (f"{float(converted):.15g}", repr(float(converted)),
+             str(Decimal(converted.numerator) / Decimal(converted.denominator)))
+    return next(text for text in (f"{digits} {to_unit}" for digits in texts)
+                if to_internal(text, unit) == value)
+
+
+def units_of(tables: object, key: str = "") -> dict[str, str]:
+    """Return the unit of each dotted key of TOML tables whose value has one.
+
+    That of a list is the unit of its first entry.
+    """
+    units: dict[str, str] = {}
+    for name, part in tables.items() if isinstance(tables, dict) else ():
+        units |= units_of(part, f"{key}.{name}" if key else str(name))
+    first = tables[0] if isinstance(tables, list) and tables else tables
+    try:
+        return units or {key: _parts(first[-1] if isinstance(first, list) and first else first)[1]}
+    except ValueError:
+        return units
+
+
+def alike(one: object, other: object) -> bool:
+    """Return whether two values of TOML tables are the same, apart from unit and round-off."""
+    if isinstance(one, list) and isinstance(other, list):
+        return len(one) == len(other) and all(map(alike, one, other))
+    try:
+        unit = _parts(other)[1]
+        return math.isclose(to_internal(one, unit), to_internal(other, unit), rel_tol=1e-14)
+    except (ValueError, OverflowError):
+        return one == other
 
 
 def unlike(kind: Kind, value: object) -> str:
@@ -466,7 +519,8 @@ def _by_pint(from_unit: str, unit: str) -> Fraction:
     """Like `_conversion`, for any unit."""
     registry = _registry()
     try:
-        one = registry.Quantity(Fraction(1), registry.Unit(re.sub("^ ?/", "1/", from_unit)))
+        powers = re.sub(r"(?<=[^\W\d])(?=-?[1-9])", "^", re.sub("^ ?/", "1/", from_unit))
+        one = registry.Quantity(Fraction(1), registry.Unit(powers))
         return Fraction(one.to(unit).magnitude)
     except Exception as error:  # pint lets errors of its parser through: of tokens, of types, ...
         raise ValueError(f"{from_unit} is not convertible to {unit}") from error

@@ -5,9 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 from typing import Any
 
+from repro.results import drawing
+from repro.results.quantities import unit_of
+from repro.results.tables import package
 from repro.runs.folder import folder_errors
 from repro.runs.machine import require_packages
 from repro.scene import Source, label
@@ -32,7 +36,7 @@ class Swept:
     source: str
     folder: Path
     factors: list[design.Factor]
-    runs: list[table.SweepRun]
+    runs: table.Runs
 
     @property
     def paths(self) -> list[Path]:
@@ -47,6 +51,81 @@ class Swept:
     def label(self, run: table.SweepRun) -> str:
         """Write the value of each factor of a run."""
         return design.label(self.factors, run.point.values)
+
+    def to_pandas(self):
+        """Return the columns of ``runs.csv`` as a ``pandas.DataFrame``.
+
+        Returns
+        -------
+        pandas.DataFrame
+            A row for each run, indexed by ``run``: the varied keys, the status, the events, and the
+            last value of each column of the run.
+
+        Raises
+        ------
+        ImportError
+            If pandas is not installed.
+        """
+        columns = table.run_columns(self.factors, self.runs)
+        kinds = dict.fromkeys({*table.COLUMNS, *table.FINAL}, float)
+        return package("pandas").DataFrame(columns).astype(kinds).set_index("run")
+
+    def to_xarray(self):
+        """Return the events and last values of the runs as an ``xarray.Dataset``.
+
+        Returns
+        -------
+        xarray.Dataset
+            The varied keys are the dimensions. Runs that are no grid, as of a Latin hypercube, have
+            the dimension ``run``, with the varied keys as coordinates.
+
+        Raises
+        ------
+        ImportError
+            If xarray is not installed.
+        """
+        frame = self.to_pandas().drop(columns="folder")
+        varied = [frame.pop(factor.column).to_numpy() for factor in self.factors]
+        levels = [list(dict.fromkeys(values.tolist())) for values in varied]
+        units = [{"units": factor.unit} for factor in self.factors]
+        keys = [factor.key for factor in self.factors]
+        if list(product(*levels)) == list(zip(*(values.tolist() for values in varied))):
+            dims, shape, values = keys, tuple(map(len, levels)), levels
+            coordinates = {key: ([key], *rest) for key, *rest in zip(keys, values, units)}
+        else:
+            dims, shape = ["run"], (len(frame),)
+            coordinates = {key: (["run"], *rest) for key, *rest in zip(keys, varied, units)}
+            coordinates["run"] = (["run"], frame.index.to_numpy(), {})
+        variables = {name: (dims, column.to_numpy().reshape(shape), {"units": unit_of(name).symbol})
+                     for name, column in frame.items()}
+        return package("xarray").Dataset(variables, coordinates, {"scene": self.source})
+
+    def plot(self, name: str = "conductivity_m_per_d", *, ax: Any = None) -> Any:
+        """Draw an event or the last value of a column against the first varied key.
+
+        Parameters
+        ----------
+        name : str
+            A column of ``runs.csv``, with its unit or without.
+        ax : matplotlib.axes.Axes, optional
+            Axes to draw in, by default those of a new figure.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            The axes, with a line for each combination of the other varied keys.
+
+        Raises
+        ------
+        ImportError
+            If matplotlib or pandas is not installed.
+        KeyError
+            If the runs have no column of this name.
+        """
+        known = drawing.full_name(name, [*table.COLUMNS, *table.FINAL])
+        if not known:
+            raise KeyError(f"{name}: runs.csv has {', '.join([*table.COLUMNS, *table.FINAL])}")
+        return drawing.against(self.to_pandas(), self.factors, known, self.source, ax)
 
     def __repr__(self) -> str:
         return (f"<Sweep of {self.source}: {len(self.runs) - len(self.failed)} of {len(self.runs)} "
@@ -158,7 +237,7 @@ def _run_points(missing: list[design.Point], runs: Path,
         yield from run_points(missing, runs)
 
 
-def _write_results(plan: Sweep, statuses: dict[int, str], clogged: float) -> list[table.SweepRun]:
+def _write_results(plan: Sweep, statuses: dict[int, str], clogged: float) -> table.Runs:
     """Read the runs, and write the tables and the page."""
     runs = table.read_runs(plan, statuses, clogged)
     with folder_errors(plan.folder, SweepError):

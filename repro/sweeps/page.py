@@ -5,6 +5,7 @@ The page needs no network.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from html import escape
 
 import numpy as np
@@ -44,7 +45,7 @@ def page(sweep: Sweep, runs: list[SweepRun], clogged: float) -> str:
 the start of the run. A pore counts as clogged once it has fallen to {clogged:g}; contact is the
 first row in which the aggregate touches the opposite wall. Values between the rows of a run are
 interpolated; <code>output.times</code> adds rows.</p>
-{_conductivity(sweep, runs)}{_clogging(sweep, runs, clogged)}
+{_conductivity(sweep, runs)}{_clogging(sweep, runs, clogged)}{_last(sweep, runs)}
 {html.section("Runs", _table(sweep, runs))}"""
     return html.page(title, body, style="sweep.css")
 
@@ -143,34 +144,62 @@ def _clogging(sweep: Sweep, runs: list[SweepRun], clogged: float) -> str:
     """Clogging time against each varied key, coloured by the next one."""
     plotted = [run for run in runs
              if _time(run) > 0 and (run.is_over or run.numbers["clogging_time_h"])]
-    figures = [_times(sweep, plotted, k, clogged) for k in range(len(sweep.factors)) if plotted]
+    axis = f"time to {clogged:g} of the conductivity (h)"
+    figures = [_against(sweep, plotted, k, _time, axis, "Clogging time")
+               for k in range(len(sweep.factors)) if plotted]
     note = ('<p class="note">A hollow triangle stands at the end of a run that was not clogged by '
             "then.</p>")
     return _pictures("Clogging time", figures, "a flow and a length in time", note)
 
 
-def _times(sweep: Sweep, plotted: list[SweepRun], k: int, clogged: float) -> str:
+def _last(sweep: Sweep, runs: list[SweepRun]) -> str:
+    """The last conductivity of the runs, or the last biomass without flow, against each varied key.
+
+    It shows what happened, also where nothing clogs.
+    """
+    with_rows = [run for run in runs if len(run.times)]
+    flowing = [run for run in with_rows if np.isfinite(run.relative).any()]
+    plotted = flowing or [run for run in with_rows if np.isfinite(run.biomass).any()]
+    axis = "conductivity / initial conductivity" if flowing else "aggregate area / pore area"
+    figures = [_against(sweep, plotted, k, _last_relative if flowing else _last_biomass, axis,
+                        "Last row of each run") for k in range(len(sweep.factors)) if plotted]
+    return _pictures("At the end of each run", figures, "rows and a flow or an aggregate")
+
+
+def _last_relative(run: SweepRun) -> float:
+    return float(run.relative[-1])
+
+
+def _last_biomass(run: SweepRun) -> float:
+    return float(run.biomass[-1])
+
+
+def _against(sweep: Sweep, plotted: list[SweepRun], k: int, value: Callable[[SweepRun], float],
+             axis: str, title: str) -> str:
+    """A value of each run against varied key k, coloured by the next one. A time that is not
+    reached is a triangle."""
     factor, colour_index = sweep.factors[k], (k + 1) % len(sweep.factors)
     x = _across(factor, [_number(factor, run.point.values[k]) for run in plotted])
-    y = charts.upwards(*_ends([_time(run) for run in plotted]))
+    y = charts.upwards(*_ends([value(run) for run in plotted]))
     lines: list[str] = []
     marks: list[str] = []
     series: dict[tuple, tuple[int, list]] = {}
     for run in sorted(plotted, key=lambda run: _number(factor, run.point.values[k])):
-        reached = run.numbers["clogging_time_h"] is not None
-        place = charts.point(x(_number(factor, run.point.values[k])), y(_time(run)))
+        reached = value is not _time or run.numbers["clogging_time_h"] is not None
+        place = charts.point(x(_number(factor, run.point.values[k])), y(value(run)))
         level = _level(sweep.factors[colour_index], run.point.values[colour_index])
-        title = f"{_run_title(sweep, run)}: {'' if reached else 'after '}{_time(run):.4g} h"
-        marks.append(charts.dot(place, level, title, RADIUS) if reached else
-                     charts.triangle(place, level, title))
+        unit = " h" if value is _time else ""
+        text = f"{_run_title(sweep, run)}: {'' if reached else 'after '}{value(run):.4g}{unit}"
+        marks.append(charts.dot(place, level, text, RADIUS) if reached else
+                     charts.triangle(place, level, text))
         rest = run.point.values[:k] + run.point.values[k + 1:]
         series.setdefault(rest, (level, []))[1].extend([place] if reached else [])
     if len(sweep.factors) > 1:
         lines = [charts.polyline(places, level)
                  for level, places in series.values() if len(places) > 1]
     key = _key(sweep.factors[colour_index], plotted, colour_index) if colour_index != k else ""
-    axes = _axis_title(factor), f"time to {clogged:g} of the conductivity (h)"
-    label = f"Clogging time against {factor.key}"
+    axes = _axis_title(factor), axis
+    label = f"{title} against {factor.key}"
     return charts.drawing(x, y, axes, label, "".join(lines + marks)) + key
 
 

@@ -6,8 +6,8 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
@@ -19,8 +19,11 @@ from repro.results.files import atomic_path
 from repro.results.quantities import Quantity
 from repro.runs import status
 from repro.runs.integrity import read_scene_run
-from repro.sweeps.design import Point
+from repro.sweeps.design import Factor, Point
 from repro.sweeps.folder import Sweep
+
+#: Lines of a printed list of runs.
+SHOWN = 10
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +31,8 @@ class RunSeries:
     """The rows of a run.
 
     times (h), relative: conductivity over its first value, biomass, touches: does the aggregate
-    touch the opposite wall; all (T,). wall: wall time (s); clogged: see :func:`clogging`.
+    touch the opposite wall; all (T,). wall: wall time (s); clogged: see :func:`clogging`; folded:
+    does the run end as a fold?
     """
 
     times: np.ndarray
@@ -37,6 +41,7 @@ class RunSeries:
     touches: np.ndarray
     wall: float
     clogged: float
+    folded: bool = False
 
     @cached_property
     def clogging(self) -> tuple[float, float]:
@@ -68,8 +73,18 @@ NUMBERS = (
     Quantity("contact_relative_conductivity", "relative conductivity at contact",
              "conductivity_m_per_d in that row over its first value",
              lambda run: run.at_contact(run.relative), "conductivity then"),
+    Quantity("half_conductivity_time_h", "time of half conductivity",
+             "when conductivity_m_per_d over its first value has first fallen to 0.5; its logarithm "
+             "is linear between rows",
+             lambda run: clogging(run.times, run.relative, run.biomass, 0.5)[0],
+             "half conductivity"),
+    Quantity("fold_time_h", "time of the fold",
+             "time_h of the last row of a run whose surface folds in the step after it",
+             lambda run: run.times[-1] if run.folded else np.nan, "fold"),
 )
 COLUMNS = [number.name for number in NUMBERS]
+#: The columns of a row of a run whose last values are in ``runs.csv``; ``end_h`` is their time.
+FINAL = [name for name in results.COLUMNS if name != "time_h"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +92,8 @@ class SweepRun:
     """The results of one run of a sweep.
 
     times (h); relative: conductivity over its first value; biomass: area of the aggregate over that
-    of the pore; all (T,), empty without a run. numbers: values of COLUMNS, None if undefined.
+    of the pore; all (T,), empty without a run. numbers: values of COLUMNS, None if undefined;
+    final: the last values of FINAL, likewise.
     """
 
     point: Point
@@ -86,6 +102,12 @@ class SweepRun:
     relative: np.ndarray
     biomass: np.ndarray
     numbers: dict[str, float | None]
+    final: dict[str, float | None] = field(default_factory=lambda: dict.fromkeys(FINAL))
+
+    def __repr__(self) -> str:
+        values = ", ".join(str(value) for value in self.point.values)
+        end = self.numbers["end_h"]
+        return f"<run {self.point.index} ({values}): {self.status}{_to(end)}>"
 
     @property
     def is_over(self) -> bool:
@@ -93,10 +115,26 @@ class SweepRun:
         return status.is_over(self.status)
 
 
-def read_runs(sweep: Sweep, statuses: dict[int, str], clogged: float) -> list[SweepRun]:
+def _to(end: float | None) -> str:
+    return "" if end is None else f", to {end:.4g} h"
+
+
+class Runs(list[SweepRun]):
+    """The runs of a sweep; ``print`` shows at most ten lines."""
+
+    def __repr__(self) -> str:
+        shown = self if len(self) <= SHOWN else self[:SHOWN - 1]
+        lines = list(map(repr, shown))
+        if len(shown) < len(self):
+            lines.append(f"... and {len(self) - len(shown)} more")
+        return "\n".join(lines)
+
+
+def read_runs(sweep: Sweep, statuses: dict[int, str], clogged: float) -> Runs:
     """Read every run of a sweep; statuses: of runs that cannot be read, by their number."""
-    return [_read_run(point, sweep.runs / point.name, statuses.get(point.index, "not run"), clogged)
-            for point in sweep.points]
+    return Runs(_read_run(point, sweep.runs / point.name, statuses.get(point.index, "not run"),
+                          clogged)
+                for point in sweep.points)
 
 
 def _read_run(point: Point, folder: Path, missing_status: str, clogged: float) -> SweepRun:
@@ -115,9 +153,11 @@ def _read_run(point: Point, folder: Path, missing_status: str, clogged: float) -
     relative = series["conductivity_m_per_d"] / series["conductivity_m_per_d"][0]
     biomass = series["aggregate_area_um2"] / (pore.width * pore.length)
     wall = run.record["wall_time_s"]
-    course = RunSeries(times, relative, biomass, series["contact"] > 0, wall, clogged)
+    course = RunSeries(times, relative, biomass, series["contact"] > 0, wall, clogged,
+                       status.is_fold(run_status))
     numbers = {number.name: _none_if_nan(number.reported(course)) for number in NUMBERS}
-    return SweepRun(point, run_status, times, relative, biomass, numbers)
+    final = {name: _none_if_nan(series[name][-1]) for name in FINAL}
+    return SweepRun(point, run_status, times, relative, biomass, numbers, final)
 
 
 def _empty_run(point: Point, run_status: str) -> SweepRun:
@@ -152,10 +192,21 @@ def write(sweep: Sweep, runs: list[SweepRun]) -> None:
     varied = [factor.column for factor in sweep.factors]
     with atomic_path(sweep.folder / "table.csv") as beside:
         results.write_table(beside, ["run", *varied, *results.COLUMNS], list(_rows(sweep, runs)))
-    rows = [[run.point.index, *run.point.values, run.status, *run.numbers.values(),
-             f"runs/{run.point.name}"] for run in runs]
+    columns = run_columns(sweep.factors, runs)
     with atomic_path(sweep.folder / "runs.csv") as beside:
-        results.write_table(beside, ["run", *varied, "status", *COLUMNS, "folder"], rows)
+        results.write_table(beside, list(columns), list(map(list, zip(*columns.values()))))
+
+
+def run_columns(factors: Sequence[Factor], runs: Sequence[SweepRun]) -> dict[str, list]:
+    """The columns of ``runs.csv``, with a value for each run."""
+    columns: dict[str, list] = {"run": [run.point.index for run in runs]}
+    columns |= {factor.column: [run.point.values[k] for run in runs]
+                for k, factor in enumerate(factors)}
+    columns["status"] = [run.status for run in runs]
+    columns |= {name: [run.numbers[name] for run in runs] for name in COLUMNS}
+    columns |= {name: [run.final[name] for run in runs] for name in FINAL}
+    columns["folder"] = [f"runs/{run.point.name}" for run in runs]
+    return columns
 
 
 def _rows(sweep: Sweep, runs: list[SweepRun]) -> Iterator[list]:

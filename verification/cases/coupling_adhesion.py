@@ -224,7 +224,7 @@ def _moves(seed: Pore, shape: Pore) -> np.ndarray:
 
 
 def _pushed(seed: Pore, by: float) -> Pore:
-    """A guess of the shape in which all of the aggregate has moved downstream."""
+    """A guess of the shape, moved downstream by ``by``."""
     points = seed.mesh.points.copy()
     points[seed.mesh.body, 0] += by
     return seed.moved(points)

@@ -1,9 +1,9 @@
-"""C50, C51: a wall to which the aggregate is tightly bound (2.3.3). C52: what the walls must bear (5). C53: the water's
-drag as a body force in a permeable aggregate (5, (20)).
+"""C50, C51: a wall to which the aggregate is tightly bound (2.3.3). C52: the traction on the walls (5). C53: the
+water's drag as a body force in a permeable aggregate (5, (20)).
 
-The base run stands on its seed's 10 um of wall and is compared at 9 h, when its area has grown fivefold and it does not
-touch the other wall. The paper prints no permeability: that of the raised viscosity is taken, with which a plug of a
-pore of width W conducts as one of lambda = 2000 does, W^2 / (12 lambda).
+The aggregate of base stands on the 10 um of wall under its seed. Runs are compared at 9 h: its area has grown fivefold,
+and it does not touch the other wall. The paper prints no permeability. These claims use W^2 / (12 lambda), W the width
+of the pore: a plug with this permeability conducts as much as a plug with the raised viscosity, lambda = 2000.
 """
 
 from __future__ import annotations
@@ -23,16 +23,16 @@ HOUR = 9
 BONDED = 'growth.wall="bonded"'
 FORCED = 'growth.fluid_forces="included"'
 TO_HOUR = (*BASE, *until(HOUR))
-#: Highly: four times what the paper calls a few percent.
+#: "Highly": four times the "few percent" of the paper.
 HIGHLY, HIGHLY_WORDS = 4 * FEW, "highly: four times a few percent"
 
 
 @claim("C50", "2.3.3", "microorganisms tightly bound to the wall prevent extension along it, and lead to a highly "
        "distorted geometry", fine=PAIRED, beside=(), date=DEFINED)
 def tightly_bound() -> Finding:
-    """Base at 9 h on a wall to which it is bonded, and on one on which it slides: area that only one outline covers;
-    mean distortion, the larger principal stretch of F over the root of J, which is one where growth distorts nothing;
-    and the length of contact."""
+    """Compare base at 9 h on a wall to which it is bonded and on a wall on which it slides. The numbers are the area
+    that only one outline covers, the mean distortion and the length of contact. The distortion is the larger principal
+    stretch of F over the root of J. It is one if growth changes no shape."""
     sliding, bonded = (body((*TO_HOUR, *changes), HOUR) for changes in ((), (BONDED,)))
     apart = uncovered(polygon(sliding.outline), polygon(bonded.outline))
     checks = (at_least(f"outlines apart at {HOUR} h (% of the area)", "highly distorted", apart, 100 * HIGHLY,
@@ -68,15 +68,15 @@ def remeshing_loses() -> Finding:
 
 
 def wall_traction(aggregate: Body) -> float:
-    """The most that a wall must bear (MPa)."""
+    """Largest traction on a wall (MPa)."""
     return adhesion.wall_peak(aggregate.scene, aggregate.pore, aggregate.solved).value
 
 
 @claim("C52", "5", "the adhesion that an aggregate requires stems from fluid flow and from its displacement boundary "
        "conditions along a surface", fine=PAIRED, beside=(), date=DEFINED)
 def required_adhesion() -> Finding:
-    """The most that a wall must bear, in the mean over W / 20: base at 19.2 h on a wall that slides, by the fluid's
-    forces; and base at 9 h, bonded against sliding."""
+    """Largest traction on the walls, in the mean over W / 20: that of the fluid's forces on base at 19.2 h, on a wall
+    on which it slides; and that on base at 9 h if it is bonded, against that if it slides."""
     plotted = (*BASE, *until(PLOTTED))
     still, forced = (wall_traction(body((*plotted, *changes), PLOTTED)) for changes in ((), (FORCED,)))
     sliding, bonded = (wall_traction(body((*TO_HOUR, *changes), HOUR)) for changes in ((), (BONDED,)))
@@ -103,8 +103,9 @@ def seeping(run: Run, width: float) -> tuple[Run, Run]:
 @claim("C53", "5", "the action of water on a poroelastic aggregate as body forces may lead to differences, depending "
        "on the conditions", fine=COMPARED, beside=(), date=DEFINED)
 def body_forces() -> Finding:
-    """Drag within a permeable aggregate, acting on its shape or not: wide, a plug at constant velocity, at 40 h, where
-    one difference must exceed a few percent; and base at 19.2 h, at constant head, where none may."""
+    """Compare runs in which the drag within a permeable aggregate acts on its shape with runs in which it does not. In
+    wide at 40 h, a plug at constant velocity, one difference must exceed a few percent. In base at 19.2 h, at constant
+    head, no difference may."""
     plug, open_pore = seeping(PLUG, 100.0), seeping((*BASE, *until(PLOTTED)), 50.0)
     of_plug = {"outlines apart at 40 h, one moved onto the other (% of the area)": moved_apart(plug, 40),
                "time of contact (%)": 100 * abs(contact_time(*plug[1]) / contact_time(*plug[0]) - 1),
@@ -121,6 +122,6 @@ def body_forces() -> Finding:
 
 
 def moved_apart(pair: tuple[Run, Run], hour: float) -> float:
-    """Area (%) that only one of two outlines covers, with both centroids at one x."""
+    """Area (%) that only one of two outlines covers after one is moved along x to the centroid of the other."""
     one, other = (polygon(body(run, hour).outline) for run in pair)
     return uncovered(one, translate(other, one.centroid.x - other.centroid.x))

@@ -2,10 +2,11 @@
 `python -m verification.claims.after_contact`.
 
 For every recorded number about wide after contact with the opposite wall, the module lists half the width of the bar
-over the value, the widest bar first. Required are 1 % for conductivities and tips and 2 % for lengths of contact, which
-`verification.sensitivity.wide` measures. Two kinds of numbers are less accurate: the conductivity of the first shape in
-contact, which closes by entire edges of the outline, with the numbers derived from it, and ratios of peaks, since a
-peak lies beside the ends of the contact surface, where stresses have no limit. The bar of a tiny change exceeds it.
+over the value, the widest bar first. The limits are 1 % for conductivities and tips and 2 % for lengths of contact;
+`verification.sensitivity.wide` measures them. Two kinds of numbers are less accurate. The first shape in contact closes
+by entire edges of the outline, which limits the accuracy of its conductivity and of the numbers derived from it. Peaks
+of stress lie beside the ends of the contact surface, where stresses have no limit, so their ratios vary. The bar of a
+tiny change is larger than the change.
 
 A second list has the numbers of base whose bars exceed 0.2 %, the limit that its velocities, effluents, uptake and
 concentrations meet. The register of the claims prints both lists, the second with the reason for each kind.
@@ -31,7 +32,7 @@ OTHER = re.compile(r"^base|before contact|a film left|^K / K_clean =|^the part f
                    r"^uniform|^theta\(R\)")
 #: Percent above which a bar is listed, after contact and for base.
 WIDE_BAR, BASE_BAR = 2.0, 0.2
-#: Claims about the model that are neither about wide nor base: what is cut off a half-disc's pore, wide in other ways.
+#: Claims about the model that concern neither wide nor base: half-discs in truncated pores, and variants of wide.
 NOT_OF_BASE = ("C19", "C41")
 #: Why a bar of base exceeds BASE_BAR, by the kind of number: what its claim or its name begins with.
 KINDS = {
@@ -44,7 +45,7 @@ KINDS = {
         r".*(stress|strain)",
     "a share of less than 1 %, made of what the fluid does to a body 2000 times as viscous": r"C35",
     "after base's own contact, whose first shape closes by whole edges of the outline": r"C43"}
-#: Asked of conductivities and tips in the preset `exact`: percent, and seconds of processor time.
+#: Limits for conductivities and tips in the preset `exact`: percent, and seconds of processor time.
 EXACT, SECONDS = 0.5, 60.0
 
 
@@ -65,7 +66,7 @@ def known(entries: list[dict]) -> list[Known]:
 
 
 def of_base(entries: list[dict]) -> list[Known]:
-    """The numbers of base in a record that the model is claimed to have, the one with the widest bar first."""
+    """The numbers of base in a record, from claims about the model, the one with the widest bar first."""
     evaluate.register_all()
     return _known(entries, lambda entry, quantity: entry["about"] == MODEL and (quantity.startswith("base") or not (
         CLAIMS[entry["id"]].of_wide or entry["id"] in NOT_OF_BASE or quantity.startswith("wide"))))
@@ -105,7 +106,8 @@ def exact() -> tuple[dict[str, float], float]:
 
 
 def distance(row: dict, value: float) -> str:
-    """A recorded number on all sizes with its bar, and how far a value of it is from the finest, in words."""
+    """Describe a recorded number on all sizes with its bar, and the distance of a value from that on the finest
+    size."""
     apart = 100 * (value / row["values"][0] - 1)
     sizes = ", ".join(f"{each:.5g}" for each in row["values"])
     verdict = "shown" if abs(apart) + row["bar_percent"] <= EXACT else "not shown"

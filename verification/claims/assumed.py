@@ -1,6 +1,6 @@
-"""C60-C65: what the paper assumes on the way, or cites, and does not compute.
+"""C60-C65: statements that the paper assumes or cites and does not compute.
 
-C60: what perfect symmetry would cost, against what the discretization costs. C61: the profiles at t = 0. C62: decay
+C60: the error of perfect symmetry against the error of the discretization. C61: the profiles at t = 0. C62: decay
 without oxygen. C63: an aggregate that bends with the flow and returns. C64: an aggregate that stays thin. C65: the
 loading of its surface.
 """
@@ -52,9 +52,10 @@ from verification.problems.channels import both, pair
 @claim("C60", "4", "errors created by assuming perfect symmetry are of the order of a few percent, less than the error "
        "due to discretization", about=OF_SCHEME, sizes=BESIDE, date="2026-11-25 22:44")
 def symmetry() -> Finding:
-    """Upstream half of base at 19.4 h in the paper's scheme: extent, growth rate and area. The error of symmetry takes
-    the mean of both halves for the upstream one; the error due to discretization is its distance from the converged
-    solution. The paper prints no mesh: a statement about its error holds if it holds on all meshes and steps here."""
+    """Upstream half of base at 19.4 h in the paper's scheme: extent, growth rate and area. The error of symmetry is the
+    difference of the mean of both halves from the upstream half. The error of the discretization is the distance of the
+    upstream half from the converged solution. The paper prints no mesh: a statement about its error holds if it holds
+    on all meshes and steps here."""
     rows = sides()
     with at_level(Level(CONVERGED, 1.0)):
         exact = sides()
@@ -83,9 +84,9 @@ def sides() -> dict[str, tuple[float, float]]:
 @claim("C61", "2.2", "at t = 0, C = C_supply throughout the entire pore", about=OF_SCHEME, sizes=BESIDE, steps=ALONE,
        fixed="the first update of 12 min is asked", date="2026-11-25 22:44")
 def first_profiles() -> Finding:
-    """The first shape update of base by the transient scheme, from C_supply everywhere and from settled profiles, from
-    which our runs begin: concentrations at its end, and biomass made. If they agree to the paper's accuracy, the
-    condition is no part of the results."""
+    """Compare two starts of base by the transient scheme: C_supply everywhere, and settled profiles, with which our
+    runs begin. The numbers are the concentrations at the end of the first shape update and the new biomass. If they
+    agree to the paper's accuracy, the results do not depend on the initial condition."""
     pore, solved = solved_pore(BASE, 0.0)
     supplies = pair("supply", solved.problem.substrates)
     uniform = Concentrations(*(np.full(len(solved.concentrations.acceptor), supply) for supply in supplies))
@@ -105,8 +106,9 @@ def first_profiles() -> Finding:
 @claim("C62", "2.2", "oxygen is always present, so that the model without anaerobic decay describes decay sufficiently "
        "well", date="2026-11-25 22:44", **ABOUT_WIDE)
 def anaerobic_decay() -> Finding:
-    """Biomass that decay at the full aerobic rate b, whatever the oxygen, would have taken from base and wide besides
-    what (9) takes, over the biomass at the end: the paper's anaerobic decay is slower, so that this is the most."""
+    """Biomass that base and wide would lose in addition to (9) if decay had the full aerobic rate b at any
+    concentration of oxygen, over the biomass at the end. This is an upper bound, because the paper's anaerobic decay is
+    slower."""
     checks = tuple(at_most(f"{run[0]}: biomass that decay at its full rate would take besides (% of the biomass)",
                            "sufficiently well", 100 * decay_left_out(run), 100 * FEW, FEW_WORDS)
                    for run in (BASE, WIDE))
@@ -132,9 +134,10 @@ def _decay_left_out(aggregate: Body) -> float:
 @claim("C63", "2.3.1", "aggregates bend with the flow and regain their original position when the flow is stopped: "
        "stresses depend on the initial and final positions and not on the path", date="2026-11-25 22:44", **ABOUT_WIDE)
 def returning() -> Finding:
-    """An aggregate at rest without the fluid's forces, then with them, then without them again: base at 19.4 h, wide at
-    30 h, with a film left, and wide at 40 h, a plug. The area that only one outline covers, after the return over under
-    the flow. An aggregate that joins the wall where the flow presses it there does not return."""
+    """Bring an aggregate to rest without the fluid's forces, then with them, then without them again: base at 19.4 h,
+    wide at 30 h, with a film left, and wide at 40 h, a plug. The number is the area that only one outline covers after
+    the return, over that area under the flow. An aggregate that the flow presses into contact with the wall does not
+    return."""
     checks, notes = [], []
     for run, hour in STATES:
         rest = released(body(run, hour))
@@ -163,8 +166,8 @@ THIN = 0.2
 @claim("C64", "1", "aggregates no thicker than 10-20 % of the width of the channels do not address permeability "
        "reduction", date="2026-11-25 22:44", **ABOUT_WIDE)
 def thin_aggregates() -> Finding:
-    """By how much the conductivities of base and wide have fallen below that of the clean pore when the aggregate is a
-    fifth of the width thick."""
+    """Fall of the conductivities of base and wide below that of the clean pore when the thickness of the aggregate is a
+    fifth of the width."""
     checks = tuple(at_most(f"{run[0]}: fall of the conductivity with the thickness at 20 % of the width (%)",
                            "did not address", 100 * (1 - reduced_to(run, THIN)), 100 * FEW, FEW_WORDS)
                    for run in (BASE, WIDE))
@@ -172,7 +175,7 @@ def thin_aggregates() -> Finding:
 
 
 def reduced_to(run: Run, part: float) -> float:
-    """K / K_clean of a run when its aggregate is a part of the pore's width thick."""
+    """K / K_clean of a run when the thickness of its aggregate is a part of the pore's width."""
     scene, rows = load_packaged(*run), series(*run)
     thickness = rows["thickness_um"] / scene.pore.width
     return float(np.interp(part, thickness, rows["conductivity_m_per_d"])) / (24e-6 * clean(scene))

@@ -1,9 +1,10 @@
 """C01-C08: the numbers that section 4 prints for its run, `base`.
 
-What it prints of effluents, uptake and inlet at 19.4 h is "before the aggregate expands" (Plate 1): the shape made at
-19.2 h with what has grown in it since [E12]. The velocity, which does not see the density, is that of the same shape.
+Its effluents, uptake and inlet concentrations at 19.4 h are those "before the aggregate expands" (Plate 1): in the
+shape of 19.2 h with the biomass that has grown in it since [E12]. The velocity is that of the same shape, since it does
+not depend on the density.
 
-C27, C28: the concentrations' scale, and what Table 1 says of F and of the diffusivities.
+C27, C28: the scale of the concentrations, and F and the diffusivities of Table 1.
 
 C09, C18: times that follow from Table 1 alone, and those of the run.
 
@@ -99,8 +100,9 @@ def consumed_share() -> Finding:
 def at_the_meshed_inlet() -> Finding:
     """Flow-weighted acceptor at the distances from the aggregate that the paper's words and rules give [E13].
 
-    In a mesh made anew: (11) stands at its end, and with it the concentrations near it. In the run's own mesh, which
-    ends 68 to 73 um from the aggregate as the size has it, they move by 0.1 % from size to size and show no order.
+    The mesh is new, because the concentrations near its end depend on the position of (11). The run's own mesh ends 68
+    to 73 um from the aggregate, depending on the size. In it the concentrations change by 0.1 % from size to size and
+    show no order.
     """
     pore, solved = grown_anew(BASE, PLOTTED)
     means = {distance: upstream_means(pore, solved, distance) for distance in DISTANCES}
@@ -138,8 +140,8 @@ def first_length() -> Finding:
 
 @claim("C08", "4, Plate 2", "meshed domain 210 um long at 19.4 h", about=OF_SCHEME)
 def last_length() -> Finding:
-    """What the rules of 3.1 allow around our aggregate: between extension and generation. The length itself hangs on
-    when the part was last regenerated, which has no limit as mesh and step are refined."""
+    """Range of lengths that the rules of 3.1 allow around our aggregate: from extension to generation. The length in a
+    run depends on the time of the last remesh, which has no limit as mesh and step are refined."""
     row, width = at(BASE, END), load_packaged(*BASE).pore.width
     span = row["downstream_um"] - row["upstream_um"]
     low, high = (span + 2 * factor * width for factor in (1.3, 1.5))
@@ -183,7 +185,7 @@ COMPARED = ("mean_velocity_m_per_d", "aggregate_area_um2", "upstream_um", "downs
 
 @claim("C27", "2.2", "only the ratios C/K_s matter when K_s is set to 1", about=CLOSED)
 def ratios() -> Finding:
-    """Base to 10 h with supply and K_s, and what is needed besides, multiplied, against itself.
+    """Compare base to 10 h with runs in which supply, K_s and, if necessary, other inputs are multiplied.
 
     Compared in every row: velocity, area, ends, inert fraction, and C / K_s of effluents and at the meshed inlet.
     """
@@ -216,8 +218,8 @@ WEIGHT = {"C": 12.011, "H": 1.008, "O": 15.999, "N": 14.007}
 
 @claim("C28", "Table 1", "F = COD - Y d_c; diffusivity in the aggregate 80 % of that in water", about=CLOSED)
 def table_1() -> Finding:
-    """F from Table 1's own entries and from chemical formulas; ratios of diffusivities. E1 tells what F's error does to
-    base."""
+    """F from Table 1's own entries and from chemical formulas; ratios of diffusivities. E1 reports the effect of the
+    error of F on base."""
     scene = load_packaged(*BASE)
     law, paper = scene.kinetics, scene.kinetics.acceptor_to_donor_ratio
     y, d_c = law.yield_coefficient, law.decay_oxygen_demand
@@ -245,7 +247,7 @@ def table_1() -> Finding:
 
 
 def oxygen_demand(molecules: int, **atoms: int) -> float:
-    """mg of O2 that oxidise a mg of a compound, a molecule of which takes so many molecules of O2."""
+    """Mass of O2 (mg) that oxidises 1 mg of a compound; ``molecules``: molecules of O2 for one molecule of it."""
     return molecules * 2 * WEIGHT["O"] / sum(count * WEIGHT[atom] for atom, count in atoms.items())
 
 
@@ -279,8 +281,8 @@ def _doubling_time(scene, concentration: float) -> float:
 @claim("C18", "1", "within a 600 um pore: flow << 1 s, advection a few seconds, diffusion of the order of minutes, "
        "growth hours")
 def time_scales() -> Finding:
-    """W^2 / nu, L / u_ave, L^2 / D of both substrates, and the doubling time at the supply. Of these a solution gives
-    u_ave alone, and the least of the ratios is that of two others."""
+    """W^2 / nu, L / u_ave, L^2 / D of both substrates, and the doubling time at the supply. Only u_ave is from a
+    solution, and the smallest ratio does not contain it."""
     scene, speed = load_packaged(*BASE), at(BASE, 0.0)["mean_velocity_m_per_d"]
     length, width = scene.pore.length, scene.pore.width
     viscous, advection = SECONDS * width**2 / scene.flow.kinematic_viscosity, SECONDS * length / speed * 24e-6
@@ -305,7 +307,7 @@ def time_scales() -> Finding:
 
 
 TIMES = (0.0, PLOTTED, END)
-#: What is halved of base in the paper's scheme: its level, and by how many percent its velocity may then move.
+#: Halved quantities of base in the paper's scheme: the level, and the accepted change of the velocity in percent.
 HALVED = {"time step": (Level(step=0.5), 0.5), "mesh size": (Level(size=0.5), 1.0)}
 LEVELS = (DEFAULT, *(level for level, _ in HALVED.values()))
 

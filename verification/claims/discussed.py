@@ -1,9 +1,9 @@
-"""C38, C39, C47: what the paper says in its introduction and discussion, and does not compute.
+"""C38, C39, C47: statements of the introduction and the discussion that the paper does not compute.
 
-C45: what an aggregate takes up, beside layers that have its biomass.
+C45: the uptake of an aggregate against that of layers with the same biomass.
 
-A layer of uniform thickness covers a wall of the whole pore, or both of them half each. The model computes what it
-takes up, with such layers as its aggregate.
+A layer of uniform thickness covers one wall of the pore, or two layers with half of the biomass each cover both walls.
+The model computes their uptake with the layers in place of the aggregate.
 
 C44: the pore as a part of a network.
 """
@@ -78,8 +78,8 @@ def filled(ratio: float, reduced: float, walls: int) -> float:
 @claim("C39", "5", "a mass transfer coefficient cannot be set a priori: it depends on the sink in the solid",
        date="2026-11-24 13:01")
 def depends_on_the_sink() -> Finding:
-    """Sherwood numbers of one shape in one flow with little and with much supply, whose sinks are nearly of first and
-    of zero order, and with a maximum rate of FASTER times that of Table 1: sinks that the model has."""
+    """Sherwood numbers of one shape in one flow with three sinks of the model: nearly of first order (small supply),
+    nearly of zero order (large supply), and with a maximum rate of FASTER times that of Table 1."""
     shapes = [in_one_shape(supply=supply) for supply in SINKS] + [in_one_shape(supply=SINKS[0], faster=FASTER)]
     sinks = np.array([*map(sherwood, shapes)])
     checks = tuple(at_least(f"{name}, one shape and flow: Sherwood numbers of three sinks, largest over smallest less "
@@ -160,9 +160,9 @@ MARGIN, FEWEST = 2.0, 4
        date="2026-11-24 12:50", **ABOUT_WIDE,
        unjudged="the paper cites a judgement of Rittmann and gives no number for crucial")
 def not_crucial() -> Finding:
-    """Share of the acceptor supplied that the aggregate of wide takes up, and that layers on one wall and on both take
-    up which have its biomass, at the same mean velocity and supply, when it has reduced the conductivity to given
-    parts."""
+    """Share of the supplied acceptor that the aggregate of wide takes up when it has reduced the conductivity to
+    several parts. Layers of the same biomass, on one wall or on both, are compared with it at the same mean velocity
+    and supply."""
     rows = []
     for reduced in REDUCED:
         part = filled_at(reduced)
@@ -185,7 +185,7 @@ def aggregates_share(part: float) -> float:
 
 
 def in_the_model(part: float, walls: int) -> float:
-    """The same of the model, layers on one or both walls as its aggregate."""
+    """The same share of layers on one wall or on both, computed by the model."""
     scene = load_packaged(*WIDE)
     grid = layered(scene, part, walls)
     _, fluxes = solution(scene, grid, full_biomass(scene, grid))
@@ -215,8 +215,8 @@ def evenly(ends: tuple[float, ...], size: float) -> np.ndarray:
     return np.unique(np.concatenate(parts))
 
 
-#: From this A / W^2 on, thicknesses of a quarter of W: what less of an aggregate adds is, in the scheme of 2001, under
-#: the error of the empty channel.
+#: The least A / W^2; the thickness is then a quarter of W. In the scheme of 2001 a smaller aggregate adds less
+#: resistance than the error of the empty channel.
 LEAST = 0.1
 
 
@@ -225,7 +225,8 @@ LEAST = 0.1
        unjudged="the paper leaves it to a companion paper, and prints nothing that a network could contradict; the law "
                 "for networks and its bound are ours")
 def for_networks() -> Finding:
-    """Added resistance of the aggregates of base and wide against the law for networks, which has not seen them."""
+    """Added resistance of the aggregates of base and wide against the law for networks, which was not fitted to
+    them."""
     rows = {"base": beyond(BASE, False), "wide before contact": beyond(WIDE, False),
             "wide after contact": beyond(WIDE, True)}
     parts = ", ".join(f"{np.abs(values).max():.2g} ({name})" for name, values in rows.items())

@@ -1,4 +1,4 @@
-"""Compute claims at all levels, each level in a process that keeps its runs meanwhile.
+"""Compute claims at all levels. Each level has one process, which keeps its runs.
 
 The error bars of a claim's numbers follow from the values at its levels.
 
@@ -36,8 +36,8 @@ def numbers(finding: Finding) -> Numbers:
 
 
 def barred(claim: Claim, finding: Finding, by_level: dict[Level, Numbers]) -> Finding:
-    """The finding with a bar on each check, from its numbers at all levels. Raises ClaimError where these do not speak
-    of the same quantities."""
+    """The finding with a bar on each check, from its numbers at all levels. Raises ClaimError if the levels have
+    different quantities."""
     scene = {quantities(row) for row in by_level.values()}
     if len(scene) != 1:
         raise ClaimError(f"the levels tell of different quantities: {sorted(scene)}")
@@ -47,12 +47,12 @@ def barred(claim: Claim, finding: Finding, by_level: dict[Level, Numbers]) -> Fi
 
 
 def quantities(row: Numbers) -> tuple[str, ...]:
-    """What a finding speaks of at one level, whatever the instants are."""
+    """The quantities of a finding at one level, without the instants in their names."""
     return tuple(unnumbered(quantity) for quantity, *_ in row)
 
 
 def unnumbered(quantity: str) -> str:
-    """A quantity without the numbers in it: the instant at which something happens differs between levels."""
+    """The name of a quantity without its numbers, because the instant of an event differs between levels."""
     return re.sub(r"\d+(\.\d+)?", "#", quantity)
 
 
@@ -80,9 +80,9 @@ def _estimate(varied: dict[float, Level], values: dict[Level, float], formal: tu
 #: Of a claim at one level: its numbers, with its finding where the level is the judged one, or the error in words.
 Outcome = tuple[Numbers, Finding | None] | str
 
-#: Runs as long as that of wide which a claim makes of its own at each of its levels; C32 reads those of C41.
+#: Further runs of a claim at each of its levels, in runs as long as wide; C32 reads those of C41.
 RUNS = {"C41": 5.5, "C42": 1, "C43": 1.5, "C53": 4}
-#: The run of base over that of wide, and what a run takes on the largest elements.
+#: Cost of base over that of wide, and the constant part of the cost of a run.
 OF_BASE, LEAST = 0.1, 0.15
 
 
@@ -114,8 +114,8 @@ def everywhere(ids: Iterable[str]) -> dict[str, dict[Level, Outcome]]:
 
 
 def effort(level: Level, ids: list[str]) -> float:
-    """About how long claims take at a level, in runs of wide at size 1: a run takes as long as elements go in a size,
-    and something whatever the size is."""
+    """Estimate the cost of claims at a level, in runs of wide at size 1. A run costs in proportion to its number of
+    elements, plus a constant."""
     runs = OF_BASE + any(CLAIMS[id].of_wide for id in ids) + sum(RUNS.get(id, 0) for id in ids)
     return runs * (LEAST + level.size**-2) / level.step
 

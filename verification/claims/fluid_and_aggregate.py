@@ -1,11 +1,11 @@
-"""C26, C35: what the fluid does to the aggregate, and how much of it goes through.
+"""C26, C35: the fluid's forces on the aggregate, and the flow through it.
 
-C40, C46: stress, flow, growth and detachment, which section 5 would link.
+C40, C46: the links of stress, flow, growth and detachment that section 5 proposes.
 
-The stress has no largest value: the aggregate slides on the walls and is kept in place at one point of each contact
-surface (2.3.3), which bears all that the fluid pulls, and what the other wall pulls; in two dimensions the stress
-around a force at a point goes as one over the distance. What tears is not a point, so that the stress is taken in the
-mean over what of the aggregate lies within a tenth of the pore's width of a place, and told for half and twice that.
+The stress has no largest value. The aggregate slides on the walls, and one fixed point of each contact surface (2.3.3)
+bears the pull of the fluid and of the other wall. In two dimensions the stress around a point force goes as one over
+the distance. A tear is larger than a point. The stress at a place is therefore the mean over the part of the aggregate
+within a tenth of the pore's width. The note reports it for half and twice this distance.
 """
 
 from dataclasses import dataclass, replace
@@ -78,9 +78,9 @@ class Forces:
 def fluid_forces() -> Finding:
     """Range of rho g phi plus the largest viscous shear on the interface, against growth's shear stress and stiffness.
 
-    From the flow fields. A uniform pressure does nothing to an incompressible body, so its range counts; uniform growth
-    causes P but no shear in the plane [E11], so growth's shear stress in the plane is what to compare with; the
-    stiffness tells whether the shape would change.
+    The forces are those of the flow fields. A uniform pressure does not deform an incompressible body, so the range of
+    the pressure counts. Uniform growth causes P but no shear in the plane [E11], so the comparison is with growth's
+    shear stress in the plane. The stiffness shows whether the shape would change.
     """
     film, end = touching()[0], bodies(WIDE)[-1]
     last, early = forces(end), forces(body(BASE, UPDATE))
@@ -158,7 +158,7 @@ def inside(aggregate: Body) -> float:
     return 100 * float(speed.mean() * height) / (flow.mean_velocity * aggregate.grid.width)
 
 
-#: The distance over which the stress is averaged, over the pore's width; and what is told besides, half and twice that.
+#: The distance over which the stress is averaged, over the pore's width; and all reported distances.
 APART = 0.1
 DISTANCES = (0.5 * APART, APART, 2 * APART)
 #: Places at which the mean is taken, in a distance; degree of the quadrature of the stress.
@@ -182,7 +182,7 @@ class Peak:
 
 
 def averaged(aggregate: Body, distance: float, places: np.ndarray) -> np.ndarray:
-    """(p, 4) Cauchy stress over mu_L, means over what of the aggregate is within a distance (um) of places (p, 2)."""
+    """(p, 4) Cauchy stress over mu_L, means over the part of the aggregate within a distance (um) of places (p, 2)."""
     body = aggregate.pore.body
     shape = growth.Shape(body.shape.cells, body.shape.corners, DEGREE)
     finer = replace(aggregate, pore=replace(aggregate.pore, body=growth.Body(shape, body.reference)))
@@ -239,8 +239,8 @@ def _on_another_size(most: dict[Run, Body]) -> str:
        "aggregate would tear", date="2026-11-22 18:19", **ABOUT_WIDE)
 def torn_by_the_fluid() -> Finding:
     """Largest principal stress, in the mean over a tenth of the pore's width, with the fluid's forces and without: of
-    base at 19.4 h and of wide at 30 h, with a film left, and of wide at 40 h, a plug under constant velocity. It could
-    link them if it does in one of these."""
+    base at 19.4 h and of wide at 30 h, with a film left, and of wide at 40 h, a plug under constant velocity. The
+    statement holds if the fluid changes the stress in one of these states."""
     pairs = {f"{run[0]}, {hour:g} h": (body(run, hour), pressed(body(run, hour))) for run, hour in STATES}
     most = max(abs(changed(pair)) for pair in pairs.values())
     check = at_least("largest principal stress, in the mean over W / 10, changed by the fluid, the most of three "
@@ -269,8 +269,9 @@ def _changes(pair: tuple[Body, Body]) -> str:
 
 
 def pressed(aggregate: Body) -> Body:
-    """The same aggregate at rest under the fluid's forces. It is elastic, so that this does not hang on the way there,
-    but for what the forces would have changed of its growth. Raises GrowthError where shape and flow do not agree."""
+    """The same aggregate at rest under the fluid's forces. The result does not depend on the path, because the
+    aggregate is elastic. It leaves out the effect of the forces on growth. Raises GrowthError if shape and flow do not
+    agree."""
     forced = replace(aggregate.scene, growth=replace(aggregate.scene.growth, fluid_forces="included"))
     at_rest = contact.expand(contact.Mechanics.of(forced), aggregate.pore, aggregate.pore.theta).pore
     return Body(forced, at_rest, aggregate.solved)

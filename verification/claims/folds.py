@@ -1,5 +1,5 @@
-"""C48, C49: up to where the smooth shape of the aggregate has the least energy, and whether the expansion that the
-paper expects comes before that ends.
+"""C48, C49: the range in which the smooth shape of the aggregate has the least energy, and whether the aggregate
+reaches the expansion that the paper expects within this range.
 
 Both are judged in three scenes: base under its constant head to 76 h (C43), wide, and a pore as wide as wide's, four
 times as long, with a seed of 10 um and a tenth of the velocity. The supply of 10 mg/L is the same in all of them. When
@@ -17,7 +17,7 @@ from repro.march.loop import Report
 from repro.model.surface import CREASE, surface
 from verification.claims import Finding, PaperCheck, at_least, between, claim, without_limit
 from verification.claims.growth_mechanics import TOTAL
-from verification.claims.levels import BESIDE_PAIRS, PAIRED, cached
+from verification.claims.levels import BESIDE_PAIRS, cached
 from verification.claims.permeability import CLOSING
 from verification.claims.runs import WIDE, Run, body_of, load_packaged, until
 
@@ -25,6 +25,8 @@ from verification.claims.runs import WIDE, Run, body_of, load_packaged, until
 SLOW = ("wide", 'pore.length="2.4 mm"', 'aggregate.radius="10 um"', 'flow.mean_velocity="0.3 m/day"',
         *until(*range(3, 91, 3)))
 SCENES: dict[str, Run] = {"base": CLOSING, "wide": WIDE, "slow pore": SLOW}
+#: Sizes of the elements. With 2.83, as in other claims of paired runs, a triangle of the slow pore collapses at 4.6 h.
+SMALLER = tuple(1.8 * 2 ** (third / 3) for third in (-1, 0, 1))
 #: When both definitions were written.
 DEFINED = "2026-11-25 22:42"
 
@@ -67,7 +69,7 @@ def smooth_expansion(run: Course) -> float:
 
 
 @claim("C48", "5", "the deterministic approach leads to biological masses with a smooth outer surface, since the "
-       "potential energy of the aggregate is kept to a minimum", fine=PAIRED, beside=BESIDE_PAIRS, date=DEFINED)
+       "potential energy of the aggregate is kept to a minimum", fine=SMALLER, beside=BESIDE_PAIRS, date=DEFINED)
 def smooth_surface() -> Finding:
     """The least elastic stretch along the free surface, in all rows of each scene. Under 0.647 a crease has less energy
     than the smooth surface of a neo-Hookean body (Hohlfeld and Mahadevan 2011; Hong, Zhao and Suo 2009), and the
@@ -81,7 +83,7 @@ def _least(name: str) -> PaperCheck:
 
 
 @claim("C49", "2.3.1", "expansion by up to 2000, after a couple of days, can be handled, also where the aggregate "
-       "grows unevenly", fine=PAIRED, beside=BESIDE_PAIRS, date=DEFINED)
+       "grows unevenly", fine=SMALLER, beside=BESIDE_PAIRS, date=DEFINED)
 def uneven_expansion() -> Finding:
     """The largest expansion of a triangle in wide and in the slow pore, as long as the smooth surface has the least
     energy (C48), and the time at which it is 2000. The deformation is handled if both pores reach 2000 so."""
@@ -97,7 +99,7 @@ def uneven_expansion() -> Finding:
 
 
 def _ends() -> str:
-    """How the scenes end that do not come to their last row."""
+    """Describe the ends of the scenes that stop before their last row."""
     ends = "; ".join(f"{name}: {run.ended}" for name in SCENES if (run := course(*SCENES[name])).ended)
     return f"growth compresses the surface of a rim that grows on a starved core. {ends}"
 

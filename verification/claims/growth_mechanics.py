@@ -26,11 +26,11 @@ RADIUS = 5.0
 
 
 def half_disc(refinement: float) -> Supported:
-    """A seed alone, in a mesh of the package's own generator: meshes of different refinement share nothing.
+    """A seed alone, in a mesh of the package's generator. Meshes of different refinement are unrelated.
 
-    Sizes fall everywhere in proportion: their growth from the rim to the middle falls with them. With the generator's
-    own the middle is not refined, whatever the rim is, and the slope over such a family falls from 2.2 to 1.7.
-    refinement: at the default level.
+    All sizes fall in proportion, and so does their growth from the rim to the middle. With the generator's default
+    growth the middle keeps its size at any refinement, and the slope over the family falls from 2.2 to 1.7. refinement:
+    at the default level.
     """
     refinement /= current().size
     outline = seed(RADIUS, ACROSS_AGGREGATE * refinement)
@@ -80,8 +80,8 @@ def stabilised() -> Finding:
     """Growth of a half-disc by theta(R) against the closed form: orders of outline and pressure; stability numbers.
 
     Orders are slopes of a least-squares line over the package's own unrelated meshes, h = (area / nodes)^(1/2). The
-    stability number is the least eigenvalue of B K^-1 B^T + C against the pressure's mass, on regular meshes: how much
-    the scheme sees of the pressure that it sees least. Without the stabilisation C = 0; with the sign of (27), -C.
+    stability number is the least eigenvalue of B K^-1 B^T + C against the pressure's mass, on regular meshes: the
+    weight of the pressure that the scheme controls least. Without the stabilisation C = 0; with the sign of (27), -C.
     """
     bodies = [half_disc(refinement) for refinement in REFINEMENTS]
     regular = [regular_half_disc(parts) for parts in REGULAR]

@@ -134,7 +134,7 @@ def upgradient_only() -> Finding:
 def squeezed() -> Finding:
     """Outlines of wide: inside the channel; length over thickness; lengths of both contact surfaces.
 
-    A contact surface grows by whole edges of the outline: the least that it grows in an update has no limit.
+    A contact surface grows by entire edges of the outline, so its least growth in an update has no limit.
     """
     rows, width = series(*WIDE), load_packaged(*WIDE).pore.width
     outlines, after = [aggregate.outline for aggregate in bodies(WIDE)], rows["contact"] == 1
@@ -188,13 +188,13 @@ def deviation(aggregate: Body) -> float:
     return float(np.abs(np.hypot(*free.T) / np.sqrt(2 * outline.area / np.pi) - 1).max())
 
 
-#: Into how many parts the edges of a triangle are cut for the places at which the least of a field is sought.
+#: Number of parts of a triangle's edge. A field is evaluated at their ends in the search for its least value.
 PARTS = 16
 
 
 def least(run: Run, name: str) -> np.ndarray:
-    """(rows,) smallest concentration of a substrate in the aggregate over K_s, between nodes too: which node is the
-    nearest to the place of the least hangs on the mesh."""
+    """(rows,) smallest concentration of a substrate in the aggregate over K_s, also between nodes, because the node
+    nearest to the minimum depends on the mesh."""
     half = getattr(load_packaged(*run).substrates, name).half_saturation
     minima = [least_of(aggregate, getattr(aggregate.solved.concentrations, name)) for aggregate in bodies(run)]
     return np.array(minima) / half
@@ -212,8 +212,8 @@ def least_of(aggregate: Body, field: np.ndarray) -> float:
 def oxygen() -> Finding:
     """Smallest C_A in the aggregate over K_s, in every row of base and wide.
 
-    The paper says it of decay, which (9)-(10) let go on in proportion to m_A = C_A / (C_A + K_s). Present is so taken
-    as m_A >= 1/2, that is C_A >= K_s: decay then has at least half of the rate that it has with plenty of oxygen.
+    The statement is about decay, whose rate in (9)-(10) is proportional to m_A = C_A / (C_A + K_s). Oxygen counts as
+    present if m_A >= 1/2, that is C_A >= K_s. Decay then has at least half of its rate with plenty of oxygen.
     """
     base, wide = (least(run, "acceptor") for run in (BASE, WIDE))
     why = "m_A >= 1/2: decay at half its rate, at least"
@@ -264,9 +264,9 @@ def evenness(aggregate: Body) -> float:
 def stresses() -> Finding:
     """Largest stresses over mu_L in every row of base and wide; both with stress-free new biomass.
 
-    The in-plane shear stress, and the equivalent (von Mises) stress of the whole deviator. Minor: that of a strain of a
-    few percent. Outlines are compared by the area that only one of the two covers. After contact both are means over
-    the rows: a contact surface grows by whole edges, with which single rows jump, in either run at other times.
+    The in-plane shear stress, and the equivalent (von Mises) stress of the whole deviator. "Minor" is the stress of a
+    strain of a few percent. Outlines are compared by the area that only one of the two covers. After contact both are
+    means over the rows. A contact surface grows by entire edges, so single rows jump, at other times in each run.
     """
     minor, why = 2 * FEW, f"minor: twice the modulus times a strain of {100 * FEW:g} %"
     largest_stresses = {run[0]: peaks(run) for run in (BASE, WIDE_TO_END)}
@@ -310,6 +310,6 @@ def apart(run: Run, time: float) -> float:
 
 
 def after_contact() -> tuple[float, ...]:
-    """Times (h) of the rows of wide in which the aggregate touches the opposite wall, however new biomass is born."""
+    """Times (h) of the rows of wide in which the aggregate touches the opposite wall with both rheologies."""
     rows, free = series(*WIDE_TO_END), series(*WIDE_TO_END, STRESS_FREE)
     return tuple(map(float, rows["time_h"][(rows["contact"] == 1) & (free["contact"] == 1)]))

@@ -30,9 +30,9 @@ from verification.store import Memory
 CONVERGED, SCHEME = "converged", "scheme"
 #: Of the converged solution at size 1: its preset.
 PRESET = "accurate"
-#: Its elements beside contact lines at size 1. Without them edges of several um join the wall whole: over the hours
-#: after contact in wide, conductivity 1.161 to 1.171 m/d from size 1.4 to 0.5 and no order; with them 1.1695, 1.1726,
-#: 1.1734 from size 1.4 to 0.7.
+#: Its elements beside contact lines at size 1. Without them entire edges of several um join the wall. The conductivity
+#: of wide over the hours after contact is then 1.161 to 1.171 m/d from size 1.4 to 0.5, without an order. With them it
+#: is 1.1695, 1.1726 and 1.1734 m/d from size 1.4 to 0.7.
 CONTACT = 2.0
 
 
@@ -48,8 +48,8 @@ class Level:
 
 
 def converged(size: float) -> tuple[str, ...]:
-    """Changes of a scene that make it the converged solution with elements and steps of a size: a midpoint step goes as
-    the root of its tolerance."""
+    """Changes of a scene that make it the converged solution with elements and steps of a size: the length of a
+    midpoint step goes as the root of its tolerance."""
     preset = PRESETS[PRESET]
     refinement = float(preset["refinement"]) / size
     tolerance = float(preset["tolerance"]) * size**2
@@ -66,12 +66,13 @@ PAIRED = tuple(2.25 * 2 ** (third / 3) for third in (-1, 0, 1))
 #: Those for changes of wide. A run with half the least angle of contact depends on its mesh: at 1.79 it stops in a step
 #: after contact, in which a triangle is inverted.
 COMPARED = tuple(1.25 * 2 ** (half / 2) for half in (1, 2, 3))
-#: Size of the scheme beside claims that compare runs of their own, which are dear.
+#: Size of the scheme beside claims that compare runs of their own, which are expensive.
 BESIDE_PAIRS = (2**0.5,)
 #: Sizes and steps of the scheme, the default first.
 SIZES = (1.0, 2**0.5, 2**-0.5, 0.5)
 STEPS = (1.0, 2.0, 3.0, 4.0)
-#: Sizes whose range is the scheme's interval beside a claim about the model, and beside one about wide, which is dear.
+#: Sizes whose range is the scheme's interval beside a claim about the model, and beside one about wide, whose runs are
+#: expensive.
 BESIDE = SIZES[:3]
 ABOUT_WIDE = {"fine": WIDE_FINE, "beside": SIZES[:2]}
 #: A single size or step.

@@ -1,10 +1,10 @@
-"""C16, C17: what the aggregate does to the conductivity.
+"""C16, C17: the effect of the aggregate on the conductivity.
 
 C43: base under its constant head, carried on through contact with the opposite wall to a hundredth of its velocity.
 
-The paper's own run of base ends at 19.4 h; what it says of clogging that restricts the supply, of where the aggregate
-grows once it spans the pore, and of how sharply the conductivity then falls, is judged here where the head is given and
-not the velocity.
+The paper's run of base ends at 19.4 h. Three statements are judged here under a constant head instead of a constant
+velocity: clogging restricts the supply, an aggregate that spans the pore grows at certain places, and the conductivity
+then falls sharply.
 """
 
 from dataclasses import replace
@@ -49,7 +49,7 @@ def layered_share(ratio: float, part: float, walls: int) -> float:
 
 #: Part of its biomass that the aggregate gains up to contact in the window of a steepness.
 GAINED = 0.1
-#: "Sharply": so many times as steeply as under uniform layers of the same biomass.
+#: "Sharply": this many times as steeply as under uniform layers of the same biomass.
 TWICE, SHARPLY = 2.0, "falls sharply"
 
 
@@ -57,7 +57,8 @@ TWICE, SHARPLY = 2.0, "falls sharply"
        "constant head)", date="2026-11-24 13:01", **ABOUT_WIDE)
 def spanning() -> Finding:
     """Conductivity of `wide` against its biomass up to contact. At contact it is that of the first shape in which a
-    film has closed, by whole edges of the outline: it is known to first order in their length, to several percent."""
+    film has closed. A film closes by entire edges of the outline, so the error is of first order in their length:
+    several percent."""
     clean_conductivity = 24e-6 * clean(load_packaged(*WIDE))
     film, closed = (float(value) / clean_conductivity for value in around_contact(*WIDE)["conductivity_m_per_d"])
     checks = (at_most("K / K_clean at contact", SHARPLY, closed, 0.01, "orders of magnitude: two at least"),

@@ -1,11 +1,11 @@
-"""C20, C36: what lies between the aggregate and the pore's ends, and what happens at the outlet.
+"""C20, C36: the fluid between the aggregate and the pore's ends, and the condition at the outlet.
 
 C19: how far from the aggregate the pore must be meshed (3.1).
 
-The meshes are nested: a core around the aggregate, and beyond it columns of triangles, of which those of a shorter mesh
-are a part of the longer one's. What two of them differ by is what the missing columns do; two unrelated meshes differ
-by more. Columns of linear elements resist by some tenths of a percent more than the water that they stand for, which is
-no truncation: the same mesh without biomass tells by how much, and that is taken off.
+The meshes are nested: a core around the aggregate, and columns of triangles beyond it. A longer mesh contains all
+columns of a shorter one. The difference of two meshes is therefore the effect of the missing columns; two unrelated
+meshes differ by more. The resistance of columns of linear elements is some tenths of a percent too large. This is no
+effect of the truncation: the same mesh without biomass shows it, and it is subtracted.
 """
 
 from dataclasses import replace
@@ -91,10 +91,11 @@ LENGTHS = (600.0, 900.0, 1200.0)
 @claim("C36", "2.2", "the flux is not affected by the condition at the downgradient end (12), if the channel is long "
        "enough")
 def downgradient_end() -> Finding:
-    """What the aggregate of base at 19.2 h takes up, with other places of the outlet and other values held there.
+    """Uptake of the aggregate of base at 19.2 h with other positions of the outlet and other values there.
 
-    At one mean velocity. (12) at the end of the meshed part and of the whole pore; then C held at the pore's end at
-    nothing, and at the supply: the least and the most that a next pore can offer; then the same in longer pores.
+    The mean velocity is the same. First (12) applies at the end of the meshed part and of the whole pore. Then C at the
+    pore's end is zero or the supply: the least and the most that a next pore can offer. Then the same applies in longer
+    pores.
     """
     scene, _, full = fully_meshed_pore()
     _, central = remeshed(replace(scene, numerics=load_packaged(*BASE).numerics), *solved_pore(BASE, PLOTTED))
@@ -118,14 +119,14 @@ def uptake(solved: Solved) -> np.ndarray:
 
 
 def end_effect(*changes: str) -> float:
-    """Largest change (%) of the uptake with C at the pore's end held at nothing, or at the supply."""
+    """Largest change (%) of the uptake if C at the pore's end is zero, or the supply."""
     _, pore, solved = fully_meshed_pore(*changes)
     outlet = pore.space.outlet.nodes
     return max(apart(uptake(holding(pore, solved, outlet, part)), uptake(solved)) for part in (0.0, 1.0))
 
 
 def holding(pore: Pore, solved: Solved, nodes: np.ndarray, part: float) -> Solved:
-    """Solved again with both concentrations held at a part of their supply at some nodes, at the outlet instead of
+    """Solve again with both concentrations prescribed as a part of their supply at some nodes, at the outlet instead of
     (12)."""
     problem, state = solved.problem, solved.concentrations
     rows = np.tile(np.isin(np.arange(problem.space.count), nodes), 2)

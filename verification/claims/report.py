@@ -7,11 +7,11 @@ An entry has the date of its definition, `defined`, and the time of the first va
 they were replaced. A claim counts with the verdict of its first definition.
 
 A check's `value` lies in `low` to `high` (numerics), the paper's in `paper_low` to `paper_high` (printing, null for
-words), and `input_low` to `input_high` is where the value goes as the inputs of Table 1 move within their rounding
-(from the committed record of the sensitivities or a closed form, null where none tells). `scheme_2001` is the range
-that the paper's scheme gives on one to three meshes, for a claim about the scheme that of all its levels. `on_sizes`
-are the values on the sizes of the converged solution, the judged one first, and `order` is that which is observed on
-them, or on the meshes of the scheme; null where none fits.
+words), and `input_low` to `input_high` is its range as the inputs of Table 1 move within their rounding (from the
+committed record of the sensitivities or a closed form; null if neither has it). `scheme_2001` is the range that the
+paper's scheme gives on one to three meshes, for a claim about the scheme that of all its levels. `on_sizes` are the
+values on the sizes of the converged solution, the judged one first, and `order` is that which is observed on them, or
+on the meshes of the scheme; null where none fits.
 """
 
 import textwrap
@@ -51,7 +51,7 @@ INDEPENDENCE = "Mesh and time-step independence of base in the paper's scheme"
 
 @dataclass(frozen=True)
 class Row:
-    """A judged claim: its finding and verdict, or the error for which there is none."""
+    """A judged claim: its finding and verdict, or the error that prevents a verdict."""
 
     id: str
     claim: Claim | None
@@ -106,8 +106,8 @@ def _paragraph(text: str, indent: str = "     ") -> str:
 
 
 def terminal(row: Row) -> str:
-    """A claim with its checks: what was changed, why it does not hold if it does not, what is not varied, and what else
-    is worth telling."""
+    """Describe a claim: its checks, its change, the reason of a failure, the sizes or steps that are not varied, and
+    its note."""
     if row.claim is None:
         return f"{row.id}  {row.verdict.upper()}: {row.error}\n"
     remarks = {"error": row.error, "command": f"python -m verification.claims {row.id}"}
@@ -157,7 +157,7 @@ def distinct(entries: list[dict]) -> dict[tuple[str, str], str]:
 
 
 def summary(rows: list[Row]) -> str:
-    """How many claims have each verdict, and what becomes of their numbers."""
+    """Count the claims with each verdict, and their numbers with each outcome."""
     verdicts = Counter(row.counted for row in rows)
     checks = [check for row in rows for check in row.checks]
     outcomes = Counter(check.outcome for check in checks)
@@ -215,7 +215,7 @@ def stamped(entry: dict, known: dict | None, now: str) -> dict:
 
 
 def _definition(entry: dict) -> tuple:
-    """The date of a definition, and what it judges by what."""
+    """The date of a definition, its quantities, and their printed values with the origins of the tolerances."""
     tolerances = [(check["paper"], unnumbered(check["tolerance"]["origin"])) for check in entry["checks"]]
     return entry["defined"], _quantities(entry), tolerances
 

@@ -1,24 +1,25 @@
-"""C41: what hangs on the rheology and the conditions of contact that the paper chose: new biomass born stress-free (5),
-fixed points elsewhere, and film and contact angle halved and doubled (2.3.3).
+"""C41: the effect of the rheology and of the conditions of contact that the paper chose. The alternatives are
+stress-free new biomass (5), other fixed points, and film and contact angle halved and doubled (2.3.3).
 
-The paper calls its rheology open to argument and expects no substantial effect on what it concludes; of the boundary
-conditions it says that they are debatable and reasonable. What it concludes: an outline as in Figure 6, contact after
-a day and a half, and a conductivity that falls when it comes. Each choice is changed alone in wide, which has all of
-them at work.
+The paper calls its rheology open to argument and expects no substantial effect on its conclusions. It calls the
+boundary conditions debatable and reasonable. Its conclusions are an outline as in Figure 6, contact after a day and a
+half, and a conductivity that falls at contact. Each choice is changed alone in wide, in which all of them have an
+effect.
 
-Outlines are compared as they are, wherever they lie along the pore, which is the same all along. What holds an
-aggregate there are its middles alone: rechosen, they let it slide. How far has no limit in a mesh: a middle is the
-node nearest to it, and the elements on the wall are 5 to 24 um long there; two points of no size hold an elastic
-plane, and what each of them bears vanishes, as one over the logarithm of the elements, so that the meshes around both
-decide whose slide it is. The conductivity is a mean over the hours after contact: a contact surface grows by whole
-edges, with which single rows jump by several percent, in every run at other times.
+Outlines are compared after a shift along the pore, which is uniform. Only its fixed points keep an aggregate in place:
+if they are rechosen, it slides. The distance has no limit as the mesh is refined. A fixed point is the node nearest to
+the middle of a contact surface, and the elements there are 5 to 24 um long. Two points support an elastic plane, and
+the force at each vanishes as one over the logarithm of the element size, so the meshes around both determine the slide.
+The conductivity is a mean over the hours after contact. A contact surface grows by entire edges, so single rows jump by
+several percent, at other times in each run.
 
 C42: a permeable body, with Brinkman's drag, in place of the pseudoviscosity: aggregate, film and plug.
 
 Section 5 calls the raised viscosity artificial, names a porous material as another approach, says that it may make a
-difference depending on the conditions, and does not evaluate it. Both laws are run here from the seed on. A pore that
-is filled over its length conducts K_clean / lambda with the one and K_clean 12 k / W^2 with the other, so that lambda =
-2000 is a permeability of W^2 / (12 lambda), no property of the biomass: it goes as the square of the pore's width.
+difference depending on the conditions, and does not evaluate it. Runs from the seed on compare both laws. A filled pore
+has the conductivity K_clean / lambda with the raised viscosity, and K_clean 12 k / W^2 with the permeability k. lambda
+= 2000 is therefore a permeability of W^2 / (12 lambda). It is no property of the biomass, because it goes as the square
+of the pore's width.
 """
 
 import numpy as np

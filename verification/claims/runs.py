@@ -46,10 +46,10 @@ ROWS = {"base": (0.2, *map(float, range(1, 20)), 19.2, 19.4), "wide": tuple(map(
 #: Hours after wide's contact of which conductivities are means: those of `verification.sensitivity.wide`, to the end of
 #: Figure 6, every second shape update of the paper.
 AFTER = tuple(round(35 + 2 * UPDATE * number, 1) for number in range(26))
-#: Changes that do nothing until the aggregate is near the opposite wall, by the first letters of their keys, and the
-#: part of the pore's width up to which it is not.
+#: Changes that have no effect until the aggregate is near the opposite wall, by the first letters of their keys, and
+#: the part of the pore's width up to which it is not.
 LATE, NEAR = ("growth.minimum_film", "growth.minimum_contact_angle"), 0.9
-#: How long (h) before contact the last shape with a film is looked at: 18 s.
+#: Time (h) from the last shape with a film to contact: 18 s.
 FILM = 0.005
 
 
@@ -63,9 +63,9 @@ def until(*hours: float) -> tuple[str, str]:
     return f'growth.end="{hours[-1]:g} h"', rows_at(*hours)
 
 
-#: Rows of t = 0 and of the last two shapes alone, for runs of which no more is asked.
+#: Rows of t = 0 and of the last two shapes alone, for runs whose other rows are not needed.
 LAST = rows_at(PLOTTED, END)
-#: Section 4, where only the last two shapes are asked for.
+#: Section 4, if only the last two shapes are needed.
 PLATES = (*BASE, LAST)
 #: Wide where it is compared with runs that are changed: every 5 h, the hours before its contact, and AFTER.
 WIDE_TO_END = ("wide", rows_at(*range(5, 31, 5), *range(31, 35), *sorted({*AFTER, 40})))
@@ -199,15 +199,15 @@ def nearest(run: Run, time: float) -> float:
 
 @cached
 def grown(run: Run, time: float) -> tuple[Pore, Solved]:
-    """The shape of a run at a time (h) with what grows in it in the next 12 min, and what is solved then: the state
-    "before the aggregate expands" [E12]."""
+    """The shape of a run at a time (h) with the biomass that grows in it in the next 12 min, and its solution: the
+    state "before the aggregate expands" [E12]."""
     return _grown(load_packaged(*run), *solved_pore(run, time))
 
 
 @cached
 def grown_anew(run: Run, time: float) -> tuple[Pore, Solved]:
-    """The same in a mesh made at that time, whose ends are 1.5 W from the aggregate (3.1) at every level. Those of the
-    run's own mesh hang on when that was last made."""
+    """The same in a mesh made at that time, whose ends are 1.5 W from the aggregate (3.1) at every level. The ends of
+    the run's own mesh depend on the time of the last remesh."""
     return _grown(load_packaged(*run), *remeshed(load_packaged(*run), *solved_pore(run, time)))
 
 
@@ -280,7 +280,7 @@ def polygon(outline: Outline) -> shapely.Polygon:
 
 
 def solved_pore(run: Run, time: float) -> tuple[Pore, Solved]:
-    """The pore of a run at a time (h) and what is solved in it."""
+    """The pore of a run at a time (h) and its solution."""
     report = instant(run, time)
     return report.pore, report.solved
 

@@ -1,10 +1,10 @@
-"""C13-C15, C34: the mass balance as section 4 takes it, what refinement does to it, and a higher supply.
+"""C13-C15, C34: the mass balance of section 4, the effect of refinement on it, and a higher supply.
 
 The paper compares dM_X = X_m (Omega_B(t0 + dt) - Omega_B(t0)) with dM_C = u_ave(t0) (C_supply - C_effluent(t0 + dt)) dt
 (times W), and expects the ratios of the integrals of F1 to F4. Our ledger integrates F1 to F4 over the step, and closes
-to round-off; the paper's dM_C takes one end of the step for the whole of it.
+to round-off; the paper's dM_C uses the value at one end of the step for the entire step.
 
-C23, C24: what reprojection keeps, and what becomes of the mesh.
+C23, C24: the conservation of reprojection, and the quality of the meshes.
 
 C21: the steps of the paper's transient scheme.
 """
@@ -59,7 +59,7 @@ SUPPLY = 10.0
 PRINTED_EFFLUENTS = (interval("4.19"), interval("6.13"))
 
 
-#: Why other steps are no measure of these numbers, or of others.
+#: Reasons why these numbers are not computed with other steps.
 BOOKED = "the update of 12 min is the paper's, and what this balance makes of it is asked"
 
 
@@ -86,7 +86,7 @@ class Bookkeeping:
         return np.vstack([self.grown / self.synthesised / against, against[:1] / against[1:]]) - 1
 
     def corrections(self) -> np.ndarray:
-        """(2, k): factor on each effluent that makes dM_X / dM_C what is expected."""
+        """(2, k): factor on each effluent that gives dM_X / dM_C its expected value."""
         return (self.supply - self.grown / self.synthesised * self.consumed / self.volume) / self.effluent
 
 
@@ -154,7 +154,7 @@ def _of_pairs(expected: float) -> str:
 
 
 def _time_lag(book: Bookkeeping) -> str:
-    """What the paper's bookkeeping does where transport conserves."""
+    """Describe the error of the paper's bookkeeping for a transport that conserves."""
     raw = 100 * book.ratio_errors()[:, -1]
     good = [f for f in np.linspace(0.99, 1.03, 4001) if np.abs(book.ratio_errors(f)[:, -1]).max() <= 0.01]
     return (f"our transport conserves, so that what is left is the effluent at the end of a step taken for the whole "
@@ -164,7 +164,7 @@ def _time_lag(book: Bookkeeping) -> str:
 
 
 def exceeding(book: Bookkeeping) -> float:
-    """Until when (h) an effluent raised by the paper's correction exceeds its supply."""
+    """Time (h) up to which an effluent raised by the paper's correction exceeds its supply."""
     excess = (PAPER_CORRECTION * book.effluent / book.supply).max(axis=0) - 1
     last = np.flatnonzero(excess > 0).max()
     return float(np.interp(0.0, -excess[last: last + 2], book.end[last: last + 2]))
@@ -267,9 +267,9 @@ def node_masses(pore: Pore) -> tuple[np.ndarray, np.ndarray]:
 def mesh_quality() -> Finding:
     """Quality of every mesh of base, its fall in an update, and the updates between remeshes.
 
-    Of base alone: the paper says it of its mesher, and after contact a growing contact surface asks for a new mesh in
-    every update, whose quality is our mesher's. That the criterion keeps the mesh acceptable is not judged: the run
-    applies it, so that nothing could contradict it.
+    Only base is judged. The statement is about the paper's mesher; after contact a growing contact surface requires a
+    new mesh in every update, whose quality is that of our mesher. The claim does not judge whether the criterion keeps
+    the mesh acceptable: the run applies it, so no value could contradict it.
     """
     qualities, new = [aggregate.grid.quality for aggregate in bodies(BASE)], series(*BASE)["remeshed"]
     least = np.array([quality.min() for quality in qualities])
@@ -290,7 +290,7 @@ FINE = 1e-5
 FIRST = 0.0
 #: Seconds in an hour.
 HOUR = 3600.0
-#: A disturbance of the profiles, and after how many steps it is looked at.
+#: A disturbance of the profiles, and the number of steps after which it is measured.
 DISTURBED, LOOKED_AT = 0.01, (3, 6)
 
 
@@ -302,9 +302,9 @@ def step_control() -> Finding:
     disturbance of the profiles in long equal steps where no biomass grows.
 
     The error is the largest of both concentrations (over the supply) and of the biomass made (relative), against a
-    tolerance of 1e-7. Unstable is a disturbance that grows from step to step: one that dies out, however wrong a long
-    step may be, is none. The range of the steps depends on the tolerance of the control, which is not printed, and on
-    its first step, so that it is not judged: the note has it for two tolerances.
+    tolerance of 1e-7. The scheme is unstable if the disturbance grows from step to step; a disturbance that dies out is
+    stable even if a long step is inaccurate. The range of the steps depends on the tolerance of the control, which the
+    paper does not print, and on its first step. It is therefore not judged; the note has it for two tolerances.
     """
     controlled = update(PLOTTED)
     error = max(deviation(time) for time in (FIRST, PLOTTED))

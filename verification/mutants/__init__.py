@@ -3,7 +3,7 @@
 ``make mutants`` runs all of them, ``python -m verification.mutants ID`` runs one. The modules of this package, apart
 from :mod:`.runner`, are data: a mutant a row, a module a stage, and ``results.py`` for what users read. A row has an
 id, what is wrong with the mutant, the text to change, which must occur once in the file, the text that replaces it, and
-the tests that catch it. A row without tests is a mutant that cases catch: those that name it in their mark.
+the tests that catch it. If a row has no tests, the cases that name the mutant in their mark must catch it.
 """
 
 from dataclasses import dataclass

@@ -6,7 +6,7 @@ MUTANTS = (
     *changes(
         "repro/model/transport.py",
         ("hard-newton-too-soon",
-         "Newton's method stops at a defect of a hundredth, wherever that is.",
+         "Newton's method stops at a defect of a hundredth of any term.",
          "(NEWTON, ROUND_OFF, MOST_ITERATIONS, balance.problem.modified_newton)",
          "(1e-2, 1e-2, MOST_ITERATIONS, balance.problem.modified_newton)"),
         ("hard-newton-unshortened",
@@ -16,17 +16,17 @@ MUTANTS = (
     *changes(
         "repro/model/uptake_law.py",
         ("hard-front-smoothed",
-         "Half saturations do not come down to what they are, but to a hundredth of the supply.",
+         "Half saturations fall to a hundredth of the supply instead of their own values.",
          "half_saturation=np.maximum(self.half_saturation, larger)",
          "half_saturation=np.maximum(0.01 * supply, larger)")),
     *changes(
         "repro/model/kinetics.py",
         ("hard-decay-unlimited",
-         "Decay takes up acceptor at its full rate whatever there is of it.",
+         "Decay takes up acceptor at its full rate at any concentration.",
          "return m_a * self.per_acceptor(m_d), ",
          "return m_a * (self.per_acceptor(m_d) - (demand := decay_demand(self.constants))) + demand, "),
         ("hard-inert-forgotten",
-         "Decay leaves nothing: X_I is not made.",
+         "Decay leaves no inert biomass X_I.",
          "inert + active * mean * remains * step",
          "inert + 0 * active * mean * remains * step")),
     *changes(
@@ -42,7 +42,7 @@ MUTANTS = (
          "landing=LANDED if cut else 0.0",
          "landing=-np.inf"),
         ("hard-estimate-ignored",
-         "Every step is accepted, however much its estimate is over the tolerance.",
+         "Every step is accepted, even if its estimate exceeds the tolerance.",
          "EXCESS * tolerance / duration",
          "np.inf")),
     *changes(
@@ -82,19 +82,19 @@ MUTANTS = (
     *changes(
         "repro/fem/transfer.py",
         ("hard-shallowest-taken",
-         "Of the triangles whose box holds a place, the one in which it lies the least deep is taken.",
+         "A point is located in the triangle in which it lies least deep, of those whose box contains it.",
          "best = np.lexsort((-depth, place))",
          "best = np.lexsort((depth, place))")),
     *changes(
         "repro/fem/mesh.py",
         ("hard-poor-mesh-kept",
-         "A mesh is kept however poor its triangles are.",
+         "A mesh with triangles of any quality is kept.",
          "straight = self.areas.min() > 0 and np.count_nonzero(self.quality < POOR) <= POOR_ALLOWED",
          "straight = self.areas.min() > 0")),
     *changes(
         "repro/fem/assembly.py",
         ("hard-keys-overflow",
-         "Places in the sparse matrix are counted in 32 bits, which end at 46 000 unknowns.",
+         "Entries of the sparse matrix have numbers of 32 bits, which end at 46 000 unknowns.",
          "np.unique(columns * len(rank) + rows, return_inverse=True)",
          "np.unique(np.minimum(columns * len(rank) + rows, 2**31 - 1), return_inverse=True)")),
     *changes(
@@ -124,7 +124,7 @@ MUTANTS = (
     *changes(
         "repro/model/flow.py",
         ("family-rest-of-the-pore-forgotten",
-         "The part of the pore that is not meshed loses no head.",
+         "The unmeshed part of the pore loses no head.",
          "poiseuille_loss(length - (mesh.ends[1] - mesh.ends[0]), mesh.width)",
          "poiseuille_loss(0 * length, mesh.width)")),
     *changes(

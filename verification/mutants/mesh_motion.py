@@ -18,7 +18,7 @@ MUTANTS = (
          "divergence(space)[wet]",
          "2 * divergence(space)[wet]"),
         ("walls-held",
-         "Nodes of the walls are held along them too.",
+         "Nodes of the walls do not slide along them.",
          "constrained[topology.walls, 1] = True",
          "constrained[topology.walls] = True"),
         ("outlet-moves",

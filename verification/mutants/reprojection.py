@@ -38,7 +38,7 @@ MUTANTS = (
          "flux = coupling * (projected[ends[:, 0], column] - projected[ends[:, 1], column])",
          "flux = 0 * coupling"),
         ("bounded-unlimited",
-         "The fluxes are not limited; what is out of bounds is cut off, with its mass.",
+         "The fluxes are not limited; values out of bounds are cut off, with their mass.",
          "np.minimum(1.0, r / np.where(p > 0, p, 1.0))",
          "np.minimum(1.0, 1 + r / np.where(p > 0, p, 1.0))"),
         ("bounded-one-sided",

@@ -2,7 +2,7 @@
 
 Each step solves for the heads of the pores (OpenPNM's StokesFlow), follows the water through the throats, and advances
 the areas with the midpoint rule of their logarithms. Water mixes completely in pores, which hold no biomass.
-`python -m verification.network lattice` runs ten of the throats with this solver.
+`python -m verification.network lattice` advances it by 48 h in an environment that also has OpenPNM.
 """
 
 from collections.abc import Callable
@@ -20,7 +20,7 @@ LENGTH = 600.0  # um, of a throat
 WIDTHS, RADII = (45.0, 75.0), (4.0, 8.0)
 #: Head over the network (um), and supplies of acceptor and donor (mg/L).
 HEAD, SUPPLIES = 40.0, (8.0, 5.0)
-HOURS, STEPS = 48.0, 48
+HOURS, STEP = 48, 1.0  # h
 SEED = 2001
 #: Conductance of a throat is g W^3 / (12 nu L) per metre of depth; g / (12 nu) in 1/(um h).
 CONDUCTANCE = 9.81e6 / (12 * 1.003e6) * 3600
@@ -100,13 +100,13 @@ class Lattice:
         raise RuntimeError(f"the concentrations of the network do not rest after {SWEEPS} sweeps")
 
 
-def advance(lattice: Lattice, count: int = STEPS) -> list[State]:
+def advance(lattice: Lattice, count: int = HOURS) -> list[State]:
     """States at the starts of some steps and at the end of the last."""
-    area, step, states = lattice.seeds, HOURS / STEPS, []
+    area, states = lattice.seeds, []
     for number in range(count):
-        state, growth = lattice.state(number * step, area)
+        state, growth = lattice.state(number * STEP, area)
         states.append(state)
-        _, middle = lattice.state((number + 0.5) * step, area * np.exp(0.5 * step * growth / area))
-        half = area * np.exp(0.5 * step * growth / area)
-        area = area * np.exp(step * middle / half)
-    return [*states, lattice.state(count * step, area)[0]]
+        half = area * np.exp(0.5 * STEP * growth / area)
+        _, middle = lattice.state((number + 0.5) * STEP, half)
+        area = area * np.exp(STEP * middle / half)
+    return [*states, lattice.state(count * STEP, area)[0]]

@@ -1,8 +1,8 @@
-"""The law: its table of half-discs and of the mean of the plugs that growth makes, how far all other shapes are from
-them, how it is judged by shapes that it has not seen, and the page that tells it.
+"""The law for networks: its table, from half-discs and the mean of grown plugs; its bounds, from all other shapes of
+the fit; its judgement by shapes outside of the fit; and its page.
 
-Fifty shapes that the fit of the law has not seen: half-discs, drawn bodies and plugs, and what growth makes, of
-sizes, positions, pores, velocities and lambdas drawn at random.
+The fifty test shapes are half-discs, drawn bodies and plugs, and grown shapes. Their sizes, positions, pores,
+velocities and lambdas are random.
 """
 
 from collections.abc import Callable, Iterator
