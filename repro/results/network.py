@@ -57,11 +57,11 @@ class Transport(NamedTuple):
 
 
 #: Before and after contact, as ``python -m verification.network uptake`` fits them.
-TRANSPORTS = Transport(8.91, 0.43, 1.01, 0.5), Transport(129.0, 0.0, 0.364, 0.8)
+TRANSPORTS = Transport(8.5, 0.364, 1.05, 0.57), Transport(12.7, 2.18, 0.529, 0.259)
 #: Relative bound of the uptake, of any aggregate: 1.25 times the largest error of the fit. Before
 #: contact it rises with the square of Pe A / W^2 of the donor by this factor, since boundary layers
 #: form beside a thick body in a fast flow.
-UPTAKE_BOUND, FAST = 0.07, 0.02
+UPTAKE_BOUND, FAST = 0.0761, 0.02
 #: Ranges of the uptake: widths (um), mean velocities (m/d) and supplies (mg/L).
 WIDTHS, FASTEST, LARGEST_SUPPLY = (40.0, 150.0), 10.0, 20.0
 #: Halvings of the interval of the donor's uptake, and of that of the acceptor's for decay, which

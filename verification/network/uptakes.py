@@ -89,17 +89,19 @@ def deviations(columns: dict[str, np.ndarray], law: Throats) -> np.ndarray:
 
 
 def fitted(columns: dict[str, np.ndarray]) -> tuple[Transport, Transport]:
-    """The constants before contact and after it, by least squares of the deviations, to three digits."""
+    """The constants before contact and after it, by least squares of the deviations over the spread of the bound, to
+    three digits."""
     spanned = columns["area"] > known(False)[1] * columns["width"]**2
     return _fitted(columns, ~spanned), _fitted(columns, spanned)
 
 
 def _fitted(columns: dict[str, np.ndarray], selected: np.ndarray) -> Transport:
     chosen = {name: values[selected] for name, values in columns.items()}
+    spread = throats(chosen).spread()
 
     def residuals(logarithms: np.ndarray) -> np.ndarray:
         one = _constants(logarithms)
-        return deviations(chosen, throats(chosen)._replace(transports=(one, one))).ravel()
+        return (deviations(chosen, throats(chosen)._replace(transports=(one, one))) / spread).ravel()
 
     start = [np.log(START.sherwood), START.power, np.log(START.plug), START.plug_power]
     logarithms = least_squares(residuals, start, diff_step=1e-2, xtol=1e-6, ftol=1e-6).x
