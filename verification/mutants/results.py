@@ -675,7 +675,7 @@ MUTANTS = (
          "The water that passes an aggregate keeps the supply.",
          "supply * mean - taken * resistance",
          "supply - taken * resistance",
-         f"{NETWORK}limits_of_the_uptake"),
+         f"{NETWORK}uptakes_outside_of_the_fit_are_within_the_bound"),
         ("uptake-decay-left-out-of-growth",
          "The growth by the law of uptake has no decay.",
          "constants.yield_coefficient * taken - decayed)",
