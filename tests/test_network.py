@@ -234,15 +234,6 @@ def test_uptakes_outside_of_the_range_are_refused(values, message):
     assert np.isnan(repro.uptake(*columns, outside="nan")).tolist() == [[False, True]] * 4
 
 
-def test_the_network_example_runs():
-    """Two hours of the network with OpenPNM: aggregates grow, and the flow falls. Skipped without the package."""
-    pytest.importorskip("openpnm")
-    from verification.network import lattice
-    states = lattice.advance(lattice.Lattice(), 2)
-    assert len(states[0].area) == 100
-    assert (states[-1].area >= states[0].area).sum() > 80 and states[-1].flow < states[0].flow
-
-
 def test_the_page_shows_the_present_table():
     verdict = law.judged(law.read(unseen=True))
     assert command.PAGE.read_text(encoding="utf-8") == law.page(law.read(unseen=False), verdict)

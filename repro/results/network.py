@@ -173,13 +173,14 @@ def uptake(area: ArrayLike, width: ArrayLike, velocity: ArrayLike, acceptor: Arr
     Parameters
     ----------
     area : array_like
-        Areas of the aggregates, um^2; zero in an empty throat. All arguments broadcast.
+        Areas of the aggregates, um^2, of any shape; zero in an empty throat.
     width : array_like
-        Widths of the throats, um.
+        Widths of the throats, um. Its shape broadcasts with the areas.
     velocity : array_like
-        Mean velocities in the throats, m/d.
+        Mean velocities in the throats, m/d. Its shape broadcasts with the areas.
     acceptor, donor : array_like
-        Supplies: concentrations in the water that enters the throats, mg/L.
+        Supplies: concentrations in the water that enters the throats, mg/L. Their shapes broadcast
+        with the areas.
     outside : {"raise", "nan"}
         As for :func:`added_resistance`.
 

@@ -4,8 +4,7 @@ Writes the table `repro/results/network.csv`; the page `docs/network.md`; and `v
 shapes of the fit at one lambda and the test shapes, from which `make figures` draws its picture. The exit status is 1
 if a test shape lies outside the law's bounds.
 
-With an argument it does another task instead: `uptake` solves the states of the law of uptake, fits and judges it;
-`lattice` advances a network by both laws (needs OpenPNM).
+With the argument `uptake` it solves the states of the law of uptake instead, fits and judges this law.
 """
 
 import sys
@@ -13,17 +12,14 @@ from pathlib import Path
 
 from repro.results import write_table, write_text
 from repro.results.network import TABLE, TRANSPORTS, UPTAKE_BOUND
-from verification.network import lattice, law, uptakes
+from verification.network import law, uptakes
 
 PAGE = Path(__file__).parents[2] / "docs" / "network.md"
 
 
 def main() -> int:
     """Entry point; returns the exit status."""
-    others = {"uptake": uptake_law, "lattice": network}
-    if sys.argv[1:]:
-        return others[sys.argv[1]]()
-    return resistance()
+    return uptake_law() if sys.argv[1:] == ["uptake"] else resistance()
 
 
 def uptake_law() -> int:
@@ -42,13 +38,6 @@ def uptake_law() -> int:
     apart, bounds = uptakes.judged()
     print(f"{(apart <= bounds).sum()} of {len(bounds)} states that the fit has not seen are within its bound")
     return int((apart > bounds).any())
-
-
-def network() -> int:
-    """Advance the network and print its flow."""
-    states = lattice.advance(lattice.Lattice())
-    print(f"{states[-1].time:g} h: the flow is {states[-1].flow / states[0].flow:.4f} of that at the start")
-    return 0
 
 
 def resistance() -> int:
