@@ -214,9 +214,9 @@ to 10 m/d and 20 mg/L.
 {_numbers(seen)}. Shapes do not change in a state; velocities are
 {uptakes.VELOCITIES[0]:g} to {uptakes.VELOCITIES[1]:g} m/d,
 supplies {uptakes.SUPPLIES[0]:g} to {uptakes.SUPPLIES[1]:g} mg/L.
-The bound is {uptakes.FACTOR:g} times the largest error of the fit, {100 * UPTAKE_BOUND:.3g} %; before contact it is more
-for a thick body in a fast flow, by a factor of 1 + {FAST:g} (Pe A / W^2)^2. This rule precedes the solution of the
-states below. The factor is from an earlier fit, with bounds of 5 % and, since one of 50 states had 5.9 %, of 7 %.
+The bound is {uptakes.FACTOR:g} times the largest error of the fit, {100 * UPTAKE_BOUND:.3g} %; before contact it is
+more for a thick body in a fast flow, by a factor of 1 + {FAST:g} (Pe A / W^2)^2. This rule precedes the solution of
+the states below. The factor is from an earlier fit, with bounds of 5 % and, since one of 50 states had 5.9 %, of 7 %.
 
 Another seed draws {len(bounds)} other states: {_numbers(new)}.
 {int((apart <= bounds).sum())} are within the bound; half of them are within {100 * np.median(apart):.2g} % of the law.
