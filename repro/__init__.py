@@ -24,7 +24,8 @@ Functions; every argument after these is given by its name:
     compare(folders, file)                  a page that compares runs
     sweep(scene, vary, folder, overrides)   runs with varied keys, their tables and page
     simulate(scene, overrides)              the full state at every row, in um, h, mg/L
-    added_resistance(area, width, spanned)  a law for models of pore networks
+    added_resistance(area, width, spanned)  resistance of an aggregate in a throat
+    uptake(area, width, velocity, acceptor, donor)  of both substrates by an aggregate in a throat
 
 Errors: ``SceneError`` (a scene is refused), ``OutputError`` (a folder or file is refused),
 ``SimulationError`` (a stage fails), ``TypeError`` (an argument is refused). ``PoreEnd``,
@@ -54,7 +55,7 @@ Sections of the paper and their modules, which name the equations that they solv
          error control (not the paper's)    repro.march.midpoint, .stepping, .step_control
          the end as a fold                  repro.march.folding, .detachment
          the loop of both                   repro.march.loop, .simulation
-    4, 5  results, a law for networks       repro.results, .columns, .arrays, .tables, .network
+    4, 5  results, laws for networks        repro.results, .columns, .arrays, .tables, .network
 
 Data flow:
 
@@ -88,7 +89,7 @@ if TYPE_CHECKING:
     from repro.march.simulation import simulate
     from repro.preflight.checked import check
     from repro.report import compare
-    from repro.results.network import added_resistance
+    from repro.results.network import added_resistance, uptake
     from repro.results.tables import Results, solve
     from repro.runs.scripts import load_run, resume, run
     from repro.scene import Scene, load_scene
@@ -105,7 +106,7 @@ else:
                 "added_resistance": "results.network", "check": "preflight.checked",
                 "compare": "report", "load_run": "runs.scripts", "load_scene": "scene",
                 "resume": "runs.scripts", "run": "runs.scripts", "simulate": "march.simulation",
-                "solve": "results.tables", "sweep": "sweeps.driver"}
+                "solve": "results.tables", "sweep": "sweeps.driver", "uptake": "results.network"}
 
     def __getattr__(name: str):
         if name == "__version__":
@@ -119,4 +120,4 @@ else:
 
 #: ``help`` lists these; errors are in the text above, so that functions come before them.
 __all__ = ["Results", "Scene", "added_resistance", "check", "compare", "load_run", "load_scene",
-           "resume", "run", "simulate", "solve", "sweep"]
+           "resume", "run", "simulate", "solve", "sweep", "uptake"]

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import repro
-from repro.results.network import TABLE, known
+from repro.results.network import CONTACT, TABLE, TRANSPORTS, UPTAKE_BOUND, known
 from verification.network import __main__ as command
-from verification.network import law, shapes
+from verification.network import law, shapes, uptakes
 from verification.network.shapes import RATIOS
 
 LAMBDA = 2000.0
@@ -99,23 +99,139 @@ def test_a_pore_twice_as_wide_takes_four_times_the_area():
 
 
 @pytest.mark.parametrize("area, spanned, ratio, message", [
-    (0.0, False, LAMBDA, "area / width^2 = 0 is not known for a half-disc before contact (spanned=False); 0.003927 "),
-    (1.6, False, LAMBDA, "area / width^2 = 1.6 is not known for a half-disc"),
-    (1.4, True, LAMBDA, "area / width^2 = 1.4 is not known for a plug (spanned=True); 1.6 to 4.5 is accepted"),
-    (5.0, True, LAMBDA, "area / width^2 = 5 "), (float("nan"), True, LAMBDA, "area / width^2 = nan "),
-    (1.0, False, 99.0, "viscosity_ratio = 99 is not known for an aggregate; 100 to 1e+04 is accepted"),
+    (1.6, False, LAMBDA, "throat 1: area / width^2 before contact (spanned=False) = 1.6 is not known; 0 to 1.509 is "),
+    (1.4, True, LAMBDA, "throat 1: area / width^2 of a plug (spanned=True) = 1.4 is not known; 1.41 to 4.5 is "),
+    (5.0, True, LAMBDA, "throat 1: area / width^2 of a plug (spanned=True) = 5 "),
+    (float("nan"), True, LAMBDA, "throat 1: area / width^2 of a plug (spanned=True) = nan "),
+    (-1.0, None, LAMBDA, "throat 1: area / width^2 = -1 is not known; 0 to 4.5 is accepted"),
+    (5.0, None, LAMBDA, "throat 1: area / width^2 = 5 "),
+    (1.0, False, 99.0, "viscosity_ratio = 99 is not known; 100 to 1e+04 is accepted"),
     (1.0, False, 1.1e4, "viscosity_ratio = 11000 "), (1.0, False, float("nan"), "viscosity_ratio = nan ")])
 def test_arguments_outside_of_the_table_are_refused(area, spanned, ratio, message):
-    """The message is one line."""
+    """The message is one line and has the index of the throat. With outside="nan" that throat alone has no result."""
+    areas = [1.0 + bool(spanned), area]
     with pytest.raises(ValueError) as error:
-        repro.added_resistance([area, 1.0 + spanned], 1.0, spanned, ratio)
+        repro.added_resistance(areas, 1.0, spanned, ratio)
     assert str(error.value).startswith(f"added_resistance: {message}") and "\n" not in str(error.value)
+    if ratio == LAMBDA:
+        without = np.isnan(repro.added_resistance(areas, 1.0, spanned, ratio, outside="nan"))
+        assert without.tolist() == [[False, True]] * 3
 
 
 @pytest.mark.parametrize("width", [0.0, -50.0, float("nan")])
 def test_a_pore_without_width_is_refused(width):
-    with pytest.raises(ValueError, match="^added_resistance: width is not known; more than zero is accepted$"):
-        repro.added_resistance(2500.0, [100.0, width], False)
+    areas, widths = np.full((2, 2), 2500.0), [[100.0, 100.0], [width, 100.0]]
+    with pytest.raises(ValueError, match=r"^added_resistance: throat 1, 0: width = .* is not known; more than zero is"):
+        repro.added_resistance(areas, widths, False)
+    without = np.isnan(repro.added_resistance(areas, widths, outside="nan").length)
+    assert without.tolist() == [[False, False], [True, False]]
+    with pytest.raises(ValueError, match="^added_resistance: outside = 'skip' is not known; 'raise' or 'nan' is acc"):
+        repro.added_resistance(areas, 100.0, outside="skip")
+
+
+def test_an_empty_pore_adds_nothing_and_thin_bodies_follow_half_discs():
+    """Below the table's first thickness, 0.05 W, the law is within 0.4 % of half-discs and continuous."""
+    assert (np.array(repro.added_resistance(0.0, 50.0)) == 0).all()
+    for thickness in (0.01, 0.025, 0.04):
+        one = shapes.sample(shapes.half_disc(thickness), (100.0, LAMBDA))
+        for ratio, length in zip(one.ratios, one.lengths):
+            assert repro.added_resistance(one.share, 1.0, False, ratio).length == pytest.approx(length, rel=4e-3)
+    first = known(False)[0]
+    below, above = (np.array(repro.added_resistance(first * (1 + side), 1.0)) for side in (-1e-9, 1e-9))
+    assert below == pytest.approx(above, rel=1e-7)
+
+
+def test_the_area_decides_the_contact():
+    """Without `spanned` the law is that of the kind that the area has; near contact its bounds include both kinds."""
+    share = np.array([0.002, 0.5, 1.3, 1.45, 1.5, 1.52, 1.58, 1.61, 4.5])
+    by_area = np.array(repro.added_resistance(share, 1.0))
+    kinds = share > known(False)[1]
+    assert by_area[0] == pytest.approx(repro.added_resistance(share, 1.0, kinds).length, rel=1e-12)
+    either = (share >= CONTACT[0]) & (share <= CONTACT[1])
+    open_film = np.array(repro.added_resistance(np.minimum(share[either], known(False)[1]), 1.0, False))
+    plug = np.array(repro.added_resistance(share[either], 1.0, True))
+    assert by_area[1, either] == pytest.approx(open_film[1], rel=1e-12)
+    assert by_area[2, either] == pytest.approx(plug[2], rel=1e-12)
+    alone = np.array(repro.added_resistance(share[~either], 1.0, kinds[~either]))
+    assert by_area[:, ~either] == pytest.approx(alone, rel=1e-12)
+
+
+@pytest.mark.parametrize("contact_is_given", [False, True])
+def test_shapes_near_contact_are_within_the_bounds(contact_is_given):
+    """Those of the fit and those that it has not seen, with contact and without it."""
+    outside, kinds = [], []
+    for unseen in (False, True):
+        columns = law.read(unseen)
+        near = (columns["area_over_width2"] >= CONTACT[0]) & (columns["area_over_width2"] <= CONTACT[1])
+        for _, _, spanned, ratio, share, length in zip(*(columns[name][near] for name in law.COLUMNS)):
+            one = repro.added_resistance(share, 1.0, bool(spanned) if contact_is_given else None, ratio)
+            kinds.append(spanned)
+            if not one.least <= length <= one.most:
+                outside.append((share, ratio, length / one.length))
+    assert outside == []
+    assert kinds.count(1) >= 10 and kinds.count(0) >= 10
+
+
+def test_the_constants_of_the_uptake_are_those_of_the_fit():
+    """A fit to the committed states from another start, to three digits; and the bound, from its largest error."""
+    states = uptakes.read(uptakes.FIT)
+    assert uptakes.fitted(states) == TRANSPORTS
+    assert uptakes.bound(states, TRANSPORTS) == UPTAKE_BOUND
+
+
+def test_uptakes_outside_of_the_fit_are_within_the_bound():
+    """Fifty half-discs and grown shapes of another seed, before contact and after it."""
+    states = uptakes.read(uptakes.NEW)
+    apart, bound = uptakes.judged()
+    assert len(apart) == 50 and (apart <= bound).all()
+    assert (states["grown"].sum(), states["spanned"].sum()) == (25, 4)
+    assert np.median(apart) < 0.01 and np.median(bound) < 0.1
+
+
+def test_uptake_of_a_new_state():
+    """Solved here: a half-disc in a state that no table has."""
+    one = uptakes.solved(shapes.half_disc(0.5, 80.0, 0.0, shapes.QUICK), 0.8, (6.0, 3.0))
+    law_of_it = repro.uptake(one.area, 80.0, 0.8, 6.0, 3.0)
+    assert law_of_it.acceptor == pytest.approx(one.acceptor_uptake, rel=float(law_of_it.bound))
+    assert law_of_it.donor == pytest.approx(one.donor_uptake, rel=float(law_of_it.bound))
+
+
+def test_limits_of_the_uptake():
+    """A small aggregate in a fast flow takes up at the rates of the supply. A slow flow brings all that is taken up."""
+    active, kinetics = 3e4, repro.load_scene("base").kinetics
+    taken = repro.uptake(20.0, 100.0, 10.0, 20.0, 20.0)
+    fastest = 20.0 * active * kinetics.maximum_utilization_rate
+    assert taken.donor == pytest.approx(fastest * (20 / 21)**2, rel=0.02)
+    inflow = 50.0 * 1e-3 * 1e6 / 24
+    starved = repro.uptake(2000.0, 50.0, 1e-3, [4.0, 20.0], [20.0, 4.0])
+    assert starved.acceptor[0] == pytest.approx(4.0 * inflow, rel=0.01)
+    assert (starved.acceptor <= np.array([4.0, 20.0]) * inflow * (1 + 1e-6)).all()
+    assert (starved.donor <= np.array([20.0, 4.0]) * inflow).all()
+
+
+def test_growth_follows_from_the_uptake():
+    """(7)-(10): biomass made = Y donor - (acceptor - F donor) / d_c; without donor the aggregate decays."""
+    kinetics = repro.load_scene("base").kinetics
+    taken = repro.uptake([100.0, 3000.0, 9000.0], 60.0, 0.5, 8.0, [1e-4, 5.0, 5.0])
+    decayed = (taken.acceptor - 1.52 * taken.donor) / kinetics.decay_oxygen_demand
+    made = kinetics.yield_coefficient * taken.donor - decayed
+    assert taken.growth == pytest.approx(made / kinetics.maximum_density, rel=1e-12)
+    assert taken.growth[0] < 0 < taken.growth[1]
+    for nothing in (repro.uptake(0.0, 60.0, 1.0, 8.0, 5.0), repro.uptake(900.0, 60.0, 0.0, 8.0, 5.0)):
+        assert [float(values) for values in nothing] == [0, 0, 0, 0]
+
+
+@pytest.mark.parametrize("values, message", [
+    ((100.0, 30.0, 1.0, 8.0, 5.0), "width = 30 is not known; 40 to 150 is accepted"),
+    ((1e5, 60.0, 1.0, 8.0, 5.0), "area / width^2 = 27.7778 "), ((100.0, 60.0, 11.0, 8.0, 5.0), "velocity = 11 "),
+    ((100.0, 60.0, -1.0, 8.0, 5.0), "velocity = -1 "), ((100.0, 60.0, 1.0, 21.0, 5.0), "acceptor = 21 "),
+    ((100.0, 60.0, 1.0, 8.0, float("nan")), "donor = nan is not known; 0 to 20 is accepted")])
+def test_uptakes_outside_of_the_range_are_refused(values, message):
+    columns = [[good, bad] for good, bad in zip((100.0, 60.0, 1.0, 8.0, 5.0), values)]
+    with pytest.raises(ValueError) as error:
+        repro.uptake(*columns)
+    assert str(error.value).startswith(f"uptake: throat 1: {message}")
+    assert np.isnan(repro.uptake(*columns, outside="nan")).tolist() == [[False, True]] * 4
 
 
 def test_the_page_shows_the_present_table():

@@ -3,20 +3,45 @@
 Writes the table `repro/results/network.csv`; the page `docs/network.md`; and `verification/network/shapes.csv`, the
 shapes of the fit at one lambda and the test shapes, from which `make figures` draws its picture. The exit status is 1
 if a test shape lies outside the law's bounds.
+
+With the argument `uptake` it solves the states of the law of uptake instead, fits and judges this law.
 """
 
 import sys
 from pathlib import Path
 
 from repro.results import write_table, write_text
-from repro.results.network import TABLE
-from verification.network import law
+from repro.results.network import TABLE, TRANSPORTS, UPTAKE_BOUND
+from verification.network import law, uptakes
 
 PAGE = Path(__file__).parents[2] / "docs" / "network.md"
 
 
 def main() -> int:
     """Entry point; returns the exit status."""
+    return uptake_law() if sys.argv[1:] == ["uptake"] else resistance()
+
+
+def uptake_law() -> int:
+    """Draw the states of the fit, fit the law of uptake, then draw other states and judge it."""
+    names = list(uptakes.State._fields)
+    rows = [list(one) for one in uptakes.states(uptakes.FIT)]
+    write_table(uptakes.TABLE, names, rows)
+    transports = uptakes.fitted(uptakes.read(uptakes.FIT))
+    bound = uptakes.bound(uptakes.read(uptakes.FIT), transports)
+    print(f"fit of {len(rows)} states:\n{transports[0]}\n{transports[1]}\nUPTAKE_BOUND = {bound}", flush=True)
+    if (transports, bound) != (TRANSPORTS, UPTAKE_BOUND):
+        print(f"these are not the constants of {TABLE.parent}/network.py: copy them and start again")
+        return 1
+    write_table(uptakes.TABLE, names, rows + [list(one) for one in uptakes.states(uptakes.NEW)])
+    write_text(PAGE, law.page(law.read(unseen=False), law.judged(law.read(unseen=True))))
+    apart, bounds = uptakes.judged()
+    print(f"{(apart <= bounds).sum()} of {len(bounds)} states that the fit has not seen are within its bound")
+    return int((apart > bounds).any())
+
+
+def resistance() -> int:
+    """Make the law of resistance, and judge it."""
     discs, other_shapes = law.half_discs(), list(law.other_shapes())
     write_table(TABLE, law.TABLE_COLUMNS, law.table_rows(discs, other_shapes))
     print(f"{TABLE.name}: made of {len(discs)} half-discs and {len(other_shapes)} other shapes", flush=True)

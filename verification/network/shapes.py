@@ -29,6 +29,8 @@ THICKER, LEANING = (0.99, 1.03), 0.05
 ENDS, UPSTREAM = (1.15, 1.4), 0.6
 #: Least supply (mg/L) over W^2 (um2): with less growth is limited by diffusion, and bodies are thicker than that.
 LEAST_SUPPLY = 1 / 2500
+#: Hours of a drawn run.
+END = 50
 #: A quarter of an ellipse that is cut here meets the upper wall at an angle.
 STEEPEST = np.radians(75.0)
 #: A film is W / 50 at least.
@@ -53,6 +55,18 @@ class Growth:
         supplies = {name: {"supply": f"{self.supply} mg/L"} for name in SUBSTRATES}
         return load_scene({**tables(self.width, aggregate, self.velocity), "substrates": supplies, "growth": {}},
                           (*QUICK, *until(*range(self.end + 1))))
+
+
+def drawn_run(random: np.random.Generator) -> Growth:
+    """A run with a drawn width, velocity, supply and seed."""
+    width, velocity = random.uniform(40, 150), log_uniform(random, 0.5, 6)
+    supply = log_uniform(random, max(LEAST_SUPPLY * width**2, 4), 20)
+    return Growth(width, velocity, supply, random.uniform(0.05, 0.15) * width, random.uniform(-0.5, 0.5) * width, END)
+
+
+def log_uniform(random: np.random.Generator, low: float, high: float) -> float:
+    """Between two values, evenly in the logarithm."""
+    return float(np.exp(random.uniform(np.log(low), np.log(high))))
 
 
 def tables(width: float, aggregate: dict, velocity: float = 1.0) -> dict:

@@ -1,0 +1,159 @@
+"""Uptake of both substrates by aggregates in throats: whole solutions of drawn states, the fit of the constants of
+`repro.uptake` to a part of them, and its judgement by the others."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from repro.march.folding import Fold
+from repro.march.loop import PoreEnd
+from repro.march.simulation import simulate
+from repro.model import pore
+from repro.model.pore import Pore
+from repro.results import read_table
+from repro.results.network import Throats, Transport, known, throats_of
+from repro.scene import load_scene
+from verification.claims.runs import SUBSTRATES
+from verification.network import shapes
+from verification.network.shapes import Growth, log_uniform
+
+TABLE = Path(__file__).with_name("uptakes.csv")
+#: Ranges of the states: mean velocity (m/d), supply of each substrate (mg/L), width (um), thickness of half-discs over
+#: the width.
+VELOCITIES, SUPPLIES, WIDTHS, THICKNESSES = (1e-4, 10.0), (0.2, 20.0), (40.0, 150.0), (0.05, 0.98)
+#: Parts of the states, and the seed of each.
+FIT, NEW = 0, 1
+SEEDS = {FIT: 20261126, NEW: 20261201}
+#: Of each part: half-discs, runs whose shapes it uses, states at each shape.
+HALF_DISCS, RUNS, STATES = {FIT: 120, NEW: 25}, {FIT: 4, NEW: 2}, {FIT: 3, NEW: 1}
+#: Each shape of a run is larger than the one before by this factor; the largest over W^2; and the shapes of NEW, evenly
+#: from all of its runs.
+APART, LARGEST, NEW_GROWN = 1.2, 4.5, 25
+#: The bound of the law is the largest error of the fit, over the spread of the bound, times this factor.
+FACTOR = 1.25
+#: Where the fit starts: diffusion through a layer of a tenth of W, and water that is half mixed.
+START = Transport(10.0, 0.5, 0.5, 0.5)
+ARGUMENTS = ("area", "width", "velocity", *SUBSTRATES)
+
+
+class State(NamedTuple):
+    """An aggregate and its uptake. part: FIT or NEW; grown, spanned: 0 or 1; area: um2; width: um;
+    velocity: m/d; acceptor, donor: supplies, mg/L; acceptor_uptake, donor_uptake: pg/m/h."""
+
+    part: int
+    grown: int
+    spanned: int
+    area: float
+    width: float
+    velocity: float
+    acceptor: float
+    donor: float
+    acceptor_uptake: float
+    donor_uptake: float
+
+
+def states(part: int) -> Iterator[State]:
+    """States of a part."""
+    random = np.random.default_rng(SEEDS[part])
+    for _ in range(HALF_DISCS[part]):
+        width = log_uniform(random, *WIDTHS)
+        body = shapes.half_disc(random.uniform(*THICKNESSES), width, 0.0, shapes.QUICK)
+        yield solved(body, *_drawn(random), False, part)
+    bodies = [body for _ in range(RUNS[part]) for body in _grown(shapes.drawn_run(random))]
+    if part == NEW:
+        bodies = [bodies[k] for k in np.linspace(0, len(bodies) - 1, NEW_GROWN).astype(int)]
+    for body in bodies:
+        for _ in range(STATES[part]):
+            yield solved(body, *_drawn(random), True, part)
+
+
+def read(part: int) -> dict[str, np.ndarray]:
+    """The columns of the fit or of a test."""
+    columns = read_table(TABLE)
+    return {name: values[columns["part"] == part] for name, values in columns.items()}
+
+
+def throats(columns: dict[str, np.ndarray]) -> Throats:
+    """The throats of some states."""
+    return throats_of(*(columns[name] for name in ARGUMENTS))
+
+
+def deviations(columns: dict[str, np.ndarray], law: Throats) -> np.ndarray:
+    """(2, n) ln of the uptake of acceptor and donor over that of the law."""
+    solutions = np.array([columns[f"{name}_uptake"] for name in SUBSTRATES])
+    return np.log(solutions / law.uptake()[:2])
+
+
+def fitted(columns: dict[str, np.ndarray]) -> tuple[Transport, Transport]:
+    """The constants before contact and after it, by least squares of the deviations over the spread of the bound, to
+    three digits."""
+    spanned = columns["area"] > known(False)[1] * columns["width"]**2
+    return _fitted(columns, ~spanned), _fitted(columns, spanned)
+
+
+def _fitted(columns: dict[str, np.ndarray], selected: np.ndarray) -> Transport:
+    chosen = {name: values[selected] for name, values in columns.items()}
+    spread = throats(chosen).spread()
+
+    def residuals(logarithms: np.ndarray) -> np.ndarray:
+        one = _constants(logarithms)
+        return (deviations(chosen, throats(chosen)._replace(transports=(one, one))) / spread).ravel()
+
+    start = [np.log(START.sherwood), START.power, np.log(START.plug), START.plug_power]
+    logarithms = least_squares(residuals, start, diff_step=1e-2, xtol=1e-6, ftol=1e-6).x
+    return Transport(*(float(f"{value:.3g}") for value in _constants(logarithms)))
+
+
+def _constants(logarithms: np.ndarray) -> Transport:
+    """The constants of the fit's unknowns: both factors are positive."""
+    sherwood, power, plug, plug_power = logarithms
+    return Transport(np.exp(sherwood), power, np.exp(plug), plug_power)
+
+
+def bound(columns: dict[str, np.ndarray], transports: tuple[Transport, Transport]) -> float:
+    """The law's least bound, to three digits: FACTOR times the largest deviation of the fit over its spread."""
+    law = throats(columns)._replace(transports=transports)
+    apart = np.expm1(np.abs(deviations(columns, law))).max(axis=0)
+    return float(f"{FACTOR * (apart / law.spread()).max():.3g}")
+
+
+def judged(part: int = NEW) -> tuple[np.ndarray, np.ndarray]:
+    """(n,) the larger relative deviation of acceptor and donor from the law, and (n,) its bound."""
+    columns = read(part)
+    law = throats(columns)
+    return np.expm1(np.abs(deviations(columns, law))).max(axis=0), law.bound()
+
+
+def _grown(run: Growth) -> Iterator[Pore]:
+    """Shapes of a run, each larger than the one before by a factor of APART."""
+    last = 0.0
+    with suppress(PoreEnd, Fold):
+        for instant in simulate(run.scene()):
+            area = instant.pore.boundary.area
+            if area > LARGEST * run.width**2:
+                return
+            if area > APART * last:
+                last = area
+                yield instant.pore
+
+
+def solved(body: Pore, velocity: float, supplies: Sequence[float], grown: bool = False, part: int = FIT) -> State:
+    """The uptake of an aggregate at a mean velocity (m/d) and supplies of acceptor and donor (mg/L)."""
+    width = body.mesh.width
+    tables = shapes.tables(width, {"radius": f"{0.1 * width} um"}, velocity)
+    tables["substrates"] = {name: {"supply": f"{supply} mg/L"} for name, supply in zip(SUBSTRATES, supplies)}
+    scene = load_scene({**tables, "growth": {"end": "0 h"}}, shapes.QUICK)
+    if not grown:
+        body = pore.seeded(scene, outline=body.boundary)
+    acceptor, donor = pore.solve(scene, body).substrates.fluxes
+    return State(part, int(grown), int(body.contact), body.boundary.area, width, velocity, *supplies,
+                 acceptor.consumed, donor.consumed)
+
+
+def _drawn(random: np.random.Generator) -> tuple[float, list[float]]:
+    """A velocity, and supplies of both substrates."""
+    return log_uniform(random, *VELOCITIES), [log_uniform(random, *SUPPLIES) for _ in SUBSTRATES]
