@@ -384,7 +384,8 @@ def test_a_leak_in_the_middle_of_three_steps_is_reported_with_its_sign(column, l
     expected = [0.0, leak if column == "oxygen_demand_balance" else 0.0, 0.0]
     assert [step["oxygen_demand_balance"] for step in steps] == pytest.approx(expected, rel=1e-9, abs=1e-12)
     table = {name: np.array([0.0, value], float) for name, value in row.items()}
-    (chart,) = [chart for chart in quantities.charts_of(Run(None, {"tables": {}}, table, {})) if "balances" in chart.title]
+    run = Run(None, {"tables": {}}, table, {})
+    (chart,) = [chart for chart in quantities.charts_of(run) if "balances" in chart.title]
     label = column.removesuffix("_balance").replace("_", " ")
     (line,) = [line for line in chart.lines if line.label == label]
     assert line.values[-1] == pytest.approx(leak, rel=1e-9) and "relative defect" in chart.axis

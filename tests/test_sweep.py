@@ -461,7 +461,8 @@ def test_marks_of_the_page_have_the_colour_of_their_key(tmp_path):
     numbers_of = [dict.fromkeys(table.COLUMNS) | {"clogging_time_h": time} for time in (5.0, 5.0, None, 5.0, 5.0, None)]
     runs = [table.SweepRun(one, "completed", course, course, course, each) for one, each in zip(designed, numbers_of)]
     runs[5] = replace(runs[5], status="failed: x")
-    times = page.page(Sweep(tmp_path, "flow_only", factors, designed), runs, 0.3).split("<h2>Clogging time")[1].split("<h2>")[0]
+    text = page.page(Sweep(tmp_path, "flow_only", factors, designed), runs, 0.3)
+    times = text.split("<h2>Clogging time")[1].split("<h2>")[0]
     figures = re.findall("<figure>.*?</figure>", times, re.S)
     for figure, key in zip(figures, ("flow.viscosity_ratio", "pore.width"), strict=True):
         named = dict(re.findall(r'class="line(.)" points="0,5 24,5"/></svg>([^<]*)</li>', figure))
