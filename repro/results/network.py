@@ -313,11 +313,12 @@ def _balance(low: np.ndarray, high: np.ndarray, halvings: int, rate: Callable) -
 
 @cache
 def _constants() -> tuple[RateLaw, tuple[float, float], float]:
-    """Rates, diffusivities of acceptor and donor in the aggregate (um2/h), X_m: those of Table 1."""
+    """Rates, diffusivities of acceptor and donor in the aggregate (um2/h), X_m: of Table 1."""
     scene = load_scene("base")
     both = scene.substrates.acceptor, scene.substrates.donor
     acceptor, donor = (substrate.diffusivity_in_aggregate for substrate in both)
-    return rate_law(scene.substrates, scene.kinetics), (acceptor, donor), scene.kinetics.maximum_density
+    rates = rate_law(scene.substrates, scene.kinetics)
+    return rates, (acceptor, donor), scene.kinetics.maximum_density
 
 
 def known(spanned: bool) -> tuple[float, float]:
