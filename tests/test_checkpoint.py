@@ -159,3 +159,12 @@ def test_a_pore_without_an_aggregate_is_packed_and_unpacked():
     assert scene.aggregate is None and state.pore.outline is None
     restored = state_arrays.unpack_state(scene, *state_arrays.pack_state(scene, state))
     assert np.array_equal(restored.pore.mesh.points, state.pore.mesh.points)
+
+
+def test_the_shape_from_which_strain_counts_is_kept():
+    """With stress-free growth it is the shape before the last step. The state comes after two steps."""
+    scene = load_scene("base", ["numerics.preset=fast", "growth.new_biomass=stress_free"])
+    state = next(state for state, _ in steps(scene) if state.pore.time > 2.0)
+    assert not np.array_equal(state.pore.unstrained, state.pore.body.reference)
+    restored = state_arrays.unpack_state(scene, *state_arrays.pack_state(scene, state))
+    assert np.array_equal(restored.pore.unstrained, state.pore.unstrained)

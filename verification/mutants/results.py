@@ -75,7 +75,7 @@ MUTANTS = (
          "A checkpoint lacks the last shape.",
          "if pore.last is not None:",
          "if False:",
-         f"{FOLD}a_run_stopped_after_every_step_equals_the_uninterrupted_run[stress_free]")),
+         "tests/test_checkpoint.py::test_the_shape_from_which_strain_counts_is_kept")),
     *changes(
         "repro/preflight/simplifications.py",
         ("fold-expected-early",
