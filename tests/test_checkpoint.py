@@ -137,7 +137,7 @@ def test_other_files_are_refused(content):
 
 def test_a_checkpoint_of_another_format_or_scene_is_refused_in_one_line(saved, tmp_path):
     old = checkpoint.KIND + b"2 " + saved[2].removeprefix(checkpoint.MAGIC)
-    with pytest.raises(CheckpointError, match="^its format is not 6: another version wrote it$"):
+    with pytest.raises(CheckpointError, match="^its format is not 7: another version wrote it$"):
         restored(saved, old, tmp_path / "x")
     with pytest.raises(CheckpointError, match="another scene"):
         restored((load_scene("flow_only"), *saved[1:]), saved[2], tmp_path / "x")
@@ -168,3 +168,10 @@ def test_the_shape_from_which_strain_counts_is_kept():
     assert not np.array_equal(state.pore.unstrained, state.pore.body.reference)
     restored = state_arrays.unpack_state(scene, *state_arrays.pack_state(scene, state))
     assert np.array_equal(restored.pore.unstrained, state.pore.unstrained)
+
+
+def test_the_least_stretch_is_kept():
+    scene = load_scene("base", ["numerics.preset=fast"])
+    state = next(state for state, _ in steps(scene) if state.pore.time > 0)
+    assert state.compression.stretch < 1 and state.compression.time == state.pore.time
+    assert state_arrays.unpack_state(scene, *state_arrays.pack_state(scene, state)).compression == state.compression

@@ -2,19 +2,20 @@
 
 See :mod:`repro.model.surface`. A step that ends below Biot's limit is rejected. A step without a
 smooth equilibrium fails like any other step. If the surface can crease already, the failure is
-reported as a fold.
+reported as a fold. So is a failure after the surface could crease: it has buckled.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 
 from repro.errors import GrowthError, MeshError, RunEnd
 from repro.model.pore import Pore
 from repro.model.surface import BIOT, CREASE, surface
 
-#: The surface folds if no equilibrium exists and the last stretch is below this, 5 % above CREASE:
+#: The surface folds if no equilibrium exists and its stretch has been below this, 5 % above CREASE:
 #: the stretch varies by up to 6 % within an edge, and runs stop at up to 0.66 (docs/design.md).
 CREASING = 0.68
 #: Accepted range of the density at a node, over X_m.
@@ -39,32 +40,58 @@ class Fold(RunEnd):
     """
 
 
+@dataclass(frozen=True)
+class Compression:
+    """The least elastic stretch of a run's free surface so far.
+
+    x, y: um, its place; time: h. A surface that creases buckles next, and its stretch rises again
+    while the buckles grow until they meet, so the present stretch does not show a fold.
+    """
+
+    stretch: float = 1.0
+    x: float = 0.0
+    y: float = 0.0
+    time: float = 0.0
+
+    def after(self, pore: Pore) -> Compression:
+        """Return the lesser of this one and that of a later pore.
+
+        It is the latter where strain counts from the last shape: compression does not accumulate.
+        """
+        if pore.outline is None:
+            return self
+        present = surface(pore)
+        if pore.last is None and present.least >= self.stretch:
+            return self
+        return Compression(present.least, *present.place, pore.time)
+
+
 def refuse_fold(previous: Pore, expanded: Pore) -> None:
     """Raise Fold if a step from ``previous`` ends below Biot's limit."""
-    if surface(expanded).least < BIOT:
-        raise Fold(_message(expanded, previous.time))
+    compression = Compression().after(expanded)
+    if compression.stretch < BIOT:
+        raise Fold(_message(compression, previous.time))
 
 
 @contextmanager
-def folding(pore: Pore, time: float) -> Iterator[None]:
-    """Raise Fold if a step from ``pore`` has no equilibrium and the surface can crease.
+def folding(compression: Compression, time: float) -> Iterator[None]:
+    """Raise Fold if a step has no equilibrium and the surface could crease.
 
     time: h, of the last row or step.
     """
     try:
         yield
     except (GrowthError, MeshError) as error:
-        if pore.outline is None or surface(pore).least >= CREASING:
+        if compression.stretch >= CREASING:
             raise
-        raise Fold(_message(pore, time)) from error
+        raise Fold(_message(compression, time)) from error
 
 
-def _message(pore: Pore, time: float) -> str:
-    """Message of the Fold in the step from ``time`` (h), with the least stretch of ``pore``."""
-    stretched = surface(pore)
-    x, y = stretched.place
-    return (f"the aggregate's surface folds in the step from t = {time:g} h: near x = {x:.4g}, "
-            f"y = {y:.4g} um growth compresses it to an elastic stretch of {stretched.least:.3f}; "
+def _message(compression: Compression, time: float) -> str:
+    """Message of the Fold in the step from ``time`` (h)."""
+    return (f"the aggregate's surface folds in the step from t = {time:g} h: growth compressed it "
+            f"to an elastic stretch of {compression.stretch:.3f} near x = {compression.x:.4g}, "
+            f"y = {compression.y:.4g} um at t = {compression.time:g} h; "
             f"it creases from {CREASE:g} on and is unstable to all waves below {BIOT:g}, so that "
             "the model has no smooth shape any more; a finer mesh does not help, "
             'growth.new_biomass = "stress_free" does')

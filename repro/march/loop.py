@@ -23,7 +23,7 @@ from repro.fem.sizing import ACROSS_PORE
 from repro.march import balance
 from repro.march.balance import Ledger, Limits
 from repro.march.detachment import detachment
-from repro.march.folding import folding, refuse_density
+from repro.march.folding import Compression, folding, refuse_density
 from repro.march.step_control import StepControl
 from repro.model.advice import with_advice
 from repro.model.pore import Pore, Solved, seeded
@@ -106,7 +106,8 @@ class RestartState:
 
     pore: pore after the step, with the initial guess of its substrates; step_control: of the next
     step; ledgers, remeshes, iterations: of the steps since the last Report; row: time (h) of that
-    Report, later than ``pore.time`` if it lies within the next step.
+    Report, later than ``pore.time`` if it lies within the next step; compression: the least stretch
+    of the surface so far.
     """
 
     pore: Pore
@@ -115,6 +116,7 @@ class RestartState:
     remeshes: int = 0
     iterations: dict[str, int] = field(default_factory=dict)
     row: float = 0.0
+    compression: Compression = Compression()
 
     @property
     def time(self) -> float:
@@ -194,13 +196,13 @@ def _grow(stages: Stages, scheme: Scheme, state: RestartState,
     limits = Limits.of(scene)
     while failure is None and stages.growth.end - pore.time > SAME_TIME:
         try:
-            with stopping(pore.time), folding(pore, state.time):
+            with stopping(pore.time), folding(state.compression, state.time):
                 step, after, control = scheme.advance(stages, pore, solved, state.step_control)
                 balance.refuse(limits, step.pore, step.ledger)
                 refuse_density(step.pore, density)
             for time in rows:
                 if state.time + SAME_TIME < time < step.pore.time - SAME_TIME:
-                    with stopping(pore.time), folding(pore, state.time):
+                    with stopping(pore.time), folding(state.compression, state.time):
                         inner = step.within(time)
                         refuse_density(inner.pore, density)
                     report = make_report(state, inner.pore, inner.solved, inner.before)
@@ -248,7 +250,8 @@ def _after_step(state: RestartState, step: StepResult, solved: Solved,
                         newton_counts(solved))
     ledgers = (*state.ledgers, step.ledger)
     remeshes = state.remeshes + step.remeshed
-    return RestartState(step.pore, control, ledgers, remeshes, counts, state.row)
+    return RestartState(step.pore, control, ledgers, remeshes, counts, state.row,
+                        state.compression.after(step.pore))
 
 
 def make_report(state: RestartState, pore: Pore, solved: Solved,
@@ -259,7 +262,7 @@ def make_report(state: RestartState, pore: Pore, solved: Solved,
 
 def mark_reported(state: RestartState, time: float) -> RestartState:
     """Return the state after a row at a time (h), without steps to report."""
-    return RestartState(state.pore, state.step_control, row=time)
+    return RestartState(state.pore, state.step_control, row=time, compression=state.compression)
 
 
 def contiguous(pore: Pore) -> Pore:

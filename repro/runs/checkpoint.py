@@ -1,6 +1,6 @@
 """Checkpoint files: plain data with a checksum. A file is complete or absent.
 
-    dupin2001-repro checkpoint 6 SHA-256 of everything after this line
+    dupin2001-repro checkpoint 7 SHA-256 of everything after this line
     an uncompressed .npz file: the arrays, and the rest as JSON in the array "plain"
 
 Reading a checkpoint executes nothing. The checksum detects accidental changes. It does not protect
@@ -26,7 +26,7 @@ NEWEST = "checkpoint.state"
 PREVIOUS = "checkpoint.previous"
 REFUSED = "checkpoint.refused"
 LAST = "checkpoint.last"
-KIND, FORMAT = b"dupin2001-repro checkpoint ", b"6"
+KIND, FORMAT = b"dupin2001-repro checkpoint ", b"7"
 MAGIC = KIND + FORMAT + b" "
 #: The array with the JSON text.
 PLAIN = "plain"

@@ -14,6 +14,7 @@ from repro.fem.linear import Method
 from repro.fem.mesh import Mesh
 from repro.fem.space import Space
 from repro.march.balance import Ledger
+from repro.march.folding import Compression
 from repro.march.loop import RestartState
 from repro.march.step_control import StepControl
 from repro.model.pore import Pore, material
@@ -48,7 +49,8 @@ def pack_state(scene: Scene, state: RestartState) -> tuple[dict, Arrays]:
              "ends_um": [float(x) for x in pore.mesh.ends], "front": float(pore.front),
              "guess": guess.iterations if guess else None, "remeshes": int(state.remeshes),
              "iterations": state.iterations, "row_h": float(state.row),
-             "ledgers": list(map(astuple, state.ledgers))}
+             "ledgers": list(map(astuple, state.ledgers)),
+             "compression": astuple(state.compression)}
     return plain, arrays
 
 
@@ -59,7 +61,7 @@ def unpack_state(scene: Scene, plain: dict, arrays: Arrays) -> RestartState:
     ledgers = tuple(map(_ledger, plain["ledgers"]))
     step_control = StepControl(**plain["pace"])
     return RestartState(_pore(scene, plain, arrays), step_control, ledgers, plain["remeshes"],
-                        plain["iterations"], plain["row_h"])
+                        plain["iterations"], plain["row_h"], Compression(*plain["compression"]))
 
 
 def _ledger(parts: list) -> Ledger:

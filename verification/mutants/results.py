@@ -28,6 +28,7 @@ SHRINKING = "tests/test_shrinking.py::test_"
 CACHE_KEYS = "tests/test_cache_keys.py::test_"
 DEEPEST = "tests/test_deepest_level.py::test_elements_are_halved_as_often_as_a_front_needs"
 FOLD = "tests/test_fold.py::test_"
+CHECKPOINT = "tests/test_checkpoint.py::test_"
 OVER = f"{FOLD}a_fold_ends_a_run"
 EXPECTED = f"{FOLD}check_expects_a_fold_of_a_starved_core"
 READERS = "tests/test_vtk.py::test_every_reader_reads_what_was_computed"
@@ -37,14 +38,19 @@ MUTANTS = (
         "repro/march/folding.py",
         ("fold-an-error",
          "A failure on a surface that creases is reported as an error.",
-         "if pore.outline is None or surface(pore).least >= CREASING:",
+         "if compression.stretch >= CREASING:",
          "if True:",
          f"{FOLD}a_failed_step_is_a_fold_only_if_the_surface_creases[GrowthError-3.0-Fold]"),
         ("every-failure-a-fold",
          "A failure on any surface is reported as a fold.",
-         "if pore.outline is None or surface(pore).least >= CREASING:",
-         "if pore.outline is None:",
+         "if compression.stretch >= CREASING:",
+         "if False:",
          f"{FOLD}a_failed_step_is_a_fold_only_if_the_surface_creases[GrowthError-1.5-SimulationError]"),
+        ("buckled-is-smooth",
+         "The least stretch is that of the present surface.",
+         "if pore.last is None and present.least >= self.stretch:",
+         "if False:",
+         f"{FOLD}the_least_stretch_of_a_run_stays"),
         ("thin-biomass-written",
          "A density under half of X_m is written.",
          "if least < low or largest > high:",
@@ -52,6 +58,11 @@ MUTANTS = (
          f"{FOLD}no_row_has_a_density_out_of_bounds[0.4-1.5-SimulationError]")),
     *changes(
         "repro/march/loop.py",
+        ("compression-forgotten",
+         "A row forgets the least stretch of the run.",
+         "row=time, compression=state.compression)",
+         "row=time)",
+         f"{FOLD}the_least_stretch_of_a_run_stays"),
         ("density-unjudged",
          "A step may end with any density.",
          "refuse_density(step.pore, density)",
@@ -71,11 +82,16 @@ MUTANTS = (
          OVER)),
     *changes(
         "repro/runs/state_arrays.py",
+        ("compression-dropped",
+         "A checkpoint lacks the least stretch of the run.",
+         'Compression(*plain["compression"])',
+         "Compression()",
+         f"{CHECKPOINT}the_least_stretch_is_kept"),
         ("last-shape-dropped",
          "A checkpoint lacks the last shape.",
          "if pore.last is not None:",
          "if False:",
-         "tests/test_checkpoint.py::test_the_shape_from_which_strain_counts_is_kept")),
+         f"{CHECKPOINT}the_shape_from_which_strain_counts_is_kept")),
     *changes(
         "repro/preflight/simplifications.py",
         ("fold-expected-early",

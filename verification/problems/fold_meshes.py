@@ -18,7 +18,6 @@ from repro.march.folding import Fold
 from repro.march.loop import PoreEnd, RestartState
 from repro.model import remeshing
 from repro.model.remeshing import Remeshing
-from repro.model.surface import surface
 from repro.scene import Scene
 from verification.problems.family import draw_member
 from verification.problems.hard import TooLong, limited
@@ -37,18 +36,18 @@ def follow(scene: Scene, limit: float, state: RestartState | None = None) -> tup
     try:
         with limited(limit):
             for last, _ in simulation.steps(scene, state):
-                if surface(last.pore).least > BEGUN:
+                if last.compression.stretch > BEGUN:
                     before = last
     except (Fold, PoreEnd, SimulationError, TooLong) as error:
         end = f"{type(error).__name__}: {error}"
-    reached = {"time_h": last.pore.time, "stretch": surface(last.pore).least} if last else {}
+    reached = {"time_h": last.pore.time, "stretch": last.compression.stretch} if last else {}
     return {"end": end, **reached}, before
 
 
 def on_mesh_of(scene: Scene, state: RestartState) -> RestartState:
     """The state in a new mesh of a scene."""
     pore = remeshing.remesh(Remeshing.of(scene), state.pore, state.pore, 0.0)[0]
-    return RestartState(pore, state.step_control)
+    return RestartState(pore, state.step_control, compression=state.compression)
 
 
 def study(number: int, limit: float) -> dict[str, object]:
