@@ -421,7 +421,7 @@ PRESETS: dict[str, dict[str, str | float]] = {
     "accurate": {"elements": "quadratic", "time": "midpoint", "refinement": 0.45,
                  "tolerance": 0.001, "jacobian": "reused"},
     "exact": {"elements": "quadratic", "time": "midpoint", "refinement": 0.7, "tolerance": 0.00025,
-              "contact_elements": 2.0, "jacobian": "reused"},
+              "contact_elements": 4.0, "jacobian": "reused"},
     "paper": {},
 }
 

@@ -144,7 +144,8 @@ def _course(folder: Path) -> dict:
 
 def independent_stretches(folder: Path) -> np.ndarray:
     """(rows, 2) the least stretches from the files of fields: the mean over an edge, and the value in its middle."""
-    return np.array([_independent_stretch(field_files.read(path)) for path in sorted((folder / "fields").glob("*.vtu"))])
+    paths = sorted((folder / "fields").glob("*.vtu"))
+    return np.array([_independent_stretch(field_files.read(path)) for path in paths])
 
 
 def _independent_stretch(grid) -> np.ndarray:
