@@ -6,6 +6,7 @@ STAMP := $(VENV)/.installed
 CRATE := build/crate/.installed
 SITE := build/docs/.installed
 OLDEST := build/oldest/.installed
+NETWORK := build/network/.installed
 OLDEST_TESTS := tests/test_python_calls.py tests/test_drawing.py tests/test_field_files.py tests/test_linear.py
 PIP := $(BIN) -m pip install -q --disable-pip-version-check
 
@@ -15,7 +16,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
-.PHONY: help env figures check-manifest claims sensitivity verify verify-fast mutants mutants-sampled test test-thorough oldest lint bench crate docs clean
+.PHONY: help env figures check-manifest claims sensitivity verify verify-fast mutants mutants-sampled test test-thorough oldest lint bench crate network docs clean
 
 help:
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/\1|\2/p' Makefile | awk -F'|' '{ printf "  make %-16s %s\n", $$1, $$2 }'
@@ -73,6 +74,10 @@ crate: $(STAMP) $(CRATE) ## pack scenes, code, environment, figures and claims a
 	@$(BIN) -m paper_figures.crate
 	@$(dir $(CRATE))bin/python .ci/crate_check.py paper_figures/out/crate
 
+network: $(STAMP) $(NETWORK) ## run the example of a network with OpenPNM, and its test
+	@$(dir $(NETWORK))bin/python docs/howto/openpnm_network.py
+	@$(dir $(NETWORK))bin/python -m pytest tests/test_openpnm.py
+
 docs: $(STAMP) $(SITE) ## build the site into docs/_build/html, without network
 	@$(dir $(SITE))bin/python -m sphinx -q -W --keep-going -b html -c docs . docs/_build/html
 	@echo "docs/_build/html/index.html"
@@ -100,11 +105,13 @@ $(CRATE): .ci/crate.lock
 	@$(@D)/bin/python -m pip install -q --disable-pip-version-check --require-hashes --only-binary :all: -r .ci/crate.lock
 	@touch $@
 
-# The site is built in an environment of its own, which also sees the packages of .venv.
-$(SITE): .ci/docs.lock $(STAMP)
+# The site is built in an environment of its own, and OpenPNM runs in one; both also see the packages of .venv.
+# One package that OpenPNM needs has no wheel.
+$(NETWORK): SOURCES := --no-binary docrep
+$(SITE) $(NETWORK): build/%/.installed: .ci/%.lock $(STAMP)
 	@rm -f $@
 	@"$(PYTHON)" -m venv --clear $(@D)
-	@$(@D)/bin/python -m pip install -q --disable-pip-version-check --require-hashes --only-binary :all: -r .ci/docs.lock
+	@$(@D)/bin/python -m pip install -q --disable-pip-version-check --require-hashes --only-binary :all: $(SOURCES) -r $<
 	@echo "import site; site.addsitedir('$$($(BIN) -c 'import sysconfig; print(sysconfig.get_path("purelib"))')')" > "$$($(@D)/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')/package.pth"
 	@touch $@
 

@@ -25,7 +25,7 @@ RUNTIME = PROJECT["project"]["dependencies"]
 EXTRAS = PROJECT["project"]["optional-dependencies"]
 LOCKS = [(ROOT / name).read_text(encoding="utf-8")
          for name in ("requirements.lock", "verification/mutants/machine/requirements.lock", ".ci/crate.lock",
-                      ".ci/oldest.lock")]
+                      ".ci/oldest.lock", ".ci/network.lock")]
 PIN = re.compile(r"^([a-z0-9-]+)==(\d+(?:\.\d+)*)", re.M)
 ADDRESS = re.compile(r"//|file:|index|--find-links|(^|\s)/\w", re.M)
 
@@ -144,7 +144,7 @@ def test_every_import_is_declared(folder):
     assert names and used <= {*map(normal, RUNTIME + extras)}
 
 
-@pytest.mark.parametrize("lock", LOCKS, ids=["all", "mutants", "crate", "oldest"])
+@pytest.mark.parametrize("lock", LOCKS, ids=["all", "mutants", "crate", "oldest", "network"])
 def test_the_lock_holds_hashes_and_no_address(lock):
     """Pip itself checks that every line is a pin with its hashes."""
     assert 0 < len(PIN.findall(lock)) <= lock.count("--hash=sha256:") and not ADDRESS.search(lock)

@@ -1,0 +1,80 @@
+"""A network of 100 throats in OpenPNM, with the laws of throats: flow, uptake and growth over 48 h (make network)."""
+
+import numpy as np
+import openpnm
+
+import repro
+
+LENGTH = 600.0                # um, of each throat
+HEAD_DROP = 12.0              # um, over the network
+PER_HEAD = 9.81 / 12e-6 * 86400 * 1e-12  # g / (12 nu), m/d per um2 at a slope of 1
+SUPPLY = 8.0, 5.0             # mg/L of acceptor and donor
+STEP, END = 2.0, 48.0         # h
+FLOW = 1e6 / 24               # um2/h in 1 m/d um
+
+random = np.random.default_rng(2001)
+network = openpnm.network.Cubic(shape=[6, 4, 2], spacing=LENGTH * 1e-6)
+throats = network["throat.conns"]
+width = random.uniform(45, 90, len(throats))             # um
+area = random.uniform(0.02, 0.08, len(throats)) * width**2  # um2
+along = network["pore.coords"][:, 0]
+inlets, outlets = along == along.min(), along == along.max()
+water = openpnm.phase.Phase(network=network)
+
+
+def heads(area: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Heads of the pores (um), and flow in the throats from their first to their second pore (m/d um)."""
+    length = LENGTH + repro.added_resistance(area, width).length * width
+    conductance = PER_HEAD * width**3 / length
+    water["throat.hydraulic_conductance"] = conductance
+    flow = openpnm.algorithms.StokesFlow(network=network, phase=water)
+    flow.set_value_BC(pores=np.flatnonzero(inlets), values=HEAD_DROP)
+    flow.set_value_BC(pores=np.flatnonzero(outlets), values=0.0)
+    flow.run()
+    head = flow["pore.pressure"]
+    return head, conductance * (head[throats[:, 0]] - head[throats[:, 1]])
+
+
+def supplies(head: np.ndarray, flow: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Concentrations of the pores (mg/L), uptake (pg/m/h) and growth (um2/h) of the throats.
+
+    Water mixes in each pore. The pores are visited from the highest head to the lowest.
+    """
+    upstream = np.where(flow > 0, throats[:, 0], throats[:, 1])
+    downstream = throats.sum(axis=1) - upstream
+    inflow, brought = np.zeros(len(head)), np.zeros((2, len(head)))
+    concentration = np.where(inlets, np.array(SUPPLY)[:, None], 0.0)
+    taken, growth = np.zeros((2, len(throats))), np.zeros(len(throats))
+    for pore in np.argsort(-head, kind="stable"):
+        if not inlets[pore]:
+            concentration[:, pore] = brought[:, pore] / inflow[pore]
+        leaving = np.flatnonzero((upstream == pore) & (np.abs(flow) > 1e-12))
+        volume = np.abs(flow[leaving])
+        uptake = repro.uptake(area[leaving], width[leaving], volume / width[leaving], *concentration[:, pore])
+        taken[:, leaving], growth[leaving] = (uptake.acceptor, uptake.donor), uptake.growth
+        np.add.at(inflow, downstream[leaving], volume)
+        for substrate in range(2):
+            np.add.at(brought[substrate], downstream[leaving],
+                      volume * concentration[substrate, pore] - taken[substrate, leaving] / FLOW)
+    return concentration, taken, growth
+
+
+total = []
+for time in np.arange(0.0, END + STEP / 2, STEP):
+    head, flow = heads(area)
+    concentration, taken, growth = supplies(head, flow)
+    across = np.where(inlets[throats[:, 0]] != inlets[throats[:, 1]], np.abs(flow), 0.0)
+    leaving = np.where(outlets[throats[:, 0]] != outlets[throats[:, 1]], np.abs(flow), 0.0)
+    total.append(across.sum())
+    effluent = (leaving * concentration[:, np.where(flow > 0, throats[:, 0], throats[:, 1])]).sum(axis=1) * FLOW
+    last = outlets[throats].any(axis=1)
+    brought = np.array(SUPPLY) * across.sum() * FLOW
+    assert np.isclose(leaving.sum(), across.sum(), rtol=1e-8)
+    assert np.allclose(taken[:, ~last].sum(axis=1), brought - effluent, rtol=1e-6, atol=1e-8 * brought.max())
+    if time < END:
+        area = np.maximum(area + STEP * growth, 0.0)
+
+print(f"flow after {END:g} h over that at 0 h: {total[-1] / total[0]:.4g}")
+print(f"touching both walls: {(area > 1.51 * width**2).sum()} of {len(throats)} throats")
+assert len(throats) == 100
+assert (np.diff(total) < 0).all()
