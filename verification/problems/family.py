@@ -162,7 +162,7 @@ def is_expected(member: Member) -> bool:
     speed = flow.mean_velocity
     if speed is None:
         speed = flow.gravity * scene.pore.width**2 / (12 * flow.kinematic_viscosity) * flow.head / scene.pore.length
-    return any("as a fold" in caveat.text for caveat in find_warnings(*numbers.evaluate_at_largest(scene, speed)))
+    return any("may fold" in caveat.text for caveat in find_warnings(*numbers.evaluate_at_largest(scene, speed)))
 
 
 def read_record() -> dict[int, dict]:
