@@ -121,6 +121,6 @@ MUTANTS = (
         "repro/march/folding.py",
         ("fold-never",
          "no limit of the stretch ends a run",
-         "if surface(expanded).least < BIOT:",
-         "if surface(expanded).least < 0:")),
+         "if compression.stretch < BIOT:",
+         "if compression.stretch < 0:")),
 )

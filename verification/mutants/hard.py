@@ -151,6 +151,6 @@ MUTANTS = (
         "repro/march/folding.py",
         ("hard-fold-unfounded",
          "A run ends as a fold although its surface is hardly compressed.",
-         "if surface(expanded).least < BIOT:",
-         "if surface(expanded).least < 0.99:")),
+         "if compression.stretch < BIOT:",
+         "if compression.stretch < 0.99:")),
 )

@@ -448,7 +448,7 @@ MUTANTS = (
          "tests/test_sweep.py::test_unfinished_runs_of_a_sweep_are_made_again"),
         ("half-a-fold",
          "A status that is cut off after the time of a fold counts as a fold.",
-         "folds in the step from {TIME}: near x = .*",
+         "folds in the step from {TIME}: growth .*",
          "folds in the step from {TIME}.*",
          f"{FOLD}the_status_of_a_fold_is_a_full_sentence"
          "[the aggregate's surface folds in the step from t = 5.24 h-False]")),
