@@ -450,7 +450,8 @@ def test_events_of_a_run():
     value = {number.name: number.reported(folded) for number in table.NUMBERS}
     assert value["half_conductivity_time_h"] == pytest.approx(1 + np.log(1.6) / np.log(4))
     assert value["fold_time_h"] == 2 and np.isnan(value["contact_time_h"]) and np.isnan(value["clogging_time_h"])
-    assert is_fold("the aggregate's surface folds in the step from t = 2 h: growth compressed it near x = 3 um") and not is_fold("completed")
+    status = "the aggregate's surface folds in the step from t = 2 h: growth compressed it near x = 3 um"
+    assert is_fold(status) and not is_fold("completed")
 
 
 def test_marks_of_the_page_have_the_colour_of_their_key(tmp_path):

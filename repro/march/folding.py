@@ -2,7 +2,7 @@
 
 See :mod:`repro.model.surface`. A step that ends below Biot's limit is rejected. A step without a
 smooth equilibrium fails like any other step. If the surface can crease already, the failure is
-reported as a fold. So is a failure after the surface could crease: it has buckled.
+reported as a fold. So is a later failure: the surface has buckled since.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from repro.model.pore import Pore
 from repro.model.surface import BIOT, CREASE, surface
 
 #: The surface folds if no equilibrium exists and its stretch has been below this, 5 % above CREASE:
-#: the stretch varies by up to 6 % within an edge, and runs stop at up to 0.66 (docs/design.md).
+#: the stretch varies by up to 6 % within an edge, and runs stop at up to 0.677 (docs/design.md).
 CREASING = 0.68
 #: Accepted range of the density at a node, over X_m.
 DENSITIES = 0.5, 2.0
@@ -44,8 +44,8 @@ class Fold(RunEnd):
 class Compression:
     """The least elastic stretch of a run's free surface so far.
 
-    x, y: um, its place; time: h. A surface that creases buckles next, and its stretch rises again
-    while the buckles grow until they meet, so the present stretch does not show a fold.
+    x, y: um, its place; time: h. A surface may buckle after it creases. Its stretch then rises
+    again until the buckles meet, so the present stretch does not show a fold.
     """
 
     stretch: float = 1.0
@@ -54,9 +54,10 @@ class Compression:
     time: float = 0.0
 
     def after(self, pore: Pore) -> Compression:
-        """Return the lesser of this one and that of a later pore.
+        """Return this compression, or that of a later pore with a smaller stretch.
 
-        It is the latter where strain counts from the last shape: compression does not accumulate.
+        Where strain counts from the last shape, compression does not accumulate: that of the later
+        pore is returned.
         """
         if pore.outline is None:
             return self

@@ -4,7 +4,7 @@
 
 A member runs with the preset fast. Its last state above BEGUN continues on each of MESHES. Another preset has another
 time tolerance too. With stress-free biomass the member runs from t = 0. Each run has a limit of processor time. A line
-of the record names the member, the end of each run, its time (h), and the least stretch of its last state.
+of the record names the member, the end of each run, its time (h), and its least stretch.
 """
 
 import argparse
