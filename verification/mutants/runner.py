@@ -9,7 +9,7 @@ nothing.
 
 The record of a mutant, in ``report/mutants.json``, has a digest of the mutated file and of the tests that caught it,
 with the functions and constants of their modules that they use. It is stale if one of these changes. A change elsewhere
-leaves it fresh, such as another case in the same module.
+leaves it fresh, such as another case in the same module. Comments and docstrings of Python files do not count.
 """
 
 import argparse
@@ -32,6 +32,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from xml.etree import ElementTree
 
+from repro.runs.machine import statements
 from verification.evidence.cases import STAGES, cases
 from verification.evidence.writing import REPORT, ROOT, load, save
 from verification.mutants import Mutant
@@ -236,11 +237,12 @@ def fresh() -> set[str]:
 def digest(mutant: Mutant, catchers: Iterable[str]) -> str:
     """16 hexadecimal digits of the mutated file and of the code of some cases or tests."""
     tests = chain.from_iterable(cases()[name].variants.values() if name in cases() else [name] for name in catchers)
-    hashed = hashlib.sha256(mutated(mutant).encode())
+    text = mutated(mutant)
+    hashed = hashlib.sha256((statements(text) if mutant.file.endswith(".py") else text).encode())
     for test in sorted({test.partition("[")[0] for test in tests}):
         file, _, function = test.partition("::")
         text = (ROOT / file).read_text(encoding="utf-8") if (ROOT / file).is_file() else ""
-        hashed.update(code_of(function, text).encode())
+        hashed.update(statements(code_of(function, text)).encode())
     return hashed.hexdigest()[:16]
 
 
