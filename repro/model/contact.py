@@ -228,7 +228,7 @@ def _close_by_lines(mechanics: Mechanics, grown: Pore, start: Pore, forces: np.n
     trials = _Trials(mechanics, grown, start, forces, search.patient)
     lines = contact_lines.lines_of(grown.boundary)
     _place_lines(grown.boundary, lines, search)
-    if grown.contact:
+    if grown.contact and not search.stationary:
         expansion = trials.settle(grown.wall, lines, rule)
         if expansion is not None:
             return expansion
