@@ -235,3 +235,9 @@ def test_the_estimate_of_the_rim_is_that_of_a_thin_ring():
     exponent = 10 * numbers.fastest_growth(scene)
     exact = (1 + exponent * numbers.depth(scene) / 40) * np.exp(-exponent / 2)
     assert numbers.rim_stretch(scene, 0.0) == pytest.approx(exact, rel=2e-3)
+
+
+@pytest.mark.parametrize(("number", "expected"), [(22, True), (70, True), (90, False)])
+def test_the_family_reads_the_forecast_of_check(number, expected):
+    """Members 22 and 70 fold before and after contact; member 90 stays almost uncompressed."""
+    assert family.is_expected(family.draw_member(number)) is expected
