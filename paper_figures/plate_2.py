@@ -18,8 +18,7 @@ TITLE = "Plate 2. One expansion of the aggregate and the deformation of the mesh
 RUNS = (runs.BASE,)
 CLAIMS = ("C08", "C11", "C24", "C31")
 
-#: Factors by which the arrows are longer than the displacements in (b) and in (a), and the least distance (um) of two
-#: of them in (a).
+#: Ratio of arrows to displacements in (b) and in (a), and the least distance (um) between two arrows in (a).
 LENGTHENED, FAR, APART = 5, 15, 7.0
 
 

@@ -21,7 +21,7 @@ from repro import load_scene, run, sweep
 from repro.sweeps.pool import cores
 
 REQUIRED = 0.95
-#: Preset of the sweep, and the further one of the commands.
+#: Preset of the sweep, and the additional preset of the commands.
 JUDGED, SLOWER = "fast", "accurate"
 RUNS = 200  # of the sweep
 SINGLE = 10  # runs before the sweep, and after it
@@ -62,7 +62,7 @@ def measure() -> float:
 
 
 def fresh(*arguments: str) -> float:
-    """Seconds that a new Python process takes with these arguments: the best of five."""
+    """Seconds of a new Python process with these arguments, the least of five measurements."""
     return min(repeat(lambda: subprocess.run([sys.executable, *arguments], stdout=subprocess.DEVNULL, check=True),
                       number=1))
 

@@ -17,7 +17,7 @@ from verification.bench.record import clock
 
 PACKAGES = "numpy, scipy.sparse.linalg, skfem, mmgpy, shapely, meshio"
 PRESETS = ("paper", "fast", "accurate", "exact")
-#: Rows of the short list, which the other points of base have too.
+#: The short list of rows; the other points of base have the same.
 FEW = 'output.times=["19.2 h", "19.4 h"]'
 PAIRS = 5
 

@@ -38,7 +38,7 @@ from verification.evidence.writing import REPORT, ROOT, load, save
 from verification.mutants import Mutant
 
 RECORD = REPORT / "mutants.json"
-#: How the message of a failure begins that catches a mutant: an assertion, `pytest.fail` or `pytest.raises`, a guard.
+#: Beginnings of the messages of failures that catch a mutant: an assertion, `pytest.fail` or `pytest.raises`, a guard.
 CATCH = ("assert", "AssertionError", "Failed: ", "repro.")
 #: How the report of a failed fixture begins.
 IN_FIXTURE = re.compile(r'^failed on (setup|teardown) with "')
@@ -162,7 +162,7 @@ def _message(failure: ElementTree.Element) -> str:
 
 
 def _run_tests(folder: Path, report: Path, tests: Iterable[str]) -> int | None:
-    """The exit status of pytest, after which nothing that it started runs; None if it was not done in time."""
+    """The exit status of pytest, or None after a timeout. All processes that it started are ended."""
     command = [sys.executable, "-m", "pytest", "-n0", "-p", "no:cacheprovider", f"--junitxml={report}", *tests]
     environment = {**os.environ, "PYTHONPATH": str(folder), "HOME": str(folder.parent), "PYTHONDONTWRITEBYTECODE": ""}
     child = subprocess.Popen(command, cwd=folder, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
@@ -207,7 +207,7 @@ def run_all(ids: Iterable[str], jobs: int, every: bool = False) -> list[Outcome]
 
 
 def judge(outcomes: list[Outcome]) -> bool:
-    """Print what is wrong; whether every mutant is caught, and by every case and test that it was run against."""
+    """Print the failures. Return whether every case and test caught each mutant that it was run against."""
     wrong = [f"survives: {outcome.mutant}" for outcome in outcomes if not outcome.caught_by]
     count = f"{len(outcomes) - len(wrong)} of {len(outcomes)} mutants caught."
     wrong += [f"{name} passes with {outcome.mutant}, which it names" for outcome in outcomes

@@ -33,7 +33,8 @@ WIDTH = 100.0
 
 
 def reaches(record: dict, number: str) -> list[tuple[str, float, bool]]:
-    """(input, effect of half a unit of its last digit on a number in percent, is it resolved?), the largest first."""
+    """(input, effect (%) of half a unit of its last digit on a number, whether it is resolved), the largest effect
+    first."""
     known = record["elasticities"][number]
     changes = [(each.name, 100 * known[each.name]["elasticity"] * each.rounding, known[each.name]["resolved"])
              for each in ROUNDED]
