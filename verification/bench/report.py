@@ -138,9 +138,8 @@ def _stage_cost(part: dict, name: str) -> tuple[str, bool]:
 
 
 def excess(row: dict, complete: dict) -> float:
-    """Excess of the processor time of a scene, over that of the complete model. The scene is compared with the complete
-    model without the stages that the scene lacks. The share of these stages in the processor time is their share in the
-    wall time of one run."""
+    """Relative excess of a scene's processor time over that of the complete model without the stages that the scene
+    lacks. The share of these stages in the processor time is their share in the wall time of one run."""
     spared = sum(seconds for stage, seconds in complete["stages"].items() if stage not in row["stages"])
     return row["cpu"] / complete["cpu"] - 1 + spared / complete["took"]
 

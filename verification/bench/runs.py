@@ -143,7 +143,8 @@ def scenes_part(quick: bool) -> dict:
     mesh.
     """
     repeats = 3 if quick else SCENES_REPEATS
-    jobs = {(f"preset {preset}", name): partial(first, preset, name) for preset in problems.PRESETS for name in SCENES}
+    jobs = {(f"preset {preset}", name): partial(measure_first_solution, preset, name)
+            for preset in problems.PRESETS for name in SCENES}
     rows = [{"scene": point["label"], "method": line["method"], **point}
             for line in measured(jobs, repeats) for point in line["points"]]
     return {"title": "What a scene does not need: seconds of a first solution, mesh included", "rows": rows,
@@ -156,7 +157,7 @@ def scene_of(preset: str, sections: dict) -> dict:
     return {name: table for name, table in tables.items() if table is not None}
 
 
-def first(preset: str, name: str) -> dict:
+def measure_first_solution(preset: str, name: str) -> dict:
     """Measure the first report of a run of one of SCENES: mesh and solution."""
     sections, needed = SCENES[name]
     tables = scene_of(preset, sections)

@@ -39,7 +39,7 @@ from verification.bench.record import clock, measured
 from verification.problems import channels, meshes
 from verification.problems.pairs import upright
 
-#: Diffusivities (um2/h) of acceptor and donor, the same in fluid and biomass; densities of biomass and supply (mg/L);
+#: Diffusivities (um2/h) of acceptor and donor, the same in fluid and biomass; density of the biomass and supply (mg/L);
 #: kinetics in the form of :mod:`reference.monod`.
 DIFFUSIVITY, DENSITY = (8e6, 4e6), 3e4
 SUPPLY, RATES = Pore().supply, Pore().rates

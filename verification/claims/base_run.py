@@ -173,7 +173,7 @@ def scaled(acceptor: float, donor: float) -> tuple[str, ...]:
                  for key, value in (("supply", 10.0), ("half_saturation", 1.0)))
 
 
-#: Factors of three kinds: 8 for every concentration; one for each substrate, with k, Y, F and d_c, which convert one
+#: Factors of three kinds: 8 for every quantity in mg/L; one for each substrate, with k, Y, F and d_c, which convert one
 #: into the other in (7)-(9); and factors of C and K_s alone. Powers of two are exact in floating point. With other
 #: factors, round-off can decide a remesh.
 ALONE = (*SHORT, *scaled(8.0, 8.0))

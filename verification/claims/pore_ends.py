@@ -122,10 +122,10 @@ def end_effect(*changes: str) -> float:
     """Largest change (%) of the uptake if C at the pore's end is zero, or the supply."""
     _, pore, solved = fully_meshed_pore(*changes)
     outlet = pore.space.outlet.nodes
-    return max(apart(uptake(holding(pore, solved, outlet, part)), uptake(solved)) for part in (0.0, 1.0))
+    return max(apart(uptake(solve_with_prescribed(pore, solved, outlet, part)), uptake(solved)) for part in (0.0, 1.0))
 
 
-def holding(pore: Pore, solved: Solved, nodes: np.ndarray, part: float) -> Solved:
+def solve_with_prescribed(pore: Pore, solved: Solved, nodes: np.ndarray, part: float) -> Solved:
     """Solve again with both concentrations prescribed as a part of their supply at some nodes, at the outlet instead of
     (12)."""
     problem, state = solved.problem, solved.concentrations

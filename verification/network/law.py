@@ -64,7 +64,7 @@ def table_rows(discs: list[Sample], samples: list[Sample]) -> list[list]:
     shares, lengths = np.array([one.share for one in discs]), np.array([one.lengths for one in discs])
     plugs = np.array(PLUGS)
     apart = departures(before, lambda one: law(shares, lengths, one.share))
-    far = departures(after, lambda one: law(plugs, mean_of_runs(after, but=one.run), one.share))
+    far = departures(after, lambda one: law(plugs, mean_of_runs(after, left_out=one.run), one.share))
     return [*_lines(0, shares, lengths, bounds(shares, before, apart)),
             *_lines(1, plugs, mean_of_runs(after), bounds(plugs, after, far))]
 
@@ -85,10 +85,10 @@ def departures(samples: list[Sample], expected: Callable[[Sample], np.ndarray]) 
     return np.array([np.array(one.lengths) / expected(one) - 1 for one in samples])
 
 
-def mean_of_runs(samples: list[Sample], but: Growth | None = None) -> np.ndarray:
+def mean_of_runs(samples: list[Sample], left_out: Growth | None = None) -> np.ndarray:
     """(m, l) geometric mean of r at the areas PLUGS over the runs that reach them, one of them left out."""
     curves = []
-    for run in dict.fromkeys(one.run for one in samples if one.run not in (None, but)):
+    for run in dict.fromkeys(one.run for one in samples if one.run not in (None, left_out)):
         of_run = [one for one in samples if one.run == run]
         place = np.log([one.share for one in of_run])
         columns = np.log([one.lengths for one in of_run]).T

@@ -194,17 +194,17 @@ RESOLVED = 0.1
 def elasticities(runs: Runs, name: str) -> dict[str, dict[str, dict]]:
     """{number: {input: elasticity, bar, resolved, and the changes (%) caused by +-10 % of an exact input}}."""
     inputs = [each for each in INPUTS if each.only in ("", name)]
-    runs.get_all(scene for each in inputs for scene in _moved(name, each))
+    runs.get_all(scene for each in inputs for scene in _scenes_around(name, each))
     plain = runs.get(load_varied(name, {}))
     by_number: dict[str, dict[str, dict]] = {number: {} for number in plain}
     for each in inputs:
-        rows = [*map(runs.get, _moved(name, each))]
+        rows = [*map(runs.get, _scenes_around(name, each))]
         for number, value in plain.items():
             by_number[number][each.name] = _elasticity(value, column(rows, number))
     return by_number
 
 
-def _moved(name: str, each: Input) -> list[Scene]:
+def _scenes_around(name: str, each: Input) -> list[Scene]:
     """Scenes with an input above and below its value, at all distances of the central differences."""
     distances = (NEAR, FAR) if each.half else (NEAR, FAR, LARGE)
     return [load_varied(name, {each.name: 1 + sign * distance}) for distance in distances for sign in (1, -1)]
@@ -232,9 +232,9 @@ MIDDLE, HALF = INTERVALS.mean(axis=1), np.ptp(INTERVALS, axis=1) / 2
 SET_SIZES = (2**-1.5, 0.5, 2**-0.5)
 #: Distance of a number from the ends of its interval, in bars.
 BARS_INSIDE = 1.5
-#: The program aims at this part of the half interval; the rest is a margin for nonlinearity. A misfit up to ENOUGH ends
-#: the search.
-AIMED, ENOUGH = 0.4, 0.5
+#: The program aims at this part of the half interval; the rest is a margin for nonlinearity. A misfit up to
+#: MISFIT_GOAL ends the search.
+AIMED, MISFIT_GOAL = 0.4, 0.5
 ROUNDS = 6
 
 
@@ -259,7 +259,7 @@ def one_set(runs: Runs, elasticities: dict[str, dict[str, dict]]) -> dict:
         x, t = program(start, slopes, bars)
         factors = {each.name: 1 + value for each, value in zip(ROUNDED, x)}
         numbers = runs.get(load_varied("base", factors, *converged(SET_SIZES[0])))
-        if misfit(numbers) <= ENOUGH and misfit(numbers, bars) <= 1:
+        if misfit(numbers) <= MISFIT_GOAL and misfit(numbers, bars) <= 1:
             break
         start = printed_of(numbers) - slopes @ x
     rows = _on_sizes(runs, factors)

@@ -87,7 +87,7 @@ LEFT_OUT = {"C32": "compares two ways for biomass to be born", "C41": "changes t
 MARGIN = 0.1
 #: Whole hours that wide goes on after contact: 45 h for Figure 6's own 10 K_s.
 AFTER = 11
-#: Hours between outlines, and the distance (um) to which their points are rounded.
+#: Hours between outlines, and the accuracy (um) of their points.
 EVERY, FINE = 5, 0.1
 
 
@@ -129,7 +129,7 @@ def _of_supply(runs: Runs, supply: float) -> dict:
     contact = runs.get(replace(load_varied("wide", factors, *converged(SIZE)), name="contact"))
     level = supplied(supply, contact["end"])
     with at_level(level), np.errstate(all="raise", under="ignore"):
-        judged = {id: holding(CLAIMS[id].function()) for id in sorted(CLAIMS)
+        judged = {id: check_outcomes(CLAIMS[id].function()) for id in sorted(CLAIMS)
                   if CLAIMS[id].of_wide and id not in LEFT_OUT and not CLAIMS[id].unjudged}
         judged_supply = {**contact, "outlines": _outlines(), "claims": judged}
     forget(level)
@@ -142,7 +142,7 @@ def supplied(supply: float, end: float) -> Level:
     return Level(CONVERGED, SIZE, wide=(*changes, f'growth.end="{end:g} h"'))
 
 
-def holding(finding: Finding) -> dict[str, bool]:
+def check_outcomes(finding: Finding) -> dict[str, bool]:
     """{quantity without its numbers: does it hold?} for the checks that are not about base."""
     judged_checks: dict[str, bool] = {}
     for check in finding.checks:
@@ -153,8 +153,7 @@ def holding(finding: Finding) -> dict[str, bool]:
 
 
 def _outlines() -> dict[str, str]:
-    """Outlines by their hour: points "x,y x,y ..." to FINE (um), without points on the straight line between their
-    neighbours."""
+    """Outlines by their hour: points "x,y x,y ..." to FINE (um), without points on a straight line between others."""
     return {f"{time:g}": _places(aggregate) for time, aggregate in zip(series(*WIDE)["time_h"], bodies(WIDE))
             if time % EVERY == 0}
 
