@@ -120,7 +120,7 @@ def line(part: Part) -> tuple[str, ...]:
 
 def mutants_of(part: Part) -> list[str]:
     """Ids of the wrong changes to its files."""
-    return [id for id, mutant in runner.everything().items() if mutant.file.startswith(part.files)]
+    return [id for id, mutant in runner.mutants_by_id().items() if mutant.file.startswith(part.files)]
 
 
 def cases_of(part: Part) -> list[str]:
