@@ -42,7 +42,7 @@ NOTE, REGISTER = (FOLDER / name for name in ("replication.md", "register.md"))
 TEMPLATES = {text: text.with_stem(f"{text.stem}_template") for text in (NOTE, REGISTER)}
 REPORT = ROOT / "verification" / "report"
 FIELD = re.compile(r"\{\{(.+?)\}\}")
-#: Names of the verdicts in the templates, and what the register quotes of a claim beside its numbers.
+#: Names of the verdicts in the templates, and the parts of a claim that the register quotes beside its numbers.
 NAMES = dict(zip(VERDICTS, ("reproduced", "rounding", "changed", "contradicted", "undecided", "unjudged")))
 WHY = {"Changed": "change", "Why not": "reason", "Inputs": "rounding", "Note": "note", "Not varied": "fixed"}
 WIDTH = 120

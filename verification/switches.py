@@ -32,8 +32,9 @@ from verification.problems.runs import next_shape, shape_of
 
 @dataclass(frozen=True)
 class Switch:
-    """choice: what is chosen; default, alternative: in words; change: KEY=VALUE of the alternative; state: can both be
-    compared in one state; note: what the reader must know; meshes: are the default's meshes good for both."""
+    """choice: the subject of the choice; default, alternative: in words; change: KEY=VALUE of the alternative; state:
+    whether both can be compared in one state; note: a remark for the reader; meshes: whether both can use the default's
+    meshes."""
 
     choice: str
     default: str
@@ -144,7 +145,7 @@ def reshaped(previous: Pore, outline: Outline) -> Pore:
 
 
 def _radius(outline: Outline) -> CubicSpline:
-    """Distance of the interface from the origin over the angle from downstream, smooth between its nodes."""
+    """Distance of the interface from the origin as a smooth function of the angle from downstream."""
     edges = outline.interface_edges()
     x, y = outline.points[edges | np.roll(edges, 1)].T
     angle = np.arctan2(y, x)
@@ -163,7 +164,7 @@ def one_state(aggregate: Body, other: Scene) -> dict[str, float]:
 
 def run_columns(run: Run) -> Columns:
     """Of a run's rows: "time" h, "velocity" m/d, "area" um2, "drift", largest |(X_A + X_I) / X_m - 1|, and "lean", the
-    middle between the tips over half their distance."""
+    middle between the tips divided by half of their distance."""
     return _row_columns(runs.series(*run))
 
 

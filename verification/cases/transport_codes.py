@@ -80,7 +80,7 @@ ITSELF_STARVED = "C_A in the starved slab over itself"
 LAW = replace(SCENE.kinetics, yield_coefficient=1e-12)
 #: h: 0.07, 0.2 and 0.7 s. Water diffuses across the slab in 0.6 s, and crosses it in 0.1 to 6 s.
 TIMES = (2e-5, 6e-5, 2e-4)
-#: Last errors of linear elements, of a density X, and of others, of their order.
+#: Last errors: of linear elements by the density X, of other elements by their order.
 CEILINGS = {3e3: 1e-6, 3e4: 3e-5, 3e5: 4e-4}
 HIGHER_CEILINGS = {2: 1e-7, 3: 1e-9}
 
@@ -196,7 +196,7 @@ SUBSTRATES = substrates_with(acceptor={"diffusivity": 8e6, "diffusivity_in_aggre
 ITSELF = "donor in the biomass, over itself"
 #: Cells (um) with the number of meshes of equally long elements around the block.
 BLOCK = {2.0: 6, 1.0: 4, 0.5: 2, 0.25: 1}
-#: Elements (um) of order 2 and 3 by shape. They err less than a tenth as much as the finest cells.
+#: Elements (um) of order 2 and 3 by shape. Their error is less than a tenth of that of the finest cells.
 FINE_AROUND = {"block": {2: 0.5, 3: 1.0}, "half-disc": {2: 1 / 3, 3: 2 / 3}}
 #: Cells (um), and the refinement that makes elements twice as long on average around the half-disc.
 DISC = {4 / 3: 0.35, 2 / 3: 0.77, 1 / 3: 1.55, 1 / 6: 3.1}

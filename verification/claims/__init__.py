@@ -71,8 +71,8 @@ CLOSED = "closed forms"
 PREDICTED = "a solution"
 ARITHMETIC = "arithmetic of Table 1"
 CONSTRUCTION = "a rule of construction"
-#: When the ranges of the words were set; and when those of later claims, and the printed digits became the ranges of
-#: the numbers.
+#: Dates: when the ranges of the words were set; when the ranges of later claims were set, and the printed digits became
+#: the ranges of the numbers.
 SET, LATER = "2026-11-21", "2026-11-22"
 #: A value that the paper prints: 2.9, or ~60.
 PRINTED = re.compile(r"~?\d+(\.\d+)?")
@@ -87,7 +87,7 @@ TRANSPORT, TRANSPORT_WORDS = 0.001, "0.1 %, the paper's accuracy of transport"
 
 
 class ClaimError(RuntimeError):
-    """A claim has no verdict: nothing was checked, a number is not one or has no bar, or a failure has no reason."""
+    """A claim has no verdict: it has no check, a number is NaN or has no bar, or a failure has no reason."""
 
 
 def interval(text: str) -> tuple[float, float] | None:
@@ -243,7 +243,7 @@ class Claim:
 
     @property
     def judging_levels(self) -> tuple[Level, ...]:
-        """The levels of both, the judged one first; that one alone where no number needs a bar."""
+        """The levels of meshes and steps, the judged one first; only the judged one if no number needs a bar."""
         levels = tuple(dict.fromkeys((*self.meshes.values(), *self.stepped.values())))
         return levels[:1] if self.unjudged else levels
 
@@ -299,6 +299,6 @@ def between(quantity: str, paper_text: str, computed: float, low: float, high: f
 
 
 def without_limit(check: PaperCheck) -> PaperCheck:
-    """A count, or a number that belongs to its mesh or step: its bar goes from the least to the largest of all levels,
-    and it holds where it does at every level."""
+    """A count, or a number that has no limit as mesh and step are refined. Its bar extends from the least to the
+    largest value of all levels, and it holds if it holds at every level."""
     return replace(check, converges=False)

@@ -34,7 +34,8 @@ OTHER = re.compile(r"^base|before contact|a film left|^K / K_clean =|^the part f
 WIDE_BAR, BASE_BAR = 2.0, 0.2
 #: Claims about the model that concern neither wide nor base: half-discs in truncated pores, and variants of wide.
 NOT_OF_BASE = ("C19", "C41")
-#: Why a bar of base exceeds BASE_BAR, by the kind of number: what its claim or its name begins with.
+#: Why a bar of base exceeds BASE_BAR, by the kind of number. A kind is the beginning of a claim's id or of a number's
+#: name.
 KINDS = {
     "a place, known to the element in which it is": r"C10",
     "a small difference of two halves, or of two runs or solutions, which takes the errors of both in parts of itself":

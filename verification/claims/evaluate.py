@@ -57,8 +57,8 @@ def unnumbered(quantity: str) -> str:
 
 
 def _judgeable(claim: Claim, check: PaperCheck, by_level: dict[Level, tuple[str, float, bool]]) -> PaperCheck:
-    """The check with its bar, from its value and whether it holds at each level, which is added to a width of its own,
-    that of the mesh around a place."""
+    """The check with its bar, from its value and outcome at each level. The bar is added to the check's own width,
+    which is that of the mesh around a point."""
     values = {level: value for level, (_, value, _) in by_level.items()}
     on_sizes = [values[level] for level in claim.judging_levels]
     beside = [value for level, value in values.items() if level not in claim.judging_levels]
@@ -77,10 +77,11 @@ def _estimate(varied: dict[float, Level], values: dict[Level, float], formal: tu
     return estimate([*varied], [values[level] for level in varied.values()], formal) if len(varied) > 1 else None
 
 
-#: Of a claim at one level: its numbers, with its finding where the level is the judged one, or the error in words.
+#: Outcome of a claim at one level: its numbers, with its finding if the level is the judged one; or the message of an
+#: error.
 Outcome = tuple[Numbers, Finding | None] | str
 
-#: Further runs of a claim at each of its levels, in runs as long as wide; C32 reads those of C41.
+#: Number of additional runs of a claim at each of its levels, in units of the run wide; C32 reads those of C41.
 RUNS = {"C41": 5.5, "C42": 1, "C43": 1.5, "C53": 4}
 #: Cost of base over that of wide, and the constant part of the cost of a run.
 OF_BASE, LEAST = 0.1, 0.15

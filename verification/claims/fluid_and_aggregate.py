@@ -40,7 +40,7 @@ from verification.claims.runs import (
 from verification.problems import meshes
 
 PASCAL = 1e6  # in a MPa
-#: "Small against": a tenth.
+#: "Small against" means at most a tenth.
 SMALL = 0.1
 
 
@@ -65,12 +65,12 @@ class Forces:
 
     @property
     def against_growth(self) -> float:
-        """The fluid's over growth's stress."""
+        """Stress of the fluid over stress of growth."""
         return (self.head + self.shear) / self.growth
 
     @property
     def strain(self) -> float:
-        """About the strain that the fluid would cause."""
+        """Estimate of the strain that the fluid would cause."""
         return (self.head + self.shear) / self.stiffness
 
 
@@ -99,7 +99,7 @@ def fluid_forces() -> Finding:
 
 
 def forces(aggregate: Body) -> Forces:
-    """Of an aggregate."""
+    """The forces of an aggregate."""
     head, shear = interface_forces(aggregate)
     drive, modulus = aggregate.scene.flow, PASCAL * aggregate.scene.growth.shear_modulus
     weight = PASCAL * MPA_PER_UM * drive.density * drive.gravity
@@ -224,7 +224,7 @@ def tearing() -> Finding:
 
 
 def _on_another_size(most: dict[Run, Body]) -> str:
-    """Where the stress of runs at their worst is the largest, here and on the size of its figure, in words."""
+    """Describe the location of the largest stress, at this level and on the element size of the figure."""
     preset_x = [peak(aggregate).x for aggregate in most.values()]
     hours = [aggregate.pore.time for aggregate in most.values()]
     with at_level(Level(CONVERGED, PAIRED[1])):
@@ -250,7 +250,7 @@ def torn_by_the_fluid() -> Finding:
 
 
 def changed(pair: tuple[Body, Body], part: float = APART) -> float:
-    """By how many percent the fluid changes the largest principal stress."""
+    """Change (%) of the largest principal stress by the fluid."""
     without, forced = (peak(aggregate, part).value for aggregate in pair)
     return 100 * (forced / without - 1)
 
@@ -264,7 +264,7 @@ def _describe_fluid_effect(pairs: dict[str, tuple[Body, Body]]) -> str:
 
 
 def _changes(pair: tuple[Body, Body]) -> str:
-    """By how many percent the fluid changes the stress, in means over all of DISTANCES."""
+    """Change (%) of the stress by the fluid, in means over each of DISTANCES."""
     return ", ".join(f"{changed(pair, part):.2g}" for part in DISTANCES)
 
 

@@ -74,7 +74,8 @@ def extremes() -> Finding:
 
 
 def nearby(grid: Mesh, node: int) -> float:
-    """How far (um) the farthest node is that shares a triangle with a node: an extreme is somewhere within."""
+    """Distance (um) from a node to the farthest node that shares a triangle with it. The extreme lies within this
+    distance."""
     around = grid.cells[(grid.cells == node).any(axis=1)].ravel()
     return float(np.hypot(*(grid.points[around] - grid.points[node]).T).max())
 

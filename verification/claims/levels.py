@@ -1,4 +1,4 @@
-"""The levels at which every claim is computed.
+"""The levels at which claims are computed.
 
 Claims about **the model** are judged with a converged solution, claims about **the scheme** with the scheme.
 
@@ -57,14 +57,14 @@ def converged(size: float) -> tuple[str, ...]:
             f"numerics.contact_elements={CONTACT / size!r}")
 
 
-#: Sizes of the converged solution, the one that is judged first; those for claims that read wide, and those for claims
-#: that compare several runs of their own, around the preset "fast", which is 2.25: an error that both runs of a pair
-#: have is not in their difference.
+#: Sizes of the converged solution, the judged one first; sizes for claims that read wide; and sizes for claims that
+#: compare several runs of their own. The last are around the preset "fast", which is 2.25: an error that both runs of a
+#: pair share cancels in their difference.
 FINE = (0.5, 2**-0.5, 1.0)
 WIDE_FINE = (2**-0.5, 1.0, 2**0.5)
 PAIRED = tuple(2.25 * 2 ** (third / 3) for third in (-1, 0, 1))
-#: Those for changes of wide. A run with half the least angle of contact depends on its mesh: at 1.79 it stops in a step
-#: after contact, in which a triangle is inverted.
+#: Sizes for variants of wide. A run with half the least angle of contact depends on its mesh: at 1.79 it stops in a
+#: step after contact, in which a triangle is inverted.
 COMPARED = tuple(1.25 * 2 ** (half / 2) for half in (1, 2, 3))
 #: Size of the scheme beside claims that compare runs of their own, which are expensive.
 BESIDE_PAIRS = (2**0.5,)

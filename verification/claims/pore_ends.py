@@ -122,10 +122,10 @@ def end_effect(*changes: str) -> float:
     """Largest change (%) of the uptake if C at the pore's end is zero, or the supply."""
     _, pore, solved = fully_meshed_pore(*changes)
     outlet = pore.space.outlet.nodes
-    return max(apart(uptake(holding(pore, solved, outlet, part)), uptake(solved)) for part in (0.0, 1.0))
+    return max(apart(uptake(solve_with_prescribed(pore, solved, outlet, part)), uptake(solved)) for part in (0.0, 1.0))
 
 
-def holding(pore: Pore, solved: Solved, nodes: np.ndarray, part: float) -> Solved:
+def solve_with_prescribed(pore: Pore, solved: Solved, nodes: np.ndarray, part: float) -> Solved:
     """Solve again with both concentrations prescribed as a part of their supply at some nodes, at the outlet instead of
     (12)."""
     problem, state = solved.problem, solved.concentrations
@@ -183,8 +183,8 @@ def _errors(scene, radius: float) -> np.ndarray:
 
 
 def _numbers(scene, grid: Mesh) -> list[float]:
-    """Conductivity with an exact clean part, to which the aggregate adds what it adds to this mesh without biomass; and
-    both effluents."""
+    """Conductivity, and both effluents. The resistance is the exact one of the clean pore, plus the difference that the
+    biomass makes on this mesh."""
     flow, fluxes = solution(scene, grid, full_biomass(scene, grid))
     added = 1 / flow.conductivity - 1 / flow_in(scene, emptied(grid)).conductivity
     return [1 / (added + 1 / clean(scene)), *(flux.effluent for flux in fluxes)]
@@ -213,8 +213,8 @@ def lengthened(mesh: Mesh, end: float, size: float) -> Mesh:
 
 
 def _with_columns(mesh: Mesh, line: np.ndarray, places: np.ndarray) -> Mesh:
-    """With columns from a line of nodes to each of the places x in turn. No triangle has an edge on an end and one on a
-    wall: diagonals run from the outer node nearer to the middle of the pore."""
+    """Add columns of triangles from a line of nodes to each position x in turn. No triangle has an edge on an end and
+    one on a wall: diagonals run from the outer node nearer to the middle of the pore."""
     y = mesh.points[line, 1]
     new = np.column_stack([np.repeat(places, len(line)), np.tile(y, len(places))])
     numbers = len(mesh.points) + np.arange(len(new)).reshape(len(places), len(line))

@@ -61,7 +61,7 @@ class Row:
 
     @property
     def checks(self) -> tuple[PaperCheck, ...]:
-        """Those that have a bar: none of a claim that came to an error."""
+        """The checks that have a bar: none if the claim failed with an error."""
         return tuple(check for check in self.finding.checks if check.bar) if self.finding else ()
 
     @property
@@ -238,7 +238,8 @@ def _finite(value: float) -> float | None:
 
 
 def differences(entries: list[dict], committed: list[dict]) -> list[str]:
-    """Where claims do not agree with the record, a line each: another verdict or outcome, a number out of its interval.
+    """One line for each disagreement of claims with the record: another verdict or outcome, or a number outside its
+    interval.
     """
     known = {each["id"]: each for each in committed}
     return [f"{each['id']}: {line}" for each in entries for line in _of_claim(each, known.get(each["id"]))]
@@ -275,7 +276,7 @@ def inside(value: float | None, low: float | None, high: float | None) -> bool:
 
 @dataclass(frozen=True)
 class Flip:
-    """A recorded verdict that is another one with a bound moved by the bar of its number.
+    """A recorded verdict that changes if a bound moves by the bar of its number.
 
     id: the claim; quantity: of the check; verdict: with the moved bound.
     """
@@ -294,7 +295,7 @@ def flips(entry: dict) -> list[Flip]:
 
 
 def _moved(check: dict) -> list[tuple[float, float]]:
-    """The bounds of a check, one of them moved by the bar; none where that has no end."""
+    """The bounds of a check, one of them moved by the bar; empty if the bar has an open end."""
     low, high = ends(check["tolerance"])
     first, last = ends(check)
     half = 0.5 * (last - first)

@@ -328,7 +328,7 @@ def step_control() -> Finding:
 
 
 def _steps(advance: gear.Advance) -> str:
-    """The steps of an update, in words."""
+    """Describe the steps of an update."""
     return f"{len(advance.steps)} steps of {HOUR * min(advance.steps):.2g} to {HOUR * max(advance.steps):.3g} s"
 
 

@@ -19,12 +19,12 @@ from verification.evidence.writing import markdown, table
 from verification.network import shapes, uptakes
 from verification.network.shapes import RATIOS, Growth, Sample, log_uniform
 
-#: Thicknesses over W of the table's half-discs, and areas over W^2 of its plugs: from where nearly all runs are in
-#: contact, as those that are earlier resist more than others.
+#: Thicknesses over W of the table's half-discs, and areas over W^2 of its plugs. The least area is one at which nearly
+#: all runs are in contact: runs with earlier contact resist more.
 THICKNESSES = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5, 0.55, 0.6, 0.65, 0.7, 0.75, 0.8, 0.85, 0.9, 0.92,
                0.94, 0.96, 0.98)
 PLUGS = (1.6, 1.75, 2.0, 2.25, 2.5, 3.0, 3.5, 4.0, 4.5)
-#: Runs of the fit: corners of the range of widths, velocities and supplies, and inside of it. None is base or wide.
+#: Runs of the fit: corners and inner points of the range of widths, velocities and supplies. None is base or wide.
 RUNS = (Growth(40, 1, 10, 5, 0, 52), Growth(50, 4, 20, 5, 10, 40), Growth(70, 6, 10, 5, 30, 38),
         Growth(80, 0.5, 20, 8, -20, 45), Growth(100, 1, 10, 8, 0, 55), Growth(100, 2.9, 4, 8, 0, 60),
         Growth(150, 2.9, 10, 10, 0, 40), Growth(150, 1, 20, 10, 0, 40))
@@ -64,7 +64,7 @@ def table_rows(discs: list[Sample], samples: list[Sample]) -> list[list]:
     shares, lengths = np.array([one.share for one in discs]), np.array([one.lengths for one in discs])
     plugs = np.array(PLUGS)
     apart = departures(before, lambda one: law(shares, lengths, one.share))
-    far = departures(after, lambda one: law(plugs, mean_of_runs(after, but=one.run), one.share))
+    far = departures(after, lambda one: law(plugs, mean_of_runs(after, left_out=one.run), one.share))
     return [*_lines(0, shares, lengths, bounds(shares, before, apart)),
             *_lines(1, plugs, mean_of_runs(after), bounds(plugs, after, far))]
 
@@ -85,10 +85,10 @@ def departures(samples: list[Sample], expected: Callable[[Sample], np.ndarray]) 
     return np.array([np.array(one.lengths) / expected(one) - 1 for one in samples])
 
 
-def mean_of_runs(samples: list[Sample], but: Growth | None = None) -> np.ndarray:
+def mean_of_runs(samples: list[Sample], left_out: Growth | None = None) -> np.ndarray:
     """(m, l) geometric mean of r at the areas PLUGS over the runs that reach them, one of them left out."""
     curves = []
-    for run in dict.fromkeys(one.run for one in samples if one.run not in (None, but)):
+    for run in dict.fromkeys(one.run for one in samples if one.run not in (None, left_out)):
         of_run = [one for one in samples if one.run == run]
         place = np.log([one.share for one in of_run])
         columns = np.log([one.lengths for one in of_run]).T
@@ -229,7 +229,7 @@ the laws over such a history is not known: whole runs of these throats have not 
 
 
 def _numbers(states: dict[str, np.ndarray]) -> str:
-    """How many states there are, and of which kinds."""
+    """Describe the number of states of each kind."""
     grown, spanned = states["grown"] == 1, states["spanned"] == 1
     return f"{(~grown).sum()} half-discs, {grown.sum()} grown shapes, {spanned.sum()} of them in contact"
 
@@ -260,7 +260,7 @@ LARGEST, FURTHER = 3.0, 1.05
 
 
 def new_shapes() -> Iterator[Sample]:
-    """All fifty, each at a lambda of its own, or of its run."""
+    """All fifty shapes, each with a lambda of its own or with that of its run."""
     random = np.random.default_rng(SEED)
     yield from _drawn(random)
     for _ in range(NEW_RUNS):

@@ -138,7 +138,7 @@ def outlines(random: Random, tables: dict) -> None:
 
 
 def brinkman(random: Random, tables: dict) -> None:
-    """A permeable body, from gravel to clay, up to most of the width."""
+    """A permeable body, with permeabilities from gravel to clay, which fills up to most of the width."""
     tables["aggregate"]["radius"] = _um(_width(tables) * random.uniform(0.1, 0.9))
     tables["flow"] |= {"biomass": "brinkman", "permeability": f"{_spread(random, 1e-17, 1e-10):.3g} m^2"}
 
