@@ -34,7 +34,7 @@ from repro.model.pore import Pore, material
 from repro.model.traction import Fluid
 from repro.scene import Growth, Numerics, Scene
 
-#: Rounds in which closing films may change the contact surfaces within one step.
+#: Largest number of rounds in which closing films change the contact surfaces in one step.
 CONTACT_ROUNDS = 60
 #: Largest number of times that contact lines go back after a trial that fails.
 RETREATS = 6
@@ -46,11 +46,11 @@ SETTLING_ROUNDS = 4
 #: Largest move of a node in the last round, over the aggregate's thickness.
 FORCE_REST = 1e-8
 PATIENT = SearchOptions()
-#: Defect at which a part of theta but the last counts as reached.
+#: Defect at which each part of theta except the last counts as reached.
 PARTLY = 1e-3
 #: Clearances of the first contact at which Newton's method takes over from the search.
 CLOSE_ENOUGH = 0.2
-#: Lengths of the first contact to both sides of the highest place, over the least film.
+#: Lengths of the first contact on both sides of the highest point, over the least film.
 FIRST_LENGTHS = np.array([1.0, 0.5, 0.25])
 
 
