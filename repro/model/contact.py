@@ -304,7 +304,7 @@ def _place_lines(outline: Outline, lines: Sequence[Line], search: SearchOptions)
 
 
 def _tip_width(outline: Outline, depth: float) -> float:
-    """The width (um) of the aggregate at a depth (um) below its highest place."""
+    """The width (um) of the aggregate at a depth (um) below its highest point."""
     x, y = outline.points.T
     top = int(np.argmax(y))
     sides = []
@@ -317,8 +317,8 @@ def _tip_width(outline: Outline, depth: float) -> float:
 
 
 def _first_contact(outline: Outline, length: float) -> tuple[np.ndarray, list[Line]]:
-    """Walls (M,) where the corner next to the highest place has joined the upper one, and the
-    contact lines at a length (um) to both sides of that place."""
+    """Walls (M,) after the corner next to the highest point has joined the upper wall, and the
+    contact lines at a length (um) on both sides of that point."""
     x = outline.points[:, 0]
     arc = int(np.argmax(outline.arcs(outline.points)[:, :, 1].max(axis=1)))
     ends = np.array([2 * arc, (2 * arc + 2) % len(x)])
@@ -343,7 +343,7 @@ def _clearance(rule: Clearance, outline: Outline, line: Line) -> tuple[float, fl
 
 
 class _Trials:
-    """Equilibria of one grown pore with several places of its contact lines.
+    """Equilibria of one grown pore with its contact lines at several positions.
 
     Each starts from the last one, extrapolated in the advance of the line that moves most.
     """
@@ -382,7 +382,8 @@ class _Trials:
         """Equilibrium with walls (M,) of the grown pore's outline and lines at zero clearance.
 
         Newton's method solves for shape and lines at once. If it fails, the result is None and the
-        lines stay unchanged. Theta goes to its target in parts, as in :func:`growth.equilibrium`.
+        lines stay unchanged. Theta changes to its target in parts, as in
+        :func:`growth.equilibrium`.
         """
         start = [line.advance for line in lines]
         grown = self._grown

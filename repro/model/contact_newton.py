@@ -52,7 +52,7 @@ HALVINGS = 5
 
 @dataclass(frozen=True, eq=False)
 class Placed:
-    """An aggregate with its contact lines at a place.
+    """An aggregate with its contact lines at given positions.
 
     grown: the pore before its expansion; pore: the same on the divided mesh, with its contact;
     division: None if no arc is divided; reference: (N, 2) um, where strain counts from, at the

@@ -622,7 +622,7 @@ class Flows(NamedTuple):
 
 
 def integrated(acceptor: Sequence[float], donor: Sequence[float]) -> Flows:
-    """Flows of substrates at rest, from what of each is supplied, out, consumed and unmet."""
+    """Flows of steady substrates, from the rates of each: supplied, out, consumed and unmet."""
     supplied, out, consumed, unmet = zip(acceptor, donor)
     return Flows(supplied, out, consumed, (0.0, 0.0), unmet)
 
