@@ -34,7 +34,7 @@ from repro.model.pore import Pore, material
 from repro.model.traction import Fluid
 from repro.scene import Growth, Numerics, Scene
 
-#: Rounds in which closing films may change the contact surfaces within one step.
+#: Largest number of rounds in which closing films change the contact surfaces in one step.
 CONTACT_ROUNDS = 60
 #: Largest number of times that contact lines go back after a trial that fails.
 RETREATS = 6
@@ -46,11 +46,11 @@ SETTLING_ROUNDS = 4
 #: Largest move of a node in the last round, over the aggregate's thickness.
 FORCE_REST = 1e-8
 PATIENT = SearchOptions()
-#: Defect at which a part of theta but the last counts as reached.
+#: Defect at which each part of theta except the last counts as reached.
 PARTLY = 1e-3
 #: Clearances of the first contact at which Newton's method takes over from the search.
 CLOSE_ENOUGH = 0.2
-#: Lengths of the first contact to both sides of the highest place, over the least film.
+#: Lengths of the first contact on both sides of the highest point, over the least film.
 FIRST_LENGTHS = np.array([1.0, 0.5, 0.25])
 
 
@@ -304,7 +304,7 @@ def _place_lines(outline: Outline, lines: Sequence[Line], search: SearchOptions)
 
 
 def _tip_width(outline: Outline, depth: float) -> float:
-    """The width (um) of the aggregate at a depth (um) below its highest place."""
+    """The width (um) of the aggregate at a depth (um) below its highest point."""
     x, y = outline.points.T
     top = int(np.argmax(y))
     sides = []
@@ -317,8 +317,8 @@ def _tip_width(outline: Outline, depth: float) -> float:
 
 
 def _first_contact(outline: Outline, length: float) -> tuple[np.ndarray, list[Line]]:
-    """Walls (M,) where the corner next to the highest place has joined the upper one, and the
-    contact lines at a length (um) to both sides of that place."""
+    """Walls (M,) after the corner next to the highest point has joined the upper wall, and the
+    contact lines at a length (um) on both sides of that point."""
     x = outline.points[:, 0]
     arc = int(np.argmax(outline.arcs(outline.points)[:, :, 1].max(axis=1)))
     ends = np.array([2 * arc, (2 * arc + 2) % len(x)])
@@ -343,7 +343,7 @@ def _clearance(rule: Clearance, outline: Outline, line: Line) -> tuple[float, fl
 
 
 class _Trials:
-    """Equilibria of one grown pore with several places of its contact lines.
+    """Equilibria of one grown pore with its contact lines at several positions.
 
     Each starts from the last one, extrapolated in the advance of the line that moves most.
     """
@@ -382,7 +382,8 @@ class _Trials:
         """Equilibrium with walls (M,) of the grown pore's outline and lines at zero clearance.
 
         Newton's method solves for shape and lines at once. If it fails, the result is None and the
-        lines stay unchanged. Theta goes to its target in parts, as in :func:`growth.equilibrium`.
+        lines stay unchanged. Theta changes to its target in parts, as in
+        :func:`growth.equilibrium`.
         """
         start = [line.advance for line in lines]
         grown = self._grown

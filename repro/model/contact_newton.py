@@ -40,7 +40,7 @@ LONGEST = 2.0
 AT_REST = CLOSE / 2
 #: Largest clearance of a line whose place is at a corner.
 AT_CORNER = 0.05
-#: A line whose place is at a corner lies at this distance (arcs) beyond it.
+#: A line at a corner is placed this far (arcs) beyond the corner.
 BESIDE = 1.01 * LEAST_PART
 #: Advance (arcs) from a corner of a line that is not at rest there.
 DEPARTURE = 0.3
@@ -52,7 +52,7 @@ HALVINGS = 5
 
 @dataclass(frozen=True, eq=False)
 class Placed:
-    """An aggregate with its contact lines at a place.
+    """An aggregate with its contact lines at given positions.
 
     grown: the pore before its expansion; pore: the same on the divided mesh, with its contact;
     division: None if no arc is divided; reference: (N, 2) um, where strain counts from, at the

@@ -237,9 +237,9 @@ def steady(problem: Problem, sink: Sink | None, guess: Concentrations | None) ->
 
 
 def _nearer(problem: Problem, guess: Concentrations | None) -> Concentrations:
-    """The guess; or C_supply everywhere if there is no guess, or if constrained nodes would jump by
-    more than SETTLING: no step is short enough for a larger jump, and quadratic and cubic
-    concentrations beside it fall below zero."""
+    """The guess, or C_supply everywhere if there is no guess or if constrained nodes would jump by
+    more than SETTLING. No step is short enough for a larger jump; quadratic and cubic
+    concentrations beside it would fall below zero."""
     supplied = supplied_everywhere(problem)
     if guess is None:
         return supplied

@@ -212,8 +212,8 @@ def _with_elements_of(scene: Scene, pore: Pore) -> Pore:
 
 
 def _with_linear(scene: Scene) -> Scene | None:
-    """The scene with linear elements of at least the paper's refinement; None if it has linear
-    elements already, or may not have them.
+    """The scene with linear elements of at least the paper's refinement; None if the scene has
+    linear elements already, or if they are not allowed.
 
     Linear elements lump the uptake at the nodes: behind a front that is thinner than an element
     their concentrations fall far less below zero than those of higher orders.

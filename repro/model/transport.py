@@ -51,7 +51,7 @@ SATURATED = 0.9
 SWITCH = 0.5
 #: A concentration below zero by more than this part of its supply is not resolved.
 UNRESOLVED = 1e-3
-#: Nor is one above its supply by more than this part of it.
+#: A concentration above its supply by more than this part of the supply is not resolved either.
 OVERSHOOT = 0.02
 #: Largest accepted concentration over its supply, by the order of the elements.
 HIGHEST = {1: np.inf, 2: 1 + OVERSHOOT, 3: 1 + OVERSHOOT}
@@ -503,7 +503,8 @@ def steady(problem: Problem, sink: Sink | None,
     -----
     If the method fails, often behind a sharp front, it starts again from the supply with the half
     saturations at the supply, and lowers them to their values by a factor of ten at a time. It does
-    not if the law is not monotone: several solutions may exist, and the one near the guess is due.
+    not start again if the law is not monotone: several solutions may exist, and the one near the
+    guess is required.
     """
     if problem.law is None:
         sink = None
@@ -621,7 +622,7 @@ class Flows(NamedTuple):
 
 
 def integrated(acceptor: Sequence[float], donor: Sequence[float]) -> Flows:
-    """Flows of substrates at rest, from what of each is supplied, out, consumed and unmet."""
+    """Flows of steady substrates, from the rates of each: supplied, out, consumed and unmet."""
     supplied, out, consumed, unmet = zip(acceptor, donor)
     return Flows(supplied, out, consumed, (0.0, 0.0), unmet)
 

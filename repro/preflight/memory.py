@@ -151,7 +151,7 @@ def require_memory(scene: Scene, warn: Callable[[str], None]) -> None:
 
 
 def _fitting(scene: Scene, free: float) -> str:
-    """Name the largest refinement of those tried that fits into the free memory, in bytes."""
+    """Name the largest tried refinement that fits into the free memory (bytes)."""
     for factor in COARSER:
         refinement = float(f"{scene.numerics.refinement * factor:.2g}")
         coarser = replace(scene, numerics=replace(scene.numerics, refinement=refinement))

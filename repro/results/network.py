@@ -12,9 +12,9 @@ After that r is nearly (lambda - 1) (A / W^2 - 0.4). A plug with straight ends h
 (lambda - 1) A / W^2; rounded ends let more water pass.
 
 ``python -m verification.network`` makes ``network.csv``. It has r of half-discs, and the mean r of
-plugs that have grown. Its bounds are the least and the largest r of other grown shapes, in pores of
-40 to 150 um at 0.5 to 6 m/d and W^2 / 2500 to 20 mg/L of both substrates, and of similar drawn
-shapes: 1 % thinner or 3 % thicker than a half-disc, or leaning by 5 %.
+plugs that have grown. Its bounds are the least and the largest r of two kinds of shapes. Grown
+shapes are from pores of 40 to 150 um, at 0.5 to 6 m/d and W^2 / 2500 to 20 mg/L of both substrates.
+Drawn shapes are 1 % thinner or 3 % thicker than a half-disc, or lean by 5 %.
 """
 
 from __future__ import annotations

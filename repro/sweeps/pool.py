@@ -1,6 +1,7 @@
 """Parallel runs on this machine, each in its own process.
 
-A killed process fails only its own run. A server that has imported the package forks them.
+If a process is killed, only its run fails. A server that has imported the package forks the
+processes.
 """
 
 from __future__ import annotations
@@ -47,7 +48,7 @@ def ready(workers: int) -> Iterator[RunPoints]:
 
 
 def _start_server() -> None:
-    """Start the server unless it is running. Ctrl-C reaches neither it nor its processes."""
+    """Start the server unless it is running. Ctrl-C does not reach the server or its processes."""
     if CONTEXT.get_start_method() != "forkserver":
         return
     from multiprocessing import forkserver, resource_tracker
