@@ -185,8 +185,8 @@ def _number(check: dict) -> str:
               "inputs": (check.get("input_low"), check.get("input_high")),
               "scheme of 2001": check.get("scheme_2001") or (None, None)}
     spans = [f"{name} {_span(*pair)}" for name, pair in widths.items() if None not in pair]
-    return (f"{check['quantity']}: paper {check['paper']}, here {check['value']:.4g} ({'; '.join(spans)}); accepted "
-            f"{accepted}: {check['outcome']}")
+    here = " ".join([claims_record.valued(check["value"], check["high"]), f"({'; '.join(spans)})" if spans else ""])
+    return f"{check['quantity']}: paper {check['paper']}, here {here.strip()}; accepted {accepted}: {check['outcome']}"
 
 
 def _sentences() -> str:

@@ -33,7 +33,7 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from decimal import Decimal
-from math import inf, isnan
+from math import inf, isfinite, isnan
 
 from verification import sensitivity
 from verification.claims.levels import (
@@ -123,7 +123,8 @@ class PaperCheck(Check):
 
     paper: the paper's text, "2.9"; date: when the accepted range was set, by default the date of the claim; converges:
     does the number have a limit as mesh and step are refined? rests_on: what the number depends on; input: its name in
-    the record of the sensitivities; bar: the interval of the number, None before it is known; holds_at: for a number
+    the record of the sensitivities; bar: the interval of the number, None before it is known, without an upper end if
+    the run ended before the number was reached, and its value is then the end of the run; holds_at: for a number
     without a limit, whether it holds at each level; scheme: smallest and largest value with the scheme of 2001, None
     where it is not computed; on_sizes: for a claim about the model, the values on the sizes of the converged solution,
     the judged one first.
@@ -139,6 +140,16 @@ class PaperCheck(Check):
     holds_at: tuple[bool, ...] = ()
     scheme: tuple[float, float] | None = None
     on_sizes: tuple[float, ...] = ()
+
+    @property
+    def holds(self) -> bool:
+        """Whether the number lies in its interval. A number without an upper end never lies under an upper bound."""
+        return super().holds and not (self.is_lower_bound and isfinite(self.high))
+
+    @property
+    def is_lower_bound(self) -> bool:
+        """Whether the value is only a lower bound, because the run ended before the number was reached."""
+        return self.bar is not None and self.bar.high == inf
 
     @property
     def printed(self) -> tuple[float, float] | None:

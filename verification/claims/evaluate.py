@@ -15,6 +15,7 @@ import re
 from collections.abc import Callable, Iterable
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
+from math import inf
 from types import ModuleType
 
 import numpy as np
@@ -68,7 +69,7 @@ def _judgeable(claim: Claim, check: PaperCheck, by_level: dict[Level, tuple[str,
     bar = replace(bar, low=bar.low - check.value + width.low, high=bar.high - check.value + width.high)
     return replace(check, bar=bar, holds_at=tuple(by_level[level][-1] for level in claim.judging_levels),
                    date=check.date or claim.date,
-                   scheme=(min(beside), max(beside)) if beside else None,
+                   scheme=(min(beside), max(beside)) if beside and bar.high < inf else None,
                    on_sizes=tuple(on_sizes) if claim.about == MODEL else ())
 
 

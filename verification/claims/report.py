@@ -11,7 +11,8 @@ words), and `input_low` to `input_high` is its range as the inputs of Table 1 mo
 committed record of the sensitivities or a closed form; null if neither has it). `scheme_2001` is the range that the
 paper's scheme gives on one to three meshes, for a claim about the scheme that of all its levels. `on_sizes` are the
 values on the sizes of the converged solution, the judged one first, and `order` is that which is observed on them, or
-on the meshes of the scheme; null where none fits.
+on the meshes of the scheme; null where none fits. If the run ended before a number was reached, `value` is the end of
+the run, a lower bound: `high` is null, an open end, and so is `scheme_2001`.
 """
 
 import textwrap
@@ -93,12 +94,18 @@ def spanned(pair: tuple[float, float] | None) -> str:
     return f"at least {low:.4g}" if isfinite(low) else f"at most {high:.4g}"
 
 
+def valued(value: float, high: float | None) -> str:
+    """A number, or the lower bound of one that a run has not reached at its end. high: upper end of its bar."""
+    return f"not reached by {value:.4g}" if high in (None, inf) else f"{value:.4g}"
+
+
 def described(check: PaperCheck) -> str:
     """A check with its widths."""
     widths = {"numerics": (check.bar.low, check.bar.high), "inputs": check.inputs, "scheme of 2001": check.scheme,
               "accepted": (check.low, check.high)}
     words = (f"{name} {spanned(pair)}" for name, pair in widths.items() if pair)
-    return "; ".join([f"{check.quantity}: paper {check.paper}; ours {check.value:.4g}", *words, check.outcome])
+    ours = valued(check.value, check.bar.high)
+    return "; ".join([f"{check.quantity}: paper {check.paper}; ours {ours}", *words, check.outcome])
 
 
 def _paragraph(text: str, indent: str = "     ") -> str:
@@ -268,10 +275,10 @@ def _quantities(entry: dict) -> list[str]:
 
 def inside(value: float | None, low: float | None, high: float | None) -> bool:
     """Whether a value lies in a recorded interval, up to round-off. An open end is None."""
-    if value is None or low is None or high is None:
-        return value is None and (low is None or high is None)
-    near = LAST_DIGITS * max(abs(low), abs(high)) + ROUND_OFF
-    return low - near <= value <= high + near
+    if value is None:
+        return low is None or high is None
+    near = LAST_DIGITS * max(abs(end) for end in (low, high, 0.0) if end is not None) + ROUND_OFF
+    return (low is None or low - near <= value) and (high is None or value <= high + near)
 
 
 @dataclass(frozen=True)
