@@ -258,7 +258,7 @@ HALF_DISCS = {
     "accurate": ((ACCURATE,), CONSERVES, 1e-4, "a tenth of what preset accurate is for")}
 
 
-@pytest.mark.case("transport-cubic-half-disc", kind="property", mutants=("cubic-edge-nodes", "outlet-forgotten"))
+@pytest.mark.case("transport-cubic-half-disc", kind="property", mutants=("outlet-forgotten",))
 @parametrize("numerics, round_off, bound, why", HALF_DISCS)
 def test_cubic_half_disc(numerics, round_off, bound, why, record):
     """Around a half-disc, under the flow of cubic velocities, each substrate is in balance to round-off, and the
