@@ -57,7 +57,7 @@ MUTANTS = (
         ("inlet-held",
          "the inlet prescribes the concentration of the supply instead of the flux (11)",
          "constrained[both_ends(space)] = ends_constrained",
-         "constrained[space.end_nodes(space.dofs.inlet)] = True")),
+         "constrained[space.dofs.inlet] = True")),
     *changes(
         "repro/model/kinetics.py",
         ("decay-leaves-all",
@@ -77,7 +77,7 @@ MUTANTS = (
         ("modulus-in-the-shape",
          "an equilibrium starts from the pressure over mu_L as if it were in MPa",
          "start.pressure[inside],",
-         "start.pressure[inside] / scene.growth.shear_modulus,"),
+         "start.pressure[inside] / mechanics.keys.shear_modulus,"),
         ("masses-of-the-start-kept",
          "The new shape has the masses of the start of its search, so the growth is lost.",
          "grown = replace(grown, theta=theta,",
