@@ -1090,7 +1090,7 @@ MUTANTS = (
         ("netcdf-when-done",
          "A run that was stopped leaves the NetCDF file of the shorter run that it was.",
          'if self.scene.output.timeseries == "netcdf":',
-         'if self.scene.output.timeseries == "netcdf" and done(status):',
+         'if self.scene.output.timeseries == "netcdf" and status == "completed":',
          "tests/test_netcdf.py::test_the_dataset_of_a_stopped_run_equals_its_table"),
         ("record-before-table",
          "run.json lists rows before they are in the table.",
@@ -1193,7 +1193,7 @@ MUTANTS = (
         ("page-units",
          "All fields of a page have the unit of the first.",
          '"unit": names.unit(name),',
-         '"unit": names.unit(SHOWN[0]),',
+         '"unit": names.unit("acceptor"),',
          "tests/test_report.py::test_the_page_leaves_out_physics_that_is_not_modelled")),
     *changes(
         "repro/results/netcdf.py",
