@@ -548,6 +548,12 @@ def _deformation(scene: Scene, row: dict, fields: Fields) -> Iterator[Finding]:
     yield size("area over that at t = 0 over J, less one", after / before / J - 1, SOLVED, "J = det dx/dX")
     yield size("integral of theta less J over that of J", np.sum((theta - J) * before) / after.sum(), SOLVED,
                "(24) with a constant test function; Newton's tolerance")
+    if scene.section("growth").get("wall") == "bonded":
+        body = np.unique(fields.cells[fields.body])
+        bonded = body[(fields.points[body, 1] == 0) & (places[body, 1] == 0)]
+        moved = fields.points[bonded, 0] - places[bonded, 0]
+        yield size("path of bonded nodes along the wall over the width", moved / scene.number("pore", "width"), SOLVED,
+                   "2.3.3: what touches a bonded wall stays; quadratic functions carry its places exactly")
 
 
 def _steps(run: Run) -> Iterator[Finding]:
@@ -630,6 +636,17 @@ def _max_decay(run: Run) -> np.ndarray:
     return rate * _decay_fraction(run) * run.duration * _max_biomass(run)
 
 
+def _least_decay(run: Run) -> np.ndarray | float:
+    """Lower bound of the biomass that degrades in each step (steps,), pg/m: what is active at t = 0 decays at b."""
+    scene = run.scene
+    if "acceptor" in scene.names and not scene.unlimited_decay:
+        return 0.0
+    b = scene.number("kinetics", "decay_coefficient")
+    active = (1 - run.series["inert_fraction"][0]) * run.ledger["biomass_before_pg_per_m"][0]
+    least = active * np.exp(-b * run.ledger["end_h"])
+    return scene.number("kinetics", "degradable_fraction") * b * run.duration * least
+
+
 def _growth(run: Run) -> Iterator[Finding]:
     """New biomass is the yield on the donor minus the decay."""
     scene, ledger = run.scene, run.ledger
@@ -646,8 +663,9 @@ def _growth(run: Run) -> Iterator[Finding]:
     slack = SUM * (before + terms) + _scheme_error(run, law, terms)
     yield excess("biomass made less Y donor - (acceptor - F donor) / d_c, pg/m", produced - grown + decayed,
                  -slack, slack, "(7)-(10); round-off with the midpoint rule")
-    yield excess("biomass that degrades by the oxygen consumed, pg/m", decayed, -slack - SOLVED * terms,
-                 _max_decay(run) * (1 + SOLVED) + slack, "f_d b m_A X_A, from zero to that at the supply")
+    yield excess("biomass that degrades by the oxygen consumed, pg/m", decayed, _least_decay(run) - slack - SOLVED * terms,
+                 _max_decay(run) * (1 + SOLVED) + slack,
+                 "f_d b m_A X_A, from zero to that at the supply; f_d b X_A at the least X_A where m_A = 1 in decay")
     rows, steps = run.at_ledger()
     inert = run.series["inert_fraction"][rows] * after[steps]
     first = run.series["inert_fraction"][0] * before[0]

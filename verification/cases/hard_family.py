@@ -155,7 +155,8 @@ COMMON = {
              "the same rows with other rows, fast against accurate, or a refusal with advice that works",
     "norm": "checks that fail, of each member; of 172, whether its head loss is wrong",
     "mutants": ("family-jump-late", "family-area-of-corners", "family-effluent-not-weighted", "family-half-saturation",
-                "family-rest-of-the-pore-forgotten", "family-rows-end-steps"),
+                "family-rest-of-the-pore-forgotten", "family-rows-end-steps", "family-inhibition",
+                "family-decay-limited", "family-absent-donor-limits"),
     "references": ("run_files",), "runs_with": "2 fast accurate",
     "omitted": "members have quadratic triangles, straight ones run where advice names them; hard-01 to hard-23 run "
                "orders 1 and 3, paper and exact"}
