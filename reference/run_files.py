@@ -663,8 +663,8 @@ def _growth(run: Run) -> Iterator[Finding]:
     slack = SUM * (before + terms) + _scheme_error(run, law, terms)
     yield excess("biomass made less Y donor - (acceptor - F donor) / d_c, pg/m", produced - grown + decayed,
                  -slack, slack, "(7)-(10); round-off with the midpoint rule")
-    yield excess("biomass that degrades by the oxygen consumed, pg/m", decayed, _least_decay(run) - slack - SOLVED * terms,
-                 _max_decay(run) * (1 + SOLVED) + slack,
+    yield excess("biomass that degrades by the oxygen consumed, pg/m", decayed,
+                 _least_decay(run) - slack - SOLVED * terms, _max_decay(run) * (1 + SOLVED) + slack,
                  "f_d b m_A X_A, from zero to that at the supply; f_d b X_A at the least X_A where m_A = 1 in decay")
     rows, steps = run.at_ledger()
     inert = run.series["inert_fraction"][rows] * after[steps]

@@ -28,8 +28,9 @@ from verification.problems.hard import TooLong, limited
 LIMIT = 30.0
 #: Seeds of ``make test``, and further seeds of ``make verify``.
 QUICK, REST = (*range(20), *range(164, 172)), (*range(20, 164), *range(172, 190))
-#: Checks that are known to fail. By zero order the yield of 172 jumps at a front in the aggregate, on which ``fast`` puts
-#: a few elements: its thickness is wrong by 0.2 %, and the head loss of the film above, a sixth of the width, by 1.6 %.
+#: Checks that are known to fail. By zero order the growth of 172 jumps at a front in the aggregate, on which ``fast``
+#: puts a few elements: its thickness is wrong by 0.2 %, and the head loss of the film above it, a sixth of the width,
+#: by 1.6 %.
 KNOWN = {172: {"head_loss_cm in fast less that in accurate, relative",
                "conductivity_m_per_d in fast less that in accurate, relative"}}
 NO_HELP = re.compile(r"no setting helps|no numerics\.refinement that is accepted")

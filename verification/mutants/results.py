@@ -297,9 +297,14 @@ MUTANTS = (
          "tests/test_sweep.py::test_biomass_and_contact_are_read_from_the_rows")),
     *changes(
         "repro/model/advice.py",
+        ("bonded-advised-like-sliding",
+         "Where places at t = 0 fold on a bonded wall, a larger refinement is advised, which need not help.",
+         "advice = ADVICE | BONDED if bonded else ADVICE",
+         "advice = ADVICE",
+         "tests/test_errors_of_elements.py::test_on_a_bonded_wall_no_refinement_is_advised_where_places_fold[OriginFolded]"),
         ("no-advice",
          "Errors of the finite elements stop a run without the keys that help.",
-         "{ADVICE.get(type(error), '')}",
+         "{advice.get(type(error), '')}",
          "",
          "tests/test_errors_of_elements.py::test_an_error_of_the_elements_stops_a_run_with_the_keys_that_help")),
     *changes(
