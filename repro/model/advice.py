@@ -28,8 +28,8 @@ ADVICE: dict[type[StageError], str] = {
 #: 12.4 h with 1.0.
 BONDED: dict[type[StageError], str] = {
     OriginFolded: "; no setting helps reliably: the strain at the contact lines of a bonded wall "
-                  'is singular, and a finer mesh may stop the run sooner; growth.wall = "sliding" is '
-                  "another model",
+                  'is singular, and a finer mesh may stop the run sooner; growth.wall = "sliding" '
+                  "is another model",
 }
 
 
