@@ -310,6 +310,18 @@ MUTANTS = (
          "value if",
          "tests/test_scene.py::test_units_are_accepted_as_papers_write_them")),
     *changes(
+        "repro/sweeps/table.py",
+        ("half-is-two-fifths",
+         "The time of half conductivity is that at 0.4.",
+         "clogging(run.times, run.relative, run.biomass, 0.5)[0]",
+         "clogging(run.times, run.relative, run.biomass, 0.4)[0]",
+         "tests/test_sweep.py::test_events_of_a_run"),
+        ("final-values-are-the-first",
+         "The final values of a run in runs.csv are those at t = 0.",
+         "_none_if_nan(series[name][-1]) for name in FINAL",
+         "_none_if_nan(series[name][0]) for name in FINAL",
+         "tests/test_sweep.py::test_a_sweep_converts_to_tables_and_pictures")),
+    *changes(
         "repro/report/comparison.py",
         ("percentage-of-a-coordinate",
          "A comparison states the percentage of a coordinate.",
