@@ -65,8 +65,8 @@ def test_the_picture_is_the_field(window, runs, name):
     grid = field_files.read(path)
     x, y = grid.points[:, :2].T
     inside = (np.abs(x) < 40) & (y > 1) & (y < y.max() - 1)
-    value = "(x, y) => shown.all[Math.floor((shown.tall - (y - shown.box[2]) * shown.scale) * shown.ratio) * " \
-            "shown.size[0] + Math.floor((x - shown.box[0]) * shown.scale * shown.ratio)]"
+    value = "(x, y) => drawn.all[Math.floor((drawn.tall - (y - drawn.box[2]) * drawn.scale) * drawn.ratio) * " \
+            "drawn.size[0] + Math.floor((x - drawn.box[0]) * drawn.scale * drawn.ratio)]"
     places = grid.points[inside, :2].tolist()
     drawn = np.array(window.run(f"{json.dumps(places)}.map(([x, y]) => ({value})(x, y))"))
     expected = grid.point_data["acceptor_mg_per_L"][inside]

@@ -522,7 +522,13 @@ def reach(system: System, start: np.ndarray, theta: np.ndarray, first: Equilibri
                               modified_newton)
         except (GrowthError, LinearError) as error:
             failure = str(error)
-    raise GrowthError(f"{failure}; try a shorter growth.time_step or a larger numerics.refinement")
+    raise GrowthError(f"{failure}; {_ADVICE[bool(system.pull.any())]}")
+
+
+#: Settings to try if there is no equilibrium; whether the fluid's forces act.
+_ADVICE = {False: "try a shorter growth.time_step or a larger numerics.refinement",
+           True: "the aggregate may be too soft for this flow: try a larger growth.shear_modulus, "
+                 "or a shorter growth.time_step"}
 
 
 def _continued(system: System, start: np.ndarray, theta: np.ndarray, first: Equilibrium,
