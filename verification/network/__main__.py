@@ -4,7 +4,11 @@ Writes the table `repro/results/network.csv`; the page `docs/network.md`; and `v
 shapes of the fit at one lambda and the test shapes, from which `make figures` draws its picture. The exit status is 1
 if a test shape lies outside the law's bounds.
 
-With the argument `uptake` it solves the states of the law of uptake instead, fits and judges this law.
+With an argument it does something else:
+
+    uptake     solves the states of the law of uptake, fits and judges this law
+    histories  writes the histories of the throats in the example with OpenPNM, in the environment of `make network`
+    expected   writes the law and its bounds for ten of these throats
 """
 
 import sys
@@ -12,14 +16,22 @@ from pathlib import Path
 
 from repro.results import write_table, write_text
 from repro.results.network import TABLE, TRANSPORTS, UPTAKE_BOUND
-from verification.network import law, uptakes
+from verification.network import histories, law, throats, uptakes
 
 PAGE = Path(__file__).parents[2] / "docs" / "network.md"
 
 
 def main() -> int:
     """Entry point; returns the exit status."""
-    return uptake_law() if sys.argv[1:] == ["uptake"] else resistance()
+    commands = {"uptake": uptake_law, "histories": write_histories, "expected": write_expected}
+    return commands[sys.argv[1]]() if sys.argv[1:] else resistance()
+
+
+def write_histories() -> int:
+    """Run the example of a network, and write the histories of its throats."""
+    histories.export()
+    print(f"{histories.TABLE.name}: {len(histories.read())} throats")
+    return 0
 
 
 def uptake_law() -> int:
@@ -38,6 +50,14 @@ def uptake_law() -> int:
     apart, bounds = uptakes.judged()
     print(f"{(apart <= bounds).sum()} of {len(bounds)} states that the fit has not seen are within its bound")
     return int((apart > bounds).any())
+
+
+def write_expected() -> int:
+    """Compute the law and its bounds for ten throats."""
+    rows = throats.expected(throats.chosen(histories.read()))
+    write_table(throats.EXPECTED, throats.EXPECTED_COLUMNS, rows)
+    print(f"{throats.EXPECTED.name}: {len(rows)} states")
+    return 0
 
 
 def resistance() -> int:
