@@ -9,6 +9,7 @@ With an argument it does something else:
     uptake     solves the states of the law of uptake, fits and judges this law
     histories  writes the histories of the throats in the example with OpenPNM, in the environment of `make network`
     expected   writes the law and its bounds for ten of these throats
+    throats    runs these ten throats, and compares them with the law; the exit status is 1 if a bound does not hold
 """
 
 import sys
@@ -16,14 +17,15 @@ from pathlib import Path
 
 from repro.results import write_table, write_text
 from repro.results.network import TABLE, TRANSPORTS, UPTAKE_BOUND
-from verification.network import histories, law, throats, uptakes
+from verification.network import histories, law, runs, throats, uptakes
 
 PAGE = Path(__file__).parents[2] / "docs" / "network.md"
 
 
 def main() -> int:
     """Entry point; returns the exit status."""
-    commands = {"uptake": uptake_law, "histories": write_histories, "expected": write_expected}
+    commands = {"uptake": uptake_law, "histories": write_histories, "expected": write_expected,
+                "throats": run_throats}
     return commands[sys.argv[1]]() if sys.argv[1:] else resistance()
 
 
@@ -58,6 +60,20 @@ def write_expected() -> int:
     write_table(throats.EXPECTED, throats.EXPECTED_COLUMNS, rows)
     print(f"{throats.EXPECTED.name}: {len(rows)} states")
     return 0
+
+
+def run_throats() -> int:
+    """Run ten throats with their histories, and compare them with the law."""
+    rows = [row for one in throats.chosen(histories.read()) for row in runs.run(one)]
+    write_table(runs.TABLE, runs.COLUMNS, rows)
+    compared = runs.compared()
+    for number, error, holds in zip(compared.number, compared.error, compared.holds):
+        for time, errors, inside in zip(throats.TIMES, error, holds):
+            print(f"throat {number}, {time:g} h, errors of the law: " + ", ".join(
+                f"{name} {100 * value:.2f} %{'' if within else ' (does not hold)'}"
+                for name, value, within in zip(throats.QUANTITIES, errors, inside)))
+    print(f"{compared.holds.sum()} of {compared.holds.size} values are within the bounds")
+    return int(not compared.holds.all())
 
 
 def resistance() -> int:

@@ -1,0 +1,107 @@
+"""Throats of the example of a network as whole runs of the solver, and their comparison with the law.
+
+A scene has the throat's width, seed, head loss and supplies; the tables keep their values for the step of the example.
+Two things it cannot have. The head loss of a scene is positive: two throats of the example reverse, and a run takes the
+amount of their head loss, as if its aggregate were the same from both sides. A run with steady substrates needs a flow:
+throats without flow get LEAST_HEAD, with which next to nothing is supplied, as in the example.
+"""
+
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from repro.march.loop import Report, RunEnd
+from repro.march.simulation import simulate
+from repro.results import M_PER_D, read_table
+from repro.scene import Scene, load_scene
+from verification.claims.runs import SUBSTRATES, rows_at
+from verification.network import throats
+from verification.network.histories import History
+from verification.network.throats import EXPECTED, LENGTH, QUANTITIES, TIMES, VISCOSITY
+
+#: um: less than that of every throat with flow.
+LEAST_HEAD = 1e-4
+#: The runs of the ten throats at TIMES; a run that ends earlier has no later rows.
+TABLE, COLUMNS = Path(__file__).with_name("throats.csv"), ["throat", "time_h", *QUANTITIES]
+
+
+def scene(one: History, times: Iterable[float] = TIMES, preset: str = "fast") -> Scene:
+    """The scene of a throat, to the last of some times (h)."""
+    times = list(times)
+    heads = np.maximum(np.abs(one.head_loss), LEAST_HEAD)
+    supplies = {name: {"supply": _table(one.time, values, "mg/L")} for name, values in zip(SUBSTRATES, one.supplies)}
+    return load_scene({
+        "pore": {"width": f"{one.width} um", "length": f"{LENGTH} um"},
+        "aggregate": {"radius": f"{np.sqrt(2 * one.area[0] / np.pi)} um"},
+        "flow": {"head": _table(one.time, heads, "um"), "kinematic_viscosity": f"{VISCOSITY} m^2/s"},
+        "substrates": supplies, "growth": {"end": f"{times[-1]} h"}},
+        [f"numerics.preset={preset}", rows_at(*times)])
+
+
+def _table(times: np.ndarray, values: np.ndarray, unit: str) -> list[list[str]]:
+    return [[f"{time} h", f"{value} {unit}"] for time, value in zip(times, values)]
+
+
+def run(one: History, times: Iterable[float] = TIMES) -> Iterator[list]:
+    """Rows of TABLE of a throat."""
+    with suppress(RunEnd):
+        for report in simulate(scene(one, times)):
+            if report.pore.time > 0:
+                yield [one.number, report.pore.time, *values(report)]
+
+
+def values(report: Report) -> list[float]:
+    """Each of QUANTITIES."""
+    solved = report.solved
+    taken = [float(flux.consumed) for flux in solved.fluxes]
+    return [float(report.pore.outline.area), float(M_PER_D * solved.flow.mean_velocity), *taken]
+
+
+class Comparison(NamedTuple):
+    """Ten throats at TIMES. number: (n,) of the throats; in_range: (n, times) are the conditions so far those of the
+    law's shapes? example: (n, times) um2, areas of the example; law, least, most, run: (n, times, quantities);
+    not-a-number where a run has ended."""
+
+    number: np.ndarray
+    in_range: np.ndarray
+    example: np.ndarray
+    law: np.ndarray
+    least: np.ndarray
+    most: np.ndarray
+    run: np.ndarray
+
+    @property
+    def error(self) -> np.ndarray:
+        """(n, times, quantities) of the law, relative to the run."""
+        return self.law / self.run - 1
+
+    @property
+    def holds(self) -> np.ndarray:
+        """(n, times, quantities) is the run within the bounds?"""
+        return (self.least <= self.run) & (self.run <= self.most)
+
+    @property
+    def example_error(self) -> np.ndarray:
+        """(n, times) of the example's areas, with the error of its step."""
+        return self.example / self.run[:, :, 0] - 1
+
+
+def compared() -> Comparison:
+    """The records of law and runs."""
+    expected, measured = read_table(EXPECTED), read_table(TABLE)
+    numbers = expected["throat"][expected["time_h"] == TIMES[0]]
+    of_run = {(number, time): row for number, time, *row in zip(*(measured[name] for name in COLUMNS))}
+    none = [np.nan] * len(QUANTITIES)
+    whole = np.array([[of_run.get((number, time), none) for time in TIMES] for number in numbers])
+    sides = [np.stack([_by_throat(expected[f"{name}_{part}"]) for name in QUANTITIES], axis=-1)
+             for part in ("law", "least", "most")]
+    return Comparison(numbers.astype(int), _by_throat(expected["in_range"]) == 1,
+                      _by_throat(expected["example_area_um2"]), *sides, whole)
+
+
+def _by_throat(column: np.ndarray) -> np.ndarray:
+    """(n, times) from the rows of EXPECTED, which are in order of time."""
+    return column.reshape(len(throats.TIMES), -1).T
