@@ -10,6 +10,7 @@ With an argument it does something else:
     histories  writes the histories of the throats in the example with OpenPNM, in the environment of `make network`
     expected   writes the law and its bounds for ten of these throats
     throats    runs these ten throats, and compares them with the law; the exit status is 1 if a bound does not hold
+    sweep      times all throats as whole runs, on the process pool and on Dask; some minutes on a free machine
 """
 
 import sys
@@ -17,7 +18,7 @@ from pathlib import Path
 
 from repro.results import write_table, write_text
 from repro.results.network import TABLE, TRANSPORTS, UPTAKE_BOUND
-from verification.network import histories, law, runs, throats, uptakes
+from verification.network import histories, law, page, runs, throats, timed, uptakes
 
 PAGE = Path(__file__).parents[2] / "docs" / "network.md"
 
@@ -25,7 +26,7 @@ PAGE = Path(__file__).parents[2] / "docs" / "network.md"
 def main() -> int:
     """Entry point; returns the exit status."""
     commands = {"uptake": uptake_law, "histories": write_histories, "expected": write_expected,
-                "throats": run_throats}
+                "throats": run_throats, "sweep": time_sweep}
     return commands[sys.argv[1]]() if sys.argv[1:] else resistance()
 
 
@@ -48,7 +49,7 @@ def uptake_law() -> int:
         print(f"these are not the constants of {TABLE.parent}/network.py: copy them and start again")
         return 1
     write_table(uptakes.TABLE, names, rows + [list(one) for one in uptakes.states(uptakes.NEW)])
-    write_text(PAGE, law.page(law.read(unseen=False), law.judged(law.read(unseen=True))))
+    write_text(PAGE, page.text())
     apart, bounds = uptakes.judged()
     print(f"{(apart <= bounds).sum()} of {len(bounds)} states that the fit has not seen are within its bound")
     return int((apart > bounds).any())
@@ -66,6 +67,7 @@ def run_throats() -> int:
     """Run ten throats with their histories, and compare them with the law."""
     rows = [row for one in throats.chosen(histories.read()) for row in runs.run(one)]
     write_table(runs.TABLE, runs.COLUMNS, rows)
+    write_text(PAGE, page.text())
     compared = runs.compared()
     for number, error, holds in zip(compared.number, compared.error, compared.holds):
         for time, errors, inside in zip(throats.TIMES, error, holds):
@@ -74,6 +76,13 @@ def run_throats() -> int:
                 for name, value, within in zip(throats.QUANTITIES, errors, inside)))
     print(f"{compared.holds.sum()} of {compared.holds.size} values are within the bounds")
     return int(not compared.holds.all())
+
+
+def time_sweep() -> int:
+    """Time a sweep of all throats, and write the record and the page."""
+    record = timed.write(histories.read())
+    write_text(PAGE, page.text())
+    return int(not record["equal"] or any(way["unfinished"] for way in record["ways"]))
 
 
 def resistance() -> int:
@@ -85,7 +94,7 @@ def resistance() -> int:
     new = [law.shape_row(one, 1) for one in law.new_shapes()]
     write_table(law.SHAPES, law.COLUMNS, fitted + new)
     verdict = law.judged(law.read(unseen=True))
-    write_text(PAGE, law.page(law.read(unseen=False), verdict))
+    write_text(PAGE, page.text())
     print(f"{verdict.inside} of {verdict.count} shapes that the fit has not seen are within the law's bounds")
     return int(verdict.inside < verdict.count)
 

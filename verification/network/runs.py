@@ -16,11 +16,12 @@ import numpy as np
 from repro.march.loop import Report, RunEnd
 from repro.march.simulation import simulate
 from repro.results import M_PER_D, read_table
+from repro.results.network import added_resistance, uptake
 from repro.scene import Scene, load_scene
 from verification.claims.runs import SUBSTRATES, rows_at
 from verification.network import throats
-from verification.network.histories import History
-from verification.network.throats import EXPECTED, LENGTH, QUANTITIES, TIMES, VISCOSITY
+from verification.network.histories import History, read
+from verification.network.throats import EXPECTED, LENGTH, PER_HEAD, QUANTITIES, TIMES, VISCOSITY, conditions
 
 #: um: less than that of every throat with flow.
 LEAST_HEAD = 1e-4
@@ -87,6 +88,40 @@ class Comparison(NamedTuple):
     def example_error(self) -> np.ndarray:
         """(n, times) of the example's areas, with the error of its step."""
         return self.example / self.run[:, :, 0] - 1
+
+
+class Judgement(NamedTuple):
+    """Values of the runs and of one law at their areas, in all s states. share: (s,) A / W^2; in_range: (s,) as above;
+    run, law, least, most: (s,) or, of both substrates, (2, s)."""
+
+    share: np.ndarray
+    in_range: np.ndarray
+    run: np.ndarray
+    law: np.ndarray
+    least: np.ndarray
+    most: np.ndarray
+
+    @property
+    def holds(self) -> np.ndarray:
+        """Is the run within the bounds of the law?"""
+        return (self.least <= self.run) & (self.run <= self.most)
+
+
+def laws_at_the_runs() -> tuple[Judgement, Judgement]:
+    """The laws of resistance (r) and of uptake at the areas and velocities of the runs, for all states."""
+    of_runs, measured = compared(), read_table(TABLE)
+    by_number = {one.number: one for one in read()}
+    states = [conditions([by_number[int(number)]], int(np.searchsorted(by_number[int(number)].time, time)), time)
+              for number, time in zip(measured["throat"], measured["time_h"])]
+    width, head = (np.concatenate([getattr(at, name) for at in states]) for name in ("width", "head_loss"))
+    supplies = np.concatenate([at.supplies for at in states], axis=1)
+    area, speed, *taken = (measured[name] for name in QUANTITIES)
+    share, inside = area / width**2, of_runs.in_range[~np.isnan(of_runs.run[:, :, 0])]
+    r = (PER_HEAD * width**2 * head / speed - LENGTH) / width
+    added, law = added_resistance(area, width), uptake(area, width, speed, *supplies)
+    both = np.stack([law.acceptor, law.donor])
+    return (Judgement(share, inside, r, added.length, added.least, added.most),
+            Judgement(share, inside, np.stack(taken), both, both / (1 + law.bound), both * (1 + law.bound)))
 
 
 def compared() -> Comparison:
