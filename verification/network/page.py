@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from repro.results import read_table
 from repro.results.network import FAST, UPTAKE_BOUND, added_resistance, known
 from verification.evidence.writing import markdown, table
 from verification.network import histories, law, runs, throats, timed, uptakes
@@ -51,7 +52,8 @@ def _fit() -> str:
     """The shapes behind the law."""
     fit = law.read(unseen=False)
     grown = int(fit["grown"].sum())
-    return f"""The table, `repro/results/network.csv`, has r of half-discs and, after contact, the mean of the plugs grown in
+    return f"""\
+The table, `repro/results/network.csv`, has r of half-discs and, after contact, the mean of the plugs grown in
 several runs. The bounds are the least and the largest r over that of the fit's {len(fit["grown"])} shapes, {grown} of
 them grown in pores of 40 to 150 um at 0.5 to 6 m/d and W^2 / 2500 (W in um) to 20 mg/L of both substrates, the others
 drawn: half-discs, bodies from 1 % thinner to 3 % thicker than a half-disc and leaning by up to 5 %, plugs with ends of
@@ -64,14 +66,16 @@ def _judged() -> str:
     """The law with shapes that are not in its fit."""
     check = law.judged(law.read(unseen=True))
     worst = 100 * np.expm1(np.abs(check.apart))
-    return f"""The law is judged with {check.count} shapes that are not in the fit. Their sizes, outlines, places, widths, velocities,
+    return f"""\
+The law is judged with {check.count} shapes that are not in the fit. Their sizes, outlines, places, widths, velocities,
 supplies and lambdas are drawn at random. {check.inside} are within the bounds; half of them are
 within {np.median(worst):.1f} % of the law, and the worst is {worst.max():.0f} % from it."""
 
 
 def _range_of_table() -> str:
     """Where the law holds."""
-    return f"""The table has A / W^2 from {_range(False)} before contact and from {_range(True)} after it, and lambda from 100 to
+    return f"""\
+The table has A / W^2 from {_range(False)} before contact and from {_range(True)} after it, and lambda from 100 to
 10 000. Thinner bodies follow half-discs, an empty pore adds nothing, and plugs of 1.41 to 1.6 have a wider lower bound.
 Without `spanned` the area decides the contact, and from 1.41 to 1.6 the bounds include both kinds. Elsewhere the
 function raises `ValueError` with the index of the throat; with `outside="nan"` that throat has no result. It holds
@@ -82,13 +86,15 @@ resistance of a half-disc differs by 0.2 %, that of a plug by 8 to 17 %."""
 def _fit_of_uptake() -> str:
     """The states behind the law of uptake."""
     seen = uptakes.read(uptakes.FIT)
-    return f"""`python -m verification.network uptake` solves states that a seed draws and fits the constants of the law to them:
+    return f"""\
+`python -m verification.network uptake` solves states that a seed draws and fits the constants of the law to them:
 {_numbers(seen)}. Shapes do not change in a state; velocities are
 {uptakes.VELOCITIES[0]:g} to {uptakes.VELOCITIES[1]:g} m/d,
 supplies {uptakes.SUPPLIES[0]:g} to {uptakes.SUPPLIES[1]:g} mg/L.
 The bound is {uptakes.FACTOR:g} times the largest error of the fit, {100 * UPTAKE_BOUND:.3g} %; before contact it is
 more for a thick body in a fast flow, by a factor of 1 + {FAST:g} (Pe A / W^2)^2. This rule precedes the solution of
-the states below. The factor is from an earlier fit, with bounds of 5 % and, since one of 50 states had 5.9 %, of 7 %."""
+the states below. The factor is from an earlier fit, with bounds of 5 % and, since one of 50 states had 5.9 %, of 7 %.\
+"""
 
 
 def _judged_uptake() -> str:
@@ -105,14 +111,16 @@ def _example() -> str:
     """The example of a network, with its step and with half of it."""
     ratios = histories.flow_ratios()
     step, half = histories.STEPS
-    return f"""`make network` runs `docs/howto/openpnm_network.py`: 100 throats in OpenPNM with both laws, over 48 h. Its flow falls to
-{ratios[step]:.3g} of the first; a step of {half:g} h instead of {step:g} h changes this by {abs(ratios[half] - ratios[step]):.1g}. No throat spans its width by then."""
+    change = abs(ratios[half] - ratios[step])
+    return f"""\
+`make network` runs `docs/howto/openpnm_network.py`: 100 throats in OpenPNM with both laws, over 48 h. Its flow falls to
+{ratios[step]:.3g} of the first; a step of {half:g} h instead of {step:g} h changes this by {change:.1g}. No throat spans its width by then."""
 
 
 def _throats() -> str:
     """Ten throats as whole runs, against the law."""
     compared = runs.compared()
-    apart = 100 * np.abs(compared.error)
+    area, flow, *uptake = np.nanmax(100 * np.abs(compared.error), axis=(0, 1))
     verdict = "all bounds hold" if compared.holds.all() else "the bounds do not hold for all of them"
     return f"""## Ten throats as whole runs
 
@@ -123,9 +131,10 @@ The law is advanced in steps of 6 min. Errors of the law relative to the run at 
 
 {_errors(compared)}
 
-{int(compared.holds.sum())} of {compared.holds.size} values at {_list(throats.TIMES)} h are within the bounds: {verdict}. Over these times the error of the area is
-{np.nanmax(apart[:, :, 0]):.2g} % at most, that of the flow {np.nanmax(apart[:, :, 1]):.2g} %, that of the uptakes {np.nanmax(apart[:, :, 2:]):.2g} %. The last column is the area in the example, whose
-step of {histories.STEPS[0]:g} h adds an error of its own."""
+{int(compared.holds.sum())} of {compared.holds.size} values at {_list(throats.TIMES)} h are within the bounds: {verdict}.
+Over these times the error of the area is {area:.2g} % at most, that of the flow {flow:.2g} %, that of the uptakes
+{max(uptake):.2g} %. The last column is the area in the example, whose step of
+{histories.STEPS[0]:g} h adds an error of its own."""
 
 
 def _errors(compared: runs.Comparison) -> str:
@@ -134,8 +143,8 @@ def _errors(compared: runs.Comparison) -> str:
     widths = {one.number: one.width for one in histories.read()}
     rows = []
     for k, number in enumerate(compared.number.tolist()):
-        errors = [_error(*(part[k, -1, quantity] for part in (compared.law, compared.least, compared.most, compared.run)))
-                  for quantity in range(len(throats.QUANTITIES))]
+        sides = (compared.law, compared.least, compared.most, compared.run)
+        errors = [_error(*(part[k, -1, quantity] for part in sides)) for quantity in range(len(throats.QUANTITIES))]
         share = compared.run[k, -1, 0] / widths[number]**2
         rows.append((str(number), f"{widths[number]:.1f}", f"{share:.2f}", *errors,
                      f"{100 * compared.example_error[k, -1]:+.1f} %"))
@@ -154,10 +163,24 @@ def _laws_apart() -> str:
     factor = (resistance.run / resistance.law)[~resistance.holds]
     outside = "" if resistance.holds.all() else (
         f" In the others r is {factor.min():.2f} to {factor.max():.2f} times that of the law. Their A / W^2 is "
-        f"{resistance.share[~resistance.holds].min():.2g} or more,\nand {_range_words(resistance)} the range of "
-        "velocities and supplies of the shapes behind the law.")
-    return f"""At the area and the velocity of a run the laws alone can be compared with it. The uptakes are within the bound of their law
-in {int(uptake.holds.sum())} of {uptake.holds.size} states, and r is within the bounds of its law in {int(resistance.holds.sum())} of {resistance.holds.size}.{outside}"""
+        f"{resistance.share[~resistance.holds].min():.2f} or more, and\n{_range_words(resistance)} the range of "
+        "velocities and supplies of the shapes behind the law: there\nthe law of resistance does not hold. "
+        + _controls())
+    counts = [f"{int(one.holds.sum())} of {one.holds.size}" for one in (uptake, resistance)]
+    return f"""\
+At the area and the velocity of a run the laws alone can be compared with it. Of the uptakes {counts[0]} are within the
+bound of their law, of r {counts[1]}.{outside}"""
+
+
+def _controls() -> str:
+    """The cause: aggregates of the same area grown at other velocities."""
+    columns = read_table(runs.CONTROLS)
+    history, *constant = zip(*(columns[name] for name in runs.CONTROL_COLUMNS))
+    words = "; ".join(f"{speed:g} m/d: {factor:.2f} and {thickness:.3f}" for speed, _, factor, thickness in constant)
+    return (f"The cause is slow flow. Aggregates\nthen grow upstream, towards the supply, and are thinner. Throat "
+            f"{runs.CONTROL} at A / W^2 = {history[1]:.2f} has {history[2]:.2f} times the r\nof the law and "
+            f"{history[3]:.3f} times the thickness of the half-disc. The same seed at a constant velocity has at up to "
+            f"{runs.CONTROL_SHARE:g}\n({words}).")
 
 
 def _range_words(resistance: runs.Judgement) -> str:
@@ -174,19 +197,23 @@ def _sweep() -> str:
     seconds = {(way["way"], way["workers"]): way["seconds"] for way in record["ways"]}
     pool, dask = ([seconds[name, workers] for workers in (1, 2)] for name in (timed.POOL, timed.DASK))
     failed = sum(way["unfinished"] for way in record["ways"])
+    alike = "all ways give the same table" if record["equal"] else "the tables differ"
     rows = ((way["way"], str(way["workers"]), f"{way['seconds']:.0f}", f"{record['runs'] / way['seconds']:.2f}",
-             f"{seconds[way['way'], 1] / way['seconds']:.2f}") for way in record["ways"])
-    head = ("runs made by", "workers", "s", "runs/s", "times faster than one worker")
+             f"{seconds[way['way'], 1] / way['seconds']:.2f}", f"{way['load']:.1f}") for way in record["ways"])
+    head = ("runs made by", "workers", "s", "runs/s", "times faster than one worker", "load")
     return f"""## A sweep of all throats
 
-`python -m verification.network sweep` makes whole runs of all {record["runs"]} throats over {record["hours"]:g} h, in `fast` with files and page,
-on the process pool and on a Dask scheduler with workers on the same machine:
+`python -m verification.network sweep` makes whole runs of all {record["runs"]} throats
+over {record["hours"]:g} h, in `fast` with files and page, on the process pool and on a Dask scheduler with workers on the same machine:
 
 {markdown([table(head, rows)])}
 
-Two workers are {pool[0] / pool[1]:.2f} times faster than one on the process pool, and {dask[0] / dask[1]:.2f} times on Dask. Dask takes {dask[1] / pool[1]:.2f} times as
-long as the pool with two workers. {"No run failed" if not failed else f"{failed} runs failed"}, and {"all ways give the same table" if record["equal"] else "the tables differ"}. The machine has {record["machine"]["cores"]} cores, on which other
-work had a load of {record["load_before"]:.1f} before the first sweep. The throats without flow have a head loss of {runs.LEAST_HEAD:g} um."""
+Two workers are {pool[0] / pool[1]:.2f} times faster than one on the process pool, and {dask[0] / dask[1]:.2f} times
+on Dask. Dask takes {dask[1] / pool[1]:.2f} times as long as the pool with two workers. Runs that failed: {failed};
+{alike}. The machine has {record["machine"]["cores"]} cores. The load
+counts the processes that want a core at the end of each sweep: above the number of workers plus one or two it shows
+other work, with which the times say little. The throats without flow
+have a head loss of {runs.LEAST_HEAD:g} um."""
 
 
 def _list(times: tuple[float, ...]) -> str:

@@ -28,18 +28,28 @@ LEAST_HEAD = 1e-4
 #: The runs of the ten throats at TIMES; a run that ends earlier has no later rows.
 TABLE, COLUMNS = Path(__file__).with_name("throats.csv"), ["throat", "time_h", *QUANTITIES]
 
+#: The throat whose aggregate is grown at constant velocities (m/d) too, up to an A / W^2, within some hours.
+CONTROL, SPEEDS, CONTROL_SHARE, LONGEST = 61, (2.0, 1.0, 0.3), 1.25, 120
+CONTROLS = Path(__file__).with_name("controls.csv")
+CONTROL_COLUMNS = ["velocity_m_per_d", "area_over_width2", "resistance_over_law", "thickness_over_half_disc"]
+
 
 def scene(one: History, times: Iterable[float] = TIMES, preset: str = "fast") -> Scene:
     """The scene of a throat, to the last of some times (h)."""
     times = list(times)
+    tables = _throat(one)
     heads = np.maximum(np.abs(one.head_loss), LEAST_HEAD)
     supplies = {name: {"supply": _table(one.time, values, "mg/L")} for name, values in zip(SUBSTRATES, one.supplies)}
-    return load_scene({
-        "pore": {"width": f"{one.width} um", "length": f"{LENGTH} um"},
-        "aggregate": {"radius": f"{np.sqrt(2 * one.area[0] / np.pi)} um"},
+    return load_scene(tables | {
         "flow": {"head": _table(one.time, heads, "um"), "kinematic_viscosity": f"{VISCOSITY} m^2/s"},
         "substrates": supplies, "growth": {"end": f"{times[-1]} h"}},
         [f"numerics.preset={preset}", rows_at(*times)])
+
+
+def _throat(one: History) -> dict:
+    """The pore and the seed of a throat."""
+    return {"pore": {"width": f"{one.width} um", "length": f"{LENGTH} um"},
+            "aggregate": {"radius": f"{np.sqrt(2 * one.area[0] / np.pi)} um"}}
 
 
 def _table(times: np.ndarray, values: np.ndarray, unit: str) -> list[list[str]]:
@@ -59,6 +69,32 @@ def values(report: Report) -> list[float]:
     solved = report.solved
     taken = [float(flux.consumed) for flux in solved.fluxes]
     return [float(report.pore.outline.area), float(M_PER_D * solved.flow.mean_velocity), *taken]
+
+
+def controls(all_throats: list[History]) -> Iterator[list]:
+    """Rows of CONTROLS: the throat CONTROL with its history, then at constant velocities and its first supplies."""
+    one = next(one for one in all_throats if one.number == CONTROL)
+    yield [0.0, *_last(scene(one, range(1, 49)), one.width)]
+    supplies = {name: {"supply": f"{values[0]} mg/L"} for name, values in zip(SUBSTRATES, one.supplies)}
+    for speed in SPEEDS:
+        tables = _throat(one) | {"substrates": supplies, "growth": {"end": f"{LONGEST} h"}}
+        tables["flow"] = {"mean_velocity": f"{speed} m/d", "kinematic_viscosity": f"{VISCOSITY} m^2/s"}
+        yield [speed, *_last(load_scene(tables, ["numerics.preset=fast", rows_at(*range(1, LONGEST + 1))]), one.width)]
+
+
+def _last(one_scene: Scene, width: float) -> list[float]:
+    """A / W^2, r over that of the law, and thickness over that of the half-disc, of the last row up to CONTROL_SHARE."""
+    rows: list[list[float]] = []
+    for report in simulate(one_scene):
+        outline, flow = report.pore.outline, report.solved.flow
+        share = float(outline.area / width**2)
+        if share > CONTROL_SHARE:
+            break
+        speed = M_PER_D * flow.mean_velocity
+        r = (PER_HEAD * width**2 * flow.head_loss / speed - LENGTH) / width
+        half_disc = np.sqrt(2 * outline.area / np.pi)
+        rows.append([share, float(r / added_resistance(share, 1.0).length), float(outline.thickness / half_disc)])
+    return rows[-1]
 
 
 class Comparison(NamedTuple):

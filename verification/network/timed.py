@@ -31,8 +31,7 @@ WARM_UP = 2.0
 
 
 def measure(all_throats: list[History], times: tuple[float, ...] = TIMES) -> dict[str, Any]:
-    """Time each way."""
-    load_before = os.getloadavg()[0]
+    """Time each way. load: of the machine in the last minute of a way, in processes that want a core."""
     rows, tables = [], []
     with TemporaryDirectory() as folder:
         for name, workers in WAYS:
@@ -41,10 +40,11 @@ def measure(all_throats: list[History], times: tuple[float, ...] = TIMES) -> dic
                                 run_points)
                 seconds, unfinished, table = timed(plan(all_throats, times, Path(folder, f"{name} {workers}")),
                                                    run_points)
-            rows.append({"way": name, "workers": workers, "seconds": seconds, "unfinished": unfinished})
+            rows.append({"way": name, "workers": workers, "seconds": seconds, "unfinished": unfinished,
+                         "load": os.getloadavg()[0]})
             tables.append(table)
             print(f"{name}, {workers} workers: {seconds:.1f} s, {unfinished} runs not finished", flush=True)
-    return {"machine": machine(), "load_before": load_before, "runs": len(all_throats), "hours": times[-1],
+    return {"machine": machine(), "runs": len(all_throats), "hours": times[-1],
             "equal": len(set(tables)) == 1, "ways": rows}
 
 
@@ -77,9 +77,9 @@ def ready(name: str, workers: int) -> Iterator[RunPoints]:
         yield run_points
 
 
-def write(all_throats: list[History]) -> dict[str, Any]:
-    """Measure, and write the record."""
-    record = measure(all_throats)
+def write(all_throats: list[History], hours: float) -> dict[str, Any]:
+    """Measure runs to some hours, and write the record."""
+    record = measure(all_throats, tuple(time for time in TIMES if time <= hours))
     save(record, RECORD)
     return record
 
