@@ -131,10 +131,9 @@ The law is advanced in steps of 6 min. Errors of the law relative to the run at 
 
 {_errors(compared)}
 
-{int(compared.holds.sum())} of {compared.holds.size} values at {_list(throats.TIMES)} h are within the bounds: {verdict}.
-Over these times the error of the area is {area:.2g} % at most, that of the flow {flow:.2g} %, that of the uptakes
-{max(uptake):.2g} %. The last column is the area in the example, whose step of
-{histories.STEPS[0]:g} h adds an error of its own."""
+{int(compared.holds.sum())} of {compared.holds.size} values at {_list(throats.TIMES)} h are within the bounds:
+{verdict}. Over these times the error of the area is {area:.2g} % at most, that of the flow {flow:.2g} %, that of
+the uptakes {max(uptake):.2g} %. The last column is the area in the example, whose step of {histories.STEPS[0]:g} h adds an error of its own."""
 
 
 def _errors(compared: runs.Comparison) -> str:
@@ -204,7 +203,8 @@ def _sweep() -> str:
     return f"""## A sweep of all throats
 
 `python -m verification.network sweep` makes whole runs of all {record["runs"]} throats
-over {record["hours"]:g} h, in `fast` with files and page, on the process pool and on a Dask scheduler with workers on the same machine:
+over {record["hours"]:g} h, in `fast` with files and page, on the process pool and on a
+Dask scheduler with workers on the same machine:
 
 {markdown([table(head, rows)])}
 

@@ -83,7 +83,7 @@ def controls(all_throats: list[History]) -> Iterator[list]:
 
 
 def _last(one_scene: Scene, width: float) -> list[float]:
-    """A / W^2, r over that of the law, and thickness over that of the half-disc, of the last row up to CONTROL_SHARE."""
+    """Of the last row up to CONTROL_SHARE: A / W^2, r over that of the law, thickness over that of the half-disc."""
     rows: list[list[float]] = []
     for report in simulate(one_scene):
         outline, flow = report.pore.outline, report.solved.flow
