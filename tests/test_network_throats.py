@@ -26,10 +26,11 @@ def test_the_ten_throats_are_evenly_spread_over_the_order_of_their_areas():
 
 @pytest.mark.parametrize("part, side", [("law", throats.LAW), ("least", throats.LEAST), ("most", throats.MOST)])
 def test_the_recorded_areas_are_those_of_the_law_and_its_bounds(part, side):
-    """At 12 h, advanced here with longer steps."""
+    """At 12 h, advanced here with steps twice as long. The method is of second order: with steps five times as long it
+    errs by 9e-4."""
     columns = read_table(throats.EXPECTED)
     recorded = columns[f"area_um2_{part}"][columns["time_h"] == 12]
-    areas = throats.areas(SHORT, side, substeps=4)[:, -1] * (1 + side * throats.PRESET)
+    areas = throats.areas(SHORT, side, substeps=throats.SUBSTEPS // 2)[:, -1] * (1 + side * throats.PRESET)
     assert areas == pytest.approx(recorded, rel=3e-4)
 
 
@@ -89,7 +90,8 @@ def test_all_runs_are_within_the_bounds_of_the_law():
 
 
 def test_the_laws_alone_are_compared_at_the_areas_of_the_runs():
-    """The law of resistance does not hold in four states with slow flow, near contact; its neighbours show the cause."""
+    """The law of resistance does not hold in four states with slow flow, near contact. Runs at other velocities show
+    the cause."""
     resistance, uptake = runs.laws_at_the_runs()
     assert uptake.holds.all() and uptake.holds.shape == (2, 40)
     outside = ~resistance.holds

@@ -114,7 +114,8 @@ def _example() -> str:
     change = abs(ratios[half] - ratios[step])
     return f"""\
 `make network` runs `docs/howto/openpnm_network.py`: 100 throats in OpenPNM with both laws, over 48 h. Its flow falls to
-{ratios[step]:.3g} of the first; a step of {half:g} h instead of {step:g} h changes this by {change:.1g}. No throat spans its width by then."""
+{ratios[step]:.3g} of the first; a step of {half:g} h instead of {step:g} h changes this by {change:.1g}. No throat spans its width \
+by then."""
 
 
 def _throats() -> str:
@@ -133,7 +134,8 @@ The law is advanced in steps of 6 min. Errors of the law relative to the run at 
 
 {int(compared.holds.sum())} of {compared.holds.size} values at {_list(throats.TIMES)} h are within the bounds:
 {verdict}. Over these times the error of the area is {area:.2g} % at most, that of the flow {flow:.2g} %, that of
-the uptakes {max(uptake):.2g} %. The last column is the area in the example, whose step of {histories.STEPS[0]:g} h adds an error of its own."""
+the uptakes {max(uptake):.2g} %. The last column is the area in the example, whose step of
+{histories.STEPS[0]:g} h adds an error of its own."""
 
 
 def _errors(compared: runs.Comparison) -> str:
