@@ -114,8 +114,8 @@ def _example() -> str:
     change = abs(ratios[half] - ratios[step])
     return f"""\
 `make network` runs `docs/howto/openpnm_network.py`: 100 throats in OpenPNM with both laws, over 48 h. Its flow falls to
-{ratios[step]:.3g} of the first; a step of {half:g} h instead of {step:g} h changes this by {change:.1g}. No throat spans its width \
-by then."""
+{ratios[step]:.3g} of the first; a step of {half:g} h instead of {step:g} h changes this by {change:.1g}.
+No throat spans its width by then."""
 
 
 def _throats() -> str:
