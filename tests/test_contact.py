@@ -220,7 +220,7 @@ def test_the_search_takes_over_from_newton(plugged, monkeypatch):
 
 
 def test_stationary_lines_stay_where_the_last_round_of_fluid_forces_left_them(plugged):
-    """Lines that every round places anew can alternate between two places, one of them the end of an arc, and the fluid's
+    """Lines that every round places anew can alternate between two places, one of them the end of an arc. The fluid's
     forces and the shape then never agree."""
     scene, pore = plugged
     moved = expanded_by(scene, pore, 1.03).advances

@@ -8,7 +8,7 @@ import pytest
 import repro
 from repro.results.network import CONTACT, TABLE, TRANSPORTS, UPTAKE_BOUND, known
 from verification.network import __main__ as command
-from verification.network import law, shapes, uptakes
+from verification.network import law, page, shapes, uptakes
 from verification.network.shapes import RATIOS
 
 LAMBDA = 2000.0
@@ -236,5 +236,5 @@ def test_uptakes_outside_of_the_range_are_refused(values, message):
 
 def test_the_page_shows_the_present_table():
     verdict = law.judged(law.read(unseen=True))
-    assert command.PAGE.read_text(encoding="utf-8") == law.page(law.read(unseen=False), verdict)
+    assert command.PAGE.read_text(encoding="utf-8") == page.text()
     assert (verdict.count, verdict.inside) == (50, 50)

@@ -19,7 +19,7 @@ ADVICE: dict[type[StageError], str] = {
                   "with the walls alone",
     OutsidePore: "; aggregate.outline: give more points, or smooth = false",
     NotCovered: "; try a shorter growth.time_step",
-    OriginFolded: "; try a larger numerics.refinement",
+    OriginFolded: "; try a shorter growth.time_step or a larger numerics.refinement",
     PackageMissing: ", or leave numerics.solver and numerics.ordering out",
 }
 

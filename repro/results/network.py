@@ -125,32 +125,43 @@ def added_resistance(area: ArrayLike, width: ArrayLike, spanned: ArrayLike | Non
     >>> bool((added.least <= added.length).all() and (added.length <= added.most).all())
     True
     """
-    ratio = float(viscosity_ratio)
-    ratios, last, largest = _table(False)[1], known(False)[1], known(True)[1]
+    ratio, ratios = float(viscosity_ratio), _table(False)[1]
     check = Check("added_resistance", outside)
     Check("added_resistance", "raise").within("viscosity_ratio", ratio, ratios[0], ratios[-1])
     share, widths = _shares(area, width)
-    touches = share > last if spanned is None else np.asarray(spanned, bool)
+    touches = share > known(False)[1] if spanned is None else np.asarray(spanned, bool)
     share, widths, touches = np.broadcast_arrays(share, widths, touches)
-    is_known = check.positive("width", widths)
-    if spanned is None:
-        is_known &= check.within(SHARE, share, 0.0, largest, is_known)
-    else:
-        is_known &= check.within(f"{SHARE} before contact (spanned=False)", share, 0.0, last,
-                                 is_known & ~touches)
-        is_known &= check.within(f"{SHARE} of a plug (spanned=True)", share, CONTACT[0], largest,
-                                 is_known & touches)
+    is_known = _in_table(check, share, widths, None if spanned is None else touches)
     results = np.full((3, *share.shape), np.nan)
     for kind in (False, True):
         selected = is_known & (touches == kind)
         results[:, selected] = _law(kind, share[selected], ratio)
     if spanned is None:
-        either = is_known & (share >= CONTACT[0]) & (share <= CONTACT[1])
-        kinds = [_law(kind, np.minimum(share[either], (last, largest)[kind]), ratio)
-                 for kind in (False, True)]
-        results[1, either] = np.min(kinds, axis=0)[1]
-        results[2, either] = np.max(kinds, axis=0)[2]
+        _include_both_kinds(results, share, is_known, ratio)
     return AddedResistance(*results)
+
+
+def _in_table(check: Check, share: np.ndarray, width: np.ndarray,
+              touches: np.ndarray | None) -> np.ndarray:
+    """Return where the law knows the throats; touches: None if the area decides the contact."""
+    last, largest = known(False)[1], known(True)[1]
+    is_known = check.positive("width", width)
+    if touches is None:
+        return is_known & check.within(SHARE, share, 0.0, largest, is_known)
+    is_known &= check.within(f"{SHARE} before contact (spanned=False)", share, 0.0, last,
+                             is_known & ~touches)
+    return is_known & check.within(f"{SHARE} of a plug (spanned=True)", share, CONTACT[0], largest,
+                                   is_known & touches)
+
+
+def _include_both_kinds(results: np.ndarray, share: np.ndarray, is_known: np.ndarray,
+                        ratio: float) -> None:
+    """Widen the bounds of the (3, ...) results where the area does not tell the kind."""
+    either = is_known & (share >= CONTACT[0]) & (share <= CONTACT[1])
+    kinds = [_law(kind, np.minimum(share[either], known(kind)[1]), ratio)
+             for kind in (False, True)]
+    results[1, either] = np.min(kinds, axis=0)[1]
+    results[2, either] = np.max(kinds, axis=0)[2]
 
 
 class Uptake(NamedTuple):

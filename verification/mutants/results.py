@@ -11,6 +11,7 @@ DENSITY = f"{DERIVED}a_density_above_the_maximum_is_reported_unchanged"
 CHARTS = f"{DERIVED}every_line_of_every_chart_is_the_column_that_it_names"
 SWEEP = "tests/test_sweep.py::test_rows_have_the_inputs_of_their_runs"
 NETWORK = "tests/test_network.py::test_"
+THROATS = "tests/test_network_throats.py::test_"
 STEPPING = "tests/test_stepping.py::test_"
 NOT_MET = "tests/test_warned.py::test_a_missed_tolerance_is_reported_with_the_largest_estimate"
 ODD = "tests/test_odd_outlines.py::test_"
@@ -1413,6 +1414,30 @@ MUTANTS = (
          "np.where(apart < 0, least - law, most - law)",
          "most - law",
          f"{MIRRORS}a_shape_is_judged_by_the_bound_of_the_law_on_its_side")),
+    *changes(
+        "verification/network/throats.py",
+        ("throats-with-exact-uptake",
+         "The bounds over a history leave the bound of the uptake out of the upper side.",
+         "donor = np.minimum(np.minimum((1 + law.bound) * law.donor",
+         "donor = np.minimum(np.minimum(law.donor",
+         f"{THROATS}the_recorded_areas_are_those_of_the_law_and_its_bounds"),
+        ("throats-with-exact-resistance",
+         "The bounds over a history have the flow of the law.",
+         "{LAW: added.length, MOST: added.least, LEAST: added.most}[side]",
+         "added.length",
+         f"{THROATS}the_bounds_enclose_what_the_bounds_of_both_laws_admit")),
+    *changes(
+        "verification/network/runs.py",
+        ("throats-with-the-first-supply",
+         "The whole runs keep the first supply of their throats.",
+         '_table(one.time, values, "mg/L")',
+         '_table(one.time[:1], values[:1], "mg/L")',
+         f"{THROATS}a_scene_has_the_history_of_its_throat"),
+        ("throats-judged-above-alone",
+         "A run below the lower bound is judged to be within the bounds.",
+         "(self.least <= self.run) & (self.run <= self.most)\n\n    @property\n    def example",
+         "self.run <= self.most\n\n    @property\n    def example",
+         f"{THROATS}all_runs_are_within_the_bounds_of_the_law")),
     *changes(
         "repro/model/traction.py",
         ("forces-laplacian",
