@@ -163,9 +163,9 @@ def _laws_apart() -> str:
     resistance, uptake = runs.laws_at_the_runs()
     factor = (resistance.run / resistance.law)[~resistance.holds]
     outside = "" if resistance.holds.all() else (
-        f" In the others r is {factor.min():.2f} to {factor.max():.2f} times that of the law. Their A / W^2 is "
-        f"{resistance.share[~resistance.holds].min():.2f} or more, and\n{_range_words(resistance)} the range of "
-        "velocities and supplies of the shapes behind the law: there\nthe law of resistance does not hold. "
+        f" In the others r is {factor.min():.2f} to {factor.max():.2f} times that of the law. Their\nA / W^2 is "
+        f"{resistance.share[~resistance.holds].min():.2f} or more, and {_range_words(resistance)} the range of "
+        "velocities and supplies of the\nshapes behind the law: there the law of resistance does not hold. "
         + _controls())
     counts = [f"{int(one.holds.sum())} of {one.holds.size}" for one in (uptake, resistance)]
     return f"""\
@@ -178,7 +178,7 @@ def _controls() -> str:
     columns = read_table(runs.CONTROLS)
     history, *constant = zip(*(columns[name] for name in runs.CONTROL_COLUMNS))
     words = "; ".join(f"{speed:g} m/d: {factor:.2f} and {thickness:.3f}" for speed, _, factor, thickness in constant)
-    return (f"The cause is slow flow. Aggregates\nthen grow upstream, towards the supply, and are thinner. Throat "
+    return (f"The cause is slow flow. Aggregates then\ngrow upstream, towards the supply, and are thinner. Throat "
             f"{runs.CONTROL} at A / W^2 = {history[1]:.2f} has {history[2]:.2f} times the r\nof the law and "
             f"{history[3]:.3f} times the thickness of the half-disc. The same seed at a constant velocity has at up to "
             f"{runs.CONTROL_SHARE:g}\n({words}).")
