@@ -41,7 +41,8 @@ PER_CORNER = 4.0
 PIECES = 16
 #: A run that needs more than this part of the free memory causes a warning.
 WARNED = 0.5
-#: Factors of a refinement that are tried for a run that does not fit; coarser meshes resolve little.
+#: Factors of a refinement that are tried for a run that does not fit. Coarser meshes resolve
+#: little.
 COARSER = (0.7, 0.5, 0.35, 0.25)
 HEXAGON = math.sqrt(3) / 2
 MB = 1e6

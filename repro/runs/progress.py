@@ -132,7 +132,8 @@ def while_checking(scene: str) -> Iterator[None]:
         nonlocal printed_at
         if monotonic() - printed_at > TICK:
             printed_at = monotonic()
-            say(f"{printable(scene)}: first state and steps are computed, {printed_at - begun:.0f} s",
+            say(f"{printable(scene)}: first state and steps are computed, "
+                f"{printed_at - begun:.0f} s",
                 to_stderr=True)
 
     with _call_regularly(tick), polling(tick):
