@@ -219,6 +219,23 @@ def test_the_search_takes_over_from_newton(plugged, monkeypatch):
     assert min(clearances(expansion.pore.boundary, rule).values()) >= -contact_lines.CLOSE
 
 
+def test_newton_gives_up_as_soon_as_no_line_moves(plugged, monkeypatch):
+    """A line beside a corner can stay there with a clearance that is not accepted. The search then takes over."""
+    counts = []
+    solve = contact_newton.Coupled.solve
+
+    def counted(coupled, *arguments):
+        try:
+            solve(coupled, *arguments)
+        finally:
+            counts.append(coupled.iterations)
+
+    monkeypatch.setattr(contact_newton.Coupled, "_accepts", lambda coupled: False)
+    monkeypatch.setattr(contact_newton.Coupled, "solve", counted)
+    expanded_by(*plugged, 1.03)
+    assert 0 < max(counts) < contact_newton.MOST_ITERATIONS
+
+
 def test_stationary_lines_stay_where_the_last_round_of_fluid_forces_left_them(plugged):
     """Lines that every round places anew can alternate between two places, one of them the end of an arc. The fluid's
     forces and the shape then never agree."""

@@ -157,6 +157,7 @@ class Coupled:
         self.placed = place()
         self.position, self.pressure = self.placed.divided(points, pressures)
         self.iterations = 0
+        self._moving = True
         self._factors: Factored | None = None
 
     def solve(self, tolerance: float = growth.NEWTON) -> None:
@@ -168,11 +169,12 @@ class Coupled:
             at = self.placed
             iterate = at.system.under(at.theta, at.target, self.position, self.pressure)
             stalled = STALLED * last < iterate.defect <= growth.ROUND_OFF
-            if iterate.complete and (iterate.defect <= tolerance or stalled) and self._accepts():
+            solved = iterate.complete and (iterate.defect <= tolerance or stalled)
+            if solved and self._accepts():
                 return
-            if self.iterations == MOST_ITERATIONS:
+            if self.iterations == MOST_ITERATIONS or solved and not self._moving:
                 raise GrowthError("Newton's method for the contact lines stands at a defect of "
-                                  f"{iterate.defect:.2g} after {MOST_ITERATIONS} iterations; "
+                                  f"{iterate.defect:.2g} after {self.iterations} iterations; "
                                   "try a shorter growth.time_step")
             if iterate.defect > REQUIRED_REDUCTION * last:
                 self._factors = None
@@ -193,6 +195,7 @@ class Coupled:
         factors = self._factors or self.placed.system.factored(iterate)
         change = factors.solve(-iterate.residual, carried)
         steps, change = self._with_lines(iterate, factors, change)
+        self._moving = bool(steps.any())
         start = [(line.advance, line.at_corner) for line in self._lines]
         for length in 0.5 ** np.arange(HALVINGS):
             for line, before, step in zip(self._lines, start, steps):

@@ -173,6 +173,11 @@ MUTANTS = (
          f"{SMALLEST_CONTACT}[search-fast]")),
     *changes(
         "repro/model/contact_newton.py",
+        ("newton-waits-for-lines",
+         "Newton's method iterates to the end although no contact line moves.",
+         " or solved and not self._moving:",
+         ":",
+         f"{CONTACT_TESTS}newton_gives_up_as_soon_as_no_line_moves"),
         ("line-slope-halved",
          "The residual changes half as much with a contact line as it should.",
          "return change / SMALL",
