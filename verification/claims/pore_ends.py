@@ -123,7 +123,8 @@ def end_effect(*changes: str) -> float:
     """Largest change (%) of the uptake if C at the pore's end is zero, or the supply."""
     _, pore, solved = fully_meshed_pore(*changes)
     outlet = pore.space.outlet.nodes
-    return max(largest_difference(uptake(solve_with_prescribed(pore, solved, outlet, part)), uptake(solved)) for part in (0.0, 1.0))
+    prescribed = [solve_with_prescribed(pore, solved, outlet, part) for part in (0.0, 1.0)]
+    return max(largest_difference(uptake(other), uptake(solved)) for other in prescribed)
 
 
 def solve_with_prescribed(pore: Pore, solved: Solved, nodes: np.ndarray, part: float) -> Solved:
