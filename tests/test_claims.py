@@ -51,7 +51,7 @@ def test_a_number_that_a_run_does_not_reach_is_a_lower_bound(end, low, high, out
     """The value is the end of the run. Under an upper bound it never holds; beyond this bound it fails."""
     check = claims.between("time (h)", "a couple of days", end, low, high, "as stated", bar=Bar(end, math.inf))
     assert check.is_lower_bound and check.outcome == outcome and check.holds == (outcome == "holds")
-    assert report.valued(check.value, check.bar.high) == f"not reached by {end:g}"
+    assert report.value_text(check.value, check.bar.high) == f"not reached by {end:g}"
     assert report.inside(end, end, None) and not report.inside(end - 1, end, None)
 
 

@@ -283,7 +283,7 @@ def rows_at(scene, times):
     (25, 17.0, 6), *(pytest.param(*pore, 50, marks=pytest.mark.thorough)
                      for pore in ((100, 45.0), (25, 18.0), (40, 24.0), (60, 32.0)))])
 def test_rows_through_contact_decide_nothing(width, end, count):
-    """A run arrives, and ends in the same state to the last bit, whichever rows are asked for."""
+    """A run reaches its end, in the same state to the last bit, for any requested rows."""
     scene = load_scene("wide", ["numerics.preset=fast", f'pore.width="{width} um"', f'growth.end="{end} h"'])
     drawn = np.random.default_rng(width).uniform(0.8 * end, end, count)
     last, = rows_at(scene, [end])

@@ -1,4 +1,4 @@
-"""What walls and biomass must bear: means of tractions; strengths that end a run; scenes without them."""
+"""Stresses that walls and biomass bear: means of tractions; strengths that end a run; scenes without strengths."""
 import json
 
 import numpy as np
@@ -46,7 +46,8 @@ def test_means_of_a_traction_are_those_of_its_integral(count):
     ("bonding_strength", 0.002, "detaches", "wall_traction_max"),
     ("tensile_strength", 5e-4, "tears", "tensile_stress_max")])
 def test_a_run_ends_where_a_strength_is_exceeded(key, strength, verb, column):
-    """The last row is the first with more, and is there although no row was due; the status names place and time."""
+    """The last row is the first one above the strength, although no row was requested at its time. The status has its
+    time and the place."""
     every = repro.solve("base", [*FAST, 'growth.end="6 h"', f"growth.{key}={strength} MPa"])
     values = every[f"{column}_MPa"]
     assert values[-1] > strength
@@ -74,7 +75,7 @@ def test_an_ended_run_is_complete_and_is_not_continued(tmp_path, capsys):
 
 
 def test_a_bonded_run_resumes_bit_for_bit(tmp_path):
-    """What lies on the wall stays there through meshes and steps."""
+    """The last rows of the resumed and the uninterrupted run agree to the last bit."""
     repro.run(load_scene("base", [*FAST, 'growth.end="3 h"']), tmp_path / "a")
     repro.resume(tmp_path / "a", overrides=['growth.end="5.6 h"'])
     repro.run(load_scene("base", [*FAST, 'growth.end="5.6 h"']), tmp_path / "b")

@@ -17,7 +17,7 @@ from verification.problems import channels
 SUPPLY, HALF_SATURATION, INHIBITION = 30.0, 1.0, 1.0
 #: Uptake, mg/L/h.
 SINK = 1e6
-#: Of the mesh, over the supply: the error of quadratic elements of 4 um beside the layer of little donor.
+#: Error over the supply of quadratic elements of 4 um, beside the layer of little donor.
 MESH = 0.01
 #: Time (h) in which the slab settles: forty times l^2 / D.
 SETTLED = 0.02
@@ -51,7 +51,7 @@ def test_the_state_reached_from_the_supply_is_returned_and_one_of_several(slab):
 
 @pytest.mark.parametrize("share", [-0.02, -1e-4, 0.0])
 def test_a_small_change_of_the_start_changes_no_state(slab, share):
-    """From the supply, and from each stable state, less a part of it that varies from node to node."""
+    """The starts are the supply and each stable state, changed by a share that varies from node to node."""
     _, problem, density, states = slab
     for start, due in ((np.full_like(states[0], SUPPLY), states[-1]), (states[-1], states[-1]), (states[0], states[0])):
         changed = start * (1 + share * np.random.default_rng(1).uniform(size=len(start)))

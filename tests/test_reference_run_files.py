@@ -256,7 +256,7 @@ def test_an_intact_run_of_other_physics_passes(others, name):
     assert failed(others(name), OTHERS[name]) == set()
 
 
-#: Runs, tables of other physics, and the check that tells them apart.
+#: Runs, tables of other physics, and the check that distinguishes them.
 MISTAKEN = [
     ("Haldane", changed(kinetics={"law": "dual Monod"}), f"donor {TAKEN}"),
     ("first order", TABLES, f"donor {TAKEN}"),

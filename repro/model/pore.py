@@ -118,8 +118,8 @@ class Pore:
         return replace(self, space=Space(self.mesh.moved(points), self.space.order))
 
     def composition(self, maximum_density: float) -> tuple[float, float, float]:
-        """Share of X_I in the biomass, and the least and the largest (X_A + X_I) / X_m, which the
-        constraint J = theta keeps near one."""
+        """Share of X_I in the biomass, and the least and the largest (X_A + X_I) / X_m. The
+        constraint J = theta keeps both near one."""
         density = (self.active + self.inert) / self.space.reaction.dx / maximum_density
         return float(self.inert.sum() / self.mass), float(density.min()), float(density.max())
 

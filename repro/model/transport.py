@@ -55,10 +55,10 @@ UNRESOLVED = 1e-3
 OVERSHOOT = 0.02
 #: Largest accepted concentration over its supply, by the order of the elements.
 HIGHEST = {1: np.inf, 2: 1 + OVERSHOOT, 3: 1 + OVERSHOOT}
-#: Nor is the uptake if a quadrature of a degree higher by FINER differs by more than this. Both use
-#: the same concentrations, which are not solved for again with the finer quadrature: in base
-#: with fronts of half saturations from 1e-1 to 1e-6 of the supply, biomass made in 2 h was wrong by
-#: a hundredth of the largest difference or less.
+#: The uptake is not resolved if a quadrature of a degree higher by FINER differs by more than this.
+#: Both quadratures use the same concentrations, which are not solved for again with the finer one.
+#: In base with fronts of half saturations from 1e-1 to 1e-6 of the supply, biomass made in 2 h was
+#: wrong by at most a hundredth of the largest difference.
 APART = 0.05
 FINER = 3
 
@@ -265,8 +265,8 @@ def _add_at(matrices: np.ndarray, beside: tuple[np.ndarray, np.ndarray],
 
 
 def _apart(space: Space, count: int) -> ElementSystem:
-    """``count`` substrates, one after the other, of all nodes in their own order, without their
-    uptake."""
+    """The system of ``count`` substrates without uptake: all nodes of one substrate in their own
+    order, then those of the next."""
     size = count * space.count
     return ElementSystem(_shifted(space.cells, space, count), np.arange(size),
                          np.zeros(size, bool), space.mesh.topology.method)
@@ -278,14 +278,16 @@ def _shifted(cells: np.ndarray, space: Space, count: int) -> tuple[np.ndarray, .
 
 
 def coupled_system(space: Space, constrained: bool, count: int) -> ElementSystem:
-    """``count`` substrates; constrained: does the supply apply at the ends?"""
+    """The system of ``count`` substrates with uptake; constrained: is the supply prescribed at the
+    ends?"""
     return space.mesh.topology.system(("transport", space.order, constrained, count),
                                       lambda: _system(space, constrained, count))
 
 
 def _system(space: Space, ends_constrained: bool, count: int) -> ElementSystem:
-    """The substrates of a node side by side, nodes in elimination order: their own triangles, then
-    all together on the pieces of biomass, where the uptake couples them."""
+    """Unknowns are numbered by node in elimination order, the substrates of a node side by side.
+    The first kinds of elements are the triangles of each substrate; the last kind is the pieces of
+    biomass, where the uptake couples the substrates."""
     constrained = np.zeros(space.count, bool)
     constrained[both_ends(space)] = ends_constrained
     coupled = np.concatenate(_shifted(space.reaction.cells, space, count), axis=1)
@@ -429,8 +431,8 @@ class Balance:
         return self.problem.system.factored(self.tangent(iterate.state, iterate.saturations))
 
     def advanced(self, iterate: Iterate, factors: Factored, fresh: bool) -> Iterate:
-        """A step of Newton's method; sizes of the terms are those of the first guess, then those
-        after the first step of each derivative."""
+        """Make a step of Newton's method. The sizes of the terms are computed for the first guess,
+        and again after the first step with each new derivative."""
         state = iterate.state + factors.solve(-self._linearised(iterate))
         if self.sink is None:
             size = self.sizes(state) if fresh else iterate.size
@@ -600,8 +602,8 @@ def _outside(problem: Problem, name: str, field: np.ndarray, node: int,
 @dataclass(frozen=True)
 class Fluxes:
     """Rates of one substrate per um of depth (um2 mg/L/h): supplied, out and consumed; its
-    flow-weighted concentrations (mg/L) at the meshed inlet and the outlet, the mean over the end
-    without flow; and its unmet demand. All but the last are zero if it is not modelled."""
+    flow-weighted concentrations (mg/L) at the inlet and the outlet of the mesh, or means over these
+    ends without flow; and its unmet demand. All but the last are zero if it is not modelled."""
 
     supplied: float
     out: float
@@ -651,7 +653,7 @@ def fluxes(problem: Problem, sink: Sink | None, state: Concentrations) -> tuple[
 
 
 def _end_means(end: End, both: np.ndarray, load: np.ndarray) -> np.ndarray:
-    """(s,) mg/L, weighted with the flow through an end, plain where nothing flows."""
+    """(s,) mg/L, means over an end, weighted with the flow through it if there is any."""
     if not load.any():
         load = end.assembled(np.ones(end.count))
     return both @ load / load.sum()

@@ -143,7 +143,7 @@ def added_resistance(area: ArrayLike, width: ArrayLike, spanned: ArrayLike | Non
 
 def _in_table(check: Check, share: np.ndarray, width: np.ndarray,
               touches: np.ndarray | None) -> np.ndarray:
-    """Return where the law knows the throats; touches: None if the area decides the contact."""
+    """Return where the law covers the throats; touches: None if the area decides the contact."""
     last, largest = known(False)[1], known(True)[1]
     is_known = check.positive("width", width)
     if touches is None:
@@ -156,7 +156,7 @@ def _in_table(check: Check, share: np.ndarray, width: np.ndarray,
 
 def _include_both_kinds(results: np.ndarray, share: np.ndarray, is_known: np.ndarray,
                         ratio: float) -> None:
-    """Widen the bounds of the (3, ...) results where the area does not tell the kind."""
+    """Widen the bounds of the (3, ...) results where the area does not determine the kind."""
     either = is_known & (share >= CONTACT[0]) & (share <= CONTACT[1])
     kinds = [_law(kind, np.minimum(share[either], known(kind)[1]), ratio)
              for kind in (False, True)]
@@ -165,7 +165,7 @@ def _include_both_kinds(results: np.ndarray, share: np.ndarray, is_known: np.nda
 
 
 class Uptake(NamedTuple):
-    """What aggregates in throats take up, per metre of depth.
+    """Uptake of aggregates in throats, per metre of depth.
 
     acceptor, donor: pg/m/h; growth: of the area, um^2/h, by (9) and (10); bound: relative error of
     acceptor and donor. All have the shape of the areas.
@@ -339,14 +339,14 @@ def known(spanned: bool) -> tuple[float, float]:
 
 
 class Check(NamedTuple):
-    """What a law does with throats outside its range. function: its name; outside: as there."""
+    """Check of a law's arguments. function: the law's name; outside: as in the law."""
 
     function: str
     outside: str
 
     def within(self, name: str, values: ArrayLike, low: float, high: float,
                where: ArrayLike = True) -> np.ndarray:
-        """Return where values are in a range, or not to be checked."""
+        """Return where values are in a range or need no check."""
         values = np.asarray(values, float)
         is_known = (values >= low) & (values <= high) | ~np.asarray(where)
         return self._checked(name, values, is_known, f"{low:.4g} to {high:.4g}")
@@ -393,7 +393,7 @@ def _law(spanned: bool, share: np.ndarray, ratio: float) -> np.ndarray:
 
 
 def _thin_body(share: np.ndarray, inside: np.ndarray) -> np.ndarray:
-    """R at A / W^2 over that at the first area of the table, for thinner half-discs.
+    """Ratio of r at A / W^2 to r at the first area of the table, for thinner half-discs.
 
     They are in a shear flow, where r is proportional to the area. Its profile is a parabola, which
     reduces r / A in proportion to the thickness.

@@ -176,8 +176,8 @@ def _last_biomass(run: SweepRun) -> float:
 
 def _against(sweep: Sweep, plotted: list[SweepRun], k: int, value: Callable[[SweepRun], float],
              axis: str, title: str) -> str:
-    """A value of each run against varied key k, coloured by the next one. A time that is not
-    reached is a triangle."""
+    """A value of each run against varied key k, coloured by the next one. A triangle marks a run
+    that ends before it clogs."""
     factor, colour_index = sweep.factors[k], (k + 1) % len(sweep.factors)
     x = _across(factor, [_number(factor, run.point.values[k]) for run in plotted])
     y = charts.upwards(*_ends([value(run) for run in plotted]))

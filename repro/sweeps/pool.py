@@ -65,7 +65,8 @@ def _start_server() -> None:
 
 @contextmanager
 def _isolated() -> Iterator[None]:
-    """Start processes within with ENVIRONMENT, and without running the user's script again."""
+    """Give ENVIRONMENT to processes that start in this block; they do not run the user's script
+    again."""
     with _starting:
         main = sys.modules["__main__"]
         previous = {name: os.environ.get(name) for name in ENVIRONMENT}

@@ -118,8 +118,8 @@ def exact(peclet: float, density: float, tolerance: float):
     return channel_bvp.solve(*reference_arguments(peclet, density), tolerance=tolerance)
 
 
-#: Random meshes of each size (um), their ends, and solve_bvp's tolerance, which takes no less at Peclet 5: cubic
-#: elements are judged at Peclet 1, on coarser meshes, as solve_bvp is good to 1e-11 or so.
+#: Random meshes of each size (um), their ends, and solve_bvp's tolerance. At Peclet 5 solve_bvp accepts no smaller one.
+#: Cubic elements are judged at Peclet 1 and on coarser meshes, because solve_bvp is accurate to about 1e-11.
 COLLOCATED = {1: (SAMPLES, CROSSED, 1e-8), 2: ({3.2: 12, 1.6: 6, 0.8: 3, 0.4: 1}, WIDE, 1e-10),
               3: ({6.4: 12, 3.2: 8, 1.6: 4, 0.8: 2}, WIDE, 1e-12)}
 

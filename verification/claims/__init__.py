@@ -24,7 +24,7 @@ its values have been seen keeps its other definitions with their outcomes in `ot
 the verdict of its first definition.
 
 `rests_on` says what a number depends on: the prediction of a solution, or an input, a rule of construction or the
-arithmetic of Table 1. The latter need no solution and do not count as reproduced numbers.
+arithmetic of Table 1. The last three need no solution and do not count as reproduced numbers.
 """
 
 from __future__ import annotations
@@ -123,8 +123,8 @@ class PaperCheck(Check):
 
     paper: the paper's text, "2.9"; date: when the accepted range was set, by default the date of the claim; converges:
     does the number have a limit as mesh and step are refined? rests_on: what the number depends on; input: its name in
-    the record of the sensitivities; bar: the interval of the number, None before it is known, without an upper end if
-    the run ended before the number was reached, and its value is then the end of the run; holds_at: for a number
+    the record of the sensitivities; bar: the interval of the number, None before it is known; if the run ended before
+    the number was reached, the bar has no upper end, and the value is the end of the run; holds_at: for a number
     without a limit, whether it holds at each level; scheme: smallest and largest value with the scheme of 2001, None
     where it is not computed; on_sizes: for a claim about the model, the values on the sizes of the converged solution,
     the judged one first.
@@ -143,7 +143,7 @@ class PaperCheck(Check):
 
     @property
     def holds(self) -> bool:
-        """Whether the number lies in its interval. A number without an upper end never lies under an upper bound."""
+        """Whether the number lies in its interval. If its bar has no upper end, it never lies under an upper bound."""
         return super().holds and not (self.is_lower_bound and isfinite(self.high))
 
     @property
@@ -212,9 +212,10 @@ class Finding:
 class Claim:
     """A row of the table: the paper's section, its statement, and the function that computes the numbers.
 
-    about: MODEL, OF_SCHEME or CLOSED; fine: sizes of the converged solution; beside: those of the scheme whose range
-    stands beside it; sizes, steps: of the scheme; fixed: why one of them is not varied; date: when its
-    definition was written (UTC); unjudged: why no value could contradict it, empty where one could.
+    about: MODEL, OF_SCHEME or CLOSED; fine: sizes of the converged solution; beside: sizes of the scheme whose range is
+    shown beside a number of the model; sizes, steps: those of a claim about the scheme; fixed: why sizes or steps are
+    not varied; date: when its definition was written (UTC); unjudged: why no value could contradict it, empty if a
+    value could.
     """
 
     id: str

@@ -33,7 +33,7 @@ from verification.claims import (
     printed,
     without_limit,
 )
-from verification.claims.evaluate import side_by_side
+from verification.claims.evaluate import map_in_parallel
 from verification.claims.levels import DEFAULT, Level, at_level
 from verification.claims.runs import (
     BASE,
@@ -322,7 +322,7 @@ def velocities(level: Level) -> list[float]:
 
 def independence() -> tuple[PaperCheck, ...]:
     """Halving the time step moves the velocity by less than 0.5 %, halving the mesh size by less than 1 %."""
-    velocity = dict(zip(LEVELS, side_by_side(velocities, LEVELS)))
+    velocity = dict(zip(LEVELS, map_in_parallel(velocities, LEVELS)))
     return tuple(at_most(f"halving the {size} moves the velocity at {time:g} h (%)", f"< {bound:g}",
                          100 * abs(new / old - 1), bound, "set beforehand")
                  for size, (level, bound) in HALVED.items()

@@ -52,7 +52,7 @@ def touching() -> tuple[Body, Body]:
 
 @dataclass(frozen=True)
 class Forces:
-    """In one geometry, in Pa.
+    """Stresses in one geometry, in Pa.
 
     head: range of the fluid's pressure over the interface; shear: largest viscous stress along it; growth: largest
     in-plane shear stress in the aggregate; stiffness: least modulus mu_L J^(-2/3) against a further deformation.
@@ -161,15 +161,15 @@ def inside(aggregate: Body) -> float:
 #: The distance over which the stress is averaged, over the pore's width; and all reported distances.
 APART = 0.1
 DISTANCES = (0.5 * APART, APART, 2 * APART)
-#: Places at which the mean is taken, in a distance; degree of the quadrature of the stress.
+#: Number of positions per distance at which the mean is taken; degree of the quadrature of the stress.
 PLACES, DEGREE = 4, 8
-#: Of C46: run and hour.
+#: The states of C46: run and hour.
 STATES = ((BASE, END), (WIDE, 30.0), (WIDE, 40.0))
 
 
 @dataclass(frozen=True)
 class Peak:
-    """value: over mu_L; x, y: its place (um)."""
+    """A largest stress. value: over mu_L; x, y: its position (um)."""
 
     value: float
     x: float
@@ -177,7 +177,7 @@ class Peak:
 
     @property
     def description(self) -> str:
-        """In words."""
+        """Value and position as text."""
         return f"{self.value:.3g} mu_L at ({self.x:.0f}, {self.y:.0f}) um"
 
 
