@@ -611,6 +611,18 @@ MUTANTS = (
          "np.linspace(0, len(line.times) - 2, MOST_POINTS)",
          "tests/test_charts.py::test_many_points_are_thinned_with_both_ends")),
     *changes(
+        "repro/report/fields.js",
+        ("colours-linear",
+         "The colour scale of a page is linear over any range.",
+         "if (!(low > 0 && high >= 100 * low))",
+         "if (true)",
+         "tests/test_report.py::test_colours_are_logarithmic_over_two_decades_or_more"),
+        ("colours-over-all-decades",
+         "A logarithmic colour scale of a page covers more than four decades.",
+         "Math.max(low, 1e-4 * high), decades",
+         "low, decades",
+         "tests/test_report.py::test_colours_are_logarithmic_over_two_decades_or_more")),
+    *changes(
         "repro/report/fields.py",
         ("any-file-is-shown",
          "A page reads any file that the index names.",
