@@ -417,9 +417,9 @@ def derived_wall_traction(scene, instant):
     return max(peaks)
 
 
-#: The late state; the same with the forces of the water; and with a lower wall that bears shear, too.
+#: The late state; with the forces of the water; with a lower wall that bears shear, too; with the bond alone.
 BEARING = {"stress": {}, "water": {"fluid_forces": "included"},
-           "bonded": {"fluid_forces": "included", "wall": "bonded"}}
+           "bonded": {"fluid_forces": "included", "wall": "bonded"}, "bonded, stress alone": {"wall": "bonded"}}
 
 
 def bearing(scene, changes):
