@@ -8,6 +8,8 @@ import repro
 from repro import results
 from repro.cli import main
 from repro.model import adhesion
+from repro.report import quantities
+from repro.report.reading import read
 from repro.runs.status import is_over
 from repro.scene import load_scene
 
@@ -72,6 +74,17 @@ def test_an_ended_run_is_complete_and_is_not_continued(tmp_path, capsys):
     assert (out / "timeseries.csv").read_bytes() == rows
     main(["run", "--resume", str(out), "--quiet", "--set", 'growth.end="4 h"'])
     assert json.loads((out / "run.json").read_text())["status"] == status
+
+
+def test_the_page_draws_the_stresses_of_a_run_that_has_them(tmp_path):
+    """A run with adhesion has two charts more, and its page names them; a run without has neither."""
+    both = {"Stress that could detach the aggregate", "Force of the fluid on the aggregate"}
+    for name, changes, drawn in (("with", ["growth.bonding_strength=1 MPa"], both), ("without", [], set())):
+        folder = tmp_path / name
+        repro.run(load_scene("base", ["numerics.preset=fast", 'growth.end="0.4 h"', *changes]), folder)
+        titles = {chart.title for chart in quantities.charts_of(read(folder))}
+        page = (folder / "report.html").read_text(encoding="utf-8")
+        assert titles & both == drawn and {title for title in both if title in page} == drawn
 
 
 def test_a_bonded_run_resumes_bit_for_bit(tmp_path):
