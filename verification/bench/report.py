@@ -124,7 +124,7 @@ def _floor(part: dict, method: str, bound: float, low: float, high: float) -> tu
 
 def _scenes(part: dict) -> Iterator[dict]:
     required = f"no other stage runs; at most {100 * EXCESS:g} % of the whole model's first solution above them"
-    for name in list(dict.fromkeys(row["scene"] for row in part["rows"]))[1:]:
+    for name in list(dict.fromkeys(row["scene"] for row in part.get("rows", ())))[1:]:
         yield verdict(f"{name}: a scene costs what its own stages cost", required, _stage_cost, part, name)
 
 

@@ -1166,7 +1166,7 @@ MUTANTS = (
          "run.json lists rows before they are in the table.",
          'self._write("timeseries.csv", results.write_table, results.COLUMNS, history.rows)',
          'self.write_record(status), self._write("timeseries.csv", results.write_table, results.COLUMNS, history.rows)',
-         "tests/test_folder.py::test_a_full_disk_is_reported_with_the_file_and_nothing_is_lost"),
+         "tests/test_folder.py::test_no_record_counts_rows_that_the_table_lacks"),
         ("steps-of-rows",
          "Steps are reported only with the next row.",
          "return len(self.history.ledgers) + (len(self.state.ledgers) if self.state else 0)",
