@@ -54,8 +54,8 @@ class Pore:
     known ones, None before the first; front: divisor of the element sizes at the aggregate, for a
     front of the substrates in it; last: (n, 2) um, the aggregate's nodes in the shape from which
     strain counts, None for the shape of t = 0; line_speeds: (2, 2) um/h, speeds of the contact
-    lines, None if unknown: a row for the lower and the upper wall, with the line before the free
-    surface on the loop first and the line after it second.
+    lines, None if unknown. A row has the lines of one wall, the lower wall first: the line where a
+    free surface begins along the loop, then the line where one ends.
     """
 
     time: float

@@ -41,8 +41,8 @@ class Surface:
     """The free edges of an aggregate's boundary.
 
     stretch: (e,) elastic stretch along each of them, at its middle; middles: (e, 2) um; distance:
-    (e,) from the nearer contact line along the surface, in parts of the length from line to line;
-    cells: (e,) their triangles, among those of the aggregate.
+    (e,) along the surface from the nearer contact line, over the length from line to line; cells:
+    (e,) their triangles, among those of the aggregate.
     """
 
     stretch: np.ndarray

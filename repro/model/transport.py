@@ -1,13 +1,13 @@
 """Substrates (2.2, 3.3): advection, diffusion and uptake of acceptor and donor, (7)-(13).
 
-For one substrate and every nodal function N_i, with order 2 or 3 in the form that conserves,
+For one substrate and every nodal function N_i, order 2 and 3 satisfy the conserving form
 
     (D grad C, grad N_i) - (C w, grad N_i) + <u_x C, N_i>_outlet + (q(C) X_A, N_i)_biomass
         = <u_x C_supply, N_i>_inlet
 
 where w = u - grad psi has (w, grad N_i) = <u_x, N_i>_outlet - <u_x, N_i>_inlet for every N_i, so
-that C = C_supply is a solution where nothing is taken up; and with linear functions, the reaction
-lumped at the nodes,
+that C = C_supply is a solution where nothing is taken up. Linear functions satisfy, with the
+reaction lumped at the nodes,
 
     (D grad C, grad N_i) + (w . grad C, N_i) + <u_x (C - C_supply), N_i>_inlet + m_i q(C_i) X_i = 0
 

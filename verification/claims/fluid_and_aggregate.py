@@ -161,7 +161,7 @@ def inside(aggregate: Body) -> float:
 #: The distance over which the stress is averaged, over the pore's width; and all reported distances.
 APART = 0.1
 DISTANCES = (0.5 * APART, APART, 2 * APART)
-#: Number of positions per distance at which the mean is taken; degree of the quadrature of the stress.
+#: Means are taken at points a distance over PLACES apart; DEGREE of the quadrature of the stress.
 PLACES, DEGREE = 4, 8
 #: The states of C46: run and hour.
 STATES = ((BASE, END), (WIDE, 30.0), (WIDE, 40.0))
