@@ -201,3 +201,14 @@ def test_a_singular_system_gives_no_advice_of_its_own():
     """Growth appends its own advice, which would otherwise appear twice."""
     with pytest.raises(LinearError, match="is singular$"):
         factorised(sp.csc_matrix(np.ones((3, 3)))).solve(np.arange(3.0))
+
+
+def test_a_shorter_step_helps_where_the_aggregate_passes_the_opposite_wall():
+    """A step of 5 h ends 0.3 um beyond the wall. Steps of 1 h, with the smaller supply of larger shapes, end below."""
+    scene = load_scene("base", ["numerics.preset=paper", "numerics.refinement=0.3", "aggregate.radius=15 um",
+                                "kinetics.maximum_utilization_rate=52 1/day", "growth.time_step=5 h",
+                                "growth.end=5 h"])
+    with pytest.raises(SimulationError, match="in growth: .* passes the opposite wall by 0.3.* try a shorter"):
+        list(simulate(scene))
+    last = list(simulate(load_scene(scene, ["growth.time_step=1 h"])))[-1].pore
+    assert last.time == 5 and last.boundary.thickness < 50
