@@ -84,7 +84,7 @@ OF_OTHER_THINGS = (
 
 @pytest.mark.skipif("PAPER" not in os.environ, reason="PAPER names no file with the text of the paper")
 def test_a_sample_of_sentences_is_in_the_table():
-    """A sentence ends with a point before a capital; the seed of the sample is 29. The table lacked two of the 20 before."""
+    """A sentence ends with a point before a capital; the seed is 29. The table lacked two of the 20 before."""
     text = " ".join(Path(os.environ["PAPER"]).read_text(encoding="utf-8").split())
     drawn = random.Random(29).sample(re.split(r"(?<=[.!?])\s+(?=[A-Z])", text), 20)
     quoted = [plain(row["words"]) for row in sentences()]
