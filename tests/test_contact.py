@@ -111,7 +111,7 @@ def test_clearance_sees_a_film_that_runs_along_the_wall(gap, clearance, mirror):
 
 
 def test_a_surface_through_the_wall_has_a_negative_clearance():
-    """The arc leans back over the contact surface while it lies beyond the wall, and is well below the wall elsewhere."""
+    """The arc leans back over the contact surface while beyond the wall, and is well below the wall elsewhere."""
     outline = wedge(30.0)
     points = outline.points.copy()
     middle = np.flatnonzero(outline.wall == TOP)[-1] + 1
