@@ -55,5 +55,7 @@ def _panel(axis, case: str, studies: Mapping[str, list]) -> None:
         axis.loglog(sizes, errors[-1] * (np.array(sizes) / sizes[-1]) ** order, "--", color=color, lw=0.4, alpha=0.6)
         named.add(name)
     axis.set_title(case, fontsize=8)
+    axis.set_xlabel("size of elements or steps", fontsize=6)
+    axis.set_ylabel("error", fontsize=6)
     axis.tick_params(labelsize=6, which="both")
     axis.legend(fontsize=5)
