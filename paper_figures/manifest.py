@@ -52,7 +52,7 @@ NOT_DATA = ("run.json", "report.html", "checkpoint.last", "fields.sha256")
 
 
 def environment() -> dict[str, str]:
-    """Everything that could change the bits of a result: source, versions, machine and its linear algebra."""
+    """All conditions that can change the bits of a result: source, versions, machine and its linear algebra."""
     blas = np.show_config(mode="dicts")["Build Dependencies"]["blas"]
     return {"source": source_hash(), "python": platform.python_version(),
             **{name: version(name) for name in (*PACKAGES, "matplotlib")},

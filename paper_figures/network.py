@@ -15,7 +15,7 @@ TITLE = "Addition. A law for networks: the resistance that an aggregate adds to 
 RUNS = ()
 CLAIMS = ("C16", "C17", "C44")
 
-#: Viscosity ratios of the curves. The bounds are drawn for that of the points.
+#: Viscosity ratios of the curves. The bounds are drawn for the viscosity ratio of the points.
 RATIOS = (100.0, RATIO, 10000.0)
 COLOURS = (style.SKY, style.BLUE, style.RED)
 POINTS = 300

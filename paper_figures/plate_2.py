@@ -18,9 +18,8 @@ TITLE = "Plate 2. One expansion of the aggregate and the deformation of the mesh
 RUNS = (runs.BASE,)
 CLAIMS = ("C08", "C11", "C24", "C31")
 
-#: Factors by which the arrows are longer than the displacements in (b) and in (a), and the least distance (um) of two
-#: of them in (a).
-LENGTHENED, FAR, APART = 5, 15, 7.0
+#: Ratio of arrows to displacements in (b) and in (a), and the least distance (um) between two arrows in (a).
+CLOSE_UP_FACTOR, MESHED_PART_FACTOR, APART = 5, 15, 7.0
 
 
 @style.styled
@@ -36,8 +35,8 @@ def draw(folder: Path) -> Figure:
     _meshed_part(meshed_part, before, after)
     colours = _close_up(near, before, after)
     figure.colorbar(colours, ax=[meshed_part, near], location="right", label="expansion θ since t = 0 (–)", aspect=40)
-    meshed_part.set_title(f"meshed part, displacements × {FAR}")
-    near.set_title(f"aggregate: shape before (dashed) and after (line), displacements × {LENGTHENED}")
+    meshed_part.set_title(f"meshed part, displacements × {MESHED_PART_FACTOR}")
+    near.set_title(f"aggregate: shape before (dashed) and after (line), displacements × {CLOSE_UP_FACTOR}")
     style.number_panels(meshed_part, near)
     return figure
 
@@ -49,7 +48,7 @@ def _meshed_part(axes: Axes, before: State, after: State) -> None:
     nodes, moved_to = displaced(before, after)
     start = before.points[nodes]
     few = scattered(start)
-    _arrows(axes, start[few], moved_to[few], FAR)
+    _arrows(axes, start[few], moved_to[few], MESHED_PART_FACTOR)
 
 
 def _close_up(axes: Axes, before: State, after: State) -> TriMesh:
@@ -61,7 +60,7 @@ def _close_up(axes: Axes, before: State, after: State) -> TriMesh:
     axes.triplot(after.triangulation, color=style.BLACK, linewidth=0.35, alpha=0.7, zorder=3)
     style.aggregate(axes, before.rim, filled=False, edgecolor="white", linestyle="--", linewidth=1.0, zorder=4)
     nodes, moved_to = displaced(before, after)
-    _arrows(axes, before.points[nodes], moved_to, LENGTHENED)
+    _arrows(axes, before.points[nodes], moved_to, CLOSE_UP_FACTOR)
     return colours
 
 
@@ -115,8 +114,8 @@ def caption(folder: Path) -> str:
             if same_mesh(before, after) else
             "This step includes a remesh, so that only the new mesh and the aggregate's displacements are shown")
     return (f"Growth in Base from {shaped:g} to {end:g} h expands the aggregate from the dashed outline to the full "
-            f"one. Red arrows are displacements times {LENGTHENED} (the largest is {largest:.2f} µm), in (a) those of "
-            f"nodes {APART:g} µm apart. {mesh}. Colour: expansion since t = 0, from {theta.min():.1f} to "
+            f"one. Red arrows are displacements times {CLOSE_UP_FACTOR} (the largest is {largest:.2f} µm), in (a) "
+            f"those of nodes {APART:g} µm apart. {mesh}. Colour: expansion since t = 0, from {theta.min():.1f} to "
             f"{theta.max():.1f}. The meshed part is {np.ptp(after.ends):.0f} µm long, the aggregate reaches "
             f"{-after.rim[:, 0].min():.2f} µm upstream and {after.rim[:, 0].max():.2f} µm downstream of the seed's "
             "centre.")

@@ -42,7 +42,7 @@ NOTE, REGISTER = (FOLDER / name for name in ("replication.md", "register.md"))
 TEMPLATES = {text: text.with_stem(f"{text.stem}_template") for text in (NOTE, REGISTER)}
 REPORT = ROOT / "verification" / "report"
 FIELD = re.compile(r"\{\{(.+?)\}\}")
-#: Names of the verdicts in the templates, and what the register quotes of a claim beside its numbers.
+#: Names of the verdicts in the templates, and the parts of a claim that the register quotes beside its numbers.
 NAMES = dict(zip(VERDICTS, ("reproduced", "rounding", "changed", "contradicted", "undecided", "unjudged")))
 WHY = {"Changed": "change", "Why not": "reason", "Inputs": "rounding", "Note": "note", "Not varied": "fixed"}
 WIDTH = 120
@@ -106,7 +106,7 @@ def _after_contact(claims: list[dict]) -> str:
     means = [known for known in sensitivity.record()["after_contact"] if known["quantity"].startswith("mean")]
     precision = "; ".join(f"{known['quantity'].partition(' (')[0]} to {known['bar_percent']:.2g} % "
                      f"({known['asked_percent']:g} % required)" for known in means)
-    numbers = after_contact.known(claims)
+    numbers = after_contact.bars_after_contact(claims)
     wide = [number for number in numbers if number.percent > after_contact.WIDE_BAR]
     listed = "; ".join(f"{number.id}, {number.quantity}, {number.percent:.2g} %" for number in wide)
     return (f"The accuracy of Wide, from contact to its end, is: {precision}. Claims are judged by {len(numbers)} "
@@ -180,13 +180,13 @@ def _claim(claim: dict) -> str:
 
 def _number(check: dict) -> str:
     """A number of a claim with its widths and its outcome."""
-    accepted = claims_record.spanned(claims_record.ends(check["tolerance"]))
+    accepted = claims_record.interval_text(claims_record.ends(check["tolerance"]))
     widths = {"numerics": (check["low"], check["high"]),
               "inputs": (check.get("input_low"), check.get("input_high")),
               "scheme of 2001": check.get("scheme_2001") or (None, None)}
     spans = [f"{name} {_span(*pair)}" for name, pair in widths.items() if None not in pair]
-    return (f"{check['quantity']}: paper {check['paper']}, here {check['value']:.4g} ({'; '.join(spans)}); accepted "
-            f"{accepted}: {check['outcome']}")
+    here = " ".join([claims_record.value_text(check["value"], check["high"]), f"({'; '.join(spans)})" if spans else ""])
+    return f"{check['quantity']}: paper {check['paper']}, here {here.strip()}; accepted {accepted}: {check['outcome']}"
 
 
 def _sentences() -> str:

@@ -118,7 +118,7 @@ def near(folder: Path, time: float) -> State:
 
 
 def every(folder: Path, hours: float) -> list[State]:
-    """The fields at the multiples of ``hours``, from t = 0 on."""
+    """The fields at multiples of ``hours``, beginning with t = 0."""
     return [read(time, path) for time, path in times(folder) if abs(time / hours - round(time / hours)) < 1e-9]
 
 

@@ -33,7 +33,7 @@ def solve(velocity, supply, diffusivity, in_strip, density, rates, length, toler
 
 
 def _extend(x, inside, velocity, supply, diffusivity, length):
-    """The strip's C, extended by (26) upstream and by C(l) downstream."""
+    """Extend the strip's C by (26) upstream and by C(l) downstream."""
     strip = inside(np.clip(x, 0.0, length).ravel())[:2].reshape(2, *x.shape)
     behind = np.minimum(x, 0.0)
     upstream = [s - (s - first) * np.exp(velocity * behind / d)

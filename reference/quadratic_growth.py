@@ -147,8 +147,8 @@ def _unknowns(basis):
 
 
 def _interpolate(basis, lower, start):
-    """A solution on another mesh, at the nodes of this one; if only the nodes of this mesh have moved, that at the
-    same nodes."""
+    """Interpolate a solution on another mesh to the nodes of this one. If both meshes differ only in the positions of
+    their nodes, copy the nodal values."""
     place = np.zeros(basis.N)
     if np.array_equal(basis.mesh.t, start.mesh.t):
         place[_unknowns(basis)] = start.place

@@ -29,12 +29,15 @@ TABLE_1 = {
     "pore": {"width": "100 um", "length": "600 um"},
     "flow": {"kinematic_viscosity": "0.01003 cm^2/s", "gravity": "9.81 m/s^2", "viscosity_ratio": 2000.0},
     "acceptor": {"supply": "10 mg/L", "half_saturation": "1 mg/L", "diffusivity": "2.32 cm^2/day"},
-    "donor": {"supply": "10 mg/L", "half_saturation": "1 mg/L", "diffusivity": "1.01 cm^2/day"},
+    "donor": {"supply": "10 mg/L", "half_saturation": "1 mg/L", "diffusivity": "1.01 cm^2/day",
+              "inhibition_constant": "100 mg/L"},
     "kinetics": {"maximum_utilization_rate": "9.3 1/day", "yield_coefficient": 0.61, "decay_coefficient": "0.12 1/day",
                  "degradable_fraction": 0.8, "decay_oxygen_demand": 1.42, "acceptor_to_donor_ratio": 1.52,
                  "maximum_density": "30000 mg/L"},
 }
 NAMES = ("acceptor", "donor")
+#: docs/scope.md: the half saturation of uptake of zero order, over that of the scene.
+ZERO_ORDER = 1e-5
 
 #: Round-off of sums over about 1e4 nodes or points.
 SUM = 1e-11
@@ -132,6 +135,43 @@ class Scene:
         """A quantity, which may be a table over time."""
         part = self.section(section)
         return TimeCourse(part.get(key, TABLE_1[section].get(key)), part.get("interpolation") == "linear")
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The substrates of the scene: both if it has the table of neither."""
+        return tuple(name for name in NAMES if name in self.tables["substrates"]) or NAMES
+
+    @property
+    def law(self) -> str:
+        """The law of uptake."""
+        return self.section("kinetics").get("law", "dual Monod")
+
+    def half_saturation(self, name: str) -> float:
+        """K of the law of a substrate, mg/L."""
+        return self.number(name, "half_saturation") * (ZERO_ORDER if self.law == "zero order" else 1.0)
+
+    def fraction(self, name: str, concentration) -> np.ndarray:
+        """m of concentrations (mg/L) that are not negative; one for a substrate that the scene leaves out."""
+        if name not in self.names:
+            return np.ones_like(concentration)
+        half = self.half_saturation(name)
+        if self.law == "first order":
+            return concentration / half
+        inhibited = self.law == "Haldane" and name == "donor"
+        square = concentration**2 / self.number(name, "inhibition_constant") if inhibited else 0.0
+        return concentration / (half + concentration + square)
+
+    def largest_fraction(self, name: str, concentration: float) -> float:
+        """The largest m up to a concentration, mg/L."""
+        if self.law == "Haldane" and name == "donor":
+            peak = np.sqrt(self.half_saturation(name) * self.number(name, "inhibition_constant"))
+            concentration = min(concentration, peak)
+        return float(self.fraction(name, concentration))
+
+    @property
+    def unlimited_decay(self) -> bool:
+        """Whether biomass decays also without acceptor."""
+        return self.section("kinetics").get("decay") == "unlimited"
 
     @property
     def flows(self) -> bool:
@@ -309,6 +349,7 @@ class Run:
 def findings(run: Run) -> Iterator[Finding]:
     """Yield all checks of one run."""
     yield from _numbers(run)
+    yield from _absent(run)
     yield from _rows(run)
     for index, fields in enumerate(run.fields):
         row = {name: values[index] for name, values in run.series.items()}
@@ -332,6 +373,15 @@ def _numbers(run: Run) -> Iterator[Finding]:
         cells = [values[_defined_in(fields, name)] for name, values in fields.in_cells.items()]
         missing += sum(np.count_nonzero(~np.isfinite(values)) for values in (*aggregate, *fluid, *cells))
     yield size("numbers that are not finite", missing, 0, "none is")
+
+
+def _absent(run: Run) -> Iterator[Finding]:
+    """A substrate that the scene leaves out has no values."""
+    tables = [*run.series, *run.ledger, *(name for fields in run.fields for name in fields.at_nodes)]
+    for name in NAMES:
+        if name not in run.scene.names:
+            yield size(f"columns and fields of {name}, which the scene leaves out",
+                       sum(name in column for column in tables), 0, "its columns are empty")
 
 
 def _defined_in(fields: Fields, name: str) -> np.ndarray:
@@ -434,7 +484,7 @@ def _dissipation(scene: Scene, fields: Fields) -> float:
 
 
 def _concentrations(scene: Scene, row: dict, fields: Fields) -> Iterator[Finding]:
-    for name in NAMES:
+    for name in scene.names:
         values = fields.at_nodes[f"{name}_mg_per_L"]
         course = scene.course(name, "supply")
         supply = course.largest(row["time_h"]) if scene.stores else course.at(row["time_h"])
@@ -451,26 +501,35 @@ def _concentrations(scene: Scene, row: dict, fields: Fields) -> Iterator[Finding
 
 
 def _rates(scene: Scene, fields: Fields) -> tuple[float, float, float]:
-    """Uptake of acceptor and donor, and the acceptor consumed by decay, (7) and (8), um2 mg/L/h."""
+    """Uptake of acceptor and donor, and the acceptor consumed by decay, (7) and (8), um2 mg/L/h.
+
+    Unlimited decay consumes the same acceptor: the rest of its demand is unmet."""
     k, b = scene.number("kinetics", "maximum_utilization_rate"), scene.number("kinetics", "decay_coefficient")
     of_decay = b * scene.number("kinetics", "degradable_fraction") * scene.number("kinetics", "decay_oxygen_demand")
-    positive = [np.maximum(fields.inside(f"{name}_mg_per_L"), 0.0) for name in NAMES]
-    m_a, m_d = (c / (c + scene.number(name, "half_saturation")) for name, c in zip(NAMES, positive))
+    m_a, m_d = (_fractions(scene, fields, name) for name in NAMES)
     active = fields.inside("active_biomass") * scene.number("kinetics", "maximum_density") * fields.dx[fields.body]
     donor = k * float(np.sum(active * m_a * m_d))
     decay = of_decay * float(np.sum(active * m_a))
     return scene.number("kinetics", "acceptor_to_donor_ratio") * donor + decay, donor, decay
 
 
+def _fractions(scene: Scene, fields: Fields, name: str) -> np.ndarray:
+    """m of a substrate at the quadrature points of the aggregate's triangles, (B, q)."""
+    if name not in scene.names:
+        return np.ones(())
+    return scene.fraction(name, np.maximum(fields.inside(f"{name}_mg_per_L"), 0.0))
+
+
 def _uptake(scene: Scene, row: dict, fields: Fields) -> Iterator[Finding]:
     """In a steady row, the loss between inlet and outlet equals the uptake by the aggregate."""
-    steep = any(scene.number(name, "half_saturation") < STEP * scene.course(name, "supply").at(row["time_h"])
-                for name in NAMES)
+    steep = any(scene.half_saturation(name) < STEP * scene.course(name, "supply").at(row["time_h"])
+                for name in scene.names)
     if not scene.flows or scene.stores or steep:
         return
     flow = row["mean_velocity_m_per_d"] * UNITS["m/day"] * scene.number("pore", "width")
-    rates = _rates(scene, fields)
-    for name, rate in zip(NAMES, rates):
+    rates = dict(zip(NAMES, _rates(scene, fields)))
+    for name in scene.names:
+        rate = rates[name]
         supply = scene.course(name, "supply").at(row["time_h"])
         lost = flow * (supply - row[f"effluent_{name}_mg_per_L"])
         slack = UPTAKE * rate + SOLVED * (flow + scene.number(name, "diffusivity")) * supply
@@ -489,6 +548,12 @@ def _deformation(scene: Scene, row: dict, fields: Fields) -> Iterator[Finding]:
     yield size("area over that at t = 0 over J, less one", after / before / J - 1, SOLVED, "J = det dx/dX")
     yield size("integral of theta less J over that of J", np.sum((theta - J) * before) / after.sum(), SOLVED,
                "(24) with a constant test function; Newton's tolerance")
+    if scene.section("growth").get("wall") == "bonded":
+        body = np.unique(fields.cells[fields.body])
+        bonded = body[(fields.points[body, 1] == 0) & (places[body, 1] == 0)]
+        moved = fields.points[bonded, 0] - places[bonded, 0]
+        yield size("path of bonded nodes along the wall over the width", moved / scene.number("pore", "width"), SOLVED,
+                   "2.3.3: what touches a bonded wall stays; quadratic functions carry its places exactly")
 
 
 def _steps(run: Run) -> Iterator[Finding]:
@@ -516,7 +581,7 @@ def _substrates(run: Run) -> Iterator[Finding]:
     """Each substrate's supply equals the amounts that leave, are consumed and are stored."""
     scene = run.scene
     width, length = scene.number("pore", "width"), scene.number("pore", "length")
-    for name in NAMES:
+    for name in scene.names:
         supplied, out, consumed, stored = (run.ledger[f"{name}_{part}_pg_per_m"]
                                            for part in ("supplied", "out", "consumed", "stored"))
         most = scene.course(name, "supply").largest(run.scene.end)
@@ -530,20 +595,28 @@ def _substrates(run: Run) -> Iterator[Finding]:
         if scene.closed:
             yield size(f"{name} that passes closed ends", [*supplied, *out], 0, "nothing passes")
         yield excess(f"{name} consumed, pg/m", consumed, -SOLVED * scale, _max_consumed(run, name) * (1 + SOLVED),
-                     "Monod's law at the supply, with the biomass that the fastest growth would make")
+                     "the law's largest m up to the supply, with the biomass that the fastest growth would make")
 
 
 def _saturation(run: Run, name: str) -> float:
-    """The largest C / (C + K_s) of the run."""
+    """The largest m of the run; one for a substrate that the scene leaves out."""
+    if name not in run.scene.names:
+        return 1.0
     most = (1 + OVERSHOOT) * run.scene.course(name, "supply").largest(run.scene.end)
-    return most / (most + run.scene.number(name, "half_saturation"))
+    return run.scene.largest_fraction(name, most)
+
+
+def _decay_fraction(run: Run) -> float:
+    """The largest factor of b in the decay: m_A, or one if decay is unlimited."""
+    return 1.0 if run.scene.unlimited_decay else _saturation(run, "acceptor")
 
 
 def _max_biomass(run: Run) -> np.ndarray:
     """Upper bound of the biomass at the end of each step (steps,), pg/m."""
     scene = run.scene
     fastest = scene.number("kinetics", "maximum_utilization_rate") * scene.number("kinetics", "yield_coefficient")
-    return run.ledger["biomass_before_pg_per_m"] * np.exp(fastest * run.duration)
+    m_a, m_d = (max(1.0, _saturation(run, name)) for name in NAMES)
+    return run.ledger["biomass_before_pg_per_m"] * np.exp(fastest * m_a * m_d * run.duration)
 
 
 def _max_consumed(run: Run, name: str) -> np.ndarray:
@@ -560,7 +633,18 @@ def _max_decay(run: Run) -> np.ndarray:
     """Upper bound of the biomass that degrades in each step (steps,), pg/m."""
     scene = run.scene
     rate = scene.number("kinetics", "decay_coefficient") * scene.number("kinetics", "degradable_fraction")
-    return rate * _saturation(run, "acceptor") * run.duration * _max_biomass(run)
+    return rate * _decay_fraction(run) * run.duration * _max_biomass(run)
+
+
+def _least_decay(run: Run) -> np.ndarray | float:
+    """Lower bound of the biomass that degrades in each step (steps,), pg/m: what is active at t = 0 decays at b."""
+    scene = run.scene
+    if "acceptor" in scene.names and not scene.unlimited_decay:
+        return 0.0
+    b = scene.number("kinetics", "decay_coefficient")
+    active = (1 - run.series["inert_fraction"][0]) * run.ledger["biomass_before_pg_per_m"][0]
+    least = active * np.exp(-b * run.ledger["end_h"])
+    return scene.number("kinetics", "degradable_fraction") * b * run.duration * least
 
 
 def _growth(run: Run) -> Iterator[Finding]:
@@ -571,7 +655,7 @@ def _growth(run: Run) -> Iterator[Finding]:
     before = ledger["biomass_before_pg_per_m"]
     yield size("biomass after less before and made, over after", (after - before - produced) / after, SOLVED,
                "(9), (10) over the aggregate")
-    acceptor, donor = (ledger[f"{name}_consumed_pg_per_m"] for name in NAMES)
+    acceptor, donor = _demands(run, law)
     grown = law["yield_coefficient"] * donor
     ratio = law["acceptor_to_donor_ratio"]
     decayed = (acceptor - ratio * donor) / law["decay_oxygen_demand"]
@@ -579,15 +663,36 @@ def _growth(run: Run) -> Iterator[Finding]:
     slack = SUM * (before + terms) + _scheme_error(run, law, terms)
     yield excess("biomass made less Y donor - (acceptor - F donor) / d_c, pg/m", produced - grown + decayed,
                  -slack, slack, "(7)-(10); round-off with the midpoint rule")
-    yield excess("biomass that degrades by the oxygen consumed, pg/m", decayed, -slack - SOLVED * terms,
-                 _max_decay(run) * (1 + SOLVED) + slack, "f_d b m_A X_A, from zero to that at the supply")
+    yield excess("biomass that degrades by the oxygen consumed, pg/m", decayed,
+                 _least_decay(run) - slack - SOLVED * terms, _max_decay(run) * (1 + SOLVED) + slack,
+                 "f_d b m_A X_A, from zero to that at the supply; f_d b X_A at the least X_A where m_A = 1 in decay")
     rows, steps = run.at_ledger()
     inert = run.series["inert_fraction"][rows] * after[steps]
     first = run.series["inert_fraction"][0] * before[0]
     share = (1 - law["degradable_fraction"]) * law["decay_coefficient"]
-    gained = np.cumsum(share * _saturation(run, "acceptor") * run.duration * _max_biomass(run))[steps]
+    gained = np.cumsum(share * _decay_fraction(run) * run.duration * _max_biomass(run))[steps]
     yield excess("inert biomass, pg/m", inert, first - SOLVED * after[steps], first + gained + SOLVED * after[steps],
                  "(10): it only gains, by (1 - f_d) b m_A X_A")
+
+
+def _demands(run: Run, law: dict) -> tuple[np.ndarray, np.ndarray]:
+    """Acceptor that growth and decay demand, met or not, and donor taken up, in each step (steps,), pg/m.
+
+    With the acceptor alone m_D = 1, and k of the uptake k F + d_c f_d b is growth. With the donor alone the demand of
+    the decay, f_d b times the active biomass, is not in the files: it is the rest of the balance, which then has bounds
+    alone."""
+    ledger = run.ledger
+    unmet = ledger.get("acceptor_unmet_pg_per_m", 0.0)
+    ratio = law["acceptor_to_donor_ratio"]
+    if "donor" not in run.scene.names:
+        acceptor, k = ledger["acceptor_consumed_pg_per_m"], law["maximum_utilization_rate"]
+        decay = law["decay_oxygen_demand"] * law["degradable_fraction"] * law["decay_coefficient"]
+        return acceptor + unmet, k * acceptor / (k * ratio + decay)
+    donor = ledger["donor_consumed_pg_per_m"]
+    if "acceptor" not in run.scene.names:
+        decayed = law["yield_coefficient"] * donor - ledger["biomass_made_pg_per_m"]
+        return ratio * donor + law["decay_oxygen_demand"] * decayed, donor
+    return ledger["acceptor_consumed_pg_per_m"] + unmet, donor
 
 
 def _scheme_error(run: Run, law: dict, terms: np.ndarray) -> np.ndarray | float:
@@ -602,8 +707,8 @@ def _scheme_error(run: Run, law: dict, terms: np.ndarray) -> np.ndarray | float:
     part = fastest * run.duration
     if not run.scene.stores:
         return part**2 / 12 * terms
-    steep = sum(run.scene.course(name, "supply").largest(run.scene.end) / run.scene.number(name, "half_saturation")
-                for name in NAMES)
+    steep = sum(run.scene.course(name, "supply").largest(run.scene.end) / run.scene.half_saturation(name)
+                for name in run.scene.names)
     return part**2 / 12 * terms + 1e-3 * max(1.0, steep) * part * _max_biomass(run)
 
 
@@ -651,7 +756,7 @@ def _scales(coarse: Run, fine: Run) -> dict[str, Callable[[int], float]]:
         scales[name] = lambda k, name=name: series[name][k]
     for name in ("upstream_um", "downstream_um"):
         scales[name] = lambda k: series["downstream_um"][k] - series["upstream_um"][k]
-    for name in NAMES:
+    for name in scene.names:
         scales[f"effluent_{name}_mg_per_L"] = lambda k, name=name: max(
             scene.course(name, "supply").largest(fine.times[k]), 1e-300)
     return scales

@@ -3,8 +3,8 @@
 The position X(x) at t = 0 is a field on the present triangles, straight or curved. A surface with the unit tangent s
 has the stretch 1 / |grad X s|. The material has the volume ratio J = 1 / det(grad X). The elastic stretch is
 det(grad X)^(1/2) / |grad X s|. It is evaluated at three Gauss points of each edge between the aggregate and the fluid.
-The second of them is the middle of the edge. The mean over the edge differs from the value there where the stretch
-varies within an edge, so their difference shows how well the mesh resolves it.
+The second of them is the middle of the edge. If the stretch varies within an edge, its mean differs from its value in
+the middle, so this difference shows how well the mesh resolves the stretch.
 """
 import numpy as np
 

@@ -93,7 +93,7 @@ class Browser:
 
     def press(self, key: str) -> None:
         """Press and release a key, such as ArrowLeft."""
-        codes = {"ArrowLeft": 37, "Home": 36, "Tab": 9, "Enter": 13}
+        codes = {"ArrowLeft": 37, "ArrowUp": 38, "Home": 36, "Tab": 9, "Enter": 13}
         text = {"text": "\r"} if key == "Enter" else {}
         for kind in ("keyDown" if text else "rawKeyDown", "keyUp"):
             self.call("Input.dispatchKeyEvent", type=kind, key=key, code=key, windowsVirtualKeyCode=codes[key], **text)

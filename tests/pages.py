@@ -35,6 +35,9 @@ CHARTS = {
                                 "downstream end": "downstream_um"},
     "Inert part of the biomass": {"inert part": "inert_fraction"},
     "Biomass density": {"least": "biomass_density_min", "largest": "biomass_density_max"},
+    "Stress that could detach the aggregate": {"wall traction": "wall_traction_max_MPa",
+                                               "tensile stress": "tensile_stress_max_MPa"},
+    "Force of the fluid on the aggregate": {"force x": "fluid_force_x_uN_per_m", "force y": "fluid_force_y_uN_per_m"},
     "Defects of the balances": {"acceptor": "acceptor_balance", "donor": "donor_balance",
                                 "biomass": "biomass_balance", "oxygen demand": "oxygen_demand_balance"},
     "Mesh": {"nodes": "nodes", "made anew": "remeshed"},
@@ -42,7 +45,8 @@ CHARTS = {
 AXES = {"Conductivity": "(m/day)", "Mean velocity": "(m/day)", "Head loss": "(cm)", "Effluents": "(mg/L)",
          "Inlet of the meshed part": "(mg/L)", "Least concentrations": "(mg/L)",
          "Concentrations above the supply": "(mg/L)", "Area of the aggregate": "(um²)",
-         "Extent of the aggregate": "(um)"}
+         "Extent of the aggregate": "(um)", "Stress that could detach the aggregate": "(MPa)",
+         "Force of the fluid on the aggregate": "(uN/m)"}
 LEDGERS = {f"Ledger: {name}": {"supplied": f"{name}_supplied_pg_per_m", "leaving": f"{name}_out_pg_per_m",
                                "taken up": f"{name}_consumed_pg_per_m", "stored": f"{name}_stored_pg_per_m",
                                "unmet": f"{name}_unmet_pg_per_m"}

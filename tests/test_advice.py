@@ -85,8 +85,8 @@ def test_the_advice_of_check_is_accepted_and_helps():
 
 
 def test_the_advice_against_a_lack_of_memory_is_accepted_and_helps(monkeypatch):
-    """In 200 scenes the refinement that a refusal names is accepted without a warning, or none of a quarter or more of
-    the refinement is."""
+    """In 200 scenes the refusal names a refinement that is accepted without a warning, or states that there is none; a
+    quarter of the scene's refinement then does not fit either."""
     outcomes = set()
     for seed in range(200):
         scene = load_scene("base", [*drawn(seed), "numerics.refinement=5"], unset=["flow.head"])

@@ -2,9 +2,11 @@
 
 import json
 import re
+import time
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from repro import report, results
 from repro.report import fields
@@ -65,8 +67,8 @@ def test_the_picture_is_the_field(window, runs, name):
     grid = field_files.read(path)
     x, y = grid.points[:, :2].T
     inside = (np.abs(x) < 40) & (y > 1) & (y < y.max() - 1)
-    value = "(x, y) => shown.all[Math.floor((shown.tall - (y - shown.box[2]) * shown.scale) * shown.ratio) * " \
-            "shown.size[0] + Math.floor((x - shown.box[0]) * shown.scale * shown.ratio)]"
+    value = "(x, y) => drawn.all[Math.floor((drawn.tall - (y - drawn.box[2]) * drawn.scale) * drawn.ratio) * " \
+            "drawn.size[0] + Math.floor((x - drawn.box[0]) * drawn.scale * drawn.ratio)]"
     places = grid.points[inside, :2].tolist()
     drawn = np.array(window.run(f"{json.dumps(places)}.map(([x, y]) => ({value})(x, y))"))
     expected = grid.point_data["acceptor_mg_per_L"][inside]
@@ -103,6 +105,22 @@ def test_the_keyboard_alone_is_enough(window, runs):
     assert (before["low"], before["high"]) == (last["low"], last["high"])  # one colour scale for all times
     window.press("Home")
     assert picture(window)["frame"] == "0" and "t = 0 h" in window.run("document.getElementById('now').textContent")
+
+
+def test_the_button_saves_the_picture_of_the_page(window, runs, tmp_path):
+    """The file has the pixels that the page shows. Its name states the field and the time."""
+    show(window, runs["paper"], "#frame=0&field=donor_mg_per_L", width=600)
+    window.call("Browser.setDownloadBehavior", behavior="allow", downloadPath=str(tmp_path))
+    window.run("document.getElementById('save').click()")
+    file, end = tmp_path / "donor_mg_per_L_0h.png", time.monotonic() + 30
+    while not file.exists():
+        assert time.monotonic() < end, f"the button saves no {file.name}, but {[*tmp_path.iterdir()]}"
+        time.sleep(0.05)
+    with Image.open(file) as image:
+        saved = np.asarray(image.convert("RGBA"))
+    shown = window.run("(canvas => Array.from(canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height)"
+                       ".data))(document.getElementById('picture'))")
+    assert (saved.ravel() == shown).all() and len(np.unique(saved.reshape(-1, 4), axis=0)) > 50
 
 
 def test_hostile_names_run_nothing(window, tmp_path):

@@ -45,6 +45,16 @@ def test_each_verdict_follows_from_the_checks_and_their_bars(checks, words, verd
     assert verdict in VERDICTS and len(VERDICTS) == 6
 
 
+@pytest.mark.parametrize("end, low, high, outcome", [
+    (88.0, 24.0, 72.0, "fails"), (60.0, 24.0, 72.0, "reaches over"), (88.0, 24.0, math.inf, "holds")])
+def test_a_number_that_a_run_does_not_reach_is_a_lower_bound(end, low, high, outcome):
+    """The value is the end of the run. Under an upper bound it never holds; beyond this bound it fails."""
+    check = claims.between("time (h)", "a couple of days", end, low, high, "as stated", bar=Bar(end, math.inf))
+    assert check.is_lower_bound and check.outcome == outcome and check.holds == (outcome == "holds")
+    assert report.value_text(check.value, check.bar.high) == f"not reached by {end:g}"
+    assert report.inside(end, end, None) and not report.inside(end - 1, end, None)
+
+
 # The committed record.
 @pytest.fixture(scope="module")
 def record():

@@ -159,3 +159,11 @@ def test_a_large_difference_is_a_factor(first, value, expected):
                 series | {"conductivity_m_per_d": np.array([one])}, {}) for name, one in (("a", first), ("b", value))]
     row = re.findall("<tr><td>[^<]*conductivity.*?</tr>", comparison.build(runs))[0]
     assert re.findall('class="value">([^<]*)<', row)[-1] == expected
+
+
+@pytest.mark.parametrize("first, value, is_coordinate, text", [
+    (-5.0, -8.0, True, "-3 um"), (-5.0, -8.0, False, "-60 %"), (10.0, 224.0, False, "22.4 times"),
+    (10.0, 11.0, False, "+10 %"), (0.0, 1.0, False, "-"), (10.0, None, True, "-"), (2.0, 2.0, True, "0")])
+def test_a_difference_has_no_percentage_of_a_coordinate_and_no_large_one(first, value, is_coordinate, text):
+    """A coordinate has no natural zero, so its difference is in um; a value many times the first is a multiple."""
+    assert comparison._text_difference(first, value, is_coordinate) == text

@@ -11,6 +11,7 @@ from skfem.refdom import RefTri
 
 from repro import results
 from repro.march.simulation import simulate
+from repro.model import adhesion
 from repro.report import quantities
 from repro.report.reading import Run
 from repro.results.names import KNOWN
@@ -174,7 +175,7 @@ def derived_row(scene, instant):
     return derived
 
 
-#: Columns that a scene must ask for: `test_detachment.py` and the cases of `coupling_adhesion.py` test them.
+#: Columns that a scene must ask for: `derived_adhesion` and `derived_wall_traction` derive those of the same state.
 ASKED = {*(f"{name}_max_{part}" for name in ("wall_traction", "tensile_stress") for part in ("MPa", "x_um", "y_um")),
          "fluid_force_x_uN_per_m", "fluid_force_y_uN_per_m", "fluid_moment_nN"}
 
@@ -250,6 +251,211 @@ def test_every_column_is_what_its_name_says(order):
     assert row["head_loss_cm"] == pytest.approx(scene.flow.head / 1e4, rel=1e-9)
     values = [value for name, value in row.items() if not name.endswith(("_balance", "_overshoot_mg_per_L"))]
     assert len(set(values)) == len(values) - 1, "two columns alike would hide an exchange (remeshed and contact are)"
+
+
+def stresses(scene, pore):
+    """Cauchy stress (t, q, 3, 3) MPa of the aggregate at the points of theta, and areas (t, q) um2 of these points."""
+    mesh = pore.mesh
+    cells = mesh.cells[mesh.biomass]
+    places, weights = rule_with(pore.theta.shape[1])
+    after = jacobians(mesh.points, cells, places)
+    before = jacobians(pore.body.reference, np.searchsorted(mesh.body, cells), places)
+    F = np.zeros((*before.shape[:2], 3, 3))
+    F[..., :2, :2], F[..., 2, 2] = after @ np.linalg.inv(before), 1.0
+    P = pore.pressure[cells[:, :3]] @ functions(1, places)[0].T
+    return scene.growth.shear_modulus * cauchy(F, P), np.linalg.det(after) * weights
+
+
+def nodal_loads(mesh, cells, places, sigma, areas):
+    """(N, 2) sums of sigma grad N_i over the areas of points."""
+    J = jacobians(mesh.points, cells, places)
+    slopes = np.einsum("qkj,tqji->tqki", functions(mesh.geometry, places)[1], np.linalg.inv(J))
+    loads = np.zeros_like(mesh.points)
+    np.add.at(loads, cells, np.einsum("tq,tqij,tqkj->tki", areas, sigma, slopes))
+    return loads
+
+
+def water_loads(scene, instant):
+    """(N, 2) MPa um, forces of the water on the nodes: its stress rho (nu grad u - g phi) in the water's triangles. At
+    a contact line, the pressure on the edge of the wall beside it acts on the wall."""
+    pore, flow = instant.pore, instant.solved.flow
+    mesh, space, drive = pore.mesh, pore.space, scene.flow
+    wet = ~mesh.biomass
+    cells = mesh.cells[wet]
+    places, weights = rule(8)
+    J = jacobians(mesh.points, cells, places)
+    slopes = np.einsum("qkj,tqji->tqki", functions(space.order, places)[1], np.linalg.inv(J))
+    grad = np.einsum("tkc,tqki->tqci", flow.velocity[space.cells[wet]], slopes)
+    head_order = max(1, space.order - 1)
+    head_cells = mesh.cells[:, : len(NODES[head_order])][wet]
+    head = flow.head[head_cells] @ functions(head_order, places)[0].T
+    stress = drive.kinematic_viscosity / drive.gravity * grad - head[..., None, None] * np.eye(2)
+    loads = -nodal_loads(mesh, cells, places, stress, np.linalg.det(J) * weights)
+    body = set(mesh.body.tolist())
+    s, gauss = np.polynomial.legendre.leggauss(6)
+    for triangle, corners in zip(cells, head_cells):
+        for k in range(3):
+            a, b = triangle[k], triangle[(k + 1) % 3]
+            y = mesh.points[[a, b], 1]
+            on_wall = (y == 0.0).all() or (y == mesh.width).all()
+            if on_wall and (a in body) != (b in body):
+                along = [NODES[1][k] + (NODES[1][(k + 1) % 3] - NODES[1][k]) * (1 + t) / 2 for t in s]
+                inside = functions(head_order, along)[0] @ flow.head[corners]
+                values = functions(mesh.geometry, along)[0]
+                half = abs(mesh.points[a, 0] - mesh.points[b, 0]) / 2
+                node = 0 if a in body else 1
+                shape = values[:, k if node == 0 else (k + 1) % 3]
+                loads[(a, b)[node], 1] += (1 if y[0] == 0.0 else -1) * half * gauss @ (inside * shape)
+    return 1e-12 * drive.density * drive.gravity * 1e-3 * 1e-6 / 3600**2 * loads
+
+
+def derived_adhesion(scene, instant):
+    """{column: value} of the columns of adhesion. `derived_wall_traction` derives those of the wall's traction."""
+    pore = instant.pore
+    mesh = pore.mesh
+    sigma, areas = stresses(scene, pore)
+    middles = mesh.points[mesh.cells[mesh.biomass, :3]].mean(axis=1)
+    near = np.linalg.norm(middles[:, None] - middles, axis=-1) <= mesh.width / 20
+    means = near @ np.einsum("tq,tqij->tij", areas, sigma).reshape(-1, 9) / (near @ areas.sum(1))[:, None]
+    largest = np.linalg.eigvalsh(means.reshape(-1, 3, 3))[:, -1]
+    x, y = middles[largest.argmax()]
+    loads = water_loads(scene, instant)[mesh.body]
+    of_body = mesh.points[mesh.body]
+    on = of_body[of_body[:, 1] == 0.0, 0]
+    arm = of_body - [(on.min() + on.max()) / 2, 0.0]
+    force = loads.sum(axis=0)
+    return {"tensile_stress_max_MPa": largest.max(), "tensile_stress_max_x_um": x, "tensile_stress_max_y_um": y,
+            "fluid_force_x_uN_per_m": 1e6 * force[0], "fluid_force_y_uN_per_m": 1e6 * force[1],
+            "fluid_moment_nN": 1e3 * (arm[:, 0] * loads[:, 1] - arm[:, 1] * loads[:, 0]).sum()}
+
+
+@EVERY_ORDER
+def test_the_columns_of_adhesion_are_what_their_names_say(order):
+    """A strength that is never reached adds the columns to the late state and changes nothing else. They agree to 1e-6.
+    """
+    scene, instant = late_instant(order)
+    growth = replace(scene.growth, tensile_strength=1e3)
+    row = results.row(replace(scene, growth=growth), instant)
+    expected = derived_adhesion(scene, instant)
+    assert {*expected, *(f"wall_traction_max_{part}" for part in ("MPa", "x_um", "y_um"))} == ASKED
+    for name, value in expected.items():
+        assert row[name] == pytest.approx(value, rel=1e-6), name
+
+
+def edges_on_wall(mesh, height):
+    """(e, 2 or 3) nodes of the aggregate's edges on the wall at this y, from the smallest x on."""
+    step = mesh.geometry
+    closed = [*mesh.loop.tolist(), int(mesh.loop[0])]
+    edges = [closed[k: k + step + 1] for k in range(0, len(closed) - 1, step)]
+    touching = [edge for edge in edges if (mesh.points[edge, 1] == height).all()]
+    along = [edge if mesh.points[edge[0], 0] < mesh.points[edge[-1], 0] else edge[::-1] for edge in touching]
+    return sorted(along, key=lambda edge: mesh.points[edge[0], 0])
+
+
+def lagrange(count):
+    """Lagrange's polynomials of `count` evenly spaced nodes in [0, 1]."""
+    at = np.linspace(0, 1, count)
+    fitted = [np.polyfit(at, row, count - 1) for row in np.eye(count)]
+    return [np.polynomial.Polynomial(coefficients[::-1]) for coefficients in fitted]
+
+
+def traction_integral(mesh, edges, forces):
+    """(x, T): places (um) along a wall, and the integral (MPa um) up to there of the traction whose consistent nodal
+    forces are ``forces`` (N,). Polynomials are integrated exactly on each edge."""
+    shapes = lagrange(len(edges[0]))
+    nodes = sorted({node for edge in edges for node in edge})
+    paths = [sum(mesh.points[node, 0] * shape for node, shape in zip(edge, shapes)) for edge in edges]
+    mass = np.zeros((len(nodes), len(nodes)))
+    for edge, path in zip(edges, paths):
+        rows = [nodes.index(node) for node in edge]
+        mass[np.ix_(rows, rows)] += [[(a * b * path.deriv()).integ()(1) for b in shapes] for a in shapes]
+    density = dict(zip(nodes, np.linalg.solve(mass, forces[nodes])))
+    s, x, T = np.linspace(0, 1, 4001), [], [np.zeros(1)]
+    for edge, path in zip(edges, paths):
+        along = (sum(density[node] * shape for node, shape in zip(edge, shapes)) * path.deriv()).integ()
+        x.append(path(s))
+        T.append(T[-1][-1] + along(s))
+    return np.concatenate(x), np.concatenate(T[1:])
+
+
+def traction_peak(pore, height, forces, bonded):
+    """(value, x) of the largest mean over W / 20 of (max(pull, 0)^2 + shear^2)^(1/2), in MPa and um, on one wall.
+
+    A wall that slides bears forces along itself at single points."""
+    mesh, edges = pore.mesh, edges_on_wall(pore.mesh, height)
+    x, T = traction_integral(mesh, edges, (-1 if height == 0.0 else 1) * forces[:, 1])
+    length = min(mesh.width / 20, x[-1] - x[0])
+    nodes = sorted({node for edge in edges for node in edge})
+    places = mesh.points[nodes, 0]
+    starts = np.unique(np.concatenate([x, x - length, places, places - length]))
+    starts = starts[(starts >= x[0] - 1e-9) & (starts <= x[-1] - length + 1e-9)]
+    pull = np.interp(starts + length, x, T) - np.interp(starts, x, T)
+    if bonded:
+        x, T = traction_integral(mesh, edges, forces[:, 0])
+        shear = np.interp(starts + length, x, T) - np.interp(starts, x, T)
+    else:
+        within = (places >= starts[:, None] - 1e-9) & (places <= starts[:, None] + length + 1e-9)
+        shear = within @ forces[nodes, 0]
+    bears = np.hypot(np.maximum(pull, 0), shear) / length
+    return bears.max(), starts[bears.argmax()] + length / 2
+
+
+def derived_wall_traction(scene, instant):
+    """(value, x, y) of the largest mean traction that a wall must bear, in MPa and um: the stress of the aggregate,
+    tested with the nodal functions, less the forces of the water if the growth problem has them."""
+    mesh = instant.pore.mesh
+    cells = mesh.cells[mesh.biomass]
+    places, _ = rule_with(instant.pore.theta.shape[1])
+    sigma, areas = stresses(scene, instant.pore)
+    forces = nodal_loads(mesh, cells, places, sigma[..., :2, :2], areas)
+    if scene.growth.fluid_forces == "included":
+        forces = forces - water_loads(scene, instant)
+    peaks = []
+    for height in (0.0, mesh.width):
+        bonded = scene.growth.wall == "bonded" and height == 0.0
+        peaks.append((*traction_peak(instant.pore, height, forces, bonded), height))
+    return max(peaks)
+
+
+#: The late state; with the forces of the water; with a lower wall that bears shear, too; with the bond alone.
+BEARING = {"stress": {}, "water": {"fluid_forces": "included"},
+           "bonded": {"fluid_forces": "included", "wall": "bonded"}, "bonded, stress alone": {"wall": "bonded"}}
+
+
+def bearing(scene, changes):
+    """The scene with columns of adhesion, in water that is 1e5 times as dense, so that its forces count."""
+    drive = replace(scene.flow, density=1e5 * scene.flow.density)
+    return replace(scene, flow=drive, growth=replace(scene.growth, tensile_strength=1e3, **changes))
+
+
+@pytest.mark.parametrize("parts", [64, 2048])
+@pytest.mark.parametrize("changes", BEARING.values(), ids=BEARING.keys())
+@EVERY_ORDER
+def test_the_columns_of_the_wall_traction_are_what_their_names_say(order, changes, parts, monkeypatch):
+    """The columns try the means that start or end at each part of an edge on the wall. These miss the largest mean by
+    h / (2 length) / parts^2, relative, for an edge h, and its place by two parts. The state was computed without the
+    water's forces and without a bond. The columns take the forces of the walls from the stress and the water alone."""
+    monkeypatch.setattr(adhesion, "PARTS", parts)
+    scene, instant = late_instant(order)
+    mesh = instant.pore.mesh
+    scene = bearing(scene, changes)
+    row = results.row(scene, instant)
+    value, x, y = derived_wall_traction(scene, instant)
+    longest = max(np.ptp(mesh.points[edge, 0]) for height in (0.0, mesh.width) for edge in edges_on_wall(mesh, height))
+    bound = longest / (2 * mesh.width / 20) / parts**2
+    assert row["wall_traction_max_MPa"] == pytest.approx(value, rel=max(bound, 1e-6))
+    assert row["wall_traction_max_x_um"] == pytest.approx(x, abs=2 * longest / parts + 1e-6)
+    assert row["wall_traction_max_y_um"] == y
+
+
+@EVERY_ORDER
+def test_each_part_of_the_wall_traction_counts(order):
+    """The forces of the water and the bond each change the largest traction by 1 % or more, and it is on both walls."""
+    scene, instant = late_instant(order)
+    peaks = [derived_wall_traction(bearing(scene, changes), instant) for changes in BEARING.values()]
+    values = [value for value, _, _ in peaks]
+    assert all(abs(after / before - 1) > 0.01 for before, after in zip(values, values[1:])), values
+    assert {y for _, _, y in peaks} == {0.0, instant.pore.mesh.width}
 
 
 def derived_arrays(scene, instant):

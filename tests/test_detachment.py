@@ -1,4 +1,4 @@
-"""What walls and biomass must bear: means of tractions; strengths that end a run; scenes without them."""
+"""Stresses that walls and biomass bear: means of tractions; strengths that end a run; scenes without strengths."""
 import json
 
 import numpy as np
@@ -8,6 +8,8 @@ import repro
 from repro import results
 from repro.cli import main
 from repro.model import adhesion
+from repro.report import quantities
+from repro.report.reading import read
 from repro.runs.status import is_over
 from repro.scene import load_scene
 
@@ -46,7 +48,8 @@ def test_means_of_a_traction_are_those_of_its_integral(count):
     ("bonding_strength", 0.002, "detaches", "wall_traction_max"),
     ("tensile_strength", 5e-4, "tears", "tensile_stress_max")])
 def test_a_run_ends_where_a_strength_is_exceeded(key, strength, verb, column):
-    """The last row is the first with more, and is there although no row was due; the status names place and time."""
+    """The last row is the first one above the strength, although no row was requested at its time. The status has its
+    time and the place."""
     every = repro.solve("base", [*FAST, 'growth.end="6 h"', f"growth.{key}={strength} MPa"])
     values = every[f"{column}_MPa"]
     assert values[-1] > strength
@@ -73,8 +76,19 @@ def test_an_ended_run_is_complete_and_is_not_continued(tmp_path, capsys):
     assert json.loads((out / "run.json").read_text())["status"] == status
 
 
+def test_the_page_draws_the_stresses_of_a_run_that_has_them(tmp_path):
+    """A run with adhesion has two charts more, and its page names them; a run without has neither."""
+    both = {"Stress that could detach the aggregate", "Force of the fluid on the aggregate"}
+    for name, changes, drawn in (("with", ["growth.bonding_strength=1 MPa"], both), ("without", [], set())):
+        folder = tmp_path / name
+        repro.run(load_scene("base", ["numerics.preset=fast", 'growth.end="0.4 h"', *changes]), folder)
+        titles = {chart.title for chart in quantities.charts_of(read(folder))}
+        page = (folder / "report.html").read_text(encoding="utf-8")
+        assert titles & both == drawn and {title for title in both if title in page} == drawn
+
+
 def test_a_bonded_run_resumes_bit_for_bit(tmp_path):
-    """What lies on the wall stays there through meshes and steps."""
+    """The last rows of the resumed and the uninterrupted run agree to the last bit."""
     repro.run(load_scene("base", [*FAST, 'growth.end="3 h"']), tmp_path / "a")
     repro.resume(tmp_path / "a", overrides=['growth.end="5.6 h"'])
     repro.run(load_scene("base", [*FAST, 'growth.end="5.6 h"']), tmp_path / "b")

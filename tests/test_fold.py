@@ -65,7 +65,9 @@ def test_a_fold_ends_a_run(tmp_path, capsys):
     assert status.startswith(f"the aggregate's surface folds in the step from t = {table['time_h'][-1]:g} h: growth ")
     assert "a finer mesh does not help" in status and 'growth.new_biomass = "stress_free" does' in status
     assert family.judge(folder, status)["verdict"] == family.FOLD
-    (text,) = warned(folder)
+    texts = warned(folder)
+    assert len(texts) == 1
+    text = texts[0]
     assert [line.partition("growth.new_biomass: ")[2] for line in messages] == [text]
     begun = float(text.split()[3])
     assert table["surface_stretch_min"][1] > CREASE > table["surface_stretch_min"][2]
@@ -235,3 +237,9 @@ def test_the_estimate_of_the_rim_is_that_of_a_thin_ring():
     exponent = 10 * numbers.fastest_growth(scene)
     exact = (1 + exponent * numbers.depth(scene) / 40) * np.exp(-exponent / 2)
     assert numbers.rim_stretch(scene, 0.0) == pytest.approx(exact, rel=2e-3)
+
+
+@pytest.mark.parametrize(("number", "expected"), [(22, True), (70, True), (90, False)])
+def test_the_family_reads_the_forecast_of_check(number, expected):
+    """Members 22 and 70 fold before and after contact; member 90 stays almost uncompressed."""
+    assert family.is_expected(family.draw_member(number)) is expected

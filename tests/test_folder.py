@@ -203,6 +203,20 @@ def test_a_full_disk_is_reported_with_the_file_and_nothing_is_lost(short, tmp_pa
     assert read_record(out)["resumes"][0]["time_h"] > 0.5
 
 
+def test_no_record_counts_rows_that_the_table_lacks(short, tmp_path, monkeypatch):
+    """A run may be killed between two writes. Its record then has no more rows than its table."""
+    out, write, counts = tmp_path / "run", results.write_table, []
+
+    def write_watched(path, columns, rows):
+        if columns is results.COLUMNS and (out / "timeseries.csv").exists():
+            counts.append((read_record(out)["rows"], len(results.read_table(out / "timeseries.csv")["time_h"])))
+        write(path, columns, rows)
+
+    monkeypatch.setattr(results, "write_table", write_watched)
+    run(short, out, watch=Watch(interval=0.0))
+    assert len(counts) > 1 and all(recorded <= written for recorded, written in counts)
+
+
 @pytest.mark.parametrize("name", ["../../outside", "/etc/cron.d/x", "a\nb", "\x1b[2J\x1b]0;owned\x07", "..", "x" * 300])
 def test_the_name_of_a_scene_is_no_path(tmp_path, capsys, monkeypatch, name):
     """A run of any scene name writes into its folder and prints one line."""

@@ -107,8 +107,8 @@ def write_group(root, path, **content):
 
 
 def test_free_memory_is_the_least_that_any_limit_leaves(tmp_path):
-    """Counted are the system, the process's control group and its parents, in both versions. Memory of cached files is
-    free."""
+    """The limits of the system, of the process's control group and of its parents count, in both versions of control
+    groups. Memory of cached files counts as free."""
     (tmp_path / "proc/self").mkdir(parents=True)
     assert memory.free_bytes(tmp_path) > 1e15
     (tmp_path / "proc/meminfo").write_text("MemTotal: 9 kB\nMemAvailable:   2000000 kB\n")

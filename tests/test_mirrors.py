@@ -61,7 +61,7 @@ def test_the_reach_of_an_outline_is_reported_on_either_side(sign, side):
     assert "(reach 100 of 130 um)" in warnings.get("pore.length", "")
 
 
-@given(st.floats(0.0, 200.0))
+@given(st.floats(0.0, 280.0))
 def test_a_seed_and_its_mirror_image_are_judged_alike(position):
     one, other = (judge(load_scene("base", [f"aggregate.position={sign * position} um"]), 1e5) for sign in (1, -1))
     assert_alike(one, other)

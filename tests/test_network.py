@@ -8,7 +8,7 @@ import pytest
 import repro
 from repro.results.network import CONTACT, TABLE, TRANSPORTS, UPTAKE_BOUND, known
 from verification.network import __main__ as command
-from verification.network import law, shapes, uptakes
+from verification.network import law, page, shapes, uptakes
 from verification.network.shapes import RATIOS
 
 LAMBDA = 2000.0
@@ -142,7 +142,7 @@ def test_an_empty_pore_adds_nothing_and_thin_bodies_follow_half_discs():
 
 
 def test_the_area_decides_the_contact():
-    """Without `spanned` the law is that of the kind that the area has; near contact its bounds include both kinds."""
+    """Without `spanned` the area decides whether a pore is spanned; near contact the bounds include both kinds."""
     share = np.array([0.002, 0.5, 1.3, 1.45, 1.5, 1.52, 1.58, 1.61, 4.5])
     by_area = np.array(repro.added_resistance(share, 1.0))
     kinds = share > known(False)[1]
@@ -158,7 +158,7 @@ def test_the_area_decides_the_contact():
 
 @pytest.mark.parametrize("contact_is_given", [False, True])
 def test_shapes_near_contact_are_within_the_bounds(contact_is_given):
-    """Those of the fit and those that it has not seen, with contact and without it."""
+    """These are shapes of the fit and shapes that it does not include, with contact and without it."""
     outside, kinds = [], []
     for unseen in (False, True):
         columns = law.read(unseen)
@@ -197,7 +197,8 @@ def test_uptake_of_a_new_state():
 
 
 def test_limits_of_the_uptake():
-    """A small aggregate in a fast flow takes up at the rates of the supply. A slow flow brings all that is taken up."""
+    """A small aggregate in a fast flow takes up at the rates of the supply. In a slow flow the inflow limits the
+    uptake."""
     active, kinetics = 3e4, repro.load_scene("base").kinetics
     taken = repro.uptake(20.0, 100.0, 10.0, 20.0, 20.0)
     fastest = 20.0 * active * kinetics.maximum_utilization_rate
@@ -236,5 +237,5 @@ def test_uptakes_outside_of_the_range_are_refused(values, message):
 
 def test_the_page_shows_the_present_table():
     verdict = law.judged(law.read(unseen=True))
-    assert command.PAGE.read_text(encoding="utf-8") == law.page(law.read(unseen=False), verdict)
+    assert command.PAGE.read_text(encoding="utf-8") == page.text()
     assert (verdict.count, verdict.inside) == (50, 50)

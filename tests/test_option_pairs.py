@@ -59,8 +59,9 @@ def test_viscosity_and_drag_dissipate_the_work_of_the_head(body, interface, orde
 
 @pytest.mark.parametrize("interface, order", [*product(INTERFACES, ORDERS)])
 def test_the_force_on_the_aggregate_comes_through_every_section_of_the_fluid(interface, order):
-    """The force on the aggregate is the momentum flux through any section around it, here a random field that is one on
-    the aggregate and zero on the other boundaries: to round-off, if forces and flow use the same form."""
+    """The force on the aggregate equals the momentum flux through any section around it, to round-off, if forces and
+    flow use the same form. A random field that is one on the aggregate and zero on the other boundaries stands for the
+    section."""
     scene, state, solution = solved("viscous", interface, order)
     space, stream, mesh = state.space, solution.flow, state.mesh
     pressure = flow.pressure_space(space)
@@ -92,7 +93,7 @@ def test_substrates_are_conserved(body, interface, order):
 
 @pytest.mark.parametrize("order", (2, 3))
 def test_the_force_on_a_permeable_body_is_the_drag_in_it(order):
-    """nu / (g k) times the integral of u over the body, by another quadrature than the forces have."""
+    """The drag is nu / (g k) times the integral of u over the body, with another quadrature than that of the forces."""
     scene, state, solution = solved("permeable", "laplacian", order, "growth.fluid_forces=included")
     drive, body = scene.flow, state.mesh.biomass
     of = elements.table(order, state.mesh.geometry, 10)

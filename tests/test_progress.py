@@ -11,7 +11,7 @@ import subprocess
 import sys
 import termios
 import time
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 
 import pytest
 import tqdm
@@ -19,8 +19,10 @@ from tqdm import tqdm as Bar
 
 from repro.cli import main
 from repro.model import growth
+from repro.preflight import resolved
 from repro.runs import progress
 from repro.runs.interrupts import catch_signals
+from repro.scene import load_scene
 from tests.pages import run
 from tests.shell import flags, read_record, start_run
 
@@ -191,3 +193,34 @@ def test_a_second_signal_ends_the_process_with_the_signal_s_status():
             "with catch_signals():\n    for _ in range(2):\n        os.kill(os.getpid(), signal.SIGTERM)\n"
             "        time.sleep(DUPLICATE + 0.2)")
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 128 + signal.SIGTERM
+
+
+OUTLINE = {"pore": {"width": "50 um"}, "flow": {"head": "1e-3 cm"}, "substrates": {}, "growth": {"end": "1 h"},
+           "aggregate": {"outline": [["-6 um", "0 um"], ["-5 um", "6 um"], ["4 um", "7 um"], ["6 um", "0 um"]]}}
+
+
+def test_a_check_reports_between_its_stages_without_its_thread(tmp_path, capsys, monkeypatch):
+    """A mesh and a head loss take 1.5 s on a fake clock, and the thread never has its turn. The lines are less than
+    two seconds apart: after each of the first mesh and the meshes of the flow there is one."""
+    clock = [0.0]
+    meshes = []
+
+    def slow(computing):
+        def call(*arguments, **keys):
+            result = computing(*arguments, **keys)
+            clock[0] += 1.5
+            meshes.append(clock[0])
+            return result
+        return call
+
+    monkeypatch.setattr(progress, "monotonic", lambda: clock[0])
+    monkeypatch.setattr(progress, "_call_regularly", lambda tick: nullcontext())
+    monkeypatch.setattr(resolved.pore, "seeded", slow(resolved.pore.seeded))
+    monkeypatch.setattr(resolved.pore, "solve_flow", slow(resolved.pore.solve_flow))
+    scene = tmp_path / "scene.toml"
+    scene.write_text(str(load_scene(OUTLINE)))
+    main(["check", str(scene)])
+    lines = [int(seconds) for seconds in re.findall(r"computed, (\d+) s", capsys.readouterr().err)]
+    times = [0, *lines, int(clock[0])]
+    assert len(meshes) > 5
+    assert max(later - earlier for earlier, later in zip(times, times[1:])) <= 2, times

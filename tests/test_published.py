@@ -54,12 +54,12 @@ def test_the_templates_have_no_number_that_a_run_computes():
         assert set(re.findall(r"\d+\.\d+", plain)) <= {"2.9", "1.5", "4.19", "6.13", "1.6", "19.2", "19.4"}
 
 
-#: Words and pictures of the note at most: what is read in five minutes. Words are what spaces part.
+#: Largest number of words and of pictures of the note, which is read in five minutes. Spaces separate words.
 WORDS, PICTURES = 1800, 4
 
 
 def test_the_note_is_short_and_its_pictures_exist():
-    """Its first paragraph says what follows for a model of clogging, with numbers."""
+    """Its first paragraph states the consequences for a model of clogging, with numbers."""
     note = replication.NOTE.read_text(encoding="utf-8")
     read = re.sub(r"<!--.*?-->|\(https?://\S+\)", "", note, flags=re.S)
     pictures = re.findall(r"^!\[.+\]\((\S+)\)$", note, re.M)
@@ -199,7 +199,7 @@ def test_the_examples_of_the_how_to_pages_run(tmp_path, capsys, monkeypatch):
 
 
 def test_the_reference_lists_all_public_names_and_files(fast):
-    """Those of the package, and the files of a run; a run that ends has no checkpoint of its last step."""
+    """They are the names of the package and the files of a run. A run that ends has no checkpoint of its last step."""
     directives = re.findall(r"^\.\. auto(?:function|class|exception):: (\w+)$", text("docs/reference/api.md"), re.M)
     assert {*directives} == {*repro.__all__, "SceneError", "OutputError", "SimulationError", "PoreEnd", "Fold"}
     listed = set(re.findall(r"`([\w.]+)`", text("docs/reference/files.md").partition("## A sweep")[0]))

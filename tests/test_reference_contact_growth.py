@@ -33,7 +33,8 @@ def touching(theta, mirrored=False):
 
 @pytest.mark.parametrize("slope, expected", [(0.15, 0.1 * (1 - 0.15 / 0.3)), (0.3, 0.0), (0.6, 0.1 * 0.1 * (1 - 2))])
 def test_a_straight_wedge_lacks_what_its_slope_lacks(slope, expected):
-    """A wedge that is too narrow lacks most at the distance film / tan(angle), one that is too wide beside the line."""
+    """In a wedge that is too narrow the gap falls short most at the distance film / tan(angle); in one that is too wide
+    the least excess is beside the line."""
     mesh = curved(contact_growth.half_disc(RADIUS, 16, 0), RADIUS)
     angle = np.arctan2(*mesh.doflocs[::-1])
     beyond = np.maximum(np.abs(angle - np.pi / 2) - np.pi / 4, 0.0)

@@ -20,6 +20,7 @@ from repro.results.arrays import ARRAYS
 from repro.results.field_files import Grid
 from repro.results.quantities import ending
 from repro.scene import load_scene, scene_tables
+from tests import browser
 from tests.pages import (
     FAST,
     HOSTILE,
@@ -282,6 +283,42 @@ def test_a_page_of_a_fine_mesh_is_small_and_accurate(tmp_path, monkeypatch, kind
     centres = nodes[decode_numbers(mesh["cells"], "<u4").reshape(-1, 3)].mean(axis=1)
     radius = np.hypot(centres[:, 0] - 50, centres[:, 1])
     assert ((decode_numbers(mesh["body"], "<u1") == 1) == (radius < 20))[np.abs(radius - 20) > 1].all()
+
+
+@pytest.mark.skipif(browser.CHROMIUM is None, reason="Chromium is not installed")
+def test_colours_are_logarithmic_over_two_decades_or_more(flow_only, tmp_path, monkeypatch):
+    """The head is exponential in x. Colours are linear below two decades, and cover at most four decades.
+
+    Colours are read at nodes. They may be 3 of 255 colours apart, because a pixel is up to 0.2 % of the width away.
+    """
+    copy = shutil.copytree(flow_only, tmp_path / "run")
+    ((_, file),) = fields.index(copy)
+    points, cells = regular_grid(monkeypatch, 1000)
+    nodes = points[((points > 1) & (points < [99, 49])).all(axis=1)]  # the frame of the picture covers the others
+    with browser.Browser() as window:
+        for decades in (1.9, 2.1, 6.0):
+            head = 10 ** (decades * points[:, 0] / 100)
+            write_fields(file, points, cells, {"head_cm": head}, np.zeros(len(cells)))
+            window.show(report.write(copy), "#field=head_cm")
+            assert window.run("document.getElementById('errors').textContent") == ""
+            part = decades * (nodes[:, 0] / 100 - 1)
+            expected = 1 + part / min(decades, 4) if decades > 2 else (10**part - 10**-decades) / (1 - 10**-decades)
+            assert np.abs(colours_at(window, nodes) - 255 * np.maximum(expected, 0)).max() < 3, decades
+
+
+def colours_at(window, points):
+    """(N,) places of the colours that the page shows at some points, from 0 to 255."""
+    script = """(places => {
+        const canvas = document.getElementById("picture"), { size, ratio, edge, scale, tall, box } = drawn;
+        const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+        const shown = new Uint32Array(data.buffer);
+        return places.map(([x, y]) => TABLE.indexOf(shown[Math.round(edge.left * ratio)
+            + Math.floor((x - box[0]) * scale * ratio) + canvas.width * (Math.round(edge.top * ratio)
+            + Math.floor((tall - (y - box[2]) * scale) * ratio))]));
+    })"""
+    places = np.array(window.run(f"{script}({json.dumps(points.tolist())})"))
+    assert (places >= 0).all()
+    return places
 
 
 def test_each_frame_has_the_aggregate_of_its_own_time(tmp_path, monkeypatch):

@@ -43,3 +43,5 @@ def test_ends_and_walls_of_a_minimal_mesh_have_their_nodes(order):
         space = Space(grid, order)
         y = space.points[:, 1]
         assert sorted(space.dofs.walls) == np.flatnonzero((y < 1e-12) | (y > 1 - 1e-12)).tolist()
+        for nodes in (*space.dofs.inlet, *space.dofs.outlet):
+            assert y[nodes] == pytest.approx(np.linspace(y[nodes[0]], y[nodes[-1]], order + 1), abs=1e-12)

@@ -167,7 +167,7 @@ def test_a_failing_step_is_halved_until_it_succeeds(monkeypatch):
 
 
 def test_a_step_ends_at_contact_within_a_thousandth_of_the_film(monkeypatch):
-    """The film of 2 um lies within an even thinning from 4 to 1 um, and the step is made to end there."""
+    """In a step in which the film thins evenly from 4 to 1 um, the step is cut where the film is just under 2 um."""
     assert 1.998 < 4 - 3 * stepping._part_to_contact(4.0, 1.0, 2.0) < 2
     searches, attempt = [], midpoint.attempt
 

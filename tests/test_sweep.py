@@ -298,8 +298,8 @@ def hostile_folder(tmp_path):
 
 
 def test_nothing_is_imported_from_the_working_folder(tmp_path):
-    """No process of a sweep does, if it is started by the command or by a script without a guard, which is not run
-    again."""
+    """This holds for a sweep that the command starts, and for one that a script without a guard starts. The script is
+    not run again."""
     working_folder, notes = hostile_folder(tmp_path)
     script = tmp_path / "script.py"
     script.write_text("import repro\nprint(repro.sweep('flow_only', ['pore.width=48 um, 50 um'], 'again'))\n")

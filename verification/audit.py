@@ -1,4 +1,4 @@
-"""Cost and effect of each choice: ``python -m verification.audit`` prints the table and writes
+"""Cost and effect of each choice of the paper: ``python -m verification.audit`` prints the table and writes
 ``verification/report/audit.json``.
 
 The audit changes one of the paper's choices (:mod:`verification.switches`) at a time. It compares base in the paper's

@@ -1,8 +1,8 @@
 """One store of results that are computed once for a scene and for the present source of ``repro``.
 
 A result is found by a key that has the hashes of the scene and of the source, so that a change of either computes it
-anew. Missing results are computed side by side. :class:`Folders` keeps whole runs, :class:`Numbers` the few numbers of
-many runs, and :class:`Memory` what functions of claims return, which is lost when the process ends.
+anew. Missing results are computed in parallel. :class:`Folders` keeps whole runs, :class:`Numbers` the few numbers of
+many runs, and :class:`Memory` the return values of the functions of claims, until the process ends.
 """
 
 import os
@@ -46,7 +46,7 @@ class Store(ABC):
         return self.get_all([scene])[0]
 
     def get_all(self, scenes: Iterable[Scene]) -> list:
-        """The results of several scenes. If more than one is missing, they are computed side by side, a process a
+        """The results of several scenes. If more than one is missing, they are computed in parallel, one process per
         core."""
         keyed = [(key_of(scene), scene) for scene in scenes]
         missing = {key: scene for key, scene in keyed if self.find(key) is None}
@@ -120,7 +120,7 @@ class Numbers(Store):
 
 
 def _append_numbers(numbers: Callable[[Scene], dict[str, float]], file: Path, scene: Scene) -> dict[str, float]:
-    """The numbers of a run, written at once: a break loses only those being computed."""
+    """Compute the numbers of a run and write them at once, so that an interruption loses only the runs in progress."""
     row = {"run": key_of(scene), "numbers": numbers(scene)}
     append(row, file)
     return row["numbers"]

@@ -4,6 +4,11 @@ A switch is a run of the claims (:mod:`verification.claims.runs`) at the paper's
 The errata report its rows; the audit reports its difference from base and its cost. Some alternatives have no key in a
 scene: the restart value of theta (28), an explicit increment, and an uneven seed. For these, :func:`course` marches a
 step or a seed of its own, also once.
+
+Some keys have no switch. With ``growth.wall = "bonded"`` base stops on the paper's mesh at 15.6 h, where a triangle
+beside the contact line collapses; the claims judge it in the converged solution. ``flow.biomass = "brinkman"``, also
+with the fluid's forces, needs quadratic elements. ``growth.bonding_strength`` and ``growth.tensile_strength`` end a run
+and change nothing before. Without one of the substrates there is no effluent of it to compare.
 """
 
 from collections.abc import Callable
@@ -32,8 +37,9 @@ from verification.problems.runs import next_shape, shape_of
 
 @dataclass(frozen=True)
 class Switch:
-    """choice: what is chosen; default, alternative: in words; change: KEY=VALUE of the alternative; state: can both be
-    compared in one state; note: what the reader must know; meshes: are the default's meshes good for both."""
+    """choice: the subject of the choice; default, alternative: in words; change: KEY=VALUE of the alternative; state:
+    whether both can be compared in one state; note: a remark for the reader; meshes: whether both can use the default's
+    meshes."""
 
     choice: str
     default: str
@@ -75,6 +81,10 @@ CHOICES = {
                           note="section 5"),
     "bubble": Switch("flow element", "stabilised (c = 100)", "bubble (MINI)", 'numerics.flow_element="bubble"',
                      note="the same unknowns; tau is the same to 7 % where triangles are equilateral"),
+    "Haldane": Switch("law of uptake", "dual Monod", "Haldane, K_i = 100 mg/L", 'kinetics.law="Haldane"',
+                      note="(7)-(10); not the paper's"),
+    "unlimited decay": Switch("decay", "with acceptor", "unlimited", 'kinetics.decay="unlimited"',
+                              note="(9), (10); not the paper's"),
     "rechosen": Switch("fixed point", "kept", "rechosen", 'numerics.fixed_point="rechosen"',
                        note="2.3.3; the same node throughout base, whose contact surface stays even about it"),
     "midpoint": Switch("steps in time", "updates of 12 min", "midpoint, tolerance 0.01", 'numerics.time="midpoint"',
@@ -144,7 +154,7 @@ def reshaped(previous: Pore, outline: Outline) -> Pore:
 
 
 def _radius(outline: Outline) -> CubicSpline:
-    """Distance of the interface from the origin over the angle from downstream, smooth between its nodes."""
+    """Distance of the interface from the origin as a smooth function of the angle from downstream."""
     edges = outline.interface_edges()
     x, y = outline.points[edges | np.roll(edges, 1)].T
     angle = np.arctan2(y, x)
@@ -163,7 +173,7 @@ def one_state(aggregate: Body, other: Scene) -> dict[str, float]:
 
 def run_columns(run: Run) -> Columns:
     """Of a run's rows: "time" h, "velocity" m/d, "area" um2, "drift", largest |(X_A + X_I) / X_m - 1|, and "lean", the
-    middle between the tips over half their distance."""
+    middle between the tips divided by half of their distance."""
     return _row_columns(runs.series(*run))
 
 

@@ -21,7 +21,7 @@ from repro import load_scene, run, sweep
 from repro.sweeps.pool import cores
 
 REQUIRED = 0.95
-#: Preset of the sweep, and the further one of the commands.
+#: Preset of the sweep, and the additional preset of the commands.
 JUDGED, SLOWER = "fast", "accurate"
 RUNS = 200  # of the sweep
 SINGLE = 10  # runs before the sweep, and after it
@@ -61,26 +61,27 @@ def measure() -> float:
     return rate / single / cores()
 
 
-def fresh(*arguments: str) -> float:
-    """Seconds that a new Python process takes with these arguments: the best of five."""
+def seconds_of_process(*arguments: str) -> float:
+    """Seconds of a new Python process with these arguments, the least of five measurements."""
     return min(repeat(lambda: subprocess.run([sys.executable, *arguments], stdout=subprocess.DEVNULL, check=True),
                       number=1))
 
 
-def warm(preset: str, folder: Path) -> float:
+def seconds_of_run(preset: str, folder: Path) -> float:
     """Seconds of a run of base in this process, files and page included: the best of five."""
     return min(runs(preset, 5, folder))
 
 
 def commands() -> dict[str, tuple[float, float]]:
     """{command: (its time over that of its imports and computation, largest accepted ratio)}."""
-    ratios = {"repro --help": (fresh("-m", "repro", "--help") / fresh("-c", "import numpy"), 2.0)}
-    packages = fresh("-c", f"import {PACKAGES}")
+    numpy_import = seconds_of_process("-c", "import numpy")
+    ratios = {"repro --help": (seconds_of_process("-m", "repro", "--help") / numpy_import, 2.0)}
+    packages = seconds_of_process("-c", f"import {PACKAGES}")
     for preset in (SLOWER, JUDGED):
         with TemporaryDirectory() as folder:
             options = ["base", "--set", f"numerics.preset={preset}", "--force", "--quiet", "--out", f"{folder}/run"]
-            seconds = fresh("-m", "repro", "run", *options)
-            ratios[f"repro run base in {preset}"] = (seconds / (packages + warm(preset, Path(folder))), 1.3)
+            seconds = seconds_of_process("-m", "repro", "run", *options)
+            ratios[f"repro run base in {preset}"] = (seconds / (packages + seconds_of_run(preset, Path(folder))), 1.3)
     return ratios
 
 

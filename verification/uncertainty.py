@@ -19,7 +19,7 @@ the next. If the observed order exceeds the lowest formal one, the law is fitted
 a first-order law scatter by a tenth of the error, the observed order is as often near two, and a bar with it covers
 three errors in four, not nineteen in twenty. In the second case q is the lowest formal order, and the range of all
 values covers oscillation and noise, as in Eca & Hoekstra's estimator for data that do not converge monotonically. The
-factors are Roache's, for three and more sizes and for two.
+factors are those that Roache gives for at least three sizes and for two.
 
     P. J. Roache, J. Fluids Eng. 116 (1994) 405; Verification and Validation in Computational Science and Engineering,
     Hermosa, 1998. I. B. Celik et al., J. Fluids Eng. 130 (2008) 078001. L. Eca, M. Hoekstra, J. Comput. Phys. 262
@@ -39,7 +39,7 @@ OBSERVED, FORMAL = 1.25, 3.0
 FEWEST = 3
 #: Relative difference below which values are equal up to round-off.
 SAME = 1e-12
-#: Range of the search for the observed order; a minimum at either end counts as none.
+#: Range of the search for the observed order; a minimum at either end does not count as an observed order.
 SOUGHT = np.linspace(0.05, 8.0, 160)
 
 

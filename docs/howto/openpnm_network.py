@@ -1,5 +1,8 @@
 """A network of 100 throats in OpenPNM, with the laws of throats: flow, uptake and growth over 48 h (make network)."""
 
+from collections.abc import Iterator
+from typing import NamedTuple
+
 import numpy as np
 import openpnm
 
@@ -35,7 +38,7 @@ def heads(area: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return head, conductance * (head[throats[:, 0]] - head[throats[:, 1]])
 
 
-def supplies(head: np.ndarray, flow: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def supplies(area: np.ndarray, head: np.ndarray, flow: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Concentrations of the pores (mg/L), uptake (pg/m/h) and growth (um2/h) of the throats.
 
     Water mixes in each pore. The pores are visited from the highest head to the lowest.
@@ -59,20 +62,41 @@ def supplies(head: np.ndarray, flow: np.ndarray) -> tuple[np.ndarray, np.ndarray
     return concentration, taken, growth
 
 
-total = []
-for time in np.arange(0.0, END + STEP / 2, STEP):
-    head, flow = heads(area)
-    concentration, taken, growth = supplies(head, flow)
+class State(NamedTuple):
+    """The network at a time. area: um2, head_loss: um, flow: m/d um, supplies: (2, n) mg/L, of the n throats; total:
+    flow through the network, m/d um."""
+
+    area: np.ndarray
+    head_loss: np.ndarray
+    flow: np.ndarray
+    supplies: np.ndarray
+    total: float
+
+
+def advance(area: np.ndarray, step: float) -> Iterator[State]:
+    """Yield the state every `step` hours. Heads, supplies and growth keep their values over a step."""
+    for _ in range(round(END / step) + 1):
+        head, flow = heads(area)
+        concentration, taken, growth = supplies(area, head, flow)
+        total = balanced(flow, concentration, taken)
+        upstream = np.where(flow > 0, throats[:, 0], throats[:, 1])
+        yield State(area, head[throats[:, 0]] - head[throats[:, 1]], flow, concentration[:, upstream], total)
+        area = np.maximum(area + step * growth, 0.0)
+
+
+def balanced(flow: np.ndarray, concentration: np.ndarray, taken: np.ndarray) -> float:
+    """The flow through the network (m/d um), after a check of the balances of water and both substrates."""
     across = np.where(inlets[throats[:, 0]] != inlets[throats[:, 1]], np.abs(flow), 0.0)
     leaving = np.where(outlets[throats[:, 0]] != outlets[throats[:, 1]], np.abs(flow), 0.0)
-    total.append(across.sum())
     effluent = (leaving * concentration[:, np.where(flow > 0, throats[:, 0], throats[:, 1])]).sum(axis=1) * FLOW
     last = outlets[throats].any(axis=1)
     brought = np.array(SUPPLY) * across.sum() * FLOW
     assert np.isclose(leaving.sum(), across.sum(), rtol=1e-8)
     assert np.allclose(taken[:, ~last].sum(axis=1), brought - effluent, rtol=1e-6, atol=1e-8 * brought.max())
-    if time < END:
-        area = np.maximum(area + STEP * growth, 0.0)
+    return across.sum()
 
+
+states = list(advance(area, STEP))
+total = [state.total for state in states]
 print(f"flow after {END:g} h over that at 0 h: {total[-1] / total[0]:.4g}")
-print(f"touching both walls: {(area > 1.51 * width**2).sum()} of {len(throats)} throats")
+print(f"touching both walls: {(states[-1].area > 1.51 * width**2).sum()} of {len(throats)} throats")

@@ -1,7 +1,7 @@
 """Command line: ``repro COMMAND ...``; each command is a module of :mod:`repro.cli`.
 
-Exit status: 0 on success, 1 if a stage failed, 2 if the input is wrong, or a folder, a file or
-standard output cannot be used, 3 if some runs of a sweep have failed, 130 or 143 if interrupted or
+Exit status: 0 on success; 1 if a stage failed; 2 if the input is wrong, or if a folder, a file or
+standard output cannot be used; 3 if some runs of a sweep have failed; 130 if interrupted, 143 if
 terminated. A closed pipe, as after ``| head -1``, is not a failure.
 """
 

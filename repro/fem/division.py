@@ -63,7 +63,8 @@ class DividedTriangle:
         return replace(self, t=t if self.forward else 1 - t)
 
     def nodes(self, values: np.ndarray) -> np.ndarray:
-        """(2, 6, ...) at the nodes of both parts, from values (6, ...) at the triangle's nodes."""
+        """(2, 6, ...) values at the nodes of both parts, from those (6, ...) at the triangle's
+        nodes."""
         corners = np.stack(self.parts)
         where = np.concatenate([corners, (corners + np.roll(corners, -1, axis=1)) / 2], axis=1)
         shapes = quadratic(where.reshape(-1, 2))
@@ -120,9 +121,9 @@ class Division:
     def topology(self) -> Topology:
         """Connections of the divided mesh.
 
-        New corners follow the old corners, new middles follow the old middles: the second halves
-        of the arcs, then one inside each divided triangle. The first part of a divided triangle
-        takes its place, the second one follows all other triangles.
+        New corners follow the old corners. New middles follow the old middles: first those of the
+        second halves of the arcs, then one inside each divided triangle. The first part of a
+        divided triangle takes its place, the second one follows all other triangles.
         """
         topology = self.parent.topology
         count = len(self.arcs)
@@ -177,14 +178,15 @@ class Division:
                                inside])
 
     def at_corners(self, values: np.ndarray) -> np.ndarray:
-        """(corners + d,) of a linear field (corners,) at the parent's corners."""
+        """(corners + d,) values at all corners, from a linear field (corners,) at the parent's
+        corners."""
         loop = self.parent.loop
         start = loop[2 * self.arcs]
         end = loop[(2 * self.arcs + 2) % len(loop)]
         return np.concatenate([values, (1 - self.t) * values[start] + self.t * values[end]])
 
     def restricted(self, values: np.ndarray) -> np.ndarray:
-        """(N, ...) at the parent's nodes of a field at all nodes of the divided mesh."""
+        """(N, ...) values at the parent's nodes, from those at all nodes of the divided mesh."""
         corners = self.parent.corners
         first_middle = corners + len(self.arcs)
         last_middle = first_middle + len(self.parent.points) - corners
@@ -218,7 +220,7 @@ class Division:
     def gathered_loads(self, loads: np.ndarray) -> np.ndarray:
         """(N, 2) nodal loads on the parent's nodes, from loads on all nodes of the divided mesh.
 
-        Both do the same work in every displacement of the parent.
+        Both sets of loads do the same work in every displacement of the parent.
         """
         corners = self.parent.corners
         first_middle = corners + len(self.arcs)

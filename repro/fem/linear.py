@@ -28,9 +28,9 @@ from repro.timing import timed
 
 #: Largest accepted componentwise backward error, max |A x - b|_i / (|A| (|x| + t) + |b| + t)_i.
 RESIDUAL = 1e-10
-#: t above, the smallest normal number. A number that underflows has the absolute error eps t, and a
-#: row multiplies the errors of its unknowns by A_ij (Demmel 1984, SIAM J. Sci. Stat. Comput. 5).
-#: The last bit of unknowns above 2 t / eps, 2e-292, does not change.
+#: The t in RESIDUAL: the smallest normal number. A number that underflows has the absolute error
+#: eps t, and a row multiplies the errors of its unknowns by A_ij (Demmel 1984, SIAM J. Sci. Stat.
+#: Comput. 5). The last bit of unknowns above 2 t / eps, 2e-292, does not change.
 UNDERFLOW = np.finfo(float).tiny
 #: The solution is refined if its error is larger than this.
 REFINE = 1e-14
@@ -91,7 +91,7 @@ def _by_degree(graph: sp.csc_array) -> np.ndarray:
 
 
 def _dissected(graph: sp.csc_array) -> np.ndarray:
-    """Nested dissection by METIS; the graph without its diagonal."""
+    """Nested dissection by METIS, which takes the graph without its diagonal."""
     matrix = sp.coo_array(graph)
     away = matrix.row != matrix.col
     places = matrix.row[away], matrix.col[away]

@@ -256,7 +256,7 @@ def _constrained_delaunay(points: np.ndarray, nodes: np.ndarray) -> np.ndarray:
 
 
 def _without_slivers(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """The same triangles (K, 3), without those whose nodes lie on one line: Mmg refuses them.
+    """The triangles (K, 3) without those with three nodes on one line, which Mmg refuses.
 
     The longest edge of a removed triangle is exchanged for the other diagonal.
     """

@@ -2,8 +2,8 @@
 
 The channel is 0 <= y <= W, -L/2 <= x <= L/2; the origin is below the middle of the seed, on the
 lower wall. Nodes run counterclockwise; each of them is FREE (on the interface with the fluid), or
-touches the lower (BOTTOM) or the upper wall (TOP). Where edges are arcs, corners and middles take
-turns: arc k has the nodes 2 k, 2 k + 1 and 2 k + 2.
+touches the lower (BOTTOM) or the upper wall (TOP). Where edges are arcs, corners and middles
+alternate: arc k has the nodes 2 k, 2 k + 1 and 2 k + 2.
 """
 
 from __future__ import annotations

@@ -81,9 +81,9 @@ def extent_too_short(outline: Outline, ends: tuple[float, float], width: float,
 def interface_sizes(outline: Outline, sizing: Sizing) -> np.ndarray:
     """(M,) element size (um) at each node of the outline.
 
-    It is the least of a tenth of the aggregate's thickness (or, if larger, the interface's length
-    over ``ALONG_INTERFACE``), a fourteenth of the pore's width, the film's size at free nodes, and
-    the size beside the contact lines with the opposite wall.
+    It is the least of several sizes: a tenth of the aggregate's thickness (or the interface's
+    length over ``ALONG_INTERFACE``, if that is larger), a fourteenth of the pore's width, the size
+    for the film at free nodes, and the size beside contact lines with the opposite wall.
     """
     length = outline.edge_lengths()[outline.interface_edges()].sum()
     size = max(outline.thickness / ACROSS_AGGREGATE, length / ALONG_INTERFACE)
@@ -261,7 +261,7 @@ def placed(outline: Outline, edge: np.ndarray, t: np.ndarray, seed: float | None
 def _on_arc(places: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.ndarray:
     """Move points (K, 2), each between two others, to the arc around the origin through these.
 
-    If there is no arc through both, or the point is on the wall, it does not move.
+    A point does not move if it is on the wall, or if no arc passes through the other two.
     """
     radius = np.hypot(*first.T)
     distance = np.hypot(*places.T)

@@ -41,8 +41,8 @@ OVERSHOOT = 1e-14
 NEWTON_STEPS = 12
 #: Length of the last step on the unit triangle; the error after it is the square of this.
 CLOSE = 1e-8
-#: A triangle's map to t = 0 counts as folded where its determinant is below this part of its
-#: largest.
+#: A triangle's map to t = 0 counts as folded where its determinant is below this part of the
+#: triangle's largest determinant.
 FOLD = 0.02
 
 
@@ -303,7 +303,7 @@ class Pieces:
 
 def _pieces(points: np.ndarray, triangles: np.ndarray, new_points: np.ndarray,
             new_triangles: np.ndarray) -> Pieces:
-    """Raise NotCovered if the two meshes do not cover the same area."""
+    """Common pieces of two meshes. Raises NotCovered if the meshes do not cover the same area."""
     corners, old, new = supermesh(points, triangles, new_points, new_triangles)
     edge = corners[:, 1:] - corners[:, :1]
     area = 0.5 * np.abs(edge[:, 0, 0] * edge[:, 1, 1] - edge[:, 0, 1] * edge[:, 1, 0])

@@ -2,7 +2,7 @@
 
 See :mod:`repro.model.surface`. A step that ends below Biot's limit is rejected. A step without a
 smooth equilibrium fails like any other step. If the surface can crease already, the failure is
-reported as a fold. So is a later failure: the surface has buckled since.
+reported as a fold. A later failure is reported as a fold too: the surface has buckled in between.
 """
 
 from __future__ import annotations

@@ -194,15 +194,16 @@ def _grow(stages: Stages, scheme: Scheme, state: RestartState,
     requested = scene.requested_times
     rows = row_times(scheme, scene)
     limits = Limits.of(scene)
+    bonded = stages.growth.wall == "bonded"
     while failure is None and stages.growth.end - pore.time > SAME_TIME:
         try:
-            with stopping(pore.time), folding(state.compression, state.time):
+            with stopping(pore.time, bonded), folding(state.compression, state.time):
                 step, after, control = scheme.advance(stages, pore, solved, state.step_control)
                 balance.refuse(limits, step.pore, step.ledger)
                 refuse_density(step.pore, density)
             for time in rows:
                 if state.time + SAME_TIME < time < step.pore.time - SAME_TIME:
-                    with stopping(pore.time), folding(state.compression, state.time):
+                    with stopping(pore.time, bonded), folding(state.compression, state.time):
                         inner = step.within(time)
                         refuse_density(inner.pore, density)
                     report = make_report(state, inner.pore, inner.solved, inner.before)
@@ -288,17 +289,19 @@ def _contiguous_arrays(data: Data) -> Data:
 
 
 @contextmanager
-def stopping(time: float) -> Iterator[None]:
+def stopping(time: float, bonded: bool = False) -> Iterator[None]:
     """Turn the failure of a step that starts at ``time`` (h) into a SimulationError.
 
-    Stage errors, floating-point errors and lack of memory count as failures.
+    bonded: whether the aggregate is bonded to the lower wall, for the advice in the message. Stage
+    errors, floating-point errors and lack of memory count as failures.
     """
     stopped = f"stopped in the step from t = {time:g} h"
     try:
         with np.errstate(all="raise", under="ignore"):
             yield
     except StageError as error:
-        raise SimulationError(f"{stopped}, in {error.stage}: {with_advice(error)}") from error
+        message = f"{stopped}, in {error.stage}: {with_advice(error, bonded)}"
+        raise SimulationError(message) from error
     except FloatingPointError as error:
         raise SimulationError(f"{stopped} by a floating-point error ({error}); try a shorter "
                               "growth.time_step or a larger numerics.refinement") from error

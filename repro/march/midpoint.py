@@ -5,11 +5,11 @@ with the *mean* biomass over the step, computed with the rates being solved for:
 a mass M that grows by e^z. These rates integrate (9)-(10) over the entire step. Uptake and growth
 in a step are then one integral, and both balances close to round-off.
 
-Within the step, at the part s of its length h, (9)-(10) are integrated over s h with the rates
-(1 - s) k_1 + s k_2 of the start and of half way. This interpolation is of second order too,
-and at its end it equals the step, k_2 over h (Hairer, Norsett and Wanner, Solving Ordinary
-Differential Equations I, section II.6). Shape, contact and mesh follow from those at the start as
-in a step; flow and substrates are solved for.
+A row at the fraction s of a step of length h integrates (9)-(10) over s h with the rates (1 - s)
+k_1 + s k_2, where k_1 are the rates at the start and k_2 those half way. This interpolation is of
+second order too. At s = 1 it equals the step, which integrates k_2 over h (Hairer, Norsett and
+Wanner, Solving Ordinary Differential Equations I, section II.6). Shape, contact and mesh follow
+from those at the start, as in a step. Flow and substrates are solved in this shape.
 """
 
 from __future__ import annotations

@@ -18,8 +18,8 @@ FASTER = 5.0
 SLOWER = 0.2
 #: Length of a step over the length that its estimate allows.
 SAFETY = 0.9
-#: Largest accepted estimate, in tolerances. A step may exceed its ideal length by the square root
-#: of it.
+#: Largest accepted estimate, in tolerances. A step may be longer than its ideal length by a factor
+#: of the square root of this.
 EXCESS = 2.0
 STRETCH = EXCESS**0.5
 

@@ -3,8 +3,8 @@
 The equilibrium (22), tested with the nodal functions, gives the forces of the walls on the
 aggregate: at a node on a wall, the force of the stress minus that of the fluid. They are the
 consistent nodal forces of a traction t, on a bonded wall in both directions, on a sliding wall
-across it. Along a sliding wall, one point keeps each contact surface in place. At x along it, a
-wall bears
+across it. Along a sliding wall, one point keeps each contact surface in place. At a point x of a
+contact surface, the wall bears
 
     ((max(pull, 0))^2 + shear^2)^(1/2)
 
@@ -200,7 +200,7 @@ class _Surface:
         return starts + length / 2
 
     def means(self, density: np.ndarray, width: float) -> np.ndarray:
-        """(w,) means of a traction (N,). Simpson's rule is exact for its parts of edges."""
+        """(w,) means of a traction (N,). Simpson's rule integrates each part of an edge exactly."""
         s = np.arange(2 * PARTS + 1) / (2 * PARTS)
         values, slopes = self._at(s)
         along = (density[self.nodes] @ values.T) * (self.x[self.nodes] @ slopes.T)

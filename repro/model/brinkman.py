@@ -12,10 +12,6 @@ module solves Brinkman's equation unchanged there. In every larger triangle it w
   the layer; the widened one would take d U. Therefore the velocity slides on the wall against a
   friction (b u_x, v_x) with b = d / (sqrt(k) (d - sqrt(k))), which restores sqrt(k) U. On a
   contact line, which belongs to the fluid too, u = 0.
-- **Divergence.** Taylor-Hood elements conserve mass in the mean over several elements. Near a
-  contact line the pressure of the drag drives large local sources, which carry concentrations out
-  of their bounds. The term (g nu_r div u, div v), g = ``DIVERGENCE``, is zero for the exact flow
-  and keeps them small: in widened triangles and, where these span the pore, in the fluid.
 
 Both limits are exact: where h falls, every triangle resolves its layer; where k falls, the velocity
 tends to one that does not depend on k.
@@ -29,14 +25,11 @@ from functools import cached_property
 import numpy as np
 
 from repro.fem import elements
-from repro.fem.forms import product
 from repro.fem.space import Space
 
 #: Longest edge over the thickness of the layer, by order. In one dimension a node overshoots where
 #: an element is more than 6.3 (quadratic) or 5.1 (cubic) times as long as the layer is thick.
 ACROSS = {2: 6.0, 3: 5.0}
-#: Weight g of the divergence, over the viscosity.
-DIVERGENCE = 10.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,12 +55,6 @@ class Permeable:
         """(T,) nu_r."""
         return np.where(self.widened, self.thickness**2 / self.permeability, 1.0)
 
-    @property
-    def spans(self) -> bool:
-        """Do widened triangles touch both walls?"""
-        y = self.velocity.mesh.points[self.velocity.mesh.triangles[self.widened], 1]
-        return bool(y.min(initial=np.inf) <= 0 and y.max(initial=0.0) >= self.velocity.mesh.width)
-
     def constrained(self, no_slip: np.ndarray) -> np.ndarray:
         """(2n + m,) constrained unknowns: those of u = 0 on all walls, ``no_slip``, without u_x at
         wall nodes that touch only widened triangles."""
@@ -79,22 +66,15 @@ class Permeable:
         return no_slip & ~slides
 
     def matrices(self) -> np.ndarray:
-        """(T, 2k, 2k) element matrices of drag, friction on the walls and divergence."""
+        """(T, 2k, 2k) element matrices of drag and of friction on the walls."""
         velocity = self.velocity
         k = velocity.cells.shape[1]
         drag = velocity.mesh.biomass / self.permeability
-        blocks = self._divergence()
+        blocks = np.zeros((len(drag), 2 * k, 2 * k))
         along = velocity.at.mass(drag[:, None] * velocity.at.dx)
         blocks[:, :k, :k] += along + self._friction()
         blocks[:, k:, k:] += along
         return blocks
-
-    def _divergence(self) -> np.ndarray:
-        """(T, 2k, 2k) of (g nu_r div u, div v)."""
-        where = self.widened | (self.spans & ~self.velocity.mesh.biomass)
-        weight = DIVERGENCE * self.viscosity * where
-        at = self.velocity.gradients_at
-        return product(at.div, weight[:, None] * at.dx, at.div)
 
     def _friction(self) -> np.ndarray:
         """(T, k, k) of (b u_x, v_x) over the walls under widened triangles."""

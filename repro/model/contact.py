@@ -34,23 +34,23 @@ from repro.model.pore import Pore, material
 from repro.model.traction import Fluid
 from repro.scene import Growth, Numerics, Scene
 
-#: Rounds in which closing films may change the contact surfaces within one step.
+#: Largest number of rounds in which closing films change the contact surfaces in one step.
 CONTACT_ROUNDS = 60
 #: Largest number of times that contact lines go back after a trial that fails.
 RETREATS = 6
 #: Rounds of shape and fluid forces.
 FORCE_ROUNDS = 12
-#: Rounds after which contact lines stay in place. A new search could move them within its tolerance
-#: again.
+#: Rounds after which contact lines stay in place, because each new search may move them by up to
+#: its tolerance.
 SETTLING_ROUNDS = 4
 #: Largest move of a node in the last round, over the aggregate's thickness.
 FORCE_REST = 1e-8
 PATIENT = SearchOptions()
-#: Defect at which a part of theta but the last counts as reached.
+#: Defect at which each part of theta except the last counts as reached.
 PARTLY = 1e-3
 #: Clearances of the first contact at which Newton's method takes over from the search.
 CLOSE_ENOUGH = 0.2
-#: Lengths of the first contact to both sides of the highest place, over the least film.
+#: Lengths of the first contact on both sides of the highest point, over the least film.
 FIRST_LENGTHS = np.array([1.0, 0.5, 0.25])
 
 
@@ -94,12 +94,13 @@ class Expansion:
 
     @property
     def position(self) -> np.ndarray:
-        """(N, 2) um, places of the nodes that the grown pore has."""
+        """(N, 2) um, new positions of the grown pore's nodes."""
         points = self.pore.mesh.points
         return points if self.division is None else self.division.restricted(points)
 
     def amounts(self, amounts: np.ndarray, grown: Pore) -> np.ndarray:
-        """Amounts (r, q) at the points of the grown pore's aggregate, at those of the new shape."""
+        """Carry amounts (r, q) from the points of the grown pore's aggregate to those of the new
+        shape."""
         if self.division is None:
             return amounts
         return self.division.amounts(amounts, grown.space.table)
@@ -273,8 +274,8 @@ def _touch(grown: Pore, shape: Expansion, rule: Clearance, trials: _Trials,
            search: SearchOptions) -> tuple[np.ndarray, list[Line], Expansion]:
     """The first contact of a shape: walls (M,), contact lines, and the equilibrium with them.
 
-    Contact covers at least the least film's thickness on both sides of the highest place, because
-    a force at a single point would indent an elastic body without limit. If the body is too pointed
+    Contact covers at least the least film's thickness on both sides of the highest point, because a
+    force at a single point would indent an elastic body without limit. If the body is too pointed
     to be flat over this length, contact covers half of it, or a quarter.
     """
     lengths = rule.film * FIRST_LENGTHS
@@ -294,7 +295,8 @@ def _touch(grown: Pore, shape: Expansion, rule: Clearance, trials: _Trials,
 
 
 def _place_lines(outline: Outline, lines: Sequence[Line], search: SearchOptions) -> None:
-    """Start each contact line at its advance in ``search``, but not before its smallest one."""
+    """Start each contact line at its advance in ``search``, or at its least advance if that is
+    larger."""
     for line in lines:
         length = search.advances.get(line.key, 0.0)
         line.advance = max(line.least, contact_lines.to_arcs(outline, line, length))
@@ -304,7 +306,7 @@ def _place_lines(outline: Outline, lines: Sequence[Line], search: SearchOptions)
 
 
 def _tip_width(outline: Outline, depth: float) -> float:
-    """The width (um) of the aggregate at a depth (um) below its highest place."""
+    """The width (um) of the aggregate at a depth (um) below its highest point."""
     x, y = outline.points.T
     top = int(np.argmax(y))
     sides = []
@@ -317,8 +319,8 @@ def _tip_width(outline: Outline, depth: float) -> float:
 
 
 def _first_contact(outline: Outline, length: float) -> tuple[np.ndarray, list[Line]]:
-    """Walls (M,) where the corner next to the highest place has joined the upper one, and the
-    contact lines at a length (um) to both sides of that place."""
+    """Walls (M,) after the corner next to the highest point has joined the upper wall, and the
+    contact lines at a length (um) on both sides of that point."""
     x = outline.points[:, 0]
     arc = int(np.argmax(outline.arcs(outline.points)[:, :, 1].max(axis=1)))
     ends = np.array([2 * arc, (2 * arc + 2) % len(x)])
@@ -343,7 +345,7 @@ def _clearance(rule: Clearance, outline: Outline, line: Line) -> tuple[float, fl
 
 
 class _Trials:
-    """Equilibria of one grown pore with several places of its contact lines.
+    """Equilibria of one grown pore with its contact lines at several positions.
 
     Each starts from the last one, extrapolated in the advance of the line that moves most.
     """
@@ -382,7 +384,8 @@ class _Trials:
         """Equilibrium with walls (M,) of the grown pore's outline and lines at zero clearance.
 
         Newton's method solves for shape and lines at once. If it fails, the result is None and the
-        lines stay unchanged. Theta goes to its target in parts, as in :func:`growth.equilibrium`.
+        lines stay unchanged. Theta changes to its target in parts, as in
+        :func:`growth.equilibrium`.
         """
         start = [line.advance for line in lines]
         grown = self._grown
@@ -540,8 +543,9 @@ def _divided_loads(division: Division, loads: np.ndarray) -> np.ndarray:
 def _strained_from(keys: Growth, grown: Pore, theta: np.ndarray) -> tuple[growth.Body, np.ndarray]:
     """Configuration from which strain counts, and the expansion since then.
 
-    It is that of t = 0 or the present one (section 5). Since the present one the expansion is
-    theta / J. This removes the error of J = theta, so the area follows the mass without drift.
+    The configuration is that of t = 0 or the present one (section 5). The expansion since the
+    present one is theta / J. This removes the error of J = theta, so the area follows the mass
+    without drift.
     """
     if keys.new_biomass == "stressed":
         return grown.body, theta
@@ -551,7 +555,7 @@ def _strained_from(keys: Growth, grown: Pore, theta: np.ndarray) -> tuple[growth
 
 
 def _placed(grown: Pore, start: Pore, rest: growth.Equilibrium) -> Pore:
-    """The pore with its aggregate at rest, the fluid's nodes where they were in the grown pore."""
+    """The pore with its aggregate in equilibrium; the fluid's nodes are those of the grown pore."""
     points = grown.mesh.points.copy()
     points[grown.mesh.body] = rest.position
     pressure = grown.pressure.copy()

@@ -22,11 +22,12 @@ import numpy as np
 from repro.errors import GrowthError
 from repro.fem.outline import BOTTOM, FREE, TOP, Outline, parabola
 
-#: A clearance of this size is zero. A line then errs by about CLOSE * film / tan(angle).
+#: A clearance up to this size counts as zero. A line then errs by about CLOSE * film / tan(angle).
 CLOSE = 2e-3
 #: Upper bound of the clearance, and its value if no free surface faces the wall.
 AMPLE = 10.0
-#: If two advances are closer than this (arcs), the clearance jumps between them.
+#: If an advance that is too short and one that is far enough are closer than this (arcs), the
+#: clearance is taken to jump between them.
 SAME_PLACE = 5e-3
 #: Smallest part of a divided arc (arcs).
 LEAST_PART = 0.02
@@ -36,7 +37,7 @@ FIRST_TRIAL = 0.7
 FIRST_RETREAT = 0.2
 #: Factor on secant steps until a trial goes far enough.
 BEYOND = 1.05
-#: Longest step (arcs) until then, if no surface beyond the line is too near.
+#: Longest step (arcs) before a trial goes far enough, if no surface beyond the line is too near.
 LEAST_REACH = 0.5
 #: Secant steps keep this fraction of the interval away from its ends.
 INSIDE = 0.03
@@ -163,8 +164,9 @@ class Line:
     present trial accurate enough; reach: arcs beyond it where the surface is too near; least: the
     smallest advance; short, far: largest advance that is too short and smallest one that is far
     enough; stalls: has the last trial halved neither the interval between these nor the clearance;
-    trials: the last two, as (advance, clearance); at_corner: is the line just beyond a corner of
-    the outline, because its place is closer to the corner than LEAST_PART?
+    trials: the last two, as (advance, clearance); at_corner: is the line put just beyond a corner
+    of the outline, because it would be closer to the corner than LEAST_PART? floor: least advance
+    after the line has left a corner.
     """
 
     wall: int

@@ -4,7 +4,8 @@ The unknowns are positions, pressures and the advance s of each contact line. Th
 equilibrium, R = 0, and the clearance beyond each line, c = 0 (2.3.3). A line at its least advance
 stays there while its clearance is not negative. K is the derivative of R by the shape. If a line
 advances, the shape moves by K^-1 (-dR/ds), one more solution with the factors of K. dR/ds is a
-difference quotient over the triangles beside the line; dc/ds is one over the moved outline.
+difference quotient over the triangles beside the line, and dc/ds is one of the clearance on the
+moved outline.
 
 The clearance is a minimum over the free surface, and jumps where a film closes. The method may
 therefore fail. The search with whole equilibria (:mod:`repro.model.contact_lines`) then takes over.
@@ -36,13 +37,13 @@ SMALL = 1e-5
 MODEST = 0.02
 #: Longest step (arcs) of a line.
 LONGEST = 2.0
-#: Lines do not move while all clearances are within this.
+#: A line does not move while its clearance is within this.
 AT_REST = CLOSE / 2
-#: Largest clearance of a line whose place is at a corner.
+#: Largest accepted clearance of a line at a corner.
 AT_CORNER = 0.05
-#: A line whose place is at a corner lies at this distance (arcs) beyond it.
+#: A line at a corner is placed this far (arcs) beyond the corner.
 BESIDE = 1.01 * LEAST_PART
-#: Advance (arcs) from a corner of a line that is not at rest there.
+#: Step (arcs) of a line away from a corner at which it is not at rest.
 DEPARTURE = 0.3
 #: A line leaves a corner if the shape's defect is smaller than this.
 NEAR = 0.05
@@ -52,12 +53,12 @@ HALVINGS = 5
 
 @dataclass(frozen=True, eq=False)
 class Placed:
-    """An aggregate with its contact lines at a place.
+    """An aggregate with its contact lines at given positions.
 
     grown: the pore before its expansion; pore: the same on the divided mesh, with its contact;
-    division: None if no arc is divided; reference: (N, 2) um, where strain counts from, at the
-    nodes of the grown pore; system: of the equilibrium; theta: (t, q) expansion; target: (n, 2) um,
-    with the prescribed coordinates; rule: for the free surface.
+    division: None if no arc is divided; reference: (N, 2) um, nodes of the grown pore in the
+    configuration from which strain counts; system: of the equilibrium; theta: (t, q) expansion;
+    target: (n, 2) um, with the prescribed coordinates; rule: for the free surface.
     """
 
     grown: Pore
@@ -157,6 +158,7 @@ class Coupled:
         self.placed = place()
         self.position, self.pressure = self.placed.divided(points, pressures)
         self.iterations = 0
+        self._moving = True
         self._factors: Factored | None = None
 
     def solve(self, tolerance: float = growth.NEWTON) -> None:
@@ -168,11 +170,12 @@ class Coupled:
             at = self.placed
             iterate = at.system.under(at.theta, at.target, self.position, self.pressure)
             stalled = STALLED * last < iterate.defect <= growth.ROUND_OFF
-            if iterate.complete and (iterate.defect <= tolerance or stalled) and self._accepts():
+            solved = iterate.complete and (iterate.defect <= tolerance or stalled)
+            if solved and self._accepts():
                 return
-            if self.iterations == MOST_ITERATIONS:
+            if self.iterations == MOST_ITERATIONS or solved and not self._moving:
                 raise GrowthError("Newton's method for the contact lines stands at a defect of "
-                                  f"{iterate.defect:.2g} after {MOST_ITERATIONS} iterations; "
+                                  f"{iterate.defect:.2g} after {self.iterations} iterations; "
                                   "try a shorter growth.time_step")
             if iterate.defect > REQUIRED_REDUCTION * last:
                 self._factors = None
@@ -181,7 +184,7 @@ class Coupled:
             self.iterations += 1
 
     def _accepts(self) -> bool:
-        """Are all lines where they should be?"""
+        """Are all lines in place?"""
         clearances, _ = self.placed.clearances(self.position, self._lines)
         return all(_fits(line, clearance, CLOSE)
                    for line, clearance in zip(self._lines, clearances))
@@ -193,6 +196,7 @@ class Coupled:
         factors = self._factors or self.placed.system.factored(iterate)
         change = factors.solve(-iterate.residual, carried)
         steps, change = self._with_lines(iterate, factors, change)
+        self._moving = bool(steps.any())
         start = [(line.advance, line.at_corner) for line in self._lines]
         for length in 0.5 ** np.arange(HALVINGS):
             for line, before, step in zip(self._lines, start, steps):
@@ -271,7 +275,7 @@ def _fits(line: Line, clearance: float, close: float) -> bool:
 
 
 def _leave_corner(line: Line, clearance: float, reach: float) -> float:
-    """The step (arcs) of a line that is not at rest at a corner."""
+    """The step (arcs) of a line away from a corner at which it is not at rest."""
     if clearance > 0:
         return max(-DEPARTURE, line.least - line.advance)
     line.floor = line.advance + BESIDE

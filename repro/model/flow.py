@@ -68,8 +68,8 @@ class Flow:
 @dataclass(frozen=True, eq=False)
 class UnitFlow:
     """Flow of mean velocity one: velocity (n, 2) and correction (T, 2) without unit, pressure (m,)
-    in 1/um at the nodes of its own order, and its loss over the meshed part, 1/um (times nu_water /
-    g and the mean velocity: the head loss (6))."""
+    in 1/um at the nodes of its own order, and its loss over the meshed part, 1/um. The head loss
+    (6) is this loss times nu_water / g times the mean velocity."""
 
     velocity: np.ndarray
     pressure: np.ndarray
@@ -79,7 +79,8 @@ class UnitFlow:
 
 @dataclass(frozen=True, eq=False)
 class Stabilised:
-    """Linear velocity and pressure with the paper's stabilisation; c: of tau = h^2 / (c nu_r)."""
+    """Linear velocity and pressure with the paper's stabilisation; constant: c in tau = h^2 / (c
+    nu_r)."""
 
     constant: float = 100.0
 

@@ -11,13 +11,13 @@ For C_A and C_D, (7) and (8), the corrector is one linear system each,
 
     M (C - C_n - carry dC_n) / (weight h) + L C - b + m X_A (q(C*) + q'(C*) (C - C*)) = 0
 
-with M the mass matrix (lumped for linear concentrations), L and b of :mod:`repro.model.transport`,
-and the uptake in the points of the reaction with X_A predicted; q is linearised in the substrate's
-own concentration; the acceptor sees the predicted donor, the donor the corrected acceptor. (9)
-advances ln X_A and (10) X_I at the corrected concentrations: both stay positive. Fluxes are
-integrated by the formula of the concentrations that they change, so that supplied - out - consumed
-= stored to round-off. Where the corrector gives a negative concentration, the step is backward
-Euler's with the sink C q(C*) / C*, which keeps C >= 0.
+with M the mass matrix (lumped for linear concentrations), and L and b of
+:mod:`repro.model.transport`. The uptake at the points of the reaction uses the predicted X_A, and q
+is linearised in the substrate's own concentration. The acceptor sees the predicted donor, and the
+donor sees the corrected acceptor. (9) advances ln X_A and (10) X_I at the corrected concentrations:
+both stay positive. Fluxes are integrated by the formula of the concentrations that they change, so
+that supplied - out - consumed = stored to round-off. Where the corrector gives a negative
+concentration, the step is backward Euler's with the sink C q(C*) / C*, which keeps C >= 0.
 
 Steps are controlled by |C - C*| within the aggregate (3.3.2), relative to the substrate's largest
 concentration.
@@ -49,10 +49,11 @@ from repro.model.transport import (
 )
 from repro.timing import timed
 
-#: Largest accepted |C - C*| in the aggregate over the supply. Measured against a tolerance of 3e-6,
-#: 12 min from settled pores (base; a seed of 40 um; wide at 40 h) and from closed ones filled with
-#: the supply (seeds of 5 and 40 um), the largest error in concentrations, biomass made or uptake is
-#: 2e-2 at 1e-1, 9e-4 at 1e-2, 3.1e-4 at 1e-3: 0.1 % is kept.
+#: Largest accepted |C - C*| in the aggregate over the supply. Errors were measured against a
+#: tolerance of 3e-6, after 12 min in settled pores (base; a seed of 40 um; wide at 40 h) and in
+#: closed ones filled with the supply (seeds of 5 and 40 um). The largest error in concentrations,
+#: biomass made or uptake is 2e-2 at a tolerance of 1e-1, 9e-4 at 1e-2, and 3.1e-4 at 1e-3. The
+#: tolerance therefore stays at 0.1 %.
 TOLERANCE = 1e-3
 #: A concentration may be below zero by this part of its supply, by the order of the elements. The
 #: lumped reaction of linear ones keeps them positive.
@@ -62,7 +63,8 @@ LONGER = 2.0
 SHORTER = 0.2
 #: Size of a step over the size that would just be accepted.
 SAFETY = 0.8
-#: Longest first step (h), which is of first order: 45 s keep its error under 2e-4 (720 s: 2e-2).
+#: Longest first step (h). This step is of first order: its error is under 2e-4 with 45 s, and 2e-2
+#: with 720 s.
 FIRST = 45 / 3600
 #: A shorter step (h) fails.
 SHORTEST = 1e-6 / 3600
@@ -195,8 +197,8 @@ def settle(problem: Problem, sink: Sink | None, guess: Concentrations | None) ->
     Notes
     -----
     The transient does not matter (3.3.2): the steps are backward Euler's and grow to LONG as fast
-    as SETTLING permits. With a law that is not monotone it decides which state is reached: changes
-    are FASTER times smaller, and a step grows as its rate of change falls.
+    as SETTLING permits. If a law is not monotone, the transient decides which state is reached.
+    Changes are then FASTER times smaller, and a step grows as its rate of change falls.
     """
     start = _nearer(problem, guess)
     if not (problem.inflow.any() or problem.system.constrained.any()):
@@ -225,7 +227,7 @@ def settle(problem: Problem, sink: Sink | None, guess: Concentrations | None) ->
 
 
 def steady(problem: Problem, sink: Sink | None, guess: Concentrations | None) -> Concentrations:
-    """Solve for steady concentrations; of several ones, those that are reached from the guess.
+    """Solve for steady concentrations; if several exist, for those that the guess leads to.
 
     With a law of uptake that is not monotone several states may be steady. :func:`settle` then
     leads to one of them, with the biomass at rest, and Newton's method starts from there.
@@ -237,9 +239,9 @@ def steady(problem: Problem, sink: Sink | None, guess: Concentrations | None) ->
 
 
 def _nearer(problem: Problem, guess: Concentrations | None) -> Concentrations:
-    """The guess; or C_supply everywhere if there is no guess, or if constrained nodes would jump by
-    more than SETTLING: no step is short enough for a larger jump, and quadratic and cubic
-    concentrations beside it fall below zero."""
+    """The guess, or C_supply everywhere if there is no guess or if constrained nodes would jump by
+    more than SETTLING. No step is short enough for a larger jump; quadratic and cubic
+    concentrations beside it would fall below zero."""
     supplied = supplied_everywhere(problem)
     if guess is None:
         return supplied
@@ -322,9 +324,9 @@ def _level(fields: np.ndarray, biomass: np.ndarray) -> Level:
 
 def _accepted(system: System, level: Level, step: float, tolerance: float, when: str,
               least: float) -> tuple[Level, float]:
-    """A step of the size ``step`` or smaller that is positive and agrees with its prediction, and
-    its difference from the prediction over the scale; each trial is shorter than the previous one
-    by a factor of 1/2 to ``least``."""
+    """Make a step of at most ``step`` (h) that is positive and agrees with its prediction; also
+    returns its difference from the prediction over the scale. Each trial is shorter than the
+    previous one by a factor between ``least`` and 1/2."""
     floor = _lowest(system.problem)
     shortest = min(SHORTEST, step)
     while step >= shortest:

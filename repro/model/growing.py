@@ -1,4 +1,4 @@
-"""Growth of the biomass in a pore (9)-(10), and the expansion theta by which it grows (28)-(29)."""
+"""Growth of the biomass in a pore (9)-(10), and the resulting expansion theta (28)-(29)."""
 
 from __future__ import annotations
 

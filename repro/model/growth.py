@@ -54,8 +54,8 @@ MOST_ITERATIONS = 25
 HALVINGS = 8
 #: Sub-steps of a continuation, by ``patient``; an impatient caller shortens its step instead.
 CONTINUATION = {True: (1, 8, 64), False: (1,)}
-#: gamma: the energy's curvature in J is -2/9 J^(-5/3) and less, so one makes it convex with a
-#: margin.
+#: gamma. The energy's curvature in J is never below -2/9 J^(-5/3), so gamma = 1 makes the energy
+#: convex with a margin.
 GAMMA = 1.0
 #: On curved triangles theta goes to its target in parts of at most this factor: a longer step of
 #: Newton's method may end in another equilibrium, with a wrinkled surface.
@@ -522,7 +522,13 @@ def reach(system: System, start: np.ndarray, theta: np.ndarray, first: Equilibri
                               modified_newton)
         except (GrowthError, LinearError) as error:
             failure = str(error)
-    raise GrowthError(f"{failure}; try a shorter growth.time_step or a larger numerics.refinement")
+    raise GrowthError(f"{failure}; {_ADVICE[bool(system.pull.any())]}")
+
+
+#: Settings to try if there is no equilibrium; whether the fluid's forces act.
+_ADVICE = {False: "try a shorter growth.time_step or a larger numerics.refinement",
+           True: "the aggregate may be too soft for this flow: try a larger growth.shear_modulus, "
+                 "or a shorter growth.time_step"}
 
 
 def _continued(system: System, start: np.ndarray, theta: np.ndarray, first: Equilibrium,

@@ -54,8 +54,8 @@ class Pore:
     known ones, None before the first; front: divisor of the element sizes at the aggregate, for a
     front of the substrates in it; last: (n, 2) um, the aggregate's nodes in the shape from which
     strain counts, None for the shape of t = 0; line_speeds: (2, 2) um/h, speeds of the contact
-    lines, None if unknown: a row for the lower and the upper wall, with the line before the free
-    surface on the loop first and the line after it second.
+    lines, None if unknown. A row has the lines of one wall, the lower wall first: the line where a
+    free surface begins along the loop, then the line where one ends.
     """
 
     time: float
@@ -118,8 +118,8 @@ class Pore:
         return replace(self, space=Space(self.mesh.moved(points), self.space.order))
 
     def composition(self, maximum_density: float) -> tuple[float, float, float]:
-        """Share of X_I in the biomass, and the least and the largest (X_A + X_I) / X_m, which the
-        constraint J = theta keeps near one."""
+        """Share of X_I in the biomass, and the least and the largest (X_A + X_I) / X_m. The
+        constraint J = theta keeps both near one."""
         density = (self.active + self.inert) / self.space.reaction.dx / maximum_density
         return float(self.inert.sum() / self.mass), float(density.min()), float(density.max())
 

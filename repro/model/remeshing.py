@@ -90,13 +90,13 @@ def new_mesh(rules: Remeshing, previous: Pore, expanded: Pore, speed: float,
     -------
     pore : Pore
     remeshed : bool
-        Is the mesh not the present one?
+        True if another mesh replaces the present one.
 
     Notes
     -----
     The paper asks for a new mesh where the extent is too short (3.1) or the moved mesh would not be
-    acceptable (3.5). Two more cases need one: contact has changed, or interface edges are twice too
-    long for the narrowest film.
+    acceptable (3.5). Two more cases need one: contact has changed, or an interface edge is more
+    than twice as long as in a new mesh.
     """
     mesh = moved_mesh(rules.meshing, previous, expanded)
     if mesh is not None:
@@ -212,8 +212,8 @@ def _with_elements_of(scene: Scene, pore: Pore) -> Pore:
 
 
 def _with_linear(scene: Scene) -> Scene | None:
-    """The scene with linear elements of at least the paper's refinement; None if it has linear
-    elements already, or may not have them.
+    """The scene with linear elements of at least the paper's refinement; None if the scene has
+    linear elements already, or if they are not allowed.
 
     Linear elements lump the uptake at the nodes: behind a front that is thinner than an element
     their concentrations fall far less below zero than those of higher orders.

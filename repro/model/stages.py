@@ -19,8 +19,9 @@ from repro.scene import Growth, Scene
 class Stages:
     """The stages of a step of growth.
 
-    scene: for what depends on the time, and for advice; growth: its section [growth]; law: rates
-    of uptake and growth; mechanics: shape of the grown aggregate; remeshing: mesh after a step.
+    scene: for values that depend on the time, and for advice; growth: its section [growth]; law:
+    rates of uptake and growth; mechanics: shape of the grown aggregate; remeshing: mesh after a
+    step.
     """
 
     scene: Scene

@@ -1,11 +1,12 @@
 """The elastic stretch along the aggregate's free surface, and the limits of a smooth equilibrium.
 
-It is the stretch of a material line along the surface, since the configuration from which strain
-counts, over J^(1/2). This division removes the growth, which causes no stress by itself. At a
-constant J, the energy (17) in the plane is that of an incompressible neo-Hookean solid. Its free
-surface creases where this stretch falls to 0.647 (Hong, Zhao and Suo, Appl. Phys. Lett. 95, 2009;
-Hohlfeld and Mahadevan, Phys. Rev. Lett. 106, 2011) and is unstable to waves of every length at
-0.544 (Biot, Appl. Sci. Res. A 12, 1963). ``docs/scope.md`` derives both for this energy.
+It is the stretch of a material line along the surface, divided by J^(1/2). The stretch is relative
+to the configuration from which strain counts. The division removes the growth, which causes no
+stress by itself. At a constant J, the energy (17) in the plane is that of an incompressible
+neo-Hookean solid. Its free surface creases where this stretch falls to 0.647 (Hong, Zhao and Suo,
+Appl. Phys. Lett. 95, 2009; Hohlfeld and Mahadevan, Phys. Rev. Lett. 106, 2011) and is unstable to
+waves of every length at 0.544 (Biot, Appl. Sci. Res. A 12, 1963). ``docs/scope.md`` derives both
+for this energy.
 """
 
 from __future__ import annotations
@@ -40,8 +41,8 @@ class Surface:
     """The free edges of an aggregate's boundary.
 
     stretch: (e,) elastic stretch along each of them, at its middle; middles: (e, 2) um; distance:
-    (e,) from the nearer contact line along the surface, in parts of the length from line to line;
-    cells: (e,) their triangles, among those of the aggregate.
+    (e,) along the surface from the nearer contact line, over the length from line to line; cells:
+    (e,) their triangles, among those of the aggregate.
     """
 
     stretch: np.ndarray

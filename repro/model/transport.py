@@ -1,13 +1,13 @@
 """Substrates (2.2, 3.3): advection, diffusion and uptake of acceptor and donor, (7)-(13).
 
-For one substrate and every nodal function N_i, with order 2 or 3 in the form that conserves,
+For one substrate and every nodal function N_i, order 2 and 3 satisfy the conserving form
 
     (D grad C, grad N_i) - (C w, grad N_i) + <u_x C, N_i>_outlet + (q(C) X_A, N_i)_biomass
         = <u_x C_supply, N_i>_inlet
 
 where w = u - grad psi has (w, grad N_i) = <u_x, N_i>_outlet - <u_x, N_i>_inlet for every N_i, so
-that C = C_supply is a solution where nothing is taken up; and with linear functions, the reaction
-lumped at the nodes,
+that C = C_supply is a solution where nothing is taken up. Linear functions satisfy, with the
+reaction lumped at the nodes,
 
     (D grad C, grad N_i) + (w . grad C, N_i) + <u_x (C - C_supply), N_i>_inlet + m_i q(C_i) X_i = 0
 
@@ -51,14 +51,14 @@ SATURATED = 0.9
 SWITCH = 0.5
 #: A concentration below zero by more than this part of its supply is not resolved.
 UNRESOLVED = 1e-3
-#: Nor is one above its supply by more than this part of it.
+#: A concentration above its supply by more than this part of the supply is not resolved either.
 OVERSHOOT = 0.02
 #: Largest accepted concentration over its supply, by the order of the elements.
 HIGHEST = {1: np.inf, 2: 1 + OVERSHOOT, 3: 1 + OVERSHOOT}
-#: Nor is the uptake if a quadrature of a degree higher by FINER differs by more than this. Both use
-#: the same concentrations, which are not solved for again with the finer quadrature: in base
-#: with fronts of half saturations from 1e-1 to 1e-6 of the supply, biomass made in 2 h was wrong by
-#: a hundredth of the largest difference or less.
+#: The uptake is not resolved if a quadrature of a degree higher by FINER differs by more than this.
+#: Both quadratures use the same concentrations, which are not solved for again with the finer one.
+#: In base with fronts of half saturations from 1e-1 to 1e-6 of the supply, biomass made in 2 h was
+#: wrong by at most a hundredth of the largest difference.
 APART = 0.05
 FINER = 3
 
@@ -265,8 +265,8 @@ def _add_at(matrices: np.ndarray, beside: tuple[np.ndarray, np.ndarray],
 
 
 def _apart(space: Space, count: int) -> ElementSystem:
-    """``count`` substrates, one after the other, of all nodes in their own order, without their
-    uptake."""
+    """The system of ``count`` substrates without uptake: all nodes of one substrate in their own
+    order, then those of the next."""
     size = count * space.count
     return ElementSystem(_shifted(space.cells, space, count), np.arange(size),
                          np.zeros(size, bool), space.mesh.topology.method)
@@ -278,14 +278,16 @@ def _shifted(cells: np.ndarray, space: Space, count: int) -> tuple[np.ndarray, .
 
 
 def coupled_system(space: Space, constrained: bool, count: int) -> ElementSystem:
-    """``count`` substrates; constrained: does the supply apply at the ends?"""
+    """The system of ``count`` substrates with uptake; constrained: is the supply prescribed at the
+    ends?"""
     return space.mesh.topology.system(("transport", space.order, constrained, count),
                                       lambda: _system(space, constrained, count))
 
 
 def _system(space: Space, ends_constrained: bool, count: int) -> ElementSystem:
-    """The substrates of a node side by side, nodes in elimination order: their own triangles, then
-    all together on the pieces of biomass, where the uptake couples them."""
+    """Unknowns are numbered by node in elimination order, the substrates of a node side by side.
+    The first kinds of elements are the triangles of each substrate; the last kind is the pieces of
+    biomass, where the uptake couples the substrates."""
     constrained = np.zeros(space.count, bool)
     constrained[both_ends(space)] = ends_constrained
     coupled = np.concatenate(_shifted(space.reaction.cells, space, count), axis=1)
@@ -429,8 +431,8 @@ class Balance:
         return self.problem.system.factored(self.tangent(iterate.state, iterate.saturations))
 
     def advanced(self, iterate: Iterate, factors: Factored, fresh: bool) -> Iterate:
-        """A step of Newton's method; sizes of the terms are those of the first guess, then those
-        after the first step of each derivative."""
+        """Make a step of Newton's method. The sizes of the terms are computed for the first guess,
+        and again after the first step with each new derivative."""
         state = iterate.state + factors.solve(-self._linearised(iterate))
         if self.sink is None:
             size = self.sizes(state) if fresh else iterate.size
@@ -503,7 +505,8 @@ def steady(problem: Problem, sink: Sink | None,
     -----
     If the method fails, often behind a sharp front, it starts again from the supply with the half
     saturations at the supply, and lowers them to their values by a factor of ten at a time. It does
-    not if the law is not monotone: several solutions may exist, and the one near the guess is due.
+    not start again if the law is not monotone: several solutions may exist, and the one near the
+    guess is required.
     """
     if problem.law is None:
         sink = None
@@ -599,8 +602,8 @@ def _outside(problem: Problem, name: str, field: np.ndarray, node: int,
 @dataclass(frozen=True)
 class Fluxes:
     """Rates of one substrate per um of depth (um2 mg/L/h): supplied, out and consumed; its
-    flow-weighted concentrations (mg/L) at the meshed inlet and the outlet, the mean over the end
-    without flow; and its unmet demand. All but the last are zero if it is not modelled."""
+    flow-weighted concentrations (mg/L) at the inlet and the outlet of the mesh, or means over these
+    ends without flow; and its unmet demand. All but the last are zero if it is not modelled."""
 
     supplied: float
     out: float
@@ -621,7 +624,7 @@ class Flows(NamedTuple):
 
 
 def integrated(acceptor: Sequence[float], donor: Sequence[float]) -> Flows:
-    """Flows of substrates at rest, from what of each is supplied, out, consumed and unmet."""
+    """Flows of steady substrates, from the rates of each: supplied, out, consumed and unmet."""
     supplied, out, consumed, unmet = zip(acceptor, donor)
     return Flows(supplied, out, consumed, (0.0, 0.0), unmet)
 
@@ -650,7 +653,7 @@ def fluxes(problem: Problem, sink: Sink | None, state: Concentrations) -> tuple[
 
 
 def _end_means(end: End, both: np.ndarray, load: np.ndarray) -> np.ndarray:
-    """(s,) mg/L, weighted with the flow through an end, plain where nothing flows."""
+    """(s,) mg/L, means over an end, weighted with the flow through it if there is any."""
     if not load.any():
         load = end.assembled(np.ones(end.count))
     return both @ load / load.sum()

@@ -10,6 +10,7 @@ from repro.errors import SimulationError
 from repro.fem.linear import Method
 from repro.march.loop import stopping
 from repro.model import pore
+from repro.polling import poll
 from repro.preflight import cost
 from repro.preflight.cost import Cost
 from repro.preflight.memory import first_nodes, require_memory, require_outline
@@ -99,8 +100,10 @@ def check(scene: Source, overrides: Sequence[str] = (), *,
         with stopping(0.0):
             Method(scene.numerics.solver, scene.numerics.ordering).checked()
             nodes, triangles = _mesh_size(scene, estimated)
+            poll()
         trial = cost.run_trial(scene, nodes)
         flow = trial.first.solved.flow
+        poll()
         largest, computed = evaluate_at_largest(scene, flow.mean_velocity if flow else None)
         caveats = [*find_warnings(largest, computed), *find_unresolved_flow(scene),
                    *warn_missed_tolerance(scene, trial.worst, " in the first steps"),

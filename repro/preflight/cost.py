@@ -24,6 +24,7 @@ from repro.march.simulation import rows_within
 from repro.march.simulation import steps as iterate_steps
 from repro.march.step_control import exceeds_tolerance
 from repro.march.stepping import SHORTEST
+from repro.polling import poll
 from repro.preflight import numbers
 from repro.preflight.memory import MB, expected_bytes
 from repro.scene import Scene, needed
@@ -93,6 +94,7 @@ def run_trial(scene: Scene, nodes: int) -> Trial:
     worst = 0.0
     for state, _ in islice(run, MOST_STEPS):
         clock.append(perf_counter())
+        poll()
         if exceeds_tolerance(state.step_control, scene.numerics.tolerance):
             worst = max(worst, state.step_control.estimate)
     seconds = [b - a for a, b in zip(clock, clock[1:])]

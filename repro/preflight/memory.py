@@ -41,7 +41,8 @@ PER_CORNER = 4.0
 PIECES = 16
 #: A run that needs more than this part of the free memory causes a warning.
 WARNED = 0.5
-#: Factors of a refinement that are tried for a run that does not fit; coarser meshes resolve little.
+#: Factors of a refinement that are tried for a run that does not fit. Coarser meshes resolve
+#: little.
 COARSER = (0.7, 0.5, 0.35, 0.25)
 HEXAGON = math.sqrt(3) / 2
 MB = 1e6
@@ -151,7 +152,7 @@ def require_memory(scene: Scene, warn: Callable[[str], None]) -> None:
 
 
 def _fitting(scene: Scene, free: float) -> str:
-    """Name the largest refinement of those tried that fits into the free memory, in bytes."""
+    """Name the largest tried refinement that fits into the free memory (bytes)."""
     for factor in COARSER:
         refinement = float(f"{scene.numerics.refinement * factor:.2g}")
         coarser = replace(scene, numerics=replace(scene.numerics, refinement=refinement))

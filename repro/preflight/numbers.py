@@ -25,8 +25,8 @@ STEPS = 2000
 #: The largest exponent of growth in a step.
 LARGEST = 50.0
 #: Exponent of the compression of a rim over that of its growth, after contact, if the core
-#: starves. Fitted to 25 pores (docs/design.md).
-SQUEEZE = 0.03
+#: starves. Fitted to 100 pores (docs/design.md).
+SQUEEZE = 0.1
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from dataclasses import replace
 from repro.errors import StageError
 from repro.model import pore
 from repro.model.remeshing import MOST_REFINED
+from repro.polling import poll
 from repro.preflight.memory import first_nodes
 from repro.preflight.simplifications import Caveat
 from repro.scene import Flow, Scene, at_time
@@ -58,6 +59,7 @@ def _compute_losses(scene: Scene, drive: Flow) -> list[tuple[float, float]]:
         if refinement > MOST_REFINED or first_nodes(finer) > MOST_COMPARED:
             break
         try:
+            poll()
             losses.append((refinement, _head_loss(finer, drive)))
         except StageError:
             break
@@ -69,4 +71,5 @@ def _compute_losses(scene: Scene, drive: Flow) -> list[tuple[float, float]]:
 def _head_loss(scene: Scene, drive: Flow) -> float:
     """Head loss (um) of the whole pore at t = 0, with the flow at that time."""
     space = pore.seeded(scene).space
+    poll()
     return pore.solve_flow(space, drive, scene.pore.length, scene.numerics).head_loss

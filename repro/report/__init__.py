@@ -53,7 +53,7 @@ def compare(folders: Sequence[str | Path], file: str | Path) -> Path:
     Raises
     ------
     OutputError
-        If there are fewer than two folders, one holds no run, or the page cannot be written there.
+        If there are fewer than two folders, a folder has no run, or the page cannot be written.
     TypeError
         If an argument has a wrong type: names the argument.
 

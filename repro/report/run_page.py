@@ -178,8 +178,8 @@ def _times_note(count: int, total: int) -> str:
 def _charts(run: Run, drawn: list[charts.Chart]) -> str:
     if not drawn:
         return ""
-    note = ("Point at a chart for its values, or focus it and press the arrow keys; a click or Enter "
-            "shows the fields of that time.")
+    note = ("Point at a chart for its values, or focus it and press the arrow keys; a click or "
+            "Enter shows the fields of that time.")
     if touching := quantities.contact(run):
         note += f" Dotted: contact with the opposite wall, t = {touching[0]:.6g} h."
     if len(run.times) > charts.MOST_POINTS:

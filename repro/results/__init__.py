@@ -97,7 +97,7 @@ def _number(field: str) -> float:
 
 
 def provenance(scene: Scene) -> dict:
-    """The scene as read, its hash, and the versions that its numbers come from."""
+    """The scene as read, its hash, and the versions of the packages that compute its numbers."""
     versions = {"dupin2001-repro": version("dupin2001-repro"),
                 "python": platform.python_version()}
     versions |= {name: version(name) for name in PACKAGES}

@@ -32,7 +32,7 @@ class State:
 
     @cached_property
     def stress(self) -> np.ndarray:
-        """(t, q, 4) MPa, components xx, yy, zz, xy in the same points."""
+        """(t, q, 4) MPa, components xx, yy, zz, xy at the same points."""
         return adhesion.stress(self.scene, self.pore)
 
     def mean(self, value: np.ndarray) -> np.ndarray:

@@ -26,7 +26,7 @@ NEEDS: dict[str, Callable[[Scene, Report], bool]] = {
 
 
 def _has_adhesion(growth: Growth) -> bool:
-    """Does a scene ask for what keeps the aggregate on its walls? Strain counts from t = 0."""
+    """Does a scene ask for the columns of adhesion? They need strain that counts from t = 0."""
     requested = (growth.wall == "bonded", growth.fluid_forces == "included",
              growth.bonding_strength is not None, growth.tensile_strength is not None)
     return any(requested) and growth.new_biomass == "stressed"

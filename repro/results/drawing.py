@@ -43,7 +43,7 @@ def optional(module: str) -> Any:
 
 
 def full_name(name: str, known: Sequence[str]) -> str:
-    """The known name that is equal to a name, or is without its unit; empty if there is none."""
+    """The known name that a name equals, with or without its unit; empty if there is none."""
     matching = [each for each in known
                 if name in (each, each.removesuffix(names.ending(each)))]
     return matching[0] if matching else ""

@@ -1,8 +1,8 @@
 """Files: written completely or not at all, read up to a limit of size, and verified by SHA-256.
 
 ``run.json`` is written last. It ends with the SHA-256 of all of its text before that. Unless the
-run is at work, it also has the SHA-256 of the run's other files. They reveal accidental changes;
-whoever changes a file on purpose can change them too.
+run is in progress, it also has the SHA-256 of the run's other files. These sums reveal accidental
+changes. They give no protection against intentional ones.
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 
 DRIVEN = ("mean_velocity_m_per_d", "head_loss_cm")
-#: Columns that jump with the flow and the supplies if substrates are at rest in each shape.
+#: Columns that jump with the flow and the supplies if substrates are quasi-steady.
 CARRIED = tuple(f"{pattern}_mg_per_L" for name in ("acceptor", "donor")
                 for pattern in (f"effluent_{name}", f"inlet_{name}", f"{name}_min",
                                 f"{name}_overshoot"))

@@ -12,9 +12,9 @@ After that r is nearly (lambda - 1) (A / W^2 - 0.4). A plug with straight ends h
 (lambda - 1) A / W^2; rounded ends let more water pass.
 
 ``python -m verification.network`` makes ``network.csv``. It has r of half-discs, and the mean r of
-plugs that have grown. Its bounds are the least and the largest r of other grown shapes, in pores of
-40 to 150 um at 0.5 to 6 m/d and W^2 / 2500 to 20 mg/L of both substrates, and of similar drawn
-shapes: 1 % thinner or 3 % thicker than a half-disc, or leaning by 5 %.
+plugs that have grown. Its bounds are the least and the largest r of two kinds of shapes. Grown
+shapes are from pores of 40 to 150 um, at 0.5 to 6 m/d and W^2 / 2500 to 20 mg/L of both substrates.
+Drawn shapes are 1 % thinner or 3 % thicker than a half-disc, or lean by 5 %.
 """
 
 from __future__ import annotations
@@ -125,36 +125,47 @@ def added_resistance(area: ArrayLike, width: ArrayLike, spanned: ArrayLike | Non
     >>> bool((added.least <= added.length).all() and (added.length <= added.most).all())
     True
     """
-    ratio = float(viscosity_ratio)
-    ratios, last, largest = _table(False)[1], known(False)[1], known(True)[1]
+    ratio, ratios = float(viscosity_ratio), _table(False)[1]
     check = Check("added_resistance", outside)
     Check("added_resistance", "raise").within("viscosity_ratio", ratio, ratios[0], ratios[-1])
     share, widths = _shares(area, width)
-    touches = share > last if spanned is None else np.asarray(spanned, bool)
+    touches = share > known(False)[1] if spanned is None else np.asarray(spanned, bool)
     share, widths, touches = np.broadcast_arrays(share, widths, touches)
-    is_known = check.positive("width", widths)
-    if spanned is None:
-        is_known &= check.within(SHARE, share, 0.0, largest, is_known)
-    else:
-        is_known &= check.within(f"{SHARE} before contact (spanned=False)", share, 0.0, last,
-                                 is_known & ~touches)
-        is_known &= check.within(f"{SHARE} of a plug (spanned=True)", share, CONTACT[0], largest,
-                                 is_known & touches)
+    is_known = _in_table(check, share, widths, None if spanned is None else touches)
     results = np.full((3, *share.shape), np.nan)
     for kind in (False, True):
         selected = is_known & (touches == kind)
         results[:, selected] = _law(kind, share[selected], ratio)
     if spanned is None:
-        either = is_known & (share >= CONTACT[0]) & (share <= CONTACT[1])
-        kinds = [_law(kind, np.minimum(share[either], (last, largest)[kind]), ratio)
-                 for kind in (False, True)]
-        results[1, either] = np.min(kinds, axis=0)[1]
-        results[2, either] = np.max(kinds, axis=0)[2]
+        _include_both_kinds(results, share, is_known, ratio)
     return AddedResistance(*results)
 
 
+def _in_table(check: Check, share: np.ndarray, width: np.ndarray,
+              touches: np.ndarray | None) -> np.ndarray:
+    """Return where the law covers the throats; touches: None if the area decides the contact."""
+    last, largest = known(False)[1], known(True)[1]
+    is_known = check.positive("width", width)
+    if touches is None:
+        return is_known & check.within(SHARE, share, 0.0, largest, is_known)
+    is_known &= check.within(f"{SHARE} before contact (spanned=False)", share, 0.0, last,
+                             is_known & ~touches)
+    return is_known & check.within(f"{SHARE} of a plug (spanned=True)", share, CONTACT[0], largest,
+                                   is_known & touches)
+
+
+def _include_both_kinds(results: np.ndarray, share: np.ndarray, is_known: np.ndarray,
+                        ratio: float) -> None:
+    """Widen the bounds of the (3, ...) results where the area does not determine the kind."""
+    either = is_known & (share >= CONTACT[0]) & (share <= CONTACT[1])
+    kinds = [_law(kind, np.minimum(share[either], known(kind)[1]), ratio)
+             for kind in (False, True)]
+    results[1, either] = np.min(kinds, axis=0)[1]
+    results[2, either] = np.max(kinds, axis=0)[2]
+
+
 class Uptake(NamedTuple):
-    """What aggregates in throats take up, per metre of depth.
+    """Uptake of aggregates in throats, per metre of depth.
 
     acceptor, donor: pg/m/h; growth: of the area, um^2/h, by (9) and (10); bound: relative error of
     acceptor and donor. All have the shape of the areas.
@@ -328,14 +339,14 @@ def known(spanned: bool) -> tuple[float, float]:
 
 
 class Check(NamedTuple):
-    """What a law does with throats outside its range. function: its name; outside: as there."""
+    """Check of a law's arguments. function: the law's name; outside: as in the law."""
 
     function: str
     outside: str
 
     def within(self, name: str, values: ArrayLike, low: float, high: float,
                where: ArrayLike = True) -> np.ndarray:
-        """Return where values are in a range, or not to be checked."""
+        """Return where values are in a range or need no check."""
         values = np.asarray(values, float)
         is_known = (values >= low) & (values <= high) | ~np.asarray(where)
         return self._checked(name, values, is_known, f"{low:.4g} to {high:.4g}")
@@ -382,7 +393,7 @@ def _law(spanned: bool, share: np.ndarray, ratio: float) -> np.ndarray:
 
 
 def _thin_body(share: np.ndarray, inside: np.ndarray) -> np.ndarray:
-    """R at A / W^2 over that at the first area of the table, for thinner half-discs.
+    """Ratio of r at A / W^2 to r at the first area of the table, for thinner half-discs.
 
     They are in a shear flow, where r is proportional to the area. Its profile is a parabola, which
     reduces r / A in proportion to the thickness.

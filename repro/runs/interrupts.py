@@ -22,9 +22,9 @@ DUPLICATE = 1.0
 def catch_signals() -> Iterator[Callable[[], int]]:
     """Record SIGINT and SIGTERM; yields a function that returns the first signal's number, or 0.
 
-    A thread waits for the signals, so that neither long calls into compiled code nor a library that
-    installs its own handlers (Mmg) can delay them. Ignored signals stay ignored. Works only in
-    the main thread.
+    A thread waits for the signals. Long calls into compiled code, or a library that installs its
+    own handlers (Mmg), therefore cannot delay them. Ignored signals stay ignored. Works only in the
+    main thread.
     """
     received: list[int] = []
     received_at = [0.0]

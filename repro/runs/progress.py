@@ -17,6 +17,7 @@ from time import monotonic
 from typing import TextIO
 
 from repro.errors import OutputError
+from repro.polling import polling
 
 Tell = Callable[[dict], None]
 #: Seconds between updates of the bar, and between lines: at first, and at most.
@@ -120,17 +121,22 @@ def in_lines() -> Iterator[Tell]:
 
 @contextmanager
 def while_checking(scene: str) -> Iterator[None]:
-    """Print a line after each LONGEST (s) of a check."""
+    """Print a line after each second of a check, from a thread and at each poll.
+
+    A thread waits while compiled code, such as the mesher, has the interpreter. The check polls
+    between its stages, so that one of them is the longest silence.
+    """
     begun = printed_at = monotonic()
 
     def tick() -> None:
         nonlocal printed_at
-        if monotonic() - printed_at > LONGEST - TICK:
+        if monotonic() - printed_at > TICK:
             printed_at = monotonic()
-            say(f"{printable(scene)}: first state and steps are computed, {printed_at - begun:.0f} s",
+            say(f"{printable(scene)}: first state and steps are computed, "
+                f"{printed_at - begun:.0f} s",
                 to_stderr=True)
 
-    with _call_regularly(tick):
+    with _call_regularly(tick), polling(tick):
         yield
 
 

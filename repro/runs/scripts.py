@@ -99,7 +99,7 @@ def resume(folder: str | Path, overrides: Sequence[str] = (), *,
     Returns
     -------
     Results
-        Rows, fields, status and folder of the run. Those of a finished run are returned at once.
+        Rows, fields, status and folder of the run. A finished run is not computed again.
 
     Raises
     ------

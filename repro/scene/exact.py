@@ -1,7 +1,7 @@
 """Symbols of common units as exact fractions of SI units, and their products.
 
-:mod:`repro.scene.units` converts all other units, names such as "micrometers" among them, with
-pint, whose import takes half a second. A test compares each factor with that of pint.
+:mod:`repro.scene.units` converts all other units with pint, also names such as "micrometers".
+Importing pint takes half a second. A test compares each factor with that of pint.
 """
 import re
 from fractions import Fraction

@@ -1,7 +1,7 @@
 """Runs on a Dask cluster, in a folder that all workers share.
 
-Each run has its own process beside its worker. If a worker dies, another one resumes its run; the
-lock of the folder admits one process at a time.
+Each run is a process of its own, which a worker starts. If a worker dies, another one resumes its
+run; the lock of the folder admits one process at a time.
 """
 
 from __future__ import annotations

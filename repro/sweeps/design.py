@@ -95,7 +95,7 @@ class Point:
 
 
 def parse(text: str) -> Factor:
-    """Parse an entry of ``--vary``. Raises SceneError if it is neither a range nor a list."""
+    """Parse an entry of ``--vary``. Raises SceneError if the entry is not a range or a list."""
     key, equals, rest = (part.strip() for part in text.partition("="))
     if not (key and equals and rest):
         raise _refused(text, EXPECTED_FORM)

@@ -192,28 +192,42 @@ def sweep(scene: Source, vary: Sequence[str], folder: str | Path, overrides: Seq
     >>> [run.status for run in swept.runs]
     ['completed', 'completed']
     """
-    statuses: dict[int, str] = {}
     factors = [design.parse(text) for text in vary]
     combinations = design.grid(factors) if samples is None else design.latin(factors, samples, seed)
-    with _ready(scheduler, min(workers or pool.cores(), len(combinations))) as run_points:
+    with ready(scheduler, min(workers or pool.cores(), len(combinations))) as run_points:
         points = design.points(scene, list(overrides), factors, combinations, unset)
         for point in points if scheduler is None else ():
             require_packages(point.scene)
         plan = Sweep(Path(folder), label(scene), factors, points)
-        with lock_folder(plan), progress_bar(progress, "runs") as show:
-            def report(event: dict[str, Any]) -> None:
-                show(event["done"], event["total"])
-                if tell:
-                    tell(event)
-
-            try:
-                _run_missing(plan, run_points, statuses, report)
-            finally:
-                swept_runs = _write_results(plan, statuses, clogged)
-    return Swept(plan.source, plan.folder, factors, swept_runs)
+        return run_plan(plan, run_points, clogged, progress, tell)
 
 
-def _ready(scheduler: str | None, workers: int) -> AbstractContextManager[pool.RunPoints]:
+def run_plan(plan: Sweep, run_points: pool.RunPoints, clogged: float = CLOGGED,
+             progress: bool = False, tell: Tell | None = None) -> Swept:
+    """Make the missing runs of a plan, then write the results of all of them, also after an error.
+
+    Raises OutputError if the folder cannot be used.
+    """
+    statuses: dict[int, str] = {}
+    with lock_folder(plan), progress_bar(progress, "runs") as show:
+        try:
+            _run_missing(plan, run_points, statuses, _reporter(show, tell))
+        finally:
+            swept_runs = _write_results(plan, statuses, clogged)
+    return Swept(plan.source, plan.folder, plan.factors, swept_runs)
+
+
+def _reporter(show: Callable[[float, float], None], tell: Tell | None) -> Tell:
+    """Make the receiver of events: the bar, then the caller's own."""
+    def report(event: dict[str, Any]) -> None:
+        show(event["done"], event["total"])
+        if tell:
+            tell(event)
+
+    return report
+
+
+def ready(scheduler: str | None, workers: int) -> AbstractContextManager[pool.RunPoints]:
     """Make the context that makes runs: processes of this machine, or a cluster."""
     return cluster.ready(scheduler) if scheduler else pool.ready(workers)
 

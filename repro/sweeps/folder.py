@@ -47,10 +47,10 @@ class Sweep:
 
 @contextmanager
 def lock_folder(sweep: Sweep):
-    """Lock the folder of a sweep, which is made if it does not exist.
+    """Lock the folder of a sweep. Make the folder if it does not exist.
 
-    Raises OutputError if it holds anything else or another sweep, if another process uses it, or if
-    it cannot be written.
+    Raises OutputError if the folder has other files or another sweep, if another process uses it,
+    or if it cannot be written.
     """
     with folder_errors(sweep.folder, SweepError):
         _check(sweep.folder, _as_json(sweep))

@@ -111,7 +111,7 @@ def _conductivity(sweep: Sweep, runs: list[SweepRun]) -> str:
 
 
 def _pictures(title: str, figures: list[str], needs: str, note: str = "") -> str:
-    """A section of charts; needs: what runs lack if there is no chart."""
+    """A section of charts; needs: the parts that no run has together if there is no chart."""
     if not figures:
         return html.section(title, f'<p class="note">No run has both {needs}.</p>')
     pictures = "".join(f"<figure>{figure}</figure>" for figure in figures)
@@ -155,7 +155,7 @@ def _clogging(sweep: Sweep, runs: list[SweepRun], clogged: float) -> str:
 def _last(sweep: Sweep, runs: list[SweepRun]) -> str:
     """The last conductivity of the runs, or the last biomass without flow, against each varied key.
 
-    It shows what happened, also where nothing clogs.
+    Unlike the time of clogging, this value exists for a pore that does not clog.
     """
     with_rows = [run for run in runs if len(run.times)]
     flowing = [run for run in with_rows if np.isfinite(run.relative).any()]
@@ -176,8 +176,8 @@ def _last_biomass(run: SweepRun) -> float:
 
 def _against(sweep: Sweep, plotted: list[SweepRun], k: int, value: Callable[[SweepRun], float],
              axis: str, title: str) -> str:
-    """A value of each run against varied key k, coloured by the next one. A time that is not
-    reached is a triangle."""
+    """A value of each run against varied key k, coloured by the next one. A triangle marks a run
+    that ends before it clogs."""
     factor, colour_index = sweep.factors[k], (k + 1) % len(sweep.factors)
     x = _across(factor, [_number(factor, run.point.values[k]) for run in plotted])
     y = charts.upwards(*_ends([value(run) for run in plotted]))

@@ -1,6 +1,7 @@
 """Parallel runs on this machine, each in its own process.
 
-A killed process fails only its own run. A server that has imported the package forks them.
+If a process is killed, only its run fails. A server that has imported the package forks the
+processes.
 """
 
 from __future__ import annotations
@@ -47,7 +48,7 @@ def ready(workers: int) -> Iterator[RunPoints]:
 
 
 def _start_server() -> None:
-    """Start the server unless it is running. Ctrl-C reaches neither it nor its processes."""
+    """Start the server unless it is running. Ctrl-C does not reach the server or its processes."""
     if CONTEXT.get_start_method() != "forkserver":
         return
     from multiprocessing import forkserver, resource_tracker
@@ -64,7 +65,8 @@ def _start_server() -> None:
 
 @contextmanager
 def _isolated() -> Iterator[None]:
-    """Start processes within with ENVIRONMENT, and without running the user's script again."""
+    """Give ENVIRONMENT to processes that start in this block; they do not run the user's script
+    again."""
     with _starting:
         main = sys.modules["__main__"]
         previous = {name: os.environ.get(name) for name in ENVIRONMENT}

@@ -1,4 +1,4 @@
-"""One run of a sweep in its folder. A begun run is resumed; a damaged one is repeated.
+"""One run of a sweep in its folder. An unfinished run is resumed; a damaged one is repeated.
 
 A sweep treats the folder of each run as ``repro run`` does.
 """

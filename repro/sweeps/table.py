@@ -74,8 +74,8 @@ NUMBERS = (
              "conductivity_m_per_d in that row over its first value",
              lambda run: run.at_contact(run.relative), "conductivity then"),
     Quantity("half_conductivity_time_h", "time of half conductivity",
-             "when conductivity_m_per_d over its first value has first fallen to 0.5; its logarithm "
-             "is linear between rows",
+             "when conductivity_m_per_d over its first value has first fallen to 0.5; its "
+             "logarithm is linear between rows",
              lambda run: clogging(run.times, run.relative, run.biomass, 0.5)[0],
              "half conductivity"),
     Quantity("fold_time_h", "time of the fold",

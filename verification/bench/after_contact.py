@@ -23,11 +23,11 @@ QUICK_TIMES, QUICK_DRAWN, QUICK = (17.5, 18.0), 18.0, ('pore.width="25 um"',)
 REFERENCE, QUICK_REFERENCE = (0.5, 2**-0.5), (2**0.5, 2.0)
 #: Refinement and time step (min) of the paper's scheme.
 PAPER = ((0.7, 24), (1.0, 24), (1.0, 12), (1.4, 12), (1.4, 6))
-#: Refinements of the presets fast and accurate beside their own.
+#: Refinements with which the presets fast and accurate run, in addition to their own.
 REFINEMENTS = {"fast": (0.15, 0.3), "accurate": (0.35, 0.6)}
 #: The numbers, as :func:`verification.problems.runs.after_contact` lists them.
 NUMBERS = ("conductivity", "upstream tip", "downstream tip", "length of contact")
-#: Largest error after contact that is asked of each preset.
+#: Largest accepted error of each preset after contact.
 AIMS = {"fast": 0.01, "accurate": 0.002, "exact": 0.0005}
 
 

@@ -17,7 +17,7 @@ from verification.bench.record import clock
 
 PACKAGES = "numpy, scipy.sparse.linalg, skfem, mmgpy, shapely, meshio"
 PRESETS = ("paper", "fast", "accurate", "exact")
-#: Rows of the short list, which the other points of base have too.
+#: The short list of rows; the other points of base have the same.
 FEW = 'output.times=["19.2 h", "19.4 h"]'
 PAIRS = 5
 
@@ -36,8 +36,9 @@ def _measured(preset: str, pairs: int) -> dict:
     with TemporaryDirectory() as folder:
         command = ["-m", "repro", "run", "base", "--set", set_preset, "--quiet", "--force", "--out",
                    str(Path(folder, "run"))]
-        typed, imports = _pairs(lambda: _fresh(command), lambda: _fresh(["-c", f"import {PACKAGES}"]), pairs)
-    every, few = _pairs(lambda: _solved(set_preset), lambda: _solved(set_preset, FEW), pairs)
+        typed, imports = _pairs(lambda: _time_process(command),
+                                lambda: _time_process(["-c", f"import {PACKAGES}"]), pairs)
+    every, few = _pairs(lambda: _time_solver(set_preset), lambda: _time_solver(set_preset, FEW), pairs)
     seconds, cpu = np.median(typed, axis=0)
     return {"method": preset, "seconds": seconds, "cpu": cpu, "imports": median(imports[:, 1]),
             "over_imports": median(typed[:, 1] / imports[:, 1]), "over_few_rows": median(every[:, 1] / few[:, 1])}
@@ -50,7 +51,7 @@ def _pairs(first: Callable[[], np.ndarray], second: Callable[[], np.ndarray],
     return samples[:, 0], samples[:, 1]
 
 
-def _fresh(arguments: list[str]) -> np.ndarray:
+def _time_process(arguments: list[str]) -> np.ndarray:
     """Wall and processor time (s) of a new Python process."""
     before, start = os.times(), perf_counter()
     subprocess.run([sys.executable, *arguments], stdout=subprocess.DEVNULL, check=True)
@@ -59,7 +60,7 @@ def _fresh(arguments: list[str]) -> np.ndarray:
     return np.array([seconds, cpu])
 
 
-def _solved(*changes: str) -> np.ndarray:
+def _time_solver(*changes: str) -> np.ndarray:
     """Wall and processor time (s) of base in this process; nothing is written."""
     start = clock()
     for _ in simulate(load_scene("base", changes)):

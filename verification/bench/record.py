@@ -79,7 +79,8 @@ Jobs = Mapping[tuple[str, str], Callable[[], dict]]
 
 
 def measured(jobs: Jobs, repeats: int) -> list[dict]:
-    """Lines of a part from jobs {(method, label): job}, in the order in which methods first come.
+    """Measure the jobs {(method, label): job}, and return the lines of a part, with the methods in the order of the
+    jobs.
 
     A job returns {"error": ..., ...}; its "apart_seconds" and "apart_cpu" are subtracted from its times. A job that
     fails is recorded with the reason and does not run again.
@@ -120,7 +121,7 @@ def clock() -> np.ndarray:
 
 
 def timed(job: Callable[[], dict]) -> tuple[float, np.ndarray, dict]:
-    """Wall time of a run; wall and processor time less the parts set apart; and the output of the job."""
+    """Wall time of a run; its wall and processor time without the seconds set apart; and the output of the job."""
     gc.collect()
     start = clock()
     output = job()
@@ -141,7 +142,7 @@ class Reading:
 
 
 def envelope(points: Iterable[Mapping]) -> list[Mapping]:
-    """The points that no other beats in both time and error, by falling error."""
+    """The points for which no other point is both faster and more accurate, by falling error."""
     lowest, best = [], np.inf
     for point in sorted(points, key=lambda p: (p["seconds"], p["error"])):
         if 0 < point["error"] < best:

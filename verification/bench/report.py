@@ -33,7 +33,7 @@ NOT_MEASURED = "not measured"
 
 
 def judged(record: dict) -> list[dict]:
-    """All verdicts of a record; what it has not measured neither holds nor fails."""
+    """All verdicts of a record. A claim without a measurement neither holds nor fails."""
     parts = defaultdict(dict, record["parts"])
     return [*_base(parts["base"]), *_other_codes(parts), *_steps(parts["size"]), *_scenes(parts["scenes"]),
             *_memory(parts["memory"]), *_commands(parts["command"]),
@@ -71,7 +71,7 @@ def _accurate(part: dict, name: str, error: float) -> tuple[str, bool]:
 
 
 def _faster(part: dict, name: str, error: float | None, least: float) -> tuple[str, bool]:
-    """error: at which the times are compared; None: at the preset's own."""
+    """error: the error at which the times are compared; None: that of the preset."""
     point = points(part, name)[0]
     required = point["error"] if error is None else error
     best = reading(points(part, runs.PRESET_PAPER), required)
@@ -124,7 +124,7 @@ def _floor(part: dict, method: str, bound: float, low: float, high: float) -> tu
 
 def _scenes(part: dict) -> Iterator[dict]:
     required = f"no other stage runs; at most {100 * EXCESS:g} % of the whole model's first solution above them"
-    for name in list(dict.fromkeys(row["scene"] for row in part["rows"]))[1:]:
+    for name in list(dict.fromkeys(row["scene"] for row in part.get("rows", ())))[1:]:
         yield verdict(f"{name}: a scene costs what its own stages cost", required, _stage_cost, part, name)
 
 
@@ -138,8 +138,8 @@ def _stage_cost(part: dict, name: str) -> tuple[str, bool]:
 
 
 def excess(row: dict, complete: dict) -> float:
-    """Processor time of a scene less that of the whole without the stages that the scene does not have, over the
-    whole's; what these have of it is what they had of the wall time of one run."""
+    """Relative excess of a scene's processor time over that of the complete model without the stages that the scene
+    lacks. The share of these stages in the processor time is their share in the wall time of one run."""
     spared = sum(seconds for stage, seconds in complete["stages"].items() if stage not in row["stages"])
     return row["cpu"] / complete["cpu"] - 1 + spared / complete["took"]
 
@@ -164,7 +164,8 @@ def _after_contact(part: dict) -> Iterator[dict]:
 
 
 def _converged(part: dict, preset: str, aim: float) -> tuple[str, bool]:
-    """The largest error of each number over the times; the number holds if error and reference's change do together."""
+    """The largest error of each number over the times. A number holds if its error plus the change of the reference is
+    within the aim."""
     errors = np.array(points(part, f"preset {preset}")[0]["errors"])
     changes = np.array(part["reference_changes"])
     listed = ", ".join(f"{name} {100 * error:.2g} %" for name, error in
@@ -191,7 +192,7 @@ WORDS = {True: "holds", False: "does not hold", None: NOT_MEASURED}
 
 
 def machine(about: dict) -> Block:
-    """What the times are of."""
+    """The machine and the packages that the times belong to."""
     return Block("text", f"Measured by `make bench` on {about['cores']} cores of {about['processor']}, one thread, "
                          f"Python {about['python']}; importing the packages is not counted. Times of another machine "
                          "differ, ratios less.")
@@ -218,7 +219,7 @@ def _rows(part: dict) -> Iterator[tuple[str, ...]]:
 
 
 def _numbers(point: dict) -> str:
-    """All that was measured at a point, its stages too."""
+    """All measurements at a point, including its stages."""
     numbers = {**point, **point.get("stages", {})}
     return ", ".join(f"{name} {value:.3g}" for name, value in numbers.items() if isinstance(value, float))
 

@@ -22,14 +22,14 @@ from verification.problems import runs as problems
 
 BASE_REPEATS = 3
 TIMES = (19.2, 19.4)
-#: Rings and steps of the reference, extrapolated; those of a check, finer in space and with other steps.
+#: Rings and steps of the extrapolated reference, and of a check that is finer in space and has other steps.
 REFERENCE, CHECK = ((8, 12), (8, 16)), ((10, 15), (10, 16))
 FAST, ACCURATE = "preset fast", "preset accurate"
 EXACT = "preset exact"
 PRESETS = (FAST, ACCURATE, EXACT)
 PRESET_PAPER = "preset paper: linear elements, updates"
-#: Refinement and time step (min) of the paper's scheme; those of them at which it is changed in one thing; refinement
-#: and tolerance of the midpoint rule's.
+#: Refinement and time step (min) of the paper's scheme; the same for the variants with one change; refinement and
+#: tolerance of the midpoint rule.
 PAPER = ((0.25, 60), (0.35, 48), (0.5, 48), (0.7, 96), (0.7, 48), (0.7, 24), (1.0, 120), (1.0, 96), (1.0, 48),
          (1.0, 12), (1.4, 96), (1.4, 48), (1.4, 24), (1.4, 12), (1.4, 6), (2.0, 6), (2.8, 12), (2.8, 6))
 CHANGED = ((0.7, 24), (1.0, 48), (1.0, 12))
@@ -124,7 +124,7 @@ def wide() -> list[dict]:
 SCENES_REPEATS = 31
 FLOW, SUBSTRATES = {"flow": {"head": "1e-3 cm"}}, {"substrates": {}}
 GROWTH, CLEAN, DONOR = {"growth": {"end": "2.4 h"}}, {"aggregate": None}, {"substrates": {"donor": {}}}
-#: Sections of each scene, None where it has none; the stages that it needs, of those that are timed.
+#: Sections of each scene, None for an absent one; the timed stages that the scene needs.
 SCENES = {"whole": ({**FLOW, **SUBSTRATES, **GROWTH}, {"flow", "transport"}),
           "frozen shape": ({**FLOW, **SUBSTRATES}, {"flow", "transport"}),
           "flow only": (FLOW, {"flow"}), "transport only": (SUBSTRATES, {"transport"}),
@@ -137,13 +137,14 @@ SCENES = {"whole": ({**FLOW, **SUBSTRATES, **GROWTH}, {"flow", "transport"}),
 
 
 def scenes_part(quick: bool) -> dict:
-    """Time of a first solution, which must contain the stages of the scene alone.
+    """Time of a first solution. It must contain only the stages of the scene.
 
     Base with a seed of 20 um, unchanged, without growth (frozen shape), and without other parts. The time includes the
     mesh.
     """
     repeats = 3 if quick else SCENES_REPEATS
-    jobs = {(f"preset {preset}", name): partial(first, preset, name) for preset in problems.PRESETS for name in SCENES}
+    jobs = {(f"preset {preset}", name): partial(measure_first_solution, preset, name)
+            for preset in problems.PRESETS for name in SCENES}
     rows = [{"scene": point["label"], "method": line["method"], **point}
             for line in measured(jobs, repeats) for point in line["points"]]
     return {"title": "What a scene does not need: seconds of a first solution, mesh included", "rows": rows,
@@ -156,7 +157,7 @@ def scene_of(preset: str, sections: dict) -> dict:
     return {name: table for name, table in tables.items() if table is not None}
 
 
-def first(preset: str, name: str) -> dict:
+def measure_first_solution(preset: str, name: str) -> dict:
     """Measure the first report of a run of one of SCENES: mesh and solution."""
     sections, needed = SCENES[name]
     tables = scene_of(preset, sections)

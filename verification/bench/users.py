@@ -39,17 +39,17 @@ from verification.bench.record import clock, measured
 from verification.problems import channels, meshes
 from verification.problems.pairs import upright
 
-#: um2/h of acceptor and donor, in fluid and biomass alike; mg/L, of biomass and of the supply; as
-#: :mod:`reference.monod` takes them.
+#: Diffusivities (um2/h) of acceptor and donor, the same in fluid and biomass; density of the biomass and supply (mg/L);
+#: kinetics in the form of :mod:`reference.monod`.
 DIFFUSIVITY, DENSITY = (8e6, 4e6), 3e4
 SUPPLY, RATES = Pore().supply, Pore().rates
 #: Newton's method of FiPy stops at this change over the supply; its direct solver refines to this residual (its own
 #: default, 1e-5, leaves an error of 1e-3 on fine grids).
 REST, EXACT = 1e-8, 1e-14
 MOST = 40
-#: py-pde runs for so many diffusion times L^2 / D of the domain, held at both ends or with an outlet, after which less
-#: than exp(-pi^2 TIMES) or exp(-pi^2 TIMES_OPEN / 4) is left of the start, in steps of this part of h^2 / D and
-#: dimension, of which a half is stable; watched in so many parts.
+#: Duration of a py-pde run in diffusion times L^2 / D of the domain, with the supply at both ends or with an outlet.
+#: Less than exp(-pi^2 TIMES) or exp(-pi^2 TIMES_OPEN / 4) of the start remains. Then the step over h^2 / D and
+#: dimension, which is stable up to a half, and the number of parts in which the run is observed.
 TIMES, TIMES_OPEN = 1.5, 6.0
 STABLE, PARTS = 0.4, 100
 
@@ -72,7 +72,7 @@ class Problem:
         return [round(length / lengths[-1] * across) for length in lengths]
 
     def judged(self, fields, load) -> np.ndarray:
-        """(2,) C in the last cell, mg/L; at rest what is taken up, um2 mg/L/h, with load = X times the cells' areas."""
+        """(2,) C in the last cell, mg/L; without flow the uptake, um2 mg/L/h, with load = X times the cells' areas."""
         if self.speed:
             return fields[:, -1]
         return np.array([np.sum(load * q) for q in uptake(*fields, RATES)])
@@ -112,8 +112,8 @@ def _fipy_mesh(problem: Problem, across: int):
 
 
 def _fipy_ends(problem: Problem, mesh, field, k: int):
-    """The supply at both ends; or advection, its inflow u (C_supply - C) a source in the first cell, and no gradient at
-    the outlet, without which FiPy's outlet passes nothing."""
+    """The supply at both ends; or advection. Its inflow u (C_supply - C) is a source in the first cell. The gradient at
+    the outlet is constrained to zero, because FiPy's outlet passes nothing otherwise."""
     if not problem.speed:
         field.constrain(SUPPLY[k], mesh.facesLeft | mesh.facesRight)
         return 0.0
@@ -152,14 +152,14 @@ def py_pde(problem: Problem, across: int) -> tuple[np.ndarray, dict]:
 
 
 def _compiled(marks: list[np.ndarray]) -> dict[str, float]:
-    """To the second mark of a callback (the first is at t = 0), less a mean interval of the others."""
+    """Time to the second mark of a callback (the first is at t = 0), less the mean interval between the other marks."""
     first, _, second, *_, last = marks
     seconds, cpu = second - first - (last - second) / (len(marks) - 3)
     return {"apart_seconds": seconds, "apart_cpu": cpu}
 
 
 def _pde_rules(problem: Problem) -> dict[str, str]:
-    """The equations as py-pde reads them."""
+    """The equations in the syntax of py-pde."""
     r = RATES
     m_a, m_d = f"A / (A + {r['K_A']})", f"D / (D + {r['K_D']})"
     sinks = (f"X * {m_a} * ({r['k'] * r['F']} * {m_d} + {r['decay']})", f"X * {r['k']} * {m_a} * {m_d}")
@@ -184,8 +184,8 @@ SCENE = load_scene("base", [f"substrates.{name}.{key}={d} um^2/h" for name, d in
 
 
 def solve_with_repro(problem: Problem, across: int, order: int) -> list[float]:
-    """(2,) what is judged, by linear (order 1), quadratic or cubic elements on halved squares, in one dimension a row
-    of them."""
+    """(2,) judged numbers, by linear (order 1), quadratic or cubic elements on halved squares. In one dimension the
+    mesh is a row of squares."""
     ends, (along, *rows) = problem.box[0], problem.cells(across)
     rows = rows or [1]
     width = rows[0] * np.ptp(ends) / along
@@ -293,8 +293,8 @@ CHANNEL = Problem((ENDS,), lambda x, *y: (x > 0) & (x < STRIP), (15, 30, 60, 120
 def channel_part(quick: bool) -> dict:
     """Plug flow through a strip of biomass with dual Monod uptake, one-dimensional: error of the effluents.
 
-    Other codes solve it in one dimension; here it is a ribbon of one cell across, which costs twice the unknowns and
-    more.
+    Other codes solve it in one dimension; this package uses a ribbon of one cell across, with more than twice the
+    unknowns.
     """
     other_codes = {"fipy": ((30, 60, 120, 240, 480), partial(fipy, CHANNEL))}
     about = ("Uptake in plug flow through a strip, one-dimensional; grid, assembly and solution",

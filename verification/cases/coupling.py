@@ -334,7 +334,8 @@ def test_quasi_steady(changes, record):
 
 
 def _lag(factor: float, *changes: str) -> dict[str, float]:
-    """Difference of the quasi-steady and the transient run, with substrates slowed by ``factor`` against growth."""
+    """Difference between the quasi-steady and the transient run, with substrates ``factor`` times slower relative to
+    growth."""
     quasi_steady, transient = (runs.last(_slower(factor, name, *changes)) for name in ("quasi_steady", "gear"))
     one, other = runs.numbers(quasi_steady), runs.numbers(transient)
     apart = quasi_steady.solved.concentrations.acceptor - transient.solved.concentrations.acceptor

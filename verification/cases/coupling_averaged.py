@@ -138,7 +138,7 @@ def test_averaged_mixing(changes, record):
 
 
 def _leaving(factor: float, scene: Scene) -> dict[str, float]:
-    """Thiele number; difference of effluents from the averaged pore (mg/L), and over its first-order value."""
+    """Thiele number; difference of effluents from the averaged pore (mg/L), and its ratio to its first-order value."""
     scene = runs.with_diffusivities(scene, lambda water, _: (factor * water, factor * water))
     scene = runs.at_velocity(scene, runs.SPEED)
     row = results.row(scene, next(simulate(scene)))
@@ -381,7 +381,7 @@ ACCEPTOR = 10.0
 CELLS = 16
 ACCURACY = 1e-5
 THIELE = "the square of the transverse Thiele number: 1.2 % of the area of base over 64; and as much for the elements"
-#: Bounds by preset, with a supply that jumps or changes linearly; cubic: fast with cubic elements.
+#: Bounds by preset, for a supply that jumps and for one that changes linearly; "cubic" is fast with cubic elements.
 HALF = 5e-3, "half of the 1 % that the preset may err by"
 SUPPLIED = {"steps": {preset: (4e-4, THIELE) for preset in runs.WITH_EXACT},
             "linear": {"paper": (1e-3, "second order in 12 min: a quarter of it with 6 min"), "fast": HALF,

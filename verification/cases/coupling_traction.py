@@ -1,6 +1,6 @@
 """The fluid's traction on the aggregate (20), (22): its balance, closed forms, and its small effect in base.
 
-Under this traction the shape and the flow around it must agree.
+Under this traction the shape must be in equilibrium with the flow around it.
 """
 
 from dataclasses import replace
@@ -306,7 +306,7 @@ def _defects(*changes: str) -> tuple[float, float]:
     return tuple(defects)
 
 
-#: The least refinement at which the moved mesh of a seed is not fine enough.
+#: The least refinement at which the moved mesh of a seed is too coarse.
 ANEW = 1.35
 
 

@@ -173,8 +173,8 @@ BEYOND = 15.0
 MIDDLE = 25.0
 RATIOS = viscous(1.0, 10.0, 100.0, RATIO, 1e5, 1e8)
 SIZES, DRAWS = LAYER / np.array([1.5, 3.0, 6.0, 12.0]), dict(enumerate((16, 12, 6, 1)))
-#: Orders of linear elements, and bounds of the errors on the finest meshes. In the traction form the remainder of the
-#: ends dominates in the layer.
+#: Orders of linear elements, and bounds of the errors on the finest meshes. In the traction form the remainder from the
+#: ends dominates the error in the layer.
 LINEAR = {"velocity": (2, SECOND, 1e-3), "velocity in the layer": (2, SECOND, 1e-3), "gradient": (2, SECOND, 1.2e-3)}
 STUDIED = {"laplacian": LINEAR, "traction": {"velocity": LINEAR["velocity"]}}
 #: Half length (um) of the layer for orders 2 and 3, and the remainder of its ends in the middle: exp(-0.739 * 18).
@@ -292,9 +292,9 @@ def test_permeable_layers(order, interface, record):
 #: Half length and elements (um) of a permeable body from wall to wall, and its permeabilities (um2). Layers are 3 um to
 #: 1 nm thick, and elements resolve the first.
 SPAN, SPAN_SIZE, SPAN_PERMEABILITIES = 125.0, 10.0, (9.0, 1.0, 1e-2, 1e-4, 1e-6)
-#: Excess energy of a layer in one dimension with the longest allowed elements, by order; the square of a quarter, the
-#: difference in size of neighbours and so of their layers; and the remainder of the ends in the middle,
-#: exp(-pi 100 / 50) times a hundredth of the gradient.
+#: Three bounds: the excess energy of a layer in one dimension with the longest allowed elements, by order; the square
+#: of a quarter, because neighbours and therefore their layers differ in size by a quarter; and the remainder of the
+#: ends in the middle, exp(-pi 100 / 50) times a hundredth of the gradient.
 LAYER_EXCESS, NEIGHBOURS, FROM_THE_ENDS = {2: 0.18, 3: 0.014}, 0.25**2, 2e-5
 
 

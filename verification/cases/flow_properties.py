@@ -44,7 +44,7 @@ def _around(radius: float, elements: int | str, lean: float = 0.0, reach: float 
     return Space(meshes.half_disc(radius, refinement, (-reach, reach), WIDTH, geometry=min(order, 2), lean=lean), order)
 
 
-#: Radii (um) of half-discs with bounds of the flux defect of linear u on a coarse mesh; that bound for a plug.
+#: Radii (um) of half-discs with bounds of the flux defect of linear u on a coarse mesh; the bound for a plug.
 DISCS, DROP = {40.0: 0.012, 46.0: 0.008}, 0.003
 
 

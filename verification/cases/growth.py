@@ -1,8 +1,8 @@
 """Growth against closed forms, its law (14)-(24), and properties of every body.
 
-Homogeneous growth, free and confined, is exact with linear and quadratic elements on any mesh. So are patch tests: a
-body whose rim is held at F X has F inside, with constant pressure. One end is free along its normal, or pulled, because
-the pressure is determined up to a constant if all of the rim is held.
+Homogeneous growth, free and confined, is exact with linear and quadratic elements on any mesh. Patch tests are exact,
+too: a body whose rim is held at F X has F inside, with constant pressure. One end is free along its normal, or pulled.
+If all of the rim were held, the pressure would be determined only up to a constant.
 
 The half-cylinder that grows by theta(R) has a closed form of shape and pressure, far from t = 0. The stabilisation
 imposes dP/dn = 0 on the rim, where the exact pressure has a slope. In one layer of elements the pressure errs by O(h),

@@ -33,7 +33,7 @@ FRONT = 36.0
 CONTRAST = 10.0
 #: Contact with an upper wall (um), and the number of refinements of the reference towards its ends.
 CONTACT, TOWARDS = Contact(np.pi / 2, 3 * np.pi / 4, 65.0), 3
-#: x + i y of these ends at t = 0, um.
+#: Ends of the contact at t = 0, x + i y in um.
 ENDS = bodies.RADIUS * np.exp([[1j * CONTACT.first], [1j * CONTACT.last]])
 PLACE = "the lower of the two orders: linear elements, second order (quadratic ones: third)"
 PRESSURE = ("the lower of the two orders: between 2, linear elements, and 3/2, a layer at the rim where the "
@@ -131,7 +131,8 @@ NORM = "L2 over the body at t = 0 of the difference to the reference on the same
 def compared(kind: int, problem: str, ceilings: dict[int, tuple[float, float]], pressure: str = "pressure"):
     """Checks of the differences of the two codes with one kind of triangles.
 
-    ceilings: by kind, of the last differences of positions and pressure; pressure: name of the one that has an order.
+    ceilings: bounds of the last differences of positions and pressure, by kind; pressure: name of the pressure
+    difference that has an order.
     """
     differences = refine(gaps, range(len(RINGS)), problem, kind)
     if kind > 1:

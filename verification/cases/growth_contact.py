@@ -80,7 +80,8 @@ def _first_contact(mechanics, seed, theta) -> tuple[float, contact.Expansion]:
 
 
 def _touching(seed: pore.Pore, expansion: contact.Expansion) -> pore.Pore:
-    """The seed with the opposite wall at those corners, and arcs between them, that an expansion has in contact."""
+    """The seed with the opposite wall at the corners, and at the arcs between them, that are in contact under an
+    expansion."""
     height = expansion.position[seed.mesh.loop][:, 1]
     on = np.isclose(height, HEIGHT, rtol=1e-9)
     if seed.mesh.geometry == 2:

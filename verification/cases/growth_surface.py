@@ -39,8 +39,8 @@ RADIUS = 20.0
 
 
 def lopsided(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The same of a late, starved aggregate: its rim has an elastic stretch down to 0.58, its core has hardly
-    grown, and it reaches 2.3 times as far upstream as downstream."""
+    """Positions and gradients of a late, starved aggregate: its rim has an elastic stretch down to 0.58, its core has
+    hardly grown, and it reaches 2.3 times as far upstream as downstream."""
     place = np.stack([x, y], axis=-1)
     squared = (x**2 + y**2) / RADIUS**2
     outwards, upstream = 1 + squared**2, 1 - 0.4 * x / RADIUS

@@ -27,7 +27,12 @@ from verification.problems.hard import TooLong, limited
 #: Processor time (s) of one run: a hundred times the median.
 LIMIT = 30.0
 #: Seeds of ``make test``, and further seeds of ``make verify``.
-QUICK, REST = range(30), range(30, 150)
+QUICK, REST = (*range(20), *range(164, 172)), (*range(20, 164), *range(172, 190))
+#: Checks that are known to fail. By zero order the growth of 172 jumps at a front in the aggregate, on which ``fast``
+#: puts a few elements: its thickness is wrong by 0.2 %, and the head loss of the film above it, a sixth of the width,
+#: by 1.6 %.
+KNOWN = {172: {"head_loss_cm in fast less that in accurate, relative",
+               "conductivity_m_per_d in fast less that in accurate, relative"}}
 NO_HELP = re.compile(r"no setting helps|no numerics\.refinement that is accepted")
 FILE = re.compile(r"\S+/\S+\.(?:state|vtu)|fields/\S+\.vtu")
 #: Advice in messages: pattern, key, and values to try, from the present value or the number in the message.
@@ -35,9 +40,10 @@ ADVICE = (
     (r"numerics\.refinement = ([\d.e+-]+) resolves", "numerics.refinement", lambda present, number: [float(number)]),
     (r"larger numerics\.refinement", "numerics.refinement", lambda present, number: [1.5 * present, 2.5 * present]),
     (r"smaller numerics\.refinement", "numerics.refinement", lambda present, number: [present / 2]),
+    (r"larger growth\.shear_modulus", "growth.shear_modulus",
+     lambda present, number: [f"{10 * present!r} MPa", f"{100 * present!r} MPa"]),
     (r"shorter growth\.time_step", "growth.time_step",
      lambda present, number: [f"{present / 4!r} h", f"{present / 20!r} h"]),
-    (r"larger growth\.shear_modulus", "growth.shear_modulus", lambda present, number: [f"{10 * present!r} MPa"]),
     (r"flow\.permeability[^;]*? ([\d.e+-]+ (?:m|um)\^2) or more", "flow.permeability",
      lambda present, number: [number]),
     (r"aggregate\.smooth = false|smooth = false", "aggregate.smooth", lambda present, number: [False]),
@@ -135,8 +141,10 @@ def _is_right(tables: dict, folder: Path) -> bool:
 
 
 def member(seed: int) -> Check:
-    """Check that no check of a member fails. The name lists those that do."""
-    failed = [f"{check.quantity} {check.value:.3g}" for check in judge(seed) if not check.holds]
+    """Check that no check of a member fails, and that those do which are known to. The name lists them."""
+    known = KNOWN.get(seed, set())
+    checks = judge(seed)
+    failed = [f"{check.quantity} {check.value:.3g}" for check in checks if check.holds == (check.quantity in known)]
     message = f": {'; '.join(failed)[:600]}" if failed else ""
     return at_most(f"{hostile.kind(seed)}{message}", len(failed), 0, "reference/run_files.py; a refusal's advice works")
 
@@ -146,9 +154,10 @@ COMMON = {
     "kind": "property",
     "claim": "Hostile scenes drawn by seed: balances, bounds, stoichiometry, area against mass and flow in the files, "
              "the same rows with other rows, fast against accurate, or a refusal with advice that works",
-    "norm": "checks that fail, of each member",
+    "norm": "checks that fail, of each member; of 172, whether its head loss is wrong",
     "mutants": ("family-jump-late", "family-area-of-corners", "family-effluent-not-weighted", "family-half-saturation",
-                "family-rest-of-the-pore-forgotten", "family-rows-end-steps"),
+                "family-rest-of-the-pore-forgotten", "family-rows-end-steps", "family-inhibition",
+                "family-decay-limited", "family-absent-donor-limits"),
     "references": ("run_files",), "runs_with": "2 fast accurate",
     "omitted": "members have quadratic triangles, straight ones run where advice names them; hard-01 to hard-23 run "
                "orders 1 and 3, paper and exact"}

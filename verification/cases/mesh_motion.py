@@ -140,7 +140,7 @@ def _wave_error(size: float, seed: int, gamma: float, geometry: int, label: str)
 
 
 RADIUS = 25.0
-#: Width of the pores around aggregates, and ends of that around a segment of a disc (um).
+#: Width of the pores around aggregates, and ends of the pore around a segment of a disc (um).
 PORE, SEGMENT_END = 50.0, 50.0
 #: Refinements of the package's mesh with the divisions of the reference. Both codes are refined.
 LEVELS = ((0.7, 6), (1.1, 8), (1.9, 12), (3.3, 16))

@@ -25,7 +25,7 @@ def smooth(x, y):
 
 
 def steep(x, y):
-    """A hill twenty times narrower than the domain, from 0 to 1."""
+    """A hill with values from 0 to 1, twenty times narrower than the domain."""
     return np.exp(-((x - 18) ** 2 + (y - 10) ** 2) / 6)
 
 

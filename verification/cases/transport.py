@@ -202,7 +202,8 @@ def test_first_order_slab_higher(setup, record):
 
 def _slab_errors(size: float, number: int, order: int, film: float, sink: float, half_saturation: float, exact,
                  uptake_name: str) -> dict[str, float]:
-    """Element size, and relative errors of C and of the uptake on a side over ``sink``. exact(x): both."""
+    """Element size, and relative errors of C and of the uptake on a side over ``sink``. exact(x): the exact values of
+    both."""
     space, field, flux = _at_rest(size, number, sink, half_saturation, film, order)
     gap = meshes.distance(in_points(space), field[space.cells], lambda x, y: exact(x)[0])
     return {"size": length(space, size), "C": gap,

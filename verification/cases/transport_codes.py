@@ -80,7 +80,7 @@ ITSELF_STARVED = "C_A in the starved slab over itself"
 LAW = replace(SCENE.kinetics, yield_coefficient=1e-12)
 #: h: 0.07, 0.2 and 0.7 s. Water diffuses across the slab in 0.6 s, and crosses it in 0.1 to 6 s.
 TIMES = (2e-5, 6e-5, 2e-4)
-#: Last errors of linear elements, of a density X, and of others, of their order.
+#: Last errors: of linear elements by the density X, of other elements by their order.
 CEILINGS = {3e3: 1e-6, 3e4: 3e-5, 3e5: 4e-4}
 HIGHER_CEILINGS = {2: 1e-7, 3: 1e-9}
 
@@ -118,8 +118,8 @@ def exact(peclet: float, density: float, tolerance: float):
     return channel_bvp.solve(*reference_arguments(peclet, density), tolerance=tolerance)
 
 
-#: Random meshes of each size (um), their ends, and solve_bvp's tolerance, which takes no less at Peclet 5: cubic
-#: elements are judged at Peclet 1, on coarser meshes, as solve_bvp is good to 1e-11 or so.
+#: Random meshes of each size (um), their ends, and solve_bvp's tolerance. At Peclet 5 solve_bvp accepts no smaller one.
+#: Cubic elements are judged at Peclet 1 and on coarser meshes, because solve_bvp is accurate to about 1e-11.
 COLLOCATED = {1: (SAMPLES, CROSSED, 1e-8), 2: ({3.2: 12, 1.6: 6, 0.8: 3, 0.4: 1}, WIDE, 1e-10),
               3: ({6.4: 12, 3.2: 8, 1.6: 4, 0.8: 2}, WIDE, 1e-12)}
 
@@ -196,7 +196,7 @@ SUBSTRATES = substrates_with(acceptor={"diffusivity": 8e6, "diffusivity_in_aggre
 ITSELF = "donor in the biomass, over itself"
 #: Cells (um) with the number of meshes of equally long elements around the block.
 BLOCK = {2.0: 6, 1.0: 4, 0.5: 2, 0.25: 1}
-#: Elements (um) of order 2 and 3 by shape. They err less than a tenth as much as the finest cells.
+#: Elements (um) of order 2 and 3 by shape. Their error is less than a tenth of that of the finest cells.
 FINE_AROUND = {"block": {2: 0.5, 3: 1.0}, "half-disc": {2: 1 / 3, 3: 2 / 3}}
 #: Cells (um), and the refinement that makes elements twice as long on average around the half-disc.
 DISC = {4 / 3: 0.35, 2 / 3: 0.77, 1 / 3: 1.55, 1 / 6: 3.1}

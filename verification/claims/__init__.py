@@ -24,7 +24,7 @@ its values have been seen keeps its other definitions with their outcomes in `ot
 the verdict of its first definition.
 
 `rests_on` says what a number depends on: the prediction of a solution, or an input, a rule of construction or the
-arithmetic of Table 1. The latter need no solution and do not count as reproduced numbers.
+arithmetic of Table 1. The last three need no solution and do not count as reproduced numbers.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from decimal import Decimal
-from math import inf, isnan
+from math import inf, isfinite, isnan
 
 from verification import sensitivity
 from verification.claims.levels import (
@@ -71,8 +71,8 @@ CLOSED = "closed forms"
 PREDICTED = "a solution"
 ARITHMETIC = "arithmetic of Table 1"
 CONSTRUCTION = "a rule of construction"
-#: When the ranges of the words were set; and when those of later claims, and the printed digits became the ranges of
-#: the numbers.
+#: Dates: when the ranges of the words were set; when the ranges of later claims were set, and the printed digits became
+#: the ranges of the numbers.
 SET, LATER = "2026-11-21", "2026-11-22"
 #: A value that the paper prints: 2.9, or ~60.
 PRINTED = re.compile(r"~?\d+(\.\d+)?")
@@ -87,7 +87,7 @@ TRANSPORT, TRANSPORT_WORDS = 0.001, "0.1 %, the paper's accuracy of transport"
 
 
 class ClaimError(RuntimeError):
-    """A claim has no verdict: nothing was checked, a number is not one or has no bar, or a failure has no reason."""
+    """A claim has no verdict: it has no check, a number is NaN or has no bar, or a failure has no reason."""
 
 
 def interval(text: str) -> tuple[float, float] | None:
@@ -123,7 +123,8 @@ class PaperCheck(Check):
 
     paper: the paper's text, "2.9"; date: when the accepted range was set, by default the date of the claim; converges:
     does the number have a limit as mesh and step are refined? rests_on: what the number depends on; input: its name in
-    the record of the sensitivities; bar: the interval of the number, None before it is known; holds_at: for a number
+    the record of the sensitivities; bar: the interval of the number, None before it is known; if the run ended before
+    the number was reached, the bar has no upper end, and the value is the end of the run; holds_at: for a number
     without a limit, whether it holds at each level; scheme: smallest and largest value with the scheme of 2001, None
     where it is not computed; on_sizes: for a claim about the model, the values on the sizes of the converged solution,
     the judged one first.
@@ -139,6 +140,16 @@ class PaperCheck(Check):
     holds_at: tuple[bool, ...] = ()
     scheme: tuple[float, float] | None = None
     on_sizes: tuple[float, ...] = ()
+
+    @property
+    def holds(self) -> bool:
+        """Whether the number lies in its interval. If its bar has no upper end, it never lies under an upper bound."""
+        return super().holds and not (self.is_lower_bound and isfinite(self.high))
+
+    @property
+    def is_lower_bound(self) -> bool:
+        """Whether the value is only a lower bound, because the run ended before the number was reached."""
+        return self.bar is not None and self.bar.high == inf
 
     @property
     def printed(self) -> tuple[float, float] | None:
@@ -201,9 +212,10 @@ class Finding:
 class Claim:
     """A row of the table: the paper's section, its statement, and the function that computes the numbers.
 
-    about: MODEL, OF_SCHEME or CLOSED; fine: sizes of the converged solution; beside: those of the scheme whose range
-    stands beside it; sizes, steps: of the scheme; fixed: why one of them is not varied; date: when its
-    definition was written (UTC); unjudged: why no value could contradict it, empty where one could.
+    about: MODEL, OF_SCHEME or CLOSED; fine: sizes of the converged solution; beside: sizes of the scheme whose range is
+    shown beside a number of the model; sizes, steps: those of a claim about the scheme; fixed: why sizes or steps are
+    not varied; date: when its definition was written (UTC); unjudged: why no value could contradict it, empty if a
+    value could.
     """
 
     id: str
@@ -243,7 +255,7 @@ class Claim:
 
     @property
     def judging_levels(self) -> tuple[Level, ...]:
-        """The levels of both, the judged one first; that one alone where no number needs a bar."""
+        """The levels of meshes and steps, the judged one first; only the judged one if no number needs a bar."""
         levels = tuple(dict.fromkeys((*self.meshes.values(), *self.stepped.values())))
         return levels[:1] if self.unjudged else levels
 
@@ -299,6 +311,6 @@ def between(quantity: str, paper_text: str, computed: float, low: float, high: f
 
 
 def without_limit(check: PaperCheck) -> PaperCheck:
-    """A count, or a number that belongs to its mesh or step: its bar goes from the least to the largest of all levels,
-    and it holds where it does at every level."""
+    """A count, or a number that has no limit as mesh and step are refined. Its bar extends from the least to the
+    largest value of all levels, and it holds if it holds at every level."""
     return replace(check, converges=False)

@@ -34,7 +34,8 @@ OTHER = re.compile(r"^base|before contact|a film left|^K / K_clean =|^the part f
 WIDE_BAR, BASE_BAR = 2.0, 0.2
 #: Claims about the model that concern neither wide nor base: half-discs in truncated pores, and variants of wide.
 NOT_OF_BASE = ("C19", "C41")
-#: Why a bar of base exceeds BASE_BAR, by the kind of number: what its claim or its name begins with.
+#: Why a bar of base exceeds BASE_BAR, by the kind of number. A kind is the beginning of a claim's id or of a number's
+#: name.
 KINDS = {
     "a place, known to the element in which it is": r"C10",
     "a small difference of two halves, or of two runs or solutions, which takes the errors of both in parts of itself":
@@ -52,7 +53,7 @@ EXACT, SECONDS = 0.5, 60.0
 
 
 @dataclass(frozen=True)
-class Known:
+class RecordedBar:
     """id: of the claim; quantity: of the check; percent: half the width of its bar over its value."""
 
     id: str
@@ -60,30 +61,31 @@ class Known:
     percent: float
 
 
-def known(entries: list[dict]) -> list[Known]:
+def bars_after_contact(entries: list[dict]) -> list[RecordedBar]:
     """The numbers after contact of a record, the one with the widest bar first."""
     evaluate.register_all()
-    return _known(entries, lambda entry, quantity: (CLAIMS[entry["id"]].of_wide or quantity.startswith("wide"))
+    return _recorded_bars(entries, lambda entry, quantity: (CLAIMS[entry["id"]].of_wide or quantity.startswith("wide"))
                   and not OTHER.search(quantity))
 
 
-def of_base(entries: list[dict]) -> list[Known]:
+def bars_of_base(entries: list[dict]) -> list[RecordedBar]:
     """The numbers of base in a record, from claims about the model, the one with the widest bar first."""
     evaluate.register_all()
-    return _known(entries, lambda entry, quantity: entry["about"] == MODEL and (quantity.startswith("base") or not (
-        CLAIMS[entry["id"]].of_wide or entry["id"] in NOT_OF_BASE or quantity.startswith("wide"))))
+    return _recorded_bars(entries, lambda entry, quantity: entry["about"] == MODEL and (
+        quantity.startswith("base") or not (
+            CLAIMS[entry["id"]].of_wide or entry["id"] in NOT_OF_BASE or quantity.startswith("wide"))))
 
 
-def _known(entries: list[dict], chosen: Callable[[dict, str], bool]) -> list[Known]:
-    bars = [Known(entry["id"], check["quantity"], percent(check))
+def _recorded_bars(entries: list[dict], chosen: Callable[[dict, str], bool]) -> list[RecordedBar]:
+    bars = [RecordedBar(entry["id"], check["quantity"], percent(check))
              for entry in entries for check in entry["checks"] if chosen(entry, check["quantity"])]
     return sorted(bars, key=lambda each: -each.percent)
 
 
-def wide_bars_of_base(entries: list[dict]) -> dict[str, list[Known]]:
+def wide_bars_of_base(entries: list[dict]) -> dict[str, list[RecordedBar]]:
     """Numbers of base whose bars exceed BASE_BAR, by reason; "" if there is none."""
-    by_reason: dict[str, list[Known]] = {}
-    for each in of_base(entries):
+    by_reason: dict[str, list[RecordedBar]] = {}
+    for each in bars_of_base(entries):
         if each.percent > BASE_BAR:
             reasons = [why for why, names in KINDS.items() if re.match(names, f"{each.id}, {each.quantity}")]
             by_reason.setdefault(next(iter(reasons), ""), []).append(each)

@@ -1,8 +1,8 @@
 """C60-C65: statements that the paper assumes or cites and does not compute.
 
 C60: the error of perfect symmetry against the error of the discretization. C61: the profiles at t = 0. C62: decay
-without oxygen. C63: an aggregate that bends with the flow and returns. C64: an aggregate that stays thin. C65: the
-loading of its surface.
+without oxygen. C63: an aggregate that the flow bends and that returns to its shape. C64: an aggregate that stays thin.
+C65: the loading of its surface.
 """
 
 from dataclasses import replace

@@ -33,7 +33,7 @@ from verification.claims import (
     printed,
     without_limit,
 )
-from verification.claims.evaluate import side_by_side
+from verification.claims.evaluate import map_in_parallel
 from verification.claims.levels import DEFAULT, Level, at_level
 from verification.claims.runs import (
     BASE,
@@ -161,7 +161,7 @@ def last_length() -> Finding:
                    reason="not on every mesh, with every step")
 
 
-#: Base to 10 h in the preset "fast": the identity to show does not depend on mesh and step.
+#: Base to 10 h in the preset "fast": the identity does not depend on mesh and step.
 SHORT = ("base", 'numerics.preset="fast"', "numerics.tolerance=0.0075", "numerics.refinement=0.2",
          *until(2, 4, 6, 8, 10))
 
@@ -173,8 +173,9 @@ def scaled(acceptor: float, donor: float) -> tuple[str, ...]:
                  for key, value in (("supply", 10.0), ("half_saturation", 1.0)))
 
 
-#: Everything in mg/L times 8; each substrate by its own factor, with k, Y, F and d_c, which turn one into the other in
-#: (7)-(9); C and K_s alone. Powers of two are exact in floating point: with others, round-off can decide a remesh.
+#: Factors of three kinds: 8 for every quantity in mg/L; one for each substrate, with k, Y, F and d_c, which convert one
+#: into the other in (7)-(9); and factors of C and K_s alone. Powers of two are exact in floating point. With other
+#: factors, round-off can decide a remesh.
 ALONE = (*SHORT, *scaled(8.0, 8.0))
 ALL_BY_8 = (*ALONE, 'kinetics.maximum_density="240000 mg/L"')
 EACH = (*SHORT, *scaled(8.0, 4.0), 'kinetics.maximum_utilization_rate="37.2 1/day"',
@@ -201,7 +202,8 @@ def ratios() -> Finding:
 
 
 def change(run: tuple[str, ...], acceptor: float, donor: float) -> float:
-    """Largest difference of a compared column from the run that is not scaled, in any row, over its largest."""
+    """Largest difference of a compared column from the unscaled run in any row, over the largest value of the
+    column."""
     scaled, plain = series(*run), series(*SHORT)
     factors = dict.fromkeys(COMPARED, 1.0) | {f"{where}_{name}_mg_per_L": factor for where in ("inlet", "effluent")
                                               for name, factor in zip(SUBSTRATES, (acceptor, donor))}
@@ -320,7 +322,7 @@ def velocities(level: Level) -> list[float]:
 
 def independence() -> tuple[PaperCheck, ...]:
     """Halving the time step moves the velocity by less than 0.5 %, halving the mesh size by less than 1 %."""
-    velocity = dict(zip(LEVELS, side_by_side(velocities, LEVELS)))
+    velocity = dict(zip(LEVELS, map_in_parallel(velocities, LEVELS)))
     return tuple(at_most(f"halving the {size} moves the velocity at {time:g} h (%)", f"< {bound:g}",
                          100 * abs(new / old - 1), bound, "set beforehand")
                  for size, (level, bound) in HALVED.items()

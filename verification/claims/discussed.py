@@ -38,7 +38,7 @@ from verification.problems.channels import pair
 
 #: Conductivities over the clean channel's at which the biomass is compared.
 REDUCED = (0.5, 0.1, 0.01)
-#: The one at which the conductivities of equal biomass are compared.
+#: The ratio at which the conductivities of equal biomass are compared.
 SAME = 0.1
 #: Thicknesses of a layer over the width that is left to it.
 LAYERS = np.linspace(1e-4, 1.0, 4001)
@@ -130,7 +130,7 @@ def in_one_shape(radius: float = RADIUS, supply: float = 10.0, head: float = 1e-
 
 
 def sherwood(aggregate: Body) -> np.ndarray:
-    """(2,) of both substrates."""
+    """Sherwood numbers (2,) of both substrates."""
     outline, edges = aggregate.outline, aggregate.outline.interface_edges()
     supply, diffusivity = (np.array(pair(name, aggregate.scene.substrates)) for name in ("supply", "diffusivity"))
     drop = supply - [aggregate.concentration(name)[aggregate.grid.loop[edges]].mean() for name in SUBSTRATES]
@@ -139,7 +139,8 @@ def sherwood(aggregate: Body) -> np.ndarray:
 
 
 def textbooks(aggregate: Body) -> np.ndarray:
-    """The same of a flat patch on the wall, as long as the aggregate (Leveque), with the aggregate's thickness."""
+    """Sherwood numbers (2,) of a flat patch on the wall, as long as the aggregate (Leveque), with the aggregate's
+    thickness."""
     outline, shear = aggregate.outline, 6 * aggregate.solved.flow.mean_velocity / aggregate.grid.width
     patch = outline.downstream - outline.upstream
     diffusivities = np.array(pair("diffusivity", aggregate.solved.problem.substrates))
@@ -152,7 +153,8 @@ def leveque(shear: float, length: float, diffusivity: Values) -> Values:
     return 1.5 * (shear * length**2 / diffusivity / 9) ** (1 / 3) / gamma(4 / 3)
 
 
-#: Of layers in the model's pore, um: the distance of their ends from those of the pore; fewest elements across one.
+#: Layers in the model's pore: distance (um) of their ends from the ends of the pore, and the least number of elements
+#: across a layer.
 MARGIN, FEWEST = 2.0, 4
 
 
@@ -209,7 +211,8 @@ def layered(scene: Scene, part: float, walls: int) -> Mesh:
 
 
 def evenly(ends: tuple[float, ...], size: float) -> np.ndarray:
-    """Coordinates from the first end to the last, FEWEST or more to a part, not further apart than a size."""
+    """Coordinates from the first end to the last. They divide each part into at least FEWEST intervals, none longer
+    than ``size``."""
     parts = [np.linspace(low, high, 1 + max(FEWEST, int(np.ceil((high - low) / size))))
              for low, high in zip(ends, ends[1:])]
     return np.unique(np.concatenate(parts))

@@ -15,6 +15,7 @@ import re
 from collections.abc import Callable, Iterable
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
+from math import inf
 from types import ModuleType
 
 import numpy as np
@@ -38,9 +39,9 @@ def numbers(finding: Finding) -> Numbers:
 def barred(claim: Claim, finding: Finding, by_level: dict[Level, Numbers]) -> Finding:
     """The finding with a bar on each check, from its numbers at all levels. Raises ClaimError if the levels have
     different quantities."""
-    scene = {quantities(row) for row in by_level.values()}
-    if len(scene) != 1:
-        raise ClaimError(f"the levels tell of different quantities: {sorted(scene)}")
+    distinct = {quantities(row) for row in by_level.values()}
+    if len(distinct) != 1:
+        raise ClaimError(f"the levels have different quantities: {sorted(distinct)}")
     columns = zip(*by_level.values())
     return replace(finding, checks=tuple(_judgeable(claim, check, dict(zip(by_level, column)))
                                          for check, column in zip(finding.checks, columns)))
@@ -57,8 +58,8 @@ def unnumbered(quantity: str) -> str:
 
 
 def _judgeable(claim: Claim, check: PaperCheck, by_level: dict[Level, tuple[str, float, bool]]) -> PaperCheck:
-    """The check with its bar, from its value and whether it holds at each level, which is added to a width of its own,
-    that of the mesh around a place."""
+    """The check with its bar, from its value and outcome at each level. The bar is added to the check's own width,
+    which is that of the mesh around a point."""
     values = {level: value for level, (_, value, _) in by_level.items()}
     on_sizes = [values[level] for level in claim.judging_levels]
     beside = [value for level, value in values.items() if level not in claim.judging_levels]
@@ -68,19 +69,20 @@ def _judgeable(claim: Claim, check: PaperCheck, by_level: dict[Level, tuple[str,
     bar = replace(bar, low=bar.low - check.value + width.low, high=bar.high - check.value + width.high)
     return replace(check, bar=bar, holds_at=tuple(by_level[level][-1] for level in claim.judging_levels),
                    date=check.date or claim.date,
-                   scheme=(min(beside), max(beside)) if beside else None,
+                   scheme=(min(beside), max(beside)) if beside and bar.high < inf else None,
                    on_sizes=tuple(on_sizes) if claim.about == MODEL else ())
 
 
 def _estimate(varied: dict[float, Level], values: dict[Level, float], formal: tuple[float, float]) -> Estimate | None:
-    """From the levels of some sizes; None where the size is not varied."""
+    """Estimate a number from its values on several sizes; None if the size is not varied."""
     return estimate([*varied], [values[level] for level in varied.values()], formal) if len(varied) > 1 else None
 
 
-#: Of a claim at one level: its numbers, with its finding where the level is the judged one, or the error in words.
+#: Outcome of a claim at one level: its numbers, with its finding if the level is the judged one; or the message of an
+#: error.
 Outcome = tuple[Numbers, Finding | None] | str
 
-#: Further runs of a claim at each of its levels, in runs as long as wide; C32 reads those of C41.
+#: Number of additional runs of a claim at each of its levels, in units of the run wide; C32 reads those of C41.
 RUNS = {"C41": 5.5, "C42": 1, "C43": 1.5, "C53": 4}
 #: Cost of base over that of wide, and the constant part of the cost of a run.
 OF_BASE, LEAST = 0.1, 0.15
@@ -107,7 +109,7 @@ def everywhere(ids: Iterable[str]) -> dict[str, dict[Level, Outcome]]:
         for level in CLAIMS[id].levels:
             ids_at.setdefault(level, []).append(id)
     levels = sorted(ids_at, key=lambda level: effort(level, ids_at[level]), reverse=True)
-    for level, outcomes in zip(levels, side_by_side(outcomes_at, levels, [ids_at[level] for level in levels])):
+    for level, outcomes in zip(levels, map_in_parallel(outcomes_at, levels, [ids_at[level] for level in levels])):
         for id in outcomes:
             by_claim[id][level] = outcomes[id]
     return by_claim
@@ -120,14 +122,14 @@ def effort(level: Level, ids: list[str]) -> float:
     return runs * (LEAST + level.size**-2) / level.step
 
 
-def side_by_side(function: Callable, *arguments: Iterable) -> list:
+def map_in_parallel(function: Callable, *arguments: Iterable) -> list:
     """Like map, on one process per core."""
     with ProcessPoolExecutor() as pool:
         return list(pool.map(function, *arguments))
 
 
 def outcomes_at(level: Level, ids: list[str]) -> dict[str, Outcome]:
-    """Outcomes of some claims at one level, whose runs are dropped afterwards."""
+    """Outcomes of some claims at one level. The runs of the level are dropped afterwards."""
     register_all()
     with at_level(level), np.errstate(all="raise", under="ignore"):
         outcomes = {id: _attempt(id, level) for id in ids}
@@ -136,7 +138,7 @@ def outcomes_at(level: Level, ids: list[str]) -> dict[str, Outcome]:
 
 
 def _attempt(id: str, level: Level) -> Outcome:
-    """A claim's numbers at the present level, or the error in words."""
+    """A claim's numbers at the present level, or the message of its error."""
     try:
         finding = CLAIMS[id].function()
         judged = finding.with_note() if level == CLAIMS[id].judged else None

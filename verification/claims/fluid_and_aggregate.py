@@ -40,7 +40,7 @@ from verification.claims.runs import (
 from verification.problems import meshes
 
 PASCAL = 1e6  # in a MPa
-#: "Small against": a tenth.
+#: "Small against" means at most a tenth.
 SMALL = 0.1
 
 
@@ -52,7 +52,7 @@ def touching() -> tuple[Body, Body]:
 
 @dataclass(frozen=True)
 class Forces:
-    """In one geometry, in Pa.
+    """Stresses in one geometry, in Pa.
 
     head: range of the fluid's pressure over the interface; shear: largest viscous stress along it; growth: largest
     in-plane shear stress in the aggregate; stiffness: least modulus mu_L J^(-2/3) against a further deformation.
@@ -65,12 +65,12 @@ class Forces:
 
     @property
     def against_growth(self) -> float:
-        """The fluid's over growth's stress."""
+        """Stress of the fluid over stress of growth."""
         return (self.head + self.shear) / self.growth
 
     @property
     def strain(self) -> float:
-        """About the strain that the fluid would cause."""
+        """Estimate of the strain that the fluid would cause."""
         return (self.head + self.shear) / self.stiffness
 
 
@@ -99,7 +99,7 @@ def fluid_forces() -> Finding:
 
 
 def forces(aggregate: Body) -> Forces:
-    """Of an aggregate."""
+    """The forces of an aggregate."""
     head, shear = interface_forces(aggregate)
     drive, modulus = aggregate.scene.flow, PASCAL * aggregate.scene.growth.shear_modulus
     weight = PASCAL * MPA_PER_UM * drive.density * drive.gravity
@@ -161,15 +161,15 @@ def inside(aggregate: Body) -> float:
 #: The distance over which the stress is averaged, over the pore's width; and all reported distances.
 APART = 0.1
 DISTANCES = (0.5 * APART, APART, 2 * APART)
-#: Places at which the mean is taken, in a distance; degree of the quadrature of the stress.
+#: Means are taken at points a distance over PLACES apart; DEGREE of the quadrature of the stress.
 PLACES, DEGREE = 4, 8
-#: Of C46: run and hour.
+#: The states of C46: run and hour.
 STATES = ((BASE, END), (WIDE, 30.0), (WIDE, 40.0))
 
 
 @dataclass(frozen=True)
 class Peak:
-    """value: over mu_L; x, y: its place (um)."""
+    """A largest stress. value: over mu_L; x, y: its position (um)."""
 
     value: float
     x: float
@@ -177,7 +177,7 @@ class Peak:
 
     @property
     def description(self) -> str:
-        """In words."""
+        """Value and position as text."""
         return f"{self.value:.3g} mu_L at ({self.x:.0f}, {self.y:.0f}) um"
 
 
@@ -224,7 +224,7 @@ def tearing() -> Finding:
 
 
 def _on_another_size(most: dict[Run, Body]) -> str:
-    """Where the stress of runs at their worst is the largest, here and on the size of its figure, in words."""
+    """Describe the location of the largest stress, at this level and on the element size of the figure."""
     preset_x = [peak(aggregate).x for aggregate in most.values()]
     hours = [aggregate.pore.time for aggregate in most.values()]
     with at_level(Level(CONVERGED, PAIRED[1])):
@@ -250,7 +250,7 @@ def torn_by_the_fluid() -> Finding:
 
 
 def changed(pair: tuple[Body, Body], part: float = APART) -> float:
-    """By how many percent the fluid changes the largest principal stress."""
+    """Change (%) of the largest principal stress by the fluid."""
     without, forced = (peak(aggregate, part).value for aggregate in pair)
     return 100 * (forced / without - 1)
 
@@ -264,7 +264,7 @@ def _describe_fluid_effect(pairs: dict[str, tuple[Body, Body]]) -> str:
 
 
 def _changes(pair: tuple[Body, Body]) -> str:
-    """By how many percent the fluid changes the stress, in means over all of DISTANCES."""
+    """Change (%) of the stress by the fluid, in means over each of DISTANCES."""
     return ", ".join(f"{changed(pair, part):.2g}" for part in DISTANCES)
 
 

@@ -148,8 +148,8 @@ TOTAL, RAISED = 2000.0, 1.04715
 def expansion() -> Finding:
     """theta from 1 to 2000 from the configuration of t = 0, in 165 updates of 4.7 %: uniform, and larger at the rim.
 
-    The second has theta = t^0.9 in the middle and t at the rim, quadratic in R between. Against closed forms; and what
-    theta comes to in wide, and when.
+    The second has theta = t^0.9 in the middle and t at the rim, quadratic in R between. Both are compared with closed
+    forms. The note gives the largest theta in wide, and its time.
     """
     body, inner = half_disc(1.4), TOTAL**0.9
     more = TOTAL - inner

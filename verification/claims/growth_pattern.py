@@ -74,7 +74,8 @@ def extremes() -> Finding:
 
 
 def nearby(grid: Mesh, node: int) -> float:
-    """How far (um) the farthest node is that shares a triangle with a node: an extreme is somewhere within."""
+    """Distance (um) from a node to the farthest node that shares a triangle with it. The extreme lies within this
+    distance."""
     around = grid.cells[(grid.cells == node).any(axis=1)].ravel()
     return float(np.hypot(*(grid.points[around] - grid.points[node]).T).max())
 
@@ -278,7 +279,7 @@ def stresses() -> Finding:
     for run, times, when in compared:
         label = f"{run[0]}, {when}, born stress-free"
         checks += [at_most(f"{label}: outlines apart (% of the area)", "not affected",
-                           float(np.mean([apart(run, time) for time in times])), 100 * FEW, FEW_WORDS),
+                           float(np.mean([outline_difference(run, time) for time in times])), 100 * FEW, FEW_WORDS),
                    between(f"{label}: change of the conductivity (%)", "not affected",
                            conductivity_change((*run, STRESS_FREE), times, run), -100 * FEW, 100 * FEW, FEW_WORDS)]
     uniform = 2.5 ** (-5 / 3) * (2.5 - 1)
@@ -304,7 +305,7 @@ def peaks(run: Run) -> tuple[float, float, float]:
     return tuple(map(float, np.max(triples, axis=0)))
 
 
-def apart(run: Run, time: float) -> float:
+def outline_difference(run: Run, time: float) -> float:
     """Area that only one of the outlines covers, with new biomass stressed and stress-free, in percent of the area."""
     return uncovered(*(polygon(body((*run, *more), time).outline) for more in ((), (STRESS_FREE,))))
 

@@ -1,4 +1,4 @@
-"""The levels at which every claim is computed.
+"""The levels at which claims are computed.
 
 Claims about **the model** are judged with a converged solution, claims about **the scheme** with the scheme.
 
@@ -10,8 +10,8 @@ Claims about **the model** are judged with a converged solution, claims about **
                 steps; beside a claim about the model on one to three meshes, whose range is `scheme_2001`.
 
 Elements twice as large as those of the preset `paper` (7 across half a pore) are not asymptotic: with them the velocity
-of base at 19.2 h shows an order of 2.9 to 3.1, without them 2.0. Steps 2, 3 and 4 times 12 min have 19.2 h as a whole
-number, and the next one ends at 19.4 h, where base does.
+of base at 19.2 h shows an order of 2.9 to 3.1, without them 2.0. With steps of 2, 3 and 4 times 12 min a step ends at
+19.2 h, and the next one ends with base, at 19.4 h.
 
 To use another solver for the converged solution, change `CONVERGED` and `converged` alone.
 
@@ -28,11 +28,11 @@ from repro.scene.keys import PRESETS
 from verification.store import Memory
 
 CONVERGED, SCHEME = "converged", "scheme"
-#: Of the converged solution at size 1: its preset.
+#: Preset of the converged solution at size 1.
 PRESET = "accurate"
-#: Its elements beside contact lines at size 1. Without them entire edges of several um join the wall. The conductivity
-#: of wide over the hours after contact is then 1.161 to 1.171 m/d from size 1.4 to 0.5, without an order. With them it
-#: is 1.1695, 1.1726 and 1.1734 m/d from size 1.4 to 0.7.
+#: numerics.contact_elements of the converged solution at size 1. Without it entire edges of several um join the wall.
+#: The conductivity of wide over the hours after contact is then 1.161 to 1.171 m/d from size 1.4 to 0.5, without an
+#: order. With it the conductivity is 1.1695, 1.1726 and 1.1734 m/d from size 1.4 to 0.7.
 CONTACT = 2.0
 
 
@@ -57,14 +57,14 @@ def converged(size: float) -> tuple[str, ...]:
             f"numerics.contact_elements={CONTACT / size!r}")
 
 
-#: Sizes of the converged solution, the one that is judged first; those for claims that read wide, and those for claims
-#: that compare several runs of their own, around the preset "fast", which is 2.25: an error that both runs of a pair
-#: have is not in their difference.
+#: Sizes of the converged solution, the judged one first; sizes for claims that read wide; and sizes for claims that
+#: compare several runs of their own. The last are around the preset "fast", which is 2.25: an error that both runs of a
+#: pair share cancels in their difference.
 FINE = (0.5, 2**-0.5, 1.0)
 WIDE_FINE = (2**-0.5, 1.0, 2**0.5)
 PAIRED = tuple(2.25 * 2 ** (third / 3) for third in (-1, 0, 1))
-#: Those for changes of wide. A run with half the least angle of contact depends on its mesh: at 1.79 it stops in a step
-#: after contact, in which a triangle is inverted.
+#: Sizes for variants of wide. A run with half the least angle of contact depends on its mesh: at 1.79 it stops in a
+#: step after contact, in which a triangle is turned over.
 COMPARED = tuple(1.25 * 2 ** (half / 2) for half in (1, 2, 3))
 #: Size of the scheme beside claims that compare runs of their own, which are expensive.
 BESIDE_PAIRS = (2**0.5,)

@@ -72,7 +72,7 @@ def spanning() -> Finding:
 
 
 def as_layers_fall(run: Run, name: str) -> PaperCheck:
-    """The steepness of a run up to contact over that of a uniform layer on one wall with the same biomass."""
+    """Steepness of a run up to contact, over the steepness with a uniform layer of the same biomass on one wall."""
     scene = load_packaged(*run)
     part = float(around_contact(*run)["aggregate_area_um2"][1]) / (scene.pore.width * scene.pore.length)
     ratio = scene.flow.viscosity_ratio
@@ -95,7 +95,8 @@ def steepness(run: Run) -> float:
 @claim("C17", "2.1", "lambda = 2000 allows a permeability reduction of up to 2000 (pore filled over its length)",
        about=CLOSED)
 def filled() -> Finding:
-    """Clean over filled conductivity, biomass in every triangle of the whole pore, at the default mesh."""
+    """Conductivity of the clean pore over that of the pore filled with biomass, on the default mesh of the entire
+    pore."""
     scene = load_packaged("flow_only")
     half = scene.pore.length / 2
     empty, _ = generate(None, (-half, half), sized(scene))

@@ -57,8 +57,9 @@ def fully_meshed_pore(*changes: str) -> tuple[Scene, Pore, Solved]:
 def upstream_profile() -> Finding:
     """Concentrations upstream in the wholly meshed pore of base at 19.2 h against (26), alpha fitted at one section.
 
-    The section is 1 W from the aggregate, where the mesh may end (C19). Compared are the means over sections from there
-    to the pore's inlet, and the range of concentrations within a section: (26) takes them as constant there.
+    The section is 1 W from the aggregate, where the mesh may end (C19). The claim compares the means over sections from
+    there to the pore's inlet, and reports the range of concentrations within a section, in which (26) takes them as
+    constant.
     """
     scene, pore, solved = fully_meshed_pore()
     x = np.linspace(pore.outline.upstream - scene.pore.width, -scene.pore.length / 2, 40)
@@ -103,7 +104,7 @@ def downgradient_end() -> Finding:
     rate = scene.flow.mean_velocity / scene.substrates.acceptor.diffusivity
     decay = np.log(effects[1] / effects[2]) / (0.5 * (LENGTHS[2] - LENGTHS[1])) / rate
     checks = (at_most("uptake, (12) put at the end of the meshed part: change (%)", "not affected",
-                      apart(uptake(central), uptake(full)), 100 * TRANSPORT, TRANSPORT_WORDS),
+                      largest_difference(uptake(central), uptake(full)), 100 * TRANSPORT, TRANSPORT_WORDS),
               at_most("uptake, any value held at the end of 600 um: change (%)", "not affected", effects[0],
                       100 * FEW, FEW_WORDS),
               near("its decay with the pore's length, over u_ave / D_A", "if long enough", decay, 1.0, 0.05,
@@ -122,10 +123,11 @@ def end_effect(*changes: str) -> float:
     """Largest change (%) of the uptake if C at the pore's end is zero, or the supply."""
     _, pore, solved = fully_meshed_pore(*changes)
     outlet = pore.space.outlet.nodes
-    return max(apart(uptake(holding(pore, solved, outlet, part)), uptake(solved)) for part in (0.0, 1.0))
+    prescribed = [solve_with_prescribed(pore, solved, outlet, part) for part in (0.0, 1.0)]
+    return max(largest_difference(uptake(other), uptake(solved)) for other in prescribed)
 
 
-def holding(pore: Pore, solved: Solved, nodes: np.ndarray, part: float) -> Solved:
+def solve_with_prescribed(pore: Pore, solved: Solved, nodes: np.ndarray, part: float) -> Solved:
     """Solve again with both concentrations prescribed as a part of their supply at some nodes, at the outlet instead of
     (12)."""
     problem, state = solved.problem, solved.concentrations
@@ -143,7 +145,7 @@ def holding(pore: Pore, solved: Solved, nodes: np.ndarray, part: float) -> Solve
     return replace(solved, problem=problem, concentrations=state, fluxes=transport.fluxes(problem, sink, state))
 
 
-def apart(computed: np.ndarray, other: np.ndarray) -> float:
+def largest_difference(computed: np.ndarray, other: np.ndarray) -> float:
     """Largest relative difference, %."""
     return 100 * float(np.abs(computed / other - 1).max())
 
@@ -183,8 +185,8 @@ def _errors(scene, radius: float) -> np.ndarray:
 
 
 def _numbers(scene, grid: Mesh) -> list[float]:
-    """Conductivity with an exact clean part, to which the aggregate adds what it adds to this mesh without biomass; and
-    both effluents."""
+    """Conductivity, and both effluents. The resistance is the exact one of the clean pore, plus the difference that the
+    biomass makes on this mesh."""
     flow, fluxes = solution(scene, grid, full_biomass(scene, grid))
     added = 1 / flow.conductivity - 1 / flow_in(scene, emptied(grid)).conductivity
     return [1 / (added + 1 / clean(scene)), *(flux.effluent for flux in fluxes)]
@@ -197,7 +199,8 @@ def emptied(grid: Mesh) -> Mesh:
 
 
 def nested(scene, radius: float, reaches: list[float]) -> list[Mesh]:
-    """Meshes around a half-disc to ascending distances (um) from it, and to the pore's ends, each part of the next."""
+    """Meshes around a half-disc to ascending distances (um) from it, and to the pore's ends. Each is a part of the next
+    one."""
     meshes = [half_disc(scene, radius, reaches[0])]
     for end in (*(radius + reach for reach in reaches[1:]), scene.pore.length / 2):
         meshes.append(lengthened(meshes[-1], end, sized(scene).largest))
@@ -205,7 +208,7 @@ def nested(scene, radius: float, reaches: list[float]) -> list[Mesh]:
 
 
 def lengthened(mesh: Mesh, end: float, size: float) -> Mesh:
-    """A mesh with columns of triangles of a length (um) at most beyond both ends, to -end and end."""
+    """Extend a mesh to -end and end (um) by columns of triangles, each at most ``size`` (um) long."""
     for line, start in zip((mesh.topology.inlet, mesh.topology.outlet), mesh.ends):
         places = np.linspace(start, np.copysign(end, start), 1 + int(np.ceil((end - abs(start)) / size)))
         mesh = _with_columns(mesh, line, places[1:])
@@ -213,8 +216,8 @@ def lengthened(mesh: Mesh, end: float, size: float) -> Mesh:
 
 
 def _with_columns(mesh: Mesh, line: np.ndarray, places: np.ndarray) -> Mesh:
-    """With columns from a line of nodes to each of the places x in turn. No triangle has an edge on an end and one on a
-    wall: diagonals run from the outer node nearer to the middle of the pore."""
+    """Add columns of triangles from a line of nodes to each position x in turn. No triangle has an edge on an end and
+    one on a wall: diagonals run from the outer node nearer to the middle of the pore."""
     y = mesh.points[line, 1]
     new = np.column_stack([np.repeat(places, len(line)), np.tile(y, len(places))])
     numbers = len(mesh.points) + np.arange(len(new)).reshape(len(places), len(line))

@@ -3,15 +3,16 @@
 The committed record of the claims, `claims.json`: intervals and verdicts that a run on any machine must agree with.
 
 An entry has the date of its definition, `defined`, and the time of the first value that was recorded for it,
-`first_value`. `other_definitions` are those that the claim had before or after, with their outcomes and the reason why
-they were replaced. A claim counts with the verdict of its first definition.
+`first_value`. `other_definitions` are earlier and later definitions of the claim, with their outcomes and the reason
+why they were replaced. A claim counts with the verdict of its first definition.
 
 A check's `value` lies in `low` to `high` (numerics), the paper's in `paper_low` to `paper_high` (printing, null for
 words), and `input_low` to `input_high` is its range as the inputs of Table 1 move within their rounding (from the
 committed record of the sensitivities or a closed form; null if neither has it). `scheme_2001` is the range that the
 paper's scheme gives on one to three meshes, for a claim about the scheme that of all its levels. `on_sizes` are the
-values on the sizes of the converged solution, the judged one first, and `order` is that which is observed on them, or
-on the meshes of the scheme; null where none fits.
+values on the sizes of the converged solution, the judged one first, and `order` is the order observed on them, or on
+the meshes of the scheme; null if no order fits. If the run ended before a number was reached, `value` is the end of the
+run, a lower bound: `high` is null, an open end, and so is `scheme_2001`.
 """
 
 import textwrap
@@ -61,7 +62,7 @@ class Row:
 
     @property
     def checks(self) -> tuple[PaperCheck, ...]:
-        """Those that have a bar: none of a claim that came to an error."""
+        """The checks that have a bar: none if the claim failed with an error."""
         return tuple(check for check in self.finding.checks if check.bar) if self.finding else ()
 
     @property
@@ -78,12 +79,12 @@ class Row:
 
 
 def terminal_independence(checks: tuple[PaperCheck, ...]) -> str:
-    """The bounds as lines."""
+    """A line for each check with its bound."""
     lines = (f"     {c.quantity}: {c.value:.4g}, bound {c.paper}" for c in checks)
     return "\n".join([INDEPENDENCE, *lines]) + "\n"
 
 
-def spanned(pair: tuple[float, float] | None) -> str:
+def interval_text(pair: tuple[float, float] | None) -> str:
     """An interval in words; empty where there is none."""
     if pair is None:
         return ""
@@ -93,12 +94,19 @@ def spanned(pair: tuple[float, float] | None) -> str:
     return f"at least {low:.4g}" if isfinite(low) else f"at most {high:.4g}"
 
 
-def described(check: PaperCheck) -> str:
+def value_text(value: float, high: float | None) -> str:
+    """A number as text; or its lower bound, if the run ended before the number was reached. high: upper end of its
+    bar."""
+    return f"not reached by {value:.4g}" if high in (None, inf) else f"{value:.4g}"
+
+
+def check_text(check: PaperCheck) -> str:
     """A check with its widths."""
     widths = {"numerics": (check.bar.low, check.bar.high), "inputs": check.inputs, "scheme of 2001": check.scheme,
               "accepted": (check.low, check.high)}
-    words = (f"{name} {spanned(pair)}" for name, pair in widths.items() if pair)
-    return "; ".join([f"{check.quantity}: paper {check.paper}; ours {check.value:.4g}", *words, check.outcome])
+    words = (f"{name} {interval_text(pair)}" for name, pair in widths.items() if pair)
+    ours = value_text(check.value, check.bar.high)
+    return "; ".join([f"{check.quantity}: paper {check.paper}; ours {ours}", *words, check.outcome])
 
 
 def _paragraph(text: str, indent: str = "     ") -> str:
@@ -115,7 +123,7 @@ def terminal(row: Row) -> str:
         finding = row.finding
         remarks = {"about": row.claim.about, "changed": finding.change, "because": row.reason,
                    "inputs": finding.rounding, "steps are not varied": row.claim.fixed, "note": finding.note, **remarks}
-    lines = [*map(described, row.checks), *(f"{name}: {text}" for name, text in remarks.items() if text)]
+    lines = [*map(check_text, row.checks), *(f"{name}: {text}" for name, text in remarks.items() if text)]
     head = _paragraph(f"{row.id}  {row.verdict.upper()}: {row.claim.text} (paper: {row.claim.where})", "")
     return "\n".join([head, *map(_paragraph, lines)]) + "\n"
 
@@ -127,8 +135,8 @@ def other_definitions() -> dict[str, list[dict]]:
 
 
 def definitions(entry: dict) -> list[dict]:
-    """The definitions of a recorded claim with their verdicts and reasons, the first one first; that without a verdict
-    alone where a claim is not judged any more."""
+    """The definitions of a recorded claim with their verdicts and reasons, the first one first; only the present one if
+    the claim is not judged any more."""
     if entry["verdict"] == NOT_JUDGED:
         return [entry]
     return sorted([entry, *entry["other_definitions"]], key=lambda each: each["defined"])
@@ -140,14 +148,14 @@ def counted(entry: dict) -> dict:
 
 
 def describe_verdicts(entry: dict) -> str:
-    """The verdict that counts, with the last definition's beside it where the claim was defined anew."""
+    """The verdict that counts; if the claim was defined anew, also the verdict of the last definition."""
     first, *later = definitions(entry)
     return f"{first['verdict']} (as defined anew: {later[-1]['verdict']})" if later else first["verdict"]
 
 
 def distinct(entries: list[dict]) -> dict[tuple[str, str], str]:
     """{(claim, printed text): outcome} of the distinct values that the paper prints and a solution predicts. A value
-    that several checks of a claim judge counts once: it holds where all of them do, and fails where one does."""
+    that several checks of a claim judge counts once: it holds if all of them hold, and fails if one fails."""
     outcomes: dict[tuple[str, str], set[str]] = {}
     for entry in entries:
         for check in entry["checks"]:
@@ -186,7 +194,7 @@ def read() -> list[dict]:
 
 
 def replaced(entries: list[dict]) -> list[dict]:
-    """The record with some claims anew, in order."""
+    """The record with the entries of some claims replaced, in order."""
     known = {each["id"]: each for each in (*read(), *entries)}
     return [known[id] for id in sorted(known)]
 
@@ -238,7 +246,8 @@ def _finite(value: float) -> float | None:
 
 
 def differences(entries: list[dict], committed: list[dict]) -> list[str]:
-    """Where claims do not agree with the record, a line each: another verdict or outcome, a number out of its interval.
+    """One line for each disagreement of claims with the record: another verdict or outcome, or a number outside its
+    interval.
     """
     known = {each["id"]: each for each in committed}
     return [f"{each['id']}: {line}" for each in entries for line in _of_claim(each, known.get(each["id"]))]
@@ -267,15 +276,15 @@ def _quantities(entry: dict) -> list[str]:
 
 def inside(value: float | None, low: float | None, high: float | None) -> bool:
     """Whether a value lies in a recorded interval, up to round-off. An open end is None."""
-    if value is None or low is None or high is None:
-        return value is None and (low is None or high is None)
-    near = LAST_DIGITS * max(abs(low), abs(high)) + ROUND_OFF
-    return low - near <= value <= high + near
+    if value is None:
+        return low is None or high is None
+    near = LAST_DIGITS * max(abs(end) for end in (low, high, 0.0) if end is not None) + ROUND_OFF
+    return (low is None or low - near <= value) and (high is None or value <= high + near)
 
 
 @dataclass(frozen=True)
 class Flip:
-    """A recorded verdict that is another one with a bound moved by the bar of its number.
+    """A recorded verdict that changes if a bound moves by the bar of its number.
 
     id: the claim; quantity: of the check; verdict: with the moved bound.
     """
@@ -294,7 +303,7 @@ def flips(entry: dict) -> list[Flip]:
 
 
 def _moved(check: dict) -> list[tuple[float, float]]:
-    """The bounds of a check, one of them moved by the bar; none where that has no end."""
+    """The bounds of a check, one of them moved by the bar; empty if the bar has an open end."""
     low, high = ends(check["tolerance"])
     first, last = ends(check)
     half = 0.5 * (last - first)

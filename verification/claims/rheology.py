@@ -64,11 +64,11 @@ def other_rheology() -> Finding:
     the pore onto the other; shift of the time of contact; and change of the conductivity after it."""
     checks = tuple(check for name, change in VARIANTS.items() for check in _changes(name, (*WIDE_TO_END, change)))
     worst = "; ".join(f"{check.quantity} {check.value:.3g}" for check in checks if not check.holds)
-    moved, where, left = slid((*WIDE_TO_END, VARIANTS[RECHOSEN]))
+    shift, before, after = outline_shift((*WIDE_TO_END, VARIANTS[RECHOSEN]))
     change = ("the place along the pore, which is the same all along, is not compared: it is that of the fixed points. "
-              f"With its middles rechosen the aggregate slides {moved:.1f} um downstream as it grows on the other "
-              f"side, with the same shape. Where they lie, the outlines are {where:.2g} % of the area apart, and "
-              f"{left:.2g} % moved back; how far has no limit in a mesh")
+              f"With its middles rechosen the aggregate slides {shift:.1f} um downstream as it grows on the other "
+              f"side, with the same shape. Where they lie, the outlines are {before:.2g} % of the area apart, and "
+              f"{after:.2g} % moved back; how far has no limit in a mesh")
     angles = " and ".join(f"{conductivity_change((*WIDE_TO_END, VARIANTS[f'angle {word}']), AFTER[:1]):+.2g} %"
                           for word in ("halved", "doubled"))
     note = (f"The least angle says how much of the narrow wedges beside the contact is filled: at {AFTER[0]:g} h the "
@@ -80,14 +80,14 @@ def other_rheology() -> Finding:
 
 def _changes(name: str, run: Run) -> tuple[PaperCheck, ...]:
     """What a variant of WIDE_TO_END changes."""
-    changes = {f"outlines apart at {END} h, one moved onto the other (% of the area)": slid(run)[2],
+    changes = {f"outlines apart at {END} h, one moved onto the other (% of the area)": outline_shift(run)[2],
                "time of contact (%)": 100 * (contact_time(*run) / contact_time(*WIDE_TO_END) - 1),
                f"conductivity, mean of {AFTER[0]:g} to {AFTER[-1]:g} h (%)": conductivity_change(run)}
     return tuple(at_most(f"{name}: {quantity}", "not substantially", abs(change), 100 * FEW, FEW_WORDS)
                  for quantity, change in changes.items())
 
 
-def slid(run: Run) -> tuple[float, float, float]:
+def outline_shift(run: Run) -> tuple[float, float, float]:
     """Compare a run's outline at END with that of WIDE_TO_END: the shift (um) of its centroid downstream, and the area
     that only one of both covers (%), before and after the shift is removed."""
     default, other = (polygon(body(chosen, END).outline) for chosen in (WIDE_TO_END, run))

@@ -46,8 +46,8 @@ ROWS = {"base": (0.2, *map(float, range(1, 20)), 19.2, 19.4), "wide": tuple(map(
 #: Hours after wide's contact of which conductivities are means: those of `verification.sensitivity.wide`, to the end of
 #: Figure 6, every second shape update of the paper.
 AFTER = tuple(round(35 + 2 * UPDATE * number, 1) for number in range(26))
-#: Changes that have no effect until the aggregate is near the opposite wall, by the first letters of their keys, and
-#: the part of the pore's width up to which it is not.
+#: Beginnings of the keys whose changes have no effect until the aggregate is near the opposite wall; and the thickness
+#: over the pore's width up to which it is not near.
 LATE, NEAR = ("growth.minimum_film", "growth.minimum_contact_angle"), 0.9
 #: Time (h) from the last shape with a film to contact: 18 s.
 FILM = 0.005
@@ -90,7 +90,7 @@ def ending(scene: Scene, *times: float) -> Scene:
 
 
 def _with_rows(scene: Scene) -> Scene:
-    """The scene with its rows, where it grows and names none."""
+    """The scene with the rows of ROWS, if it grows and requests none."""
     if scene.growth is None or scene.output.times:
         return scene
     times = tuple(time for time in ROWS[scene.name] if time <= scene.growth.end + 1e-9)
@@ -99,8 +99,8 @@ def _with_rows(scene: Scene) -> Scene:
 
 @dataclass(frozen=True, eq=False)
 class History:
-    """A run. instants: those of its rows; contact: the last instant before it touches the opposite wall and the first
-    after, None where it does not; far: the last state that is not NEAR that wall."""
+    """A run. instants: those of its rows; contact: the last instant without contact with the opposite wall and the
+    first one with it, None without contact; far: the last state that is not NEAR that wall."""
 
     scene: Scene
     instants: tuple[Report, ...]
@@ -110,8 +110,8 @@ class History:
 
 @cached
 def history(*run: str) -> History:
-    """One run, computed. With a change that is LATE its rows begin where it can differ from the run without it. Raises
-    SimulationError where it fails."""
+    """Compute one run. If a change is LATE, the run starts from ``far`` of the run without it. Raises SimulationError
+    if the run fails."""
     scene = load_packaged(*run)
     plain = tuple(change for change in run if not change.startswith(LATE))
     instants: list[Report] = []
@@ -356,7 +356,7 @@ def plug(scene, first: float, last: float) -> Mesh:
 
 def halved(lattice: np.ndarray, falling=False) -> np.ndarray:
     """(2 (m - 1) (n - 1), 3) triangles of a lattice of nodes (m, n), along x and y: squares halved by the diagonal that
-    rises with x, or falls where it is to."""
+    rises with x, or by the falling one where ``falling``."""
     near, far = lattice[:-1], lattice[1:]
     a, b, c, d = (corner.ravel() for corner in (near[:, :-1], far[:, :-1], far[:, 1:], near[:, 1:]))
     return np.hstack([np.where(falling, [a, b, d], [a, b, c]), np.where(falling, [b, c, d], [a, c, d])]).T

@@ -67,8 +67,8 @@ BOOKED = "the update of 12 min is the paper's, and what this balance makes of it
 class Bookkeeping:
     """The balance of each step k of a run, by the paper's definitions and by F1 to F4 (per um of depth).
 
-    end: (k,) h; volume: (k,) um2, what flows in; made: (k,) biomass from F3 + F4; consumed: (2, k) from F1, F2;
-    grown: (k,) the paper's dM_X; effluent: (2, k) mg/L at t0 + dt before the expansion; supply: (2, 1) mg/L.
+    end: (k,) h; volume: (k,) um2 of water that flows in; synthesised: (k,) biomass from F3 + F4; consumed: (2, k) from
+    F1, F2; grown: (k,) the paper's dM_X; effluent: (2, k) mg/L at t0 + dt before the expansion; supply: (2, 1) mg/L.
     """
 
     end: np.ndarray
@@ -93,8 +93,8 @@ class Bookkeeping:
 def bookkeeping(run) -> Bookkeeping:
     """The balance of each step of a run that reports every step.
 
-    The ledger holds the mean of the outflows at both ends of a step, so that the one at its end, before the expansion,
-    follows from the one at its beginning.
+    The ledger has the mean of the outflows at the beginning and at the end of a step. The outflow at the end, before
+    the expansion, follows from this mean and the outflow at the beginning.
     """
     steps = ledger(*run)
     rows = series(*run)
@@ -127,7 +127,7 @@ def papers_bookkeeping() -> Finding:
                        "the paper's bound"))
     reason = (f"{_time_lag(book)}. An effluent that is 1.6 % higher exceeds its supply until {exceeding(book):.1f} h "
               "[E18], so that this cannot have been a correction of all effluents")
-    return Finding(tuple(checks), reason=reason, note=_of_pairs(expected))
+    return Finding(tuple(checks), reason=reason, note=_describe_printed_range(expected))
 
 
 #: The ratios that the paper compares with their expected values.
@@ -135,8 +135,8 @@ RATIOS = ("dM_X/dM_CA", "dM_X/dM_CD", "dM_CA/dM_CD")
 
 
 def printed_ratios(correction: float) -> tuple[float, float]:
-    """Least and greatest dM_CA / dM_CD that the printed effluents give, times a correction: it falls with the
-    acceptor's and rises with the donor's."""
+    """Least and greatest dM_CA / dM_CD from the printed effluents times a correction. The ratio falls with the
+    acceptor's effluent and rises with the donor's."""
     (low_a, high_a), (low_d, high_d) = PRINTED_EFFLUENTS
     return ratio_of(correction, high_a, low_d), ratio_of(correction, low_a, high_d)
 
@@ -146,8 +146,8 @@ def ratio_of(correction: float, acceptor, donor):
     return (SUPPLY - acceptor * correction) / (SUPPLY - donor * correction)
 
 
-def _of_pairs(expected: float) -> str:
-    """How far the printed digits go, in words."""
+def _describe_printed_range(expected: float) -> str:
+    """Describe the range of dM_CA / dM_CD that the printed digits admit."""
     errors = [100 * (ratio / expected - 1) for ratio in printed_ratios(PAPER_CORRECTION)]
     return (f"Effluents that print as 4.19 and 6.13, raised by 1.6 %, make dM_CA/dM_CD {errors[0]:+.2f} to "
             f"{errors[1]:+.2f} % off.")
@@ -298,8 +298,8 @@ DISTURBED, LOOKED_AT = 0.01, (3, 6)
        "stable for long steps (steps saved by the control)", about=OF_SCHEME, sizes=BESIDE, steps=ALONE,
        fixed="an update of 12 min is the paper's, and the steps within it are asked")
 def step_control() -> Finding:
-    """Errors of the transport of one shape update (12 min) of base at t = 0 and 19.2 h, and what becomes of a
-    disturbance of the profiles in long equal steps where no biomass grows.
+    """Errors of the transport of one shape update (12 min) of base at t = 0 and 19.2 h, and the growth of a disturbance
+    of the profiles in long equal steps if no biomass grows.
 
     The error is the largest of both concentrations (over the supply) and of the biomass made (relative), against a
     tolerance of 1e-7. The scheme is unstable if the disturbance grows from step to step; a disturbance that dies out is
@@ -328,7 +328,7 @@ def step_control() -> Finding:
 
 
 def _steps(advance: gear.Advance) -> str:
-    """The steps of an update, in words."""
+    """Describe the steps of an update."""
     return f"{len(advance.steps)} steps of {HOUR * min(advance.steps):.2g} to {HOUR * max(advance.steps):.3g} s"
 
 

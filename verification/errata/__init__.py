@@ -72,7 +72,7 @@ def percent(ratio: float, digits: int = 2) -> str:
 
 
 def small(value: float) -> str:
-    """A defect with one digit, or "round-off", whose digits differ between machines."""
+    """A defect with one digit, or "round-off" for a defect whose digits differ between machines."""
     return f"{value:.0e}" if abs(value) > 1e-12 else "round-off"
 
 

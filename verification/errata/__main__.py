@@ -7,7 +7,7 @@ import numpy as np
 
 import verification.errata as package
 from repro.results import write_text
-from verification.claims.evaluate import import_all, side_by_side
+from verification.claims.evaluate import import_all, map_in_parallel
 from verification.errata import ERRATA, filled
 
 REPORT = Path(__file__).parents[2] / "reference" / "ERRATA.md"
@@ -44,7 +44,7 @@ def main(arguments: list[str]) -> int:
     if unknown:
         print(f"errata: there is no {', '.join(unknown)}; {', '.join(known)} are accepted", file=sys.stderr)
         return 2
-    text = "\n".join(side_by_side(entry, arguments or known))
+    text = "\n".join(map_in_parallel(entry, arguments or known))
     if arguments:
         print(text)
     else:

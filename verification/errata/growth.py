@@ -43,7 +43,7 @@ class Cylinder:
         return float(np.sqrt(pairs.square(mesh, pressure - self.pressure) / pairs.square(mesh, self.pressure)))
 
     def place_error(self, position: np.ndarray) -> float:
-        """Largest error of a place over the radius."""
+        """Largest error of a position over the radius."""
         return float(np.linalg.norm(position - self.position, axis=1).max() / self.position[:, 0].max())
 
 
@@ -143,7 +143,8 @@ def stabilisation_scale() -> Numbers:
 
 
 def stabilisations(case: Cylinder) -> dict[str, np.ndarray]:
-    """(t, 3, 3) none, that of t = 0, and those of the present shape with the modulus of t = 0 and with its own."""
+    """(t, 3, 3) stabilisations: none, that of t = 0, and those of the present shape with the modulus of t = 0 and with
+    the present modulus."""
     cells, ones = case.body.cells, np.ones(len(case.theta))
     start = growth.gradient_stabilisation(case.body.reference, cells, ones)
     present = [growth.gradient_stabilisation(case.position, cells, expansion)
@@ -152,9 +153,8 @@ def stabilisations(case: Cylinder) -> dict[str, np.ndarray]:
 
 
 def equilibrium_errors(case: Cylinder, stabilising: np.ndarray) -> tuple[float, float, float]:
-    """Errors of the equilibrium next to the exact one: of the pressure in L2, at its worst node, of the places.
-
-    Raises GrowthError where none is found.
+    """Errors of the equilibrium that Newton's method reaches from the exact one: of the pressure in L2 and at its worst
+    node, and of the positions. Raises GrowthError if it does not converge.
     """
     system = growth.System(case.body, case.body.constrained, stabilisation=growth.PressureGradient(stabilising))
     exact = growth.Equilibrium(case.position, case.pressure, 0)
@@ -256,7 +256,7 @@ def transfers() -> Numbers:
     return {"table": table(head, rows), "overshoot": f"{100 * (largest - 1):.1f} %"}
 
 
-#: How the field of :func:`chain` goes to the next mesh.
+#: Methods that transfer the field of :func:`chain` to the next mesh.
 TRANSFER = {"linear": transfer.interpolated, "conserving": transfer.project}
 
 

@@ -1,5 +1,5 @@
-"""E2, E10: what the flow's equations leave open; E7, E12, E13, E16: what happens in a step, and what is not printed;
-E20: the point that stays where it is."""
+"""E2, E10: choices that the flow's equations leave open; E7, E12, E13, E16: the order of operations in a step, and
+parameters that are not printed; E20: the fixed point of a contact surface."""
 
 import numpy as np
 
@@ -145,7 +145,8 @@ HALF_STEP = switches.changed('growth.time_step="6 min"')
         After contact the worst nodes are at the contact lines, where biomass, water and wall meet and films close: at
         {time} h, when it is worst, the root mean square over the aggregate is {rms}.""")
 def density_drift() -> Numbers:
-    """Base and wide, theta restarting as J X / X_m or as J, apart before and after contact with the opposite wall."""
+    """Drift of the density in base and wide if theta restarts as J X / X_m or as J. The rows of wide are split at
+    contact with the opposite wall."""
     rows = []
     for run in (BASE, WIDE):
         contact = series(*run)["contact"]

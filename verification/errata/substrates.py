@@ -1,5 +1,5 @@
-"""E1, E3, E4, E9, E14, E18: what is consumed, supplied and balanced; E19, E21-E23: what can be checked of Table 1 and
-of the text without computing anything large."""
+"""E1, E3, E4, E9, E14, E18: consumption, supply and balances; E19, E21-E23: checks of Table 1 and of the text without a
+run."""
 
 from dataclasses import replace
 from math import atan, cbrt, degrees, exp, log
@@ -94,8 +94,8 @@ def acceptor_and_donor_uptake(law) -> np.ndarray:
 
 
 def electron_defect(law) -> float:
-    """Oxygen taken up by a reading of (7) + oxygen demand of the biomass made - that of the donor taken up, over the
-    oxygen taken up."""
+    """Defect of the oxygen demand under a reading of (7): (oxygen taken up + oxygen demand of new biomass - oxygen
+    demand of the donor taken up) / oxygen taken up."""
     scene = load_packaged(*BASE)
     weight, acceptor, donor = plotted_biomass()
     present = rate_law(scene.substrates, scene.kinetics)
@@ -183,7 +183,7 @@ def printed_effluents() -> Numbers:
         one of all effluents: raised by 1.6 %, one of them (the donor's, the longer) exceeds its supply until
         {until} h.""")
 def balance_formula() -> Numbers:
-    """The paper's dM_C over the integrals of F1 and F2, in some steps of base."""
+    """Ratio of the paper's dM_C to the integrals of F1 and F2, in some steps of base."""
     book, columns = bookkeeping(BASE), series(*BASE)
     after = np.array([columns[f"effluent_{name}_mg_per_L"][1:] for name in ("acceptor", "donor")])
     kinds = {"before the expansion": book.effluent, "after it": after}
@@ -228,8 +228,8 @@ def smaller_points() -> Numbers:
     return {"table": table(["where", "printed", "our reading, consequence"], rows)}
 
 
-#: Printed diffusivity in water, cm2/d; molar volume at the boiling point, cm3/mol, with which the method of Hayduk &
-#: Laudie is used (LeBas).
+#: Printed diffusivity in water, cm2/d; molar volume at the boiling point by LeBas, cm3/mol, as the method of Hayduk &
+#: Laudie takes it.
 SUBSTRATES = {"oxygen": (2.32, 25.6), "phenol": (1.01, 103.4)}
 ZERO_C = 273.15
 

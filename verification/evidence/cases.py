@@ -24,7 +24,7 @@ KINDS = ("exact", "manufactured", "cross-code", "property")
 STAGES = ("flow", "transport", "growth", "reprojection", "mesh_motion", "coupling", "hard")
 #: Numerics that a case may run with: elements of order 1, 2 and 3, and the presets of whole scenes.
 NUMERICS = ("1", "2", "3", "paper", "fast", "accurate", "exact")
-#: The numerics that a word of a label stands for, unless it is one of them itself.
+#: The numerics that a word in a label means, for words that are not names of numerics.
 OF_LABELS = {"linear": "1", "quadratic": "2", "cubic": "3", "order 1": "1", "order 2": "2", "order 3": "3",
              "straight": "1", "curved": "2", "of cubic scenes": "3"}
 

@@ -22,7 +22,7 @@ ORDERS, PRESETS = NUMERICS[:3], NUMERICS[3:]
 #: Why a case does not run with presets, or not with all of them.
 ALONE = "presets: the stage alone, with the elements that they choose"
 ONE_BY_ONE = "other presets: their elements, by themselves"
-#: Why cases of a stage that run with accurate do not run with exact, where the case does not say it.
+#: Why cases of a stage that run with accurate do not run with exact, unless the case gives its own reason.
 SAME = "exact: the elements and the order of accurate"
 EXACT = {"flow": SAME, "transport": SAME,
          "hard": "exact: the scheme of accurate, and some times slower; its contact and remeshes: coupling-contact, "
@@ -83,7 +83,7 @@ def row(case: Case) -> tuple[str, ...]:
 
 
 def reasons(case: Case) -> str:
-    """Why it does not run with the others; "" where it runs with all."""
+    """Why a case does not run with the other numerics; "" if it runs with all."""
     missing = _unexplained_presets(case)
     default = ONE_BY_ONE if missing else ""
     if missing == PRESETS:
@@ -94,12 +94,12 @@ def reasons(case: Case) -> str:
 
 
 def _unexplained_presets(case: Case) -> tuple[str, ...]:
-    """The presets that it neither runs with nor tells of."""
+    """The presets that the case neither runs with nor mentions in ``omitted``."""
     return tuple(preset for preset in PRESETS if preset not in case.numerics and preset not in case.omitted)
 
 
 def _exact_alone(case: Case) -> bool:
-    """Does it tell of all presets but exact, and run with accurate?"""
+    """Whether the case runs with accurate and ``omitted`` mentions all presets except exact."""
     return "accurate" in case.numerics and _unexplained_presets(case) == ("exact",)
 
 
@@ -120,7 +120,7 @@ def line(part: Part) -> tuple[str, ...]:
 
 def mutants_of(part: Part) -> list[str]:
     """Ids of the wrong changes to its files."""
-    return [id for id, mutant in runner.everything().items() if mutant.file.startswith(part.files)]
+    return [id for id, mutant in runner.mutants_by_id().items() if mutant.file.startswith(part.files)]
 
 
 def cases_of(part: Part) -> list[str]:

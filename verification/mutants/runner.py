@@ -38,7 +38,7 @@ from verification.evidence.writing import REPORT, ROOT, load, save
 from verification.mutants import Mutant
 
 RECORD = REPORT / "mutants.json"
-#: How the message of a failure begins that catches a mutant: an assertion, `pytest.fail` or `pytest.raises`, a guard.
+#: Beginnings of the messages of failures that catch a mutant: an assertion, `pytest.fail` or `pytest.raises`, a guard.
 CATCH = ("assert", "AssertionError", "Failed: ", "repro.")
 #: How the report of a failed fixture begins.
 IN_FIXTURE = re.compile(r'^failed on (setup|teardown) with "')
@@ -88,14 +88,14 @@ def load_mutants() -> dict[str, tuple[Mutant, ...]]:
     return stages
 
 
-def everything() -> dict[str, Mutant]:
+def mutants_by_id() -> dict[str, Mutant]:
     """All mutants by id."""
     return {mutant.id: mutant for mutants in load_mutants().values() for mutant in mutants}
 
 
 def caught_by(catchers: str) -> dict[str, Mutant]:
     """The mutants that "cases" or "tests" must catch, by id."""
-    return {id: mutant for id, mutant in everything().items() if bool(mutant.tests) == (catchers == "tests")}
+    return {id: mutant for id, mutant in mutants_by_id().items() if bool(mutant.tests) == (catchers == "tests")}
 
 
 def mutated(mutant: Mutant) -> str:
@@ -162,7 +162,7 @@ def _message(failure: ElementTree.Element) -> str:
 
 
 def _run_tests(folder: Path, report: Path, tests: Iterable[str]) -> int | None:
-    """The exit status of pytest, after which nothing that it started runs; None if it was not done in time."""
+    """The exit status of pytest, or None after a timeout. All processes that it started are ended."""
     command = [sys.executable, "-m", "pytest", "-n0", "-p", "no:cacheprovider", f"--junitxml={report}", *tests]
     environment = {**os.environ, "PYTHONPATH": str(folder), "HOME": str(folder.parent), "PYTHONDONTWRITEBYTECODE": ""}
     child = subprocess.Popen(command, cwd=folder, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
@@ -179,7 +179,7 @@ def _run_tests(folder: Path, report: Path, tests: Iterable[str]) -> int | None:
 
 def main(arguments: list[str] | None = None) -> int:
     """Entry point; 0 if every mutant is caught, and no case or test passes with a mutant that it names."""
-    known = everything()
+    known = mutants_by_id()
     parser = argparse.ArgumentParser(prog="python -m verification.mutants", description="Run wrong changes of repro.")
     parser.add_argument("ids", nargs="*", metavar="MUTANT", choices=[*known, []], default=[], help="all by default")
     parser.add_argument("--every", action="store_true", help="against every case that names it, not to the first catch")
@@ -195,7 +195,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 def run_all(ids: Iterable[str], jobs: int, every: bool = False) -> list[Outcome]:
     """Outcomes in the order of ``ids``, several mutants side by side. Each is printed and recorded as it ends."""
-    known, outcomes = everything(), []
+    known, outcomes = mutants_by_id(), []
     with ThreadPoolExecutor(jobs) as pool:
         for outcome in pool.map(lambda id: run(known[id], every), ids):
             outcomes.append(outcome)
@@ -207,7 +207,7 @@ def run_all(ids: Iterable[str], jobs: int, every: bool = False) -> list[Outcome]
 
 
 def judge(outcomes: list[Outcome]) -> bool:
-    """Print what is wrong; whether every mutant is caught, and by every case and test that it was run against."""
+    """Print the failures. Return whether every case and test caught each mutant that it was run against."""
     wrong = [f"survives: {outcome.mutant}" for outcome in outcomes if not outcome.caught_by]
     count = f"{len(outcomes) - len(wrong)} of {len(outcomes)} mutants caught."
     wrong += [f"{name} passes with {outcome.mutant}, which it names" for outcome in outcomes
@@ -218,19 +218,19 @@ def judge(outcomes: list[Outcome]) -> bool:
 
 def record(outcome: Outcome) -> None:
     """Replace the record of a mutant."""
-    entry = {"caught_by": outcome.caught_by, "digest": digest(everything()[outcome.mutant], outcome.caught_by)}
+    entry = {"caught_by": outcome.caught_by, "digest": digest(mutants_by_id()[outcome.mutant], outcome.caught_by)}
     save({**recorded(), outcome.mutant: entry}, RECORD)
 
 
 def recorded() -> dict[str, dict]:
     """{mutant: {"caught_by": [case or test, ...], "digest": digits}} of all mutants."""
     records = load(RECORD, {})
-    return {id: records.get(id, {"caught_by": [], "digest": ""}) for id in everything()}
+    return {id: records.get(id, {"caught_by": [], "digest": ""}) for id in mutants_by_id()}
 
 
 def fresh() -> set[str]:
     """The mutants whose record is of the present code."""
-    known = everything()
+    known = mutants_by_id()
     return {id for id, entry in recorded().items() if entry["digest"] == digest(known[id], entry["caught_by"])}
 
 

@@ -1,5 +1,5 @@
 """The law for networks: its table, from half-discs and the mean of grown plugs; its bounds, from all other shapes of
-the fit; its judgement by shapes outside of the fit; and its page.
+the fit; and its judgement by shapes outside of the fit.
 
 The fifty test shapes are half-discs, drawn bodies and plugs, and grown shapes. Their sizes, positions, pores,
 velocities and lambdas are random.
@@ -14,17 +14,16 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from repro.results import read_table
-from repro.results.network import FAST, UPTAKE_BOUND, added_resistance, known
-from verification.evidence.writing import markdown, table
-from verification.network import shapes, uptakes
+from repro.results.network import added_resistance, known
+from verification.network import shapes
 from verification.network.shapes import RATIOS, Growth, Sample, log_uniform
 
-#: Thicknesses over W of the table's half-discs, and areas over W^2 of its plugs: from where nearly all runs are in
-#: contact, as those that are earlier resist more than others.
+#: Thicknesses over W of the table's half-discs, and areas over W^2 of its plugs. The least area is one at which nearly
+#: all runs are in contact: runs with earlier contact resist more.
 THICKNESSES = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5, 0.55, 0.6, 0.65, 0.7, 0.75, 0.8, 0.85, 0.9, 0.92,
                0.94, 0.96, 0.98)
 PLUGS = (1.6, 1.75, 2.0, 2.25, 2.5, 3.0, 3.5, 4.0, 4.5)
-#: Runs of the fit: corners of the range of widths, velocities and supplies, and inside of it. None is base or wide.
+#: Runs of the fit: corners and inner points of the range of widths, velocities and supplies. None is base or wide.
 RUNS = (Growth(40, 1, 10, 5, 0, 52), Growth(50, 4, 20, 5, 10, 40), Growth(70, 6, 10, 5, 30, 38),
         Growth(80, 0.5, 20, 8, -20, 45), Growth(100, 1, 10, 8, 0, 55), Growth(100, 2.9, 4, 8, 0, 60),
         Growth(150, 2.9, 10, 10, 0, 40), Growth(150, 1, 20, 10, 0, 40))
@@ -64,7 +63,7 @@ def table_rows(discs: list[Sample], samples: list[Sample]) -> list[list]:
     shares, lengths = np.array([one.share for one in discs]), np.array([one.lengths for one in discs])
     plugs = np.array(PLUGS)
     apart = departures(before, lambda one: law(shares, lengths, one.share))
-    far = departures(after, lambda one: law(plugs, mean_of_runs(after, but=one.run), one.share))
+    far = departures(after, lambda one: law(plugs, mean_of_runs(after, left_out=one.run), one.share))
     return [*_lines(0, shares, lengths, bounds(shares, before, apart)),
             *_lines(1, plugs, mean_of_runs(after), bounds(plugs, after, far))]
 
@@ -85,10 +84,10 @@ def departures(samples: list[Sample], expected: Callable[[Sample], np.ndarray]) 
     return np.array([np.array(one.lengths) / expected(one) - 1 for one in samples])
 
 
-def mean_of_runs(samples: list[Sample], but: Growth | None = None) -> np.ndarray:
+def mean_of_runs(samples: list[Sample], left_out: Growth | None = None) -> np.ndarray:
     """(m, l) geometric mean of r at the areas PLUGS over the runs that reach them, one of them left out."""
     curves = []
-    for run in dict.fromkeys(one.run for one in samples if one.run not in (None, but)):
+    for run in dict.fromkeys(one.run for one in samples if one.run not in (None, left_out)):
         of_run = [one for one in samples if one.run == run]
         place = np.log([one.share for one in of_run])
         columns = np.log([one.lengths for one in of_run]).T
@@ -111,8 +110,6 @@ SHAPES = Path(__file__).with_name("shapes.csv")
 COLUMNS = ["unseen", "grown", "spanned", "viscosity_ratio", "area_over_width2", "added_length_over_width"]
 #: The lambda of the fit's shapes there: the paper's.
 RATIO = 2000.0
-#: Areas over W^2 that the page lists, before contact and after it.
-PAGE_SHARES = ((0.01, 0.03, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0, 1.2, 1.3, 1.4, 1.5), (1.6, 1.75, 2.0, 2.5, 3.0, 4.0, 4.5))
 
 
 def shape_row(one: Sample, new: int) -> list:
@@ -156,97 +153,6 @@ def judged(columns: dict[str, np.ndarray]) -> Judged:
     return Judged(apart, apart / np.where(apart < 0, least - law, most - law))
 
 
-def page(fit: dict[str, np.ndarray], check: Judged) -> str:
-    """`docs/network.md`."""
-    grown = int(fit["grown"].sum())
-    worst = 100 * np.expm1(np.abs(check.apart))
-    seen, new = uptakes.read(uptakes.FIT), uptakes.read(uptakes.NEW)
-    apart, bounds = uptakes.judged()
-    worst_state = (apart / bounds).argmax()
-    return f"""# A law for networks
-
-Made by `python -m verification.network`. For models of networks,
-`repro.added_resistance(area, width, spanned, viscosity_ratio)` computes the head loss that an aggregate of area A adds
-to a pore of width W.
-
-    head loss = 12 nu u_ave / (g W^2) (L + r W),        r = r(A / W^2, lambda, spanned)
-
-r W is the length of empty pore with the resistance that the aggregate adds. Stokes flow is linear and has no length
-scale, so r depends neither on u_ave nor on W. The position of the aggregate has no effect at 1.5 W or more from the
-pore's ends. Before contact r hardly depends on lambda until the film is thin. For a body that spans the pore, r is
-nearly proportional to lambda - 1: a plug with straight ends has exactly (lambda - 1) A / W^2, and rounded ends reduce
-it.
-
-At lambda = {RATIO:g}, with the bounds of shapes of the same area:
-
-{_markdown_table(False)}
-
-{_markdown_table(True)}
-
-The table, `repro/results/network.csv`, has r of half-discs and, after contact, the mean of the plugs grown in
-several runs. The bounds are the least and the largest r over that of the fit's {len(fit["grown"])} shapes, {grown} of
-them grown in pores of 40 to 150 um at 0.5 to 6 m/d and W^2 / 2500 (W in um) to 20 mg/L of both substrates, the others
-drawn: half-discs, bodies from 1 % thinner to 3 % thicker than a half-disc and leaning by up to 5 %, plugs with ends of
-other lengths. Grown plugs are compared with the mean of the other runs. With less substrate, diffusion limits
-growth, the aggregate is thicker before contact, and r exceeds the bounds: near contact r doubles if the thickness rises
-by some 5 %.
-
-The law is judged with {check.count} shapes that are not in the fit. Their sizes, outlines, places, widths, velocities,
-supplies and lambdas are drawn at random. {check.inside} are within the bounds; half of them are
-within {np.median(worst):.1f} % of the law, and the worst is {worst.max():.0f} % from it.
-
-The table has A / W^2 from {_range(False)} before contact and from {_range(True)} after it, and lambda from 100 to
-10 000. Thinner bodies follow half-discs, an empty pore adds nothing, and plugs of 1.41 to 1.6 have a wider lower bound.
-Without `spanned` the area decides the contact, and from 1.41 to 1.6 the bounds include both kinds. Elsewhere the
-function raises `ValueError` with the index of the throat; with `outside="nan"` that throat has no result. It holds
-for the paper's viscous aggregate with its own condition on the surface [E2]. With continuous traction the
-resistance of a half-disc differs by 0.2 %, that of a plug by 8 to 17 %.
-
-## Uptake
-
-`repro.uptake(area, width, velocity, acceptor, donor)` computes the uptake of both substrates and the growth of the
-area, with the kinetics of Table 1. It has the rates (7)-(10) at one concentration of each substrate in the aggregate.
-That concentration is below the supply because the inflow is limited and because diffusion to the aggregate needs a
-difference; `repro/results/network.py` has the equations. The range is A / W^2 to 4.5, widths of 40 to 150 um, and up
-to 10 m/d and 20 mg/L.
-
-`python -m verification.network uptake` solves states that a seed draws and fits the constants of the law to them:
-{_numbers(seen)}. Shapes do not change in a state; velocities are
-{uptakes.VELOCITIES[0]:g} to {uptakes.VELOCITIES[1]:g} m/d,
-supplies {uptakes.SUPPLIES[0]:g} to {uptakes.SUPPLIES[1]:g} mg/L.
-The bound is {uptakes.FACTOR:g} times the largest error of the fit, {100 * UPTAKE_BOUND:.3g} %; before contact it is
-more for a thick body in a fast flow, by a factor of 1 + {FAST:g} (Pe A / W^2)^2. This rule precedes the solution of
-the states below. The factor is from an earlier fit, with bounds of 5 % and, since one of 50 states had 5.9 %, of 7 %.
-
-Another seed draws {len(bounds)} other states: {_numbers(new)}.
-{int((apart <= bounds).sum())} are within the bound; half of them are within {100 * np.median(apart):.2g} % of the law.
-The worst is {100 * apart[worst_state]:.1f} % from it, where the bound is {100 * bounds[worst_state]:.0f} %.
-
-`make network` runs `docs/howto/openpnm_network.py`: 100 throats in OpenPNM with both laws, over 48 h. Its flow falls to
-0.117 of the first; a step of 1 h instead of 2 h changes this by 0.0002. No throat spans its width by then. The error of
-the laws over such a history is not known: whole runs of these throats have not been compared with it.
-"""
-
-
-def _numbers(states: dict[str, np.ndarray]) -> str:
-    """How many states there are, and of which kinds."""
-    grown, spanned = states["grown"] == 1, states["spanned"] == 1
-    return f"{(~grown).sum()} half-discs, {grown.sum()} grown shapes, {spanned.sum()} of them in contact"
-
-
-def _range(spanned: bool) -> str:
-    low, high = known(spanned)
-    return f"{low:.3g} to {high:.3g}"
-
-
-def _markdown_table(spanned: bool) -> str:
-    """A table in Markdown."""
-    shares = np.array(PAGE_SHARES[spanned])
-    head = (f"A / W^2, {'touching both walls' if spanned else 'before contact'}", "r", "least", "most")
-    rows = zip(shares, *added_resistance(shares, 1.0, spanned, RATIO))
-    return markdown([table(head, ("{:g} {:.3g} {:.3g} {:.3g}".format(*row).split() for row in rows))])
-
-
 SEED = 20261123
 HALF_DISCS = 10
 DRAWN_BODIES = DRAWN_PLUGS = 8
@@ -260,7 +166,7 @@ LARGEST, FURTHER = 3.0, 1.05
 
 
 def new_shapes() -> Iterator[Sample]:
-    """All fifty, each at a lambda of its own, or of its run."""
+    """All fifty shapes, each with a lambda of its own or with that of its run."""
     random = np.random.default_rng(SEED)
     yield from _drawn(random)
     for _ in range(NEW_RUNS):

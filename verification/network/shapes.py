@@ -16,7 +16,7 @@ from verification.claims.runs import SUBSTRATES, until
 RATIOS = (100.0, 200.0, 500.0, 1000.0, 2000.0, 5000.0, 10000.0)
 #: Length of the pores over their width: growth upstream has room.
 LENGTH = 15.0
-#: Width (um) of the pores of drawn shapes: any other gives the same.
+#: Width (um) of the pores of drawn shapes. The results do not depend on it.
 WIDTH = 100.0
 #: Numerics of the shapes of the law, over the entire pore, and of the compared shapes. On half-discs of R / W from 0.05
 #: to 0.96 they differ from the preset `exact` by 0.2 % and by 0.8 % at most.

@@ -28,10 +28,10 @@ VELOCITIES, SUPPLIES, WIDTHS, THICKNESSES = (1e-4, 10.0), (0.2, 20.0), (40.0, 15
 #: Parts of the states, and the seed of each.
 FIT, NEW = 0, 1
 SEEDS = {FIT: 20261126, NEW: 20261201}
-#: Of each part: half-discs, runs whose shapes it uses, states at each shape.
+#: Numbers for each part: half-discs, runs whose shapes it uses, and states at each shape.
 HALF_DISCS, RUNS, STATES = {FIT: 120, NEW: 25}, {FIT: 4, NEW: 2}, {FIT: 3, NEW: 1}
-#: Each shape of a run is larger than the one before by this factor; the largest over W^2; and the shapes of NEW, evenly
-#: from all of its runs.
+#: The factor by which each shape of a run is larger than the one before; the largest area over W^2; and the number of
+#: shapes in NEW, drawn evenly from all of its runs.
 APART, LARGEST, NEW_GROWN = 1.2, 4.5, 25
 #: The bound of the law is the largest error of the fit, over the spread of the bound, times this factor.
 FACTOR = 1.25

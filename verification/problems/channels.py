@@ -31,7 +31,7 @@ NAMES = ("acceptor", "donor")
 HEIGHTS = 5
 #: Under plug flow the slab is 0 < x < SLAB; without flow |x| < SLAB, between films of fluid of thickness FILM or none.
 CROSSED, FILM = (-20.0, 60.0), 20.0
-#: The same with more fluid at both ends, for order 2 and 3.
+#: Ends of the channel with more fluid, for order 2 and 3.
 WIDE = (-40.0, 80.0)
 #: Element sizes (um) and the number of meshes of each. Coarse meshes are cheap and scatter most.
 SAMPLES = {4.0: 12, 2.0: 6, 1.0: 3, 0.5: 1}

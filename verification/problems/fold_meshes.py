@@ -1,4 +1,4 @@
-"""Where runs of the family stop on other meshes, and how they go on with stress-free biomass.
+"""End times of the family's runs on other meshes, and the same runs with stress-free biomass.
 
     python -m verification.problems.fold_meshes 12 13 41 --limit 60
 

@@ -1,8 +1,9 @@
 """Physically plausible scenes that are hard on the solver, drawn by seed.
 
 They have tables that jump, odd outlines, permeable bodies, transient substrates, soft bodies under the flow, closed
-pores, starved seeds, dense rows, still water or contact. ``scene(seed)`` gives the tables of a scene as in TOML, each
-value a text with its unit. Seeds take the kinds of :data:`KINDS` in turn.
+pores, starved seeds, dense rows, still water or contact. From :data:`FIRST_LATER` on they have one substrate alone,
+another law of uptake, unlimited decay or a bonded wall. ``scene(seed)`` gives the tables of a scene as in TOML, each
+value a text with its unit. Seeds take the kinds of :data:`KINDS`, and then those of :data:`LATER`, in turn.
 """
 
 from collections.abc import Callable
@@ -16,14 +17,19 @@ def scene(seed: int) -> dict:
     """The tables of a member of the family."""
     random = np.random.default_rng(seed)
     tables = _plain(random)
-    tuple(KINDS.values())[seed % len(KINDS)](random, tables)
+    _kinds(seed)[kind(seed)](random, tables)
     tables["output"] = tables.get("output") or {"times": _rows(random, _hours(tables["growth"]["end"]))}
     return tables
 
 
 def kind(seed: int) -> str:
     """The kind of a member: the feature that makes it hostile."""
-    return tuple(KINDS)[seed % len(KINDS)]
+    kinds = _kinds(seed)
+    return tuple(kinds)[seed % len(kinds)]
+
+
+def _kinds(seed: int) -> dict[str, Callable[[Random, dict], None]]:
+    return KINDS if seed < FIRST_LATER else LATER
 
 
 def with_other_rows(tables: dict, seed: int) -> dict:
@@ -138,7 +144,7 @@ def outlines(random: Random, tables: dict) -> None:
 
 
 def brinkman(random: Random, tables: dict) -> None:
-    """A permeable body, from gravel to clay, up to most of the width."""
+    """A permeable body, with permeabilities from gravel to clay, which fills up to most of the width."""
     tables["aggregate"]["radius"] = _um(_width(tables) * random.uniform(0.1, 0.9))
     tables["flow"] |= {"biomass": "brinkman", "permeability": f"{_spread(random, 1e-17, 1e-10):.3g} m^2"}
 
@@ -203,8 +209,50 @@ def narrow(random: Random, tables: dict) -> None:
         tables["aggregate"]["position"] = _um(side * (length / 2 - radius - gap))
 
 
+def one_substrate(random: Random, tables: dict) -> None:
+    """One substrate alone. In some scenes it has another law of uptake, or decay is unlimited."""
+    del tables["substrates"][("acceptor", "donor")[int(random.integers(2))]]
+    if random.uniform() < 0.4:
+        law(random, tables)
+    if random.uniform() < 0.4:
+        unlimited(random, tables)
+
+
+def law(random: Random, tables: dict) -> None:
+    """Another law of uptake. Haldane's donor may inhibit so much that several states are steady."""
+    substrates = tables["substrates"]
+    laws = ("Haldane", "first order", "zero order")[0 if "donor" in substrates else 1:]
+    tables["kinetics"]["law"] = laws[int(random.integers(len(laws)))]
+    if tables["kinetics"]["law"] == "Haldane":
+        substrates["donor"]["inhibition_constant"] = f"{_spread(random, 0.02, 30.0):.4g} mg/L"
+    if tables["kinetics"]["law"] == "zero order":
+        for part in substrates.values():
+            part["half_saturation"] = f"{float(part['supply'].split()[0]) * random.uniform(0.1, 0.9):.4g} mg/L"
+
+
+def unlimited(random: Random, tables: dict) -> None:
+    """Unlimited decay in a large body. In every other scene there is little acceptor, so that its demand is unmet."""
+    tables["aggregate"]["radius"] = _um(_width(tables) * random.uniform(0.2, 0.7))
+    tables["kinetics"]["decay"] = "unlimited"
+    acceptor = tables["substrates"].get("acceptor")
+    if acceptor and random.uniform() < 0.5:
+        acceptor["supply"] = f"{_spread(random, 0.01, 0.5):.4g} mg/L"
+
+
+def bonded(random: Random, tables: dict) -> None:
+    """A body bonded to the lower wall. In every other scene the water's forces act on it."""
+    tables["aggregate"]["radius"] = _um(_width(tables) * random.uniform(0.1, 0.6))
+    if random.uniform() < 0.5:
+        forces(random, tables)
+    tables["growth"]["wall"] = "bonded"
+
+
 KINDS: dict[str, Callable[[Random, dict], None]] = {
     "jumps": jumps, "outline": outlines, "brinkman": brinkman, "gear": gear, "forces": forces, "closed": closed,
     "starved": starved, "dense rows": dense, "still": still, "narrow": narrow}
+#: Kinds of seeds from FIRST_LATER on, so that the members before keep their scenes.
+LATER: dict[str, Callable[[Random, dict], None]] = {
+    "one substrate": one_substrate, "law": law, "unlimited decay": unlimited, "bonded": bonded}
+FIRST_LATER = 150
 #: Kinds with transient substrates, which take many steps of their own.
 TRANSIENT = ("gear", "closed")

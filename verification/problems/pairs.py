@@ -1,4 +1,5 @@
-"""Pairs of meshes of one rectangle, related in every way that a transfer may meet, and norms on them."""
+"""Pairs of meshes of one rectangle, one for each relation between meshes that a transfer must handle, and norms on
+them."""
 
 from collections.abc import Iterator
 

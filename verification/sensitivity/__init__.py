@@ -34,7 +34,7 @@ def interval(quantity: str, value: float) -> tuple[float, float] | None:
 
 
 def reach(quantity: str) -> float | None:
-    """How far a number goes so, over it."""
+    """Half of the range of a number as the inputs vary within their rounding, over the number."""
     known = record().get("elasticities", {}).get(quantity)
     if known is None:
         return None
@@ -42,15 +42,15 @@ def reach(quantity: str) -> float | None:
 
 
 def in_closed_form(form: Callable[..., float], *inputs: tuple[float, float]) -> tuple[float, float]:
-    """Least and largest value of a form that is monotone in each input, as these move within their rounding: over the
-    corners. inputs: (value, half a unit of its last digit) of each."""
+    """Least and largest value of a form that is monotone in each input, while the inputs vary within their rounding.
+    The extremes are at corners. inputs: (value, half a unit of its last digit) of each."""
     ends = [(value - half, value + half) for value, half in inputs]
     values = [form(*corner) for corner in product(*ends)]
     return min(values), max(values)
 
 
 def holds_for_supplies(id: str) -> str:
-    """With which supplies of Figure 6 a claim holds and with which it does not, in words."""
+    """Describe the supplies of Figure 6 with which a claim holds, and those with which it does not."""
     by_supply = record()["supplies"]
     holds = {supply: all(known["claims"][id].values()) for supply, known in by_supply.items()}
     sides = (" and ".join(supply for supply in holds if holds[supply] == side) or "none" for side in (True, False))

@@ -33,7 +33,8 @@ WIDTH = 100.0
 
 
 def reaches(record: dict, number: str) -> list[tuple[str, float, bool]]:
-    """(input, effect of half a unit of its last digit on a number in percent, is it resolved?), the largest first."""
+    """(input, effect (%) of half a unit of its last digit on a number, whether it is resolved), the largest effect
+    first."""
     known = record["elasticities"][number]
     changes = [(each.name, 100 * known[each.name]["elasticity"] * each.rounding, known[each.name]["resolved"])
              for each in ROUNDED]
@@ -106,10 +107,10 @@ def page(record: dict) -> str:
 
 def _table(record: dict) -> Block:
     known = record["elasticities"]
-    return table(("input", "rounding (%)", *map(_called, known)), (_row(each, known) for each in INPUTS))
+    return table(("input", "rounding (%)", *map(_title_of, known)), (_row(each, known) for each in INPUTS))
 
 
-def _called(number: str) -> str:
+def _title_of(number: str) -> str:
     return NAMES.get(number, number.replace("_", " "))
 
 
@@ -136,7 +137,7 @@ def _set(one_set: dict) -> Iterator[Block]:
                         f"was run on sizes {sizes} of elements and steps, over those of `accurate`; the bar is from "
                         "all of them, and a set counts where the whole bar lies in the interval of the printed digits.")
     yield table(("number", "printed", "a run with the set", "bar", "on these sizes"), (
-        (_called(name), "{:g} to {:g}".format(*interval(rounding.PRINTED[name])), f"{value:.4f}",
+        (_title_of(name), "{:g} to {:g}".format(*interval(rounding.PRINTED[name])), f"{value:.4f}",
          f"{one_set['bars'][name]:.1g}", _listed(one_set["on_sizes"][name], ".4f"))
         for name, value in one_set["numbers"].items()))
     yield table(("input", "value"), ((name, f"{value:.4f}") for name, value in one_set["inputs"].items()))
@@ -182,7 +183,7 @@ def _sobol(indices: dict) -> Iterator[Block]:
                 f"{100 * indices['confidence']:.0f} %: the share of a number's variance within the rounding that goes "
                 f"with an input. The widest of the intervals is {widest:.2f} to either side.")
     yield table(("number", *indices["inputs"]), (
-        (_called(name), *map(_index, known["total_order"])) for name, known in indices["numbers"].items()))
+        (_title_of(name), *map(_index, known["total_order"])) for name, known in indices["numbers"].items()))
 
 
 def _index(known: list[float]) -> str:

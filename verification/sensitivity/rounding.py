@@ -123,7 +123,7 @@ def _scaled(node, keys: list[str], factor: float):
 
 
 RUNS_FILE = Path(__file__).parent / "out" / "runs.jsonl"
-#: Conductivity is asked for so long after contact, h.
+#: Time (h) from contact to the conductivity that is studied.
 AFTER = 4.0
 
 Row = dict[str, float]
@@ -135,8 +135,8 @@ def load_varied(name: str, factors: dict[str, float], *changes: str) -> Scene:
 
 
 def of_base(scene: Scene) -> Row:
-    """What section 4 prints, concentrations in K_s; "before the aggregate expands" is the shape a time step before
-    19.4 h with what grows in it [E12]."""
+    """The numbers that section 4 prints, concentrations in K_s. "Before the aggregate expands" means the shape one time
+    step before 19.4 h, with the biomass that has grown in it since [E12]."""
     plotted = END - scene.growth.time_step
     first, shaped, last = simulation.simulate(ending(scene, plotted, END))
     grown, _, _ = updates.make_biomass(Stages.of(scene), shaped.pore, shaped.solved, scene.growth.time_step)
@@ -185,7 +185,7 @@ def computed(scene: Scene) -> dict[str, float]:
         return {name: float(value) for name, value in OF[scene.name](scene).items()}
 
 
-#: Relative distances of an input from its printed value; the larger one of an input that is taken as exact.
+#: Relative distances of an input from its printed value; the larger distance for an input that is taken as exact.
 NEAR, FAR = 0.01, 0.02
 LARGE = 0.1
 RESOLVED = 0.1
@@ -194,18 +194,18 @@ RESOLVED = 0.1
 def elasticities(runs: Runs, name: str) -> dict[str, dict[str, dict]]:
     """{number: {input: elasticity, bar, resolved, and the changes (%) caused by +-10 % of an exact input}}."""
     inputs = [each for each in INPUTS if each.only in ("", name)]
-    runs.get_all(scene for each in inputs for scene in _moved(name, each))
+    runs.get_all(scene for each in inputs for scene in _scenes_around(name, each))
     plain = runs.get(load_varied(name, {}))
     by_number: dict[str, dict[str, dict]] = {number: {} for number in plain}
     for each in inputs:
-        rows = [*map(runs.get, _moved(name, each))]
+        rows = [*map(runs.get, _scenes_around(name, each))]
         for number, value in plain.items():
             by_number[number][each.name] = _elasticity(value, column(rows, number))
     return by_number
 
 
-def _moved(name: str, each: Input) -> list[Scene]:
-    """Scenes with an input above and below its value, at all distances at which differences are taken."""
+def _scenes_around(name: str, each: Input) -> list[Scene]:
+    """Scenes with an input above and below its value, at all distances of the central differences."""
     distances = (NEAR, FAR) if each.half else (NEAR, FAR, LARGE)
     return [load_varied(name, {each.name: 1 + sign * distance}) for distance in distances for sign in (1, -1)]
 
@@ -228,13 +228,13 @@ PRINTED = {"velocity_0": "2.9", "velocity": "1.5", "effluent_acceptor": "4.19", 
 INTERVALS = np.array([interval(text) for text in PRINTED.values()])
 MIDDLE, HALF = INTERVALS.mean(axis=1), np.ptp(INTERVALS, axis=1) / 2
 #: Sizes of elements and steps of the runs that make the set, the one that counts first: on 0.5, 2**-0.5 and 1 the bar
-#: of the acceptor effluent, 0.005, is as wide as what its digits leave to either side.
+#: of the acceptor effluent, 0.005, is as wide as half a unit of its last digit.
 SET_SIZES = (2**-1.5, 0.5, 2**-0.5)
 #: Distance of a number from the ends of its interval, in bars.
 BARS_INSIDE = 1.5
-#: Part of the half interval that the program aims at; the rest is for nonlinearity. A misfit up to ENOUGH ends the
-#: search.
-AIMED, ENOUGH = 0.4, 0.5
+#: The program aims at this part of the half interval; the rest is a margin for nonlinearity. A misfit up to
+#: MISFIT_GOAL ends the search.
+AIMED, MISFIT_GOAL = 0.4, 0.5
 ROUNDS = 6
 
 
@@ -259,7 +259,7 @@ def one_set(runs: Runs, elasticities: dict[str, dict[str, dict]]) -> dict:
         x, t = program(start, slopes, bars)
         factors = {each.name: 1 + value for each, value in zip(ROUNDED, x)}
         numbers = runs.get(load_varied("base", factors, *converged(SET_SIZES[0])))
-        if misfit(numbers) <= ENOUGH and misfit(numbers, bars) <= 1:
+        if misfit(numbers) <= MISFIT_GOAL and misfit(numbers, bars) <= 1:
             break
         start = printed_of(numbers) - slopes @ x
     rows = _on_sizes(runs, factors)

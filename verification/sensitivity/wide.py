@@ -77,9 +77,9 @@ def _bar_of(rows: list[Row], quantity: str, required: float) -> dict:
 
 #: Supplies over K_s, and the size of the converged solution's elements and steps.
 SUPPLIES, SIZE = (5.0, 10.0, 20.0, 40.0), 2**0.5
-#: Hours by which all of them have made contact.
+#: Hours within which the aggregate touches the wall with every supply.
 END = 120.0
-#: Claims that read this run but are not judged again, since they compare it with other models; with the reasons.
+#: Claims about this run that are not judged again, with the reasons: they compare it with other models.
 LEFT_OUT = {"C32": "compares two ways for biomass to be born", "C41": "changes the rheology and the walls",
             "C46": "compares its stresses with and without the fluid's forces",
             "C63": "compares its shapes with and without them"}
@@ -87,7 +87,7 @@ LEFT_OUT = {"C32": "compares two ways for biomass to be born", "C41": "changes t
 MARGIN = 0.1
 #: Whole hours that wide goes on after contact: 45 h for Figure 6's own 10 K_s.
 AFTER = 11
-#: Hours between outlines; um to which these are kept.
+#: Hours between outlines, and the accuracy (um) of their points.
 EVERY, FINE = 5, 0.1
 
 
@@ -129,7 +129,7 @@ def _of_supply(runs: Runs, supply: float) -> dict:
     contact = runs.get(replace(load_varied("wide", factors, *converged(SIZE)), name="contact"))
     level = supplied(supply, contact["end"])
     with at_level(level), np.errstate(all="raise", under="ignore"):
-        judged = {id: holding(CLAIMS[id].function()) for id in sorted(CLAIMS)
+        judged = {id: check_outcomes(CLAIMS[id].function()) for id in sorted(CLAIMS)
                   if CLAIMS[id].of_wide and id not in LEFT_OUT and not CLAIMS[id].unjudged}
         judged_supply = {**contact, "outlines": _outlines(), "claims": judged}
     forget(level)
@@ -142,7 +142,7 @@ def supplied(supply: float, end: float) -> Level:
     return Level(CONVERGED, SIZE, wide=(*changes, f'growth.end="{end:g} h"'))
 
 
-def holding(finding: Finding) -> dict[str, bool]:
+def check_outcomes(finding: Finding) -> dict[str, bool]:
     """{quantity without its numbers: does it hold?} for the checks that are not about base."""
     judged_checks: dict[str, bool] = {}
     for check in finding.checks:
@@ -153,7 +153,7 @@ def holding(finding: Finding) -> dict[str, bool]:
 
 
 def _outlines() -> dict[str, str]:
-    """Outlines by their hour: places "x,y x,y ..." to FINE (um), without those that lie on a straight line."""
+    """Outlines by their hour: points "x,y x,y ..." to FINE (um), without points on a straight line between others."""
     return {f"{time:g}": _places(aggregate) for time, aggregate in zip(series(*WIDE)["time_h"], bodies(WIDE))
             if time % EVERY == 0}
 
@@ -175,7 +175,8 @@ def verdicts(by_supply: dict[str, dict]) -> tuple[list[str], list[str], list[str
 
 
 def moving(by_supply: dict[str, dict]) -> Iterator[tuple[str, list[bool]]]:
-    """Checks, by claim and quantity, that hold with some supplies and not with all: whether they do with each."""
+    """Whether each check holds with each supply, by claim and quantity; only checks that hold with some supplies and
+    fail with others."""
     claims = [known["claims"] for known in by_supply.values()]
     for id in claims[0]:
         for quantity in claims[0][id]:

@@ -7,7 +7,7 @@ import pytest
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_protocol(item):
-    """Name the context, here and in the settings that processes read which the test starts."""
+    """Name the context in this process, and in the settings that the processes of the test read."""
     from coverage import Coverage
 
     os.environ |= {"TEST": item.nodeid, "COVERAGE_PROCESS_START": os.environ["SETTINGS"]}

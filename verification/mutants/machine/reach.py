@@ -1,9 +1,9 @@
-"""Which tests reach which line of ``repro/``, and the command that runs those which reach the line of a mutant.
+"""Which tests reach which line of ``repro/``, and the command that runs the tests of a mutant's line.
 
-The tests run once under coverage.py, whose context is the name of the test, in the process of the tests and in those
-that these start. A mutant is run against the tests that reach its lines, the cheapest first, and then against the other
-tests of their files, because several tests can share a fixture; a line that runs at import belongs to the tests that
-reach its module. This module imports nothing of ``repro/``, in which the mutant is.
+The tests run once under coverage.py, whose context is the name of the test. This covers the process of the tests and
+the processes that they start. A mutant is run against the tests that reach its lines, the cheapest first, and then
+against the other tests of their files, because several tests can share a fixture; a line that runs at import belongs to
+the tests that reach its module. This module imports nothing of ``repro/``, in which the mutant is.
 """
 
 import difflib
@@ -20,7 +20,7 @@ from xml.etree import ElementTree
 TESTS, DATA = "tests.json", "reach.coverage"
 #: Seconds of the tests that a mutant is run against, as they take without it.
 LIMIT = 60.0
-#: Tests of the text of the code, not of what it does: every change of it fails them.
+#: Tests that read the text of the code and fail after any change of it.
 OF_TEXT = ("mutants", "architecture", "published", "machine_mutants")
 #: Exit statuses of pytest where no test fails: all pass, or none is left.
 NONE_FAILS = (0, 5)

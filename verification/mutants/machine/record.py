@@ -1,4 +1,4 @@
-"""What came of a session, as it is committed: ``report/sampled.json``, a row a mutant, and ``report/sampled.md``."""
+"""The committed results of a session: ``report/sampled.json``, a row a mutant, and ``report/sampled.md``."""
 
 import re
 from collections import Counter
@@ -41,7 +41,7 @@ def _row(mutation, result) -> dict:
 
 
 def _change(diff: str, operator: str) -> tuple[str, str]:
-    """The lines that a mutant changes, as they are and as they become; of a decorator with the line that follows."""
+    """The lines that a mutant changes, before and after; a decorator with the line that follows it."""
     lines = diff.partition("\n@@")[2].splitlines()[1:]
     old, new = ("\n".join(line[1:].strip() for line in lines if line.startswith(sign)) for sign in "-+")
     if operator.endswith("RemoveDecorator"):
@@ -120,5 +120,5 @@ def _section(title: str, rows: list[tuple[str, ...]], *columns: str) -> list[Blo
 
 
 def _place(row: dict) -> tuple[str, str, str]:
-    """Where, from what and to what."""
+    """The place, the old text and the new text."""
     return f"{row['file']}:{row['line']}", f"`{row['old']}`", f"`{row['new']}`"

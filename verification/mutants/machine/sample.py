@@ -37,9 +37,9 @@ def draw(count: int = COUNT) -> list:
 
     modules = sorted(Path("repro").rglob("*.py"))
     texts = {path: path.read_text(encoding="utf-8") for path in modules}
-    with use_db("all.sqlite") as everything:
-        init(modules, everything, {})
-        places = _places(everything.work_items, texts)
+    with use_db("all.sqlite") as database:
+        init(modules, database, {})
+        places = _places(database.work_items, texts)
     available = {path: len(places[path]) for path in modules if places[path]}
     shares = shared({path: min(statements(texts[path]), most) for path, most in available.items()}, available, count)
     return [item for path, share in shares.items() for item in _drawn(places[path], texts[path], share)]

@@ -35,7 +35,7 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
         "There is one frame or more: without any, nothing is packed, and nothing shown.",
 }
 
-#: Survivors that are left: (effect, why no test).
+#: Remaining survivors: (effect, reason why no test catches it).
 LEFT: dict[tuple[str, str, str], tuple[str, str]] = {
     ("runs/__init__.py", "INTERVAL = 60.0", "INTERVAL = 59.0"):
         ("Checkpoints are written every 59 s, and the help says so.",

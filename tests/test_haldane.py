@@ -1,0 +1,81 @@
+"""Haldane's law in a slab of biomass where several states are steady at once, with scipy's profiles as the reference.
+
+``reference/haldane_slab.py`` shoots from the middle of the slab and shares nothing with the solver. Its least state has
+little donor, and its largest one is that which is reached in time from the supply.
+"""
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from reference import haldane_slab
+from repro.model import gear, transport
+from repro.model.uptake_law import LAWS
+from repro.scene import Substrates
+from verification.problems import channels
+
+SUPPLY, HALF_SATURATION, INHIBITION = 30.0, 1.0, 1.0
+#: Uptake, mg/L/h.
+SINK = 1e6
+#: Error over the supply of quadratic elements of 4 um, beside the layer of little donor.
+MESH = 0.01
+#: Time (h) in which the slab settles: forty times l^2 / D.
+SETTLED = 0.02
+
+
+@pytest.fixture(scope="module")
+def slab():
+    """Space, problem and density of the biomass, which does not grow; and the reference's states at the nodes."""
+    donor = replace(channels.SCENE.substrates.donor, supply=SUPPLY, half_saturation=HALF_SATURATION,
+                    inhibition_constant=INHIBITION)
+    space = channels.slab_space(4.0, 0, 2, (-channels.SLAB, channels.SLAB), (-channels.SLAB, channels.SLAB))
+    kinetics = replace(channels.SCENE.kinetics, law="Haldane", yield_coefficient=1e-12, decay_coefficient=0.0)
+    problem = channels.problem(space, None, Substrates(donor=donor), kinetics)
+    states = haldane_slab.solutions(SUPPLY, SINK, HALF_SATURATION, INHIBITION, channels.SLAB,
+                                    donor.diffusivity_in_aggregate)
+    density = SINK / kinetics.maximum_utilization_rate
+    return space, problem, density, [state(space.points[:, 0]) for state in states]
+
+
+def largest_gap(one, other):
+    return np.abs(one - other).max() / SUPPLY
+
+
+def test_the_state_reached_from_the_supply_is_returned_and_one_of_several(slab):
+    """Three states are steady. The one that is returned has the most donor, and the others are far from it."""
+    _, problem, density, states = slab
+    computed = channels.steady(problem, density).donor
+    assert len(states) == 3 and min(largest_gap(one, states[-1]) for one in states[:-1]) > 10 * MESH
+    assert largest_gap(computed, states[-1]) < MESH
+
+
+@pytest.mark.parametrize("share", [-0.02, -1e-4, 0.0])
+def test_a_small_change_of_the_start_changes_no_state(slab, share):
+    """The starts are the supply and each stable state, changed by a share that varies from node to node."""
+    _, problem, density, states = slab
+    for start, due in ((np.full_like(states[0], SUPPLY), states[-1]), (states[-1], states[-1]), (states[0], states[0])):
+        changed = start * (1 + share * np.random.default_rng(1).uniform(size=len(start)))
+        computed = channels.steady(problem, density, transport.Concentrations(None, changed)).donor
+        assert largest_gap(computed, due) < MESH
+
+
+@pytest.mark.parametrize("place", [0, -1])
+def test_the_transient_scheme_settles_to_the_same_state(slab, place):
+    """Gear's scheme, from the supply and from a start with little donor."""
+    space, problem, density, states = slab
+    supplied = transport.supplied_everywhere(problem)
+    start = transport.Concentrations(None, states[0] if place == 0 else supplied.donor)
+    active = channels.uniform_masses(space, density)
+    end = gear.advance(problem, active, 0 * active, start, SETTLED).concentrations
+    steady = channels.steady(problem, density, start if place == 0 else None)
+    assert largest_gap(end.donor, steady.donor) < 10 * gear.TOLERANCE
+    assert largest_gap(end.donor, states[place]) < MESH
+
+
+def test_only_haldanes_law_may_have_several_states():
+    """m of every law without the mark never decreases up to a large C."""
+    concentrations = np.linspace(0, 50, 501)
+    for name, law in LAWS.items():
+        constants = (1.0, 1.0) if name == "Haldane" else (1.0,)
+        rises = np.diff(law(*constants).fraction(concentrations)) >= 0
+        assert rises.all() == law.monotone

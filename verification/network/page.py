@@ -1,0 +1,241 @@
+"""The page `docs/network.md`, from the records of the laws, of ten throats as whole runs, and of a sweep."""
+
+import numpy as np
+
+from repro.results import read_table
+from repro.results.network import FAST, UPTAKE_BOUND, added_resistance, known
+from verification.evidence.writing import markdown, table
+from verification.network import histories, law, runs, throats, timed, uptakes
+from verification.network.law import RATIO
+
+#: Areas over W^2 that the page lists, before contact and after it.
+PAGE_SHARES = ((0.01, 0.03, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0, 1.2, 1.3, 1.4, 1.5), (1.6, 1.75, 2.0, 2.5, 3.0, 4.0, 4.5))
+
+
+def text() -> str:
+    """The page."""
+    parts = (DEFINITION, _values(), _fit(), _judged(), _range_of_table(), UPTAKE, _fit_of_uptake(), _judged_uptake(),
+             _example(), _throats(), _laws_apart(), _sweep())
+    return "\n\n".join(part for part in parts if part) + "\n"
+
+
+DEFINITION = """# A law for networks
+
+Made by `python -m verification.network`. For models of networks,
+`repro.added_resistance(area, width, spanned, viscosity_ratio)` computes the head loss that an aggregate of area A adds
+to a pore of width W.
+
+    head loss = 12 nu u_ave / (g W^2) (L + r W),        r = r(A / W^2, lambda, spanned)
+
+r W is the length of empty pore with the resistance that the aggregate adds. Stokes flow is linear and has no length
+scale, so r depends neither on u_ave nor on W. The position of the aggregate has no effect at 1.5 W or more from the
+pore's ends. Before contact r hardly depends on lambda until the film is thin. For a body that spans the pore, r is
+nearly proportional to lambda - 1: a plug with straight ends has exactly (lambda - 1) A / W^2, and rounded ends reduce
+it."""
+
+UPTAKE = """## Uptake
+
+`repro.uptake(area, width, velocity, acceptor, donor)` computes the uptake of both substrates and the growth of the
+area, with the kinetics of Table 1. It has the rates (7)-(10) at one concentration of each substrate in the aggregate.
+That concentration is below the supply because the inflow is limited and because diffusion to the aggregate needs a
+difference; `repro/results/network.py` has the equations. The range is A / W^2 to 4.5, widths of 40 to 150 um, and up
+to 10 m/d and 20 mg/L."""
+
+
+def _values() -> str:
+    """The law at one lambda."""
+    head = f"At lambda = {RATIO:g}, with the bounds of shapes of the same area:"
+    return "\n\n".join((head, _markdown_table(False), _markdown_table(True)))
+
+
+def _fit() -> str:
+    """The shapes behind the law."""
+    fit = law.read(unseen=False)
+    grown = int(fit["grown"].sum())
+    return f"""\
+The table, `repro/results/network.csv`, has r of half-discs and, after contact, the mean of the plugs grown in
+several runs. The bounds are the least and the largest r over that of the fit's {len(fit["grown"])} shapes, {grown} of
+them grown in pores of 40 to 150 um at 0.5 to 6 m/d and W^2 / 2500 (W in um) to 20 mg/L of both substrates, the others
+drawn: half-discs, bodies from 1 % thinner to 3 % thicker than a half-disc and leaning by up to 5 %, plugs with ends of
+other lengths. Grown plugs are compared with the mean of the other runs. With less substrate, diffusion limits
+growth, the aggregate is thicker before contact, and r exceeds the bounds: near contact r doubles if the thickness rises
+by some 5 %."""
+
+
+def _judged() -> str:
+    """The law with shapes that are not in its fit."""
+    check = law.judged(law.read(unseen=True))
+    worst = 100 * np.expm1(np.abs(check.apart))
+    return f"""\
+The law is judged with {check.count} shapes that are not in the fit. Their sizes, outlines, places, widths, velocities,
+supplies and lambdas are drawn at random. {check.inside} are within the bounds; half of them are
+within {np.median(worst):.1f} % of the law, and the worst is {worst.max():.0f} % from it."""
+
+
+def _range_of_table() -> str:
+    """Where the law holds."""
+    return f"""\
+The table has A / W^2 from {_range(False)} before contact and from {_range(True)} after it, and lambda from 100 to
+10 000. Thinner bodies follow half-discs, an empty pore adds nothing, and plugs of 1.41 to 1.6 have a wider lower bound.
+Without `spanned` the area decides the contact, and from 1.41 to 1.6 the bounds include both kinds. Elsewhere the
+function raises `ValueError` with the index of the throat; with `outside="nan"` that throat has no result. It holds
+for the paper's viscous aggregate with its own condition on the surface [E2]. With continuous traction the
+resistance of a half-disc differs by 0.2 %, that of a plug by 8 to 17 %."""
+
+
+def _fit_of_uptake() -> str:
+    """The states behind the law of uptake."""
+    seen = uptakes.read(uptakes.FIT)
+    return f"""\
+`python -m verification.network uptake` solves states that a seed draws and fits the constants of the law to them:
+{_numbers(seen)}. Shapes do not change in a state; velocities are
+{uptakes.VELOCITIES[0]:g} to {uptakes.VELOCITIES[1]:g} m/d,
+supplies {uptakes.SUPPLIES[0]:g} to {uptakes.SUPPLIES[1]:g} mg/L.
+The bound is {uptakes.FACTOR:g} times the largest error of the fit, {100 * UPTAKE_BOUND:.3g} %; before contact it is
+more for a thick body in a fast flow, by a factor of 1 + {FAST:g} (Pe A / W^2)^2. This rule precedes the solution of
+the states below. The factor is from an earlier fit, with bounds of 5 % and, since one of 50 states had 5.9 %, of 7 %.\
+"""
+
+
+def _judged_uptake() -> str:
+    """The law of uptake with other states."""
+    new = uptakes.read(uptakes.NEW)
+    apart, bounds = uptakes.judged()
+    worst_state = (apart / bounds).argmax()
+    return f"""Another seed draws {len(bounds)} other states: {_numbers(new)}.
+{int((apart <= bounds).sum())} are within the bound; half of them are within {100 * np.median(apart):.2g} % of the law.
+The worst is {100 * apart[worst_state]:.1f} % from it, where the bound is {100 * bounds[worst_state]:.0f} %."""
+
+
+def _example() -> str:
+    """The example of a network, with its step and with half of it."""
+    ratios = histories.flow_ratios()
+    step, half = histories.STEPS
+    change = abs(ratios[half] - ratios[step])
+    return f"""\
+`make network` runs `docs/howto/openpnm_network.py`: 100 throats in OpenPNM with both laws, over 48 h. Its flow falls to
+{ratios[step]:.3g} of the first; a step of {half:g} h instead of {step:g} h changes this by {change:.1g}.
+No throat spans its width by then."""
+
+
+def _throats() -> str:
+    """Ten throats as whole runs, against the law."""
+    compared = runs.compared()
+    area, flow, *uptake = np.nanmax(100 * np.abs(compared.error), axis=(0, 1))
+    verdict = "all bounds hold" if compared.holds.all() else "the bounds do not hold for all of them"
+    return f"""## Ten throats as whole runs
+
+`python -m verification.network throats` runs ten throats of this network in the preset `fast`, with the head loss and
+the supplies that they have in the example. `verification/network/throats.py` has the rule that chooses them, and the
+bounds of the law over a history, which precede the runs: those of resistance and uptake, compounded over the growth.
+The law is advanced in steps of 6 min. Errors of the law relative to the run at 48 h, with the bounds of the error:
+
+{_errors(compared)}
+
+{int(compared.holds.sum())} of {compared.holds.size} values at {_list(throats.TIMES)} h are within the bounds:
+{verdict}. Over these times the error of the area is {area:.2g} % at most, that of the flow {flow:.2g} %, that of
+the uptakes {max(uptake):.2g} %. The last column is the area in the example, whose step of
+{histories.STEPS[0]:g} h adds an error of its own."""
+
+
+def _errors(compared: runs.Comparison) -> str:
+    """A table of the errors at the last time."""
+    head = ("throat", "width (um)", "A / W^2", "area", "flow", "acceptor uptake", "donor uptake", "area in the example")
+    widths = {one.number: one.width for one in histories.read()}
+    rows = []
+    for k, number in enumerate(compared.number.tolist()):
+        sides = (compared.law, compared.least, compared.most, compared.run)
+        errors = [_error(*(part[k, -1, quantity] for part in sides)) for quantity in range(len(throats.QUANTITIES))]
+        share = compared.run[k, -1, 0] / widths[number]**2
+        rows.append((str(number), f"{widths[number]:.1f}", f"{share:.2f}", *errors,
+                     f"{100 * compared.example_error[k, -1]:+.1f} %"))
+    return markdown([table(head, rows)])
+
+
+def _error(value: float, least: float, most: float, run: float) -> str:
+    """The error of the law in percent, and its bounds."""
+    error, low, high = (100 * (value / other - 1) for other in (run, most, least))
+    return f"{error:+.2f} % ({low:+.0f} to {high:+.0f})"
+
+
+def _laws_apart() -> str:
+    """Both laws at the area and the velocity of the runs, where no error of the growth adds to theirs."""
+    resistance, uptake = runs.laws_at_the_runs()
+    factor = (resistance.run / resistance.law)[~resistance.holds]
+    outside = "" if resistance.holds.all() else (
+        f" In the others r is {factor.min():.2f} to {factor.max():.2f} times that of the law. Their\nA / W^2 is "
+        f"{resistance.share[~resistance.holds].min():.2f} or more, and {_range_words(resistance)} the range of "
+        "velocities and supplies of the\nshapes behind the law: there the law of resistance does not hold. "
+        + _controls())
+    counts = [f"{int(one.holds.sum())} of {one.holds.size}" for one in (uptake, resistance)]
+    return f"""\
+At the area and the velocity of a run the laws alone can be compared with it. Of the uptakes {counts[0]} are within the
+bound of their law, of r {counts[1]}.{outside}"""
+
+
+def _controls() -> str:
+    """The cause: aggregates of the same area grown at other velocities."""
+    columns = read_table(runs.CONTROLS)
+    history, *constant = zip(*(columns[name] for name in runs.CONTROL_COLUMNS))
+    words = "; ".join(f"{speed:g} m/d: {factor:.2f} and {thickness:.3f}" for speed, _, factor, thickness in constant)
+    return (f"The cause is slow flow. Aggregates then\ngrow upstream, towards the supply, and are thinner. Throat "
+            f"{runs.CONTROL} at A / W^2 = {history[1]:.2f} has {history[2]:.2f} times the r\nof the law and "
+            f"{history[3]:.3f} times the thickness of the half-disc. The same seed at a constant velocity has at up to "
+            f"{runs.CONTROL_SHARE:g}\n({words}).")
+
+
+def _range_words(resistance: runs.Judgement) -> str:
+    """How many of the states outside the bounds have conditions outside the range."""
+    inside = int(resistance.in_range[~resistance.holds].sum())
+    return "all of them have left" if inside == 0 else f"all but {inside} of them have left"
+
+
+def _sweep() -> str:
+    """The time of a sweep of all throats; nothing without a record."""
+    record = timed.read()
+    if not record:
+        return ""
+    seconds = {(way["way"], way["workers"]): way["seconds"] for way in record["ways"]}
+    pool, dask = ([seconds[name, workers] for workers in (1, 2)] for name in (timed.POOL, timed.DASK))
+    failed = sum(way["unfinished"] for way in record["ways"])
+    alike = "all ways give the same table" if record["equal"] else "the tables differ"
+    rows = ((way["way"], str(way["workers"]), f"{way['seconds']:.0f}", f"{record['runs'] / way['seconds']:.2f}",
+             f"{seconds[way['way'], 1] / way['seconds']:.2f}", f"{way['load']:.1f}") for way in record["ways"])
+    head = ("runs made by", "workers", "s", "runs/s", "times faster than one worker", "load")
+    return f"""## A sweep of all throats
+
+`python -m verification.network sweep` makes whole runs of all {record["runs"]} throats
+over {record["hours"]:g} h, in `fast` with files and page, on the process pool and on a
+Dask scheduler with workers on the same machine:
+
+{markdown([table(head, rows)])}
+
+Two workers are {pool[0] / pool[1]:.2f} times faster than one on the process pool, and {dask[0] / dask[1]:.2f} times
+on Dask. Dask takes {dask[1] / pool[1]:.2f} times as long as the pool with two workers. Runs that failed: {failed};
+{alike}. The machine has {record["machine"]["cores"]} cores. The load
+counts the processes that want a core at the end of each sweep: above the number of workers plus one or two it shows
+other work, with which the times say little. The throats without flow
+have a head loss of {runs.LEAST_HEAD:g} um."""
+
+
+def _list(times: tuple[float, ...]) -> str:
+    return ", ".join(f"{time:g}" for time in times[:-1]) + f" and {times[-1]:g}"
+
+
+def _numbers(states: dict[str, np.ndarray]) -> str:
+    """How many states there are, and of which kinds."""
+    grown, spanned = states["grown"] == 1, states["spanned"] == 1
+    return f"{(~grown).sum()} half-discs, {grown.sum()} grown shapes, {spanned.sum()} of them in contact"
+
+
+def _range(spanned: bool) -> str:
+    low, high = known(spanned)
+    return f"{low:.3g} to {high:.3g}"
+
+
+def _markdown_table(spanned: bool) -> str:
+    """A table in Markdown."""
+    shares = np.array(PAGE_SHARES[spanned])
+    head = (f"A / W^2, {'touching both walls' if spanned else 'before contact'}", "r", "least", "most")
+    rows = zip(shares, *added_resistance(shares, 1.0, spanned, RATIO))
+    return markdown([table(head, ("{:g} {:.3g} {:.3g} {:.3g}".format(*row).split() for row in rows))])
