@@ -7,7 +7,8 @@ CRATE := build/crate/.installed
 SITE := build/docs/.installed
 OLDEST := build/oldest/.installed
 NETWORK := build/network/.installed
-OLDEST_TESTS := tests/test_python_calls.py tests/test_drawing.py tests/test_field_files.py tests/test_linear.py
+OLDEST_TESTS := tests/test_python_calls.py tests/test_drawing.py tests/test_field_files.py tests/test_linear.py \
+	tests/test_scene.py tests/test_progress.py tests/test_folder.py
 PIP := $(BIN) -m pip install -q --disable-pip-version-check
 
 export MPLBACKEND := Agg

@@ -59,18 +59,19 @@ def _conductivity(axes: Axes, folders: tuple[Path, ...]) -> None:
 
 
 def _changes(axes: Axes, folders: tuple[Path, ...]) -> None:
-    """Change of the conductivity (%) against the paper's choice at the same time, on a scale that is linear up to 1 "
-    "%."""
+    """Change of the conductivity (%) against the paper's choice at the same time, on a scale that is linear up to 1 %.
+    """
     plain = states.series(folders[0])
     for folder, label, colour in zip(folders[1:], LABELS[1:], COLOURS[1:]):
         table = states.series(folder)
         reference = np.interp(table["time_h"], plain["time_h"], plain["conductivity_m_per_d"])
         axes.plot(table["time_h"], 100 * (table["conductivity_m_per_d"] / reference - 1), color=colour, label=label)
     axes.axhline(0.0, color=COLOURS[0], linewidth=0.8)
-    contact_time = min(contact(folders[0]), float(plain["time_h"][-1]))
+    end = float(plain["time_h"][-1])
     axes.set(title="change of the conductivity at the same time", xlabel="time (h)", ylabel="%",
-             xlim=(contact_time - AROUND, None))
+             xlim=(min(contact(folders[0]), end) - AROUND, end))
     axes.set_yscale("symlog", linthresh=1.0)
+    axes.set_yticks([-10, -1, 0, 1, 10, 100], labels=["-10", "-1", "0", "1", "10", "100"])
     style.grid(axes)
 
 

@@ -40,7 +40,7 @@ def draw(base: Path, wide: Path) -> Figure:
         for time, value in PRINTED.get(column, ()):
             axes.scatter(time, value, marker="x", s=36, color=style.BLACK, linewidths=1.4, zorder=3,
                          clip_on=False)
-            axes.annotate(f"{value:g}", (time, value), (6, -11), textcoords="offset points")
+            axes.annotate(f"{value:g}", (time, value), (3, -13), textcoords="offset points")
         if not log:
             axes.set_ylim(0)
         for time in _contact_times(base, wide):

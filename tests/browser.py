@@ -14,6 +14,11 @@ CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", 
 OPTIONS = """--headless --no-sandbox --disable-gpu --disable-background-networking --disable-sync --no-first-run
 --disable-component-update --disable-default-apps --remote-debugging-pipe""".split()
 PATIENCE = 60.0  # s for an answer
+REPLACED = ("Inspected target navigated or closed", "Execution context was destroyed.")  # another page took its place
+
+
+class PageReplaced(Exception):
+    """The page went to another address, as a redirection does, before it answered a script."""
 
 
 class Browser:
@@ -51,6 +56,8 @@ class Browser:
         while True:
             reply = self._next()
             if reply.get("id") == self.count:
+                if reply.get("error", {}).get("message") in REPLACED:
+                    raise PageReplaced
                 assert "error" not in reply, reply
                 return reply["result"]
 
@@ -81,9 +88,16 @@ class Browser:
         self.requests.clear()
         self.call("Page.navigate", url=path.resolve().as_uri() + fragment)
         end = time.monotonic() + PATIENCE
-        while self.run("document.readyState === 'complete' && location.protocol === 'file:'") is not True:
+        while self.attempt("document.readyState === 'complete' && location.protocol === 'file:'") is not True:
             assert time.monotonic() < end, "the page does not load"
             time.sleep(0.05)
+
+    def attempt(self, script: str):
+        """Return the value of a JavaScript expression, or None if another page replaces the page meanwhile."""
+        try:
+            return self.run(script)
+        except PageReplaced:
+            return None
 
     def run(self, script: str):
         """Return the value of a JavaScript expression in the page."""

@@ -119,7 +119,8 @@ def test_wheel_and_source_distribution_are_complete(tmp_path):
     assert data <= set(members) and len(data) >= 5
     with tarfile.open(source) as archive:
         packed = {name.partition("/")[2] for name in archive.getnames()}
-    required = {name for name in tracked if name.endswith((".py", ".md", ".toml", ".json", ".lock", ".yml", ".cff"))}
+        kinds = (".py", ".md", ".toml", ".json", ".lock", ".yml", ".cff", ".bib", ".css", ".js", ".html")
+        required = {name for name in tracked if name.endswith(kinds)}
     assert required - packed == set()
 
 

@@ -30,7 +30,7 @@ def window():
 def settled(window, script):
     """Return the value of a script in the page as soon as it is true; fail after 20 s."""
     end = time.monotonic() + 20
-    while not (value := window.run(script)):
+    while not (value := window.attempt(script)):
         assert time.monotonic() < end, script
         time.sleep(0.05)
     return value
@@ -54,6 +54,12 @@ def test_every_page_opens_without_an_error_and_loads_nothing_from_elsewhere(wind
 @cache
 def content(page):
     return page.read_text(encoding="utf-8")
+
+
+def test_figures_are_pictures():
+    """No cell prints the name of a figure in place of the figure."""
+    for page in PAGES:
+        assert "&lt;Figure size" not in content(page), page
 
 
 def test_links_lead_to_existing_places():

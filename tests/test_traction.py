@@ -11,7 +11,7 @@ from tests.strategies import ORDERS
 @pytest.mark.parametrize("order", ORDERS)
 @pytest.mark.parametrize("density, rounds, error, message", [
     ("1e9 mg/cm^3", contact.FORCE_ROUNDS, StageError, "try a|crosses itself"),
-    ("998 mg/cm^3", 1, GrowthError, "do not agree after 1 rounds, a node still moves by .* um: .*try a shorter")])
+    ("998 mg/cm^3", 1, GrowthError, "do not agree after 1 rounds, a node still moves by .* um: .*try a larger")])
 def test_a_shape_without_equilibrium_under_the_forces_is_refused(monkeypatch, density, rounds, error, message, order):
     """If the pressure of the water is a thousand times the stiffness, or the rounds do not converge, an error gives
     advice."""

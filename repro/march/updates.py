@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
-from repro.errors import Unresolved
+from repro.errors import GrowthError, Unresolved
 from repro.march.balance import Ledger
 from repro.march.folding import refuse_fold
 from repro.march.loop import (
@@ -28,6 +28,8 @@ from repro.march.loop import (
 from repro.march.step_control import StepControl
 from repro.model import biomass, gear, pore, remeshing, transport
 from repro.model.biomass import Rates
+from repro.model.contact import Expansion
+from repro.model.contact_lines import FirstContact
 from repro.model.growing import grow
 from repro.model.kinetics import Sink
 from repro.model.pore import Pore, Solved
@@ -102,7 +104,7 @@ def step(stages: Stages, previous: Pore, solved: Solved, duration: float) -> Ste
     solved = _solve_midway(stages.scene, previous, solved, duration)
     grown, end, flows = make_biomass(stages, previous, solved, duration)
     grown = replace(grown, time=time_before_end(previous, duration))
-    expansion = stages.expand(previous, grown)
+    expansion = _expand(stages, previous, grown)
     expanded = expansion.pore
     if leaves := pore_end(stages.scene.pore, expanded, 0.1):
         raise PoreEnd(f"{leaves} in the step from t = {previous.time:g} h")
@@ -113,6 +115,18 @@ def step(stages: Stages, previous: Pore, solved: Solved, duration: float) -> Ste
                     grown.mass - previous.mass, after.mass, flows.unmet)
     last = replace(grown, time=previous.time + duration), replace(solved, concentrations=end)
     return StepResult(after, last, ledger, remeshed, expansion.iterations, within)
+
+
+def _expand(stages: Stages, previous: Pore, grown: Pore) -> Expansion:
+    """Compute the shape of the grown aggregate.
+
+    Raises GrowthError if it passes the opposite wall within the step.
+    """
+    try:
+        return stages.expand(previous, grown)
+    except FirstContact as early:
+        raise GrowthError(f"the aggregate passes the opposite wall by {-early.gap:.3g} um before "
+                          "its contact; try a shorter growth.time_step") from None
 
 
 def _solve_midway(scene: Scene, previous: Pore, solved: Solved, duration: float) -> Solved:

@@ -160,7 +160,7 @@ def expand(mechanics: Mechanics, grown: Pore, theta: np.ndarray, guess: Pore | N
         last = shape
     raise GrowthError(f"the fluid's forces and the shape do not agree after {FORCE_ROUNDS} rounds, "
                       f"a node still moves by {moved:.2g} um: the aggregate is too soft for this "
-                      "flow; try a shorter growth.time_step, a larger growth.shear_modulus, or "
+                      "flow; try a larger growth.shear_modulus, or "
                       'growth.fluid_forces = "neglected"')
 
 

@@ -527,8 +527,7 @@ def reach(system: System, start: np.ndarray, theta: np.ndarray, first: Equilibri
 
 #: Settings to try if there is no equilibrium; whether the fluid's forces act.
 _ADVICE = {False: "try a shorter growth.time_step or a larger numerics.refinement",
-           True: "the aggregate may be too soft for this flow: try a larger growth.shear_modulus, "
-                 "or a shorter growth.time_step"}
+           True: "the aggregate may be too soft for this flow: try a larger growth.shear_modulus"}
 
 
 def _continued(system: System, start: np.ndarray, theta: np.ndarray, first: Equilibrium,
