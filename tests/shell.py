@@ -92,13 +92,9 @@ def flags(*entries) -> list[str]:
 
 
 def state(folder: Path) -> dict[Path, object]:
-    """Return the paths of a folder, if it exists, with the modification time and the content of each file.
-
-    Old versions of filelock change the modification time of a lock, which is empty, when they wait for it.
-    """
+    """Return the paths of a folder, if it exists, with the modification time and the content of each file."""
     paths = [folder, *folder.rglob("*")] if folder.exists() else []
-    return {path: path.is_file() and (path.name == ".lock" or path.stat().st_mtime_ns, path.read_bytes())
-            for path in paths}
+    return {path: path.is_file() and (path.stat().st_mtime_ns, path.read_bytes()) for path in paths}
 
 
 def refusal(folder: Path, capsys, *arguments) -> str:
