@@ -158,13 +158,13 @@ class Coupled:
         self.placed = place()
         self.position, self.pressure = self.placed.divided(points, pressures)
         self.iterations = 0
-        self._moving = True
         self._factors: Factored | None = None
 
     def solve(self, tolerance: float = growth.NEWTON) -> None:
         """Solve to a defect of ``tolerance``, or to round-off. Raises GrowthError if there is no
         convergence."""
         last = np.inf
+        moving = True
         while True:
             poll()
             at = self.placed
@@ -173,14 +173,14 @@ class Coupled:
             solved = iterate.complete and (iterate.defect <= tolerance or stalled)
             if solved and self._accepts():
                 return
-            if self.iterations == MOST_ITERATIONS or solved and not self._moving:
+            if self.iterations == MOST_ITERATIONS or solved and not moving:
                 raise GrowthError("Newton's method for the contact lines stands at a defect of "
                                   f"{iterate.defect:.2g} after {self.iterations} iterations; "
                                   "try a shorter growth.time_step")
             if iterate.defect > REQUIRED_REDUCTION * last:
                 self._factors = None
             last = iterate.defect
-            self._step(iterate)
+            moving = self._step(iterate)
             self.iterations += 1
 
     def _accepts(self) -> bool:
@@ -189,14 +189,13 @@ class Coupled:
         return all(_fits(line, clearance, CLOSE)
                    for line, clearance in zip(self._lines, clearances))
 
-    def _step(self, iterate: growth.Iterate) -> None:
-        """Make one step of shape and lines, with det F > 0."""
+    def _step(self, iterate: growth.Iterate) -> bool:
+        """Make one step of shape and lines, with det F > 0. Do the lines move?"""
         lag = iterate.lag
         carried = np.concatenate([lag[:, 0], lag[:, 1], np.zeros(len(self.pressure))])
         factors = self._factors or self.placed.system.factored(iterate)
         change = factors.solve(-iterate.residual, carried)
         steps, change = self._with_lines(iterate, factors, change)
-        self._moving = bool(steps.any())
         start = [(line.advance, line.at_corner) for line in self._lines]
         for length in 0.5 ** np.arange(HALVINGS):
             for line, before, step in zip(self._lines, start, steps):
@@ -212,7 +211,7 @@ class Coupled:
                 self.placed = placed
                 self.position = position
                 self.pressure = pressure
-                return
+                return bool(steps.any())
         raise GrowthError("no step of contact lines keeps det F > 0; "
                           "try a shorter growth.time_step")
 

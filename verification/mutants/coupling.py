@@ -175,7 +175,7 @@ MUTANTS = (
         "repro/model/contact_newton.py",
         ("newton-waits-for-lines",
          "Newton's method iterates to the end although no contact line moves.",
-         " or solved and not self._moving:",
+         " or solved and not moving:",
          ":",
          f"{CONTACT_TESTS}newton_gives_up_as_soon_as_no_line_moves"),
         ("line-slope-halved",

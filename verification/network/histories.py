@@ -61,7 +61,7 @@ def rows(example: dict) -> list[list]:
     for number, width in enumerate(example["width"]):
         for k, state in enumerate(example["states"]):
             values = (width, state.area[number], state.head_loss[number], *state.supplies[:, number])
-            lines.append([number, STEPS[0] * k, *map(_rounded, values)])
+            lines.append([number, STEPS[0] * k, *map(rounded, values)])
     return lines
 
 
@@ -69,11 +69,12 @@ def flows(example: dict) -> list[list]:
     """Rows of FLOWS."""
     totals = {STEPS[0]: example["total"],
               STEPS[1]: [state.total for state in example["advance"](example["area"], STEPS[1])]}
-    return [[step, step * k, _rounded(total)] for step, of_step in totals.items() for k, total in enumerate(of_step)]
+    return [[step, step * k, rounded(total)] for step, of_step in totals.items() for k, total in enumerate(of_step)]
 
 
-def _rounded(value: float) -> float:
-    return float(f"{value:.{DIGITS}g}")
+def rounded(value: float, digits: int = DIGITS) -> float:
+    """A value with so many significant digits."""
+    return float(f"{value:.{digits}g}")
 
 
 def read() -> list[History]:

@@ -180,8 +180,8 @@ def _controls() -> str:
     words = "; ".join(f"{speed:g} m/d: {factor:.2f} and {thickness:.3f}" for speed, _, factor, thickness in constant)
     return (f"The cause is slow flow. Aggregates then\ngrow upstream, towards the supply, and are thinner. Throat "
             f"{runs.CONTROL} at A / W^2 = {history[1]:.2f} has {history[2]:.2f} times the r\nof the law and "
-            f"{history[3]:.3f} times the thickness of the half-disc. The same seed at a constant velocity has at up to "
-            f"{runs.CONTROL_SHARE:g}\n({words}).")
+            f"{history[3]:.3f} times the thickness of the half-disc. Grown from the same seed at\na "
+            f"constant velocity, to A / W^2 = {runs.CONTROL_SHARE:g} at most, it has these two ratios:\n{words}.")
 
 
 def _range_words(resistance: runs.Judgement) -> str:
@@ -213,8 +213,8 @@ Dask scheduler with workers on the same machine:
 Two workers are {pool[0] / pool[1]:.2f} times faster than one on the process pool, and {dask[0] / dask[1]:.2f} times
 on Dask. Dask takes {dask[1] / pool[1]:.2f} times as long as the pool with two workers. Runs that failed: {failed};
 {alike}. The machine has {record["machine"]["cores"]} cores. The load
-counts the processes that want a core at the end of each sweep: above the number of workers plus one or two it shows
-other work, with which the times say little. The throats without flow
+is the mean number of processes that used or awaited a core in the last minute of a sweep. A load above the number of
+workers by more than two shows that other work disturbed the times. The throats without flow
 have a head loss of {runs.LEAST_HEAD:g} um."""
 
 

@@ -1,9 +1,9 @@
 """Throats of the example of a network as whole runs of the solver, and their comparison with the law.
 
 A scene has the throat's width, seed, head loss and supplies; the tables keep their values for the step of the example.
-Two things it cannot have. The head loss of a scene is positive: two throats of the example reverse, and a run takes the
-amount of their head loss, as if its aggregate were the same from both sides. A run with steady substrates needs a flow:
-throats without flow get LEAST_HEAD, with which next to nothing is supplied, as in the example.
+Two properties differ from those of the example. First, a scene has no negative head loss. Where the flow in a throat
+reverses (two throats), the run keeps its direction and uses the absolute value. Second, a run with steady substrates
+needs a flow. Throats without flow get LEAST_HEAD, which supplies almost nothing.
 """
 
 from collections.abc import Iterable, Iterator
@@ -19,9 +19,8 @@ from repro.results import M_PER_D, read_table
 from repro.results.network import added_resistance, uptake
 from repro.scene import Scene, load_scene
 from verification.claims.runs import SUBSTRATES, rows_at
-from verification.network import throats
 from verification.network.histories import History, read
-from verification.network.throats import EXPECTED, LENGTH, PER_HEAD, QUANTITIES, TIMES, VISCOSITY, conditions
+from verification.network.throats import EXPECTED, LENGTH, QUANTITIES, TIMES, VISCOSITY, conditions, resistance
 
 #: um: less than that of every throat with flow.
 LEAST_HEAD = 1e-4
@@ -91,7 +90,7 @@ def _last(one_scene: Scene, width: float) -> list[float]:
         if share > CONTROL_SHARE:
             break
         speed = M_PER_D * flow.mean_velocity
-        r = (PER_HEAD * width**2 * flow.head_loss / speed - LENGTH) / width
+        r = resistance(width, flow.head_loss, speed)
         half_disc = np.sqrt(2 * outline.area / np.pi)
         rows.append([share, float(r / added_resistance(share, 1.0).length), float(outline.thickness / half_disc)])
     return rows[-1]
@@ -153,7 +152,7 @@ def laws_at_the_runs() -> tuple[Judgement, Judgement]:
     supplies = np.concatenate([at.supplies for at in states], axis=1)
     area, speed, *taken = (measured[name] for name in QUANTITIES)
     share, inside = area / width**2, of_runs.in_range[~np.isnan(of_runs.run[:, :, 0])]
-    r = (PER_HEAD * width**2 * head / speed - LENGTH) / width
+    r = resistance(width, head, speed)
     added, law = added_resistance(area, width), uptake(area, width, speed, *supplies)
     both = np.stack([law.acceptor, law.donor])
     return (Judgement(share, inside, r, added.length, added.least, added.most),
@@ -175,4 +174,4 @@ def compared() -> Comparison:
 
 def _by_throat(column: np.ndarray) -> np.ndarray:
     """(n, times) from the rows of EXPECTED, which are in order of time."""
-    return column.reshape(len(throats.TIMES), -1).T
+    return column.reshape(len(TIMES), -1).T

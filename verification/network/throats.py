@@ -18,8 +18,9 @@ not know: it is divided from the lower bound only. The growth of the area,
 
     dA/dt = (Y U_D - (U_A - F U_D) / d_c) / X_m,
 
-rises with U_D and falls with U_A. Put into it, the largest admitted values give a rate G_most(A, t) and the least
-G_least(A, t) with G_least <= dA/dt <= G_most for any shape. By the comparison theorem for scalar equations the
+rises with U_D and falls with U_A. Let G_most(A, t) be dA/dt with the largest admitted U_D and the least U_A, and
+G_least(A, t) dA/dt with the least U_D and the largest U_A. Then G_least <= dA/dt <= G_most for any shape. By the
+comparison theorem for scalar equations the
 solutions of dA/dt = G_most and of dA/dt = G_least from the same seed enclose A(t), whatever the signs of dG/dA: the
 errors of both laws compound over the growth in them, with its feedback on the flow. PRESET is added to both sides for
 the error of the preset `fast`. The bounds of flow and uptake are those of the laws at the two areas.
@@ -38,9 +39,9 @@ import numpy as np
 import repro
 from repro.results.network import UM_PER_HOUR, Uptake
 from repro.scene import load_scene
-from verification.network.histories import History
+from verification.network.histories import History, rounded
 
-#: A / W^2 at the end that separates the two groups of throats, and how many are taken of each.
+#: A / W^2 at the end that separates the two groups of throats, and the number of throats from each group.
 THICK, OF_THICK, OF_OTHERS = 1.0, 4, 6
 #: Length of a throat (um), nu (m2/s) and g (m/s2) of the example.
 LENGTH, VISCOSITY, GRAVITY = 600.0, 1e-6, 9.81
@@ -60,6 +61,10 @@ LAW, MOST, LEAST = 0, 1, -1
 TRIALS = 9
 QUANTITIES = ("area_um2", "velocity_m_per_d", "acceptor_pg_per_m_h", "donor_pg_per_m_h")
 EXPECTED = Path(__file__).with_name("throats_expected.csv")
+#: Digits of EXPECTED.
+DIGITS = 6
+#: A number, or a number for each of several throats or times.
+Values = float | np.ndarray
 EXPECTED_COLUMNS = ["throat", "time_h", "in_range", "example_area_um2",
                     *(f"{name}_{part}" for name in QUANTITIES for part in ("law", "least", "most"))]
 
@@ -93,11 +98,20 @@ def conditions(throats: list[History], index: int, time: float) -> Conditions:
                       np.array([one.supplies[:, index] for one in throats]).T)
 
 
+def mean_velocity(width: Values, head_loss: Values, resistance: Values) -> Values:
+    """m/d in a throat of a width (um) at a head loss (um), with the added resistance r."""
+    return PER_HEAD * width**2 * head_loss / (LENGTH + resistance * width)
+
+
+def resistance(width: Values, head_loss: Values, speed: Values) -> Values:
+    """r of a throat with this mean velocity (m/d): the inverse of :func:`mean_velocity`."""
+    return (PER_HEAD * width**2 * head_loss / speed - LENGTH) / width
+
+
 def velocity(area: np.ndarray, at: Conditions, side: int) -> np.ndarray:
     """(n,) m/d by the law of resistance. Its most is that of the least resistance."""
     added = repro.added_resistance(area, at.width)
-    resistance = {LAW: added.length, MOST: added.least, LEAST: added.most}[side]
-    return PER_HEAD * at.width**2 * at.head_loss / (LENGTH + resistance * at.width)
+    return mean_velocity(at.width, at.head_loss, {LAW: added.length, MOST: added.least, LEAST: added.most}[side])
 
 
 class Taken(NamedTuple):
@@ -169,7 +183,8 @@ def expected(throats: list[History]) -> list[list]:
     for time, of_time in zip(TIMES, at_times(throats)):
         for k, one in enumerate(throats):
             area = float(one.area[np.searchsorted(one.time, time)])
-            lines.append([one.number, time, int(in_range(one, time)), area, *map(_digits, of_time[:, k].ravel())])
+            bounds = [rounded(value, DIGITS) for value in of_time[:, k].ravel()]
+            lines.append([one.number, time, int(in_range(one, time)), area, *bounds])
     return lines
 
 
@@ -202,11 +217,7 @@ def quantities(area: np.ndarray, at: Conditions, side: int) -> tuple[np.ndarray,
 def in_range(one: History, time: float) -> bool:
     """Do the conditions up to a time stay within those of the shapes behind the law of resistance?"""
     until = one.time <= time
-    speed = PER_HEAD * one.width**2 * np.abs(one.head_loss[until]) / (LENGTH + one.width * repro.added_resistance(
-        one.area[until], one.width).length)
+    added = repro.added_resistance(one.area[until], one.width)
+    speed = mean_velocity(one.width, np.abs(one.head_loss[until]), added.length)
     supplied = (one.supplies[:, until] >= LEAST_SUPPLY * one.width**2).all()
     return bool(supplied and (speed >= VELOCITIES[0]).all() and (speed <= VELOCITIES[1]).all())
-
-
-def _digits(value: float) -> float:
-    return float(f"{value:.6g}")

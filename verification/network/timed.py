@@ -31,7 +31,7 @@ WARM_UP = 2.0
 
 
 def measure(all_throats: list[History], times: tuple[float, ...] = TIMES) -> dict[str, Any]:
-    """Time each way. load: of the machine in the last minute of a way, in processes that want a core."""
+    """Time each way. load: mean number of processes that used or awaited a core, in the last minute of the way."""
     rows, tables = [], []
     with TemporaryDirectory() as folder:
         for name, workers in WAYS:

@@ -37,8 +37,9 @@ PAST_CONTACT, LONGEST = 3.0, 200.0
 #: Times of the rows over the end.
 ROWS = (0.2, 0.4, 0.6, 0.8, 1.0)
 DRIVES = ("head", "0.3 m/day", "10 m/day")
-#: Further members, which test the estimate of `repro check`. Its constants were fitted to the first MEMBERS. The aim,
-#: set on 2026-11-26 before these were run: it expects two thirds of their folds, and a quarter of the others at most.
+#: Further members, which test the estimate of `repro check`. Its constants were fitted to the first MEMBERS. The aim
+#: was set on 2026-11-26, before these were run: `repro check` expects a fold in at least two thirds of the members that
+#: fold, and in at most a quarter of the others.
 TESTED = range(100, 140)
 #: Relative difference of two computations of one stretch from the same shape: round-off of the fields in a file.
 SAME = 1e-6
