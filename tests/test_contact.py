@@ -236,6 +236,57 @@ def test_newton_gives_up_as_soon_as_no_line_moves(plugged, monkeypatch):
     assert 0 < max(counts) < contact_newton.MOST_ITERATIONS
 
 
+def test_lines_advance_the_farther_the_more_biomass_grows(plugged):
+    """A line that came to rest too far, beyond the corner at 0.62 um, would not move when more biomass grows."""
+    factors = (1.011, 1.012, 1.013, 1.015, 1.017, 1.019)
+    advances = [expanded_by(*plugged, factor).advances[TOP, 1] for factor in factors]
+    assert (np.diff(advances) > 0.01).all()
+    assert np.interp(factors, factors[::5], advances[::5]) == pytest.approx(advances, abs=0.1)
+
+
+@pytest.mark.parametrize("factor", [1.017, 1.029])
+def test_newton_places_a_line_whose_clearance_jumps_at_a_corner(factor, plugged, monkeypatch):
+    """Before the corner the line is too short, and beyond it far enough. No search is necessary."""
+    monkeypatch.setattr(contact.growth, "equilibrium", lambda *_, **__: pytest.fail("the search took over"))
+    expanded_by(*plugged, factor)
+
+
+@pytest.mark.parametrize("start, step, near, place", [
+    (1.5, -0.3, False, 1.2),
+    (1.5, -0.49, False, 1.0202),
+    (0.5, 0.51, False, 1.0202),
+    (1.0202, -0.01, False, 1.0202),
+    (1.0202, -0.01, True, 0.9798),
+    (1.0202, -0.3, True, 0.7202),
+    (0.9798, 0.01, False, 0.9798),
+    (0.9798, 0.01, True, 1.0202),
+    (0.0202, -0.01, True, 0.0),
+    (0.0202, -0.5, True, 0.0),
+    (0.3, -0.5, False, 0.0202),
+    (0.5, 9.0, False, 2.5),
+])
+def test_a_line_keeps_away_from_corners(start, step, near, place):
+    """It goes to the other side of a corner only from beside it, and near to equilibrium."""
+    line = contact_lines.Line(TOP, 0, 1, advance=start)
+    assert contact_newton._place(line, start, step, near) == pytest.approx(place, abs=1e-12)
+
+
+def test_newton_for_lines_gives_up_if_it_is_not_near_the_solution_in_time(plugged, monkeypatch):
+    iterations = []
+    solve = contact_newton.Coupled.solve
+
+    def counted(coupled, *arguments):
+        try:
+            solve(coupled, *arguments)
+        finally:
+            iterations.append(coupled.iterations)
+
+    monkeypatch.setattr(contact_newton, "EARLY", (2, 0.0))
+    monkeypatch.setattr(contact_newton.Coupled, "solve", counted)
+    expanded_by(*plugged, 1.03)
+    assert iterations == [2]
+
+
 def test_stationary_lines_stay_where_the_last_round_of_fluid_forces_left_them(plugged):
     """Lines that every round places anew can alternate between two places, one of them the end of an arc. The fluid's
     forces and the shape then never agree."""

@@ -149,8 +149,8 @@ def numbers(state, solved):
     return np.array([state.mass, state.outline.area, state.outline.upstream, solved.fluxes[0].effluent])
 
 
-def test_a_failing_step_is_halved_until_it_succeeds(monkeypatch):
-    """Steps above 0.02 h fail: 0.2, 0.1, 0.05 and 0.025 h are tried in turn."""
+def test_each_failure_shortens_a_step_by_the_square_of_the_last_factor(monkeypatch):
+    """Steps above 0.02 h fail: 0.2, 0.2 / 2, 0.1 / 4 and 0.025 / 16 h are tried in turn."""
     scene, tried = base(), []
     state = pore.seeded(scene)
 
@@ -162,8 +162,8 @@ def test_a_failing_step_is_halved_until_it_succeeds(monkeypatch):
 
     monkeypatch.setattr(midpoint, "attempt", attempt)
     result, _, after = stepping._advance(Stages.of(scene), state, None, step_control.StepControl(0.2))
-    assert tried == [0.2, 0.1, 0.05, 0.025, 0.0125]
-    assert result.pore.time == 0.0125 and after.length == pytest.approx(step_control.FASTER * 0.0125)
+    assert tried == [0.2, 0.1, 0.025, 0.0015625]
+    assert result.pore.time == 0.0015625 and after.length == pytest.approx(step_control.FASTER * 0.0015625)
 
 
 def test_a_step_ends_at_contact_within_a_thousandth_of_the_film(monkeypatch):

@@ -50,6 +50,10 @@ NEWTON = 1e-11
 #: Or at this one, if round-off keeps the residual from falling.
 ROUND_OFF = 1e-8
 MOST_ITERATIONS = 25
+#: Newton's method gives up if its defect is larger than this after so many iterations. Of 1240
+#: solutions in 19 pores that converged, three would have been given up; of the processor time of 117
+#: that did not, half is saved.
+NEAR = 12, 0.02
 #: Halvings in a line search.
 HALVINGS = 8
 #: Sub-steps of a continuation, by ``patient``; an impatient caller shortens its step instead.
@@ -533,7 +537,7 @@ _ADVICE = {False: "try a shorter growth.time_step or a larger numerics.refinemen
 def _continued(system: System, start: np.ndarray, theta: np.ndarray, first: Equilibrium,
                prescribed: np.ndarray, steps: int, modified_newton: bool) -> Equilibrium:
     """Newton's method at theta = start (theta / start)^s for s = 1 / steps ... 1."""
-    newton = Newton(NEWTON, ROUND_OFF, MOST_ITERATIONS, modified_newton)
+    newton = Newton(NEWTON, ROUND_OFF, MOST_ITERATIONS, modified_newton, NEAR)
     solution = first
     for part in np.arange(1, steps + 1) / steps:
         target = first.position + part * (prescribed - first.position)
