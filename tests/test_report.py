@@ -201,8 +201,8 @@ def test_every_name_has_its_unit_or_is_a_pure_number():
 
 #: The words for parts of a name; other parts occur in the long name as they are.
 MEANING = {"out": "leaving", "effluent": "leaving", "consumed": "taken up", "min": "least", "max": "largest",
-           "fraction": "part", "balance": "relative", "t0": "t = 0", "remeshed": "made anew", "before": "start",
-           "after": "end", "region": "aggregate (1)", "oxygen": "acceptor", "demand": "donor", "overshoot": "above"}
+           "fraction": "part", "balance": "relative", "t0": "t = 0", "remeshed": "new mesh", "before": "start",
+           "after": "end", "region": "aggregate (1)", "overshoot": "above"}
 #: A name and its long name have the same word of each tuple, or none.
 CONTRASTS = [("acceptor", "donor"), ("upstream", "downstream"), ("least", "largest"), ("active", "inert"),
              ("supplied", "leaving", "taken up", "stored"), (" xx", " yy", " zz", " xy")]

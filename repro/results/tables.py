@@ -137,9 +137,9 @@ class Results(Mapping[str, np.ndarray]):
         """Find the row at, or nearest to, a time (h)."""
         if method not in (None, "nearest"):
             raise ValueError(f'method: None or "nearest" is needed, not {method!r}')
-        apart = np.abs(self.time - time)
-        if len(apart) and (apart.min() <= SAME_TIME or method and np.isfinite(time)):
-            return int(apart.argmin())
+        distance = np.abs(self.time - time)
+        if len(distance) and (distance.min() <= SAME_TIME or method and np.isfinite(time)):
+            return int(distance.argmin())
         raise KeyError(f"{time} h: not a reported time; {self._rows_beside(time)}")
 
     def _rows_beside(self, time: float) -> str:

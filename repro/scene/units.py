@@ -511,8 +511,8 @@ def _conversion(from_unit: str, unit: str) -> Fraction:
     """
     if unit == "rad" and from_unit not in ANGLES:
         raise ValueError(f"{from_unit} is not a unit of angle")
-    known = exact.conversion(from_unit, unit)
-    return _by_pint(from_unit, unit) if known is None else known
+    factor = exact.conversion(from_unit, unit)
+    return _by_pint(from_unit, unit) if factor is None else factor
 
 
 def _by_pint(from_unit: str, unit: str) -> Fraction:

@@ -16,7 +16,7 @@ from repro.fem.mesh import Mesh, curved
 from repro.fem.mesher import unlocked
 from repro.model.pore import sized
 from repro.model.uptake_law import Values
-from repro.results.network import added_resistance, known
+from repro.results.network import added_resistance, share_range
 from repro.scene import Scene
 from verification.claims import FEW, FEW_WORDS, LATER, Finding, at_least, claim
 from verification.claims.levels import ABOUT_WIDE
@@ -242,7 +242,7 @@ def beyond(run: tuple[str, ...], spanned: bool) -> np.ndarray:
     """(n,) ln(r / law's r) of a run's rows in the law's range from LEAST on, over the ln of its bound on that side."""
     scene, rows = load_packaged(*run), series(*run)
     width = scene.pore.width
-    low, high = known(spanned)
+    low, high = share_range(spanned)
     share = rows["aggregate_area_um2"] / width**2
     in_range = (rows["contact"] == spanned) & (share >= max(low, LEAST)) & (share <= high)
     resisted = 24e-6 * clean(scene) / rows["conductivity_m_per_d"][in_range] - 1
