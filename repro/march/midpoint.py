@@ -278,13 +278,13 @@ def _guess_shape(previous: Pore, half: Halfway, part: float) -> Pore:
     It is extrapolated from the first half, or interpolated in start, half way and end if the end is
     known.
     """
-    parabola = [(2 * part, half.expansion)]
+    terms = [(2 * part, half.expansion)]
     if half.end is not None:
-        parabola = [(4 * part * (1 - part), half.expansion), (part * (2 * part - 1), half.end)]
+        terms = [(4 * part * (1 - part), half.expansion), (part * (2 * part - 1), half.end)]
     corners = previous.mesh.corners
     push = previous.pressure
     points = previous.mesh.points
-    for weight, shape in parabola:
+    for weight, shape in terms:
         push = push + weight * (shape.pore.pressure[:corners] - previous.pressure)
         points = points + weight * (shape.position - previous.mesh.points)
     return _place_body(replace(previous, pressure=push), points)
