@@ -75,7 +75,7 @@ REFINEMENTS, REGULAR = (0.5, 0.7, 1.0, 1.4, 2.0, 2.8), (4, 8, 12)
 
 
 @claim("C22", "3.4", "P1-P1 with the stabilisation is stable and convergent; without it, it is not",
-       about=OF_SCHEME, sizes=BESIDE, steps=ALONE, fixed="there is no time in it")
+       about=OF_SCHEME, sizes=BESIDE, steps=ALONE, fixed="the claim does not depend on time")
 def stabilised() -> Finding:
     """Growth of a half-disc by theta(R) against the closed form: orders of outline and pressure; stability numbers.
 
@@ -87,17 +87,18 @@ def stabilised() -> Finding:
     regular = [regular_half_disc(parts) for parts in REGULAR]
     errors = np.array([growth_errors(body) for body in bodies])
     outline, pressure = (order(bodies, column) for column in errors.T)
-    with_, without, printed = ([stability(body, factor) for body in regular] for factor in (1.0, 0.0, -1.0))
+    with_term, without_term, as_printed = ([stability(body, factor) for body in regular]
+                                           for factor in (1.0, 0.0, -1.0))
     checks = (at_least("order of the outline", "convergent", outline, 1.7, "2 in theory; 1.7 for unrelated meshes"),
               at_least("order of the pressure", "convergent", pressure, 1.0, "1 in theory, in the mean square"),
-              at_least("stability number, finest over coarsest mesh", "stable", with_[-1] / with_[0], 0.8,
+              at_least("stability number, finest over coarsest mesh", "stable", with_term[-1] / with_term[0], 0.8,
                        "independent of h; a fifth for the coarsest mesh"),
-              at_most("stability number without stabilisation, largest", "it is not", max(without), 1e-10,
+              at_most("stability number without stabilisation, largest", "it is not", max(without_term), 1e-10,
                       "zero: a pressure that nothing sees; round-off"),
-              at_most("stability number with the sign of (27), largest", "as printed", max(printed), 0.0,
+              at_most("stability number with the sign of (27), largest", "as printed", max(as_printed), 0.0,
                       "negative: stationary, but no saddle point [E5]"))
     return Finding(tuple(map(without_limit, checks)),
-                   reason="it is not of the order of theory on every family of meshes, or not stable")
+                   reason="on a family of meshes its order is below that of theory, or it is not stable")
 
 
 def order(family: list[Supported], errors) -> float:
@@ -123,10 +124,10 @@ def growth_errors(body: Supported) -> tuple[float, float]:
 
 def stability(body: Supported, factor: float) -> float:
     """Least eigenvalue of B K^-1 B^T + factor C against the pressure's mass matrix, at t = 0 (dense)."""
-    n, of = body.corners, stabilised_by(body, factor)
-    numbered = np.argsort(of.sparse.order)
-    of.under(np.ones_like(of.strained(body.reference).J), body.reference, body.reference, body.resting)
-    matrix = of.sparse.matrix(of.tangent(body.reference, body.resting)).toarray()[np.ix_(numbered, numbered)]
+    n, system = body.corners, stabilised_by(body, factor)
+    rows = np.argsort(system.sparse.order)
+    system.under(np.ones_like(system.strained(body.reference).J), body.reference, body.reference, body.resting)
+    matrix = system.sparse.matrix(system.tangent(body.reference, body.resting)).toarray()[np.ix_(rows, rows)]
     M = np.zeros((n, n))
     np.add.at(M, (body.cells[:, :, None], body.cells[:, None, :]), mass(areas(body)))
     divergence = matrix[-n:, :-n]
@@ -172,11 +173,11 @@ def expansion() -> Finding:
                       "one to three days"))
     last, wide = bodies(WIDE)[-1], series(*WIDE)["aggregate_area_um2"]
     note = (f"165 updates, no remesh. Wide at its end: theta from {last.mean(last.pore.theta).min():.0f} to "
-            f"{largest[-1]:.0f}, area {wide[-1] / wide[0]:.0f} times the seed's; there the grown body is remeshed.")
+            f"{largest[-1]:.0f}, area {wide[-1] / wide[0]:.0f} times the seed's, with remeshes of the grown body.")
     change = (f"\"up to 2000\" is judged as reaching 2000, which is no upper bound: at {hours[-1]:g} h it is "
               f"{largest[-1]:.0f}; {sensitivity.holds_for_supplies('C25')}")
     return Finding(checks, change=change, note=note,
-                   reason="the expansion or its time is not decided by these meshes")
+                   reason="these meshes do not decide the expansion or its time")
 
 
 #: Sizes of the displacement's gradient.

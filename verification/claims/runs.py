@@ -54,7 +54,7 @@ FILM = 0.005
 
 
 def rows_at(*hours: float) -> str:
-    """The change of a scene that asks for rows at some times (h)."""
+    """The change of a scene that requests rows at some times (h)."""
     return "output.times=[" + ", ".join(f'"{hour:g} h"' for hour in hours) + "]"
 
 
@@ -205,9 +205,9 @@ def grown(run: Run, time: float) -> tuple[Pore, Solved]:
 
 
 @cached
-def grown_anew(run: Run, time: float) -> tuple[Pore, Solved]:
-    """The same in a mesh made at that time, whose ends are 1.5 W from the aggregate (3.1) at every level. The ends of
-    the run's own mesh depend on the time of the last remesh."""
+def grown_on_new_mesh(run: Run, time: float) -> tuple[Pore, Solved]:
+    """The same on a new mesh, whose ends are 1.5 W from the aggregate (3.1) at every level. The ends of the run's own
+    mesh depend on the time of the last remesh."""
     return _grown(load_packaged(*run), *remeshed(load_packaged(*run), *solved_pore(run, time)))
 
 
@@ -286,7 +286,7 @@ def solved_pore(run: Run, time: float) -> tuple[Pore, Solved]:
 
 
 def remeshed(chosen: Scene, pore: Pore, solved: Solved) -> tuple[Pore, Solved]:
-    """The same aggregate in a new mesh of the extent that the scene asks for, solved."""
+    """The same aggregate in a new mesh of the extent that the scene requests, solved."""
     new, _ = remeshing.remesh(Remeshing.of(chosen), pore, pore, solved.flow.mean_velocity)
     return new, solve(chosen, new)
 
@@ -362,9 +362,9 @@ def halved(lattice: np.ndarray, falling=False) -> np.ndarray:
     return np.hstack([np.where(falling, [a, b, d], [a, b, c]), np.where(falling, [b, c, d], [a, c, d])]).T
 
 
-def uncovered(outline: shapely.Polygon, other: shapely.Polygon) -> float:
-    """Area that only one of two shapes covers, in percent of ours."""
-    return 100 * float(outline.symmetric_difference(other).area / outline.area)
+def uncovered(first: shapely.Polygon, second: shapely.Polygon) -> float:
+    """Area that only one of two shapes covers, in percent of the first one's."""
+    return 100 * float(first.symmetric_difference(second).area / first.area)
 
 
 def upstream_part(first: shapely.Polygon, last: shapely.Polygon) -> float:

@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 from repro.model.kinetics import rate_law
 from verification.claims.base_run import upstream_means
 from verification.claims.levels import CONVERGED, Level, at_level
-from verification.claims.runs import BASE, PLATES, at, grown, grown_anew, load_packaged, series, solved_pore
+from verification.claims.runs import BASE, PLATES, at, grown, grown_on_new_mesh, load_packaged, series, solved_pore
 from verification.claims.scheme import PAPER_CORRECTION, bookkeeping, exceeding
 from verification.errata import (
     STATE_HEAD,
@@ -141,7 +141,7 @@ def inlet_condition() -> Numbers:
         {table}""")
 def meshed_inlet() -> Numbers:
     """Both substrates at the distances in question."""
-    pore, solved = grown_anew(BASE, PLOTTED)
+    pore, solved = grown_on_new_mesh(BASE, PLOTTED)
     rows = [[f"{d} um", *map("{:.2f}".format, upstream_means(pore, solved, float(d)))] for d in (60, 65, 75)]
     distance = pore.boundary.upstream - pore.mesh.ends[0]
     return {"table": table(["distance", "acceptor", "donor"], rows), "distance": f"{distance:.0f}"}

@@ -1709,7 +1709,7 @@ MUTANTS = (
         "verification/claims/report.py",
         ("first-value-undated",
          "A new claim may have any date before its first value.",
-         'before = known["first_value"] if known else RULE_SINCE',
-         'before = known["first_value"] if known else ""',
+         'before = recorded["first_value"] if recorded else RULE_SINCE',
+         'before = recorded["first_value"] if recorded else ""',
          "tests/test_claims.py::test_a_definition_without_a_date_before_its_values_is_refused")),
 )
