@@ -103,10 +103,10 @@ def symmetry() -> list[dict]:
         other = switches.course(BASE, switches.step_of_paper, bulge)
         lean = switches.near(other.columns, "lean", TIMES)
         default = switches.near(switches.run_columns(BASE), "lean", TIMES)
-        off = ", ".join(f"{100 * value:+.2f} % at {time:g} h" for value, time in zip(lean - default, TIMES))
+        shifts = ", ".join(f"{100 * value:+.2f} % at {time:g} h" for value, time in zip(lean - default, TIMES))
         rows.append(_marched(other, Switch(
             "symmetry of the seed", "half-disc", f"1 % longer {word}", "",
-            note=f"R (1 + 0.01 cos 3 phi), area as before; the middle between the tips is off by {off}")))
+            note=f"R (1 + 0.01 cos 3 phi), area as before; the middle between the tips is off by {shifts}")))
     return rows
 
 

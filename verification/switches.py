@@ -140,7 +140,7 @@ def converged(switch: Switch) -> tuple[dict[str, float], dict[str, float]]:
         with at_level(level):
             effects.append(effect(state((*BASE, LAST)), state(switch.run)))
         forget(level)
-    return effects[0], {name: float(np.abs(sizes - sizes[0]).max()) for name, sizes in columns(effects).items()}
+    return effects[0], {name: float(np.abs(values - values[0]).max()) for name, values in columns(effects).items()}
 
 
 def reshaped(previous: Pore, outline: Outline) -> Pore:

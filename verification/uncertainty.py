@@ -77,9 +77,9 @@ def estimate(sizes, values, formal: tuple[float, float]) -> Estimate:
     order, (lowest, highest) = observed_order(h, f), formal
     if lowest - BAND <= order <= highest + BAND:
         used = min(order, lowest)
-        slope, apart = fit(h, f, used)
-        if (scatter := deviation(apart)) < np.ptp(f) / (len(f) - 1):
-            return Estimate(float(OBSERVED * abs(slope) * h[0] ** used + scatter + abs(apart[0])), order, OBSERVED)
+        slope, residuals = fit(h, f, used)
+        if (scatter := deviation(residuals)) < np.ptp(f) / (len(f) - 1):
+            return Estimate(float(OBSERVED * abs(slope) * h[0] ** used + scatter + abs(residuals[0])), order, OBSERVED)
     reach = h[0] ** lowest / (h.max() ** lowest - h.min() ** lowest)
     return Estimate(float(FORMAL * np.ptp(f) * reach), order, FORMAL)
 
@@ -102,9 +102,9 @@ def fit(h: np.ndarray, f: np.ndarray, order: float) -> tuple[float, np.ndarray]:
     return slope, f - np.mean(f) - slope * x
 
 
-def deviation(apart: np.ndarray) -> float:
+def deviation(residuals: np.ndarray) -> float:
     """Standard deviation of a fit of three unknowns from its residuals (k,)."""
-    return float(np.sqrt(apart @ apart / max(len(apart) - FEWEST, 1)))
+    return float(np.sqrt(residuals @ residuals / max(len(residuals) - FEWEST, 1)))
 
 
 def combined(value: float, mesh: Estimate | None, step: Estimate | None) -> Bar:
