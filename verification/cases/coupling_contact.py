@@ -61,10 +61,10 @@ def test_after_contact(width, record):
     finest, before = (numbers(width, *converged(size)) for size in PORES[width][1])
     for name, change in errors(before, finest).items():
         record(at_most(f"{name}, change of the reference", change, KNOWN[name == LENGTH],
-                       "less than the errors that are accepted below"))
+                       "less than the accepted errors of the presets"))
     for preset in QUADRATIC:
         for name, error in errors(numbers(width, with_preset(preset)), finest).items():
             limit = ACCEPTED[preset][name == LENGTH]
             origin = f"the aim of {preset}" if limit == AIMS[preset] else (
-                f"the aim is {100 * AIMS[preset]:g} %: missed, for singular lines and unrelated meshes")
+                f"the aim of {100 * AIMS[preset]:g} % is missed because of singular lines and unrelated meshes")
             record(at_most(f"{name}, {preset}", error, limit, origin))
