@@ -113,7 +113,7 @@ THETAS = (1.5, 1 / CREASE**2, 3.0)
 @pytest.mark.parametrize("elements", ELEMENTS)
 def test_surface_confined(elements, record):
     """A plug that grows by theta between the walls has the elastic stretch theta^(-1/2) all along its free surfaces,
-    also beyond the limit of creases; where new biomass is born without stress theta counts from the last shape.
+    also beyond the limit of creases. If new biomass is born without stress, theta counts from the last shape.
 
     Norm: largest difference of stretches.
     """
@@ -164,9 +164,9 @@ def energy_and_constraint(gamma: float) -> tuple[Callable, Callable]:
     references=("surface_stability",), runs_with="2",
     omitted="linear elements: their stabilisation is no part of the energy; cubic ones: those of order 2")
 def test_surface_stability(record):
-    """A block that grows between side walls is stable down to Biot's elastic stretch, 0.544: quartic places that are
-    exactly divergence-free find it within 1 %; quadratic ones with linear pressures do within 5 %, thanks to their
-    stabilisation.
+    """A block that grows between side walls is stable down to Biot's elastic stretch, 0.544: quartic positions that are
+    exactly divergence-free give it within 1 %, and quadratic ones with linear pressures and their stabilisation within
+    5 %.
 
     Norm: elastic stretch at which the least eigenvalue is zero.
     """
@@ -190,8 +190,8 @@ def test_surface_stability(record):
     omitted="orders of elements by themselves: growth-surface-confined; accurate, exact: as fast")
 @pytest.mark.parametrize("preset", ["paper", "fast"])
 def test_fold(preset, record):
-    """A plug that grows alike everywhere between the walls ends as a fold where its area has grown by 3.38; born
-    without stress it grows on.
+    """A plug that grows uniformly between the walls ends as a fold when its area has grown by a factor of 3.38. If new
+    biomass is born without stress, it continues to grow.
 
     Norm: area at the end over that at the start.
     """

@@ -120,7 +120,7 @@ def contact_rests(run: Run) -> list[Check]:
     joins = [_closing(shape, width, film, angle) for shape in shapes]
     crossed = [shape.points[:, 1].max() > width or shape.points[:, 1].min() < 0 for shape in shapes]
     return [at_most("films or wedges that should have closed", sum(joins), 0, "contact rests (2.3.3)"),
-            at_most("instants with nodes beyond a wall", sum(crossed), 0, "the walls hold"),
+            at_most("instants with nodes beyond a wall", sum(crossed), 0, "the walls are rigid"),
             at_least("instants in contact", len(shapes) - len(before), 1, "else less is tested"),
             at_least("thinnest film left open, um", min(before, default=film), film, "2.3.3: it closes")]
 
@@ -142,7 +142,7 @@ def _clearances(shape: Outline, width: float, film: float, angle: float) -> dict
 CONTACT = HardCase(
     7, "contact", "Film of 2 um and contact, with remeshing forced just before and after",
     "The same shape and flow with and without forced remeshes, no film under 2 um left, the area that of the biomass",
-    "A film that is passed over in one step, overlaps the wall, or a remesh that moves the contact",
+    "A step that passes over the film or overlaps the wall, or a remesh that moves the contact",
     {"as it comes": partial(film_closes, simulator=simulation.simulate),
      "remeshed at every step": partial(film_closes, simulator=remeshing_always)},
     mutants=("hard-contact-passed-over",))
@@ -200,8 +200,8 @@ def wedges_close(preset: str) -> list:
     return [run, contact_rests(run),
             at_least("length of the contact surface at the end, over that at first", lengths[-1] / lengths[0], 1.5,
                      "nodes never leave; else less is tested"),
-            at_most("um by which it ever shrinks", max(0.0, -np.diff(lengths).min(initial=0.0)), 0.5,
-                    "nodes keep the wall; between fixed nodes the surface may slide")]
+            at_most("largest decrease of this length, um", max(0.0, -np.diff(lengths).min(initial=0.0)), 0.5,
+                    "nodes stay on the wall; between fixed nodes the surface may slide")]
 
 
 ANGLE = HardCase(
@@ -379,7 +379,7 @@ def one_step(preset: str) -> list:
                     "C to 1e-7 of the supply"),
             at_most("thickness against the root of it, relative", abs(thickness / np.sqrt(expected) - 1), 1e-4,
                     "uniform growth keeps the shape; arcs are parabolas"),
-            at_most("steps", sum(len(each.ledgers) for each in run.instants), 1, "the one step that is asked for")]
+            at_most("steps", sum(len(each.ledgers) for each in run.instants), 1, "the one requested step")]
 
 
 def long_steps(preset: str) -> list:
@@ -396,8 +396,8 @@ def long_steps(preset: str) -> list:
 UPDATES = {"updates": 0.06, "midpoint": 0.0}
 LONG = HardCase(
     11, "three-hours", "A growth step of 3 h",
-    "The exact exponential where rates are constant; else the finer run's numbers, by steps cut where they err",
-    "Newton's method that fails on a step that makes the area half as large again, or an error that no one sees",
+    "The exact exponential if rates are constant; else the numbers of a finer run, with shorter steps where they err",
+    "Newton's method that fails on a step in which the area grows by half, or an error that is not detected",
     {"constant rates": one_step, "base, 25 um": long_steps},
     mutants=("hard-estimate-ignored",))
 

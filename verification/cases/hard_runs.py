@@ -53,7 +53,7 @@ def _conserved(first: Pore, last: Pore) -> list[Check]:
             at_most("biomass, relative change", abs(last.mass / first.mass - 1), 1e-8, "the transfer conserves it"),
             at_most("X_I, relative change", abs(last.inert.sum() / first.inert.sum() - 1), 1e-8, "as above"),
             at_most("share of X_I beyond where it was, over its range", beyond, 0.05,
-                    "projection overshoots by a part of a jump that there is not")]
+                    "projection overshoots by a part of a jump, and this field has none")]
 
 
 def _step(scene: Scene, start: Pore):
@@ -73,7 +73,7 @@ def _numbers(scene: Scene, state: Pore) -> list[float]:
 
 REMESHES = HardCase(
     13, "remeshes", "Fifty forced remeshes",
-    "Area and biomass as before, X_I and the next step as without them",
+    "The area and biomass of before, and X_I and the next step of a run without them",
     "Mass that drifts by percents (30 % in 40 remeshes by linear interpolation), or places at t = 0 that fold",
     {"base at 4 h": remeshes},
     mutants=("hard-inert-degraded-at-a-remesh", "theta-anew-at-a-remesh"))
@@ -166,13 +166,13 @@ def _spoilt(good: Pore) -> tuple[Pore, int]:
         moved = good.moved(points)
         if moved.mesh.areas.min() > 0.02 * straight.areas.min() and not moved.mesh.turned_over().any():
             return moved, np.count_nonzero(moved.mesh.quality < POOR)
-    raise RuntimeError("no such mesh")
+    raise RuntimeError("no displacement leaves all triangles upright")
 
 
 POOR_MESH = HardCase(
     19, "poor-mesh", "Poor initial mesh",
     "A new mesh within two steps, and the shape and flow of a good start",
-    "Triangles turned over that no one notices",
+    "Triangles that are turned over without an error",
     {"nodes moved at random": poor}, refusable=("nodes moved at random",),
     mutants=("hard-poor-mesh-kept",))
 
@@ -206,7 +206,7 @@ SCALES = {"lengths x 1e6": (1e6, 1.0), "lengths x 2^20": (2.0**20, 1.0), "length
 UNITS = HardCase(
     17, "units", "Extreme units: lengths times 1e6, times times 1e-6",
     "The same numbers times their unit",
-    "A length or a time that is written into the code: a tolerance, a smallest step, a size",
+    "A length or a time in the code: a tolerance, a smallest step, a size",
     {label: partial(units, length=length, time=time) for label, (length, time) in SCALES.items()},
     refusable=tuple(SCALES),
     mutants=("length-scale",))
@@ -238,7 +238,7 @@ DRAWS = range(10)
 RANDOM = HardCase(
     22, "random", "Parameters drawn at random within physical ranges",
     "Balances, bounds and area by biomass in every run, or a refusal that says what to change",
-    "A run that ends with a number that is none, or with mass made or lost",
+    "A run that ends with NaN, or that creates or loses mass",
     {f"draw {seed}": partial(at_random, seed=seed) for seed in DRAWS},
     refusable=tuple(f"draw {seed}" for seed in DRAWS),
     mutants=("reprojection-left-out",))

@@ -81,7 +81,7 @@ def exhausted(preset: str, scarce: str) -> list:
                     "else less is tested"),
             at_most(f"{column}: 1000 mg/L of the other for 1e6, over the supply",
                     abs(run.last[column] - more.last[column]) / 10, 2e-3,
-                    "the other's m is 0.997 or more: uptake changes by less, and so does what leaves")]
+                    "the other's m is 0.997 or more: uptake changes by less, and so do effluents")]
 
 
 def _stoichiometry(run: Run) -> list[Check]:
@@ -102,8 +102,8 @@ def _stoichiometry(run: Run) -> list[Check]:
 
 EXHAUSTED = HardCase(
     2, "exhausted", "One substrate exhausted, the other in excess",
-    "Uptake in the ratio of (7) and (8), and no change of what leaves when the excess is a thousandfold",
-    "Uptake of what is not there, or a substrate in excess that is clipped or overshoots",
+    "Uptake in the ratio of (7) and (8), and the same effluents with a thousandfold excess",
+    "Uptake of an exhausted substrate, or a substrate in excess that is clipped or overshoots",
     {f"{scarce} exhausted": partial(exhausted, scarce=scarce) for scarce in NAMES},
     mutants=("hard-decay-unlimited",))
 
@@ -181,7 +181,7 @@ def exponential(run: Run) -> list[Check]:
 SATURATED = HardCase(
     21, "saturated", "Supply of 1000 K_s",
     "Growth between the exponentials at the least concentration and at the supply, 0.3 % apart in their rates",
-    "A balance that no longer closes, as uptake is a small part of what passes", {"base": saturated},
+    "A balance that does not close, because uptake is a small part of the flux", {"base": saturated},
     mutants=("decay-leaves-all",))
 
 
@@ -274,8 +274,8 @@ def trickle(preset: str, velocity: str, balance: float) -> list:
 TRICKLES = {"1e-4": 1e-8, "1e-6": 1e-6, "1e-12": 1e-6}
 STILL = HardCase(
     5, "still", "No flow, and flow so small that the inlet's condition degenerates",
-    "The closed form of a pore in which diffusion is everything, or a refusal that names the Peclet number",
-    "A singular system that is solved all the same; concentrations above the supply",
+    "The closed form of a pore with diffusion alone, or a refusal that names the Peclet number",
+    "A singular system that is solved nevertheless; concentrations above the supply",
     {"velocity 0": no_flow, "without [flow]": still,
      **{f"{slow} m/d": partial(trickle, velocity=slow, balance=missing) for slow, missing in TRICKLES.items()}},
     refusable=("velocity 0", "1e-4 m/d", "1e-6 m/d", "1e-12 m/d"),

@@ -45,7 +45,7 @@ LINEAR = "the field is linear: round-off"
 @parametrize("geometry", EITHER)
 def test_plug(geometry, record):
     """A plug that slides and stretches along the pore, and a layer that thickens under a wall, stretch the fluid beside
-    them linearly; a plug that rests moves nothing; on straight triangles and on curved ones.
+    them linearly. A plug at rest does not move the mesh. Both hold on straight triangles and on curved ones.
 
     Norm: largest difference of displacement over the aggregate's largest, for gamma = 0.1, 1, 10.
     """
@@ -158,8 +158,8 @@ SEGMENT_MOTIONS = {"grows": lambda x, y: np.array([x, y]), "slides": lambda x, y
     references=("quadratic_mesh_motion",), runs_with="3")
 @parametrize("geometry", EITHER)
 def test_half_disc(geometry, record):
-    """Around a half-disc that grows, or slides along the wall, the fluid is displaced as an independent code displaces
-    it, for three gamma, on straight triangles and on curved ones; both codes refined.
+    """Around a half-disc that grows, or slides along the wall, the displacement of the fluid is that of an independent
+    code, for three gamma, on straight triangles and on curved ones; both codes are refined.
 
     Norm: L2 of the difference of the whole displacement over that of the displacement.
     """
@@ -183,7 +183,7 @@ def _comparison(geometry: int, contact: float, levels, motion: str, gamma: float
 @parametrize("geometry", EITHER)
 def test_corner(geometry, record):
     """Around an aggregate whose contact angle is 60 degrees the order falls to twice the exponent of the fluid's corner
-    of 120 degrees, for three gamma, on straight triangles and on curved ones; both codes refined.
+    of 120 degrees, for three gamma, on straight triangles and on curved ones; both codes are refined.
 
     Norm: L2 of the difference of the whole displacement over that of the displacement.
     """
@@ -236,9 +236,9 @@ STEPS = 18
     references=("quadratic_mesh_motion",), runs_with="3")
 @parametrize("geometry", EITHER)
 def test_growth(geometry, record):
-    """A half-disc that doubles its area, or slides by its radius, in 18 steps (under a narrow film: grows by 30 %,
-    slides by half of it) turns no triangle over, leaves no gap, and keeps the nodes of walls, inlet and outlet on their
-    lines, whether triangles are straight or curved.
+    """If a half-disc doubles its area or slides by its radius in 18 steps (under a narrow film: grows by 30 % or slides
+    by half of its radius), no triangle turns over, no gap opens, and the nodes of walls, inlet and outlet stay on their
+    lines, with straight and with curved triangles.
 
     Norm: least area of a triangle over its own at first; area of fluid and biomass, relative; distance from a line.
     """
@@ -286,8 +286,8 @@ STRIDES = (0.08, 0.04, 0.02, 0.01)
     references=("quadratic_mesh_motion",), runs_with="3")
 @parametrize("geometry", EITHER)
 def test_round_trip(geometry, record):
-    """There and back, the nodes return to second order in the length of the way, since the way back starts from the
-    moved mesh; beside a plug, where the motion is linear, to round-off.
+    """After a motion and its reverse the nodes return to second order in the length of the motion, because the reverse
+    starts from the moved mesh; beside a plug, where the displacement is linear, to round-off.
 
     Norm: root mean square of the nodes' distances from where they started, over the radius, or the largest.
     """
@@ -315,9 +315,9 @@ HALF_BENT = "the map is one to one while it is bent by less than half the height
     mutants=("more-poor-triangles", "turned-over-accepted", "quality-halved", "remeshed-too-late",
              "bent-over-accepted"), runs_with="1 2 3")
 def test_criterion(record):
-    """An equilateral triangle stretched by s has the quality 2 s / (1 + s^2), however it lies; a mesh is remade if
-    seven triangles are stretched by more than 3, or one is turned over, and not if six are; a curved triangle of the
-    aggregate may be bent, but not so far that it turns over at a node.
+    """An equilateral triangle stretched by s in any direction has the quality 2 s / (1 + s^2). A mesh with seven
+    triangles stretched by more than 3, or with one turned over, is not acceptable; with six it is. A curved triangle of
+    the aggregate may be bent, but not so far that it turns over at a node.
 
     Norm: largest difference of the quality; verdicts on meshes with so many triangles stretched.
     """

@@ -59,9 +59,9 @@ def _defect(flux) -> float:
              "outlet-forgotten"))
 @parametrize("kind", combined(KINDS))
 def test_balance(kind, record):
-    """Supply in = out + consumed to round-off, with flow and without; with the printed inlet (11) once its (u_ave -
-    u_x) C is counted [E4]; and supply in = out + consumed + stored in the transient scheme; with linear, quadratic and
-    cubic elements.
+    """The supply equals out + consumed to round-off, with flow and without, and with the printed inlet (11) if its
+    (u_ave - u_x) C is counted [E4]. In the transient scheme it equals out + consumed + stored. Both hold with linear,
+    quadratic and cubic elements.
 
     Norm: supplied - out - consumed over supplied; in time, less what is stored.
     """
@@ -106,23 +106,23 @@ def _in_time(seed, solved):
     {f"R = {row[0]:g} um, supplies {row[1]:g}, {row[2]:g} mg/L, {label}": (kind, *row)
      for (label, kind), row in product(KINDS.items(), STARVED)})
 def test_starved(kind, radius, supplies, record):
-    """Starved pores (0.35 m/d, radius 27 and 42 um, supplies of 0.15 and 10 mg/L) have one steady state, C >= 0, that
-    closes the balance to round-off, whatever Newton's method starts from; the transient scheme comes to rest in it;
-    with quadratic and cubic elements C is no more below zero than is let pass.
+    """Starved pores (0.35 m/d, radius 27 and 42 um, supplies of 0.15 and 10 mg/L) have one steady state, with C >= 0
+    and a balance that closes to round-off. It does not depend on the start of Newton's method, and the transient scheme
+    comes to rest in it. With quadratic and cubic elements C is not below the accepted undershoot.
 
     Norm: least C over the supply; balance as above; largest relative difference between ways to the steady state.
     """
     seed, solved = _solved(kind, radius, *supplies, SLOW)
     computed, linear = both(solved.concentrations), seed.space.order == 1
     least = max(-(field.min() / supply) for field, supply in zip(computed, supplies))
-    bound, why = (0.0, "C >= 0") if linear else (1e-3, "what is let pass as resolved")
+    bound, why = (0.0, "C >= 0") if linear else (1e-3, "the accepted undershoot")
     record(at_most("least C below zero", max(least, 0.0), bound, why))
     record(at_most("balance", max(abs(_defect(flux)) for flux in solved.fluxes), 1e-9, ROUND_OFF))
     record(at_most("from other first iterates", _spread(seed, solved, computed), 1e-8, "one steady state"))
     if linear and radius == STARVED[0][0]:
         again = both(gear.settle(solved.problem, Sink(seed.active), None))
         record(at_most("the transient scheme at rest", np.abs(again / computed - 1).max(), 1e-7,
-                       "it stops when 1e-9 of the supply is left to come"))
+                       "it stops when 1e-9 of the supply is left to change"))
 
 
 def _spread(seed, solved, computed) -> float:
@@ -165,7 +165,7 @@ def proportion(half: str, *numerics: str) -> Check:
     """Check consumed acceptor over F times consumed donor."""
     acceptor, donor = _front(half, *numerics)
     ratio = acceptor.consumed / donor.consumed / SCENE.kinetics.acceptor_to_donor_ratio
-    return at_most("proportion", abs(ratio - 1), 1e-9, "one rate for both: exact but for where Newton's method stops")
+    return at_most("proportion", abs(ratio - 1), 1e-9, "one rate for both: exact to Newton's tolerance")
 
 
 @pytest.mark.slow
@@ -173,8 +173,8 @@ def proportion(half: str, *numerics: str) -> Check:
 @parametrize("half, solved", combined(HALVES, {**SOLVED, **CUBIC}) | combined(LEAST, SOLVED))
 def test_curved_front(half, solved, record):
     """Behind a front where the donor is used up, to half saturations of a millionth of the supply, both are taken up in
-    their proportion, with linear and quadratic elements (cubic: a ten-thousandth), and what leaves is within the
-    presets' accuracy; where a mesh is refused, with the refinement that it names.
+    their proportion, with linear and quadratic elements (cubic: a ten-thousandth), and effluents are within the
+    presets' accuracy. If a mesh is refused, the refinement is that of the refusal.
 
     Norm: consumed acceptor over F times consumed donor, less one; difference of effluents over the larger supply, to a
     mesh of refinement 1.3.
@@ -183,7 +183,7 @@ def test_curved_front(half, solved, record):
     record(proportion(half, *numerics))
     near, far = _front(half, *numerics), _front(half, FAST, "numerics.refinement=1.3")
     apart = max(abs(a.effluent - b.effluent) for a, b in zip(near, far)) / SUPPLY
-    record(at_most("effluents", apart, bound, "what the preset is for"))
+    record(at_most("effluents", apart, bound, "the error that the preset promises"))
 
 
 @cache
@@ -221,8 +221,8 @@ def _carried(*arguments):
     return pore.solve(scene, pore.seeded(scene)).fluxes
 
 
-WITHIN = "0.1 %, what preset accurate is for"
-TENTH = "a tenth of what preset fast is for"
+WITHIN = "0.1 %, the error that preset accurate promises"
+TENTH = "a tenth of the error that preset fast promises"
 #: A half-disc under fast water: numerics, bound of the difference of effluents and consumption from those of quadratic
 #: elements of refinement 2.5, and its origin.
 FASTEST = {"quadratic, accurate": ((ACCURATE, runs.with_elements("quadratic"), FINER), 1e-3, WITHIN),
@@ -233,11 +233,11 @@ FASTEST = {"quadratic, accurate": ((ACCURATE, runs.with_elements("quadratic"), F
 @pytest.mark.slow
 @pytest.mark.case(
     "transport-curved-peclet", kind="property", mutants=("layers-ignored",),
-    omitted="order 1 and paper: linear elements are not made for boundary layers")
+    omitted="order 1 and paper: linear elements are not graded to boundary layers")
 @parametrize("speed, preset", combined({speed: speed for speed in ("2.9 m/day", "29 m/day", "290 m/day")}, FASTEST))
 def test_curved_peclet(speed, preset, record):
-    """In fast water (u W / D to 3e4) the boundary layers that the presets make their elements for are resolved to 0.1
-    %, by accurate with quadratic and with cubic elements, and by fast.
+    """In fast water (u W / D to 3e4) the presets accurate, with quadratic and with cubic elements, and fast resolve
+    boundary layers to 0.1 %.
 
     Norm: difference of effluents, over the supply, and of consumption, relative, to a mesh of refinement 2.5.
     """
@@ -251,20 +251,21 @@ def test_curved_peclet(speed, preset, record):
 #: Numerics, bound of the balance, and bound of the difference of effluents from quadratic elements twice finer.
 CONSERVES = 1e-11, "round-off: the form conserves"
 HALF_DISCS = {
-    "cubic": ((ACCURATE, runs.with_elements("cubic")), CONSERVES, 1e-5, "a hundredth of what preset accurate is for"),
-    "quadratic": ((ACCURATE, "numerics.refinement=0.9"), CONSERVES, 0.0, "itself what the others are compared with"),
-    "linear, paper": ((PAPER,), (1e-9, ROUND_OFF), 1e-2, "1 %, what preset paper is for"),
+    "cubic": ((ACCURATE, runs.with_elements("cubic")), CONSERVES, 1e-5,
+              "a hundredth of the error that preset accurate promises"),
+    "quadratic": ((ACCURATE, "numerics.refinement=0.9"), CONSERVES, 0.0, "the others are compared with this solution"),
+    "linear, paper": ((PAPER,), (1e-9, ROUND_OFF), 1e-2, "1 %, the error that preset paper promises"),
     "fast": ((FAST,), CONSERVES, 1e-3, TENTH),
-    "accurate": ((ACCURATE,), CONSERVES, 1e-4, "a tenth of what preset accurate is for")}
+    "accurate": ((ACCURATE,), CONSERVES, 1e-4, "a tenth of the error that preset accurate promises")}
 
 
 @pytest.mark.case("transport-cubic-half-disc", kind="property", mutants=("outlet-forgotten",))
 @parametrize("numerics, round_off, bound, why", HALF_DISCS)
 def test_cubic_half_disc(numerics, round_off, bound, why, record):
     """Around a half-disc, under the flow of cubic velocities, each substrate is in balance to round-off, and the
-    effluents are those of quadratic elements on a mesh twice finer; so are those of the presets, to what they are for.
+    effluents are those of quadratic elements on a mesh twice finer. Those of the presets agree within their errors.
 
-    Norm: (in - out - consumed) over what comes in; difference over the supply to quadratic concentrations.
+    Norm: (in - out - consumed) over in; difference over the supply to quadratic concentrations.
     """
     far = _carried(50.0, 40.0, "2.9 m/day", *HALF_DISCS["quadratic"][0])
     for name, flux, expected in zip(NAMES, _carried(50.0, 40.0, "2.9 m/day", *numerics), far):
@@ -295,11 +296,11 @@ def _open(numerics: int | str) -> transport.Problem:
     mutants=("biomass-of-the-start", "biomass-half-way", "mean-biomass-constant-in-c"), references=("monod",))
 @parametrize("numerics", combined(MEAN))
 def test_mean_biomass(numerics, record):
-    """With the mean biomass of a step of hours, biomass made is Y donor - (acceptor - F donor) / d_c of what is taken
-    up, to round-off, wherever concentrations are; at constant ones the uptake is the integral of (7)-(10) over the
-    step; and the tangent is the uptake's derivative.
+    """With the mean biomass of a step of hours, the new biomass is Y donor - (acceptor - F donor) / d_c, of the donor
+    and the acceptor taken up, to round-off at any concentrations. At constant concentrations the uptake is the integral
+    of (7)-(10) over the step. The tangent is the derivative of the uptake.
 
-    Norm: biomass made less Y donor - (acceptor - F donor) / d_c, over what is made; uptake at constant C, relative;
+    Norm: new biomass - (Y donor - (acceptor - F donor) / d_c), over the new biomass; uptake at constant C, relative;
     remainder of a first-order Taylor expansion.
     """
     problem = _open(numerics)
@@ -320,7 +321,7 @@ def _balanced(problem: transport.Problem, hours: float) -> Check:
     grown = np.sum(kinetics.grow(active, 0 * active, growth_rates.growth, growth_rates.remains, hours)) - active.sum()
     F, d_c = law.acceptor_to_donor_ratio, law.decay_oxygen_demand
     expected = law.yield_coefficient * donor - (acceptor - F * donor) / d_c
-    return at_most(f"biomass made, {hours:g} h", abs(grown - expected) / grown, 1e-12,
+    return at_most(f"new biomass, {hours:g} h", abs(grown - expected) / grown, 1e-12,
                    "one integral of growth and uptake in each point: round-off")
 
 
