@@ -42,12 +42,14 @@ def test_no_growth(changes, record):
     scene = runs.base("1 h", 'kinetics.decay_coefficient="0 1/d"', 'kinetics.maximum_utilization_rate="0 1/d"',
                       *changes)
     first, last = list(simulate(scene))
-    pairs = [(one.pore.mesh.points, one.pore.theta, one.pore.inert, one.solved.flow.velocity, one.solved.flow.head,
-              one.solved.concentrations.acceptor, one.solved.concentrations.donor) for one in (first, last)]
-    moved = sum(not np.array_equal(a, b) for a, b in zip(*pairs))
-    record(at_most("arrays that differ", moved, 0.0, "nothing changes: bit for bit"),
+    pairs = [(report.pore.mesh.points, report.pore.theta, report.pore.inert, report.solved.flow.velocity,
+              report.solved.flow.head, report.solved.concentrations.acceptor, report.solved.concentrations.donor)
+             for report in (first, last)]
+    differing = sum(not np.array_equal(a, b) for a, b in zip(*pairs))
+    record(at_most("arrays that differ", differing, 0.0, "nothing changes: bit for bit"),
            at_most("X_A", runs.density_drift(scene, last), 1e-14, "(34) multiplies and divides by the same areas"),
-           at_most("C over the supply, less 1", _lack(last), *(EVEN if scene.numerics.order == 1 else UNEVEN)))
+           at_most("C over the supply, less 1", _lack(last),
+                   *(LINEAR_BOUND if scene.numerics.order == 1 else HIGHER_BOUND)))
 
 
 def _lack(instant: Report) -> float:
@@ -63,8 +65,8 @@ def _poiseuille(scene: Scene) -> float:
 
 #: Bounds of |C / supply - 1|. w is divergence-free against the functions of C if these are linear. Taylor-Hood's u is
 #: divergence-free against functions of one order less, and jumps of viscosity bend it.
-EVEN = 1e-12, runs.ROUND_OFF
-UNEVEN = 1e-4, "div u is zero against functions of one order less than C's: error in space"
+LINEAR_BOUND = 1e-12, runs.ROUND_OFF
+HIGHER_BOUND = 1e-4, "div u is zero against functions of one order less than C's: error in space"
 
 
 REFINEMENTS = (1.0, 1.4, 2.0, 2.8)
@@ -223,8 +225,8 @@ def test_units(changes, record):
     reference = runs.numbers(runs.last(scene))
     for factor in (8.0, 0.125):
         other = runs.numbers(runs.last(runs.scaled(scene, factor, 1.0)))
-        apart = {name: abs(other[name] / value / factor ** POWERS[name] - 1) for name, value in reference.items()}
-        record(each_at_most(apart, 1e-14, "powers of two are exact, also in the mesher",
+        differences = {name: abs(other[name] / value / factor ** POWERS[name] - 1) for name, value in reference.items()}
+        record(each_at_most(differences, 1e-14, "powers of two are exact, also in the mesher",
                             f", lengths times {factor:g}"))
 
 
@@ -247,8 +249,8 @@ def test_foreign_units(changes, record):
     foreign = runs.last(runs.base("60 min", *changes, *FOREIGN))
     pairs = {"positions": (standard.pore.mesh.points, foreign.pore.mesh.points),
              "C_A": (standard.solved.concentrations.acceptor, foreign.solved.concentrations.acceptor)}
-    apart = {name: np.abs(a - b).max() for name, (a, b) in pairs.items()}
-    record(each_at_most(apart, 0.0, "the same numbers after reading"))
+    differences = {name: np.abs(a - b).max() for name, (a, b) in pairs.items()}
+    record(each_at_most(differences, 0.0, "the same numbers after reading"))
 
 
 @pytest.mark.case(
@@ -279,10 +281,10 @@ def test_reversed(changes, record):
     Norm: relative difference between a lopsided aggregate and its mirror image, refinement 2, t = 0.
     """
     forward, mirrored = (_lopsided(sign, *changes) for sign in (1.0, -1.0))
-    apart = {name: abs(forward[name] / mirrored[name] - 1) for name in forward}
-    record(at_most("conductivity", apart["conductivity"], 3e-4, ERROR),
-           at_most("effluent", apart["effluent"], 3e-4, ERROR),
-           at_least("C at the inlet, which no theorem constrains", apart["inlet"], 3e-3,
+    differences = {name: abs(forward[name] / mirrored[name] - 1) for name in forward}
+    record(at_most("conductivity", differences["conductivity"], 3e-4, ERROR),
+           at_most("effluent", differences["effluent"], 3e-4, ERROR),
+           at_least("C at the inlet, which no theorem constrains", differences["inlet"], 3e-3,
                     "else the aggregate is not lopsided"))
 
 
@@ -337,9 +339,10 @@ def _lag(factor: float, *changes: str) -> dict[str, float]:
     """Difference between the quasi-steady and the transient run, with substrates ``factor`` times slower relative to
     growth."""
     quasi_steady, transient = (runs.last(_slower(factor, name, *changes)) for name in ("quasi_steady", "gear"))
-    one, other = runs.numbers(quasi_steady), runs.numbers(transient)
-    apart = quasi_steady.solved.concentrations.acceptor - transient.solved.concentrations.acceptor
-    return {**{name: abs(one[name] / other[name] - 1) for name in one}, "C_A": np.abs(apart).max() / 10.0}
+    expected = runs.numbers(transient)
+    difference = quasi_steady.solved.concentrations.acceptor - transient.solved.concentrations.acceptor
+    return {**{name: abs(value / expected[name] - 1) for name, value in runs.numbers(quasi_steady).items()},
+            "C_A": np.abs(difference).max() / 10.0}
 
 
 def _slower(factor: float, transport: str, *changes: str):
@@ -365,12 +368,12 @@ def test_extent(changes, record):
     (central, near), (full, far) = (_solved(f'numerics.extent="{name}"', *changes) for name in ("central", "full"))
     for name, bound in BOUNDS.items():
         record(at_most(name, abs(central[name] / full[name] - 1), *bound))
-    record(at_most("C", np.abs(near - far).max() / 10.0, *APART.get(changes[1:], (4e-4, IN_SPACE))))
+    record(at_most("C", np.abs(near - far).max() / 10.0, *BOUNDS_OF_C.get(changes[1:], (4e-4, IN_SPACE))))
 
 
 IN_SPACE = "error in space, 0.1 % at refinement 1, a quarter of that here"
 #: Bound of the difference of section means of C on the coarser mesh of a preset.
-APART = {(runs.with_preset("fast"),): (2.5e-3, "error in space: a quarter of the 1 % that the preset promises")}
+BOUNDS_OF_C = {(runs.with_preset("fast"),): (2.5e-3, "error in space: a quarter of the 1 % that the preset promises")}
 BOUNDS = {"conductivity": (1e-3, "first order in the mesh: 0.17 % in a clean channel at this refinement; both meshes "
                            "share most of it"),
           "effluent acceptor": (4e-4, IN_SPACE), "effluent donor": (4e-4, IN_SPACE)}
@@ -416,9 +419,9 @@ def test_midpoint_order(elements, record):
     scene = load_scene("base", (runs.with_preset("fast"), runs.with_elements(elements), "numerics.refinement=0.5",
                                 'aggregate.radius="25 um"'))
     values = np.array([_equal_steps(scene, steps) for steps in RULE_STEPS])
-    apart = np.abs(np.diff(values, axis=0) / values[-1])
+    changes = np.abs(np.diff(values, axis=0) / values[-1])
     record([study(name, 2 / np.array(RULE_STEPS[:-1]), column, 2, "midpoint rule", ceiling=2e-5, band=0.15)
-            for name, column in zip(("area", "upstream tip"), apart.T)])
+            for name, column in zip(("area", "upstream tip"), changes.T)])
 
 
 @pytest.mark.slow
@@ -434,8 +437,8 @@ def test_midpoint_limit(changes, record):
     Norm: relative difference at 3.2 h from a seed of 25 um, base, no remesh.
     """
     short = ('numerics.time="midpoint"', "numerics.tolerance=0.00003")
-    reports = [runs.last(runs.base("3.2 h", 'aggregate.radius="25 um"', *changes, *how))
-             for how in (short, *((f'growth.time_step="{step} h"',) for step in STEPS))]
+    reports = [runs.last(runs.base("3.2 h", 'aggregate.radius="25 um"', *changes, *setting))
+             for setting in (short, *((f'growth.time_step="{step} h"',) for step in STEPS))]
     record(at_most("remeshes, all runs", sum(instant.remeshes for instant in reports), 0.0,
                    "one mesh: the error in space is common"))
     exact, *rows = map(runs.numbers, reports)
@@ -491,10 +494,10 @@ def test_jacobian_reused(changes, record):
     Norm: relative difference of the area, the tips and the conductivity at 2 h; factorisations over those with fresh
     derivatives; base from a seed of 25 um.
     """
-    (fresh, fresh_count), (reused, reused_count) = (_factorisations(kind, *changes) for kind in ("fresh", "reused"))
-    record(at_most("difference", np.abs(reused / fresh - 1).max(), 1e-8,
+    (fresh, fresh_count), (modified, modified_count) = (_factorisations(kind, *changes) for kind in ("fresh", "reused"))
+    record(at_most("difference", np.abs(modified / fresh - 1).max(), 1e-8,
                    "Newton's tolerances, 1e-10 and less, times the steps"),
-           at_most("factorisations", reused_count / fresh_count, 0.8, "a third of Newton's factorisations is saved"))
+           at_most("factorisations", modified_count / fresh_count, 0.8, "a third of Newton's factorisations is saved"))
 
 
 def _factorisations(kind: str, *changes: str) -> tuple[np.ndarray, int]:

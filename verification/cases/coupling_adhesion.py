@@ -83,8 +83,9 @@ def _at_rest(wall: str, *changes: str) -> tuple:
     slope = seed.body.reference[seed.body.shape.cells, 0] @ seed.body.shape.table.shape.T
     grown = contact.expand(contact.Mechanics.of(scene), seed, seed.theta * (1.1 - 0.002 * slope)).pore
     grown = replace(grown, time=1.0)
-    around = traction.follow(pore.Meshing.of(scene), traction.surroundings(pore.Meshing.of(scene), seed, seed), grown)
-    placed = replace(grown, space=replace(grown.space, mesh=around.mesh))
+    meshing = pore.Meshing.of(scene)
+    surroundings = traction.follow(meshing, traction.surroundings(meshing, seed, seed), grown)
+    placed = replace(grown, space=replace(grown.space, mesh=surroundings.mesh))
     return scene, placed, water(scene, placed)
 
 
@@ -101,20 +102,20 @@ def test_balance(wall, changes, record):
     their moments, over the water's; defect at free nodes over the water's force at a node.
     """
     scene, state, solved = _at_rest(wall, *changes)
-    on = adhesion.fluid_forces(scene, state, solved)
-    held = adhesion.wall_forces(scene, state, solved)
+    fluid_force = adhesion.fluid_forces(scene, state, solved)
+    wall_force = adhesion.wall_forces(scene, state, solved)
     rim = state.mesh.topology.body_loop
-    touching = np.zeros(len(held), bool)
+    touching = np.zeros(len(wall_force), bool)
     touching[rim[state.wall == BOTTOM]] = True
     x, y = state.mesh.points[state.mesh.body].T
-    total = (held * touching[:, None]).sum(axis=0) + on.sum(axis=0)
-    moments = [x @ forces[:, 1] - y @ forces[:, 0] for forces in (held * touching[:, None], on)]
-    size = np.abs(on).max()
-    record(each_at_most({"force": largest(total) / largest(on.sum(axis=0)),
+    total = (wall_force * touching[:, None]).sum(axis=0) + fluid_force.sum(axis=0)
+    moments = [x @ forces[:, 1] - y @ forces[:, 0] for forces in (wall_force * touching[:, None], fluid_force)]
+    largest_force = np.abs(fluid_force).max()
+    record(each_at_most({"force": largest(total) / largest(fluid_force.sum(axis=0)),
                          "moment": abs(sum(moments)) / abs(moments[1]),
-                         "free nodes": largest(held[~touching]) / size}, 1e-5,
+                         "free nodes": largest(wall_force[~touching]) / largest_force}, 1e-5,
                         "the last round moves nodes by 1e-8, and the stress is 1e3 times the water's"))
-    along = np.abs(held[rim[state.wall == BOTTOM], 0])
+    along = np.abs(wall_force[rim[state.wall == BOTTOM], 0])
     if wall == "sliding":
         record(at_most("along the wall, beside one point", np.sort(along)[-2] / along.max(), 1e-5,
                        "one point keeps a contact surface in place"))
@@ -164,19 +165,19 @@ def test_seepage(changes, record):
     solved = water(scene, seed)
     drive = scene.flow
     density = drive.kinematic_viscosity / drive.gravity / drive.permeability * solved.flow.mean_velocity
-    on = traction.on_aggregate(seed.space, solved.flow, drive, scene.numerics.interface)[seed.mesh.body]
-    total = abs(on[:, 0].sum() / density / (120.0 * WIDTH) - 1)
+    drag = traction.on_aggregate(seed.space, solved.flow, drive, scene.numerics.interface)[seed.mesh.body]
+    total = abs(drag[:, 0].sum() / density / (120.0 * WIDTH) - 1)
     place = seed.mesh.points[seed.mesh.body]
     prescribed = np.column_stack([place[:, 0] < -60.0 + 1e-9, (place[:, 1] == 0.0) | (place[:, 1] == WIDTH)])
     inside = seed.mesh.topology.body_corners
-    rest = growth.equilibrium(seed.body, seed.theta, place, 0 * seed.pressure[inside], prescribed, place,
-                              forces=0.1 * on / (density * 120.0))
+    equilibrium = growth.equilibrium(seed.body, seed.theta, place, 0 * seed.pressure[inside], prescribed, place,
+                              forces=0.1 * drag / (density * 120.0))
     x = seed.mesh.points[inside, 0]
     linear = (60.0 - x) / 120.0
     record(at_most("sum of the drag", total, 1e-10, "the same flux through every section: round-off"),
-           at_most("stress", largest((10 * rest.pressure - linear)[np.abs(x) < 30.0]), 0.01,
+           at_most("stress", largest((10 * equilibrium.pressure - linear)[np.abs(x) < 30.0]), 0.01,
                    "the flow becomes even within the pore's width of the ends, and in the layers"),
-           at_most("displacement", largest(rest.position - place) / WIDTH, 1e-3,
+           at_most("displacement", largest(equilibrium.position - place) / WIDTH, 1e-3,
                    "the load is a gradient outside of the layers"))
 
 
@@ -219,15 +220,15 @@ def _moves(seed: Pore, shape: Pore) -> np.ndarray:
     """Displacements along the wall (um) of the nodes that lay on it, matched by their positions at t = 0."""
     before = seed.outline.points[seed.wall == BOTTOM, 0]
     on = shape.wall == BOTTOM
-    origin, now = shape.outline.origin[on], shape.outline.points[on, 0]
+    origin, present = shape.outline.origin[on], shape.outline.points[on, 0]
     rows = [np.flatnonzero((origin[:, 1] == 0.0) & (np.abs(origin[:, 0] - x) < 1e-9))[0] for x in before]
-    return now[rows] - before
+    return present[rows] - before
 
 
-def _pushed(seed: Pore, by: float) -> Pore:
+def _pushed(seed: Pore, shift: float) -> Pore:
     """A guess of the shape, moved downstream by ``by``."""
     points = seed.mesh.points.copy()
-    points[seed.mesh.body, 0] += by
+    points[seed.mesh.body, 0] += shift
     return seed.moved(points)
 
 

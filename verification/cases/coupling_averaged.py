@@ -56,13 +56,13 @@ def test_averaged_base(changes, record):
     record(at_most("velocity, the loss of a half-disc of our area", _at_our_area(scene, instants), 0.01, LINEAR))
     if scene.numerics.preset == "paper":  # the others: 1.6 % with the averaged area, without linear elements' error
         record(at_most("velocity, a half-disc's loss", rest["velocity"], 0.01, LINEAR))
-    for name, bound in zip(APART, (0.013, 0.02, 0.02)):
+    for name, bound in zip(COMPARED, (0.013, 0.02, 0.02)):
         record(at_most(f"{name}, a half-disc's loss", rest[name], bound, SQUARE_LAW))
 
 
 LINEAR = "linear elements: 0.3 % at the ends of the mesh, 0.5 % around the aggregate"
 #: Quantities that are compared between a run and its averaged pore.
-APART = ("area", "effluents", "C along the pore")
+COMPARED = ("area", "effluents", "C along the pore")
 
 
 @cache
@@ -145,9 +145,9 @@ def _leaving(factor: float, scene: Scene) -> dict[str, float]:
     radius = runs.half_disc_radius(row["aggregate_area_um2"])
     first = averaged_pore.excess(runs.pore_of(scene), radius, runs.SPEED)
     differences = {"size": thiele(scene)}
-    for name, trusted, more in zip(NAMES, runs.half_disc(scene).seed().fields[:, -1], first):
-        gap = row[f"effluent_{name}_mg_per_L"] - trusted
-        differences |= {name: abs(gap), f"{name} over first": gap / more}
+    for name, expected, first_order in zip(NAMES, runs.half_disc(scene).seed().fields[:, -1], first):
+        gap = row[f"effluent_{name}_mg_per_L"] - expected
+        differences |= {name: abs(gap), f"{name} over first": gap / first_order}
     return differences
 
 
@@ -171,8 +171,8 @@ def test_averaged_run(preset, record):
     because its own error in time, 4e-5, would show.
     """
     errors, base = refine(_whole_run, SLOWER, preset), _whole_run(1.0, preset)
-    record(studies(errors, dict.fromkeys(APART, (2, SQUARE, 3e-4))))
-    for name in APART[:2]:
+    record(studies(errors, dict.fromkeys(COMPARED, (2, SQUARE, 3e-4))))
+    for name in COMPARED[:2]:
         record(between(f"base, {name}: over the square law through the first of these",
                        base[name] / (SLOWER[0] * errors[name][0]), 1.0, 2.0, "terms of fourth order"))
 
@@ -202,7 +202,7 @@ def test_averaged_refined(elements, record):
     """
     coarse, fine = (_piece(elements, *level) for level in (COARSE, FINE))
     record([at_most(name, abs(fine[name] / coarse[name] - 1), 0.01,
-                    "error in space 0.1 % of what is lost, in time 0.2 % of an hour's growth") for name in APART])
+                    "error in space 0.1 % of what is lost, in time 0.2 % of an hour's growth") for name in COMPARED])
 
 
 def _piece(elements: str, refinement: float, minutes: float, finer: int) -> dict[str, float]:
@@ -234,7 +234,7 @@ def test_averaged_strip(elements, record):
     pore starts from the same state.
     """
     errors = refine(_strip, ASPECTS, elements)
-    record(studies(errors, dict.fromkeys(APART, (2, THIN_SQUARE, 4e-4))),
+    record(studies(errors, dict.fromkeys(COMPARED, (2, THIN_SQUARE, 4e-4))),
            at_most("ends of the thinnest, relative", errors["ends"][-1], 1.5e-4,
                    "stretches: as the square of the aspect ratio"),
            between("lean upstream over that of the averaged pore, 0.27 %", errors["lean"][-1], 0.97, 1.03,
@@ -394,9 +394,10 @@ SUPPLIED = {"steps": {preset: (4e-4, THIELE) for preset in runs.WITH_EXACT},
     "coupling-averaged-supply", kind="cross-code",
     mutants=("supply-of-the-start", "supply-half-way-of-the-start", "supply-a-step-late", "supply-not-yet",
              "row-of-the-end"), references=("averaged_pore", "poiseuille", "taylor_hood"), runs_with="1 2")
-@parametrize("how, bound, origin, *changes", {f"{how}, {preset}": (how, *bound, *runs.WITH_EXACT[preset])
-                                              for how, bounds in SUPPLIED.items() for preset, bound in bounds.items()})
-def test_averaged_supply(how, bound, origin, changes, record):
+@parametrize("interpolation, bound, origin, *changes",
+             {f"{interpolation}, {preset}": (interpolation, *bound, *runs.WITH_EXACT[preset])
+              for interpolation, bounds in SUPPLIED.items() for preset, bound in bounds.items()})
+def test_averaged_supply(interpolation, bound, origin, changes, record):
     """An aggregate whose supply of donor falls to zero and returns after 2.5 h, by jumps or linearly, starves and
     recovers like its averaged pore (FiPy, solve_ivp).
 
@@ -404,26 +405,26 @@ def test_averaged_supply(how, bound, origin, changes, record):
     and section means of C along the mesh over the acceptor's supply; a seed of 20 um in base at 2.9 m/d, diffusivities
     times 64.
     """
-    scene, moments = supplied(how, *changes), _fed(how, changes[0])
+    scene, moments = supplied(interpolation, *changes), _fed(interpolation, changes[0])
     worst = runs.differences(scene, runs.reports_of(scene), moments)
-    record([at_most(name, worst[name], bound, origin) for name in APART])
-    if how == "steps":
+    record([at_most(name, worst[name], bound, origin) for name in COMPARED])
+    if interpolation == "steps":
         record(at_least("area at 2 h over that at 4.5 h", moments[1].area / moments[3].area, 1.005,
                         "decay over 2.5 h: else nothing is starved"))
 
 
 @cache
-def _fed(how: str, preset: str) -> list:
+def _fed(interpolation: str, preset: str) -> list:
     """States of the averaged pore, from the seed of a preset."""
-    both = [(end, (ACCEPTOR, first), (ACCEPTOR, first if how == "steps" else last))
-            for (_, first), (end, last) in pairwise(COURSES[how])]
-    scene = supplied(how, preset).at(0.0)
-    return runs.half_disc(scene, cells=CELLS).run_through(both, ROWS, ACCURACY)
+    pieces = [(end, (ACCEPTOR, first), (ACCEPTOR, first if interpolation == "steps" else last))
+            for (_, first), (end, last) in pairwise(COURSES[interpolation])]
+    scene = supplied(interpolation, preset).at(0.0)
+    return runs.half_disc(scene, cells=CELLS).run_through(pieces, ROWS, ACCURACY)
 
 
-def supplied(how: str, *changes: str) -> Scene:
+def supplied(interpolation: str, *changes: str) -> Scene:
     """Base with a donor whose supply changes."""
-    table = [[f"{time} h", f"{supply} mg/L"] for time, supply in COURSES[how]]
+    table = [[f"{time} h", f"{supply} mg/L"] for time, supply in COURSES[interpolation]]
     scene = runs.base("7 h", *changes, 'aggregate.radius="20 um"', f"substrates.donor.supply={json.dumps(table)}",
-                     f"substrates.donor.interpolation={how}", times=ROWS)
+                     f"substrates.donor.interpolation={interpolation}", times=ROWS)
     return runs.faster(scene, QUICK)

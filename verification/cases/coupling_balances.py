@@ -70,10 +70,10 @@ def _steps(rows: list[Ledger], equations: float = 1000) -> list[Check]:
 
     equations: number of equations of a substrate times the largest term of a row over the supplied mass.
     """
-    parted = [abs(two.biomass_before / one.biomass_after - 1) for one, two in pairwise(rows)]
+    gaps = [abs(two.biomass_before / one.biomass_after - 1) for one, two in pairwise(rows)]
     return [at_most("substrates", runs.substrate_defect(rows), 1e-13 * equations,
                     "Newton's tolerance, 1e-13 of the largest term of each row, over all rows"),
-            at_most("biomass, worst step", np.max([runs.biomass_defect(rows), *parted]), 1e-10, runs.ROUND_OFF)]
+            at_most("biomass, worst step", np.max([runs.biomass_defect(rows), *gaps]), 1e-10, runs.ROUND_OFF)]
 
 
 STEPS = (0.8, 0.4, 0.2, 0.1)
@@ -115,8 +115,8 @@ def _restored(*changes: str) -> tuple[float, float]:
     x = aggregates.reaction_points(state.space)[0]
     state = replace(state, active=state.active * (1 + 0.1 * x / scene.aggregate.radius))
     solved = pore.solve(scene, state)
-    anew = remeshing.remesh(Remeshing.of(scene), state, state, solved.flow.mean_velocity)[0]
-    after = runs.step(scene, anew, pore.solve(scene, anew), 0.2).pore
+    new_pore = remeshing.remesh(Remeshing.of(scene), state, state, solved.flow.mean_velocity)[0]
+    after = runs.step(scene, new_pore, pore.solve(scene, new_pore), 0.2).pore
     weight, density = after.space.reaction.dx, runs.density(scene, after)
     error = np.sqrt(np.average((density - 1) ** 2, weights=weight))
     return error, abs(np.vdot(weight, density) / after.outline.area - 1)
@@ -128,7 +128,7 @@ CLOSED, CLOSES = 1e-9, "identities of the discrete equations: round-off and Newt
 PAST = 2.0
 
 
-def _worth(scene: Scene, ledgers: list[Ledger]) -> float:
+def _yield_defect(scene: Scene, ledgers: list[Ledger]) -> float:
     """Relative defect of the yield in the worst step: |new - (grown - decayed)| / max(grown, decayed)."""
     production = np.array([step.biomass_made for step in ledgers])
     grown, decayed = np.array([runs.worth(scene.kinetics, step) for step in ledgers]).T
@@ -137,16 +137,17 @@ def _worth(scene: Scene, ledgers: list[Ledger]) -> float:
 
 def _closed(scene: Scene, ledgers: list[Ledger]) -> list:
     """Checks of the worst step of a run."""
-    bound, why = WORTH.get((scene.numerics.transport, scene.numerics.time), (CLOSED, CLOSES))
+    bound, why = YIELD_BOUNDS.get((scene.numerics.transport, scene.numerics.time), (CLOSED, CLOSES))
     return [at_most("substrates", runs.substrate_defect(ledgers), CLOSED, CLOSES),
             at_most("biomass", runs.biomass_defect(ledgers), CLOSED, CLOSES),
-            at_most("new biomass against uptake", _worth(scene, ledgers), bound, why)]
+            at_most("new biomass against uptake", _yield_defect(scene, ledgers), bound, why)]
 
 
 TRAPEZOIDAL = "trapezoidal rule on an exponential: (r step)^2 / 12, 1.2e-4 at the supply's rate"
 #: Bounds of the yield's defect in a step of 12 min of the paper's schemes. Updates weigh the rates of both ends alike,
 #: and grow by their mean.
-WORTH = {("quasi_steady", "updates"): (2e-4, TRAPEZOIDAL), ("gear", "updates"): (1e-3, "the tolerance of Gear, 0.1 %")}
+YIELD_BOUNDS = {("quasi_steady", "updates"): (2e-4, TRAPEZOIDAL),
+                ("gear", "updates"): (1e-3, "the tolerance of Gear, 0.1 %")}
 HEUN = "Heun's method, and the trapezoidal rule on what is consumed: second order"
 
 
@@ -156,8 +157,8 @@ def _of_base(preset: str):
     yield _closed(scene, ledgers)
     if scene.numerics.time == "updates":
         expected = (runs.growth_rates(scene.kinetics, scene.substrates)[0] * STEPS[2]) ** 2 / 12
-        yield between("new biomass against uptake, over (r step)^2 / 12", _worth(scene, ledgers) / expected, 0.95, 1.0,
-                      "r at the supply; that of the seed is 1 % lower, and falls as the pore clogs")
+        yield between("new biomass against uptake, over (r step)^2 / 12", _yield_defect(scene, ledgers) / expected,
+                      0.95, 1.0, "r at the supply; that of the seed is 1 % lower, and falls as the pore clogs")
         yield _order([_base(preset, step)[:2] for step in STEPS])
     yield at_least("remeshes", remeshes, 1.0, "else they are not tested")
 
@@ -208,7 +209,7 @@ def _of_updates(elements: str) -> Study:
 
 def _order(series: Iterable[tuple[Scene, list[Ledger]]]) -> Study:
     """Study of the yield's defect in the worst step of runs with step sizes STEPS."""
-    errors = [_worth(*run) for run in series]
+    errors = [_yield_defect(*run) for run in series]
     return study("new biomass against uptake, worst step", STEPS, errors, 2, HEUN, ceiling=4e-5, band=0.15)
 
 
@@ -262,8 +263,9 @@ def test_amounts(preset, end, changes, record):
     the ends of the steps; exact: 4 h from a seed of 25 um, with elements as large as in fast.
     """
     scene = runs.base(end, runs.with_preset(preset), *changes)
-    shorter = runs.base(end, runs.with_preset(preset), *changes, f"numerics.tolerance={scene.numerics.tolerance / 100}")
-    (times, amounts), (fine, fine_amounts) = (_cumulated(one) for one in (scene, shorter))
+    tolerance = f"numerics.tolerance={scene.numerics.tolerance / 100}"
+    finer = runs.base(end, runs.with_preset(preset), *changes, tolerance)
+    (times, amounts), (fine, fine_amounts) = map(_cumulated, (scene, finer))
     expected = CubicSpline(fine, fine_amounts)(times)
     over_run = np.abs(amounts[-1] / expected[-1] - 1)
     in_a_step = np.abs(np.diff(amounts, axis=0) / np.diff(expected, axis=0) - 1)

@@ -60,16 +60,16 @@ def test_traction_balance(changes, record):
     """
     scene = loaded_scene(*changes)
     seed = pore.seeded(scene)
-    on, solution = nodal_forces(scene, seed.space)
+    forces, solution = nodal_forces(scene, seed.space)
     mesh = seed.mesh
     x, y = mesh.points.T
     rim = np.isin(x, mesh.ends) | np.isin(y, (0.0, mesh.width))
     rim[mesh.body] = True
     free = mesh.loop[seed.wall == FREE]
-    largest = np.abs(on[free]).max()
-    apart = on[free] + _by_biomass(scene, seed, solution)[free]
-    record(each_at_most({"force within the fluid": np.abs(on[~rim]).max() / largest,
-                         "action and reaction": np.abs(apart).max() / largest}, 1e-9, BOTH_ENDS))
+    largest = np.abs(forces[free]).max()
+    imbalance = forces[free] + _by_biomass(scene, seed, solution)[free]
+    record(each_at_most({"force within the fluid": np.abs(forces[~rim]).max() / largest,
+                         "action and reaction": np.abs(imbalance).max() / largest}, 1e-9, BOTH_ENDS))
     if seed.space.order == 1 and scene.numerics.interface == FORMS[0]:
         record(study("drag", 1 / np.array(REFINEMENTS), [*map(_drag_error, REFINEMENTS)], 1,
                      "shear from the slopes of linear triangles: first order"))
@@ -93,10 +93,10 @@ def _drag_error(refinement: float) -> float:
     """
     scene = loaded_scene(f"numerics.refinement={refinement}")
     seed = pore.seeded(scene)
-    on, solution = nodal_forces(scene, seed.space)
+    forces, solution = nodal_forces(scene, seed.space)
     viscosity = scene.flow.kinematic_viscosity / scene.flow.gravity
-    left = solution.meshed_loss * seed.mesh.width - viscosity * _wall_shear(seed.mesh, solution.velocity)
-    return abs(on[seed.mesh.loop, 0].sum() / left - 1)
+    expected = solution.meshed_loss * seed.mesh.width - viscosity * _wall_shear(seed.mesh, solution.velocity)
+    return abs(forces[seed.mesh.loop, 0].sum() / expected - 1)
 
 
 def _wall_shear(grid: Mesh, velocity: np.ndarray) -> float:
@@ -143,10 +143,10 @@ def _shear(space: Space) -> float:
     ratio = 2000.0
     unit = flow.unit_flow(space, ratio)
     as_flow = Flow(1.0, unit.velocity, unit.pressure, unit.correction, 1.0, 1.0, 1.0)
-    on = traction.nodal(space, as_flow, 1.0, "laplacian")
+    forces = traction.nodal(space, as_flow, 1.0, "laplacian")
     along, across = mesh.points.T
     line = np.flatnonzero((across == flow_cases.LAYER) & (np.abs(along) < flow_cases.LAYER_END))
-    x, shear = mesh.points[line, 0], on[line, 0]
+    x, shear = mesh.points[line, 0], forces[line, 0]
     weight = np.clip((50 - np.abs(x)) / 10, 0, 1)  # level, then ramps: the sum is a tested integral
     length = _tested(mesh, line, weight)
     gradient = layered_channel.gradient(flow_cases.WIDTH, flow_cases.LAYER, ratio)
@@ -208,15 +208,16 @@ def test_traction_even(changes, record):
     space = seed.moved(mesh_motion.move(seed.mesh, plain.mesh.points[seed.mesh.body], 1.0, 100.0)).space
     mesh = space.mesh
     still = Flow(0.0, np.zeros((space.count, 2)), np.full(flow.pressure_space(space).count, 5.0), None, 0.0, 0.0, 0.0)
-    on = traction.nodal(space, still, 1.0, "laplacian")
-    by_hand = -5.0 * _normals(plain.outline)
-    apart = (on[mesh.loop] - by_hand)[plain.wall == FREE]
-    record(at_most("forces", np.abs(apart).max() / np.abs(by_hand).max(), 1e-12, "the divergence theorem: round-off"))
+    forces = traction.nodal(space, still, 1.0, "laplacian")
+    expected = -5.0 * _normals(plain.outline)
+    difference = (forces[mesh.loop] - expected)[plain.wall == FREE]
+    record(at_most("forces", np.abs(difference).max() / np.abs(expected).max(), 1e-12,
+                   "the divergence theorem: round-off"))
     for sign in (1.0, -1.0):
-        pushed = contact._at_rest(mechanics, seed, theta, seed, sign * on[mesh.body], contact.PATIENT).pore
-        apart = np.abs(pushed.mesh.points - plain.mesh.points).max() / 25.0
+        pushed = contact._at_rest(mechanics, seed, theta, seed, sign * forces[mesh.body], contact.PATIENT).pore
+        difference = np.abs(pushed.mesh.points - plain.mesh.points).max() / 25.0
         change = (pushed.pressure - plain.pressure)[mesh.topology.body_corners] + sign * 5.0
-        record(at_most(f"displacement, {sign:+g}", apart, 1e-9, "J = theta: Newton's tolerance"))
+        record(at_most(f"displacement, {sign:+g}", difference, 1e-9, "J = theta: Newton's tolerance"))
         record(at_most(f"P, {sign:+g}", np.abs(change).max(), 1e-8, "Newton's tolerance"))
 
 
@@ -271,9 +272,9 @@ def test_traction_fixed_point(changes, record):
     plain = _moved(0.0, *changes)[1].mesh.points
     moves = [(_moved(factor, *changes)[1].mesh.points - plain) / factor for factor in (*FACTORS, 1.0)]
     size = np.abs(moves[-1]).max()
-    apart = [np.abs(move - moves[-1]).max() / size for move in moves[:-1]]
+    differences = [np.abs(move - moves[-1]).max() / size for move in moves[:-1]]
     own_defect, previous_defect = _defects(*changes)
-    record(study("displacement over force", FACTORS, apart, 1, "quadratic remainder of a smooth map: first order",
+    record(study("displacement over force", FACTORS, differences, 1, "quadratic remainder of a smooth map: first order",
                  ceiling=1e-3))
     record(at_most("defect with its own flow", own_defect, 1e-8, "nodes at rest to 1e-8 of R"))
     record(at_least("defect with the flow before", previous_defect, 1e-5, "else no round is needed"))
@@ -298,17 +299,17 @@ def _defects(*changes: str) -> tuple[float, float]:
     defects = []
     stabilisation = growth.STABILISATIONS[body.shape.geometry].on(body, seed.mesh.points[nodes])
     place, pressure = grown.mesh.points[nodes], grown.pressure[seed.mesh.topology.body_corners]
-    rest = growth.System(body, constrained_dofs, stabilisation=stabilisation).under(theta, place, place, pressure)
-    for around in (grown, seed):
+    iterate = growth.System(body, constrained_dofs, stabilisation=stabilisation).under(theta, place, place, pressure)
+    for pore_of_flow in (grown, seed):
         fluid = traction.Fluid.of(scene)
-        forces = traction.forces(fluid, traction.surroundings(fluid.meshing, seed, around), around)
+        forces = traction.forces(fluid, traction.surroundings(fluid.meshing, seed, pore_of_flow), pore_of_flow)
         load = np.concatenate([forces.T.ravel(), np.zeros(len(pressure))])
-        defects.append(relative((rest.residual - load)[rest.free], (rest.size + np.abs(load))[rest.free]))
+        defects.append(relative((iterate.residual - load)[iterate.free], (iterate.size + np.abs(load))[iterate.free]))
     return tuple(defects)
 
 
 #: The least refinement at which the moved mesh of a seed is too coarse.
-ANEW = 1.35
+REMESHED_FROM = 1.35
 
 
 @pytest.mark.case("coupling-traction-remeshed", kind="property", mutants=("forces-shared-evenly",), runs_with="paper")
@@ -321,11 +322,11 @@ def test_traction_remeshed(changes, record):
     """
     seed, grown, _ = _moved(0.0, *changes)
     coarse = loaded_scene(*changes)
-    fine = loaded_scene(*changes, f"numerics.refinement={max(ANEW, 3 * coarse.numerics.refinement)}")
+    fine = loaded_scene(*changes, f"numerics.refinement={max(REMESHED_FROM, 3 * coarse.numerics.refinement)}")
     mesh, _ = pore.Meshing.of(fine).generate(grown.outline)
-    on = nodal_forces(fine, Space(mesh, grown.space.order))[0]
+    forces = nodal_forces(fine, Space(mesh, grown.space.order))[0]
     scale = traction.MPA_PER_UM * fine.flow.density * fine.flow.gravity / fine.growth.shear_modulus
-    new = _sums(mesh.points[mesh.loop], scale * on[mesh.loop])
+    new = _sums(mesh.points[mesh.loop], scale * forces[mesh.loop])
     places = grown.mesh.points[seed.mesh.body]
     both = [traction.forces(fluid, traction.surroundings(fluid.meshing, seed, grown), grown)
             for fluid in map(traction.Fluid.of, (fine, coarse))]
@@ -337,6 +338,6 @@ def test_traction_remeshed(changes, record):
                     "else none was split"))
 
 
-def _sums(places: np.ndarray, on: np.ndarray) -> np.ndarray:
+def _sums(places: np.ndarray, forces: np.ndarray) -> np.ndarray:
     """Sum along x, and moment of the forces."""
-    return np.array([on[:, 0].sum(), np.sum(places[:, 0] * on[:, 1] - places[:, 1] * on[:, 0])])
+    return np.array([forces[:, 0].sum(), np.sum(places[:, 0] * forces[:, 1] - places[:, 1] * forces[:, 0])])

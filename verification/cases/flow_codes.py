@@ -113,7 +113,7 @@ def test_film(order, interface, record):
     if order > 1:
         space = meshes.half_disc_space(FILM, FILM_CURVED, ENDS, WIDTH, order)
         solution = flow.unit_flow(space, RATIO, interface=interface)
-        differences = _differences(space, solution, _trusted(FILM, RATIO, interface, [*DRAWS][-1]))
+        differences = _differences(space, solution, _reference_flow(FILM, RATIO, interface, [*DRAWS][-1]))
         record(each_at_most({name: differences[name] for name in IN_THE_FILM}, 1e-3, CODES))
         return
     errors = refine(_level, FILM_DRAWS, FILM_REFINEMENTS, FILM, RATIO, interface)
@@ -124,7 +124,7 @@ def test_film(order, interface, record):
 
 
 @cache
-def _trusted(radius: float, ratio: float, interface: str, level: int, ends=ENDS, corner: int = CORNER
+def _reference_flow(radius: float, ratio: float, interface: str, level: int, ends=ENDS, corner: int = CORNER
              ) -> taylor_hood.Stokes:
     return taylor_hood.stokes(taylor_hood.half_disc(WIDTH, ends, radius, level, corner), ratio, interface)
 
@@ -140,24 +140,24 @@ def _level(level: int, draw: int, refinements, radius: float, ratio: float, inte
     The excess of the head loss leaves out the error of the ends, which the clean channel on the same mesh shares.
     """
     space = _space(radius, refinements[level] * meshes.SPREAD[draw])
-    reference = _trusted(radius, ratio, interface, level)
+    reference = _reference_flow(radius, ratio, interface, level)
     solution, clean = (flow.unit_flow(space, each, interface=interface) for each in (ratio, 1.0))
-    spoilt = clean.loss - poiseuille.head_loss(np.ptp(ENDS), WIDTH, 1.0, 1.0)
-    excess = abs((solution.loss - spoilt) / reference.loss - 1)
+    error_of_ends = clean.loss - poiseuille.head_loss(np.ptp(ENDS), WIDTH, 1.0, 1.0)
+    excess = abs((solution.loss - error_of_ends) / reference.loss - 1)
     return {**_differences(space, solution, reference), "excess of the head loss": excess}
 
 
 def _differences(space: Space, solution: flow.UnitFlow, reference: taylor_hood.Stokes) -> dict[str, float]:
     """Element size, and differences from Taylor-Hood's flow at the middles of its edges, weighted by their areas."""
     pressures = flow.pressure_space(space)
-    apart = {"size": meshes.mean_size(space.mesh),
+    differences = {"size": meshes.mean_size(space.mesh),
              "head loss": abs(solution.loss / reference.loss - 1),
              "velocity": meshes.relative(meshes.field_at(space, solution.velocity, reference.points),
                                          reference.velocity, reference.areas)}
     for part in reference.pressures:
-        apart[f"pressure in the {'biomass' if part.biomass else 'fluid'}"] = meshes.relative(
+        differences[f"pressure in the {'biomass' if part.biomass else 'fluid'}"] = meshes.relative(
             meshes.field_at(pressures, solution.pressure, part.points), part.values, part.areas)
-    return apart
+    return differences
 
 
 #: Radius of the half-disc (um) on curved triangles, and refinements of its mesh. On coarser meshes the smooth error of
@@ -209,7 +209,7 @@ def _round(refinement: float) -> Mesh:
 def _round_errors(refinement: float, draw: int, ratio: float, order: int, interface: str) -> dict[str, float]:
     space = Space(_round(refinement * meshes.SPREAD[draw]), order)
     solution = flow.unit_flow(space, ratio, interface=interface)
-    return _differences(space, solution, _trusted(ROUND, ratio, interface, 2, space.mesh.ends, 6))
+    return _differences(space, solution, _reference_flow(ROUND, ratio, interface, 2, space.mesh.ends, 6))
 
 
 #: Number of meshes of each level of the layer.
@@ -310,7 +310,7 @@ def _slope_error(grid: Mesh, speed: np.ndarray, chosen: np.ndarray) -> float:
     where, weight, _ = meshes.quadrature(grid.points, grid.triangles[chosen])
     computed = np.einsum("tai,ta->ti", grid.gradients[chosen], speed[grid.triangles[chosen]])
     y, step = where[..., 1], 1e-4
-    above, below = (layered_channel.velocity(y + apart, WIDTH, LAYER, RATIO) for apart in (step, -step))
+    above, below = (layered_channel.velocity(y + shift, WIDTH, LAYER, RATIO) for shift in (step, -step))
     exact = np.stack([0 * y, (above - below) / (2 * step)], axis=-1)
     return meshes.relative(computed[:, None], exact, weight)
 

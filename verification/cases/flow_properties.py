@@ -150,15 +150,15 @@ def test_reversed(numerics, interface, record):
     """
     space = _around(25.0, numerics, 0.6, 150.0)
     mirror = Space(_mirrored(space.mesh), space.order)
-    forward, back = (flow.unit_flow(way, RATIO, interface=interface).velocity for way in (space, mirror))
+    forward, mirrored = (flow.unit_flow(each, RATIO, interface=interface).velocity for each in (space, mirror))
     _, weight, shape = meshes.fine(space)
-    apart, total = (np.einsum("tq,tqi->t", weight, (shape @ field[space.cells]) ** 2)
-                    for field in (forward - back * [1.0, -1.0], forward))
+    difference, total = (np.einsum("tq,tqi->t", weight, (shape @ field[space.cells]) ** 2)
+                         for field in (forward - mirrored * [1.0, -1.0], forward))
     near = np.abs(space.mesh.points[space.mesh.triangles, 0]).max(axis=1) < 40
     for where, chosen, bound, why in (
             ("around the aggregate", near, 1e-6, "the difference at inlet and outlet decays like exp(-4.2 x / W)"),
             ("everywhere", slice(None), 5e-4, "second order, in the layer where inlet and outlet differ")):
-        record(at_most(f"difference {where}", np.sqrt(apart[chosen].sum() / total.sum()), bound, why))
+        record(at_most(f"difference {where}", np.sqrt(difference[chosen].sum() / total.sum()), bound, why))
 
 
 def _mirrored(grid: Mesh) -> Mesh:
@@ -182,12 +182,12 @@ def test_obstacle(numerics, interface, record):
                        for space, ratio in product(spaces, RATIOS)]).reshape(len(spaces), -1)
     rises = np.diff(losses, axis=1)
     slopes = rises / np.diff(RATIOS)
-    why = "least dissipation (Helmholtz): the loss is the least of functions that are linear in lambda"
+    origin = "least dissipation (Helmholtz): the loss is the least of functions that are linear in lambda"
     record(at_least("least rise with lambda, over the loss",
-                    (rises / losses[:, 1:]).min(), 0.0, why),
-           at_most("largest slope over the one before", (slopes[:, 1:] / slopes[:, :-1]).max(), 1.0, why),
+                    (rises / losses[:, 1:]).min(), 0.0, origin),
+           at_most("largest slope over the one before", (slopes[:, 1:] / slopes[:, :-1]).max(), 1.0, origin),
            at_least("least rise with R at lambda = 2000, over the loss",
-                    (np.diff(losses[:, 4]) / losses[1:, 4]).min(), 0.0, "nested obstacles: " + why))
+                    (np.diff(losses[:, 4]) / losses[1:, 4]).min(), 0.0, "nested obstacles: " + origin))
 
 
 ACCURATE = runs.with_preset("accurate")

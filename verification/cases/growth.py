@@ -36,10 +36,10 @@ def exactly(name: str, body: Supported, solution: growth.Equilibrium, F: np.ndar
     exact = neo_hookean.cauchy(F, pressure)
     P = solution.pressure[body.cells[:, :3]] @ body.shape.table.linear.T
     stress = growth.cauchy(body.strained(solution.position).F, P)
-    most = max(largest(exact), abs(pressure))
+    scale = max(largest(exact), abs(pressure))
     sizes = {"place": largest(solution.position @ np.linalg.inv(F).T - body.reference) / bodies.LENGTH,
-             "pressure": largest(solution.pressure - pressure) / most,
-             "stress": largest(stress - exact[COMPONENTS]) / most}
+             "pressure": largest(solution.pressure - pressure) / scale,
+             "stress": largest(stress - exact[COMPONENTS]) / scale}
     return each_at_most(sizes, 1e-9, REPRODUCED, f", {name}")
 
 
@@ -165,11 +165,11 @@ def exact(top: float) -> bodies.HalfCylinder:
 def errors(refinement: float, top: float, kind: int = 1) -> dict[str, float]:
     """Element size, largest error of the outline's radius, and L2 errors of positions and pressure."""
     body, rim = bodies.half_disc(refinement, kind)
-    known = exact(top)
-    solution = bodies.grow(body, body.field(known.theta))
+    reference = exact(top)
+    solution = bodies.grow(body, body.field(reference.theta))
     start, end = (np.hypot(*places[rim].T) for places in (body.reference, solution.position))
-    return {"outline": largest(end / known.radius(start) - 1),
-            **bodies.errors(body, solution, known.at)}
+    return {"outline": largest(end / reference.radius(start) - 1),
+            **bodies.errors(body, solution, reference.at)}
 
 
 CYLINDER_NORM = ("largest relative error of the outline's radius; L2 of positions and of the pressure over the body at "
@@ -218,9 +218,9 @@ def test_curved_half_cylinder(kind, record):
     record(studies(computed, {"place": (around(3, 0.4), "quadratic places: third order in L2", 1e-5),
                            "pressure": (2, "linear pressure: second order in L2", 2e-3)}, ", theta to 36"))
     record(at_most("outline, theta to 36", computed["outline"][-1], 1e-5, "under that of positions in L2"))
-    far = errors(REFINEMENTS[kind][-2], 2000.0, kind)
+    large = errors(REFINEMENTS[kind][-2], 2000.0, kind)
     for name in ("outline", "place", "pressure"):
-        record(at_most(f"{name}, theta to 2000", far[name], 1.05 * computed[name][-2],
+        record(at_most(f"{name}, theta to 2000", large[name], 1.05 * computed[name][-2],
                        "as at theta = 36: the error depends on the shape of theta(R), not on its size"))
 
 
@@ -256,11 +256,11 @@ def test_stress(record):
     exact = np.array([neo_hookean.cauchy(f, p) for f, p in zip(F, P)])
     S, Q = growth.piola(F, P), _turns(np.linspace(0, 6, len(F)))
     full = S @ F.mT / np.linalg.det(F)[:, None, None]
-    size, first = (np.abs(one).max(axis=(1, 2), keepdims=True) for one in (exact, S))
-    apart = {"stress": (growth.cauchy(F, P) - exact[:, *COMPONENTS]) / size[:, 0], "symmetry": (full - full.mT) / size,
+    size, first = (np.abs(array).max(axis=(1, 2), keepdims=True) for array in (exact, S))
+    errors = {"stress": (growth.cauchy(F, P) - exact[:, *COMPONENTS]) / size[:, 0], "symmetry": (full - full.mT) / size,
              "objectivity": (growth.piola(Q @ F, P) - Q @ S) / first,
              "isotropy": (growth.piola(F @ Q, P) - S @ Q) / first}
-    record(each_at_most({name: largest(gap) for name, gap in apart.items()}, 1e-11, ROUND_OFF))
+    record(each_at_most({name: largest(gap) for name, gap in errors.items()}, 1e-11, ROUND_OFF))
 
 
 def _near_one():
@@ -350,11 +350,11 @@ def test_curved_taylor(kind, record):
     random, theta = np.random.default_rng(6), body.constant(1.4)
     position = grid.points @ np.array([[1.2, 0.1], [0.2, 1.1]])
     push, move = random.standard_normal(body.corners), 0.05 * random.standard_normal(position.shape)
-    more, steps = random.standard_normal(body.corners), 0.25 * 0.5 ** np.arange(4)
-    tangents, linear, residual = _along(body, theta, position, push, move, more)
-    left = [largest(residual(s) - residual(0.0) - s * linear) for s in steps]
+    push_step, steps = random.standard_normal(body.corners), 0.25 * 0.5 ** np.arange(4)
+    tangents, linear, residual = _along(body, theta, position, push, move, push_step)
+    remainders = [largest(residual(s) - residual(0.0) - s * linear) for s in steps]
     record(at_most("symmetry", largest(tangents - tangents.mT) / largest(tangents), 1e-13, ROUND_OFF),
-           study("residual", steps, left, 2, "Taylor's theorem: second order", band=0.25))
+           study("residual", steps, remainders, 2, "Taylor's theorem: second order", band=0.25))
 
 
 @pytest.mark.case(
@@ -403,14 +403,15 @@ def test_rigid(kind, record):
     place = 6 * x @ np.array([[1.1, -0.3], [0.6, 0.9]]) + 0.3 * random.standard_normal(x.shape)
     pressure, theta = random.standard_normal(body.corners), body.field(_theta)
     forces, volume = _forces(body, place, pressure, theta)
-    most = largest(forces)
+    scale = largest(forces)
     moment = np.sum(place * (forces @ TURN)) / largest(place)
-    record(each_at_most({"resultant": largest(forces.sum(axis=0)) / most,
-                         "moment over the largest distance": abs(moment) / most}, 1e-11, NEWTON_ROUND_OFF))
+    record(each_at_most({"resultant": largest(forces.sum(axis=0)) / scale,
+                         "moment over the largest distance": abs(moment) / scale}, 1e-11, NEWTON_ROUND_OFF))
     for angle, Q in zip(ANGLES, _turns(ANGLES)):
-        turned, same = _forces(body, place @ Q.T + [70.0, -30.0], pressure, theta)
-        record(each_at_most({"forces": largest(turned - forces @ Q.T) / most,
-                             "volume": largest(same - volume) / largest(volume)}, 1e-12, ROUND_OFF, f", {angle:g} rad"))
+        rotated_forces, rotated_volume = _forces(body, place @ Q.T + [70.0, -30.0], pressure, theta)
+        record(each_at_most({"forces": largest(rotated_forces - forces @ Q.T) / scale,
+                             "volume": largest(rotated_volume - volume) / largest(volume)}, 1e-12, ROUND_OFF,
+                            f", {angle:g} rad"))
 
 
 def _forces(body: Supported, place, pressure, theta):
@@ -469,5 +470,5 @@ def _changed(change: np.ndarray, kind: int) -> growth.Equilibrium:
     cells = body.cells
     if np.linalg.det(change) < 0:
         cells = cells[:, MIRRORED[: cells.shape[1]]]
-    same = replace(body, shape=growth.Shape(cells, body.corners, body.shape.degree))
-    return bodies.grow(_turned(same, change), same.field(_theta))
+    transformed = replace(body, shape=growth.Shape(cells, body.corners, body.shape.degree))
+    return bodies.grow(_turned(transformed, change), transformed.field(_theta))

@@ -90,9 +90,9 @@ def gaps(level: int, name: str, kind: int) -> dict[str, float]:
         return place, pressure / MODULUS
 
     middles = body.reference[body.cells[:, :3]].mean(axis=1) @ [1, 1j]
-    away = np.abs(middles - ENDS).min(axis=0) > 0.2 * bodies.RADIUS
+    is_away = np.abs(middles - ENDS).min(axis=0) > 0.2 * bodies.RADIUS
     return {**bodies.errors(body, solution, exact),
-            "pressure away": bodies.errors(body, solution, exact, away)["pressure"]}
+            "pressure away": bodies.errors(body, solution, exact, is_away)["pressure"]}
 
 
 def _reference_change(name: str, difference: float) -> Check:
@@ -117,10 +117,10 @@ def _curved(differences: dict, pressure: str, ceilings: tuple[float, float]):
     They cover the last differences and, without contact, the orders over all refinements. Orders between two meshes of
     few triangles scatter.
     """
-    fallen = {name: np.log(values[0] / values[-1]) for name, values in differences.items()}
+    decrease = {name: np.log(values[0] / values[-1]) for name, values in differences.items()}
     for field, order, ceiling in zip(("place", pressure), (3, 2), ceilings):
         if pressure == "pressure":
-            yield between(f"order of the {field}", fallen[field] / fallen["size"], *around(order, 0.5),
+            yield between(f"order of the {field}", decrease[field] / decrease["size"], *around(order, 0.5),
                           "quadratic positions, linear pressure: third and second order")
         yield at_most(field, differences[field][-1], ceiling, "the reference's elements are finer")
 

@@ -68,8 +68,8 @@ def _first_contact(mechanics, seed, theta) -> tuple[float, contact.Expansion]:
     def gap(part: float) -> float:
         try:
             shape = contact.expand(mechanics, seed, theta**part, shapes[-1])
-        except FirstContact as late:
-            return late.gap - WALLS.film / 2
+        except FirstContact as contact_made:
+            return contact_made.gap - WALLS.film / 2
         if not shape.pore.contact:
             shapes.append(shape.pore)
         return shape.gap - WALLS.film / 2
@@ -98,14 +98,14 @@ def differences(refinement: float, elements: str) -> dict[str, float]:
     length, tips = np.ptp(reference.lines), np.array([rim.downstream, rim.upstream])
     angle, place = contact_growth.outline(reference.equilibrium)
     above = rim.origin[:, 1] > 0
-    at = np.arctan2(*rim.origin[above].T[::-1])
-    apart = rim.points[above].T - [np.interp(at, angle, each) for each in place]
+    angles = np.arctan2(*rim.origin[above].T[::-1])
+    distances = rim.points[above].T - [np.interp(angles, angle, each) for each in place]
     return {"size": np.pi * bodies.RADIUS / (above.sum() + 1) * rim.geometry,
             "contact lines": np.abs(ends - reference.lines).max() / length,
             "length of contact": abs(np.ptp(ends) / length - 1),
             "edges": max(abs(end - line) / beside for end, line, beside in zip(ends, reference.lines, edges)),
             "tips": np.abs(tips - reference.tips).max() / np.ptp(reference.tips),
-            "outline": np.sqrt(np.mean(np.sum(apart**2, axis=0))) / np.ptp(reference.tips)}
+            "outline": np.sqrt(np.mean(np.sum(distances**2, axis=0))) / np.ptp(reference.tips)}
 
 
 #: Refinements of the package, by elements; those of quadratic ones are the preset fast's 0.2 and accurate's 0.45, and
@@ -136,9 +136,9 @@ def test_contact_lines(elements, record):
     if elements == "linear":
         record(at_most("contact lines, over the edge beside them", errors["edges"].max(), 2.0, ONE_BY_ONE))
     else:
-        fallen = {name: np.log(values[0] / values[-1]) for name, values in errors.items()}
+        decrease = {name: np.log(values[0] / values[-1]) for name, values in errors.items()}
         for name in ("contact lines", "length of contact", "outline"):
-            record(between(f"order of the {name}", fallen[name] / fallen["size"], *around(1, 0.5), SINGULAR))
+            record(between(f"order of the {name}", decrease[name] / decrease["size"], *around(1, 0.5), SINGULAR))
         for name in ("contact lines", "length of contact"):
             record(at_most(name, errors[name][-1], 1e-2, "the error of the preset fast after contact"))
     for name in ("tips", "outline"):

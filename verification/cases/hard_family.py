@@ -85,8 +85,8 @@ def _outcome(tables: dict, folder: Path) -> Outcome:
     try:
         with limited(LIMIT):
             run(load_scene(tables), folder)
-    except (SceneError, SimulationError, TooLong) as error:
-        refusal = str(error)
+    except (SceneError, SimulationError, TooLong) as failure:
+        refusal = str(failure)
     files = run_files.Run(folder, tables) if (folder / "timeseries.csv").is_file() else None
     return Outcome(files, refusal)
 
@@ -142,9 +142,9 @@ def _is_right(tables: dict, folder: Path) -> bool:
 
 def member(seed: int) -> Check:
     """Check that the checks of a member hold, except for those that are known to fail. The name lists the others."""
-    known = KNOWN.get(seed, set())
-    checks = judge(seed)
-    failed = [f"{check.quantity} {check.value:.3g}" for check in checks if check.holds == (check.quantity in known)]
+    known_failures = KNOWN.get(seed, set())
+    failed = [f"{check.quantity} {check.value:.3g}" for check in judge(seed)
+              if check.holds == (check.quantity in known_failures)]
     message = f": {'; '.join(failed)[:600]}" if failed else ""
     return at_most(f"{hostile.kind(seed)}{message}", len(failed), 0, "reference/run_files.py; a refusal's advice works")
 

@@ -97,12 +97,12 @@ def _edge_wide(computed: Run, fine: Run, preset: str) -> Iterator:
     surface_length, expected = (_contact_length(run.end.pore.outline) for run in (computed, fine))
     fall = -np.diff([width - line["thickness_um"] for line in computed.rows if not line["contact"]]).min(initial=0.0)
     share, late = LATE[computed.scene.numerics.time]
-    known = 2 * edge + share * np.sqrt(8 * width * fall)
-    yield at_most("length of the contact surface against a finer run, um", abs(surface_length - expected), known,
+    tolerance = 2 * edge + share * np.sqrt(8 * width * fall)
+    yield at_most("length of the contact surface against a finer run, um", abs(surface_length - expected), tolerance,
                   f"an edge of the interface at each end{late}")
-    tips = {tip: known * film / width / 2 / abs(fine.last[tip]) for tip in SHAPE[2:]}
-    for name, more in {DRIVE[0]: known * ratio / loss, **tips}.items():
-        yield hard.close(computed, fine, preset, name, allowed=TOLERANCE[preset] + more)
+    tips = {tip: tolerance * film / width / 2 / abs(fine.last[tip]) for tip in SHAPE[2:]}
+    for name, extra in {DRIVE[0]: tolerance * ratio / loss, **tips}.items():
+        yield hard.close(computed, fine, preset, name, allowed=TOLERANCE[preset] + extra)
 
 
 def _contact_length(shape: Outline) -> float:
@@ -296,8 +296,8 @@ def even(preset: str, theta: float) -> list[Check]:
     body, _ = seed(preset)
     solution = grown(body, np.full(len(body.reference), theta))
     push = neo_hookean.free_growth_pressure(theta)
-    apart = largest(solution.position / np.sqrt(theta) - body.reference) / RADIUS
-    return [at_most(f"places against theta^1/2 X, theta = {theta:g}, over the radius", apart, 1e-8, "exact; round-off"),
+    error = largest(solution.position / np.sqrt(theta) - body.reference) / RADIUS
+    return [at_most(f"places against theta^1/2 X, theta = {theta:g}, over the radius", error, 1e-8, "exact; round-off"),
             at_most("pressure against the closed form", largest(solution.pressure / push - 1), 1e-6, "as above")]
 
 
@@ -328,10 +328,10 @@ def uneven(preset: str, inner: float, outer: float, pressed: bool = False) -> It
     yield at_most(f"radius of the rim, {span}", largest(np.hypot(*solution.position[rim].T) / size - 1), bound, origin)
     if pressed:
         corners = body.reference[: body.corners]
-        far = np.hypot(*corners.T) > RADIUS / 4
-        push = exact.pressure(*corners[far].T)
-        wrong = np.linalg.norm(solution.pressure[far] - push) / np.linalg.norm(push)
-        yield at_most("pressure outside of R_0 / 4, root of mean squares", wrong, PRESSURE[preset],
+        outer_corners = np.hypot(*corners.T) > RADIUS / 4
+        push = exact.pressure(*corners[outer_corners].T)
+        pressure_error = np.linalg.norm(solution.pressure[outer_corners] - push) / np.linalg.norm(push)
+        yield at_most("pressure outside of R_0 / 4, root of mean squares", pressure_error, PRESSURE[preset],
                       "[E6]; first order at least: half of h / R")
 
 
@@ -408,9 +408,9 @@ def decay(preset: str) -> Iterator:
                         'output.times=["200 h", "1000 h", "2000 h"]')
     area = run.over_first()
     yield run
-    for time, left in zip(run.column("time_h")[1:], area[1:]):
+    for time, computed in zip(run.column("time_h")[1:], area[1:]):
         yield at_most(f"area over 0.2 + 0.8 exp(-b m_A t) at {time:g} h, less one",
-                      abs(left / runs.mass_after(run.scene, time) - 1), 1e-6, "C to 1e-7 of the supply")
+                      abs(computed / runs.mass_after(run.scene, time) - 1), 1e-6, "C to 1e-7 of the supply")
     yield at_least("least area over that of the seed", area.min(), 0.2, "1 - f_d is never degraded")
 
 

@@ -39,9 +39,9 @@ def remeshes(preset: str) -> list:
     for index in range(FIFTY):
         finer = replace(original.numerics, refinement=original.numerics.refinement * (0.85, 1.0, 1.15)[index % 3])
         last, _ = remeshing.remesh(Remeshing.of(replace(original, numerics=finer)), last, last, speed)
-    without, after = (_numbers(original, _step(original, start).pore) for start in (first, last))
+    unremeshed, after = (_numbers(original, _step(original, start).pore) for start in (first, last))
     return [run, *_conserved(first, last),
-            *hard.alike("after a step more, with and without them", NAMES, after, without, preset)]
+            *hard.alike("after a step more, with and without them", NAMES, after, unremeshed, preset)]
 
 
 def _conserved(first: Pore, last: Pore) -> list[Check]:
@@ -137,7 +137,7 @@ def poor(preset: str) -> list:
     """Base from 20 um with poor triangles in the fluid: two steps of 12 min against those from a good mesh."""
     scene = hard.load("base", preset, 'aggregate.radius="20 um"')
     good, _ = hard.solved_seed(scene)
-    bad, count = _spoilt(good)
+    bad, count = _with_poor_triangles(good)
     ends = []
     for start in (good, bad):
         first = _step(scene, start)
@@ -148,7 +148,7 @@ def poor(preset: str) -> list:
             *hard.alike("after two steps", NAMES, ends[1], ends[0], preset)]
 
 
-def _spoilt(good: Pore) -> tuple[Pore, int]:
+def _with_poor_triangles(good: Pore) -> tuple[Pore, int]:
     """The pore with straight edges and randomly moved inner nodes of the fluid, and its number of poor triangles.
 
     The nodes move as far as possible without turning a triangle over.
@@ -273,14 +273,15 @@ def _first_step(preset: str, *changes: str) -> tuple[Run, StepResult]:
 
 def huge(preset: str) -> list:
     """One step of 6 min with 1e5 nodes, against the mesh of the preset."""
-    run, near = _first_step(preset)
+    run, own_step = _first_step(preset)
     fine_preset, refinement = HUGE[run.scene.numerics.order]
-    fine, far = _first_step(fine_preset, f"numerics.refinement={refinement}")
-    shapes = [(step.pore.outline.area, step.pore.outline.thickness, step.pore.outline.upstream) for step in (near, far)]
+    fine, fine_step = _first_step(fine_preset, f"numerics.refinement={refinement}")
+    outlines = [step.pore.outline for step in (own_step, fine_step)]
+    shapes = [(outline.area, outline.thickness, outline.upstream) for outline in outlines]
     return [fine, run, at_least("nodes", fine.instants[0].pore.space.count, 1e5, "else less is tested"),
-            at_most("in - out - consumed over the step, over in", problems.substrate_defect([far.ledger]),
+            at_most("in - out - consumed over the step, over in", problems.substrate_defect([fine_step.ledger]),
                     1e-12 * fine.last["nodes"], "Newton's tolerance of 1e-12 a row, times the rows"),
-            at_most("biomass after - before - made, over after", problems.biomass_defect([far.ledger]),
+            at_most("biomass after - before - made, over after", problems.biomass_defect([fine_step.ledger]),
                     hard.BALANCE, hard.MEAN),
             *hard.close(run, fine, preset, *DRIVE, *EFFLUENTS),
             *hard.alike("after the step, own mesh", NAMES, *shapes, preset)]

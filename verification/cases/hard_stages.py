@@ -74,13 +74,13 @@ def exhausted(preset: str, scarce: str) -> list:
         supplies = (10.0 if name == scarce else plenty for name in NAMES)
         return hard.run_packaged("wide", preset, *disc(80, SLOW), *supply(*supplies))
 
-    run, more = run_with(1000.0), run_with(1e6)
+    run, larger_excess = run_with(1000.0), run_with(1e6)
     column = f"effluent_{scarce}_mg_per_L"
     return [run, _stoichiometry(run),
             at_most(f"least {scarce} over its supply", run.last[f"{scarce}_min_mg_per_L"] / 10, 0.02,
                     "else less is tested"),
             at_most(f"{column}: 1000 mg/L of the other for 1e6, over the supply",
-                    abs(run.last[column] - more.last[column]) / 10, 2e-3,
+                    abs(run.last[column] - larger_excess.last[column]) / 10, 2e-3,
                     "the other's m is 0.997 or more: uptake changes by less, and so do effluents")]
 
 
@@ -213,9 +213,9 @@ def _more_than(faster: Run, slower: Run, preset: str) -> list[Check]:
     law, both = faster.scene.kinetics, faster.scene.substrates
     m_a, m_d = (s.supply / (s.supply + s.half_saturation) for s in (both.acceptor, both.donor))
     most = law.maximum_utilization_rate * m_a * m_d * law.maximum_density * faster.last["aggregate_area_um2"]
-    uptake, before = (run.end.solved.fluxes[1].consumed for run in (faster, slower))
+    uptake, slower_uptake = (run.end.solved.fluxes[1].consumed for run in (faster, slower))
     return [between("donor taken up over what it would be at the supply everywhere", uptake / most,
-                    before / most * (1 - TOLERANCE[preset]), 1.0, "the faster, the more: at least that at a tenth")]
+                    slower_uptake / most * (1 - TOLERANCE[preset]), 1.0, "it rises with the velocity: that at a tenth")]
 
 
 def fast_growth(preset: str, factor: float) -> list:
@@ -261,13 +261,13 @@ def trickle(preset: str, velocity: str, balance: float) -> list:
         ratio = law.acceptor_to_donor_ratio + decay * (c + K) / (law.maximum_utilization_rate * c)
         return both.acceptor.supply - ratio * (supply - c)
 
-    left, u = brentq(missing, 1e-3, supply * (1 - 1e-9)), run.last["mean_velocity_m_per_d"] / M_PER_D
+    remaining, u = brentq(missing, 1e-3, supply * (1 - 1e-9)), run.last["mean_velocity_m_per_d"] / M_PER_D
     peclet = u * run.last["thickness_um"] / both.donor.diffusivity_in_aggregate
-    apart = abs(run.last[EFFLUENTS[1]] - left) / supply
+    difference = abs(run.last[EFFLUENTS[1]] - remaining) / supply
     return [run,
             at_most("acceptor leaving, over the supply", run.last[EFFLUENTS[0]] / both.acceptor.supply, peclet,
                     "C varies by u R / D over the aggregate"),
-            at_most("donor leaving against the closed form, over the supply", apart, peclet, "as above")]
+            at_most("donor leaving against the closed form, over the supply", difference, peclet, "as above")]
 
 
 #: Velocities (m/d), and bounds of the substrates' balances.
@@ -287,8 +287,8 @@ def viscous(preset: str, ratio: float) -> list:
     changes = disc(80, f"flow.viscosity_ratio={ratio!r}")
     run, _, checks = hard.against("wide", preset, changes, *DRIVE, *EFFLUENTS)
     if ratio == 1:
-        apart = abs(run.last[DRIVE[0]] / hard.clean_conductivity(run.scene) - 1)
-        checks.append(hard.promised("conductivity against Poiseuille's", apart, preset))
+        difference = abs(run.last[DRIVE[0]] / hard.clean_conductivity(run.scene) - 1)
+        checks.append(hard.promised("conductivity against Poiseuille's", difference, preset))
     return checks
 
 

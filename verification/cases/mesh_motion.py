@@ -242,8 +242,8 @@ def test_growth(geometry, record):
 
     Norm: least area of a triangle over its own at first; area of fluid and biomass, relative; distance from a line.
     """
-    for radius, factor, way in JOURNEYS:
-        for name, stretch, shift in (("grown", factor ** (0.5 / STEPS), 0.0), ("slid", 1.0, way * radius / STEPS)):
+    for radius, factor, slide in JOURNEYS:
+        for name, stretch, shift in (("grown", factor ** (0.5 / STEPS), 0.0), ("slid", 1.0, slide * radius / STEPS)):
             first = _around(radius, geometry)
             record(_journey_checks(f"R = {radius:g} um, {name}", first, _journey(first, stretch, shift)))
 
@@ -262,15 +262,15 @@ def _journey(grid: Mesh, stretch: float, shift: float) -> Mesh:
 
 def _journey_checks(name: str, first: Mesh, last: Mesh) -> list:
     """Checks of one journey."""
-    apart = np.abs(last.points - first.points)
+    displacement = np.abs(last.points - first.points)
     lines = ((0, first.ends), (1, (0.0, first.width)))
-    off = max(apart[np.isin(first.points[:, axis], line), axis].max() for axis, line in lines)
+    off_line = max(displacement[np.isin(first.points[:, axis], line), axis].max() for axis, line in lines)
     return [at_least(f"least area over its own at first: {name}", (last.areas / first.areas).min(), 0.25,
                      "upright, and not near turning over"),
             at_most(f"triangles turned over: {name}", last.turned_over().sum(), 0.0, "at no node or quadrature point"),
             at_most(f"area of fluid and biomass: {name}", abs(_area(last) / _area(first) - 1), 1e-12,
                     "no gap, no overlap"),
-            at_most(f"off its line (um): {name}", off, 0.0, "nodes slide; the four corners, on two lines, rest")]
+            at_most(f"off its line (um): {name}", off_line, 0.0, "nodes slide; the four corners, on two lines, rest")]
 
 
 def _area(grid: Mesh) -> float:
@@ -293,12 +293,12 @@ def test_round_trip(geometry, record):
     """
     grid = _around(20.0, geometry)
     for name, growth, shift, ceiling in (("grows", 1.0, 0.0, 4e-5), ("slides", 0.0, 20.0, 4e-6)):
-        back = [_round_trip(grid, 1 + growth * stride, shift * stride) for stride in STRIDES]
-        record(study(f"a half-disc {name}", STRIDES, np.sqrt(np.mean(np.square(back), axis=(1, 2))) / 20.0, 2,
+        distances = [_round_trip(grid, 1 + growth * stride, shift * stride) for stride in STRIDES]
+        record(study(f"a half-disc {name}", STRIDES, np.sqrt(np.mean(np.square(distances), axis=(1, 2))) / 20.0, 2,
                      "(35) is linear in the motion on a given mesh: second order", ceiling=ceiling, band=0.1))
     plug = _nodes(meshes.plug(ENDS, WIDTH, HALF, 3.0, seed=4), geometry)
-    missed = largest(_round_trip(plug, np.array([1.2, 1.0]), 10.0))
-    record(at_most("a plug that stretches and slides (um)", missed, 1e-11, "linear on each side: round-off"))
+    distance = largest(_round_trip(plug, np.array([1.2, 1.0]), 10.0))
+    record(at_most("a plug that stretches and slides (um)", distance, 1e-11, "linear on each side: round-off"))
 
 
 def _round_trip(grid: Mesh, stretch: float | np.ndarray, shift: float) -> np.ndarray:
@@ -322,16 +322,16 @@ def test_criterion(record):
     Norm: largest difference of the quality; verdicts on meshes with so many triangles stretched.
     """
     stretch = np.random.default_rng(5).uniform(0.1, 8.0, 50)
-    off = largest(_triangles(stretch).quality - 2 * stretch / (1 + stretch**2))
+    quality_error = largest(_triangles(stretch).quality - 2 * stretch / (1 + stretch**2))
     verdicts = {"six by 3.001": (_stretched(6, 3.001), True, "3.5"),
                 "seven by 2.999": (_stretched(7, 2.999), True, "3.5"),
                 "seven by 3.001": (_stretched(7, 3.001), False, "3.5"),
                 "one turned over": (_stretched(1, -1.0), False, "3.5"),
                 "one edge bent by 0.49": (_bowed(0.49), True, HALF_BENT),
                 "one edge bent by 0.51": (_bowed(0.51), False, HALF_BENT)}
-    record(at_most("quality", off, 1e-12, "closed form: round-off"))
-    for name, (mesh, fine, why) in verdicts.items():
-        record(at_most(f"wrong verdicts: {name}", mesh.acceptable() != fine, 0.0, why))
+    record(at_most("quality", quality_error, 1e-12, "closed form: round-off"))
+    for name, (mesh, acceptable, why) in verdicts.items():
+        record(at_most(f"wrong verdicts: {name}", mesh.acceptable() != acceptable, 0.0, why))
 
 
 def _stretched(count: int, by: float) -> Mesh:

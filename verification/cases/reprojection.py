@@ -65,18 +65,18 @@ def test_half_disc(order, record):
     scene = aggregates.base_scene(order=order)
     state = aggregates.seed(RADIUS, order=order)
     rows: list[dict] = []
-    renewed: list[int] = []
+    remesh_updates: list[int] = []
     first = state.mass
     for update in range(1, UPDATES + 1):
-        state, anew = aggregates.update(scene, state, INCREASE)
-        renewed += [update] * anew
+        state, is_new_mesh = aggregates.update(scene, state, INCREASE)
+        remesh_updates += [update] * is_new_mesh
         rows.append(_errors(state, (1 + INCREASE) ** update, first))
     bounds = {"radius": (1e-4, "arcs that are parabolas: (edge / R)^4 / 100")} if order > 1 else {}
     for quantity, value in runs.worst(rows).items():
         record(at_most(quantity, value, *bounds.get(quantity, (1e-12, "closed form: round-off"))))
-    record(at_least("remeshes", len(renewed), 2.0, "else the transfer is not tested"))
+    record(at_least("remeshes", len(remesh_updates), 2.0, "else the transfer is not tested"))
     first = np.ceil(2 * np.log(11 / 8) / np.log(1 + INCREASE))  # 8 R_0 sqrt(theta) > 11 R_0
-    record(at_most("first remesh, updates from that of (3.1)", abs(renewed[0] - first), 0.0,
+    record(at_most("first remesh, updates from that of (3.1)", abs(remesh_updates[0] - first), 0.0,
                    "meshed to 11 R_0, remeshed beyond 8 R"))
 
 
@@ -127,9 +127,9 @@ def _growth_history(transfer: str, order: int) -> dict[str, np.ndarray]:
     for _ in range(GROWING_UPDATES):
         increase = _faster_in_front(state)
         expected += (state.active * increase).sum()
-        state, anew = aggregates.update(scene, state, increase)
-        rows.append({"drift": state.mass / expected - 1, "restart": _restart(state) if anew else 0.0,
-                     "poor": _poor(state), "missing": _missing(state), "anew": anew})
+        state, is_new_mesh = aggregates.update(scene, state, increase)
+        rows.append({"drift": state.mass / expected - 1, "restart": _restart(state) if is_new_mesh else 0.0,
+                     "poor": _poor(state), "missing": _missing(state), "anew": is_new_mesh})
     return columns(rows)
 
 
@@ -335,13 +335,13 @@ def test_remesh_arc(record):
     new = aggregates.remesh(fine, grown)
     after = aggregates.expand(fine, new, 0.0)
     free = new.wall == FREE
-    added = np.count_nonzero(free) / np.count_nonzero(grown.wall == FREE)
-    beside = largest(np.hypot(*new.outline.origin[free].T) / 10 - 1)
-    record(at_most("beside the arc at t = 0", beside, 1e-12, "the seed's arc: round-off"),
+    node_ratio = np.count_nonzero(free) / np.count_nonzero(grown.wall == FREE)
+    off_arc = largest(np.hypot(*new.outline.origin[free].T) / 10 - 1)
+    record(at_most("beside the arc at t = 0", off_arc, 1e-12, "the seed's arc: round-off"),
            at_most("area of the polygon", abs(new.outline.area / grown.outline.area - 1), 1e-12, "round-off"),
            at_most("unroundness left", _unround(after) / _unround(new), 0.25,
                    "edges half as long: a quarter of the sag"),
-           at_least("interface nodes, after over before", added, 1.9, "split, else nothing is tested"))
+           at_least("interface nodes, after over before", node_ratio, 1.9, "split, else nothing is tested"))
 
 
 def _unround(state) -> float:

@@ -188,8 +188,8 @@ def _polynomials(pieces: pairs.Grid) -> float:
     power = np.arange(DEGREE + 1)
     along, across = np.moveaxis(where[..., None] ** power, 2, 0)
     exact = np.outer(*(side ** (power + 1) / (power + 1) for side in (pairs.ENDS[1], pairs.WIDTH)))
-    apart = np.einsum("tq,tqa,tqb->ab", weight, along, across) / exact - 1
-    return largest(apart[np.add.outer(power, power) <= DEGREE])
+    errors = np.einsum("tq,tqa,tqb->ab", weight, along, across) / exact - 1
+    return largest(errors[np.add.outer(power, power) <= DEGREE])
 
 
 @pytest.mark.case(
@@ -231,10 +231,10 @@ def _plane_error(computed: np.ndarray, mesh: pairs.Grid) -> float:
 def _pythagoras(old: pairs.Grid, before: np.ndarray, new: pairs.Grid, after: np.ndarray) -> float:
     """|X_old|^2 - |X_new|^2 - |X_old - X_new|^2 over the first: zero if the difference is orthogonal to X_new."""
     corners, of_old, of_new = transfer.supermesh(*old, *new)
-    gap = 0.0
+    difference = 0.0
     for (points, triangles), field, owner, sign in ((old, before, of_old, 1), (new, after, of_new, -1)):
         nodes = triangles[owner][:, None]
-        gap = gap + sign * np.sum(transfer.barycentric(points[nodes], corners) * field[nodes], axis=2)
-    pieces = corners.reshape(-1, 2), np.arange(gap.size).reshape(-1, 3)
-    left = pairs.square(old, before) - pairs.square(new, after) - pairs.square(pieces, gap.ravel())
-    return abs(left) / pairs.square(old, before)
+        difference = difference + sign * np.sum(transfer.barycentric(points[nodes], corners) * field[nodes], axis=2)
+    pieces = corners.reshape(-1, 2), np.arange(difference.size).reshape(-1, 3)
+    defect = pairs.square(old, before) - pairs.square(new, after) - pairs.square(pieces, difference.ravel())
+    return abs(defect) / pairs.square(old, before)

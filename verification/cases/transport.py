@@ -325,8 +325,8 @@ def _expected(order: int, peclet: float) -> tuple:
 
 @cache
 def _half_disc_space(refinement: float, number: int, order: int) -> Space:
-    about = refinement * NEAR ** (number - REFINEMENTS[order][refinement] // 2)
-    return meshes.half_disc_space(RADIUS, about, ENDS, WIDTH, order)
+    near_refinement = refinement * NEAR ** (number - REFINEMENTS[order][refinement] // 2)
+    return meshes.half_disc_space(RADIUS, near_refinement, ENDS, WIDTH, order)
 
 
 @cache
@@ -386,17 +386,17 @@ def _through(space: Space, edges: np.ndarray, peclet: float, inlet: str) -> np.n
     dx, dy = (nodes[:, -1] - nodes[:, 0]).T[..., None]
     mean, velocity, _ = _chosen(peclet)
     field, flux = (_by_side(peclet, name, np.hypot(x, y).mean(axis=1) < RADIUS, x, y) for name in ("value", "flux"))
-    enters = velocity[0](x, y) if inlet == "local" else mean
-    over = enters * (field - np.reshape(pair("supply", SUBSTRATES), (2, 1, 1)))
-    along = flux[:, 0] - np.where(np.isclose(x, ENDS[0]), over, 0.0)
-    return ((along * dy - flux[:, 1] * dx) * weights) @ values
+    inflow = velocity[0](x, y) if inlet == "local" else mean
+    excess = inflow * (field - np.reshape(pair("supply", SUBSTRATES), (2, 1, 1)))
+    normal_x = flux[:, 0] - np.where(np.isclose(x, ENDS[0]), excess, 0.0)
+    return ((normal_x * dy - flux[:, 1] * dx) * weights) @ values
 
 
 def chosen_concentrations(order: int, peclet: float, inlet: str, ceilings: tuple[float, float]):
     errors = refine(_chosen_errors, REFINEMENTS[order], order, peclet, inlet)
-    cells = " to ".join(f"{peclet * size / WIDTH:.1g}" for size in errors["size"][[-1, 0]])
+    peclet_range = " to ".join(f"{peclet * size / WIDTH:.1g}" for size in errors["size"][[-1, 0]])
     return studies(errors, {name: (*_expected(order, peclet), ceiling) for name, ceiling in zip(NAMES, ceilings)},
-                   f", elements' {cells}")
+                   f", elements' {peclet_range}")
 
 
 @pytest.mark.case(

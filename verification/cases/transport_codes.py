@@ -313,8 +313,8 @@ def mass(space: Space) -> np.ndarray:
         return np.diag(space.lumped())
     grid = space.mesh.fem
     basis = Basis(MeshTri(grid.p, grid.t), ELEMENTS[space.order], intorder=8)  # sorted, as edges of order 3 must be
-    _, same = cKDTree(basis.doflocs.T).query(space.points)
-    return poisson.mass.assemble(basis).toarray()[np.ix_(same, same)]
+    _, nodes = cKDTree(basis.doflocs.T).query(space.points)
+    return poisson.mass.assemble(basis).toarray()[np.ix_(nodes, nodes)]
 
 
 def _exact_in_time(size: float, peclet: float, density: float, order: int) -> np.ndarray:
@@ -359,9 +359,9 @@ def test_gear_in_time(order, peclet, density, size, ceiling, record):
 
     Norm: largest over three times of the root mean square over the nodes, over the supply.
     """
-    trusted = _exact_in_time(size, peclet, density, order)
+    expected = _exact_in_time(size, peclet, density, order)
     errors = refine(lambda steps: {"size": TIMES[0] / steps, **_over_the_supply(
-        _computed(size, 0, order, peclet, density, steps) - trusted)}, STEPS)
+        _computed(size, 0, order, peclet, density, steps) - expected)}, STEPS)
     record(studies(errors, each(2, "BDF2 after a first step of backward Euler", ceiling)))
 
 
@@ -389,10 +389,10 @@ def _rows(timed: bool) -> dict[str, tuple]:
 
 
 def finite_volumes(timed: bool, order: int, peclet: float, density: float):
-    samples, why, ceilings, closest = AGAINST_FIPY[timed]
+    samples, why, ceilings, higher_ceiling = AGAINST_FIPY[timed]
     if order > 1:
         errors = refine(_from_fipy, dict.fromkeys(CELLS, 1), order, peclet, density, timed)
-        yield studies(errors, each(2, "FiPy's second order", closest), " of FiPy less ours")
+        yield studies(errors, each(2, "FiPy's second order", higher_ceiling), " of FiPy less ours")
         return
     errors = refine(_from_fipy, samples, order, peclet, density, timed)
     yield studies(errors, each(2, why, ceilings[density]))
@@ -514,11 +514,11 @@ def _mixed_reference(order: int) -> np.ndarray:
 
 def well_mixed(order: int):
     """A check that the box is uniform, and studies of C_A, C_D, X_A and X_I."""
-    trusted = _mixed_reference(order)
-    uneven = (_mixed(MIXED_STEPS[-1], order)[:, :, 1] / trusted).max()
+    expected = _mixed_reference(order)
+    uneven = (_mixed(MIXED_STEPS[-1], order)[:, :, 1] / expected).max()
     yield at_most("unevenness in the box", uneven, 1e-6, "L^2 / D over the time in which the supply lasts")
     errors = refine(lambda step: {"size": step, **dict(zip(
-        MIXED, np.abs(_mixed(step, order)[:, :, 0] / trusted - 1).max(axis=0)))}, MIXED_STEPS)
+        MIXED, np.abs(_mixed(step, order)[:, :, 0] / expected - 1).max(axis=0)))}, MIXED_STEPS)
     yield studies(errors, {name: (2, "BDF2, restarted ten times", ceiling) for name, ceiling in MIXED.items()})
     if order == 1:
         yield at_most("X at constant C, 12 min steps", _constant_supply(), 1e-9,
@@ -559,7 +559,7 @@ def _constant_supply() -> float:
     active, inert = 3e4, 0.0
     for _ in range(600):
         active, inert = kinetics.grow(active, inert, growth, remains, 0.2)
-    rise, left = runs.growth_rates(SLOW_LAW, CLOSED, acceptor, donor)
-    risen = rise * HALF_DAYS[-1]
-    exact = 3e4 * np.array([np.exp(risen), left / rise * np.expm1(risen)])
+    growth_rate, inert_rate = runs.growth_rates(SLOW_LAW, CLOSED, acceptor, donor)
+    risen = growth_rate * HALF_DAYS[-1]
+    exact = 3e4 * np.array([np.exp(risen), inert_rate / growth_rate * np.expm1(risen)])
     return np.abs(np.array([active, inert]) / exact - 1).max()

@@ -136,8 +136,8 @@ def _haldane(size: float, number: int, order: int, sink: float, from_least: bool
     states = _haldane_states(sink)
     guess = transport.Concentrations(None, states[0](space.points[:, 0])) if from_least else None
     state = steady(equations(space, "donor", "Haldane", **INHIBITED), sink / FASTEST["donor"], guess)
-    due = states[0 if from_least else -1]
-    gap, _ = rms_errors(space, both(state), lambda x, y: due(x)[None])
+    expected = states[0 if from_least else -1]
+    gap, _ = rms_errors(space, both(state), lambda x, y: expected(x)[None])
     return {"size": length(space, size), "C": gap[0] / INHIBITED["supply"]}
 
 

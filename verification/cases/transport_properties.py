@@ -85,8 +85,8 @@ def _by_the_printed_inlet(seed, solved) -> list[float]:
     less this.
     """
     space = seed.space
-    apart = solved.flow.mean_velocity - solved.flow.velocity[:, 0]
-    weight = space.inlet.assembled(apart)
+    difference = solved.flow.mean_velocity - solved.flow.velocity[:, 0]
+    weight = space.inlet.assembled(difference)
     return [weight @ field / flux.supplied for field, flux in zip(both(solved.concentrations), solved.fluxes)]
 
 
@@ -120,8 +120,8 @@ def test_starved(kind, radius, supplies, record):
     record(at_most("balance", max(abs(_defect(flux)) for flux in solved.fluxes), 1e-9, ROUND_OFF))
     record(at_most("from other first iterates", _spread(seed, solved, computed), 1e-8, "one steady state"))
     if linear and radius == STARVED[0][0]:
-        again = both(gear.settle(solved.problem, Sink(seed.active), None))
-        record(at_most("the transient scheme at rest", np.abs(again / computed - 1).max(), 1e-7,
+        at_rest = both(gear.settle(solved.problem, Sink(seed.active), None))
+        record(at_most("the transient scheme at rest", np.abs(at_rest / computed - 1).max(), 1e-7,
                        "it stops when 1e-9 of the supply is left to change"))
 
 
@@ -134,8 +134,8 @@ def _spread(seed, solved, computed) -> float:
     shape = computed.shape
     guesses = [np.full(shape, 30.0), random.uniform(0, 30.0, shape), random.uniform(0, 0.1, shape)]
     size = computed if seed.space.order == 1 else solved.problem.supply.reshape(2, -1)
-    again = [both(transport.steady(solved.problem, Sink(seed.active), Concentrations(*guess))) for guess in guesses]
-    return max(np.abs((one - computed) / size).max() for one in again)
+    states = [both(transport.steady(solved.problem, Sink(seed.active), Concentrations(*guess))) for guess in guesses]
+    return max(np.abs((state - computed) / size).max() for state in states)
 
 
 SUPPLY = SCENE.substrates.acceptor.supply
@@ -181,9 +181,9 @@ def test_curved_front(half, solved, record):
     """
     numerics, bound = solved
     record(proportion(half, *numerics))
-    near, far = _front(half, *numerics), _front(half, FAST, "numerics.refinement=1.3")
-    apart = max(abs(a.effluent - b.effluent) for a, b in zip(near, far)) / SUPPLY
-    record(at_most("effluents", apart, bound, "the error that the preset promises"))
+    coarse, fine = _front(half, *numerics), _front(half, FAST, "numerics.refinement=1.3")
+    difference = max(abs(a.effluent - b.effluent) for a, b in zip(coarse, fine)) / SUPPLY
+    record(at_most("effluents", difference, bound, "the error that the preset promises"))
 
 
 @cache
@@ -215,9 +215,9 @@ def _half_disc(width: float, radius: float, speed: str, *changes: str) -> Scene:
 
 
 @cache
-def _carried(*arguments):
+def _carried(*scene_arguments):
     """Ledgers of a half-disc at t = 0, on the first mesh."""
-    scene = _half_disc(*arguments)
+    scene = _half_disc(*scene_arguments)
     return pore.solve(scene, pore.seeded(scene)).fluxes
 
 
@@ -242,10 +242,10 @@ def test_curved_peclet(speed, preset, record):
     Norm: difference of effluents, over the supply, and of consumption, relative, to a mesh of refinement 2.5.
     """
     numerics, bound, why = preset
-    far = _carried(100.0, 60.0, speed, ACCURATE, "numerics.refinement=2.5")
-    for name, flux, trusted in zip(NAMES, _carried(100.0, 60.0, speed, *numerics), far):
-        record(each_at_most({"effluent": abs(flux.effluent - trusted.effluent) / SUPPLY,
-                             "consumed": abs(flux.consumed / trusted.consumed - 1)}, bound, why, f" {name}"))
+    finer = _carried(100.0, 60.0, speed, ACCURATE, "numerics.refinement=2.5")
+    for name, flux, expected in zip(NAMES, _carried(100.0, 60.0, speed, *numerics), finer):
+        record(each_at_most({"effluent": abs(flux.effluent - expected.effluent) / SUPPLY,
+                             "consumed": abs(flux.consumed / expected.consumed - 1)}, bound, why, f" {name}"))
 
 
 #: Numerics, bound of the balance, and bound of the difference of effluents from quadratic elements twice finer.
@@ -267,8 +267,8 @@ def test_cubic_half_disc(numerics, round_off, bound, why, record):
 
     Norm: (in - out - consumed) over in; difference over the supply to quadratic concentrations.
     """
-    far = _carried(50.0, 40.0, "2.9 m/day", *HALF_DISCS["quadratic"][0])
-    for name, flux, expected in zip(NAMES, _carried(50.0, 40.0, "2.9 m/day", *numerics), far):
+    finer = _carried(50.0, 40.0, "2.9 m/day", *HALF_DISCS["quadratic"][0])
+    for name, flux, expected in zip(NAMES, _carried(50.0, 40.0, "2.9 m/day", *numerics), finer):
         record(at_most(f"balance, {name}", abs(_defect(flux)), *round_off))
         if bound:
             record(at_most(f"effluent, {name}", abs(flux.effluent - expected.effluent) / SUPPLY, bound, why))
@@ -345,5 +345,5 @@ def _tangent(problem: transport.Problem, hours: float) -> Study:
     state, along = random.uniform(0.5, 1.0, (2, 2 * problem.space.count))
     steps = 0.05 * 0.5 ** np.arange(4)
     linear, start = problem.system.product(balance.tangent(state), along), balance.residual(state)
-    left = [np.abs(balance.residual(state + s * along) - start - s * linear).max() for s in steps]
-    return study(f"tangent, {hours:g} h", steps, left, 2, "Taylor's theorem: second order")
+    remainders = [np.abs(balance.residual(state + s * along) - start - s * linear).max() for s in steps]
+    return study(f"tangent, {hours:g} h", steps, remainders, 2, "Taylor's theorem: second order")
