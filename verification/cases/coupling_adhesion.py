@@ -68,10 +68,10 @@ def _load_errors(radius: float, *changes: str) -> tuple[float, float, float]:
     drive = scene.flow
     shear = 6 * solved.flow.mean_velocity / WIDTH
     scale = traction.MPA_PER_UM * drive.density * drive.kinematic_viscosity * shear * radius
-    along, _, moment = half_cylinder.solved(radius / WIDTH).load()
+    drag, _, moment = half_cylinder.solve(radius / WIDTH).load()
     middle = traction.MPA_PER_UM * drive.density * drive.gravity * solved.flow.meshed_loss / 2
-    return (abs(load.x / scale - along) / along, abs(load.y / (middle * 2 * radius) + 1),
-            abs(load.moment / scale / radius - moment) / along)
+    return (abs(load.x / scale - drag) / drag, abs(load.y / (middle * 2 * radius) + 1),
+            abs(load.moment / scale / radius - moment) / drag)
 
 
 @cache
