@@ -65,8 +65,8 @@ CHOICES = {
     "transient": Switch("transport in time", "quasi-steady", "transient (Gear)", 'numerics.transport="gear"',
                         note="3.3"),
     "full pore": Switch("extent", "central part (3.1)", "full pore", 'numerics.extent="full"', False,
-                        "the inlet and the outlet 1.5 W away or less, against the pore's ends; in the converged "
-                        "solution, since each has meshes of its own", False),
+                        "inlet and outlet at most 1.5 W away, against the pore's ends; in the converged solution, "
+                        "because the meshes differ", False),
     "traction": Switch("interface", "Laplacian form", "traction form", 'numerics.interface="traction"', note="[E2]"),
     "fluid forces": Switch("fluid forces", "neglected", "included", 'growth.fluid_forces="included"',
                            note="(20), (22), C26"),
@@ -86,7 +86,7 @@ CHOICES = {
     "unlimited decay": Switch("decay", "with acceptor", "unlimited", 'kinetics.decay="unlimited"',
                               note="(9), (10); not the paper's"),
     "rechosen": Switch("fixed point", "kept", "rechosen", 'numerics.fixed_point="rechosen"',
-                       note="2.3.3; the same node throughout base, whose contact surface stays even about it"),
+                       note="2.3.3; in base always the same node, because the contact surface stays symmetric"),
     "midpoint": Switch("steps in time", "updates of 12 min", "midpoint, tolerance 0.01", 'numerics.time="midpoint"',
                        False, "first order in the step against second"),
 }
@@ -172,8 +172,8 @@ def one_state(aggregate: Body, other: Scene) -> dict[str, float]:
 
 
 def run_columns(run: Run) -> Columns:
-    """Of a run's rows: "time" h, "velocity" m/d, "area" um2, "drift", largest |(X_A + X_I) / X_m - 1|, and "lean", the
-    middle between the tips divided by half of their distance."""
+    """Columns of a run's rows: "time" h, "velocity" m/d, "area" um2, "drift", largest |(X_A + X_I) / X_m - 1|, and
+    "lean", the middle between the tips divided by half of their distance."""
     return _row_columns(runs.series(*run))
 
 
@@ -241,8 +241,8 @@ def explicit(scene: Scene, previous: Pore, solved: Solved, hours: float) -> Pore
     return Stages.of(scene).new_mesh(previous, shape_of(scene, previous, grown), solved)[0]
 
 
-#: The seed's radius is R (1 + BULGE cos 3 phi) or R (1 - BULGE cos 3 phi): area as before to second order, one tip
-#: further out by 1 %, the other one less by that. With cos phi it would be a half-disc again, moved.
+#: The seed's radius is R (1 + BULGE cos 3 phi) or R (1 - BULGE cos 3 phi): the area is the same to second order, one
+#: tip is 1 % farther out, and the other 1 % farther in. With cos phi the seed would be a shifted half-disc.
 BULGE = 0.01
 
 
