@@ -92,7 +92,7 @@ def test_a_claim_counts_with_its_first_definition(record):
             continue
         assert report.counted(entry) is first and all(first["defined"] < each["defined"] for each in later)
         assert all(each["replaced_because"] and each["words"] for each in entry["other_definitions"])
-        assert f"{first['verdict']} (as defined anew: {later[-1]['verdict']})" == report.describe_verdicts(entry)
+        assert f"{first['verdict']} (as redefined: {later[-1]['verdict']})" == report.describe_verdicts(entry)
     assert [report.counted(anew[id])["verdict"] for id in ("C13", "C39", "C41")] == [CONTRADICTED] * 3
 
 

@@ -55,7 +55,7 @@ def test_numbers_are_those_of_the_first_and_the_last_row(request, name):
     kind = {"fast": "Quadratic triangles, drawn curved", "paper": "Linear triangles"}[name]
     record = read(out).record
     for expected in (kind, f"{record['wall_time_s']:.3g} s in all", '<td>width</td><td class="value">50 um<',
-                 f'anew</td><td class="value">{record["remeshes"]}<', f'hash</td><td class="value">{record["hash"]}<',
+                 f'meshes</td><td class="value">{record["remeshes"]}<', f'hash</td><td class="value">{record["hash"]}<',
                  f"{len(times)} rows, to t = {times[-1]:g} h."):
         assert expected in text_of(out)
     assert re.findall("t = ([^ ]*) h", panel) == [f"{times[k]:.6g}" for k in (0, -1)] and len(times) > 2

@@ -404,7 +404,7 @@ class Numerics:
 
     @property
     def follows_layers(self) -> bool:
-        """Are elements made smaller for boundary layers and fronts? Linear ones are the paper's."""
+        """Are elements refined at boundary layers and fronts? Linear ones, the paper's, are not."""
         return self.elements != "linear"
 
     @property

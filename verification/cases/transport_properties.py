@@ -2,7 +2,7 @@
 
 Substrates around a half-disc in scenes, including sharp fronts and fast water, are compared with finer meshes. A step
 of the midpoint rule takes up substrates with the mean biomass of the step, at steady concentrations. At constant C_A
-and C_D this is the integral of (7)-(10), and the biomass made balances the uptake.
+and C_D this is the integral of (7)-(10), and the new biomass balances the uptake.
 """
 
 import re
@@ -311,7 +311,7 @@ def test_mean_biomass(numerics, record):
 
 
 def _balanced(problem: transport.Problem, hours: float) -> Check:
-    """Check biomass made against uptake, at the steady concentrations of a step."""
+    """Check new biomass against uptake, at the steady concentrations of a step."""
     law = SCENE.kinetics
     active = law.maximum_density * problem.space.reaction.dx
     sink = Sink(active, hours)

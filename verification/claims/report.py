@@ -150,7 +150,7 @@ def counted(entry: dict) -> dict:
 def describe_verdicts(entry: dict) -> str:
     """The verdict that counts; if the definition has changed, also the verdict of the last definition."""
     first, *later = definitions(entry)
-    return f"{first['verdict']} (as defined anew: {later[-1]['verdict']})" if later else first["verdict"]
+    return f"{first['verdict']} (as redefined: {later[-1]['verdict']})" if later else first["verdict"]
 
 
 def distinct(entries: list[dict]) -> dict[tuple[str, str], str]:

@@ -302,7 +302,7 @@ def step_control() -> Finding:
     """Errors of the transport of one shape update (12 min) of base at t = 0 and 19.2 h, and the growth of a disturbance
     of the profiles in long equal steps if no biomass grows.
 
-    The error is the largest of both concentrations (over the supply) and of the biomass made (relative), against a
+    The error is the largest of both concentrations (over the supply) and of the new biomass (relative), against a
     tolerance of 1e-7. The scheme is unstable if the disturbance grows from step to step; a disturbance that dies out is
     stable even if a long step is inaccurate. The range of the steps depends on the tolerance of the control, which the
     paper does not print, and on its first step. It is therefore not judged; the note has it for two tolerances.
@@ -364,7 +364,7 @@ def resting_profiles(time: float) -> Concentrations:
 
 
 def deviation(time: float, fixed_step: float | None = None) -> float:
-    """Error of an update: of both concentrations over the supply, and of the biomass made; the largest."""
+    """Error of an update: the largest of both concentrations (over the supply) and of the new biomass (relative)."""
     pore, solved = solved_pore(BASE, time)
     advanced, exact = update(time, fixed_step), update(time, None, EXACT)
     gaps = np.abs(both(advanced.concentrations) - both(exact.concentrations)).max(axis=1)
