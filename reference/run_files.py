@@ -342,8 +342,8 @@ class Run:
 
     def at_ledger(self) -> tuple[np.ndarray, np.ndarray]:
         """Indices of the rows at which a step ends, and of these steps."""
-        apart = np.abs(np.subtract.outer(self.times, self.ledger.get("end_h", np.zeros(0))))
-        return np.nonzero(apart <= 1e-9)
+        distances = np.abs(np.subtract.outer(self.times, self.ledger.get("end_h", np.zeros(0))))
+        return np.nonzero(distances <= 1e-9)
 
 
 def findings(run: Run) -> Iterator[Finding]:
@@ -447,8 +447,8 @@ def _flow(scene: Scene, row: dict, fields: Fields) -> Iterator[Finding]:
     velocity = fields.at_nodes["velocity_m_per_d"]
     walls = np.concatenate([fields.wall(0.0), fields.wall(width)])
     in_fluid = walls[np.isin(walls, fields.cells[~fields.body])]
-    still = walls if scene.viscosity_ratio else in_fluid
-    yield size("velocity at the walls over the mean", velocity[still] / speed, SUM,
+    no_slip = walls if scene.viscosity_ratio else in_fluid
+    yield size("velocity at the walls over the mean", velocity[no_slip] / speed, SUM,
                "(5): no slip; water may slide under a permeable body whose layers are thin")
     yield size("velocity through the walls over the mean", velocity[walls, 1] / speed, SUM, "no flow through walls")
     for name, outlet, bound in (("inlet", False, SUM), ("outlet", True, SOLVED)):
@@ -622,7 +622,7 @@ def _max_biomass(run: Run) -> np.ndarray:
 
 def _max_consumed(run: Run, name: str) -> np.ndarray:
     scene = run.scene
-    m_a, m_d = (_saturation(run, each) for each in NAMES)
+    m_a, m_d = (_saturation(run, name_of_substrate) for name_of_substrate in NAMES)
     donor = scene.number("kinetics", "maximum_utilization_rate") * m_a * m_d * run.duration * _max_biomass(run)
     if name == "donor":
         return donor

@@ -67,15 +67,15 @@ def measured(switch: Switch, ratio: float) -> dict:
     if not switch.meshes:
         effects, noise = switches.converged(switch)
         return {**row(switch, ratio, effects), "noise": noise}
-    default, other = state(BASE), state(switch.run)
-    measured_row = row(switch, ratio, switches.effect_of_runs(default, other))
-    return {**measured_row, "one_state": switches.one_state(default, other.scene) if switch.state else {}}
+    default, alternative = state(BASE), state(switch.run)
+    measured_row = row(switch, ratio, switches.effect_of_runs(default, alternative))
+    return {**measured_row, "one_state": switches.one_state(default, alternative.scene) if switch.state else {}}
 
 
 def cost(run: tuple[str, ...], repeats: int = REPEATS) -> float:
     """Processor time of a run over that of base, medians of alternating runs."""
-    default, other = map(median, zip(*((seconds(PLATES), seconds(run)) for _ in range(repeats))))
-    return other / default
+    default, alternative = map(median, zip(*((seconds(PLATES), seconds(run)) for _ in range(repeats))))
+    return alternative / default
 
 
 def seconds(run: tuple[str, ...]) -> float:
@@ -88,11 +88,11 @@ def seconds(run: tuple[str, ...]) -> float:
 
 def drift() -> dict:
     """Compare theta = J X / X_m with theta = J after a remesh: the drift of (28) [E7]."""
-    other = switches.course(BASE, switches.restarting_as_j)
+    alternative = switches.course(BASE, switches.restarting_as_j)
     drifts = {name: float(columns["drift"].max()) for name, columns in
-              (("default", switches.run_columns(BASE)), ("alternative", other.columns))}
+              (("default", switches.run_columns(BASE)), ("alternative", alternative.columns))}
     note = f"drift, max |X / X_m - 1| over the run: {drifts['default']:.2g} against {drifts['alternative']:.2g} [E7]"
-    drift_row = _marched(other, Switch("theta after a remesh (28)", "J X / X_m", "J", "", note=note))
+    drift_row = _marched(alternative, Switch("theta after a remesh (28)", "J X / X_m", "J", "", note=note))
     return {**drift_row, "drift": drifts}
 
 
@@ -100,18 +100,18 @@ def symmetry() -> list[dict]:
     """Compare a half-disc with seeds that have one tip 1 % farther out and the other 1 % farther in."""
     rows = []
     for word, bulge in (("upstream", -switches.BULGE), ("downstream", switches.BULGE)):
-        other = switches.course(BASE, switches.step_of_paper, bulge)
-        lean = switches.near(other.columns, "lean", TIMES)
+        alternative = switches.course(BASE, switches.step_of_paper, bulge)
+        lean = switches.near(alternative.columns, "lean", TIMES)
         default = switches.near(switches.run_columns(BASE), "lean", TIMES)
         shifts = ", ".join(f"{100 * value:+.2f} % at {time:g} h" for value, time in zip(lean - default, TIMES))
-        rows.append(_marched(other, Switch(
+        rows.append(_marched(alternative, Switch(
             "symmetry of the seed", "half-disc", f"1 % longer {word}", "",
             note=f"R (1 + 0.01 cos 3 phi), the same area; the middle between the tips shifts by {shifts}")))
     return rows
 
 
-def _marched(other: Course, switch: Switch) -> dict:
-    return row(switch, other.seconds / seconds(PLATES), switches.effect_of_runs(state(BASE), other.plotted))
+def _marched(alternative: Course, switch: Switch) -> dict:
+    return row(switch, alternative.seconds / seconds(PLATES), switches.effect_of_runs(state(BASE), alternative.plotted))
 
 
 def row(switch: Switch, ratio: float, effects: dict[str, float]) -> dict:

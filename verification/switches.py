@@ -116,19 +116,19 @@ def quantities(aggregate: Body) -> dict[str, float]:
             "thickness": shape.thickness, "upstream": shape.upstream, "downstream": shape.downstream}
 
 
-def effect(default: Body, other: Body) -> dict[str, float]:
+def effect(default: Body, alternative: Body) -> dict[str, float]:
     """Relative difference of the other from the default; for effluents, the difference over the supply."""
-    supply = dict(zip(EFFLUENTS, pair("supply", other.scene.substrates)))
-    changed = quantities(other)
+    supply = dict(zip(EFFLUENTS, pair("supply", alternative.scene.substrates)))
+    changed = quantities(alternative)
     return {name: float((changed[name] - value) / supply.get(name, value))
             for name, value in quantities(default).items()}
 
 
-def effect_of_runs(default: Body, other: Body) -> dict[str, float]:
+def effect_of_runs(default: Body, alternative: Body) -> dict[str, float]:
     """Effect between two complete runs. Flow and substrates around the other's shape are solved on the default's mesh,
     which removes the effect of two different meshes."""
-    pore_on_mesh = reshaped(default.pore, other.outline)
-    return effect(default, replace(other, solved=pore.solve(other.scene, pore_on_mesh)))
+    pore_on_mesh = reshaped(default.pore, alternative.outline)
+    return effect(default, replace(alternative, solved=pore.solve(alternative.scene, pore_on_mesh)))
 
 
 def converged(switch: Switch) -> tuple[dict[str, float], dict[str, float]]:
@@ -162,10 +162,10 @@ def _radius(outline: Outline) -> CubicSpline:
     return CubicSpline(angle[order], np.hypot(x, y)[order])
 
 
-def one_state(aggregate: Body, other: Scene) -> dict[str, float]:
+def one_state(aggregate: Body, alternative: Scene) -> dict[str, float]:
     """Effect in one state: flow, substrates and the next shape, computed with both scenes."""
     bodies = []
-    for scene in (aggregate.scene, other):
+    for scene in (aggregate.scene, alternative):
         solved = pore.solve(scene, aggregate.pore)
         bodies.append(Body(scene, next_shape(scene, aggregate.pore, solved, UPDATE), solved))
     return effect(*bodies)
@@ -214,8 +214,8 @@ def course(run: Run, step: Callable[[Scene, Pore, Solved, float], Pore], bulge: 
         solved = pore.solve(scene, present)
         present = replace(present, concentrations=solved.concentrations)
         reports.append(Report(present, solved, None, (), 0, {}))
-    rows = columns([row(scene, each) for each in reports])
-    plotted = [each for each in reports if each.pore.time < PLOTTED + 1e-6][-1]
+    rows = columns([row(scene, report) for report in reports])
+    plotted = [report for report in reports if report.pore.time < PLOTTED + 1e-6][-1]
     return Course(process_time() - start, _row_columns(rows), runs.body_of(scene, plotted))
 
 

@@ -263,8 +263,8 @@ def _without_slivers(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     corners = points[triangles]
     lengths = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
     flat = triangle_areas(points, triangles) < SLIVER * lengths.max(axis=1) ** 2
-    for one in np.flatnonzero(flat):
-        _exchange(points, triangles, int(one), int(lengths[one].argmax()))
+    for triangle in np.flatnonzero(flat):
+        _exchange(points, triangles, int(triangle), int(lengths[triangle].argmax()))
     return triangles
 
 

@@ -247,7 +247,7 @@ def _is_drawable(scale: Scale, values: np.ndarray) -> np.ndarray:
 def _piece(points: list[str], colour: int, title: str, dots: bool) -> str:
     if len(points) > 1 and not dots:
         return polyline(points, colour, title)
-    return "".join(dot(each, colour, title) for each in points)
+    return "".join(dot(place, colour, title) for place in points)
 
 
 def point(x: float, y: float) -> str:

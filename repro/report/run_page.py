@@ -242,7 +242,7 @@ def _bars(stages: dict, total: float) -> str:
     positive = [(name, value) for name, value in stages.items() if value > 0]
     if not positive:
         return ""
-    positive.sort(key=lambda each: -each[1])
+    positive.sort(key=lambda entry: -entry[1])
     rows = "".join(_bar(22 * k, name, value, 150 * min(1.0, value / total))
                    for k, (name, value) in enumerate(positive))
     return (f'<svg class="bars" viewBox="0 0 340 {22 * len(positive) + 4}" role="img" '

@@ -151,7 +151,7 @@ LONG = {**{kind: (runs.with_preset("fast"), runs.with_elements(kind), runs.coars
         **{preset: (runs.with_preset(preset),) for preset in runs.QUADRATIC[1:]}}
 
 
-def uniform_growth(hours: tuple[float, ...], most: float, why: str, *changes: str):
+def uniform_growth(hours: tuple[float, ...], bound: float, origin: str, *changes: str):
     """Checks of a run with rows at some hours, the last of which is its end."""
     scene = runs.supplied_everywhere(runs.base(f"{hours[-1]} h", *changes, times=hours))
     seed = pore.seeded(scene).outline
@@ -159,7 +159,7 @@ def uniform_growth(hours: tuple[float, ...], most: float, why: str, *changes: st
     expected = seed.area * np.array([runs.mass_after(scene, hour) for hour in hours])
     sizes = {"area": [instant.pore.outline.area for instant in instants],
              "mass": [instant.pore.mass / scene.kinetics.maximum_density for instant in instants]}
-    yield each_at_most({name: np.abs(size / expected - 1).max() for name, size in sizes.items()}, most, why)
+    yield each_at_most({name: np.abs(size / expected - 1).max() for name, size in sizes.items()}, bound, origin)
     yield at_most("outline", _unround(instants[-1], expected[-1]), *_roundness(scene, seed))
     yield at_least("remeshes", sum(i.remeshes for i in instants), 1.0, "else they are not tested")
 
@@ -224,8 +224,9 @@ def test_units(changes, record):
     scene = runs.base("2 h", *changes)
     reference = runs.numbers(runs.last(scene))
     for factor in (8.0, 0.125):
-        other = runs.numbers(runs.last(runs.scaled(scene, factor, 1.0)))
-        differences = {name: abs(other[name] / value / factor ** POWERS[name] - 1) for name, value in reference.items()}
+        scaled_numbers = runs.numbers(runs.last(runs.scaled(scene, factor, 1.0)))
+        differences = {name: abs(scaled_numbers[name] / value / factor ** POWERS[name] - 1)
+                       for name, value in reference.items()}
         record(each_at_most(differences, 1e-14, "powers of two are exact, also in the mesher",
                             f", lengths times {factor:g}"))
 

@@ -207,8 +207,11 @@ def test_bonded_slab(changes, record):
     sigma = adhesion.stress(scene, shape)[near] / scene.growth.shear_modulus
     expected = theta ** (-2 / 3) * (1 / theta - theta)
     size = abs(expected)
-    on = seed.wall == BOTTOM
-    moved = x[: len(on)][on] - seed.outline.points[on, 0] if shape.mesh.geometry == 1 else _moves(seed, shape)
+    if shape.mesh.geometry == 1:
+        on_wall = seed.wall == BOTTOM
+        moved = x[: len(on_wall)][on_wall] - seed.outline.points[on_wall, 0]
+    else:
+        moved = _moves(seed, shape)
     record(each_at_most({"height": largest(y[free] / (theta * HIGH) - 1),
                          "stress xx": largest(sigma[..., 0] - expected) / size,
                          "stress yy": largest(sigma[..., 1]) / size}, 1e-3,
@@ -219,8 +222,8 @@ def test_bonded_slab(changes, record):
 def _moves(seed: Pore, shape: Pore) -> np.ndarray:
     """Displacements along the wall (um) of the nodes that lay on it, matched by their positions at t = 0."""
     before = seed.outline.points[seed.wall == BOTTOM, 0]
-    on = shape.wall == BOTTOM
-    origin, present = shape.outline.origin[on], shape.outline.points[on, 0]
+    on_wall = shape.wall == BOTTOM
+    origin, present = shape.outline.origin[on_wall], shape.outline.points[on_wall, 0]
     rows = [np.flatnonzero((origin[:, 1] == 0.0) & (np.abs(origin[:, 0] - x) < 1e-9))[0] for x in before]
     return present[rows] - before
 

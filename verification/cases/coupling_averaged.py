@@ -307,9 +307,9 @@ def test_averaged_flow(order, record):
 
     Triangles are straight: the ends of the bump lie flat on the wall, which arcs would cross.
     """
-    losses, thin, more = np.array([_losses(order, aspect) for aspect in SLENDER]).T
+    losses, thin, extension = np.array([_losses(order, aspect) for aspect in SLENDER]).T
     clean = poiseuille.head_loss(LENGTH, WIDTH, 1.0, 1.0)
-    record(between("gap over that of extended lubrication, the most slender", (losses - thin)[-1] / more[-1],
+    record(between("gap over that of extended lubrication, the most slender", (losses - thin)[-1] / extension[-1],
                    0.94, 1.02, "mesh, 2 %; the next term, 1 %; lambda = 2000 for a rigid wall, 0.4 %"),
            study("loss", SLENDER, (losses - thin) / (thin - clean), 2, THIN_SQUARE, ceiling=1.5e-2))
 
@@ -328,8 +328,8 @@ def _losses(order: int, aspect: float) -> tuple[float, float, float]:
     s, weight = np.polynomial.legendre.leggauss(200)
     height, slope = LOW * (1 - s**2) ** 2, -4 * aspect * s * (1 - s**2)
     thin = half * weight @ layered_channel.gradient(WIDTH, height, RATIO)
-    more = half * weight @ (12 * WIDTH * 4 / 5 * slope**2 / (WIDTH - height) ** 3)
-    return solution.head_loss, thin + poiseuille.head_loss(LENGTH - 2 * half, WIDTH, 1.0, 1.0), more
+    extension = half * weight @ (12 * WIDTH * 4 / 5 * slope**2 / (WIDTH - height) ** 3)
+    return solution.head_loss, thin + poiseuille.head_loss(LENGTH - 2 * half, WIDTH, 1.0, 1.0), extension
 
 
 UPTAKE_ASPECTS = (0.2, 0.1, 0.05, 0.025)
@@ -351,9 +351,9 @@ def test_averaged_uptake(elements, record):
     inverse).
     """
     errors = refine(_around, UPTAKE_ASPECTS, elements)
-    left = errors.pop("left")[-1]
+    least_effluent = errors.pop("left")[-1]
     record(studies(errors, {name: (2, THIN_SQUARE, 1e-3) for name in errors if name != "size"}),
-           at_most("acceptor leaving the starved one, over the supply", left, 0.02, "else none is starved"))
+           at_most("acceptor leaving the starved one, over the supply", least_effluent, 0.02, "else none is starved"))
 
 
 def _around(aspect: float, elements: str) -> dict[str, float]:

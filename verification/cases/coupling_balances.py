@@ -70,7 +70,7 @@ def _steps(rows: list[Ledger], equations: float = 1000) -> list[Check]:
 
     equations: number of equations of a substrate times the largest term of a row over the supplied mass.
     """
-    gaps = [abs(two.biomass_before / one.biomass_after - 1) for one, two in pairwise(rows)]
+    gaps = [abs(next_step.biomass_before / step.biomass_after - 1) for step, next_step in pairwise(rows)]
     return [at_most("substrates", runs.substrate_defect(rows), 1e-13 * equations,
                     "Newton's tolerance, 1e-13 of the largest term of each row, over all rows"),
             at_most("biomass, worst step", np.max([runs.biomass_defect(rows), *gaps]), 1e-10, runs.ROUND_OFF)]
@@ -341,10 +341,10 @@ def _narrowest(scene: Scene, state, wall: int) -> float:
     contact the result is zero.
     """
     outline, growth = state.outline, scene.growth
-    free, on = outline.points[outline.wall == FREE], outline.points[outline.wall == wall, 0]
-    if len(on) == 0:
+    free, contact_x = outline.points[outline.wall == FREE], outline.points[outline.wall == wall, 0]
+    if len(contact_x) == 0:
         return 0.0
-    along = np.maximum(on.min() - free[:, 0], free[:, 0] - on.max())
+    along = np.maximum(contact_x.min() - free[:, 0], free[:, 0] - contact_x.max())
     gap = free[:, 1] if wall == BOTTOM else scene.pore.width - free[:, 1]
     allowed = np.minimum(growth.minimum_film, np.tan(growth.minimum_contact_angle) * along)
     return (gap[along > 0] / allowed[along > 0]).min()

@@ -81,9 +81,9 @@ def _by_biomass(scene, state: pore.Pore, solution: Flow) -> np.ndarray:
     They are computed on a mesh in which biomass and fluid are exchanged.
     """
     mesh = state.mesh
-    other = replace(mesh, topology=replace(mesh.topology, biomass=~mesh.biomass))
+    exchanged = replace(mesh, topology=replace(mesh.topology, biomass=~mesh.biomass))
     viscosity = scene.flow.viscosity_ratio * scene.flow.kinematic_viscosity / scene.flow.gravity
-    return traction.nodal(Space(other, state.space.order), solution, viscosity, scene.numerics.interface)
+    return traction.nodal(Space(exchanged, state.space.order), solution, viscosity, scene.numerics.interface)
 
 
 def _drag_error(refinement: float) -> float:
@@ -105,9 +105,9 @@ def _wall_shear(grid: Mesh, velocity: np.ndarray) -> float:
     for nodes, slope, wet in zip(grid.triangles, grid.gradients, ~grid.biomass):
         y = grid.points[nodes, 1]
         for wall, sign in ((0.0, 1.0), (grid.width, -1.0)):
-            on = y == wall
-            if wet and np.count_nonzero(on) == 2:
-                total += sign * np.ptp(grid.points[nodes[on], 0]) * (velocity[nodes, 0] @ slope[:, 1])
+            on_wall = y == wall
+            if wet and np.count_nonzero(on_wall) == 2:
+                total += sign * np.ptp(grid.points[nodes[on_wall], 0]) * (velocity[nodes, 0] @ slope[:, 1])
     return total
 
 
@@ -207,8 +207,8 @@ def test_traction_even(changes, record):
     plain = contact._at_rest(mechanics, seed, theta, seed, None, contact.PATIENT).pore
     space = seed.moved(mesh_motion.move(seed.mesh, plain.mesh.points[seed.mesh.body], 1.0, 100.0)).space
     mesh = space.mesh
-    still = Flow(0.0, np.zeros((space.count, 2)), np.full(flow.pressure_space(space).count, 5.0), None, 0.0, 0.0, 0.0)
-    forces = traction.nodal(space, still, 1.0, "laplacian")
+    at_rest = Flow(0.0, np.zeros((space.count, 2)), np.full(flow.pressure_space(space).count, 5.0), None, 0.0, 0.0, 0.0)
+    forces = traction.nodal(space, at_rest, 1.0, "laplacian")
     expected = -5.0 * _normals(plain.outline)
     difference = (forces[mesh.loop] - expected)[plain.wall == FREE]
     record(at_most("forces", np.abs(difference).max() / np.abs(expected).max(), 1e-12,

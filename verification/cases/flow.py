@@ -281,7 +281,7 @@ def test_permeable_layers(order, interface, record):
     if order == 2:
         record(studies(refine(_permeable_layer, PERMEABLE_SIZES, RESOLVED, interface, 2), THIRD))
     else:
-        cubic, quadratic = (_permeable_layer(second, 0, RESOLVED, interface, each)["velocity"] for each in (3, 2))
+        cubic, quadratic = (_permeable_layer(second, 0, RESOLVED, interface, degree)["velocity"] for degree in (3, 2))
         record(at_most("velocity over that of order 2", cubic / quadratic, CUBIC, "the elements' orders"))
     if interface == "laplacian":
         record(at_most(f"gradient, k = {TIGHT:g} um2", _permeable_layer(third, 0, TIGHT, interface, order)["gradient"],
@@ -431,9 +431,9 @@ def test_inclusion_quadratic(setup, record):
     record(inclusion(*setup))
 
 
-def _errors(size: float, draw: int, make_mesh: Callable, how, *arguments) -> dict[str, float]:
+def _errors(size: float, draw: int, make_mesh: Callable, setting, *arguments) -> dict[str, float]:
     """Errors on the mesh ``make_mesh(size, draw, how)``. arguments: the other arguments of :func:`box_errors`."""
-    return box_errors(make_mesh(size, draw, how), *arguments)
+    return box_errors(make_mesh(size, draw, setting), *arguments)
 
 
 @cache

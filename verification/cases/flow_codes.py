@@ -141,7 +141,7 @@ def _level(level: int, draw: int, refinements, radius: float, ratio: float, inte
     """
     space = _space(radius, refinements[level] * meshes.SPREAD[draw])
     reference = _reference_flow(radius, ratio, interface, level)
-    solution, clean = (flow.unit_flow(space, each, interface=interface) for each in (ratio, 1.0))
+    solution, clean = (flow.unit_flow(space, viscosity_ratio, interface=interface) for viscosity_ratio in (ratio, 1.0))
     error_of_ends = clean.loss - poiseuille.head_loss(np.ptp(ENDS), WIDTH, 1.0, 1.0)
     excess = abs((solution.loss - error_of_ends) / reference.loss - 1)
     return {**_differences(space, solution, reference), "excess of the head loss": excess}

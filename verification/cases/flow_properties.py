@@ -239,7 +239,7 @@ def test_permeable_run(record):
     overrides = ["numerics.preset=fast", *TIGHT_RUN]
     instants = list(simulate(load_scene("base", overrides, unset=["flow.head"])))
     solved = [instant.solved.concentrations for instant in instants]
-    largest = max(max(each.acceptor.max(), each.donor.max()) for each in solved)
+    largest = max(max(concentrations.acceptor.max(), concentrations.donor.max()) for concentrations in solved)
     record(at_most("largest concentration", largest / 10.0, 1.01, "half of the accepted overshoot"))
     end, solution = instants[-1].pore, instants[-1].solved.flow
     along = solution.velocity[np.unique(end.space.cells[end.mesh.biomass]), 0]

@@ -70,9 +70,9 @@ def package_solution(name: str, level: int, kind: int):
     if contact:
         x, y = body.reference[rim].T
         angle = np.arctan2(y, x)
-        on = rim[(angle > contact.first - 1e-9) & (angle < contact.last + 1e-9)]
-        constrained[on, 1] = True
-        move[on, 1] = contact.height - body.reference[on, 1]
+        in_contact = rim[(angle > contact.first - 1e-9) & (angle < contact.last + 1e-9)]
+        constrained[in_contact, 1] = True
+        move[in_contact, 1] = contact.height - body.reference[in_contact, 1]
     body = replace(body, constrained=constrained)
     return body, bodies.grow(body, body.field(theta), lambda part: body.reference + part * move)
 
@@ -164,9 +164,9 @@ def _reference_errors(level: int) -> dict[str, float]:
     """Size of the reference's elements, and its errors to the closed form."""
     where, weight = _points()
     place, pressure = reference_solution("half-cylinder", level).at(*where)
-    exact, known = growth_cases.exact(2000.0).at(*where)
+    exact, exact_pressure = growth_cases.exact(2000.0).at(*where)
     return {"size": bodies.RADIUS / RINGS[level], "places": meshes.relative(place, exact, weight),
-            "pressure": meshes.relative(pressure / MODULUS, known, weight)}
+            "pressure": meshes.relative(pressure / MODULUS, exact_pressure, weight)}
 
 
 @pytest.mark.slow

@@ -83,23 +83,23 @@ def _touching(seed: pore.Pore, expansion: contact.Expansion) -> pore.Pore:
     """The seed with the opposite wall at the corners, and at the arcs between them, that are in contact under an
     expansion."""
     height = expansion.position[seed.mesh.loop][:, 1]
-    on = np.isclose(height, HEIGHT, rtol=1e-9)
+    in_contact = np.isclose(height, HEIGHT, rtol=1e-9)
     if seed.mesh.geometry == 2:
-        on[1::2] = on[::2] & np.roll(on[::2], -1)
-    return replace(seed, wall=np.where(on, TOP, seed.wall))
+        in_contact[1::2] = in_contact[::2] & np.roll(in_contact[::2], -1)
+    return replace(seed, wall=np.where(in_contact, TOP, seed.wall))
 
 
 def differences(refinement: float, elements: str) -> dict[str, float]:
     """Element size along the arc (um), and differences to the reference: of contact lines and contact length over that
     length, of tips over the length of the aggregate, and of the outline's material points (root mean square)."""
     reference, rim = reference_solution(len(LEVELS) - 1), grown(elements, refinement).pore.boundary
-    on = np.flatnonzero(rim.wall == TOP)  # counterclockwise, so from downstream to upstream
-    ends, edges = rim.points[on[[0, -1]], 0], rim.edge_lengths()[[on[0], on[-1] - 1]]
+    in_contact = np.flatnonzero(rim.wall == TOP)  # counterclockwise, so from downstream to upstream
+    ends, edges = rim.points[in_contact[[0, -1]], 0], rim.edge_lengths()[[in_contact[0], in_contact[-1] - 1]]
     length, tips = np.ptp(reference.lines), np.array([rim.downstream, rim.upstream])
     angle, place = contact_growth.outline(reference.equilibrium)
     above = rim.origin[:, 1] > 0
     angles = np.arctan2(*rim.origin[above].T[::-1])
-    distances = rim.points[above].T - [np.interp(angles, angle, each) for each in place]
+    distances = rim.points[above].T - [np.interp(angles, angle, coordinate) for coordinate in place]
     return {"size": np.pi * bodies.RADIUS / (above.sum() + 1) * rim.geometry,
             "contact lines": np.abs(ends - reference.lines).max() / length,
             "length of contact": abs(np.ptp(ends) / length - 1),

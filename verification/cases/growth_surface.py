@@ -179,8 +179,8 @@ def test_surface_stability(record):
                  for gamma in (growth.GAMMA, 10.0, 100.0)]
     record(between("P2/P1, gamma of the package", stretches[0] / exact, 0.95, 1.05,
                    "not divergence-free in each point"))
-    for gamma, less, more in zip((10, 100), stretches[1:], stretches):
-        record(at_most(f"P2/P1, gamma = {gamma}, over that of a tenth", less / more, 1.0,
+    for gamma, smaller, larger in zip((10, 100), stretches[1:], stretches):
+        record(at_most(f"P2/P1, gamma = {gamma}, over that of a tenth", smaller / larger, 1.0,
                        "the energy grows with gamma"))
 
 

@@ -180,8 +180,8 @@ def _sides(shape: Outline) -> list[bool]:
 
 def in_a_wedge(preset: str) -> list:
     """The stage alone: a mesh around a plug with sides at the least angle, and the flow through it."""
-    loss, fine = (_loss(hard.load("wide", name, 'pore.width="20 um"', *more))
-                 for name, more in ((preset, ()), ("accurate", ("numerics.refinement=1",))))
+    loss, fine = (_loss(hard.load("wide", name, 'pore.width="20 um"', *options))
+                 for name, options in ((preset, ()), ("accurate", ("numerics.refinement=1",))))
     return [at_most("head loss against a finer mesh", abs(loss / fine - 1), 3 * TOLERANCE[preset],
                     "that of velocity, times three: the loss is lambda h^-3")]
 
@@ -379,7 +379,7 @@ def one_step(preset: str) -> list:
                     "C to 1e-7 of the supply"),
             at_most("thickness against the root of it, relative", abs(thickness / np.sqrt(expected) - 1), 1e-4,
                     "uniform growth keeps the shape; arcs are parabolas"),
-            at_most("steps", sum(len(each.ledgers) for each in run.instants), 1, "the one requested step")]
+            at_most("steps", sum(len(instant.ledgers) for instant in run.instants), 1, "the one requested step")]
 
 
 def long_steps(preset: str) -> list:

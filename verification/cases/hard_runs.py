@@ -45,8 +45,8 @@ def remeshes(preset: str) -> list:
 
 
 def _conserved(first: Pore, last: Pore) -> list[Check]:
-    before, after = (one.space.integration.to_nodes(one.inert / (one.active + one.inert))[one.mesh.body]
-                     for one in (first, last))
+    before, after = (state.space.integration.to_nodes(state.inert / (state.active + state.inert))[state.mesh.body]
+                     for state in (first, last))
     beyond = max(before.min() - after.min(), after.max() - before.max(), 0.0) / np.ptp(before)
     return [at_most("area, relative change", abs(last.outline.area / first.outline.area - 1), 1e-10,
                     "outlines are split on themselves"),
@@ -117,9 +117,9 @@ def nearly_same(preset: str) -> list:
     inner = ~np.isin(np.arange(len(places)), grid.topology.body_loop)
     checks, random = [], np.random.default_rng(8)
     for noise in (0.0, 1e-14, 1e-11, 1e-8):
-        other = places.copy()
-        other[inner] += noise * random.uniform(-1, 1, (inner.sum(), 2))
-        carried = TRANSFER[grid.geometry](places, cells, field, other, cells)
+        moved_places = places.copy()
+        moved_places[inner] += noise * random.uniform(-1, 1, (inner.sum(), 2))
+        carried = TRANSFER[grid.geometry](places, cells, field, moved_places, cells)
         checks.append(at_most(f"largest change of a field of size one, noise {noise:g} um",
                               np.abs(carried - field).max(), 1e-9 + noise, "the identity, and what the field changes"))
     return checks
@@ -191,13 +191,13 @@ def units(preset: str, length: float, time: float) -> list:
     scene = hard.load("base", preset, 'aggregate.radius="15 um"', 'growth.end="2.4 h"', 'growth.time_step="1.2 h"',
                         'output.times=["2.4 h"]')
     rescaled = parse_scene(scene_tables(problems.scaled(scene, length, time)), "scaled", "scaled")
-    plain, other = hard.run_scene(scene), hard.run_scene(rescaled)
+    plain, converted = hard.run_scene(scene), hard.run_scene(rescaled)
     exact = np.log2(length) % 1 == 0
     bound, origin = (1e-9, "dimensions; round-off") if exact else (
         TOLERANCE[preset], "round-off makes another mesh; " + hard.PROMISED[preset])
-    return [plain, other, *(
+    return [plain, converted, *(
         at_most(f"{column}, relative difference",
-                abs(other.last[column] / (length**along * time**during) / plain.last[column] - 1), bound, origin)
+                abs(converted.last[column] / (length**along * time**during) / plain.last[column] - 1), bound, origin)
         for column, (along, during) in COLUMNS.items())]
 
 

@@ -112,9 +112,9 @@ EXHAUSTED = HardCase(
 SHARP = tuple(f'substrates.{name}.half_saturation="1e-5 mg/L"' for name in NAMES)
 
 
-def front(preset: str, radius: float, more: tuple[str, ...] = ()) -> list:
+def front(preset: str, radius: float, changes: tuple[str, ...] = ()) -> list:
     """A half-disc with half saturations of a millionth of the supply."""
-    return hard.against("wide", preset, disc(radius, *SHARP, *more), *EFFLUENTS, refinement=0.8)[2]
+    return hard.against("wide", preset, disc(radius, *SHARP, *changes), *EFFLUENTS, refinement=0.8)[2]
 
 
 #: Half thickness and films of the slab (um), and its penetration depth over the half thickness.
@@ -157,7 +157,7 @@ ZERO_ORDER = HardCase(
     "The closed form of zero-order uptake in a slab, and the effluents of a finer run around half-discs",
     "Newton's method that cycles at the front, or concentrations under zero behind it",
     {"slab": slab_front, "R = 60 um": partial(front, radius=60), "R = 80 um": partial(front, radius=80),
-     "0.35 m/d, R = 40 um": partial(front, radius=40, more=(SLOW,))},
+     "0.35 m/d, R = 40 um": partial(front, radius=40, changes=(SLOW,))},
     refusable=("slab",),
     mutants=("hard-front-smoothed", "hard-newton-unshortened"))
 

@@ -334,9 +334,9 @@ def test_criterion(record):
         record(at_most(f"wrong verdicts: {name}", mesh.acceptable() != acceptable, 0.0, why))
 
 
-def _stretched(count: int, by: float) -> Mesh:
+def _stretched(count: int, stretch: float) -> Mesh:
     """Thirty triangles, of which ``count`` are stretched."""
-    return _triangles(np.where(np.arange(30) < count, by, 1.0))
+    return _triangles(np.where(np.arange(30) < count, stretch, 1.0))
 
 
 def _bowed(bow: float) -> Mesh:

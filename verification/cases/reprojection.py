@@ -365,10 +365,10 @@ def test_beyond_the_ends(order, record):
     initial = aggregates.seed_around(meshes.seed(10.0, 1.0, order), 1.0, ends=ENDS, order=order)
     old = _exact(np.clip(initial.space.points[:, 0], *ENDS))
     filled = replace(initial, concentrations=Concentrations(*(SUPPLY * old)))
-    flowing, still = (aggregates.remesh(aggregates.base_scene(order=order), filled, speed) for speed in (SPEED, 0.0))
+    flowing, unmoved = (aggregates.remesh(aggregates.base_scene(order=order), filled, speed) for speed in (SPEED, 0.0))
     x = flowing.space.points[:, 0]
     outside = (x < ENDS[0]) | (x > ENDS[1])
-    computed, resting = (both(new.concentrations) / SUPPLY for new in (flowing, still))
+    computed, resting = (both(new.concentrations) / SUPPLY for new in (flowing, unmoved))
     between = meshes.field_at(initial.space, old.T, flowing.space.points[~outside]).T
     gaps = {"beyond the ends": (computed - _exact(x))[:, outside], "between": computed[:, ~outside] - between,
             "beyond the ends, no flow": resting[:, outside] - 1, "between, no flow": resting[:, ~outside] - between}

@@ -282,33 +282,33 @@ def claim(id: str, where: str, text: str, **fields):
     return register
 
 
-def printed(quantity: str, paper_text: str, computed: float, why: str = DIGITS, **more) -> PaperCheck:
+def printed(quantity: str, paper_text: str, computed: float, why: str = DIGITS, **fields) -> PaperCheck:
     """A number that the paper prints: it must lie in the interval of its digits. Raises ValueError for words."""
     accepted = interval(paper_text)
     if accepted is None:
         raise ValueError(f"{quantity}: {paper_text!r} is not a printed number")
-    return between(quantity, paper_text, computed, *accepted, why, date=LATER, **more)
+    return between(quantity, paper_text, computed, *accepted, why, date=LATER, **fields)
 
 
-def near(quantity: str, paper_text: str, computed: float, target: float, tolerance: float, why: str, **more
+def near(quantity: str, paper_text: str, computed: float, target: float, tolerance: float, why: str, **fields
          ) -> PaperCheck:
     """A number that must lie within a tolerance of its target."""
-    return between(quantity, paper_text, computed, target - tolerance, target + tolerance, why, **more)
+    return between(quantity, paper_text, computed, target - tolerance, target + tolerance, why, **fields)
 
 
-def at_most(quantity: str, paper_text: str, computed: float, bound: float, why: str, **more) -> PaperCheck:
+def at_most(quantity: str, paper_text: str, computed: float, bound: float, why: str, **fields) -> PaperCheck:
     """A number that must not exceed a bound."""
-    return between(quantity, paper_text, computed, -inf, bound, why, **more)
+    return between(quantity, paper_text, computed, -inf, bound, why, **fields)
 
 
-def at_least(quantity: str, paper_text: str, computed: float, bound: float, why: str, **more) -> PaperCheck:
+def at_least(quantity: str, paper_text: str, computed: float, bound: float, why: str, **fields) -> PaperCheck:
     """A number that must not be under a bound."""
-    return between(quantity, paper_text, computed, bound, inf, why, **more)
+    return between(quantity, paper_text, computed, bound, inf, why, **fields)
 
 
-def between(quantity: str, paper_text: str, computed: float, low: float, high: float, why: str, **more) -> PaperCheck:
+def between(quantity: str, paper_text: str, computed: float, low: float, high: float, why: str, **fields) -> PaperCheck:
     """A number that must lie in a range."""
-    return PaperCheck(quantity, float(computed), low, high, why, paper_text, **more)
+    return PaperCheck(quantity, float(computed), low, high, why, paper_text, **fields)
 
 
 def without_limit(check: PaperCheck) -> PaperCheck:

@@ -45,9 +45,9 @@ def agree_with_record(rows: list[Row], rewrite: bool) -> bool:
     """Whether the rows agree with the committed record; prints the differences."""
     entries = [report.entry(row) for row in rows if row.verdict != NO_VERDICT]
     if rewrite:
-        recorded_entries = {each["id"]: each for each in report.read()}
+        recorded_entries = {entry["id"]: entry for entry in report.read()}
         now = f"{datetime.now(UTC):%Y-%m-%d %H:%M}"
-        entries = [report.stamped(each, recorded_entries.get(each["id"]), now) for each in entries]
+        entries = [report.stamped(entry, recorded_entries.get(entry["id"]), now) for entry in entries]
         write_json(report.COMMITTED, report.replaced(entries))
         print(f"{report.COMMITTED.name}: written")
         return True
@@ -68,10 +68,10 @@ def _row(id: str, outcomes: dict[Level, Outcome]) -> Row:
         return Row(id, None, None, NO_VERDICT, "no module computes it")
     claim, finding = CLAIMS[id], None
     try:
-        if errors := [each for each in outcomes.values() if isinstance(each, str)]:
+        if errors := [outcome for outcome in outcomes.values() if isinstance(outcome, str)]:
             raise ClaimError("; ".join(errors))
         finding = outcomes[claim.judged][1]
-        finding = with_bars(claim, finding, {level: each[0] for level, each in outcomes.items()})
+        finding = with_bars(claim, finding, {level: outcome[0] for level, outcome in outcomes.items()})
         return Row(id, claim, finding, claim.verdict(finding))
     except ClaimError as error:
         return Row(id, claim, finding, NO_VERDICT, str(error))

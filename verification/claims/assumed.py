@@ -118,7 +118,7 @@ def anaerobic_decay() -> Finding:
 
 def missing_decay(run: Run) -> float:
     """f_d b int (1 - m_A) X_A dV dt over the biomass at the end of a run, by the trapezoidal rule between its rows."""
-    rates = np.array([_missing_decay_rate(each) for each in bodies(run)])
+    rates = np.array([_missing_decay_rate(aggregate) for aggregate in bodies(run)])
     last = bodies(run)[-1].pore
     return float(np.trapezoid(rates, series(*run)["time_h"]) / (last.active.sum() + last.inert.sum()))
 
@@ -142,7 +142,7 @@ def returning() -> Finding:
     for run, hour in STATES:
         rest = without_fluid_forces(body(run, hour))
         bent = with_fluid_forces(rest)
-        outlines = [polygon(each.outline) for each in (rest, bent, without_fluid_forces(bent))]
+        outlines = [polygon(aggregate.outline) for aggregate in (rest, bent, without_fluid_forces(bent))]
         bent_area, remaining_area = (uncovered(outlines[0], outline) for outline in outlines[1:])
         name = f"{run[0]}, {hour:g} h"
         checks.append(at_most(f"{name}: outlines apart after the flow has stopped, over those under the flow", "regain",
@@ -155,9 +155,9 @@ def returning() -> Finding:
 
 def without_fluid_forces(aggregate: Body) -> Body:
     """The same aggregate at rest without the fluid's forces."""
-    still = replace(aggregate.scene, growth=replace(aggregate.scene.growth, fluid_forces="neglected"))
-    at_rest = contact.expand(contact.Mechanics.of(still), aggregate.pore, aggregate.pore.theta).pore
-    return Body(still, at_rest, aggregate.solved)
+    unforced = replace(aggregate.scene, growth=replace(aggregate.scene.growth, fluid_forces="neglected"))
+    at_rest = contact.expand(contact.Mechanics.of(unforced), aggregate.pore, aggregate.pore.theta).pore
+    return Body(unforced, at_rest, aggregate.solved)
 
 
 #: Thickness over the pore's width up to which the scheme of Chen et al. (1996a) worked.

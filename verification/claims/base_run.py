@@ -146,7 +146,7 @@ def last_length() -> Finding:
     span = row["downstream_um"] - row["upstream_um"]
     low, high = (span + 2 * factor * width for factor in (1.3, 1.5))
     half = 0.5 * span * sensitivity.reach("area")
-    within = [(each - half, each + half) for each in (low, high)]
+    within = [(length - half, length + half) for length in (low, high)]
     lengths, times = series(*BASE)["meshed_length_um"], series(*BASE)["time_h"]
     last = times[1:][np.diff(lengths) != 0][-1]
     change = (f"our meshed part is {row['meshed_length_um']:.0f} um long at 19.4 h, since its last regeneration was at "
@@ -179,7 +179,7 @@ def scaled(acceptor: float, donor: float) -> tuple[str, ...]:
 #: factors, round-off can decide a remesh.
 ALONE = (*SHORT, *scaled(8.0, 8.0))
 ALL_BY_8 = (*ALONE, 'kinetics.maximum_density="240000 mg/L"')
-EACH = (*SHORT, *scaled(8.0, 4.0), 'kinetics.maximum_utilization_rate="37.2 1/day"',
+EACH_SUBSTRATE = (*SHORT, *scaled(8.0, 4.0), 'kinetics.maximum_utilization_rate="37.2 1/day"',
         f"kinetics.yield_coefficient={0.61 / 4!r}", f"kinetics.acceptor_to_donor_ratio={1.52 * 2!r}",
         f"kinetics.decay_oxygen_demand={1.42 * 8!r}")
 COMPARED = ("mean_velocity_m_per_d", "aggregate_area_um2", "upstream_um", "downstream_um", "inert_fraction")
@@ -194,7 +194,7 @@ def ratios() -> Finding:
     why = "exact; 1e-8 for the round-off of 50 updates with remeshes"
     checks = (at_most("C, K_s and X_m times 8: largest relative change", "none", change(ALL_BY_8, 8.0, 8.0), 1e-8, why),
               at_most("C and K_s times 8 and 4, with k, Y, F, d_c: largest relative change", "none",
-                      change(EACH, 8.0, 4.0), 1e-8, why))
+                      change(EACH_SUBSTRATE, 8.0, 4.0), 1e-8, why))
     plain, alone = (at(run, 10.0)["effluent_acceptor_mg_per_L"] for run in (SHORT, ALONE))
     return Finding(checks, change="the ratios C/K_s are not sufficient: (7)-(8) also contain X_m/K_sA and X_m/K_sD. "
                    "X_m must be scaled too, or k, Y, F and d_c if the two K_s differ",
@@ -227,13 +227,13 @@ def table_1() -> Finding:
     law, paper = scene.kinetics, scene.kinetics.acceptor_to_donor_ratio
     y, d_c = law.yield_coefficient, law.decay_oxygen_demand
     value, from_formulas = COD - y * d_c, oxygen_demand(7, C=6, H=6, O=1) - y * oxygen_demand(5, C=5, H=7, O=2, N=1)
-    printed_values = [(each, HALF_DIGIT) for each in (COD, y, d_c)]
+    printed_values = [(printed_value, HALF_DIGIT) for printed_value in (COD, y, d_c)]
     checks = [printed("COD - Y d_c from the printed values (mg/mg)", f"{paper}", value, rests_on=ARITHMETIC,
                       within=sensitivity.in_closed_form(lambda cod, y, d_c: cod - y * d_c, *printed_values))]
     for name in SUBSTRATES:
         substrate = getattr(scene.substrates, name)
-        printed_values = [(each / DIFFUSIVITY, HALF_DIGIT) for each in (substrate.diffusivity_in_aggregate,
-                                                                       substrate.diffusivity)]
+        diffusivities = (substrate.diffusivity_in_aggregate, substrate.diffusivity)
+        printed_values = [(diffusivity / DIFFUSIVITY, HALF_DIGIT) for diffusivity in diffusivities]
         checks.append(printed(f"{name}: diffusivity, aggregate over water (%)", "80",
                               100 * substrate.diffusivity_in_aggregate / substrate.diffusivity, rests_on=ARITHMETIC,
                               within=sensitivity.in_closed_form(lambda inner, outer: 100 * inner / outer,
@@ -289,7 +289,7 @@ def time_scales() -> Finding:
     scene, speed = load_packaged(*BASE), at(BASE, 0.0)["mean_velocity_m_per_d"]
     length, width = scene.pore.length, scene.pore.width
     viscous, advection = SECONDS * width**2 / scene.flow.kinematic_viscosity, SECONDS * length / speed * 24e-6
-    diffusion = [60 * length**2 / each for each in pair("diffusivity", scene.substrates)]
+    diffusion = [60 * length**2 / diffusivity for diffusivity in pair("diffusivity", scene.substrates)]
     growth = _doubling_time(scene, scene.substrates.acceptor.supply)
     separation = min(advection / viscous, growth * 60 / max(diffusion))
     tenfold = "of the order: one to ten of the unit"

@@ -87,7 +87,7 @@ def depends_on_the_sink() -> Finding:
                    for name, value in zip(SUBSTRATES, spread_in_percent(sinks)))
     kinds = (*(f"with supplies of {supply:g} K_s" for supply in SINKS), f"with k times {FASTER:g}")
     rows = "; ".join(f"{a:.3g} and {d:.3g} {kind}" for kind, (a, d) in zip(kinds, sinks))
-    moved = " and ".join(f"{each:.1f}" for each in spread_in_percent(sinks))
+    moved = " and ".join(f"{spread:.1f}" for spread in spread_in_percent(sinks))
     return Finding(checks, reason="between a sink of nearly zero order and one of "
                    f"{FASTER:g} times the rate the number changes by only {moved} %, acceptor and donor",
                    note=f"Sherwood numbers of acceptor and donor of a half-disc of {RADIUS:g} um in the flow of 1e-3 "
@@ -168,9 +168,9 @@ def not_crucial() -> Finding:
     rows = []
     for reduced in REDUCED:
         part = filled_at(reduced)
-        one, both = (100 * share_of_layers(part, walls) for walls in (1, 2))
-        rows.append(f"{100 * share_of_aggregate(part):.0f}, {one:.0f} and {both:.0f} % with {100 * part:.1f} % of the "
-                    "pore filled")
+        one_layer, two_layers = (100 * share_of_layers(part, walls) for walls in (1, 2))
+        rows.append(f"{100 * share_of_aggregate(part):.0f}, {one_layer:.0f} and {two_layers:.0f} % with "
+                    f"{100 * part:.1f} % of the pore filled")
     return Finding((), note="Of the acceptor supplied, the aggregate, a layer on one wall and layers on both walls "
                    f"take up with the same biomass: {'; '.join(rows)}.")
 
@@ -247,6 +247,6 @@ def deviation_over_bound(run: tuple[str, ...], spanned: bool) -> np.ndarray:
     share = rows["aggregate_area_um2"] / width**2
     in_range = (rows["contact"] == spanned) & (share >= max(low, LEAST)) & (share <= high)
     added = 24e-6 * clean(scene) / rows["conductivity_m_per_d"][in_range] - 1
-    law, least, most = np.log(added_resistance(share[in_range], 1.0, spanned, scene.flow.viscosity_ratio))
+    law, least, largest = np.log(added_resistance(share[in_range], 1.0, spanned, scene.flow.viscosity_ratio))
     deviation = np.log(added * scene.pore.length / width) - law
-    return deviation / np.where(deviation < 0, law - least, most - law)
+    return deviation / np.where(deviation < 0, law - least, largest - law)

@@ -141,7 +141,7 @@ def _attempt(id: str, level: Level) -> Outcome:
     """A claim's numbers at the present level, or the message of its error."""
     try:
         finding = CLAIMS[id].function()
-        judged = finding.with_note() if level == CLAIMS[id].judged else None
-        return numbers(finding), judged
+        judged_finding = finding.with_note() if level == CLAIMS[id].judged else None
+        return numbers(finding), judged_finding
     except Exception as error:
         return f"at {level}: {type(error).__name__}: {error}"

@@ -47,7 +47,7 @@ SMALL = 0.1
 def touching() -> tuple[Body, Body]:
     """Wide's last state that leaves a film to the opposite wall, and its first in contact."""
     run = history(*WIDE)
-    return tuple(body_of(run.scene, each) for each in run.contact)
+    return tuple(body_of(run.scene, report) for report in run.contact)
 
 
 @dataclass(frozen=True)
@@ -138,13 +138,14 @@ def crossing() -> Finding:
     through = "all of it; 5 % for the flux of u through a plug of stabilised linear triangles"
     checks = (at_most("base, 19.2 h: share through the aggregate (%)", "around", inside(body(BASE, PLOTTED)), 5,
                       "all but a few percent"),
-              *(at_least(f"wide, {each.pore.time:.2f} h: share through the aggregate (%)", "through", inside(each), 95,
-                         through) for each in (touched, last)))
-    half = next(each for each in bodies(WIDE) if each.pore.time > touched.pore.time - 5 and inside(each) > 50)
-    left = half.grid.width - half.outline.thickness
+              *(at_least(f"wide, {aggregate.pore.time:.2f} h: share through the aggregate (%)", "through",
+                         inside(aggregate), 95, through) for aggregate in (touched, last)))
+    half = next(aggregate for aggregate in bodies(WIDE)
+                if aggregate.pore.time > touched.pore.time - 5 and inside(aggregate) > 50)
+    film_left = half.grid.width - half.outline.thickness
     return Finding(checks, note="The flux crosses the aggregate before contact, because lambda is finite: in wide, in "
                    f"whole hours, more than half of it from {half.pore.time:g} h on, with a film of "
-                   f"{max(left, 0.0):.1f} um, and {inside(film):.2g} % in the last shape with a film.",
+                   f"{max(film_left, 0.0):.1f} um, and {inside(film):.2g} % in the last shape with a film.",
                    reason="at contact some of the flux still passes beside the aggregate")
 
 
@@ -216,21 +217,21 @@ def lattice(aggregate: Body, spacing: float) -> np.ndarray:
        unjudged="it says what could be added to the model, and gives no strength at which an aggregate would tear")
 def tearing() -> Finding:
     """Largest principal stress in the aggregate of base and wide, and its position, where it would tear first."""
-    most = {run: max(bodies(run)[1:], key=tension) for run in (BASE, WIDE)}
+    most_stressed = {run: max(bodies(run)[1:], key=tension) for run in (BASE, WIDE)}
     places = " and ".join(f"{peak(aggregate).description} and {aggregate.pore.time:g} h in {run[0]}"
-                          for run, aggregate in most.items())
+                          for run, aggregate in most_stressed.items())
     return Finding((), note=lambda: f"The largest principal stress, in the mean over W / 10, is {places}. "
-                   f"{_on_another_size(most)}")
+                   f"{_on_another_size(most_stressed)}")
 
 
-def _on_another_size(most: dict[Run, Body]) -> str:
+def _on_another_size(most_stressed: dict[Run, Body]) -> str:
     """Describe the location of the largest stress, at this level and on the element size of the figure."""
-    preset_x = [peak(aggregate).x for aggregate in most.values()]
-    hours = [aggregate.pore.time for aggregate in most.values()]
+    preset_x = [peak(aggregate).x for aggregate in most_stressed.values()]
+    hours = [aggregate.pore.time for aggregate in most_stressed.values()]
     with at_level(Level(CONVERGED, PAIRED[1])):
-        paired_x = [peak(body((*run, rows_at(hour)), hour)).x for run, hour in zip(most, hours)]
-    places = ", ".join(f"at x = {x:.0f} and {other:.0f} um in {run[0]}"
-                       for run, x, other in zip(most, preset_x, paired_x))
+        paired_x = [peak(body((*run, rows_at(hour)), hour)).x for run, hour in zip(most_stressed, hours)]
+    places = ", ".join(f"at x = {x:.0f} and {paired:.0f} um in {run[0]}"
+                       for run, x, paired in zip(most_stressed, preset_x, paired_x))
     return ("The position is less certain than the value: here and with the elements of its figure, "
             f"{PAIRED[1]:g} times those of the preset, it is {places}.")
 
@@ -242,9 +243,9 @@ def stress_changed_by_fluid() -> Finding:
     base at 19.4 h and of wide at 30 h, with a film left, and of wide at 40 h, a plug under constant velocity. The
     statement holds if the fluid changes the stress in one of these states."""
     pairs = {f"{run[0]}, {hour:g} h": (body(run, hour), with_fluid_forces(body(run, hour))) for run, hour in STATES}
-    most = max(abs(fluid_effect(pair)) for pair in pairs.values())
+    largest_effect = max(abs(fluid_effect(pair)) for pair in pairs.values())
     check = at_least("largest principal stress, in the mean over W / 10, changed by the fluid, the most of three "
-                     "states (%)", "could provide a link", most, 100 * FEW, f"more than {FEW_WORDS}")
+                     "states (%)", "could provide a link", largest_effect, 100 * FEW, f"more than {FEW_WORDS}")
     return Finding((check,), reason="the fluid changes the stress by a few percent at most",
                    note=lambda: _describe_fluid_effect(pairs))
 

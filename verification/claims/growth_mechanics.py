@@ -59,9 +59,9 @@ def sliding(points: np.ndarray, triangles: np.ndarray) -> Supported:
     return Supported(shape, points, np.column_stack([middle, on_wall]))
 
 
-def radial_theta(body: Supported, inner: float, more: float) -> np.ndarray:
+def radial_theta(body: Supported, inner: float, increase: float) -> np.ndarray:
     """(t, 1) theta = inner + more (R / R_0)^2 at the triangles' middles."""
-    return inner + more * np.sum(body.reference[body.cells].mean(axis=1) ** 2, axis=1)[:, None] / RADIUS**2
+    return inner + increase * np.sum(body.reference[body.cells].mean(axis=1) ** 2, axis=1)[:, None] / RADIUS**2
 
 
 def areas(body: Supported) -> np.ndarray:
@@ -70,7 +70,7 @@ def areas(body: Supported) -> np.ndarray:
 
 
 # C22: theta = INNER + MORE (R / R_0)^2 on meshes of the package's own, by refinement, and on regular ones, by parts.
-INNER, MORE = 1.5, 1.0
+INNER, INCREASE = 1.5, 1.0
 REFINEMENTS, REGULAR = (0.5, 0.7, 1.0, 1.4, 2.0, 2.8), (4, 8, 12)
 
 
@@ -110,11 +110,11 @@ def order(family: list[Supported], errors) -> float:
 def growth_errors(body: Supported) -> tuple[float, float]:
     """Mean-square errors, relative, of the outline's radius and of the pressure."""
     start = growth.Equilibrium(body.reference, body.resting, 0)
-    theta = radial_theta(body, INNER, MORE)
+    theta = radial_theta(body, INNER, INCREASE)
     solution = growth.reach(stabilised_by(body, 1.0), np.ones_like(theta), theta, start, body.reference)
     R = np.minimum(np.hypot(*body.reference.T), RADIUS)
     rim = R > (1 - 1e-9) * RADIUS
-    radius, pressure = (exact(R, INNER, MORE, RADIUS) for exact in (neo_hookean.cylinder_radius,
+    radius, pressure = (exact(R, INNER, INCREASE, RADIUS) for exact in (neo_hookean.cylinder_radius,
                                                                     neo_hookean.cylinder_pressure))
     weight = np.bincount(body.cells.ravel(), np.repeat(areas(body) / 3, 3))
     outline = np.hypot(*solution.position[rim].T) / radius[rim] - 1
@@ -153,12 +153,12 @@ def expansion() -> Finding:
     forms. The note gives the largest theta in wide, and its time.
     """
     body, inner = half_disc(1.4), TOTAL**0.9
-    more = TOTAL - inner
-    uniform, radial = (grow(body, radial_theta(body, *law), factor=RAISED) for law in ((TOTAL, 0.0), (inner, more)))
+    increase = TOTAL - inner
+    uniform, radial = (grow(body, radial_theta(body, *law), factor=RAISED) for law in ((TOTAL, 0.0), (inner, increase)))
     area = triangle_areas(uniform.position, body.cells).sum() / areas(body).sum()
     R = np.hypot(*body.reference.T)
     radii = [np.hypot(*solution.position[R > (1 - 1e-9) * RADIUS].T).mean() for solution in (uniform, radial)]
-    free, rim = RADIUS * np.sqrt(TOTAL), float(neo_hookean.cylinder_radius(RADIUS, inner, more, RADIUS))
+    free, rim = RADIUS * np.sqrt(TOTAL), float(neo_hookean.cylinder_radius(RADIUS, inner, increase, RADIUS))
     largest = np.array([aggregate.mean(aggregate.pore.theta).max() for aggregate in bodies(WIDE)])
     hours = series(*WIDE)["time_h"]
     reached = float(np.interp(np.log(TOTAL), np.log(np.maximum.accumulate(largest)), hours, right=np.inf))

@@ -76,8 +76,8 @@ def extremes() -> Finding:
 def nearby(grid: Mesh, node: int) -> float:
     """Distance (um) from a node to the farthest node that shares a triangle with it. The extreme lies within this
     distance."""
-    around = grid.cells[(grid.cells == node).any(axis=1)].ravel()
-    return float(np.hypot(*(grid.points[around] - grid.points[node]).T).max())
+    neighbours = grid.cells[(grid.cells == node).any(axis=1)].ravel()
+    return float(np.hypot(*(grid.points[neighbours] - grid.points[node]).T).max())
 
 
 @claim("C11", "4, Plate 2", "asymmetry minor while fully penetrated: a few percent")
@@ -115,7 +115,7 @@ def upgradient_only() -> Finding:
     """Share of the new area, and of the biomass made, upgradient of the seed's centre, at the end of `wide`."""
     last, end = bodies(WIDE)[-1], float(bodies(WIDE)[-1].pore.time)
     contact = contact_time(*WIDE)
-    spanned = next(each for each in bodies(WIDE) if each.pore.time >= contact)
+    spanned = next(aggregate for aggregate in bodies(WIDE) if aggregate.pore.time >= contact)
     late, since = (upstream_part(polygon(first.outline), polygon(last.outline))
                    for first in (body(WIDE, end - LAST_HOURS), spanned))
     up, down = biomass_rates(last)
@@ -297,17 +297,17 @@ def peaks(run: Run) -> tuple[float, float, float]:
     """Largest in-plane shear and equivalent stress over mu_L, and largest in-plane shear stress over mu_L J^(-2/3), in
     all rows of a run."""
     triples = []
-    for each in bodies(run):
-        cauchy = stress(each)
+    for aggregate in bodies(run):
+        cauchy = stress(aggregate)
         shear = in_plane(cauchy)
-        softened = shear * each.mean(each.strained.J) ** (2 / 3)
+        softened = shear * aggregate.mean(aggregate.strained.J) ** (2 / 3)
         triples.append((shear.max(), equivalent(cauchy).max(), softened.max()))
     return tuple(map(float, np.max(triples, axis=0)))
 
 
 def outline_difference(run: Run, time: float) -> float:
     """Area that only one of the outlines covers, with new biomass stressed and stress-free, in percent of the area."""
-    return uncovered(*(polygon(body((*run, *more), time).outline) for more in ((), (STRESS_FREE,))))
+    return uncovered(*(polygon(body((*run, *change), time).outline) for change in ((), (STRESS_FREE,))))
 
 
 def after_contact() -> tuple[float, ...]:

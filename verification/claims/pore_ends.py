@@ -124,7 +124,7 @@ def end_effect(*changes: str) -> float:
     _, pore, solved = fully_meshed_pore(*changes)
     outlet = pore.space.outlet.nodes
     prescribed = [solve_with_prescribed(pore, solved, outlet, part) for part in (0.0, 1.0)]
-    return max(largest_difference(uptake(other), uptake(solved)) for other in prescribed)
+    return max(largest_difference(uptake(changed), uptake(solved)) for changed in prescribed)
 
 
 def solve_with_prescribed(pore: Pore, solved: Solved, nodes: np.ndarray, part: float) -> Solved:
@@ -145,9 +145,9 @@ def solve_with_prescribed(pore: Pore, solved: Solved, nodes: np.ndarray, part: f
     return replace(solved, problem=problem, concentrations=state, fluxes=transport.fluxes(problem, sink, state))
 
 
-def largest_difference(computed: np.ndarray, other: np.ndarray) -> float:
+def largest_difference(computed: np.ndarray, expected: np.ndarray) -> float:
     """Largest relative difference, %."""
-    return 100 * float(np.abs(computed / other - 1).max())
+    return 100 * float(np.abs(computed / expected - 1).max())
 
 
 RADII, REACHES = (5.0, 10.0, 20.0, 30.0), (0.25, 0.5, 1.0, 1.5)

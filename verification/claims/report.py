@@ -196,7 +196,7 @@ def read() -> list[dict]:
 
 def replaced(entries: list[dict]) -> list[dict]:
     """The record with the entries of some claims replaced, in order."""
-    by_id = {each["id"]: each for each in (*read(), *entries)}
+    by_id = {entry["id"]: entry for entry in (*read(), *entries)}
     return [by_id[id] for id in sorted(by_id)]
 
 
@@ -250,8 +250,8 @@ def differences(entries: list[dict], committed: list[dict]) -> list[str]:
     """One line for each disagreement of claims with the record: another verdict or outcome, or a number outside its
     interval.
     """
-    by_id = {each["id"]: each for each in committed}
-    return [f"{each['id']}: {line}" for each in entries for line in _of_claim(each, by_id.get(each["id"]))]
+    by_id = {entry["id"]: entry for entry in committed}
+    return [f"{entry['id']}: {line}" for entry in entries for line in _of_claim(entry, by_id.get(entry["id"]))]
 
 
 def _of_claim(entry: dict, recorded_entry: dict | None) -> Iterator[str]:

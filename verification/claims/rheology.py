@@ -90,9 +90,9 @@ def _changes(name: str, run: Run) -> tuple[PaperCheck, ...]:
 def outline_shift(run: Run) -> tuple[float, float, float]:
     """Compare a run's outline at END with that of WIDE_TO_END: the shift (um) of its centroid downstream, and the area
     that only one of both covers (%), before and after the shift is removed."""
-    default, other = (polygon(body(chosen, END).outline) for chosen in (WIDE_TO_END, run))
-    moved = other.centroid.x - default.centroid.x
-    return moved, uncovered(default, other), uncovered(default, translate(other, -moved))
+    default, variant = (polygon(body(chosen, END).outline) for chosen in (WIDE_TO_END, run))
+    moved = variant.centroid.x - default.centroid.x
+    return moved, uncovered(default, variant), uncovered(default, translate(variant, -moved))
 
 
 def conductivity_change(run: Run, hours: tuple[float, ...] = AFTER, plain: Run = WIDE_TO_END) -> float:

@@ -121,7 +121,7 @@ def history(*run: str) -> History:
         if instant:
             instants.append(instant)
         if contact is None and before is not None and state.pore.contact:
-            contact = tuple(_solved(scene, each) for each in (_with_a_film(scene, before, state), state))
+            contact = tuple(_solved(scene, touching) for touching in (_with_a_film(scene, before, state), state))
         before = state
         far = state if state.pore.boundary.thickness <= NEAR * scene.pore.width else far
     return History(scene, tuple(instants), contact, far)
@@ -146,7 +146,7 @@ def _solved(scene: Scene, state: RestartState) -> Report:
 def series(*run: str) -> Columns:
     """Columns of a run's rows, as in ``timeseries.csv``."""
     computed = history(*run)
-    return columns([results.row(computed.scene, each) for each in computed.instants])
+    return columns([results.row(computed.scene, report) for report in computed.instants])
 
 
 @cached
@@ -155,7 +155,7 @@ def around_contact(*run: str) -> Columns:
     computed = history(*run)
     if computed.contact is None:
         raise LookupError(f"{run} does not touch the opposite wall")
-    return columns([results.row(computed.scene, each) for each in computed.contact])
+    return columns([results.row(computed.scene, report) for report in computed.contact])
 
 
 def contact_time(*run: str) -> float:
@@ -167,8 +167,8 @@ def contact_time(*run: str) -> float:
 def ledger(*run: str) -> Columns:
     """Columns of ``ledger.csv``, of all steps."""
     computed = history(*run)
-    steps = np.array([results.ledger_row(computed.scene, step) for each in computed.instants for step in each.ledgers],
-                     dtype=float)
+    ledgers = [step for report in computed.instants for step in report.ledgers]
+    steps = np.array([results.ledger_row(computed.scene, step) for step in ledgers], dtype=float)
     return dict(zip(results.LEDGER_COLUMNS, steps.T))
 
 
@@ -181,7 +181,7 @@ def biomass_defects(run: Run) -> np.ndarray:
 
 def instant(run: Run, time: float) -> Report:
     """The report of a run at a time (h). Raises KeyError if no row has this time."""
-    reports = [each for each in history(*run).instants if abs(each.pore.time - time) < 1e-6]
+    reports = [report for report in history(*run).instants if abs(report.pore.time - time) < 1e-6]
     if len(reports) != 1:
         raise KeyError(f"{run}: {len(reports)} rows at t = {time} h")
     return reports[0]
@@ -268,7 +268,7 @@ def body(run: Run, time: float) -> Body:
 def bodies(run: Run) -> tuple[Body, ...]:
     """The aggregate in every row of a run."""
     computed = history(*run)
-    return tuple(body_of(computed.scene, each) for each in computed.instants)
+    return tuple(body_of(computed.scene, report) for report in computed.instants)
 
 
 def polygon(outline: Outline) -> shapely.Polygon:

@@ -59,11 +59,11 @@ def half_disc_body(rings: int) -> Supported:
     return sliding(*pairs.upright(points, Delaunay(points).simplices))
 
 
-def cylinder(rings: int, inner: float, more: float) -> Cylinder:
+def cylinder(rings: int, inner: float, increase: float) -> Cylinder:
     """The growing half-cylinder."""
-    body, exact = half_disc_body(rings), HalfCylinder(inner, inner + more)
+    body, exact = half_disc_body(rings), HalfCylinder(inner, inner + increase)
     places = RADIUS * body.reference.T
-    return Cylinder(body, body.field(lambda x, y: inner + more * (x**2 + y**2)), exact.place(*places) / RADIUS,
+    return Cylinder(body, body.field(lambda x, y: inner + increase * (x**2 + y**2)), exact.place(*places) / RADIUS,
                     exact.pressure(*places))
 
 
@@ -133,7 +133,7 @@ def stabilisation_scale() -> Numbers:
     for mean, name in product((36, 2000), KINDS):
         cases = [cylinder(rings, 0.75 * mean, 0.5 * mean) for rings in RINGS]
         errors = [equilibrium_errors(case, stabilisations(case)[name]) for case in cases]
-        rows.append([f"{mean}", name, *(f"{100 * p:.1f} %, {100 * most:.0f} %" for p, most, _ in errors)])
+        rows.append([f"{mean}", name, *(f"{100 * p:.1f} %, {100 * worst:.0f} %" for p, worst, _ in errors)])
         places = max(places, *(x for _, _, x in errors))
     nodes = ", ".join(str(len(half_disc_body(rings).reference)) for rings in RINGS)
     head = ["m", "stabilisation", *(f"element size R / {rings}" for rings in RINGS)]

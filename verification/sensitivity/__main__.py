@@ -145,8 +145,8 @@ def _set(one_set: dict) -> Iterator[Block]:
     yield table(("input", "value"), ((name, f"{value:.4f}") for name, value in one_set["inputs"].items()))
 
 
-def _listed(values: list[float], how: str) -> str:
-    return ", ".join(format(value, how) for value in values)
+def _listed(values: list[float], form: str) -> str:
+    return ", ".join(format(value, form) for value in values)
 
 
 def _supplies(by_supply: dict) -> Iterator[Block]:
@@ -212,7 +212,7 @@ def main(arguments: list[str] | None = None) -> int:
 def computed(runs: Runs, only: str | None) -> dict:
     """The record with the requested parts computed; the others do not change."""
     record = {"values": {}, "elasticities": {}, **sensitivity.record()}
-    record["rounding"] = {each.name: each.rounding for each in ROUNDED}
+    record["rounding"] = {parameter.name: parameter.rounding for parameter in ROUNDED}
     for name in PARTS if only is None else (only,):
         PARTS[name](runs, record)
     return record

@@ -141,9 +141,9 @@ def of_base(scene: Scene) -> Row:
     first, shaped, last = simulation.simulate(ending(scene, plotted, END))
     grown, _, _ = updates.make_biomass(Stages.of(scene), shaped.pore, shaped.solved, scene.growth.time_step)
     solved = pore.solve(scene, grown)
-    halves = [each.half_saturation for each in solved.problem.both]
+    halves = [substrate.half_saturation for substrate in solved.problem.both]
     acceptor, donor = (flux.effluent / half for flux, half in zip(solved.fluxes, halves))
-    supply = [each.supply for each in solved.problem.both]
+    supply = [substrate.supply for substrate in solved.problem.both]
     rate = float(rate_law(scene.substrates, scene.kinetics).growth_rate(*supply))
     return {"velocity_0": M_PER_D * first.solved.flow.mean_velocity,
             "velocity": M_PER_D * shaped.solved.flow.mean_velocity,
@@ -217,7 +217,7 @@ def _elasticity(value: float, moved: list[float]) -> dict:
     bar = abs(far - near)
     elasticity = {"elasticity": near, "bar": bar, "resolved": bar <= RESOLVED * abs(near)}
     if moved[4:]:
-        elasticity["by_10_percent"] = [100 * (each / value - 1) for each in moved[4:]]
+        elasticity["by_10_percent"] = [100 * (moved_value / value - 1) for moved_value in moved[4:]]
     return elasticity
 
 
@@ -263,8 +263,9 @@ def one_set(runs: Runs, elasticities: dict[str, dict[str, dict]]) -> dict:
             break
         start = printed_of(numbers) - slopes @ x
     rows = _on_sizes(runs, factors)
-    left = misfit(numbers, _bars(rows))
-    return {"reached": bool(t <= 1 + 1e-9 and left <= 1), "share_of_the_rounding": t, "misfit_in_half_intervals": left,
+    final_misfit = misfit(numbers, _bars(rows))
+    return {"reached": bool(t <= 1 + 1e-9 and final_misfit <= 1), "share_of_the_rounding": t,
+            "misfit_in_half_intervals": final_misfit,
             "inputs": {name: BY_NAME[name].value * factor for name, factor in factors.items()},
             "numbers": {name: numbers[name] for name in PRINTED}, "bars": dict(zip(PRINTED, _bars(rows).tolist())),
             "sizes": list(SET_SIZES), "on_sizes": dict(zip(PRINTED, rows.T.tolist()))}

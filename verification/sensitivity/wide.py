@@ -50,7 +50,7 @@ def of_after(scene) -> Row:
     after = [instant for _, instant in simulation.steps(scene) if instant and instant.pore.contact]
     if len(after) != len(HOURS):
         raise LookupError(f"{len(after)} of {len(HOURS)} rows are after contact")
-    table = np.array([[*problems.after_contact(each).values()] for each in after])
+    table = np.array([[*problems.after_contact(report).values()] for report in after])
     means = np.exp(np.log(np.abs(table)).mean(axis=0))
     rows = zip(KINDS, (means, table[HOURS.index(LATER)], table[-1]))
     return {f"{kind} {name}": float(abs(value)) for kind, row in rows for name, value in zip(REQUIRED_BARS, row)}
