@@ -202,7 +202,7 @@ def test_averaged_refined(elements, record):
     """
     coarse, fine = (_piece(elements, *level) for level in (COARSE, FINE))
     record([at_most(name, abs(fine[name] / coarse[name] - 1), 0.01,
-                    "error in space 0.1 % of what is lost, in time 0.2 % of an hour's growth") for name in COMPARED])
+                    "error in space 0.1 % of the loss, in time 0.2 % of an hour's growth") for name in COMPARED])
 
 
 def _piece(elements: str, refinement: float, minutes: float, finer: int) -> dict[str, float]:

@@ -148,7 +148,7 @@ TRAPEZOIDAL = "trapezoidal rule on an exponential: (r step)^2 / 12, 1.2e-4 at th
 #: and grow by their mean.
 YIELD_BOUNDS = {("quasi_steady", "updates"): (2e-4, TRAPEZOIDAL),
                 ("gear", "updates"): (1e-3, "the tolerance of Gear, 0.1 %")}
-HEUN = "Heun's method, and the trapezoidal rule on what is consumed: second order"
+HEUN = "Heun's method, and the trapezoidal rule for the consumption: second order"
 
 
 def _of_base(preset: str):

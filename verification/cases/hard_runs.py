@@ -88,7 +88,8 @@ def cocircular(preset: str) -> list:
         corners = grid.straight
         covered = corners.areas.sum() / (corners.width * np.ptp(corners.ends))
         checks += [at_most(f"area covered, noise {size:g}", abs(covered - 1), 1e-12, "round-off"),
-                   at_least(f"least quality, noise {size:g}", corners.quality.min(), 0.2, "a third of what is poor"),
+                   at_least(f"least quality, noise {size:g}", corners.quality.min(), 0.2,
+                            "a third of the limit for a poor triangle"),
                    hard.promised(f"head loss against no noise, noise {size:g}", abs(loss / exact - 1), preset)]
     return checks
 
@@ -121,7 +122,7 @@ def nearly_same(preset: str) -> list:
         moved_places[inner] += noise * random.uniform(-1, 1, (inner.sum(), 2))
         carried = TRANSFER[grid.geometry](places, cells, field, moved_places, cells)
         checks.append(at_most(f"largest change of a field of size one, noise {noise:g} um",
-                              np.abs(carried - field).max(), 1e-9 + noise, "the identity, and what the field changes"))
+                              np.abs(carried - field).max(), 1e-9 + noise, "the identity, and the change of the field"))
     return checks
 
 

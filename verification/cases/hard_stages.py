@@ -214,7 +214,7 @@ def _more_than(faster: Run, slower: Run, preset: str) -> list[Check]:
     m_a, m_d = (s.supply / (s.supply + s.half_saturation) for s in (both.acceptor, both.donor))
     most = law.maximum_utilization_rate * m_a * m_d * law.maximum_density * faster.last["aggregate_area_um2"]
     uptake, slower_uptake = (run.end.solved.fluxes[1].consumed for run in (faster, slower))
-    return [between("donor taken up over what it would be at the supply everywhere", uptake / most,
+    return [between("uptake of donor over that at the supply everywhere", uptake / most,
                     slower_uptake / most * (1 - TOLERANCE[preset]), 1.0, "it rises with the velocity: that at a tenth")]
 
 

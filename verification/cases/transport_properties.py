@@ -63,7 +63,7 @@ def test_balance(kind, record):
     (u_ave - u_x) C is counted [E4]. In the transient scheme it equals out + consumed + stored. Both hold with linear,
     quadratic and cubic elements.
 
-    Norm: supplied - out - consumed over supplied; in time, less what is stored.
+    Norm: supplied - out - consumed over supplied; in time, less stored.
     """
     pores = {"R = 5 um": _solved(kind, 5.0), "R = 40 um": _solved(kind, 40.0),
              "R = 20 um, no flow": _solved(kind, 20.0, speed=None),

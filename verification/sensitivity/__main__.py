@@ -1,4 +1,4 @@
-"""`python -m verification.sensitivity [--only PART]`: what the inputs allow, with pictures and a page.
+"""`python -m verification.sensitivity [--only PART]`: effects of the rounding of inputs, with pictures and a page.
 
 The parts are base and wide, their elasticities and the one set of inputs; after_contact, the accuracy of wide after
 contact; supplies, the claims about wide that hold with other supplies; and sobol, indices of base.
@@ -103,7 +103,7 @@ def page(record: dict) -> str:
     blocks = [Block("text", introduction), Block("text", f"![Tornado diagram]({TARGET.name})"), _table(record)]
     for part, section in SECTIONS.items():
         blocks += section(record[part])
-    return f"# What the inputs of Table 1 allow\n\n{markdown(blocks, 2)}\n\n"
+    return f"# Effects of the rounding of Table 1\n\n{markdown(blocks, 2)}\n\n"
 
 
 def _table(record: dict) -> Block:
