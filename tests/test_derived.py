@@ -653,6 +653,7 @@ def test_every_line_of_every_chart_is_the_column_that_it_names():
             assert line.times.tolist() == ([0.5, 2.0] if of_steps else run.times.tolist())
             assert line.values == pytest.approx(known[column], rel=1e-12, nan_ok=True), title
     present, produced = charts["Ledger: biomass"].lines
-    assert (present.label, produced.label) == ("held", "made since t = 0") and present.times.tolist() == [1.0, 3.0]
+    assert (present.label, produced.label) == ("in the aggregate", "made since t = 0")
+    assert present.times.tolist() == [1.0, 3.0]
     assert present.values == pytest.approx(1e-6 * run.ledger["biomass_after_pg_per_m"], rel=1e-12)
     assert produced.values == pytest.approx(1e-6 * np.cumsum(run.ledger["biomass_made_pg_per_m"]), rel=1e-12)

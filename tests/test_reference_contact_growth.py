@@ -39,8 +39,9 @@ def test_a_straight_wedge_lacks_what_its_slope_lacks(slope, expected):
     angle = np.arctan2(*mesh.doflocs[::-1])
     beyond = np.maximum(np.abs(angle - np.pi / 2) - np.pi / 4, 0.0)
     place = np.array([np.pi / 2 - angle, WALLS.height - slope * beyond])
-    lack = contact_growth.lack(Equilibrium(mesh, place, np.zeros(0)), np.pi * np.array([0.25, 0.75]), WALLS)
-    assert lack == pytest.approx([expected, expected], abs=2e-3)
+    angles = np.pi * np.array([0.25, 0.75])
+    missing = contact_growth.missing_gap(Equilibrium(mesh, place, np.zeros(0)), angles, WALLS)
+    assert missing == pytest.approx([expected, expected], abs=2e-3)
 
 
 @pytest.mark.parametrize("theta", [even, uneven])

@@ -91,7 +91,7 @@ def test_quadratic_growth_of_a_half_disc_is_the_closed_form():
 def test_the_flow_over_a_half_cylinder_obeys_its_equations(curvature):
     """No slip on the wall and on r = 1; vorticity and pressure from the stream function; and the momentum balance of
     the water within r = 3: the loads on the half-cylinder, the wall beside it and the half-circle add up to zero."""
-    flow = half_cylinder.solved(curvature)
+    flow = half_cylinder.solve(curvature)
     t = np.linspace(0.0, np.pi, 400)[1:-1]
     x, y = np.cos(t), np.sin(t)
     assert np.abs(flow.stream(x, y)).max() < 1e-6

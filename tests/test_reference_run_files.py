@@ -155,7 +155,7 @@ DAMAGES = [
     (scaled("surface_stretch", np.nan, "cell_data"), "numbers that are not finite"),
     (series("time_h", lambda _: 1.0), "rows that are not later than the row before"),
     (forgotten, "rows without fields of their time"),
-    (unfinished, "rows that were asked for and are not there, or the reverse"),
+    (unfinished, "requested rows that are missing, and rows that were not requested"),
     (ledger("end_h", plus(-0.01)), "end of the ledger, h, beyond its bounds"),
     (series("nodes", plus(1)), "nodes of the row less those of the fields"),
     (series("meshed_length_um", times(1.0001)), "area of the mesh over meshed length times width, less one"),
@@ -170,9 +170,9 @@ DAMAGES = [
     (node("velocity_m_per_d", [0.0, 0.001, 0.0], at_wall), "velocity through the walls over the mean"),
     (series("mean_velocity_m_per_d", times(1.001)), "flow through the inlet over u_ave W, less one"),
     (node("velocity_m_per_d", 0.0, inside_outlet), "flow through the outlet over u_ave W, less one"),
-    (scaled("head_cm", 1.1), "mean head at inlet less outlet and the clean rest, over the head loss, less one"),
+    (scaled("head_cm", 1.1), "mean head at inlet less outlet and the loss outside, over the head loss, less one"),
     (scaled("velocity_m_per_d", 1.05),
-     "work that the water spends and the clean rest, over the head loss, less one"),
+     "dissipation in the mesh and the loss outside, over the head loss, less one"),
     (series("conductivity_m_per_d", times(1.001)), "u L / head loss over the conductivity, less one"),
     (series("conductivity_m_per_d", times(1.5)), "conductivity over that of the clean pore, beyond its bounds"),
     (ledger("start_h", plus(1e-6)), "time between one step's end and the next one's start, h"),
@@ -180,9 +180,9 @@ DAMAGES = [
     (ledger("biomass_before_pg_per_m", times(1.000001)),
      "biomass at a step's start over that at the end before, less one"),
     (ledger("biomass_after_pg_per_m", times(1.01)), "biomass over X_m times the area of the row, less one"),
-    (ledger("biomass_made_pg_per_m", times(1.0001)), "biomass after less before and made, over after"),
+    (ledger("biomass_made_pg_per_m", times(1.0001)), "biomass after, less before and new, over after"),
     (ledger("biomass_made_pg_per_m", times(1.0001)),
-     "biomass made less Y donor - (acceptor - F donor) / d_c, pg/m, beyond its bounds"),
+     "new biomass - (Y donor - (acceptor - F donor) / d_c), pg/m, beyond its bounds"),
     (ledger("acceptor_consumed_pg_per_m", times(1.1)),
      "biomass that degrades by the oxygen consumed, pg/m, beyond its bounds"),
     (series("inert_fraction", lambda _: -0.001), "inert biomass, pg/m, beyond its bounds"),
@@ -202,7 +202,7 @@ DAMAGES = [
         (scaled("active_biomass", 1.2), f"{name} that the aggregate takes up, um2 mg/L/h, beyond its bounds"),
         (ledger(f"{name}_out_pg_per_m", times(1.00001)),
          f"{name} supplied less leaving, consumed and stored, relative"),
-        (ledger(f"{name}_stored_pg_per_m", plus(1e-3)), f"{name} stored by what is at rest"),
+        (ledger(f"{name}_stored_pg_per_m", plus(1e-3)), f"{name} stored by quasi-steady substrates"),
         (ledger(f"{name}_consumed_pg_per_m", times(-1)), f"{name} consumed, pg/m, beyond its bounds"),
         (ledger(f"{name}_consumed_pg_per_m", times(3)), f"{name} consumed, pg/m, beyond its bounds"))),
 ]
@@ -223,7 +223,7 @@ def test_an_intact_run_passes_and_every_check_has_a_damage(intact):
 
 
 DECAYED = "biomass that degrades by the oxygen consumed, pg/m, beyond its bounds"
-MADE = "biomass made less Y donor - (acceptor - F donor) / d_c, pg/m, beyond its bounds"
+MADE = "new biomass - (Y donor - (acceptor - F donor) / d_c), pg/m, beyond its bounds"
 TAKEN = "that the aggregate takes up, um2 mg/L/h, beyond its bounds"
 #: Scenes with other physics, damages, and the check that detects each.
 OTHER_DAMAGES = [

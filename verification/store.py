@@ -1,8 +1,8 @@
 """One store of results that are computed once for a scene and for the present source of ``repro``.
 
-A result is found by a key that has the hashes of the scene and of the source, so that a change of either computes it
-anew. Missing results are computed in parallel. :class:`Folders` keeps whole runs, :class:`Numbers` the few numbers of
-many runs, and :class:`Memory` the return values of the functions of claims, until the process ends.
+The key of a result contains the hashes of the scene and of the source, so a change of either recomputes the result.
+Missing results are computed in parallel. :class:`Folders` stores whole runs, :class:`Numbers` the few numbers of many
+runs, and :class:`Memory` the return values of the functions of claims, until the process ends.
 """
 
 import os
@@ -136,12 +136,12 @@ class Memory:
     def cached(self, function: Callable) -> Callable:
         """Decorate a function: each call is computed once in each context."""
         @wraps(function)
-        def remembering(*arguments):
+        def wrapper(*arguments):
             results = self._results.setdefault(self._context(), {})
             if (function, arguments) not in results:
                 results[function, arguments] = function(*arguments)
             return results[function, arguments]
-        return remembering
+        return wrapper
 
     def forget(self, context: Hashable) -> None:
         """Drop the results of a context."""

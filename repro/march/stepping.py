@@ -52,8 +52,8 @@ def rows(growth: Growth) -> tuple[float, ...]:
     if growth.end <= SAME_TIME:
         return ()
     power = math.floor(math.log2(growth.end / (LEAST * growth.time_step)) + 1e-9)
-    apart = max(growth.time_step * 2.0**power, 2 * SAME_TIME)
-    times = [round(k * apart, 9) for k in range(1, int(growth.end / apart) + 1)]
+    interval = max(growth.time_step * 2.0**power, 2 * SAME_TIME)
+    times = [round(k * interval, 9) for k in range(1, int(growth.end / interval) + 1)]
     return (*(time for time in times if growth.end - time > SAME_TIME), growth.end)
 
 

@@ -158,8 +158,8 @@ MUTANTS = (
         "repro/fem/mesher.py",
         ("mesher-slivers-kept",
          "Triangles whose nodes lie on a line reach the mesher.",
-         "for one in np.flatnonzero(flat):",
-         "for one in np.flatnonzero(flat)[:0]:",
+         "for triangle in np.flatnonzero(flat):",
+         "for triangle in np.flatnonzero(flat)[:0]:",
          "tests/test_ragged_outlines.py::test_no_triangle_has_its_nodes_on_one_line")),
     *changes(
         "repro/march/folding.py",

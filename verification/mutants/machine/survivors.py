@@ -1,28 +1,27 @@
-"""Survivors among the mutants made by machine that are explained: data, read by :mod:`.record`."""
+"""Explained survivors among the machine-made mutants: data, read by :mod:`.record`."""
 
-#: Survivors that no test can tell from the code, each with the reason, by (file of repro/, line or lines as they are,
-#: as they become).
+#: Survivors with the same effect as the code, each with the reason, by (file of repro/, old lines, new lines).
 EQUIVALENT: dict[tuple[str, str, str], str] = {
     ("fem/elements.py", "EDGE_DEGREES = {1: 2, 2: 6, 3: 9}", "EDGE_DEGREES = {1: 3, 2: 6, 3: 9}"):
         "The same rule: Gauss' two points, which scikit-fem gives for degree 2, are exact to degree 3.",
     ("fem/linear.py", "dominant = np.tile((np.ones((k, k)) + k * np.eye(k)).ravel(), len(elements))",
      "dominant = np.tile((np.ones((k, k)) + k - np.eye(k)).ravel(), len(elements))"):
-        "Identical orders of elimination for every system of base in the three presets: they follow from which entries "
-        "there are, and the values only keep the factorisation, which is thrown away, from a zero pivot.",
+        "Identical orders of elimination for every system of base in the three presets. The order follows from the "
+        "positions of the entries; their values only prevent a zero pivot, and the factorisation is not used.",
     ("fem/transfer.py", "return np.where(lost[:, None], 99.0, local)",
      "return np.where(lost[:, None], 100.0, local)"):
-        "Either is outside of every triangle, places found are from -2 to 3, and is brought back to the same place of "
-        "its edge.",
+        "Both values lie outside of every triangle (the search ends between -2 and 3), and both move to the same point "
+        "of its edge.",
     ("model/flow.py", "@dataclass(frozen=True, eq=False)", "@dataclass(frozen=True, eq=True)"):
-        "Bubble has no fields and is not compared, nor a key of anything: it is called.",
+        "Bubble has no fields, and instances are neither compared nor used as keys.",
     ("model/flow.py", "@dataclass(frozen=True, eq=False) class Bubble:", "class Bubble:"):
-        "Bubble has no fields: what the decorator makes of it, but for the text that shows it, a class has by itself.",
+        "Bubble has no fields: the decorator then changes only the text representation of the class.",
     ("model/gear.py", "still = np.zeros_like(fields), np.zeros_like(biomass), np.zeros((2, 4))",
      "still = np.zeros_like(fields), np.zeros_like(biomass), np.zeros(( 1, 4))"):
-        "A row of zeros, added to two rows, is two rows of zeros.",
+        "NumPy broadcasts one row of zeros to two rows of zeros.",
     ("model/transport.py", "return self._reaction.evaluate(state.reshape(len(self.problem.both), -1))",
      "return self._reaction.evaluate(state.reshape(len(self.problem.both), - 2))"):
-        "numpy takes any negative length of one axis for the one that is left.",
+        "NumPy infers the length of an axis from any negative number.",
     ("report/quantities.py", 'is_new_mesh = run.series.get("remeshed", run.times * np.nan) == 1',
      'is_new_mesh = run.series.get("remeshed", run.times * np.nan) >= 1'):
         "The column is 0 or 1, and NaN is neither.",
@@ -30,18 +29,19 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
         "Identical outputs of base in the three presets, whose equilibria take 5, 5 and 3 iterations at most.",
     ("runs/folder.py", '(folder / "fields").mkdir(parents=True, exist_ok=True)',
      '(folder / "fields").mkdir(parents=False, exist_ok=True)'):
-        "The folder is there already: it is made with those above it for its lock.",
+        "The folder exists already: the lock creates it with its parents.",
     ("report/run_page.py", 'several=hidden[packed["of"] > 1])', 'several=hidden[packed["of"] != 1])'):
-        "There is one frame or more: without any, nothing is packed, and nothing shown.",
+        "There is at least one frame: without frames the function packs and shows nothing.",
 }
 
 #: Remaining survivors: (effect, reason why no test catches it).
 LEFT: dict[tuple[str, str, str], tuple[str, str]] = {
     ("runs/__init__.py", "INTERVAL = 60.0", "INTERVAL = 59.0"):
         ("Checkpoints are written every 59 s, and the help says so.",
-         "It is a choice; what a run makes does not depend on it."),
+         "The interval is a choice, and the results of a run do not depend on it."),
     ("model/transport.py", "woken = (iterate.saturations <= 0) & (predicted <= 0) & (concentrations > 0)",
      "woken = (iterate.saturations <= 0) & (predicted != 0) & (concentrations > 0)"):
-        ("Newton's method goes on from another fraction where one was zero and another is predicted; what it ends at "
-         "is the same to its tolerance.", "It takes more or fewer iterations in starved pores, which nothing bounds."),
+        ("Newton's method continues from another fraction if a fraction was zero and the prediction differs from zero. "
+         "The solution is the same to its tolerance.",
+         "It takes more or fewer iterations in starved pores, and no test bounds their number."),
 }
