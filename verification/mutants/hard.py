@@ -39,7 +39,7 @@ MUTANTS = (
         "repro/march/stepping.py",
         ("hard-contact-passed-over",
          "Steps do not end where the film is first too thin, but go on.",
-         "landing=LANDED if cut else 0.0",
+         "landing=0.0 if last else LANDED",
          "landing=-np.inf"),
         ("hard-estimate-ignored",
          "Every step is accepted, even if its estimate exceeds the tolerance.",
