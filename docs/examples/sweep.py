@@ -29,7 +29,7 @@ print(pandas.read_csv(folder / "runs.csv")[columns].to_string(index=False))
 # A higher head supplies more of the acceptor, so a smaller share of it is consumed. The conductivity hardly depends on
 # the head.
 
-# %%
+# %% mystnb={"image": {"alt": "effluent acceptor of six runs against time"}}
 figure, axes = plt.subplots(figsize=(6, 3.5), layout="constrained")
 for run, path in zip(swept.runs, swept.paths):
     repro.load_run(path).plot("effluent_acceptor", ax=axes)
