@@ -18,6 +18,7 @@ from verification.evidence.writing import saved_figure
 
 COLUMNS = 2
 MOST_NAMED = 5  # quantities in a legend
+MANY_DECADES = 200.0  # largest over least size from which only powers of ten are labelled
 
 
 def series(result: Result) -> dict[str, list[list[float]]]:
@@ -55,7 +56,8 @@ def _panel(axis, case: str, studies: Mapping[str, list]) -> None:
         axis.loglog(sizes, errors, ".-", color=color, lw=0.8, ms=4, label=label)
         axis.loglog(sizes, errors[-1] * (np.array(sizes) / sizes[-1]) ** order, "--", color=color, lw=0.4, alpha=0.6)
         named.add(name)
-    axis.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    low, high = axis.get_xlim()
+    axis.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5) if high < MANY_DECADES * low else (1,)))
     axis.xaxis.set_major_formatter("{x:g}")
     axis.xaxis.set_minor_formatter(NullFormatter())
     axis.set_title(case, fontsize=10)
