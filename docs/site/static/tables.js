@@ -50,7 +50,7 @@ function addFilter(table) {
 }
 
 // Least widths of columns by the length of their longest text; longer words are broken.
-const WIDTHS = [[150, "15em"], [50, "10em"], [22, "7em"]];
+const WIDTHS = [[200, "14em"], [50, "9em"], [22, "7em"]];
 const LONGEST_WORD = 34;
 
 function widenColumns(table) {
