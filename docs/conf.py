@@ -26,7 +26,10 @@ include_patterns = [
     "verification/sensitivity/sensitivity.md",
 ]
 exclude_patterns = ["docs/_build", "build", "**/.*"]
-extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.autosummary", "numpydoc", "sphinx_design", "mathml", "citations", "times"]
+extensions = [
+    "myst_nb", "sphinx.ext.autodoc", "sphinx.ext.autosummary", "numpydoc", "sphinx_design",
+    "mathml", "citations", "times",  # in docs/site
+]
 source_suffix = {".md": "myst-nb", ".py": "myst-nb"}
 nb_custom_formats = {".py": ["jupytext.reads", {"fmt": "py:percent"}]}
 myst_enable_extensions = ["dollarmath", "colon_fence", "deflist"]

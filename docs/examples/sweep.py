@@ -18,8 +18,8 @@ swept = repro.sweep("base", vary, folder, ['numerics.preset="fast"', 'growth.end
 print(len(swept.runs), "runs,", len(swept.failed), "failed")
 
 # %% [markdown]
-# `runs.csv` has a row for each run with the values at its end, and `table.csv` a row for each run and time. A few columns
-# of `runs.csv`:
+# `runs.csv` has a row for each run with the values at its end, and `table.csv` a row for each run and time. A few
+# columns of `runs.csv`:
 
 # %%
 columns = ["flow.head_cm", "pore.width_um", "conductivity_m_per_d", "effluent_acceptor_mg_per_L"]
