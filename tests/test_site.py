@@ -110,7 +110,7 @@ def test_the_root_leads_to_the_start(window):
 
 def test_the_search_finds_pages(window):
     window.show(SITE / "search.html", "?q=neo-Hookean")
-    assert settled(window, "document.querySelectorAll('#search-results li a').length") >= 2
+    assert settled(window, "document.querySelectorAll('#search-results li a').length >= 2")
     window.show(SITE / "search.html", "?q=zzzznothing")
     assert settled(window, "/did not match/.test(document.getElementById('search-results').innerText)")
 
