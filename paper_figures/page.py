@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from html import escape
@@ -65,6 +66,11 @@ def also(module) -> tuple[str, ...]:
     return tuple(f"python -m verification.claims {id}" for id in getattr(module, "COMPUTED", ()))
 
 
+def caption_html(caption: str, claims: Iterable[str]) -> str:
+    """The caption of a figure and the verdicts of its claims; words between backticks are code."""
+    return re.sub("`(.+?)`", r"<code>\1</code>", escape(f"{caption} {judged(claims)}".strip()))
+
+
 def _short(entry: Entry) -> str:
     """The number of a figure of the paper, or the title of an addition."""
     kind, _, title = entry.title.partition(". ")
@@ -80,7 +86,7 @@ def _section(entry: Entry) -> str:
     return f"""<section id="{name}">
 <h2>{escape(entry.title)}</h2>
 <img src="{name}.png" alt="{escape(entry.title)}"/>
-<p>{escape(entry.caption)} {escape(judged(entry.claims))} <a href="{name}.pdf">PDF</a></p>
+<p>{caption_html(entry.caption, entry.claims)} <a href="{name}.pdf">PDF</a></p>
 <h3>Commands</h3>
 <pre>{escape(run)}</pre>
 <h3>Claims</h3>

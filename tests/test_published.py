@@ -103,6 +103,17 @@ def test_the_codecheck_lists_what_make_figures_makes():
     assert f'title: "{title}"' in content
 
 
+def test_the_paper_has_the_form_that_joss_requires():
+    """Its sections, between 750 and 1750 words, and a reference with a DOI for each citation."""
+    body = text("docs/paper.md").rpartition("---\n")[2]
+    assert re.findall(r"^# (.+)$", body, re.M) == [
+        "Summary", "Statement of need", "State of the field", "Software design", "Research impact statement",
+        "AI usage disclosure", "Acknowledgements", "References"]
+    assert 750 <= len(body.split()) <= 1750
+    entries = dict(re.findall(r"^@\w+\{(\w+), (.+)$", text("docs/paper.bib"), re.M))
+    assert {*re.findall(r"@(\w+)", body)} == {*entries} and all("doi = {10." in entry for entry in entries.values())
+
+
 @pytest.mark.thorough
 def test_wheel_and_source_distribution_are_complete(tmp_path):
     """The wheel has the solver and its scenes alone, the source distribution the files of the checkout."""

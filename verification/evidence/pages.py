@@ -129,8 +129,8 @@ def index(records: Mapping[str, Mapping]) -> list[Block]:
              "elements and presets"))
     return [Block("text", f"{INTRODUCTION} Written by `make verify`."),
             Block("text", f"**{summary(records.values())}**"),
-            table(("stage", ""), (*stages, *more)),
-            table(("besides", ""), BESIDES),
+            table(("stage", "result"), (*stages, *more)),
+            table(("judged besides", "command"), BESIDES),
             table(("case", "kind", "runs with", "numbers", "verdict", "must fall short with"),
                   (_index_row(cases()[id], record) for id, record in records.items()))]
 
