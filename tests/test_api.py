@@ -84,12 +84,6 @@ def test_a_run_without_rows_can_be_shown():
         empty.fields(0.0)
 
 
-def test_a_run_to_the_pores_end_says_so():
-    scene = load_scene("wide", ["aggregate.radius=40 um", "pore.length=90 um", "growth.time_step=2 h", "growth.end=4 h",
-                                "numerics.refinement=0.5"])
-    assert "reaches the pore's" in solve(scene).status
-
-
 def test_the_table_of_a_notebook_escapes_and_is_short(solved):
     rows = [dict.fromkeys(results.COLUMNS) | {"time_h": float(k)} for k in range(40)]
     html = Results("<script>alert(1)</script>&", rows, [{}] * 40, "<b>")._repr_html_()

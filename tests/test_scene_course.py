@@ -1,4 +1,5 @@
-"""Supplies, head and mean velocity as tables over time: reading, writing, and runs with them."""
+"""Supplies, head and mean velocity as tables over time: reading, writing, and runs with them. `test_longer.py` makes a
+run with a table longer."""
 import json
 from math import inf
 from operator import attrgetter
@@ -11,13 +12,10 @@ from repro.march.simulation import simulate
 from repro.model import pore
 from repro.preflight.checked import check
 from repro.preflight.numbers import evaluate_at_largest
-from repro.results import read_table
 from repro.scene import Scene, load_scene, parse_scene, scene_tables
 from repro.scene.text import scene_text
 from repro.scene.time_table import TimeTable
 from repro.scene.units import Timed
-from tests.pages import run
-from tests.shell import resume_run
 from tests.strategies import scene
 from tests.test_scene_text import fields
 
@@ -104,10 +102,3 @@ def test_a_table_is_judged_by_its_extreme():
         [number.start for number in expected[1]], rel=1e-12)
     report = check(loaded)
     assert "0 to 20 mg/L, in steps, the last from 0.5 h" in dict(report.modelled)["substrates"]
-
-
-def test_commands_take_tables(tmp_path):
-    """A run with its page is made longer."""
-    out = run(tmp_path, "base", *SHORT, RISING)
-    assert resume_run(out, "--set", 'growth.end="1.2 h"') == 0
-    assert (out / "report.html").exists() and read_table(out / "timeseries.csv")["time_h"][-1] == 1.2
