@@ -181,21 +181,6 @@ def test_a_missing_optional_package_is_reported_in_one_line(solved, monkeypatch,
         make(solved)
 
 
-def test_a_sweep_from_python(tmp_path):
-    """It has runs, labels and tables. A second call computes nothing."""
-    events = []
-    arguments = NARROW, ["pore.width=30 um, 40 um"], tmp_path / "sweep"
-    swept = repro.sweep(*arguments, workers=1, tell=events.append)
-    assert [run.is_over for run in swept.runs] == [True, True] and swept.failed == []
-    assert [swept.label(run) for run in swept.runs] == ["pore.width = 30 um", "pore.width = 40 um"]
-    assert [event["done"] for event in events] == [0, 1, 2] and repr(swept).startswith("<Sweep of scene: 2 of 2 runs")
-    widths = [repro.load_run(path)["head_loss_cm"][0] for path in swept.paths]
-    assert widths[0] > widths[1] and (tmp_path / "sweep" / "runs.csv").exists()
-    again = []
-    repro.sweep(*arguments, workers=1, tell=again.append)
-    assert [event["done"] for event in again] == [2]
-
-
 def test_a_notebook_shows_key_figures_and_a_picture(solved):
     """The picture is a PNG of the meshed part; the aggregate's boundary is white up to its top."""
     html = solved._repr_html_()

@@ -168,22 +168,15 @@ def test_area_and_mass_do_not_drift_apart(born):
     assert len(apart) > 8 and np.abs(apart).max() < 1e-9
 
 
-LEAKS = {"acceptor": lambda ledger: {"supplied": (1.01 * ledger.supplied[0], ledger.supplied[1])},
-         "donor": lambda ledger: {"out": (ledger.out[0], ledger.out[1] - 0.01 * ledger.supplied[1])},
-         "biomass": lambda ledger: {"biomass_after": 1.01 * ledger.biomass_after},
-         "oxygen demand": lambda ledger: {"biomass_made": 1.01 * ledger.biomass_made}}
-
-
-@pytest.mark.parametrize("quantity", LEAKS)
-def test_a_step_that_does_not_balance_ends_the_run_and_keeps_its_files(quantity, monkeypatch, tmp_path, capsys):
+def test_a_step_that_does_not_balance_ends_the_run_and_keeps_its_files(monkeypatch, tmp_path, capsys):
     """The exit status is 1, and one line has the quantity, the defect, the position, the time and advice. Rows, fields
-    and the checkpoint of the last good state stay."""
+    and the checkpoint of the last good state stay. test_guards.py tests leaks of all quantities."""
     ledgers = []
 
     def leaking(*parts):
         ledger = Ledger(*parts)
         ledgers.append(ledger)
-        return replace(ledger, **LEAKS[quantity](ledger)) if len(ledgers) > 1 else ledger
+        return replace(ledger, biomass_after=1.01 * ledger.biomass_after) if len(ledgers) > 1 else ledger
 
     monkeypatch.setattr(midpoint, "Ledger", leaking)
     out = pages.run(tmp_path, "base", pages.FAST, "growth.end=3 h", status=1)
@@ -191,7 +184,7 @@ def test_a_step_that_does_not_balance_ends_the_run_and_keeps_its_files(quantity,
     table = read_table(out / "timeseries.csv")
     assert len(table["time_h"]) == len(list((out / "fields").iterdir())) > 1
     assert f"stopped in the step from t = {table['time_h'][-1]:g} h, in its balance: " in line
-    assert re.search(rf"x = -\S+ and \S+ um: it lacks (.*, )?-?0\.0\d+ of the {quantity}.*; try a shorter", line)
+    assert re.search(r"x = -\S+ and \S+ um: it lacks -?0\.0\d+ of the biomass.*; try a shorter", line)
     assert shell.read_record(out)["status"].startswith("failed: ")
     assert "last good state" in line and (out / "checkpoint.state").exists()
 

@@ -82,7 +82,6 @@ def test_a_film_has_every_row_in_one_view_and_one_palette(results, tmp_path):
 @pytest.mark.parametrize("call, error, message", [
     (lambda run, file: run.animate("donor", file.with_suffix(".mp4")), ValueError, "a file name that ends in .gif"),
     (lambda run, file: run.animate("doner", file), KeyError, "no such column or field; did you mean donor"),
-    (lambda run, file: run.plot("doner"), KeyError, "no such column or field; did you mean donor"),
     (lambda run, file: run.plot("acceptor", time="1"), TypeError, "plot: time: float is needed, not '1'"),
     (lambda run, file: repro.solve({"pore": {"width": "50 um"}}).plot(), KeyError, "no curves of flow"),
 ])
