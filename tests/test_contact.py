@@ -192,25 +192,6 @@ def test_the_residual_changes_with_a_line_as_its_slope_says(plugged, rheology):
     assert sum(slopes) == pytest.approx((moved - at_rest) / 1e-6, abs=2e-4 * np.abs(slopes).max())
 
 
-def test_newton_and_search_place_the_lines_alike(plugged, monkeypatch):
-    """Both accept clearances of up to CLOSE, which a line passes in about CLOSE film / tan(angle), 0.013 um; at corners
-    a line errs by LEAST_PART of an arc."""
-    scene, pore = plugged
-    counts = []
-    solve = contact.growth.equilibrium
-    monkeypatch.setattr(contact.growth, "equilibrium", lambda *a, **k: counts.append(1) or solve(*a, **k))
-    by_newton = expanded_by(scene, pore, 1.03)
-    assert not counts and by_newton.iterations <= contact_newton.MOST_ITERATIONS
-    without_newton(monkeypatch)
-    by_search = expanded_by(scene, pore, 1.03)
-    assert len(counts) > 1
-    arc = contact_lines.arc_lengths(pore.boundary, contact_lines.lines_of(pore.boundary)[-1]).max()
-    for key, length in by_search.advances.items():
-        assert by_newton.advances[key] == pytest.approx(length, abs=0.05 + contact_newton.BESIDE * arc)
-    assert sum(by_search.advances.values()) > 0.5
-    assert by_newton.pore.boundary.area == pytest.approx(by_search.pore.boundary.area, rel=1e-6)
-
-
 def test_the_search_takes_over_from_newton(plugged, monkeypatch):
     scene, pore = plugged
     monkeypatch.setattr(contact_newton, "MOST_ITERATIONS", 1)
