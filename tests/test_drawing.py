@@ -117,8 +117,7 @@ def test_the_command_draws_the_same(results, tmp_path, capsys):
 
 @pytest.mark.parametrize("arguments, message", [
     (["doner", "--out", "x.png"], "did you mean donor"), (["--out", "x.gif"], "a film needs FIELD and accepts no"),
-    (["donor", "--time", "1", "--out", "x.gif"], "no --time"), (["--out", "x.txt"], "is not supported"),
-    (["thickness", "--time", "1", "--out", "x.png"], "time: thickness_um is drawn over all times")])
+    (["donor", "--time", "1", "--out", "x.gif"], "no --time"), (["--out", "x.txt"], "is not supported")])
 def test_the_command_refuses_in_one_line(results, tmp_path, capsys, monkeypatch, arguments, message):
     monkeypatch.chdir(tmp_path)
     assert message in refusal(tmp_path, capsys, "plot", results.folder, *arguments) and not list(tmp_path.iterdir())
