@@ -15,6 +15,7 @@ import pytest
 from repro.cli import main
 from repro.sweeps import cluster, single_run
 from tests.shell import rows
+from tests.shell import start as start_command
 
 VARY = ["--vary", "pore.width=48:52 um:linear:6", "--set", "numerics.preset=fast"]
 
@@ -116,19 +117,13 @@ def workers(tmp_path):
         process.wait(30)
 
 
-def on_cluster(address, out):
-    """Start a sweep in a separate process."""
-    arguments = [sys.executable, "-m", "repro", *command(out, "--scheduler", address)]
-    return subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-
-
 @pytest.mark.thorough
 def test_no_run_is_lost_or_repeated_after_a_worker_is_killed(workers, tmp_path):
     """Of two workers with six runs one is killed during a run. The results equal those without a cluster."""
     address, start = workers
     first, _ = start("one"), start("two")
     out, reference = tmp_path / "sweep", tmp_path / "here"
-    process = on_cluster(address, out)
+    process = start_command(*command(out, "--scheduler", address))
     until(lambda: list(out.glob("runs/0*")) and len(list(out.glob("runs/*/.lock"))) == 2)
     first.send_signal(signal.SIGKILL)
     outputs = process.communicate(timeout=120)
