@@ -1,8 +1,8 @@
 """Advice appears once, names a value that is accepted and helps, or says that no setting helps.
 
-Where the advice of runs that fail was followed. Members are those of verification/cases/hard_family.py. "Drawn" scenes
-are changes of base, drawn once: soft bodies in fast flow, steps of hours, and starts near contact. All advice for them
-was tried with a quarter and a twentieth of the step, and ten and a hundred times the modulus.
+The table lists where the advice of failing runs was followed. Members are those of verification/cases/hard_family.py.
+"Drawn" scenes are changes of base, drawn once: soft bodies in fast flow, steps of hours, and starts near contact.
+All advice for them was tried with a quarter and a twentieth of the step, and ten and a hundred times the modulus.
 
     message                                     followed in                     result
     negative substrate: refinement, linear      tests below, member 66          runs; tried before it is named

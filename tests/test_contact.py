@@ -230,8 +230,8 @@ def test_stationary_lines_stay_where_the_last_round_of_fluid_forces_left_them(pl
 
 
 def test_a_run_stops_within_a_step_in_contact(plugged, tmp_path):
-    """At most three systems (motion of the mesh, flow, substrates) are factorised between two
-    polls. A run that stops there goes on as if it had not."""
+    """At most three systems (motion of the mesh, flow, substrates) are factorised between two polls. A run that stops
+    there resumes with the bits of an uninterrupted run."""
     scene = plugged[0]
     since = []
     polls = []

@@ -136,8 +136,8 @@ def test_altered_fields_are_reported_and_computed_again(out, short, capsys, cont
 
 
 def test_a_run_killed_at_its_very_end_is_tidied(tmp_path, capsys):
-    """The status is written, but the page is missing and a checkpoint remains. Resuming, the same command and --force
-    tidy the folder."""
+    """The status is written, the page is missing, and a checkpoint remains. A resume, the same command and --force
+    each tidy the folder."""
     run(load_scene("flow_only"), tmp_path)
     page = tmp_path / "report.html"
     page_content = page.read_bytes()

@@ -48,10 +48,11 @@ def test_a_small_change_of_the_start_changes_no_state(slab, share):
     are the supply and each stable state, changed by a share that varies from node to node."""
     _, problem, density, states = slab
     assert largest_gap(channels.steady(problem, density).donor, states[-1]) < MESH
-    for start, due in ((np.full_like(states[0], SUPPLY), states[-1]), (states[-1], states[-1]), (states[0], states[0])):
+    supplied = np.full_like(states[0], SUPPLY)
+    for start, expected in ((supplied, states[-1]), (states[-1], states[-1]), (states[0], states[0])):
         changed = start * (1 + share * np.random.default_rng(1).uniform(size=len(start)))
         computed = channels.steady(problem, density, transport.Concentrations(None, changed)).donor
-        assert largest_gap(computed, due) < MESH
+        assert largest_gap(computed, expected) < MESH
 
 
 @pytest.mark.parametrize("place", [0, -1])

@@ -40,7 +40,7 @@ def scene(name, end=None):
 
 
 def same(one, other):
-    """Do two runs have the same tables, fields and indices, and the same record?"""
+    """Return whether two runs have the same tables, fields, indices and record."""
     left, right = (lasting_record(folder) | {"origin": None, "files": None, "sha256": None} for folder in (one, other))
     return files(one) == files(other) and left == right
 

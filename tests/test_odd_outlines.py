@@ -89,8 +89,8 @@ def test_a_hostile_outline_has_a_first_row_or_is_refused_by_its_scene(family, se
     points = family(random.Random(seed))
     try:
         accepted = scene(points)
-    except SceneError as refusal:
-        assert "aggregate.outline" in str(refusal) and " is needed" in str(refusal) and "\n" not in str(refusal)
+    except SceneError as error:
+        assert "aggregate.outline" in str(error) and " is needed" in str(error) and "\n" not in str(error)
         return
     expected = memory.first_nodes(accepted)
     assert expected < MOST_NODES

@@ -242,14 +242,14 @@ def repository_files():
 
 
 def is_file(name):
-    """Does the repository have a file of this path, or one that ends with it?"""
+    """Return whether the repository has a file of this path, or one whose path ends with it."""
     name = name.removeprefix("../")
     return name in repository_files() or any(path.endswith(f"/{name}") for path in repository_files())
 
 
 @cache
 def is_module(name):
-    """Does the module, or its attribute, exist?"""
+    """Return whether the module, or its attribute, exists."""
     try:
         resolve_name(name)
     except (ImportError, AttributeError):

@@ -48,7 +48,7 @@ SCENES = {"fast": (FAST, 'growth.end="9.7 h"'), "contact": (FAST, 'growth.end="0
 
 
 def same(one, other):
-    """Are two states, without their rows, the same to the last bit?"""
+    """Return whether two states, without their rows, agree to the last bit."""
     return alike(one.pore, other.pore) and one.step_control == other.step_control
 
 
