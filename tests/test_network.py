@@ -188,14 +188,6 @@ def test_uptakes_outside_of_the_fit_are_within_the_bound():
     assert np.median(apart) < 0.01 and np.median(bound) < 0.1
 
 
-def test_uptake_of_a_new_state():
-    """Solved here: a half-disc in a state that no table has."""
-    one = uptakes.solved(shapes.half_disc(0.5, 80.0, 0.0, shapes.QUICK), 0.8, (6.0, 3.0))
-    law_of_it = repro.uptake(one.area, 80.0, 0.8, 6.0, 3.0)
-    assert law_of_it.acceptor == pytest.approx(one.acceptor_uptake, rel=float(law_of_it.bound))
-    assert law_of_it.donor == pytest.approx(one.donor_uptake, rel=float(law_of_it.bound))
-
-
 def test_limits_of_the_uptake():
     """A small aggregate in a fast flow takes up at the rates of the supply. In a slow flow the inflow limits the
     uptake."""

@@ -24,7 +24,6 @@ from tests import browser
 from tests.pages import (
     FAST,
     HOSTILE,
-    PURE,
     Page,
     check_alone,
     decode_numbers,
@@ -186,17 +185,6 @@ def test_a_run_that_stops_has_its_page(tmp_path, monkeypatch):
     text = text_of(run(tmp_path, "base", status=1))
     assert "Failed: stopped in the step from t = 0 h, in growth: " in text
     Page(text)
-
-
-def test_every_name_has_its_unit_or_is_a_pure_number():
-    """This holds for columns, ledgers and arrays."""
-    for name, quantity in names.KNOWN.items():
-        assert bool(names.unit(name)) != (name in PURE)
-        assert quantity.formula and names.words(name) != name or name == "J"
-    examples = {"mean_velocity_m_per_d": ("m/day", "m d-1"), "thickness_um": ("um", "um"), "head_loss_cm": ("cm", "cm"),
-             "aggregate_area_um2": ("um²", "um2"), "acceptor_supplied_pg_per_m": ("pg/m", "pg m-1"),
-             "donor_min_mg_per_L": ("mg/L", "mg L-1"), "nodes": ("", "1")}
-    assert {name: (names.unit(name), names.udunits(name)) for name in examples} == examples
 
 
 #: The words for parts of a name; other parts occur in the long name as they are.

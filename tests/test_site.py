@@ -24,12 +24,6 @@ pytestmark = [pytest.mark.thorough, pytest.mark.skipif(browser.CHROMIUM is None,
               pytest.mark.skipif(not PAGES, reason="make docs has built no site")]
 
 
-@pytest.fixture(scope="module")
-def window():
-    with browser.Browser() as chromium:
-        yield chromium
-
-
 def settled(window, script):
     """Return the value of a script in the page as soon as it is true; fail after 20 s."""
     end = time.monotonic() + 20
@@ -48,9 +42,7 @@ def test_every_page_opens_without_an_error_and_loads_nothing_from_elsewhere(wind
         window.show(page, width=width, dark=dark)
         assert window.errors == [], page
         assert [url for url in window.requests if not url.startswith(("file:", "data:"))] == [], page
-        assert window.run("document.documentElement.scrollWidth") <= width, page
-        colour = window.run("getComputedStyle(document.body).backgroundColor")
-        assert (max(map(int, re.findall(r"\d+", colour)[:3])) < 128) == dark, page
+        window.check_look(width, dark)
         assert window.run("[...document.images].every(image => image.naturalWidth > 0 && image.alt)"), page
         assert not window.run("[...document.images].some(image => /[.](png|svg)$/.test(image.alt))"), page
 

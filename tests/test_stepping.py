@@ -11,13 +11,10 @@ from itertools import product
 import numpy as np
 import pytest
 
-from repro import timing
 from repro.errors import GrowthError, SimulationError, Unresolved
-from repro.fem import linear
 from repro.fem.outline import FREE, TOP
 from repro.march import midpoint, simulation, step_control, stepping, updates
 from repro.march.midpoint import Attempt
-from repro.march.simulation import simulate
 from repro.march.step_control import EXCESS, StepControl, exceeds_tolerance
 from repro.model import contact, pore, remeshing
 from repro.model.pore import solve
@@ -51,7 +48,7 @@ SCENES = {"fast": (FAST, 'growth.end="9.7 h"'), "contact": (FAST, 'growth.end="0
 
 
 def same(one, other):
-    """Are two states, without their rows, the same to the last bit?"""
+    """Return whether two states, without their rows, agree to the last bit."""
     return alike(one.pore, other.pore) and one.step_control == other.step_control
 
 
@@ -289,12 +286,3 @@ def test_an_update_under_a_table_starts_from_gears_concentrations(order):
     stored = updates.step(Stages.of(scene), pore, solved, 0.2).ledger.stored[0]
     risen = stored / (scene.pore.width * np.ptp(pore.mesh.ends))
     assert risen == pytest.approx(2.0, rel=0.05)
-
-
-def test_every_stage_of_a_step_is_timed():
-    """These times are the reported cost of a run."""
-    timing.reset()
-    *_, last = simulate(load_scene("base", ["growth.end=0.2 h", "numerics.refinement=0.5"]))
-    assert last.pore.time == 0.2
-    assert {"flow", "transport", "growth", "mesh motion", "meshing", linear.STAGE} <= set(timing.seconds)
-    assert min(timing.seconds.values()) > 0
