@@ -35,11 +35,10 @@ class ElementSystem:
         self.kinds = _several(unknowns)
         self.method = method
         self._ranked = np.argsort(rank, kind="stable")
-        place = np.empty(len(rank), int)
+        place = np.empty(len(rank), np.int32)
         place[self._ranked] = np.arange(len(rank))
         rows, columns = (place[_flat(part)] for part in zip(*map(linear.pairs, self.kinds)))
-        keys, self._slot = np.unique(columns * len(rank) + rows, return_inverse=True)
-        self._columns, self._rows = np.divmod(keys, len(rank))
+        self._rows, self._columns, self._slot = _distinct(rows, columns, len(rank))
         ends = np.cumsum([part.shape[0] * part.shape[1] ** 2 for part in self.kinds])
         self._slots = np.split(self._slot, ends[:-1])
         self._constrain(constrained)
@@ -117,6 +116,29 @@ class Factored:
             right = right - self.system.product(self.elements, x)
         x[order] = self.solver.solve(right[order])
         return x
+
+
+def _distinct(rows: np.ndarray, columns: np.ndarray,
+              count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Rows and columns of the distinct entries (m,), by column and then by row, and the number of
+    the distinct entry of each (m,)."""
+    order = _counting_sort(rows, count)
+    order = order[_counting_sort(columns[order], count)]
+    rows = rows[order]
+    columns = columns[order]
+    first = np.ones(len(order), bool)
+    first[1:] = (rows[1:] != rows[:-1]) | (columns[1:] != columns[:-1])
+    slot = np.empty(len(order), int)
+    slot[order] = np.cumsum(first) - 1
+    return rows[first], columns[first], slot
+
+
+def _counting_sort(keys: np.ndarray, count: int) -> np.ndarray:
+    """(m,) stable order of keys (m,) from 0 to count - 1, in linear time: the transpose of a sparse
+    row sorts its columns by counting. np.argsort takes twice as long."""
+    ends = np.array([0, len(keys)], np.int32)
+    entries = np.arange(len(keys), dtype=np.int32)
+    return sp.csr_matrix((entries, keys, ends), shape=(1, count)).tocsc().data
 
 
 def _several(parts: Parts) -> tuple[np.ndarray, ...]:
