@@ -7,7 +7,7 @@ import argparse
 from importlib import import_module
 
 from verification.bench import record, report
-from verification.evidence.writing import markdown, save
+from verification.evidence.writing import save
 
 #: Modules of the parts, imported when a part runs.
 PARTS = {"box": "users", "channel": "users", "base": "runs", "command": "commands", "size": "runs", "scenes": "runs",
@@ -27,17 +27,17 @@ def main(arguments: list[str] | None = None) -> dict:
 def measure(names, quick: bool) -> dict:
     """Run parts one after the other and save the record after each."""
     benchmark = {"machine": record.machine(), "parts": {} if quick else record.load()["parts"]}
-    print(markdown([report.machine(benchmark["machine"])]))
+    print(report.machine(benchmark["machine"]))
     for name in names:
         part = getattr(import_module(f"verification.bench.{PARTS[name]}"), f"{name}_part")(quick)
         benchmark["parts"][name] = part
         benchmark["verdicts"] = report.judged(benchmark)
-        print(markdown(report.blocks(name, part)), flush=True)
+        print(*report.blocks(name, part), sep="\n\n", flush=True)
         if not quick:
             save(benchmark, record.FILE)
     if not quick:
         report.draw(benchmark["parts"], record.FOLDER)
-    print(markdown([report.verdicts(benchmark["verdicts"])]))
+    print(report.verdicts(benchmark["verdicts"]))
     return benchmark
 
 

@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 
 from verification.bench import after_contact, runs
 from verification.bench.record import envelope, points, reading
-from verification.evidence.writing import Block, table
+from verification.evidence.writing import table
 
 #: (error, least ratio, aim) of the paper's scheme at its own best speed over a preset.
 FASTER = {runs.FAST: (0.01, 5.0, 10.0), runs.ACCURATE: (0.001, 20.0, 20.0)}
@@ -191,23 +191,22 @@ def _ratio(row: dict, key: str, most: float) -> tuple[str, bool]:
 WORDS = {True: "holds", False: "does not hold", None: NOT_MEASURED}
 
 
-def machine(about: dict) -> Block:
+def machine(about: dict) -> str:
     """The machine and the packages that the times belong to."""
-    return Block("text", f"Measured by `make bench` on {about['cores']} cores of {about['processor']}, one thread, "
-                         f"Python {about['python']}; importing the packages is not counted. Times of another machine "
-                         "differ, ratios less.")
+    return (f"Measured by `make bench` on {about['cores']} cores of {about['processor']}, one thread, Python "
+            f"{about['python']}; importing the packages is not counted. Times of another machine differ, ratios less.")
 
 
-def verdicts(rows: list[dict]) -> Block:
+def verdicts(rows: list[dict]) -> str:
     """A table."""
     return table(("claim", "wanted", "measured", ""), (
         (one["claim"], one["wanted"], one["measured"], WORDS[one["holds"]]) for one in rows))
 
 
-def blocks(name: str, part: dict) -> list[Block]:
+def blocks(name: str, part: dict) -> list[str]:
     """The blocks of a part with all its points."""
     description = "; ".join(f"{key}: {part[key]}" for key in ("error", "reference", "repeats") if key in part)
-    return [Block("heading", f"{name}: {part['title']}"), Block("text", description),
+    return [f"## {name}: {part['title']}", description,
             table(("method", "", "seconds and errors"), _rows(part))]
 
 

@@ -7,7 +7,7 @@ preset fast with cubic elements. A case names the parts that a preset may refuse
 from collections.abc import Collection, Iterable, Iterator, Mapping
 
 from verification.evidence.results import Result
-from verification.evidence.writing import REPORT, Block, load, save, table
+from verification.evidence.writing import REPORT, load, save, table
 
 RECORD = REPORT / "hard_cases.json"
 
@@ -40,16 +40,15 @@ def lines(cells: Collection[Mapping]) -> list[tuple[str, str, str, bool]]:
     return rows
 
 
-def blocks(matrix: dict) -> Iterator[Block]:
+def blocks(matrix: dict) -> Iterator[str]:
     """The matrix as blocks of a page."""
     presets = tuple(matrix["cases"][0]["cells"])
-    yield Block("heading", "Hard cases")
-    yield Block("text", "Right: the exact value, bound or conserved quantity of the case is met, and so are the "
-                        "balances; refused: an error says which bound was met; wrong: anything else. `make verify` "
-                        "runs them all, and leaves every number in `verification/report/live`; "
-                        "`pytest verification -k hard` runs them alone.")
+    yield "## Hard cases"
+    yield ("Right: the exact value, bound or conserved quantity of the case is met, and so are the balances; refused: "
+           "an error says which bound was met; wrong: anything else. `make verify` runs them all, and leaves every "
+           "number in `verification/report/live`; `pytest verification -k hard` runs them alone.")
     yield table(("", "case", "right is", *presets), (
-        (str(case["number"]), case["title"], case["right_is"], *map(_verdict, map(case["cells"].get, presets)))
+        (case["number"], case["title"], case["right_is"], *map(_verdict, map(case["cells"].get, presets)))
         for case in matrix["cases"]))
 
 

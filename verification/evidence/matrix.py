@@ -14,7 +14,7 @@ from itertools import product, starmap
 
 import repro
 from verification.evidence.cases import NUMERICS, Case, cases
-from verification.evidence.writing import REPORT, ROOT, Block, markdown, table
+from verification.evidence.writing import REPORT, ROOT, page, table
 from verification.mutants import runner
 
 FILE = REPORT / "matrix.md"
@@ -182,11 +182,11 @@ def orphans() -> list[str]:
 def text() -> str:
     """The page: both tables."""
     head = ("section", "equations", "modules", "cases", "references", "mutants", "claims")
-    blocks = [Block("heading", "Elements and presets"),
-              Block("text", "run: with every `make verify-fast`; slow: with `make verify`; n/a: not applicable."),
+    blocks = ["## Elements and presets",
+              "run: with every `make verify-fast`; slow: with `make verify`; n/a: not applicable.",
               table(("case", *NUMERICS, "not applicable because"), map(row, cases().values())),
-              Block("heading", "Equation, module, case, reference, mutant, claim"), table(head, map(line, parts()))]
-    return f"# What is verified by what, with which elements and presets\n\n{markdown(blocks, 2)}\n"
+              "## Equation, module, case, reference, mutant, claim", table(head, map(line, parts()))]
+    return page("What is verified by what, with which elements and presets", blocks)
 
 
 def main() -> int:

@@ -12,7 +12,7 @@ from os.path import commonprefix
 from verification.evidence import convergence, hard_cases, matrix
 from verification.evidence.cases import NUMERICS, Case, cases
 from verification.evidence.results import PASSES, Result
-from verification.evidence.writing import REPORT, Block, link, load, markdown, save, table
+from verification.evidence.writing import REPORT, link, load, page, save, table
 from verification.mutants import runner
 from verification.mutants.runner import Mutant
 
@@ -95,16 +95,15 @@ def texts(records: Mapping[str, Mapping]) -> dict[str, str]:
     for stage, title in TITLES.items():
         chosen = of_stage(stage, records)
         articles = [article(cases()[id], record) for id, record in chosen.items()]
-        head = [Block("text", summary(chosen.values())), *picture(stage, records)]
+        head = [summary(chosen.values()), *picture(stage, records)]
         pages[f"{stage}.md"] = title, [*head, *chain.from_iterable(articles)]
-    written = {name: f"# {title}\n\n{markdown(blocks, 2, '.')}\n" for name, (title, blocks) in pages.items()}
-    return {**written, "matrix.md": matrix.text()}
+    return {**{name: page(*parts) for name, parts in pages.items()}, "matrix.md": matrix.text()}
 
 
-def picture(stage: str, records: Mapping[str, Mapping]) -> list[Block]:
+def picture(stage: str, records: Mapping[str, Mapping]) -> list[str]:
     """The picture of convergence of a stage, if cases have series."""
     caption = "errors against sizes of meshes or steps, a panel a case; dashed: the expected order"
-    return [Block("picture", f"{stage}.svg: {caption}")] if stage in studies(records) else []
+    return [f"![{caption}](./{stage}.svg)"] if stage in studies(records) else []
 
 
 def of_stage(stage: str, records: Mapping[str, Mapping]) -> dict[str, Mapping]:
@@ -120,15 +119,15 @@ BESIDES = ((link("The paper's claims", "../../paper_figures/replication.md"), "`
            (link("Mutants made by machine", "sampled.md"), "`make mutants-sampled`"))
 
 
-def index(records: Mapping[str, Mapping]) -> list[Block]:
+def index(records: Mapping[str, Mapping]) -> list[str]:
     """The first page: stages, and a line a case."""
     stages = [(link(title, stage), summary(of_stage(stage, records).values())) for stage, title in TITLES.items()]
     more = ((link("Mutants", "mutants"), mutant_state()),
             (link(OF_READERS, "mutants_read"), "files, columns, charts and messages that users read"),
             (link("Equation, module, case, reference, mutant, claim", "matrix"), "what verifies what, with which "
              "elements and presets"))
-    return [Block("text", f"{INTRODUCTION} Written by `make verify`."),
-            Block("text", f"**{summary(records.values())}**"),
+    return [f"{INTRODUCTION} Written by `make verify`.",
+            f"**{summary(records.values())}**",
             table(("stage", ""), (*stages, *more)),
             table(("besides", ""), BESIDES),
             table(("case", "kind", "runs with", "numbers", "verdict", "must fall short with"),
@@ -137,19 +136,19 @@ def index(records: Mapping[str, Mapping]) -> list[Block]:
 
 def _index_row(case: Case, record: Mapping) -> tuple:
     numerics = " ".join(case.numerics) if case.numerics != NUMERICS else "all"
-    return (link(case.id, case.stage, case.id), case.kind, numerics, str(record["numbers"]), record["verdict"],
+    return (link(case.id, case.stage, case.id), case.kind, numerics, record["numbers"], record["verdict"],
             ", ".join(case.mutants))
 
 
-def article(case: Case, record: Mapping) -> list[Block]:
+def article(case: Case, record: Mapping) -> list[str]:
     """A case: its claim, verdict, norm, references and mutants, and a table of quantities, intervals and origins."""
     references = f" References: {', '.join(case.references)}." if case.references else ""
     about = (f"**{record['verdict']}**. {case.claim} ({case.kind}). Norm: {case.norm}.{references} "
              f"Must fail with: {', '.join(case.mutants)}.")
-    stopped = [Block("text", f"Stopped by an error: {error}") for error in record["errors"]]
+    stopped = [f"Stopped by an error: {error}" for error in record["errors"]]
     head = ("quantities", "expected", "origin", "hold")
     judged = [table(head, record["table"])] if record["table"] else []
-    return [Block("heading", case.id), Block("text", about), *stopped, *judged]
+    return [f"## {case.id}", about, *stopped, *judged]
 
 
 def shared(names: list[str]) -> str:
@@ -197,12 +196,12 @@ def mutant_state() -> str:
     return f"{count} by `make mutants`, {state}."
 
 
-def mutant_blocks(stages: Mapping[str, Iterable[Mutant]]) -> list[Block]:
+def mutant_blocks(stages: Mapping[str, Iterable[Mutant]]) -> list[str]:
     """A table a stage: mutants, and the cases or tests that caught them when they were last run."""
     records = runner.recorded()
-    blocks = [Block("text", mutant_state())]
+    blocks = [mutant_state()]
     for stage, chosen in stages.items():
         rows = [(mutant.id, mutant.says, ", ".join(records[mutant.id]["caught_by"]) or "not caught")
                 for mutant in chosen]
-        blocks += [Block("heading", stage), table(("mutant", "what is wrong with it", "caught by"), rows)]
+        blocks += [f"## {stage}", table(("mutant", "what is wrong with it", "caught by"), rows)]
     return blocks

@@ -4,7 +4,7 @@ import numpy as np
 
 from repro.results import read_table
 from repro.results.network import FAST, UPTAKE_BOUND, added_resistance, known
-from verification.evidence.writing import markdown, table
+from verification.evidence.writing import table
 from verification.network import histories, law, runs, throats, timed, uptakes
 from verification.network.law import RATIO
 
@@ -147,9 +147,9 @@ def _errors(compared: runs.Comparison) -> str:
         sides = (compared.law, compared.least, compared.most, compared.run)
         errors = [_error(*(part[k, -1, quantity] for part in sides)) for quantity in range(len(throats.QUANTITIES))]
         share = compared.run[k, -1, 0] / widths[number]**2
-        rows.append((str(number), f"{widths[number]:.1f}", f"{share:.2f}", *errors,
+        rows.append((number, f"{widths[number]:.1f}", f"{share:.2f}", *errors,
                      f"{100 * compared.example_error[k, -1]:+.1f} %"))
-    return markdown([table(head, rows)])
+    return table(head, rows)
 
 
 def _error(value: float, least: float, most: float, run: float) -> str:
@@ -199,7 +199,7 @@ def _sweep() -> str:
     pool, dask = ([seconds[name, workers] for workers in (1, 2)] for name in (timed.POOL, timed.DASK))
     failed = sum(way["unfinished"] for way in record["ways"])
     alike = "all ways give the same table" if record["equal"] else "the tables differ"
-    rows = ((way["way"], str(way["workers"]), f"{way['seconds']:.0f}", f"{record['runs'] / way['seconds']:.2f}",
+    rows = ((way["way"], way["workers"], f"{way['seconds']:.0f}", f"{record['runs'] / way['seconds']:.2f}",
              f"{seconds[way['way'], 1] / way['seconds']:.2f}", f"{way['load']:.1f}") for way in record["ways"])
     head = ("runs made by", "workers", "s", "runs/s", "times faster than one worker", "load")
     return f"""## A sweep of all throats
@@ -208,7 +208,7 @@ def _sweep() -> str:
 over {record["hours"]:g} h, in `fast` with files and page, on the process pool and on a
 Dask scheduler with workers on the same machine:
 
-{markdown([table(head, rows)])}
+{table(head, rows)}
 
 Two workers are {pool[0] / pool[1]:.2f} times faster than one on the process pool, and {dask[0] / dask[1]:.2f} times
 on Dask. Dask takes {dask[1] / pool[1]:.2f} times as long as the pool with two workers. Runs that failed: {failed};
@@ -238,4 +238,4 @@ def _markdown_table(spanned: bool) -> str:
     shares = np.array(PAGE_SHARES[spanned])
     head = (f"A / W^2, {'touching both walls' if spanned else 'before contact'}", "r", "least", "most")
     rows = zip(shares, *added_resistance(shares, 1.0, spanned, RATIO))
-    return markdown([table(head, ("{:g} {:.3g} {:.3g} {:.3g}".format(*row).split() for row in rows))])
+    return table(head, ("{:g} {:.3g} {:.3g} {:.3g}".format(*row).split() for row in rows))

@@ -27,7 +27,7 @@ from repro.results import field_files, read_table
 from repro.runs.execution import run
 from repro.runs.status import COMPLETED
 from repro.scene import Scene, load_scene
-from verification.evidence.writing import REPORT, markdown, table
+from verification.evidence.writing import REPORT, table
 from verification.problems.hard import TooLong, limited
 
 SEED, MEMBERS = 28, 100
@@ -178,7 +178,7 @@ def page(rows: dict[int, dict]) -> str:
     verdicts = Counter(row["verdict"] for row in rows.values())
     counts = ", ".join(f"{verdict}: {count}" for verdict, count in verdicts.most_common())
     folds = [row for row in rows.values() if row["verdict"] in (FOLD, UNCONFIRMED)]
-    cells = [(str(row["number"]), f"{row['width']:.0f}", f"{row['seed']:.0f}", f"{row['supply']:.2g}", row["drive"],
+    cells = [(row["number"], f"{row['width']:.0f}", f"{row['seed']:.0f}", f"{row['supply']:.2g}", row["drive"],
               f"{row['times_h'][-1]:.3g}", "yes" if row["contact"] else "no", f"{row['middle']:.3f}",
               f"{row['mean']:.3f}", "yes" if row["verdict"] == FOLD else "no")
              for row in sorted(folds, key=lambda row: row["width"])]
@@ -189,7 +189,7 @@ def page(rows: dict[int, dict]) -> str:
             "least stretch, middle of an edge", "mean over an edge", "confirmed")
     return (f"# Pores of the family\n\nWritten by `python -m verification.problems.family`. {len(rows)} "
             f"pores: {counts}.\n\n{' '.join(_forecast(name, counted) for name, counted in fates.items())}\n\n"
-            f"{markdown([table(head, cells)])}\n")
+            f"{table(head, cells)}\n")
 
 
 def _forecast(name: str, fates: Counter) -> str:

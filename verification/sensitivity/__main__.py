@@ -18,7 +18,8 @@ from matplotlib.figure import Figure
 from repro.results import write_json, write_text
 from verification import sensitivity
 from verification.claims import interval
-from verification.evidence.writing import Block, markdown, saved_figure, table
+from verification.evidence import writing
+from verification.evidence.writing import saved_figure, table
 from verification.sensitivity import rounding, wide
 from verification.sensitivity.rounding import INPUTS, ROUNDED, Input, Runs, load_varied
 
@@ -96,16 +97,16 @@ def _bars(axes: Axes, name: str, value: float, resolved: bool) -> None:
 
 
 def page(record: dict) -> str:
-    """The record in words and tables."""
+    """The page of the record."""
     words = ("Elasticities d ln(number) / d ln(input), by central differences of the converged solution; ± is their "
              "bar, and one that exceeds a tenth of the value is *not resolved*. `make sensitivity` writes this page.")
-    blocks = [Block("text", words), Block("text", f"![Tornado diagram]({TARGET.name})"), _table(record)]
+    blocks = [words, f"![Tornado diagram]({TARGET.name})", _table(record)]
     for part, section in SECTIONS.items():
         blocks += section(record[part])
-    return f"# What the inputs of Table 1 allow\n\n{markdown(blocks, 2)}\n\n"
+    return writing.page("What the inputs of Table 1 allow", blocks) + "\n"
 
 
-def _table(record: dict) -> Block:
+def _table(record: dict) -> str:
     known = record["elasticities"]
     return table(("input", "rounding (%)", *map(_title_of, known)), (_row(each, known) for each in INPUTS))
 
@@ -128,14 +129,14 @@ def _cell(known: dict | None) -> str:
     return f"{word} (± {known['bar']:.1g}){by_10_percent}"
 
 
-def _set(one_set: dict) -> Iterator[Block]:
+def _set(one_set: dict) -> Iterator[str]:
     words = ("One set of inputs within the rounding gives all printed numbers of base at once" if one_set["reached"]
              else "No set of inputs within the rounding gives all printed numbers of base at once; the nearest")
     sizes = _listed(one_set["sizes"], ".3g")
-    yield Block("heading", "One set of inputs")
-    yield Block("text", f"{words} (a share of {one_set['share_of_the_rounding']:.2f} of the rounding is needed). It "
-                        f"was run on sizes {sizes} of elements and steps, over those of `accurate`; the bar is from "
-                        "all of them, and a set counts where the whole bar lies in the interval of the printed digits.")
+    yield "## One set of inputs"
+    yield (f"{words} (a share of {one_set['share_of_the_rounding']:.2f} of the rounding is needed). It was run on "
+           f"sizes {sizes} of elements and steps, over those of `accurate`; the bar is from all of them, and a set "
+           "counts where the whole bar lies in the interval of the printed digits.")
     yield table(("number", "printed", "a run with the set", "bar", "on these sizes"), (
         (_title_of(name), "{:g} to {:g}".format(*interval(rounding.PRINTED[name])), f"{value:.4f}",
          f"{one_set['bars'][name]:.1g}", _listed(one_set["on_sizes"][name], ".4f"))
@@ -147,41 +148,41 @@ def _listed(values: list[float], how: str) -> str:
     return ", ".join(format(value, how) for value in values)
 
 
-def _supplies(by_supply: dict) -> Iterator[Block]:
-    yield Block("heading", "The supply of Figure 6, which is not printed")
+def _supplies(by_supply: dict) -> Iterator[str]:
+    yield "## The supply of Figure 6, which is not printed"
     yield table(("supply of both (K_s)", "contact (h)", "ends at contact (um)", "least acceptor then (K_s)"), (
         (supply, f"{known['contact_time']:.1f}", f"{known['upstream']:.0f} to {known['downstream']:.0f}",
          f"{known['acceptor_min']:.2g}") for supply, known in by_supply.items()))
-    yield Block("text", f"![Outlines with each supply]({OUTLINES.name})")
+    yield f"![Outlines with each supply]({OUTLINES.name})"
     yield from _verdicts(by_supply)
 
 
-def _verdicts(by_supply: dict[str, dict]) -> Iterator[Block]:
+def _verdicts(by_supply: dict[str, dict]) -> Iterator[str]:
     """Which claims about wide hold with which supplies."""
     every, some, none = (", ".join(ids) or "none" for ids in wide.verdicts(by_supply))
-    yield Block("text", "Of the claims about this run, each judged anew with the converged solution at one size, to "
-                f"{wide.AFTER} h after contact or until the aggregate reaches an end of the pore, these hold with "
-                f"all supplies: {every}; with some: {some}; with none: {none}.")
-    yield Block("text", "Numbers that hold with some supplies and not with all:")
+    yield ("Of the claims about this run, each judged anew with the converged solution at one size, to "
+           f"{wide.AFTER} h after contact or until the aggregate reaches an end of the pore, these hold with all "
+           f"supplies: {every}; with some: {some}; with none: {none}.")
+    yield "Numbers that hold with some supplies and not with all:"
     yield table(("claim", *(f"{supply} K_s" for supply in by_supply)), (
         (name, *map({True: "yes", False: "no"}.get, holds)) for name, holds in wide.moving(by_supply)))
 
 
-def _after_contact(rows: list[dict]) -> Iterator[Block]:
-    yield Block("heading", "How well wide is known after contact")
-    yield Block("text", "Values from the finest size to the coarsest; means are over whole hours from contact to 45 h. "
-                "A single row jumps as one more edge of the outline comes to rest on the wall.")
+def _after_contact(rows: list[dict]) -> Iterator[str]:
+    yield "## How well wide is known after contact"
+    yield ("Values from the finest size to the coarsest; means are over whole hours from contact to 45 h. A single row "
+           "jumps as one more edge of the outline comes to rest on the wall.")
     yield table(("number", "values", "bar (%)", "asked (%)", "kept"), (
         (known["quantity"], _listed(known["values"], ".4g"), f"{known['bar_percent']:.2g}",
          f"{known['asked_percent']:g}", "yes" if known["kept"] else "no") for known in rows))
 
 
-def _sobol(indices: dict) -> Iterator[Block]:
+def _sobol(indices: dict) -> Iterator[str]:
     widest = max(0.5 * (high - low) for known in indices["numbers"].values() for _, low, high in known["total_order"])
-    yield Block("heading", "Sobol indices of base")
-    yield Block("text", f"Total indices of {indices['samples']} samples in `fast`, with intervals of "
-                f"{100 * indices['confidence']:.0f} %: the share of a number's variance within the rounding that goes "
-                f"with an input. The widest of the intervals is {widest:.2f} to either side.")
+    yield "## Sobol indices of base"
+    yield (f"Total indices of {indices['samples']} samples in `fast`, with intervals of "
+           f"{100 * indices['confidence']:.0f} %: the share of a number's variance within the rounding that goes with "
+           f"an input. The widest of the intervals is {widest:.2f} to either side.")
     yield table(("number", *indices["inputs"]), (
         (_title_of(name), *map(_index, known["total_order"])) for name, known in indices["numbers"].items()))
 
@@ -191,7 +192,7 @@ def _index(known: list[float]) -> str:
 
 
 #: Page sections of the parts of the record, in order.
-SECTIONS: dict[str, Callable[..., Iterator[Block]]] = {
+SECTIONS: dict[str, Callable[..., Iterator[str]]] = {
     "one_set": _set, "after_contact": _after_contact, "supplies": _supplies, "sobol": _sobol}
 
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from itertools import chain
 from pathlib import Path
 
-from verification.evidence.writing import REPORT, Block, load, markdown, save, table
+from verification.evidence.writing import REPORT, load, page, save, table
 from verification.mutants.machine.sample import COUNT, SEED
 from verification.mutants.machine.survivors import EQUIVALENT, LEFT
 
@@ -106,17 +106,17 @@ def text() -> str:
     caught = Counter(row["file"] for row in verdicts["caught"])
     survivors = [(*_place(row), *LEFT.get(key(row), ("", ""))) for row in verdicts["survivor"]]
     equivalent = [(*_place(row), EQUIVALENT[key(row)]) for row in verdicts["equivalent"]]
-    counts = [(file, str(drawn[file]), str(caught[file])) for file in sorted(drawn)]
-    blocks = [Block("text", INTRODUCTION), Block("text", summary(verdicts)),
+    counts = [(file, drawn[file], caught[file]) for file in sorted(drawn)]
+    blocks = [INTRODUCTION, summary(verdicts),
               *_section("Survivors", survivors, "effect", "why no test"),
               *_section("Shown equivalent", equivalent, "why"),
-              Block("heading", "By module"), table(("module", "mutants", "caught"), counts)]
-    return f"# Mutants made by machine\n\n{markdown(blocks, level=2)}\n"
+              "## By module", table(("module", "mutants", "caught"), counts)]
+    return page("Mutants made by machine", blocks)
 
 
-def _section(title: str, rows: list[tuple[str, ...]], *columns: str) -> list[Block]:
+def _section(title: str, rows: list[tuple[str, ...]], *columns: str) -> list[str]:
     """A table of changes; nothing if there are none."""
-    return [Block("heading", title), table(("where", "was", "is", *columns), rows)] if rows else []
+    return [f"## {title}", table(("where", "was", "is", *columns), rows)] if rows else []
 
 
 def _place(row: dict) -> tuple[str, str, str]:
