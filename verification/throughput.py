@@ -9,23 +9,21 @@ run in a process that has imported them, each the best of five. Takes under four
 """
 
 import argparse
-import subprocess
 import sys
 from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
 from time import perf_counter
-from timeit import repeat
 
 from repro import load_scene, run, sweep
 from repro.sweeps.pool import cores
+from verification.bench.commands import PACKAGES, time_process
 
 REQUIRED = 0.95
 #: Preset of the sweep, and the additional preset of the commands.
 JUDGED, SLOWER = "fast", "accurate"
 RUNS = 200  # of the sweep
 SINGLE = 10  # runs before the sweep, and after it
-PACKAGES = "numpy, scipy.sparse.linalg, skfem, mmgpy, shapely, meshio"  # that a run needs
 WIDTHS = "48:52 um"  # nearly the same run each time
 
 
@@ -63,8 +61,7 @@ def measure() -> float:
 
 def seconds_of_process(*arguments: str) -> float:
     """Seconds of a new Python process with these arguments, the least of five measurements."""
-    return min(repeat(lambda: subprocess.run([sys.executable, *arguments], stdout=subprocess.DEVNULL, check=True),
-                      number=1))
+    return min(time_process(*arguments)[0] for _ in range(5))
 
 
 def seconds_of_run(preset: str, folder: Path) -> float:

@@ -41,8 +41,7 @@ import numpy as np
 
 from verification.evidence import writing
 
-FOLDER = Path(__file__).parents[1] / "report"
-FILE = FOLDER / "bench.json"
+FILE = writing.REPORT / "bench.json"
 CPUS = Path("/proc/cpuinfo")
 PACKAGES = ("numpy", "scipy", "scikit-fem", "shapely", "mmgpy", "fipy", "py-pde", "numba")
 
@@ -50,6 +49,12 @@ PACKAGES = ("numpy", "scipy", "scikit-fem", "shapely", "mmgpy", "fipy", "py-pde"
 def load() -> dict:
     """The record of the last benchmark; without parts if there is none."""
     return writing.load(FILE, {"parts": {}})
+
+
+def reference_of(name: str, key: str, value: object) -> dict:
+    """The recorded reference of a part, if it has an entry with this value; else nothing."""
+    part = load()["parts"].get(name, {})
+    return {key: entry for key, entry in part.items() if key.startswith("reference")} if part.get(key) == value else {}
 
 
 def machine() -> dict:

@@ -9,14 +9,13 @@ from collections import defaultdict
 from collections.abc import Callable, Iterator
 from itertools import cycle, product
 from math import inf
-from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from verification.bench import after_contact, runs
 from verification.bench.record import envelope, points, reading
-from verification.evidence.writing import table
+from verification.evidence.writing import REPORT, saved_figure, table
 
 #: (error, least ratio, aim) of the paper's scheme at its own best speed over a preset.
 FASTER = {runs.FAST: (0.01, 5.0, 10.0), runs.ACCURATE: (0.001, 20.0, 20.0)}
@@ -227,14 +226,11 @@ MARKS = "os^vDP*X<>hd"
 COLORS = (*(f"C{k}" for k in range(10)), "black", "navy", "darkgreen", "darkred")
 
 
-def draw(parts: dict, folder: Path) -> list[Path]:
-    """Draw the errors of the parts; return the files."""
-    files = []
+def draw(parts: dict) -> None:
+    """Draw the errors of the parts."""
     for name, part in parts.items():
         if "error" in part:
-            files.append(folder / f"bench_{name}.svg")
-            _precision(part).savefig(files[-1], metadata={"Date": None})
-    return files
+            saved_figure(_precision(part), REPORT / f"bench_{name}.svg")
 
 
 def _precision(part: dict) -> Figure:

@@ -205,7 +205,7 @@ METHODS = {1: "linear elements (paper)", 2: "order 2 (fast, accurate)", 3: "orde
 QUADRATIC = "scikit-fem: quadratic elements"
 
 
-def _compared(problem: Problem, about: tuple[str, str, str], other_codes: dict, truths, scale, quick: bool) -> dict:
+def _compared(problem: Problem, about: tuple[str, str, str], other_codes: dict, truths, scale) -> dict:
     """A part of the benchmark. about: (title, error, reference), the latter formatted with the finer of both truths and
     their difference; other_codes: {name: (sizes, solve)}, ``solve(cells)`` returns (2,) numbers; truths: the reference,
     coarser first. py-pde's compiled run comes once, on one grid: numba compiles for longer than it runs.
@@ -226,12 +226,11 @@ def _compared(problem: Problem, about: tuple[str, str, str], other_codes: dict, 
                         partial(solve_with_repro, problem, order=order))
                for order, method in METHODS.items()} | other_codes
     jobs = {(method, f"{cells} cells"): partial(solved, solve, cells)
-            for method, (sizes, solve) in methods.items() for cells in (sizes[:1] if quick else sizes)}
-    once = {} if quick else {(COMPILED, f"{problem.stepped} cells"): stepped}
-    repeats = 1 if quick else REPEATS
+            for method, (sizes, solve) in methods.items() for cells in sizes}
+    once = {(COMPILED, f"{problem.stepped} cells"): stepped}
     title, judged, reference = about
-    return {"title": title, "error": judged, "reference": reference.format(*truth, error(coarse)), "repeats": repeats,
-            "lines": measured(jobs, repeats) + measured(once, 1)}
+    return {"title": title, "error": judged, "reference": reference.format(*truth, error(coarse)), "repeats": REPEATS,
+            "lines": measured(jobs, REPEATS) + measured(once, 1)}
 
 
 #: Runs of a job that count.
@@ -250,7 +249,7 @@ BOX = Problem(((-HALF, HALF), (0.0, WIDTH)), _inside, (8, 16, 32, 64, 96), (2, 4
 COARSE, FINE = 32, 64
 
 
-def box_part(quick: bool) -> dict:
+def box_part() -> dict:
     """Diffusion and dual Monod uptake in a box with a block of biomass, whose sides follow the cells: what FiPy and
     py-pde can do as well; error of what is taken up."""
     truths = [quadratic(cells) for cells in (COARSE, FINE)]
@@ -261,7 +260,7 @@ def box_part(quick: bool) -> dict:
              "what is taken up of each substrate, relative, the larger error",
              f"quadratic elements of scikit-fem, {FINE} cells across: {{:.9g}} and {{:.9g}} um2 mg/L/h; from {COARSE} "
              "cells on they change by {:.1e}")
-    return _compared(BOX, about, other_codes, truths, truths[1], quick)
+    return _compared(BOX, about, other_codes, truths, truths[1])
 
 
 def _newton(cells: int) -> np.ndarray:
@@ -290,7 +289,7 @@ CHANNEL = Problem((ENDS,), lambda x, *y: (x > 0) & (x < STRIP), (15, 30, 60, 120
                   SPEED)
 
 
-def channel_part(quick: bool) -> dict:
+def channel_part() -> dict:
     """Plug flow through a strip of biomass with dual Monod uptake, one-dimensional: error of the effluents.
 
     Other codes solve it in one dimension; this package uses a ribbon of one cell across, with more than twice the
@@ -301,7 +300,7 @@ def channel_part(quick: bool) -> dict:
              "effluents over the supply, the larger error",
              "scipy's solve_bvp, tolerance 1e-9: {:.9f} and {:.9f} mg/L; from 1e-7 on they change by {:.1e} of the "
              "supply")
-    return _compared(CHANNEL, about, other_codes, [reference(1e-7), reference(1e-9)], SUPPLY, quick)
+    return _compared(CHANNEL, about, other_codes, [reference(1e-7), reference(1e-9)], SUPPLY)
 
 
 def reference(tolerance: float) -> np.ndarray:
