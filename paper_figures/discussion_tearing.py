@@ -16,7 +16,7 @@ from matplotlib.lines import Line2D
 
 from paper_figures import figure_6, style
 from repro.errors import GrowthError
-from verification.claims.fluid_and_aggregate import APART, peak, pressed
+from verification.claims.fluid_and_aggregate import APART, at_rest, peak
 from verification.claims.levels import CONVERGED, PAIRED, Level, at_level, cached
 from verification.claims.runs import BASE, WIDE, Body, bodies, load_packaged
 
@@ -42,7 +42,7 @@ def stress_history(run: tuple[str, ...], forced: bool) -> np.ndarray:
     rows = []
     for body in bodies(run)[:0:-2][::-1]:
         try:
-            largest = peak(pressed(body) if forced else body)
+            largest = peak(at_rest(body, "included") if forced else body)
         except GrowthError:
             break
         modulus = PASCAL * body.scene.growth.shear_modulus

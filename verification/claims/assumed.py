@@ -5,11 +5,9 @@ without oxygen. C63: an aggregate that the flow bends and that returns to its sh
 C65: the loading of its surface.
 """
 
-from dataclasses import replace
-
 import numpy as np
 
-from repro.model import biomass, contact, gear
+from repro.model import biomass, gear
 from repro.model.kinetics import Sink
 from repro.model.transport import Concentrations
 from verification.claims import (
@@ -23,7 +21,7 @@ from verification.claims import (
     claim,
     without_limit,
 )
-from verification.claims.fluid_and_aggregate import STATES, pressed
+from verification.claims.fluid_and_aggregate import STATES, at_rest
 from verification.claims.growth_pattern import biomass_rates, halves
 from verification.claims.levels import ABOUT_WIDE, ALONE, BESIDE, CONVERGED, Level, at_level
 from verification.claims.permeability import clean, decay_share
@@ -140,9 +138,9 @@ def returning() -> Finding:
     return."""
     checks, notes = [], []
     for run, hour in STATES:
-        rest = released(body(run, hour))
-        bent = pressed(rest)
-        outlines = [polygon(each.outline) for each in (rest, bent, released(bent))]
+        rest = at_rest(body(run, hour), "neglected")
+        bent = at_rest(rest, "included")
+        outlines = [polygon(each.outline) for each in (rest, bent, at_rest(bent, "neglected"))]
         moved, left = (uncovered(outlines[0], other) for other in outlines[1:])
         name = f"{run[0]}, {hour:g} h"
         checks.append(at_most(f"{name}: outlines apart after the flow has stopped, over those under the flow", "regain",
@@ -150,13 +148,6 @@ def returning() -> Finding:
         notes.append(f"{name} {moved:.2g} %")
     return Finding(tuple(map(without_limit, checks)), reason="where the flow presses the aggregate to a wall, it stays",
                    note=f"Area that only one of the outlines with and without the flow covers: {', '.join(notes)}.")
-
-
-def released(aggregate: Body) -> Body:
-    """The same aggregate at rest without the fluid's forces."""
-    still = replace(aggregate.scene, growth=replace(aggregate.scene.growth, fluid_forces="neglected"))
-    at_rest = contact.expand(contact.Mechanics.of(still), aggregate.pore, aggregate.pore.theta).pore
-    return Body(still, at_rest, aggregate.solved)
 
 
 #: Thickness over the pore's width up to which the scheme of Chen et al. (1996a) worked.

@@ -241,7 +241,7 @@ def torn_by_the_fluid() -> Finding:
     """Largest principal stress, in the mean over a tenth of the pore's width, with the fluid's forces and without: of
     base at 19.4 h and of wide at 30 h, with a film left, and of wide at 40 h, a plug under constant velocity. The
     statement holds if the fluid changes the stress in one of these states."""
-    pairs = {f"{run[0]}, {hour:g} h": (body(run, hour), pressed(body(run, hour))) for run, hour in STATES}
+    pairs = {f"{run[0]}, {hour:g} h": (body(run, hour), at_rest(body(run, hour), "included")) for run, hour in STATES}
     most = max(abs(changed(pair)) for pair in pairs.values())
     check = at_least("largest principal stress, in the mean over W / 10, changed by the fluid, the most of three "
                      "states (%)", "could provide a link", most, 100 * FEW, f"more than {FEW_WORDS}")
@@ -268,13 +268,13 @@ def _changes(pair: tuple[Body, Body]) -> str:
     return ", ".join(f"{changed(pair, part):.2g}" for part in DISTANCES)
 
 
-def pressed(aggregate: Body) -> Body:
-    """The same aggregate at rest under the fluid's forces. The result does not depend on the path, because the
-    aggregate is elastic. It leaves out the effect of the forces on growth. Raises GrowthError if shape and flow do not
-    agree."""
-    forced = replace(aggregate.scene, growth=replace(aggregate.scene.growth, fluid_forces="included"))
-    at_rest = contact.expand(contact.Mechanics.of(forced), aggregate.pore, aggregate.pore.theta).pore
-    return Body(forced, at_rest, aggregate.solved)
+def at_rest(aggregate: Body, fluid_forces: str) -> Body:
+    """The same aggregate at rest with the fluid's forces "included" or "neglected". The result does not depend on the
+    path, because the aggregate is elastic. It leaves out the effect of the forces on growth. Raises GrowthError if
+    shape and flow do not agree."""
+    scene = replace(aggregate.scene, growth=replace(aggregate.scene.growth, fluid_forces=fluid_forces))
+    pore = contact.expand(contact.Mechanics.of(scene), aggregate.pore, aggregate.pore.theta).pore
+    return Body(scene, pore, aggregate.solved)
 
 
 def tension(aggregate: Body) -> tuple[float, float, float, float]:

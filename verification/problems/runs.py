@@ -8,7 +8,7 @@ import numpy as np
 
 from reference import averaged_pore, whole_run
 from repro import results
-from repro.fem.outline import TOP
+from repro.fem.outline import TOP, Outline
 from repro.march import midpoint, updates
 from repro.march.balance import Ledger
 from repro.march.loop import Report, StepResult
@@ -105,12 +105,17 @@ def numbers(instant: Report) -> dict[str, float]:
             "conductivity": instant.solved.flow.conductivity}
 
 
+def contact_length(outline: Outline, wall: int) -> float:
+    """Length (um) of the contact surface with a wall; zero without contact."""
+    x = outline.points[outline.wall == wall, 0]
+    return float(np.ptp(x)) if len(x) else 0.0
+
+
 def after_contact(instant: Report) -> dict[str, float]:
-    """Conductivity, tips, and the length of contact with the opposite wall (zero without contact) at an instant."""
+    """Conductivity, tips, and the length of contact with the opposite wall at an instant."""
     outline = instant.pore.boundary
-    on = outline.points[outline.wall == TOP, 0]
     return {"conductivity (m/d)": M_PER_D * instant.solved.flow.conductivity, "upstream tip (um)": outline.upstream,
-            "downstream tip (um)": outline.downstream, "length of contact (um)": float(np.ptp(on)) if len(on) else 0.0}
+            "downstream tip (um)": outline.downstream, "length of contact (um)": contact_length(outline, TOP)}
 
 
 def without_flow(scene: Scene) -> Scene:
