@@ -37,8 +37,9 @@ def write(results: Iterable[Result]) -> None:
     records = {**load(RECORD, {}), **{result.id: entry(result) for result in complete}}
     save({id: records[id] for id in known if id in records}, RECORD)
     hard_cases.record(complete)
-    for stage, cases_of_stage in studies(recorded()).items():
-        convergence.draw(cases_of_stage, REPORT / f"{stage}.svg")
+    for stage in TITLES:
+        if series := studies(of_stage(stage, recorded())):
+            convergence.draw(series, REPORT / f"{stage}.svg")
     for name, text in texts(recorded()).items():
         (REPORT / name).write_text(text, encoding="utf-8")
 
@@ -51,12 +52,9 @@ def entry(result: Result) -> dict:
             "studies": convergence.series(result)}
 
 
-def studies(records: Mapping[str, Mapping]) -> dict[str, dict[str, dict]]:
-    """{stage: {case: its series}} of the cases whose records have series."""
-    by_stage = {stage: of_stage(stage, records) for stage in TITLES}
-    series = {stage: {id: record["studies"] for id, record in chosen.items() if record.get("studies")}
-              for stage, chosen in by_stage.items()}
-    return {stage: chosen for stage, chosen in series.items() if chosen}
+def studies(records: Mapping[str, Mapping]) -> dict[str, dict]:
+    """{case: its series} of the cases whose records have series."""
+    return {id: record["studies"] for id, record in records.items() if record.get("studies")}
 
 
 def lines(result: Result) -> list[tuple[str, str, str, bool]]:
@@ -95,15 +93,15 @@ def texts(records: Mapping[str, Mapping]) -> dict[str, str]:
     for stage, title in TITLES.items():
         chosen = of_stage(stage, records)
         articles = [article(cases()[id], record) for id, record in chosen.items()]
-        head = [summary(chosen.values()), *picture(stage, records)]
+        head = [summary(chosen.values()), *picture(stage, chosen)]
         pages[f"{stage}.md"] = title, [*head, *chain.from_iterable(articles)]
     return {**{name: page(*parts) for name, parts in pages.items()}, "matrix.md": matrix.text()}
 
 
 def picture(stage: str, records: Mapping[str, Mapping]) -> list[str]:
-    """The picture of convergence of a stage, if cases have series."""
+    """The picture of convergence of a stage, if the records of its cases have series."""
     caption = "errors against sizes of meshes or steps, a panel a case; dashed: the expected order"
-    return [f"![{caption}](./{stage}.svg)"] if stage in studies(records) else []
+    return [f"![{caption}](./{stage}.svg)"] if studies(records) else []
 
 
 def of_stage(stage: str, records: Mapping[str, Mapping]) -> dict[str, Mapping]:

@@ -183,13 +183,11 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m verification.mutants", description="Run wrong changes of repro.")
     parser.add_argument("ids", nargs="*", metavar="MUTANT", choices=[*known, []], default=[], help="all by default")
     parser.add_argument("--every", action="store_true", help="against every case that names it, not to the first catch")
-    parser.add_argument("--tests", action="store_true", help="only those that tests catch, not cases")
     parser.add_argument("--stale", action="store_true", help="only those whose record is not of the present code")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="processes; one a core by default")
     chosen = parser.parse_args(arguments)
-    ids = chosen.ids or (caught_by("tests") if chosen.tests else known)
     skipped = fresh() if chosen.stale else ()
-    outcomes = run_all([id for id in ids if id not in skipped], chosen.jobs, chosen.every)
+    outcomes = run_all([id for id in chosen.ids or known if id not in skipped], chosen.jobs, chosen.every)
     return 0 if judge(outcomes) else 1
 
 

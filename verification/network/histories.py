@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from repro.results import read_table, write_table
+from verification.network.shapes import select
 
 EXAMPLE = Path(__file__).parents[2] / "docs" / "howto" / "openpnm_network.py"
 #: A row per throat and time: its number in the network, and the state of the example, with a step of STEPS[0].
@@ -81,8 +82,7 @@ def read() -> list[History]:
     """The histories of all throats, by their numbers."""
     columns = read_table(TABLE)
     numbers = columns["throat"].astype(int)
-    return [_history(number, {name: values[numbers == number] for name, values in columns.items()})
-            for number in np.unique(numbers).tolist()]
+    return [_history(number, select(columns, numbers == number)) for number in np.unique(numbers).tolist()]
 
 
 def _history(number: int, columns: dict[str, np.ndarray]) -> History:

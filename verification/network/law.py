@@ -16,7 +16,7 @@ from scipy.interpolate import PchipInterpolator
 from repro.results import read_table
 from repro.results.network import added_resistance, known
 from verification.network import shapes
-from verification.network.shapes import RATIOS, Growth, Sample, log_uniform
+from verification.network.shapes import RATIOS, Growth, Sample, log_uniform, select
 
 #: Thicknesses over W of the table's half-discs, and areas over W^2 of its plugs. The least area is one at which nearly
 #: all runs are in contact: runs with earlier contact resist more.
@@ -53,7 +53,7 @@ def other_shapes() -> Iterator[Sample]:
     for share, ends, upstream in product((2.1, 2.7, 3.2, 3.7, 4.2), shapes.ENDS, (0.5, shapes.UPSTREAM)):
         yield shapes.sample(shapes.drawn(shapes.plug(share, ends, upstream)))
     for run in RUNS:
-        yield from shapes.grown(run, MOST, APART)
+        yield from (shapes.sample(pore, run=run) for pore in shapes.grown(run, MOST, APART))
 
 
 def table_rows(discs: list[Sample], samples: list[Sample]) -> list[list]:
@@ -122,7 +122,7 @@ def shape_row(one: Sample, new: int) -> list:
 def read(unseen: bool) -> dict[str, np.ndarray]:
     """The columns of the fit's shapes, or of the shapes that the fit has not seen."""
     columns = read_table(SHAPES)
-    return {name: values[columns["unseen"] == unseen] for name, values in columns.items()}
+    return select(columns, columns["unseen"] == unseen)
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,8 +194,9 @@ def _outlined(points: np.ndarray, random: np.random.Generator) -> Sample:
 
 def _grown(random: np.random.Generator) -> Iterator[Sample]:
     """Shapes of a run that are in the law's range, their areas evenly from the first to the last."""
-    run = shapes.drawn_run(random)
-    samples = [one for one in shapes.grown(run, LARGEST, FURTHER, (_ratio(random),)) if _known(one)]
+    run, ratio = shapes.drawn_run(random), _ratio(random)
+    grown = (shapes.sample(pore, (ratio,), run) for pore in shapes.grown(run, LARGEST, FURTHER))
+    samples = [one for one in grown if _known(one)]
     shares = np.array([one.share for one in samples])
     for share in np.linspace(shares[0], shares[-1], OF_EACH):
         yield samples[np.abs(shares - share).argmin()]

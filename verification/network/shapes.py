@@ -134,7 +134,7 @@ def plug(share: float, ends: float, upstream: float) -> np.ndarray:
     return np.vstack([left, right[::-1]])
 
 
-def grown(run: Growth, most: float, apart: float, ratios=RATIOS) -> Iterator[Sample]:
+def grown(run: Growth, most: float, apart: float) -> Iterator[Pore]:
     """Yield shapes of a run up to an area over W^2, each larger than the last by a factor of at least `apart`."""
     last = 0.0
     for instant in simulate(run.scene()):
@@ -143,4 +143,9 @@ def grown(run: Growth, most: float, apart: float, ratios=RATIOS) -> Iterator[Sam
             return
         if share > apart * last:
             last = share
-            yield sample(instant.pore, ratios, run)
+            yield instant.pore
+
+
+def select(columns: dict[str, np.ndarray], rows: np.ndarray) -> dict[str, np.ndarray]:
+    """Some rows of the columns of a table; rows: (n,) bool."""
+    return {name: values[rows] for name, values in columns.items()}

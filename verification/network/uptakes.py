@@ -11,7 +11,6 @@ from scipy.optimize import least_squares
 
 from repro.march.folding import Fold
 from repro.march.loop import PoreEnd
-from repro.march.simulation import simulate
 from repro.model import pore
 from repro.model.pore import Pore
 from repro.results import read_table
@@ -19,7 +18,7 @@ from repro.results.network import Throats, Transport, known, throats_of
 from repro.scene import load_scene
 from verification.claims.runs import SUBSTRATES
 from verification.network import shapes
-from verification.network.shapes import Growth, log_uniform
+from verification.network.shapes import Growth, log_uniform, select
 
 TABLE = Path(__file__).with_name("uptakes.csv")
 #: Ranges of the states: mean velocity (m/d), supply of each substrate (mg/L), width (um), thickness of half-discs over
@@ -74,7 +73,7 @@ def states(part: int) -> Iterator[State]:
 def read(part: int) -> dict[str, np.ndarray]:
     """The columns of the fit or of a test."""
     columns = read_table(TABLE)
-    return {name: values[columns["part"] == part] for name, values in columns.items()}
+    return select(columns, columns["part"] == part)
 
 
 def throats(columns: dict[str, np.ndarray]) -> Throats:
@@ -96,7 +95,7 @@ def fitted(columns: dict[str, np.ndarray]) -> tuple[Transport, Transport]:
 
 
 def _fitted(columns: dict[str, np.ndarray], selected: np.ndarray) -> Transport:
-    chosen = {name: values[selected] for name, values in columns.items()}
+    chosen = select(columns, selected)
     spread = throats(chosen).spread()
 
     def residuals(logarithms: np.ndarray) -> np.ndarray:
@@ -129,16 +128,9 @@ def judged(part: int = NEW) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _grown(run: Growth) -> Iterator[Pore]:
-    """Shapes of a run, each larger than the one before by a factor of APART."""
-    last = 0.0
+    """Shapes of a run, which may end at the pore's end or as a fold."""
     with suppress(PoreEnd, Fold):
-        for instant in simulate(run.scene()):
-            area = instant.pore.boundary.area
-            if area > LARGEST * run.width**2:
-                return
-            if area > APART * last:
-                last = area
-                yield instant.pore
+        yield from shapes.grown(run, LARGEST, APART)
 
 
 def solved(body: Pore, velocity: float, supplies: Sequence[float], grown: bool = False, part: int = FIT) -> State:

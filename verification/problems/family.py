@@ -27,7 +27,7 @@ from repro.results import field_files, read_table
 from repro.runs.execution import run
 from repro.runs.status import COMPLETED
 from repro.scene import Scene, load_scene
-from verification.evidence.writing import REPORT, table
+from verification.evidence.writing import REPORT, lines, table
 from verification.problems.hard import TooLong, limited
 
 SEED, MEMBERS = 28, 100
@@ -169,8 +169,7 @@ def is_expected(member: Member) -> bool:
 
 def read_record() -> dict[int, dict]:
     """Recorded rows by number. The last row of a member counts."""
-    rows = (json.loads(line) for line in RECORD.read_text(encoding="utf-8").splitlines())
-    return dict(sorted((row["number"], row) for row in rows))
+    return dict(sorted((row["number"], row) for row in lines(RECORD)))
 
 
 def page(rows: dict[int, dict]) -> str:
