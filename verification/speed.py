@@ -62,10 +62,16 @@ def _after_contact(part: dict) -> Iterator[str]:
     """Yield the diagram of wide after contact, and the errors of the presets."""
     yield "![error against time of wide at 39.3 h, after contact](../verification/report/bench_wide.svg)"
     yield f"{part['title']}. Error: {part['error']}. Reference: {part['reference']}."
-    yield table(("preset", "time (s)", *after_contact.NUMBERS), (
-        (line["method"].split()[1], f"{line['points'][0]['seconds']:.2f}",
-         *(f"{100 * error:.2g} %" for error in line["points"][0]["errors"][after_contact.TIMES.index(
-             after_contact.DRAWN)])) for line in part["lines"] if line["method"] in runs.PRESETS))
+    drawn, rows = after_contact.TIMES.index(after_contact.DRAWN), []
+    for name, point in _preset_points(part).items():
+        errors = (f"{100 * error:.2g} %" for error in point["errors"][drawn])
+        rows.append((name, f"{point['seconds']:.2f}", *errors))
+    yield table(("preset", "time (s)", *after_contact.NUMBERS), rows)
+
+
+def _preset_points(part: dict) -> dict[str, dict]:
+    """{preset: its own point} of a part."""
+    return {line["method"].split()[1]: line["points"][0] for line in part["lines"] if line["method"] in runs.PRESETS}
 
 
 def paper_point(part: dict) -> dict:
@@ -75,9 +81,7 @@ def paper_point(part: dict) -> dict:
 
 def _presets(part: dict) -> Iterator[tuple[str, ...]]:
     slow = paper_point(part)
-    preset_points = {line["method"].split()[1]: line["points"][0]
-                     for line in part["lines"] if line["method"] in runs.PRESETS}
-    for name, point in {"paper": slow, **preset_points}.items():
+    for name, point in {"paper": slow, **_preset_points(part)}.items():
         errors = (f"{100 * error:.2g} %" for error in (point["error"], *point["errors"]))
         yield (name, f"{point['seconds']:.2f}", f"{slow['seconds'] / point['seconds']:.1f} times", *errors)
 

@@ -114,7 +114,8 @@ def wide() -> list[dict]:
 
 SCENES_REPEATS = 31
 FLOW, SUBSTRATES = {"flow": {"head": "1e-3 cm"}}, {"substrates": {}}
-GROWTH, CLEAN, DONOR = {"growth": {"end": "2.4 h"}}, {"aggregate": None}, {"substrates": {"donor": {}}}
+GROWTH, CLEAN = {"growth": {"end": "2.4 h"}}, {"aggregate": None}
+DONOR = {"substrates": {"donor": {}}}
 #: Sections of each scene, None for an absent one; the timed stages that the scene needs.
 SCENES = {"whole": ({**FLOW, **SUBSTRATES, **GROWTH}, {"flow", "transport"}),
           "frozen shape": ({**FLOW, **SUBSTRATES}, {"flow", "transport"}),

@@ -90,8 +90,8 @@ def first_profiles() -> Finding:
     uniform = Concentrations(*(np.full(len(solved.concentrations.acceptor), supply) for supply in supplies))
     settled = gear.settle(solved.problem, Sink(pore.active), solved.concentrations)
     ends = [gear.advance(solved.problem, pore.active, pore.inert, start, UPDATE) for start in (uniform, settled)]
-    apart = [np.abs(one - other).max() / supply
-             for one, other, supply in zip(*(both(end.concentrations) for end in ends), supplies)]
+    one, other = (both(end.concentrations) for end in ends)
+    apart = np.abs(one - other).max(axis=1) / supplies
     made = [float((end.active + end.inert - pore.active - pore.inert).sum()) for end in ends]
     checks = (*(at_most(f"{name} after 12 min, from C_supply and from settled profiles: apart (% of the supply)",
                         "C = C_supply", 100 * value, 100 * TRANSPORT, TRANSPORT_WORDS)

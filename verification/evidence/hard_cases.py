@@ -17,7 +17,8 @@ def record(results: Iterable[Result]) -> None:
     rows = {row["number"]: row for row in load(RECORD, {"cases": []})["cases"]}
     for cells in (result.cells for result in results if result.cells):
         case = next(iter(cells.values()))["case"]
-        verdicts = {preset: {key: cell[key] for key in ("verdict", "accepted")} for preset, cell in cells.items()}
+        verdicts = {preset: {"verdict": cell["verdict"], "accepted": cell["accepted"]}
+                    for preset, cell in cells.items()}
         rows[case["number"]] = {**case, "cells": verdicts}
     save({"cases": [rows[number] for number in sorted(rows)]}, RECORD)
 

@@ -143,9 +143,9 @@ def _errors(compared: runs.Comparison) -> str:
     head = ("throat", "width (um)", "A / W^2", "area", "flow", "acceptor uptake", "donor uptake", "area in the example")
     widths = {one.number: one.width for one in histories.read()}
     rows = []
+    sides = np.array([compared.law, compared.least, compared.most, compared.run])
     for k, number in enumerate(compared.number.tolist()):
-        sides = (compared.law, compared.least, compared.most, compared.run)
-        errors = [_error(*(part[k, -1, quantity] for part in sides)) for quantity in range(len(throats.QUANTITIES))]
+        errors = [_error(*values) for values in sides[:, k, -1].T]
         share = compared.run[k, -1, 0] / widths[number]**2
         rows.append((number, f"{widths[number]:.1f}", f"{share:.2f}", *errors,
                      f"{100 * compared.example_error[k, -1]:+.1f} %"))
@@ -196,7 +196,8 @@ def _sweep() -> str:
     if not record:
         return ""
     seconds = {(way["way"], way["workers"]): way["seconds"] for way in record["ways"]}
-    pool, dask = ([seconds[name, workers] for workers in (1, 2)] for name in (timed.POOL, timed.DASK))
+    pool = [seconds[timed.POOL, workers] for workers in (1, 2)]
+    dask = [seconds[timed.DASK, workers] for workers in (1, 2)]
     failed = sum(way["unfinished"] for way in record["ways"])
     alike = "all ways give the same table" if record["equal"] else "the tables differ"
     rows = ((way["way"], way["workers"], f"{way['seconds']:.0f}", f"{record['runs'] / way['seconds']:.2f}",

@@ -42,9 +42,12 @@ from repro.scene import load_scene
 from verification.network.histories import History, rounded
 
 #: A / W^2 at the end that separates the two groups of throats, and the number of throats from each group.
-THICK, OF_THICK, OF_OTHERS = 1.0, 4, 6
-#: Length of a throat (um), nu (m2/s) and g (m/s2) of the example.
-LENGTH, VISCOSITY, GRAVITY = 600.0, 1e-6, 9.81
+THICK = 1.0
+OF_THICK, OF_OTHERS = 4, 6
+#: Length of a throat (um).
+LENGTH = 600.0
+#: nu (m2/s) and g (m/s2) of the example.
+VISCOSITY, GRAVITY = 1e-6, 9.81
 #: g / (12 nu), m/d per um2 at a slope of 1.
 PER_HEAD = GRAVITY / (12 * VISCOSITY) * 86400 * 1e-12
 #: Steps of the law in each step of the example.
@@ -55,8 +58,9 @@ PRESET = 0.01
 TIMES = (12.0, 24.0, 36.0, 48.0)
 #: Velocities (m/d) and the least supply over W^2 (mg/L/um2) of the shapes behind the law of resistance.
 VELOCITIES, LEAST_SUPPLY = (0.5, 6.0), 1 / 2500
-#: Sides of the bounds: the law itself, the largest and the least.
-LAW, MOST, LEAST = 0, 1, -1
+#: Sides of the law: the law itself, and its largest and least value.
+LAW = 0
+MOST, LEAST = 1, -1
 #: Areas between both bounds at which the other bounds are computed: a larger area takes up more and lets less pass.
 TRIALS = 9
 QUANTITIES = ("area_um2", "velocity_m_per_d", "acceptor_pg_per_m_h", "donor_pg_per_m_h")
@@ -190,17 +194,17 @@ def expected(throats: list[History]) -> list[list]:
 
 def at_times(throats: list[History]) -> np.ndarray:
     """(times, quantities, n, 3) the law, its least and its most value at TIMES."""
-    of_sides = {side: areas(throats, side) for side in (LAW, LEAST, MOST)}
+    reached = np.array([areas(throats, side) for side in (LAW, LEAST, MOST)])
     indices = np.searchsorted(throats[0].time, TIMES)
-    return np.array([values({side: reached[:, index] for side, reached in of_sides.items()},
-                            conditions(throats, index, time)) for index, time in zip(indices, TIMES)])
+    return np.array([values(reached[:, :, index], conditions(throats, index, time))
+                     for index, time in zip(indices, TIMES)])
 
 
-def values(area: dict[int, np.ndarray], at: Conditions) -> np.ndarray:
-    """(quantities, n, 3) the law, its least and its most value, from the areas (n,) of these sides."""
-    low, high = (1 - PRESET) * area[LEAST], (1 + PRESET) * area[MOST]
+def values(area: np.ndarray, at: Conditions) -> np.ndarray:
+    """(quantities, n, 3) the law, its least and its most value, from the areas (3, n) of these sides."""
+    low, high = (1 - PRESET) * area[1], (1 + PRESET) * area[2]
     trials = np.linspace(low, high, TRIALS)
-    law = np.array(quantities(area[LAW], at, LAW))
+    law = np.array(quantities(area[0], at, LAW))
     least = np.min([quantities(trial, at, LEAST) for trial in trials], axis=0)
     most = np.max([quantities(trial, at, MOST) for trial in trials], axis=0)
     least[1:] *= 1 - PRESET

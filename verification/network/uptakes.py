@@ -21,20 +21,24 @@ from verification.network import shapes
 from verification.network.shapes import Growth, log_uniform, select
 
 TABLE = Path(__file__).with_name("uptakes.csv")
-#: Ranges of the states: mean velocity (m/d), supply of each substrate (mg/L), width (um), thickness of half-discs over
-#: the width.
-VELOCITIES, SUPPLIES, WIDTHS, THICKNESSES = (1e-4, 10.0), (0.2, 20.0), (40.0, 150.0), (0.05, 0.98)
+#: Ranges of the mean velocity (m/d) and of the supply of each substrate (mg/L).
+VELOCITIES, SUPPLIES = (1e-4, 10.0), (0.2, 20.0)
+#: Ranges of the width (um) and of the thickness of half-discs over the width.
+WIDTHS, THICKNESSES = (40.0, 150.0), (0.05, 0.98)
 #: Parts of the states, and the seed of each.
 FIT, NEW = 0, 1
 SEEDS = {FIT: 20261126, NEW: 20261201}
-#: Numbers for each part: half-discs, runs whose shapes it uses, and states at each shape.
-HALF_DISCS, RUNS, STATES = {FIT: 120, NEW: 25}, {FIT: 4, NEW: 2}, {FIT: 3, NEW: 1}
-#: The factor by which each shape of a run is larger than the one before; the largest area over W^2; and the number of
-#: shapes in NEW, drawn evenly from all of its runs.
-APART, LARGEST, NEW_GROWN = 1.2, 4.5, 25
+#: Half-discs in each part.
+HALF_DISCS = {FIT: 120, NEW: 25}
+#: Runs in each part, and states at each of their shapes.
+RUNS, STATES = {FIT: 4, NEW: 2}, {FIT: 3, NEW: 1}
+#: The factor by which each shape of a run is larger than the one before, and the largest area over W^2.
+APART, LARGEST = 1.2, 4.5
+#: Number of grown shapes in NEW, drawn evenly from all of its runs.
+NEW_GROWN = 25
 #: The bound of the law is the largest error of the fit, over the spread of the bound, times this factor.
 FACTOR = 1.25
-#: Where the fit starts: diffusion through a layer of a tenth of W, and water that is half mixed.
+#: The start of the fit: diffusion through a layer of a tenth of W, and water that is half mixed.
 START = Transport(10.0, 0.5, 0.5, 0.5)
 ARGUMENTS = ("area", "width", "velocity", *SUBSTRATES)
 

@@ -45,8 +45,11 @@ TESTED = range(100, 140)
 SAME = 1e-6
 #: Time (h) of the least stretch in the message of a fold.
 LEAST = re.compile(r"um at t = (\S+) h;")
-#: Verdicts. The last two are errors.
-ARRIVES, PORE_END, FOLD, UNCONFIRMED, FAILED = ("end", "pore's end", "fold", "fold, not confirmed", "failed")
+#: Verdicts of runs that end as the model does.
+ARRIVES, PORE_END = "end", "pore's end"
+FOLD = "fold"
+#: Verdicts that are errors.
+UNCONFIRMED, FAILED = "fold, not confirmed", "failed"
 
 
 @dataclass(frozen=True)
@@ -181,18 +184,18 @@ def page(rows: dict[int, dict]) -> str:
               f"{row['times_h'][-1]:.3g}", "yes" if row["contact"] else "no", f"{row['middle']:.3f}",
               f"{row['mean']:.3f}", "yes" if row["verdict"] == FOLD else "no")
              for row in sorted(folds, key=lambda row: row["width"])]
-    fates = {name: Counter((is_expected(draw_member(number)), row in folds) for number, row in rows.items()
-                           if number in members and row["verdict"] != FAILED)
-             for name, members in (("fitted", range(MEMBERS)), ("not fitted", TESTED))}
+    sentences = [_forecast("fitted", rows, range(MEMBERS)), _forecast("not fitted", rows, TESTED)]
     head = ("member", "width (um)", "seed (um)", "supply (mg/L)", "drive", "fold (h)", "contact before it",
             "least stretch, middle of an edge", "mean over an edge", "confirmed")
     return (f"# Pores of the family\n\nWritten by `python -m verification.problems.family`. {len(rows)} "
-            f"pores: {counts}.\n\n{' '.join(_forecast(name, counted) for name, counted in fates.items())}\n\n"
+            f"pores: {counts}.\n\n{' '.join(sentences)}\n\n"
             f"{table(head, cells)}\n")
 
 
-def _forecast(name: str, fates: Counter) -> str:
-    """A sentence on the folds that `repro check` expects. fates: {(expected, folds): number of pores}."""
+def _forecast(name: str, rows: dict[int, dict], members: range) -> str:
+    """A sentence on the folds that `repro check` expects among some members."""
+    fates = Counter((is_expected(draw_member(number)), rows[number]["verdict"] in (FOLD, UNCONFIRMED))
+                    for number in members if number in rows and rows[number]["verdict"] != FAILED)
     expected, others = (fates[forecast, True] + fates[forecast, False] for forecast in (True, False))
     return (f"Of the {expected + others} pores to which its estimate was {name}, `repro check` expects {expected} to "
             f"fold, of which {fates[True, True]} do, and {others} not to, of which {fates[False, True]} do.")

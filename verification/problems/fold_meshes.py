@@ -32,7 +32,8 @@ STRESS_FREE = "growth.new_biomass=stress_free"
 
 def follow(scene: Scene, limit: float, state: RestartState | None = None) -> tuple[dict, RestartState | None]:
     """(end, time and least stretch) of a run, and its last state with a stretch above BEGUN."""
-    last, before, end = state, state, "end"
+    last = before = state
+    end = "end"
     try:
         with limited(limit):
             for last, _ in simulation.steps(scene, state):

@@ -303,6 +303,12 @@ class Part:
     checks: tuple[Check, ...] = ()
     always: tuple[Check, ...] = ()
 
+    @property
+    def bounds(self) -> list[list[str]]:
+        """Name, interval and origin of each of its own checks, if the part is right."""
+        checks = self.checks if self.verdict == RIGHT else ()
+        return [[check.quantity, check.interval(3), check.origin] for check in checks]
+
 
 @dataclass(frozen=True, eq=False)
 class Cell:
@@ -333,8 +339,7 @@ class Cell:
         """The cell in plain types for the pages: case, verdicts, messages, and the intervals of the right parts."""
         case = self.case
         parts = [{"name": part.name, "verdict": part.verdict, "accepted": part not in self.unaccepted,
-                  "bounds": [[check.quantity, check.interval(3), check.origin] for check in part.checks
-                             if part.verdict == RIGHT]} for part in self.parts]
+                  "bounds": part.bounds} for part in self.parts]
         return {"case": {"number": case.number, "id": case.full_id, "title": case.title, "right_is": case.right_is,
                          "failure_is": case.failure_is, "may_refuse": list(case.refusable)},
                 "preset": self.preset, "verdict": self.verdict, "accepted": not self.unaccepted,

@@ -43,7 +43,8 @@ def _row(mutation, result) -> dict:
 def _change(diff: str, operator: str) -> tuple[str, str]:
     """The lines that a mutant changes, before and after; a decorator with the line that follows it."""
     lines = diff.partition("\n@@")[2].splitlines()[1:]
-    old, new = ("\n".join(line[1:].strip() for line in lines if line.startswith(sign)) for sign in "-+")
+    old = "\n".join(line[1:].strip() for line in lines if line.startswith("-"))
+    new = "\n".join(line[1:].strip() for line in lines if line.startswith("+"))
     if operator.endswith("RemoveDecorator"):
         place = next(place for place, line in enumerate(lines) if line.startswith("-"))
         new = lines[place + 1][1:].strip()
