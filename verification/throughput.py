@@ -1,11 +1,13 @@
 """Rate of a sweep against that of single runs: ``python -m verification.throughput [--repeats N]``.
 
-The rate of single runs is the median of several runs, one after the other in one process that has imported all
-packages, before and after the sweep. The rate of the sweep counts 200 short runs on all cores, from an empty folder to
-the page, with the start of the processes. Required: 0.95 times the number of cores, with base in `fast`, which takes
-less than half a second a run. The exit status is 1 if the sweep is slower, or if a command takes too long: `repro
---help` may take twice the import of NumPy; a run of base may take 1.3 times the import of its packages plus the same
-run in a process that has imported them, each the best of five. Takes under four minutes on two free cores.
+Single runs are made one after the other, before and after the sweep, in a process that has imported all packages. Their
+rate is that of the median. The sweep makes 200 short runs on all cores. Its time includes the start of the processes,
+the files and the page. The required ratio of both rates is 0.95 times the number of cores, with base in `fast`, which
+takes less than half a second per run.
+
+Two commands are timed too, each the best of five. `repro --help` may take twice the import of NumPy. A run of base may
+take 1.3 times the import of its packages plus the same run in a process that has imported them. The exit status is 1 if
+a ratio is missed. All takes less than four minutes on two free cores.
 """
 
 import argparse

@@ -84,8 +84,7 @@ Jobs = Mapping[tuple[str, str], Callable[[], dict]]
 
 
 def measured(jobs: Jobs, repeats: int) -> list[dict]:
-    """Measure the jobs {(method, label): job}, and return the lines of a part, with the methods in the order of the
-    jobs.
+    """Measure jobs, and return the lines of a part, with the methods in the order of the jobs.
 
     A job returns {"error": ..., ...}; its "apart_seconds" and "apart_cpu" are subtracted from its times. A job that
     fails is recorded with the reason and does not run again.
@@ -126,7 +125,8 @@ def clock() -> np.ndarray:
 
 
 def timed(job: Callable[[], dict]) -> tuple[float, np.ndarray, dict]:
-    """Wall time of a run; its wall and processor time without the seconds set apart; and the output of the job."""
+    """Wall time of a job; its wall and processor time without the seconds that its output sets apart; and this
+    output."""
     gc.collect()
     start = clock()
     output = job()
@@ -138,8 +138,10 @@ def timed(job: Callable[[], dict]) -> tuple[float, np.ndarray, dict]:
 
 @dataclass(frozen=True)
 class Reading:
-    """Wall and processor seconds that a method needs for an error; how: "measured", "between points" or
-    "extrapolated with slope p", of log time by log error."""
+    """Wall and processor seconds that a method needs for an error.
+
+    how: "measured", "between points", or "extrapolated with slope p" of log time against log error.
+    """
 
     seconds: float
     cpu: float

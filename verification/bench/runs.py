@@ -43,7 +43,7 @@ BY_MINUTES = ("refinement {:g}, {} min", "numerics.refinement={}", "growth.time_
 BY_TOLERANCE = ("refinement {:g}, tolerance {:g}", "numerics.refinement={}", "numerics.tolerance={}")
 OF_PAPER, OF_ACCURATE = ("numerics.preset=paper",), ("numerics.preset=accurate",)
 BUBBLE, MIDPOINT_RULE = "numerics.flow_element=bubble", "numerics.time=midpoint"
-#: Method, labels and keys, sizes, and further changes of the scene.
+#: (method, label and keys, sizes, other changes of the scene).
 METHODS_OF_BASE = (
     (PRESET_PAPER, BY_MINUTES, PAPER, OF_PAPER),
     ("bubble alone", BY_MINUTES, CHANGED, (*OF_PAPER, BUBBLE)),
@@ -129,7 +129,7 @@ SCENES = {"whole": ({**FLOW, **SUBSTRATES, **GROWTH}, {"flow", "transport"}),
 
 
 def scenes_part() -> dict:
-    """Time of a first solution. It must contain only the stages of the scene.
+    """Time of a first solution, in which only the stages of the scene may run.
 
     Base with a seed of 20 um, unchanged, without growth (frozen shape), and without other parts. The time includes the
     mesh.
@@ -160,25 +160,27 @@ def measure_first_solution(preset: str, name: str) -> dict:
     return {"stages": stages, "took": took, "unneeded": sorted(set(stages) - needed - {"meshing"})}
 
 
-#: Number of steps, their length (h), and the part of them that is ignored.
+#: Number of steps.
 MANY_STEPS = 180
+#: Length of a step (h), and the part of the steps that is ignored.
 LENGTH, WARM = 0.001, 0.25
+#: Largest slope over the size of one nodal field.
 PART = 0.1
 MEMORY_PRESETS = {"paper": 0.4, "accurate": 0.25}
 
 
 def memory_part() -> dict:
-    """No allocation that grows with the number of steps: live memory of a long run of an aggregate that hardly grows.
+    """Live memory of a long run of an aggregate that hardly grows. It must not grow with the number of steps.
 
     The slope of the allocated memory (tracemalloc, numpy's arrays included) against the step, after the first ones: the
     median of the slopes between all pairs (Theil and Sen), which is robust to single jumps. Storing one nodal field per
     step would take 8 bytes per node and step; the bound is a tenth of that.
     """
-    rows = [grown(preset, refinement) for preset, refinement in MEMORY_PRESETS.items()]
+    rows = [memory_slope(preset, refinement) for preset, refinement in MEMORY_PRESETS.items()]
     return {"title": "Live memory against the number of steps, after the first quarter", "rows": rows, "repeats": 1}
 
 
-def grown(preset: str, refinement: float) -> dict:
+def memory_slope(preset: str, refinement: float) -> dict:
     """Slope (bytes per step) of a run of MANY_STEPS steps."""
     scene = load_scene("base", [f"numerics.preset={preset}", f"numerics.refinement={refinement}",
                                 "aggregate.radius=20 um", f"growth.time_step={LENGTH} h",
@@ -197,7 +199,7 @@ def grown(preset: str, refinement: float) -> dict:
             "bound": PART * 8 * nodes}
 
 
-#: {target number of nodes: steps timed after the first}; with 0 the first step is timed, with its orderings.
+#: {target number of nodes: timed steps after the first}. With 0 the first step is timed, which orders the nodes.
 SIZES = {600: 5, 2500: 3, 10_000: 2, 40_000: 1, 160_000: 0}
 #: Preset and Jacobian of Newton's methods: a reused Jacobian makes the floor and the step cheaper.
 METHODS = {"preset paper": "paper fresh", "order 2, midpoint (accurate)": "accurate reused",

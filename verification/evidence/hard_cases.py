@@ -1,7 +1,7 @@
 """The matrix of the hard cases with every preset, ``verification/report/hard_cases.json``.
 
-Each cell, a case with a preset, is right, refused or wrong; see :mod:`verification.problems.hard`. "cubic" is the
-preset fast with cubic elements. A case names the parts that a preset may refuse, and ``paper`` may refuse all.
+A cell is a case with a preset. It is right, refused or wrong; see :mod:`verification.problems.hard`. "cubic" is the
+preset fast with cubic elements. A case names the parts that a preset may refuse; ``paper`` may refuse all parts.
 """
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
@@ -13,7 +13,7 @@ RECORD = REPORT / "hard_cases.json"
 
 
 def record(results: Iterable[Result]) -> None:
-    """Replace the rows of the hard cases among some results."""
+    """Replace the recorded rows of the hard cases that ran."""
     rows = {row["number"]: row for row in load(RECORD, {"cases": []})["cases"]}
     for cells in (result.cells for result in results if result.cells):
         case = next(iter(cells.values()))["case"]
@@ -24,8 +24,8 @@ def record(results: Iterable[Result]) -> None:
 
 
 def lines(cells: Collection[Mapping]) -> list[tuple[str, str, str, bool]]:
-    """The verdict of each part by preset; then the intervals of the right parts, by preset where they differ. Cells
-    have the form of :meth:`verification.problems.hard.Cell.as_row`."""
+    """Rows of a table: the verdicts of each part, and the intervals of the right parts. Presets share equal intervals.
+    Cells have the form of :meth:`verification.problems.hard.Cell.as_row`."""
     presets = ", ".join(cell["preset"] for cell in cells)
     rows = []
     for parts in zip(*(cell["parts"] for cell in cells)):
@@ -35,8 +35,8 @@ def lines(cells: Collection[Mapping]) -> list[tuple[str, str, str, bool]]:
     for part in (part for cell in cells for part in cell["parts"]):
         for quantity, interval, origin in part["bounds"]:
             bounds.setdefault(f"{part['name']}, {quantity}", []).append((interval, origin))
-    for name, alike in bounds.items():
-        intervals, origins = map(dict.fromkeys, zip(*alike))
+    for name, pairs in bounds.items():
+        intervals, origins = map(dict.fromkeys, zip(*pairs))
         rows.append((name, "; ".join(intervals), "; ".join(origins), True))
     return rows
 

@@ -1,8 +1,8 @@
 """The pages of the verification: a page a stage, an index, the mutants, and the matrix.
 
-Pages are committed. They hold verdicts, orders, intervals, and numbers rounded to half of their tolerance, so that a
-run on another machine writes the same files. All of them follow from ``evidence.json``, which has an entry a case. A
-run of some cases replaces their entries and leaves the others as recorded.
+Pages are committed. They contain verdicts, orders, intervals, and numbers rounded to half of their tolerance. A run on
+another machine therefore writes the same files. All pages follow from ``evidence.json``, which has an entry for each
+case. A run of some cases replaces their entries and does not change the others.
 """
 
 from collections.abc import Iterable, Mapping
@@ -45,7 +45,7 @@ def write(results: Iterable[Result]) -> None:
 
 
 def entry(result: Result) -> dict:
-    """The record of a case: verdict, how many numbers it judged, the errors that stopped variants, and the table."""
+    """The record of a case: verdict, count of judged numbers, errors that stopped variants, table, and studies."""
     stopped = [f"{label}: {error}" if label else error for label, error in result.errors.items()]
     return {"verdict": result.verdict, "numbers": len(result.measured), "errors": stopped,
             "table": grouped(hard_cases.lines(result.cells.values()) if result.cells else lines(result)),
@@ -58,17 +58,17 @@ def studies(records: Mapping[str, Mapping]) -> dict[str, dict]:
 
 
 def lines(result: Result) -> list[tuple[str, str, str, bool]]:
-    """(quantity and its reproducible number, interval, origin, whether it holds) of all evidence of a case."""
+    """Rows of the table of a case: quantity with its reproducible number, interval, origin, whether it holds."""
     return [(part.quantity + (f" ({part.reproducible})" if part.reproducible else ""), part.interval(3), part.origin,
              part.holds) for part in result.measured]
 
 
 def grouped(rows: Iterable[tuple[str, str, str, bool]]) -> list[list[str]]:
-    """Rows of a table; quantities with the same interval, origin and outcome share one."""
-    alike: dict[tuple[str, str, str], list[str]] = {}
+    """Rows of a table. Quantities with the same interval, origin and outcome share a row."""
+    names: dict[tuple[str, str, str], list[str]] = {}
     for quantity, interval, origin, holds in rows:
-        alike.setdefault((interval, origin, "yes" if holds else "NO"), []).append(quantity)
-    return [[shared(names), *key] for key, names in alike.items()]
+        names.setdefault((interval, origin, "yes" if holds else "NO"), []).append(quantity)
+    return [[shared(quantities), *key] for key, quantities in names.items()]
 
 
 def recorded() -> dict[str, dict]:
@@ -109,8 +109,8 @@ def of_stage(stage: str, records: Mapping[str, Mapping]) -> dict[str, Mapping]:
     return {id: record for id, record in records.items() if cases()[id].stage == stage}
 
 
-#: Judgements with pages of their own.
-BESIDES = ((link("The paper's claims", "../../paper_figures/replication.md"), "`make claims`"),
+#: Other pages on what is verified or judged.
+OTHER_PAGES = ((link("The paper's claims", "../../paper_figures/replication.md"), "`make claims`"),
            (link("Ambiguities and misprints of the paper", "../../reference/ERRATA.md"), "`verification.errata`"),
            (link("What the rounding of Table 1 allows", "../sensitivity/sensitivity.md"), "`make sensitivity`"),
            (link("The law for networks", "../../docs/network.md"), "`python -m verification.network`"),
@@ -127,7 +127,7 @@ def index(records: Mapping[str, Mapping]) -> list[str]:
     return [f"{INTRODUCTION} Written by `make verify`.",
             f"**{summary(records.values())}**",
             table(("stage", ""), (*stages, *more)),
-            table(("besides", ""), BESIDES),
+            table(("besides", ""), OTHER_PAGES),
             table(("case", "kind", "runs with", "numbers", "verdict", "must fall short with"),
                   (_index_row(cases()[id], record) for id, record in records.items()))]
 
@@ -163,8 +163,8 @@ def shared(names: list[str]) -> str:
 
 
 def listed(labels: list[str]) -> str:
-    """Labels as one list. Neighbours share a number in brackets at their ends, and three or more share the parts after
-    a comma that they end with."""
+    """Labels as one list. Neighbours share a number in brackets at their end. Three or more share the parts
+    after a comma that they end with."""
     split = [label.rpartition(" (") if label.endswith(")") else (label, "", "") for label in labels]
     rows = []
     for ending, group in groupby(split, key=lambda parts: parts[2]):

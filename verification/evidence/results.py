@@ -1,4 +1,4 @@
-"""The results of a session, case by case, and their record ``report/live/measured.json``, which is not committed."""
+"""The results of the cases of a session, and their record ``report/live/measured.json``, which is not committed."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def as_row(part: Check | Study) -> dict:
 
 
 def from_row(row: dict, label: str = "") -> Check | Study:
-    """The check or the study of a row; the label of its variant ends the name of the quantity."""
+    """The check or study of a row. The label of its variant is added to the name of the quantity."""
     quantity = f"{row['quantity']}, {label}" if label else row["quantity"]
     arrays = {name: np.array(value) for name, value in row.items() if isinstance(value, list)}
     return (Study if arrays else Check)(**{**row, **arrays, "quantity": quantity})
@@ -39,8 +39,8 @@ def shortfall(part: Check | Study) -> str:
 
 @dataclass
 class Result:
-    """What the variants of a case recorded, by label: their evidence, the error that stopped them, and the cells of
-    hard cases; seconds of all of them."""
+    """The results of a case by the labels of its variants: evidence, the error that stopped a variant, and the cell of
+    a hard case. seconds: of all variants together."""
 
     id: str
     evidence: dict[str, list[Check | Study]] = field(default_factory=dict)

@@ -17,8 +17,11 @@ REPORT = ROOT / "verification" / "report"
 
 
 def link(text: str, page: str, place: str = "") -> str:
-    """A cell of Markdown that leads to a place on a page of the report: page "flow", place "flow-plug"; or to another
-    file: page "../../docs/network.md"."""
+    """A link in Markdown.
+
+    page: a page of the report, such as "flow", or the path of another page, such as "../../docs/network.md"; place: a
+    heading on it, such as "flow-plug".
+    """
     file = page if page.endswith(".md") else f"{page}.md"
     return f"[{text}]({file}{'#' * bool(place)}{place})"
 
@@ -58,7 +61,7 @@ def saved_figure(figure: Figure, target: Path) -> None:
 
 
 def lines(file: Path) -> list[dict]:
-    """The complete rows of a file; rows that were cut off are skipped."""
+    """The complete rows of a file. Incomplete rows are skipped."""
     rows = []
     for line in file.read_text(encoding="utf-8").splitlines() if file.exists() else []:
         with suppress(json.JSONDecodeError):
@@ -67,7 +70,7 @@ def lines(file: Path) -> list[dict]:
 
 
 def append(row: dict, file: Path) -> None:
-    """Append a row to a file. Each row begins with its line break, so that an interruption loses at most one row."""
+    """Append a row to a file. A row begins with its line break, so an interruption damages at most one row."""
     file.parent.mkdir(parents=True, exist_ok=True)
     with file.open("a", encoding="utf-8") as opened:
         opened.write("\n" + json.dumps(row))

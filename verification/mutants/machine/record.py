@@ -12,13 +12,13 @@ from verification.mutants.machine.survivors import EQUIVALENT, LEFT
 
 RECORD = REPORT / "sampled.json"
 PAGE = RECORD.with_suffix(".md")
-#: The least share of the mutants to be caught, without those shown to be equivalent; the largest share of the latter.
+#: Least share of caught mutants among those that are not equivalent, and largest share of equivalent mutants.
 CAUGHT, EQUIVALENT_AT_MOST = 0.95, 0.10
 FAILED = re.compile(r"^(?:FAILED|ERROR) (tests/\S+)", re.M)
 INTRODUCTION = (
-    "`make mutants-sampled` draws them from all that cosmic-ray can make of `repro/`, spread over its modules by size, "
-    "and runs each against the tests that reach its line, as coverage.py has recorded them, the cheapest first, for a "
-    "minute. A timeout is a mutant that makes a test run without end, and does not count as caught. `sampled.json` has "
+    "`make mutants-sampled` draws a sample of the mutants that cosmic-ray makes of `repro/`, spread over its modules "
+    "by size. Each mutant is run for a minute against the tests that reach its line according to coverage.py, the "
+    "cheapest first. If a test does not end, the mutant is a timeout and does not count as caught. `sampled.json` has "
     "each mutant with the test that catches it.")
 
 
@@ -41,7 +41,7 @@ def _row(mutation, result) -> dict:
 
 
 def _change(diff: str, operator: str) -> tuple[str, str]:
-    """The lines that a mutant changes, before and after; a decorator with the line that follows it."""
+    """The changed lines before and after. A decorator includes the line that follows it."""
     lines = diff.partition("\n@@")[2].splitlines()[1:]
     old = "\n".join(line[1:].strip() for line in lines if line.startswith("-"))
     new = "\n".join(line[1:].strip() for line in lines if line.startswith("+"))
@@ -67,7 +67,7 @@ def key(row: dict) -> tuple[str, str, str]:
 
 
 def shares(verdicts: dict[str, list[dict]]) -> tuple[float, float]:
-    """The share caught of those not shown to be equivalent, and the share of the latter of all."""
+    """The share of caught mutants among those that are not equivalent, and the share of equivalent mutants."""
     total, equivalent = sum(map(len, verdicts.values())), len(verdicts["equivalent"])
     return len(verdicts["caught"]) / max(total - equivalent, 1), equivalent / max(total, 1)
 
@@ -88,7 +88,7 @@ def summary(verdicts: dict[str, list[dict]]) -> str:
 
 
 def write(rows: list[dict]) -> int:
-    """Print the outcome, and write both files if the sample was run to its end; 0 if enough are caught."""
+    """Print the outcome. Write both files if the sample is complete. Return 0 if enough mutants are caught."""
     verdicts = judged(rows)
     print(summary(verdicts))
     for row in [*verdicts["survivor"], *verdicts["timeout"]]:
