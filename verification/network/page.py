@@ -159,7 +159,7 @@ def _error(value: float, least: float, most: float, run: float) -> str:
 
 
 def _laws_apart() -> str:
-    """Both laws at the area and the velocity of the runs, where no error of the growth adds to theirs."""
+    """Both laws at the area and the velocity of the runs, without the error of the growth."""
     resistance, uptake = runs.laws_at_the_runs()
     factor = (resistance.run / resistance.law)[~resistance.holds]
     outside = "" if resistance.holds.all() else (
@@ -185,7 +185,7 @@ def _controls() -> str:
 
 
 def _range_words(resistance: runs.Judgement) -> str:
-    """How many of the states outside the bounds have conditions outside the range."""
+    """Describe whether the states outside of the bounds have conditions outside of the range."""
     inside = int(resistance.in_range[~resistance.holds].sum())
     return "all of them have left" if inside == 0 else f"all but {inside} of them have left"
 
@@ -224,7 +224,7 @@ def _list(times: tuple[float, ...]) -> str:
 
 
 def _numbers(states: dict[str, np.ndarray]) -> str:
-    """How many states there are, and of which kinds."""
+    """The numbers of states of each kind."""
     grown, spanned = states["grown"] == 1, states["spanned"] == 1
     return f"{(~grown).sum()} half-discs, {grown.sum()} grown shapes, {spanned.sum()} of them in contact"
 

@@ -1,8 +1,8 @@
 """Ten throats of the example of a network as whole runs, against the two laws for networks.
 
-A run has the same seed, and the same head loss and supplies as the example at every time: tables over time that keep
-their values for the step of the example. Its flow follows from its own shape. The law is the example's model of one
-throat with this history, in steps of 6 min: the example itself takes 2 h.
+A run has the seed of the example, and the same head loss and supplies at every time. Its tables over time keep their
+values for a step of the example. Its flow follows from its own shape. The law is the model of the example for one
+throat with this history, in steps of 6 min. The example itself takes steps of 2 h.
 
 **The throats.** Of the 80 throats with flow, those that end with A / W^2 over one (THICK) and the others are put in
 order of A / W^2 at the end. The ten are four of the first and six of the others, at even distances from the first to
@@ -61,7 +61,8 @@ VELOCITIES, LEAST_SUPPLY = (0.5, 6.0), 1 / 2500
 #: Sides of the law: the law itself, and its largest and least value.
 LAW = 0
 MOST, LEAST = 1, -1
-#: Areas between both bounds at which the other bounds are computed: a larger area takes up more and lets less pass.
+#: Number of areas between both bounds at which the other bounds are computed. A larger area takes up more substrate and
+#: lets less water pass.
 TRIALS = 9
 QUANTITIES = ("area_um2", "velocity_m_per_d", "acceptor_pg_per_m_h", "donor_pg_per_m_h")
 EXPECTED = Path(__file__).with_name("throats_expected.csv")
@@ -74,7 +75,7 @@ EXPECTED_COLUMNS = ["throat", "time_h", "in_range", "example_area_um2",
 
 
 class Conditions(NamedTuple):
-    """What the network prescribes in n throats at a time (h). width: um; head_loss: um; supplies: (2, n) mg/L."""
+    """Conditions in n throats at a time (h). width: (n,) um; head_loss: (n,) um; supplies: (2, n) mg/L."""
 
     time: float
     width: np.ndarray
@@ -83,7 +84,7 @@ class Conditions(NamedTuple):
 
 
 def chosen(all_throats: list[History]) -> list[History]:
-    """The ten throats, by their areas at the end: the largest first."""
+    """The ten throats in the order of their areas at the end, the largest first."""
     ordered = sorted((one for one in all_throats if one.flows), key=lambda one: -one.share)
     thick = [one for one in ordered if one.share > THICK]
     others = ordered[len(thick):]
@@ -113,13 +114,13 @@ def resistance(width: Values, head_loss: Values, speed: Values) -> Values:
 
 
 def velocity(area: np.ndarray, at: Conditions, side: int) -> np.ndarray:
-    """(n,) m/d by the law of resistance. Its most is that of the least resistance."""
+    """(n,) m/d by the law of resistance. The largest velocity is that with the least resistance."""
     added = repro.added_resistance(area, at.width)
     return mean_velocity(at.width, at.head_loss, {LAW: added.length, MOST: added.least, LEAST: added.most}[side])
 
 
 class Taken(NamedTuple):
-    """Of n throats. acceptor, donor: (n,) uptakes, pg/m/h; growth: (n,) um2/h."""
+    """Uptakes of n throats. acceptor, donor: (n,) pg/m/h; growth: (n,) um2/h."""
 
     acceptor: np.ndarray
     donor: np.ndarray
@@ -219,7 +220,7 @@ def quantities(area: np.ndarray, at: Conditions, side: int) -> tuple[np.ndarray,
 
 
 def in_range(one: History, time: float) -> bool:
-    """Do the conditions up to a time stay within those of the shapes behind the law of resistance?"""
+    """Whether the conditions up to a time are within those of the shapes behind the law of resistance."""
     until = one.time <= time
     added = repro.added_resistance(one.area[until], one.width)
     speed = mean_velocity(one.width, np.abs(one.head_loss[until]), added.length)

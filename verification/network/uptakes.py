@@ -1,5 +1,7 @@
-"""Uptake of both substrates by aggregates in throats: whole solutions of drawn states, the fit of the constants of
-`repro.uptake` to a part of them, and its judgement by the others."""
+"""Uptake of both substrates by aggregates in throats: solutions of drawn states, and the law `repro.uptake`.
+
+A part of the states gives the constants of the law. The other part tests it.
+"""
 
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
@@ -44,8 +46,11 @@ ARGUMENTS = ("area", "width", "velocity", *SUBSTRATES)
 
 
 class State(NamedTuple):
-    """An aggregate and its uptake. part: FIT or NEW; grown, spanned: 0 or 1; area: um2; width: um;
-    velocity: m/d; acceptor, donor: supplies, mg/L; acceptor_uptake, donor_uptake: pg/m/h."""
+    """An aggregate and its uptake.
+
+    part: FIT or NEW; grown, spanned: 0 or 1; area: um2; width: um; velocity: m/d; acceptor, donor: supplies, mg/L;
+    acceptor_uptake, donor_uptake: pg/m/h.
+    """
 
     part: int
     grown: int
@@ -75,7 +80,7 @@ def states(part: int) -> Iterator[State]:
 
 
 def read(part: int) -> dict[str, np.ndarray]:
-    """The columns of the fit or of a test."""
+    """The columns of the states of a part."""
     columns = read_table(TABLE)
     return select(columns, columns["part"] == part)
 
@@ -92,8 +97,8 @@ def deviations(columns: dict[str, np.ndarray], law: Throats) -> np.ndarray:
 
 
 def fitted(columns: dict[str, np.ndarray]) -> tuple[Transport, Transport]:
-    """The constants before contact and after it, by least squares of the deviations over the spread of the bound, to
-    three digits."""
+    """The constants before and after contact, to three digits. The fit minimises the squares of the deviations over the
+    spread of the bound."""
     spanned = columns["area"] > known(False)[1] * columns["width"]**2
     return _fitted(columns, ~spanned), _fitted(columns, spanned)
 
