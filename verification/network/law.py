@@ -130,7 +130,8 @@ class Judged:
     """Deviations of shapes from the law.
 
     apart: (n,) ln of r over that of the law; beyond: (n,) apart over the ln of the bound on its side, at most one
-    within the bounds. """
+    within the bounds.
+    """
 
     apart: np.ndarray
     beyond: np.ndarray

@@ -83,7 +83,8 @@ class Sample:
     """An aggregate.
 
     run: its growth, None if it is drawn; spanned: whether it touches both walls; share: A / W^2; ratios, lengths:
-    lambdas, and r for each of them. """
+    lambdas, and r for each of them.
+    """
 
     run: Growth | None
     spanned: bool
