@@ -1,4 +1,4 @@
-"""Practical pores, drawn by seed, far past contact. Each reaches its end, the pore's end, or a confirmed fold.
+"""Practical pores drawn by seed. Far past contact each run reaches its end, the pore's end, or a confirmed fold.
 
     python -m verification.problems.family 17 18 --limit 60     # these members; all of them without numbers
 
@@ -32,14 +32,14 @@ from verification.problems.hard import TooLong, limited
 
 SEED, MEMBERS = 28, 100
 RECORD = REPORT / "pores.jsonl"
-#: The end over the time to contact in growth at the supply, and the end (h) without contact.
+#: End of a run over the time to contact with growth at the supply, and the end (h) of a run without contact.
 PAST_CONTACT, LONGEST = 3.0, 200.0
 #: Times of the rows over the end.
 ROWS = (0.2, 0.4, 0.6, 0.8, 1.0)
 DRIVES = ("head", "0.3 m/day", "10 m/day")
-#: Further members, which test the estimate of `repro check`. Its constants were fitted to the first MEMBERS. The aim
-#: was set on 2026-11-26, before these were run: `repro check` expects a fold in at least two thirds of the members that
-#: fold, and in at most a quarter of the others.
+#: Other members, which test the estimate of `repro check`. Its constants were fitted to the first MEMBERS. The aim was
+#: set on 2026-11-26, before these members were run: `repro check` expects a fold in at least two thirds of the members
+#: that fold, and in at most a quarter of the others.
 TESTED = range(100, 140)
 #: Relative difference of two computations of one stretch from the same shape: round-off of the fields in a file.
 SAME = 1e-6
@@ -116,7 +116,7 @@ def run_member(member: Member, limit: float, *changes: str) -> dict:
 
 
 def _run_until_least(member: Member, folder: Path, status: str, changes: Iterable[str]) -> Path:
-    """Run a member until the least stretch of its fold, and return the folder. Later buckles raise the stretch."""
+    """Run a member to the time of its least stretch, and return the folder. Later buckles raise the stretch."""
     creased = folder.with_name("creased")
     run(member.scene(f'growth.end="{LEAST.search(status)[1]} h"', *changes), creased)
     return creased
@@ -138,7 +138,7 @@ def judge(folder: Path, status: str) -> dict:
 
 
 def _course(folder: Path) -> dict:
-    """Times (h) and least stretches of the rows, and whether the last one has contact. Empty without rows."""
+    """Times (h) and least stretches of the rows, and whether the last row has contact; empty without rows."""
     try:
         table = read_table(folder / "timeseries.csv")
     except (OSError, ValueError):
@@ -202,16 +202,16 @@ def _forecast(name: str, rows: dict[int, dict], members: range) -> str:
 
 
 def main(numbers: list[int], limit: float) -> int:
-    """Run members, and add a line for each to the record. Return 1 if one has failed."""
-    bad = 0
+    """Run members, and add a line for each to the record. Return 1 if a member fails."""
+    failures = 0
     for number in numbers:
         row = run_member(draw_member(number), limit)
-        bad += row["verdict"] in (UNCONFIRMED, FAILED)
+        failures += row["verdict"] in (UNCONFIRMED, FAILED)
         print(json.dumps(row), flush=True)
         with RECORD.open("a", encoding="utf-8") as file:
             file.write(json.dumps(row) + "\n")
     RECORD.with_suffix(".md").write_text(page(read_record()), encoding="utf-8")
-    return int(bad > 0)
+    return int(failures > 0)
 
 
 if __name__ == "__main__":
