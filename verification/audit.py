@@ -20,10 +20,10 @@ from time import process_time
 
 from repro.march.simulation import simulate
 from verification import switches
-from verification.bench.record import machine
 from verification.claims import runs
 from verification.claims.runs import BASE, PLATES, UPDATE
 from verification.evidence.checks import columns
+from verification.evidence.results import machine
 from verification.evidence.writing import save, table
 from verification.switches import CHOICES, PLOTTED, Course, Switch, state
 

@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from importlib import import_module
 
 from verification.bench import record, report
+from verification.evidence.results import machine
 from verification.evidence.writing import save
 
 #: Modules of the parts, imported when a part runs.
@@ -22,7 +23,7 @@ def main(arguments: list[str] | None = None) -> None:
 
 def measure(names: Iterable[str]) -> None:
     """Run parts one after the other and save the record after each."""
-    benchmark = {"machine": record.machine(), "parts": record.load()["parts"]}
+    benchmark = {"machine": machine(), "parts": record.load()["parts"]}
     print(report.machine(benchmark["machine"]))
     for name in names:
         module = import_module(f"verification.bench.{PARTS[name]}")

@@ -25,16 +25,10 @@ speed of a method is the lower envelope of its points, interpolated and extrapol
 """
 
 import gc
-import os
-import platform
-import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from datetime import date
-from importlib.metadata import version
 from math import isfinite
 from operator import itemgetter
-from pathlib import Path
 from time import perf_counter, process_time
 
 import numpy as np
@@ -42,8 +36,6 @@ import numpy as np
 from verification.evidence import writing
 
 FILE = writing.REPORT / "bench.json"
-CPUS = Path("/proc/cpuinfo")
-PACKAGES = ("numpy", "scipy", "scikit-fem", "shapely", "mmgpy", "fipy", "py-pde", "numba")
 
 
 def load() -> dict:
@@ -55,20 +47,6 @@ def reference_of(name: str, key: str, value: object) -> dict:
     """The recorded reference of a part, if it has an entry with this value; else nothing."""
     part = load()["parts"].get(name, {})
     return {key: entry for key, entry in part.items() if key.startswith("reference")} if part.get(key) == value else {}
-
-
-def machine() -> dict:
-    """The machine and the packages that the times belong to."""
-    return {"platform": platform.platform(), "processor": processor(), "cores": os.cpu_count(),
-            "python": platform.python_version(), "versions": {name: version(name) for name in PACKAGES},
-            "threads": os.environ.get("OMP_NUM_THREADS", "not set"), "date": date.today().isoformat()}
-
-
-def processor() -> str:
-    """The processor's model from Linux, else from Python."""
-    text = CPUS.read_text(encoding="utf-8") if CPUS.exists() else ""
-    match = re.search("^model name\\s*: (.*)", text, re.MULTILINE)
-    return match[1].strip() if match else platform.processor() or "unknown"
 
 
 def points(part: dict, method: str) -> list[dict]:

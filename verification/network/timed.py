@@ -16,7 +16,7 @@ from repro.sweeps import driver
 from repro.sweeps.design import Factor, Point
 from repro.sweeps.folder import Sweep
 from repro.sweeps.pool import RunPoints
-from verification.bench.record import machine
+from verification.evidence.results import machine
 from verification.evidence.writing import load, save
 from verification.network import runs
 from verification.network.histories import History

@@ -27,7 +27,7 @@ from repro.results import field_files, read_table
 from repro.runs.execution import run
 from repro.runs.status import COMPLETED
 from repro.scene import Scene, load_scene
-from verification.evidence.writing import REPORT, lines, table
+from verification.evidence.writing import REPORT, append, lines, table
 from verification.problems.hard import TooLong, limited
 
 SEED, MEMBERS = 28, 100
@@ -208,8 +208,7 @@ def main(numbers: list[int], limit: float) -> int:
         row = run_member(draw_member(number), limit)
         failures += row["verdict"] in (UNCONFIRMED, FAILED)
         print(json.dumps(row), flush=True)
-        with RECORD.open("a", encoding="utf-8") as file:
-            file.write(json.dumps(row) + "\n")
+        append(row, RECORD)
     RECORD.with_suffix(".md").write_text(page(read_record()), encoding="utf-8")
     return int(failures > 0)
 

@@ -19,6 +19,7 @@ from repro.march.loop import PoreEnd, RestartState
 from repro.model import remeshing
 from repro.model.remeshing import Remeshing
 from repro.scene import Scene
+from verification.evidence.writing import append
 from verification.problems.family import draw_member
 from verification.problems.hard import TooLong, limited
 
@@ -67,10 +68,9 @@ def study(number: int, limit: float) -> dict[str, object]:
 def main(numbers: Iterable[int], limit: float, record: Path) -> None:
     """Print a line for each member, and add it to the record."""
     for number in numbers:
-        line = json.dumps(study(number, limit))
-        print(line, flush=True)
-        with record.open("a", encoding="utf-8") as file:
-            file.write(line + "\n")
+        row = study(number, limit)
+        print(json.dumps(row), flush=True)
+        append(row, record)
 
 
 if __name__ == "__main__":
