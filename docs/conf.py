@@ -5,12 +5,16 @@ The source folder is the repository, so that a link between two pages is the sam
 
 import os
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path[:0] = [str(ROOT), str(ROOT / "docs" / "site")]
 os.environ["PYTHONPATH"] = str(ROOT)
 os.environ.pop("MPLBACKEND", None)  # notebooks show their figures inline
+
+#: Browsers need a font with mathematical metrics for brackets and integrals that fit their contents.
+MATHEMATICS_FONT = Path(find_spec("ziamath").origin).with_name("fonts") / "STIXTwoMath-Regular.ttf"
 
 project = "dupin2001-repro"
 author = "the dupin2001-repro authors"
@@ -22,7 +26,10 @@ include_patterns = [
     "verification/sensitivity/sensitivity.md",
 ]
 exclude_patterns = ["docs/_build", "build", "**/.*"]
-extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.autosummary", "numpydoc", "sphinx_design", "mathml"]
+extensions = [
+    "myst_nb", "sphinx.ext.autodoc", "sphinx.ext.autosummary", "numpydoc", "sphinx_design",
+    "mathml", "citations", "times",  # in docs/site
+]
 source_suffix = {".md": "myst-nb", ".py": "myst-nb"}
 nb_custom_formats = {".py": ["jupytext.reads", {"fmt": "py:percent"}]}
 myst_enable_extensions = ["dollarmath", "colon_fence", "deflist"]
@@ -36,7 +43,7 @@ autodoc_typehints = "none"
 
 html_theme = "furo"
 html_title = "Biological clogging of a pore, reproduced"
-html_static_path = ["site/static"]
+html_static_path = ["site/static", str(MATHEMATICS_FONT)]
 html_css_files = ["site.css"]
 html_js_files = ["tables.js"]
 html_domain_indices = False

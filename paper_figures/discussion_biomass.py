@@ -53,7 +53,7 @@ def _uptake(axes: Axes, folder: Path) -> None:
     table = states.series(folder)
     axes.plot(filled(table), discussed.shares(table), color=style.RED, label="aggregate")
     for walls, (label, linestyle) in WALLS.items():
-        shares = [discussed.in_the_model(part, walls) for part in UPTAKE_SHARES[1:]]
+        shares = [discussed.share_of_layers(part, walls) for part in UPTAKE_SHARES[1:]]
         axes.plot(UPTAKE_SHARES, [0.0, *shares], linestyle, marker=".", markersize=3, color=style.BLUE, label=label)
     axes.set(title="share of the acceptor that is taken up", xlim=(0, UPTAKE_SHARES[-1]), ylim=(0, 1.03))
 

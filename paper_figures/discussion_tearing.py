@@ -16,7 +16,7 @@ from matplotlib.lines import Line2D
 
 from paper_figures import figure_6, style
 from repro.errors import GrowthError
-from verification.claims.fluid_and_aggregate import APART, at_rest, peak
+from verification.claims.fluid_and_aggregate import AVERAGED_OVER, peak, with_fluid_forces
 from verification.claims.levels import CONVERGED, PAIRED, Level, at_level, cached
 from verification.claims.runs import BASE, WIDE, Body, bodies, load_packaged
 
@@ -42,7 +42,7 @@ def stress_history(run: tuple[str, ...], forced: bool) -> np.ndarray:
     rows = []
     for body in bodies(run)[:0:-2][::-1]:
         try:
-            largest = peak(at_rest(body, "included") if forced else body)
+            largest = peak(with_fluid_forces(body) if forced else body)
         except GrowthError:
             break
         modulus = PASCAL * body.scene.growth.shear_modulus
@@ -59,7 +59,7 @@ def agreed(run: tuple[str, ...], forced: bool) -> np.ndarray:
     count = min(len(rows), len(coarser))
     rows = rows[:count]
     apart = np.hypot(*(rows[:, 1:3] - coarser[:count, 1:3]).T)
-    return rows[apart <= APART * np.minimum(load_packaged(*run).pore.width, rows[:, 4])]
+    return rows[apart <= AVERAGED_OVER * np.minimum(load_packaged(*run).pore.width, rows[:, 4])]
 
 
 @style.styled

@@ -8,9 +8,9 @@ from matplotlib.figure import Figure
 
 from paper_figures import style
 from verification.claims.base_run import upstream_means
-from verification.claims.discussed import RADIUS, in_one_shape, sherwood, textbooks
+from verification.claims.discussed import RADIUS, in_one_shape, leveque_numbers, sherwood
 from verification.claims.levels import CONVERGED, PAIRED, Level, at_level, cached
-from verification.claims.runs import BASE, UPDATE, Body, bodies, grown_anew
+from verification.claims.runs import BASE, UPDATE, Body, bodies, grown_on_new_mesh
 
 TITLE = "Addition. Mass transfer to the growing aggregate"
 RUNS = ()
@@ -64,12 +64,12 @@ def bodies_before_end() -> tuple[Body, ...]:
 def _over_time(axes: Axes) -> None:
     hours = [body.pore.time for body in bodies_before_end()]
     computed = [sherwood(body) for body in bodies_before_end()]
-    _pairs(axes, hours, computed, [textbooks(body) for body in bodies_before_end()])
+    _pairs(axes, hours, computed, [leveque_numbers(body) for body in bodies_before_end()])
     axes.set(title="the growing aggregate of Base", xlabel="time (h)", ylabel="Sherwood number", ylim=(0, 1.1))
 
 
 def _panel(axes: Axes, x, bodies_at_rest: list[Body], label: str, log: bool) -> None:
-    _pairs(axes, x, [sherwood(body) for body in bodies_at_rest], [textbooks(body) for body in bodies_at_rest])
+    _pairs(axes, x, [sherwood(body) for body in bodies_at_rest], [leveque_numbers(body) for body in bodies_at_rest])
     axes.set(xlabel=label, xscale="log" if log else "linear")
 
 
@@ -83,7 +83,7 @@ def _pairs(axes: Axes, x, numbers: list[tuple[float, float]], leveque: list[tupl
 def _upstream_depletion(axes: Axes) -> None:
     """Concentrations in the state that the paper reports: the shape of UNTIL with the biomass grown in it [E12]."""
     last = bodies_before_end()[-1].pore.time
-    state = grown_anew(RUN, last)
+    state = grown_on_new_mesh(RUN, last)
     means = np.array([upstream_means(*state, float(distance)) for distance in UPSTREAM])
     for name, colour, values in zip(NAMES, COLOURS, means.T):
         axes.plot(UPSTREAM, values, color=colour, label=name)
@@ -97,7 +97,7 @@ def caption() -> str:
     """Caption, with the first and last numbers of each panel."""
     with at_level(LEVEL):
         first, last = (sherwood(body) for body in (bodies_before_end()[0], bodies_before_end()[-1]))
-        leveque, hours = textbooks(bodies_before_end()[-1]), bodies_before_end()[-1].pore.time
+        leveque, hours = leveque_numbers(bodies_before_end()[-1]), bodies_before_end()[-1].pore.time
         slow, fast = (sherwood(in_one_shape(head=float(head))) for head in (HEADS[0], HEADS[-1]))
         poor, rich = (sherwood(in_one_shape(supply=float(supply))) for supply in (SUPPLIES[0], SUPPLIES[-1]))
     return ("Sherwood numbers (full lines): uptake over interface and over the drop from the supply, times thickness "

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from paper_figures import style
 from repro import added_resistance
-from repro.results.network import known
+from repro.results.network import share_range
 from verification.network.law import RATIO, SEED, judged, read
 
 TITLE = "Addition. A law for networks: the resistance that an aggregate adds to its pore"
@@ -36,7 +36,7 @@ def _law(axes: Axes) -> None:
     """r against A / W^2, before contact and after it."""
     for ratio, colour in zip(RATIOS, COLOURS):
         for spanned in (False, True):
-            share = np.geomspace(*known(spanned), POINTS)
+            share = np.geomspace(*share_range(spanned), POINTS)
             resistance = added_resistance(share, 1.0, spanned, ratio)
             label = None if spanned else rf"$\lambda$ = {ratio:g}"
             axes.plot(share, resistance.length, color=colour, linestyle="--" if spanned else "-", label=label)

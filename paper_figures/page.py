@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from html import escape
@@ -51,8 +52,8 @@ def page(entries: list[Entry], endings: Iterable[str]) -> str:
 <p>Pore-scale modeling of biological clogging due to aggregate expansion: a material mechanics approach, Water
 Resources Research, paper 2001WR000306. All numbers on this page are read from the runs behind it. <b>Figure 1</b> of
 the paper is a photograph of an experiment and cannot be regenerated. Claims are judged by <code>make claims</code>,
-with verdicts as recorded in <code>verification/claims/claims.json</code>. A claim that was defined anew counts with the
-verdict of its first definition; the later verdict stands beside it.</p>
+with verdicts as recorded in <code>verification/claims/claims.json</code>. A redefined claim counts with the verdict of
+its first definition; the later verdict stands beside it.</p>
 <nav>{links}</nav>
 <ul class="note">{"".join(f"<li>{escape(ending)}</li>" for ending in endings)}</ul>
 {"".join(map(_section, entries))}</body>
@@ -63,6 +64,11 @@ verdict of its first definition; the later verdict stands beside it.</p>
 def also(module) -> tuple[str, ...]:
     """Commands for the numbers that a figure computes with the functions of the claims in COMPUTED."""
     return tuple(f"python -m verification.claims {id}" for id in getattr(module, "COMPUTED", ()))
+
+
+def caption_html(caption: str, claims: Iterable[str]) -> str:
+    """The caption of a figure and the verdicts of its claims; words between backticks are code."""
+    return re.sub("`(.+?)`", r"<code>\1</code>", escape(f"{caption} {judged(claims)}".strip()))
 
 
 def _short(entry: Entry) -> str:
@@ -80,7 +86,7 @@ def _section(entry: Entry) -> str:
     return f"""<section id="{name}">
 <h2>{escape(entry.title)}</h2>
 <img src="{name}.png" alt="{escape(entry.title)}"/>
-<p>{escape(entry.caption)} {escape(judged(entry.claims))} <a href="{name}.pdf">PDF</a></p>
+<p>{caption_html(entry.caption, entry.claims)} <a href="{name}.pdf">PDF</a></p>
 <h3>Commands</h3>
 <pre>{escape(run)}</pre>
 <h3>Claims</h3>

@@ -173,7 +173,7 @@ def _claim(claim: dict) -> str:
     words = [f"*{word}:* {first[key]}" for word, key in WHY.items() if first.get(key)]
     for each in later:
         numbers = "; ".join(map(_number, each["checks"]))
-        words.append(f"*Defined anew* on {each['defined']}, after values had been seen: {each['verdict']}; {numbers}")
+        words.append(f"*Redefined* on {each['defined']}, after its values were known: {each['verdict']}; {numbers}")
     return markdown_row((f"**{claim['id']}**", claim["where"], claim["claim"], first["verdict"],
                          "<br>".join(map(_number, first["checks"])) or "-", "<br>".join(words) or "-"))
 

@@ -1,7 +1,7 @@
 """A pore averaged over its cross-sections: flow, substrates and growth in one dimension, by FiPy and scipy.
 
 An aggregate of height h(x) lies on the lower wall of the channel 0 < y < W, -L/2 < x < L/2. The model is the limit of
-an aggregate that is long compared with W and takes up little over its height. Its error scales with the squares of the
+an aggregate that is long compared with W, with little uptake over its height. Its error scales with the squares of the
 slope and of the transverse Thiele number h sqrt(X q / (D C)).
 
 *Flow* is fully developed in each section, between two layers (:mod:`reference.layered_channel`): with the mean velocity
@@ -19,7 +19,7 @@ i' = a r_I(C), (9)-(10); its area grows by theta = a + i. A thin strip that slid
 sigma_xx = sigma_yy = 0, so that both stretches of each cell are sqrt(theta); x = 0 stays in place. An aggregate that
 keeps its shape, as a half-disc nearly does, stretches by the root of the mean theta; its biomass is uniform.
 
-Any consistent units. Pairs are (acceptor, donor).
+Units are consistent. Pairs are (acceptor, donor).
 """
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -221,10 +221,10 @@ def constriction(radius, width, modes=80, points=400):
     """
     s, weight = np.polynomial.legendre.leggauss(points)
     x, height = radius * np.sin(np.pi / 2 * s), radius * np.cos(np.pi / 2 * s)
-    apart, total = np.abs(x[:, None] - x), 0.0
+    distances, total = np.abs(x[:, None] - x), 0.0
     for k in np.arange(1, modes + 1) * np.pi / width:
         column = np.pi / 2 * weight * height * np.sin(k * height) / k
-        total += column @ np.exp(-k * apart) @ column / (k * width)
+        total += column @ np.exp(-k * distances) @ column / (k * width)
     return total / (np.pi / 2 * radius**2)
 
 
@@ -237,6 +237,6 @@ def excess(pore, radius, velocity):
     supply, uptaken = np.array(pore.supply), pore.density * np.pi / 2 * radius**2
     carried = velocity * pore.width
     mixed = root(lambda c: carried * (supply - c) - uptaken * np.array(uptake(*c, pore.rates)), supply, tol=1e-13).x
-    lack = constriction(radius, pore.width) * pore.density * np.array(uptake(*mixed, pore.rates)) / pore.diffusivity
+    deficit = constriction(radius, pore.width) * pore.density * np.array(uptake(*mixed, pore.rates)) / pore.diffusivity
     rises = uptaken * derivatives(mixed, pore.rates)
-    return np.linalg.solve(carried * np.eye(2) + rises, rises @ lack)
+    return np.linalg.solve(carried * np.eye(2) + rises, rises @ deficit)

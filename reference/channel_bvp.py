@@ -2,9 +2,9 @@
 
     u C' = D_B C'' - X q(C_A, C_D) in the strip, 0 < x < l,      u C - D_B C' = u C_s at 0,      C' = 0 at l
 
-The fluid upstream carries the flux u C_s unchanged and the fluid downstream keeps C(l), so the problem is that of
-the strip alone. Upstream C = C_s - (C_s - C(0)) exp(u x / D), (26). :mod:`reference.monod` defines q_A and
-q_D. Any consistent units, such as um, h and mg/L.
+The fluid upstream carries the flux u C_s unchanged and the fluid downstream keeps C(l), so it suffices to solve in the
+strip. Upstream C = C_s - (C_s - C(0)) exp(u x / D), (26). :mod:`reference.monod` defines q_A and q_D. Units are
+consistent, for instance um, h and mg/L.
 """
 import numpy as np
 from scipy.integrate import solve_bvp

@@ -3,12 +3,13 @@
 The mechanics are those of :mod:`reference.quadratic_growth`. The arc between two angles lies on the wall, on which it
 slides. Both angles are unknowns. The mesh at t = 0 has a node at each of them and slides along the arc with them.
 
-The paper states a least film and a least angle of a wedge (2.3.3). Together they say: at the distance d from a contact
-line, along the wall, the gap is at least min(film, tan(angle) d). The lack of a line is the largest value (um) of
+The paper states a least film and a least angle of a wedge (2.3.3). Together they require a gap of at least
+min(film, tan(angle) d) at the distance d from a contact line, along the wall. The missing gap of a line is the largest
+value (um) of
 
     min(film, tan(angle) d) - gap
 
-on the free surface beyond it. The lack of both lines is zero. At a line itself both terms are zero, and beside it the
+on the free surface beyond it. It is zero for both lines. At a line itself both terms are zero, and beside it the
 surface opens like the root of d. The first tenth of the distance film / tan(angle) is therefore left out. MINPACK's
 hybrid method solves for the angles.
 """
@@ -68,18 +69,18 @@ def outline(equilibrium, per_edge=PER_EDGE):
     first, last = mesh.facets[:, facets]
     middle = mesh.t.max() + 1 + facets
     angle = np.arctan2(*mesh.doflocs[::-1])
-    backwards = angle[first] > angle[last]
-    first, last = np.where(backwards, last, first), np.where(backwards, first, last)
+    reversed_edges = angle[first] > angle[last]
+    first, last = np.where(reversed_edges, last, first), np.where(reversed_edges, first, last)
     t = np.linspace(0, 1, per_edge + 1)
     functions = np.array([(1 - t) * (1 - 2 * t), 4 * t * (1 - t), t * (2 * t - 1)])
     nodes = np.array([first, middle, last])[:, np.argsort(angle[middle])]
-    every, places = angle[nodes], equilibrium.place[:, nodes]
-    angles = every[0][:, None] * (1 - t) + every[2][:, None] * t
+    node_angles, places = angle[nodes], equilibrium.place[:, nodes]
+    angles = node_angles[0][:, None] * (1 - t) + node_angles[2][:, None] * t
     points = np.einsum("iak,at->ikt", places, functions)
     return angles.ravel(), points.reshape(2, -1)
 
 
-def lack(equilibrium, angles, walls):
+def missing_gap(equilibrium, angles, walls):
     """(2,) um by which the gap beyond the contact lines is too small at worst, downstream first; negative if it is
     larger than required."""
     angle, (x, y) = outline(equilibrium)
@@ -114,13 +115,13 @@ def grow(mesh, radius, theta, top, walls, angles, start=None):
     """
     last = [start]
 
-    def at(pair):
+    def solve_at(pair):
         contact = Contact(*pair, walls.height)
         last[0] = quadratic_growth.grow(curved(slid(mesh, pair), radius), theta, top, contact=contact, start=last[0])
-        return lack(last[0], pair, walls)
+        return missing_gap(last[0], pair, walls)
 
-    solution = root(at, angles, tol=ACCURACY, options={"eps": CHANGE**2, "factor": FIRST_STEP})
+    solution = root(solve_at, angles, tol=ACCURACY, options={"eps": CHANGE**2, "factor": FIRST_STEP})
     if not solution.success:
         raise RuntimeError(f"no contact lines: {solution.message}")
-    at(solution.x)
+    solve_at(solution.x)
     return Touching(solution.x, last[0])

@@ -81,7 +81,7 @@ def _half_circle(count: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 @cache
-def solved(curvature: float = 0.0, terms: int = TERMS) -> HalfCylinder:
+def solve(curvature: float = 0.0, terms: int = TERMS) -> HalfCylinder:
     """The flow over the half-cylinder."""
     t, weight = _half_circle(POINTS * terms)
     even, odd = 2 * np.arange(terms // 2), 1 + 2 * np.arange(terms // 2)
@@ -89,11 +89,11 @@ def solved(curvature: float = 0.0, terms: int = TERMS) -> HalfCylinder:
                              *((p + 2) * np.sin(p * t) - p * np.sin((p + 2) * t) for p in odd)])
     slope = -np.concatenate([even, odd]) * value
     y = np.sin(t)
-    far = -(y**2 / 2 - curvature * y**3 / 3)
-    far_slope = -(y**2 - curvature * y**3)
+    shear_flow = -(y**2 / 2 - curvature * y**3 / 3)
+    shear_flow_slope = -(y**2 - curvature * y**3)
     root = np.sqrt(weight)
     scale = np.maximum(1.0, np.concatenate([even + 1, (odd + 1) * odd]))
     matrix = np.vstack([value * root[:, None], slope * root[:, None]]) / scale
-    right = np.concatenate([far * root, far_slope * root])
+    right = np.concatenate([shear_flow * root, shear_flow_slope * root])
     coefficients = np.linalg.lstsq(matrix, right, rcond=None)[0] / scale
     return HalfCylinder(curvature, coefficients[: len(even)], coefficients[len(even):])

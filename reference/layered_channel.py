@@ -2,7 +2,7 @@
 
 Layer B, 0 < y < h, has viscosity lambda; layer F, h < y < W, has one (without the factor nu/g). With G = -dphi/dx the
 same in both, lambda u'' = -G below and u'' = -G above, u(0) = u(W) = 0, and u and the shear stress nu u' are continuous
-at y = h (the flow is along x, so that the Laplacian and the traction form of [E2] agree). Integrated once, nu u' = s -
+at y = h (the flow is along x, so the Laplacian and the traction form of [E2] agree). Integrated once, nu u' = s -
 G y with the same s in both layers:
 
     B: u = (s y - G y^2/2) / lambda,        F: u = G (W^2 - y^2)/2 - s (W - y).

@@ -35,8 +35,8 @@ def cauchy(F, P):
     """Cauchy stress (3, 3) of a homogeneous plane deformation F (2, 2), F33 = 1, at pressure P."""
     gradient = np.eye(3)
     gradient[:2, :2] = F
-    left = gradient @ gradient.T
-    return np.linalg.det(gradient) ** (-5 / 3) * (left - np.trace(left) / 3 * np.eye(3)) + P * np.eye(3)
+    B = gradient @ gradient.T  # the left Cauchy-Green tensor
+    return np.linalg.det(gradient) ** (-5 / 3) * (B - np.trace(B) / 3 * np.eye(3)) + P * np.eye(3)
 
 
 def free_growth_pressure(theta):
@@ -49,25 +49,25 @@ def confined_growth_pressure(theta):
     return -2 * theta ** (-5 / 3) * (theta**2 - 1) / 3
 
 
-def cylinder_radius(R, inner, more, outer):
+def cylinder_radius(R, inner, increase, outer):
     """r(R) for theta = inner + more (R / outer)^2."""
-    return R * np.sqrt(inner + more * R**2 / (2 * outer**2))
+    return R * np.sqrt(inner + increase * R**2 / (2 * outer**2))
 
 
-def cylinder_pressure(R, inner, more, outer, points=50):
+def cylinder_pressure(R, inner, increase, outer, points=50):
     """P(R), R (n,), for theta = inner + more (R / outer)^2; outer is R_0."""
     s, weight = np.polynomial.legendre.leggauss(points)
     half = 0.5 * (outer - np.asarray(R, float))[:, None]
     along = np.asarray(R, float)[:, None] + half * (1 + s)
-    radial, hoop, theta = _stretches(along, inner, more, outer)
+    radial, hoop, theta = _stretches(along, inner, increase, outer)
     shear = theta ** (-5 / 3) * (radial**2 - hoop**2)
     sigma = np.sum(weight * half * shear * radial / (hoop * along), axis=1)
-    radial, hoop, theta = _stretches(np.asarray(R, float), inner, more, outer)
+    radial, hoop, theta = _stretches(np.asarray(R, float), inner, increase, outer)
     return sigma - theta ** (-5 / 3) * (radial**2 - (radial**2 + hoop**2 + 1) / 3)
 
 
-def _stretches(R, inner, more, outer):
+def _stretches(R, inner, increase, outer):
     """r', r/R and theta."""
-    theta = inner + more * (R / outer) ** 2
-    hoop = np.sqrt(inner + more * R**2 / (2 * outer**2))
+    theta = inner + increase * (R / outer) ** 2
+    hoop = np.sqrt(inner + increase * R**2 / (2 * outer**2))
     return theta / hoop, hoop, theta

@@ -169,11 +169,11 @@ def _constraints(basis, contact, initial):
     return np.concatenate(constrained), target
 
 
-def _newton(basis, lower, theta, mu, constrained, value, place, pressure):
+def _newton(basis, lower, theta, mu, constrained, target, place, pressure):
     """(place, pressure) of the equilibrium in which the constrained unknowns have the values ``value``."""
     for _ in range(MAX_ITERATIONS):
         prescribed = np.zeros(basis.N + lower.N)
-        prescribed[constrained] = (value - place)[constrained]
+        prescribed[constrained] = (target - place)[constrained]
         step = newton_step(basis, lower, theta, mu, place, pressure, x=prescribed, D=constrained)
         step = step * _step_length(basis, place, step[: basis.N])
         place, pressure = place + step[: basis.N], pressure + step[basis.N:]

@@ -342,8 +342,8 @@ class Run:
 
     def at_ledger(self) -> tuple[np.ndarray, np.ndarray]:
         """Indices of the rows at which a step ends, and of these steps."""
-        apart = np.abs(np.subtract.outer(self.times, self.ledger.get("end_h", np.zeros(0))))
-        return np.nonzero(apart <= 1e-9)
+        distances = np.abs(np.subtract.outer(self.times, self.ledger.get("end_h", np.zeros(0))))
+        return np.nonzero(distances <= 1e-9)
 
 
 def findings(run: Run) -> Iterator[Finding]:
@@ -372,11 +372,11 @@ def _numbers(run: Run) -> Iterator[Finding]:
                                                     "donor_mg_per_L") if name in fields.at_nodes]
         cells = [values[_defined_in(fields, name)] for name, values in fields.in_cells.items()]
         missing += sum(np.count_nonzero(~np.isfinite(values)) for values in (*aggregate, *fluid, *cells))
-    yield size("numbers that are not finite", missing, 0, "none is")
+    yield size("numbers that are not finite", missing, 0, "all numbers are finite")
 
 
 def _absent(run: Run) -> Iterator[Finding]:
-    """A substrate that the scene leaves out has no values."""
+    """Check that a substrate that the scene leaves out has no values."""
     tables = [*run.series, *run.ledger, *(name for fields in run.fields for name in fields.at_nodes)]
     for name in NAMES:
         if name not in run.scene.names:
@@ -393,13 +393,13 @@ def _defined_in(fields: Fields, name: str) -> np.ndarray:
 
 
 def _rows(run: Run) -> Iterator[Finding]:
-    """Rows and fields are at the requested times, and cover the run."""
+    """Check that rows and fields are at the requested times, and cover the run."""
     times = run.times
     yield size("rows that are not later than the row before", np.count_nonzero(np.diff(times) <= 0), 0, "time passes")
     yield size("rows without fields of their time", _unmatched(times, [f.time for f in run.fields]), 0, "one a row")
     requested = run.scene.section("output").get("times")
     if requested and run.completed:
-        yield size("rows that were asked for and are not there, or the reverse",
+        yield size("requested rows that are missing, and rows that were not requested",
                    _unmatched(times, {0.0, *map(number, requested)}), 0, "output.times, and the start")
     elif run.completed:
         yield size("time between the last row and the end", times[-1] - run.scene.end, 1e-9, "growth.end")
@@ -409,10 +409,10 @@ def _rows(run: Run) -> Iterator[Finding]:
         yield excess("end of the ledger, h", covered, last - 1e-9, run.scene.end + 1e-9, "every step is in the ledger")
 
 
-def _unmatched(one, other) -> int:
+def _unmatched(times, other_times) -> int:
     """Number of times in two lists without an equal time in the other list."""
-    apart = np.abs(np.subtract.outer(list(one), list(other))) <= 1e-9
-    return np.count_nonzero(~apart.any(axis=1)) + np.count_nonzero(~apart.any(axis=0))
+    equal = np.abs(np.subtract.outer(list(times), list(other_times))) <= 1e-9
+    return np.count_nonzero(~equal.any(axis=1)) + np.count_nonzero(~equal.any(axis=0))
 
 
 def _geometry(scene: Scene, row: dict, fields: Fields) -> Iterator[Finding]:
@@ -431,7 +431,8 @@ def _geometry(scene: Scene, row: dict, fields: Fields) -> Iterator[Finding]:
                np.subtract(fields.outline_extremes(), reported) / width, SUM, "extremes of parabolas")
     touches = np.isin(np.unique(fields.cells[fields.body]), fields.wall(width)).any()
     yield size("contact in the fields less that of the row", float(touches) - row["contact"], 0, "yes or no")
-    yield size("triangles that are turned over", np.count_nonzero(fields.dx.min(axis=1) <= 0), 0, "none is")
+    yield size("triangles that are turned over", np.count_nonzero(fields.dx.min(axis=1) <= 0), 0,
+               "all triangles are upright")
 
 
 def _flow(scene: Scene, row: dict, fields: Fields) -> Iterator[Finding]:
@@ -446,25 +447,25 @@ def _flow(scene: Scene, row: dict, fields: Fields) -> Iterator[Finding]:
     velocity = fields.at_nodes["velocity_m_per_d"]
     walls = np.concatenate([fields.wall(0.0), fields.wall(width)])
     in_fluid = walls[np.isin(walls, fields.cells[~fields.body])]
-    still = walls if scene.viscosity_ratio else in_fluid
-    yield size("velocity at the walls over the mean", velocity[still] / speed, SUM,
+    no_slip = walls if scene.viscosity_ratio else in_fluid
+    yield size("velocity at the walls over the mean", velocity[no_slip] / speed, SUM,
                "(5): no slip; water may slide under a permeable body whose layers are thin")
-    yield size("velocity through the walls over the mean", velocity[walls, 1] / speed, SUM, "nothing passes")
+    yield size("velocity through the walls over the mean", velocity[walls, 1] / speed, SUM, "no flow through walls")
     for name, outlet, bound in (("inlet", False, SUM), ("outlet", True, SOLVED)):
         through = fields.over_end(outlet, velocity[:, 0]) / (speed * width)
-        yield size(f"flow through the {name} over u_ave W, less one", through - 1, bound, "(2): water is kept")
+        yield size(f"flow through the {name} over u_ave W, less one", through - 1, bound, "(2): water is conserved")
     viscosity = scene.number("flow", "kinematic_viscosity") / scene.number("flow", "gravity")
     clean = width**2 / (12 * viscosity) / UNITS["m/day"]
     outside = (length - row["meshed_length_um"]) * speed / clean / UNITS["cm"]
     head = fields.at_nodes["head_cm"]
     inside = (fields.over_end(False, head) - fields.over_end(True, head)) / width
-    yield size("mean head at inlet less outlet and the clean rest, over the head loss, less one",
+    yield size("mean head at inlet less outlet and the loss outside, over the head loss, less one",
                (inside + outside) / row["head_loss_cm"] - 1, PROMISED, "(6); the preset's error")
     if scene.viscosity_ratio:
         bound = STRAIGHT_LOSS if fields.straight else QUADRATURE
         spent = viscosity * _dissipation(scene, fields) / (speed * UNITS["m/day"] * width) / UNITS["cm"]
-        yield size("work that the water spends and the clean rest, over the head loss, less one",
-                   (spent + outside) / row["head_loss_cm"] - 1, bound, "work of the head is spent on viscosity")
+        yield size("dissipation in the mesh and the loss outside, over the head loss, less one",
+                   (spent + outside) / row["head_loss_cm"] - 1, bound, "viscosity dissipates the work of the head")
     conductivity = speed * length / (row["head_loss_cm"] * UNITS["cm"])
     yield size("u L / head loss over the conductivity, less one", conductivity / row["conductivity_m_per_d"] - 1,
                SUM, "its definition")
@@ -494,8 +495,8 @@ def _concentrations(scene: Scene, row: dict, fields: Fields) -> Iterator[Finding
                    "the same number")
         for end, outlet in (("inlet", False), ("effluent", True)):
             weights = [fields.at_nodes["velocity_m_per_d"][:, 0]] if scene.flows else []
-            one = np.ones(len(values))
-            mean = fields.over_end(outlet, values, *weights) / fields.over_end(outlet, one, *weights)
+            ones = np.ones(len(values))
+            mean = fields.over_end(outlet, values, *weights) / fields.over_end(outlet, ones, *weights)
             yield size(f"{end} {name} of the fields less that of the row, over the supply",
                        (mean - row[f"{end}_{name}_mg_per_L"]) / max(supply, 1e-300), SUM, "(12), flux-averaged")
 
@@ -521,7 +522,7 @@ def _fractions(scene: Scene, fields: Fields, name: str) -> np.ndarray:
 
 
 def _uptake(scene: Scene, row: dict, fields: Fields) -> Iterator[Finding]:
-    """In a steady row, the loss between inlet and outlet equals the uptake by the aggregate."""
+    """Check, in a steady row, that the loss between inlet and outlet equals the uptake by the aggregate."""
     steep = any(scene.half_saturation(name) < STEP * scene.course(name, "supply").at(row["time_h"])
                 for name in scene.names)
     if not scene.flows or scene.stores or steep:
@@ -538,7 +539,7 @@ def _uptake(scene: Scene, row: dict, fields: Fields) -> Iterator[Finding]:
 
 
 def _deformation(scene: Scene, row: dict, fields: Fields) -> Iterator[Finding]:
-    """J is the ratio of areas, and theta equals J in the mean (24)."""
+    """Check that J is the ratio of areas, and that theta equals J in the mean (24)."""
     if scene.section("growth").get("new_biomass") == "stress_free":
         return
     places = np.nan_to_num(fields.at_nodes["position_t0_um"][:, :2])
@@ -553,7 +554,7 @@ def _deformation(scene: Scene, row: dict, fields: Fields) -> Iterator[Finding]:
         bonded = body[(fields.points[body, 1] == 0) & (places[body, 1] == 0)]
         moved = fields.points[bonded, 0] - places[bonded, 0]
         yield size("path of bonded nodes along the wall over the width", moved / scene.number("pore", "width"), SOLVED,
-                   "2.3.3: what touches a bonded wall stays; quadratic functions carry its places exactly")
+                   "2.3.3: nodes on a bonded wall stay there; quadratic functions carry their positions exactly")
 
 
 def _steps(run: Run) -> Iterator[Finding]:
@@ -562,7 +563,7 @@ def _steps(run: Run) -> Iterator[Finding]:
     yield size("time between one step's end and the next one's start, h", gaps, SUM, "steps follow each other")
     before, after = ledger["biomass_before_pg_per_m"], ledger["biomass_after_pg_per_m"]
     yield size("biomass at a step's start over that at the end before, less one", before[1:] / after[:-1] - 1, SUM,
-               "nothing happens in between")
+               "biomass does not change between steps")
     dense = run.scene.number("kinetics", "maximum_density")
     area = run.series["aggregate_area_um2"]
     yield size("biomass at t = 0 over X_m times the area, less one", before[0] / (dense * area[0]) - 1, SUM,
@@ -578,32 +579,32 @@ def _steps(run: Run) -> Iterator[Finding]:
 
 
 def _substrates(run: Run) -> Iterator[Finding]:
-    """Each substrate's supply equals the amounts that leave, are consumed and are stored."""
+    """Check that each substrate's supply equals the amounts that leave, are consumed and are stored."""
     scene = run.scene
     width, length = scene.number("pore", "width"), scene.number("pore", "length")
     for name in scene.names:
         supplied, out, consumed, stored = (run.ledger[f"{name}_{part}_pg_per_m"]
                                            for part in ("supplied", "out", "consumed", "stored"))
-        most = scene.course(name, "supply").largest(run.scene.end)
-        exchanged = scene.number(name, "diffusivity") * most * run.duration
-        content = most * width * length if scene.stores else 0.0
+        largest_supply = scene.course(name, "supply").largest(run.scene.end)
+        exchanged = scene.number(name, "diffusivity") * largest_supply * run.duration
+        content = largest_supply * width * length if scene.stores else 0.0
         scale = np.abs(supplied) + np.abs(consumed) + exchanged + content
         yield size(f"{name} supplied less leaving, consumed and stored, relative",
                    (supplied - out - consumed - stored) / np.maximum(scale, 1e-300), SOLVED, "(7), (8) over the pore")
         if not scene.stores:
-            yield size(f"{name} stored by what is at rest", stored, 0, "quasi-steady")
+            yield size(f"{name} stored by quasi-steady substrates", stored, 0, "quasi-steady")
         if scene.closed:
-            yield size(f"{name} that passes closed ends", [*supplied, *out], 0, "nothing passes")
+            yield size(f"{name} that passes closed ends", [*supplied, *out], 0, "no flux through closed ends")
         yield excess(f"{name} consumed, pg/m", consumed, -SOLVED * scale, _max_consumed(run, name) * (1 + SOLVED),
-                     "the law's largest m up to the supply, with the biomass that the fastest growth would make")
+                     "the law's largest m up to the supply, with the biomass of the fastest growth")
 
 
 def _saturation(run: Run, name: str) -> float:
     """The largest m of the run; one for a substrate that the scene leaves out."""
     if name not in run.scene.names:
         return 1.0
-    most = (1 + OVERSHOOT) * run.scene.course(name, "supply").largest(run.scene.end)
-    return run.scene.largest_fraction(name, most)
+    largest = (1 + OVERSHOOT) * run.scene.course(name, "supply").largest(run.scene.end)
+    return run.scene.largest_fraction(name, largest)
 
 
 def _decay_fraction(run: Run) -> float:
@@ -621,7 +622,7 @@ def _max_biomass(run: Run) -> np.ndarray:
 
 def _max_consumed(run: Run, name: str) -> np.ndarray:
     scene = run.scene
-    m_a, m_d = (_saturation(run, each) for each in NAMES)
+    m_a, m_d = (_saturation(run, name_of_substrate) for name_of_substrate in NAMES)
     donor = scene.number("kinetics", "maximum_utilization_rate") * m_a * m_d * run.duration * _max_biomass(run)
     if name == "donor":
         return donor
@@ -637,7 +638,7 @@ def _max_decay(run: Run) -> np.ndarray:
 
 
 def _least_decay(run: Run) -> np.ndarray | float:
-    """Lower bound of the biomass that degrades in each step (steps,), pg/m: what is active at t = 0 decays at b."""
+    """Lower bound of the biomass that degrades in each step (steps,), pg/m: the part active at t = 0 decays at b."""
     scene = run.scene
     if "acceptor" in scene.names and not scene.unlimited_decay:
         return 0.0
@@ -648,12 +649,12 @@ def _least_decay(run: Run) -> np.ndarray | float:
 
 
 def _growth(run: Run) -> Iterator[Finding]:
-    """New biomass is the yield on the donor minus the decay."""
+    """Check that new biomass is the yield on the donor minus the decay."""
     scene, ledger = run.scene, run.ledger
     law = {key: scene.number("kinetics", key) for key in TABLE_1["kinetics"]}
     produced, after = ledger["biomass_made_pg_per_m"], ledger["biomass_after_pg_per_m"]
     before = ledger["biomass_before_pg_per_m"]
-    yield size("biomass after less before and made, over after", (after - before - produced) / after, SOLVED,
+    yield size("biomass after, less before and new, over after", (after - before - produced) / after, SOLVED,
                "(9), (10) over the aggregate")
     acceptor, donor = _demands(run, law)
     grown = law["yield_coefficient"] * donor
@@ -661,26 +662,27 @@ def _growth(run: Run) -> Iterator[Finding]:
     decayed = (acceptor - ratio * donor) / law["decay_oxygen_demand"]
     terms = acceptor / law["decay_oxygen_demand"] + ratio * donor + grown
     slack = SUM * (before + terms) + _scheme_error(run, law, terms)
-    yield excess("biomass made less Y donor - (acceptor - F donor) / d_c, pg/m", produced - grown + decayed,
+    yield excess("new biomass - (Y donor - (acceptor - F donor) / d_c), pg/m", produced - grown + decayed,
                  -slack, slack, "(7)-(10); round-off with the midpoint rule")
     yield excess("biomass that degrades by the oxygen consumed, pg/m", decayed,
                  _least_decay(run) - slack - SOLVED * terms, _max_decay(run) * (1 + SOLVED) + slack,
                  "f_d b m_A X_A, from zero to that at the supply; f_d b X_A at the least X_A where m_A = 1 in decay")
     rows, steps = run.at_ledger()
     inert = run.series["inert_fraction"][rows] * after[steps]
-    first = run.series["inert_fraction"][0] * before[0]
+    first_inert = run.series["inert_fraction"][0] * before[0]
     share = (1 - law["degradable_fraction"]) * law["decay_coefficient"]
     gained = np.cumsum(share * _decay_fraction(run) * run.duration * _max_biomass(run))[steps]
-    yield excess("inert biomass, pg/m", inert, first - SOLVED * after[steps], first + gained + SOLVED * after[steps],
+    tolerance = SOLVED * after[steps]
+    yield excess("inert biomass, pg/m", inert, first_inert - tolerance, first_inert + gained + tolerance,
                  "(10): it only gains, by (1 - f_d) b m_A X_A")
 
 
 def _demands(run: Run, law: dict) -> tuple[np.ndarray, np.ndarray]:
     """Acceptor that growth and decay demand, met or not, and donor taken up, in each step (steps,), pg/m.
 
-    With the acceptor alone m_D = 1, and k of the uptake k F + d_c f_d b is growth. With the donor alone the demand of
-    the decay, f_d b times the active biomass, is not in the files: it is the rest of the balance, which then has bounds
-    alone."""
+    With the acceptor alone m_D = 1, and growth takes the part k F of the uptake k F + d_c f_d b. With the donor alone
+    the files do not contain the demand of the decay, f_d b times the active biomass. It is then the rest of the
+    balance, which has bounds alone."""
     ledger = run.ledger
     unmet = ledger.get("acceptor_unmet_pg_per_m", 0.0)
     ratio = law["acceptor_to_donor_ratio"]
@@ -716,23 +718,24 @@ def _scheme_error(run: Run, law: dict, terms: np.ndarray) -> np.ndarray | float:
 OF_STEPS = ("acceptor_balance", "donor_balance", "biomass_balance", "oxygen_demand_balance", "remeshed")
 
 
-def same_rows(one: Run, other: Run) -> Iterator[Finding]:
+def same_rows(first: Run, second: Run) -> Iterator[Finding]:
     """Check that two runs that differ only in ``output.times`` have identical rows at the same times."""
-    rows = [(i, k) for i, time in enumerate(one.times) for k in np.flatnonzero(other.times == time)]
+    rows = [(i, k) for i, time in enumerate(first.times) for k in np.flatnonzero(second.times == time)]
     yield Finding("rows that both runs have", len(rows), 2, inf, "else less is tested")
-    columns = [name for name in one.series if name not in OF_STEPS]
-    apart = sum(one.series[name][i] != other.series[name][k] for name in columns for i, k in rows)
-    yield size("numbers of rows that depend on other rows", apart, 0, "output.times changes no step")
-    apart = sum(_differ(one.fields[i], other.fields[k]) for i, k in rows)
-    yield size("fields that depend on other rows", apart, 0, "output.times changes no step")
-    shared = min(len(table.get("end_h", ())) for table in (one.ledger, other.ledger))
-    apart = sum(np.count_nonzero(one.ledger[name][:shared] != other.ledger[name][:shared]) for name in one.ledger)
-    yield size("numbers of the ledger that depend on rows", apart, 0, "output.times changes no step")
+    columns = [name for name in first.series if name not in OF_STEPS]
+    differing = sum(first.series[name][i] != second.series[name][k] for name in columns for i, k in rows)
+    yield size("numbers of rows that depend on other rows", differing, 0, "output.times changes no step")
+    differing = sum(_differ(first.fields[i], second.fields[k]) for i, k in rows)
+    yield size("fields that depend on other rows", differing, 0, "output.times changes no step")
+    shared = min(len(table.get("end_h", ())) for table in (first.ledger, second.ledger))
+    differing = sum(np.count_nonzero(first.ledger[name][:shared] != second.ledger[name][:shared])
+                    for name in first.ledger)
+    yield size("numbers of the ledger that depend on rows", differing, 0, "output.times changes no step")
 
 
-def _differ(one: Fields, other: Fields) -> bool:
+def _differ(*files: Fields) -> bool:
     """Whether two files contain different arrays."""
-    first, second = ({**fields.at_nodes, **fields.in_cells, "points": fields.points} for fields in (one, other))
+    first, second = ({**fields.at_nodes, **fields.in_cells, "points": fields.points} for fields in files)
     if first.keys() != second.keys():
         return True
     return not all(np.array_equal(first[key], second[key], equal_nan=True) for key in first)
@@ -744,8 +747,9 @@ def close(coarse: Run, fine: Run) -> Iterator[Finding]:
         if column in coarse.series and column in fine.series:
             pairs = [(i, k) for i, time in enumerate(coarse.times) for k in np.flatnonzero(fine.times == time)
                      if not (coarse.series["contact"][i] or fine.series["contact"][k])]
-            apart = [(coarse.series[column][i] - fine.series[column][k]) / scale(k) for i, k in pairs]
-            yield size(f"{column} in fast less that in accurate, relative", apart, PROMISED, "README.md: 1 % and 0.1 %")
+            differences = [(coarse.series[column][i] - fine.series[column][k]) / scale(k) for i, k in pairs]
+            yield size(f"{column} in fast less that in accurate, relative", differences, PROMISED,
+                       "README.md: 1 % and 0.1 %")
 
 
 def _scales(coarse: Run, fine: Run) -> dict[str, Callable[[int], float]]:

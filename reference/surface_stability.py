@@ -51,7 +51,7 @@ def mesh(across, up, length=1.0, height=1.0):
 
 
 def divergence_free(block):
-    """(energy, constraint) of the quartic element: functions of theta that give dense matrices of the free unknowns."""
+    """(energy, constraint) of the quartic element: functions of theta that return dense matrices of free unknowns."""
     basis = Basis(block, ElementVector(ElementTriP4()), intorder=8)
     lower = basis.with_element(ElementDG(ElementTriP3()))
     x, y = basis.doflocs

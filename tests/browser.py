@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import select
 import shutil
 import subprocess
@@ -91,6 +92,13 @@ class Browser:
         while self.attempt("document.readyState === 'complete' && location.protocol === 'file:'") is not True:
             assert time.monotonic() < end, "the page does not load"
             time.sleep(0.05)
+
+    def check_look(self, width: int, dark: bool) -> None:
+        """Check that the page is no wider than a window of this width, and follows the dark mode of the system."""
+        page = self.run("location.pathname")
+        assert self.run("document.documentElement.scrollWidth") <= width, page
+        colour = self.run("getComputedStyle(document.body).backgroundColor")
+        assert (max(map(int, re.findall(r"\d+", colour)[:3])) < 128) == dark, page
 
     def attempt(self, script: str):
         """Return the value of a JavaScript expression, or None if another page replaces the page meanwhile."""

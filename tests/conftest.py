@@ -7,7 +7,7 @@ import numpy
 import pytest
 from hypothesis import HealthCheck, settings
 
-from tests import pages
+from tests import browser, pages
 
 matplotlib.use("Agg")
 SLOW_MACHINES_MAY = {"deadline": None, "suppress_health_check": [HealthCheck.too_slow]}
@@ -28,6 +28,13 @@ def run_fixture(name, *arguments):
 fast = run_fixture("fast", "base", pages.FAST, 'growth.end="3 h"')
 paper = run_fixture("paper", "base", 'growth.end="1 h"')
 flow_only = run_fixture("flow_only", "flow_only")
+
+
+@pytest.fixture(scope="module")
+def window():
+    """A window of Chromium."""
+    with browser.Browser() as chromium:
+        yield chromium
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -28,14 +28,24 @@ BRIEF = ('numerics.preset="fast"', 'growth.end="3 h"',
          'output.times=["0 h", "0.25 h", "0.5 h", "1 h", "2 h", "3 h"]')
 
 
-def start_run(*arguments, threads="1", **options) -> subprocess.Popen:
-    """Start `repro run ARGUMENTS` with the signal handlers of an interactive shell."""
+def start(*arguments, threads="1", **options) -> subprocess.Popen:
+    """Start `repro ARGUMENTS` with the signal handlers of an interactive shell."""
     code = ("import signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler); "
             "from repro.cli import main; sys.exit(main(sys.argv[1:]))")
     names = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), threads)
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, **options}
-    command = [sys.executable, "-c", code, "run", *map(str, arguments)]
+    command = [sys.executable, "-c", code, *map(str, arguments)]
     return subprocess.Popen(command, env={**os.environ, **names}, **pipes)
+
+
+def start_run(*arguments, **options) -> subprocess.Popen:
+    """Start `repro run ARGUMENTS`."""
+    return start("run", *arguments, **options)
+
+
+def run_python(code: str, *arguments: str) -> subprocess.CompletedProcess:
+    """Run Python code, which must succeed, in a process."""
+    return subprocess.run([sys.executable, "-c", code, *arguments], capture_output=True, text=True, check=True)
 
 
 def run_and_wait(*arguments, **options) -> tuple[int, str, str]:

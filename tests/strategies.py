@@ -78,14 +78,6 @@ def outlines(draw, width=standard):
 
 
 @st.composite
-def meshes(draw, width=standard, finest=0.6, clean=True):
-    """Coarse straight Mesh around an aggregate on the wall or a plug or, if ``clean``, of an empty channel."""
-    kinds = [attached_aggregates(width), outlines(width)] + [st.tuples(st.none(), width)] * clean
-    outline, width = draw(st.one_of(kinds))
-    return meshed(outline, width, draw(st.floats(0.35, finest)), film=0.1 * width)[0]
-
-
-@st.composite
 def scenes(draw, drives=("none", "head", "mean_velocity"), peclet=3.0, thiele=30.0, steps=2, elements=("linear",)):
     """A small scene: a narrow or wide pore, a seed or nearly a plug, any supply including none, driven by a head, by a
     velocity or not. It grows for 1 to ``steps`` steps on one of the given kinds of elements.

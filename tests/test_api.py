@@ -84,12 +84,6 @@ def test_a_run_without_rows_can_be_shown():
         empty.fields(0.0)
 
 
-def test_a_run_to_the_pores_end_says_so():
-    scene = load_scene("wide", ["aggregate.radius=40 um", "pore.length=90 um", "growth.time_step=2 h", "growth.end=4 h",
-                                "numerics.refinement=0.5"])
-    assert "reaches the pore's" in solve(scene).status
-
-
 def test_the_table_of_a_notebook_escapes_and_is_short(solved):
     rows = [dict.fromkeys(results.COLUMNS) | {"time_h": float(k)} for k in range(40)]
     html = Results("<script>alert(1)</script>&", rows, [{}] * 40, "<b>")._repr_html_()
@@ -185,21 +179,6 @@ def test_a_missing_optional_package_is_reported_in_one_line(solved, monkeypatch,
     faults.remove_package(monkeypatch, package)
     with pytest.raises(ImportError, match=f"^the package {package} is not installed; pip install {package}$"):
         make(solved)
-
-
-def test_a_sweep_from_python(tmp_path):
-    """It has runs, labels and tables. A second call computes nothing."""
-    events = []
-    arguments = NARROW, ["pore.width=30 um, 40 um"], tmp_path / "sweep"
-    swept = repro.sweep(*arguments, workers=1, tell=events.append)
-    assert [run.is_over for run in swept.runs] == [True, True] and swept.failed == []
-    assert [swept.label(run) for run in swept.runs] == ["pore.width = 30 um", "pore.width = 40 um"]
-    assert [event["done"] for event in events] == [0, 1, 2] and repr(swept).startswith("<Sweep of scene: 2 of 2 runs")
-    widths = [repro.load_run(path)["head_loss_cm"][0] for path in swept.paths]
-    assert widths[0] > widths[1] and (tmp_path / "sweep" / "runs.csv").exists()
-    again = []
-    repro.sweep(*arguments, workers=1, tell=again.append)
-    assert [event["done"] for event in again] == [2]
 
 
 def test_a_notebook_shows_key_figures_and_a_picture(solved):

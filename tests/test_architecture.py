@@ -1,6 +1,5 @@
 """Rules of the package, checked in its source: imports between rooms, declared and locked dependencies."""
 import ast
-import pathlib
 import re
 import sys
 import tomllib
@@ -9,7 +8,8 @@ from importlib.metadata import packages_distributions
 
 import pytest
 
-ROOT = pathlib.Path(__file__).parents[1]
+from tests.blocks import ROOT
+
 FOLDERS = ("repro", "reference", "verification", "paper_figures", "tests")
 #: Names of folders that commands make. They may hold copies of the package, or earlier versions of it.
 GENERATED = {"__pycache__", "out", "cache", "live", "pictures", "build", "dist", ".venv", ".git", ".hypothesis"}

@@ -1,7 +1,6 @@
 """Pages in a real browser: scripts run, the slider and its keys change the picture, and nothing else is loaded."""
 
 import json
-import re
 import time
 
 import numpy as np
@@ -16,12 +15,6 @@ from tests.pages import FAST, make_hostile, page_data, run
 
 pytestmark = [pytest.mark.thorough,
               pytest.mark.skipif(browser.CHROMIUM is None, reason="Chromium is not installed")]
-
-
-@pytest.fixture(scope="module")
-def window():
-    with browser.Browser() as chromium:
-        yield chromium
 
 
 @pytest.fixture(scope="module")
@@ -53,9 +46,7 @@ def test_pages_open_from_disk_without_error(window, runs, name, width, dark):
     assert state["frame"] == str(len(page_data(runs[name])["frames"]) - 1) and float(state["filled"]) > 0.9
     charts = int(window.run("document.documentElement.dataset.charts"))
     assert (charts > 10) == (name in ("fast", "paper"))
-    assert window.run("document.documentElement.scrollWidth") <= width
-    colour = window.run("getComputedStyle(document.body).backgroundColor")
-    assert (max(map(int, re.findall(r"\d+", colour))) < 128) == dark
+    window.check_look(width, dark)
 
 
 @pytest.mark.parametrize("name", ["fast", "paper"])

@@ -82,18 +82,18 @@ def test_the_recorded_verdicts_follow_from_the_recorded_numbers(record):
 
 
 def test_a_claim_counts_with_its_first_definition(record):
-    """Claims that were defined anew after their values had been seen keep all definitions."""
-    anew = {entry["id"]: entry for entry in record if entry["other_definitions"]}
-    assert {"C13", "C39", "C41", "C46"} <= anew.keys()
-    for entry in anew.values():
+    """Claims that were redefined after their values had been seen keep all definitions."""
+    redefined = {entry["id"]: entry for entry in record if entry["other_definitions"]}
+    assert {"C13", "C39", "C41", "C46"} <= redefined.keys()
+    for entry in redefined.values():
         first, *later = report.definitions(entry)
         if entry["verdict"] == NOT_JUDGED:
             assert (first, later) == (entry, []) and report.describe_verdicts(entry) == NOT_JUDGED
             continue
         assert report.counted(entry) is first and all(first["defined"] < each["defined"] for each in later)
         assert all(each["replaced_because"] and each["words"] for each in entry["other_definitions"])
-        assert f"{first['verdict']} (as defined anew: {later[-1]['verdict']})" == report.describe_verdicts(entry)
-    assert [report.counted(anew[id])["verdict"] for id in ("C13", "C39", "C41")] == [CONTRADICTED] * 3
+        assert f"{first['verdict']} (as redefined: {later[-1]['verdict']})" == report.describe_verdicts(entry)
+    assert [report.counted(redefined[id])["verdict"] for id in ("C13", "C39", "C41")] == [CONTRADICTED] * 3
 
 
 def test_a_definition_is_dated_before_its_first_value(record):
@@ -116,7 +116,7 @@ OTHER = {**DEFINED, "checks": [{**DEFINED["checks"][0], "quantity": "speed of an
     ({**OTHER, "defined": "2030-01-02 10:04"}, {**DEFINED, "first_value": "2030-01-02 10:01"}, "2030-01-02 10:03"),
 ])
 def test_a_definition_without_a_date_before_its_values_is_refused(entry, known, now):
-    with pytest.raises(ClaimError, match="C01: defined anew"):
+    with pytest.raises(ClaimError, match="C01: the definition is new"):
         report.stamped(entry, known, now)
 
 

@@ -64,6 +64,12 @@ def jacobians(points, cells, places):
     return np.einsum("tai,qaj->tqij", points[cells], functions({3: 1, 6: 2}[cells.shape[1]], places)[1])
 
 
+def gradients(order, points, cells, places):
+    """(t, q, k, 2) gradients of the functions of an order, and (t, q) determinants of the triangles' maps."""
+    J = jacobians(points, cells, places)
+    return np.einsum("qkj,tqji->tqki", functions(order, places)[1], np.linalg.inv(J)), np.linalg.det(J)
+
+
 def rule(degree):
     """(q, 2) points and (q,) weights of scikit-fem's quadrature."""
     places, weights = get_quadrature(RefTri, degree)
@@ -100,11 +106,10 @@ def pressure_drop(scene, pore, flow):
         first, last = (integrate_over_end(space, x, flow.head) / scene.pore.width for x in pore.mesh.ends)
         return first - last
     places, weights = rule(space.gradient_degree)
-    J = jacobians(pore.mesh.points, pore.mesh.cells, places)
-    slopes = np.einsum("qkj,tqji->tqki", functions(space.order, places)[1], np.linalg.inv(J))
+    slopes, determinants = gradients(space.order, pore.mesh.points, pore.mesh.cells, places)
     gradient = np.einsum("tkc,tqki->tqci", flow.velocity[space.cells], slopes)
     thick = np.where(pore.mesh.biomass, scene.flow.viscosity_ratio, 1.0)
-    work = np.einsum("t,tq,q,tqci->", thick, np.linalg.det(J), weights, gradient**2)
+    work = np.einsum("t,tq,q,tqci->", thick, determinants, weights, gradient**2)
     through = integrate_over_end(space, pore.mesh.ends[0], flow.velocity[:, 0])
     return scene.flow.kinematic_viscosity / scene.flow.gravity * work / through
 
@@ -254,22 +259,21 @@ def test_every_column_is_what_its_name_says(order):
 
 
 def stresses(scene, pore):
-    """Cauchy stress (t, q, 3, 3) MPa of the aggregate at the points of theta, and areas (t, q) um2 of these points."""
+    """At the points of theta: Cauchy stress (t, q, 3, 3) MPa of the aggregate, J (t, q), and areas (t, q) um2 at t = 0.
+    """
     mesh = pore.mesh
     cells = mesh.cells[mesh.biomass]
     places, weights = rule_with(pore.theta.shape[1])
-    after = jacobians(mesh.points, cells, places)
     before = jacobians(pore.body.reference, np.searchsorted(mesh.body, cells), places)
     F = np.zeros((*before.shape[:2], 3, 3))
-    F[..., :2, :2], F[..., 2, 2] = after @ np.linalg.inv(before), 1.0
+    F[..., :2, :2], F[..., 2, 2] = jacobians(mesh.points, cells, places) @ np.linalg.inv(before), 1.0
     P = pore.pressure[cells[:, :3]] @ functions(1, places)[0].T
-    return scene.growth.shear_modulus * cauchy(F, P), np.linalg.det(after) * weights
+    return scene.growth.shear_modulus * cauchy(F, P), np.linalg.det(F), np.linalg.det(before) * weights
 
 
 def nodal_loads(mesh, cells, places, sigma, areas):
     """(N, 2) sums of sigma grad N_i over the areas of points."""
-    J = jacobians(mesh.points, cells, places)
-    slopes = np.einsum("qkj,tqji->tqki", functions(mesh.geometry, places)[1], np.linalg.inv(J))
+    slopes, _ = gradients(mesh.geometry, mesh.points, cells, places)
     loads = np.zeros_like(mesh.points)
     np.add.at(loads, cells, np.einsum("tq,tqij,tqkj->tki", areas, sigma, slopes))
     return loads
@@ -283,14 +287,13 @@ def water_loads(scene, instant):
     wet = ~mesh.biomass
     cells = mesh.cells[wet]
     places, weights = rule(8)
-    J = jacobians(mesh.points, cells, places)
-    slopes = np.einsum("qkj,tqji->tqki", functions(space.order, places)[1], np.linalg.inv(J))
+    slopes, determinants = gradients(space.order, mesh.points, cells, places)
     grad = np.einsum("tkc,tqki->tqci", flow.velocity[space.cells[wet]], slopes)
     head_order = max(1, space.order - 1)
     head_cells = mesh.cells[:, : len(NODES[head_order])][wet]
     head = flow.head[head_cells] @ functions(head_order, places)[0].T
     stress = drive.kinematic_viscosity / drive.gravity * grad - head[..., None, None] * np.eye(2)
-    loads = -nodal_loads(mesh, cells, places, stress, np.linalg.det(J) * weights)
+    loads = -nodal_loads(mesh, cells, places, stress, determinants * weights)
     body = set(mesh.body.tolist())
     s, gauss = np.polynomial.legendre.leggauss(6)
     for triangle, corners in zip(cells, head_cells):
@@ -313,7 +316,8 @@ def derived_adhesion(scene, instant):
     """{column: value} of the columns of adhesion. `derived_wall_traction` derives those of the wall's traction."""
     pore = instant.pore
     mesh = pore.mesh
-    sigma, areas = stresses(scene, pore)
+    sigma, J, initial_areas = stresses(scene, pore)
+    areas = J * initial_areas
     middles = mesh.points[mesh.cells[mesh.biomass, :3]].mean(axis=1)
     near = np.linalg.norm(middles[:, None] - middles, axis=-1) <= mesh.width / 20
     means = near @ np.einsum("tq,tqij->tij", areas, sigma).reshape(-1, 9) / (near @ areas.sum(1))[:, None]
@@ -406,8 +410,8 @@ def derived_wall_traction(scene, instant):
     mesh = instant.pore.mesh
     cells = mesh.cells[mesh.biomass]
     places, _ = rule_with(instant.pore.theta.shape[1])
-    sigma, areas = stresses(scene, instant.pore)
-    forces = nodal_loads(mesh, cells, places, sigma[..., :2, :2], areas)
+    sigma, J, areas = stresses(scene, instant.pore)
+    forces = nodal_loads(mesh, cells, places, sigma[..., :2, :2], J * areas)
     if scene.growth.fluid_forces == "included":
         forces = forces - water_loads(scene, instant)
     peaks = []
@@ -463,8 +467,7 @@ def derived_arrays(scene, instant):
     pore, flow = instant.pore, instant.solved.flow
     state = instant.solved.concentrations
     mesh, body = pore.mesh, pore.body
-    body_cells = mesh.cells[mesh.biomass]
-    inside = sorted(set(body_cells.ravel().tolist()))
+    inside = sorted(set(mesh.cells[mesh.biomass].ravel().tolist()))
 
     def at_nodes(field, order=pore.space.order, cells=pore.space.cells):
         values, basis = np.empty((len(mesh.points), *field.shape[1:])), functions(order, NODES[mesh.geometry])[0]
@@ -472,9 +475,9 @@ def derived_arrays(scene, instant):
         return values
 
     def only(values, where, count):
-        compute_theta = np.full((count, *values.shape[1:]), np.nan)
-        compute_theta[where] = values
-        return compute_theta
+        everywhere = np.full((count, *values.shape[1:]), np.nan)
+        everywhere[where] = values
+        return everywhere
 
     def plane(vectors):
         return np.column_stack([vectors, np.where(np.isnan(vectors[:, 0]), np.nan, 0.0)])
@@ -488,23 +491,15 @@ def derived_arrays(scene, instant):
              "region": mesh.biomass.astype(float)}
     for name in ("active", "inert"):
         derived[f"{name}_biomass"] = density_at_nodes(pore, getattr(pore, name)) / scene.kinetics.maximum_density
-    places, weights = rule_with(pore.theta.shape[1])
-    local = np.searchsorted(inside, body_cells)
-    before, after = jacobians(body.reference, local, places), jacobians(mesh.points, body_cells, places)
-    reference_areas = np.linalg.det(before) * weights
-    F = np.zeros((*reference_areas.shape, 3, 3))
-    F[..., :2, :2], F[..., 2, 2] = after @ np.linalg.inv(before), 1.0
-    P = pore.pressure[body_cells[:, :3]] @ functions(1, places)[0].T
-    modulus = scene.growth.shear_modulus
-    pressure = modulus * at_nodes(pore.pressure, 1, mesh.cells[:, :3])
+    pressure = scene.growth.shear_modulus * at_nodes(pore.pressure, 1, mesh.cells[:, :3])
     derived["pressure_MPa"] = only(pressure[inside], inside, len(mesh.points))
-    sigma = modulus * cauchy(F, P)
-    means = {"theta": pore.theta, "J": np.linalg.det(F),
+    sigma, J, areas = stresses(scene, pore)
+    means = {"theta": pore.theta, "J": J,
              "largest_principal_stress_MPa": np.linalg.eigvalsh(sigma)[..., -1]}
     for name, (i, j) in {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1)}.items():
         means[f"stress_{name}_MPa"] = sigma[..., i, j]
     for name, values in means.items():
-        derived[name] = only((values * reference_areas).sum(1) / reference_areas.sum(1), mesh.biomass, len(mesh.cells))
+        derived[name] = only((values * areas).sum(1) / areas.sum(1), mesh.biomass, len(mesh.cells))
     derived["surface_stretch"] = np.full(len(mesh.cells), np.nan)
     for edge in (edge for part in free_surfaces(pore) for edge in part):
         value, _, triangle = along_edge(pore, *edge)
@@ -653,6 +648,7 @@ def test_every_line_of_every_chart_is_the_column_that_it_names():
             assert line.times.tolist() == ([0.5, 2.0] if of_steps else run.times.tolist())
             assert line.values == pytest.approx(known[column], rel=1e-12, nan_ok=True), title
     present, produced = charts["Ledger: biomass"].lines
-    assert (present.label, produced.label) == ("held", "made since t = 0") and present.times.tolist() == [1.0, 3.0]
+    assert (present.label, produced.label) == ("in the aggregate", "made since t = 0")
+    assert present.times.tolist() == [1.0, 3.0]
     assert present.values == pytest.approx(1e-6 * run.ledger["biomass_after_pg_per_m"], rel=1e-12)
     assert produced.values == pytest.approx(1e-6 * np.cumsum(run.ledger["biomass_made_pg_per_m"]), rel=1e-12)

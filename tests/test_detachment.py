@@ -1,15 +1,15 @@
-"""Stresses that walls and biomass bear: means of tractions; strengths that end a run; scenes without strengths."""
-import json
+"""Stresses that walls and biomass bear: means of tractions; strengths that end a run; scenes without strengths.
+
+`test_fold.py` tests what a run that has ended leaves, `test_derived.py` the charts of these stresses, and
+`test_longer.py` a run with a bonded wall that is made longer.
+"""
 
 import numpy as np
 import pytest
 
 import repro
 from repro import results
-from repro.cli import main
 from repro.model import adhesion
-from repro.report import quantities
-from repro.report.reading import read
 from repro.runs.status import is_over
 from repro.scene import load_scene
 
@@ -60,41 +60,6 @@ def test_a_run_ends_where_a_strength_is_exceeded(key, strength, verb, column):
     assert sparse.status.startswith(f"the aggregate {verb} at t = {sparse['time_h'][-1]:g} h: {where}")
     assert f"growth.{key} is {strength:g} MPa" in sparse.status
     assert len(sparse["time_h"]) == 2 and sparse["time_h"][-1] == every["time_h"][-1]
-
-
-def test_an_ended_run_is_complete_and_is_not_continued(tmp_path, capsys):
-    out = tmp_path / "run"
-    change = ["--set", "growth.bonding_strength=2 kPa", "--set", 'growth.end="3 h"']
-    sets = [word for entry in FAST for word in ("--set", entry)]
-    assert main(["run", "base", "--out", str(out), "--quiet", *sets, *change]) == 0
-    status = json.loads((out / "run.json").read_text())["status"]
-    assert status.startswith("the aggregate detaches at t = ")
-    rows = (out / "timeseries.csv").read_bytes()
-    assert main(["run", "--resume", str(out), "--quiet"]) == 0
-    assert (out / "timeseries.csv").read_bytes() == rows
-    main(["run", "--resume", str(out), "--quiet", "--set", 'growth.end="4 h"'])
-    assert json.loads((out / "run.json").read_text())["status"] == status
-
-
-def test_the_page_draws_the_stresses_of_a_run_that_has_them(tmp_path):
-    """A run with adhesion has two charts more, and its page names them; a run without has neither."""
-    both = {"Stress that could detach the aggregate", "Force of the fluid on the aggregate"}
-    for name, changes, drawn in (("with", ["growth.bonding_strength=1 MPa"], both), ("without", [], set())):
-        folder = tmp_path / name
-        repro.run(load_scene("base", ["numerics.preset=fast", 'growth.end="0.4 h"', *changes]), folder)
-        titles = {chart.title for chart in quantities.charts_of(read(folder))}
-        page = (folder / "report.html").read_text(encoding="utf-8")
-        assert titles & both == drawn and {title for title in both if title in page} == drawn
-
-
-def test_a_bonded_run_resumes_bit_for_bit(tmp_path):
-    """The last rows of the resumed and the uninterrupted run agree to the last bit."""
-    repro.run(load_scene("base", [*FAST, 'growth.end="3 h"']), tmp_path / "a")
-    repro.resume(tmp_path / "a", overrides=['growth.end="5.6 h"'])
-    repro.run(load_scene("base", [*FAST, 'growth.end="5.6 h"']), tmp_path / "b")
-    one, other = (repro.load_run(tmp_path / name) for name in "ab")
-    for name in ("time_h", "thickness_um", "downstream_um", "wall_traction_max_MPa", "fluid_moment_nN"):
-        assert one[name][-1] == other[name][-1]
 
 
 def test_a_scene_without_these_keys_computes_none_of_it(monkeypatch):

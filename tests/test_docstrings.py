@@ -13,7 +13,8 @@ import pytest
 from numpydoc import validate
 
 import repro
-from tests.test_architecture import ROOT, modules
+from tests.blocks import ROOT
+from tests.test_architecture import modules
 
 USERS = [f"repro.{name}" for name in dir(repro)]
 METHODS = [f"repro.Results.{name}" for name in ("animate", "fields", "plot", "to_pandas", "to_xarray")]

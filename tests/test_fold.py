@@ -20,17 +20,15 @@ from repro.march.loop import InterpolatedState, RestartState, Scheme, StepResult
 from repro.march.step_control import StepControl
 from repro.model import contact
 from repro.model.pore import seeded, solve
-from repro.model.stages import Stages
 from repro.model.surface import BIOT, CREASE, surface
 from repro.preflight import numbers
 from repro.preflight.numbers import evaluate_at_largest
 from repro.preflight.simplifications import find_warnings
 from repro.results import read_table
-from repro.runs.execution import run
 from repro.runs.status import is_over
 from repro.scene import load_scene
-from tests.shell import files, lasting_record, read_record, state
-from tests.test_resume import in_parts
+from tests.shell import read_record, state
+from tests.test_resume import check_parts
 from verification.problems import family
 
 SETS = ('numerics.preset="fast"', "numerics.refinement=0.3", 'pore.width="20 um"', 'growth.end="6 h"',
@@ -81,10 +79,7 @@ def test_a_run_stopped_after_every_step_equals_the_uninterrupted_run(tmp_path, r
     """A checkpoint also holds the warning and the last shape, which is the reference of strain for stress-free biomass.
     That run completes, and its smallest stretch is that of the last step."""
     scene = plug(f"growth.new_biomass={rheology}", 'growth.end="5.3 h"', 'output.times=["1 h", "4.6 h", "5.3 h"]')
-    run(scene, tmp_path / "whole")
-    assert in_parts(scene, tmp_path / "parts", 2) >= 2
-    assert files(tmp_path / "parts") == files(tmp_path / "whole")
-    assert lasting_record(tmp_path / "parts") == lasting_record(tmp_path / "whole")
+    check_parts(scene, tmp_path)
     if rheology == "stress_free":
         stretches = read_table(tmp_path / "whole" / "timeseries.csv")["surface_stretch_min"]
         assert read_record(tmp_path / "whole")["status"] == "completed"
@@ -173,22 +168,6 @@ def test_no_row_has_a_density_out_of_bounds(theta, kind, factor):
         ending, rows = continue_run(theta, advance)
         assert type(ending) is kind and not rows
         assert kind is repro.Fold or f"{factor:.2g} X_m, out of 0.5 to 2" in str(ending)
-
-
-@pytest.mark.parametrize("numerics", [
-    ("numerics.preset=paper",), ("numerics.preset=paper", "numerics.transport=gear"), ("numerics.preset=fast",)])
-def test_every_scheme_refuses_an_aggregate_that_collapses(numerics, monkeypatch):
-    """No row follows t = 0 if each new mesh leaves the biomass 0.4 times its area."""
-    def collapse(stages, *arguments):
-        after, remeshed = new_mesh(stages, *arguments)
-        return after.moved(after.mesh.points * [1.0, 0.4]), remeshed
-
-    new_mesh = Stages.new_mesh
-    monkeypatch.setattr(Stages, "new_mesh", collapse)
-    rows = []
-    with pytest.raises(SimulationError, match=r"the density of biomass comes to 2\.[45]"):
-        rows.extend(repro.simulate(load_scene("base", [*numerics, 'growth.end="1 h"'])))
-    assert [row.pore.time for row in rows] == [0.0]
 
 
 @pytest.mark.parametrize("status, over", [

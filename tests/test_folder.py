@@ -123,7 +123,7 @@ def test_a_checkpoint_that_is_no_file_is_refused(out, capsys, make):
         out / "fields", capsys, "run", "--resume", out)
 
 
-@pytest.mark.parametrize("content", [None, b"", b"<VTKFile", b'<VTKFile type="UnstructuredGrid"/>', b"\xff" * 5000])
+@pytest.mark.parametrize("content", [None, b"<VTKFile"])
 def test_altered_fields_are_reported_and_computed_again(out, short, capsys, content):
     """So are missing fields. The resume starts from the last good state, here t = 0, and ends with the bits of an
     uninterrupted run."""
@@ -136,8 +136,8 @@ def test_altered_fields_are_reported_and_computed_again(out, short, capsys, cont
 
 
 def test_a_run_killed_at_its_very_end_is_tidied(tmp_path, capsys):
-    """The status is written, but the page is missing and a checkpoint remains. Resuming, the same command and --force
-    tidy the folder."""
+    """The status is written, the page is missing, and a checkpoint remains. A resume, the same command and --force
+    each tidy the folder."""
     run(load_scene("flow_only"), tmp_path)
     page = tmp_path / "report.html"
     page_content = page.read_bytes()

@@ -27,11 +27,6 @@ def at_rest(body, constrained, theta, prescribed=None):
     return growth.equilibrium(body, theta, body.reference, np.zeros(body.shape.corners), constrained, target)
 
 
-def area(body, position):
-    """Return the area of the body with its nodes at these coordinates."""
-    return (body.at.dx * body.strained(position).J).sum()
-
-
 @GEOMETRIES
 def test_one_step_of_growth_takes_few_iterations(geometry):
     """Newton's method converges quadratically: at most 5 iterations for 4 % growth (measured 4)."""

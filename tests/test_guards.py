@@ -46,6 +46,12 @@ def ledger(scene, before=1e12, demand=0.0, biomass=0.0, acceptor=0.0, donor=0.0)
     return Ledger(0.0, 0.2, SUPPLIED, out, CONSUMED, (0.0, 0.0), before, produced, after)
 
 
+def refuse(case, **leaks):
+    """Judge a step with relative leaks. Raises BalanceError if one is too large."""
+    scene, pore = case
+    balance.refuse(Limits.of(scene), pore, ledger(scene, **leaks))
+
+
 def accepted_demand(scene, way, before=1e12):
     """The tolerance in the docstrings: 1e-6 and the round-off of the mass. Updates add (dt (k Y + b))^2 / 12 of the
     turnover. Gear's method adds 1e-3 of the largest possible turnover times the supplies over their half
@@ -69,13 +75,13 @@ LEAKS = [(kind, way) for kind in ("acceptor", "donor", "biomass", "demand") for 
 @pytest.mark.parametrize("kind, way", LEAKS)
 def test_a_leak_below_the_tolerance_passes_and_a_larger_one_is_refused(kind, way, sign):
     """The leaks are 2 % below and above the tolerance, with gains and losses in one balance at a time."""
-    scene, pore = base(way)
-    limit = sign * (accepted_demand(scene, way) if kind == "demand" else 1e-6)
-    balance.refuse(Limits.of(scene), pore, ledger(scene))
-    balance.refuse(Limits.of(scene), pore, ledger(scene, **{kind: 0.98 * limit}))
+    case = base(way)
+    limit = sign * (accepted_demand(case[0], way) if kind == "demand" else 1e-6)
+    refuse(case)
+    refuse(case, **{kind: 0.98 * limit})
     name = "oxygen demand" if kind == "demand" else kind
     with pytest.raises(BalanceError, match=rf"it lacks -?[\d.e-]+ of the {name}; try") as error:
-        balance.refuse(Limits.of(scene), pore, ledger(scene, **{kind: 1.02 * limit}))
+        refuse(case, **{kind: 1.02 * limit})
     assert ("lacks -" in str(error.value)) == (sign < 0)
 
 
@@ -91,12 +97,12 @@ def test_the_demand_of_a_longer_update_may_be_off_by_its_square():
                                            (["numerics.transfer=linear"], "biomass")])
 def test_a_stated_defect_lets_no_other_one_pass(changes, kind):
     """[E4] excuses the substrates only, [E8] the biomass only."""
-    scene, pore = base("updates", *changes)
+    case = base("updates", *changes)
     excused = {"acceptor", "donor"} if kind != "biomass" else {"biomass"}
-    balance.refuse(Limits.of(scene), pore, ledger(scene, **{kind: 0.03}))
+    refuse(case, **{kind: 0.03})
     for other in {"acceptor", "donor", "biomass", "demand"} - excused:
         with pytest.raises(BalanceError):
-            balance.refuse(Limits.of(scene), pore, ledger(scene, **{kind: 0.03, other: 0.03}))
+            refuse(case, **{kind: 0.03, other: 0.03})
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), -float("inf")])

@@ -31,32 +31,28 @@ def slab():
     space = channels.slab_space(4.0, 0, 2, (-channels.SLAB, channels.SLAB), (-channels.SLAB, channels.SLAB))
     kinetics = replace(channels.SCENE.kinetics, law="Haldane", yield_coefficient=1e-12, decay_coefficient=0.0)
     problem = channels.problem(space, None, Substrates(donor=donor), kinetics)
-    states = haldane_slab.solutions(SUPPLY, SINK, HALF_SATURATION, INHIBITION, channels.SLAB,
-                                    donor.diffusivity_in_aggregate)
-    density = SINK / kinetics.maximum_utilization_rate
-    return space, problem, density, [state(space.points[:, 0]) for state in states]
+    solutions = haldane_slab.solutions(SUPPLY, SINK, HALF_SATURATION, INHIBITION, channels.SLAB,
+                                       donor.diffusivity_in_aggregate)
+    states = [solution(space.points[:, 0]) for solution in solutions]
+    assert len(states) == 3 and min(largest_gap(state, states[-1]) for state in states[:-1]) > 10 * MESH
+    return space, problem, SINK / kinetics.maximum_utilization_rate, states
 
 
 def largest_gap(one, other):
     return np.abs(one - other).max() / SUPPLY
 
 
-def test_the_state_reached_from_the_supply_is_returned_and_one_of_several(slab):
-    """Three states are steady. The one that is returned has the most donor, and the others are far from it."""
-    _, problem, density, states = slab
-    computed = channels.steady(problem, density).donor
-    assert len(states) == 3 and min(largest_gap(one, states[-1]) for one in states[:-1]) > 10 * MESH
-    assert largest_gap(computed, states[-1]) < MESH
-
-
 @pytest.mark.parametrize("share", [-0.02, -1e-4, 0.0])
 def test_a_small_change_of_the_start_changes_no_state(slab, share):
-    """The starts are the supply and each stable state, changed by a share that varies from node to node."""
+    """Three states are steady. From the supply, the start of a run, the one with the most donor is reached. The starts
+    are the supply and each stable state, changed by a share that varies from node to node."""
     _, problem, density, states = slab
-    for start, due in ((np.full_like(states[0], SUPPLY), states[-1]), (states[-1], states[-1]), (states[0], states[0])):
+    assert largest_gap(channels.steady(problem, density).donor, states[-1]) < MESH
+    supplied = np.full_like(states[0], SUPPLY)
+    for start, expected in ((supplied, states[-1]), (states[-1], states[-1]), (states[0], states[0])):
         changed = start * (1 + share * np.random.default_rng(1).uniform(size=len(start)))
         computed = channels.steady(problem, density, transport.Concentrations(None, changed)).donor
-        assert largest_gap(computed, due) < MESH
+        assert largest_gap(computed, expected) < MESH
 
 
 @pytest.mark.parametrize("place", [0, -1])

@@ -10,20 +10,6 @@ from repro.fem.linear import DEFAULT, Method
 from tests import faults
 from tests.strategies import meshed
 
-LINE = np.column_stack([np.arange(9), np.arange(1, 10)])
-#: The first kind is every segment of a line; the second couples a segment with a distant one.
-KINDS = LINE, np.column_stack([LINE[:4], LINE[5:]])
-_ROUGH = [np.random.default_rng(3).standard_normal((*kind.shape, kind.shape[1])) for kind in KINDS]
-ELEMENTS = tuple(part @ np.swapaxes(part, 1, 2) + np.eye(part.shape[1]) for part in _ROUGH)
-
-
-def dense():
-    matrix = np.zeros((10, 10))
-    for kind, elements in zip(KINDS, ELEMENTS):
-        for unknowns, element in zip(kind, elements):
-            matrix[np.ix_(unknowns, unknowns)] += element
-    return matrix
-
 
 def solve(matrix, right, method=DEFAULT):
     """x of A x = right."""
@@ -44,8 +30,9 @@ def test_tiny_pivots_do_not_spoil_the_answer():
 @pytest.mark.parametrize("matrix", [[[1.0, 1.0], [1.0, 1.0]], [[0.0, 0.0], [0.0, 1.0]],
                                     [[2.0, -1.0, -1.0], [-1.0, 2.0, -1.0], [-1.0, -1.0, 2.0]]])
 def test_a_singular_system_is_refused(matrix):
-    """The factors of a pure Neumann problem are not exactly singular."""
-    with pytest.raises(LinearError, match="singular|residual"):
+    """The factors of a pure Neumann problem are not exactly singular. The message ends with the cause, because the
+    stage appends its advice."""
+    with pytest.raises(LinearError, match="is singular$|residual"):
         solve(sp.csc_array(np.array(matrix)), np.arange(1.0, len(matrix) + 1))
 
 

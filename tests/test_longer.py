@@ -26,6 +26,8 @@ SCENES = {
                                "pore.width=20 um", "flow.head=1 mm", "numerics.tolerance=0.001",
                                "growth.new_biomass=stress_free"]),
     "gear": ((0.5,), ["growth.end=0.7 h", "numerics.transport=gear"]),
+    "fast, bonded": ((3.0,), ["growth.end=5.6 h", "numerics.preset=fast", "growth.wall=bonded"]),
+    "donor alone": ((0.4,), ["growth.end=1 h", "numerics.refinement=0.5", "substrates={donor={}}"]),
     "to the pore's end": ((8.0,), ["aggregate.radius=40 um", "pore.length=90 um", "growth.time_step=2 h",
                                    "growth.end=9 h", "numerics.refinement=0.5"]),
     "fast, rows closer than those of the longer run": ((4.75,), [
@@ -38,13 +40,15 @@ def scene(name, end=None):
 
 
 def same(one, other):
-    """Do two runs have the same tables, fields and indices, and the same record?"""
+    """Return whether two runs have the same tables, fields, indices and record."""
     left, right = (lasting_record(folder) | {"origin": None, "files": None, "sha256": None} for folder in (one, other))
     return files(one) == files(other) and left == right
 
 
-#: The paper's scheme, the midpoint rule and Gear's scheme; make test-thorough runs the rest.
-QUICK = {("paper", 1.4), ("fast", 2.0), ("gear", 0.5), ("to the pore's end", 8.0)}
+#: The paper's scheme, the midpoint rule, Gear's scheme, a bonded wall and one substrate; make test-thorough runs the
+#: rest.
+QUICK = {("paper", 1.4), ("fast", 2.0), ("gear", 0.5), ("fast, bonded", 3.0), ("donor alone", 0.4),
+         ("to the pore's end", 8.0)}
 
 
 @pytest.mark.parametrize("name, end", [

@@ -4,7 +4,6 @@ time."""
 import ast
 import json
 import re
-import subprocess
 import sys
 from pathlib import Path
 
@@ -21,7 +20,7 @@ from repro.runs.execution import resume
 from repro.scene import SceneError, load_scene
 from tests import faults
 from tests.pages import run
-from tests.shell import SHORT, files, interrupt_run, read_record, refusal, run_and_wait
+from tests.shell import SHORT, files, interrupt_run, read_record, refusal, run_and_wait, run_python
 from verification.bench import runs as bench_runs
 
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="for Linux alone")
@@ -74,8 +73,7 @@ def test_the_estimated_memory_is_what_a_run_uses():
     for refinement in (1, 4):
         changes = [f"numerics.refinement={refinement}", "growth.end=12 min"]
         estimated.append(check(load_scene("base", changes)).cost.memory)
-        measured.append(int(subprocess.run([sys.executable, "-c", code, *changes], capture_output=True, text=True,
-                                        check=True).stdout) * 1024 / 1e6)
+        measured.append(int(run_python(code, *changes).stdout) * 1024 / 1e6)
     difference = estimated[1] - estimated[0]
     assert (measured[1] - measured[0]) / 1.5 < difference < 1.5 * (measured[1] - measured[0])
 
@@ -264,9 +262,7 @@ def test_a_scene_runs_and_imports_only_its_own_parts(name):
     sections, needed = bench_runs.SCENES[name]
     tables = bench_runs.scene_of("fast", {key: {**table, "end": "0.4 h"} if key == "growth" else table
                                           for key, table in sections.items()})
-    command = [sys.executable, "-c", STAGES, json.dumps(tables)]
-    output = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-    stages, columns, modules = map(set, json.loads(output))
+    stages, columns, modules = map(set, json.loads(run_python(STAGES, json.dumps(tables)).stdout))
     grows = {"growth", "mesh motion"} if "growth" in tables else set()
     assert stages - {"transfer", "factorise and solve"} == needed | grows | {"meshing"}
     assert modules & (NEVER | SOLVER | FILES) <= SOLVER
@@ -285,8 +281,7 @@ def test_a_command_imports_only_the_modules_that_it_needs(tmp_path, arguments, n
     """A command without a run imports no solver, and one without fields no meshio. The run has remeshes, fields and a
     page."""
     out = ["--out", str(tmp_path / "run")] if arguments[0] == "run" else []
-    command = [sys.executable, "-c", COMMAND, *arguments, *out]
-    modules = subprocess.run(command, capture_output=True, text=True, check=True).stderr.split()
+    modules = run_python(COMMAND, *arguments, *out).stderr.split()
     assert {*modules} & (NEVER | SOLVER | FILES) == needed
     assert (tmp_path / "run" / "report.html").exists() is (FILES <= needed)
 

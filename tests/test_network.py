@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import repro
-from repro.results.network import CONTACT, TABLE, TRANSPORTS, UPTAKE_BOUND, known
+from repro.results.network import CONTACT, TABLE, TRANSPORTS, UPTAKE_BOUND, share_range
 from verification.network import __main__ as command
 from verification.network import law, page, shapes, uptakes
 from verification.network.shapes import RATIOS
@@ -64,7 +64,7 @@ def test_the_law_between_the_rows_agrees_with_half_discs(thickness):
 def test_the_law_grows_with_area_and_lambda_and_lies_within_its_bounds():
     """This also holds between the rows of the table."""
     for spanned in (False, True):
-        share = np.geomspace(*known(spanned), 200)
+        share = np.geomspace(*share_range(spanned), 200)
         laws = [repro.added_resistance(share, 1.0, spanned, ratio) for ratio in np.geomspace(100, 10000, 12)]
         for one_law in laws:
             assert (np.diff(one_law.length) > 0).all()
@@ -136,7 +136,7 @@ def test_an_empty_pore_adds_nothing_and_thin_bodies_follow_half_discs():
         one = shapes.sample(shapes.half_disc(thickness), (100.0, LAMBDA))
         for ratio, length in zip(one.ratios, one.lengths):
             assert repro.added_resistance(one.share, 1.0, False, ratio).length == pytest.approx(length, rel=4e-3)
-    first = known(False)[0]
+    first = share_range(False)[0]
     below, above = (np.array(repro.added_resistance(first * (1 + side), 1.0)) for side in (-1e-9, 1e-9))
     assert below == pytest.approx(above, rel=1e-7)
 
@@ -145,10 +145,10 @@ def test_the_area_decides_the_contact():
     """Without `spanned` the area decides whether a pore is spanned; near contact the bounds include both kinds."""
     share = np.array([0.002, 0.5, 1.3, 1.45, 1.5, 1.52, 1.58, 1.61, 4.5])
     by_area = np.array(repro.added_resistance(share, 1.0))
-    kinds = share > known(False)[1]
+    kinds = share > share_range(False)[1]
     assert by_area[0] == pytest.approx(repro.added_resistance(share, 1.0, kinds).length, rel=1e-12)
     either = (share >= CONTACT[0]) & (share <= CONTACT[1])
-    open_film = np.array(repro.added_resistance(np.minimum(share[either], known(False)[1]), 1.0, False))
+    open_film = np.array(repro.added_resistance(np.minimum(share[either], share_range(False)[1]), 1.0, False))
     plug = np.array(repro.added_resistance(share[either], 1.0, True))
     assert by_area[1, either] == pytest.approx(open_film[1], rel=1e-12)
     assert by_area[2, either] == pytest.approx(plug[2], rel=1e-12)
@@ -186,14 +186,6 @@ def test_uptakes_outside_of_the_fit_are_within_the_bound():
     assert len(apart) == 50 and (apart <= bound).all()
     assert (states["grown"].sum(), states["spanned"].sum()) == (25, 4)
     assert np.median(apart) < 0.01 and np.median(bound) < 0.1
-
-
-def test_uptake_of_a_new_state():
-    """Solved here: a half-disc in a state that no table has."""
-    one = uptakes.solved(shapes.half_disc(0.5, 80.0, 0.0, shapes.QUICK), 0.8, (6.0, 3.0))
-    law_of_it = repro.uptake(one.area, 80.0, 0.8, 6.0, 3.0)
-    assert law_of_it.acceptor == pytest.approx(one.acceptor_uptake, rel=float(law_of_it.bound))
-    assert law_of_it.donor == pytest.approx(one.donor_uptake, rel=float(law_of_it.bound))
 
 
 def test_limits_of_the_uptake():

@@ -61,7 +61,7 @@ def unchanged(scene, pore):
 
 
 def criteria(scene, pore, expanded):
-    """{criterion: does it require a new mesh}. By 3.5, at most six triangles may have a quality under 0.6."""
+    """{criterion: whether it requires a new mesh}. By 3.5, at most six triangles may have a quality under 0.6."""
     outline, ends, body = expanded.boundary, pore.mesh.ends, expanded.mesh
     reach = min(7 * outline.thickness, 1.3 * scene.pore.width)
     required = sizing.interface_sizes(outline.corners, sized(scene)).max()

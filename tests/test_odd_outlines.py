@@ -1,4 +1,7 @@
-"""Hostile outlines, drawn by seed: each runs in bounded time and memory, or is refused before anything is written."""
+"""Hostile outlines, drawn by seed: each runs in bounded time and memory, or is refused before anything is written.
+
+The case hard-family has thin films and seeds beside the pore's ends.
+"""
 import json
 import math
 import random
@@ -41,11 +44,6 @@ def needle(draw):
     return [(-20, 0), (-20, 5), (-thickness / 2, 5), (0, draw.uniform(20, 95)), (thickness / 2, 5), (20, 5), (20, 0)]
 
 
-def below_the_wall(draw):
-    gap, half = log_between(draw, 1e-10, 2), draw.uniform(10, 100)
-    return [(-half, 0), (-half / 2, WIDTH - gap), (half / 2, WIDTH - gap * draw.uniform(0.5, 1)), (half, 0)]
-
-
 def overhang(draw):
     gap, half = log_between(draw, 1e-8, 5), draw.uniform(10, 50)
     if draw.random() < 0.5:
@@ -71,16 +69,7 @@ def tiny_and_huge_edges(draw):
             (0, draw.uniform(5, 90)), (half, 0)]
 
 
-def at_the_end(draw):
-    return [(-300 + log_between(draw, 1e-13, 10), 0), (-280, 20), (-260, 0)]
-
-
-def narrow_foot(draw):
-    return [(0, 0), (-40, 50), (-40, WIDTH), (40, WIDTH), (log_between(draw, 1e-9, 1), 0)]
-
-
-FAMILIES = [sliver, wedge, needle, below_the_wall, overhang, fold, many_points, tiny_and_huge_edges, at_the_end,
-            narrow_foot]
+FAMILIES = [sliver, wedge, needle, overhang, fold, many_points, tiny_and_huge_edges]
 
 
 def scene(points, preset="fast"):
@@ -100,8 +89,8 @@ def test_a_hostile_outline_has_a_first_row_or_is_refused_by_its_scene(family, se
     points = family(random.Random(seed))
     try:
         accepted = scene(points)
-    except SceneError as refusal:
-        assert "aggregate.outline" in str(refusal) and " is needed" in str(refusal) and "\n" not in str(refusal)
+    except SceneError as error:
+        assert "aggregate.outline" in str(error) and " is needed" in str(error) and "\n" not in str(error)
         return
     expected = memory.first_nodes(accepted)
     assert expected < MOST_NODES

@@ -1,20 +1,19 @@
-"""Scenes that need less of the kinetics: one substrate alone, and decay that goes on without acceptor."""
-import csv
+"""Scenes that need less of the kinetics: one substrate alone, and decay that goes on without acceptor.
+
+The case hard-family judges the files of runs with one substrate, and `test_longer.py` makes one of them longer.
+"""
 from time import process_time
 
 import numpy as np
 import pytest
 
-import repro
 from repro import results
 from repro.march.balance import LARGEST, Limits, accepted_demand, oxygen_demand
 from repro.march.simulation import simulate
 from repro.model import pore, transport
 from repro.model.kinetics import Sink
 from repro.preflight.modelled import describe_model
-from repro.runs.execution import resume, run
 from repro.scene import load_scene
-from tests.shell import files
 
 SCHEMES = {"midpoint": ["numerics.preset=fast", 'growth.end="2 h"'],
            "updates": ["numerics.preset=paper", "numerics.refinement=0.5", 'growth.end="1 h"'],
@@ -72,22 +71,6 @@ def test_unlimited_decay_goes_on_without_acceptor(scheme):
     assert unmet == pytest.approx(scene.kinetics.decay_oxygen_demand * degraded, rel=max(steps, 1e-6))
     limited = list(simulate(load_scene("base", starved)))[-1]
     assert limited.pore.mass == reports[0].pore.mass and limited.pore.inert.sum() == 0
-
-
-def test_a_run_of_one_substrate_is_written_and_resumed(tmp_path):
-    """The files have empty columns for the absent one. A run that is made longer writes the files of a long one."""
-    changes = ["numerics.preset=paper", "numerics.refinement=0.5"]
-    short, long = (load_scene("base", [*changes, f"growth.end={end} h"], unset=["substrates.acceptor"])
-                   for end in (0.4, 1))
-    run(short, tmp_path / "run")
-    resume(tmp_path / "run", overrides=["growth.end=1 h"])
-    run(long, tmp_path / "long")
-    assert files(tmp_path / "run") == files(tmp_path / "long")
-    with open(tmp_path / "run" / "ledger.csv", encoding="utf-8") as file:
-        ledger = next(csv.DictReader(line for line in file if not line.startswith("#")))
-    assert {key for key, value in ledger.items() if value == ""} == {key for key in ledger if "acceptor" in key}
-    assert float(ledger["donor_consumed_pg_per_m"]) > 0
-    assert "acceptor_min_mg_per_L" not in repro.load_run(tmp_path / "run")
 
 
 def test_check_states_what_is_assumed():

@@ -72,8 +72,3 @@ def test_a_preset_changes_the_defaults():
         assert numerics(preset=preset) == replace(Numerics(), preset=preset, extent="central", **chosen)
     paper = numerics(preset="paper")
     assert (paper.elements, paper.time, paper.refinement) == ("linear", "updates", 1.0)
-
-
-def test_a_key_of_the_scene_overrides_the_preset():
-    chosen = numerics(preset="fast", refinement=0.8, elements="linear", time="updates")
-    assert (chosen.refinement, chosen.elements, chosen.time, chosen.tolerance) == (0.8, "linear", "updates", 0.0075)

@@ -118,12 +118,8 @@ def test_runs_are_compared_from_python(tmp_path):
     folders = [repro.run("flow_only", tmp_path / width, [f"pore.width={width} um"]).folder for width in ("40", "50")]
     page = repro.compare(folders, str(tmp_path / "both.html"))
     assert page == tmp_path / "both.html" and "pore.width" in page.read_text(encoding="utf-8")
-    refused = (((folders[:1], page), "two runs or more"), ((folders, tmp_path / "x.txt"), "in .html"),
-               ((folders, folders[0] / "x.html"), "the folder of a run"),
-               ((folders, tmp_path / "no/x.html"), "No such file"))
-    for arguments, message in refused:
-        with pytest.raises(OutputError, match=message):
-            repro.compare(*arguments)
+    with pytest.raises(OutputError, match="two runs or more"):
+        repro.compare(folders[:1], page)
 
 
 def test_help_shows_functions_before_errors_and_no_address():

@@ -24,7 +24,6 @@ from tests import browser
 from tests.pages import (
     FAST,
     HOSTILE,
-    PURE,
     Page,
     check_alone,
     decode_numbers,
@@ -55,7 +54,7 @@ def test_numbers_are_those_of_the_first_and_the_last_row(request, name):
     kind = {"fast": "Quadratic triangles, drawn curved", "paper": "Linear triangles"}[name]
     record = read(out).record
     for expected in (kind, f"{record['wall_time_s']:.3g} s in all", '<td>width</td><td class="value">50 um<',
-                 f'anew</td><td class="value">{record["remeshes"]}<', f'hash</td><td class="value">{record["hash"]}<',
+                 f'meshes</td><td class="value">{record["remeshes"]}<', f'hash</td><td class="value">{record["hash"]}<',
                  f"{len(times)} rows, to t = {times[-1]:g} h."):
         assert expected in text_of(out)
     assert re.findall("t = ([^ ]*) h", panel) == [f"{times[k]:.6g}" for k in (0, -1)] and len(times) > 2
@@ -188,21 +187,10 @@ def test_a_run_that_stops_has_its_page(tmp_path, monkeypatch):
     Page(text)
 
 
-def test_every_name_has_its_unit_or_is_a_pure_number():
-    """This holds for columns, ledgers and arrays."""
-    for name, quantity in names.KNOWN.items():
-        assert bool(names.unit(name)) != (name in PURE)
-        assert quantity.formula and names.words(name) != name or name == "J"
-    examples = {"mean_velocity_m_per_d": ("m/day", "m d-1"), "thickness_um": ("um", "um"), "head_loss_cm": ("cm", "cm"),
-             "aggregate_area_um2": ("um²", "um2"), "acceptor_supplied_pg_per_m": ("pg/m", "pg m-1"),
-             "donor_min_mg_per_L": ("mg/L", "mg L-1"), "nodes": ("", "1")}
-    assert {name: (names.unit(name), names.udunits(name)) for name in examples} == examples
-
-
 #: The words for parts of a name; other parts occur in the long name as they are.
 MEANING = {"out": "leaving", "effluent": "leaving", "consumed": "taken up", "min": "least", "max": "largest",
-           "fraction": "part", "balance": "relative", "t0": "t = 0", "remeshed": "made anew", "before": "start",
-           "after": "end", "region": "aggregate (1)", "oxygen": "acceptor", "demand": "donor", "overshoot": "above"}
+           "fraction": "part", "balance": "relative", "t0": "t = 0", "remeshed": "new mesh", "before": "start",
+           "after": "end", "region": "aggregate (1)", "overshoot": "above"}
 #: A name and its long name have the same word of each tuple, or none.
 CONTRASTS = [("acceptor", "donor"), ("upstream", "downstream"), ("least", "largest"), ("active", "inert"),
              ("supplied", "leaving", "taken up", "stored"), (" xx", " yy", " zz", " xy")]

@@ -4,7 +4,6 @@
 from repro.cli import main
 from repro.runs import machine
 from repro.runs.execution import run
-from repro.runs.integrity import find_defect
 from repro.scene import load_scene
 from tests import faults, pages
 from tests.pages import cached_run
@@ -34,15 +33,6 @@ def test_a_finished_run_is_left_unchanged(tmp_path, capsys):
         capsys.readouterr()
         assert main(repeated) == 0
         assert "completed, already finished" in capsys.readouterr().out and state(tmp_path / "run") == before
-
-
-def test_the_defect_of_an_incomplete_run_is_reported(tmp_path):
-    """A complete run in a new folder has no defect; another scene is one."""
-    scene, folder = load_scene("flow_only"), tmp_path / "new" / "run"
-    run(scene, folder)
-    assert find_defect(folder, scene) == find_defect(cached_run(SCENE), SCENE) == ""
-    other = load_scene("flow_only", ["flow.viscosity_ratio=5"])
-    assert "it holds the run of another scene" in find_defect(folder, other)
 
 
 def test_an_interrupted_run_is_resumed(tmp_path, capsys):

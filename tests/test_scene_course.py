@@ -1,4 +1,5 @@
-"""Supplies, head and mean velocity as tables over time: reading, writing, and runs with them."""
+"""Supplies, head and mean velocity as tables over time: reading, writing, and runs with them. `test_longer.py` makes a
+run with a table longer."""
 import json
 from math import inf
 from operator import attrgetter
@@ -11,13 +12,10 @@ from repro.march.simulation import simulate
 from repro.model import pore
 from repro.preflight.checked import check
 from repro.preflight.numbers import evaluate_at_largest
-from repro.results import read_table
 from repro.scene import Scene, load_scene, parse_scene, scene_tables
 from repro.scene.text import scene_text
 from repro.scene.time_table import TimeTable
 from repro.scene.units import Timed
-from tests.pages import run
-from tests.shell import resume_run
 from tests.strategies import scene
 from tests.test_scene_text import fields
 
@@ -48,11 +46,8 @@ def test_every_key_that_takes_a_table_follows_its_sections_interpolation(key):
         assert attrgetter(key)(loaded.largest) == 6 and [loaded.corner(time) for time in (0, 1, 4)] == [1, 4, inf]
 
 
-def test_a_scene_at_a_time_has_numbers_for_tables():
-    loaded = load_scene("base", [*SHORT, RISING, "flow.interpolation=linear"])
-    at_time = loaded.at(0.2)
-    assert (at_time.substrates.donor.supply, at_time.flow.head) == (10.0, pytest.approx(20.0))
-    assert (loaded.largest.substrates.donor.supply, loaded.largest.flow.head) == (20.0, 30.0)
+def test_the_times_of_all_tables_of_a_scene_are_its_corners():
+    loaded = load_scene("base", [*SHORT, RISING])
     assert [loaded.corner(time) for time in (0.0, 0.3, 0.35, 0.4, 0.5)] == [0.3, 0.4, 0.4, 0.5, inf]
     plain = load_scene("base")
     assert plain.at(3.0) is plain and plain.largest is plain and plain.corner(0.0) == inf
@@ -104,10 +99,3 @@ def test_a_table_is_judged_by_its_extreme():
         [number.start for number in expected[1]], rel=1e-12)
     report = check(loaded)
     assert "0 to 20 mg/L, in steps, the last from 0.5 h" in dict(report.modelled)["substrates"]
-
-
-def test_commands_take_tables(tmp_path):
-    """A run with its page is made longer."""
-    out = run(tmp_path, "base", *SHORT, RISING)
-    assert resume_run(out, "--set", 'growth.end="1.2 h"') == 0
-    assert (out / "report.html").exists() and read_table(out / "timeseries.csv")["time_h"][-1] == 1.2

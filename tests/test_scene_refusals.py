@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from repro.cli import main
-from repro.scene import PRESETS, Scene, files, load_scene, load_tables, packaged_scenes, parse_scene, scene_tables
+from repro.scene import Scene, files, load_scene, load_tables, parse_scene, scene_tables
 from repro.scene.reading import SCOPE, toml
 from tests.blocks import ROOT
 from tests.test_scene import refusal, write_scene
@@ -232,8 +232,6 @@ def test_a_file_is_refused_by_its_own_key(tmp_path, text, part):
     ("initial_mesh", ["substrates.donor.supply=1000 mg/L", "substrates.acceptor={}"]),
     ("base", ["aggregate.position=-294.9 um", "aggregate.inert_fraction=0.999999"]),
     ("flow_only", ["aggregate.inert_fraction=0.3", "substrates={}"]),
-    *((name, ()) for name in packaged_scenes()),
-    *(("base", [f"numerics.preset={preset}", "numerics.refinement=0.77"]) for preset in PRESETS),
 ])
 def test_values_at_the_bounds_are_accepted(source, overrides):
     scene = load_scene(source, overrides)

@@ -28,11 +28,11 @@ def parsed(text, name):
     return parse_scene(tomllib.loads(text), name, "again")
 
 
-def uncommented(text, but=()):
+def uncommented(text, left_out=()):
     """The text with every key and section active."""
     def active(line):
         key = line[1:].partition(" ")[0]
-        return line[1:] if re.match(r"#[\[a-z]", line) and key not in but else line
+        return line[1:] if re.match(r"#[\[a-z]", line) and key not in left_out else line
     return "\n".join(map(active, text.splitlines()))
 
 
@@ -47,7 +47,7 @@ def test_the_output_is_the_scene_alone(name, preset, capsys):
     for line in text.splitlines():
         inside = line.startswith("[") if re.match(r"#?\[", line) else inside
         lines.append(line if inside else "")
-    active = uncommented("\n".join(lines), but={*OTHER_DRIVE, *EXAMPLES})
+    active = uncommented("\n".join(lines), left_out={*OTHER_DRIVE, *EXAMPLES})
     assert parsed(text, name) == parsed(active, name) == load_scene(name, [change])
     assert errors == "" and text.isascii()
 
@@ -56,7 +56,7 @@ def test_the_output_is_the_scene_alone(name, preset, capsys):
 def test_every_key_may_be_made_active_at_once(name):
     drive = load_scene(name).flow
     excluded = "head" if drive and drive.head is None else "mean_velocity"
-    scene = parsed(uncommented(scene_text(name), but={excluded, "outline", "permeability"}), name)
+    scene = parsed(uncommented(scene_text(name), left_out={excluded, "outline", "permeability"}), name)
     assert None not in (scene.aggregate, scene.flow, scene.substrates, scene.kinetics, scene.growth)
     assert scene.output.times == (5.0, 18.0)
 

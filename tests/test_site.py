@@ -11,20 +11,17 @@ from urllib.parse import unquote, urldefrag
 
 import pytest
 
+from paper_figures import FIGURES
 from tests import browser
 from tests.blocks import ROOT
+from verification.claims import EXPECTED
 
 SITE = ROOT / "docs" / "_build" / "html"
 PAGES = sorted(path for path in SITE.rglob("*.html") if "_static" not in path.parts and path != SITE / "index.html")
-REGISTER = SITE / "verification" / "report" / "REPORT.html"
+CASES = SITE / "verification" / "report" / "REPORT.html"
+REGISTER = SITE / "paper_figures" / "register.html"
 pytestmark = [pytest.mark.thorough, pytest.mark.skipif(browser.CHROMIUM is None, reason="Chromium is not installed"),
               pytest.mark.skipif(not PAGES, reason="make docs has built no site")]
-
-
-@pytest.fixture(scope="module")
-def window():
-    with browser.Browser() as chromium:
-        yield chromium
 
 
 def settled(window, script):
@@ -45,10 +42,9 @@ def test_every_page_opens_without_an_error_and_loads_nothing_from_elsewhere(wind
         window.show(page, width=width, dark=dark)
         assert window.errors == [], page
         assert [url for url in window.requests if not url.startswith(("file:", "data:"))] == [], page
-        assert window.run("document.documentElement.scrollWidth") <= width, page
-        colour = window.run("getComputedStyle(document.body).backgroundColor")
-        assert (max(map(int, re.findall(r"\d+", colour)[:3])) < 128) == dark, page
+        window.check_look(width, dark)
         assert window.run("[...document.images].every(image => image.naturalWidth > 0 && image.alt)"), page
+        assert not window.run("[...document.images].some(image => /[.](png|svg)$/.test(image.alt))"), page
 
 
 @cache
@@ -60,6 +56,28 @@ def test_figures_are_pictures():
     """No cell prints the name of a figure in place of the figure."""
     for page in PAGES:
         assert "&lt;Figure size" not in content(page), page
+
+
+def test_every_page_has_one_title():
+    """A script writes that of the page of search."""
+    for page in PAGES:
+        assert content(page).count("<h1") == (page.name != "search.html"), page
+
+
+def test_all_figures_have_a_picture_and_a_caption():
+    page = content(SITE / "docs" / "figures.html")
+    figures = re.findall(r'<figure id="(\w+)"><img alt="([^"]+)"[^>]*><figcaption>(.+?)</figcaption>', page, re.S)
+    assert [name for name, _, _ in figures] == list(FIGURES)
+    assert all(caption.startswith(f"<strong>{title}.</strong> ") for _, title, caption in figures)
+    assert all(len(caption) > 200 for _, _, caption in figures)
+
+
+def test_the_paper_has_links_to_its_references():
+    page = content(SITE / "docs" / "paper.html")
+    cited = set(re.findall(r"@(\w+)", content(ROOT / "docs" / "paper.md").partition("# Summary")[2]))
+    assert len(cited) > 5 and "[@" not in page
+    assert cited <= set(re.findall(r'href="#(\w+)"', page)) and all(f'id="{key}"' in page for key in cited)
+    assert page.count("https://doi.org/") >= len(cited)
 
 
 def test_links_lead_to_existing_places():
@@ -83,7 +101,7 @@ def test_the_root_leads_to_the_start(window):
 
 def test_the_search_finds_pages(window):
     window.show(SITE / "search.html", "?q=neo-Hookean")
-    assert settled(window, "document.querySelectorAll('#search-results li a').length") >= 2
+    assert settled(window, "document.querySelectorAll('#search-results li a').length >= 2")
     window.show(SITE / "search.html", "?q=zzzznothing")
     assert settled(window, "/did not match/.test(document.getElementById('search-results').innerText)")
 
@@ -93,7 +111,7 @@ ROWS = "[...document.querySelectorAll('article table')].at(-1).tBodies[0].rows"
 
 def test_a_table_sorts_by_keys_and_filters_its_rows(window):
     """The table of cases: Enter on a heading sorts upwards and then downwards; each word of the filter must occur."""
-    window.show(REGISTER)
+    window.show(CASES)
     window.run("[...document.querySelectorAll('article table')].at(-1).tHead.rows[0].cells[3].focus()")
     numbers = f"[...{ROWS}].map(row => Number(row.cells[3].innerText))"
     for factor in (1, -1):
@@ -104,6 +122,30 @@ def test_a_table_sorts_by_keys_and_filters_its_rows(window):
                "field.value = 'flow exact'; field.dispatchEvent(new Event('input'))")
     shown = window.run(f"[...{ROWS}].filter(row => row.offsetParent).map(row => row.innerText)")
     assert 3 < len(shown) < 50 and all("flow" in row and "exact" in row for row in shown)
+
+
+def test_the_register_of_claims_sorts_and_filters(window):
+    """By verdict, with equal verdicts in the order of the claims; back by the number; a filter hides all other rows."""
+    window.show(REGISTER)
+    table = "document.querySelector('#claims table')"
+    heading = f"{table}.tHead.rows[0].cells"
+    rows = f"[...{table}.tBodies[0].rows]"
+    texts = f"{rows}.map(row => row.cells[%d].innerText.trim())"
+    claims = window.run(texts % 0)
+    assert claims == sorted(claims) and len(claims) == len(EXPECTED)
+    window.run(f"{heading}[3].click()")
+    verdicts = window.run(texts % 3)
+    assert verdicts == sorted(verdicts) and len(set(verdicts)) > 3 and window.run(texts % 0) != claims
+    assert window.run(f"{heading}[3].getAttribute('aria-sort')") == "ascending"
+    window.run(f"{heading}[0].focus()")
+    for order in (claims, claims[::-1]):
+        window.press("Enter")
+        assert window.run(texts % 0) == order
+    window.run("field = document.querySelector('#claims .table-filter');"
+               "field.value = 'Contradicted effluent'; field.dispatchEvent(new Event('input'))")
+    shown = window.run(f"{rows}.map(row => [row.offsetParent !== null, row.textContent.toLowerCase()])")
+    assert all(visible == ("contradicted" in text and "effluent" in text) for visible, text in shown)
+    assert 1 < sum(visible for visible, _ in shown) < len(claims) / 2
 
 
 def test_the_keyboard_alone_opens_a_page(window):

@@ -24,7 +24,7 @@ def cached_names(cls):
 
 
 def alike(one, other):
-    """Are two values the same to the last bit? Objects are compared by their fields."""
+    """Return whether two values agree to the last bit. Objects are compared by their fields."""
     if isinstance(one, np.ndarray):
         return np.array_equal(one, other)
     if isinstance(one, SkfemMesh):

@@ -1,13 +1,10 @@
-"""Error bars from values on several sizes; and the levels for them."""
+"""Error bars from values on several sizes."""
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from verification import claims
-from verification.claims import evaluate
-from verification.claims.levels import ALONE, CONVERGED, DEFAULT, SCHEME, WIDE_FINE
 from verification.uncertainty import OBSERVED, estimate
 
 SIZES = np.array([1.0, 2**0.5, 2**-0.5, 0.5])
@@ -37,27 +34,3 @@ def test_a_bar_is_the_sum_of_its_three_terms(noise, order, sign):
     result = estimate(SIZES, values, (1.0, 2.0))
     if result.factor == OBSERVED:
         assert result.bar == pytest.approx(sum(parts(SIZES, values, min(result.order, 1.0))), rel=1e-6)
-
-
-# Levels.
-#: Claims with fewer than three sizes of the scheme of 2001: linear elements have no permeable body (C42), and
-#: comparisons of many or long runs would take minutes (C32, C41, C43). Claims about wide have two.
-FEWER_OF_SCHEME = {"C32": 1, "C41": 1, "C43": 1, "C48": 1, "C49": 1, "C50": 0, "C52": 0, "C53": 0}
-
-
-def test_every_claim_has_three_meshes_and_three_steps_or_a_reason():
-    """A claim about the model is also computed with the scheme; one that is not judged has a single level."""
-    evaluate.register_all()
-    for claim in claims.CLAIMS.values():
-        kinds = [level.kind for level in claim.levels]
-        if claim.unjudged:
-            assert claim.levels == (claim.judged,), claim.id
-        elif claim.about == claims.MODEL:
-            scheme = FEWER_OF_SCHEME.get(claim.id, 2 if claim.fine == WIDE_FINE else 3)
-            assert (kinds.count(CONVERGED), kinds.count(SCHEME)) == (3, scheme), claim.id
-            assert claim.judged == claim.levels[0] and claim.judged.size == min(claim.fine), claim.id
-        elif claim.about == claims.OF_SCHEME:
-            assert len(claim.sizes) >= 3 and claim.sizes[0] == claim.steps[0] == 1.0, claim.id
-            assert len(claim.steps) >= 3 or claim.steps == ALONE and claim.fixed, claim.id
-        else:
-            assert claim.about == claims.CLOSED and claim.levels == (DEFAULT,), claim.id

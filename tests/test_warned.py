@@ -1,4 +1,4 @@
-"""A run gives the warnings of `check` as well: on standard error, in run.json, and at the head of its page."""
+"""A run repeats the warnings of `check` on standard error, in run.json, and at the head of its page."""
 
 import html
 import json

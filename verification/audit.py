@@ -33,11 +33,11 @@ REPEATS = 3
 #: Times (h) at which the audit reports the lean of an uneven seed.
 TIMES = (0.4, 4.8, 9.6, 14.4, PLOTTED)
 METHOD = (f"base, preset paper, at {PLOTTED:g} h in steps of {60 * UPDATE:g} min; "
-          "effect: difference of two whole runs, relative, effluents over the supply, flow and substrates of both last "
-          "shapes on the default's mesh (extent: of the converged solution, as they are); one_state: both choices in "
-          "the default's last state, with the shape of one step more; resolved: changes by more than twice what meshes "
-          "of the same fineness do (extent: what coarser ones do); cost_ratio: processor time, median of "
-          f"{REPEATS} runs in turn (mesh, theta after a remesh, symmetry: one run each)")
+          "effect: difference of two complete runs, relative, effluents over the supply, with flow and substrates of "
+          "both last shapes on the default's mesh (extent: on their own meshes, in the converged solution); one_state: "
+          "both choices in the default's last state, with the shape after one more step; resolved: changes by more "
+          "than twice the effect of meshes of the same fineness (extent: of coarser meshes); cost_ratio: processor "
+          f"time, median of {REPEATS} alternating runs (mesh, theta after a remesh, symmetry: one run each)")
 
 
 def main() -> int:
@@ -55,8 +55,8 @@ def mesh() -> dict:
     """Largest effect of the mesh on each quantity, for element sizes within 2.5 %."""
     effects = columns([switches.effect_of_runs(state(BASE), state(switch.run)) for switch in switches.FINENESS])
     mesh_switch = Switch("mesh", "refinement 1", "refinement 0.975 to 0.995", "",
-                         note="no choice: what runs on meshes of the same fineness differ by; "
-                         "less than twice that is not resolved")
+                         note="no choice: the difference of runs on meshes of the same fineness; "
+                         "less than twice this difference is not resolved")
     return row(mesh_switch, cost(switches.FINENESS[-1].run, 1),
                {name: max(column, key=abs) for name, column in effects.items()})
 
@@ -67,15 +67,15 @@ def measured(switch: Switch, ratio: float) -> dict:
     if not switch.meshes:
         effects, noise = switches.converged(switch)
         return {**row(switch, ratio, effects), "noise": noise}
-    default, other = state(BASE), state(switch.run)
-    measured_row = row(switch, ratio, switches.effect_of_runs(default, other))
-    return {**measured_row, "one_state": switches.one_state(default, other.scene) if switch.state else {}}
+    default, alternative = state(BASE), state(switch.run)
+    measured_row = row(switch, ratio, switches.effect_of_runs(default, alternative))
+    return {**measured_row, "one_state": switches.one_state(default, alternative.scene) if switch.state else {}}
 
 
 def cost(run: tuple[str, ...], repeats: int = REPEATS) -> float:
     """Processor time of a run over that of base, medians of alternating runs."""
-    default, other = map(median, zip(*((seconds(PLATES), seconds(run)) for _ in range(repeats))))
-    return other / default
+    default, alternative = map(median, zip(*((seconds(PLATES), seconds(run)) for _ in range(repeats))))
+    return alternative / default
 
 
 def seconds(run: tuple[str, ...]) -> float:
@@ -88,30 +88,30 @@ def seconds(run: tuple[str, ...]) -> float:
 
 def drift() -> dict:
     """Compare theta = J X / X_m with theta = J after a remesh: the drift of (28) [E7]."""
-    other = switches.course(BASE, switches.restarting_as_j)
+    alternative = switches.course(BASE, switches.restarting_as_j)
     drifts = {name: float(columns["drift"].max()) for name, columns in
-              (("default", switches.run_columns(BASE)), ("alternative", other.columns))}
+              (("default", switches.run_columns(BASE)), ("alternative", alternative.columns))}
     note = f"drift, max |X / X_m - 1| over the run: {drifts['default']:.2g} against {drifts['alternative']:.2g} [E7]"
-    drift_row = _marched(other, Switch("theta after a remesh (28)", "J X / X_m", "J", "", note=note))
+    drift_row = _marched(alternative, Switch("theta after a remesh (28)", "J X / X_m", "J", "", note=note))
     return {**drift_row, "drift": drifts}
 
 
 def symmetry() -> list[dict]:
-    """Compare a half-disc with seeds that have one tip 1 % further out and the other 1 % less."""
+    """Compare a half-disc with seeds that have one tip 1 % farther out and the other 1 % farther in."""
     rows = []
     for word, bulge in (("upstream", -switches.BULGE), ("downstream", switches.BULGE)):
-        other = switches.course(BASE, switches.step_of_paper, bulge)
-        lean = switches.near(other.columns, "lean", TIMES)
+        alternative = switches.course(BASE, switches.step_of_paper, bulge)
+        lean = switches.near(alternative.columns, "lean", TIMES)
         default = switches.near(switches.run_columns(BASE), "lean", TIMES)
-        off = ", ".join(f"{100 * value:+.2f} % at {time:g} h" for value, time in zip(lean - default, TIMES))
-        rows.append(_marched(other, Switch(
+        shifts = ", ".join(f"{100 * value:+.2f} % at {time:g} h" for value, time in zip(lean - default, TIMES))
+        rows.append(_marched(alternative, Switch(
             "symmetry of the seed", "half-disc", f"1 % longer {word}", "",
-            note=f"R (1 + 0.01 cos 3 phi), area as before; the middle between the tips is off by {off}")))
+            note=f"R (1 + 0.01 cos 3 phi), the same area; the middle between the tips shifts by {shifts}")))
     return rows
 
 
-def _marched(other: Course, switch: Switch) -> dict:
-    return row(switch, other.seconds / seconds(PLATES), switches.effect_of_runs(state(BASE), other.plotted))
+def _marched(alternative: Course, switch: Switch) -> dict:
+    return row(switch, alternative.seconds / seconds(PLATES), switches.effect_of_runs(state(BASE), alternative.plotted))
 
 
 def row(switch: Switch, ratio: float, effects: dict[str, float]) -> dict:

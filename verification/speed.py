@@ -27,9 +27,9 @@ def records() -> dict[str, dict]:
 
 def blocks(records: dict[str, dict]) -> Iterator[str]:
     """Yield all blocks of the section."""
-    for name, tell in {"bench": _bench, "hard_cases": hard_cases.blocks, "audit": audit.blocks}.items():
+    for name, section in {"bench": _bench, "hard_cases": hard_cases.blocks, "audit": audit.blocks}.items():
         if records[name]:
-            yield from tell(records[name])
+            yield from section(records[name])
 
 
 def summary(records: dict[str, dict]) -> Iterator[str]:

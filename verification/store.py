@@ -1,9 +1,8 @@
 """Stores of results that are computed once for a scene and for the present source of ``repro``.
 
-The key of a result has the hashes of the scene and of the source. A change of either gives another key, and the result
-is computed again. Missing results are computed in parallel. :class:`Folders` stores whole runs, and :class:`Numbers`
-the few numbers of many runs. :class:`Memory` stores the return values of the functions of claims until the process
-ends.
+The key of a result contains the hashes of the scene and of the source, so a change of either recomputes the result.
+Missing results are computed in parallel. :class:`Folders` stores whole runs, :class:`Numbers` the few numbers of many
+runs, and :class:`Memory` the return values of the functions of claims, until the process ends.
 """
 
 import os
@@ -136,12 +135,12 @@ class Memory:
     def cached(self, function: Callable) -> Callable:
         """Decorate a function: each call is computed once in each context."""
         @wraps(function)
-        def remembering(*arguments):
+        def wrapper(*arguments):
             results = self._results.setdefault(self._context(), {})
             if (function, arguments) not in results:
                 results[function, arguments] = function(*arguments)
             return results[function, arguments]
-        return remembering
+        return wrapper
 
     def forget(self, context: Hashable) -> None:
         """Drop the results of a context."""

@@ -65,8 +65,8 @@ CHOICES = {
     "transient": Switch("transport in time", "quasi-steady", "transient (Gear)", 'numerics.transport="gear"',
                         note="3.3"),
     "full pore": Switch("extent", "central part (3.1)", "full pore", 'numerics.extent="full"', False,
-                        "the inlet and the outlet 1.5 W away or less, against the pore's ends; in the converged "
-                        "solution, since each has meshes of its own", False),
+                        "inlet and outlet at most 1.5 W away, against the pore's ends; in the converged solution, "
+                        "because the meshes differ", False),
     "traction": Switch("interface", "Laplacian form", "traction form", 'numerics.interface="traction"', note="[E2]"),
     "fluid forces": Switch("fluid forces", "neglected", "included", 'growth.fluid_forces="included"',
                            note="(20), (22), C26"),
@@ -86,7 +86,7 @@ CHOICES = {
     "unlimited decay": Switch("decay", "with acceptor", "unlimited", 'kinetics.decay="unlimited"',
                               note="(9), (10); not the paper's"),
     "rechosen": Switch("fixed point", "kept", "rechosen", 'numerics.fixed_point="rechosen"',
-                       note="2.3.3; the same node throughout base, whose contact surface stays even about it"),
+                       note="2.3.3; in base always the same node, because the contact surface stays symmetric"),
     "midpoint": Switch("steps in time", "updates of 12 min", "midpoint, tolerance 0.01", 'numerics.time="midpoint"',
                        False, "first order in the step against second"),
 }
@@ -116,19 +116,19 @@ def quantities(aggregate: Body) -> dict[str, float]:
             "thickness": shape.thickness, "upstream": shape.upstream, "downstream": shape.downstream}
 
 
-def effect(default: Body, other: Body) -> dict[str, float]:
+def effect(default: Body, alternative: Body) -> dict[str, float]:
     """Relative difference of the other from the default; for effluents, the difference over the supply."""
-    supply = dict(zip(EFFLUENTS, pair("supply", other.scene.substrates)))
-    changed = quantities(other)
+    supply = dict(zip(EFFLUENTS, pair("supply", alternative.scene.substrates)))
+    changed = quantities(alternative)
     return {name: float((changed[name] - value) / supply.get(name, value))
             for name, value in quantities(default).items()}
 
 
-def effect_of_runs(default: Body, other: Body) -> dict[str, float]:
+def effect_of_runs(default: Body, alternative: Body) -> dict[str, float]:
     """Effect between two complete runs. Flow and substrates around the other's shape are solved on the default's mesh,
     which removes the effect of two different meshes."""
-    pore_on_mesh = reshaped(default.pore, other.outline)
-    return effect(default, replace(other, solved=pore.solve(other.scene, pore_on_mesh)))
+    pore_on_mesh = reshaped(default.pore, alternative.outline)
+    return effect(default, replace(alternative, solved=pore.solve(alternative.scene, pore_on_mesh)))
 
 
 def converged(switch: Switch) -> tuple[dict[str, float], dict[str, float]]:
@@ -140,7 +140,7 @@ def converged(switch: Switch) -> tuple[dict[str, float], dict[str, float]]:
         with at_level(level):
             effects.append(effect(state((*BASE, LAST)), state(switch.run)))
         forget(level)
-    return effects[0], {name: float(np.abs(sizes - sizes[0]).max()) for name, sizes in columns(effects).items()}
+    return effects[0], {name: float(np.abs(values - values[0]).max()) for name, values in columns(effects).items()}
 
 
 def reshaped(previous: Pore, outline: Outline) -> Pore:
@@ -162,18 +162,18 @@ def _radius(outline: Outline) -> CubicSpline:
     return CubicSpline(angle[order], np.hypot(x, y)[order])
 
 
-def one_state(aggregate: Body, other: Scene) -> dict[str, float]:
+def one_state(aggregate: Body, alternative: Scene) -> dict[str, float]:
     """Effect in one state: flow, substrates and the next shape, computed with both scenes."""
     bodies = []
-    for scene in (aggregate.scene, other):
+    for scene in (aggregate.scene, alternative):
         solved = pore.solve(scene, aggregate.pore)
         bodies.append(Body(scene, next_shape(scene, aggregate.pore, solved, UPDATE), solved))
     return effect(*bodies)
 
 
 def run_columns(run: Run) -> Columns:
-    """Of a run's rows: "time" h, "velocity" m/d, "area" um2, "drift", largest |(X_A + X_I) / X_m - 1|, and "lean", the
-    middle between the tips divided by half of their distance."""
+    """Columns of a run's rows: "time" h, "velocity" m/d, "area" um2, "drift", largest |(X_A + X_I) / X_m - 1|, and
+    "lean", the middle between the tips divided by half of their distance."""
     return _row_columns(runs.series(*run))
 
 
@@ -214,8 +214,8 @@ def course(run: Run, step: Callable[[Scene, Pore, Solved, float], Pore], bulge: 
         solved = pore.solve(scene, present)
         present = replace(present, concentrations=solved.concentrations)
         reports.append(Report(present, solved, None, (), 0, {}))
-    rows = columns([row(scene, each) for each in reports])
-    plotted = [each for each in reports if each.pore.time < PLOTTED + 1e-6][-1]
+    rows = columns([row(scene, report) for report in reports])
+    plotted = [report for report in reports if report.pore.time < PLOTTED + 1e-6][-1]
     return Course(process_time() - start, _row_columns(rows), runs.body_of(scene, plotted))
 
 
@@ -241,8 +241,8 @@ def explicit(scene: Scene, previous: Pore, solved: Solved, hours: float) -> Pore
     return Stages.of(scene).new_mesh(previous, shape_of(scene, previous, grown), solved)[0]
 
 
-#: The seed's radius is R (1 + BULGE cos 3 phi) or R (1 - BULGE cos 3 phi): area as before to second order, one tip
-#: further out by 1 %, the other one less by that. With cos phi it would be a half-disc again, moved.
+#: The seed's radius is R (1 + BULGE cos 3 phi) or R (1 - BULGE cos 3 phi): the area is the same to second order, one
+#: tip is 1 % farther out, and the other 1 % farther in. With cos phi the seed would be a shifted half-disc.
 BULGE = 0.01
 
 

@@ -92,8 +92,8 @@ def main(arguments: list[str] | None = None) -> int:
     rate = median(measure() for _ in range(chosen.repeats))
     throughput = f"throughput of the sweep over cores times a single run's rate: {rate:.3f} in {JUDGED}"
     verdicts = {f"{throughput}, {REQUIRED} required": rate >= REQUIRED}
-    for command, (ratio, most) in commands().items():
-        verdicts[f"{command}: {ratio:.2f} times its imports and computation, {most} accepted"] = ratio <= most
+    for command, (ratio, largest) in commands().items():
+        verdicts[f"{command}: {ratio:.2f} times its imports and computation, {largest} accepted"] = ratio <= largest
     for words, holds in verdicts.items():
         print(f"{words}: {'holds' if holds else 'does not hold'}")
     return int(not all(verdicts.values()))

@@ -1,13 +1,13 @@
 """Numerical uncertainty of a computed number, from its values on three or more meshes, or time steps.
 
-The Grid Convergence Index (Roache 1994, 1998) says how far a number f may be from its limit f_0 as the size h of the
+The Grid Convergence Index (Roache 1994, 1998) bounds the distance of a number f from its limit f_0 as the size h of the
 elements, or of the steps, goes to zero. With f_i = f_0 + a h_i^p on sizes h_i,
 
     GCI = Fs |a| h^p,    which on two sizes is    Fs |f_2 - f_1| / (r^p - 1),    r = h_2 / h_1
 
 Three values give f_0, a and the observed order p (Celik et al. 2008 find p by iteration: ratios r need not be equal).
-Values on unrelated meshes scatter about such a law, so that from four on it is fitted by least squares, and the bar
-gets the fit's standard deviation s and the number's own distance from it on top (Eca & Hoekstra 2014):
+Values on unrelated meshes scatter about this law. Four or more of them are fitted by least squares, and the bar
+includes the standard deviation s of the fit and the number's own distance from it (Eca & Hoekstra 2014):
 
     Fs = 1.25    bar = 1.25 |a| h^p + s + |f - fit|                         where the observed order is reasonable
     Fs = 3       bar = 3 (max f - min f) h^q / (h_max^q - h_min^q)          where it is not: q is the formal order
@@ -77,9 +77,9 @@ def estimate(sizes, values, formal: tuple[float, float]) -> Estimate:
     order, (lowest, highest) = observed_order(h, f), formal
     if lowest - BAND <= order <= highest + BAND:
         used = min(order, lowest)
-        slope, apart = fit(h, f, used)
-        if (scatter := deviation(apart)) < np.ptp(f) / (len(f) - 1):
-            return Estimate(float(OBSERVED * abs(slope) * h[0] ** used + scatter + abs(apart[0])), order, OBSERVED)
+        slope, residuals = fit(h, f, used)
+        if (scatter := deviation(residuals)) < np.ptp(f) / (len(f) - 1):
+            return Estimate(float(OBSERVED * abs(slope) * h[0] ** used + scatter + abs(residuals[0])), order, OBSERVED)
     reach = h[0] ** lowest / (h.max() ** lowest - h.min() ** lowest)
     return Estimate(float(FORMAL * np.ptp(f) * reach), order, FORMAL)
 
@@ -102,9 +102,9 @@ def fit(h: np.ndarray, f: np.ndarray, order: float) -> tuple[float, np.ndarray]:
     return slope, f - np.mean(f) - slope * x
 
 
-def deviation(apart: np.ndarray) -> float:
+def deviation(residuals: np.ndarray) -> float:
     """Standard deviation of a fit of three unknowns from its residuals (k,)."""
-    return float(np.sqrt(apart @ apart / max(len(apart) - FEWEST, 1)))
+    return float(np.sqrt(residuals @ residuals / max(len(residuals) - FEWEST, 1)))
 
 
 def combined(value: float, mesh: Estimate | None, step: Estimate | None) -> Bar:

@@ -28,14 +28,14 @@ assert round(at_19_2_h, 1) == 1.5
 # Conductivity falls because the film above the aggregate becomes thin. `plot` draws it with the thickness and the
 # effluents. Both substrates stay above their half-saturation of 1 mg/L, so uptake is fast in the complete aggregate.
 
-# %%
+# %% mystnb={"image": {"alt": "conductivity, thickness and effluents of base against time"}}
 results.plot()
 plt.show()
 
 # %% [markdown]
 # With the name of a field, `plot` draws the field over the pore at a reported time.
 
-# %%
+# %% mystnb={"image": {"alt": "the acceptor in the pore at 15.2 h, with the outline of the aggregate"}}
 results.plot("acceptor", time=15)
 plt.show()
 

@@ -43,7 +43,7 @@ low, high = fit.x[0] - 2 * error, fit.x[0] + 2 * error
 print(f"k = {fit.x[0]:.3f} 1/day, between {low:.3f} and {high:.3f} (two standard errors), after {fit.nfev} fits")
 assert low < TRUE_RATE < high
 
-# %%
+# %% mystnb={"image": {"alt": "made data and the fitted curve of conductivity against time"}}
 figure, axes = plt.subplots(figsize=(6, 3), layout="constrained")
 axes.plot(TIMES, measured, "k.", label="made data")
 axes.plot(TIMES, conductivity(float(fit.x[0])), label=f"k = {fit.x[0]:.2f} 1/day")

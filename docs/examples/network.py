@@ -52,7 +52,7 @@ def flow_through(conductance: np.ndarray) -> float:
     return float((matrix @ head)[nodes[:, 0]].sum())
 
 
-# %%
+# %% mystnb={"image": {"alt": "flow through the network, which falls as the aggregates grow"}}
 clean = flow_through(conductance_of(np.zeros(len(throats))))
 shares = np.linspace(0.01, 1.5, 30)                # area over width^2, before contact
 flows = np.array([flow_through(conductance_of(np.where(seeded, share * width**2, 0.0))) for share in shares])

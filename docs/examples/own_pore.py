@@ -34,7 +34,7 @@ print(f"area: {area[0]:.0f} um2 at t = 0, {area[-1]:.0f} um2 at {results.time[-1
 # %% [markdown]
 # Growth nearly stops with the supply.
 
-# %%
+# %% mystnb={"image": {"alt": "area of the aggregate against time; growth nearly stops at 12 h"}}
 axes = results.plot("aggregate_area")
 axes.axvline(12, linestyle=":", color="gray")
 plt.show()

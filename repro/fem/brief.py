@@ -17,10 +17,10 @@ def brief(kind: Class) -> Class:
     return kind
 
 
-def _short_repr(one: Any) -> str:
-    parts = [f"{entry.name}={_short(getattr(one, entry.name))}" for entry in fields(one)
+def _short_repr(instance: Any) -> str:
+    parts = [f"{entry.name}={_short(getattr(instance, entry.name))}" for entry in fields(instance)
              if not entry.name.startswith("_")]
-    return f"{type(one).__name__}({', '.join(parts)})"
+    return f"{type(instance).__name__}({', '.join(parts)})"
 
 
 def _short(value: object) -> str:

@@ -172,21 +172,21 @@ def jacobian(corners: np.ndarray, map_derivatives: np.ndarray) -> np.ndarray:
     return by_component(corners.transpose(2, 0, 1)[:, None] @ map_derivatives.transpose(2, 1, 0))
 
 
-def mapped(corners: np.ndarray, of: Table) -> tuple[np.ndarray, np.ndarray]:
+def mapped(corners: np.ndarray, tabulated: Table) -> tuple[np.ndarray, np.ndarray]:
     """Weights (T, q) um2 of the points, and gradients (T, q, 2, k) 1/um of the functions.
 
     corners: (T, g, 2) um, nodes of triangles, none of which is turned over.
     """
-    J = jacobian(corners, of.map_derivatives)
+    J = jacobian(corners, tabulated.map_derivatives)
     det = determinant(J)
     turned = inverse_transpose(J, det)
     # A few products of large matrices take less time than many of small ones.
-    by_point = np.swapaxes(turned, 0, 1).reshape(len(of.weights), -1, 2)
-    by_function = by_point @ np.swapaxes(of.derivatives, 1, 2)
-    gradients = by_function.reshape(len(of.weights), len(corners), 2, -1)
-    return det * of.weights, np.ascontiguousarray(np.swapaxes(gradients, 0, 1))
+    by_point = np.swapaxes(turned, 0, 1).reshape(len(tabulated.weights), -1, 2)
+    by_function = by_point @ np.swapaxes(tabulated.derivatives, 1, 2)
+    gradients = by_function.reshape(len(tabulated.weights), len(corners), 2, -1)
+    return det * tabulated.weights, np.ascontiguousarray(np.swapaxes(gradients, 0, 1))
 
 
-def weights(corners: np.ndarray, of: Table) -> np.ndarray:
+def weights(corners: np.ndarray, tabulated: Table) -> np.ndarray:
     """(T, q) um2, the weights dx without the gradients."""
-    return determinant(jacobian(corners, of.map_derivatives)) * of.weights
+    return determinant(jacobian(corners, tabulated.map_derivatives)) * tabulated.weights

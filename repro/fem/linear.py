@@ -36,7 +36,7 @@ UNDERFLOW = np.finfo(float).tiny
 REFINE = 1e-14
 
 #: Name of factorisation and solution in the times by stage.
-FLOOR = "factorise and solve"
+STAGE = "factorise and solve"
 
 
 @dataclass(frozen=True)
@@ -155,7 +155,7 @@ class Solver:
         scale = self.magnitude @ (np.abs(solution) + UNDERFLOW) + np.abs(right) + UNDERFLOW
         return residual, float(np.max(np.abs(residual) / scale, initial=0.0))
 
-    @timed(FLOOR)
+    @timed(STAGE)
     def solve(self, right: np.ndarray) -> np.ndarray:
         """x (n,) of A x = right (n,)."""
         for attempt in ("plain", "pivoted"):
@@ -176,7 +176,7 @@ class Solver:
                              f"leaves a residual of {defect:.2g}, above {RESIDUAL:g}"))
 
 
-@timed(FLOOR)
+@timed(STAGE)
 def factorised(matrix: sp.spmatrix, method: Method = DEFAULT) -> Solver:
     """Factorise a matrix."""
     return Solver(matrix, method)

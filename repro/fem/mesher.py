@@ -263,8 +263,8 @@ def _without_slivers(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     corners = points[triangles]
     lengths = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
     flat = triangle_areas(points, triangles) < SLIVER * lengths.max(axis=1) ** 2
-    for one in np.flatnonzero(flat):
-        _exchange(points, triangles, int(one), int(lengths[one].argmax()))
+    for triangle in np.flatnonzero(flat):
+        _exchange(points, triangles, int(triangle), int(lengths[triangle].argmax()))
     return triangles
 
 
@@ -316,13 +316,13 @@ def _flip(points: np.ndarray, triangles: np.ndarray, biomass: np.ndarray, corner
         _exchange(points, triangles, corner, int(np.flatnonzero(~outer)[0]))
 
 
-def _exchange(points: np.ndarray, triangles: np.ndarray, one: int, edge: int) -> None:
+def _exchange(points: np.ndarray, triangles: np.ndarray, triangle: int, edge: int) -> None:
     """Exchange, in place, an edge of a triangle for the other diagonal of the quadrilateral that
     it forms with its neighbour, unless a new triangle is then turned over."""
-    c, a, b = np.roll(triangles[one], -edge)
+    c, a, b = np.roll(triangles[triangle], -edge)
     sharing = np.flatnonzero((triangles == a).any(axis=1) & (triangles == c).any(axis=1))
-    beside = int(sharing[sharing != one][0])
+    beside = int(sharing[sharing != triangle][0])
     d = int(triangles[beside][(triangles[beside] != a) & (triangles[beside] != c)][0])
     pair = np.array([[a, b, d], [b, c, d]])
     if triangle_areas(points, pair).min() > 0:
-        triangles[one], triangles[beside] = pair
+        triangles[triangle], triangles[beside] = pair

@@ -50,13 +50,15 @@ class Newton:
     """Newton's method.
 
     tolerance: of the defect; round_off: accepted defect when the iteration stalls; most: largest
-    number of iterations; modified_newton: keep the derivative while it suffices?
+    number of iterations; modified_newton: keep the derivative while it suffices? near: (iterations,
+    defect), the iteration gives up if its defect is larger after so many iterations.
     """
 
     tolerance: float
     round_off: float
     most: int
     modified_newton: bool = False
+    near: tuple[int, float] | None = None
 
     def solve(self, system: System[State], iterate: State) -> tuple[State, int, bool]:
         """The last iterate, the number of steps, and whether it converged."""
@@ -68,6 +70,8 @@ class Newton:
             stalled = STALLED * last < defect <= self.round_off
             if iterate.complete and (defect <= self.tolerance or stalled):
                 return iterate, count, True
+            if self.near and count == self.near[0] and defect > self.near[1]:
+                return iterate, count, False
             if not self.modified_newton or defect > REQUIRED_REDUCTION * last:
                 factors = None
             fresh = factors is None

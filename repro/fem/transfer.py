@@ -96,19 +96,19 @@ def _inverted(nodes: np.ndarray, where: np.ndarray, geometry: int) -> np.ndarray
         guess = local[rest]
         corners = nodes[rest]
         values, gradients = elements.evaluated(2, guess)
-        apart = (values[:, None] @ corners)[:, 0] - where[rest]
+        offset = (values[:, None] @ corners)[:, 0] - where[rest]
         J = np.swapaxes(corners, 1, 2) @ gradients
         det = elements.determinant(J)
         det = np.where(np.abs(det) > 1e-12 * np.abs(det).max(), det, np.inf)
-        ds = J[:, 1, 1] * apart[:, 0] - J[:, 0, 1] * apart[:, 1]
-        dt = J[:, 0, 0] * apart[:, 1] - J[:, 1, 0] * apart[:, 0]
+        ds = J[:, 1, 1] * offset[:, 0] - J[:, 0, 1] * offset[:, 1]
+        dt = J[:, 0, 0] * offset[:, 1] - J[:, 1, 0] * offset[:, 0]
         step = np.stack([ds, dt], axis=1) / det[:, None]
         local[rest] = np.clip(guess - step, -2.0, 3.0)
         rest = rest[np.abs(step).max(axis=1) >= CLOSE]
         if len(rest) == 0:
             break
-    apart = np.einsum("ka,kai->ki", elements.values(2, local), nodes) - where
-    lost = np.hypot(*apart.T) > 1e-6 * np.ptp(nodes, axis=(1, 2))
+    offset = np.einsum("ka,kai->ki", elements.values(2, local), nodes) - where
+    lost = np.hypot(*offset.T) > 1e-6 * np.ptp(nodes, axis=(1, 2))
     return np.where(lost[:, None], 99.0, local)
 
 

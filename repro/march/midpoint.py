@@ -111,8 +111,8 @@ def attempt(stages: Stages, previous: Pore, solved: Solved, duration: float,
     flows = _flows(half.solved.substrates.fluxes, duration)
     ledger = Ledger(previous.time, previous.time + duration, *flows[:4], previous.mass,
                     after.mass - previous.mass, new.mass, flows.unmet)
-    known = replace(half, generated=half.generated + generated, end=expansion)
-    inner = partial(interpolate, stages, previous, solved, known)
+    complete = replace(half, generated=half.generated + generated, end=expansion)
+    inner = partial(interpolate, stages, previous, solved, complete)
     step = StepResult(new, None, ledger, remeshed, expansion.iterations, inner)
     return Attempt(step, change, (gap, expansion.gap) if makes_contact else None)
 
@@ -123,7 +123,7 @@ def _expand(stages: Stages, previous: Pore, after: Pore, half: Halfway, part: fl
 
     Contact lines continue at their speed.
     """
-    advances = {key: 2 * part * arcs for key, arcs in half.expansion.advances.items()}
+    advances = {key: 2 * part * distance for key, distance in half.expansion.advances.items()}
     guess = _guess_shape(previous, half, part)
     return stages.expand(previous, after, guess, replace(search, advances=advances))
 
@@ -278,13 +278,13 @@ def _guess_shape(previous: Pore, half: Halfway, part: float) -> Pore:
     It is extrapolated from the first half, or interpolated in start, half way and end if the end is
     known.
     """
-    known = [(2 * part, half.expansion)]
+    terms = [(2 * part, half.expansion)]
     if half.end is not None:
-        known = [(4 * part * (1 - part), half.expansion), (part * (2 * part - 1), half.end)]
+        terms = [(4 * part * (1 - part), half.expansion), (part * (2 * part - 1), half.end)]
     corners = previous.mesh.corners
     push = previous.pressure
     points = previous.mesh.points
-    for weight, shape in known:
+    for weight, shape in terms:
         push = push + weight * (shape.pore.pressure[:corners] - previous.pressure)
         points = points + weight * (shape.position - previous.mesh.points)
     return _place_body(replace(previous, pressure=push), points)

@@ -52,8 +52,8 @@ def rows(growth: Growth) -> tuple[float, ...]:
     if growth.end <= SAME_TIME:
         return ()
     power = math.floor(math.log2(growth.end / (LEAST * growth.time_step)) + 1e-9)
-    apart = max(growth.time_step * 2.0**power, 2 * SAME_TIME)
-    times = [round(k * apart, 9) for k in range(1, int(growth.end / apart) + 1)]
+    interval = max(growth.time_step * 2.0**power, 2 * SAME_TIME)
+    times = [round(k * interval, 9) for k in range(1, int(growth.end / interval) + 1)]
     return (*(time for time in times if growth.end - time > SAME_TIME), growth.end)
 
 
@@ -94,6 +94,9 @@ def _find_step(
 ) -> tuple[tuple[Pore, Solved], StepResult, Solved, StepControl]:
     """Shorten a step until it is accepted.
 
+    The first failure halves the step, and each further one squares the factor (1/4, 1/16 ...):
+    close to a fold, no step succeeds down to the shortest one.
+
     Returns its start, possibly on finer elements, the step, the solution after it, and the next
     step control.
     """
@@ -105,11 +108,12 @@ def _find_step(
     corner = scene.corner(previous.time)
     remaining = corner - previous.time
     duration = fit_to_interval(length, remaining, STRETCH)
+    factor = 0.5
     while True:
         largest_change = np.inf if duration <= shortest else EXCESS * tolerance / duration
         try:
-            cut = duration > shortest
-            search = SearchOptions(landing=LANDED if cut else 0.0, patient=not cut)
+            last = duration <= shortest
+            search = SearchOptions(landing=0.0 if last else LANDED, patient=last)
             trial = midpoint.attempt(stages, previous, solved, duration, largest_change, search)
             estimate = trial.change * duration
             if trial.step:
@@ -138,7 +142,8 @@ def _find_step(
         except (RunEnd, StageError, FloatingPointError):
             if duration <= shortest:
                 raise
-            length = duration / 2
+            length = max(duration * factor, shortest)
+            factor *= factor
         duration = fit_to_interval(length, remaining)
 
 

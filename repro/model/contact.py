@@ -302,7 +302,6 @@ def _place_lines(outline: Outline, lines: Sequence[Line], search: SearchOptions)
         line.advance = max(line.least, contact_lines.to_arcs(outline, line, length))
         if 0 < line.advance < contact_lines.LEAST_PART:
             line.advance = BESIDE
-            line.at_corner = True
 
 
 def _tip_width(outline: Outline, depth: float) -> float:

@@ -164,9 +164,8 @@ class Line:
     present trial accurate enough; reach: arcs beyond it where the surface is too near; least: the
     smallest advance; short, far: largest advance that is too short and smallest one that is far
     enough; stalls: has the last trial halved neither the interval between these nor the clearance;
-    trials: the last two, as (advance, clearance); at_corner: is the line put just beyond a corner
-    of the outline, because it would be closer to the corner than LEAST_PART? floor: least advance
-    after the line has left a corner.
+    trials: the last two, as (advance, clearance); floor: least advance that
+    Newton's method allows, just beyond the last corner at which the line was too short.
     """
 
     wall: int
@@ -180,7 +179,6 @@ class Line:
     far: float = np.inf
     stalls: bool = False
     trials: list[tuple[float, float]] = field(default_factory=list)
-    at_corner: bool = False
     floor: float = 0.0
 
     @property

@@ -453,10 +453,10 @@ def _solved(system: System, s: int, interval: float, past: np.ndarray, slope: np
     entries = row.operator + row.storage / interval + sparse.entries(1, reaction.mass(slope))
     right = row.mass @ past / interval + row.source - reaction.assembled(offset)
     constrained = np.where(sparse.constrained, row.supply, 0.0)
-    known = row.matrix @ constrained + row.mass @ constrained / interval
+    prescribed = row.matrix @ constrained + row.mass @ constrained / interval
     field = constrained
     solver = linear.factorised(sparse.filled(entries), system.space.mesh.topology.method)
-    field[sparse.order] = solver.solve((right - known)[sparse.order])
+    field[sparse.order] = solver.solve((right - prescribed)[sparse.order])
     consumed = slope * reaction.evaluate(field) + offset
     stored = row.mass @ (field - past) / interval
     entered = row.matrix @ field + stored - row.source + reaction.assembled(consumed)

@@ -44,8 +44,8 @@ def move(mesh: Mesh, body: np.ndarray, compressibility: float, stabilisation: fl
     straight = mesh.straight
     points = mesh.points.copy()
     points[mesh.body] = body
-    known = points[: mesh.corners] - straight.points
-    moved = _fluid_displacement(straight, known, compressibility, stabilisation)
+    prescribed = points[: mesh.corners] - straight.points
+    moved = _fluid_displacement(straight, prescribed, compressibility, stabilisation)
     corners = straight.points.copy()
     corners[straight.topology.fluid] += moved
     points = mesh.with_middles(corners)
@@ -53,7 +53,7 @@ def move(mesh: Mesh, body: np.ndarray, compressibility: float, stabilisation: fl
     return points
 
 
-def _fluid_displacement(mesh: Mesh, known: np.ndarray, gamma: float, c: float) -> np.ndarray:
+def _fluid_displacement(mesh: Mesh, prescribed: np.ndarray, gamma: float, c: float) -> np.ndarray:
     """(f, 2) um, displacement of the fluid's corners; known: (N, 2) um, displacement of the
     aggregate, zero elsewhere."""
     fluid = mesh.topology.fluid
@@ -63,7 +63,7 @@ def _fluid_displacement(mesh: Mesh, known: np.ndarray, gamma: float, c: float) -
     lower = each(mesh.circumdiameter[wet] ** 2 / c, laplace) + gamma * mass(mesh.areas[wet])
     elements = saddle_blocks(laplace, divergence(space)[wet], lower)
     system = mesh.topology.system("mesh motion", lambda: _system(mesh))
-    value = np.concatenate([known[fluid, 0], known[fluid, 1], np.zeros(len(fluid))])
+    value = np.concatenate([prescribed[fluid, 0], prescribed[fluid, 1], np.zeros(len(fluid))])
     solution = system.solve(elements, np.zeros(len(value)), value)
     return solution[: 2 * len(fluid)].reshape(2, -1).T
 

@@ -101,8 +101,8 @@ def new_mesh(rules: Remeshing, previous: Pore, expanded: Pore, speed: float,
     mesh = moved_mesh(rules.meshing, previous, expanded)
     if mesh is not None:
         return replace(expanded, space=Space(mesh, previous.space.order)), False
-    for each in generated:
-        pore = _on_generated(rules, each, expanded)
+    for generated_mesh in generated:
+        pore = _on_generated(rules, generated_mesh, expanded)
         if pore is not None:
             return pore, True
     return remesh(rules, previous, expanded, speed)[0], True

@@ -167,8 +167,8 @@ def problem(space: Space, flow: Flow | None, substrates: Substrates, kinetics: K
     carried, source, inflow, outflow = _through(space, flow, inlet)
     matrices = tuple(diffusion(space, kind) + carried for kind in kinds)
     constrained = flow is None and substrates.boundary == "open"
-    apart = topology.system(("both", space.order, count), lambda: _apart(space, count))
-    operator = apart.matrix(matrices)
+    uncoupled = topology.system(("both", space.order, count), lambda: _apart(space, count))
+    operator = uncoupled.matrix(matrices)
     system = coupled_system(space, constrained, count)
     magnitude = copy(operator)
     magnitude.data = np.abs(operator.data)
@@ -448,16 +448,16 @@ class Balance:
         if self.sink is None or iterate.consistent:
             return iterate.residual
         about = iterate.saturations
-        apart = self._predicted(iterate, iterate.state) - about
-        rise = np.einsum("ijrq,jrq->riq", self._uptake_slopes(about), apart)
+        change = self._predicted(iterate, iterate.state) - about
+        rise = np.einsum("ijrq,jrq->riq", self._uptake_slopes(about), change)
         loads = self.sink.uptake(self._both.at_saturation(about)[0], self._law) + rise
         return self.residual(iterate.state, loads)
 
     def _predicted(self, iterate: Iterate, state: np.ndarray) -> np.ndarray:
         """(s, r, q) saturations at other concentrations by the linearisation."""
         about = np.minimum(iterate.saturations, LARGEST_SATURATION)
-        apart = self.at(state) - self._both.concentration(about)
-        return about + self._slopes(iterate.state, about) * apart
+        change = self.at(state) - self._both.concentration(about)
+        return about + self._slopes(iterate.state, about) * change
 
     def _resaturated(self, iterate: Iterate, new: Iterate, concentrations: np.ndarray) -> Iterate:
         """The new iterate with the saturations for the next linearisation; concentrations: those
@@ -571,9 +571,9 @@ def _checked(problem: Problem, state: np.ndarray, iterations: int) -> Concentrat
 
 def _refuse_unresolved(problem: Problem, sink: Sink, state: Concentrations) -> None:
     """Raise Unresolved if two quadratures of the uptake differ by more than APART."""
-    apart = quadrature_error(problem, sink, state)
-    if apart > APART:
-        raise _front(f"two quadratures of the uptake differ by {100 * apart:.2g} % (up to "
+    difference = quadrature_error(problem, sink, state)
+    if difference > APART:
+        raise _front(f"two quadratures of the uptake differ by {100 * difference:.2g} % (up to "
                      f"{100 * APART:g} % is accepted)")
 
 

@@ -100,8 +100,8 @@ def _over_time(value: float | TimeTable, factor: float, unit: str) -> str:
 
 def _kinetics(scene: Scene) -> Iterator[str]:
     law = scene.kinetics.law
-    one = len(scene.substrates.modelled) == 1
-    name = law.removeprefix("dual ") if one else law
+    alone = len(scene.substrates.modelled) == 1
+    name = law.removeprefix("dual ") if alone else law
     yield f"{name} uptake by the aggregate, {_equations(scene)}"
     if law == "Haldane":
         yield ("of several solutions, the one that is reached in time from the profile in the "

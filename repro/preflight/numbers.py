@@ -163,7 +163,7 @@ def rim_stretch(scene: Scene, uptake: float) -> float:
 
     uptake: uptake of biomass at the supply over the inflow of the substrate, per area, 1/um2.
     """
-    scarcer = min(uptakes(scene), key=lambda each: each.depth)
+    scarcer = min(uptakes(scene), key=lambda substrate_uptake: substrate_uptake.depth)
     rate = max(fastest_growth(scene), 0.0)
     step = scene.growth.end / STEPS
     start = at_start(scene).area

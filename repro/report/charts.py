@@ -196,8 +196,8 @@ def number(value: float, digits: int | None = None) -> str:
     if value == 0:
         return "0"
     if not 1e-3 <= abs(value) < 1e5:
-        known = 4 if digits is None else math.floor(math.log10(abs(value)) + 1e-9) + digits + 1
-        mantissa, _, power = f"{value:.{max(1, known)}g}".partition("e")
+        decimals = 4 if digits is None else math.floor(math.log10(abs(value)) + 1e-9) + digits + 1
+        mantissa, _, power = f"{value:.{max(1, decimals)}g}".partition("e")
         return f"{mantissa}e{int(power)}" if power else mantissa
     return f"{value:.{max(0, digits)}f}" if digits is not None else f"{value:.6g}"
 
@@ -234,8 +234,8 @@ def _mark(x: Scale, time: float) -> str:
 def curve(x: Scale, y: Scale, coordinates: np.ndarray, values: np.ndarray, colour: int,
           title: str = "", dots: bool = False) -> str:
     """Values (n,) at coordinates (n,): lines between gaps; dots for single points, or for all."""
-    known = np.flatnonzero(_is_drawable(x, coordinates) & _is_drawable(y, values))
-    pieces = np.split(known, np.flatnonzero(np.diff(known) > 1) + 1)
+    drawable = np.flatnonzero(_is_drawable(x, coordinates) & _is_drawable(y, values))
+    pieces = np.split(drawable, np.flatnonzero(np.diff(drawable) > 1) + 1)
     polylines = [list(map(point, x(coordinates[piece]), y(values[piece]))) for piece in pieces]
     return "".join(_piece(points, colour, title, dots) for points in polylines)
 
@@ -247,7 +247,7 @@ def _is_drawable(scale: Scale, values: np.ndarray) -> np.ndarray:
 def _piece(points: list[str], colour: int, title: str, dots: bool) -> str:
     if len(points) > 1 and not dots:
         return polyline(points, colour, title)
-    return "".join(dot(each, colour, title) for each in points)
+    return "".join(dot(place, colour, title) for place in points)
 
 
 def point(x: float, y: float) -> str:

@@ -13,7 +13,7 @@ from repro.report.reading import Run
 from repro.results import names
 from repro.scene.units import alike
 
-#: Columns that are positions, of which a percentage means nothing.
+#: Columns that are positions. A percentage of a position has no meaning.
 COORDINATES = {name for name in names.KNOWN if name.endswith(("stream_um", "_x_um", "_y_um"))}
 #: A value of this many times another one is not a percentage any more.
 TIMES = 10.0

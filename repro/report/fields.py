@@ -165,11 +165,11 @@ def _values(grid: Grid, region: np.ndarray) -> dict[str, list]:
 
 def _levels(values: np.ndarray) -> list:
     """[least, largest, base64 of the values in LEVELS steps between them]."""
-    known = values[np.isfinite(values)]
-    low, high = (float(known.min()), float(known.max())) if len(known) else (0.0, 0.0)
+    finite = values[np.isfinite(values)]
+    low, high = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 0.0)
     steps = np.full(len(values), LEVELS + 1.0)
     if high > low:
-        steps[np.isfinite(values)] = np.round((known - low) / (high - low) * LEVELS)
+        steps[np.isfinite(values)] = np.round((finite - low) / (high - low) * LEVELS)
     else:
         steps[np.isfinite(values)] = 0.0
     return [low, high, _text(steps, "<u2")]

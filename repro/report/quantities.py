@@ -74,14 +74,16 @@ def _remeshed_nodes(run: Run) -> TimeSeries:
 #: Quantities besides the columns of the time series; ``value`` maps a run to a TimeSeries.
 DERIVED = (
     *(_rate(name, part) for name in SUBSTRATES for part in PARTS),
-    Quantity("biomass_held_ug_per_m", "biomass held", "biomass_after_pg_per_m, at the step's end",
-             lambda run: (run.ledger["end_h"], run.ledger["biomass_after_pg_per_m"]), "held"),
+    Quantity("biomass_held_ug_per_m", "biomass of the aggregate",
+             "biomass_after_pg_per_m, at the step's end",
+             lambda run: (run.ledger["end_h"], run.ledger["biomass_after_pg_per_m"]),
+             "in the aggregate"),
     Quantity("biomass_made_ug_per_m", "biomass made since t = 0",
              "sum of biomass_made_pg_per_m up to the step's end",
              lambda run: (run.ledger["end_h"], np.cumsum(run.ledger["biomass_made_pg_per_m"])),
              "made since t = 0", signed=True),
-    Quantity("remeshed_nodes", "nodes of a mesh made anew", "nodes, where remeshed is 1",
-             _remeshed_nodes, "made anew"),
+    Quantity("remeshed_nodes", "nodes of a new mesh", "nodes, where remeshed is 1",
+             _remeshed_nodes, "new mesh"),
 )
 KNOWN = names.KNOWN | {each.name: each for each in DERIVED}
 
@@ -155,19 +157,19 @@ def charts_of(run: Run) -> list[Chart]:
 
 def overlaid(runs: Sequence[Run], labels: Sequence[str]) -> list[Chart]:
     """Make a chart for each quantity, with one line for each run."""
-    known, overlays = [series(run) if len(run.times) > 1 else {} for run in runs], []
+    by_run, overlays = [series(run) if len(run.times) > 1 else {} for run in runs], []
     for kind in KINDS:
         for name in kind.drawn:
-            lines = [_line(label, name, each) for label, each in zip(labels, known)]
+            lines = [_line(label, name, drawable) for label, drawable in zip(labels, by_run)]
             title = kind.title if len(kind.drawn) == 1 else f"{kind.title}: {KNOWN[name].label}"
-            if any(name in each for each in known):
+            if any(name in drawable for drawable in by_run):
                 overlays.append(Chart(title, kind.axis, lines))
     return overlays
 
 
-def _line(label: str, name: str, known: dict[str, TimeSeries]) -> Line:
+def _line(label: str, name: str, drawable: dict[str, TimeSeries]) -> Line:
     """Make the line of a quantity. An unknown one has no points: each run keeps its colour."""
-    times, values = known.get(name, (np.array([]), np.array([])))
+    times, values = drawable.get(name, (np.array([]), np.array([])))
     return Line(label, times, values, dots=name == "remeshed_nodes")
 
 

@@ -129,10 +129,10 @@ def _assumed(run: Run) -> str:
 def _numerics(run: Run) -> str:
     """The most important numerical choices in words."""
     tables = run.record["tables"]
-    known = tables["numerics"]
-    choices = [f"{key} {page.format_value(known[key])}".replace("_", "-")
+    numerics = tables["numerics"]
+    choices = [f"{key} {page.format_value(numerics[key])}".replace("_", "-")
                for key, part in NUMERICS.items()
-               if key in known and (part is None or part in tables)]
+               if key in numerics and (part is None or part in tables)]
     return f"Numerics: {', '.join(choices)}." if choices else ""
 
 
@@ -230,7 +230,7 @@ def _cost(run: Run) -> str:
     iterations = page.flat(record["newton_iterations"])
     counts = [(f"Newton iterations, {name}", value) for name, value in iterations.items() if value]
     if "growth" in record["tables"]:
-        counts.append(("meshes made anew", record["remeshes"]))
+        counts.append(("new meshes", record["remeshes"]))
     total_text = f"<p>{total:.3g} s in all, without this page.</p>"
     bars = _bars(record["wall_time_by_stage_s"], total)
     return page.section("Cost", total_text, bars, page.table("", [], counts))
@@ -239,13 +239,13 @@ def _cost(run: Run) -> str:
 def _bars(stages: dict, total: float) -> str:
     """Seconds by stage, the longest first; the lengths are parts of the total. Empty without any.
     """
-    known = [(name, value) for name, value in stages.items() if value > 0]
-    if not known:
+    positive = [(name, value) for name, value in stages.items() if value > 0]
+    if not positive:
         return ""
-    known.sort(key=lambda each: -each[1])
+    positive.sort(key=lambda entry: -entry[1])
     rows = "".join(_bar(22 * k, name, value, 150 * min(1.0, value / total))
-                   for k, (name, value) in enumerate(known))
-    return (f'<svg class="bars" viewBox="0 0 340 {22 * len(known) + 4}" role="img" '
+                   for k, (name, value) in enumerate(positive))
+    return (f'<svg class="bars" viewBox="0 0 340 {22 * len(positive) + 4}" role="img" '
             f'aria-label="seconds by stage">{rows}</svg><p class="note">{NESTED}</p>')
 
 

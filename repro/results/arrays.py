@@ -188,7 +188,7 @@ def fields(scene: Scene, pore: Pore, solved: Solved) -> Grid:
     strain since t = 0: a scene whose new biomass is born stress-free has neither.
     """
     state = State(scene, pore, solved)
-    known = [each for each in ARRAYS if is_modelled(each, NEEDS, state)]
-    points = {each.name: each.on_mesh(state) for each in known if not each.cells}
-    cells = {each.name: each.on_mesh(state) for each in known if each.cells}
+    modelled = [quantity for quantity in ARRAYS if is_modelled(quantity, NEEDS, state)]
+    points = {quantity.name: quantity.on_mesh(state) for quantity in modelled if not quantity.cells}
+    cells = {quantity.name: quantity.on_mesh(state) for quantity in modelled if quantity.cells}
     return Grid(_three(pore.mesh.points), pore.mesh.cells, points, cells, pore.time)

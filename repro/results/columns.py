@@ -87,7 +87,7 @@ def _peak(name: str, words: str, formula: str, label: str, peak: Callable) -> li
     return [Quantity(f"{name}_MPa", words, formula, lambda scene, at: peak(scene, at).value, label,
                      "adhesion", signed=True),
             *(Quantity(f"{name}_{axis}_um", f"place of the {words}, {axis}",
-                       f"middle of the mean that is the {words}",
+                       f"middle of the part whose mean is the {words}",
                        lambda scene, at, axis=axis: getattr(peak(scene, at), axis),
                        f"{axis} of {label}", "adhesion", signed=axis == "x") for axis in "xy")]
 
@@ -100,10 +100,10 @@ def _composition(index: int, scene: Scene, at: Report) -> float:
     return at.pore.composition(scene.kinetics.maximum_density)[index]
 
 
-_BALANCE = ("(supplied - leaving - consumed - stored) / the largest of supplied, consumed, the "
-            "amount of which round-off is 1e-6 and, with Gear, the content of the meshed part at "
-            "the supply; the worst of the steps since the last row and, except with Gear, of the "
-            "row's own fluxes")
+_BALANCE = ("(supplied - leaving - consumed - stored) / scale; the worst of the steps since the "
+            "last row and, except with Gear, of the row's own fluxes. scale: the largest of "
+            "supplied, consumed, 1e6 times the round-off and, with Gear, the content of the "
+            "meshed part at the supply")
 
 #: Columns of ``timeseries.csv``: value takes the scene and a Report.
 SERIES = (
@@ -112,17 +112,17 @@ SERIES = (
     Quantity("mean_velocity_m_per_d", "mean velocity", "u_ave: flow through a cross-section / W",
              lambda scene, at: at.solved.flow.mean_velocity, "mean velocity", "flow"),
     Quantity("head_loss_cm", "head loss over the whole pore",
-             "of the meshed part (6) + 12 nu u_ave / (g W^2) times the length that is not meshed",
+             "loss of the meshed part (6) + 12 nu u_ave / (g W^2) times the length outside of it",
              lambda scene, at: at.solved.flow.head_loss, "head loss", "flow"),
     Quantity("conductivity_m_per_d", "hydraulic conductivity of the pore",
              "u_ave L / head loss, of the whole pore",
              lambda scene, at: at.solved.flow.conductivity, "conductivity", "flow"),
     *_both("effluent_{}_mg_per_L", "{} leaving (flux-averaged)",
-           "integral of u_x C over the outlet of the meshed part / that of u_x; without flow the "
-           "mean of C over it", lambda k, scene, at: at.solved.fluxes[k].effluent),
+           "integral of u_x C over the outlet of the meshed part / that of u_x; without flow, "
+           "the mean of C over it", lambda k, scene, at: at.solved.fluxes[k].effluent),
     *_both("inlet_{}_mg_per_L", "{} at the inlet of the meshed part",
-           "integral of u_x C over the inlet of the meshed part / that of u_x; without flow the "
-           "mean of C over it", lambda k, scene, at: at.solved.fluxes[k].inlet),
+           "integral of u_x C over the inlet of the meshed part / that of u_x; without flow, "
+           "the mean of C over it", lambda k, scene, at: at.solved.fluxes[k].inlet),
     Quantity("aggregate_area_um2", "area of the aggregate", "area inside its boundary",
              lambda scene, at: at.pore.outline.area, "area", "aggregate"),
     Quantity("thickness_um", "thickness of the aggregate", "largest y of its boundary",
@@ -154,10 +154,10 @@ SERIES = (
              lambda scene, at: _of_steps(balance.biomass, at), "biomass", "growth",
              signed=True),
     Quantity("oxygen_demand_balance",
-             "biomass made less Y donor - (acceptor - F donor) / d_c, relative",
-             "(made - Y donor + (acceptor - F donor) / d_c) / the largest of the two terms, of "
-             "what a step consumes (7)-(10), and 1e-7 of the biomass, of which round-off is 1e-6; "
-             "the worst of the steps since the last row",
+             "relative defect of the oxygen demand's balance",
+             "(biomass made - Y donor + (acceptor - F donor) / d_c) / scale, with the acceptor and "
+             "the donor that a step consumes (7)-(10); the worst of the steps since the last row. "
+             "scale: the largest of the two terms and 1e-7 of the biomass",
              lambda scene, at: _of_steps(partial(balance.oxygen_demand, scene.kinetics), at),
              "oxygen demand", "growth", signed=True),
     Quantity("surface_stretch_min", "least elastic stretch along the aggregate's free surface",
@@ -186,10 +186,10 @@ SERIES = (
              partial(_load, "moment"), "moment", "adhesion and flow", signed=True),
     Quantity("nodes", "nodes of the mesh", "corners, and middles of the sides of curved triangles",
              lambda scene, at: len(at.pore.mesh.points), "nodes"),
-    Quantity("remeshed", "mesh made anew", "1 where a step since the last row made a new mesh",
+    Quantity("remeshed", "new mesh", "1 if a step since the last row generated a new mesh, else 0",
              lambda scene, at: int(at.remeshes > 0), yes_no=True),
     Quantity("contact", "contact with the opposite wall",
-             "1 where a node of the aggregate is held on the upper wall",
+             "1 if a node of the aggregate lies on the upper wall, else 0",
              lambda scene, at: int(at.pore.contact), yes_no=True),
 )
 
@@ -197,8 +197,8 @@ SERIES = (
 PARTS = {"supplied": ("supplied", "supply times the flow through the inlet, over the step"),
          "out": ("leaving", "integral of u_x C over the outlet, over the step"),
          "consumed": ("taken up", "uptake (7)-(8) over the aggregate and the step"),
-         "stored": ("stored", "what the meshed part holds more at the step's end; zero where "
-                              "substrates are quasi-steady"),
+         "stored": ("stored", "content of the meshed part at the step's end - at its start; zero "
+                              "if substrates are quasi-steady"),
          "unmet": ("unmet", "demand of decay without acceptor over the aggregate and the step, "
                             "with kinetics.decay = unlimited; else zero")}
 
@@ -218,28 +218,28 @@ LEDGER = (
              lambda scene, step: step.biomass_made, "made", signed=True),
     Quantity("biomass_after_pg_per_m", "biomass at the step's end",
              "integral of X_A + X_I over the aggregate, in its new shape and on its new mesh",
-             lambda scene, step: step.biomass_after, "held"),
+             lambda scene, step: step.biomass_after, "after"),
     Quantity("oxygen_demand_balance",
-             "biomass made less Y donor - (acceptor - F donor) / d_c, relative",
+             "relative defect of the oxygen demand's balance",
              "as in timeseries.csv, of the step",
              lambda scene, step: balance.oxygen_demand(scene.kinetics, step), "oxygen demand",
              signed=True),
 )
 
-COLUMNS = [each.name for each in SERIES]
+COLUMNS = [quantity.name for quantity in SERIES]
 #: Parts that a column of a ledger may need: does a scene have them?
 LEDGER_NEEDS: dict[str, Callable[..., bool]] = {
     name: lambda scene, name=name: name in scene.substrates.modelled for name in SUBSTRATES}
-LEDGER_COLUMNS = [each.name for each in LEDGER]
+LEDGER_COLUMNS = [quantity.name for quantity in LEDGER]
 
 
 def row(scene: Scene, instant: Report) -> dict[str, float | None]:
     """One row of ``timeseries.csv``: the geometry at its time, and flow and substrates in it."""
-    return {each.name: each.reported(scene, instant)
-            if is_modelled(each, NEEDS, scene, instant) else None for each in SERIES}
+    return {quantity.name: quantity.reported(scene, instant)
+            if is_modelled(quantity, NEEDS, scene, instant) else None for quantity in SERIES}
 
 
 def ledger_row(scene: Scene, ledger: Ledger) -> list[float | None]:
     """One row of ``ledger.csv``: a step's balances per metre of depth."""
-    return [each.reported(scene, ledger) if is_modelled(each, LEDGER_NEEDS, scene) else None
-            for each in LEDGER]
+    return [quantity.reported(scene, ledger) if is_modelled(quantity, LEDGER_NEEDS, scene) else None
+            for quantity in LEDGER]

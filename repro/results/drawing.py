@@ -44,8 +44,8 @@ def optional(module: str) -> Any:
 
 def full_name(name: str, known: Sequence[str]) -> str:
     """The known name that a name equals, with or without its unit; empty if there is none."""
-    matching = [each for each in known
-                if name in (each, each.removesuffix(names.ending(each)))]
+    matching = [candidate for candidate in known
+                if name in (candidate, candidate.removesuffix(names.ending(candidate)))]
     return matching[0] if matching else ""
 
 

@@ -7,9 +7,9 @@ from repro.results.columns import LEDGER, SERIES
 from repro.results.quantities import Quantity, ending, unit_of
 
 #: Every column and array by its name.
-KNOWN: dict[str, Quantity] = {each.name: each for each in (*LEDGER, *SERIES, *ARRAYS)}
+KNOWN: dict[str, Quantity] = {quantity.name: quantity for quantity in (*LEDGER, *SERIES, *ARRAYS)}
 #: Pure numbers that stand for yes (1) and no (0).
-YES_NO = {name for name, each in KNOWN.items() if each.yes_no}
+YES_NO = {name for name, quantity in KNOWN.items() if quantity.yes_no}
 #: Relative defects of balances.
 DEFECTS = {name for name in KNOWN if name.endswith("_balance")}
 

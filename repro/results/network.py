@@ -129,7 +129,7 @@ def added_resistance(area: ArrayLike, width: ArrayLike, spanned: ArrayLike | Non
     check = Check("added_resistance", outside)
     Check("added_resistance", "raise").within("viscosity_ratio", ratio, ratios[0], ratios[-1])
     share, widths = _shares(area, width)
-    touches = share > known(False)[1] if spanned is None else np.asarray(spanned, bool)
+    touches = share > share_range(False)[1] if spanned is None else np.asarray(spanned, bool)
     share, widths, touches = np.broadcast_arrays(share, widths, touches)
     is_known = _in_table(check, share, widths, None if spanned is None else touches)
     results = np.full((3, *share.shape), np.nan)
@@ -144,7 +144,7 @@ def added_resistance(area: ArrayLike, width: ArrayLike, spanned: ArrayLike | Non
 def _in_table(check: Check, share: np.ndarray, width: np.ndarray,
               touches: np.ndarray | None) -> np.ndarray:
     """Return where the law covers the throats; touches: None if the area decides the contact."""
-    last, largest = known(False)[1], known(True)[1]
+    last, largest = share_range(False)[1], share_range(True)[1]
     is_known = check.positive("width", width)
     if touches is None:
         return is_known & check.within(SHARE, share, 0.0, largest, is_known)
@@ -158,7 +158,7 @@ def _include_both_kinds(results: np.ndarray, share: np.ndarray, is_known: np.nda
                         ratio: float) -> None:
     """Widen the bounds of the (3, ...) results where the area does not determine the kind."""
     either = is_known & (share >= CONTACT[0]) & (share <= CONTACT[1])
-    kinds = [_law(kind, np.minimum(share[either], known(kind)[1]), ratio)
+    kinds = [_law(kind, np.minimum(share[either], share_range(kind)[1]), ratio)
              for kind in (False, True)]
     results[1, either] = np.min(kinds, axis=0)[1]
     results[2, either] = np.max(kinds, axis=0)[2]
@@ -223,7 +223,7 @@ def uptake(area: ArrayLike, width: ArrayLike, velocity: ArrayLike, acceptor: Arr
         *(np.asarray(values, float) for values in (area, width, velocity, acceptor, donor)))
     is_known = check.within("width", width, *WIDTHS)
     share = area / np.where(is_known, width, np.nan)**2
-    is_known &= check.within(SHARE, share, 0.0, known(True)[1], is_known)
+    is_known &= check.within(SHARE, share, 0.0, share_range(True)[1], is_known)
     is_known &= check.within("velocity", velocity, 0.0, FASTEST)
     for name, supply in zip(("acceptor", "donor"), supplies):
         is_known &= check.within(name, supply, 0.0, LARGEST_SUPPLY)
@@ -303,7 +303,7 @@ class Throats(NamedTuple):
         return 1 + np.where(self._spanned(), 0.0, FAST * (peclet * self.share)**2)
 
     def _spanned(self) -> np.ndarray:
-        return self.share > known(False)[1]
+        return self.share > share_range(False)[1]
 
 
 def throats_of(area: np.ndarray, width: np.ndarray, velocity: np.ndarray, acceptor: np.ndarray,
@@ -332,7 +332,7 @@ def _constants() -> tuple[RateLaw, tuple[float, float], float]:
     return rates, (acceptor, donor), scene.kinetics.maximum_density
 
 
-def known(spanned: bool) -> tuple[float, float]:
+def share_range(spanned: bool) -> tuple[float, float]:
     """Return the least and the largest A / W^2 in the table."""
     shares, _, _ = _table(spanned)
     return float(shares[0]), float(shares[-1])

@@ -137,9 +137,9 @@ class Results(Mapping[str, np.ndarray]):
         """Find the row at, or nearest to, a time (h)."""
         if method not in (None, "nearest"):
             raise ValueError(f'method: None or "nearest" is needed, not {method!r}')
-        apart = np.abs(self.time - time)
-        if len(apart) and (apart.min() <= SAME_TIME or method and np.isfinite(time)):
-            return int(apart.argmin())
+        distance = np.abs(self.time - time)
+        if len(distance) and (distance.min() <= SAME_TIME or method and np.isfinite(time)):
+            return int(distance.argmin())
         raise KeyError(f"{time} h: not a reported time; {self._rows_beside(time)}")
 
     def _rows_beside(self, time: float) -> str:
@@ -149,7 +149,7 @@ class Results(Mapping[str, np.ndarray]):
             return "there is no row"
         after = int(np.searchsorted(self.time, time))
         beside = self.time[max(after - 1, 0):after + 1]
-        near = " and ".join(f"{each:.6g}" for each in beside)
+        near = " and ".join(f"{neighbour:.6g}" for neighbour in beside)
         return (f"the nearest rows are at {near} h, of {count} from {self.time[0]:.6g} to "
                 f'{self.time[-1]:.6g} h; method="nearest" takes the nearest')
 
@@ -213,7 +213,7 @@ class Results(Mapping[str, np.ndarray]):
 
     def _field(self, name: str, fields: Mapping[str, np.ndarray]) -> str:
         """Full name of a field. Raises KeyError, with the nearest name, if there is none."""
-        drawn = [each for each in fields if each not in ("places_um", "triangles")]
+        drawn = [key for key in fields if key not in ("places_um", "triangles")]
         field = drawing.full_name(name, drawn)
         if not field:
             near = difflib.get_close_matches(name, [*self.columns, *drawn], n=1, cutoff=0.5)

@@ -44,12 +44,12 @@ COUNTS = (
     Quantity("wall_time_s", "wall time", "of the process that runs, and of those before a resume",
              lambda history: history.seconds),
     Quantity("wall_time_by_stage_s", "wall time by stage",
-             "within each stage; what a stage calls is counted in both",
+             "within each stage; the time of a stage that another one calls counts in both",
              lambda history: history.stages),
     Quantity("newton_iterations", "Newton's iterations, for growth and for transport",
-             "of the solutions that steps begin and end with: neither those of half a step nor "
-             "attempts that were given up", lambda history: history.iterations),
-    Quantity("remeshes", "meshes made anew", "steps that end on a new mesh",
+             "of the solutions at the start and the end of each step; half steps and rejected "
+             "attempts are not counted", lambda history: history.iterations),
+    Quantity("remeshes", "new meshes", "steps that end on a new mesh",
              lambda history: history.remeshes),
 )
 

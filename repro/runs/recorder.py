@@ -76,7 +76,7 @@ class Recorder:
 
     @property
     def remeshes(self) -> int:
-        """Number of steps that made a new mesh."""
+        """Number of steps that generated a new mesh."""
         return self.history.remeshes + (self.state.remeshes if self.state else 0)
 
     @property
@@ -315,7 +315,7 @@ def complete_folder(folder: Path, record: dict, run_files: set[str]) -> None:
     """Write the page of a run and its SHA-256; remove the checkpoints of a finished run.
 
     record: content of ``run.json``; run_files: names of the run's files. Raises OutputError if the
-    page cannot be made or written.
+    page cannot be written.
     """
     path = claim(folder, REPORT, run_files)
     with file_errors(path):

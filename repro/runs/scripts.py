@@ -129,7 +129,7 @@ def resume(folder: str | Path, overrides: Sequence[str] = (), *,
 
 @contextmanager
 def _watch(progress: bool) -> Iterator[Watch]:
-    """Report warnings as Python warnings, and the simulated time by a bar if it is asked for."""
+    """Report warnings as Python warnings and, if requested, the simulated time by a bar."""
     with progress_bar(progress, "h") as show:
         def tell(event: dict[str, Any]) -> None:
             issue_warnings(event)

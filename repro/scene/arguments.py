@@ -39,14 +39,14 @@ def typed(function: Function) -> Function:
 def _accepts(hint: Any, value: object) -> bool:
     """Does a value have the type of an annotation? Only texts are checked within sequences."""
     if _is_union(hint):
-        return any(_accepts(each, value) for each in get_args(hint))
+        return any(_accepts(option, value) for option in get_args(hint))
     if hint is Any:
         return True
     kind = get_origin(hint) or hint
     if kind is Sequence:
         if not isinstance(value, Sequence) or isinstance(value, (str, bytes)):
             return False
-        return str not in get_args(hint) or all(isinstance(each, str) for each in value)
+        return str not in get_args(hint) or all(isinstance(option, str) for option in value)
     return isinstance(value, NUMBERS.get(kind, kind))
 
 
@@ -57,7 +57,7 @@ def _is_union(hint: Any) -> bool:
 def _words(hint: Any) -> str:
     """The accepted types of an annotation, such as "str or Path"."""
     if _is_union(hint):
-        return " or ".join(_words(each) for each in get_args(hint) if each is not NoneType)
+        return " or ".join(_words(option) for option in get_args(hint) if option is not NoneType)
     if get_origin(hint) is Sequence:
         return f"a list of {_words(get_args(hint)[0])}"
     return getattr(hint, "__name__", str(hint))

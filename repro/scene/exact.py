@@ -69,13 +69,13 @@ def conversion(from_unit: str, unit: str) -> Fraction | None:
     Both are products and quotients like "mg/L", "1/day", "m^2 s^-1", "m2 s-1". Raises ValueError if
     their dimensions differ.
     """
-    one = _product(from_unit)
-    other = _product(unit)
-    if one is None or other is None:
+    source = _product(from_unit)
+    target = _product(unit)
+    if source is None or target is None:
         return None
-    if one[1:] != other[1:]:
+    if source[1:] != target[1:]:
         raise ValueError(f"{from_unit} is not convertible to {unit}")
-    return one.size / other.size
+    return source.size / target.size
 
 
 def _product(text: str) -> Unit | None:

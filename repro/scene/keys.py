@@ -272,7 +272,7 @@ class Kinetics:
         "0.12 1/day", "1/h", NON_NEGATIVE, about="b, decay of active biomass",
         source="(9)-(10), Table 1")
     degradable_fraction: float = number(
-        0.8, FRACTION, about="f_d; of what decays, 1 - f_d stays as inert biomass",
+        0.8, FRACTION, about="f_d; the part 1 - f_d of decayed biomass stays, inert",
         source="(7), (10), Table 1")
     decay_oxygen_demand: float = number(
         1.42, about="d_c, mg of acceptor per mg of biomass that degrades",
@@ -404,7 +404,7 @@ class Numerics:
 
     @property
     def follows_layers(self) -> bool:
-        """Are elements made smaller for boundary layers and fronts? Linear ones are the paper's."""
+        """Are elements refined at boundary layers and fronts? Linear ones, the paper's, are not."""
         return self.elements != "linear"
 
     @property

@@ -56,8 +56,8 @@ def read_table(kind: type, table: object, place: Place, **extra):
     keys = entries(kind)
     if not isinstance(table, dict):
         several = isinstance(table, list) and place.key in ("aggregate", "pore")
-        one = f"one {place.key} is modelled, see {SCOPE}: " if several else ""
-        requirement = f"{one}a table [{place.key}] is needed, with the keys {', '.join(keys)}"
+        single = f"one {place.key} is modelled, see {SCOPE}: " if several else ""
+        requirement = f"{single}a table [{place.key}] is needed, with the keys {', '.join(keys)}"
         raise place.refuse(table, requirement)
     for key in table:
         if key not in keys:
@@ -124,15 +124,15 @@ def _instead(key: str, keys: list[str], place: Place) -> str:
     return message + did_you_mean(nearest(key, keys) or elsewhere(key, place.known))
 
 
-def elsewhere(key: str, known: tuple[str, ...]) -> str:
+def elsewhere(key: str, keys: tuple[str, ...]) -> str:
     """The known keys nearest to a dotted key or to its last part, joined by "or".
 
     Empty if there are none.
     """
-    full_key = nearest(key, known) if "." in key else ""
-    lasts = [other.rpartition(".")[2] for other in known]
+    full_key = nearest(key, keys) if "." in key else ""
+    lasts = [other.rpartition(".")[2] for other in keys]
     last = nearest(key.rpartition(".")[2], lasts)
-    same_last = [other for other, end in zip(known, lasts) if last and end == last]
+    same_last = [other for other, end in zip(keys, lasts) if last and end == last]
     return full_key or " or ".join(same_last)
 
 

@@ -40,7 +40,8 @@ def scene_text(source: str, overrides: Sequence[str] = (), unset: Sequence[str] 
     tables = load_tables(source, overrides, unset)
     changed = [key_of(entry) for entry in overrides]
     scene = parse_scene(tables, Path(source).stem, source, changed)
-    name = "".join(one if one.isprintable() and one.isascii() else "?" for one in scene.name)
+    name = "".join(letter if letter.isprintable() and letter.isascii() else "?"
+                   for letter in scene.name)
     lines = [*_comment(f"Scene {name}. {HEAD}")]
     for key, entry in entries(Scene).items():
         lines += _table(key, entry, tables.get(key, {}), getattr(scene, key))

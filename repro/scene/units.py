@@ -460,15 +460,15 @@ def units_of(tables: object, key: str = "") -> dict[str, str]:
         return units
 
 
-def alike(one: object, other: object) -> bool:
+def alike(first: object, second: object) -> bool:
     """Return whether two values of TOML tables are the same, apart from unit and round-off."""
-    if isinstance(one, list) and isinstance(other, list):
-        return len(one) == len(other) and all(map(alike, one, other))
+    if isinstance(first, list) and isinstance(second, list):
+        return len(first) == len(second) and all(map(alike, first, second))
     try:
-        unit = _parts(other)[1]
-        return math.isclose(to_internal(one, unit), to_internal(other, unit), rel_tol=1e-14)
+        unit = _parts(second)[1]
+        return math.isclose(to_internal(first, unit), to_internal(second, unit), rel_tol=1e-14)
     except (ValueError, OverflowError):
-        return one == other
+        return first == second
 
 
 def unlike(kind: Kind, value: object) -> str:
@@ -511,8 +511,8 @@ def _conversion(from_unit: str, unit: str) -> Fraction:
     """
     if unit == "rad" and from_unit not in ANGLES:
         raise ValueError(f"{from_unit} is not a unit of angle")
-    known = exact.conversion(from_unit, unit)
-    return _by_pint(from_unit, unit) if known is None else known
+    factor = exact.conversion(from_unit, unit)
+    return _by_pint(from_unit, unit) if factor is None else factor
 
 
 def _by_pint(from_unit: str, unit: str) -> Fraction:

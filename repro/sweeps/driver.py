@@ -122,10 +122,10 @@ class Swept:
         KeyError
             If the runs have no column of this name.
         """
-        known = drawing.full_name(name, [*table.COLUMNS, *table.FINAL])
-        if not known:
+        column = drawing.full_name(name, [*table.COLUMNS, *table.FINAL])
+        if not column:
             raise KeyError(f"{name}: runs.csv has {', '.join([*table.COLUMNS, *table.FINAL])}")
-        return drawing.against(self.to_pandas(), self.factors, known, self.source, ax)
+        return drawing.against(self.to_pandas(), self.factors, column, self.source, ax)
 
     def __repr__(self) -> str:
         return (f"<Sweep of {self.source}: {len(self.runs) - len(self.failed)} of {len(self.runs)} "

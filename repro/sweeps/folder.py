@@ -22,7 +22,7 @@ from repro.sweeps.design import Factor, Point
 
 
 class SweepError(OutputError):
-    """A sweep cannot be made in this folder or on this cluster."""
+    """A sweep cannot run in this folder or on this cluster."""
 
 
 @dataclass(frozen=True)

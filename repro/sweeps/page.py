@@ -134,9 +134,9 @@ def _coloured(sweep: Sweep, plotted: list[SweepRun], k: int) -> str:
 def _ends(values) -> tuple[float, float, bool]:
     """The ends of an axis for positive values, and whether it is logarithmic. A linear axis begins
     at zero; an axis over a wide range is logarithmic."""
-    known = np.array(values)[np.isfinite(values)]
-    log = charts.is_wide(known)
-    low, high = charts.limits(known if log else [0.0, *known], log)
+    finite = np.array(values)[np.isfinite(values)]
+    log = charts.is_wide(finite)
+    low, high = charts.limits(finite if log else [0.0, *finite], log)
     return low, high, log
 
 
@@ -228,9 +228,9 @@ def _time(run: SweepRun) -> float:
 
 
 def _table(sweep: Sweep, runs: list[SweepRun]) -> str:
-    known = {each.name: each for each in NUMBERS}
+    quantities = {each.name: each for each in NUMBERS}
     names = ["run", *(factor.key for factor in sweep.factors),
-             *(_heading(known[name]) for name in TABLE_NUMBERS)]
+             *(_heading(quantities[name]) for name in TABLE_NUMBERS)]
     head = "".join(f"<th>{escape(name)}</th>" for name in names) + '<th class="text">status</th>'
     rows = "".join(_row(sweep, run) for run in runs)
     failures = "".join(f'<li class="bad">run {run.point.index}: {escape(run.status)}</li>'

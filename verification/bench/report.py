@@ -234,7 +234,7 @@ def draw(parts: dict) -> None:
 
 def _precision(part: dict) -> Figure:
     """Draw the points and the envelope of each method; the legend counts failures."""
-    figure = Figure(figsize=(7.8, 4.6), layout="constrained")
+    figure = Figure(figsize=(7.8, 6.2), layout="constrained")
     axis = figure.subplots()
     for line, color, mark in zip(part["lines"], cycle(COLORS), cycle(MARKS)):
         positive = [p for p in line["points"] if p["error"] > 0]
@@ -244,9 +244,9 @@ def _precision(part: dict) -> Figure:
     axis.set_title(part["title"], fontsize=9)
     axis.set_xlabel("wall time (s)", fontsize=8)
     axis.set_ylabel(part["error"] if len(part["error"]) < 60 else "largest error", fontsize=8)
-    axis.tick_params(labelsize=7, which="both")
+    axis.tick_params(labelsize=8, which="both")
     axis.grid(which="major", lw=0.3)
-    figure.legend(fontsize=6, loc="outside right upper")
+    figure.legend(fontsize=8, loc="outside lower center", ncols=2)
     return figure
 
 

@@ -35,19 +35,21 @@ from verification.problems.channels import NAMES, both
 @pytest.mark.case("coupling-no-growth", kind="property", mutants=("increase-not-taken",), runs_with="paper")
 @parametrize("*changes", runs.EVERY)
 def test_no_growth(changes, record):
-    """Biomass that neither takes up nor decays leaves the pore fixed, and C the supply.
+    """If biomass neither takes up substrates nor decays, the pore does not change, and C is the supply everywhere.
 
     Norm: t = 0 against 1 h: arrays of geometry, flow and C that differ in any bit; largest |X_A / X_m - 1|.
     """
     scene = runs.base("1 h", 'kinetics.decay_coefficient="0 1/d"', 'kinetics.maximum_utilization_rate="0 1/d"',
                       *changes)
     first, last = list(simulate(scene))
-    pairs = [(one.pore.mesh.points, one.pore.theta, one.pore.inert, one.solved.flow.velocity, one.solved.flow.head,
-              one.solved.concentrations.acceptor, one.solved.concentrations.donor) for one in (first, last)]
-    moved = sum(not np.array_equal(a, b) for a, b in zip(*pairs))
-    record(at_most("arrays moved", moved, 0.0, "nothing acts on them: bit for bit"),
+    pairs = [(report.pore.mesh.points, report.pore.theta, report.pore.inert, report.solved.flow.velocity,
+              report.solved.flow.head, report.solved.concentrations.acceptor, report.solved.concentrations.donor)
+             for report in (first, last)]
+    differing = sum(not np.array_equal(a, b) for a, b in zip(*pairs))
+    record(at_most("arrays that differ", differing, 0.0, "nothing changes: bit for bit"),
            at_most("X_A", runs.density_drift(scene, last), 1e-14, "(34) multiplies and divides by the same areas"),
-           at_most("C over the supply, less 1", _lack(last), *(EVEN if scene.numerics.order == 1 else UNEVEN)))
+           at_most("C over the supply, less 1", _lack(last),
+                   *(LINEAR_BOUND if scene.numerics.order == 1 else HIGHER_BOUND)))
 
 
 def _lack(instant: Report) -> float:
@@ -63,14 +65,14 @@ def _poiseuille(scene: Scene) -> float:
 
 #: Bounds of |C / supply - 1|. w is divergence-free against the functions of C if these are linear. Taylor-Hood's u is
 #: divergence-free against functions of one order less, and jumps of viscosity bend it.
-EVEN = 1e-12, runs.ROUND_OFF
-UNEVEN = 1e-4, "div u is zero against functions of one order less than C's: error in space"
+LINEAR_BOUND = 1e-12, runs.ROUND_OFF
+HIGHER_BOUND = 1e-4, "div u is zero against functions of one order less than C's: error in space"
 
 
 REFINEMENTS = (1.0, 1.4, 2.0, 2.8)
 #: Origins of the bounds in a clean channel: linear elements, and the others.
 LAYER = "first order: the stabilisation spoils one layer of elements at both ends of the mesh"
-PARABOLA = "elements hold the parabola: round-off"
+PARABOLA = "the elements contain the parabola: round-off"
 
 
 @pytest.mark.case(
@@ -106,7 +108,7 @@ def _clean(*changes: str) -> tuple[float, float]:
     references=("poiseuille",), runs_with="paper")
 @parametrize("*changes", runs.EVERY)
 def test_equal_viscosities(changes, record):
-    """An aggregate as thin as water, growing, is hydraulically an empty channel.
+    """The flow through a growing aggregate with the viscosity of water is that of an empty channel.
 
     Norm: relative difference of the mean velocity from Poiseuille's, and of u from that in an empty channel on the same
     mesh; base from 25 um, 1 h, lambda = 1.
@@ -128,15 +130,15 @@ def test_equal_viscosities(changes, record):
 @pytest.mark.case("coupling-stiffness", kind="property", mutants=("modulus-in-the-shape",), runs_with="paper")
 @parametrize("*changes", runs.EVERY)
 def test_stiffness(changes, record):
-    """mu_L does not matter without tractions: 0.001 or 10 MPa make the same aggregate.
+    """Without tractions the shape does not depend on mu_L: 0.001 and 10 MPa give the same aggregate.
 
-    Norm: largest difference of any node's place (um) at 1 h.
+    Norm: largest difference of a node's position (um) at 1 h.
     """
     soft, stiff = (runs.last(runs.base("1 h", f'growth.shear_modulus="{value} MPa"', *changes)).pore
                    for value in (0.001, 10))
     seed = pore.seeded(runs.base("1 h", *changes)).outline.area
-    record(at_most("places", np.abs(soft.mesh.points - stiff.mesh.points).max(), 0.0,
-                   "it is nowhere in the equations without tractions"),
+    record(at_most("positions", np.abs(soft.mesh.points - stiff.mesh.points).max(), 0.0,
+                   "without tractions mu_L does not occur in the equations"),
            at_least("growth of the area", soft.outline.area / seed, 1.1, "else nothing is tested"))
 
 
@@ -149,7 +151,7 @@ LONG = {**{kind: (runs.with_preset("fast"), runs.with_elements(kind), runs.coars
         **{preset: (runs.with_preset(preset),) for preset in runs.QUADRATIC[1:]}}
 
 
-def uniform_growth(hours: tuple[float, ...], most: float, why: str, *changes: str):
+def uniform_growth(hours: tuple[float, ...], bound: float, origin: str, *changes: str):
     """Checks of a run with rows at some hours, the last of which is its end."""
     scene = runs.supplied_everywhere(runs.base(f"{hours[-1]} h", *changes, times=hours))
     seed = pore.seeded(scene).outline
@@ -157,9 +159,9 @@ def uniform_growth(hours: tuple[float, ...], most: float, why: str, *changes: st
     expected = seed.area * np.array([runs.mass_after(scene, hour) for hour in hours])
     sizes = {"area": [instant.pore.outline.area for instant in instants],
              "mass": [instant.pore.mass / scene.kinetics.maximum_density for instant in instants]}
-    yield each_at_most({name: np.abs(size / expected - 1).max() for name, size in sizes.items()}, most, why)
+    yield each_at_most({name: np.abs(size / expected - 1).max() for name, size in sizes.items()}, bound, origin)
     yield at_most("outline", _unround(instants[-1], expected[-1]), *_roundness(scene, seed))
-    yield at_least("remeshes", sum(i.remeshes for i in instants), 1.0, "else that is not tested")
+    yield at_least("remeshes", sum(i.remeshes for i in instants), 1.0, "else they are not tested")
 
 
 @pytest.mark.case(
@@ -170,8 +172,8 @@ def uniform_growth(hours: tuple[float, ...], most: float, why: str, *changes: st
     "*setup",
     {kind: (EVERY_HOUR, *OF_UPDATES, *changes) for kind, changes in runs.every(0.3).items()})
 def test_uniform_growth(setup, record):
-    """Where diffusion holds the supply everywhere the aggregate stays a half-disc of exactly exp-growing mass, through
-    a remesh.
+    """If diffusion keeps the supply everywhere, the aggregate stays a half-disc through a remesh, and its mass grows
+    exactly exponentially.
 
     Norm: largest relative error of area and mass, every hour to 6 h; largest deviation of the outline from a half-disc.
     """
@@ -184,8 +186,8 @@ def test_uniform_growth(setup, record):
     omitted="paper: coupling-uniform-growth")
 @parametrize("*setup", {kind: ((9.0,), *OF_LONG_STEPS, *changes) for kind, changes in LONG.items()})
 def test_curved_uniform_growth(setup, record):
-    """Where diffusion holds the supply everywhere the midpoint rule keeps a half-disc of exactly exp-growing mass
-    through remeshes, in few long steps.
+    """If diffusion keeps the supply everywhere, the aggregate stays a half-disc through remeshes and a few long steps
+    of the midpoint rule, and its mass grows exactly exponentially.
 
     Norm: relative error of area and mass; largest deviation of the outline from a half-disc.
     """
@@ -214,17 +216,18 @@ POWERS = {"area": 2, "upstream tip": 1, "conductivity": 1}
 @pytest.mark.case("coupling-units", kind="property", mutants=("length-scale",), runs_with="paper")
 @parametrize("*changes", runs.EVERY)
 def test_units(changes, record):
-    """A pore eight times larger or smaller, with transport to match, grows alike to the last bits: nothing has a scale
-    of its own.
+    """A pore eight times larger or smaller, with scaled transport, grows in the same way to the last bits: the code
+    contains no length.
 
     Norm: relative difference at 2 h.
     """
     scene = runs.base("2 h", *changes)
     reference = runs.numbers(runs.last(scene))
     for factor in (8.0, 0.125):
-        other = runs.numbers(runs.last(runs.scaled(scene, factor, 1.0)))
-        apart = {name: abs(other[name] / value / factor ** POWERS[name] - 1) for name, value in reference.items()}
-        record(each_at_most(apart, 1e-14, "powers of two are exact: even the mesher does the same",
+        scaled_numbers = runs.numbers(runs.last(runs.scaled(scene, factor, 1.0)))
+        differences = {name: abs(scaled_numbers[name] / value / factor ** POWERS[name] - 1)
+                       for name, value in reference.items()}
+        record(each_at_most(differences, 1e-14, "powers of two are exact, also in the mesher",
                             f", lengths times {factor:g}"))
 
 
@@ -241,21 +244,21 @@ FOREIGN = ('pore.width="0.05 mm"', 'pore.length="0.06 cm"', 'aggregate.radius="5
 def test_foreign_units(changes, record):
     """A scene written in other units is the same scene, bit for bit.
 
-    Norm: largest difference of any node's place (um), and of C, at 1 h.
+    Norm: largest difference of a node's position (um), and of C, at 1 h.
     """
     standard = runs.last(runs.base("1 h", *changes))
     foreign = runs.last(runs.base("60 min", *changes, *FOREIGN))
-    pairs = {"places": (standard.pore.mesh.points, foreign.pore.mesh.points),
+    pairs = {"positions": (standard.pore.mesh.points, foreign.pore.mesh.points),
              "C_A": (standard.solved.concentrations.acceptor, foreign.solved.concentrations.acceptor)}
-    apart = {name: np.abs(a - b).max() for name, (a, b) in pairs.items()}
-    record(each_at_most(apart, 0.0, "the same numbers after reading"))
+    differences = {name: np.abs(a - b).max() for name, (a, b) in pairs.items()}
+    record(each_at_most(differences, 0.0, "the same numbers after reading"))
 
 
 @pytest.mark.case(
     "coupling-mirror", kind="property", mutants=("one-supply-held", "fixed-beside-the-middle"), runs_with="paper")
 @parametrize("*changes", runs.every(0.5))
 def test_mirror(changes, record):
-    """Without flow an aggregate grows alike to both sides.
+    """Without flow an aggregate grows equally to both sides.
 
     Norm: difference of the tips' distances from the origin, and of C_A left and right, relative.
     """
@@ -265,24 +268,24 @@ def test_mirror(changes, record):
     x = np.linspace(1.0, 70.0, 70)
     sides = [meshes.field_at(space, last.solved.concentrations.acceptor, np.column_stack([s * x, 0.3 + 0 * x]))
              for s in (-1, 1)]
-    record(at_most("tips", tips, 3e-6, "unsymmetric mesh: the error of C_A, of which growth feels a tenth"),
+    record(at_most("tips", tips, 3e-6, "unsymmetric mesh: a tenth of the error of C_A"),
            at_most("C_A", np.abs(np.subtract(*sides)).max() / 10.0, 1e-4, "unsymmetric mesh: error in space"),
-           at_least("it has grown (area over the seed's)", outline.area / 39.27, 2.0, "else nothing is tested"))
+           at_least("area over the seed's", outline.area / 39.27, 2.0, "else nothing is tested"))
 
 
 @pytest.mark.case("coupling-reversed", kind="property", mutants=("inlet-held",), runs_with="paper")
 @parametrize("*changes", runs.every(0.6, 2.0))
 def test_reversed(changes, record):
-    """Flow from the other side meets the same resistance (Stokes flow is reversible) and, where uptake is of first
-    order, loses as much of its substrate (reciprocity of (7), (11) and (12)).
+    """Reversed flow has the same resistance (Stokes flow is reversible). If uptake is of first order, it loses the same
+    amount of substrate (reciprocity of (7), (11) and (12)).
 
     Norm: relative difference between a lopsided aggregate and its mirror image, refinement 2, t = 0.
     """
     forward, mirrored = (_lopsided(sign, *changes) for sign in (1.0, -1.0))
-    apart = {name: abs(forward[name] / mirrored[name] - 1) for name in forward}
-    record(at_most("conductivity", apart["conductivity"], 3e-4, ERROR),
-           at_most("effluent", apart["effluent"], 3e-4, ERROR),
-           at_least("C at the inlet, which no theorem makes equal", apart["inlet"], 3e-3,
+    differences = {name: abs(forward[name] / mirrored[name] - 1) for name in forward}
+    record(at_most("conductivity", differences["conductivity"], 3e-4, ERROR),
+           at_most("effluent", differences["effluent"], 3e-4, ERROR),
+           at_least("C at the inlet, which no theorem constrains", differences["inlet"], 3e-3,
                     "else the aggregate is not lopsided"))
 
 
@@ -319,14 +322,14 @@ SLOWER = (16.0, 8.0, 4.0, 2.0)
 
 @pytest.mark.case(
     "coupling-quasi-steady", kind="property", mutants=("rates-two-percent-low",), runs_with="paper",
-    omitted="fast, accurate, exact: the transient scheme goes with updates")
+    omitted="fast, accurate, exact: the transient scheme requires updates")
 @parametrize("*changes", runs.kinds(0.4))
 def test_quasi_steady(changes, record):
-    """The paper's transient scheme and quasi-steady substrates make the same aggregate, up to the substrates' lag,
-    which is as their storage.
+    """The paper's transient scheme and quasi-steady substrates give the same aggregate, up to the lag of the
+    substrates, which is proportional to their storage.
 
     Norm: relative difference at 0.6 h, and that of C_A at the nodes over the supply; base from 25 um at 2.9 m/d, with
-    D, u and X_m over 16 to 2: steady states and growth stay, substrates are 16 to 2 times slower.
+    D, u and X_m divided by 16 to 2: steady states and growth do not change, and substrates are 16 to 2 times slower.
     """
     errors = refine(_lag, SLOWER, *changes)
     record([study(name, SLOWER, values, 1, "lag: first order in storage over reaction, 2e-4 for base", ceiling=3e-6,
@@ -337,9 +340,10 @@ def _lag(factor: float, *changes: str) -> dict[str, float]:
     """Difference between the quasi-steady and the transient run, with substrates ``factor`` times slower relative to
     growth."""
     quasi_steady, transient = (runs.last(_slower(factor, name, *changes)) for name in ("quasi_steady", "gear"))
-    one, other = runs.numbers(quasi_steady), runs.numbers(transient)
-    apart = quasi_steady.solved.concentrations.acceptor - transient.solved.concentrations.acceptor
-    return {**{name: abs(one[name] / other[name] - 1) for name in one}, "C_A": np.abs(apart).max() / 10.0}
+    expected = runs.numbers(transient)
+    difference = quasi_steady.solved.concentrations.acceptor - transient.solved.concentrations.acceptor
+    return {**{name: abs(value / expected[name] - 1) for name, value in runs.numbers(quasi_steady).items()},
+            "C_A": np.abs(difference).max() / 10.0}
 
 
 def _slower(factor: float, transport: str, *changes: str):
@@ -357,22 +361,22 @@ def _slower(factor: float, transport: str, *changes: str):
                           for radius, labelled in (("5 um", runs.kinds(0.6, 2.0)), ("25 um", runs.every(0.6, 2.0)))
                           for label, changes in labelled.items()})
 def test_extent(changes, record):
-    """The central mesh with (6) and (26) beyond it is worth the whole pore.
+    """The central mesh, with (6) and (26) beyond it, gives the results of a mesh of the whole pore.
 
-    Norm: t = 0, refinement 2 (linear) and 0.6: conductivity and effluents relative; section means of C along the
-    central mesh, over the supply.
+    Norm: relative difference of conductivity and effluents, and difference of section means of C along the central
+    mesh over the supply; t = 0, refinement 2 (linear) and 0.6.
     """
     (central, near), (full, far) = (_solved(f'numerics.extent="{name}"', *changes) for name in ("central", "full"))
     for name, bound in BOUNDS.items():
         record(at_most(name, abs(central[name] / full[name] - 1), *bound))
-    record(at_most("C", np.abs(near - far).max() / 10.0, *APART.get(changes[1:], (4e-4, IN_SPACE))))
+    record(at_most("C", np.abs(near - far).max() / 10.0, *BOUNDS_OF_C.get(changes[1:], (4e-4, IN_SPACE))))
 
 
 IN_SPACE = "error in space, 0.1 % at refinement 1, a quarter of that here"
 #: Bound of the difference of section means of C on the coarser mesh of a preset.
-APART = {(runs.with_preset("fast"),): (2.5e-3, "error in space: a quarter of the 1 % that the preset stands for")}
-BOUNDS = {"conductivity": (1e-3, "of first order in the mesh: 0.17 % in a clean channel at this refinement, most of "
-                           "which both meshes have in common"),
+BOUNDS_OF_C = {(runs.with_preset("fast"),): (2.5e-3, "error in space: a quarter of the 1 % that the preset promises")}
+BOUNDS = {"conductivity": (1e-3, "first order in the mesh: 0.17 % in a clean channel at this refinement; both meshes "
+                           "share most of it"),
           "effluent acceptor": (4e-4, IN_SPACE), "effluent donor": (4e-4, IN_SPACE)}
 
 
@@ -406,7 +410,7 @@ def _equal_steps(scene, steps: int) -> np.ndarray:
 @pytest.mark.case(
     "coupling-midpoint-order", kind="property", mutants=("curved-rates-of-the-start", "midpoint-rates-of-the-start"),
     runs_with="fast",
-    omitted="paper: coupling-midpoint-limit; accurate, exact: equal steps know no tolerance: those of fast")
+    omitted="paper: coupling-midpoint-limit; accurate, exact: equal steps have no tolerance, as in fast")
 @pytest.mark.parametrize("elements", runs.ELEMENTS)
 def test_midpoint_order(elements, record):
     """The midpoint rule is of second order in time, with every kind of elements.
@@ -416,26 +420,26 @@ def test_midpoint_order(elements, record):
     scene = load_scene("base", (runs.with_preset("fast"), runs.with_elements(elements), "numerics.refinement=0.5",
                                 'aggregate.radius="25 um"'))
     values = np.array([_equal_steps(scene, steps) for steps in RULE_STEPS])
-    apart = np.abs(np.diff(values, axis=0) / values[-1])
+    changes = np.abs(np.diff(values, axis=0) / values[-1])
     record([study(name, 2 / np.array(RULE_STEPS[:-1]), column, 2, "midpoint rule", ceiling=2e-5, band=0.15)
-            for name, column in zip(("area", "upstream tip"), apart.T)])
+            for name, column in zip(("area", "upstream tip"), changes.T)])
 
 
 @pytest.mark.slow
 @pytest.mark.case(
     "coupling-midpoint-limit", kind="property",
     mutants=("midpoint-rates-of-the-start", "rates-at-the-start", "stale-flow"), runs_with="paper",
-    omitted="fast, accurate, exact: coupling-midpoint-order; their own tolerances would be seen")
+    omitted="fast, accurate, exact: coupling-midpoint-order; their own tolerances would show")
 @parametrize("*changes", runs.kinds(0.3, 0.6))
 def test_midpoint_limit(changes, record):
-    """With short steps the paper's shape updates and the midpoint rule come to the same, on the same triangles: the
-    loop of updates is of first order in the step, as the geometry is frozen within it and the rates are not.
+    """With short steps the paper's shape updates and the midpoint rule agree on the same triangles: the loop of updates
+    has first order in the step, because the geometry is frozen within a step.
 
     Norm: relative difference at 3.2 h from a seed of 25 um, base, no remesh.
     """
     short = ('numerics.time="midpoint"', "numerics.tolerance=0.00003")
-    reports = [runs.last(runs.base("3.2 h", 'aggregate.radius="25 um"', *changes, *how))
-             for how in (short, *((f'growth.time_step="{step} h"',) for step in STEPS))]
+    reports = [runs.last(runs.base("3.2 h", 'aggregate.radius="25 um"', *changes, *setting))
+             for setting in (short, *((f'growth.time_step="{step} h"',) for step in STEPS))]
     record(at_most("remeshes, all runs", sum(instant.remeshes for instant in reports), 0.0,
                    "one mesh: the error in space is common"))
     exact, *rows = map(runs.numbers, reports)
@@ -473,10 +477,10 @@ def test_presets(bound, preset, changes, record):
     effluents over the supply.
     """
     expected, error = _reference()
-    record(at_most("the reference itself", error, 5e-5, "half of what is asked of exact"))
+    record(at_most("error of the reference", error, 5e-5, "half of the bound for exact"))
     computed = runs.values(TIMES, runs.with_preset(preset), *changes)
     for name, errors in zip(whole_run.NAMES, runs.errors(computed, expected).T):
-        record(at_most(name, errors.max(), bound, "what the preset is for"))
+        record(at_most(name, errors.max(), bound, "the error that the preset promises"))
 
 
 @pytest.mark.case("coupling-jacobian-reused", kind="property", mutants=("newton-never-reused",))
@@ -486,15 +490,15 @@ def test_presets(bound, preset, changes, record):
                           "quadratic, accurate": (runs.with_preset("accurate"),),
                           "quadratic, exact": (runs.with_preset("exact"),)})
 def test_jacobian_reused(changes, record):
-    """Newton's methods that use a derivative again come to the same with fewer factorisations.
+    """Newton's methods that reuse a derivative give the same results with fewer factorisations.
 
-    Norm: relative difference of the area, the tips and the conductivity at 2 h; factorisations over those of fresh
+    Norm: relative difference of the area, the tips and the conductivity at 2 h; factorisations over those with fresh
     derivatives; base from a seed of 25 um.
     """
-    (fresh, fresh_count), (reused, reused_count) = (_factorisations(kind, *changes) for kind in ("fresh", "reused"))
-    record(at_most("difference", np.abs(reused / fresh - 1).max(), 1e-8,
+    (fresh, fresh_count), (modified, modified_count) = (_factorisations(kind, *changes) for kind in ("fresh", "reused"))
+    record(at_most("difference", np.abs(modified / fresh - 1).max(), 1e-8,
                    "Newton's tolerances, 1e-10 and less, times the steps"),
-           at_most("factorisations", reused_count / fresh_count, 0.8, "one in three of Newton's is saved"))
+           at_most("factorisations", modified_count / fresh_count, 0.8, "a third of Newton's factorisations is saved"))
 
 
 def _factorisations(kind: str, *changes: str) -> tuple[np.ndarray, int]:

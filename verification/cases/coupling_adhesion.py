@@ -1,5 +1,5 @@
-"""What keeps the aggregate on its walls (section 5): the fluid's force, tractions of the walls, and tensile stress; and
-a lower wall to which the aggregate is bonded (2.3.3).
+"""Forces on an aggregate and on its walls (section 5): the fluid's force, the tractions of the walls, and the tensile
+stress; and a lower wall to which the aggregate is bonded (2.3.3).
 """
 
 from dataclasses import replace
@@ -68,10 +68,10 @@ def _load_errors(radius: float, *changes: str) -> tuple[float, float, float]:
     drive = scene.flow
     shear = 6 * solved.flow.mean_velocity / WIDTH
     scale = traction.MPA_PER_UM * drive.density * drive.kinematic_viscosity * shear * radius
-    along, _, moment = half_cylinder.solved(radius / WIDTH).load()
+    drag, _, moment = half_cylinder.solve(radius / WIDTH).load()
     middle = traction.MPA_PER_UM * drive.density * drive.gravity * solved.flow.meshed_loss / 2
-    return (abs(load.x / scale - along) / along, abs(load.y / (middle * 2 * radius) + 1),
-            abs(load.moment / scale / radius - moment) / along)
+    return (abs(load.x / scale - drag) / drag, abs(load.y / (middle * 2 * radius) + 1),
+            abs(load.moment / scale / radius - moment) / drag)
 
 
 @cache
@@ -83,8 +83,9 @@ def _at_rest(wall: str, *changes: str) -> tuple:
     slope = seed.body.reference[seed.body.shape.cells, 0] @ seed.body.shape.table.shape.T
     grown = contact.expand(contact.Mechanics.of(scene), seed, seed.theta * (1.1 - 0.002 * slope)).pore
     grown = replace(grown, time=1.0)
-    around = traction.follow(pore.Meshing.of(scene), traction.surroundings(pore.Meshing.of(scene), seed, seed), grown)
-    placed = replace(grown, space=replace(grown.space, mesh=around.mesh))
+    meshing = pore.Meshing.of(scene)
+    surroundings = traction.follow(meshing, traction.surroundings(meshing, seed, seed), grown)
+    placed = replace(grown, space=replace(grown.space, mesh=surroundings.mesh))
     return scene, placed, water(scene, placed)
 
 
@@ -94,32 +95,32 @@ def _at_rest(wall: str, *changes: str) -> tuple:
 @parametrize("wall, *changes", {f"{wall}, {kind}": (wall, *changes) for wall in ("sliding", "bonded")
                                 for kind, changes in KINDS.items()})
 def test_balance(wall, changes, record):
-    """The walls bear the water's force and its moment, and nothing else does: they hold the aggregate at its contact
-    alone, and a wall that slides pulls along itself at one point.
+    """The walls alone bear the force and the moment of the water, and only where they touch the aggregate. Along a wall
+    on which the aggregate slides, the force acts at one point.
 
     Norm: after a step of uneven growth under the water's forces: sums of the walls' forces and the water's, and of
     their moments, over the water's; defect at free nodes over the water's force at a node.
     """
     scene, state, solved = _at_rest(wall, *changes)
-    on = adhesion.fluid_forces(scene, state, solved)
-    held = adhesion.wall_forces(scene, state, solved)
+    fluid_force = adhesion.fluid_forces(scene, state, solved)
+    wall_force = adhesion.wall_forces(scene, state, solved)
     rim = state.mesh.topology.body_loop
-    touching = np.zeros(len(held), bool)
+    touching = np.zeros(len(wall_force), bool)
     touching[rim[state.wall == BOTTOM]] = True
     x, y = state.mesh.points[state.mesh.body].T
-    total = (held * touching[:, None]).sum(axis=0) + on.sum(axis=0)
-    moments = [x @ forces[:, 1] - y @ forces[:, 0] for forces in (held * touching[:, None], on)]
-    size = np.abs(on).max()
-    record(each_at_most({"force": largest(total) / largest(on.sum(axis=0)),
+    total = (wall_force * touching[:, None]).sum(axis=0) + fluid_force.sum(axis=0)
+    moments = [x @ forces[:, 1] - y @ forces[:, 0] for forces in (wall_force * touching[:, None], fluid_force)]
+    largest_force = np.abs(fluid_force).max()
+    record(each_at_most({"force": largest(total) / largest(fluid_force.sum(axis=0)),
                          "moment": abs(sum(moments)) / abs(moments[1]),
-                         "free nodes": largest(held[~touching]) / size}, 1e-5,
+                         "free nodes": largest(wall_force[~touching]) / largest_force}, 1e-5,
                         "the last round moves nodes by 1e-8, and the stress is 1e3 times the water's"))
-    along = np.abs(held[rim[state.wall == BOTTOM], 0])
+    along = np.abs(wall_force[rim[state.wall == BOTTOM], 0])
     if wall == "sliding":
         record(at_most("along the wall, beside one point", np.sort(along)[-2] / along.max(), 1e-5,
                        "one point keeps a contact surface in place"))
     else:
-        record(at_least("points that hold along the wall", np.mean(along > 1e-3 * along.max()), 0.5,
+        record(at_least("share of points with a force along the wall", np.mean(along > 1e-3 * along.max()), 0.5,
                         "every point is bonded; the shear may vanish at some"))
 
 
@@ -133,10 +134,10 @@ def _plug(half: float, *changes: str):
     runs_with="paper")
 @parametrize("*changes", KINDS)
 def test_plug(changes, record):
-    """A plug that loses a fifth of its area, between walls that slide, becomes narrower, and pulls on both walls: with
-    F = diag(theta, 1) and no traction on its ends, by mu theta^(-2/3) (1 / theta - theta).
+    """A plug that loses a fifth of its area between walls without friction becomes narrower and pulls on both walls by
+    mu theta^(-2/3) (1 / theta - theta), with F = diag(theta, 1) and no traction on its ends.
 
-    Norm: walls' largest traction and tensile stress over this, less 1.
+    Norm: largest traction of the walls and largest tensile stress over this, less 1.
     """
     scene = _plug(30.0, *changes)
     seed = pore.seeded(scene)
@@ -153,30 +154,31 @@ def test_plug(changes, record):
     omitted="1: permeable aggregates have higher orders")
 @parametrize("*changes", CURVED)
 def test_seepage(changes, record):
-    """Water that seeps evenly through a plug, held at its upstream end on walls without friction, stretches it by a
-    stress that falls linearly to zero, rho nu u / k times the distance to the downstream end; nothing moves.
+    """Water that seeps evenly through a plug, fixed at its upstream end between walls without friction, causes a
+    tensile stress of rho nu u / k times the distance to the downstream end, and does not move the plug.
 
     Norm: sum of the drag over rho nu u / k times the area, less 1; P less the linear stress, over the largest, in the
-    middle half of the plug; largest move over the width.
+    middle half of the plug; largest displacement over the width.
     """
     scene = _plug(60.0, *changes, 'flow.biomass="brinkman"', 'flow.permeability="1e-14 m^2"')
     seed = pore.seeded(scene)
     solved = water(scene, seed)
     drive = scene.flow
     density = drive.kinematic_viscosity / drive.gravity / drive.permeability * solved.flow.mean_velocity
-    on = traction.on_aggregate(seed.space, solved.flow, drive, scene.numerics.interface)[seed.mesh.body]
-    total = abs(on[:, 0].sum() / density / (120.0 * WIDTH) - 1)
+    drag = traction.on_aggregate(seed.space, solved.flow, drive, scene.numerics.interface)[seed.mesh.body]
+    total = abs(drag[:, 0].sum() / density / (120.0 * WIDTH) - 1)
     place = seed.mesh.points[seed.mesh.body]
     prescribed = np.column_stack([place[:, 0] < -60.0 + 1e-9, (place[:, 1] == 0.0) | (place[:, 1] == WIDTH)])
     inside = seed.mesh.topology.body_corners
-    rest = growth.equilibrium(seed.body, seed.theta, place, 0 * seed.pressure[inside], prescribed, place,
-                              forces=0.1 * on / (density * 120.0))
+    equilibrium = growth.equilibrium(seed.body, seed.theta, place, 0 * seed.pressure[inside], prescribed, place,
+                              forces=0.1 * drag / (density * 120.0))
     x = seed.mesh.points[inside, 0]
     linear = (60.0 - x) / 120.0
     record(at_most("sum of the drag", total, 1e-10, "the same flux through every section: round-off"),
-           at_most("stress", largest((10 * rest.pressure - linear)[np.abs(x) < 30.0]), 0.01,
+           at_most("stress", largest((10 * equilibrium.pressure - linear)[np.abs(x) < 30.0]), 0.01,
                    "the flow becomes even within the pore's width of the ends, and in the layers"),
-           at_most("move", largest(rest.position - place) / WIDTH, 1e-3, "the load is a gradient but for the layers"))
+           at_most("displacement", largest(equilibrium.position - place) / WIDTH, 1e-3,
+                   "the load is a gradient outside of the layers"))
 
 
 LONG, HIGH, MIDDLE = 150.0, 10.0, 15.0
@@ -186,11 +188,11 @@ LONG, HIGH, MIDDLE = 150.0, 10.0, 15.0
     "coupling-bonded-slab", kind="exact", mutants=("bonded-slides", "bonded-where-it-starts"), runs_with="paper")
 @parametrize("*changes", runs.kinds(0.3, 0.6))
 def test_bonded_slab(changes, record):
-    """The middle of a long slab that is bonded to the wall grows upwards alone, F = diag(1, theta), and pulls at the
-    wall neither across nor along; on a wall that slides it grows to both sides.
+    """The middle of a long slab that is bonded to the wall grows only upwards, F = diag(1, theta), and exerts no
+    traction on the wall.
 
     Norm: height in the middle over theta times the first one, less 1; stress xx and yy there, over mu_L, less
-    theta^(-2/3) (1 / theta - theta) and 0; largest move along the wall of what lay on it.
+    theta^(-2/3) (1 / theta - theta) and 0; largest displacement along the wall of nodes that lay on it.
     """
     scene = shaped(scene_of('growth.wall="bonded"', *changes),
                    [(-LONG, 0), (-LONG, HIGH), (LONG, HIGH), (LONG, 0)])
@@ -205,28 +207,31 @@ def test_bonded_slab(changes, record):
     sigma = adhesion.stress(scene, shape)[near] / scene.growth.shear_modulus
     expected = theta ** (-2 / 3) * (1 / theta - theta)
     size = abs(expected)
-    on = seed.wall == BOTTOM
-    moved = x[: len(on)][on] - seed.outline.points[on, 0] if shape.mesh.geometry == 1 else _moves(seed, shape)
+    if shape.mesh.geometry == 1:
+        on_wall = seed.wall == BOTTOM
+        moved = x[: len(on_wall)][on_wall] - seed.outline.points[on_wall, 0]
+    else:
+        moved = _moves(seed, shape)
     record(each_at_most({"height": largest(y[free] / (theta * HIGH) - 1),
                          "stress xx": largest(sigma[..., 0] - expected) / size,
                          "stress yy": largest(sigma[..., 1]) / size}, 1e-3,
                         "ends of a bonded layer fade as exp(-a distance / height), a = cos a = 0.739: 2e-4 here"),
-           at_most("move along the wall", largest(moved), 1e-9, "prescribed"))
+           at_most("displacement along the wall", largest(moved), 1e-9, "prescribed"))
 
 
 def _moves(seed: Pore, shape: Pore) -> np.ndarray:
-    """Moves along the wall (um) of the nodes that lay on it, matched by their place at t = 0."""
+    """Displacements along the wall (um) of the nodes that lay on it, matched by their positions at t = 0."""
     before = seed.outline.points[seed.wall == BOTTOM, 0]
-    on = shape.wall == BOTTOM
-    origin, now = shape.outline.origin[on], shape.outline.points[on, 0]
+    on_wall = shape.wall == BOTTOM
+    origin, present = shape.outline.origin[on_wall], shape.outline.points[on_wall, 0]
     rows = [np.flatnonzero((origin[:, 1] == 0.0) & (np.abs(origin[:, 0] - x) < 1e-9))[0] for x in before]
-    return now[rows] - before
+    return present[rows] - before
 
 
-def _pushed(seed: Pore, by: float) -> Pore:
+def _pushed(seed: Pore, shift: float) -> Pore:
     """A guess of the shape, moved downstream by ``by``."""
     points = seed.mesh.points.copy()
-    points[seed.mesh.body, 0] += by
+    points[seed.mesh.body, 0] += shift
     return seed.moved(points)
 
 
@@ -238,15 +243,16 @@ SIZES = (0.35, 0.5, 0.7, 1.0)
     "coupling-bonded-traction", kind="property", mutants=("traction-at-a-point",), omitted="1, 3: the balance")
 @parametrize("*changes", {"quadratic": (runs.with_elements("quadratic"),)})
 def test_bonded_traction(changes, record):
-    """What a bonded wall must bear converges with the mesh, although the stress at the contact line is singular.
+    """The largest traction on a bonded wall converges with the mesh, although the stress at the contact line is
+    singular.
 
-    Norm: base's half-disc after growth by a tenth, and along x: the largest traction in the mean over W / 20 at four
-    refinements, less that at twice the finest, over the latter.
+    Norm: base's half-disc after growth by a tenth that varies along x: the largest traction in the mean over W / 20 at
+    four refinements, less that at twice the finest, over the latter.
     """
     values = [_bonded_peak(size, *changes) for size in (*SIZES, 2.0)]
     errors = np.abs(np.array(values[:-1]) / values[-1] - 1)
-    record(at_most("at the coarsest", errors[0], 0.05, "a few percent, the error of `fast` in what it reports worst"),
-           at_most("at the finest", errors[-1], 0.01, "1 %, to which adhesion is reported"))
+    record(at_most("at the coarsest", errors[0], 0.05, "a few percent, the error of the worst number of `fast`"),
+           at_most("at the finest", errors[-1], 0.01, "1 %, the accuracy of the columns of adhesion"))
 
 
 def _bonded_peak(refinement: float, *changes: str) -> float:

@@ -38,31 +38,31 @@ RADII, REACH = (5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 33.0), 75.0
 @pytest.mark.case(
     "coupling-averaged-base", kind="cross-code", mutants=("stale-flow", "conductivity-for-velocity"),
     references=("averaged_pore", "poiseuille", "taylor_hood"), runs_with="1 2",
-    omitted="exact: what is judged is the averaged pore, 1 % off, ten times what accurate may err by")
+    omitted="exact: the error of the averaged pore, 1 %, is ten times that of accurate")
 @parametrize("*changes", runs.NUMERICS)
 def test_averaged_base(changes, record):
-    """Under its head base clogs as its averaged pore (FiPy, solve_ivp) does, up to what lubrication and section means
-    are worth: a velocity 11 % too high, of which 1 % is left with a half-disc's own loss.
+    """Under its head base clogs like its averaged pore (FiPy, solve_ivp), up to the errors of lubrication and of
+    section means: lubrication makes the velocity 11 % too high, and with a half-disc's own loss 1 % is left.
 
-    Norm: largest difference at ten times from 2 to 19.4 h, read off the tables that a run writes: area and velocity
-    relative, effluents and section means of C along the mesh over the supply.
+    Norm: largest difference at ten times from 2 to 19.4 h, from the tables of a run: area and velocity relative,
+    effluents and section means of C along the mesh over the supply.
     """
     scene = runs.base("19.4 h", *changes, times=TIMES)
     instants = runs.reports_of(scene)
     flow, rest = (runs.differences(scene, instants, moments) for moments in _clogged(changes[0]))
     record(between("velocity, lubrication", flow["velocity"], 0.09, 0.12,
-                   "lubrication loses 11.3 % of the loss around a half-disc of 30 um, by Taylor-Hood; less what its "
-                   "aggregate, 2 % larger, gains"))
+                   "lubrication misses 11.3 % of the loss around a half-disc of 30 um, by Taylor-Hood; its aggregate "
+                   "is 2 % larger, which makes up for a part"))
     record(at_most("velocity, the loss of a half-disc of our area", _at_our_area(scene, instants), 0.01, LINEAR))
     if scene.numerics.preset == "paper":  # the others: 1.6 % with the averaged area, without linear elements' error
         record(at_most("velocity, a half-disc's loss", rest["velocity"], 0.01, LINEAR))
-    for name, bound in zip(APART, (0.013, 0.02, 0.02)):
+    for name, bound in zip(COMPARED, (0.013, 0.02, 0.02)):
         record(at_most(f"{name}, a half-disc's loss", rest[name], bound, SQUARE_LAW))
 
 
 LINEAR = "linear elements: 0.3 % at the ends of the mesh, 0.5 % around the aggregate"
 #: Quantities that are compared between a run and its averaged pore.
-APART = ("area", "effluents", "C along the pore")
+COMPARED = ("area", "effluents", "C along the pore")
 
 
 @cache
@@ -123,8 +123,8 @@ FASTER = (4.0, 16.0, 64.0, 256.0)
     references=("averaged_pore", "poiseuille", "taylor_hood"), runs_with="paper")
 @parametrize("*changes", runs.every(0.5, 1.5))
 def test_averaged_mixing(changes, record):
-    """What averaging over sections costs in the effluents is, as diffusion becomes fast, the constriction of a
-    half-disc in a strip, in closed form.
+    """As diffusion becomes fast, the error of the effluents that averaging over sections causes is the constriction of
+    a half-disc in a strip, in closed form.
 
     Norm: effluents less those of the averaged pore (FiPy); a seed of 20 um at t = 0, refinement 1.5, D the same in
     fluid and biomass and times 4 to 256.
@@ -145,9 +145,9 @@ def _leaving(factor: float, scene: Scene) -> dict[str, float]:
     radius = runs.half_disc_radius(row["aggregate_area_um2"])
     first = averaged_pore.excess(runs.pore_of(scene), radius, runs.SPEED)
     differences = {"size": thiele(scene)}
-    for name, trusted, more in zip(NAMES, runs.half_disc(scene).seed().fields[:, -1], first):
-        gap = row[f"effluent_{name}_mg_per_L"] - trusted
-        differences |= {name: abs(gap), f"{name} over first": gap / more}
+    for name, expected, first_order in zip(NAMES, runs.half_disc(scene).seed().fields[:, -1], first):
+        gap = row[f"effluent_{name}_mg_per_L"] - expected
+        differences |= {name: abs(gap), f"{name} over first": gap / first_order}
     return differences
 
 
@@ -159,7 +159,7 @@ MIXING_TIMES = (5.0, 10.0, 15.0, 19.4)
 @pytest.mark.case(
     "coupling-averaged-run", kind="cross-code", mutants=("rates-two-percent-low",),
     references=("averaged_pore", "poiseuille", "taylor_hood"), runs_with="1 2",
-    omitted="fast: its own error in time would be seen; exact: accurate has a smaller tolerance here; order 3: "
+    omitted="fast: its own error in time would show; exact: accurate has a smaller tolerance here; order 3: "
             "coupling-averaged-refined")
 @pytest.mark.parametrize("preset", ("paper", "accurate"))
 def test_averaged_run(preset, record):
@@ -167,12 +167,12 @@ def test_averaged_run(preset, record):
     number, and base itself is where that square puts it.
 
     Norm: largest difference at 5, 10, 15 and 19.4 h: area relative, effluents and section means of C along the mesh
-    over the supply; base at 2.9 m/d, diffusivities times 8 to 64; paper, and accurate with a fifth of its tolerance:
-    its own error in time, 4e-5, would be seen.
+    over the supply; base at 2.9 m/d, diffusivities times 8 to 64; paper, and accurate with a fifth of its tolerance,
+    because its own error in time, 4e-5, would show.
     """
     errors, base = refine(_whole_run, SLOWER, preset), _whole_run(1.0, preset)
-    record(studies(errors, dict.fromkeys(APART, (2, SQUARE, 3e-4))))
-    for name in APART[:2]:
+    record(studies(errors, dict.fromkeys(COMPARED, (2, SQUARE, 3e-4))))
+    for name in COMPARED[:2]:
         record(between(f"base, {name}: over the square law through the first of these",
                        base[name] / (SLOWER[0] * errors[name][0]), 1.0, 2.0, "terms of fourth order"))
 
@@ -195,14 +195,14 @@ COARSE, FINE = (1.0, 12.0, 1), (2.0, 6.0, 2)
     references=("averaged_pore", "poiseuille", "taylor_hood"), runs_with="paper")
 @pytest.mark.parametrize("elements", runs.ELEMENTS)
 def test_averaged_refined(elements, record):
-    """The disagreement with the averaged pore is that of the models: it stays when both codes are refined.
+    """The difference from the averaged pore is one of the models: it does not change if both codes are refined.
 
-    Norm: change of the disagreement, over itself, when mesh, step and FiPy's cells are halved: area, effluents and
+    Norm: change of the difference, over itself, if mesh, step and FiPy's cells are halved: area, effluents and
     section means of C; 2 h from 20 um at 2.9 m/d.
     """
     coarse, fine = (_piece(elements, *level) for level in (COARSE, FINE))
     record([at_most(name, abs(fine[name] / coarse[name] - 1), 0.01,
-                    "error in space 0.1 % of what is lost, in time 0.2 % of an hour's growth") for name in APART])
+                    "error in space 0.1 % of the loss, in time 0.2 % of an hour's growth") for name in COMPARED])
 
 
 def _piece(elements: str, refinement: float, minutes: float, finer: int) -> dict[str, float]:
@@ -226,18 +226,18 @@ THIN_SQUARE = "regular perturbation: the square of the aspect ratio"
     references=("averaged_pore", "poiseuille", "taylor_hood"), runs_with="paper")
 @pytest.mark.parametrize("elements", runs.ELEMENTS)
 def test_averaged_strip(elements, record):
-    """Thin aggregates grow as the averaged pore (FiPy, solve_ivp) with the stress-free strip says, starved downstream,
-    up to the square of the aspect ratio.
+    """Thin aggregates that are starved downstream grow like the averaged pore (FiPy, solve_ivp) with a stress-free
+    strip, up to the square of the aspect ratio.
 
     Norm: largest difference at 0.5 and 1 h: area relative, effluents and section means of C over the supply; seeds of 5
-    um, thickness over half length 1/2 to 1/16, u as that ratio, X_m as its square, so that the averaged pore starts
-    alike.
+    um, thickness over half length 1/2 to 1/16, u proportional to that ratio and X_m to its square, so that the averaged
+    pore starts from the same state.
     """
     errors = refine(_strip, ASPECTS, elements)
-    record(studies(errors, dict.fromkeys(APART, (2, THIN_SQUARE, 4e-4))),
+    record(studies(errors, dict.fromkeys(COMPARED, (2, THIN_SQUARE, 4e-4))),
            at_most("ends of the thinnest, relative", errors["ends"][-1], 1.5e-4,
                    "stretches: as the square of the aspect ratio"),
-           between("how far it leans upstream, over the averaged pore's 0.27 %", errors["lean"][-1], 0.97, 1.03,
+           between("lean upstream over that of the averaged pore, 0.27 %", errors["lean"][-1], 0.97, 1.03,
                    "the same: 0.4 %, and as much for the step in time"))
 
 
@@ -296,20 +296,20 @@ SLENDER = (0.25, 0.177, 0.125, 0.0884)
 @pytest.mark.case(
     "coupling-averaged-flow", kind="cross-code", mutants=("extent-not-subtracted",),
     references=("averaged_pore", "layered_channel", "poiseuille", "taylor_hood"),
-    omitted="order 1: its own error is as large as what is measured")
+    omitted="order 1: its own error is as large as the measured difference")
 @parametrize("order", {f"order {order}": (order,) for order in (2, 3)})
 def test_averaged_flow(order, record):
     """The head loss of a long aggregate is that of developed flow in each section, and the next term is that of
     extended lubrication theory, coefficient included.
 
-    Norm: head loss of the whole pore less that of lubrication, over what the latter has more than a clean channel;
+    Norm: head loss of the whole pore less that of lubrication, over the excess of the latter over a clean channel;
     refinement 2.5 over the order of the elements; a bump 8 (1 - s^2)^2 um high in 20 um.
 
     Triangles are straight: the ends of the bump lie flat on the wall, which arcs would cross.
     """
-    losses, thin, more = np.array([_losses(order, aspect) for aspect in SLENDER]).T
+    losses, thin, extension = np.array([_losses(order, aspect) for aspect in SLENDER]).T
     clean = poiseuille.head_loss(LENGTH, WIDTH, 1.0, 1.0)
-    record(between("gap over that of extended lubrication, the most slender", (losses - thin)[-1] / more[-1],
+    record(between("gap over that of extended lubrication, the most slender", (losses - thin)[-1] / extension[-1],
                    0.94, 1.02, "mesh, 2 %; the next term, 1 %; lambda = 2000 for a rigid wall, 0.4 %"),
            study("loss", SLENDER, (losses - thin) / (thin - clean), 2, THIN_SQUARE, ceiling=1.5e-2))
 
@@ -328,8 +328,8 @@ def _losses(order: int, aspect: float) -> tuple[float, float, float]:
     s, weight = np.polynomial.legendre.leggauss(200)
     height, slope = LOW * (1 - s**2) ** 2, -4 * aspect * s * (1 - s**2)
     thin = half * weight @ layered_channel.gradient(WIDTH, height, RATIO)
-    more = half * weight @ (12 * WIDTH * 4 / 5 * slope**2 / (WIDTH - height) ** 3)
-    return solution.head_loss, thin + poiseuille.head_loss(LENGTH - 2 * half, WIDTH, 1.0, 1.0), more
+    extension = half * weight @ (12 * WIDTH * 4 / 5 * slope**2 / (WIDTH - height) ** 3)
+    return solution.head_loss, thin + poiseuille.head_loss(LENGTH - 2 * half, WIDTH, 1.0, 1.0), extension
 
 
 UPTAKE_ASPECTS = (0.2, 0.1, 0.05, 0.025)
@@ -347,12 +347,13 @@ def test_averaged_uptake(elements, record):
     and three densities, from 99 % to 1 % of the acceptor leaving.
 
     Norm: largest difference of the section means of C_A and C_D along the mesh, over the supply; half-ellipses 5 um
-    high, thickness over half length 1/5 to 1/40 (FiPy's cells: its inverse, u: as it, X_m: as its square).
+    high, thickness over half length 1/5 to 1/40 (u is proportional to it, X_m to its square, FiPy's cells to its
+    inverse).
     """
     errors = refine(_around, UPTAKE_ASPECTS, elements)
-    left = errors.pop("left")[-1]
+    least_effluent = errors.pop("left")[-1]
     record(studies(errors, {name: (2, THIN_SQUARE, 1e-3) for name in errors if name != "size"}),
-           at_most("acceptor leaving the starved one, over the supply", left, 0.02, "else none is starved"))
+           at_most("acceptor leaving the starved one, over the supply", least_effluent, 0.02, "else none is starved"))
 
 
 def _around(aspect: float, elements: str) -> dict[str, float]:
@@ -393,36 +394,37 @@ SUPPLIED = {"steps": {preset: (4e-4, THIELE) for preset in runs.WITH_EXACT},
     "coupling-averaged-supply", kind="cross-code",
     mutants=("supply-of-the-start", "supply-half-way-of-the-start", "supply-a-step-late", "supply-not-yet",
              "row-of-the-end"), references=("averaged_pore", "poiseuille", "taylor_hood"), runs_with="1 2")
-@parametrize("how, bound, origin, *changes", {f"{how}, {preset}": (how, *bound, *runs.WITH_EXACT[preset])
-                                              for how, bounds in SUPPLIED.items() for preset, bound in bounds.items()})
-def test_averaged_supply(how, bound, origin, changes, record):
-    """An aggregate whose donor is taken away for 2.5 h and given back, at once or evenly, starves and recovers as its
-    averaged pore (FiPy, solve_ivp) does.
+@parametrize("interpolation, bound, origin, *changes",
+             {f"{interpolation}, {preset}": (interpolation, *bound, *runs.WITH_EXACT[preset])
+              for interpolation, bounds in SUPPLIED.items() for preset, bound in bounds.items()})
+def test_averaged_supply(interpolation, bound, origin, changes, record):
+    """An aggregate whose supply of donor falls to zero and returns after 2.5 h, by jumps or linearly, starves and
+    recovers like its averaged pore (FiPy, solve_ivp).
 
     Norm: largest difference at six times in 7 h, rows at jumps and within steps among them: area relative, effluents
     and section means of C along the mesh over the acceptor's supply; a seed of 20 um in base at 2.9 m/d, diffusivities
     times 64.
     """
-    scene, moments = supplied(how, *changes), _fed(how, changes[0])
+    scene, moments = supplied(interpolation, *changes), _fed(interpolation, changes[0])
     worst = runs.differences(scene, runs.reports_of(scene), moments)
-    record([at_most(name, worst[name], bound, origin) for name in APART])
-    if how == "steps":
+    record([at_most(name, worst[name], bound, origin) for name in COMPARED])
+    if interpolation == "steps":
         record(at_least("area at 2 h over that at 4.5 h", moments[1].area / moments[3].area, 1.005,
                         "decay over 2.5 h: else nothing is starved"))
 
 
 @cache
-def _fed(how: str, preset: str) -> list:
+def _fed(interpolation: str, preset: str) -> list:
     """States of the averaged pore, from the seed of a preset."""
-    both = [(end, (ACCEPTOR, first), (ACCEPTOR, first if how == "steps" else last))
-            for (_, first), (end, last) in pairwise(COURSES[how])]
-    scene = supplied(how, preset).at(0.0)
-    return runs.half_disc(scene, cells=CELLS).run_through(both, ROWS, ACCURACY)
+    pieces = [(end, (ACCEPTOR, first), (ACCEPTOR, first if interpolation == "steps" else last))
+            for (_, first), (end, last) in pairwise(COURSES[interpolation])]
+    scene = supplied(interpolation, preset).at(0.0)
+    return runs.half_disc(scene, cells=CELLS).run_through(pieces, ROWS, ACCURACY)
 
 
-def supplied(how: str, *changes: str) -> Scene:
+def supplied(interpolation: str, *changes: str) -> Scene:
     """Base with a donor whose supply changes."""
-    table = [[f"{time} h", f"{supply} mg/L"] for time, supply in COURSES[how]]
+    table = [[f"{time} h", f"{supply} mg/L"] for time, supply in COURSES[interpolation]]
     scene = runs.base("7 h", *changes, 'aggregate.radius="20 um"', f"substrates.donor.supply={json.dumps(table)}",
-                     f"substrates.donor.interpolation={how}", times=ROWS)
+                     f"substrates.donor.interpolation={interpolation}", times=ROWS)
     return runs.faster(scene, QUICK)

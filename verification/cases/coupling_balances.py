@@ -43,7 +43,7 @@ LONG = 'growth.time_step="24 min"'
         for kind in runs.ELEMENTS[1:]},
      **{kind: (1e-10, 1e-3, 2.0, runs.with_preset(kind)) for kind in runs.QUADRATIC}})
 def test_ledger(area, density, remeshes, changes, record):
-    """Over a whole run with its remeshes substrates and biomass are accounted for to round-off, and the area is the
+    """Over a whole run with remeshes the balances of substrates and biomass close to round-off, and the area is the
     biomass over X_m.
 
     Norm: base to 19.4 h in steps of 24 min: worst step of both substrates' balances and of the biomass', relative; X_m
@@ -70,10 +70,10 @@ def _steps(rows: list[Ledger], equations: float = 1000) -> list[Check]:
 
     equations: number of equations of a substrate times the largest term of a row over the supplied mass.
     """
-    parted = [abs(two.biomass_before / one.biomass_after - 1) for one, two in pairwise(rows)]
+    gaps = [abs(next_step.biomass_before / step.biomass_after - 1) for step, next_step in pairwise(rows)]
     return [at_most("substrates", runs.substrate_defect(rows), 1e-13 * equations,
                     "Newton's tolerance, 1e-13 of the largest term of each row, over all rows"),
-            at_most("biomass, worst step", np.max([runs.biomass_defect(rows), *parted]), 1e-10, runs.ROUND_OFF)]
+            at_most("biomass, worst step", np.max([runs.biomass_defect(rows), *gaps]), 1e-10, runs.ROUND_OFF)]
 
 
 STEPS = (0.8, 0.4, 0.2, 0.1)
@@ -87,7 +87,7 @@ REFINEMENTS = (0.7, 1.0, 1.4, 2.0)
     runs_with="paper")
 @parametrize("*changes", runs.every(0.5))
 def test_density_restored(changes, record):
-    """What a density has of error at a remesh is gone after the next update [E7]: the shape takes up X_m again.
+    """The next update removes the error of the density at a remesh [E7]: the density returns to X_m.
 
     Norm: a half-disc of 20 um whose density is X_m (1 + 0.1 x / R), remeshed, one step without uptake or decay: L2 of
     (X_A + X_I) / X_m - 1 over it; X_m times the area over the biomass, less 1.
@@ -97,13 +97,13 @@ def test_density_restored(changes, record):
     if runs.base("1 h", *changes).numerics.order > 1:
         error, area = _restored(*changes)
         record(at_most("density", error, 1e-10,
-                       "the masses of a new mesh are X_m, and J = theta in each point where it can be"))
+                       "the masses of a new mesh are X_m, and J = theta in each point that the elements allow"))
     else:
         errors, areas = zip(*(_restored(*changes, f"numerics.refinement={refinement}") for refinement in REFINEMENTS))
         area = max(areas)
         record(study("density", 1 / np.array(REFINEMENTS), errors, 1.5,
-                     "theta of triangles against X of nodes: second order, but at the rim, where they lie on one side, "
-                     "first; in L2 half an order more", ceiling=1.2e-3))
+                     "theta of triangles against X of nodes: second order inside, first order at the rim, where "
+                     "triangles lie on one side of a node; 3/2 in L2", ceiling=1.2e-3))
     record(at_most("X_m times the area", area, 1e-11, runs.ROUND_OFF))
 
 
@@ -115,21 +115,21 @@ def _restored(*changes: str) -> tuple[float, float]:
     x = aggregates.reaction_points(state.space)[0]
     state = replace(state, active=state.active * (1 + 0.1 * x / scene.aggregate.radius))
     solved = pore.solve(scene, state)
-    anew = remeshing.remesh(Remeshing.of(scene), state, state, solved.flow.mean_velocity)[0]
-    after = runs.step(scene, anew, pore.solve(scene, anew), 0.2).pore
+    new_pore = remeshing.remesh(Remeshing.of(scene), state, state, solved.flow.mean_velocity)[0]
+    after = runs.step(scene, new_pore, pore.solve(scene, new_pore), 0.2).pore
     weight, density = after.space.reaction.dx, runs.density(scene, after)
     error = np.sqrt(np.average((density - 1) ** 2, weights=weight))
     return error, abs(np.vdot(weight, density) / after.outline.area - 1)
 
 
 #: Round-off and Newton's tolerance, 1e-13 of the largest term of each row, over all rows, with a margin.
-CLOSED, CLOSES = 1e-9, "identities of the discrete equations: round-off and Newton's tolerance, with room"
+CLOSED, CLOSES = 1e-9, "identities of the discrete equations: round-off and Newton's tolerance, with a margin"
 #: Time (h) that a run continues after contact.
 PAST = 2.0
 
 
-def _worth(scene: Scene, ledgers: list[Ledger]) -> float:
-    """Relative defect of the yield in the worst step: |made - (grown - decayed)| / max(grown, decayed)."""
+def _yield_defect(scene: Scene, ledgers: list[Ledger]) -> float:
+    """Relative defect of the yield in the worst step: |new - (grown - decayed)| / max(grown, decayed)."""
     production = np.array([step.biomass_made for step in ledgers])
     grown, decayed = np.array([runs.worth(scene.kinetics, step) for step in ledgers]).T
     return np.max(np.abs(production - (grown - decayed)) / np.maximum(np.abs(grown), np.abs(decayed)))
@@ -137,17 +137,18 @@ def _worth(scene: Scene, ledgers: list[Ledger]) -> float:
 
 def _closed(scene: Scene, ledgers: list[Ledger]) -> list:
     """Checks of the worst step of a run."""
-    bound, why = WORTH.get((scene.numerics.transport, scene.numerics.time), (CLOSED, CLOSES))
+    bound, why = YIELD_BOUNDS.get((scene.numerics.transport, scene.numerics.time), (CLOSED, CLOSES))
     return [at_most("substrates", runs.substrate_defect(ledgers), CLOSED, CLOSES),
             at_most("biomass", runs.biomass_defect(ledgers), CLOSED, CLOSES),
-            at_most("made against taken up", _worth(scene, ledgers), bound, why)]
+            at_most("new biomass against uptake", _yield_defect(scene, ledgers), bound, why)]
 
 
 TRAPEZOIDAL = "trapezoidal rule on an exponential: (r step)^2 / 12, 1.2e-4 at the supply's rate"
 #: Bounds of the yield's defect in a step of 12 min of the paper's schemes. Updates weigh the rates of both ends alike,
 #: and grow by their mean.
-WORTH = {("quasi_steady", "updates"): (2e-4, TRAPEZOIDAL), ("gear", "updates"): (1e-3, "its own tolerance, 0.1 %")}
-HEUN = "Heun's method, and the trapezoidal rule on what is consumed: second order"
+YIELD_BOUNDS = {("quasi_steady", "updates"): (2e-4, TRAPEZOIDAL),
+                ("gear", "updates"): (1e-3, "the tolerance of Gear, 0.1 %")}
+HEUN = "Heun's method, and the trapezoidal rule for the consumption: second order"
 
 
 def _of_base(preset: str):
@@ -156,8 +157,8 @@ def _of_base(preset: str):
     yield _closed(scene, ledgers)
     if scene.numerics.time == "updates":
         expected = (runs.growth_rates(scene.kinetics, scene.substrates)[0] * STEPS[2]) ** 2 / 12
-        yield between("made against taken up, over (r step)^2 / 12", _worth(scene, ledgers) / expected, 0.95, 1.0,
-                      "r at the supply; that of the seed is 1 % lower, and falls as the pore clogs")
+        yield between("new biomass against uptake, over (r step)^2 / 12", _yield_defect(scene, ledgers) / expected,
+                      0.95, 1.0, "r at the supply; that of the seed is 1 % lower, and falls as the pore clogs")
         yield _order([_base(preset, step)[:2] for step in STEPS])
     yield at_least("remeshes", remeshes, 1.0, "else they are not tested")
 
@@ -208,8 +209,8 @@ def _of_updates(elements: str) -> Study:
 
 def _order(series: Iterable[tuple[Scene, list[Ledger]]]) -> Study:
     """Study of the yield's defect in the worst step of runs with step sizes STEPS."""
-    errors = [_worth(*run) for run in series]
-    return study("made against taken up, worst step", STEPS, errors, 2, HEUN, ceiling=4e-5, band=0.15)
+    errors = [_yield_defect(*run) for run in series]
+    return study("new biomass against uptake, worst step", STEPS, errors, 2, HEUN, ceiling=4e-5, band=0.15)
 
 
 #: Runs by label: base and a narrow pore by preset, a short run by scheme and elements.
@@ -228,13 +229,13 @@ BALANCED = {**{f"base, {preset}": (_of_base, preset) for preset in ("paper", *ru
              "flows-of-the-start", "euler-biomass", "rates-at-the-start", "rates-two-percent-low", "decay-leaves-all"))
 @parametrize("judge, *arguments", BALANCED)
 def test_one_balance(judge, arguments, record):
-    """In every step what is supplied leaves, is consumed or stored, what is there is what was and what is made, and
-    what is made is what the substrates taken up are worth: to round-off by the midpoint rule, to second order by the
-    paper's updates, in whole base to 2e-4 in a step of 12 min.
+    """In every step supplied substrates leave, are consumed or are stored, the biomass changes by the new biomass, and
+    the new biomass balances the uptake: to round-off with the midpoint rule, to second order with the paper's updates,
+    and to 2e-4 in a step of 12 min over all of base.
 
-    Norm: worst ledger step, all at once: |supplied - out - consumed - stored| over supplied, |after - before - made|
-    over after, |made - (Y donor - (acceptor - F donor) / d_c)| over the larger of its two terms; base, and a pore of 40
-    um at 2.9 m/d from a seed to 2 h past contact.
+    Norm: worst step of the ledger: |supplied - out - consumed - stored| over supplied, |after - before - new| over
+    after, |new - (Y donor - (acceptor - F donor) / d_c)| over the larger of its two terms; base, and a pore of 40 um at
+    2.9 m/d from a seed to 2 h after contact.
     """
     record(judge(*arguments))
 
@@ -254,25 +255,26 @@ IN_A_STEP = 3.0
      "exact": ("exact", "4 h", 'aggregate.radius="25 um"', "numerics.refinement=0.2"),
      **{f"fast, {kind}": ("fast", "19.4 h", runs.with_elements(kind)) for kind in ("linear", "cubic")}})
 def test_amounts(preset, end, changes, record):
-    """The amounts in the ledgers are those of ten times shorter steps: to 1 % by preset fast, 0.1 % by accurate and
-    0.01 % by exact in all, to three times that in every step.
+    """The consumed amounts are those of ten times shorter steps: over the run to 1 % with the preset fast, 0.1 % with
+    accurate and 0.01 % with exact, and in every step to three times as much.
 
     Norm: amounts of both substrates consumed over base, and in its worst step, over those of a run with a hundredth of
-    the tolerance, less 1; of that run, of ten times as many steps, the cumulated amounts are interpolated at the ends
-    of the steps by a cubic spline; exact: 4 h from a seed of 25 um, with elements as large as in fast.
+    the tolerance and ten times as many steps, less 1; a cubic spline interpolates the cumulated amounts of that run at
+    the ends of the steps; exact: 4 h from a seed of 25 um, with elements as large as in fast.
     """
     scene = runs.base(end, runs.with_preset(preset), *changes)
-    shorter = runs.base(end, runs.with_preset(preset), *changes, f"numerics.tolerance={scene.numerics.tolerance / 100}")
-    (times, amounts), (fine, fine_amounts) = (_cumulated(one) for one in (scene, shorter))
+    tolerance = f"numerics.tolerance={scene.numerics.tolerance / 100}"
+    finer = runs.base(end, runs.with_preset(preset), *changes, tolerance)
+    (times, amounts), (fine, fine_amounts) = map(_cumulated, (scene, finer))
     expected = CubicSpline(fine, fine_amounts)(times)
-    in_all = np.abs(amounts[-1] / expected[-1] - 1)
+    over_run = np.abs(amounts[-1] / expected[-1] - 1)
     in_a_step = np.abs(np.diff(amounts, axis=0) / np.diff(expected, axis=0) - 1)
     for k, name in enumerate(("acceptor", "donor")):
-        record(at_most(f"{name} in all", in_all[k], RIGHT[preset], "what the preset is for"))
+        record(at_most(f"{name} over the run", over_run[k], RIGHT[preset], "the error that the preset promises"))
         record(at_most(f"{name} in a step", in_a_step[:, k].max(), IN_A_STEP * RIGHT[preset],
-                       "three times what the preset is for"))
-    record(at_least("steps, of the other run over these", len(fine) / len(times), 6.0,
-                    "tolerance to the power 1/2, ten; fewer where a step ends with the run"))
+                       "three times the error that the preset promises"))
+    record(at_least("steps of the run with shorter steps, over these", len(fine) / len(times), 6.0,
+                    "tolerance to the power 1/2, ten; fewer if a step ends with the run"))
 
 
 def _cumulated(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
@@ -339,10 +341,10 @@ def _narrowest(scene: Scene, state, wall: int) -> float:
     contact the result is zero.
     """
     outline, growth = state.outline, scene.growth
-    free, on = outline.points[outline.wall == FREE], outline.points[outline.wall == wall, 0]
-    if len(on) == 0:
+    free, contact_x = outline.points[outline.wall == FREE], outline.points[outline.wall == wall, 0]
+    if len(contact_x) == 0:
         return 0.0
-    along = np.maximum(on.min() - free[:, 0], free[:, 0] - on.max())
+    along = np.maximum(contact_x.min() - free[:, 0], free[:, 0] - contact_x.max())
     gap = free[:, 1] if wall == BOTTOM else scene.pore.width - free[:, 1]
     allowed = np.minimum(growth.minimum_film, np.tan(growth.minimum_contact_angle) * along)
     return (gap[along > 0] / allowed[along > 0]).min()

@@ -32,7 +32,7 @@ AIMS = {"fast": 0.01, "accurate": 0.002, "exact": 0.0005}
 #: its aim.
 ACCEPTED = {"fast": (0.01, 0.02), "accurate": (0.002, 0.006), "exact": (0.0005, 0.0005)}
 #: Largest change of the reference between its two levels: of conductivity and tips, of the length of contact.
-KNOWN = (0.0015, 0.002)
+REFERENCE_CHANGES = (0.0015, 0.002)
 
 
 @cache
@@ -44,7 +44,7 @@ def numbers(width: int, *changes: str) -> tuple[dict[str, float], ...]:
 
 def errors(computed, expected) -> dict[str, float]:
     """The largest relative difference of each number over the times."""
-    return {name: max(abs(row[name] / other[name] - 1) for row, other in zip(computed, expected))
+    return {name: max(abs(row[name] / expected_row[name] - 1) for row, expected_row in zip(computed, expected))
             for name in expected[0]}
 
 
@@ -58,13 +58,13 @@ def test_after_contact(width, record):
 
     Norm: the largest relative difference over three times.
     """
-    finest, before = (numbers(width, *converged(size)) for size in PORES[width][1])
-    for name, change in errors(before, finest).items():
-        record(at_most(f"{name}, change of the reference", change, KNOWN[name == LENGTH],
-                       "less than the errors that are accepted below"))
+    finest, coarser = (numbers(width, *converged(size)) for size in PORES[width][1])
+    for name, change in errors(coarser, finest).items():
+        record(at_most(f"{name}, change of the reference", change, REFERENCE_CHANGES[name == LENGTH],
+                       "less than the accepted errors of the presets"))
     for preset in QUADRATIC:
         for name, error in errors(numbers(width, with_preset(preset)), finest).items():
             limit = ACCEPTED[preset][name == LENGTH]
             origin = f"the aim of {preset}" if limit == AIMS[preset] else (
-                f"the aim is {100 * AIMS[preset]:g} %: missed, for singular lines and unrelated meshes")
+                f"the aim of {100 * AIMS[preset]:g} % is missed because of singular lines and unrelated meshes")
             record(at_most(f"{name}, {preset}", error, limit, origin))

@@ -50,8 +50,8 @@ def nodal_forces(scene, space: Space) -> tuple[np.ndarray, Flow]:
 @parametrize("*changes", {f"{form}, {label}": (f'numerics.interface="{form}"', *changes) for form in FORMS
                           for label, changes in DEFAULT.items()})
 def test_traction_balance(changes, record):
-    """What the fluid does to the aggregate the aggregate does to the fluid; no force is left in the fluid; the drag is
-    what the ends' pressure and the walls' shear leave over.
+    """The force of the fluid on the aggregate is opposite to that of the aggregate on the fluid, no force acts within
+    the fluid, and the drag is the pressure on the ends less the shear on the walls.
 
     Norm: x-force on the interface against minus that by the aggregate's own triangles, and forces at nodes within the
     fluid, over the largest; drag on a half-disc over head loss times W less wall shear, less 1.
@@ -60,16 +60,16 @@ def test_traction_balance(changes, record):
     """
     scene = loaded_scene(*changes)
     seed = pore.seeded(scene)
-    on, solution = nodal_forces(scene, seed.space)
+    forces, solution = nodal_forces(scene, seed.space)
     mesh = seed.mesh
     x, y = mesh.points.T
     rim = np.isin(x, mesh.ends) | np.isin(y, (0.0, mesh.width))
     rim[mesh.body] = True
     free = mesh.loop[seed.wall == FREE]
-    largest = np.abs(on[free]).max()
-    apart = on[free] + _by_biomass(scene, seed, solution)[free]
-    record(each_at_most({"force within the fluid": np.abs(on[~rim]).max() / largest,
-                         "action and reaction": np.abs(apart).max() / largest}, 1e-9, BOTH_ENDS))
+    largest = np.abs(forces[free]).max()
+    imbalance = forces[free] + _by_biomass(scene, seed, solution)[free]
+    record(each_at_most({"force within the fluid": np.abs(forces[~rim]).max() / largest,
+                         "action and reaction": np.abs(imbalance).max() / largest}, 1e-9, BOTH_ENDS))
     if seed.space.order == 1 and scene.numerics.interface == FORMS[0]:
         record(study("drag", 1 / np.array(REFINEMENTS), [*map(_drag_error, REFINEMENTS)], 1,
                      "shear from the slopes of linear triangles: first order"))
@@ -81,9 +81,9 @@ def _by_biomass(scene, state: pore.Pore, solution: Flow) -> np.ndarray:
     They are computed on a mesh in which biomass and fluid are exchanged.
     """
     mesh = state.mesh
-    other = replace(mesh, topology=replace(mesh.topology, biomass=~mesh.biomass))
+    exchanged = replace(mesh, topology=replace(mesh.topology, biomass=~mesh.biomass))
     viscosity = scene.flow.viscosity_ratio * scene.flow.kinematic_viscosity / scene.flow.gravity
-    return traction.nodal(Space(other, state.space.order), solution, viscosity, scene.numerics.interface)
+    return traction.nodal(Space(exchanged, state.space.order), solution, viscosity, scene.numerics.interface)
 
 
 def _drag_error(refinement: float) -> float:
@@ -93,10 +93,10 @@ def _drag_error(refinement: float) -> float:
     """
     scene = loaded_scene(f"numerics.refinement={refinement}")
     seed = pore.seeded(scene)
-    on, solution = nodal_forces(scene, seed.space)
+    forces, solution = nodal_forces(scene, seed.space)
     viscosity = scene.flow.kinematic_viscosity / scene.flow.gravity
-    left = solution.meshed_loss * seed.mesh.width - viscosity * _wall_shear(seed.mesh, solution.velocity)
-    return abs(on[seed.mesh.loop, 0].sum() / left - 1)
+    expected = solution.meshed_loss * seed.mesh.width - viscosity * _wall_shear(seed.mesh, solution.velocity)
+    return abs(forces[seed.mesh.loop, 0].sum() / expected - 1)
 
 
 def _wall_shear(grid: Mesh, velocity: np.ndarray) -> float:
@@ -105,9 +105,9 @@ def _wall_shear(grid: Mesh, velocity: np.ndarray) -> float:
     for nodes, slope, wet in zip(grid.triangles, grid.gradients, ~grid.biomass):
         y = grid.points[nodes, 1]
         for wall, sign in ((0.0, 1.0), (grid.width, -1.0)):
-            on = y == wall
-            if wet and np.count_nonzero(on) == 2:
-                total += sign * np.ptp(grid.points[nodes[on], 0]) * (velocity[nodes, 0] @ slope[:, 1])
+            on_wall = y == wall
+            if wet and np.count_nonzero(on_wall) == 2:
+                total += sign * np.ptp(grid.points[nodes[on_wall], 0]) * (velocity[nodes, 0] @ slope[:, 1])
     return total
 
 
@@ -123,7 +123,7 @@ def test_traction_layer(order, record):
     """
     if order > 1:
         record(at_most("shear", abs(_shear(Space(flow_cases.long_layer(), order))), 1e-5,
-                       "both parabolas are held; what is left of the layer's ends"))
+                       "the elements contain both parabolas; remainder of the layer's ends"))
         return
     record(studies(refine(_shear_error, LAYER_DRAWS), {
         "shear": (2, "forces as residuals of linear elements: second order, as the flux", 1e-3)}))
@@ -143,10 +143,10 @@ def _shear(space: Space) -> float:
     ratio = 2000.0
     unit = flow.unit_flow(space, ratio)
     as_flow = Flow(1.0, unit.velocity, unit.pressure, unit.correction, 1.0, 1.0, 1.0)
-    on = traction.nodal(space, as_flow, 1.0, "laplacian")
+    forces = traction.nodal(space, as_flow, 1.0, "laplacian")
     along, across = mesh.points.T
     line = np.flatnonzero((across == flow_cases.LAYER) & (np.abs(along) < flow_cases.LAYER_END))
-    x, shear = mesh.points[line, 0], on[line, 0]
+    x, shear = mesh.points[line, 0], forces[line, 0]
     weight = np.clip((50 - np.abs(x)) / 10, 0, 1)  # level, then ramps: the sum is a tested integral
     length = _tested(mesh, line, weight)
     gradient = layered_channel.gradient(flow_cases.WIDTH, flow_cases.LAYER, ratio)
@@ -170,20 +170,21 @@ def _tested(mesh: Mesh, line: np.ndarray, weight: np.ndarray) -> float:
     "coupling-traction-base", kind="property", mutants=("density-squared", "forces-thousandfold"), runs_with="paper")
 @parametrize("*changes", runs.every(0.2, 0.6))
 def test_traction_base(changes, record):
-    """The fluid's forces are small against those of growth (C26): they move base's interface by less than 1e-4.
+    """The fluid's forces are small against those of growth (C26): they displace base's interface by less than 1e-4 of
+    its thickness.
 
-    Norm: base at 4, 10 and 16 h, steps of 24 min: largest move of the interface by the fluid in the next step, over the
-    thickness.
+    Norm: base at 4, 10 and 16 h, steps of 24 min: largest displacement of the interface by the fluid in the next step,
+    over the thickness.
     """
     _, *reports = simulate(runs.base("16 h", 'growth.time_step="24 min"', *changes, times=(4, 10, 16)))
     moves = [_next_move(instant, *changes) for instant in reports]
-    record(at_most("largest move", max(moves), 1e-4, "0.1 Pa of the fluid on a stiffness of 2 to 10 kPa, some times "
-                   "for the slender shape"),
-           at_least("least move", min(moves), 1e-7, "else no force has acted"))
+    record(at_most("largest displacement", max(moves), 1e-4,
+                   "0.1 Pa of the fluid on a stiffness of 2 to 10 kPa, and a few times that for a slender shape"),
+           at_least("least displacement", min(moves), 1e-7, "else no force has acted"))
 
 
 def _next_move(report: Report, *changes: str) -> float:
-    """Largest move of the interface by the fluid in a step, over the thickness. Both shapes are on one mesh."""
+    """Largest displacement of the interface by the fluid in a step, over the thickness. Both shapes are on one mesh."""
     scenes = (runs.base("16 h", *changes, f'growth.fluid_forces="{word}"') for word in ("neglected", "included"))
     plain, pushed = (runs.next_shape(scene, report.pore, report.solved, 0.4) for scene in scenes)
     return np.abs(pushed.mesh.points - plain.mesh.points).max() / plain.outline.thickness
@@ -193,11 +194,11 @@ def _next_move(report: Report, *changes: str) -> float:
     "coupling-traction-even", kind="exact", mutants=("traction-pressure-left-out", "forces-pushed"), runs_with="paper")
 @parametrize("*changes", DEFAULT)
 def test_traction_even(changes, record):
-    """An even pressure of the fluid, five times mu_L and more, moves nothing: the aggregate is incompressible, and its
-    P takes the pressure up.
+    """A uniform pressure of the fluid, five times mu_L, does not move the aggregate, which is incompressible; its P
+    changes by the pressure.
 
-    Norm: largest move of a node, over R; P over mu_L less what it was and the pressure; forces at free nodes less those
-    of an even pressure, over the largest.
+    Norm: largest displacement of a node, over R; change of P over mu_L, less the pressure; forces at free nodes less
+    those of a uniform pressure, over the largest.
     """
     scene = loaded_scene(*changes)
     seed = pore.seeded(scene)
@@ -206,16 +207,17 @@ def test_traction_even(changes, record):
     plain = contact._at_rest(mechanics, seed, theta, seed, None, contact.PATIENT).pore
     space = seed.moved(mesh_motion.move(seed.mesh, plain.mesh.points[seed.mesh.body], 1.0, 100.0)).space
     mesh = space.mesh
-    still = Flow(0.0, np.zeros((space.count, 2)), np.full(flow.pressure_space(space).count, 5.0), None, 0.0, 0.0, 0.0)
-    on = traction.nodal(space, still, 1.0, "laplacian")
-    by_hand = -5.0 * _normals(plain.outline)
-    apart = (on[mesh.loop] - by_hand)[plain.wall == FREE]
-    record(at_most("forces", np.abs(apart).max() / np.abs(by_hand).max(), 1e-12, "the divergence theorem: round-off"))
+    at_rest = Flow(0.0, np.zeros((space.count, 2)), np.full(flow.pressure_space(space).count, 5.0), None, 0.0, 0.0, 0.0)
+    forces = traction.nodal(space, at_rest, 1.0, "laplacian")
+    expected = -5.0 * _normals(plain.outline)
+    difference = (forces[mesh.loop] - expected)[plain.wall == FREE]
+    record(at_most("forces", np.abs(difference).max() / np.abs(expected).max(), 1e-12,
+                   "the divergence theorem: round-off"))
     for sign in (1.0, -1.0):
-        pushed = contact._at_rest(mechanics, seed, theta, seed, sign * on[mesh.body], contact.PATIENT).pore
-        apart = np.abs(pushed.mesh.points - plain.mesh.points).max() / 25.0
+        pushed = contact._at_rest(mechanics, seed, theta, seed, sign * forces[mesh.body], contact.PATIENT).pore
+        difference = np.abs(pushed.mesh.points - plain.mesh.points).max() / 25.0
         change = (pushed.pressure - plain.pressure)[mesh.topology.body_corners] + sign * 5.0
-        record(at_most(f"move, {sign:+g}", apart, 1e-9, "J = theta: Newton's tolerance"))
+        record(at_most(f"displacement, {sign:+g}", difference, 1e-9, "J = theta: Newton's tolerance"))
         record(at_most(f"P, {sign:+g}", np.abs(change).max(), 1e-8, "Newton's tolerance"))
 
 
@@ -262,27 +264,27 @@ def _moved(factor: float, *changes: str) -> tuple[pore.Pore, pore.Pore, np.ndarr
     mutants=("forces-of-the-first-round", "forces-pushed", "density-squared"), runs_with="paper")
 @parametrize("*changes", DEFAULT)
 def test_traction_fixed_point(changes, record):
-    """The move is proportional to the force as the force falls, and shape and flow agree in the end.
+    """As the force falls, the displacement becomes proportional to it, and at the end shape and flow agree.
 
-    Norm: nodes' move by the fluid, over the force's factor and R, against that of the factor below; defect of the
-    equilibrium under the forces of the flow around its own shape, and around the shape before.
+    Norm: displacement of the nodes by the fluid, over the factor of the force and R, against that with the factor 1;
+    defect of the equilibrium under the forces of the flow around its own shape, and around the shape before.
     """
     plain = _moved(0.0, *changes)[1].mesh.points
     moves = [(_moved(factor, *changes)[1].mesh.points - plain) / factor for factor in (*FACTORS, 1.0)]
     size = np.abs(moves[-1]).max()
-    apart = [np.abs(move - moves[-1]).max() / size for move in moves[:-1]]
+    differences = [np.abs(move - moves[-1]).max() / size for move in moves[:-1]]
     own_defect, previous_defect = _defects(*changes)
-    record(study("move over force", FACTORS, apart, 1, "quadratic remainder of a smooth map: first order",
+    record(study("displacement over force", FACTORS, differences, 1, "quadratic remainder of a smooth map: first order",
                  ceiling=1e-3))
     record(at_most("defect with its own flow", own_defect, 1e-8, "nodes at rest to 1e-8 of R"))
     record(at_least("defect with the flow before", previous_defect, 1e-5, "else no round is needed"))
-    record(between("downstream tip's move at factor 1, over the upstream one's", _tips(moves[-1], *changes), 0.2, 5.0,
-                   "both are pushed downstream"))
-    record(at_most("largest move at factor 1, over R", size / 25.0, 1e-4, "0.1 Pa on 10 kPa"))
+    record(between("displacement of the downstream tip at factor 1, over that of the upstream tip",
+                   _tips(moves[-1], *changes), 0.2, 5.0, "the flow pushes both downstream"))
+    record(at_most("largest displacement at factor 1, over R", size / 25.0, 1e-4, "0.1 Pa on 10 kPa"))
 
 
 def _tips(move: np.ndarray, *changes: str) -> float:
-    """Move along x of the downstream contact line over that of the upstream one."""
+    """Displacement along x of the downstream contact line over that of the upstream one."""
     mesh = _moved(0.0, *changes)[0].mesh
     x, along = mesh.points[mesh.loop, 0], move[mesh.loop, 0]
     return along[x.argmax()] / along[x.argmin()]
@@ -297,45 +299,45 @@ def _defects(*changes: str) -> tuple[float, float]:
     defects = []
     stabilisation = growth.STABILISATIONS[body.shape.geometry].on(body, seed.mesh.points[nodes])
     place, pressure = grown.mesh.points[nodes], grown.pressure[seed.mesh.topology.body_corners]
-    rest = growth.System(body, constrained_dofs, stabilisation=stabilisation).under(theta, place, place, pressure)
-    for around in (grown, seed):
+    iterate = growth.System(body, constrained_dofs, stabilisation=stabilisation).under(theta, place, place, pressure)
+    for pore_of_flow in (grown, seed):
         fluid = traction.Fluid.of(scene)
-        forces = traction.forces(fluid, traction.surroundings(fluid.meshing, seed, around), around)
+        forces = traction.forces(fluid, traction.surroundings(fluid.meshing, seed, pore_of_flow), pore_of_flow)
         load = np.concatenate([forces.T.ravel(), np.zeros(len(pressure))])
-        defects.append(relative((rest.residual - load)[rest.free], (rest.size + np.abs(load))[rest.free]))
+        defects.append(relative((iterate.residual - load)[iterate.free], (iterate.size + np.abs(load))[iterate.free]))
     return tuple(defects)
 
 
 #: The least refinement at which the moved mesh of a seed is too coarse.
-ANEW = 1.35
+REMESHED_FROM = 1.35
 
 
 @pytest.mark.case("coupling-traction-remeshed", kind="property", mutants=("forces-shared-evenly",), runs_with="paper")
 @parametrize("*changes", REMESHED)
 def test_traction_remeshed(changes, record):
-    """Where a new mesh must be made for the flow, its forces go to the aggregate's nodes, sum and moment kept.
+    """If the flow requires a new mesh, its forces are transferred to the aggregate's nodes with their sum and moment.
 
     Norm: sum along x and moment of the forces on an outline's nodes against those on the nodes of a new mesh around it,
-    and the sum against that on the mesh that followed; relative.
+    and the sum against that on the moved mesh; relative.
     """
     seed, grown, _ = _moved(0.0, *changes)
     coarse = loaded_scene(*changes)
-    fine = loaded_scene(*changes, f"numerics.refinement={max(ANEW, 3 * coarse.numerics.refinement)}")
+    fine = loaded_scene(*changes, f"numerics.refinement={max(REMESHED_FROM, 3 * coarse.numerics.refinement)}")
     mesh, _ = pore.Meshing.of(fine).generate(grown.outline)
-    on = nodal_forces(fine, Space(mesh, grown.space.order))[0]
+    forces = nodal_forces(fine, Space(mesh, grown.space.order))[0]
     scale = traction.MPA_PER_UM * fine.flow.density * fine.flow.gravity / fine.growth.shear_modulus
-    new = _sums(mesh.points[mesh.loop], scale * on[mesh.loop])
+    new = _sums(mesh.points[mesh.loop], scale * forces[mesh.loop])
     places = grown.mesh.points[seed.mesh.body]
     both = [traction.forces(fluid, traction.surroundings(fluid.meshing, seed, grown), grown)
             for fluid in map(traction.Fluid.of, (fine, coarse))]
     transferred, on_moved_mesh = (_sums(places, forces) for forces in both)
     record(at_most("new mesh, nodes of the outline", np.abs(transferred / new - 1).max(), 1e-9, runs.ROUND_OFF),
-           at_most("new mesh, mesh that followed, x", abs(transferred[0] / on_moved_mesh[0] - 1), 0.02,
+           at_most("new mesh against moved mesh, x", abs(transferred[0] / on_moved_mesh[0] - 1), 0.02,
                    "the drag's own error at this refinement: 0.012"),
            at_least("nodes, new over old", len(mesh.loop) / len(seed.mesh.loop), 1.5,
                     "else none was split"))
 
 
-def _sums(places: np.ndarray, on: np.ndarray) -> np.ndarray:
+def _sums(places: np.ndarray, forces: np.ndarray) -> np.ndarray:
     """Sum along x, and moment of the forces."""
-    return np.array([on[:, 0].sum(), np.sum(places[:, 0] * on[:, 1] - places[:, 1] * on[:, 0])])
+    return np.array([forces[:, 0].sum(), np.sum(places[:, 0] * forces[:, 1] - places[:, 1] * forces[:, 0])])

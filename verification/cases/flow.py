@@ -8,9 +8,9 @@ order, but the head loss (6), the difference of the mean pressures *at* both end
 A layer of biomass along the lower wall of a long channel: two viscous layers, exact for any ratio of viscosities. The
 parabola of the inlet turns into the layered profile over a few thicknesses (like exp(-1.1 x / h) in biomass). The
 middle of the layer is ten thicknesses from its ends, where the remainder is under 1e-4. Both forms of [E2] have the
-same shear between the layers, but in the traction form a layer that is held below and free above forgets its ends more
-slowly, like exp(-z x / h) with cos z = z, z = 0.739. Elements of order 2 and 3 contain both parabolas. On a coarse mesh
-of a longer layer this remainder is their only error.
+same shear between the layers. In the traction form the layer is fixed below and free above, and the effect of its ends
+decays more slowly, like exp(-z x / h) with cos z = z, z = 0.739. Elements of order 2 and 3 contain both parabolas. On a
+coarse mesh of a longer layer this remainder is their only error.
 
 A permeable layer has Brinkman's drag instead of a viscosity, exact for any drag. Its boundary layers are sqrt(k) thick.
 If elements resolve them, errors fall with the order of the elements. Much thinner ones (0.03 um for 1e-15 m2) are not
@@ -61,7 +61,7 @@ HIGHER = {label: order for label, order in ORDERS.items() if order > 1}
 LENGTH, VISCOSITY, MEAN = 600.0, 3e-4, 2.0
 SECOND = "linear elements: second order in L2"
 ENDS_FIRST = "first order: the stabilisation's own condition dp/dn = 0 at both ends spoils one layer of elements"
-ROUND_OFF = "round-off: the elements hold a parabola and a linear head"
+ROUND_OFF = "round-off: the elements contain a parabola and a linear head"
 
 
 def viscous(*ratios: float) -> dict[str, float]:
@@ -178,7 +178,7 @@ SIZES, DRAWS = LAYER / np.array([1.5, 3.0, 6.0, 12.0]), dict(enumerate((16, 12, 
 LINEAR = {"velocity": (2, SECOND, 1e-3), "velocity in the layer": (2, SECOND, 1e-3), "gradient": (2, SECOND, 1.2e-3)}
 STUDIED = {"laplacian": LINEAR, "traction": {"velocity": LINEAR["velocity"]}}
 #: Half length (um) of the layer for orders 2 and 3, and the remainder of its ends in the middle: exp(-0.739 * 18).
-LONG, LEFT = 250.0, 2e-6
+LONG, REMAINDER = 250.0, 2e-6
 
 
 @pytest.mark.slow
@@ -199,7 +199,7 @@ def test_layers(order, ratio, interface, record):
         record(studies(refine(_layer_errors, DRAWS, ratio, interface), STUDIED[interface]))
     else:
         space = Space(long_layer(), order)
-        record(each_at_most(_viscous_layer(space, ratio, interface), LEFT, "what is left of the layer's ends"))
+        record(each_at_most(_viscous_layer(space, ratio, interface), REMAINDER, "remainder of the layer's ends"))
 
 
 def _layer_errors(level: int, draw: int, ratio: float, interface: str) -> dict[str, float]:
@@ -271,8 +271,8 @@ CUBIC = 0.05
     references=("brinkman_channel",), omitted="linear elements are refused with a permeable body")
 @parametrize("order, interface", combined(HIGHER, FORMS))
 def test_permeable_layers(order, interface, record):
-    """Along a permeable layer the flow is that of a layer with Brinkman's drag: of third order with quadratic elements,
-    and twenty times nearer with cubic ones; a layer too tight to be resolved acts as a wall to one percent.
+    """Along a permeable layer the flow is that of a layer with Brinkman's drag: to third order with quadratic elements,
+    and twenty times more accurate with cubic ones. A layer too tight to be resolved acts as a wall to one percent.
 
     Norm: middle of a long layer, root mean square over random meshes of a size: L2 of u; relative error of the pressure
     gradient.
@@ -281,12 +281,12 @@ def test_permeable_layers(order, interface, record):
     if order == 2:
         record(studies(refine(_permeable_layer, PERMEABLE_SIZES, RESOLVED, interface, 2), THIRD))
     else:
-        cubic, quadratic = (_permeable_layer(second, 0, RESOLVED, interface, each)["velocity"] for each in (3, 2))
+        cubic, quadratic = (_permeable_layer(second, 0, RESOLVED, interface, degree)["velocity"] for degree in (3, 2))
         record(at_most("velocity over that of order 2", cubic / quadratic, CUBIC, "the elements' orders"))
     if interface == "laplacian":
         record(at_most(f"gradient, k = {TIGHT:g} um2", _permeable_layer(third, 0, TIGHT, interface, order)["gradient"],
                        1e-2,
-                       "of a wall instead of the layer: 2.5e-3; what the elements beside it add is of that order"))
+                       "a wall in place of the layer: 2.5e-3; the elements beside it add about as much"))
 
 
 #: Half length and elements (um) of a permeable body from wall to wall, and its permeabilities (um2). Layers are 3 um to
@@ -303,8 +303,8 @@ LAYER_EXCESS, NEIGHBOURS, FROM_THE_ENDS = {2: 0.18, 3: 0.014}, 0.25**2, 2e-5
     references=("brinkman_channel",), omitted="linear elements are refused with a permeable body")
 @parametrize("order, interface", combined(HIGHER, FORMS))
 def test_permeable_plug(order, interface, record):
-    """A permeable body from wall to wall lets through what Brinkman's equation says, with layers on the walls that are
-    resolved or are a ten thousandth of an element, and its velocity turns back nowhere.
+    """The flow through a permeable body from wall to wall is that of Brinkman's equation, with layers on the walls that
+    are resolved or as thin as a ten thousandth of an element, and the velocity is nowhere reversed.
 
     Norm: middle of a long plug: relative error of the pressure gradient; least velocity along the pore at a node, over
     the mean.
@@ -324,7 +324,7 @@ def test_permeable_plug(order, interface, record):
             (LAYER_EXCESS[order] + NEIGHBOURS) * 2 * k / (WIDTH * thickness) + FROM_THE_ENDS,
             "the layers' share of the loss times their excess, elements half as long as the mean; the ends"))
         record(at_least(f"velocity, k = {k:g} um2", solution.velocity[inside, 0].min(), -1e-2,
-                        "no node of a line of elements overshoots; a hundredth is for triangles"))
+                        "no node overshoots on a line of elements; a hundredth is for triangles"))
 
 
 def _permeable_layer(size: float, draw: int, permeability: float, interface: str, order: int) -> dict[str, float]:
@@ -337,7 +337,7 @@ RADIUS = 25.0
 RISE_REFINEMENTS = {0.5: 3, 1.0: 3, 2.0: 3, 4.0: 1}
 #: Half step of lambda in the central difference, whose error is of the order of its square.
 STEP = 1e-3
-RISE_SECOND = "second order, like the dissipation of linear elements; what the ends spoil is in both losses"
+RISE_SECOND = "second order, like the dissipation of linear elements; both losses contain the error of the ends"
 #: Refinement of the mesh for orders 2 and 3, and bound of their error. Straight triangles contain the parabola. Those
 #: beside the arc err by their bow, which is of fourth order in the loss.
 CURVED, BOW = 0.5, 1e-5
@@ -347,8 +347,8 @@ CURVED, BOW = 0.5, 1e-5
     "flow-first-rise", kind="exact", mutants=("viscosity-swapped", "loss-per-width"), references=("poiseuille",))
 @parametrize("order, interface", combined(ORDERS, FORMS))
 def test_first_rise(order, interface, record):
-    """At lambda = 1 the head loss rises with lambda by what Poiseuille flow dissipates in a half-disc: to second order
-    with linear elements, on a coarse mesh with quadratic and cubic ones.
+    """At lambda = 1 the derivative of the head loss by lambda is the dissipation of Poiseuille flow in a half-disc: to
+    second order with linear elements, and on a coarse mesh with quadratic and cubic ones.
 
     Norm: root mean square over meshes of about a size: relative error of d(head loss)/d(lambda) by a central
     difference.
@@ -357,7 +357,7 @@ def test_first_rise(order, interface, record):
         record(studies(refine(_rise_error, RISE_REFINEMENTS, interface, 1), {"rise": (2, RISE_SECOND, 4e-4)}))
         return
     record(at_most("rise", _rise_error(CURVED, 0, interface, order)["rise"], BOW,
-                   "the parabola is held but for the bow of the triangles beside the arc"))
+                   "the elements contain the parabola; the bow of the triangles beside the arc is left"))
 
 
 def _rise_error(refinement: float, draw: int, interface: str, order: int) -> dict[str, float]:
@@ -375,7 +375,7 @@ DISC_RADIUS = 15.0
 ANGLE = 0.4
 SOFT_AND_STIFF = viscous(10.0, RATIO)
 JUMP = "1/2, from above: a continuous pressure cannot jump, the smooth part of the error falls faster"
-STIFF = JUMP + "; more so where lambda multiplies the error of the disc's strain"
+STIFF = JUMP + "; the more if lambda multiplies the error of the disc's strain"
 FULL_DISC = (2, "linear elements: second order; the jump's own share is smaller on these meshes", 1e-3)
 SLOWER = ((0.9, 1.8), "from 2 (chords of the circle) or more down to 1 (the jump)", 1e-3)
 #: Polygons and round discs: order of the elements, kind of mesh, element sizes (um) with the number of meshes of each,
@@ -423,17 +423,17 @@ def test_inclusion(setup, record):
     "*setup",
     {**combined(POLYGON_2, SOFT_AND_STIFF, {"traction": "traction"}), **combined(ROUND, SOFT_AND_STIFF, FORMS)})
 def test_inclusion_quadratic(setup, record):
-    """Quadratic and cubic velocities show what the jump of the pressure costs: first order where the disc gives way, in
-    both forms; a stiff disc shows the chords of its polygon, second order, or, round, the full order.
+    """With quadratic and cubic velocities the jump of the pressure limits the order to one around a soft disc, in both
+    forms. Around a stiff disc the order is two on a polygon, because of its chords, and full on a round disc.
 
     Norm: root mean square over random meshes of a size, relative L2 of u and p.
     """
     record(inclusion(*setup))
 
 
-def _errors(size: float, draw: int, make_mesh: Callable, how, *arguments) -> dict[str, float]:
+def _errors(size: float, draw: int, make_mesh: Callable, setting, *arguments) -> dict[str, float]:
     """Errors on the mesh ``make_mesh(size, draw, how)``. arguments: the other arguments of :func:`box_errors`."""
-    return box_errors(make_mesh(size, draw, how), *arguments)
+    return box_errors(make_mesh(size, draw, setting), *arguments)
 
 
 @cache
@@ -447,7 +447,7 @@ BOX, COARSE_BOX = (dict(zip(sizes, (10, 6, 3, 1)))
 BEND, STRAIGHT = 0.2, 0.0
 FULL = "one more than the elements, in L2"
 LAYERS = "3/2 at first (layers of one element along the rim, dp/dn = 0), 1 in the end (linear elements)"
-BELOW = "that of the velocity's gradient in the end, the velocity's own at first; 0.3 on both sides"
+BELOW = "at first that of the velocity, in the end that of its gradient; 0.3 on both sides"
 #: Lowest and highest order of the pressure, and why, for each order of the elements.
 PRESSURE = {1: ((0.9, 1.7), LAYERS), 2: ((1.7, 3.3), BELOW), 3: ((2.7, 4.3), BELOW)}
 #: Order, bend, elements, and last errors of velocity and pressure.
@@ -468,7 +468,7 @@ def manufactured(setup: tuple, ratio: float, interface: str):
     omitted="orders 2, 3: flow-manufactured-quadratic")
 @parametrize("*setup", combined(SETUPS, SOFT_AND_STIFF, FORMS))
 def test_manufactured(setup, record):
-    """Where nothing jumps but the viscosity all orders are full, for lambda = 10 and 2000 in both forms.
+    """If only the viscosity jumps, all orders are full, for lambda = 10 and 2000 in both forms.
 
     Norm: root mean square over random meshes of a size, relative L2 of u and p.
     """
@@ -497,8 +497,8 @@ def test_manufactured_quadratic(setup, record):
     omitted="order 1 has straight triangles: flow-manufactured")
 @parametrize("*setup", combined(SETUPS_BENT, viscous(10.0), FORMS))
 def test_curved_manufactured(setup, record):
-    """On bent triangles quadratic velocities are of third order and cubic ones of fourth, their pressures of second and
-    third, where the viscosity jumps tenfold at a straight interface, in both forms.
+    """On bent triangles quadratic velocities are of third order and cubic ones of fourth, and their pressures of second
+    and third, if the viscosity jumps tenfold at a straight interface, in both forms.
 
     Norm: root mean square over random meshes of a size, relative L2 of u and p.
     """

@@ -54,21 +54,21 @@ JUMP = "1/2: the pressure jumps at the interface, a continuous one cannot"
 INSIDE = "2 inside, 3/2 by the layers of one element at both ends, 1 in the end"
 FIELDS = {"velocity": (2, SECOND, 8e-4), "pressure in the fluid": ((1.2, 2.2), INSIDE, 1e-3),
           "pressure in the biomass": (0.5, JUMP, 0.2)}
-EXCESS = {"excess of the head loss": (2, "second order: what the ends spoil is in both losses", 1e-3)}
+EXCESS = {"excess of the head loss": (2, "second order: both losses contain the error of the ends", 1e-3)}
 #: Radius, lambda, form, studies, and further bounds of the differences on the finest meshes.
 AROUND = {
     "R = 5 um": (5.0, RATIO, "laplacian", {**FIELDS, "head loss": (1, ENDS_FIRST, 4e-3)}, {
         "excess of the head loss": (
-            2e-4, "a fifth of 0.1 %; the grading of the mesh (see _film_size) leaves no order to judge")}),
+            2e-4, "a fifth of 0.1 %; the mesh is graded, so there is no order to judge")}),
     "R = 25 um": (25.0, RATIO, "laplacian", {**FIELDS, **EXCESS}, {})}
 AROUND_TRACTION = {
     "lambda = 2000": (25.0, RATIO, "traction", {**FIELDS, **EXCESS}, {}),
     "lambda = 10": (25.0, 10.0, "traction", {
         "velocity": (2, SECOND, 7e-4), "pressure in the biomass": (0.5, JUMP, 0.1)}, {
         "excess of the head loss": (
-            1e-3, "the jump's share, first order and negative, meets the rest, second order and positive"),
+            1e-3, "the error of the jump, first order and negative, and the rest, second order and positive, cancel"),
         "pressure in the fluid": (
-            3e-3, "the jump's share: biomass that gives way leaves half of it to the fluid, order 1/2 in the end")})}
+            3e-3, "the jump: soft biomass leaves half of its error to the fluid, with order 1/2 in the end")})}
 
 
 def half_disc(radius: float, ratio: float, interface: str, orders: dict, bounds: dict):
@@ -113,18 +113,18 @@ def test_film(order, interface, record):
     if order > 1:
         space = meshes.half_disc_space(FILM, FILM_CURVED, ENDS, WIDTH, order)
         solution = flow.unit_flow(space, RATIO, interface=interface)
-        differences = _differences(space, solution, _trusted(FILM, RATIO, interface, [*DRAWS][-1]))
+        differences = _differences(space, solution, _reference_flow(FILM, RATIO, interface, [*DRAWS][-1]))
         record(each_at_most({name: differences[name] for name in IN_THE_FILM}, 1e-3, CODES))
         return
     errors = refine(_level, FILM_DRAWS, FILM_REFINEMENTS, FILM, RATIO, interface)
     ratios = {name: (errors[name][1:] / errors[name][:-1]).max() for name in IN_THE_FILM}
     record(each_at_most({name: errors[name][-1] for name in IN_THE_FILM}, 1e-3, CODES, ", finest meshes"),
-           each_at_most(ratios, 0.6, "both codes refined twofold: half is of first order, the film's elements are "
+           each_at_most(ratios, 0.6, "both codes refined twofold: a half is first order, and the film's elements are "
                         "refined later", ", largest ratio of neighbours"))
 
 
 @cache
-def _trusted(radius: float, ratio: float, interface: str, level: int, ends=ENDS, corner: int = CORNER
+def _reference_flow(radius: float, ratio: float, interface: str, level: int, ends=ENDS, corner: int = CORNER
              ) -> taylor_hood.Stokes:
     return taylor_hood.stokes(taylor_hood.half_disc(WIDTH, ends, radius, level, corner), ratio, interface)
 
@@ -140,24 +140,24 @@ def _level(level: int, draw: int, refinements, radius: float, ratio: float, inte
     The excess of the head loss leaves out the error of the ends, which the clean channel on the same mesh shares.
     """
     space = _space(radius, refinements[level] * meshes.SPREAD[draw])
-    reference = _trusted(radius, ratio, interface, level)
-    solution, clean = (flow.unit_flow(space, each, interface=interface) for each in (ratio, 1.0))
-    spoilt = clean.loss - poiseuille.head_loss(np.ptp(ENDS), WIDTH, 1.0, 1.0)
-    excess = abs((solution.loss - spoilt) / reference.loss - 1)
+    reference = _reference_flow(radius, ratio, interface, level)
+    solution, clean = (flow.unit_flow(space, viscosity_ratio, interface=interface) for viscosity_ratio in (ratio, 1.0))
+    error_of_ends = clean.loss - poiseuille.head_loss(np.ptp(ENDS), WIDTH, 1.0, 1.0)
+    excess = abs((solution.loss - error_of_ends) / reference.loss - 1)
     return {**_differences(space, solution, reference), "excess of the head loss": excess}
 
 
 def _differences(space: Space, solution: flow.UnitFlow, reference: taylor_hood.Stokes) -> dict[str, float]:
     """Element size, and differences from Taylor-Hood's flow at the middles of its edges, weighted by their areas."""
     pressures = flow.pressure_space(space)
-    apart = {"size": meshes.mean_size(space.mesh),
+    differences = {"size": meshes.mean_size(space.mesh),
              "head loss": abs(solution.loss / reference.loss - 1),
              "velocity": meshes.relative(meshes.field_at(space, solution.velocity, reference.points),
                                          reference.velocity, reference.areas)}
     for part in reference.pressures:
-        apart[f"pressure in the {'biomass' if part.biomass else 'fluid'}"] = meshes.relative(
+        differences[f"pressure in the {'biomass' if part.biomass else 'fluid'}"] = meshes.relative(
             meshes.field_at(pressures, solution.pressure, part.points), part.values, part.areas)
-    return apart
+    return differences
 
 
 #: Radius of the half-disc (um) on curved triangles, and refinements of its mesh. On coarser meshes the smooth error of
@@ -178,9 +178,9 @@ SOFT = {"laplacian": 5e-4, "traction": 1.5e-3}
     references=("poiseuille", "taylor_hood"), omitted="order 1: flow-half-disc, flow-half-disc-traction")
 @parametrize("ratio, order, interface", combined(flow_cases.viscous(10.0, RATIO), HIGHER, FORMS))
 def test_curved_half_disc(ratio, order, interface, record):
-    """Around a half-disc of biomass the whole velocity field and the loss are scikit-fem's, which has a pressure of its
-    own on either side: to first order for lambda = 10, under 0.1 % for lambda = 2000, with elements of order 2 and 3 in
-    both forms.
+    """Around a half-disc of biomass the velocity field and the loss agree with scikit-fem, whose pressure jumps at the
+    interface: to first order for lambda = 10, and under 0.1 % for lambda = 2000, with elements of order 2 and 3 in both
+    forms.
 
     Norm: velocity at the corners of the reference's triangles, root mean square, and the loss, relative.
 
@@ -196,7 +196,7 @@ def test_curved_half_disc(ratio, order, interface, record):
         row = _round_errors(refinement, 0, ratio, order, interface)
         for name in ("velocity", "head loss"):
             record(at_most(f"{name}, refinement {refinement:g}", row[name], bound,
-                           "0.1 %, as between codes; biomass all but stands still, and its pressure hardly matters"))
+                           "0.1 %, as between codes; the biomass is nearly at rest, so its pressure hardly matters"))
 
 
 @cache
@@ -209,7 +209,7 @@ def _round(refinement: float) -> Mesh:
 def _round_errors(refinement: float, draw: int, ratio: float, order: int, interface: str) -> dict[str, float]:
     space = Space(_round(refinement * meshes.SPREAD[draw]), order)
     solution = flow.unit_flow(space, ratio, interface=interface)
-    return _differences(space, solution, _trusted(ROUND, ratio, interface, 2, space.mesh.ends, 6))
+    return _differences(space, solution, _reference_flow(ROUND, ratio, interface, 2, space.mesh.ends, 6))
 
 
 #: Number of meshes of each level of the layer.
@@ -243,7 +243,7 @@ def uncondensed(grid: Mesh, ratio: float, interface: str) -> dict[str, np.ndarra
 
 @pytest.mark.case(
     "flow-bubble", kind="cross-code", mutants=("bubble-of-water", "bubble-mean-unweighted", "bubble-block-isotropic"),
-    references=("taylor_hood",), runs_with="1", omitted="the bubble is of linear velocities")
+    references=("taylor_hood",), runs_with="1", omitted="the bubble belongs to linear velocities")
 @pytest.mark.parametrize("interface", FORMS)
 def test_bubble(interface, record):
     """The condensed bubble is scikit-fem's MINI element with its bubbles as unknowns, in both forms, and the mean
@@ -266,10 +266,11 @@ def test_bubble(interface, record):
 
 @pytest.mark.case(
     "flow-bubble-layers", kind="exact", mutants=("bubble-of-water", "bubble-tenfold"), references=("layered_channel",),
-    runs_with="1", omitted="the bubble is of linear velocities")
+    runs_with="1", omitted="the bubble belongs to linear velocities")
 def test_bubble_layers(record):
-    """The bubble is of second order in velocity and loss and of first in the gradient; it errs as the stabilised
-    element with c = 100 does on good triangles, many times less on triangles stretched eightfold.
+    """With the bubble the velocity and the loss are of second order, and the velocity's gradient of first. On good
+    triangles its error is that of the stabilised element with c = 100; on triangles stretched eightfold it is many
+    times smaller.
 
     Norm: middle of a long layer, lambda = 2000, root mean square over random meshes of a size: L2 of u, of grad u, and
     relative error of the pressure gradient; errors of the stabilised element over the bubble's.
@@ -309,7 +310,7 @@ def _slope_error(grid: Mesh, speed: np.ndarray, chosen: np.ndarray) -> float:
     where, weight, _ = meshes.quadrature(grid.points, grid.triangles[chosen])
     computed = np.einsum("tai,ta->ti", grid.gradients[chosen], speed[grid.triangles[chosen]])
     y, step = where[..., 1], 1e-4
-    above, below = (layered_channel.velocity(y + apart, WIDTH, LAYER, RATIO) for apart in (step, -step))
+    above, below = (layered_channel.velocity(y + shift, WIDTH, LAYER, RATIO) for shift in (step, -step))
     exact = np.stack([0 * y, (above - below) / (2 * step)], axis=-1)
     return meshes.relative(computed[:, None], exact, weight)
 

@@ -1,4 +1,4 @@
-"""Properties of every viscous flow: it keeps flux and energy, is reversible, and never gains by an obstacle.
+"""Properties of every viscous flow: it conserves flux and energy, is reversible, and no obstacle lowers its loss.
 
 Element sizes that grow with the distance from the aggregate are compared with one size everywhere.
 """
@@ -53,8 +53,8 @@ DISCS, DROP = {40.0: 0.012, 46.0: 0.008}, 0.003
     mutants=("tau-of-water", "carried-by-u-plus", "inlet-not-scaled", "curved-straight-divergence", "inlet-parabola"))
 @parametrize("numerics, interface", EVERY)
 def test_sections(numerics, interface, record):
-    """The same flux passes every section of a pore, plugged or not: to round-off for w = u - tau grad p of linear
-    elements and for u itself of quadratic and cubic ones, the outlet included, in both forms.
+    """The same flux passes every section of a pore with or without a plug: to round-off for w = u - tau grad p of
+    linear elements and for u itself of quadratic and cubic ones, the outlet included, in both forms.
 
     Norm: largest relative error of the flux through 25 sections, and through the outlet.
     """
@@ -98,8 +98,8 @@ def flux_error(space: Space, carried: np.ndarray) -> float:
 @pytest.mark.case("flow-energy", kind="property", mutants=("correction-not-scaled", "loss-per-width"))
 @parametrize("numerics, interface", EVERY)
 def test_energy(numerics, interface, record):
-    """The work of the inlet is what viscosity and stabilisation dissipate, of order 2 and 3 the head loss times the
-    flux, and the flow is linear in its drive.
+    """The work of the inlet is the dissipation by viscosity and stabilisation, with order 2 and 3 also the head loss
+    times the flux, and the flow is linear in its drive.
 
     Norm: relative difference.
     """
@@ -109,7 +109,8 @@ def test_energy(numerics, interface, record):
     driven = [flow.scaled(unit, space.mesh, LENGTH, drive(head=head)) for head in (10.0, 20.0)]
     record(at_most("work less dissipation", abs(work / dissipated - 1), 1e-9, "symmetry of the weak form, round-off"))
     record(each_at_most({"twice the head, twice the flow": _off_twice(*driven),
-                         "head given, head lost": abs(driven[0].head_loss / 10.0 - 1)}, 1e-12, "linearity, round-off"))
+                         "head loss over the head": abs(driven[0].head_loss / 10.0 - 1)}, 1e-12,
+                        "linearity, round-off"))
     if space.order > 1:
         record(at_most("loss times flux", abs(unit.loss * WIDTH / dissipated - 1), 1e-9,
                        "the loss is the work of the inlet, round-off"))
@@ -142,21 +143,22 @@ def _power(space: Space, unit: flow.UnitFlow, interface: str) -> tuple[float, fl
 @pytest.mark.case("flow-reversed", kind="property", mutants=("outlet-free",))
 @parametrize("numerics, interface", EVERY)
 def test_reversed(numerics, interface, record):
-    """Flow through a leaning aggregate is its mirror image's flow mirrored, since Stokes flow is reversible.
+    """The flow around a leaning aggregate is the mirror image of that around its mirror image, since Stokes flow is
+    reversible.
 
     Norm: L2 of the difference of both velocities, in the middle and everywhere.
     """
     space = _around(25.0, numerics, 0.6, 150.0)
     mirror = Space(_mirrored(space.mesh), space.order)
-    forward, back = (flow.unit_flow(way, RATIO, interface=interface).velocity for way in (space, mirror))
+    forward, mirrored = (flow.unit_flow(each, RATIO, interface=interface).velocity for each in (space, mirror))
     _, weight, shape = meshes.fine(space)
-    apart, total = (np.einsum("tq,tqi->t", weight, (shape @ field[space.cells]) ** 2)
-                    for field in (forward - back * [1.0, -1.0], forward))
+    difference, total = (np.einsum("tq,tqi->t", weight, (shape @ field[space.cells]) ** 2)
+                         for field in (forward - mirrored * [1.0, -1.0], forward))
     near = np.abs(space.mesh.points[space.mesh.triangles, 0]).max(axis=1) < 40
     for where, chosen, bound, why in (
-            ("around the aggregate", near, 1e-6, "what differs at inlet and outlet decays like exp(-4.2 x / W)"),
+            ("around the aggregate", near, 1e-6, "the difference at inlet and outlet decays like exp(-4.2 x / W)"),
             ("everywhere", slice(None), 5e-4, "second order, in the layer where inlet and outlet differ")):
-        record(at_most(f"difference {where}", np.sqrt(apart[chosen].sum() / total.sum()), bound, why))
+        record(at_most(f"difference {where}", np.sqrt(difference[chosen].sum() / total.sum()), bound, why))
 
 
 def _mirrored(grid: Mesh) -> Mesh:
@@ -180,12 +182,12 @@ def test_obstacle(numerics, interface, record):
                        for space, ratio in product(spaces, RATIOS)]).reshape(len(spaces), -1)
     rises = np.diff(losses, axis=1)
     slopes = rises / np.diff(RATIOS)
-    why = "least dissipation (Helmholtz): the loss is the least of functions that are linear in lambda"
+    origin = "least dissipation (Helmholtz): the loss is the least of functions that are linear in lambda"
     record(at_least("least rise with lambda, over the loss",
-                    (rises / losses[:, 1:]).min(), 0.0, why),
-           at_most("largest slope over the one before", (slopes[:, 1:] / slopes[:, :-1]).max(), 1.0, why),
+                    (rises / losses[:, 1:]).min(), 0.0, origin),
+           at_most("largest slope over the one before", (slopes[:, 1:] / slopes[:, :-1]).max(), 1.0, origin),
            at_least("least rise with R at lambda = 2000, over the loss",
-                    (np.diff(losses[:, 4]) / losses[1:, 4]).min(), 0.0, "nested obstacles: " + why))
+                    (np.diff(losses[:, 4]) / losses[1:, 4]).min(), 0.0, "nested obstacles: " + origin))
 
 
 ACCURATE = runs.with_preset("accurate")
@@ -199,14 +201,14 @@ SCHEMES = {"paper": (5e-3, runs.with_preset("paper")), "fast": (5e-3, runs.with_
     "flow-graded", kind="property", mutants=("gradation-ignored", "gradation-not-passed"), runs_with="1 2")
 @parametrize("bound, *numerics", SCHEMES)
 def test_graded(bound, numerics, record):
-    """With one element size everywhere the loss of a half-disc is that of sizes which grow with the distance from it,
-    for more than twice the nodes, on straight triangles and on curved ones of order 2 and 3.
+    """Elements that grow with the distance from a half-disc give the loss of elements of one size, with less than half
+    of the nodes, on straight triangles and on curved ones of order 2 and 3.
 
     Norm: relative difference of the loss; nodes over those of graded sizes; largest over least edge.
     """
     (loss, nodes), (even, many) = (_graded(*numerics, f"numerics.gradation={value}") for value in (0.25, 0.0))
     record(at_most("loss", abs(loss / even - 1), bound,
-                   "errors near the aggregate rule: those of the preset's elements there"),
+                   "errors near the aggregate dominate, and the elements there are those of the preset"),
            at_most("nodes", nodes / many, 0.5, "half"))
 
 
@@ -225,10 +227,11 @@ TIGHT_RUN = ("pore.width=100 um", "aggregate.radius=40 um", "flow.mean_velocity=
 @pytest.mark.slow
 @pytest.mark.case(
     "flow-permeable-run", kind="property", mutants=("drag-layer-sticks",), runs_with="fast",
-    omitted="the other presets refine what fast has")
+    omitted="the other presets have finer elements")
 def test_permeable_run(record):
-    """A run whose water must pass an aggregate with layers of 7.5 nm goes on from the film to its end: concentrations
-    keep their bounds, the velocity turns back nowhere, head loss is that of a finer mesh.
+    """A run in which the water must pass through an aggregate with layers of 7.5 nm continues from the film to its end:
+    concentrations stay within their bounds, the velocity is nowhere reversed, and the head loss is that of a finer
+    mesh.
 
     Norm: concentrations over the supply; relative difference of the head loss from that of a finer mesh; least velocity
     along the pore in the aggregate over the largest.
@@ -236,13 +239,14 @@ def test_permeable_run(record):
     overrides = ["numerics.preset=fast", *TIGHT_RUN]
     instants = list(simulate(load_scene("base", overrides, unset=["flow.head"])))
     solved = [instant.solved.concentrations for instant in instants]
-    largest = max(max(each.acceptor.max(), each.donor.max()) for each in solved)
-    record(at_most("largest concentration", largest / 10.0, 1.01, "half of what a solution may overshoot by"))
+    largest = max(max(concentrations.acceptor.max(), concentrations.donor.max()) for concentrations in solved)
+    record(at_most("largest concentration", largest / 10.0, 1.01, "half of the accepted overshoot"))
     end, solution = instants[-1].pore, instants[-1].solved.flow
     along = solution.velocity[np.unique(end.space.cells[end.mesh.biomass]), 0]
-    record(at_least("least velocity", along.min() / along.max(), -0.01, "no node of a line of elements overshoots"))
+    record(at_least("least velocity", along.min() / along.max(), -0.01, "no node overshoots on a line of elements"))
     scene = load_scene("base", [*overrides, "numerics.refinement=0.6", "numerics.contact_elements=10"],
                        unset=["flow.head"])
     fine_mesh, _ = pore.Meshing.of(scene).generate(end.boundary)
     finer = pore.solve_flow(Space(fine_mesh, 3), scene.flow, scene.pore.length, scene.numerics)
-    record(at_most("head loss", abs(solution.head_loss / finer.head_loss - 1), 0.01, "what fast is for: 1 %"))
+    record(at_most("head loss", abs(solution.head_loss / finer.head_loss - 1), 0.01,
+                   "the error that fast promises: 1 %"))

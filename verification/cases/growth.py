@@ -1,8 +1,8 @@
 """Growth against closed forms, its law (14)-(24), and properties of every body.
 
 Homogeneous growth, free and confined, is exact with linear and quadratic elements on any mesh. Patch tests are exact,
-too: a body whose rim is held at F X has F inside, with constant pressure. One end is free along its normal, or pulled.
-If all of the rim were held, the pressure would be determined only up to a constant.
+too: if the positions of the rim are prescribed as F X, the body has F inside, with constant pressure. One end is free
+along its normal, or pulled. If the whole rim were prescribed, the pressure would be determined only up to a constant.
 
 The half-cylinder that grows by theta(R) has a closed form of shape and pressure, far from t = 0. The stabilisation
 imposes dP/dn = 0 on the rim, where the exact pressure has a slope. In one layer of elements the pressure errs by O(h),
@@ -26,7 +26,7 @@ from verification.evidence.checks import Check, around, at_most, each_at_most, l
 from verification.problems import bodies
 from verification.problems.bodies import Supported
 
-REPRODUCED = "round-off: the elements hold it; Newton's method stops at 1e-11"
+REPRODUCED = "round-off: the elements contain the solution; Newton's method stops at 1e-11"
 #: Rows and columns of the components of a stress (3, 3) that the package returns.
 COMPONENTS = [0, 1, 2, 0], [0, 1, 2, 1]
 
@@ -36,14 +36,14 @@ def exactly(name: str, body: Supported, solution: growth.Equilibrium, F: np.ndar
     exact = neo_hookean.cauchy(F, pressure)
     P = solution.pressure[body.cells[:, :3]] @ body.shape.table.linear.T
     stress = growth.cauchy(body.strained(solution.position).F, P)
-    most = max(largest(exact), abs(pressure))
+    scale = max(largest(exact), abs(pressure))
     sizes = {"place": largest(solution.position @ np.linalg.inv(F).T - body.reference) / bodies.LENGTH,
-             "pressure": largest(solution.pressure - pressure) / most,
-             "stress": largest(stress - exact[COMPONENTS]) / most}
+             "pressure": largest(solution.pressure - pressure) / scale,
+             "stress": largest(stress - exact[COMPONENTS]) / scale}
     return each_at_most(sizes, 1e-9, REPRODUCED, f", {name}")
 
 
-NORM = "largest difference: places, carried back to t = 0, over the length; pressures and stresses over the largest"
+NORM = "largest difference: positions, mapped back to t = 0, over the length; pressures and stresses over the largest"
 #: Element sizes (um) of each kind, and random displacements (um) of inner nodes.
 SIZES, SHAKEN = {1: 1.3, 2: 2.0, 3: 2.0}, {1: 0.1, 2: 0.02, 3: 0.02}
 
@@ -62,8 +62,8 @@ def _supported(size: float, kind: int):
 @parametrize("kind", bodies.EVERY)
 def test_homogeneous(kind, record):
     """Uniform growth, free to theta = 2000 and confined to one direction to theta = 36, has the exact shape, pressure
-    and stress on any mesh of straight or of curved triangles [E11]; so it has on a mesh that was made half way, its
-    material grown before: theta counts from t = 0, whatever shape the search starts from.
+    and stress on any mesh of straight or of curved triangles [E11]. The same holds on a mesh that was generated after a
+    part of the growth: theta counts from t = 0, whatever shape the search starts from.
     """
     for name, body, exact in _supported(SIZES[kind], kind):
         for theta in (36.0,) if kind == 3 else (2.0, 36.0, 2000.0):
@@ -74,7 +74,7 @@ def test_homogeneous(kind, record):
         for top, mesh_theta in ((2.0, 1.0), (36.0, 1.0), (36.0, 5.0)):
             start = body.reference @ exact(mesh_theta)[0]
             solution = bodies.equilibrium(body, body.constant(top), start)
-            record(exactly(f"{name}, theta = {top:g}, mesh made at {mesh_theta:g}", body, solution, *exact(top))[:2])
+            record(exactly(f"{name}, theta = {top:g}, mesh of {mesh_theta:g}", body, solution, *exact(top))[:2])
 
 
 def _free(theta: float):
@@ -97,9 +97,9 @@ TURN = np.array([[0.0, -1.0], [1.0, 0.0]])
     mutants=("theta-power", "untransposed", "thickness-forgotten", "held-short"), references=("neo_hookean",))
 @parametrize("kind", bodies.EVERY)
 def test_patch(kind, record):
-    """A body of straight or curved triangles whose rim is held at F X, but for an end that is free to move along its
-    normal, has F inside and constant, exact pressure and stress: shears to 3, J from 0.5 to 2000, the end on each of
-    the four sides.
+    """A body of straight or curved triangles has F inside, with constant and exact pressure and stress, if the
+    positions of its rim are prescribed as F X and one end is free along its normal: for shears to 3, J from 0.5 to
+    2000, and the free end on each of the four sides.
     """
     record([_sheared(kind, np.linalg.matrix_power(TURN, turns), *shear) for turns, shear in enumerate(SHEARS)])
 
@@ -123,7 +123,7 @@ def _sheared(kind: int, Q: np.ndarray, a: float, b: float, d: float) -> list[Che
     return exactly(f"a, b, d = {a:g}, {b:g}, {d:g}", body, solution, F(1.0), pressure)
 
 
-#: Any F: a turn, a shear in any direction, a stretch; and P over mu_L.
+#: Any F: a rotation, a shear in any direction, a stretch; and P over mu_L.
 LOADED = (([[0.8, -0.6], [0.6, 0.8]], 0.4), ([[1.7, 2.1], [-0.8, 1.1]], -1.3), ([[-31.0, 45.0], [-42.0, -3.0]], 0.02))
 
 
@@ -133,8 +133,8 @@ LOADED = (([[0.8, -0.6], [0.6, 0.8]], 0.4), ([[1.7, 2.1], [-0.8, 1.1]], -1.3), (
     references=("neo_hookean",))
 @parametrize("kind", bodies.EVERY)
 def test_patch_traction(kind, record):
-    """A body of straight or curved triangles held at F X on three sides and pulled by the traction of F and P on the
-    fourth has F and P inside, for any F, turned and sheared, J to 2000, and any P.
+    """A body of straight or curved triangles has F and P inside if three sides are prescribed as F X and the traction
+    of F and P pulls the fourth: for any F, with rotations, shears and J to 2000, and any P.
     """
     record([_pulled(kind, np.array(F), P) for F, P in LOADED])
 
@@ -154,7 +154,7 @@ def _pulled(kind: int, F: np.ndarray, P: float) -> list[Check]:
 
 REFINEMENTS = {1: (1.3, 2.2, 3.5, 6.0), 2: (0.3, 0.6, 1.2, 2.4), 3: (0.3, 0.6, 1.2, 2.4)}
 SECOND = "linear elements: second order"
-LAYER = "3/2 from a layer of one element at the rim, where the stabilisation wants dP/dn = 0"
+LAYER = "3/2 from a layer of one element at the rim, where the stabilisation imposes dP/dn = 0"
 
 
 def exact(top: float) -> bodies.HalfCylinder:
@@ -165,14 +165,14 @@ def exact(top: float) -> bodies.HalfCylinder:
 def errors(refinement: float, top: float, kind: int = 1) -> dict[str, float]:
     """Element size, largest error of the outline's radius, and L2 errors of positions and pressure."""
     body, rim = bodies.half_disc(refinement, kind)
-    known = exact(top)
-    solution = bodies.grow(body, body.field(known.theta))
+    reference = exact(top)
+    solution = bodies.grow(body, body.field(reference.theta))
     start, end = (np.hypot(*places[rim].T) for places in (body.reference, solution.position))
-    return {"outline": largest(end / known.radius(start) - 1),
-            **bodies.errors(body, solution, known.at)}
+    return {"outline": largest(end / reference.radius(start) - 1),
+            **bodies.errors(body, solution, reference.at)}
 
 
-CYLINDER_NORM = ("largest relative error of the outline's radius; L2 of places and of the pressure over the body at "
+CYLINDER_NORM = ("largest relative error of the outline's radius; L2 of positions and of the pressure over the body at "
                  "t = 0, relative")
 CLAIM = "A half-disc that grows by theta(R), {} on the rim, becomes the exact half-disc, with the exact pressure"
 WRONG = ("stabilisation-power", "stabilisation-too-weak", "stabilisation-of-rest", "stabilisation-sign")
@@ -209,8 +209,8 @@ def test_half_cylinder_2000(record):
     omitted="order 1: growth-half-cylinder")
 @parametrize("kind", bodies.CURVED)
 def test_curved_half_cylinder(kind, record):
-    """A curved half-disc that grows by theta(R) becomes the exact half-disc: places to third order, the pressure to
-    second, and as well at theta = 2000 as at 36; in scenes of quadratic and of cubic elements.
+    """A curved half-disc that grows by theta(R) becomes the exact half-disc, with positions of third order and a
+    pressure of second, and with equal errors at theta = 2000 and at 36; in scenes of quadratic and of cubic elements.
 
     Norm: largest relative error of the outline's radius; L2 of positions and of the pressure over the body at t = 0.
     """
@@ -218,10 +218,10 @@ def test_curved_half_cylinder(kind, record):
     record(studies(computed, {"place": (around(3, 0.4), "quadratic places: third order in L2", 1e-5),
                            "pressure": (2, "linear pressure: second order in L2", 2e-3)}, ", theta to 36"))
     record(at_most("outline, theta to 36", computed["outline"][-1], 1e-5, "under that of positions in L2"))
-    far = errors(REFINEMENTS[kind][-2], 2000.0, kind)
+    large = errors(REFINEMENTS[kind][-2], 2000.0, kind)
     for name in ("outline", "place", "pressure"):
-        record(at_most(f"{name}, theta to 2000", far[name], 1.05 * computed[name][-2],
-                       "as at theta = 36: what is left of the error is in the shape of theta(R), not in its size"))
+        record(at_most(f"{name}, theta to 2000", large[name], 1.05 * computed[name][-2],
+                       "as at theta = 36: the error depends on the shape of theta(R), not on its size"))
 
 
 ROUND_OFF, STEPS = "round-off", 0.1 * 0.5 ** np.arange(4)
@@ -247,8 +247,8 @@ def _turns(angles: np.ndarray) -> np.ndarray:
     "growth-stress", kind="exact", mutants=("third-power", "thickness-forgotten", "stress-across", "untransposed"),
     references=("neo_hookean",), runs_with="1 2 3")
 def test_stress(record):
-    """The Cauchy stress of any homogeneous F and P is the closed form; it turns with the body (objectivity), does not
-    see a turn before the deformation (isotropy), and is symmetric.
+    """The Cauchy stress of any homogeneous F and P is the closed form. It rotates with the body (objectivity), does not
+    depend on a rotation before the deformation (isotropy), and is symmetric.
 
     Norm: largest difference over the largest stress, 200 random F with shears to 3 and J to 2000.
     """
@@ -256,11 +256,11 @@ def test_stress(record):
     exact = np.array([neo_hookean.cauchy(f, p) for f, p in zip(F, P)])
     S, Q = growth.piola(F, P), _turns(np.linspace(0, 6, len(F)))
     full = S @ F.mT / np.linalg.det(F)[:, None, None]
-    size, first = (np.abs(one).max(axis=(1, 2), keepdims=True) for one in (exact, S))
-    apart = {"stress": (growth.cauchy(F, P) - exact[:, *COMPONENTS]) / size[:, 0], "symmetry": (full - full.mT) / size,
+    size, first = (np.abs(array).max(axis=(1, 2), keepdims=True) for array in (exact, S))
+    errors = {"stress": (growth.cauchy(F, P) - exact[:, *COMPONENTS]) / size[:, 0], "symmetry": (full - full.mT) / size,
              "objectivity": (growth.piola(Q @ F, P) - Q @ S) / first,
              "isotropy": (growth.piola(F @ Q, P) - S @ Q) / first}
-    record(each_at_most({name: largest(gap) for name, gap in apart.items()}, 1e-11, ROUND_OFF))
+    record(each_at_most({name: largest(gap) for name, gap in errors.items()}, 1e-11, ROUND_OFF))
 
 
 def _near_one():
@@ -350,11 +350,11 @@ def test_curved_taylor(kind, record):
     random, theta = np.random.default_rng(6), body.constant(1.4)
     position = grid.points @ np.array([[1.2, 0.1], [0.2, 1.1]])
     push, move = random.standard_normal(body.corners), 0.05 * random.standard_normal(position.shape)
-    more, steps = random.standard_normal(body.corners), 0.25 * 0.5 ** np.arange(4)
-    tangents, linear, residual = _along(body, theta, position, push, move, more)
-    left = [largest(residual(s) - residual(0.0) - s * linear) for s in steps]
+    push_step, steps = random.standard_normal(body.corners), 0.25 * 0.5 ** np.arange(4)
+    tangents, linear, residual = _along(body, theta, position, push, move, push_step)
+    remainders = [largest(residual(s) - residual(0.0) - s * linear) for s in steps]
     record(at_most("symmetry", largest(tangents - tangents.mT) / largest(tangents), 1e-13, ROUND_OFF),
-           study("residual", steps, left, 2, "Taylor's theorem: second order", band=0.25))
+           study("residual", steps, remainders, 2, "Taylor's theorem: second order", band=0.25))
 
 
 @pytest.mark.case(
@@ -393,8 +393,8 @@ ANGLES = np.array([0.4, 1.9, 4.0])
 @pytest.mark.case("growth-rigid", kind="property", mutants=("untransposed",))
 @parametrize("kind", bodies.EVERY)
 def test_rigid(kind, record):
-    """The nodal forces of any state of a body have no resultant and no moment, and turn with the body by any angle,
-    while what they ask of the volume stays (objectivity).
+    """The nodal forces of any state of a body have no resultant and no moment, and rotate with the body by any angle;
+    the residual of the volume does not change (objectivity).
 
     Norm: largest sum, over the largest nodal force; largest difference, over the same.
     """
@@ -403,14 +403,15 @@ def test_rigid(kind, record):
     place = 6 * x @ np.array([[1.1, -0.3], [0.6, 0.9]]) + 0.3 * random.standard_normal(x.shape)
     pressure, theta = random.standard_normal(body.corners), body.field(_theta)
     forces, volume = _forces(body, place, pressure, theta)
-    most = largest(forces)
+    scale = largest(forces)
     moment = np.sum(place * (forces @ TURN)) / largest(place)
-    record(each_at_most({"resultant": largest(forces.sum(axis=0)) / most,
-                         "moment over the largest distance": abs(moment) / most}, 1e-11, NEWTON_ROUND_OFF))
+    record(each_at_most({"resultant": largest(forces.sum(axis=0)) / scale,
+                         "moment over the largest distance": abs(moment) / scale}, 1e-11, NEWTON_ROUND_OFF))
     for angle, Q in zip(ANGLES, _turns(ANGLES)):
-        turned, same = _forces(body, place @ Q.T + [70.0, -30.0], pressure, theta)
-        record(each_at_most({"forces": largest(turned - forces @ Q.T) / most,
-                             "volume": largest(same - volume) / largest(volume)}, 1e-12, ROUND_OFF, f", {angle:g} rad"))
+        rotated_forces, rotated_volume = _forces(body, place @ Q.T + [70.0, -30.0], pressure, theta)
+        record(each_at_most({"forces": largest(rotated_forces - forces @ Q.T) / scale,
+                             "volume": largest(rotated_volume - volume) / largest(volume)}, 1e-12, ROUND_OFF,
+                            f", {angle:g} rad"))
 
 
 def _forces(body: Supported, place, pressure, theta):
@@ -426,8 +427,8 @@ GROWN = {1: ((0.6, 1.0), (1.0, 15.0), (1.5, 500.0)), 2: ((0.3, 1.0), (0.6, 15.0)
 @pytest.mark.case("growth-area", kind="property", mutants=("theta-power", "stabilisation-diagonal"))
 @parametrize("kind", bodies.EVERY)
 def test_area(kind, record):
-    """However unevenly a body grows, it gets the area that was asked for, the integral of theta, to round-off: the sum
-    of the rows J = theta, in which the stabilisation cancels (24).
+    """A body that grows unevenly gets the prescribed area, the integral of theta, to round-off: the sum of the rows
+    J = theta, in which the stabilisation cancels (24).
 
     Norm: relative difference of the area.
     """
@@ -444,10 +445,10 @@ def test_area(kind, record):
 @pytest.mark.case("growth-units", kind="property", mutants=("h-not-squared",))
 @parametrize("kind", bodies.EVERY)
 def test_units(kind, record):
-    """In metres for micrometres, on a wall that stands upright, or in a mirror, a body grows to the same shape with the
-    same pressure over mu_L.
+    """A body grows to the same shape with the same pressure over mu_L if its lengths are in metres, if its wall is
+    vertical, or if it is mirrored.
 
-    Norm: largest difference: of places, carried back, over the radius; of pressures over the largest.
+    Norm: largest difference: of positions, mapped back, over the radius; of pressures over the largest.
     """
     changes = {"in metres": 1e-6 * np.eye(2), "upright": TURN, "mirrored": np.diag([-1.0, 1.0])}
     reference = _changed(np.eye(2), kind)
@@ -469,5 +470,5 @@ def _changed(change: np.ndarray, kind: int) -> growth.Equilibrium:
     cells = body.cells
     if np.linalg.det(change) < 0:
         cells = cells[:, MIRRORED[: cells.shape[1]]]
-    same = replace(body, shape=growth.Shape(cells, body.corners, body.shape.degree))
-    return bodies.grow(_turned(same, change), same.field(_theta))
+    transformed = replace(body, shape=growth.Shape(cells, body.corners, body.shape.degree))
+    return bodies.grow(_turned(transformed, change), transformed.field(_theta))

@@ -5,8 +5,8 @@ takes mu_L = 0.01 MPa, and the package takes no mu_L: without traction it drops 
 pressure.
 
 The manufactured growth has finite strain, uneven theta, shear and pressure, and the loads that balance it. On random
-meshes of a square, three sides are held and the fourth is pulled by its traction, which determines the level of the
-pressure. If the exact pressure has a slope on the rim, its order is that of the layer there (see
+meshes of a square, three sides are prescribed, and the traction of the fourth determines the level of the pressure. If
+the exact pressure has a slope on the rim, its order is that of the layer there (see
 :mod:`verification.cases.growth`). Otherwise h_tau, which jumps from triangle to triangle, limits it: with one h for all
 triangles the order is two (measured: 1.9 and 2.0 between 0.1 and 0.025), and with their own h it falls from two towards
 3/2.
@@ -37,7 +37,7 @@ CONTACT, TOWARDS = Contact(np.pi / 2, 3 * np.pi / 4, 65.0), 3
 ENDS = bodies.RADIUS * np.exp([[1j * CONTACT.first], [1j * CONTACT.last]])
 PLACE = "the lower of the two orders: linear elements, second order (quadratic ones: third)"
 PRESSURE = ("the lower of the two orders: between 2, linear elements, and 3/2, a layer at the rim where the "
-            "stabilisation wants dP/dn = 0 (the reference: second)")
+            "stabilisation imposes dP/dn = 0 (the reference: second)")
 SINGULAR = "no order: the stress is singular, if weakly, like r^(-1/2) at the ends of the contact; under 1 %"
 
 
@@ -70,9 +70,9 @@ def package_solution(name: str, level: int, kind: int):
     if contact:
         x, y = body.reference[rim].T
         angle = np.arctan2(y, x)
-        on = rim[(angle > contact.first - 1e-9) & (angle < contact.last + 1e-9)]
-        constrained[on, 1] = True
-        move[on, 1] = contact.height - body.reference[on, 1]
+        in_contact = rim[(angle > contact.first - 1e-9) & (angle < contact.last + 1e-9)]
+        constrained[in_contact, 1] = True
+        move[in_contact, 1] = contact.height - body.reference[in_contact, 1]
     body = replace(body, constrained=constrained)
     return body, bodies.grow(body, body.field(theta), lambda part: body.reference + part * move)
 
@@ -90,18 +90,18 @@ def gaps(level: int, name: str, kind: int) -> dict[str, float]:
         return place, pressure / MODULUS
 
     middles = body.reference[body.cells[:, :3]].mean(axis=1) @ [1, 1j]
-    away = np.abs(middles - ENDS).min(axis=0) > 0.2 * bodies.RADIUS
+    is_away = np.abs(middles - ENDS).min(axis=0) > 0.2 * bodies.RADIUS
     return {**bodies.errors(body, solution, exact),
-            "pressure away": bodies.errors(body, solution, exact, away)["pressure"]}
+            "pressure away": bodies.errors(body, solution, exact, is_away)["pressure"]}
 
 
 def _reference_change(name: str, difference: float) -> Check:
     """Check that the reference is fine enough: its last change is small against the difference."""
     where, weight = _points()
     before, last = (reference_solution(name, level).at(*where)[0] for level in (len(RINGS) - 2, len(RINGS) - 1))
-    return at_most("last change of the reference's places, over the last difference to ours",
+    return at_most("last change of the reference's positions, over its last difference from the package",
                    meshes.relative(before, last, weight) / difference, 0.3,
-                   "the reference must be the finer one; it changes by less with every level")
+                   "the reference must be the finer one; its changes decrease from level to level")
 
 
 def _points():
@@ -117,15 +117,15 @@ def _curved(differences: dict, pressure: str, ceilings: tuple[float, float]):
     They cover the last differences and, without contact, the orders over all refinements. Orders between two meshes of
     few triangles scatter.
     """
-    fallen = {name: np.log(values[0] / values[-1]) for name, values in differences.items()}
+    decrease = {name: np.log(values[0] / values[-1]) for name, values in differences.items()}
     for field, order, ceiling in zip(("place", pressure), (3, 2), ceilings):
         if pressure == "pressure":
-            yield between(f"order of the {field}", fallen[field] / fallen["size"], *around(order, 0.5),
-                          "quadratic places, linear pressure: third and second order")
+            yield between(f"order of the {field}", decrease[field] / decrease["size"], *around(order, 0.5),
+                          "quadratic positions, linear pressure: third and second order")
         yield at_most(field, differences[field][-1], ceiling, "the reference's elements are finer")
 
 
-NORM = "L2 over the body at t = 0 of the difference to the reference on the same level, relative: places; pressure"
+NORM = "L2 over the body at t = 0 of the difference to the reference on the same level, relative: positions; pressure"
 
 
 def compared(kind: int, problem: str, ceilings: dict[int, tuple[float, float]], pressure: str = "pressure"):
@@ -151,8 +151,8 @@ def compared(kind: int, problem: str, ceilings: dict[int, tuple[float, float]], 
     mutants=("stabilisation-power", "stabilisation-of-rest"), references=("quadratic_growth",))
 @parametrize("kind", bodies.EVERY)
 def test_quadratic_cylinder(kind, record):
-    """The half-cylinder grown to theta = 2000, on straight and on curved triangles, agrees with quadratic elements of
-    scikit-fem, which have their orders 3 and 2 against the closed form.
+    """The half-cylinder that has grown to theta = 2000 agrees with quadratic elements of scikit-fem, on straight and on
+    curved triangles. These elements have the orders 3 and 2 against the closed form.
     """
     record(compared(kind, "half-cylinder", {1: (6e-4, 6e-3), 2: (6e-5, 6e-3)}))
     if kind == 1:
@@ -164,9 +164,9 @@ def _reference_errors(level: int) -> dict[str, float]:
     """Size of the reference's elements, and its errors to the closed form."""
     where, weight = _points()
     place, pressure = reference_solution("half-cylinder", level).at(*where)
-    exact, known = growth_cases.exact(2000.0).at(*where)
+    exact, exact_pressure = growth_cases.exact(2000.0).at(*where)
     return {"size": bodies.RADIUS / RINGS[level], "places": meshes.relative(place, exact, weight),
-            "pressure": meshes.relative(pressure / MODULUS, known, weight)}
+            "pressure": meshes.relative(pressure / MODULUS, exact_pressure, weight)}
 
 
 @pytest.mark.slow
@@ -188,15 +188,17 @@ def test_uneven(kind, record):
     mutants=("held-short", "theta-power"), references=("quadratic_growth",))
 @parametrize("kind", bodies.EVERY)
 def test_between_walls(kind, record):
-    """The same half-disc, its arc held at the upper wall on which it slides, agrees with quadratic elements."""
+    """The same half-disc, with a part of its arc on the upper wall, along which it slides, agrees with quadratic
+    elements.
+    """
     record(compared(kind, "between walls", {1: (1e-3, 6e-3), 2: (1e-3, 6e-3)}, "pressure away"))
 
 
 #: Element sizes of straight and of curved triangles, with the number of random meshes of each.
 SIZES = {1: dict.fromkeys((0.2, 0.1, 0.05, 0.025), 3), 2: dict.fromkeys((0.2, 0.1, 0.05, 0.03), 6)}
-LAYER = "3/2 from a layer of one element at the rim, where the stabilisation wants dP/dn = 0"
+LAYER = "3/2 from a layer of one element at the rim, where the stabilisation imposes dP/dn = 0"
 UNEVEN = "no layer where dP/dn = 0: between 2, linear elements, and 3/2, for an h that jumps between triangles"
-TAYLOR_HOOD = "quadratic places: third order; linear pressure: second"
+TAYLOR_HOOD = "quadratic positions: third order; linear pressure: second"
 #: Orders of the pressure, by kind, and why.
 ORDERS = {1: {"sloping": (1.5, LAYER), "flat on the rim": (1.75, UNEVEN)},
           2: {"sloping": (2, TAYLOR_HOOD), "flat on the rim": (2, TAYLOR_HOOD)}}
@@ -225,11 +227,12 @@ def _errors(size: float, seed: int, kind: int, exact) -> dict[str, float]:
     references=("manufactured_growth",))
 @parametrize("kind", bodies.EVERY)
 def test_manufactured(kind, record):
-    """A made-up growth with theta from 1 to 6.5, shears to one and an uneven pressure, held by body force and traction,
-    is found at its order, whether the pressure has a slope on the rim or not, on straight and on curved triangles.
+    """A manufactured growth with theta from 1 to 6.5, shears to one and an uneven pressure, in equilibrium with body
+    force and traction, converges with its order, with or without a slope of the pressure on the rim, on straight and on
+    curved triangles.
 
-    Norm: L2 of places and pressure over the body at t = 0, relative, root mean square over three or four random meshes
-    a size.
+    Norm: L2 of positions and pressure over the body at t = 0, relative, root mean square over three or four random
+    meshes a size.
     """
     geometry = min(kind, 2)
     for name, (order, why) in ORDERS[geometry].items():

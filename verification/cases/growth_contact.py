@@ -68,8 +68,8 @@ def _first_contact(mechanics, seed, theta) -> tuple[float, contact.Expansion]:
     def gap(part: float) -> float:
         try:
             shape = contact.expand(mechanics, seed, theta**part, shapes[-1])
-        except FirstContact as late:
-            return late.gap - WALLS.film / 2
+        except FirstContact as contact_made:
+            return contact_made.gap - WALLS.film / 2
         if not shape.pore.contact:
             shapes.append(shape.pore)
         return shape.gap - WALLS.film / 2
@@ -83,29 +83,29 @@ def _touching(seed: pore.Pore, expansion: contact.Expansion) -> pore.Pore:
     """The seed with the opposite wall at the corners, and at the arcs between them, that are in contact under an
     expansion."""
     height = expansion.position[seed.mesh.loop][:, 1]
-    on = np.isclose(height, HEIGHT, rtol=1e-9)
+    in_contact = np.isclose(height, HEIGHT, rtol=1e-9)
     if seed.mesh.geometry == 2:
-        on[1::2] = on[::2] & np.roll(on[::2], -1)
-    return replace(seed, wall=np.where(on, TOP, seed.wall))
+        in_contact[1::2] = in_contact[::2] & np.roll(in_contact[::2], -1)
+    return replace(seed, wall=np.where(in_contact, TOP, seed.wall))
 
 
 def differences(refinement: float, elements: str) -> dict[str, float]:
     """Element size along the arc (um), and differences to the reference: of contact lines and contact length over that
     length, of tips over the length of the aggregate, and of the outline's material points (root mean square)."""
     reference, rim = reference_solution(len(LEVELS) - 1), grown(elements, refinement).pore.boundary
-    on = np.flatnonzero(rim.wall == TOP)  # counterclockwise, so from downstream to upstream
-    ends, edges = rim.points[on[[0, -1]], 0], rim.edge_lengths()[[on[0], on[-1] - 1]]
+    in_contact = np.flatnonzero(rim.wall == TOP)  # counterclockwise, so from downstream to upstream
+    ends, edges = rim.points[in_contact[[0, -1]], 0], rim.edge_lengths()[[in_contact[0], in_contact[-1] - 1]]
     length, tips = np.ptp(reference.lines), np.array([rim.downstream, rim.upstream])
     angle, place = contact_growth.outline(reference.equilibrium)
     above = rim.origin[:, 1] > 0
-    at = np.arctan2(*rim.origin[above].T[::-1])
-    apart = rim.points[above].T - [np.interp(at, angle, each) for each in place]
+    angles = np.arctan2(*rim.origin[above].T[::-1])
+    distances = rim.points[above].T - [np.interp(angles, angle, coordinate) for coordinate in place]
     return {"size": np.pi * bodies.RADIUS / (above.sum() + 1) * rim.geometry,
             "contact lines": np.abs(ends - reference.lines).max() / length,
             "length of contact": abs(np.ptp(ends) / length - 1),
             "edges": max(abs(end - line) / beside for end, line, beside in zip(ends, reference.lines, edges)),
             "tips": np.abs(tips - reference.tips).max() / np.ptp(reference.tips),
-            "outline": np.sqrt(np.mean(np.sum(apart**2, axis=0))) / np.ptp(reference.tips)}
+            "outline": np.sqrt(np.mean(np.sum(distances**2, axis=0))) / np.ptp(reference.tips)}
 
 
 #: Refinements of the package, by elements; those of quadratic ones are the preset fast's 0.2 and accurate's 0.45, and
@@ -136,9 +136,9 @@ def test_contact_lines(elements, record):
     if elements == "linear":
         record(at_most("contact lines, over the edge beside them", errors["edges"].max(), 2.0, ONE_BY_ONE))
     else:
-        fallen = {name: np.log(values[0] / values[-1]) for name, values in errors.items()}
+        decrease = {name: np.log(values[0] / values[-1]) for name, values in errors.items()}
         for name in ("contact lines", "length of contact", "outline"):
-            record(between(f"order of the {name}", fallen[name] / fallen["size"], *around(1, 0.5), SINGULAR))
+            record(between(f"order of the {name}", decrease[name] / decrease["size"], *around(1, 0.5), SINGULAR))
         for name in ("contact lines", "length of contact"):
             record(at_most(name, errors[name][-1], 1e-2, "the error of the preset fast after contact"))
     for name in ("tips", "outline"):

@@ -113,7 +113,7 @@ THETAS = (1.5, 1 / CREASE**2, 3.0)
 @pytest.mark.parametrize("elements", ELEMENTS)
 def test_surface_confined(elements, record):
     """A plug that grows by theta between the walls has the elastic stretch theta^(-1/2) all along its free surfaces,
-    also beyond the limit of creases; where new biomass is born without stress theta counts from the last shape.
+    also beyond the limit of creases. If new biomass is born without stress, theta counts from the last shape.
 
     Norm: largest difference of stretches.
     """
@@ -164,9 +164,9 @@ def energy_and_constraint(gamma: float) -> tuple[Callable, Callable]:
     references=("surface_stability",), runs_with="2",
     omitted="linear elements: their stabilisation is no part of the energy; cubic ones: those of order 2")
 def test_surface_stability(record):
-    """A block that grows between side walls is stable down to Biot's elastic stretch, 0.544: quartic places that are
-    exactly divergence-free find it within 1 %; quadratic ones with linear pressures do within 5 %, thanks to their
-    stabilisation.
+    """A block that grows between side walls is stable down to Biot's elastic stretch, 0.544: quartic positions that are
+    exactly divergence-free give it within 1 %, and quadratic ones with linear pressures and their stabilisation within
+    5 %.
 
     Norm: elastic stretch at which the least eigenvalue is zero.
     """
@@ -179,8 +179,8 @@ def test_surface_stability(record):
                  for gamma in (growth.GAMMA, 10.0, 100.0)]
     record(between("P2/P1, gamma of the package", stretches[0] / exact, 0.95, 1.05,
                    "not divergence-free in each point"))
-    for gamma, less, more in zip((10, 100), stretches[1:], stretches):
-        record(at_most(f"P2/P1, gamma = {gamma}, over that of a tenth", less / more, 1.0,
+    for gamma, smaller, larger in zip((10, 100), stretches[1:], stretches):
+        record(at_most(f"P2/P1, gamma = {gamma}, over that of a tenth", smaller / larger, 1.0,
                        "the energy grows with gamma"))
 
 
@@ -190,8 +190,8 @@ def test_surface_stability(record):
     omitted="orders of elements by themselves: growth-surface-confined; accurate, exact: as fast")
 @pytest.mark.parametrize("preset", ["paper", "fast"])
 def test_fold(preset, record):
-    """A plug that grows alike everywhere between the walls ends as a fold where its area has grown by 3.38; born
-    without stress it grows on.
+    """A plug that grows uniformly between the walls ends as a fold when its area has grown by a factor of 3.38. If new
+    biomass is born without stress, it continues to grow.
 
     Norm: area at the end over that at the start.
     """

@@ -85,8 +85,8 @@ def _outcome(tables: dict, folder: Path) -> Outcome:
     try:
         with limited(LIMIT):
             run(load_scene(tables), folder)
-    except (SceneError, SimulationError, TooLong) as error:
-        refusal = str(error)
+    except (SceneError, SimulationError, TooLong) as failure:
+        refusal = str(failure)
     files = run_files.Run(folder, tables) if (folder / "timeseries.csv").is_file() else None
     return Outcome(files, refusal)
 
@@ -107,7 +107,7 @@ def _refusal(message: str, room: Path) -> Iterator[Check]:
     named = [Path(name) for name in FILE.findall(message)]
     folders = [Path("/"), *room.iterdir()]
     missing = [path for path in named if not any((folder / path).exists() for folder in folders)]
-    yield at_most("files that a refusal names and that are not there", len(missing), 0, "a user looks there")
+    yield at_most("files that a refusal names and that do not exist", len(missing), 0, "a user looks there")
 
 
 def _advised_scenes(tables: dict, message: str) -> Iterator[dict]:
@@ -141,10 +141,10 @@ def _is_right(tables: dict, folder: Path) -> bool:
 
 
 def member(seed: int) -> Check:
-    """Check that no check of a member fails, and that those do which are known to. The name lists them."""
-    known = KNOWN.get(seed, set())
-    checks = judge(seed)
-    failed = [f"{check.quantity} {check.value:.3g}" for check in checks if check.holds == (check.quantity in known)]
+    """Check that the checks of a member hold, except for those that are known to fail. The name lists the others."""
+    known_failures = KNOWN.get(seed, set())
+    failed = [f"{check.quantity} {check.value:.3g}" for check in judge(seed)
+              if check.holds == (check.quantity in known_failures)]
     message = f": {'; '.join(failed)[:600]}" if failed else ""
     return at_most(f"{hostile.kind(seed)}{message}", len(failed), 0, "reference/run_files.py; a refusal's advice works")
 

@@ -97,12 +97,12 @@ def _edge_wide(computed: Run, fine: Run, preset: str) -> Iterator:
     surface_length, expected = (_contact_length(run.end.pore.outline) for run in (computed, fine))
     fall = -np.diff([width - line["thickness_um"] for line in computed.rows if not line["contact"]]).min(initial=0.0)
     share, late = LATE[computed.scene.numerics.time]
-    known = 2 * edge + share * np.sqrt(8 * width * fall)
-    yield at_most("length of the contact surface against a finer run, um", abs(surface_length - expected), known,
+    tolerance = 2 * edge + share * np.sqrt(8 * width * fall)
+    yield at_most("length of the contact surface against a finer run, um", abs(surface_length - expected), tolerance,
                   f"an edge of the interface at each end{late}")
-    tips = {tip: known * film / width / 2 / abs(fine.last[tip]) for tip in SHAPE[2:]}
-    for name, more in {DRIVE[0]: known * ratio / loss, **tips}.items():
-        yield hard.close(computed, fine, preset, name, allowed=TOLERANCE[preset] + more)
+    tips = {tip: tolerance * film / width / 2 / abs(fine.last[tip]) for tip in SHAPE[2:]}
+    for name, extra in {DRIVE[0]: tolerance * ratio / loss, **tips}.items():
+        yield hard.close(computed, fine, preset, name, allowed=TOLERANCE[preset] + extra)
 
 
 def _contact_length(shape: Outline) -> float:
@@ -120,7 +120,7 @@ def contact_rests(run: Run) -> list[Check]:
     joins = [_closing(shape, width, film, angle) for shape in shapes]
     crossed = [shape.points[:, 1].max() > width or shape.points[:, 1].min() < 0 for shape in shapes]
     return [at_most("films or wedges that should have closed", sum(joins), 0, "contact rests (2.3.3)"),
-            at_most("instants with nodes beyond a wall", sum(crossed), 0, "the walls hold"),
+            at_most("instants with nodes beyond a wall", sum(crossed), 0, "the walls are rigid"),
             at_least("instants in contact", len(shapes) - len(before), 1, "else less is tested"),
             at_least("thinnest film left open, um", min(before, default=film), film, "2.3.3: it closes")]
 
@@ -142,7 +142,7 @@ def _clearances(shape: Outline, width: float, film: float, angle: float) -> dict
 CONTACT = HardCase(
     7, "contact", "Film of 2 um and contact, with remeshing forced just before and after",
     "The same shape and flow with and without forced remeshes, no film under 2 um left, the area that of the biomass",
-    "A film that is passed over in one step, overlaps the wall, or a remesh that moves the contact",
+    "A step that passes over the film or overlaps the wall, or a remesh that moves the contact",
     {"as it comes": partial(film_closes, simulator=simulation.simulate),
      "remeshed at every step": partial(film_closes, simulator=remeshing_always)},
     mutants=("hard-contact-passed-over",))
@@ -180,8 +180,8 @@ def _sides(shape: Outline) -> list[bool]:
 
 def in_a_wedge(preset: str) -> list:
     """The stage alone: a mesh around a plug with sides at the least angle, and the flow through it."""
-    loss, fine = (_loss(hard.load("wide", name, 'pore.width="20 um"', *more))
-                 for name, more in ((preset, ()), ("accurate", ("numerics.refinement=1",))))
+    loss, fine = (_loss(hard.load("wide", name, 'pore.width="20 um"', *options))
+                 for name, options in ((preset, ()), ("accurate", ("numerics.refinement=1",))))
     return [at_most("head loss against a finer mesh", abs(loss / fine - 1), 3 * TOLERANCE[preset],
                     "that of velocity, times three: the loss is lambda h^-3")]
 
@@ -200,8 +200,8 @@ def wedges_close(preset: str) -> list:
     return [run, contact_rests(run),
             at_least("length of the contact surface at the end, over that at first", lengths[-1] / lengths[0], 1.5,
                      "nodes never leave; else less is tested"),
-            at_most("um by which it ever shrinks", max(0.0, -np.diff(lengths).min(initial=0.0)), 0.5,
-                    "nodes keep the wall; between fixed nodes the surface may slide")]
+            at_most("largest decrease of this length, um", max(0.0, -np.diff(lengths).min(initial=0.0)), 0.5,
+                    "nodes stay on the wall; between fixed nodes the surface may slide")]
 
 
 ANGLE = HardCase(
@@ -296,8 +296,8 @@ def even(preset: str, theta: float) -> list[Check]:
     body, _ = seed(preset)
     solution = grown(body, np.full(len(body.reference), theta))
     push = neo_hookean.free_growth_pressure(theta)
-    apart = largest(solution.position / np.sqrt(theta) - body.reference) / RADIUS
-    return [at_most(f"places against theta^1/2 X, theta = {theta:g}, over the radius", apart, 1e-8, "exact; round-off"),
+    error = largest(solution.position / np.sqrt(theta) - body.reference) / RADIUS
+    return [at_most(f"places against theta^1/2 X, theta = {theta:g}, over the radius", error, 1e-8, "exact; round-off"),
             at_most("pressure against the closed form", largest(solution.pressure / push - 1), 1e-6, "as above")]
 
 
@@ -328,10 +328,10 @@ def uneven(preset: str, inner: float, outer: float, pressed: bool = False) -> It
     yield at_most(f"radius of the rim, {span}", largest(np.hypot(*solution.position[rim].T) / size - 1), bound, origin)
     if pressed:
         corners = body.reference[: body.corners]
-        far = np.hypot(*corners.T) > RADIUS / 4
-        push = exact.pressure(*corners[far].T)
-        wrong = np.linalg.norm(solution.pressure[far] - push) / np.linalg.norm(push)
-        yield at_most("pressure outside of R_0 / 4, root of mean squares", wrong, PRESSURE[preset],
+        outer_corners = np.hypot(*corners.T) > RADIUS / 4
+        push = exact.pressure(*corners[outer_corners].T)
+        pressure_error = np.linalg.norm(solution.pressure[outer_corners] - push) / np.linalg.norm(push)
+        yield at_most("pressure outside of R_0 / 4, root of mean squares", pressure_error, PRESSURE[preset],
                       "[E6]; first order at least: half of h / R")
 
 
@@ -379,7 +379,7 @@ def one_step(preset: str) -> list:
                     "C to 1e-7 of the supply"),
             at_most("thickness against the root of it, relative", abs(thickness / np.sqrt(expected) - 1), 1e-4,
                     "uniform growth keeps the shape; arcs are parabolas"),
-            at_most("steps", sum(len(each.ledgers) for each in run.instants), 1, "the one step that is asked for")]
+            at_most("steps", sum(len(instant.ledgers) for instant in run.instants), 1, "the one requested step")]
 
 
 def long_steps(preset: str) -> list:
@@ -396,8 +396,8 @@ def long_steps(preset: str) -> list:
 UPDATES = {"updates": 0.06, "midpoint": 0.0}
 LONG = HardCase(
     11, "three-hours", "A growth step of 3 h",
-    "The exact exponential where rates are constant; else the finer run's numbers, by steps cut where they err",
-    "Newton's method that fails on a step that makes the area half as large again, or an error that no one sees",
+    "The exact exponential if rates are constant; else the numbers of a finer run, with shorter steps where they err",
+    "Newton's method that fails on a step in which the area grows by half, or an error that is not detected",
     {"constant rates": one_step, "base, 25 um": long_steps},
     mutants=("hard-estimate-ignored",))
 
@@ -408,9 +408,9 @@ def decay(preset: str) -> Iterator:
                         'output.times=["200 h", "1000 h", "2000 h"]')
     area = run.over_first()
     yield run
-    for time, left in zip(run.column("time_h")[1:], area[1:]):
+    for time, computed in zip(run.column("time_h")[1:], area[1:]):
         yield at_most(f"area over 0.2 + 0.8 exp(-b m_A t) at {time:g} h, less one",
-                      abs(left / runs.mass_after(run.scene, time) - 1), 1e-6, "C to 1e-7 of the supply")
+                      abs(computed / runs.mass_after(run.scene, time) - 1), 1e-6, "C to 1e-7 of the supply")
     yield at_least("least area over that of the seed", area.min(), 0.2, "1 - f_d is never degraded")
 
 

@@ -39,21 +39,21 @@ def remeshes(preset: str) -> list:
     for index in range(FIFTY):
         finer = replace(original.numerics, refinement=original.numerics.refinement * (0.85, 1.0, 1.15)[index % 3])
         last, _ = remeshing.remesh(Remeshing.of(replace(original, numerics=finer)), last, last, speed)
-    without, after = (_numbers(original, _step(original, start).pore) for start in (first, last))
+    unremeshed, after = (_numbers(original, _step(original, start).pore) for start in (first, last))
     return [run, *_conserved(first, last),
-            *hard.alike("after a step more, with and without them", NAMES, after, without, preset)]
+            *hard.alike("after a step more, with and without them", NAMES, after, unremeshed, preset)]
 
 
 def _conserved(first: Pore, last: Pore) -> list[Check]:
-    before, after = (one.space.integration.to_nodes(one.inert / (one.active + one.inert))[one.mesh.body]
-                     for one in (first, last))
+    before, after = (state.space.integration.to_nodes(state.inert / (state.active + state.inert))[state.mesh.body]
+                     for state in (first, last))
     beyond = max(before.min() - after.min(), after.max() - before.max(), 0.0) / np.ptp(before)
     return [at_most("area, relative change", abs(last.outline.area / first.outline.area - 1), 1e-10,
                     "outlines are split on themselves"),
             at_most("biomass, relative change", abs(last.mass / first.mass - 1), 1e-8, "the transfer conserves it"),
             at_most("X_I, relative change", abs(last.inert.sum() / first.inert.sum() - 1), 1e-8, "as above"),
             at_most("share of X_I beyond where it was, over its range", beyond, 0.05,
-                    "projection overshoots by a part of a jump that there is not")]
+                    "projection overshoots by a part of a jump, and this field has none")]
 
 
 def _step(scene: Scene, start: Pore):
@@ -73,7 +73,7 @@ def _numbers(scene: Scene, state: Pore) -> list[float]:
 
 REMESHES = HardCase(
     13, "remeshes", "Fifty forced remeshes",
-    "Area and biomass as before, X_I and the next step as without them",
+    "The area and biomass of before, and X_I and the next step of a run without them",
     "Mass that drifts by percents (30 % in 40 remeshes by linear interpolation), or places at t = 0 that fold",
     {"base at 4 h": remeshes},
     mutants=("hard-inert-degraded-at-a-remesh", "theta-anew-at-a-remesh"))
@@ -88,7 +88,8 @@ def cocircular(preset: str) -> list:
         corners = grid.straight
         covered = corners.areas.sum() / (corners.width * np.ptp(corners.ends))
         checks += [at_most(f"area covered, noise {size:g}", abs(covered - 1), 1e-12, "round-off"),
-                   at_least(f"least quality, noise {size:g}", corners.quality.min(), 0.2, "a third of what is poor"),
+                   at_least(f"least quality, noise {size:g}", corners.quality.min(), 0.2,
+                            "a third of the limit for a poor triangle"),
                    hard.promised(f"head loss against no noise, noise {size:g}", abs(loss / exact - 1), preset)]
     return checks
 
@@ -117,11 +118,11 @@ def nearly_same(preset: str) -> list:
     inner = ~np.isin(np.arange(len(places)), grid.topology.body_loop)
     checks, random = [], np.random.default_rng(8)
     for noise in (0.0, 1e-14, 1e-11, 1e-8):
-        other = places.copy()
-        other[inner] += noise * random.uniform(-1, 1, (inner.sum(), 2))
-        carried = TRANSFER[grid.geometry](places, cells, field, other, cells)
+        moved_places = places.copy()
+        moved_places[inner] += noise * random.uniform(-1, 1, (inner.sum(), 2))
+        carried = TRANSFER[grid.geometry](places, cells, field, moved_places, cells)
         checks.append(at_most(f"largest change of a field of size one, noise {noise:g} um",
-                              np.abs(carried - field).max(), 1e-9 + noise, "the identity, and what the field changes"))
+                              np.abs(carried - field).max(), 1e-9 + noise, "the identity, and the change of the field"))
     return checks
 
 
@@ -137,7 +138,7 @@ def poor(preset: str) -> list:
     """Base from 20 um with poor triangles in the fluid: two steps of 12 min against those from a good mesh."""
     scene = hard.load("base", preset, 'aggregate.radius="20 um"')
     good, _ = hard.solved_seed(scene)
-    bad, count = _spoilt(good)
+    bad, count = _with_poor_triangles(good)
     ends = []
     for start in (good, bad):
         first = _step(scene, start)
@@ -148,7 +149,7 @@ def poor(preset: str) -> list:
             *hard.alike("after two steps", NAMES, ends[1], ends[0], preset)]
 
 
-def _spoilt(good: Pore) -> tuple[Pore, int]:
+def _with_poor_triangles(good: Pore) -> tuple[Pore, int]:
     """The pore with straight edges and randomly moved inner nodes of the fluid, and its number of poor triangles.
 
     The nodes move as far as possible without turning a triangle over.
@@ -166,13 +167,13 @@ def _spoilt(good: Pore) -> tuple[Pore, int]:
         moved = good.moved(points)
         if moved.mesh.areas.min() > 0.02 * straight.areas.min() and not moved.mesh.turned_over().any():
             return moved, np.count_nonzero(moved.mesh.quality < POOR)
-    raise RuntimeError("no such mesh")
+    raise RuntimeError("no displacement leaves all triangles upright")
 
 
 POOR_MESH = HardCase(
     19, "poor-mesh", "Poor initial mesh",
     "A new mesh within two steps, and the shape and flow of a good start",
-    "Triangles turned over that no one notices",
+    "Triangles that are turned over without an error",
     {"nodes moved at random": poor}, refusable=("nodes moved at random",),
     mutants=("hard-poor-mesh-kept",))
 
@@ -191,13 +192,13 @@ def units(preset: str, length: float, time: float) -> list:
     scene = hard.load("base", preset, 'aggregate.radius="15 um"', 'growth.end="2.4 h"', 'growth.time_step="1.2 h"',
                         'output.times=["2.4 h"]')
     rescaled = parse_scene(scene_tables(problems.scaled(scene, length, time)), "scaled", "scaled")
-    plain, other = hard.run_scene(scene), hard.run_scene(rescaled)
+    plain, converted = hard.run_scene(scene), hard.run_scene(rescaled)
     exact = np.log2(length) % 1 == 0
     bound, origin = (1e-9, "dimensions; round-off") if exact else (
         TOLERANCE[preset], "round-off makes another mesh; " + hard.PROMISED[preset])
-    return [plain, other, *(
+    return [plain, converted, *(
         at_most(f"{column}, relative difference",
-                abs(other.last[column] / (length**along * time**during) / plain.last[column] - 1), bound, origin)
+                abs(converted.last[column] / (length**along * time**during) / plain.last[column] - 1), bound, origin)
         for column, (along, during) in COLUMNS.items())]
 
 
@@ -206,7 +207,7 @@ SCALES = {"lengths x 1e6": (1e6, 1.0), "lengths x 2^20": (2.0**20, 1.0), "length
 UNITS = HardCase(
     17, "units", "Extreme units: lengths times 1e6, times times 1e-6",
     "The same numbers times their unit",
-    "A length or a time that is written into the code: a tolerance, a smallest step, a size",
+    "A length or a time in the code: a tolerance, a smallest step, a size",
     {label: partial(units, length=length, time=time) for label, (length, time) in SCALES.items()},
     refusable=tuple(SCALES),
     mutants=("length-scale",))
@@ -238,7 +239,7 @@ DRAWS = range(10)
 RANDOM = HardCase(
     22, "random", "Parameters drawn at random within physical ranges",
     "Balances, bounds and area by biomass in every run, or a refusal that says what to change",
-    "A run that ends with a number that is none, or with mass made or lost",
+    "A run that ends with NaN, or that creates or loses mass",
     {f"draw {seed}": partial(at_random, seed=seed) for seed in DRAWS},
     refusable=tuple(f"draw {seed}" for seed in DRAWS),
     mutants=("reprojection-left-out",))
@@ -273,14 +274,15 @@ def _first_step(preset: str, *changes: str) -> tuple[Run, StepResult]:
 
 def huge(preset: str) -> list:
     """One step of 6 min with 1e5 nodes, against the mesh of the preset."""
-    run, near = _first_step(preset)
+    run, own_step = _first_step(preset)
     fine_preset, refinement = HUGE[run.scene.numerics.order]
-    fine, far = _first_step(fine_preset, f"numerics.refinement={refinement}")
-    shapes = [(step.pore.outline.area, step.pore.outline.thickness, step.pore.outline.upstream) for step in (near, far)]
+    fine, fine_step = _first_step(fine_preset, f"numerics.refinement={refinement}")
+    outlines = [step.pore.outline for step in (own_step, fine_step)]
+    shapes = [(outline.area, outline.thickness, outline.upstream) for outline in outlines]
     return [fine, run, at_least("nodes", fine.instants[0].pore.space.count, 1e5, "else less is tested"),
-            at_most("in - out - consumed over the step, over in", problems.substrate_defect([far.ledger]),
+            at_most("in - out - consumed over the step, over in", problems.substrate_defect([fine_step.ledger]),
                     1e-12 * fine.last["nodes"], "Newton's tolerance of 1e-12 a row, times the rows"),
-            at_most("biomass after - before - made, over after", problems.biomass_defect([far.ledger]),
+            at_most("biomass after - before - made, over after", problems.biomass_defect([fine_step.ledger]),
                     hard.BALANCE, hard.MEAN),
             *hard.close(run, fine, preset, *DRIVE, *EFFLUENTS),
             *hard.alike("after the step, own mesh", NAMES, *shapes, preset)]

@@ -74,14 +74,14 @@ def exhausted(preset: str, scarce: str) -> list:
         supplies = (10.0 if name == scarce else plenty for name in NAMES)
         return hard.run_packaged("wide", preset, *disc(80, SLOW), *supply(*supplies))
 
-    run, more = run_with(1000.0), run_with(1e6)
+    run, larger_excess = run_with(1000.0), run_with(1e6)
     column = f"effluent_{scarce}_mg_per_L"
     return [run, _stoichiometry(run),
             at_most(f"least {scarce} over its supply", run.last[f"{scarce}_min_mg_per_L"] / 10, 0.02,
                     "else less is tested"),
             at_most(f"{column}: 1000 mg/L of the other for 1e6, over the supply",
-                    abs(run.last[column] - more.last[column]) / 10, 2e-3,
-                    "the other's m is 0.997 or more: uptake changes by less, and so does what leaves")]
+                    abs(run.last[column] - larger_excess.last[column]) / 10, 2e-3,
+                    "the other's m is 0.997 or more: uptake changes by less, and so do effluents")]
 
 
 def _stoichiometry(run: Run) -> list[Check]:
@@ -102,8 +102,8 @@ def _stoichiometry(run: Run) -> list[Check]:
 
 EXHAUSTED = HardCase(
     2, "exhausted", "One substrate exhausted, the other in excess",
-    "Uptake in the ratio of (7) and (8), and no change of what leaves when the excess is a thousandfold",
-    "Uptake of what is not there, or a substrate in excess that is clipped or overshoots",
+    "Uptake in the ratio of (7) and (8), and the same effluents with a thousandfold excess",
+    "Uptake of an exhausted substrate, or a substrate in excess that is clipped or overshoots",
     {f"{scarce} exhausted": partial(exhausted, scarce=scarce) for scarce in NAMES},
     mutants=("hard-decay-unlimited",))
 
@@ -112,9 +112,9 @@ EXHAUSTED = HardCase(
 SHARP = tuple(f'substrates.{name}.half_saturation="1e-5 mg/L"' for name in NAMES)
 
 
-def front(preset: str, radius: float, more: tuple[str, ...] = ()) -> list:
+def front(preset: str, radius: float, changes: tuple[str, ...] = ()) -> list:
     """A half-disc with half saturations of a millionth of the supply."""
-    return hard.against("wide", preset, disc(radius, *SHARP, *more), *EFFLUENTS, refinement=0.8)[2]
+    return hard.against("wide", preset, disc(radius, *SHARP, *changes), *EFFLUENTS, refinement=0.8)[2]
 
 
 #: Half thickness and films of the slab (um), and its penetration depth over the half thickness.
@@ -157,7 +157,7 @@ ZERO_ORDER = HardCase(
     "The closed form of zero-order uptake in a slab, and the effluents of a finer run around half-discs",
     "Newton's method that cycles at the front, or concentrations under zero behind it",
     {"slab": slab_front, "R = 60 um": partial(front, radius=60), "R = 80 um": partial(front, radius=80),
-     "0.35 m/d, R = 40 um": partial(front, radius=40, more=(SLOW,))},
+     "0.35 m/d, R = 40 um": partial(front, radius=40, changes=(SLOW,))},
     refusable=("slab",),
     mutants=("hard-front-smoothed", "hard-newton-unshortened"))
 
@@ -181,7 +181,7 @@ def exponential(run: Run) -> list[Check]:
 SATURATED = HardCase(
     21, "saturated", "Supply of 1000 K_s",
     "Growth between the exponentials at the least concentration and at the supply, 0.3 % apart in their rates",
-    "A balance that no longer closes, as uptake is a small part of what passes", {"base": saturated},
+    "A balance that does not close, because uptake is a small part of the flux", {"base": saturated},
     mutants=("decay-leaves-all",))
 
 
@@ -213,9 +213,9 @@ def _more_than(faster: Run, slower: Run, preset: str) -> list[Check]:
     law, both = faster.scene.kinetics, faster.scene.substrates
     m_a, m_d = (s.supply / (s.supply + s.half_saturation) for s in (both.acceptor, both.donor))
     most = law.maximum_utilization_rate * m_a * m_d * law.maximum_density * faster.last["aggregate_area_um2"]
-    uptake, before = (run.end.solved.fluxes[1].consumed for run in (faster, slower))
-    return [between("donor taken up over what it would be at the supply everywhere", uptake / most,
-                    before / most * (1 - TOLERANCE[preset]), 1.0, "the faster, the more: at least that at a tenth")]
+    uptake, slower_uptake = (run.end.solved.fluxes[1].consumed for run in (faster, slower))
+    return [between("uptake of donor over that at the supply everywhere", uptake / most,
+                    slower_uptake / most * (1 - TOLERANCE[preset]), 1.0, "it rises with the velocity: that at a tenth")]
 
 
 def fast_growth(preset: str, factor: float) -> list:
@@ -261,21 +261,21 @@ def trickle(preset: str, velocity: str, balance: float) -> list:
         ratio = law.acceptor_to_donor_ratio + decay * (c + K) / (law.maximum_utilization_rate * c)
         return both.acceptor.supply - ratio * (supply - c)
 
-    left, u = brentq(missing, 1e-3, supply * (1 - 1e-9)), run.last["mean_velocity_m_per_d"] / M_PER_D
+    remaining, u = brentq(missing, 1e-3, supply * (1 - 1e-9)), run.last["mean_velocity_m_per_d"] / M_PER_D
     peclet = u * run.last["thickness_um"] / both.donor.diffusivity_in_aggregate
-    apart = abs(run.last[EFFLUENTS[1]] - left) / supply
+    difference = abs(run.last[EFFLUENTS[1]] - remaining) / supply
     return [run,
             at_most("acceptor leaving, over the supply", run.last[EFFLUENTS[0]] / both.acceptor.supply, peclet,
                     "C varies by u R / D over the aggregate"),
-            at_most("donor leaving against the closed form, over the supply", apart, peclet, "as above")]
+            at_most("donor leaving against the closed form, over the supply", difference, peclet, "as above")]
 
 
 #: Velocities (m/d), and bounds of the substrates' balances.
 TRICKLES = {"1e-4": 1e-8, "1e-6": 1e-6, "1e-12": 1e-6}
 STILL = HardCase(
     5, "still", "No flow, and flow so small that the inlet's condition degenerates",
-    "The closed form of a pore in which diffusion is everything, or a refusal that names the Peclet number",
-    "A singular system that is solved all the same; concentrations above the supply",
+    "The closed form of a pore with diffusion alone, or a refusal that names the Peclet number",
+    "A singular system that is solved nevertheless; concentrations above the supply",
     {"velocity 0": no_flow, "without [flow]": still,
      **{f"{slow} m/d": partial(trickle, velocity=slow, balance=missing) for slow, missing in TRICKLES.items()}},
     refusable=("velocity 0", "1e-4 m/d", "1e-6 m/d", "1e-12 m/d"),
@@ -287,8 +287,8 @@ def viscous(preset: str, ratio: float) -> list:
     changes = disc(80, f"flow.viscosity_ratio={ratio!r}")
     run, _, checks = hard.against("wide", preset, changes, *DRIVE, *EFFLUENTS)
     if ratio == 1:
-        apart = abs(run.last[DRIVE[0]] / hard.clean_conductivity(run.scene) - 1)
-        checks.append(hard.promised("conductivity against Poiseuille's", apart, preset))
+        difference = abs(run.last[DRIVE[0]] / hard.clean_conductivity(run.scene) - 1)
+        checks.append(hard.promised("conductivity against Poiseuille's", difference, preset))
     return checks
 
 

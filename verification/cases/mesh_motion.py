@@ -45,7 +45,7 @@ LINEAR = "the field is linear: round-off"
 @parametrize("geometry", EITHER)
 def test_plug(geometry, record):
     """A plug that slides and stretches along the pore, and a layer that thickens under a wall, stretch the fluid beside
-    them linearly; a plug that rests moves nothing; on straight triangles and on curved ones.
+    them linearly. A plug at rest does not move the mesh. Both hold on straight triangles and on curved ones.
 
     Norm: largest difference of displacement over the aggregate's largest, for gamma = 0.1, 1, 10.
     """
@@ -158,8 +158,8 @@ SEGMENT_MOTIONS = {"grows": lambda x, y: np.array([x, y]), "slides": lambda x, y
     references=("quadratic_mesh_motion",), runs_with="3")
 @parametrize("geometry", EITHER)
 def test_half_disc(geometry, record):
-    """Around a half-disc that grows, or slides along the wall, the fluid is displaced as an independent code displaces
-    it, for three gamma, on straight triangles and on curved ones; both codes refined.
+    """Around a half-disc that grows, or slides along the wall, the displacement of the fluid is that of an independent
+    code, for three gamma, on straight triangles and on curved ones; both codes are refined.
 
     Norm: L2 of the difference of the whole displacement over that of the displacement.
     """
@@ -183,7 +183,7 @@ def _comparison(geometry: int, contact: float, levels, motion: str, gamma: float
 @parametrize("geometry", EITHER)
 def test_corner(geometry, record):
     """Around an aggregate whose contact angle is 60 degrees the order falls to twice the exponent of the fluid's corner
-    of 120 degrees, for three gamma, on straight triangles and on curved ones; both codes refined.
+    of 120 degrees, for three gamma, on straight triangles and on curved ones; both codes are refined.
 
     Norm: L2 of the difference of the whole displacement over that of the displacement.
     """
@@ -236,14 +236,14 @@ STEPS = 18
     references=("quadratic_mesh_motion",), runs_with="3")
 @parametrize("geometry", EITHER)
 def test_growth(geometry, record):
-    """A half-disc that doubles its area, or slides by its radius, in 18 steps (under a narrow film: grows by 30 %,
-    slides by half of it) turns no triangle over, leaves no gap, and keeps the nodes of walls, inlet and outlet on their
-    lines, whether triangles are straight or curved.
+    """If a half-disc doubles its area or slides by its radius in 18 steps (under a narrow film: grows by 30 % or slides
+    by half of its radius), no triangle turns over, no gap opens, and the nodes of walls, inlet and outlet stay on their
+    lines, with straight and with curved triangles.
 
     Norm: least area of a triangle over its own at first; area of fluid and biomass, relative; distance from a line.
     """
-    for radius, factor, way in JOURNEYS:
-        for name, stretch, shift in (("grown", factor ** (0.5 / STEPS), 0.0), ("slid", 1.0, way * radius / STEPS)):
+    for radius, factor, slide in JOURNEYS:
+        for name, stretch, shift in (("grown", factor ** (0.5 / STEPS), 0.0), ("slid", 1.0, slide * radius / STEPS)):
             first = _around(radius, geometry)
             record(_journey_checks(f"R = {radius:g} um, {name}", first, _journey(first, stretch, shift)))
 
@@ -262,15 +262,15 @@ def _journey(grid: Mesh, stretch: float, shift: float) -> Mesh:
 
 def _journey_checks(name: str, first: Mesh, last: Mesh) -> list:
     """Checks of one journey."""
-    apart = np.abs(last.points - first.points)
+    displacement = np.abs(last.points - first.points)
     lines = ((0, first.ends), (1, (0.0, first.width)))
-    off = max(apart[np.isin(first.points[:, axis], line), axis].max() for axis, line in lines)
+    off_line = max(displacement[np.isin(first.points[:, axis], line), axis].max() for axis, line in lines)
     return [at_least(f"least area over its own at first: {name}", (last.areas / first.areas).min(), 0.25,
                      "upright, and not near turning over"),
             at_most(f"triangles turned over: {name}", last.turned_over().sum(), 0.0, "at no node or quadrature point"),
             at_most(f"area of fluid and biomass: {name}", abs(_area(last) / _area(first) - 1), 1e-12,
                     "no gap, no overlap"),
-            at_most(f"off its line (um): {name}", off, 0.0, "nodes slide; the four corners, on two lines, rest")]
+            at_most(f"off its line (um): {name}", off_line, 0.0, "nodes slide; the four corners, on two lines, rest")]
 
 
 def _area(grid: Mesh) -> float:
@@ -286,19 +286,19 @@ STRIDES = (0.08, 0.04, 0.02, 0.01)
     references=("quadratic_mesh_motion",), runs_with="3")
 @parametrize("geometry", EITHER)
 def test_round_trip(geometry, record):
-    """There and back, the nodes return to second order in the length of the way, since the way back starts from the
-    moved mesh; beside a plug, where the motion is linear, to round-off.
+    """After a motion and its reverse the nodes return to second order in the length of the motion, because the reverse
+    starts from the moved mesh; beside a plug, where the displacement is linear, to round-off.
 
     Norm: root mean square of the nodes' distances from where they started, over the radius, or the largest.
     """
     grid = _around(20.0, geometry)
     for name, growth, shift, ceiling in (("grows", 1.0, 0.0, 4e-5), ("slides", 0.0, 20.0, 4e-6)):
-        back = [_round_trip(grid, 1 + growth * stride, shift * stride) for stride in STRIDES]
-        record(study(f"a half-disc {name}", STRIDES, np.sqrt(np.mean(np.square(back), axis=(1, 2))) / 20.0, 2,
+        distances = [_round_trip(grid, 1 + growth * stride, shift * stride) for stride in STRIDES]
+        record(study(f"a half-disc {name}", STRIDES, np.sqrt(np.mean(np.square(distances), axis=(1, 2))) / 20.0, 2,
                      "(35) is linear in the motion on a given mesh: second order", ceiling=ceiling, band=0.1))
     plug = _nodes(meshes.plug(ENDS, WIDTH, HALF, 3.0, seed=4), geometry)
-    missed = largest(_round_trip(plug, np.array([1.2, 1.0]), 10.0))
-    record(at_most("a plug that stretches and slides (um)", missed, 1e-11, "linear on each side: round-off"))
+    distance = largest(_round_trip(plug, np.array([1.2, 1.0]), 10.0))
+    record(at_most("a plug that stretches and slides (um)", distance, 1e-11, "linear on each side: round-off"))
 
 
 def _round_trip(grid: Mesh, stretch: float | np.ndarray, shift: float) -> np.ndarray:
@@ -315,28 +315,28 @@ HALF_BENT = "the map is one to one while it is bent by less than half the height
     mutants=("more-poor-triangles", "turned-over-accepted", "quality-halved", "remeshed-too-late",
              "bent-over-accepted"), runs_with="1 2 3")
 def test_criterion(record):
-    """An equilateral triangle stretched by s has the quality 2 s / (1 + s^2), however it lies; a mesh is remade if
-    seven triangles are stretched by more than 3, or one is turned over, and not if six are; a curved triangle of the
-    aggregate may be bent, but not so far that it turns over at a node.
+    """An equilateral triangle stretched by s in any direction has the quality 2 s / (1 + s^2). A mesh with seven
+    triangles stretched by more than 3, or with one turned over, is not acceptable; with six it is. A curved triangle of
+    the aggregate may be bent, but not so far that it turns over at a node.
 
     Norm: largest difference of the quality; verdicts on meshes with so many triangles stretched.
     """
     stretch = np.random.default_rng(5).uniform(0.1, 8.0, 50)
-    off = largest(_triangles(stretch).quality - 2 * stretch / (1 + stretch**2))
+    quality_error = largest(_triangles(stretch).quality - 2 * stretch / (1 + stretch**2))
     verdicts = {"six by 3.001": (_stretched(6, 3.001), True, "3.5"),
                 "seven by 2.999": (_stretched(7, 2.999), True, "3.5"),
                 "seven by 3.001": (_stretched(7, 3.001), False, "3.5"),
                 "one turned over": (_stretched(1, -1.0), False, "3.5"),
                 "one edge bent by 0.49": (_bowed(0.49), True, HALF_BENT),
                 "one edge bent by 0.51": (_bowed(0.51), False, HALF_BENT)}
-    record(at_most("quality", off, 1e-12, "closed form: round-off"))
-    for name, (mesh, fine, why) in verdicts.items():
-        record(at_most(f"wrong verdicts: {name}", mesh.acceptable() != fine, 0.0, why))
+    record(at_most("quality", quality_error, 1e-12, "closed form: round-off"))
+    for name, (mesh, acceptable, why) in verdicts.items():
+        record(at_most(f"wrong verdicts: {name}", mesh.acceptable() != acceptable, 0.0, why))
 
 
-def _stretched(count: int, by: float) -> Mesh:
+def _stretched(count: int, stretch: float) -> Mesh:
     """Thirty triangles, of which ``count`` are stretched."""
-    return _triangles(np.where(np.arange(30) < count, by, 1.0))
+    return _triangles(np.where(np.arange(30) < count, stretch, 1.0))
 
 
 def _bowed(bow: float) -> Mesh:

@@ -32,7 +32,7 @@ def test_mass(order, record):
     and no others.
 
     Norm: largest relative difference over the aggregate's nodes (linear) or quadrature points; weights of the points
-    less those worked out here, over the largest.
+    less independent ones, over the largest.
     """
     def density(x, y):
         return aggregates.DENSITY * (1 + 0.02 * np.sin(0.3 * x + 0.2 * y))
@@ -65,19 +65,19 @@ def test_half_disc(order, record):
     scene = aggregates.base_scene(order=order)
     state = aggregates.seed(RADIUS, order=order)
     rows: list[dict] = []
-    renewed: list[int] = []
+    remesh_updates: list[int] = []
     first = state.mass
     for update in range(1, UPDATES + 1):
-        state, anew = aggregates.update(scene, state, INCREASE)
-        renewed += [update] * anew
+        state, is_new_mesh = aggregates.update(scene, state, INCREASE)
+        remesh_updates += [update] * is_new_mesh
         rows.append(_errors(state, (1 + INCREASE) ** update, first))
     bounds = {"radius": (1e-4, "arcs that are parabolas: (edge / R)^4 / 100")} if order > 1 else {}
     for quantity, value in runs.worst(rows).items():
         record(at_most(quantity, value, *bounds.get(quantity, (1e-12, "closed form: round-off"))))
-    record(at_least("remeshes", len(renewed), 2.0, "else the transfer is not tested"))
+    record(at_least("remeshes", len(remesh_updates), 2.0, "else the transfer is not tested"))
     first = np.ceil(2 * np.log(11 / 8) / np.log(1 + INCREASE))  # 8 R_0 sqrt(theta) > 11 R_0
-    record(at_most("first remesh, updates from (3.1)'s", abs(renewed[0] - first), 0.0,
-                   "meshed to 11 R_0, remade beyond 8 R"))
+    record(at_most("first remesh, updates from that of (3.1)", abs(remesh_updates[0] - first), 0.0,
+                   "meshed to 11 R_0, remeshed beyond 8 R"))
 
 
 def _errors(state, theta: float, first: float) -> dict[str, float]:
@@ -105,18 +105,18 @@ def test_growing(order, record):
     """An aggregate that grows sixfold, seven times faster in front than behind, keeps its biomass to round-off through
     every remesh, restarts theta at J times the density over X_m, and is remeshed in time.
 
-    Norm: biomass less what was made, relative; theta over J less the density over X_m; triangles, and um, by which the
-    criteria are missed; all updates.
+    Norm: biomass over the sum of the first and the new biomass, less 1; theta over J and the density over X_m, less 1;
+    triangles, and um, beyond the criteria; all updates.
     """
     rows = _growth_history("conserving", order)
     record(at_most("biomass", largest(rows["drift"]), 1e-12, "round-off"))
     record(at_most("theta after a remesh", rows["restart"].max(), 1e-12, "J times the density over X_m"))
     record(at_most("triangles under 0.6", rows["poor"].max(), ALLOWED, "remesh criterion (3.5)"))
     record(at_most("missing reach (um)", rows["missing"].max(), 1e-9, "remesh criterion (3.1)"))
-    record(at_least("remeshes", np.count_nonzero(rows["anew"]), 3, "else nothing is tested"))
+    record(at_least("remeshes", np.count_nonzero(rows["new mesh"]), 3, "else nothing is tested"))
     if order == 1:
         record(at_least("drift of the biomass by the paper's transfer", largest(_growth_history("linear", 1)["drift"]),
-                        1e-4, "not conserving [E8]: the case would see it"))
+                        1e-4, "it does not conserve [E8], and the case detects this"))
 
 
 def _growth_history(transfer: str, order: int) -> dict[str, np.ndarray]:
@@ -127,9 +127,9 @@ def _growth_history(transfer: str, order: int) -> dict[str, np.ndarray]:
     for _ in range(GROWING_UPDATES):
         increase = _faster_in_front(state)
         expected += (state.active * increase).sum()
-        state, anew = aggregates.update(scene, state, increase)
-        rows.append({"drift": state.mass / expected - 1, "restart": _restart(state) if anew else 0.0,
-                     "poor": _poor(state), "missing": _missing(state), "anew": anew})
+        state, is_new_mesh = aggregates.update(scene, state, increase)
+        rows.append({"drift": state.mass / expected - 1, "restart": _restart(state) if is_new_mesh else 0.0,
+                     "poor": _poor(state), "missing": _missing(state), "new mesh": is_new_mesh})
     return columns(rows)
 
 
@@ -199,9 +199,9 @@ def _plane(coefficients, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     {f"{transfer}, order {order}": (order, transfer) for order, transfers in TRANSFERS.items()
      for transfer in transfers})
 def test_remesh_linear(order, transfer, record):
-    """Through a remesh of an aggregate that was moved linearly, places at t = 0, densities and pressure that are linear
-    stay so, and theta is det F times the density over X_m, with every transfer; with higher orders both kinds are X_m
-    together, and a share of X_I that is linear stays so.
+    """A remesh of a linearly moved aggregate keeps linear positions at t = 0, densities and pressure, and theta is
+    det F times the density over X_m, with every transfer. With higher orders X_A + X_I stays X_m, and a linear share of
+    X_I stays linear.
 
     Norm: largest relative difference over all nodes or points of the new mesh.
     """
@@ -216,7 +216,7 @@ def test_remesh_linear(order, transfer, record):
     pressure = _plane(PRESSURE, *mesh.points[inside].T)
     theta = np.linalg.det(MOTION) * _at_theta_points(new, sum(exact) / aggregates.DENSITY)
     record(each_at_most({**errors, "pressure": largest(new.pressure[inside] / pressure - 1),
-                         "places at t = 0": largest(new.body.reference @ MOTION.T - positions) / largest(positions),
+                         "positions at t = 0": largest(new.body.reference @ MOTION.T - positions) / largest(positions),
                          "theta": largest(new.theta / theta - 1)}, 1e-12, "linear fields: round-off"))
 
 
@@ -246,8 +246,8 @@ def _moved_linearly(order: int, kinds: dict):
     "reprojection-remesh-order", kind="manufactured", mutants=("theta-without-density", "corners-for-middles"))
 @parametrize("order", aggregates.EVERY)
 def test_remesh_order(order, record):
-    """A remesh carries a smooth density to second order, with higher orders a smooth share of X_I; the next update
-    brings the density back to X_m to second order, and the area to the biomass over X_m exactly.
+    """A remesh transfers a smooth density to second order, and with higher orders a smooth share of X_I. The next
+    update returns the density to X_m to second order, and the area to the biomass over X_m exactly.
 
     Norm: L2 of the density on the new mesh less the exact one, and of the density over X_m less one after an update
     without growth, relative, root mean square over three pairs of meshes a size; area after that update, relative.
@@ -323,10 +323,10 @@ def _density_error(state, exact=aggregates.uniform) -> float:
 
 @pytest.mark.case(
     "reprojection-remesh-arc", kind="exact", mutants=("origin-on-the-chord",), runs_with="1",
-    omitted="orders 2, 3 have arcs, which lie on it")
+    omitted="orders 2, 3 have arcs, which lie on the seed's arc")
 def test_remesh_arc(record):
-    """Where a remesh splits edges of what was the seed's arc, the new nodes were on it at t = 0, the polygon stays what
-    it is, and the next update rounds it.
+    """If a remesh splits edges of the seed's arc, the new nodes were on the arc at t = 0, the polygon does not change,
+    and the next update rounds it.
 
     Norm: largest relative difference; distance of the interface's nodes from a circle, over that before the update.
     """
@@ -335,13 +335,13 @@ def test_remesh_arc(record):
     new = aggregates.remesh(fine, grown)
     after = aggregates.expand(fine, new, 0.0)
     free = new.wall == FREE
-    added = np.count_nonzero(free) / np.count_nonzero(grown.wall == FREE)
-    beside = largest(np.hypot(*new.outline.origin[free].T) / 10 - 1)
-    record(at_most("beside the arc at t = 0", beside, 1e-12, "the seed's arc: round-off"),
+    node_ratio = np.count_nonzero(free) / np.count_nonzero(grown.wall == FREE)
+    off_arc = largest(np.hypot(*new.outline.origin[free].T) / 10 - 1)
+    record(at_most("beside the arc at t = 0", off_arc, 1e-12, "the seed's arc: round-off"),
            at_most("area of the polygon", abs(new.outline.area / grown.outline.area - 1), 1e-12, "round-off"),
            at_most("unroundness left", _unround(after) / _unround(new), 0.25,
                    "edges half as long: a quarter of the sag"),
-           at_least("interface nodes, after over before", added, 1.9, "split, else nothing is tested"))
+           at_least("interface nodes, after over before", node_ratio, 1.9, "split, else nothing is tested"))
 
 
 def _unround(state) -> float:
@@ -357,19 +357,18 @@ SPEED, ENDS = 1.2e5, (-40.0, 30.0)
     "reprojection-beyond-the-ends", kind="exact", mutants=("upstream-reversed", "diffusivity-of-the-acceptor"))
 @parametrize("order", aggregates.EVERY)
 def test_beyond_the_ends(order, record):
-    """On a mesh that reaches further both substrates follow (26) upstream of the old one, each with its own
-    diffusivity, stay constant downstream and are interpolated between; without flow they are the supply beyond both
-    ends.
+    """On a longer mesh both substrates follow (26) upstream of the old mesh, each with its own diffusivity. They stay
+    constant downstream of it, and are interpolated between. Without flow they are the supply beyond both ends.
 
     Norm: largest difference over the supply.
     """
     initial = aggregates.seed_around(meshes.seed(10.0, 1.0, order), 1.0, ends=ENDS, order=order)
     old = _exact(np.clip(initial.space.points[:, 0], *ENDS))
     filled = replace(initial, concentrations=Concentrations(*(SUPPLY * old)))
-    flowing, still = (aggregates.remesh(aggregates.base_scene(order=order), filled, speed) for speed in (SPEED, 0.0))
+    flowing, unmoved = (aggregates.remesh(aggregates.base_scene(order=order), filled, speed) for speed in (SPEED, 0.0))
     x = flowing.space.points[:, 0]
     outside = (x < ENDS[0]) | (x > ENDS[1])
-    computed, resting = (both(new.concentrations) / SUPPLY for new in (flowing, still))
+    computed, resting = (both(new.concentrations) / SUPPLY for new in (flowing, unmoved))
     between = meshes.field_at(initial.space, old.T, flowing.space.points[~outside]).T
     gaps = {"beyond the ends": (computed - _exact(x))[:, outside], "between": computed[:, ~outside] - between,
             "beyond the ends, no flow": resting[:, outside] - 1, "between, no flow": resting[:, ~outside] - between}

@@ -71,8 +71,8 @@ LOCATED = {1: 4e-3, 2: 1e-4, 3: 2e-6}
                                             "interpolation: one order more than the elements'", ceiling)
         for k, ceiling in LOCATED.items()}})
 def test_order(field, measure, method, expected, record):
-    """No transfer loses the accuracy of linear elements, the limiter leaves linear fields alone, and fields of each
-    order are found to their order.
+    """No transfer loses the accuracy of linear elements, the limiter does not change linear fields, and fields of each
+    order are interpolated to their order.
 
     Norm: L2 of a smooth field, interpolated on one mesh and carried to another, root mean square over three pairs a
     size; largest error of a linear field over nine pairs of meshes, over its range; root mean square error at a
@@ -87,8 +87,8 @@ def test_order(field, measure, method, expected, record):
 
 @pytest.mark.case("reprojection-chain", kind="property", mutants=("linear-transfer",), runs_with="1", omitted=MASSES)
 def test_chain(record):
-    """Forty remeshes of a steep field keep its integral to round-off and never raise its square by projection; by
-    linear interpolation they stay within its bounds and change what it integrates to.
+    """Over forty remeshes of a steep field, projection keeps its integral to round-off and never raises the integral of
+    its square. Linear interpolation keeps the field within its bounds and changes its integral.
 
     Norm: change of the integral of a steep field over 40 remeshes, and of its square in each, relative; largest and
     least nodal value.
@@ -96,12 +96,12 @@ def test_chain(record):
     projected, paper = (_remesh_history(carry, steep) for carry in (transfer.project, sampled))
     rise = (projected["square"][1:] / projected["square"][:-1]).max()
     record(at_most("integral by projection", largest(projected["integral"] - 1), 1e-12, "round-off"))
-    record(at_most("square by projection, after over before", rise, 1.0, "a projection makes nothing longer"))
+    record(at_most("square by projection, after over before", rise, 1.0, "a projection raises no norm"))
     record(at_most("largest value by interpolation", paper["largest"].max(), paper["largest"][0],
                    "weights between 0 and 1"))
     record(at_least("least value by interpolation", paper["least"].min(), paper["least"][0], "weights between 0 and 1"))
     record(at_least("integral by interpolation, change", abs(paper["integral"][-1] - 1), 0.02,
-                    "not conserving: the case would see it"))
+                    "it does not conserve, and the case detects this"))
 
 
 def _remesh_history(carry, field) -> dict[str, np.ndarray]:
@@ -138,11 +138,11 @@ FIELDS = {"hill": (steep,), "cylinder": (cylinder,)}
     runs_with="1", omitted=MASSES)
 @parametrize("field", FIELDS)
 def test_bounded_chain(field, record):
-    """Forty remeshes of a steep field keep its integral to round-off and every value in the range of the first; the
-    unlimited projection leaves it, and is hardly more accurate.
+    """Forty remeshes of a steep field keep its integral to round-off and every value in the first range. The unlimited
+    projection leaves this range, and is hardly more accurate.
 
-    Norm: change of the integral of a hill and of a cylinder (a jump from 0 to 1) over 40 remeshes, relative; by how
-    much values leave their range, over it; L2 error over that of the unlimited projection.
+    Norm: change of the integral of a hill and of a cylinder (a jump from 0 to 1) over 40 remeshes, relative; excess of
+    the values over their range, over it; L2 error over that of the unlimited projection.
     """
     limited, free = (_remesh_history(carry, field) for carry in (transfer.project_bounded, transfer.project))
     record(at_most("integral", largest(limited["integral"] - 1), 1e-12, "round-off"))
@@ -188,16 +188,16 @@ def _polynomials(pieces: pairs.Grid) -> float:
     power = np.arange(DEGREE + 1)
     along, across = np.moveaxis(where[..., None] ** power, 2, 0)
     exact = np.outer(*(side ** (power + 1) / (power + 1) for side in (pairs.ENDS[1], pairs.WIDTH)))
-    apart = np.einsum("tq,tqa,tqb->ab", weight, along, across) / exact - 1
-    return largest(apart[np.add.outer(power, power) <= DEGREE])
+    errors = np.einsum("tq,tqa,tqb->ab", weight, along, across) / exact - 1
+    return largest(errors[np.add.outer(power, power) <= DEGREE])
 
 
 @pytest.mark.case(
     "reprojection-projection", kind="cross-code", mutants=("lumped-mass", "corners-for-middles", "contributions-lost"),
     references=("galerkin_transfer",), runs_with="1", omitted=MASSES)
 def test_projection(record):
-    """The projection of a random field is that of a dense code on shapely's pieces; it keeps linear fields, the field's
-    integral and centre, and what it takes from the square is the square of the difference.
+    """The projection of a random field is that of a dense code on shapely's pieces. It keeps linear fields, the field's
+    integral and its centre, and the square decreases by the square of the difference.
 
     Norm: largest difference of nodal values over the field's largest; integrals of the field, of the field times x and
     y, and of its square, relative.
@@ -231,10 +231,10 @@ def _plane_error(computed: np.ndarray, mesh: pairs.Grid) -> float:
 def _pythagoras(old: pairs.Grid, before: np.ndarray, new: pairs.Grid, after: np.ndarray) -> float:
     """|X_old|^2 - |X_new|^2 - |X_old - X_new|^2 over the first: zero if the difference is orthogonal to X_new."""
     corners, of_old, of_new = transfer.supermesh(*old, *new)
-    gap = 0.0
+    difference = 0.0
     for (points, triangles), field, owner, sign in ((old, before, of_old, 1), (new, after, of_new, -1)):
         nodes = triangles[owner][:, None]
-        gap = gap + sign * np.sum(transfer.barycentric(points[nodes], corners) * field[nodes], axis=2)
-    pieces = corners.reshape(-1, 2), np.arange(gap.size).reshape(-1, 3)
-    left = pairs.square(old, before) - pairs.square(new, after) - pairs.square(pieces, gap.ravel())
-    return abs(left) / pairs.square(old, before)
+        difference = difference + sign * np.sum(transfer.barycentric(points[nodes], corners) * field[nodes], axis=2)
+    pieces = corners.reshape(-1, 2), np.arange(difference.size).reshape(-1, 3)
+    defect = pairs.square(old, before) - pairs.square(new, after) - pairs.square(pieces, difference.ravel())
+    return abs(defect) / pairs.square(old, before)

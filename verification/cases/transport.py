@@ -84,7 +84,7 @@ def robin(order: int, peclet: float, ends, ceiling: float):
 @parametrize("*setup", ROBIN)
 def test_robin_channel(setup, record):
     """First-order uptake in a slab under plug flow follows its closed form, (26) upstream included, at Peclet 0.1, 1,
-    10, wherever the inlet is put.
+    10, for any position of the inlet.
 
     Norm: L2 of C over the mesh, relative; several meshes a size.
     """
@@ -143,7 +143,7 @@ def _sides(film: float) -> dict[str, float]:
             "diffusivity": ACCEPTOR.diffusivity}
 
 
-#: Thiele's modulus, film (um), and the last errors of C and of what is taken up, for each order.
+#: Thiele's modulus, film (um), and the last errors of C and of the uptake, for each order.
 THIELE = {1: ((0.1, 0.0, 3e-7, 3e-7), (1.0, 0.0, 4e-5, 4e-5), (10.0, 0.0, 4e-3, 4e-3), (1.0, FILM, 3e-5, 3e-5)),
           2: ((0.1, 0.0, 1e-12, 3e-12), (1.0, 0.0, 1e-8, 1e-11), (10.0, 0.0, 2e-5, 3e-7), (1.0, FILM, 7e-9, 1e-11)),
           3: ((1.0, 0.0, 2e-11, 3e-12), (10.0, 0.0, 2e-7, 1e-10), (1.0, FILM, 2e-11, 3e-12))}
@@ -151,7 +151,7 @@ THIELE = {1: ((0.1, 0.0, 3e-7, 3e-7), (1.0, 0.0, 4e-5, 4e-5), (10.0, 0.0, 4e-3, 
 FILMED = {0.0: "", FILM: f", films of {FILM:g} um"}
 #: Element sizes (um) with the number of meshes of each.
 THIELE_MESHES = {1: SAMPLES, 2: {4.0: 8, 2.0: 4, 1.0: 2, 0.5: 1}, 3: SAMPLES}
-NORM = "L2 of C over the mesh, relative; what is taken up, relative; several meshes a size"
+NORM = "L2 of C over the mesh, relative; uptake, relative; several meshes a size"
 
 
 def _thiele(*orders: int) -> dict[str, tuple]:
@@ -182,7 +182,7 @@ def first_order(order: int, modulus: float, film: float, ceiling: float, uptake_
 @parametrize("*setup", _thiele(1))
 def test_first_order_slab(setup, record):
     """A slab that takes up kappa C has the profile cosh(phi x / l) and the effectiveness tanh(phi) / phi of Thiele's
-    modulus 0.1, 1, 10, and those of its films where it has some.
+    modulus 0.1, 1, 10, and with films the profile and effectiveness of their closed form.
     """
     record(first_order(*setup))
 
@@ -272,11 +272,11 @@ def _exhausted(film: float):
                              **{f"K = {LEAST:g} mg/L, {label}, linear": (_exhausted, film)
                                 for label, film in (("no films", 0.0), (f"films of {FILM:g} um", FILM))}})
 def test_zero_order_slab(judge, row, record):
-    """Where half saturation is small against the supply, uptake s goes on at its full rate down to the depth of
-    penetration sqrt(2 D C_s / s), or that of its films, and nothing is left beyond; on the way there the slab follows
-    Monod's first integral.
+    """If the half saturation is small against the supply, uptake has its full rate s down to the depth of penetration
+    sqrt(2 D C_s / s), or that with films, and C is zero beyond. With larger half saturations the slab follows Monod's
+    first integral.
 
-    Norm: L2 of C over the mesh, relative; depth = what enters a side over s, relative; several meshes a size.
+    Norm: L2 of C over the mesh, relative; depth = flux through a side over s, relative; several meshes a size.
     """
     record(judge(*row))
 
@@ -325,8 +325,8 @@ def _expected(order: int, peclet: float) -> tuple:
 
 @cache
 def _half_disc_space(refinement: float, number: int, order: int) -> Space:
-    about = refinement * NEAR ** (number - REFINEMENTS[order][refinement] // 2)
-    return meshes.half_disc_space(RADIUS, about, ENDS, WIDTH, order)
+    near_refinement = refinement * NEAR ** (number - REFINEMENTS[order][refinement] // 2)
+    return meshes.half_disc_space(RADIUS, near_refinement, ENDS, WIDTH, order)
 
 
 @cache
@@ -386,17 +386,17 @@ def _through(space: Space, edges: np.ndarray, peclet: float, inlet: str) -> np.n
     dx, dy = (nodes[:, -1] - nodes[:, 0]).T[..., None]
     mean, velocity, _ = _chosen(peclet)
     field, flux = (_by_side(peclet, name, np.hypot(x, y).mean(axis=1) < RADIUS, x, y) for name in ("value", "flux"))
-    enters = velocity[0](x, y) if inlet == "local" else mean
-    over = enters * (field - np.reshape(pair("supply", SUBSTRATES), (2, 1, 1)))
-    along = flux[:, 0] - np.where(np.isclose(x, ENDS[0]), over, 0.0)
-    return ((along * dy - flux[:, 1] * dx) * weights) @ values
+    inflow = velocity[0](x, y) if inlet == "local" else mean
+    excess = inflow * (field - np.reshape(pair("supply", SUBSTRATES), (2, 1, 1)))
+    normal_x = flux[:, 0] - np.where(np.isclose(x, ENDS[0]), excess, 0.0)
+    return ((normal_x * dy - flux[:, 1] * dx) * weights) @ values
 
 
 def chosen_concentrations(order: int, peclet: float, inlet: str, ceilings: tuple[float, float]):
     errors = refine(_chosen_errors, REFINEMENTS[order], order, peclet, inlet)
-    cells = " to ".join(f"{peclet * size / WIDTH:.1g}" for size in errors["size"][[-1, 0]])
+    peclet_range = " to ".join(f"{peclet * size / WIDTH:.1g}" for size in errors["size"][[-1, 0]])
     return studies(errors, {name: (*_expected(order, peclet), ceiling) for name, ceiling in zip(NAMES, ceilings)},
-                   f", elements' {cells}")
+                   f", elements' {peclet_range}")
 
 
 @pytest.mark.case(
@@ -406,8 +406,8 @@ def chosen_concentrations(order: int, peclet: float, inlet: str, ceilings: tuple
     omitted="orders 2, 3: transport-manufactured-higher")
 @parametrize("*setup", _variants(1))
 def test_manufactured(setup, record):
-    """Chosen concentrations around a half-disc come out of the full equations with second order, at Peclet numbers of
-    the pore from 0.1 to 100 and of the elements from 0.002 to 18, with either inlet condition.
+    """The full equations reproduce manufactured concentrations around a half-disc with second order, at Peclet numbers
+    of the pore from 0.1 to 100 and of the elements from 0.002 to 18, with either inlet condition.
 
     Norm: L2 of each substrate over the mesh, relative.
     """
@@ -422,7 +422,7 @@ def test_manufactured(setup, record):
 @parametrize("*setup", _variants(2, 3))
 def test_manufactured_higher(setup, record):
     """The same with quadratic and cubic elements on curved triangles, at Peclet numbers from 0.1 to 100, with either
-    inlet condition: third order, of advection alone fourth; and fourth order.
+    inlet condition: quadratic elements have third order (fourth for advection alone), cubic ones fourth.
 
     Norm: L2 of each substrate over the mesh, relative.
     """

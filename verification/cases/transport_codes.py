@@ -141,8 +141,8 @@ def collocation(order: int, peclet: float, density: float):
              "exchanged-substrates"), references=("channel_bvp",), omitted="orders 2, 3: transport-monod-higher")
 @parametrize("*setup", combined(LINEAR, PECLETS, DENSITIES))
 def test_monod_collocation(setup, record):
-    """Dual Monod uptake under plug flow is solve_bvp's at Peclet 0.1, 1, 5 times Thiele numbers 0.6, 1.9, 6, from
-    barely touched to starved.
+    """Dual Monod uptake under plug flow is solve_bvp's at Peclet 0.1, 1, 5 times Thiele numbers 0.6, 1.9, 6, from low
+    uptake to starved.
 
     Norm: L2 of each substrate over the mesh, relative; starved: root mean square over the slab of C_A over its own
     value; several meshes a size.
@@ -161,7 +161,7 @@ def test_monod_collocation(setup, record):
      **combined({"cubic": 3}, {"Pe = 1": 1.0}, DENSITIES)})
 def test_monod_higher(setup, record):
     """Dual Monod uptake under plug flow on quadratic and cubic triangles is solve_bvp's, to third and fourth order, at
-    Peclet 0.5, 1, 5 (cubic: 1) times Thiele numbers 0.6, 1.9, 6, from barely touched to starved.
+    Peclet 0.5, 1, 5 (cubic: 1) times Thiele numbers 0.6, 1.9, 6, from low uptake to starved.
 
     Norm: root mean square over the mesh of both substrates less solve_bvp, over the supply.
     """
@@ -200,8 +200,8 @@ BLOCK = {2.0: 6, 1.0: 4, 0.5: 2, 0.25: 1}
 FINE_AROUND = {"block": {2: 0.5, 3: 1.0}, "half-disc": {2: 1 / 3, 3: 2 / 3}}
 #: Cells (um), and the refinement that makes elements twice as long on average around the half-disc.
 DISC = {4 / 3: 0.35, 2 / 3: 0.77, 1 / 3: 1.55, 1 / 6: 3.1}
-CUT = ("second order: what the cut cells of py-pde take up is right, its place is off now to one side, now to "
-       "the other (with whole cells in or out it is 0.8 to 1.9)")
+CUT = ("second order: the uptake of py-pde's cut cells is right, and its position errs to either side (with entire "
+       "cells in or out the order is 0.8 to 1.9)")
 #: Shape, order, density (mg/L), and the last errors of both substrates, and of the donor in the biomass.
 BLOCKS = {"X = 1e+05 mg/L, linear": ("block", 1, 1e5, 2e-5, 2e-5, 3e-5),
           "X = 1e+06 mg/L, linear": ("block", 1, 1e6, 1e-4, 1e-4, 3e-4),
@@ -240,7 +240,7 @@ def finite_differences(shape: str, order: int, density: float, *ceilings: float)
 @parametrize("*setup", BLOCKS)
 def test_block(setup, record):
     """Diffusion into a block of biomass on a wall is py-pde's, both codes refined together, at Thiele numbers 0.7, 2.2
-    and 4.3; with quadratic and cubic elements the transient scheme comes to rest in what py-pde's cells come to.
+    and 4.3; with quadratic and cubic elements the rest state of the transient scheme is the limit of py-pde's cells.
 
     Norm: root mean square over py-pde's cells over the supply; that of C_D in the biomass over itself; several meshes a
     size.
@@ -255,7 +255,7 @@ def test_block(setup, record):
 @parametrize("*setup", HALF_DISCS)
 def test_half_disc(setup, record):
     """Diffusion into a half-disc is py-pde's, both codes refined together, at Thiele numbers 0.7, 2.2 and 7; with
-    quadratic and cubic elements the transient scheme comes to rest in what py-pde's cells come to.
+    quadratic and cubic elements the rest state of the transient scheme is the limit of py-pde's cells.
 
     Norm: root mean square over py-pde's cells over the supply; that of C_D in the biomass over itself.
     """
@@ -313,8 +313,8 @@ def mass(space: Space) -> np.ndarray:
         return np.diag(space.lumped())
     grid = space.mesh.fem
     basis = Basis(MeshTri(grid.p, grid.t), ELEMENTS[space.order], intorder=8)  # sorted, as edges of order 3 must be
-    _, same = cKDTree(basis.doflocs.T).query(space.points)
-    return poisson.mass.assemble(basis).toarray()[np.ix_(same, same)]
+    _, nodes = cKDTree(basis.doflocs.T).query(space.points)
+    return poisson.mass.assemble(basis).toarray()[np.ix_(nodes, nodes)]
 
 
 def _exact_in_time(size: float, peclet: float, density: float, order: int) -> np.ndarray:
@@ -359,9 +359,9 @@ def test_gear_in_time(order, peclet, density, size, ceiling, record):
 
     Norm: largest over three times of the root mean square over the nodes, over the supply.
     """
-    trusted = _exact_in_time(size, peclet, density, order)
+    expected = _exact_in_time(size, peclet, density, order)
     errors = refine(lambda steps: {"size": TIMES[0] / steps, **_over_the_supply(
-        _computed(size, 0, order, peclet, density, steps) - trusted)}, STEPS)
+        _computed(size, 0, order, peclet, density, steps) - expected)}, STEPS)
     record(studies(errors, each(2, "BDF2 after a first step of backward Euler", ceiling)))
 
 
@@ -389,10 +389,10 @@ def _rows(timed: bool) -> dict[str, tuple]:
 
 
 def finite_volumes(timed: bool, order: int, peclet: float, density: float):
-    samples, why, ceilings, closest = AGAINST_FIPY[timed]
+    samples, why, ceilings, higher_ceiling = AGAINST_FIPY[timed]
     if order > 1:
         errors = refine(_from_fipy, dict.fromkeys(CELLS, 1), order, peclet, density, timed)
-        yield studies(errors, each(2, "FiPy's second order", closest), " of FiPy less ours")
+        yield studies(errors, each(2, "FiPy's second order", higher_ceiling), " of FiPy less ours")
         return
     errors = refine(_from_fipy, samples, order, peclet, density, timed)
     yield studies(errors, each(2, why, ceilings[density]))
@@ -410,8 +410,8 @@ def finite_volumes(timed: bool, order: int, peclet: float, density: float):
 @parametrize("*setup", _rows(False))
 def test_monod_fipy(setup, record):
     """Dual Monod uptake under plug flow is FiPy's, both codes refined together, at Peclet 0.1, 1, 5 times Thiele
-    numbers 0.6, 1.9, 6, from barely touched to starved; that of quadratic and cubic elements, on one mesh, is what
-    FiPy's cells come to.
+    numbers 0.6, 1.9, 6, from low uptake to starved; that of quadratic and cubic elements, on one mesh, is the limit of
+    FiPy's cells.
 
     Norm: root mean square over FiPy's cells, at five heights, of each substrate over its supply, and in the starved
     slab over its own value; several meshes a size.
@@ -427,7 +427,7 @@ def test_monod_fipy(setup, record):
 def test_gear_fipy(setup, record):
     """Transient profiles of both substrates are FiPy's, both codes refined together in space, at Peclet 0.1, 1, 5 times
     Thiele numbers 0.6, 1.9, 6; and refined in time, where FiPy's own scheme is of first order; those of quadratic and
-    cubic elements, on one mesh, are what FiPy's cells come to.
+    cubic elements, on one mesh, are the limit of FiPy's cells.
 
     Norm: largest over three times of the root mean square over FiPy's cells, at five heights, over the supply; several
     meshes a size.
@@ -514,12 +514,12 @@ def _mixed_reference(order: int) -> np.ndarray:
 
 def well_mixed(order: int):
     """A check that the box is uniform, and studies of C_A, C_D, X_A and X_I."""
-    trusted = _mixed_reference(order)
-    uneven = (_mixed(MIXED_STEPS[-1], order)[:, :, 1] / trusted).max()
+    expected = _mixed_reference(order)
+    uneven = (_mixed(MIXED_STEPS[-1], order)[:, :, 1] / expected).max()
     yield at_most("unevenness in the box", uneven, 1e-6, "L^2 / D over the time in which the supply lasts")
     errors = refine(lambda step: {"size": step, **dict(zip(
-        MIXED, np.abs(_mixed(step, order)[:, :, 0] / trusted - 1).max(axis=0)))}, MIXED_STEPS)
-    yield studies(errors, {name: (2, "BDF2, started anew ten times", ceiling) for name, ceiling in MIXED.items()})
+        MIXED, np.abs(_mixed(step, order)[:, :, 0] / expected - 1).max(axis=0)))}, MIXED_STEPS)
+    yield studies(errors, {name: (2, "BDF2, restarted ten times", ceiling) for name, ceiling in MIXED.items()})
     if order == 1:
         yield at_most("X at constant C, 12 min steps", _constant_supply(), 1e-9,
                       "(9)-(10) are integrated exactly: round-off of 600 steps")
@@ -545,7 +545,7 @@ def test_well_mixed(order, record):
 @parametrize("order", combined(HIGHER))
 def test_well_mixed_higher(order, record):
     """With quadratic and cubic concentrations C_A, C_D, X_A and X_I of the well-mixed pore follow the four ordinary
-    equations alike.
+    equations, too.
     """
     record(well_mixed(order))
 
@@ -559,7 +559,7 @@ def _constant_supply() -> float:
     active, inert = 3e4, 0.0
     for _ in range(600):
         active, inert = kinetics.grow(active, inert, growth, remains, 0.2)
-    rise, left = runs.growth_rates(SLOW_LAW, CLOSED, acceptor, donor)
-    risen = rise * HALF_DAYS[-1]
-    exact = 3e4 * np.array([np.exp(risen), left / rise * np.expm1(risen)])
+    growth_rate, inert_rate = runs.growth_rates(SLOW_LAW, CLOSED, acceptor, donor)
+    risen = growth_rate * HALF_DAYS[-1]
+    exact = 3e4 * np.array([np.exp(risen), inert_rate / growth_rate * np.expm1(risen)])
     return np.abs(np.array([active, inert]) / exact - 1).max()

@@ -82,7 +82,7 @@ def test_first_order_law(name, order, record):
     """With kinetics.law = "first order" one substrate alone has the closed form of a slab with films at Thiele's
     modulus 1, at its own rate of uptake: k X for the donor, (k F + d_c f_d b) X for the acceptor.
 
-    Norm: L2 of C over the mesh, relative; what is taken up, relative; several meshes a size.
+    Norm: L2 of C over the mesh, relative; uptake, relative; several meshes a size.
     """
     errors = refine(_first_order, MESHES[order], name, order)
     record(studies(errors, {"C": (*EXPECTED[order], CEILINGS[order][0])}))
@@ -97,10 +97,10 @@ DEPTH = 20.0
     references=("slab",))
 @parametrize("order, size", {"linear": (1, 1.0), "quadratic": (2, 2.0), "cubic": (3, 4.0)})
 def test_zero_order_law(order, size, record):
-    """With kinetics.law = "zero order" the donor alone is taken up at k X down to the depth of penetration, and nothing
-    is left beyond.
+    """With kinetics.law = "zero order" the donor alone is taken up at k X down to the depth of penetration, and C is
+    zero beyond.
 
-    Norm: largest error of C at the nodes over the supply; depth = what enters a side over k X, relative.
+    Norm: largest error of C at the nodes over the supply; depth = flux through a side over k X, relative.
     """
     donor, space = SCENE.substrates.donor, space_of(size, 0, order, 0.0)
     sink = 2 * donor.diffusivity_in_aggregate * donor.supply / DEPTH**2
@@ -136,8 +136,8 @@ def _haldane(size: float, number: int, order: int, sink: float, from_least: bool
     states = _haldane_states(sink)
     guess = transport.Concentrations(None, states[0](space.points[:, 0])) if from_least else None
     state = steady(equations(space, "donor", "Haldane", **INHIBITED), sink / FASTEST["donor"], guess)
-    due = states[0 if from_least else -1]
-    gap, _ = rms_errors(space, both(state), lambda x, y: due(x)[None])
+    expected = states[0 if from_least else -1]
+    gap, _ = rms_errors(space, both(state), lambda x, y: expected(x)[None])
     return {"size": length(space, size), "C": gap[0] / INHIBITED["supply"]}
 
 
@@ -147,8 +147,8 @@ def _haldane(size: float, number: int, order: int, sink: float, from_least: bool
     mutants=("haldane-without-inhibition", "haldane-by-newton-alone"), omitted="order 3: the code of order 2")
 @parametrize("order, ceiling", {"linear": (1, 1e-4), "quadratic": (2, 1e-6)})
 def test_haldane(order, ceiling, record):
-    """Where three states are steady by Haldane's law, the solution from the supply is the largest of them, and that
-    from the least of them is the least. Where only a state with little donor is steady, the solution is that one.
+    """If three states are steady by Haldane's law, the solution from the supply is the largest of them, and that from
+    the least of them is the least. If only a state with little donor is steady, the solution is this state.
 
     Norm: root mean square of C over the mesh, over the supply; several meshes a size.
     """

@@ -2,7 +2,7 @@
 
 Substrates around a half-disc in scenes, including sharp fronts and fast water, are compared with finer meshes. A step
 of the midpoint rule takes up substrates with the mean biomass of the step, at steady concentrations. At constant C_A
-and C_D this is the integral of (7)-(10), and the biomass made balances the uptake.
+and C_D this is the integral of (7)-(10), and the new biomass balances the uptake.
 """
 
 import re
@@ -59,11 +59,11 @@ def _defect(flux) -> float:
              "outlet-forgotten"))
 @parametrize("kind", combined(KINDS))
 def test_balance(kind, record):
-    """Supply in = out + consumed to round-off, with flow and without; with the printed inlet (11) once its (u_ave -
-    u_x) C is counted [E4]; and supply in = out + consumed + stored in the transient scheme; with linear, quadratic and
-    cubic elements.
+    """The supply equals out + consumed to round-off, with flow and without, and with the printed inlet (11) if its
+    (u_ave - u_x) C is counted [E4]. In the transient scheme it equals out + consumed + stored. Both hold with linear,
+    quadratic and cubic elements.
 
-    Norm: supplied - out - consumed over supplied; in time, less what is stored.
+    Norm: supplied - out - consumed over supplied; in time, less stored.
     """
     pores = {"R = 5 um": _solved(kind, 5.0), "R = 40 um": _solved(kind, 40.0),
              "R = 20 um, no flow": _solved(kind, 20.0, speed=None),
@@ -85,8 +85,8 @@ def _by_the_printed_inlet(seed, solved) -> list[float]:
     less this.
     """
     space = seed.space
-    apart = solved.flow.mean_velocity - solved.flow.velocity[:, 0]
-    weight = space.inlet.assembled(apart)
+    difference = solved.flow.mean_velocity - solved.flow.velocity[:, 0]
+    weight = space.inlet.assembled(difference)
     return [weight @ field / flux.supplied for field, flux in zip(both(solved.concentrations), solved.fluxes)]
 
 
@@ -106,23 +106,23 @@ def _in_time(seed, solved):
     {f"R = {row[0]:g} um, supplies {row[1]:g}, {row[2]:g} mg/L, {label}": (kind, *row)
      for (label, kind), row in product(KINDS.items(), STARVED)})
 def test_starved(kind, radius, supplies, record):
-    """Starved pores (0.35 m/d, radius 27 and 42 um, supplies of 0.15 and 10 mg/L) have one steady state, C >= 0, that
-    closes the balance to round-off, whatever Newton's method starts from; the transient scheme comes to rest in it;
-    with quadratic and cubic elements C is no more below zero than is let pass.
+    """Starved pores (0.35 m/d, radius 27 and 42 um, supplies of 0.15 and 10 mg/L) have one steady state, with C >= 0
+    and a balance that closes to round-off. It does not depend on the start of Newton's method, and the transient scheme
+    comes to rest in it. With quadratic and cubic elements C is not below the accepted undershoot.
 
     Norm: least C over the supply; balance as above; largest relative difference between ways to the steady state.
     """
     seed, solved = _solved(kind, radius, *supplies, SLOW)
     computed, linear = both(solved.concentrations), seed.space.order == 1
     least = max(-(field.min() / supply) for field, supply in zip(computed, supplies))
-    bound, why = (0.0, "C >= 0") if linear else (1e-3, "what is let pass as resolved")
+    bound, why = (0.0, "C >= 0") if linear else (1e-3, "the accepted undershoot")
     record(at_most("least C below zero", max(least, 0.0), bound, why))
     record(at_most("balance", max(abs(_defect(flux)) for flux in solved.fluxes), 1e-9, ROUND_OFF))
     record(at_most("from other first iterates", _spread(seed, solved, computed), 1e-8, "one steady state"))
     if linear and radius == STARVED[0][0]:
-        again = both(gear.settle(solved.problem, Sink(seed.active), None))
-        record(at_most("the transient scheme at rest", np.abs(again / computed - 1).max(), 1e-7,
-                       "it stops when 1e-9 of the supply is left to come"))
+        at_rest = both(gear.settle(solved.problem, Sink(seed.active), None))
+        record(at_most("the transient scheme at rest", np.abs(at_rest / computed - 1).max(), 1e-7,
+                       "it stops when 1e-9 of the supply is left to change"))
 
 
 def _spread(seed, solved, computed) -> float:
@@ -134,8 +134,8 @@ def _spread(seed, solved, computed) -> float:
     shape = computed.shape
     guesses = [np.full(shape, 30.0), random.uniform(0, 30.0, shape), random.uniform(0, 0.1, shape)]
     size = computed if seed.space.order == 1 else solved.problem.supply.reshape(2, -1)
-    again = [both(transport.steady(solved.problem, Sink(seed.active), Concentrations(*guess))) for guess in guesses]
-    return max(np.abs((one - computed) / size).max() for one in again)
+    states = [both(transport.steady(solved.problem, Sink(seed.active), Concentrations(*guess))) for guess in guesses]
+    return max(np.abs((state - computed) / size).max() for state in states)
 
 
 SUPPLY = SCENE.substrates.acceptor.supply
@@ -165,7 +165,7 @@ def proportion(half: str, *numerics: str) -> Check:
     """Check consumed acceptor over F times consumed donor."""
     acceptor, donor = _front(half, *numerics)
     ratio = acceptor.consumed / donor.consumed / SCENE.kinetics.acceptor_to_donor_ratio
-    return at_most("proportion", abs(ratio - 1), 1e-9, "one rate for both: exact but for where Newton's method stops")
+    return at_most("proportion", abs(ratio - 1), 1e-9, "one rate for both: exact to Newton's tolerance")
 
 
 @pytest.mark.slow
@@ -173,17 +173,17 @@ def proportion(half: str, *numerics: str) -> Check:
 @parametrize("half, solved", combined(HALVES, {**SOLVED, **CUBIC}) | combined(LEAST, SOLVED))
 def test_curved_front(half, solved, record):
     """Behind a front where the donor is used up, to half saturations of a millionth of the supply, both are taken up in
-    their proportion, with linear and quadratic elements (cubic: a ten-thousandth), and what leaves is within the
-    presets' accuracy; where a mesh is refused, with the refinement that it names.
+    their proportion, with linear and quadratic elements (cubic: a ten-thousandth), and effluents are within the
+    presets' accuracy. If a mesh is refused, the refinement is that of the refusal.
 
     Norm: consumed acceptor over F times consumed donor, less one; difference of effluents over the larger supply, to a
     mesh of refinement 1.3.
     """
     numerics, bound = solved
     record(proportion(half, *numerics))
-    near, far = _front(half, *numerics), _front(half, FAST, "numerics.refinement=1.3")
-    apart = max(abs(a.effluent - b.effluent) for a, b in zip(near, far)) / SUPPLY
-    record(at_most("effluents", apart, bound, "what the preset is for"))
+    coarse, fine = _front(half, *numerics), _front(half, FAST, "numerics.refinement=1.3")
+    difference = max(abs(a.effluent - b.effluent) for a, b in zip(coarse, fine)) / SUPPLY
+    record(at_most("effluents", difference, bound, "the error that the preset promises"))
 
 
 @cache
@@ -215,14 +215,14 @@ def _half_disc(width: float, radius: float, speed: str, *changes: str) -> Scene:
 
 
 @cache
-def _carried(*arguments):
+def _carried(*scene_arguments):
     """Ledgers of a half-disc at t = 0, on the first mesh."""
-    scene = _half_disc(*arguments)
+    scene = _half_disc(*scene_arguments)
     return pore.solve(scene, pore.seeded(scene)).fluxes
 
 
-WITHIN = "0.1 %, what preset accurate is for"
-TENTH = "a tenth of what preset fast is for"
+WITHIN = "0.1 %, the error that preset accurate promises"
+TENTH = "a tenth of the error that preset fast promises"
 #: A half-disc under fast water: numerics, bound of the difference of effluents and consumption from those of quadratic
 #: elements of refinement 2.5, and its origin.
 FASTEST = {"quadratic, accurate": ((ACCURATE, runs.with_elements("quadratic"), FINER), 1e-3, WITHIN),
@@ -233,41 +233,42 @@ FASTEST = {"quadratic, accurate": ((ACCURATE, runs.with_elements("quadratic"), F
 @pytest.mark.slow
 @pytest.mark.case(
     "transport-curved-peclet", kind="property", mutants=("layers-ignored",),
-    omitted="order 1 and paper: linear elements are not made for boundary layers")
+    omitted="order 1 and paper: linear elements are not graded to boundary layers")
 @parametrize("speed, preset", combined({speed: speed for speed in ("2.9 m/day", "29 m/day", "290 m/day")}, FASTEST))
 def test_curved_peclet(speed, preset, record):
-    """In fast water (u W / D to 3e4) the boundary layers that the presets make their elements for are resolved to 0.1
-    %, by accurate with quadratic and with cubic elements, and by fast.
+    """In fast water (u W / D to 3e4) the presets accurate, with quadratic and with cubic elements, and fast resolve
+    boundary layers to 0.1 %.
 
     Norm: difference of effluents, over the supply, and of consumption, relative, to a mesh of refinement 2.5.
     """
     numerics, bound, why = preset
-    far = _carried(100.0, 60.0, speed, ACCURATE, "numerics.refinement=2.5")
-    for name, flux, trusted in zip(NAMES, _carried(100.0, 60.0, speed, *numerics), far):
-        record(each_at_most({"effluent": abs(flux.effluent - trusted.effluent) / SUPPLY,
-                             "consumed": abs(flux.consumed / trusted.consumed - 1)}, bound, why, f" {name}"))
+    finer = _carried(100.0, 60.0, speed, ACCURATE, "numerics.refinement=2.5")
+    for name, flux, expected in zip(NAMES, _carried(100.0, 60.0, speed, *numerics), finer):
+        record(each_at_most({"effluent": abs(flux.effluent - expected.effluent) / SUPPLY,
+                             "consumed": abs(flux.consumed / expected.consumed - 1)}, bound, why, f" {name}"))
 
 
 #: Numerics, bound of the balance, and bound of the difference of effluents from quadratic elements twice finer.
 CONSERVES = 1e-11, "round-off: the form conserves"
 HALF_DISCS = {
-    "cubic": ((ACCURATE, runs.with_elements("cubic")), CONSERVES, 1e-5, "a hundredth of what preset accurate is for"),
-    "quadratic": ((ACCURATE, "numerics.refinement=0.9"), CONSERVES, 0.0, "itself what the others are compared with"),
-    "linear, paper": ((PAPER,), (1e-9, ROUND_OFF), 1e-2, "1 %, what preset paper is for"),
+    "cubic": ((ACCURATE, runs.with_elements("cubic")), CONSERVES, 1e-5,
+              "a hundredth of the error that preset accurate promises"),
+    "quadratic": ((ACCURATE, "numerics.refinement=0.9"), CONSERVES, 0.0, "the others are compared with this solution"),
+    "linear, paper": ((PAPER,), (1e-9, ROUND_OFF), 1e-2, "1 %, the error that preset paper promises"),
     "fast": ((FAST,), CONSERVES, 1e-3, TENTH),
-    "accurate": ((ACCURATE,), CONSERVES, 1e-4, "a tenth of what preset accurate is for")}
+    "accurate": ((ACCURATE,), CONSERVES, 1e-4, "a tenth of the error that preset accurate promises")}
 
 
 @pytest.mark.case("transport-cubic-half-disc", kind="property", mutants=("outlet-forgotten",))
 @parametrize("numerics, round_off, bound, why", HALF_DISCS)
 def test_cubic_half_disc(numerics, round_off, bound, why, record):
     """Around a half-disc, under the flow of cubic velocities, each substrate is in balance to round-off, and the
-    effluents are those of quadratic elements on a mesh twice finer; so are those of the presets, to what they are for.
+    effluents are those of quadratic elements on a mesh twice finer. Those of the presets agree within their errors.
 
-    Norm: (in - out - consumed) over what comes in; difference over the supply to quadratic concentrations.
+    Norm: (in - out - consumed) over in; difference over the supply to quadratic concentrations.
     """
-    far = _carried(50.0, 40.0, "2.9 m/day", *HALF_DISCS["quadratic"][0])
-    for name, flux, expected in zip(NAMES, _carried(50.0, 40.0, "2.9 m/day", *numerics), far):
+    finer = _carried(50.0, 40.0, "2.9 m/day", *HALF_DISCS["quadratic"][0])
+    for name, flux, expected in zip(NAMES, _carried(50.0, 40.0, "2.9 m/day", *numerics), finer):
         record(at_most(f"balance, {name}", abs(_defect(flux)), *round_off))
         if bound:
             record(at_most(f"effluent, {name}", abs(flux.effluent - expected.effluent) / SUPPLY, bound, why))
@@ -295,11 +296,11 @@ def _open(numerics: int | str) -> transport.Problem:
     mutants=("biomass-of-the-start", "biomass-half-way", "mean-biomass-constant-in-c"), references=("monod",))
 @parametrize("numerics", combined(MEAN))
 def test_mean_biomass(numerics, record):
-    """With the mean biomass of a step of hours, biomass made is Y donor - (acceptor - F donor) / d_c of what is taken
-    up, to round-off, wherever concentrations are; at constant ones the uptake is the integral of (7)-(10) over the
-    step; and the tangent is the uptake's derivative.
+    """With the mean biomass of a step of hours, the new biomass is Y donor - (acceptor - F donor) / d_c, of the donor
+    and the acceptor taken up, to round-off at any concentrations. At constant concentrations the uptake is the integral
+    of (7)-(10) over the step. The tangent is the derivative of the uptake.
 
-    Norm: biomass made less Y donor - (acceptor - F donor) / d_c, over what is made; uptake at constant C, relative;
+    Norm: new biomass - (Y donor - (acceptor - F donor) / d_c), over the new biomass; uptake at constant C, relative;
     remainder of a first-order Taylor expansion.
     """
     problem = _open(numerics)
@@ -310,7 +311,7 @@ def test_mean_biomass(numerics, record):
 
 
 def _balanced(problem: transport.Problem, hours: float) -> Check:
-    """Check biomass made against uptake, at the steady concentrations of a step."""
+    """Check new biomass against uptake, at the steady concentrations of a step."""
     law = SCENE.kinetics
     active = law.maximum_density * problem.space.reaction.dx
     sink = Sink(active, hours)
@@ -320,7 +321,7 @@ def _balanced(problem: transport.Problem, hours: float) -> Check:
     grown = np.sum(kinetics.grow(active, 0 * active, growth_rates.growth, growth_rates.remains, hours)) - active.sum()
     F, d_c = law.acceptor_to_donor_ratio, law.decay_oxygen_demand
     expected = law.yield_coefficient * donor - (acceptor - F * donor) / d_c
-    return at_most(f"biomass made, {hours:g} h", abs(grown - expected) / grown, 1e-12,
+    return at_most(f"new biomass, {hours:g} h", abs(grown - expected) / grown, 1e-12,
                    "one integral of growth and uptake in each point: round-off")
 
 
@@ -344,5 +345,5 @@ def _tangent(problem: transport.Problem, hours: float) -> Study:
     state, along = random.uniform(0.5, 1.0, (2, 2 * problem.space.count))
     steps = 0.05 * 0.5 ** np.arange(4)
     linear, start = problem.system.product(balance.tangent(state), along), balance.residual(state)
-    left = [np.abs(balance.residual(state + s * along) - start - s * linear).max() for s in steps]
-    return study(f"tangent, {hours:g} h", steps, left, 2, "Taylor's theorem: second order")
+    remainders = [np.abs(balance.residual(state + s * along) - start - s * linear).max() for s in steps]
+    return study(f"tangent, {hours:g} h", steps, remainders, 2, "Taylor's theorem: second order")

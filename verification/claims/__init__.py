@@ -19,9 +19,9 @@ Claims about **the scheme** are judged with the scheme. A verdict follows from t
 If the paper says that something may or could happen, the claim holds if it happens in at least one of the scenes that
 are tried. If the paper says that it depends on the conditions, it must also not happen in another scene.
 
-A definition carries the date when it was written, which is before its first value. A claim that is defined anew after
-its values have been seen keeps its other definitions with their outcomes in `other_definitions.json`, and counts with
-the verdict of its first definition.
+A definition carries the date when it was written, which is before its first value. If the definition of a claim changes
+after its values are known, its other definitions stay in `other_definitions.json` with their outcomes, and the claim
+counts with the verdict of its first definition.
 
 `rests_on` says what a number depends on: the prediction of a solution, or an input, a rule of construction or the
 arithmetic of Table 1. The last three need no solution and do not count as reproduced numbers.
@@ -102,14 +102,14 @@ def interval(text: str) -> tuple[float, float] | None:
 
 
 def outcome_of(bar: tuple[float, float], bounds: tuple[float, float]) -> str:
-    """HOLDS or FAILS with the whole bar between the bounds, or REACHES_OVER."""
+    """HOLDS if the whole bar lies between the bounds, FAILS if all of it lies outside, else REACHES_OVER."""
     (first, last), (low, high) = bar, bounds
     return HOLDS if low <= first and last <= high else FAILS if last < low or high < first else REACHES_OVER
 
 
 def verdict_of(outcomes: set[str], changed: bool, rounding: bool) -> str:
-    """The verdict from the outcomes of all checks. changed: does something differ from the paper? rounding: does one
-    set of inputs within the rounding give all printed numbers?"""
+    """The verdict from the outcomes of all checks. changed: whether the claim differs from the paper's statement;
+    rounding: whether one set of inputs within the rounding gives all printed numbers."""
     if outcomes == {HOLDS}:
         return CHANGED if changed else REPRODUCED
     if FAILS not in outcomes:
@@ -119,14 +119,14 @@ def verdict_of(outcomes: set[str], changed: bool, rounding: bool) -> str:
 
 @dataclass(frozen=True)
 class PaperCheck(Check):
-    """A check of a number against the paper's, whatever its bar.
+    """A check of a number against the paper's number.
 
     paper: the paper's text, "2.9"; date: when the accepted range was set, by default the date of the claim; converges:
-    does the number have a limit as mesh and step are refined? rests_on: what the number depends on; input: its name in
+    whether the number has a limit as mesh and step are refined; rests_on: the basis of the number; input: its name in
     the record of the sensitivities; bar: the interval of the number, None before it is known; if the run ended before
     the number was reached, the bar has no upper end, and the value is the end of the run; holds_at: for a number
     without a limit, whether it holds at each level; scheme: smallest and largest value with the scheme of 2001, None
-    where it is not computed; on_sizes: for a claim about the model, the values on the sizes of the converged solution,
+    if it is not computed; on_sizes: for a claim about the model, the values on the sizes of the converged solution,
     the judged one first.
     """
 
@@ -163,7 +163,7 @@ class PaperCheck(Check):
 
     @property
     def outcome(self) -> str:
-        """HOLDS or FAILS with the whole bar, or REACHES_OVER. Raises ClaimError without a bar or a number."""
+        """The outcome of the whole bar: HOLDS, FAILS or REACHES_OVER. Raises ClaimError without a bar or a number."""
         if isnan(self.value):
             raise ClaimError(f"{self.quantity}: not a number")
         if self.bar is None:
@@ -193,7 +193,7 @@ class Finding:
     def verdict(self) -> str:
         """The verdict from the checks and their bars. Raises ClaimError if there is none."""
         if not self.checks:
-            raise ClaimError("nothing is checked")
+            raise ClaimError("the finding has no checks")
         outcomes = {check.outcome for check in self.checks}
         if outcomes != {HOLDS} and not self.reason:
             raise ClaimError("a check does not hold and no reason is given: " + self._failed())
@@ -282,32 +282,33 @@ def claim(id: str, where: str, text: str, **fields):
     return register
 
 
-def printed(quantity: str, paper_text: str, computed: float, why: str = DIGITS, **more) -> PaperCheck:
+def printed(quantity: str, paper_text: str, computed: float, why: str = DIGITS, **fields) -> PaperCheck:
     """A number that the paper prints: it must lie in the interval of its digits. Raises ValueError for words."""
     accepted = interval(paper_text)
     if accepted is None:
-        raise ValueError(f"{quantity}: {paper_text!r} is no printed number")
-    return between(quantity, paper_text, computed, *accepted, why, date=LATER, **more)
+        raise ValueError(f"{quantity}: {paper_text!r} is not a printed number")
+    return between(quantity, paper_text, computed, *accepted, why, date=LATER, **fields)
 
 
-def near(quantity: str, paper_text: str, computed: float, target: float, apart: float, why: str, **more) -> PaperCheck:
+def near(quantity: str, paper_text: str, computed: float, target: float, tolerance: float, why: str, **fields
+         ) -> PaperCheck:
     """A number that must lie within a tolerance of its target."""
-    return between(quantity, paper_text, computed, target - apart, target + apart, why, **more)
+    return between(quantity, paper_text, computed, target - tolerance, target + tolerance, why, **fields)
 
 
-def at_most(quantity: str, paper_text: str, computed: float, bound: float, why: str, **more) -> PaperCheck:
+def at_most(quantity: str, paper_text: str, computed: float, bound: float, why: str, **fields) -> PaperCheck:
     """A number that must not exceed a bound."""
-    return between(quantity, paper_text, computed, -inf, bound, why, **more)
+    return between(quantity, paper_text, computed, -inf, bound, why, **fields)
 
 
-def at_least(quantity: str, paper_text: str, computed: float, bound: float, why: str, **more) -> PaperCheck:
+def at_least(quantity: str, paper_text: str, computed: float, bound: float, why: str, **fields) -> PaperCheck:
     """A number that must not be under a bound."""
-    return between(quantity, paper_text, computed, bound, inf, why, **more)
+    return between(quantity, paper_text, computed, bound, inf, why, **fields)
 
 
-def between(quantity: str, paper_text: str, computed: float, low: float, high: float, why: str, **more) -> PaperCheck:
+def between(quantity: str, paper_text: str, computed: float, low: float, high: float, why: str, **fields) -> PaperCheck:
     """A number that must lie in a range."""
-    return PaperCheck(quantity, float(computed), low, high, why, paper_text, **more)
+    return PaperCheck(quantity, float(computed), low, high, why, paper_text, **fields)
 
 
 def without_limit(check: PaperCheck) -> PaperCheck:

@@ -35,8 +35,8 @@ def tightly_bound() -> Finding:
     that only one outline covers, the mean distortion and the length of contact. The distortion is the larger principal
     stretch of F over the root of J. It is one if growth changes no shape."""
     sliding, bonded = (body((*TO_HOUR, *changes), HOUR) for changes in ((), (BONDED,)))
-    apart = uncovered(polygon(sliding.outline), polygon(bonded.outline))
-    checks = (at_least(f"outlines apart at {HOUR} h (% of the area)", "highly distorted", apart, 100 * HIGHLY,
+    area_difference = uncovered(polygon(sliding.outline), polygon(bonded.outline))
+    checks = (at_least(f"outlines apart at {HOUR} h (% of the area)", "highly distorted", area_difference, 100 * HIGHLY,
                        HIGHLY_WORDS),
               at_least(f"mean distortion at {HOUR} h, less one (%)", "highly distorted",
                        100 * (distortion(bonded) - 1), 100 * HIGHLY, HIGHLY_WORDS),
@@ -44,7 +44,8 @@ def tightly_bound() -> Finding:
                       100 * contact_length(bonded.outline, BOTTOM) / contact_length(sliding.outline, BOTTOM),
                       100 * (1 - HIGHLY), HIGHLY_WORDS))
     return Finding(checks, reason="the geometry differs less, or its difference is not known well enough",
-                   note=f"On a wall that slides the mean distortion is {100 * (distortion(sliding) - 1):.2g} %.")
+                   note="On a wall along which the aggregate slides, the mean distortion is "
+                        f"{100 * (distortion(sliding) - 1):.2g} %.")
 
 
 def distortion(aggregate: Body) -> float:
@@ -56,11 +57,11 @@ def distortion(aggregate: Body) -> float:
 
 @claim("C51", "2.3.3", "finite elements would not perform well there, because of remeshing and the loss of information",
        fine=PAIRED, beside=(), date=DEFINED,
-       unjudged="the paper gives no accuracy that would be missed, and its meshless alternative is not at hand")
+       unjudged="the paper states no accuracy, and its meshless alternative is not available here")
 def remeshing_loses() -> Finding:
     """Wall traction of bonded base at 9 h with elements of two sizes."""
     peak = wall_traction(body((*TO_HOUR, BONDED), HOUR))
-    return Finding((), note=f"Bonded base comes to {HOUR} h, where the wall must bear {1000 * peak:.3g} kPa.")
+    return Finding((), note=f"The run of bonded base reaches {HOUR} h. The wall must then bear {1000 * peak:.3g} kPa.")
 
 
 def wall_traction(aggregate: Body) -> float:
@@ -74,23 +75,23 @@ def required_adhesion() -> Finding:
     """Largest traction on the walls, in the mean over W / 20: that of the fluid's forces on base at 19.2 h, on a wall
     on which it slides; and that on base at 9 h if it is bonded, against that if it slides."""
     plotted = (*BASE, *until(PLOTTED))
-    still, forced = (wall_traction(body((*plotted, *changes), PLOTTED)) for changes in ((), (FORCED,)))
+    unforced, forced = (wall_traction(body((*plotted, *changes), PLOTTED)) for changes in ((), (FORCED,)))
     sliding, bonded = (wall_traction(body((*TO_HOUR, *changes), HOUR)) for changes in ((), (BONDED,)))
     checks = (at_least("required by fluid flow, of what a wall must bear at 19.2 h (%)", "stemming from fluid flow",
-                       100 * abs(forced - still) / max(forced, still), 100 * FEW, f"more than {FEW_WORDS}"),
+                       100 * abs(forced - unforced) / max(forced, unforced), 100 * FEW, f"more than {FEW_WORDS}"),
               at_least("required by bonding, of what a wall must bear at 9 h (%)", "boundary conditions",
                        100 * abs(bonded - sliding) / max(bonded, sliding), 100 * FEW, f"more than {FEW_WORDS}"))
     return Finding(checks, reason="one of the two requires hardly any adhesion",
-                   note=f"Walls must bear {1e6 * still:.3g} Pa at {PLOTTED} h without the fluid's forces and "
-                        f"{1e6 * forced:.3g} Pa with them; at {HOUR} h {1e6 * sliding:.3g} Pa on a wall that slides "
-                        f"and {1e6 * bonded:.3g} Pa bonded.")
+                   note=f"Walls must bear {1e6 * unforced:.3g} Pa at {PLOTTED} h without the fluid's forces and "
+                        f"{1e6 * forced:.3g} Pa with them; at {HOUR} h {1e6 * sliding:.3g} Pa if the aggregate slides "
+                        f"and {1e6 * bonded:.3g} Pa if it is bonded.")
 
 
 #: lambda of Table 1.
 LAMBDA = 2000
 
 
-def seeping(run: Run, width: float) -> tuple[Run, Run]:
+def permeable_runs(run: Run, width: float) -> tuple[Run, Run]:
     """A run in a pore of a width (um) with a permeable aggregate, without and with the drag on the biomass."""
     permeable = (*run, 'flow.biomass="brinkman"', f'flow.permeability="{width**2 / (12 * LAMBDA)!r} um^2"')
     return permeable, (*permeable, FORCED)
@@ -102,9 +103,9 @@ def body_forces() -> Finding:
     """Compare runs in which the drag within a permeable aggregate acts on its shape with runs in which it does not. In
     wide at 40 h, a plug at constant velocity, one difference must exceed a few percent. In base at 19.2 h, at constant
     head, no difference may."""
-    plug, open_pore = seeping(PLUG, 100.0), seeping((*BASE, *until(PLOTTED)), 50.0)
-    apart = outline_shift(plug[1], 40, plug[0])[2]
-    of_plug = {"outlines apart at 40 h, one moved onto the other (% of the area)": apart,
+    plug, open_pore = permeable_runs(PLUG, 100.0), permeable_runs((*BASE, *until(PLOTTED)), 50.0)
+    area_apart = outline_shift(plug[1], 40, plug[0])[2]
+    of_plug = {"outlines apart at 40 h, one moved onto the other (% of the area)": area_apart,
                "time of contact (%)": 100 * abs(contact_time(*plug[1]) / contact_time(*plug[0]) - 1),
                "conductivity at 40 h (%)": abs(conductivity_change(plug[1], (40,), plug[0]))}
     of_base = max(outline_shift(open_pore[1], PLOTTED, open_pore[0])[2],

@@ -19,8 +19,8 @@ from math import inf
 from verification.claims import CLAIMS, MODEL, evaluate
 
 #: Names of numbers in claims about wide that concern other scenes or earlier times.
-OTHER = re.compile(r"^base|before contact|a film left|^K / K_clean =|^the part filled|^layer|^wide, 30 h|"
-                   r"^uniform|^theta\(R\)")
+EXCLUDED = re.compile(r"^base|before contact|a film left|^K / K_clean =|^the part filled|^layer|^wide, 30 h|"
+                      r"^uniform|^theta\(R\)")
 #: Percent above which a bar is listed, after contact and for base.
 WIDE_BAR, BASE_BAR = 2.0, 0.2
 #: Claims about the model that concern neither wide nor base: half-discs in truncated pores, and variants of wide.
@@ -28,17 +28,17 @@ NOT_OF_BASE = ("C19", "C41")
 #: Why a bar of base exceeds BASE_BAR, by the kind of number. A kind is the beginning of a claim's id or of a number's
 #: name.
 KINDS = {
-    "a place, known to the element in which it is": r"C10",
-    "a small difference of two halves, or of two runs or solutions, which takes the errors of both in parts of itself":
+    "a position, which is known to the size of an element": r"C10",
+    "a small difference of two halves, runs or solutions, which is not much larger than their errors":
         r"C11|C36|C42|C53|C63|C64|.*(born stress-free|deviation|law's r|changed by the fluid)",
-    "a Sherwood number, over the drop from the supply to the interface, small against the supply, and ratios less one":
+    "a Sherwood number, whose drop of concentration is small against the supply, or a ratio of two, less one":
         r"C39|C47",
-    "a peak of stress or strain, beside the corner of interface and wall or in one element, and ratios of such":
+    "a peak of stress or strain, beside a corner or in one element, or a ratio of two peaks":
         r".*(stress|strain)",
-    "a share of less than 1 %, made of what the fluid does to a body 2000 times as viscous": r"C35",
-    "a body that is bound to its wall, whose stress is singular at the corners": r"C50|C52",
+    "a share of less than 1 %, the small effect of the fluid on a body 2000 times as viscous": r"C35",
+    "a body that is bonded to its wall, with stress that is singular at the corners": r"C50|C52",
     "a rim of few elements just before it folds": r"C48|C49",
-    "after base's own contact, whose first shape closes by whole edges of the outline": r"C43"}
+    "after base's own contact, at which whole edges of the outline join the wall": r"C43"}
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ def bars_after_contact(entries: list[dict]) -> list[RecordedBar]:
     """The bars of the numbers after contact, the widest first."""
     evaluate.register_all()
     return _recorded_bars(entries, lambda entry, quantity: (CLAIMS[entry["id"]].of_wide or quantity.startswith("wide"))
-                  and not OTHER.search(quantity))
+                  and not EXCLUDED.search(quantity))
 
 
 def bars_of_base(entries: list[dict]) -> list[RecordedBar]:
@@ -68,19 +68,19 @@ def bars_of_base(entries: list[dict]) -> list[RecordedBar]:
             CLAIMS[entry["id"]].of_wide or entry["id"] in NOT_OF_BASE or quantity.startswith("wide"))))
 
 
-def _recorded_bars(entries: list[dict], chosen: Callable[[dict, str], bool]) -> list[RecordedBar]:
+def _recorded_bars(entries: list[dict], is_chosen: Callable[[dict, str], bool]) -> list[RecordedBar]:
     bars = [RecordedBar(entry["id"], check["quantity"], percent(check))
-             for entry in entries for check in entry["checks"] if chosen(entry, check["quantity"])]
-    return sorted(bars, key=lambda each: -each.percent)
+             for entry in entries for check in entry["checks"] if is_chosen(entry, check["quantity"])]
+    return sorted(bars, key=lambda bar: -bar.percent)
 
 
 def wide_bars_of_base(entries: list[dict]) -> dict[str, list[RecordedBar]]:
     """The bars of base that exceed BASE_BAR, by reason; the reason is "" for kinds that KINDS lacks."""
     by_reason: dict[str, list[RecordedBar]] = {}
-    for each in bars_of_base(entries):
-        if each.percent > BASE_BAR:
-            reasons = [why for why, names in KINDS.items() if re.match(names, f"{each.id}, {each.quantity}")]
-            by_reason.setdefault(next(iter(reasons), ""), []).append(each)
+    for bar in bars_of_base(entries):
+        if bar.percent > BASE_BAR:
+            reasons = [why for why, names in KINDS.items() if re.match(names, f"{bar.id}, {bar.quantity}")]
+            by_reason.setdefault(next(iter(reasons), ""), []).append(bar)
     return by_reason
 
 

@@ -21,7 +21,7 @@ from verification.claims import (
     claim,
     without_limit,
 )
-from verification.claims.fluid_and_aggregate import STATES, at_rest
+from verification.claims.fluid_and_aggregate import STATES, with_fluid_forces
 from verification.claims.growth_pattern import biomass_rates, halves
 from verification.claims.levels import ABOUT_WIDE, ALONE, BESIDE, CONVERGED, Level, at_level
 from verification.claims.permeability import clean, decay_share
@@ -66,8 +66,8 @@ def symmetry() -> Finding:
                    at_most(f"{name} of the upstream half, error of symmetry over that of discretization",
                            "less than the error due to discretization", symmetric / discretized, 1.0, "the words")]
     return Finding(tuple(map(without_limit, checks)),
-                   reason="on meshes as fine as ours the discretization costs less than perfect symmetry would; the "
-                          "mesh of the paper is not printed")
+                   reason="on our meshes the error of the discretization is smaller than that of perfect symmetry; the "
+                          "paper does not print its mesh")
 
 
 def sides() -> dict[str, tuple[float, float]]:
@@ -80,7 +80,7 @@ def sides() -> dict[str, tuple[float, float]]:
 
 
 @claim("C61", "2.2", "at t = 0, C = C_supply throughout the entire pore", about=OF_SCHEME, sizes=BESIDE, steps=ALONE,
-       fixed="the first update of 12 min is asked", date="2026-11-25 22:44")
+       fixed="the claim concerns the first update of 12 min", date="2026-11-25 22:44")
 def first_profiles() -> Finding:
     """Compare two starts of base by the transient scheme: C_supply everywhere, and settled profiles, with which our
     runs begin. The numbers are the concentrations at the end of the first shape update and the new biomass. If they
@@ -90,15 +90,15 @@ def first_profiles() -> Finding:
     uniform = Concentrations(*(np.full(len(solved.concentrations.acceptor), supply) for supply in supplies))
     settled = gear.settle(solved.problem, Sink(pore.active), solved.concentrations)
     ends = [gear.advance(solved.problem, pore.active, pore.inert, start, UPDATE) for start in (uniform, settled)]
-    one, other = (both(end.concentrations) for end in ends)
-    apart = np.abs(one - other).max(axis=1) / supplies
-    made = [float((end.active + end.inert - pore.active - pore.inert).sum()) for end in ends]
+    uniform_end, settled_end = (both(end.concentrations) for end in ends)
+    differences = np.abs(uniform_end - settled_end).max(axis=1) / supplies
+    new_biomass = [float((end.active + end.inert - pore.active - pore.inert).sum()) for end in ends]
     checks = (*(at_most(f"{name} after 12 min, from C_supply and from settled profiles: apart (% of the supply)",
                         "C = C_supply", 100 * value, 100 * TRANSPORT, TRANSPORT_WORDS)
-                for name, value in zip(SUBSTRATES, apart)),
-              at_most("biomass made in 12 min, the same: change (%)", "C = C_supply", 100 * abs(made[0] / made[1] - 1),
-                      100 * TRANSPORT, TRANSPORT_WORDS))
-    return Finding(tuple(map(without_limit, checks)), reason="the first update remembers how it began")
+                for name, value in zip(SUBSTRATES, differences)),
+              at_most("biomass made in 12 min, the same: change (%)", "C = C_supply",
+                      100 * abs(new_biomass[0] / new_biomass[1] - 1), 100 * TRANSPORT, TRANSPORT_WORDS))
+    return Finding(tuple(map(without_limit, checks)), reason="the first update depends on the initial profiles")
 
 
 @claim("C62", "2.2", "oxygen is always present, so that the model without anaerobic decay describes decay sufficiently "
@@ -108,20 +108,20 @@ def anaerobic_decay() -> Finding:
     concentration of oxygen, over the biomass at the end. This is an upper bound, because the paper's anaerobic decay is
     slower."""
     checks = tuple(at_most(f"{run[0]}: biomass that decay at its full rate would take besides (% of the biomass)",
-                           "sufficiently well", 100 * decay_left_out(run), 100 * FEW, FEW_WORDS)
+                           "sufficiently well", 100 * missing_decay(run), 100 * FEW, FEW_WORDS)
                    for run in (BASE, WIDE))
-    return Finding(checks, reason="behind the front, where the acceptor is used up, the model lets biomass live that "
-                   "decay at the aerobic rate would take")
+    return Finding(checks, reason="behind the front, where the acceptor is used up, the model keeps biomass that decay "
+                   "at the aerobic rate would remove")
 
 
-def decay_left_out(run: Run) -> float:
+def missing_decay(run: Run) -> float:
     """f_d b int (1 - m_A) X_A dV dt over the biomass at the end of a run, by the trapezoidal rule between its rows."""
-    rates = np.array([_decay_left_out(each) for each in bodies(run)])
+    rates = np.array([_missing_decay_rate(aggregate) for aggregate in bodies(run)])
     last = bodies(run)[-1].pore
     return float(np.trapezoid(rates, series(*run)["time_h"]) / (last.active.sum() + last.inert.sum()))
 
 
-def _decay_left_out(aggregate: Body) -> float:
+def _missing_decay_rate(aggregate: Body) -> float:
     """f_d b int (1 - m_A) X_A dV, um2 mg/L/h."""
     pore, constants = aggregate.pore, aggregate.solved.problem.law.constants
     remains = biomass.rates(pore.space, aggregate.solved.concentrations, aggregate.solved.problem.law).remains
@@ -138,15 +138,16 @@ def returning() -> Finding:
     return."""
     checks, notes = [], []
     for run, hour in STATES:
-        rest = at_rest(body(run, hour), "neglected")
-        bent = at_rest(rest, "included")
-        outlines = [polygon(each.outline) for each in (rest, bent, at_rest(bent, "neglected"))]
-        moved, left = (uncovered(outlines[0], other) for other in outlines[1:])
+        rest = with_fluid_forces(body(run, hour), "neglected")
+        bent = with_fluid_forces(rest)
+        outlines = [polygon(aggregate.outline) for aggregate in (rest, bent, with_fluid_forces(bent, "neglected"))]
+        bent_area, remaining_area = (uncovered(outlines[0], outline) for outline in outlines[1:])
         name = f"{run[0]}, {hour:g} h"
         checks.append(at_most(f"{name}: outlines apart after the flow has stopped, over those under the flow", "regain",
-                              left / moved, 0.01, "a hundredth of the way"))
-        notes.append(f"{name} {moved:.2g} %")
-    return Finding(tuple(map(without_limit, checks)), reason="where the flow presses the aggregate to a wall, it stays",
+                              remaining_area / bent_area, 0.01, "a hundredth of the way"))
+        notes.append(f"{name} {bent_area:.2g} %")
+    return Finding(tuple(map(without_limit, checks)),
+                   reason="if the flow presses the aggregate against a wall, the contact stays",
                    note=f"Area that only one of the outlines with and without the flow covers: {', '.join(notes)}.")
 
 
@@ -160,12 +161,12 @@ def thin_aggregates() -> Finding:
     """Fall of the conductivities of base and wide below that of the clean pore when the thickness of the aggregate is a
     fifth of the width."""
     checks = tuple(at_most(f"{run[0]}: fall of the conductivity with the thickness at 20 % of the width (%)",
-                           "did not address", 100 * (1 - reduced_to(run, THIN)), 100 * FEW, FEW_WORDS)
+                           "did not address", 100 * (1 - conductivity_ratio_at(run, THIN)), 100 * FEW, FEW_WORDS)
                    for run in (BASE, WIDE))
     return Finding(checks, reason="a thin aggregate already reduces the permeability")
 
 
-def reduced_to(run: Run, part: float) -> float:
+def conductivity_ratio_at(run: Run, part: float) -> float:
     """K / K_clean of a run when the thickness of its aggregate is a part of the pore's width."""
     scene, rows = load_packaged(*run), series(*run)
     thickness = rows["thickness_um"] / scene.pore.width
@@ -175,7 +176,7 @@ def reduced_to(run: Run, part: float) -> float:
 @claim("C65", "1", "at high values of the normalized surface loading a biofilm tends to be continuous, at low values "
        "only patchy growth is sustained", date="2026-11-25 22:44",
        unjudged="the paper cites a review of data; its model is seeded with one aggregate and neglects attachment, so "
-                "that no loading could make it continuous or patchy")
+                "no loading could make it continuous or patchy")
 def loading() -> Finding:
     """Flux of donor into base's aggregate over the flux with which synthesis just balances decay."""
     balance = 1 / decay_share(body(BASE, PLOTTED))

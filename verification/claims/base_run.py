@@ -41,7 +41,7 @@ from verification.claims.runs import (
     SUBSTRATES,
     at,
     grown,
-    grown_anew,
+    grown_on_new_mesh,
     load_packaged,
     series,
     until,
@@ -70,7 +70,7 @@ def velocity_at_last() -> Finding:
               f"itself the velocity is {last:.3f} m/d, outside the printed digits")
     return Finding((printed("mean velocity in the shape of 19.2 h (m/d)", "1.5",
                             at(BASE, PLOTTED)["mean_velocity_m_per_d"], input="velocity"),),
-                   change=change, reason="it is another velocity in this shape, too")
+                   change=change, reason="the velocity in this shape differs, too")
 
 
 @claim("C03", "4", "effluent acceptor 4.19 K_s, donor 6.13 K_s at 19.4 h")
@@ -80,12 +80,12 @@ def effluents() -> Finding:
     checks = tuple(printed(f"effluent {name} (K_s)", text, value, input=f"effluent_{name}")
                    for name, text, value in zip(SUBSTRATES, ("4.19", "6.13"), effluents))
     ratio = (SUPPLY - effluents[0]) / (SUPPLY - effluents[1])
-    reason = (f"with the printed inputs {effluents[0]:.3f} and {effluents[1]:.3f} leave; acceptor over donor consumed "
-              f"is {ratio:.3f}, the printed effluents make it {(SUPPLY - 4.19) / (SUPPLY - 6.13):.3f}, less than "
-              "F [E14]")
+    reason = (f"the printed inputs give effluents of {effluents[0]:.3f} and {effluents[1]:.3f}, and {ratio:.3f} times "
+              "as much acceptor as donor is consumed; by the printed effluents it is "
+              f"{(SUPPLY - 4.19) / (SUPPLY - 6.13):.3f} times, less than F [E14]")
     reason = "; ".join(filter(None, (reason, sensitivity.nearest_set())))
     return Finding(checks, reason=reason, rounding=sensitivity.verified_set(),
-                   note="With the paper's own 1.6 % its effluents are 4.257 and 6.228.")
+                   note="Raised by the paper's own 1.6 %, its effluents are 4.257 and 6.228.")
 
 
 @claim("C04", "4", "about 60 % of the influent acceptor is consumed by then")
@@ -104,13 +104,13 @@ def at_the_meshed_inlet() -> Finding:
     to 73 um from the aggregate, depending on the size. In it the concentrations change by 0.1 % from size to size and
     show no order.
     """
-    pore, solved = grown_anew(BASE, PLOTTED)
+    pore, solved = grown_on_new_mesh(BASE, PLOTTED)
     means = {distance: upstream_means(pore, solved, distance) for distance in DISTANCES}
     checks = tuple(printed(f"acceptor {distance:g} um from the aggregate (K_s)", "~7", pair[0],
                            input=f"acceptor_at_{distance:g}") for distance, pair in means.items())
     donors = ", ".join(f"{pair[1]:.2f} at {distance:g} um" for distance, pair in means.items())
     change = f"the paper names the donor, but the number is the acceptor's [E9]: the donor is {donors}"
-    return Finding(checks, change=change, reason="it is not 7 K_s at every distance that may be meant")
+    return Finding(checks, change=change, reason="it is not 7 K_s at every distance that the paper may mean")
 
 
 def upstream_means(pore: Pore, solved: Solved, distance: float) -> np.ndarray:
@@ -146,19 +146,20 @@ def last_length() -> Finding:
     span = row["downstream_um"] - row["upstream_um"]
     low, high = (span + 2 * factor * width for factor in (1.3, 1.5))
     half = 0.5 * span * sensitivity.reach("area")
-    within = [(each - half, each + half) for each in (low, high)]
+    within = [(length - half, length + half) for length in (low, high)]
     lengths, times = series(*BASE)["meshed_length_um"], series(*BASE)["time_h"]
     last = times[1:][np.diff(lengths) != 0][-1]
-    change = (f"our meshed part is {row['meshed_length_um']:.0f} um long at 19.4 h, since it was last regenerated at "
-              f"{last:g} h: compared is what the rules of 3.1 allow around our aggregate, and they allow 210 um")
-    note = (f"210 um is what the rule gives to an aggregate of half-width {0.5 * (210 - 3 * width):.0f} um at the "
-            f"moment of a regeneration; ours is of {0.5 * span:.1f} um.")
+    change = (f"our meshed part is {row['meshed_length_um']:.0f} um long at 19.4 h, since its last regeneration was at "
+              f"{last:g} h. The claim compares the lengths that the rules of 3.1 allow around our aggregate; 210 um is "
+              "among them")
+    note = (f"At a regeneration the rule gives 210 um to an aggregate with a half-width of "
+            f"{0.5 * (210 - 3 * width):.0f} um; ours is {0.5 * span:.1f} um.")
     checks = (at_most("least length that 3.1 allows at 19.4 h (um)", "210 or less", low, 210.5,
                       "extended under 1.3 W from the aggregate", rests_on=CONSTRUCTION, within=within[0]),
               at_least("largest length that 3.1 allows at 19.4 h (um)", "210 or more", high, 209.5,
                        "generated at 1.5 W from the aggregate", rests_on=CONSTRUCTION, within=within[1]))
     return Finding(tuple(map(without_limit, checks)), change=change, note=note,
-                   reason="not on every mesh, with every step")
+                   reason="it does not hold on every mesh with every step")
 
 
 #: Base to 10 h in the preset "fast": the identity does not depend on mesh and step.
@@ -178,7 +179,7 @@ def scaled(acceptor: float, donor: float) -> tuple[str, ...]:
 #: factors, round-off can decide a remesh.
 ALONE = (*SHORT, *scaled(8.0, 8.0))
 ALL_BY_8 = (*ALONE, 'kinetics.maximum_density="240000 mg/L"')
-EACH = (*SHORT, *scaled(8.0, 4.0), 'kinetics.maximum_utilization_rate="37.2 1/day"',
+EACH_SUBSTRATE = (*SHORT, *scaled(8.0, 4.0), 'kinetics.maximum_utilization_rate="37.2 1/day"',
         f"kinetics.yield_coefficient={0.61 / 4!r}", f"kinetics.acceptor_to_donor_ratio={1.52 * 2!r}",
         f"kinetics.decay_oxygen_demand={1.42 * 8!r}")
 COMPARED = ("mean_velocity_m_per_d", "aggregate_area_um2", "upstream_um", "downstream_um", "inert_fraction")
@@ -193,11 +194,11 @@ def ratios() -> Finding:
     why = "exact; 1e-8 for the round-off of 50 updates with remeshes"
     checks = (at_most("C, K_s and X_m times 8: largest relative change", "none", change(ALL_BY_8, 8.0, 8.0), 1e-8, why),
               at_most("C and K_s times 8 and 4, with k, Y, F, d_c: largest relative change", "none",
-                      change(EACH, 8.0, 4.0), 1e-8, why))
+                      change(EACH_SUBSTRATE, 8.0, 4.0), 1e-8, why))
     plain, alone = (at(run, 10.0)["effluent_acceptor_mg_per_L"] for run in (SHORT, ALONE))
-    return Finding(checks, change="the ratios C/K_s are not all: (7)-(8) also hold X_m/K_sA and X_m/K_sD, so that X_m "
-                   "must be scaled too, or k, Y, F and d_c where the two K_s differ",
-                   note="With C and K_s times 8 and nothing else, the acceptor leaves at 10 h with "
+    return Finding(checks, change="the ratios C/K_s are not sufficient: (7)-(8) also contain X_m/K_sA and X_m/K_sD. "
+                   "X_m must be scaled too, or k, Y, F and d_c if the two K_s differ",
+                   note="If C and K_s alone are multiplied by 8, the effluent acceptor at 10 h is "
                    f"{alone / 8:.3f} K_s instead of {plain:.3f}.")
 
 
@@ -226,13 +227,13 @@ def table_1() -> Finding:
     law, paper = scene.kinetics, scene.kinetics.acceptor_to_donor_ratio
     y, d_c = law.yield_coefficient, law.decay_oxygen_demand
     value, from_formulas = COD - y * d_c, oxygen_demand(7, C=6, H=6, O=1) - y * oxygen_demand(5, C=5, H=7, O=2, N=1)
-    printed_values = [(each, HALF_DIGIT) for each in (COD, y, d_c)]
+    printed_values = [(printed_value, HALF_DIGIT) for printed_value in (COD, y, d_c)]
     checks = [printed("COD - Y d_c from the printed values (mg/mg)", f"{paper}", value, rests_on=ARITHMETIC,
                       within=sensitivity.in_closed_form(lambda cod, y, d_c: cod - y * d_c, *printed_values))]
     for name in SUBSTRATES:
         substrate = getattr(scene.substrates, name)
-        printed_values = [(each / DIFFUSIVITY, HALF_DIGIT) for each in (substrate.diffusivity_in_aggregate,
-                                                                       substrate.diffusivity)]
+        diffusivities = (substrate.diffusivity_in_aggregate, substrate.diffusivity)
+        printed_values = [(diffusivity / DIFFUSIVITY, HALF_DIGIT) for diffusivity in diffusivities]
         checks.append(printed(f"{name}: diffusivity, aggregate over water (%)", "80",
                               100 * substrate.diffusivity_in_aggregate / substrate.diffusivity, rests_on=ARITHMETIC,
                               within=sensitivity.in_closed_form(lambda inner, outer: 100 * inner / outer,
@@ -276,7 +277,7 @@ def doubling() -> Finding:
 
 
 def _doubling_time(scene, concentration: float) -> float:
-    """ln 2 / (F3 / X_A), h, with so much of both substrates (mg/L)."""
+    """ln 2 / (F3 / X_A), h, at one concentration of both substrates (mg/L)."""
     return log(2) / float(rate_law(scene.substrates, scene.kinetics).growth_rate(concentration, concentration))
 
 
@@ -288,9 +289,9 @@ def time_scales() -> Finding:
     scene, speed = load_packaged(*BASE), at(BASE, 0.0)["mean_velocity_m_per_d"]
     length, width = scene.pore.length, scene.pore.width
     viscous, advection = SECONDS * width**2 / scene.flow.kinematic_viscosity, SECONDS * length / speed * 24e-6
-    diffusion = [60 * length**2 / each for each in pair("diffusivity", scene.substrates)]
+    diffusion = [60 * length**2 / diffusivity for diffusivity in pair("diffusivity", scene.substrates)]
     growth = _doubling_time(scene, scene.substrates.acceptor.supply)
-    apart = min(advection / viscous, growth * 60 / max(diffusion))
+    separation = min(advection / viscous, growth * 60 / max(diffusion))
     tenfold = "of the order: one to ten of the unit"
     checks = (at_most("flow, W^2 / nu (s)", "<< 1", viscous, 0.1, "much less: a tenth",
                       rests_on=ARITHMETIC),
@@ -299,12 +300,12 @@ def time_scales() -> Finding:
                         rests_on=ARITHMETIC) for name, value in zip(SUBSTRATES, diffusion)),
               between("growth, doubling time at the supply (h)", "hours", growth, 1, 10, tenfold,
                       rests_on=ARITHMETIC),
-              at_least("substrates over flow, growth over substrates (times)", "sequential", apart, 10,
+              at_least("substrates over flow, growth over substrates (times)", "sequential", separation, 10,
                        "an order of magnitude, of both ratios", rests_on=ARITHMETIC))
     slow = advection * speed / at(BASE, PLOTTED)["mean_velocity_m_per_d"]
-    reason = (f"over 600 um at the paper's own 2.9 m/d it is {advection:.0f} s, {advection / 1.5:.0f} s on the axis of "
-              f"the pore, and {slow:.0f} s at the velocity of 19.2 h; {advection / 6:.0f} s are what it takes over 100 "
-              f"um. The order of the scales, which the sequential coupling needs, holds")
+    reason = (f"advection over 600 um takes {advection:.0f} s at the paper's own 2.9 m/d, {advection / 1.5:.0f} s on "
+              f"the axis of the pore, and {slow:.0f} s at the velocity of 19.2 h; over 100 um it takes "
+              f"{advection / 6:.0f} s. The order of the scales, on which the sequential coupling rests, holds")
     return Finding(checks, reason=reason)
 
 

@@ -16,7 +16,7 @@ from repro.fem.mesh import Mesh, curved
 from repro.fem.mesher import unlocked
 from repro.model.pore import sized
 from repro.model.uptake_law import Values
-from repro.results.network import added_resistance, known
+from repro.results.network import added_resistance, share_range
 from repro.scene import Scene
 from verification.claims import FEW, FEW_WORDS, LATER, Finding, at_least, claim
 from verification.claims.levels import ABOUT_WIDE
@@ -58,7 +58,7 @@ def less_biomass() -> Finding:
                         f"{walls} wall{'s' * (walls - 1)} over it", "crucial to model permeability reduction",
                         layered_share(scene.flow.viscosity_ratio, same, walls) / SAME, 1 + FEW,
                         f"porosity does not determine it: more than {FEW_WORDS}") for walls in (1, 2)]
-    return Finding(tuple(checks), reason="a layer plugs with less, or porosity determines the permeability")
+    return Finding(tuple(checks), reason="less biomass plugs as a layer, or porosity determines the permeability")
 
 
 def filled_at(reduced: float) -> float:
@@ -84,12 +84,12 @@ def depends_on_the_sink() -> Finding:
     sinks = np.array([*map(sherwood, shapes)])
     checks = tuple(at_least(f"{name}, one shape and flow: Sherwood numbers of three sinks, largest over smallest less "
                             "one (%)", "depends on the sink in the solid", value, 100 * FEW, FEW_WORDS)
-                   for name, value in zip(SUBSTRATES, differing(sinks)))
+                   for name, value in zip(SUBSTRATES, spread_in_percent(sinks)))
     kinds = (*(f"with supplies of {supply:g} K_s" for supply in SINKS), f"with k times {FASTER:g}")
     rows = "; ".join(f"{a:.3g} and {d:.3g} {kind}" for kind, (a, d) in zip(kinds, sinks))
-    moved = " and ".join(f"{each:.1f}" for each in differing(sinks))
-    return Finding(checks, reason="from a sink of nearly zero order to one of "
-                   f"{FASTER:g} times the rate the number moves by {moved} % only, acceptor and donor",
+    moved = " and ".join(f"{spread:.1f}" for spread in spread_in_percent(sinks))
+    return Finding(checks, reason="between a sink of nearly zero order and one of "
+                   f"{FASTER:g} times the rate the number changes by only {moved} %, acceptor and donor",
                    note=f"Sherwood numbers of acceptor and donor of a half-disc of {RADIUS:g} um in the flow of 1e-3 "
                    f"cm: {rows}. Most of the drop is in the water upstream.")
 
@@ -98,11 +98,11 @@ def depends_on_the_sink() -> Finding:
        date="2026-11-24 13:01")
 def depends_on_geometry() -> Finding:
     """Sherwood numbers of base from t = 0 to 19.2 h: uptake over interface and drop of the concentration from the
-    supply to the interface's mean, times thickness over diffusivity in water. Beside them a textbook's, that of a flat
-    patch as long as the aggregate."""
+    supply to the interface's mean, times thickness over diffusivity in water. They are compared with Leveque's number
+    of a flat patch that is as long as the aggregate."""
     early = [aggregate for aggregate in bodies(BASE) if aggregate.pore.time <= PLOTTED + 1e-6]
-    numbers, textbook = np.array([*map(sherwood, early)]), textbooks(early[-1])
-    rows = {"{}: largest over smallest Sherwood number, less one (%)": differing(numbers),
+    numbers, textbook = np.array([*map(sherwood, early)]), leveque_numbers(early[-1])
+    rows = {"{}: largest over smallest Sherwood number, less one (%)": spread_in_percent(numbers),
             "{}, 19.2 h: Leveque's number over ours, less one, either way (%)":
                 100 * np.abs(textbook / numbers[-1] - 1)}
     checks = tuple(at_least(quantity.format(name), "cannot be set", value, 100 * FEW, FEW_WORDS)
@@ -110,7 +110,7 @@ def depends_on_geometry() -> Finding:
     return Finding(checks, reason="it does not depend on shape or flow by more than a few percent")
 
 
-def differing(numbers: np.ndarray) -> np.ndarray:
+def spread_in_percent(numbers: np.ndarray) -> np.ndarray:
     """(2,) largest over smallest of the numbers (n, 2) of both substrates, less one, in percent."""
     return 100 * (numbers.max(axis=0) / numbers.min(axis=0) - 1)
 
@@ -138,7 +138,7 @@ def sherwood(aggregate: Body) -> np.ndarray:
     return uptake / (outline.edge_lengths()[edges].sum() * drop) * outline.thickness / diffusivity
 
 
-def textbooks(aggregate: Body) -> np.ndarray:
+def leveque_numbers(aggregate: Body) -> np.ndarray:
     """Sherwood numbers (2,) of a flat patch on the wall, as long as the aggregate (Leveque), with the aggregate's
     thickness."""
     outline, shear = aggregate.outline, 6 * aggregate.solved.flow.mean_velocity / aggregate.grid.width
@@ -168,9 +168,9 @@ def not_crucial() -> Finding:
     rows = []
     for reduced in REDUCED:
         part = filled_at(reduced)
-        one, both = (100 * in_the_model(part, walls) for walls in (1, 2))
-        rows.append(f"{100 * aggregates_share(part):.0f}, {one:.0f} and {both:.0f} % with {100 * part:.1f} % of the "
-                    "pore filled")
+        one_layer, two_layers = (100 * share_of_layers(part, walls) for walls in (1, 2))
+        rows.append(f"{100 * share_of_aggregate(part):.0f}, {one_layer:.0f} and {two_layers:.0f} % with "
+                    f"{100 * part:.1f} % of the pore filled")
     return Finding((), note="Of the acceptor supplied, the aggregate, a layer on one wall and layers on both walls "
                    f"take up with the same biomass: {'; '.join(rows)}.")
 
@@ -180,13 +180,13 @@ def shares(rows: dict[str, np.ndarray]) -> np.ndarray:
     return 1 - rows["effluent_acceptor_mg_per_L"] / 10.0
 
 
-def aggregates_share(part: float) -> float:
+def share_of_aggregate(part: float) -> float:
     """Part of the acceptor supplied that the aggregate of wide takes up when it fills a part of the pore."""
     scene, rows = load_packaged(*WIDE), series(*WIDE)
     return float(np.interp(part, rows["aggregate_area_um2"] / (scene.pore.width * scene.pore.length), shares(rows)))
 
 
-def in_the_model(part: float, walls: int) -> float:
+def share_of_layers(part: float, walls: int) -> float:
     """The same share of layers on one wall or on both, computed by the model."""
     scene = load_packaged(*WIDE)
     grid = layered(scene, part, walls)
@@ -230,22 +230,23 @@ LEAST = 0.1
 def for_networks() -> Finding:
     """Added resistance of the aggregates of base and wide against the law for networks, which was not fitted to
     them."""
-    rows = {"base": beyond(BASE, False), "wide before contact": beyond(WIDE, False),
-            "wide after contact": beyond(WIDE, True)}
+    rows = {"base": deviation_over_bound(BASE, False), "wide before contact": deviation_over_bound(WIDE, False),
+            "wide after contact": deviation_over_bound(WIDE, True)}
     parts = ", ".join(f"{np.abs(values).max():.2g} ({name})" for name, values in rows.items())
     return Finding((), note="r is the length of empty pore, over W, that resists as much as the aggregate adds. The "
                    "law `repro.added_resistance` gives it from A / W^2, lambda and whether the pore is spanned. "
                    f"Largest ln(r / law's r) over that of the law's bound: {parts}.")
 
 
-def beyond(run: tuple[str, ...], spanned: bool) -> np.ndarray:
-    """(n,) ln(r / law's r) of a run's rows in the law's range from LEAST on, over the ln of its bound on that side."""
+def deviation_over_bound(run: tuple[str, ...], spanned: bool) -> np.ndarray:
+    """(n,) ln(r / law's r) over ln of the law's bound on the same side, for the rows of a run in the law's range, from
+    LEAST on."""
     scene, rows = load_packaged(*run), series(*run)
     width = scene.pore.width
-    low, high = known(spanned)
+    low, high = share_range(spanned)
     share = rows["aggregate_area_um2"] / width**2
     in_range = (rows["contact"] == spanned) & (share >= max(low, LEAST)) & (share <= high)
-    resisted = 24e-6 * clean(scene) / rows["conductivity_m_per_d"][in_range] - 1
-    law, least, most = np.log(added_resistance(share[in_range], 1.0, spanned, scene.flow.viscosity_ratio))
-    apart = np.log(resisted * scene.pore.length / width) - law
-    return apart / np.where(apart < 0, law - least, most - law)
+    added = 24e-6 * clean(scene) / rows["conductivity_m_per_d"][in_range] - 1
+    law, least, largest = np.log(added_resistance(share[in_range], 1.0, spanned, scene.flow.viscosity_ratio))
+    deviation = np.log(added * scene.pore.length / width) - law
+    return deviation / np.where(deviation < 0, law - least, largest - law)

@@ -36,7 +36,7 @@ def numbers(finding: Finding) -> Numbers:
     return tuple((check.quantity, check.value, check.holds) for check in finding.checks)
 
 
-def barred(claim: Claim, finding: Finding, by_level: dict[Level, Numbers]) -> Finding:
+def with_bars(claim: Claim, finding: Finding, by_level: dict[Level, Numbers]) -> Finding:
     """The finding with a bar on each check, from its numbers at all levels. Raises ClaimError if the levels have
     different quantities."""
     distinct = {quantities(row) for row in by_level.values()}
@@ -58,8 +58,8 @@ def unnumbered(quantity: str) -> str:
 
 
 def _judgeable(claim: Claim, check: PaperCheck, by_level: dict[Level, tuple[str, float, bool]]) -> PaperCheck:
-    """The check with its bar, from its value and outcome at each level. The bar is added to the check's own width,
-    which is that of the mesh around a point."""
+    """The check with its bar, from its value and outcome at each level. The bar is added to the check's own width, the
+    uncertainty of a position on its mesh."""
     values = {level: value for level, (_, value, _) in by_level.items()}
     on_sizes = [values[level] for level in claim.judging_levels]
     beside = [value for level, value in values.items() if level not in claim.judging_levels]
@@ -135,7 +135,7 @@ def _attempt(id: str, level: Level) -> Outcome:
     """A claim's numbers at the present level, or the message of its error."""
     try:
         finding = CLAIMS[id].function()
-        judged = finding.with_note() if level == CLAIMS[id].judged else None
-        return numbers(finding), judged
+        judged_finding = finding.with_note() if level == CLAIMS[id].judged else None
+        return numbers(finding), judged_finding
     except Exception as error:
         return f"at {level}: {type(error).__name__}: {error}"

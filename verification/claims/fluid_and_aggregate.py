@@ -47,7 +47,7 @@ SMALL = 0.1
 def touching() -> tuple[Body, Body]:
     """Wide's last state that leaves a film to the opposite wall, and its first in contact."""
     run = history(*WIDE)
-    return tuple(body_of(run.scene, each) for each in run.contact)
+    return tuple(body_of(run.scene, report) for report in run.contact)
 
 
 @dataclass(frozen=True)
@@ -90,9 +90,9 @@ def fluid_forces() -> Finding:
               for name, aggregate_forces in chosen.items()
               for ratio, value in (("fluid's over growth's stress", aggregate_forces.against_growth),
                                   ("strain that the fluid would cause", aggregate_forces.strain))]
-    reason = (f"it holds in base, and in wide while a film of fluid is left; then the constant mean velocity is driven "
-              f"through the plug by a head of {last.head:.3g} Pa, where growth's shear stress is {last.growth:.3g} Pa "
-              f"and the stiffness has fallen as theta^(-2/3) to {last.stiffness:.3g} Pa")
+    reason = (f"it holds in base, and in wide while a film of fluid is left. Later a head of {last.head:.3g} Pa drives "
+              f"the constant mean velocity through the plug; growth's shear stress is {last.growth:.3g} Pa, and the "
+              f"stiffness has fallen as theta^(-2/3) to {last.stiffness:.3g} Pa")
     note = (f"In base at {UPDATE} h, when growth has hardly begun, the first ratio is {early.against_growth:.2g}, but "
             f"the strain {early.strain:.1g}.")
     return Finding(tuple(checks), reason=reason, note=note)
@@ -138,14 +138,15 @@ def crossing() -> Finding:
     through = "all of it; 5 % for the flux of u through a plug of stabilised linear triangles"
     checks = (at_most("base, 19.2 h: share through the aggregate (%)", "around", inside(body(BASE, PLOTTED)), 5,
                       "all but a few percent"),
-              *(at_least(f"wide, {each.pore.time:.2f} h: share through the aggregate (%)", "through", inside(each), 95,
-                         through) for each in (touched, last)))
-    half = next(each for each in bodies(WIDE) if each.pore.time > touched.pore.time - 5 and inside(each) > 50)
-    left = half.grid.width - half.outline.thickness
-    return Finding(checks, note="It does not wait for contact, since lambda is finite: in wide, in whole hours, more "
-                   f"than half of the flux crosses the aggregate from {half.pore.time:g} h on, when a film of "
-                   f"{max(left, 0.0):.1f} um is left, and {inside(film):.2g} % in the last shape that leaves one.",
-                   reason="at contact some of the flux still goes beside it")
+              *(at_least(f"wide, {aggregate.pore.time:.2f} h: share through the aggregate (%)", "through",
+                         inside(aggregate), 95, through) for aggregate in (touched, last)))
+    half = next(aggregate for aggregate in bodies(WIDE)
+                if aggregate.pore.time > touched.pore.time - 5 and inside(aggregate) > 50)
+    film_left = half.grid.width - half.outline.thickness
+    return Finding(checks, note="The flux crosses the aggregate before contact, because lambda is finite: in wide, in "
+                   f"whole hours, more than half of it from {half.pore.time:g} h on, with a film of "
+                   f"{max(film_left, 0.0):.1f} um, and {inside(film):.2g} % in the last shape with a film.",
+                   reason="at contact some of the flux still passes beside the aggregate")
 
 
 def inside(aggregate: Body) -> float:
@@ -159,8 +160,8 @@ def inside(aggregate: Body) -> float:
 
 
 #: The distance over which the stress is averaged, over the pore's width; and all reported distances.
-APART = 0.1
-DISTANCES = (0.5 * APART, APART, 2 * APART)
+AVERAGED_OVER = 0.1
+DISTANCES = (0.5 * AVERAGED_OVER, AVERAGED_OVER, 2 * AVERAGED_OVER)
 #: Means are taken at points a distance over PLACES apart; DEGREE of the quadrature of the stress.
 PLACES, DEGREE = 4, 8
 #: The states of C46: run and hour.
@@ -187,13 +188,13 @@ def averaged(aggregate: Body, distance: float, places: np.ndarray) -> np.ndarray
     shape = growth.Shape(body.shape.cells, body.shape.corners, DEGREE)
     finer = replace(aggregate, pore=replace(aggregate.pore, body=growth.Body(shape, body.reference)))
     where, areas = meshes.quadrature_points(aggregate.grid.points[aggregate.triangles], shape.table)
-    apart = KDTree(places).sparse_distance_matrix(KDTree(where.reshape(-1, 2)), distance, output_type="coo_matrix")
-    weights = sp.csr_array((areas.ravel()[apart.col], (apart.row, apart.col)), shape=apart.shape)
+    within = KDTree(places).sparse_distance_matrix(KDTree(where.reshape(-1, 2)), distance, output_type="coo_matrix")
+    weights = sp.csr_array((areas.ravel()[within.col], (within.row, within.col)), shape=within.shape)
     means = (weights @ finer.stress.reshape(-1, 4)) / weights.sum(axis=1)[:, None]
     return means / aggregate.scene.growth.shear_modulus
 
 
-def peak(aggregate: Body, part: float = APART) -> Peak:
+def peak(aggregate: Body, part: float = AVERAGED_OVER) -> Peak:
     """Largest principal value of the stress in the mean over a part of the pore's width, and where."""
     distance = part * aggregate.grid.width
     places = lattice(aggregate, distance / PLACES)
@@ -215,60 +216,60 @@ def lattice(aggregate: Body, spacing: float) -> np.ndarray:
        date="2026-11-24 12:50", **ABOUT_WIDE,
        unjudged="it says what could be added to the model, and gives no strength at which an aggregate would tear")
 def tearing() -> Finding:
-    """Largest principal stress in the aggregate of base and wide: where would it tear first?"""
-    most = {run: max(bodies(run)[1:], key=tension) for run in (BASE, WIDE)}
+    """Largest principal stress in the aggregate of base and wide, and its position, where it would tear first."""
+    most_stressed = {run: max(bodies(run)[1:], key=tension) for run in (BASE, WIDE)}
     places = " and ".join(f"{peak(aggregate).description} and {aggregate.pore.time:g} h in {run[0]}"
-                          for run, aggregate in most.items())
+                          for run, aggregate in most_stressed.items())
     return Finding((), note=lambda: f"The largest principal stress, in the mean over W / 10, is {places}. "
-                   f"{_on_another_size(most)}")
+                   f"{_on_another_size(most_stressed)}")
 
 
-def _on_another_size(most: dict[Run, Body]) -> str:
+def _on_another_size(most_stressed: dict[Run, Body]) -> str:
     """Describe the location of the largest stress, at this level and on the element size of the figure."""
-    preset_x = [peak(aggregate).x for aggregate in most.values()]
-    hours = [aggregate.pore.time for aggregate in most.values()]
+    preset_x = [peak(aggregate).x for aggregate in most_stressed.values()]
+    hours = [aggregate.pore.time for aggregate in most_stressed.values()]
     with at_level(Level(CONVERGED, PAIRED[1])):
-        paired_x = [peak(body((*run, rows_at(hour)), hour)).x for run, hour in zip(most, hours)]
-    places = ", ".join(f"at x = {x:.0f} and {other:.0f} um in {run[0]}"
-                       for run, x, other in zip(most, preset_x, paired_x))
-    return ("The place is not known as well as the size: here and with the elements of its figure, "
+        paired_x = [peak(body((*run, rows_at(hour)), hour)).x for run, hour in zip(most_stressed, hours)]
+    places = ", ".join(f"at x = {x:.0f} and {paired:.0f} um in {run[0]}"
+                       for run, x, paired in zip(most_stressed, preset_x, paired_x))
+    return ("The position is less certain than the value: here and with the elements of its figure, "
             f"{PAIRED[1]:g} times those of the preset, it is {places}.")
 
 
 @claim("C46", "5", "the stress could link fluid flow, growth and detachment: the fluid changes the stress of which the "
        "aggregate would tear", date="2026-11-22 18:19", **ABOUT_WIDE)
-def torn_by_the_fluid() -> Finding:
+def stress_changed_by_fluid() -> Finding:
     """Largest principal stress, in the mean over a tenth of the pore's width, with the fluid's forces and without: of
     base at 19.4 h and of wide at 30 h, with a film left, and of wide at 40 h, a plug under constant velocity. The
     statement holds if the fluid changes the stress in one of these states."""
-    pairs = {f"{run[0]}, {hour:g} h": (body(run, hour), at_rest(body(run, hour), "included")) for run, hour in STATES}
-    most = max(abs(changed(pair)) for pair in pairs.values())
+    pairs = {f"{run[0]}, {hour:g} h": (body(run, hour), with_fluid_forces(body(run, hour))) for run, hour in STATES}
+    largest_effect = max(abs(fluid_effect(pair)) for pair in pairs.values())
     check = at_least("largest principal stress, in the mean over W / 10, changed by the fluid, the most of three "
-                     "states (%)", "could provide a link", most, 100 * FEW, f"more than {FEW_WORDS}")
+                     "states (%)", "could provide a link", largest_effect, 100 * FEW, f"more than {FEW_WORDS}")
     return Finding((check,), reason="the fluid changes the stress by a few percent at most",
                    note=lambda: _describe_fluid_effect(pairs))
 
 
-def changed(pair: tuple[Body, Body], part: float = APART) -> float:
+def fluid_effect(pair: tuple[Body, Body], part: float = AVERAGED_OVER) -> float:
     """Change (%) of the largest principal stress by the fluid."""
-    without, forced = (peak(aggregate, part).value for aggregate in pair)
-    return 100 * (forced / without - 1)
+    unforced, forced = (peak(aggregate, part).value for aggregate in pair)
+    return 100 * (forced / unforced - 1)
 
 
 def _describe_fluid_effect(pairs: dict[str, tuple[Body, Body]]) -> str:
-    peaks = "; ".join(f"{name} {peak(without).description} and {peak(forced).description}"
-                      for name, (without, forced) in pairs.items())
+    peaks = "; ".join(f"{name} {peak(unforced).description} and {peak(forced).description}"
+                      for name, (unforced, forced) in pairs.items())
     changes = "; ".join(f"{name} {_changes(pair)}" for name, pair in pairs.items())
-    return (f"Without and with the fluid's forces: {peaks}. In the mean over W / 20, W / 10 and W / 5 it changes by, "
-            f"in percent: {changes}. A largest value in a point does not exist.")
+    return (f"Without and with the fluid's forces: {peaks}. Changes (%) in the mean over W / 20, W / 10 and W / 5: "
+            f"{changes}. The stress at a point has no largest value.")
 
 
 def _changes(pair: tuple[Body, Body]) -> str:
     """Change (%) of the stress by the fluid, in means over each of DISTANCES."""
-    return ", ".join(f"{changed(pair, part):.2g}" for part in DISTANCES)
+    return ", ".join(f"{fluid_effect(pair, part):.2g}" for part in DISTANCES)
 
 
-def at_rest(aggregate: Body, fluid_forces: str) -> Body:
+def with_fluid_forces(aggregate: Body, fluid_forces: str = "included") -> Body:
     """The same aggregate at rest with the fluid's forces "included" or "neglected". The result does not depend on the
     path, because the aggregate is elastic. It leaves out the effect of the forces on growth. Raises GrowthError if
     shape and flow do not agree."""

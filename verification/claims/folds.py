@@ -96,11 +96,11 @@ def uneven_expansion() -> Finding:
         run = stretch_history(*SCENES[name])
         checks += [at_least(f"{name}: largest expansion under a smooth surface of least energy", "up to 2000",
                             smooth_expansion(run), TOTAL, "as stated"),
-                   _reached(name)]
+                   reached_time(name)]
     return Finding(tuple(map(without_limit, checks)), reason=f"{_unreached()}{_ends()}", note=_stretches)
 
 
-def _reached(name: str) -> PaperCheck:
+def reached_time(name: str) -> PaperCheck:
     """The time at which the expansion is 2000; the end of the run, without an upper end, if the run ends before."""
     run = stretch_history(*SCENES[name])
     expansion = np.maximum.accumulate(run.expansion)

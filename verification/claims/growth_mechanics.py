@@ -59,9 +59,9 @@ def sliding(points: np.ndarray, triangles: np.ndarray) -> Supported:
     return Supported(shape, points, np.column_stack([middle, on_wall]))
 
 
-def radial_theta(body: Supported, inner: float, more: float) -> np.ndarray:
+def radial_theta(body: Supported, inner: float, increase: float) -> np.ndarray:
     """(t, 1) theta = inner + more (R / R_0)^2 at the triangles' middles."""
-    return inner + more * np.sum(body.reference[body.cells].mean(axis=1) ** 2, axis=1)[:, None] / RADIUS**2
+    return inner + increase * np.sum(body.reference[body.cells].mean(axis=1) ** 2, axis=1)[:, None] / RADIUS**2
 
 
 def areas(body: Supported) -> np.ndarray:
@@ -70,12 +70,12 @@ def areas(body: Supported) -> np.ndarray:
 
 
 # C22: theta = INNER + MORE (R / R_0)^2 on meshes of the package's own, by refinement, and on regular ones, by parts.
-INNER, MORE = 1.5, 1.0
+INNER, INCREASE = 1.5, 1.0
 REFINEMENTS, REGULAR = (0.5, 0.7, 1.0, 1.4, 2.0, 2.8), (4, 8, 12)
 
 
 @claim("C22", "3.4", "P1-P1 with the stabilisation is stable and convergent; without it, it is not",
-       about=OF_SCHEME, sizes=BESIDE, steps=ALONE, fixed="there is no time in it")
+       about=OF_SCHEME, sizes=BESIDE, steps=ALONE, fixed="the claim does not depend on time")
 def stabilised() -> Finding:
     """Growth of a half-disc by theta(R) against the closed form: orders of outline and pressure; stability numbers.
 
@@ -87,17 +87,18 @@ def stabilised() -> Finding:
     regular = [regular_half_disc(parts) for parts in REGULAR]
     errors = np.array([growth_errors(body) for body in bodies])
     outline, pressure = (order(bodies, column) for column in errors.T)
-    with_, without, printed = ([stability(body, factor) for body in regular] for factor in (1.0, 0.0, -1.0))
+    with_term, without_term, as_printed = ([stability(body, factor) for body in regular]
+                                           for factor in (1.0, 0.0, -1.0))
     checks = (at_least("order of the outline", "convergent", outline, 1.7, "2 in theory; 1.7 for unrelated meshes"),
               at_least("order of the pressure", "convergent", pressure, 1.0, "1 in theory, in the mean square"),
-              at_least("stability number, finest over coarsest mesh", "stable", with_[-1] / with_[0], 0.8,
+              at_least("stability number, finest over coarsest mesh", "stable", with_term[-1] / with_term[0], 0.8,
                        "independent of h; a fifth for the coarsest mesh"),
-              at_most("stability number without stabilisation, largest", "it is not", max(without), 1e-10,
+              at_most("stability number without stabilisation, largest", "it is not", max(without_term), 1e-10,
                       "zero: a pressure that nothing sees; round-off"),
-              at_most("stability number with the sign of (27), largest", "as printed", max(printed), 0.0,
+              at_most("stability number with the sign of (27), largest", "as printed", max(as_printed), 0.0,
                       "negative: stationary, but no saddle point [E5]"))
     return Finding(tuple(map(without_limit, checks)),
-                   reason="it is not of the order of theory on every family of meshes, or not stable")
+                   reason="on a family of meshes its order is below that of theory, or it is not stable")
 
 
 def order(family: list[Supported], errors) -> float:
@@ -109,11 +110,11 @@ def order(family: list[Supported], errors) -> float:
 def growth_errors(body: Supported) -> tuple[float, float]:
     """Mean-square errors, relative, of the outline's radius and of the pressure."""
     start = growth.Equilibrium(body.reference, body.resting, 0)
-    theta = radial_theta(body, INNER, MORE)
+    theta = radial_theta(body, INNER, INCREASE)
     solution = growth.reach(stabilised_by(body, 1.0), np.ones_like(theta), theta, start, body.reference)
     R = np.minimum(np.hypot(*body.reference.T), RADIUS)
     rim = R > (1 - 1e-9) * RADIUS
-    radius, pressure = (exact(R, INNER, MORE, RADIUS) for exact in (neo_hookean.cylinder_radius,
+    radius, pressure = (exact(R, INNER, INCREASE, RADIUS) for exact in (neo_hookean.cylinder_radius,
                                                                     neo_hookean.cylinder_pressure))
     weight = np.bincount(body.cells.ravel(), np.repeat(areas(body) / 3, 3))
     outline = np.hypot(*solution.position[rim].T) / radius[rim] - 1
@@ -123,10 +124,10 @@ def growth_errors(body: Supported) -> tuple[float, float]:
 
 def stability(body: Supported, factor: float) -> float:
     """Least eigenvalue of B K^-1 B^T + factor C against the pressure's mass matrix, at t = 0 (dense)."""
-    n, of = body.corners, stabilised_by(body, factor)
-    numbered = np.argsort(of.sparse.order)
-    of.under(np.ones_like(of.strained(body.reference).J), body.reference, body.reference, body.resting)
-    matrix = of.sparse.matrix(of.tangent(body.reference, body.resting)).toarray()[np.ix_(numbered, numbered)]
+    n, system = body.corners, stabilised_by(body, factor)
+    rows = np.argsort(system.sparse.order)
+    system.under(np.ones_like(system.strained(body.reference).J), body.reference, body.reference, body.resting)
+    matrix = system.sparse.matrix(system.tangent(body.reference, body.resting)).toarray()[np.ix_(rows, rows)]
     M = np.zeros((n, n))
     np.add.at(M, (body.cells[:, :, None], body.cells[:, None, :]), mass(areas(body)))
     divergence = matrix[-n:, :-n]
@@ -152,12 +153,12 @@ def expansion() -> Finding:
     forms. The note gives the largest theta in wide, and its time.
     """
     body, inner = half_disc(1.4), TOTAL**0.9
-    more = TOTAL - inner
-    uniform, radial = (grow(body, radial_theta(body, *law), factor=RAISED) for law in ((TOTAL, 0.0), (inner, more)))
+    increase = TOTAL - inner
+    uniform, radial = (grow(body, radial_theta(body, *law), factor=RAISED) for law in ((TOTAL, 0.0), (inner, increase)))
     area = triangle_areas(uniform.position, body.cells).sum() / areas(body).sum()
     R = np.hypot(*body.reference.T)
     radii = [np.hypot(*solution.position[R > (1 - 1e-9) * RADIUS].T).mean() for solution in (uniform, radial)]
-    free, rim = RADIUS * np.sqrt(TOTAL), float(neo_hookean.cylinder_radius(RADIUS, inner, more, RADIUS))
+    free, rim = RADIUS * np.sqrt(TOTAL), float(neo_hookean.cylinder_radius(RADIUS, inner, increase, RADIUS))
     largest = np.array([aggregate.mean(aggregate.pore.theta).max() for aggregate in bodies(WIDE)])
     hours = series(*WIDE)["time_h"]
     reached = float(np.interp(np.log(TOTAL), np.log(np.maximum.accumulate(largest)), hours, right=np.inf))
@@ -172,11 +173,11 @@ def expansion() -> Finding:
                       "one to three days"))
     last, wide = bodies(WIDE)[-1], series(*WIDE)["aggregate_area_um2"]
     note = (f"165 updates, no remesh. Wide at its end: theta from {last.mean(last.pore.theta).min():.0f} to "
-            f"{largest[-1]:.0f}, area {wide[-1] / wide[0]:.0f} times the seed's; there the grown body is remeshed.")
+            f"{largest[-1]:.0f}, area {wide[-1] / wide[0]:.0f} times the seed's, with remeshes of the grown body.")
     change = (f"\"up to 2000\" is judged as reaching 2000, which is no upper bound: at {hours[-1]:g} h it is "
               f"{largest[-1]:.0f}; {sensitivity.holds_for_supplies('C25')}")
     return Finding(checks, change=change, note=note,
-                   reason="the expansion or its time is not decided by these meshes")
+                   reason="these meshes do not decide the expansion or its time")
 
 
 #: Sizes of the displacement's gradient.

@@ -48,7 +48,7 @@ LAST_HOURS = 5.0
 
 
 def growth_rates(aggregate: Body) -> np.ndarray:
-    """(N,) (F3 + F4) / X_m, 1/h, at the mesh's nodes, zero in the fluid: how fast each place makes biomass."""
+    """(N,) (F3 + F4) / X_m, 1/h, the rate of new biomass at the nodes of the mesh; zero in the fluid."""
     space, problem = aggregate.pore.space, aggregate.solved.problem
     rates = biomass.rates(space, aggregate.solved.concentrations, problem.law)
     density = aggregate.pore.active / space.reaction.dx / problem.law.constants.maximum_density
@@ -67,7 +67,7 @@ def extremes() -> Finding:
     checks = (at_most("x of the fastest growth (um)", "upgradient side", x_fast, 0.0, "the words"),
               between("x of the slowest growth (um)", "centre to downgradient side", x_slow, 0.0, last, "the words"),
               between("y of the slowest growth (um)", "on the wall", y_slow, 0.0, 0.0, "the words"))
-    note = "The place of an extreme is a node's: its bar is the range over the sizes and the way to the next node."
+    note = "An extreme lies at a node: its bar is the range over the sizes plus the distance to the next node."
     widths = (nearby(grid, fast), nearby(grid, slow), 0.0)
     checks = tuple(replace(without_limit(check), bar=Bar(check.value - width, check.value + width))
                    for check, width in zip(checks, widths))
@@ -77,8 +77,8 @@ def extremes() -> Finding:
 def nearby(grid: Mesh, node: int) -> float:
     """Distance (um) from a node to the farthest node that shares a triangle with it. The extreme lies within this
     distance."""
-    around = grid.cells[(grid.cells == node).any(axis=1)].ravel()
-    return float(np.hypot(*(grid.points[around] - grid.points[node]).T).max())
+    neighbours = grid.cells[(grid.cells == node).any(axis=1)].ravel()
+    return float(np.hypot(*(grid.points[neighbours] - grid.points[node]).T).max())
 
 
 @claim("C11", "4, Plate 2", "asymmetry minor while fully penetrated: a few percent")
@@ -116,7 +116,7 @@ def upgradient_only() -> Finding:
     """Share of the new area, and of the biomass made, upgradient of the seed's centre, at the end of `wide`."""
     last, end = bodies(WIDE)[-1], float(bodies(WIDE)[-1].pore.time)
     contact = contact_time(*WIDE)
-    spanned = next(each for each in bodies(WIDE) if each.pore.time >= contact)
+    spanned = next(aggregate for aggregate in bodies(WIDE) if aggregate.pore.time >= contact)
     late, since = (upstream_part(polygon(first.outline), polygon(last.outline))
                    for first in (body(WIDE, end - LAST_HOURS), spanned))
     up, down = biomass_rates(last)
@@ -124,10 +124,10 @@ def upgradient_only() -> Finding:
     checks = (at_least("new area upgradient, last 5 h (%)", "only upgradient", 100 * late, 95, bound),
               at_least(f"biomass made upgradient, rate at {end:g} h (%)", "only upgradient", 100 * up / (up + down), 95,
                        bound))
-    note = (f"Contact with the opposite wall comes at {contact:.2f} h; of the area that is new between "
+    note = (f"The aggregate touches the opposite wall at {contact:.2f} h. Of the new area between "
             f"{spanned.pore.time:g} h and {end:g} h, {100 * since:.1f} % lies upgradient.")
     return Finding(checks, change=sensitivity.holds_for_supplies("C12"), note=note,
-                   reason="growth is not upgradient alone")
+                   reason="growth is not only upgradient")
 
 
 
@@ -153,7 +153,7 @@ def squeezed() -> Finding:
                        np.sqrt(2 * outlines[-1].area / np.pi) / width, 1 + FEW, "more than fits, by a few percent"),
               without_limit(at_least("least rate at which a contact surface grows (um/h)", "as it grows", rates.min(),
                                      0.0, "both grow in each update")))
-    return Finding(checks, change=sensitivity.holds_for_supplies("C29"), reason="not on every mesh")
+    return Finding(checks, change=sensitivity.holds_for_supplies("C29"), reason="it does not hold on every mesh")
 
 
 @claim("C31", "2.3.3, 4", "the shape stays a half-disc until it is limited or squeezed",
@@ -170,10 +170,10 @@ def stays_half_disc() -> Finding:
     half = load_packaged(*WIDE).substrates.acceptor.half_saturation
     limited = rows["time_h"][rows["acceptor_min_mg_per_L"] < half]
     centre = 0.5 * (rows["upstream_um"] + rows["downstream_um"])
-    return Finding(checks, note=f"Somewhere in wide C_A falls under K_s at {min(limited, default=np.inf):g} h: its "
-                   "growth is then limited, but shows as a shift of the whole half-disc, its centre being "
+    return Finding(checks, note=f"In wide C_A first falls below K_s at {min(limited, default=np.inf):g} h. Growth is "
+                   "then limited, but the half-disc keeps its shape and shifts: its centre is "
                    f"{-centre[before][-1]:.1f} um upstream at {rows['time_h'][before][-1]:g} h.",
-                   reason="the deviation is not decided by these meshes")
+                   reason="these meshes do not decide the deviation")
 
 
 def deviation(aggregate: Body) -> float:
@@ -218,13 +218,13 @@ def oxygen() -> Finding:
               at_least("the smaller of both", "present", min(base.min(), wide.min()), np.finfo(float).tiny, "not zero"))
     hours, last = series(*WIDE)["time_h"], bodies(WIDE)[-1]
     since = hours[wide < 1][0] if (wide < 1).any() else np.inf
-    reason = ("it holds in base; in wide, whose supply of 10 K_s is assumed, the front takes all the oxygen: behind it "
-              f"C_A falls under K_s at {since:g} h and to {wide.min():.1g} K_s at {hours[wide.argmin()]:g} h, where it "
-              f"is not zero, but {share_under(last, 1.0):.0f} % of the biomass has less than K_s and "
-              f"{share_under(last, 0.1):.0f} % less than K_s / 10, and hardly decays any more")
+    reason = ("it holds in base. In wide, whose supply of 10 K_s is assumed, the front consumes all the oxygen: behind "
+              f"it C_A falls below K_s at {since:g} h, and to {wide.min():.1g} K_s at {hours[wide.argmin()]:g} h. This "
+              f"is not zero, but {share_under(last, 1.0):.0f} % of the biomass has less than K_s, and "
+              f"{share_under(last, 0.1):.0f} % has less than K_s / 10 and hardly decays")
     lost = 100 * (1 - np.exp(-load_packaged(*WIDE).kinetics.decay_coefficient * max(hours[-1] - since, 0.0)))
-    return Finding(checks, reason=reason, note="What that leaves out is small: decay at its full rate b since then "
-                   f"would have taken {lost:.1f} % of that biomass, at most.")
+    return Finding(checks, reason=reason, note="The missing decay is small: at its full rate b it would have removed "
+                   f"at most {lost:.1f} % of that biomass since then.")
 
 
 def share_under(aggregate: Body, bound: float) -> float:
@@ -278,13 +278,13 @@ def stresses() -> Finding:
                    between(f"{label}: change of the conductivity (%)", "not affected",
                            conductivity_change((*run, STRESS_FREE), times, run), -100 * FEW, 100 * FEW, FEW_WORDS)]
     uniform = 2.5 ** (-5 / 3) * (2.5 - 1)
-    reason = ("it hangs on the modulus: in the plane the stress is minor against mu_L, that of t = 0, and in base also "
-              f"against that of the grown material, mu_L theta^(-2/3); in wide it reaches "
+    reason = ("it depends on the modulus. In the plane the stress is minor against mu_L, the modulus at t = 0, and in "
+              f"base also against that of the grown material, mu_L theta^(-2/3); in wide it reaches "
               f"{largest_stresses['wide'][2]:.2g} of the latter after contact. "
-              "Across the plane it is minor against neither: plane strain keeps growth from "
-              "expanding that way, and that alone makes the equivalent stress of uniform growth theta^(-5/3) "
-              f"(theta - 1), {uniform:.3f} at its largest, for theta = 2.5. It does no work on the shape, and what the "
-              "paper concludes from minor stresses holds")
+              "Across the plane it is minor against neither: plane strain prevents expansion in this direction, and "
+              "this alone gives uniform growth an equivalent stress of theta^(-5/3) "
+              f"(theta - 1), at most {uniform:.3f}, for theta = 2.5. This stress does no work on the shape, and the "
+              "paper's conclusions from minor stresses hold")
     return Finding(tuple(checks), reason=reason)
 
 
@@ -292,17 +292,17 @@ def peaks(run: Run) -> tuple[float, float, float]:
     """Largest in-plane shear and equivalent stress over mu_L, and largest in-plane shear stress over mu_L J^(-2/3), in
     all rows of a run."""
     triples = []
-    for each in bodies(run):
-        cauchy = stress(each)
+    for aggregate in bodies(run):
+        cauchy = stress(aggregate)
         shear = in_plane(cauchy)
-        softened = shear * each.mean(each.strained.J) ** (2 / 3)
+        softened = shear * aggregate.mean(aggregate.strained.J) ** (2 / 3)
         triples.append((shear.max(), equivalent(cauchy).max(), softened.max()))
     return tuple(map(float, np.max(triples, axis=0)))
 
 
 def outline_difference(run: Run, time: float) -> float:
     """Area that only one of the outlines covers, with new biomass stressed and stress-free, in percent of the area."""
-    return uncovered(*(polygon(body((*run, *more), time).outline) for more in ((), (STRESS_FREE,))))
+    return uncovered(*(polygon(body((*run, *change), time).outline) for change in ((), (STRESS_FREE,))))
 
 
 def after_contact() -> tuple[float, ...]:

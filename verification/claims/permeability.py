@@ -50,7 +50,7 @@ def layered_share(ratio: float, part: float, walls: int) -> float:
 #: Part of its biomass that the aggregate gains up to contact in the window of a steepness.
 GAINED = 0.1
 #: "Sharply": this many times as steeply as under uniform layers of the same biomass.
-TWICE, SHARPLY = 2.0, "falls sharply"
+TWICE_AS_STEEP, SHARPLY = 2.0, "falls sharply"
 
 
 @claim("C16", "4, 2.1", "conductivity falls sharply when the aggregate spans the pore (at constant velocity; C43 at "
@@ -64,9 +64,9 @@ def spanning() -> Finding:
     checks = (at_most("K / K_clean at contact", SHARPLY, closed, 0.01, "orders of magnitude: two at least"),
               as_layers_fall(WIDE, "wide"))
     before = 100 * np.log(film) / np.log(closed)
-    change = (f"it falls as the aggregate comes to span the pore, not when it does: of the orders of magnitude lost by "
-              f"contact {before:.0f} % are lost while a film is left, K / K_clean being {film:.2g} in the last shape "
-              f"with a film and {closed:.2g} in the first without, {film / closed:.1f} times less")
+    change = (f"it falls while the aggregate approaches the opposite wall, not at contact: {before:.0f} % of the "
+              f"orders of magnitude lost up to contact are lost while a film is left. K / K_clean is {film:.2g} in the "
+              f"last shape with a film and {closed:.2g} in the first one without, {film / closed:.1f} times less")
     return Finding(checks, change=change, reason="the fall is not as sharp on every mesh",
                    note=f"-d ln K / d ln A of wide is {steepness(WIDE):.3g} over this window.")
 
@@ -78,7 +78,7 @@ def as_layers_fall(run: Run, name: str) -> PaperCheck:
     ratio = scene.flow.viscosity_ratio
     layer = np.log(layered_share(ratio, part / (1 + GAINED), 1) / layered_share(ratio, part, 1)) / np.log(1 + GAINED)
     return at_least(f"{name}: -d ln K / d ln A over the last {100 * GAINED:g} % of biomass up to contact, over that of "
-                    "a uniform layer", SHARPLY, steepness(run) / layer, TWICE, "twice as steep at least")
+                    "a uniform layer", SHARPLY, steepness(run) / layer, TWICE_AS_STEEP, "twice as steep at least")
 
 
 def steepness(run: Run) -> float:
@@ -137,11 +137,11 @@ def throttled() -> Finding:
         at_least(f"biomass made upgradient, rate at {END} h (%)", "only upgradient", upgradient, 95, "95 %, as in C12"),
         as_layers_fall(CLOSING, "base"))
     reason = ("flow and supply are restricted long before the pore is spanned: a tenth of the velocity is left at "
-              f"{tenth:.1f} h, and from then on the aggregate starves. The last film closes at {touched:.1f} h only, "
+              f"{tenth:.1f} h, and from then on the aggregate starves. The last film closes only at {touched:.1f} h, "
               f"and with it the conductivity falls by a factor of {film / closed:.2g}. Most of the growth, but "
               f"not all, is upgradient: {upgradient:.0f} %. Decay "
-              "never balances it, since (9) lets it go on in proportion to m_A as growth does: where the acceptor is "
-              "used up both stop")
+              "never balances synthesis, because both are proportional to m_A in (9): where the acceptor is used up, "
+              "both stop")
     decays = ", ".join(f"{decay_share(aggregate):.2g} at {aggregate.pore.time:g} h"
                        for aggregate in bodies(CLOSING)[::12])
     return Finding(checks, reason=reason, note=f"Decay over synthesis is {decays}. -d ln K / d ln A of base is "

@@ -110,8 +110,8 @@ def downgradient_end() -> Finding:
               near("its decay with the pore's length, over u_ave / D_A", "if long enough", decay, 1.0, 0.05,
                    "(25): exp(-u x / D) upstream; 5 %, since the donor's part fades sooner"))
     changes = ", ".join(f"{effect:.2g} % at {length:g} um" for effect, length in zip(effects, LENGTHS))
-    return Finding(checks, note=f"Largest change of the uptake with C held at nothing or at the supply at the pore's "
-                   f"end: {changes}. The flux that enters is u_ave W C_supply whatever happens downstream, by (11).")
+    return Finding(checks, note="Largest change of the uptake if C at the pore's end is zero or the supply: "
+                   f"{changes}. By (11) the entering flux is u_ave W C_supply, whatever C is downstream.")
 
 
 def uptake(solved: Solved) -> np.ndarray:
@@ -124,7 +124,7 @@ def end_effect(*changes: str) -> float:
     _, pore, solved = fully_meshed_pore(*changes)
     outlet = pore.space.outlet.nodes
     prescribed = [solve_with_prescribed(pore, solved, outlet, part) for part in (0.0, 1.0)]
-    return max(largest_difference(uptake(other), uptake(solved)) for other in prescribed)
+    return max(largest_difference(uptake(changed), uptake(solved)) for changed in prescribed)
 
 
 def solve_with_prescribed(pore: Pore, solved: Solved, nodes: np.ndarray, part: float) -> Solved:
@@ -140,21 +140,21 @@ def solve_with_prescribed(pore: Pore, solved: Solved, nodes: np.ndarray, part: f
     newton = Newton(transport.NEWTON, transport.ROUND_OFF, transport.MOST_ITERATIONS)
     last, _, converged = newton.solve(balance, balance.begun(guess))
     if not converged:
-        raise TransportError(f"Newton's method stands at a defect of {last.defect:.2g}")
+        raise TransportError(f"Newton's method has not converged: defect {last.defect:.2g}")
     state = Concentrations(*last.state.reshape(2, -1))
     return replace(solved, problem=problem, concentrations=state, fluxes=transport.fluxes(problem, sink, state))
 
 
-def largest_difference(computed: np.ndarray, other: np.ndarray) -> float:
+def largest_difference(computed: np.ndarray, expected: np.ndarray) -> float:
     """Largest relative difference, %."""
-    return 100 * float(np.abs(computed / other - 1).max())
+    return 100 * float(np.abs(computed / expected - 1).max())
 
 
 RADII, REACHES = (5.0, 10.0, 20.0, 30.0), (0.25, 0.5, 1.0, 1.5)
 
 
 @claim("C19", "3.1", "meshing to min(5 R, 1 W) from the aggregate suffices", about=OF_SCHEME, sizes=BESIDE, steps=ALONE,
-       fixed="the shapes are given, and no step is made", date="2026-11-22 18:19")
+       fixed="the shapes are prescribed, and the claim has no steps", date="2026-11-22 18:19")
 def truncation() -> Finding:
     """Conductivity, and effluents at one mean velocity, of half-discs of X_m meshed to parts of min(5 R, W), against
     the whole pore meshed, on nested meshes whose clean part resists alike."""
@@ -164,10 +164,10 @@ def truncation() -> Finding:
                            deviations[REACHES.index(1.0)].max(), 0.5, "0.5 %: as little as the time step is to matter")
                    for radius, deviations in errors.items())
     table = "; ".join(f"R = {radius:g} um: {_listed(deviations)}" for radius, deviations in errors.items())
-    return Finding(checks, reason="what is cut off matters by more than that",
+    return Finding(checks, reason="the truncation has a larger effect",
                    note="Errors (%) of conductivity/acceptor effluent/donor effluent at parts of min(5 R, W): "
-                   f"{table}. That is without what the elements of the clean part add to the resistance, which is no "
-                   "truncation.")
+                   f"{table}. The error of the elements of the clean part is subtracted, because it is no effect of "
+                   "the truncation.")
 
 
 def _listed(errors: np.ndarray) -> str:

@@ -43,10 +43,10 @@ from verification.claims import (
 from verification.claims.evaluate import unnumbered
 from verification.evidence.writing import load
 
-LEGEND = ("paper: as printed. ours: the converged solution, or the scheme where the claim is about that. numerics: the "
-          "error bar; inputs: where the number goes as the inputs of Table 1 move within their rounding; scheme of "
-          "2001: its range on one to three meshes. accepted: the interval of the printed digits, or what the words are "
-          "taken for. An outcome is that of the whole bar.\n")
+LEGEND = ("paper: as printed. ours: the converged solution, or the scheme if the claim is about the scheme. numerics: "
+          "the error bar; inputs: the range of the number as the inputs of Table 1 vary within their rounding; scheme "
+          "of 2001: its range on one to three meshes. accepted: the interval of the printed digits, or the range that "
+          "the words stand for. An outcome is that of the whole bar.\n")
 INDEPENDENCE = "Mesh and time-step independence of base in the paper's scheme"
 
 
@@ -139,7 +139,7 @@ def definitions(entry: dict) -> list[dict]:
     the claim is not judged any more."""
     if entry["verdict"] == NOT_JUDGED:
         return [entry]
-    return sorted([entry, *entry["other_definitions"]], key=lambda each: each["defined"])
+    return sorted([entry, *entry["other_definitions"]], key=lambda definition: definition["defined"])
 
 
 def counted(entry: dict) -> dict:
@@ -148,9 +148,9 @@ def counted(entry: dict) -> dict:
 
 
 def describe_verdicts(entry: dict) -> str:
-    """The verdict that counts; if the claim was defined anew, also the verdict of the last definition."""
+    """The verdict that counts; if the definition has changed, also the verdict of the last definition."""
     first, *later = definitions(entry)
-    return f"{first['verdict']} (as defined anew: {later[-1]['verdict']})" if later else first["verdict"]
+    return f"{first['verdict']} (as redefined: {later[-1]['verdict']})" if later else first["verdict"]
 
 
 def distinct(entries: list[dict]) -> dict[tuple[str, str], str]:
@@ -161,7 +161,7 @@ def distinct(entries: list[dict]) -> dict[tuple[str, str], str]:
         for check in entry["checks"]:
             if check["paper_low"] is not None and check["rests_on"] == PREDICTED:
                 outcomes.setdefault((entry["id"], check["paper"]), set()).add(check["outcome"])
-    return {key: min(each, key=(FAILS, REACHES_OVER, HOLDS).index) for key, each in outcomes.items()}
+    return {key: min(kinds, key=(FAILS, REACHES_OVER, HOLDS).index) for key, kinds in outcomes.items()}
 
 
 def summary(rows: list[Row]) -> str:
@@ -195,8 +195,8 @@ def read() -> list[dict]:
 
 def replaced(entries: list[dict]) -> list[dict]:
     """The record with the entries of some claims replaced, in order."""
-    known = {each["id"]: each for each in (*read(), *entries)}
-    return [known[id] for id in sorted(known)]
+    by_id = {entry["id"]: entry for entry in (*read(), *entries)}
+    return [by_id[id] for id in sorted(by_id)]
 
 
 def entry(row: Row) -> dict:
@@ -209,16 +209,16 @@ def entry(row: Row) -> dict:
             "checks": [_check(check, claim.about) for check in row.checks]}
 
 
-def stamped(entry: dict, known: dict | None, now: str) -> dict:
+def stamped(entry: dict, recorded: dict | None, now: str) -> dict:
     """The entry with the time of its first value: the recorded one while the definition is the same, else now (UTC).
     Raises ClaimError for a definition that is not dated before its first value, or not after those of another one; for
     a new claim not after RULE_SINCE."""
-    if known and _definition(entry) == _definition(known):
-        return {**entry, "first_value": known["first_value"]}
-    before = known["first_value"] if known else RULE_SINCE
+    if recorded and _definition(entry) == _definition(recorded):
+        return {**entry, "first_value": recorded["first_value"]}
+    before = recorded["first_value"] if recorded else RULE_SINCE
     if not before < entry["defined"] < now:
-        raise ClaimError(f"{entry['id']}: defined anew, and {entry['defined']} is not between {before} and {now}: a "
-                         "definition is dated before its first value, and after those of another definition")
+        raise ClaimError(f"{entry['id']}: the definition is new, and {entry['defined']} is not between {before} and "
+                         f"{now}: a definition is dated before its first value, and after those of another definition")
     return {**entry, "first_value": now}
 
 
@@ -249,25 +249,25 @@ def differences(entries: list[dict], committed: list[dict]) -> list[str]:
     """One line for each disagreement of claims with the record: another verdict or outcome, or a number outside its
     interval.
     """
-    known = {each["id"]: each for each in committed}
-    return [f"{each['id']}: {line}" for each in entries for line in _of_claim(each, known.get(each["id"]))]
+    by_id = {entry["id"]: entry for entry in committed}
+    return [f"{entry['id']}: {line}" for entry in entries for line in _of_claim(entry, by_id.get(entry["id"]))]
 
 
-def _of_claim(entry: dict, known: dict | None) -> Iterator[str]:
-    if known is None:
+def _of_claim(entry: dict, recorded_entry: dict | None) -> Iterator[str]:
+    if recorded_entry is None:
         yield "not in the record"
         return
-    if entry["verdict"] != known["verdict"]:
-        yield f"{entry['verdict']}, recorded as {known['verdict']}"
-    if _quantities(entry) != _quantities(known):
+    if entry["verdict"] != recorded_entry["verdict"]:
+        yield f"{entry['verdict']}, recorded as {recorded_entry['verdict']}"
+    if _quantities(entry) != _quantities(recorded_entry):
         yield "other quantities than recorded"
         return
-    for one, recorded in zip(entry["checks"], known["checks"]):
-        if not inside(one["value"], recorded["low"], recorded["high"]):
-            yield (f"{one['quantity']} is {one['value']:.6g}, "
+    for computed, recorded in zip(entry["checks"], recorded_entry["checks"]):
+        if not inside(computed["value"], recorded["low"], recorded["high"]):
+            yield (f"{computed['quantity']} is {computed['value']:.6g}, "
                    f"recorded as {recorded['low']:.6g} to {recorded['high']:.6g}")
-        if one["outcome"] != recorded["outcome"]:
-            yield f"{one['quantity']} {one['outcome']}, recorded: {recorded['outcome']}"
+        if computed["outcome"] != recorded["outcome"]:
+            yield f"{computed['quantity']} {computed['outcome']}, recorded: {recorded['outcome']}"
 
 
 def _quantities(entry: dict) -> list[str]:

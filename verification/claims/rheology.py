@@ -65,17 +65,17 @@ def other_rheology() -> Finding:
     checks = tuple(check for name, change in VARIANTS.items() for check in _changes(name, (*WIDE_TO_END, change)))
     worst = "; ".join(f"{check.quantity} {check.value:.3g}" for check in checks if not check.holds)
     shift, before, after = outline_shift((*WIDE_TO_END, VARIANTS[RECHOSEN]))
-    change = ("the place along the pore, which is the same all along, is not compared: it is that of the fixed points. "
-              f"With its middles rechosen the aggregate slides {shift:.1f} um downstream as it grows on the other "
-              f"side, with the same shape. Where they lie, the outlines are {before:.2g} % of the area apart, and "
-              f"{after:.2g} % moved back; how far has no limit in a mesh")
+    change = ("positions along the pore, which is uniform, are not compared: the fixed points alone determine them. "
+              f"With rechosen middles the aggregate keeps its shape and slides {shift:.1f} um downstream while it "
+              f"grows upstream. The outlines differ by {before:.2g} % of the area, and by {after:.2g} % after the "
+              "shift is removed; the shift has no limit as the mesh is refined")
     angles = " and ".join(f"{conductivity_change((*WIDE_TO_END, VARIANTS[f'angle {word}']), AFTER[:1]):+.2g} %"
                           for word in ("halved", "doubled"))
-    note = (f"The least angle says how much of the narrow wedges beside the contact is filled: at {AFTER[0]:g} h the "
-            f"conductivity changes by {angles} with it halved and doubled, and ever less. The paper expects no effect "
-            "of the rheology; the conditions at the walls it calls debatable and reasonable.")
+    note = ("The least angle determines how much of the narrow wedges beside the contact is filled: halved and "
+            f"doubled, it changes the conductivity by {angles} at {AFTER[0]:g} h, and by less later. The paper expects "
+            "no effect of the rheology, and calls the conditions at the walls debatable and reasonable.")
     return Finding(checks, change=change, note=note,
-                   reason=f"what changes by more than a few percent: {worst or 'nothing, but a bar reaches over'}")
+                   reason=f"changes by more than a few percent: {worst or 'none, but a bar reaches over the bound'}")
 
 
 def _changes(name: str, run: Run) -> tuple[PaperCheck, ...]:
@@ -90,9 +90,9 @@ def _changes(name: str, run: Run) -> tuple[PaperCheck, ...]:
 def outline_shift(run: Run, hour: float = END, plain: Run = WIDE_TO_END) -> tuple[float, float, float]:
     """Compare the outline of a run at an hour with that of a plain run: the shift (um) of its centroid downstream, and
     the area that only one of both covers (%), before and after the shift is removed."""
-    default, other = (polygon(body(chosen, hour).outline) for chosen in (plain, run))
-    moved = other.centroid.x - default.centroid.x
-    return moved, uncovered(default, other), uncovered(default, translate(other, -moved))
+    default, variant = (polygon(body(chosen, hour).outline) for chosen in (plain, run))
+    moved = variant.centroid.x - default.centroid.x
+    return moved, uncovered(default, variant), uncovered(default, translate(variant, -moved))
 
 
 def conductivity_change(run: Run, hours: tuple[float, ...] = AFTER, plain: Run = WIDE_TO_END) -> float:
@@ -114,8 +114,8 @@ def permeable(run: Run) -> Run:
 
 @claim("C42", "5", "a porous material instead of a raised viscosity may lead to differences, depending on the "
                    "conditions", fine=COMPARED, beside=(), date="2026-11-24 12:50",
-       unjudged="the paper speaks of the water's drag as body forces that act on the shape, and here it acts on the "
-                "flow alone, with a permeability that the paper does not print")
+       unjudged="in the paper the water's drag is a body force that acts on the shape; here it acts on the flow alone, "
+                "with a permeability that the paper does not print")
 def drag_or_viscosity() -> Finding:
     """Conductivity with Brinkman's drag of a permeability of 1e-15 m2 and with lambda = 2000: base at 19.2 h, an
     aggregate; wide just before contact, a film; and 5 h after it, a plug."""

@@ -54,7 +54,7 @@ FILM = 0.005
 
 
 def rows_at(*hours: float) -> str:
-    """The change of a scene that asks for rows at some times (h)."""
+    """The change of a scene that requests rows at some times (h)."""
     return "output.times=[" + ", ".join(f'"{hour:g} h"' for hour in hours) + "]"
 
 
@@ -121,7 +121,7 @@ def history(*run: str) -> History:
         if instant:
             instants.append(instant)
         if contact is None and before is not None and state.pore.contact:
-            contact = tuple(_solved(scene, each) for each in (_with_a_film(scene, before, state), state))
+            contact = tuple(_solved(scene, touching) for touching in (_with_a_film(scene, before, state), state))
         before = state
         far = state if state.pore.boundary.thickness <= NEAR * scene.pore.width else far
     return History(scene, tuple(instants), contact, far)
@@ -146,7 +146,7 @@ def _solved(scene: Scene, state: RestartState) -> Report:
 def series(*run: str) -> Columns:
     """Columns of a run's rows, as in ``timeseries.csv``."""
     computed = history(*run)
-    return columns([results.row(computed.scene, each) for each in computed.instants])
+    return columns([results.row(computed.scene, report) for report in computed.instants])
 
 
 @cached
@@ -155,7 +155,7 @@ def around_contact(*run: str) -> Columns:
     computed = history(*run)
     if computed.contact is None:
         raise LookupError(f"{run} does not touch the opposite wall")
-    return columns([results.row(computed.scene, each) for each in computed.contact])
+    return columns([results.row(computed.scene, report) for report in computed.contact])
 
 
 def contact_time(*run: str) -> float:
@@ -167,8 +167,8 @@ def contact_time(*run: str) -> float:
 def ledger(*run: str) -> Columns:
     """Columns of ``ledger.csv``, of all steps."""
     computed = history(*run)
-    steps = np.array([results.ledger_row(computed.scene, step) for each in computed.instants for step in each.ledgers],
-                     dtype=float)
+    ledgers = [step for report in computed.instants for step in report.ledgers]
+    steps = np.array([results.ledger_row(computed.scene, step) for step in ledgers], dtype=float)
     return dict(zip(results.LEDGER_COLUMNS, steps.T))
 
 
@@ -181,7 +181,7 @@ def biomass_defects(run: Run) -> np.ndarray:
 
 def instant(run: Run, time: float) -> Report:
     """The report of a run at a time (h). Raises KeyError if no row has this time."""
-    reports = [each for each in history(*run).instants if abs(each.pore.time - time) < 1e-6]
+    reports = [report for report in history(*run).instants if abs(report.pore.time - time) < 1e-6]
     if len(reports) != 1:
         raise KeyError(f"{run}: {len(reports)} rows at t = {time} h")
     return reports[0]
@@ -205,9 +205,9 @@ def grown(run: Run, time: float) -> tuple[Pore, Solved]:
 
 
 @cached
-def grown_anew(run: Run, time: float) -> tuple[Pore, Solved]:
-    """The same in a mesh made at that time, whose ends are 1.5 W from the aggregate (3.1) at every level. The ends of
-    the run's own mesh depend on the time of the last remesh."""
+def grown_on_new_mesh(run: Run, time: float) -> tuple[Pore, Solved]:
+    """The same on a new mesh, whose ends are 1.5 W from the aggregate (3.1) at every level. The ends of the run's own
+    mesh depend on the time of the last remesh."""
     return _grown(load_packaged(*run), *remeshed(load_packaged(*run), *solved_pore(run, time)))
 
 
@@ -268,7 +268,7 @@ def body(run: Run, time: float) -> Body:
 def bodies(run: Run) -> tuple[Body, ...]:
     """The aggregate in every row of a run."""
     computed = history(*run)
-    return tuple(body_of(computed.scene, each) for each in computed.instants)
+    return tuple(body_of(computed.scene, report) for report in computed.instants)
 
 
 def polygon(outline: Outline) -> shapely.Polygon:
@@ -286,7 +286,7 @@ def solved_pore(run: Run, time: float) -> tuple[Pore, Solved]:
 
 
 def remeshed(chosen: Scene, pore: Pore, solved: Solved) -> tuple[Pore, Solved]:
-    """The same aggregate in a new mesh of the extent that the scene asks for, solved."""
+    """The same aggregate in a new mesh of the extent that the scene requests, solved."""
     new, _ = remeshing.remesh(Remeshing.of(chosen), pore, pore, solved.flow.mean_velocity)
     return new, solve(chosen, new)
 
@@ -362,9 +362,9 @@ def halved(lattice: np.ndarray, falling=False) -> np.ndarray:
     return np.hstack([np.where(falling, [a, b, d], [a, b, c]), np.where(falling, [b, c, d], [a, c, d])]).T
 
 
-def uncovered(outline: shapely.Polygon, other: shapely.Polygon) -> float:
-    """Area that only one of two shapes covers, in percent of ours."""
-    return 100 * float(outline.symmetric_difference(other).area / outline.area)
+def uncovered(first: shapely.Polygon, second: shapely.Polygon) -> float:
+    """Area that only one of two shapes covers, in percent of the first one's."""
+    return 100 * float(first.symmetric_difference(second).area / first.area)
 
 
 def upstream_part(first: shapely.Polygon, last: shapely.Polygon) -> float:

@@ -59,8 +59,8 @@ SUPPLY = 10.0
 PRINTED_EFFLUENTS = (interval("4.19"), interval("6.13"))
 
 
-#: Reasons why these numbers are not computed with other steps.
-BOOKED = "the update of 12 min is the paper's, and what this balance makes of it is asked"
+#: Why the numbers of this balance are not computed with other steps.
+PAPER_UPDATE = "the claim concerns the balance of the paper's update of 12 min"
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +110,7 @@ def bookkeeping(run) -> Bookkeeping:
 
 
 @claim("C13", "4", "mass balance from effluents within a few percent; 1.6 % on the effluents brings all ratios within "
-       "1 %", about=OF_SCHEME, steps=ALONE, fixed=BOOKED, date="2026-11-21 02:08")
+       "1 %", about=OF_SCHEME, steps=ALONE, fixed=PAPER_UPDATE, date="2026-11-21 02:08")
 def papers_bookkeeping() -> Finding:
     """The correction that the paper's bookkeeping needs in each step of base; the errors of its three ratios at 19.4 h
     with its own correction of all effluents; and dM_CA / dM_CD from the effluents that it prints, with the same."""
@@ -125,8 +125,8 @@ def papers_bookkeeping() -> Finding:
                for name, error in zip(RATIOS, corrected)]
     checks.append(near("error of dM_CA/dM_CD, the paper's own effluents + 1.6 % (%)", "within 1", printed_error, 0, 1,
                        "the paper's bound"))
-    reason = (f"{_time_lag(book)}. An effluent that is 1.6 % higher exceeds its supply until {exceeding(book):.1f} h "
-              "[E18], so that this cannot have been a correction of all effluents")
+    reason = (f"{_time_lag(book)}. An effluent raised by 1.6 % exceeds its supply until {exceeding(book):.1f} h [E18], "
+              "so the paper cannot have corrected all effluents")
     return Finding(tuple(checks), reason=reason, note=_describe_printed_range(expected))
 
 
@@ -157,10 +157,10 @@ def _time_lag(book: Bookkeeping) -> str:
     """Describe the error of the paper's bookkeeping for a transport that conserves."""
     raw = 100 * book.ratio_errors()[:, -1]
     good = [f for f in np.linspace(0.99, 1.03, 4001) if np.abs(book.ratio_errors(f)[:, -1]).max() <= 0.01]
-    return (f"our transport conserves, so that what is left is the effluent at the end of a step taken for the whole "
-            f"of it: dM_X/dM_CA, dM_X/dM_CD and dM_CA/dM_CD are {raw[0]:+.2f}, {raw[1]:+.2f} and {raw[2]:+.3f} % "
-            f"off at 19.4 h. A common factor on the effluents spoils the last, which is right; all three are within 1 "
-            f"% for {100 * (good[0] - 1):+.1f} to {100 * (good[-1] - 1):+.1f} %")
+    return (f"our transport conserves mass, so the rest comes from the effluent at the end of a step, which is used "
+            f"for the whole step: dM_X/dM_CA, dM_X/dM_CD and dM_CA/dM_CD are {raw[0]:+.2f}, {raw[1]:+.2f} and "
+            f"{raw[2]:+.3f} % off at 19.4 h. A common correction of the effluents worsens the last ratio, which is "
+            f"right; all three are within 1 % for {100 * (good[0] - 1):+.1f} to {100 * (good[-1] - 1):+.1f} %")
 
 
 def exceeding(book: Bookkeeping) -> float:
@@ -192,15 +192,16 @@ def refined_balance() -> Finding:
                             "first order at least: halved with the mesh size")
                    for name, fall in zip(SUBSTRATES, (lost[:-1] / lost[1:]).min(axis=0))]
     closed = max(np.abs(series(*BASE)[f"{name}_balance"]).max() for name in SUBSTRATES)
-    plain = f"Advected with u, as the paper writes it; the default, with w = u - tau grad p, closes to {closed:.0e}"
-    return Finding(tuple(map(without_limit, checks)), reason="refining does not help on every mesh",
+    plain = ("u carries the substrates, as in the paper; with the default, w = u - tau grad p, the balances close to "
+             f"{closed:.0e}")
+    return Finding(tuple(map(without_limit, checks)), reason="refinement does not improve the balance on every mesh",
                    note=f"{plain}. Defects on the meshes, % of the acceptor/donor effluent: {'; '.join(defects)}.")
 
 
 @claim("C34", "4", "at early times C_supply - C_effluent is comparable to its numerical error",
        date="2026-11-24 12:50",
-       unjudged="it is the numerical error of the paper's own effluents at early times, which is not printed; the 1.6 "
-                "% of its correction cannot be this error, since an effluent so raised exceeds the supply [E18]")
+       unjudged="the paper does not print the numerical error of its effluents at early times; its correction of 1.6 % "
+                "cannot be this error, since an effluent raised by it exceeds the supply [E18]")
 def early_drop() -> Finding:
     """C_supply - C_effluent around the seed, as a part of the effluent."""
     row, supply = at(BASE, 0.0), load_packaged(*BASE).substrates.acceptor.supply
@@ -216,16 +217,16 @@ def richer_supply() -> Finding:
     scene = load_packaged("base", *(f'substrates.{name}.supply="20 mg/L"' for name in SUBSTRATES))
     poor, rich = solved.fluxes, solve(scene, replace(pore, concentrations=None)).fluxes
     amounts = [b.consumed / a.consumed for a, b in zip(poor, rich)]
-    shares = [more * a.supplied / b.supplied for more, a, b in zip(amounts, poor, rich)]
-    checks = [near(f"{name} consumed at 20 K_s over 10 K_s", "about the same", more, 1, FEW, FEW_WORDS)
-              for name, more in zip(SUBSTRATES, amounts)]
+    shares = [ratio * a.supplied / b.supplied for ratio, a, b in zip(amounts, poor, rich)]
+    checks = [near(f"{name} consumed at 20 K_s over 10 K_s", "about the same", ratio, 1, FEW, FEW_WORDS)
+              for name, ratio in zip(SUBSTRATES, amounts)]
     checks += [at_most(f"share of the {name} consumed, 20 K_s over 10 K_s", "smaller", less, 1, "the words")
                for name, less in zip(SUBSTRATES, shares)]
     row = at(BASE, PLOTTED)
     law = rate_law(scene.substrates, scene.kinetics)
     m_a, m_d = law.fractions(row["acceptor_min_mg_per_L"], row["donor_min_mg_per_L"])
     reason = (f"base is not in the zero-order range at 19.2 h (C33): m_A = {m_a:.2f} and m_D = {m_d:.2f} at its lowest "
-              f"concentrations, so that uptake there stands at {100 * m_a * m_d:.0f} % of its most and can rise")
+              f"concentrations, so the uptake there is {100 * m_a * m_d:.0f} % of its maximum and can rise")
     return Finding(tuple(checks), reason=reason)
 
 
@@ -263,7 +264,7 @@ def node_masses(pore: Pore) -> tuple[np.ndarray, np.ndarray]:
 
 @claim("C24", "3.5", "the mesh degrades gradually; the remesh criterion keeps it acceptable", about=OF_SCHEME,
        steps=ALONE, date="2026-11-24 12:50",
-       fixed="it is counted in updates of 12 min, and what an update does is asked")
+       fixed="the claim concerns updates of 12 min")
 def mesh_quality() -> Finding:
     """Quality of every mesh of base, its fall in an update, and the updates between remeshes.
 
@@ -278,7 +279,7 @@ def mesh_quality() -> Finding:
     checks = (at_most("base: largest fall of the least quality in an update", "gradually", fall, 0.05,
                       "twice the strain of an update, 2.4 %: what a triangle can lose"),
               at_least("base: fewest updates between remeshes", "gradually", updates_apart, 5, "many updates, not one"))
-    return Finding(tuple(map(without_limit, checks)), reason="not on every mesh",
+    return Finding(tuple(map(without_limit, checks)), reason="it does not hold on every mesh",
                    note=f"{int(new.sum())} remeshes, at least {updates_apart} updates apart, least quality "
                    f"{least.min():.2f}.")
 
@@ -291,39 +292,39 @@ FIRST = 0.0
 #: Seconds in an hour.
 HOUR = 3600.0
 #: A disturbance of the profiles, and the number of steps after which it is measured.
-DISTURBED, LOOKED_AT = 0.01, (3, 6)
+DISTURBANCE, STEP_COUNTS = 0.01, (3, 6)
 
 
 @claim("C21", "3.3.2", "predictor-corrector control: steps from minutes to about a second, accurate to 0.1 %; not "
        "stable for long steps (steps saved by the control)", about=OF_SCHEME, sizes=BESIDE, steps=ALONE,
-       fixed="an update of 12 min is the paper's, and the steps within it are asked")
+       fixed="the claim concerns the steps within the paper's update of 12 min")
 def step_control() -> Finding:
     """Errors of the transport of one shape update (12 min) of base at t = 0 and 19.2 h, and the growth of a disturbance
     of the profiles in long equal steps if no biomass grows.
 
-    The error is the largest of both concentrations (over the supply) and of the biomass made (relative), against a
+    The error is the largest of both concentrations (over the supply) and of the new biomass (relative), against a
     tolerance of 1e-7. The scheme is unstable if the disturbance grows from step to step; a disturbance that dies out is
     stable even if a long step is inaccurate. The range of the steps depends on the tolerance of the control, which the
     paper does not print, and on its first step. It is therefore not judged; the note has it for two tolerances.
     """
     controlled = update(PLOTTED)
     error = max(deviation(time) for time in (FIRST, PLOTTED))
-    alone = deviation(PLOTTED, UPDATE)
-    alike = next(n for n in range(2, 1000) if deviation(PLOTTED, UPDATE / n) <= deviation(PLOTTED))
+    one_step_error = deviation(PLOTTED, UPDATE)
+    equal_steps = next(n for n in range(2, 1000) if deviation(PLOTTED, UPDATE / n) <= deviation(PLOTTED))
     growth, damped = (growth_of_a_disturbance(simultaneous) for simultaneous in (True, False))
     checks = (at_most("error with the control (%)", "within 0.1", 100 * error, 0.1, "as stated"),
               without_limit(at_least("growth of a disturbance in a step of 12 min, both substrates predicted",
                                      "not stable", growth, 1.0, "it grows", date=LATER)),
               without_limit(at_least("equal steps for the control's error, over its own", "steps saved",
-                                     alike / len(controlled.steps), 1.5, "a third of the steps at least")))
-    reason = (f"in equal steps of 12 min a disturbance changes by a factor of {growth:.2g} a step where each substrate "
-              f"sees the other's prediction, and of {damped:.2g} where the donor sees the corrected acceptor: backward "
-              f"differences are stable, long steps are wrong ({100 * alone:.2g} %) but do not blow up")
+                                     equal_steps / len(controlled.steps), 1.5, "a third of the steps at least")))
+    reason = (f"in equal steps of 12 min a disturbance changes by a factor of {growth:.2g} a step if each substrate "
+              f"uses the other's prediction, and of {damped:.2g} if the donor uses the corrected acceptor: backward "
+              f"differences are stable; long steps are inaccurate ({100 * one_step_error:.2g} %) but do not diverge")
     early, fine = update(FIRST), update(PLOTTED, None, FINE)
     note = (f"With the default tolerance of {gear.TOLERANCE:g} there are {_steps(early)} at t = 0 and "
-            f"{_steps(controlled)} at 19.2 h, where equal steps with its error are {alike}. The paper's steps, from "
-            f"minutes to about a second, are those of a tolerance of {FINE:g}, with {_steps(fine)} at 19.2 h; the "
-            "paper prints no tolerance, so that they are not judged.")
+            f"{_steps(controlled)} at 19.2 h, where {equal_steps} equal steps have the same error. The paper's steps, "
+            f"from minutes to about a second, are those of a tolerance of {FINE:g}, with {_steps(fine)} at 19.2 h. The "
+            "paper prints no tolerance, so the claim does not judge them.")
     return Finding(checks, reason=reason, note=note)
 
 
@@ -333,18 +334,18 @@ def _steps(advance: gear.Advance) -> str:
 
 
 def growth_of_a_disturbance(simultaneous: bool) -> float:
-    """Factor a step of 12 min by which a disturbance of the acceptor in base at 19.2 h changes, biomass neither growing
-    nor decaying; simultaneous: both substrates see the other's prediction."""
+    """Factor by which a disturbance of the acceptor in base at 19.2 h changes in a step of 12 min, with constant
+    biomass; simultaneous: whether each substrate uses the other's prediction."""
     pore, solved = solved_pore(BASE, PLOTTED)
     law = solved.problem.law
-    still = replace(law.constants, yield_coefficient=1e-12, decay_coefficient=1e-15)
-    problem = replace(solved.problem, law=replace(law, constants=still))
+    constants = replace(law.constants, yield_coefficient=1e-12, decay_coefficient=1e-15)
+    problem = replace(solved.problem, law=replace(law, constants=constants))
     rest = gear.settle(problem, Sink(pore.active), solved.concentrations)
-    start = replace(rest, acceptor=(1 - DISTURBED) * rest.acceptor)
+    start = replace(rest, acceptor=(1 - DISTURBANCE) * rest.acceptor)
     ends = [gear.advance(problem, pore.active, pore.inert, start, count * UPDATE, fixed_step=UPDATE,
-                         simultaneous=simultaneous).concentrations for count in LOOKED_AT]
+                         simultaneous=simultaneous).concentrations for count in STEP_COUNTS]
     early, late = (np.abs(both(end) - both(rest)).max() for end in ends)
-    return float((late / early) ** (1 / (LOOKED_AT[1] - LOOKED_AT[0])))
+    return float((late / early) ** (1 / (STEP_COUNTS[1] - STEP_COUNTS[0])))
 
 
 @cached
@@ -363,7 +364,7 @@ def resting_profiles(time: float) -> Concentrations:
 
 
 def deviation(time: float, fixed_step: float | None = None) -> float:
-    """Error of an update: of both concentrations over the supply, and of the biomass made; the largest."""
+    """Error of an update: the largest of both concentrations (over the supply) and of the new biomass (relative)."""
     pore, solved = solved_pore(BASE, time)
     advanced, exact = update(time, fixed_step), update(time, None, EXACT)
     gaps = np.abs(both(advanced.concentrations) - both(exact.concentrations)).max(axis=1)

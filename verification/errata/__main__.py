@@ -14,15 +14,15 @@ from verification.store import map_in_parallel
 REPORT = Path(__file__).parents[2] / "reference" / "ERRATA.md"
 
 INTRODUCTION = """\
-# Errata: what the paper leaves open or prints wrongly, and what it costs
+# Errata: the paper's ambiguities and misprints, and their consequences
 
-Dupin, Kitanidis & McCarty (2001), paper 2001WR000306; numbers in brackets are its equations. For each point: what is
-printed, how we read it and why, and the measured consequence. Every number in a consequence is computed, and this file
-is written, by `python -m verification.errata`.
+Dupin, Kitanidis & McCarty (2001), paper 2001WR000306; numbers in brackets are its equations. Each entry gives the
+printed text, our reading with its reason, and the measured consequence. `python -m verification.errata` computes every
+number of a consequence, and writes this file.
 
 "base" is the run of section 4, "wide" that of Figure 6, both with the default settings, and deviations are from these.
-"At 19.2 h" means in the geometry shaped then (E12). Concentrations are in K_s = 1 mg/L. The mesh error of base is about
-half a percent (E13): a smaller difference between two runs is of the order of what another mesh would do."""
+"At 19.2 h" means in the geometry of that time (E12). Concentrations are in K_s = 1 mg/L. The mesh error of base is
+about half a percent (E13). A smaller difference between two runs may be an effect of the mesh."""
 
 
 def load() -> list[str]:
@@ -40,17 +40,17 @@ def entry(id: str) -> str:
 
 def main(arguments: list[str]) -> int:
     """Entry point; returns the exit status."""
-    known = load()
-    unknown = [id for id in arguments if id not in known]
+    ids = load()
+    unknown = [id for id in arguments if id not in ids]
     if unknown:
-        print(f"errata: there is no {', '.join(unknown)}; {', '.join(known)} are accepted", file=sys.stderr)
+        print(f"errata: there is no {', '.join(unknown)}; {', '.join(ids)} are accepted", file=sys.stderr)
         return 2
-    text = "\n".join(map_in_parallel(entry, arguments or known))
+    text = "\n".join(map_in_parallel(entry, arguments or ids))
     if arguments:
         print(text)
     else:
         write_text(REPORT, filled(INTRODUCTION) + "\n" + text)
-        print(f"{len(known)} entries written to {REPORT.parent.name}/{REPORT.name}")
+        print(f"{len(ids)} entries written to {REPORT.parent.name}/{REPORT.name}")
     return 0
 
 

@@ -51,8 +51,8 @@ class Cylinder:
 @cache
 def half_disc_body(rings: int) -> Supported:
     """A half-disc of radius 1 on its frictionless wall, its middle fixed: rings of nodes, shaken (seed 2001)."""
-    at = [(k / rings, angle) for k in range(rings + 1) for angle in np.linspace(0, np.pi, 3 * k + 1)]
-    R, angle = np.array(at).T
+    polar = [(k / rings, angle) for k in range(rings + 1) for angle in np.linspace(0, np.pi, 3 * k + 1)]
+    R, angle = np.array(polar).T
     flat, rim = (angle == 0) | (angle == np.pi), R == 1
     points = R[:, None] * np.column_stack([np.cos(angle), np.where(flat, 0.0, np.sin(angle))])
     shake = np.random.default_rng(2001).uniform(-0.2, 0.2, points.shape) / rings
@@ -60,11 +60,11 @@ def half_disc_body(rings: int) -> Supported:
     return sliding(*pairs.upright(points, Delaunay(points).simplices))
 
 
-def cylinder(rings: int, inner: float, more: float) -> Cylinder:
+def cylinder(rings: int, inner: float, increase: float) -> Cylinder:
     """The growing half-cylinder."""
-    body, exact = half_disc_body(rings), HalfCylinder(inner, inner + more)
+    body, exact = half_disc_body(rings), HalfCylinder(inner, inner + increase)
     places = RADIUS * body.reference.T
-    return Cylinder(body, body.field(lambda x, y: inner + more * (x**2 + y**2)), exact.place(*places) / RADIUS,
+    return Cylinder(body, body.field(lambda x, y: inner + increase * (x**2 + y**2)), exact.place(*places) / RADIUS,
                     exact.pressure(*places))
 
 
@@ -72,22 +72,22 @@ def cylinder(rings: int, inner: float, more: float) -> Cylinder:
     "E5", "the sign of the stabilisation in (27)",
     printed="""(21) and (27) add P (J - theta), (22) subtracts it; (27) then adds + 1/2 sum h^2 / (12 mu_L)
         |grad P|^2.""",
-    reading="""The sign of P (J - theta) only says which sign P has: with plus, P is the mean stress, "the
+    reading="""The sign of P (J - theta) only determines the sign of P: with plus, P is the mean stress, "the
         opposite of the hydrostatic pressure" of the text before (21). The stabilisation must be **subtracted**:
-        Pi is a saddle point, a minimum in phi and a maximum in P, and a positive term in P works against that
+        the solution is a saddle point of Pi, a minimum in phi and a maximum in P. A positive term in P opposes this
         maximum.""",
     consequence="""
-        The first Newton step of a half-cylinder with theta = 1 + 1e-4 (3/4 + R^2 / 2) on three meshes: how many
-        eigenvalues of its matrix are negative (a saddle point has one for each pressure), its condition, and
-        the relative L2 error of the pressure.
+        The first Newton step of a half-cylinder with theta = 1 + 1e-4 (3/4 + R^2 / 2) on three meshes: the number of
+        negative eigenvalues of the matrix (a saddle point has one for each pressure), the condition, and the
+        relative L2 error of the pressure.
 
         {table}
 
-        With the printed sign most pressures sit on the wrong side: as the stabilisation is raised from nothing
-        to what is printed, the matrix becomes singular once for each of them. It need not be singular at the
-        end, and a solver may well return an answer; but that answer is noise, which no refinement cures. With
-        no term at all the pressure of this smooth case comes out too, if less well, from a matrix whose
-        condition is hundreds of times worse.""",
+        With the printed sign most of these eigenvalues are positive: as the stabilisation rises from zero to the
+        printed one, the matrix becomes singular once for each of them. At the end it need not be singular, and
+        a solver may return a solution. But this solution is noise, and refinement does not improve it. Without
+        the term the pressure of this smooth case is less accurate, and the condition of the matrix is hundreds
+        of times worse.""",
     quick=True)
 def stabilisation_sign() -> Numbers:
     """Inertia, condition and error with the stabilisation subtracted, left out, and added."""
@@ -112,12 +112,11 @@ def first_step(case: Cylinder, sign: float) -> list[str]:
 @erratum(
     "E6", "the configuration of the stabilisation in (27)",
     printed="""The stabilisation in (27) is an integral over the elements in dv, the letter of the present volume in
-        (30), beside integrals over Omega_B0 in dV. Which shape h_tau and grad P belong to is not said; mu_L is the
-        modulus at t = 0.""",
-    reading="""h, grad and dv of the present shape, and mu_L theta^(-2/3) for mu_L: the modulus that
-        an increment of the deformation feels there, as A = mu_L J^(-2/3) multiplies the deviatoric stress. In
-        quantities of t = 0 this is J^(5/3) times h^2 / (12 mu_L), so that the stabilised problem is the same
-        whether the body has grown little or much.""",
+        (30), beside integrals over Omega_B0 in dV. The paper does not say to which shape h_tau and grad P belong;
+        mu_L is the modulus at t = 0.""",
+    reading="""h, grad and dv of the present shape, and mu_L theta^(-2/3) for mu_L: the modulus of an increment of
+        the deformation there, as A = mu_L J^(-2/3) multiplies the deviatoric stress. In quantities of t = 0 this is
+        J^(5/3) times h^2 / (12 mu_L). The stabilised problem is then the same for small and for large growth.""",
     consequence="""
         Half-cylinder grown by theta = m (3/4 + R^2 / 2), equilibrium against the closed form, on three meshes
         ({nodes} nodes): relative L2 error of the pressure, then its largest nodal error over the largest
@@ -125,9 +124,9 @@ def first_step(case: Cylinder, sign: float) -> list[str]:
 
         {table}
 
-        The term of t = 0 fades to {fade_36} and {fade_2000} of the matched one, and what remains at theta =
-        2000 is the pressure without stabilisation. Ours has the same error at both. Places are right to
-        {places} of the radius on all meshes in all cases: the choice matters for stresses alone.""",
+        The term of t = 0 falls to {fade_36} and {fade_2000} of the matched one, so the pressure at theta = 2000 is
+        that without stabilisation. Ours has the same error at both. Positions err by at most {places} of the
+        radius on all meshes in all cases: the choice affects the stresses alone.""",
     quick=True)
 def stabilisation_scale() -> Numbers:
     """Errors of pressure and places at theta = 36 and 2000 for four stabilisations."""
@@ -135,7 +134,7 @@ def stabilisation_scale() -> Numbers:
     for mean, name in product((36, 2000), KINDS):
         cases = [cylinder(rings, 0.75 * mean, 0.5 * mean) for rings in RINGS]
         errors = [equilibrium_errors(case, stabilisations(case)[name]) for case in cases]
-        rows.append([f"{mean}", name, *(f"{100 * p:.1f} %, {100 * most:.0f} %" for p, most, _ in errors)])
+        rows.append([f"{mean}", name, *(f"{100 * p:.1f} %, {100 * worst:.0f} %" for p, worst, _ in errors)])
         places = max(places, *(x for _, _, x in errors))
     nodes = ", ".join(str(len(half_disc_body(rings).reference)) for rings in RINGS)
     head = ["m", "stabilisation", *(f"element size R / {rings}" for rings in RINGS)]
@@ -153,11 +152,11 @@ def stabilisations(case: Cylinder) -> dict[str, np.ndarray]:
     return dict(zip(KINDS, (0 * start, start, *present)))
 
 
-def equilibrium_errors(case: Cylinder, stabilising: np.ndarray) -> tuple[float, float, float]:
+def equilibrium_errors(case: Cylinder, matrices: np.ndarray) -> tuple[float, float, float]:
     """Errors of the equilibrium that Newton's method reaches from the exact one: of the pressure in L2 and at its worst
     node, and of the positions. Raises GrowthError if it does not converge.
     """
-    system = growth.System(case.body, case.body.constrained, stabilisation=growth.PressureGradient(stabilising))
+    system = growth.System(case.body, case.body.constrained, stabilisation=growth.PressureGradient(matrices))
     exact = growth.Equilibrium(case.position, case.pressure, 0)
     solution = growth.reach(system, case.theta, case.theta, exact, case.position)
     worst = np.abs(solution.pressure - case.pressure).max() / np.abs(case.pressure).max()
@@ -168,18 +167,18 @@ def equilibrium_errors(case: Cylinder, stabilising: np.ndarray) -> tuple[float, 
     "E11", "uniform growth is not free of stress",
     printed="""(14)-(17) split C by J^(2/3), "as the material is inherently three-dimensional", while the strain
         is plane (F33 = 1).""",
-    reading="""As printed. Growth then acts as heating does: the body would like to expand along the third axis
-        too, and cannot. F = sqrt(theta) I has no in-plane shear, but sigma = 0 in the plane needs P = -mu_L
+    reading="""As printed. Growth then acts like heating in plane strain, which prevents expansion along the third
+        axis. F = sqrt(theta) I has no in-plane shear, but sigma = 0 in the plane requires P = -mu_L
         theta^(-5/3) (theta - 1) / 3, and across it the stress is compressive. A multiplicative split F = F_e
-        F_g with in-plane F_g would have no stress at all.""",
+        F_g with in-plane F_g would have no stress.""",
     consequence="""
         A half-disc that grows uniformly from t = 0, in steps of a factor of 1.5 at most:
 
         {table}
 
-        The pressure that is computed is exact. It scales with mu_L and moves nothing; it matters where stresses
-        are read. It is largest at theta = 2.5, {kilopascal} kPa with Table 1's mu_L = 0.01 MPa, and fades as
-        the body grows.""",
+        The computed pressure is exact. It scales with mu_L and does not change the shape; it matters for stresses
+        alone. It is largest at theta = 2.5, {kilopascal} kPa with Table 1's mu_L = 0.01 MPa, and then decreases
+        as the body grows.""",
     quick=True)
 def uniform_growth() -> Numbers:
     """Pressure, out-of-plane stress and radius of a half-disc grown by theta, against the closed form."""
@@ -198,16 +197,16 @@ def uniform_growth() -> Numbers:
 @erratum(
     "E17", "the penalty (19) softens as the aggregate grows",
     printed="(19): U = kappa/2 (J / theta - 1)^2 with a constant kappa, of which (21) is said to be the limit.",
-    reading="""The multiplier of (21), as is all of the scheme. In (19) the counterpart of P is kappa (J / theta
-        - 1) / theta: at a given pressure the volume is wrong by P theta / kappa, so that kappa would have to
-        grow with theta for the same accuracy.""",
+    reading="""The multiplier of (21), as in the rest of the scheme. In (19) the counterpart of P is kappa (J / theta
+        - 1) / theta. At a given pressure the relative error of the volume is P theta / kappa, so kappa would have
+        to grow with theta for the same accuracy.""",
     consequence="""
         J / theta - 1 of a body that grows uniformly and freely under (19):
 
         {table}
 
         For large kappa it is -mu_L theta^(1/3) / (3 kappa): the error grows although the pressure falls (E11),
-        and where kappa is small the body does not grow at all (no J between theta / 2 and theta).""",
+        and with a small kappa the body does not grow (no J between theta / 2 and theta).""",
     quick=True)
 def penalty() -> Numbers:
     """Volume error of uniform free growth under (19), from dPsi/dJ = 0."""
@@ -233,17 +232,17 @@ LINEAR = CHOICES["linear transfer"].run
     "E8", "linear interpolation at a remesh",
     printed="""At a remesh the values at the new nodes are interpolated linearly in the old mesh (3.5), X_A and
         X_I among them.""",
-    reading="""That does not conserve mass. The default projects X_A and X_I by Galerkin's method over the
-        common pieces of both meshes, which does; `numerics.transfer = "linear"` is the paper's.""",
+    reading="""Interpolation does not conserve mass. The default does: it projects X_A and X_I by Galerkin's method
+        over the common pieces of both meshes. `numerics.transfer = "linear"` is the paper's transfer.""",
     consequence="""
-        Relative defects of the mass of X_A + X_I, of one step or remesh at its worst and of a whole run:
+        Relative defects of the mass of X_A + X_I, in the worst step or remesh and in a whole run:
 
         {table}
 
-        In base X is X_m nearly everywhere, so that there is nothing to lose. The chain carries exp(-(R - r) /
-        l), l = 6 um, in a half-disc of R = 30 um through 40 unrelated meshes of the default size: interpolation
-        on chords always errs upwards in a convex field. The projection keeps the mass, but is not bounded by
-        the old values: it overshoots the largest by {overshoot} at its worst.""")
+        In base X is X_m nearly everywhere, so interpolation changes little. The chain carries exp(-(R - r) /
+        l), l = 6 um, in a half-disc of R = 30 um through 40 unrelated meshes of the default size. This field is
+        convex, so interpolated values are always too large. The projection conserves the mass, but is not bounded
+        by the old values: it exceeds the largest one by up to {overshoot}.""")
 def transfers() -> Numbers:
     """Mass defects in base and in a chain of remeshes."""
     rows = []
@@ -261,7 +260,7 @@ def transfers() -> Numbers:
 TRANSFER = {"linear": transfer.interpolated, "conserving": transfer.project}
 
 
-def chain(how: str) -> tuple[np.ndarray, float]:
+def chain(method: str) -> tuple[np.ndarray, float]:
     """Masses (41,) of a steep field through a chain of remeshes of one half-disc, and its largest value."""
     outline = seed(30.0, ACROSS_AGGREGATE)
     refinements = 1 + 0.3 * (0.618 * np.arange(41) % 1)
@@ -269,7 +268,7 @@ def chain(how: str) -> tuple[np.ndarray, float]:
     bodies = [(grid.points[grid.body], grid.topology.body_cells) for grid in grids]
     fields = [np.exp((np.linalg.norm(bodies[0][0], axis=1) - 30.0) / 6.0)[:, None]]
     for old, new in pairwise(bodies):
-        fields.append(TRANSFER[how](*old, fields[-1], *new))
+        fields.append(TRANSFER[method](*old, fields[-1], *new))
     masses = [pairs.integral(body, field[:, 0]) for body, field in zip(bodies, fields)]
     return np.array(masses), max(float(field.max()) for field in fields)
 
@@ -280,9 +279,9 @@ def chain(how: str) -> tuple[np.ndarray, float]:
         lap u - grad P~ = 0.""",
     reading="""div u + gamma P~ = 0. Then -lap u - grad(div u) / gamma = 0, an elastic body that resists
         compression. As printed the second term changes sign: a compression wave then has the stiffness 1 -
-        1 / gamma, none at gamma = 1 and a negative one below, and for some values of gamma between 0 and 1 (the
-        Cosserat spectrum of the domain) there is no solution at all. (With the opposite sign of grad P~ in the
-        momentum equation the print would be right; the paper does not write that equation again.)""",
+        1 / gamma, which is zero at gamma = 1 and negative below. For some values of gamma between 0 and 1 (the
+        Cosserat spectrum of the domain) there is no solution. (With the opposite sign of grad P~ in the momentum
+        equation the printed sign would be right; the paper does not repeat that equation.)""",
     consequence="""
         The mesh around a half-disc of R = 10 um in a 50 um pore follows a growth of its radius by 10 %. Largest
         displacement of a fluid node over that of the interface (one is right), and smallest quality of a
@@ -290,7 +289,8 @@ def chain(how: str) -> tuple[np.ndarray, float]:
 
         {table}
 
-        Most values of gamma get by with the printed sign; near a resonance it throws the mesh about.""",
+        With most values of gamma the mesh stays acceptable under the printed sign. Near a resonance the
+        displacements are far too large.""",
     quick=True)
 def compressibility_sign() -> Numbers:
     """Mesh motion with both signs of gamma."""

@@ -29,7 +29,7 @@ TRACTION = CHOICES["traction"].run
 @erratum(
     "E2", "the interface condition of the flow is not stated",
     printed="""(1) is written with the Laplacian of u on both sides of the interface and a viscosity that jumps
-        there; nothing is said of what is continuous across it.""",
+        there; the paper does not say what is continuous across it.""",
     reading="""The Galerkin form of (1) makes nu du/dn - phi n continuous ("laplacian", our default). The
         traction of a viscous fluid is continuous if the symmetric gradient takes its place (`numerics.interface
         = "traction"`).""",
@@ -39,22 +39,22 @@ TRACTION = CHOICES["traction"].run
 
         {table}
 
-        Around half-discs the two forms differ by less than the meshes do. A plug is another matter: in the
-        laplacian form Poiseuille flow passes through it undisturbed (its loss is the exact
-        12 nu u_ave (L + 1999 l) / (g W^2) within {mesh_error} %); in the traction form the profile changes near both
-        faces, where the water exerts next to
-        no shear on the biomass, and every plug loses about the same head less, that of {saved} of plug. Base at
-        19.2 h: velocity {velocity} m/d with traction, {deviation} against ours.""")
+        Around half-discs the two forms differ by less than the meshes do. Plugs differ by more. In the laplacian
+        form Poiseuille flow passes through a plug undisturbed (its loss is the exact
+        12 nu u_ave (L + 1999 l) / (g W^2) within {mesh_error} %). In the traction form the profile changes near both
+        faces, where the water exerts almost no shear on the biomass. The loss of every plug is smaller by about the
+        same amount, the loss of {saved} of plug. Base at 19.2 h: velocity {velocity} m/d with traction, {deviation}
+        against ours.""")
 def interface_forms() -> Numbers:
     """Both forms around half-discs and through plugs of the pore's whole width."""
     width, rows = 50.0, []
     scenes = [load_packaged("flow_only", f"numerics.refinement={r}") for r in (1, 2)]
-    for part in (0.1, 0.3, 0.5, 0.7, 0.9):
-        grids = [half_disc(s, part * width, min(10 * part, 1.5) * width) for s in scenes]
-        rows.append([f"half-disc, R / W = {part}", *map(interface_difference, grids)])
-    for part in (0.25, 0.5, 1.0, 2.0):
-        grids = [plug(s, -part * width / 2, part * width / 2) for s in scenes]
-        rows.append([f"plug, length / W = {part}", *map(interface_difference, grids)])
+    for share in (0.1, 0.3, 0.5, 0.7, 0.9):
+        grids = [half_disc(s, share * width, min(10 * share, 1.5) * width) for s in scenes]
+        rows.append([f"half-disc, R / W = {share}", *map(interface_difference, grids)])
+    for share in (0.25, 0.5, 1.0, 2.0):
+        grids = [plug(s, -share * width / 2, share * width / 2) for s in scenes]
+        rows.append([f"plug, length / W = {share}", *map(interface_difference, grids)])
     laplacian, traction = losses(plug(scenes[1], -width / 2, width / 2))
     exact = flow.poiseuille_loss(600 + 1999 * width, width)
     saved = (laplacian - traction) / flow.poiseuille_loss(2000.0, width)
@@ -83,17 +83,16 @@ def interface_difference(grid: Mesh) -> str:
 @erratum(
     "E10", "the outlet of the flow",
     printed="(4): du/dx = 0 at the outlet, and the mean of phi over it is zero.",
-    reading="""In the laplacian form nu du/dx - phi n = 0 is the natural condition; it makes the mean of phi
-        vanish by itself, as the outlet's mean of du_x/dx does (div u = 0, u_y = 0 on the walls). In the
-        traction form (E2) the natural condition is another, and Poiseuille flow does not satisfy it: there we
-        add u_y = 0 at the outlet.""",
+    reading="""In the laplacian form nu du/dx - phi n = 0 is the natural condition. It makes the mean of phi zero,
+        because the mean of du_x/dx over the outlet is zero (div u = 0, u_y = 0 on the walls). Poiseuille flow does
+        not satisfy the natural condition of the traction form (E2): there we add u_y = 0 at the outlet.""",
     consequence="""
-        A clean channel meshed over 3 W, where Poiseuille flow is the answer; largest |u_y| over u_ave, and the
+        A clean channel meshed over 3 W, with the exact solution Poiseuille flow; largest |u_y| over u_ave, and the
         head loss of the meshed part against 12 nu u_ave l / (g W^2):
 
         {table}
 
-        Without u_y = 0 the flow fans out at the outlet, as a jet does that leaves the channel there.""",
+        Without u_y = 0 the flow spreads at the outlet like a jet that leaves the channel.""",
     quick=True)
 def outlet() -> Numbers:
     """Poiseuille flow in three forms on two meshes."""
@@ -132,18 +131,18 @@ HALF_STEP = switches.changed('growth.time_step="6 min"')
 
 @erratum(
     "E7", "theta and the density drift apart",
-    printed="""(28) multiplies theta by 1 + dX / X_m, though after (34) the density is X_m only as well as the
-        constraint J = theta holds; at a remesh J is taken from the places of t = 0 that were carried along.""",
+    printed="""(28) multiplies theta by 1 + dX / X_m, although after (34) the density is X_m only to the accuracy of
+        the constraint J = theta. At a remesh J follows from the transferred positions at t = 0.""",
     reading="""(28) as printed between remeshes. At a remesh theta restarts as J times the density over X_m, the
-        expansion that would bring each triangle back to X_m, so that the error is worked off and does not add
-        up. J alone (the paper's, as we understand it) declares the present density to be the right one.""",
+        expansion that returns each triangle to X_m. Errors then do not accumulate. With J alone (the paper's
+        choice, as we understand it) the present density counts as exact.""",
     consequence="""
         Largest |X / X_m - 1|, X = X_A + X_I, of any node (wide: in whole hours):
 
         {table}
 
-        After contact the worst nodes are at the contact lines, where biomass, water and wall meet and films close: at
-        {time} h, when it is worst, the root mean square over the aggregate is {rms}.""")
+        After contact the largest deviations are at the contact lines, where biomass, water and wall meet and films
+        close. At {time} h, the worst hour, the root mean square over the aggregate is {rms}.""")
 def density_drift() -> Numbers:
     """Drift of the density in base and wide if theta restarts as J X / X_m or as J. The rows of wide are split at
     contact with the opposite wall."""
@@ -173,14 +172,14 @@ def density_rms(scene, pore) -> float:
     "E12", "which state is that of 19.4 h",
     printed="""Section 4 gives values at 19.4 h, and plots (Plate 1) biomass "before the aggregate expands".""",
     reading="""At 19.4 h = 97 x 12 min a shape update is due. Before it the shape is still that of 19.2 h, with
-        the biomass grown since, and what is printed of effluents, uptake and inlet is that of this state; the
-        velocity is that of the shape.""",
+        the biomass that has grown since. The printed effluents, uptake and inlet concentration belong to this
+        state; the velocity is that of the shape.""",
     consequence="""
         The paper prints 1.5 m/d, 4.19 and 6.13. Base:
 
         {table}
 
-        Within that one update the velocity falls by {fall}.""")
+        In this update the velocity falls by {fall}.""")
 def plotted_state() -> Numbers:
     """Base at 19.2 h, and at 19.4 h before and after the expansion."""
     before = [flux.effluent for flux in grown(BASE, PLOTTED)[1].fluxes]
@@ -199,11 +198,11 @@ def plotted_state() -> Numbers:
         thickness, or a fourteenth of the pore's width, as the element size at the interface. All three are
         scene keys.""",
     consequence="""
-        Base at 19.2 h, one thing changed at a time:
+        Base at 19.2 h, with one parameter changed at a time:
 
         {table}
 
-        What the paper says to lie 60 um away from the aggregate is tabulated under E9.""")
+        E9 lists the concentrations 60 um from the aggregate.""")
 def sensitivity() -> Numbers:
     """Base with other stabilisation, mesh compressibility and refinement."""
     runs = {"c = 100, gamma = 1, refinement = 1 (ours)": BASE,
@@ -216,17 +215,17 @@ def sensitivity() -> Numbers:
     "E16", "one explicit increment agrees with the paper by accident",
     printed="""(28)-(29) take the "total increase" of the biomass during 12 min; section 3.3 integrates (7)-(10)
         with steps of minutes down to seconds.""",
-    reading="""(9)-(10) are integrated over the 12 min. A single explicit increment dX = dt F_3 at the rates of
-        its beginning, as one may read (28), is another model: the biomass doubles in three to four hours, and
-        what is lost in each step is lost for good.""",
+    reading="""(9)-(10) are integrated over the 12 min. (28) may also mean one explicit increment dX = dt F_3 at the
+        rates of the start. That is another model: the biomass doubles in three to four hours, and each step makes
+        too little of it.""",
     consequence="""
         Deviations are from the integrated model with 12 min:
 
         {table}
 
-        The explicit increment hits the printed 1.5 m/d at 19.4 h, after the expansion, which is not the state
-        that the paper prints (E12), and misses it where it should. With shorter steps the integrated model
-        stays where it is.""")
+        The explicit increment gives the printed 1.5 m/d at 19.4 h after the expansion. The paper prints another
+        state (E12), in which the increment does not give it. The integrated model hardly changes with shorter
+        steps.""")
 def explicit_increment() -> Numbers:
     """Base with one explicit Euler increment a shape update, against ours with both steps."""
     compared = switches.run_columns(BASE), switches.run_columns(HALF_STEP), course(BASE, explicit).columns
@@ -242,15 +241,15 @@ def explicit_increment() -> Numbers:
 
 
 RECHOSEN = CHOICES["rechosen"]
-AGAIN = {BASE: RECHOSEN.run, WIDE: (*WIDE, RECHOSEN.change)}
+RECHOSEN_RUNS = {BASE: RECHOSEN.run, WIDE: (*WIDE, RECHOSEN.change)}
 COLUMNS = {"mean_velocity_m_per_d": "mean velocity, m/d", "conductivity_m_per_d": "conductivity, m/d",
            "upstream_um": "upstream, um", "downstream_um": "downstream, um", "aggregate_area_um2": "area, um2"}
 
 
 @erratum(
     "E20", "which point of a contact surface stays",
-    printed="""2.3.3 keeps the middle point of each contact surface fixed, and does not say whether that is the same
-        material as the surface grows.""",
+    printed="""2.3.3 keeps the middle point of each contact surface fixed, and does not say whether this point stays
+        the same material as the surface grows.""",
     reading="""The material point in the middle when the surface first forms (the origin, on the lower wall), for good.
         `numerics.fixed_point = "rechosen"` takes the node nearest to the present middle at every update.""",
     consequence="Rechosen against kept, where growth is nearly symmetric and where it is not:\n\n{table}")
@@ -258,7 +257,7 @@ def fixed_point() -> Numbers:
     """Base at 19.2 h and wide at 45 h with both choices."""
     rows = []
     for run, time in ((BASE, PLOTTED), (WIDE, 45.0)):
-        fixed, rechosen = at(run, time), at(AGAIN[run], time)
+        fixed, rechosen = at(run, time), at(RECHOSEN_RUNS[run], time)
         rows.append([f"{run[0]}, {time:g} h, kept (ours)", *(f"{fixed[key]:.4g}" for key in COLUMNS)])
         moved = (f"{rechosen[key]:.4g} ({percent(rechosen[key] / fixed[key], 1)})" for key in COLUMNS)
         rows.append([f"{run[0]}, {time:g} h, rechosen", *moved])

@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 from repro.model.kinetics import rate_law
 from verification.claims.base_run import upstream_means
 from verification.claims.levels import CONVERGED, Level, at_level
-from verification.claims.runs import BASE, PLATES, at, grown, grown_anew, load_packaged, series, solved_pore
+from verification.claims.runs import BASE, PLATES, at, grown, grown_on_new_mesh, load_packaged, series, solved_pore
 from verification.claims.scheme import PAPER_CORRECTION, bookkeeping, exceeding
 from verification.errata import (
     STATE_HEAD,
@@ -35,8 +35,8 @@ COD = 2.38  # of phenol, Table 1; it enters through F alone
     printed="Table 1 gives F = COD - Y d_c and the value 1.52 mg/mg.",
     reading="The table's own COD, Y and d_c give less. We keep 1.52, the paper's number.",
     consequence="""
-        COD - Y d_c = {value}. In base at 19.2 h it would change what follows (the converged solution, so that no
-        difference of meshes is in it); acceptor over donor consumed would be {ratio} instead of {ours}.
+        COD - Y d_c = {value}. The table has its effect on base at 19.2 h, in the converged solution, which excludes
+        differences of meshes. The ratio of consumed acceptor to donor would be {ratio} instead of {ours}.
 
         {table}""")
 def ratio_of_substrates() -> Numbers:
@@ -53,18 +53,17 @@ def ratio_of_substrates() -> Numbers:
     "E3", "the oxygen demand of decay",
     printed='(7) adds "d_f d_b" to k F m_D; neither symbol is defined anywhere.',
     reading="""d_c f_d b, of Table 1: mg of oxygen per mg of biomass, times the share that degrades, times the
-        rate of decay. It is in 1/d, as k F is, and it is what (9)-(10) need: X_A loses b and leaves (1 - f_d) b
-        inert, so biomass worth d_c f_d b of oxygen disappears. With it and F = COD - Y d_c, oxygen demand is
-        conserved at every point.""",
+        rate of decay. Its unit is 1/d, like that of k F, and (9)-(10) require it: X_A loses b and leaves (1 - f_d) b
+        inert, so biomass with the oxygen demand d_c f_d b disappears. With this term and F = COD - Y d_c, oxygen
+        demand is conserved at every point.""",
     consequence="""
-        The term is {share} % of the acceptor's uptake in base at 19.2 h. Oxygen that
-        each reading uses in excess of what the donor's and the biomass's oxygen demands account for, as a share of
-        the uptake:
+        The term is {share} % of the acceptor's uptake in base at 19.2 h. The oxygen that each reading uses beyond
+        the oxygen demands of donor and biomass, as a share of the uptake:
 
         {table}
 
-        Base at 19.2 h with f_d b for d_c f_d b: velocity {velocity}, acceptor effluent {acceptor}, donor
-        effluent {donor} against ours.""")
+        Changes of base at 19.2 h with f_d b in place of d_c f_d b: velocity {velocity}, acceptor effluent
+        {acceptor}, donor effluent {donor}.""")
 def decay_demand() -> Numbers:
     """Size of the term, electron balance of the readings, and base with d_c left out."""
     scene = load_packaged(*BASE)
@@ -73,7 +72,7 @@ def decay_demand() -> Numbers:
     readings = {"F = 1.52, d_c f_d b (ours)": law, "F = 1.5138, d_c f_d b": defined,
                 "F = 1.5138, f_d b": replace(defined, decay_oxygen_demand=1.0),
                 "F = 1.5138, no term": replace(defined, decay_oxygen_demand=0.0)}
-    rows = [[name, percent(1 + electron_defect(read))] for name, read in readings.items()]
+    rows = [[name, percent(1 + electron_defect(reading_law))] for name, reading_law in readings.items()]
     share = 1 - acceptor_and_donor_uptake(replace(law, decay_oxygen_demand=0.0))[0] / acceptor_and_donor_uptake(law)[0]
     velocity, acceptor, donor = (percent(a / b) for a, b in zip(state(NO_D_C), state(BASE)))
     return {"share": f"{100 * share:.1f}", "velocity": velocity, "acceptor": acceptor, "donor": donor,
@@ -107,9 +106,9 @@ def electron_defect(law) -> float:
 @erratum(
     "E4", "u_ave in the inlet condition",
     printed="(11) supplies u_ave C_supply and takes u_ave C - D dC/dx, uniform over the inlet.",
-    reading="""u_x(y) in the place of u_ave, as the flow that enters is parabolic (3). For a concentration that
-        does not vary across the inlet both say the same, and (26) follows from either; otherwise only u_x(y)
-        supplies what (7)-(8) carry away. `numerics.inlet = "mean"` is the printed form.""",
+    reading="""u_x(y) in place of u_ave, since the entering flow is parabolic (3). If the concentration does not vary
+        across the inlet, both conditions are equal, and (26) follows from either. Otherwise only u_x(y) supplies as
+        much as (7)-(8) carry away. `numerics.inlet = "mean"` is the printed form.""",
     consequence="""
         Base; the balance defect is (supplied - out - consumed) / supplied, with the flow-weighted effluent:
 
@@ -131,8 +130,8 @@ def inlet_condition() -> Numbers:
     printed="""Section 4: "the electron donor concentration at the inlet of the meshed domain is ~7 K_s", 70 %
         of the influent's, 60 um away from the aggregate.""",
     reading="""The sentence is about the acceptor. The donor has less than half its diffusivity and is consumed
-        at two thirds of its rate: its profile (26) is steeper and shorter, and it cannot fall that far so far
-        away. The distance is not one that the rules of 3.1 allow either (65 um at least; 75 um in a domain of
+        at two thirds of its rate: its profile (26) is steeper and shorter, so it cannot be that low at this
+        distance. The rules of 3.1 do not allow the distance either (65 um at least; 75 um in a domain of
         210 um around an aggregate of 60 um).""",
     consequence="""
         Base at 19.4 h before the expansion (E12), flow-weighted over the section, upstream of the aggregate (our
@@ -141,7 +140,7 @@ def inlet_condition() -> Numbers:
         {table}""")
 def meshed_inlet() -> Numbers:
     """Both substrates at the distances in question."""
-    pore, solved = grown_anew(BASE, PLOTTED)
+    pore, solved = grown_on_new_mesh(BASE, PLOTTED)
     rows = [[f"{d} um", *map("{:.2f}".format, upstream_means(pore, solved, float(d)))] for d in (60, 65, 75)]
     distance = pore.boundary.upstream - pore.mesh.ends[0]
     return {"table": table(["distance", "acceptor", "donor"], rows), "distance": f"{distance:.0f}"}
@@ -150,37 +149,37 @@ def meshed_inlet() -> Numbers:
 @erratum(
     "E14", "the printed effluents contradict the printed F",
     printed="Effluents of 4.19 and 6.13 K_s from 10 K_s each.",
-    reading="""Every mg of donor takes at least F mg of acceptor, decay comes on top. Section 4 says itself that its
-        effluents want 1.6 % more to balance, and that is this contradiction: it is the numerical error of the
-        paper's own effluents, which no reading of the model removes.""",
+    reading="""The uptake of 1 mg of donor consumes at least F mg of acceptor, and decay consumes more. According to
+        section 4 the effluents must be 1.6 % higher to balance. This is the same contradiction: a numerical error of
+        the paper's own effluents, which no reading of the model removes.""",
     consequence="""
         Acceptor over donor consumed: {printed} from the printed effluents, less than F = 1.52, which is
-        impossible where both K_s are equal; {corrected} with the paper's 1.6 % on both, within 1 % of {ours}, F and
-        the decay, in base at 19.4 h before the expansion. To an acceptor effluent of 4.19 belongs a donor effluent
-        of {donor}: {apart} of the printed one.""")
+        impossible if both K_s are equal; {corrected} with the paper's 1.6 % on both, within 1 % of {ours} (F and
+        the decay), in base at 19.4 h before the expansion. An acceptor effluent of 4.19 corresponds to a donor
+        effluent of {donor}, {apart} against the printed one.""")
 def printed_effluents() -> Numbers:
     """Stoichiometry of the printed numbers and of ours."""
-    computed = consumed_ratio(*(flux.effluent for flux in grown(BASE, PLOTTED)[1].fluxes))
-    donor = 10 - (10 - 4.19) / computed
+    ratio = consumed_ratio(*(flux.effluent for flux in grown(BASE, PLOTTED)[1].fluxes))
+    donor = 10 - (10 - 4.19) / ratio
     corrected = consumed_ratio(PAPER_CORRECTION * 4.19, PAPER_CORRECTION * 6.13)
     return {"printed": f"{consumed_ratio(4.19, 6.13):.3f}", "corrected": f"{corrected:.3f}",
-            "ours": f"{computed:.3f}", "donor": f"{donor:.2f}", "apart": percent(donor / 6.13, 1)}
+            "ours": f"{ratio:.3f}", "donor": f"{donor:.2f}", "apart": percent(donor / 6.13, 1)}
 
 
 @erratum(
     "E18", "the mass balance of section 4",
     printed="""dM_C = U_ave(t_0) (C_supply - C_effluent(t_0 + dt)) dt, compared with dM_X = X_m (Omega_B(t_0 +
         dt) - Omega_B(t_0)).""",
-    reading="""dM_C lacks the width of the pore: it is a mass per area, dM_X a mass per length; W is meant. It
-        also takes the velocity of the beginning and the effluent of the end of the step for the whole of it.""",
+    reading="""dM_C lacks the factor W: it is a mass per area, dM_X a mass per length. It also uses the velocity at
+        the start and the effluent at the end for the whole step.""",
     consequence="""
         Times W = {width} um, dM_C of base exceeds what F1 and F2 consume, integrated over the step:
 
         {table}
 
-        Our own ledger closes to round-off, so these are the formula's errors, and of the size of the few
-        percent that the paper corrects. Its correction, "throughout the whole numerical simulation", cannot have been
-        one of all effluents: raised by 1.6 %, one of them (the donor's, the longer) exceeds its supply until
+        Our own ledger closes to round-off, so these are errors of the formula. They are as large as the few
+        percent that the paper corrects. Its correction, "throughout the whole numerical simulation", cannot apply
+        to all effluents: raised by 1.6 %, one of them (the donor's for the longer time) exceeds its supply until
         {until} h.""")
 def balance_formula() -> Numbers:
     """Ratio of the paper's dM_C to the integrals of F1 and F2, in some steps of base."""
@@ -200,7 +199,7 @@ def balance_formula() -> Numbers:
 @erratum(
     "E19", "smaller points",
     consequence="""
-        What Table 1 and the text say against each other:
+        Contradictions within Table 1 and the text:
 
         {table}""",
     quick=True)
@@ -211,12 +210,13 @@ def smaller_points() -> Numbers:
     linear = cbrt(36.0) - 1
     rows = [
         ["Table 1", "density of water, 998 mg cm-3",
-         f"right, {998 / 1000:.3f} g cm-3; with the pressure as a head, (1)-(6) do not need it, and it takes no part"],
+         f"right, {998 / 1000:.3f} g cm-3; with the pressure as a head, it does not occur in (1)-(6)"],
         ["2.1", "the head is once called theta", "phi; theta is the expansion"],
-        ["2.3.1, Table 1", "mu_L is a Lame coefficient", "the shear modulus; without tractions it moves nothing"],
+        ["2.3.1, Table 1", "mu_L is a Lame coefficient",
+         "the shear modulus; the shape does not depend on it without tractions"],
         ["2.3.2", "(20) has body forces f_0, (22) and (27) have none", "neglected, as the text says"],
         ["(18)", "alpha is the volumetric coefficient, yet 1 + alpha (T - T_0) is cubed, as with a linear one",
-         "an analogy for (19) and no more: theta = 36 would be "
+         "only an analogy for (19): theta = 36 would be "
          f"alpha (T - T_0) = {linear:.2f} with a linear coefficient, {36 - 1} with a volumetric one"],
         ["2.3.3, Table 1", "minimum angle 17 deg, 16.7 deg, tangent 0.3",
          f"arctan 0.3 = {degrees(atan(0.3)):.2f} deg; we take 16.7"],
@@ -255,13 +255,13 @@ def temperature_of(diffusivity: float, volume: float) -> float:
         Hayduk and Laudie [1974]"; the viscosity of water is that of 20 C.""",
     reading="We keep the printed values.",
     consequence="""
-        The method at 20 C, and the temperature at which it gives the printed values, water's viscosity by Vogel's
-        law:
+        The method at 20 C, and the temperature at which it gives the printed values, with the viscosity of water by
+        Vogel's law:
 
         {table}
 
-        Both are those of one and the same warmer water. What the printed digits leave open of them moves the
-        effluents of base by less than their last digits (`verification/sensitivity`).""",
+        Both values belong to the same, warmer water. Their rounding changes the effluents of base by less than
+        a last digit (`verification/sensitivity`).""",
     quick=True)
 def diffusivities() -> Numbers:
     """Both diffusivities by the method that the paper names."""
@@ -295,7 +295,7 @@ def oxygen_supplied() -> Numbers:
     reading="That of C >> K_s, which base does not have (C09, C33).",
     consequence="""
         ln 2 over the net growth rate k Y m_A m_D - b m_A: {saturated} h at saturation, {supplied} h at 10 K_s of both,
-        the most that anything in base sees.""",
+        the largest concentrations in base.""",
     quick=True)
 def doubling_time() -> Numbers:
     """At saturation and at the supply."""

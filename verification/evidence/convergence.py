@@ -10,14 +10,17 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from verification.evidence.checks import Study
 from verification.evidence.results import Result
 from verification.evidence.writing import saved_figure
 
-COLUMNS = 3
+COLUMNS = 2
 #: Largest number of quantities in a legend.
 MAX_NAMED = 5
+#: Largest ratio of the sizes with labels besides powers of ten.
+MANY_DECADES = 200.0
 
 
 def series(result: Result) -> dict[str, list[list[float]]]:
@@ -34,7 +37,7 @@ def _two_digits(values: np.ndarray) -> list[float]:
 def draw(cases: Mapping[str, Mapping[str, list]], target: Path) -> None:
     """Write the picture of the series of some cases: {case: {quantity: series}}."""
     rows = -(-len(cases) // COLUMNS)
-    figure = Figure(figsize=(9, 2.5 * rows + 0.2), layout="constrained")
+    figure = Figure(figsize=(9, 3.3 * rows + 0.2), layout="constrained")
     axes = figure.subplots(rows, COLUMNS, squeeze=False).ravel()
     for axis, case in zip_longest(axes, cases):
         if case is None:
@@ -55,8 +58,12 @@ def _panel(axis, case: str, studies: Mapping[str, list]) -> None:
         axis.loglog(sizes, errors, ".-", color=color, lw=0.8, ms=4, label=label)
         axis.loglog(sizes, errors[-1] * (np.array(sizes) / sizes[-1]) ** order, "--", color=color, lw=0.4, alpha=0.6)
         named.add(name)
-    axis.set_title(case, fontsize=8)
-    axis.set_xlabel("size of elements or steps", fontsize=6)
-    axis.set_ylabel("error", fontsize=6)
-    axis.tick_params(labelsize=6, which="both")
-    axis.legend(fontsize=5)
+    low, high = axis.get_xlim()
+    axis.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5) if high < MANY_DECADES * low else (1,)))
+    axis.xaxis.set_major_formatter("{x:g}")
+    axis.xaxis.set_minor_formatter(NullFormatter())
+    axis.set_title(case, fontsize=10)
+    axis.set_xlabel("size of elements or steps", fontsize=8)
+    axis.set_ylabel("error", fontsize=8)
+    axis.tick_params(labelsize=8, which="both")
+    axis.legend(fontsize=7)

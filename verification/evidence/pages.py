@@ -126,8 +126,8 @@ def index(records: Mapping[str, Mapping]) -> list[str]:
              "elements and presets"))
     return [f"{INTRODUCTION} Written by `make verify`.",
             f"**{summary(records.values())}**",
-            table(("stage", ""), (*stages, *more)),
-            table(("besides", ""), OTHER_PAGES),
+            table(("stage", "result"), (*stages, *more)),
+            table(("judged besides", "command"), OTHER_PAGES),
             table(("case", "kind", "runs with", "numbers", "verdict", "must fall short with"),
                   (_index_row(cases()[id], record) for id, record in records.items()))]
 

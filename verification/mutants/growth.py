@@ -59,7 +59,7 @@ MUTANTS = (
          "h**2 / 12 * theta ** (5 / 3)"),
         ("stabilisation-of-rest",
          "the stabilisation uses the shape and the modulus of t = 0 in place of the present ones [E6]",
-         "PressureGradient(gradient_stabilisation(known,",
+         "PressureGradient(gradient_stabilisation(last_shape,",
          "PressureGradient(gradient_stabilisation(body.reference,"),
         ("stabilisation-too-weak",
          "the stabilisation is a thousandth of its size",

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from repro.results import read_table
-from repro.results.network import added_resistance, known
+from repro.results.network import added_resistance, share_range
 from verification.network import shapes
 from verification.network.shapes import RATIOS, Growth, Sample, log_uniform, select
 
@@ -206,7 +206,7 @@ def _grown(random: np.random.Generator) -> Iterator[Sample]:
 
 
 def _known(one: Sample) -> bool:
-    low, high = known(one.spanned)
+    low, high = share_range(one.spanned)
     return low <= one.share <= high
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from repro.results import read_table
-from repro.results.network import FAST, UPTAKE_BOUND, added_resistance, known
+from repro.results.network import FAST, UPTAKE_BOUND, added_resistance, share_range
 from verification.evidence.writing import table
 from verification.network import histories, law, runs, throats, timed, uptakes
 from verification.network.law import RATIO
@@ -230,7 +230,7 @@ def _numbers(states: dict[str, np.ndarray]) -> str:
 
 
 def _range(spanned: bool) -> str:
-    low, high = known(spanned)
+    low, high = share_range(spanned)
     return f"{low:.3g} to {high:.3g}"
 
 

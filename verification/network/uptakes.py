@@ -16,7 +16,7 @@ from repro.march.loop import PoreEnd
 from repro.model import pore
 from repro.model.pore import Pore
 from repro.results import read_table
-from repro.results.network import Throats, Transport, known, throats_of
+from repro.results.network import Throats, Transport, share_range, throats_of
 from repro.scene import load_scene
 from verification.claims.runs import SUBSTRATES
 from verification.network import shapes
@@ -99,7 +99,7 @@ def deviations(columns: dict[str, np.ndarray], law: Throats) -> np.ndarray:
 def fitted(columns: dict[str, np.ndarray]) -> tuple[Transport, Transport]:
     """The constants before and after contact, to three digits. The fit minimises the squares of the deviations over the
     spread of the bound."""
-    spanned = columns["area"] > known(False)[1] * columns["width"]**2
+    spanned = columns["area"] > share_range(False)[1] * columns["width"]**2
     return _fitted(columns, ~spanned), _fitted(columns, spanned)
 
 

@@ -1,13 +1,13 @@
-"""What the inputs of Table 1 allow: `make sensitivity`, or `python -m verification.sensitivity`.
+"""Effects of the rounding of Table 1: `make sensitivity`, or `python -m verification.sensitivity`.
 
 Table 1 prints rounded numbers: an input may be anywhere within half a unit of its last digit. The record
-`sensitivity.json` holds the elasticities of every number that the paper prints of base, and of contact and conductivity
-of wide, with respect to each input, by central differences of the converged solution; and the set of inputs within the
-rounding that comes nearest to all printed numbers of base at once. The claims read the record here.
+`sensitivity.json` has the elasticities of every number that the paper prints of base, and of contact and conductivity
+of wide, with respect to each input, by central differences of the converged solution. It also has the set of inputs
+within the rounding that comes nearest to all printed numbers of base at once. The claims read the record here.
 
 Runs are computed in this process and not by `repro sweep`. Some numbers need a state that no row has (grown and not yet
-expanded [E12]) or a second run from contact on, and elasticities and the set choose each run from the results of the
-last. A run writes its numbers alone, 0.4 kB in `out/runs.jsonl`; the study writes 2 MB. A run is not repeated while its
+expanded [E12]) or a second run from contact on. Elasticities and the set choose each run by the results of the last
+one. A run writes its numbers alone, 0.4 kB in `out/runs.jsonl`; the study writes 2 MB. A run is not repeated while its
 numbers are stored under the same scene and source.
 """
 
@@ -35,10 +35,10 @@ def interval(quantity: str, value: float) -> tuple[float, float] | None:
 
 def reach(quantity: str) -> float | None:
     """Half of the range of a number as the inputs vary within their rounding, over the number."""
-    known = record().get("elasticities", {}).get(quantity)
-    if known is None:
+    by_input = record().get("elasticities", {}).get(quantity)
+    if by_input is None:
         return None
-    return sum(abs(known[name]["elasticity"]) * half for name, half in record()["rounding"].items())
+    return sum(abs(by_input[name]["elasticity"]) * half for name, half in record()["rounding"].items())
 
 
 def in_closed_form(form: Callable[..., float], *inputs: tuple[float, float]) -> tuple[float, float]:
@@ -52,7 +52,7 @@ def in_closed_form(form: Callable[..., float], *inputs: tuple[float, float]) -> 
 def holds_for_supplies(id: str) -> str:
     """Describe the supplies of Figure 6 with which a claim holds, and those with which it does not."""
     by_supply = record()["supplies"]
-    holds = {supply: all(known["claims"][id].values()) for supply, known in by_supply.items()}
+    holds = {supply: all(result["claims"][id].values()) for supply, result in by_supply.items()}
     sides = (" and ".join(supply for supply in holds if holds[supply] == side) or "none" for side in (True, False))
     return ("the paper prints no supply for Figure 6, and 10 K_s of both is assumed; with {} K_s the claim holds, with "
             "{} K_s it does not").format(*sides)
@@ -69,7 +69,7 @@ def nearest_set() -> str:
     if one_set["reached"]:
         return ""
     return (f"no set of inputs within the rounding of Table 1 reaches all printed numbers of base, which would take "
-            f"{one_set['share_of_the_rounding']:.1f} times the rounding; the nearest: {_described_set()}")
+            f"{one_set['share_of_the_rounding']:.1f} times the rounding; the nearest set: {_described_set()}")
 
 
 def _described_set() -> str:

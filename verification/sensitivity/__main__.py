@@ -1,4 +1,4 @@
-"""`python -m verification.sensitivity [--only PART]`: what the inputs allow, with pictures and a page.
+"""`python -m verification.sensitivity [--only PART]`: effects of the rounding of inputs, with pictures and a page.
 
 The parts are base and wide, their elasticities and the one set of inputs; after_contact, the accuracy of wide after
 contact; supplies, the claims about wide that hold with other supplies; and sobol, indices of base.
@@ -28,7 +28,7 @@ NAMES = {"velocity_0": "mean velocity, t = 0", "velocity": "mean velocity, 19.2 
          "effluent_acceptor": "effluent acceptor, 19.4 h", "effluent_donor": "effluent donor, 19.4 h",
          "contact_time": "time of contact (wide)", "conductivity_after": "conductivity 4 h after contact (wide)"}
 UP, DOWN = "#D55E00", "#0072B2"
-UNMOVED = "no rounding of an input moves it"
+UNMOVED = "no rounding of an input changes it"
 #: Width of wide (um).
 WIDTH = 100.0
 
@@ -36,9 +36,9 @@ WIDTH = 100.0
 def reaches(record: dict, number: str) -> list[tuple[str, float, bool]]:
     """(input, effect (%) of half a unit of its last digit on a number, whether it is resolved), the largest effect
     first."""
-    known = record["elasticities"][number]
-    changes = [(each.name, 100 * known[each.name]["elasticity"] * each.rounding, known[each.name]["resolved"])
-             for each in ROUNDED]
+    elasticities = record["elasticities"][number]
+    changes = [(parameter.name, 100 * elasticities[parameter.name]["elasticity"] * parameter.rounding,
+                elasticities[parameter.name]["resolved"]) for parameter in ROUNDED]
     return sorted(changes, key=lambda row: -abs(row[1]))
 
 
@@ -51,14 +51,14 @@ def write(record: dict, target: Path = TARGET, outlines: Path = OUTLINES) -> Non
 def of_supplies(by_supply: dict[str, dict], target: Path) -> None:
     """Draw the outlines of wide every 5 h, one supply per row, the latest at the back."""
     figure = Figure(figsize=(9, 1.7 * len(by_supply)), layout="constrained")
-    for axes, (supply, known) in zip(figure.subplots(len(by_supply), sharex=True), by_supply.items()):
-        *_, last = map(float, known["outlines"])
-        for time, places in reversed(known["outlines"].items()):
+    for axes, (supply, result) in zip(figure.subplots(len(by_supply), sharex=True), by_supply.items()):
+        *_, last = map(float, result["outlines"])
+        for time, places in reversed(result["outlines"].items()):
             colour = matplotlib.colormaps["viridis_r"](float(time) / last)
             axes.fill(*_places(places).T, facecolor=colour, edgecolor="white")
         axes.set_ylim(0, WIDTH)
         axes.set_aspect("equal")
-        axes.set_title(f"{supply} K_s: every 5 h to {last:g} h; contact at {known['contact_time']:.1f} h", loc="left",
+        axes.set_title(f"{supply} K_s: every 5 h to {last:g} h; contact at {result['contact_time']:.1f} h", loc="left",
                        fontsize=10)
     axes.set_xlabel("x (um); the fluid comes from the left")
     saved_figure(figure, target)
@@ -98,45 +98,47 @@ def _bars(axes: Axes, name: str, value: float, resolved: bool) -> None:
 
 def page(record: dict) -> str:
     """The page of the record."""
-    words = ("Elasticities d ln(number) / d ln(input), by central differences of the converged solution; ± is their "
-             "bar, and one that exceeds a tenth of the value is *not resolved*. `make sensitivity` writes this page.")
-    blocks = [words, f"![Tornado diagram]({TARGET.name})", _table(record)]
+    introduction = ("Elasticities d ln(number) / d ln(input), by central differences of the converged solution. ± is "
+                    "the bar; an elasticity whose bar exceeds a tenth of it is *not resolved*. `make sensitivity` "
+                    "writes this page.")
+    blocks = [introduction, f"![Tornado diagram]({TARGET.name})", _table(record)]
     for part, section in SECTIONS.items():
         blocks += section(record[part])
-    return writing.page("What the inputs of Table 1 allow", blocks) + "\n"
+    return writing.page("Effects of the rounding of Table 1", blocks) + "\n"
 
 
 def _table(record: dict) -> str:
-    known = record["elasticities"]
-    return table(("input", "rounding (%)", *map(_title_of, known)), (_row(each, known) for each in INPUTS))
+    elasticities = record["elasticities"]
+    return table(("input", "rounding (%)", *map(_title_of, elasticities)),
+                 (_row(parameter, elasticities) for parameter in INPUTS))
 
 
 def _title_of(number: str) -> str:
     return NAMES.get(number, number.replace("_", " "))
 
 
-def _row(each: Input, elasticities: dict[str, dict]) -> tuple[str, ...]:
-    rounding = f"{100 * each.rounding:.2g}" if each.half else "exact"
-    return (each.name, rounding, *(_cell(known.get(each.name)) for known in elasticities.values()))
+def _row(parameter: Input, elasticities: dict[str, dict]) -> tuple[str, ...]:
+    rounding = f"{100 * parameter.rounding:.2g}" if parameter.half else "exact"
+    return (parameter.name, rounding, *(_cell(by_input.get(parameter.name)) for by_input in elasticities.values()))
 
 
-def _cell(known: dict | None) -> str:
-    if known is None:
+def _cell(entry: dict | None) -> str:
+    if entry is None:
         return "-"
-    word = f"{known['elasticity']:+.3f}" if known["resolved"] else f"{known['elasticity']:+.1g}, not resolved"
-    large = known.get("by_10_percent")
+    word = f"{entry['elasticity']:+.3f}" if entry["resolved"] else f"{entry['elasticity']:+.1g}, not resolved"
+    large = entry.get("by_10_percent")
     by_10_percent = f"; ± 10 %: {large[0]:+.2g}, {large[1]:+.2g} %" if large else ""
-    return f"{word} (± {known['bar']:.1g}){by_10_percent}"
+    return f"{word} (± {entry['bar']:.1g}){by_10_percent}"
 
 
 def _set(one_set: dict) -> Iterator[str]:
-    words = ("One set of inputs within the rounding gives all printed numbers of base at once" if one_set["reached"]
-             else "No set of inputs within the rounding gives all printed numbers of base at once; the nearest")
+    sentence = (f"{'A' if one_set['reached'] else 'No'} set of inputs within the rounding gives all printed numbers of "
+                f"base at once. {'This' if one_set['reached'] else 'The nearest'}")
     sizes = _listed(one_set["sizes"], ".3g")
     yield "## One set of inputs"
-    yield (f"{words} (a share of {one_set['share_of_the_rounding']:.2f} of the rounding is needed). It was run on "
-           f"sizes {sizes} of elements and steps, over those of `accurate`; the bar is from all of them, and a set "
-           "counts where the whole bar lies in the interval of the printed digits.")
+    yield (f"{sentence} set takes {one_set['share_of_the_rounding']:.2f} times the rounding. It was run on sizes "
+           f"{sizes} of elements and steps, over those of `accurate`. The bar follows from all of them, and a set "
+           "counts if the whole bar lies in the interval of the printed digits.")
     yield table(("number", "printed", "a run with the set", "bar", "on these sizes"), (
         (_title_of(name), "{:g} to {:g}".format(*interval(rounding.PRINTED[name])), f"{value:.4f}",
          f"{one_set['bars'][name]:.1g}", _listed(one_set["on_sizes"][name], ".4f"))
@@ -144,15 +146,15 @@ def _set(one_set: dict) -> Iterator[str]:
     yield table(("input", "value"), ((name, f"{value:.4f}") for name, value in one_set["inputs"].items()))
 
 
-def _listed(values: list[float], how: str) -> str:
-    return ", ".join(format(value, how) for value in values)
+def _listed(values: list[float], form: str) -> str:
+    return ", ".join(format(value, form) for value in values)
 
 
 def _supplies(by_supply: dict) -> Iterator[str]:
     yield "## The supply of Figure 6, which is not printed"
     yield table(("supply of both (K_s)", "contact (h)", "ends at contact (um)", "least acceptor then (K_s)"), (
-        (supply, f"{known['contact_time']:.1f}", f"{known['upstream']:.0f} to {known['downstream']:.0f}",
-         f"{known['acceptor_min']:.2g}") for supply, known in by_supply.items()))
+        (supply, f"{result['contact_time']:.1f}", f"{result['upstream']:.0f} to {result['downstream']:.0f}",
+         f"{result['acceptor_min']:.2g}") for supply, result in by_supply.items()))
     yield f"![Outlines with each supply]({OUTLINES.name})"
     yield from _verdicts(by_supply)
 
@@ -160,7 +162,7 @@ def _supplies(by_supply: dict) -> Iterator[str]:
 def _verdicts(by_supply: dict[str, dict]) -> Iterator[str]:
     """Which claims about wide hold with which supplies."""
     every, some, none = (", ".join(ids) or "none" for ids in wide.verdicts(by_supply))
-    yield ("Of the claims about this run, each judged anew with the converged solution at one size, to "
+    yield ("Of the claims about this run, each judged again with the converged solution at one size, to "
            f"{wide.AFTER} h after contact or until the aggregate reaches an end of the pore, these hold with all "
            f"supplies: {every}; with some: {some}; with none: {none}.")
     yield "Numbers that hold with some supplies and not with all:"
@@ -169,26 +171,26 @@ def _verdicts(by_supply: dict[str, dict]) -> Iterator[str]:
 
 
 def _after_contact(rows: list[dict]) -> Iterator[str]:
-    yield "## How well wide is known after contact"
+    yield "## Accuracy of wide after contact"
     yield ("Values from the finest size to the coarsest; means are over whole hours from contact to 45 h. A single row "
-           "jumps as one more edge of the outline comes to rest on the wall.")
-    yield table(("number", "values", "bar (%)", "asked (%)", "kept"), (
-        (known["quantity"], _listed(known["values"], ".4g"), f"{known['bar_percent']:.2g}",
-         f"{known['asked_percent']:g}", "yes" if known["kept"] else "no") for known in rows))
+           "jumps if one more edge of the outline joins the wall.")
+    yield table(("number", "values", "bar (%)", "accepted (%)", "met"), (
+        (row["quantity"], _listed(row["values"], ".4g"), f"{row['bar_percent']:.2g}",
+         f"{row['asked_percent']:g}", "yes" if row["kept"] else "no") for row in rows))
 
 
 def _sobol(indices: dict) -> Iterator[str]:
-    widest = max(0.5 * (high - low) for known in indices["numbers"].values() for _, low, high in known["total_order"])
+    widest = max(0.5 * (high - low) for entry in indices["numbers"].values() for _, low, high in entry["total_order"])
     yield "## Sobol indices of base"
     yield (f"Total indices of {indices['samples']} samples in `fast`, with intervals of "
-           f"{100 * indices['confidence']:.0f} %: the share of a number's variance within the rounding that goes with "
-           f"an input. The widest of the intervals is {widest:.2f} to either side.")
+           f"{100 * indices['confidence']:.0f} %: the share of an input in the variance of a number within the "
+           f"rounding. The widest of the intervals is {widest:.2f} to either side.")
     yield table(("number", *indices["inputs"]), (
-        (_title_of(name), *map(_index, known["total_order"])) for name, known in indices["numbers"].items()))
+        (_title_of(name), *map(_index, entry["total_order"])) for name, entry in indices["numbers"].items()))
 
 
-def _index(known: list[float]) -> str:
-    return "{:.2f} ({:.2f} to {:.2f})".format(*known)
+def _index(bounds: list[float]) -> str:
+    return "{:.2f} ({:.2f} to {:.2f})".format(*bounds)
 
 
 #: Page sections of the parts of the record, in order.
@@ -199,7 +201,7 @@ SECTIONS: dict[str, Callable[..., Iterator[str]]] = {
 def main(arguments: list[str] | None = None) -> int:
     """Entry point; returns the exit status."""
     parser = argparse.ArgumentParser(prog="python -m verification.sensitivity", description=__doc__.split("\n")[0])
-    parser.add_argument("--only", choices=tuple(PARTS), help="one part alone; the record of the others stays")
+    parser.add_argument("--only", choices=tuple(PARTS), help="compute one part alone; the others stay as recorded")
     record = computed(Runs(), parser.parse_args(arguments).only)
     write_json(sensitivity.RECORD, record)
     write(record)
@@ -211,7 +213,7 @@ def main(arguments: list[str] | None = None) -> int:
 def computed(runs: Runs, only: str | None) -> dict:
     """The record with the requested parts computed; the others do not change."""
     record = {"values": {}, "elasticities": {}, **sensitivity.record()}
-    record["rounding"] = {each.name: each.rounding for each in ROUNDED}
+    record["rounding"] = {parameter.name: parameter.rounding for parameter in ROUNDED}
     for name in PARTS if only is None else (only,):
         PARTS[name](runs, record)
     return record

@@ -85,7 +85,7 @@ ROUNDED = (
     Input("D_d", _of("donor", "diffusivity"), 1.01, 0.005),
     Input("D_fd", _of("donor", "diffusivity_in_aggregate"), 0.81, 0.005),
 )
-#: Section 2.2 sets both K_s to 1 mg/L: they are a choice and no rounded measurement, so no set of inputs moves them.
+#: Section 2.2 sets both K_s to 1 mg/L. They are a choice, not a rounded measurement, so no set of inputs changes them.
 #: The supply is printed as 10 K_s, and goes with K_s.
 EXACT = (
     Input("K_sA", _of("acceptor", "half_saturation", "supply")),
@@ -141,9 +141,9 @@ def of_base(scene: Scene) -> Row:
     first, shaped, last = simulation.simulate(ending(scene, plotted, END))
     grown, _, _ = updates.make_biomass(Stages.of(scene), shaped.pore, shaped.solved, scene.growth.time_step)
     solved = pore.solve(scene, grown)
-    halves = [each.half_saturation for each in solved.problem.both]
+    halves = [substrate.half_saturation for substrate in solved.problem.both]
     acceptor, donor = (flux.effluent / half for flux, half in zip(solved.fluxes, halves))
-    supply = [each.supply for each in solved.problem.both]
+    supply = [substrate.supply for substrate in solved.problem.both]
     rate = float(rate_law(scene.substrates, scene.kinetics).growth_rate(*supply))
     return {"velocity_0": M_PER_D * first.solved.flow.mean_velocity,
             "velocity": M_PER_D * shaped.solved.flow.mean_velocity,
@@ -193,21 +193,21 @@ RESOLVED = 0.1
 
 def elasticities(runs: Runs, name: str) -> dict[str, dict[str, dict]]:
     """{number: {input: elasticity, bar, resolved, and the changes (%) caused by +-10 % of an exact input}}."""
-    inputs = [each for each in INPUTS if each.only in ("", name)]
-    runs.get_all(scene for each in inputs for scene in _scenes_around(name, each))
+    inputs = [parameter for parameter in INPUTS if parameter.only in ("", name)]
+    runs.get_all(scene for parameter in inputs for scene in _scenes_around(name, parameter))
     plain = runs.get(load_varied(name, {}))
     by_number: dict[str, dict[str, dict]] = {number: {} for number in plain}
-    for each in inputs:
-        rows = [*map(runs.get, _scenes_around(name, each))]
+    for parameter in inputs:
+        rows = [*map(runs.get, _scenes_around(name, parameter))]
         for number, value in plain.items():
-            by_number[number][each.name] = _elasticity(value, column(rows, number))
+            by_number[number][parameter.name] = _elasticity(value, column(rows, number))
     return by_number
 
 
-def _scenes_around(name: str, each: Input) -> list[Scene]:
+def _scenes_around(name: str, parameter: Input) -> list[Scene]:
     """Scenes with an input above and below its value, at all distances of the central differences."""
-    distances = (NEAR, FAR) if each.half else (NEAR, FAR, LARGE)
-    return [load_varied(name, {each.name: 1 + sign * distance}) for distance in distances for sign in (1, -1)]
+    distances = (NEAR, FAR) if parameter.half else (NEAR, FAR, LARGE)
+    return [load_varied(name, {parameter.name: 1 + sign * distance}) for distance in distances for sign in (1, -1)]
 
 
 def _elasticity(value: float, moved: list[float]) -> dict:
@@ -217,7 +217,7 @@ def _elasticity(value: float, moved: list[float]) -> dict:
     bar = abs(far - near)
     elasticity = {"elasticity": near, "bar": bar, "resolved": bar <= RESOLVED * abs(near)}
     if moved[4:]:
-        elasticity["by_10_percent"] = [100 * (each / value - 1) for each in moved[4:]]
+        elasticity["by_10_percent"] = [100 * (moved_value / value - 1) for moved_value in moved[4:]]
     return elasticity
 
 
@@ -257,14 +257,15 @@ def one_set(runs: Runs, elasticities: dict[str, dict[str, dict]]) -> dict:
     slopes = start[:, None] * _table(elasticities)
     for _ in range(ROUNDS):
         x, t = program(start, slopes, bars)
-        factors = {each.name: 1 + value for each, value in zip(ROUNDED, x)}
+        factors = {parameter.name: 1 + value for parameter, value in zip(ROUNDED, x)}
         numbers = runs.get(load_varied("base", factors, *converged(SET_SIZES[0])))
         if misfit(numbers) <= MISFIT_GOAL and misfit(numbers, bars) <= 1:
             break
         start = printed_of(numbers) - slopes @ x
     rows = _on_sizes(runs, factors)
-    left = misfit(numbers, _bars(rows))
-    return {"reached": bool(t <= 1 + 1e-9 and left <= 1), "share_of_the_rounding": t, "misfit_in_half_intervals": left,
+    final_misfit = misfit(numbers, _bars(rows))
+    return {"reached": bool(t <= 1 + 1e-9 and final_misfit <= 1), "share_of_the_rounding": t,
+            "misfit_in_half_intervals": final_misfit,
             "inputs": {name: BY_NAME[name].value * factor for name, factor in factors.items()},
             "numbers": {name: numbers[name] for name in PRINTED}, "bars": dict(zip(PRINTED, _bars(rows).tolist())),
             "sizes": list(SET_SIZES), "on_sizes": dict(zip(PRINTED, rows.T.tolist()))}
@@ -272,7 +273,7 @@ def one_set(runs: Runs, elasticities: dict[str, dict[str, dict]]) -> dict:
 
 def _table(elasticities: dict[str, dict[str, dict]]) -> np.ndarray:
     """(printed numbers, rounded inputs) elasticities."""
-    listed = [elasticities[name][each.name]["elasticity"] for name, each in product(PRINTED, ROUNDED)]
+    listed = [elasticities[name][parameter.name]["elasticity"] for name, parameter in product(PRINTED, ROUNDED)]
     return np.reshape(listed, (len(PRINTED), -1))
 
 
@@ -295,15 +296,15 @@ def _bars(rows: np.ndarray) -> np.ndarray:
 def program(start: np.ndarray, slopes: np.ndarray, bars: np.ndarray) -> tuple[np.ndarray, float]:
     """Relative changes of the inputs and the share of the rounding that they use. If the intervals, less the bars, are
     out of reach, the changes within the rounding that have the least misfit."""
-    rounding = np.array([each.rounding for each in ROUNDED])
+    rounding = np.array([parameter.rounding for parameter in ROUNDED])
     aimed = np.minimum(HALF - BARS_INSIDE * bars, AIMED * HALF)
     system = slopes * rounding, MIDDLE - start
-    none = 0 * HALF
+    zero_widths = 0 * HALF
     ones = np.ones(len(rounding))
-    best = _solved(*system, aimed, none, 0 * ones, ones)
+    best = _solved(*system, aimed, zero_widths, 0 * ones, ones)
     share = best[-1] if best is not None else np.inf
     if share > 1:
-        best = _solved(*system, none, HALF, ones, 0 * ones)
+        best = _solved(*system, zero_widths, HALF, ones, 0 * ones)
     return best[:-1] * rounding, float(share)
 
 
@@ -328,22 +329,23 @@ FAST = ('numerics.preset="fast"',)
 def sobol(runs: Runs, elasticities: dict[str, dict[str, dict]], samples: int = SAMPLES) -> dict:
     """First-order and total indices of each printed number, with their intervals."""
     moves = np.abs(_table(elasticities)) > LEAST
-    chosen = [each for each, moving in zip(ROUNDED, moves.any(axis=0)) if moving]
-    inputs = [each.name for each in chosen]
-    names = [name for name, moved in zip(PRINTED, moves.any(axis=1)) if moved and name != "consumed"]
+    chosen = [parameter for parameter, is_moving in zip(ROUNDED, moves.any(axis=0)) if is_moving]
+    inputs = [parameter.name for parameter in chosen]
+    names = [name for name, is_moved in zip(PRINTED, moves.any(axis=1)) if is_moved and name != "consumed"]
 
     def numbers(x: np.ndarray) -> list[list[float]]:
         rows = runs.get_all(load_varied("base", dict(zip(inputs, factors)), *FAST) for factors in x.T)
         return [column(rows, name) for name in names]
-    spread = [uniform(1 - each.rounding, 2 * each.rounding) for each in chosen]
+    spread = [uniform(1 - parameter.rounding, 2 * parameter.rounding) for parameter in chosen]
     indices = sobol_indices(func=numbers, n=samples, dists=spread, rng=np.random.default_rng(SEED))
-    sure = indices.bootstrap(confidence_level=CONFIDENCE, n_resamples=999)
-    orders = zip(names, _listed(indices.first_order, sure.first_order), _listed(indices.total_order, sure.total_order))
+    bootstrap = indices.bootstrap(confidence_level=CONFIDENCE, n_resamples=999)
+    orders = zip(names, _listed(indices.first_order, bootstrap.first_order),
+                 _listed(indices.total_order, bootstrap.total_order))
     return {"samples": samples, "inputs": inputs, "confidence": CONFIDENCE,
             "numbers": {name: {"first_order": first, "total_order": total} for name, first, total in orders}}
 
 
-def _listed(values: np.ndarray, sure) -> list[list[list[float]]]:
+def _listed(values: np.ndarray, bootstrap) -> list[list[list[float]]]:
     """[index, low, high] of each number and input."""
-    interval = sure.confidence_interval
+    interval = bootstrap.confidence_interval
     return np.stack([values, interval.low, interval.high], axis=-1).tolist()

@@ -45,12 +45,12 @@ REQUIRED_BARS = {"conductivity (m/d)": 1.0, "upstream tip (um)": 1.0, "downstrea
 
 
 def of_after(scene) -> Row:
-    """Means over HOURS (geometric, of magnitudes), values at LATER and at the last of them. Raises LookupError where
-    one of the hours is before contact."""
+    """Means over HOURS (geometric, of magnitudes), values at LATER and at the last of HOURS. Raises LookupError if one
+    of HOURS is before contact."""
     after = [instant for _, instant in simulation.steps(scene) if instant and instant.pore.contact]
     if len(after) != len(HOURS):
         raise LookupError(f"{len(after)} of {len(HOURS)} rows are after contact")
-    table = np.array([[*problems.after_contact(each).values()] for each in after])
+    table = np.array([[*problems.after_contact(report).values()] for report in after])
     means = np.exp(np.log(np.abs(table)).mean(axis=0))
     rows = zip(KINDS, (means, table[HOURS.index(LATER)], table[-1]))
     return {f"{kind} {name}": float(abs(value)) for kind, row in rows for name, value in zip(REQUIRED_BARS, row)}
@@ -80,12 +80,12 @@ SUPPLIES, SIZE = (5.0, 10.0, 20.0, 40.0), 2**0.5
 #: Hours within which the aggregate touches the wall with every supply.
 END = 120.0
 #: Claims about this run that are not judged again, with the reasons: they compare it with other models.
-LEFT_OUT = {"C32": "compares two ways for biomass to be born", "C41": "changes the rheology and the walls",
+LEFT_OUT = {"C32": "compares two rheologies of new biomass", "C41": "changes the rheology and the walls",
             "C46": "compares its stresses with and without the fluid's forces",
             "C63": "compares its shapes with and without them"}
 #: Hours before it reaches an end of the pore at which an aggregate is still clear of it.
 MARGIN = 0.1
-#: Whole hours that wide goes on after contact: 45 h for Figure 6's own 10 K_s.
+#: Whole hours that wide continues after contact: to 45 h for Figure 6's own 10 K_s.
 AFTER = 11
 #: Hours between outlines, and the accuracy (um) of their points.
 EVERY, FINE = 5, 0.1
@@ -129,11 +129,11 @@ def _of_supply(runs: Runs, supply: float) -> dict:
     contact = runs.get(replace(load_varied("wide", factors, *converged(SIZE)), name="contact"))
     level = supplied(supply, contact["end"])
     with at_level(level), np.errstate(all="raise", under="ignore"):
-        judged = {id: check_outcomes(CLAIMS[id].function()) for id in sorted(CLAIMS)
+        outcomes = {id: check_outcomes(CLAIMS[id].function()) for id in sorted(CLAIMS)
                   if CLAIMS[id].of_wide and id not in LEFT_OUT and not CLAIMS[id].unjudged}
-        judged_supply = {**contact, "outlines": _outlines(), "claims": judged}
+        entry = {**contact, "outlines": _outlines(), "claims": outcomes}
     forget(level)
-    return judged_supply
+    return entry
 
 
 def supplied(supply: float, end: float) -> Level:
@@ -144,12 +144,12 @@ def supplied(supply: float, end: float) -> Level:
 
 def check_outcomes(finding: Finding) -> dict[str, bool]:
     """{quantity without its numbers: does it hold?} for the checks that are not about base."""
-    judged_checks: dict[str, bool] = {}
+    outcomes: dict[str, bool] = {}
     for check in finding.checks:
         name = unnumbered(check.quantity)
         if not name.startswith("base"):
-            judged_checks[name] = check.holds and judged_checks.get(name, True)
-    return judged_checks
+            outcomes[name] = check.holds and outcomes.get(name, True)
+    return outcomes
 
 
 def _outlines() -> dict[str, str]:
@@ -169,7 +169,7 @@ def verdicts(by_supply: dict[str, dict]) -> tuple[list[str], list[str], list[str
     some: list[str] = []
     none: list[str] = []
     for id in next(iter(by_supply.values()))["claims"]:
-        holds = [all(known["claims"][id].values()) for known in by_supply.values()]
+        holds = [all(result["claims"][id].values()) for result in by_supply.values()]
         (every if all(holds) else some if any(holds) else none).append(id)
     return every, some, none
 
@@ -177,9 +177,9 @@ def verdicts(by_supply: dict[str, dict]) -> tuple[list[str], list[str], list[str
 def moving(by_supply: dict[str, dict]) -> Iterator[tuple[str, list[bool]]]:
     """Whether each check holds with each supply, by claim and quantity; only checks that hold with some supplies and
     fail with others."""
-    claims = [known["claims"] for known in by_supply.values()]
+    claims = [result["claims"] for result in by_supply.values()]
     for id in claims[0]:
         for quantity in claims[0][id]:
-            holds = [judged[id][quantity] for judged in claims]
+            holds = [outcomes[id][quantity] for outcomes in claims]
             if any(holds) and not all(holds):
                 yield f"{id}, {quantity}", holds

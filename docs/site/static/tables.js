@@ -1,4 +1,5 @@
-// Sort a table by a click or Enter on a heading; tables of ten rows or more get a field that filters their rows.
+// Sort a table by a click or Enter on a heading; tables of twelve rows or more get a field that filters their rows.
+// A column of long texts has a least width, and a table wider than the page scrolls within it.
 "use strict";
 
 function cellText(row, column) {
@@ -48,10 +49,27 @@ function addFilter(table) {
   (table.closest(".table-wrapper") || table).before(field);
 }
 
+// Least widths of columns by the length of their longest text; longer words are broken.
+const WIDTHS = [[200, "14em"], [50, "9em"], [22, "7em"]];
+const LONGEST_WORD = 34;
+
+function widenColumns(table) {
+  const rows = [...table.tBodies[0].rows];
+  for (const heading of table.tHead.rows[0].cells) {
+    const texts = rows.map((row) => cellText(row, heading.cellIndex));
+    const width = WIDTHS.find(([length]) => texts.some((text) => text.length >= length));
+    if (width) heading.style.minWidth = width[1];
+    if (texts.some((text) => text.split(/\s/).some((word) => word.length > LONGEST_WORD)))
+      for (const row of rows) if (row.cells[heading.cellIndex]) row.cells[heading.cellIndex].style.overflowWrap = "anywhere";
+  }
+}
+
 document.addEventListener("DOMContentLoaded", () => {
   for (const table of document.querySelectorAll("article table")) {
-    if (!table.tHead || !table.tBodies.length || table.tBodies[0].rows.length < 3) continue;
-    makeSortable(table);
-    if (table.tBodies[0].rows.length >= 10) addFilter(table);
+    if (!table.tHead || !table.tBodies.length) continue;
+    widenColumns(table);
+    const count = table.tBodies[0].rows.length;
+    if (count >= 3) makeSortable(table);
+    if (count >= 12) addFilter(table);
   }
 });

@@ -107,7 +107,7 @@ def text() -> str:
     caught = Counter(row["file"] for row in verdicts["caught"])
     survivors = [(*_place(row), *LEFT.get(key(row), ("", ""))) for row in verdicts["survivor"]]
     equivalent = [(*_place(row), EQUIVALENT[key(row)]) for row in verdicts["equivalent"]]
-    counts = [(file, drawn[file], caught[file]) for file in sorted(drawn)]
+    counts = [(f"`{file}`", drawn[file], caught[file]) for file in sorted(drawn)]
     blocks = [INTRODUCTION, summary(verdicts),
               *_section("Survivors", survivors, "effect", "why no test"),
               *_section("Shown equivalent", equivalent, "why"),
@@ -122,4 +122,4 @@ def _section(title: str, rows: list[tuple[str, ...]], *columns: str) -> list[str
 
 def _place(row: dict) -> tuple[str, str, str]:
     """The place, the old text and the new text."""
-    return f"{row['file']}:{row['line']}", f"`{row['old']}`", f"`{row['new']}`"
+    return f"`{row['file']}:{row['line']}`", f"`{row['old']}`", f"`{row['new']}`"

@@ -10,18 +10,18 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
         "pattern of the entries. Their values only prevent a zero pivot of a factorisation that is not used further.",
     ("fem/transfer.py", "return np.where(lost[:, None], 99.0, local)",
      "return np.where(lost[:, None], 100.0, local)"):
-        "Both values are outside of every triangle, where local coordinates are from -2 to 3, and both are moved to "
-        "the same place on an edge.",
+        "Both values lie outside of every triangle (the search ends between -2 and 3), and both move to the same point "
+        "of its edge.",
     ("model/flow.py", "@dataclass(frozen=True, eq=False)", "@dataclass(frozen=True, eq=True)"):
-        "Bubble has no fields. It is called, and neither compared nor used as a key.",
+        "Bubble has no fields, and instances are neither compared nor used as keys.",
     ("model/flow.py", "@dataclass(frozen=True, eq=False) class Bubble:", "class Bubble:"):
         "Bubble has no fields. Without the decorator only its text representation differs.",
     ("model/gear.py", "still = np.zeros_like(fields), np.zeros_like(biomass), np.zeros((2, 4))",
      "still = np.zeros_like(fields), np.zeros_like(biomass), np.zeros(( 1, 4))"):
-        "One row of zeros is broadcast to two rows.",
+        "NumPy broadcasts one row of zeros to two rows of zeros.",
     ("model/transport.py", "return self._reaction.evaluate(state.reshape(len(self.problem.both), -1))",
      "return self._reaction.evaluate(state.reshape(len(self.problem.both), - 2))"):
-        "NumPy accepts any negative number as the length of the remaining axis.",
+        "NumPy infers the length of an axis from any negative number.",
     ("report/quantities.py", 'is_new_mesh = run.series.get("remeshed", run.times * np.nan) == 1',
      'is_new_mesh = run.series.get("remeshed", run.times * np.nan) >= 1'):
         "The column is 0 or 1, and NaN is neither.",
@@ -29,9 +29,9 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
         "Identical outputs of base in the three presets, whose equilibria take at most 5, 5 and 3 iterations.",
     ("runs/folder.py", '(folder / "fields").mkdir(parents=True, exist_ok=True)',
      '(folder / "fields").mkdir(parents=False, exist_ok=True)'):
-        "The folder exists already: its lock has created it with its parents.",
+        "The folder exists already: the lock creates it with its parents.",
     ("report/run_page.py", 'several=hidden[packed["of"] > 1])', 'several=hidden[packed["of"] != 1])'):
-        "There is at least one frame. Without frames nothing is packed or displayed.",
+        "There is at least one frame: without frames the function packs and shows nothing.",
 }
 
 #: Remaining survivors: (effect, reason why no test catches it).
