@@ -28,7 +28,7 @@ from matplotlib.figure import Figure
 from paper_figures import FIGURES, runs, states
 from repro.results import PACKAGES, field_files
 from repro.runs.machine import source_hash
-from verification.bench.record import processor
+from verification.evidence.results import processor
 from verification.store import provenance
 
 OUT = Path(__file__).parent / "out"

@@ -20,11 +20,11 @@ from time import process_time
 
 from repro.march.simulation import simulate
 from verification import switches
-from verification.bench.record import machine
 from verification.claims import runs
 from verification.claims.runs import BASE, PLATES, UPDATE
 from verification.evidence.checks import columns
-from verification.evidence.writing import Block, markdown, save, table
+from verification.evidence.results import machine
+from verification.evidence.writing import save, table
 from verification.switches import CHOICES, PLOTTED, Course, Switch, state
 
 RECORD = Path(__file__).parent / "report" / "audit.json"
@@ -47,7 +47,7 @@ def main() -> int:
     rows = [{**row, "resolved": resolved(row["effect"], row.get("noise", noise["effect"]))} for row in rows]
     record = {"machine": machine(), "method": METHOD, "rows": rows}
     save(record, RECORD)
-    print(markdown(blocks(record)))
+    print(*blocks(record), sep="\n\n")
     return 0
 
 
@@ -130,10 +130,10 @@ HEAD = ("choice", "default", "alternative", "cost", "velocity", "area", "accepto
         "in one state", "note")
 
 
-def blocks(record: dict) -> Iterator[Block]:
+def blocks(record: dict) -> Iterator[str]:
     """Yield the table: per choice its cost, its effects over the runs, and the largest effects of both kinds."""
-    yield Block("heading", "What the paper's choices cost and change")
-    yield Block("text", f"{record['method']}.")
+    yield "## What the paper's choices cost and change"
+    yield f"{record['method']}."
     yield table(HEAD, map(_choice, record["rows"]))
 
 

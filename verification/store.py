@@ -1,4 +1,4 @@
-"""One store of results that are computed once for a scene and for the present source of ``repro``.
+"""Stores of results that are computed once for a scene and for the present source of ``repro``.
 
 The key of a result contains the hashes of the scene and of the source, so a change of either recomputes the result.
 Missing results are computed in parallel. :class:`Folders` stores whole runs, :class:`Numbers` the few numbers of many
@@ -8,7 +8,7 @@ runs, and :class:`Memory` the return values of the functions of claims, until th
 import os
 import shutil
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection, Hashable, Iterable
+from collections.abc import Callable, Hashable, Iterable
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial, wraps
 from pathlib import Path
@@ -25,6 +25,12 @@ from verification.evidence.writing import append, lines
 def key_of(scene: Scene) -> str:
     """The key of a scene's results with the present source."""
     return f"{scene.name}-{scene_hash(scene)}-{source_hash()}"
+
+
+def map_in_parallel(function: Callable, *arguments: Iterable) -> list:
+    """Like map, on one process per core."""
+    with ProcessPoolExecutor() as pool:
+        return list(pool.map(function, *arguments))
 
 
 class Store(ABC):
@@ -46,20 +52,13 @@ class Store(ABC):
         return self.get_all([scene])[0]
 
     def get_all(self, scenes: Iterable[Scene]) -> list:
-        """The results of several scenes. If more than one is missing, they are computed in parallel, one process per
-        core."""
+        """The results of several scenes. If more than one is missing, they are computed in parallel."""
         keyed = [(key_of(scene), scene) for scene in scenes]
         missing = {key: scene for key, scene in keyed if self.find(key) is None}
-        results = map(self.compute, missing.values()) if len(missing) == 1 else self._side_by_side(missing.values())
-        for key, result in zip(missing, results):
+        compute_all = map_in_parallel if len(missing) > 1 else map
+        for key, result in zip(missing, compute_all(self.compute, missing.values())):
             self.keep(key, result)
         return [self.find(key) for key, _ in keyed]
-
-    def _side_by_side(self, scenes: Collection[Scene]) -> list:
-        if not scenes:
-            return []
-        with ProcessPoolExecutor(max_workers=os.cpu_count()) as pool:
-            return list(pool.map(self.compute, scenes))
 
 
 class Folders(Store):
@@ -78,7 +77,7 @@ class Folders(Store):
         return self.folder / key if (self.folder / key / "run.json").exists() else None
 
     def keep(self, key: str, result: Path) -> None:
-        """The run is in its folder already."""
+        """Do nothing: the computation has stored the run in its folder."""
 
 
 def _run_into(folder: Path, scene: Scene) -> Path:

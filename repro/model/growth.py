@@ -51,8 +51,8 @@ NEWTON = 1e-11
 ROUND_OFF = 1e-8
 MOST_ITERATIONS = 25
 #: Newton's method gives up if its defect is larger than this after so many iterations. Of 1240
-#: solutions in 19 pores that converged, three would have been given up; of the processor time of 117
-#: that did not, half is saved.
+#: solutions in 19 pores that converged, three would have been given up; of the processor time of
+#: 117 that did not, half is saved.
 NEAR = 12, 0.02
 #: Halvings in a line search.
 HALVINGS = 8

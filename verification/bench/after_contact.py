@@ -8,8 +8,7 @@ import numpy as np
 from repro.march.simulation import simulate
 from repro.runs.machine import source_hash
 from repro.scene import load_scene
-from verification.bench import record
-from verification.bench.record import clock, measured
+from verification.bench.record import clock, measured, reference_of
 from verification.bench.runs import BY_MINUTES, PRESET_PAPER
 from verification.claims.levels import converged
 from verification.claims.runs import until
@@ -17,10 +16,8 @@ from verification.problems.runs import QUADRATIC, after_contact
 
 #: Times of the numbers (h), and that of the diagram.
 TIMES, DRAWN = (35.0, 39.3, 45.0), 39.3
-#: The same for the quick version, a pore of 25 um.
-QUICK_TIMES, QUICK_DRAWN, QUICK = (17.5, 18.0), 18.0, ('pore.width="25 um"',)
 #: Sizes of the reference's elements and steps over those of the preset accurate, the finest first.
-REFERENCE, QUICK_REFERENCE = (0.5, 2**-0.5), (2**0.5, 2.0)
+REFERENCE = (0.5, 2**-0.5)
 #: Refinement and time step (min) of the paper's scheme.
 PAPER = ((0.7, 24), (1.0, 24), (1.0, 12), (1.4, 12), (1.4, 6))
 #: Refinements with which the presets fast and accurate run, in addition to their own.
@@ -31,66 +28,52 @@ NUMBERS = ("conductivity", "upstream tip", "downstream tip", "length of contact"
 AIMS = {"fast": 0.01, "accurate": 0.002, "exact": 0.0005}
 
 
-def wide_part(quick: bool) -> dict:
+def wide_part() -> dict:
     """Wide: the largest error of conductivity, tips and length of contact at 39.3 h against the time to 39.3 h. The
-    errors at all times are kept.
-
-    ``quick``: a pore of 25 um at 18 h, against coarser levels.
-    """
-    changes, times, drawn = (QUICK, QUICK_TIMES, QUICK_DRAWN) if quick else ((), TIMES, DRAWN)
-    about = reference(QUICK_REFERENCE, times, changes) if quick else _known() or reference(REFERENCE, times, changes)
+    errors at all times are kept."""
+    about = reference_of("wide", "reference_source", source_hash()) or reference()
     truth = np.array(about["reference_values"])
-    jobs = {(method, label): partial(judged, truth, times, drawn, (*changes, *own))
-            for method, label, own in methods(quick)}
-    return {"title": f"Wide at {drawn:g} h, after contact, nothing written", "repeats": 1, "lines": measured(jobs, 1),
-            "error": f"largest of four numbers at {drawn:g} h: conductivity, tips, length of contact", **about}
+    jobs = {(method, label): partial(judged, truth, changes) for method, label, changes in methods()}
+    return {"title": f"Wide at {DRAWN:g} h, after contact, nothing written", "repeats": 1, "lines": measured(jobs, 1),
+            "error": f"largest of four numbers at {DRAWN:g} h: conductivity, tips, length of contact", **about}
 
 
-def methods(quick: bool) -> list[tuple[str, str, tuple[str, ...]]]:
+def methods() -> list[tuple[str, str, tuple[str, ...]]]:
     """Method, label and changes of the scene of each job."""
     rows = [(f"preset {preset}", "as it is", (f"numerics.preset={preset}",)) for preset in QUADRATIC]
+    rows += [(f"preset {preset}", f"refinement {refinement:g}",
+              (f"numerics.preset={preset}", f"numerics.refinement={refinement}"))
+             for preset, refinements in REFINEMENTS.items() for refinement in refinements]
     text, *keys = BY_MINUTES
-    paper = [(PRESET_PAPER, text.format(*size), ("numerics.preset=paper", *map(str.format, keys, size)))
-             for size in PAPER]
-    varied = [(f"preset {preset}", f"refinement {refinement:g}",
-               (f"numerics.preset={preset}", f"numerics.refinement={refinement}"))
-              for preset, refinements in REFINEMENTS.items() for refinement in refinements]
-    return [*rows[:2], paper[0]] if quick else [*rows, *varied, *paper]
+    return rows + [(PRESET_PAPER, text.format(*size), ("numerics.preset=paper", *map(str.format, keys, size)))
+                   for size in PAPER]
 
 
-def judged(truth: np.ndarray, times: Sequence[float], drawn: float, changes: Sequence[str]) -> dict:
-    """The errors of a run; the time after ``drawn`` is set apart."""
-    values, at_drawn, end = numbers(times, drawn, changes)
+def judged(truth: np.ndarray, changes: Sequence[str]) -> dict:
+    """The errors of a run; the time after DRAWN is set apart."""
+    values, at_drawn, end = numbers(changes)
     errors = np.abs(values / truth - 1)
     seconds, cpu = end - at_drawn
-    return {"error": float(errors[times.index(drawn)].max()), "errors": errors.tolist(), "apart_seconds": seconds,
+    return {"error": float(errors[TIMES.index(DRAWN)].max()), "errors": errors.tolist(), "apart_seconds": seconds,
             "apart_cpu": cpu}
 
 
-def numbers(times: Sequence[float], drawn: float, changes: Sequence[str]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(times, 4) numbers of a run, and the clock at ``drawn`` and at the end."""
+def numbers(changes: Sequence[str]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(times, 4) numbers of a run, and the clock at DRAWN and at the end."""
     rows, clocks = [], []
-    for instant in simulate(load_scene("wide", [*changes, *until(*times)])):
+    for instant in simulate(load_scene("wide", [*changes, *until(*TIMES)])):
         if instant.pore.time > 0:
             rows.append([*after_contact(instant).values()])
             clocks.append(clock())
-    return np.array(rows), clocks[list(times).index(drawn)], clock()
+    return np.array(rows), clocks[TIMES.index(DRAWN)], clock()
 
 
-def reference(sizes: Sequence[float], times: Sequence[float], changes: Sequence[str]) -> dict:
+def reference() -> dict:
     """The package's own values on its finest level, and the change of each from the level before."""
-    finest, before = (numbers(times, times[-1], (*changes, *converged(size)))[0] for size in sizes)
+    finest, before = (numbers(converged(size))[0] for size in REFERENCE)
     change = np.abs(before / finest - 1)
-    return {"reference": f"the package itself with elements and steps {sizes[0]:.2g} times those of the preset "
-                         f"accurate (small elements beside contact lines); from {sizes[1]:.2g} times on the numbers "
-                         f"change by at most {change.max():.1e}",
+    return {"reference": f"the package itself with elements and steps {REFERENCE[0]:.2g} times those of the preset "
+                         f"accurate (small elements beside contact lines); from {REFERENCE[1]:.2g} times on the "
+                         f"numbers change by at most {change.max():.1e}",
             "reference_source": source_hash(), "reference_values": finest.tolist(),
             "reference_changes": change.tolist()}
-
-
-def _known() -> dict:
-    """The recorded reference, if it belongs to the present source; else nothing."""
-    previous = record.load()["parts"].get("wide", {})
-    if previous.get("reference_source") != source_hash():
-        return {}
-    return {key: value for key, value in previous.items() if key.startswith("reference")}

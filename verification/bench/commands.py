@@ -22,37 +22,33 @@ FEW = 'output.times=["19.2 h", "19.4 h"]'
 PAIRS = 5
 
 
-def command_part(quick: bool) -> dict:
+def command_part() -> dict:
     """Base to 19.4 h: seconds of the command, of its imports, and of the solver with all and with few rows."""
-    pairs = 1 if quick else PAIRS
-    rows = [_measured(preset, pairs) for preset in (PRESETS[1:2] if quick else PRESETS)]
     return {"title": f"repro run base, as typed, over python -c 'import {PACKAGES}'; the solver with all default rows "
-                     "over that with two", "repeats": pairs, "rows": rows}
+                     "over that with two", "repeats": PAIRS, "rows": [*map(_measured, PRESETS)]}
 
 
-def _measured(preset: str, pairs: int) -> dict:
-    """Medians over pairs; the ratios are of processor times, each within a pair."""
+def _measured(preset: str) -> dict:
+    """Medians over PAIRS; the ratios are of processor times, each within a pair."""
     set_preset = f"numerics.preset={preset}"
     with TemporaryDirectory() as folder:
         command = ["-m", "repro", "run", "base", "--set", set_preset, "--quiet", "--force", "--out",
                    str(Path(folder, "run"))]
-        typed, imports = _pairs(lambda: _time_process(command),
-                                lambda: _time_process(["-c", f"import {PACKAGES}"]), pairs)
-    every, few = _pairs(lambda: _time_solver(set_preset), lambda: _time_solver(set_preset, FEW), pairs)
+        typed, imports = _pairs(lambda: time_process(*command), lambda: time_process("-c", f"import {PACKAGES}"))
+    every, few = _pairs(lambda: _time_solver(set_preset), lambda: _time_solver(set_preset, FEW))
     seconds, cpu = np.median(typed, axis=0)
     return {"method": preset, "seconds": seconds, "cpu": cpu, "imports": median(imports[:, 1]),
             "over_imports": median(typed[:, 1] / imports[:, 1]), "over_few_rows": median(every[:, 1] / few[:, 1])}
 
 
-def _pairs(first: Callable[[], np.ndarray], second: Callable[[], np.ndarray],
-           count: int) -> tuple[np.ndarray, np.ndarray]:
-    """(count, 2) wall and processor time (s) of two jobs in turn, after a first run of each that does not count."""
-    samples = np.array([(first(), second()) for _ in range(count + 1)])[1:]
+def _pairs(first: Callable[[], np.ndarray], second: Callable[[], np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """(PAIRS, 2) wall and processor time (s) of two jobs in turn, after a first run of each that does not count."""
+    samples = np.array([(first(), second()) for _ in range(PAIRS + 1)])[1:]
     return samples[:, 0], samples[:, 1]
 
 
-def _time_process(arguments: list[str]) -> np.ndarray:
-    """Wall and processor time (s) of a new Python process."""
+def time_process(*arguments: str) -> np.ndarray:
+    """Wall and processor time (s) of a new Python process with these arguments."""
     before, start = os.times(), perf_counter()
     subprocess.run([sys.executable, *arguments], stdout=subprocess.DEVNULL, check=True)
     seconds, after = perf_counter() - start, os.times()

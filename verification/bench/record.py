@@ -25,26 +25,17 @@ speed of a method is the lower envelope of its points, interpolated and extrapol
 """
 
 import gc
-import os
-import platform
-import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from datetime import date
-from importlib.metadata import version
 from math import isfinite
 from operator import itemgetter
-from pathlib import Path
 from time import perf_counter, process_time
 
 import numpy as np
 
 from verification.evidence import writing
 
-FOLDER = Path(__file__).parents[1] / "report"
-FILE = FOLDER / "bench.json"
-CPUS = Path("/proc/cpuinfo")
-PACKAGES = ("numpy", "scipy", "scikit-fem", "shapely", "mmgpy", "fipy", "py-pde", "numba")
+FILE = writing.REPORT / "bench.json"
 
 
 def load() -> dict:
@@ -52,18 +43,10 @@ def load() -> dict:
     return writing.load(FILE, {"parts": {}})
 
 
-def machine() -> dict:
-    """The machine and the packages that the times belong to."""
-    return {"platform": platform.platform(), "processor": processor(), "cores": os.cpu_count(),
-            "python": platform.python_version(), "versions": {name: version(name) for name in PACKAGES},
-            "threads": os.environ.get("OMP_NUM_THREADS", "not set"), "date": date.today().isoformat()}
-
-
-def processor() -> str:
-    """The processor's model from Linux, else from Python."""
-    text = CPUS.read_text(encoding="utf-8") if CPUS.exists() else ""
-    match = re.search("^model name\\s*: (.*)", text, re.MULTILINE)
-    return match[1].strip() if match else platform.processor() or "unknown"
+def reference_of(name: str, key: str, value: object) -> dict:
+    """The recorded reference of a part, if it has an entry with this value; else nothing."""
+    part = load()["parts"].get(name, {})
+    return {key: entry for key, entry in part.items() if key.startswith("reference")} if part.get(key) == value else {}
 
 
 def points(part: dict, method: str) -> list[dict]:
@@ -79,8 +62,7 @@ Jobs = Mapping[tuple[str, str], Callable[[], dict]]
 
 
 def measured(jobs: Jobs, repeats: int) -> list[dict]:
-    """Measure the jobs {(method, label): job}, and return the lines of a part, with the methods in the order of the
-    jobs.
+    """Measure jobs, and return the lines of a part, with the methods in the order of the jobs.
 
     A job returns {"error": ..., ...}; its "apart_seconds" and "apart_cpu" are subtracted from its times. A job that
     fails is recorded with the reason and does not run again.
@@ -121,7 +103,8 @@ def clock() -> np.ndarray:
 
 
 def timed(job: Callable[[], dict]) -> tuple[float, np.ndarray, dict]:
-    """Wall time of a run; its wall and processor time without the seconds set apart; and the output of the job."""
+    """Wall time of a job; its wall and processor time without the seconds that its output sets apart; and this
+    output."""
     gc.collect()
     start = clock()
     output = job()
@@ -133,8 +116,10 @@ def timed(job: Callable[[], dict]) -> tuple[float, np.ndarray, dict]:
 
 @dataclass(frozen=True)
 class Reading:
-    """Wall and processor seconds that a method needs for an error; how: "measured", "between points" or
-    "extrapolated with slope p", of log time by log error."""
+    """Wall and processor seconds that a method needs for an error.
+
+    how: "measured", "between points", or "extrapolated with slope p" of log time against log error.
+    """
 
     seconds: float
     cpu: float

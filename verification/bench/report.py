@@ -1,22 +1,20 @@
 """Verdicts, tables and pictures of a benchmark.
 
-The claims about speed and accuracy are judged by the numbers of a record; the verdicts are written nowhere else. Ratios
-compare wall times of one run. Ratios of processor times, which other loads of the machine disturb less, stand beside
-them.
+The numbers of a record judge the claims about speed and accuracy. Ratios compare wall times of one run. Each verdict
+also has the ratio of processor times, which other loads of the machine disturb less.
 """
 
 from collections import defaultdict
 from collections.abc import Callable, Iterator
 from itertools import cycle, product
 from math import inf
-from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from verification.bench import after_contact, runs
 from verification.bench.record import envelope, points, reading
-from verification.evidence.writing import Block, table
+from verification.evidence.writing import REPORT, saved_figure, table
 
 #: (error, least ratio, aim) of the paper's scheme at its own best speed over a preset.
 FASTER = {runs.FAST: (0.01, 5.0, 10.0), runs.ACCURATE: (0.001, 20.0, 20.0)}
@@ -55,17 +53,17 @@ def _base(part: dict) -> Iterator[dict]:
     for name, (error, least, aim) in FASTER.items():
         percent = f"{100 * error:g} %"
         yield verdict(f"base: the error of {name} is at most {percent}", f"at most {percent}",
-                      _accurate, part, name, error)
+                      _error, part, name, error)
         required = f"at least {least:g} times" + (f" (aim {aim:g})" if aim > least else "")
         for words, at in ((percent, error), ("the error that the preset has", None)):
             yield verdict(f"base: {name} is faster than the paper's scheme at its own best speed for {words}", required,
                           _faster, part, name, at, least)
     yield verdict(f"base: {runs.ACCURATE} takes about {ACCURATE_RUN:g} s", f"at most {ACCURATE_RUN:g} s",
-                  _quick, part)
-    yield verdict("wide in preset fast takes about 10 s", f"at most {WIDE:g} s", _wide, part)
+                  _accurate_time, part)
+    yield verdict("wide in preset fast takes about 10 s", f"at most {WIDE:g} s", _wide_time, part)
 
 
-def _accurate(part: dict, name: str, error: float) -> tuple[str, bool]:
+def _error(part: dict, name: str, error: float) -> tuple[str, bool]:
     computed = points(part, name)[0]["error"]
     return f"{100 * computed:.2g} %", computed <= error
 
@@ -80,7 +78,7 @@ def _faster(part: dict, name: str, error: float | None, least: float) -> tuple[s
     return f"{description}, against {point['seconds']:.2f} s", ratio >= least and point["error"] <= required
 
 
-def _quick(part: dict) -> tuple[str, bool]:
+def _accurate_time(part: dict) -> tuple[str, bool]:
     point = points(part, runs.ACCURATE)[0]
     return _seconds(point), point["seconds"] <= ACCURATE_RUN
 
@@ -89,7 +87,7 @@ def _seconds(point: dict) -> str:
     return f"{point['seconds']:.2f} s (processor time {point['cpu']:.2f} s)"
 
 
-def _wide(part: dict) -> tuple[str, bool]:
+def _wide_time(part: dict) -> tuple[str, bool]:
     run = part["wide"][0]
     return f"{_seconds(run)} to {run['end']:g} h, {run['steps']} steps", run["seconds"] <= WIDE
 
@@ -130,11 +128,11 @@ def _scenes(part: dict) -> Iterator[dict]:
 
 def _stage_cost(part: dict, name: str) -> tuple[str, bool]:
     rows = [row for row in part["rows"] if row["scene"] == name]
-    wholes = {row["method"]: row for row in part["rows"] if row["scene"] == "whole"}
-    strange = sorted({stage for row in rows for stage in row["unneeded"]})
-    worst = sorted(excess(row, wholes[row["method"]]) for row in rows)[-1]
-    return (f"{round(100 * worst)} % at most above them; other stages: {', '.join(strange) or 'none'}",
-            not strange and worst <= EXCESS)
+    complete = {row["method"]: row for row in part["rows"] if row["scene"] == "whole"}
+    unneeded = sorted({stage for row in rows for stage in row["unneeded"]})
+    worst = sorted(excess(row, complete[row["method"]]) for row in rows)[-1]
+    return (f"{round(100 * worst)} % at most above them; other stages: {', '.join(unneeded) or 'none'}",
+            not unneeded and worst <= EXCESS)
 
 
 def excess(row: dict, complete: dict) -> float:
@@ -147,10 +145,10 @@ def excess(row: dict, complete: dict) -> float:
 def _memory(part: dict) -> Iterator[dict]:
     for preset in runs.MEMORY_PRESETS:
         yield verdict(f"preset {preset}: live memory does not grow with the number of steps",
-                      f"under {runs.PART:g} of one nodal field a step", _flat, part, f"preset {preset}")
+                      f"under {runs.PART:g} of one nodal field a step", _memory_slope, part, f"preset {preset}")
 
 
-def _flat(part: dict, method: str) -> tuple[str, bool]:
+def _memory_slope(part: dict, method: str) -> tuple[str, bool]:
     row = {row["method"]: row for row in part["rows"]}[method]
     description = f"{row['slope']:.0f} bytes a step over {row['steps']} steps; {row['bound']:.0f} allowed"
     return description, row["slope"] <= row["bound"]
@@ -191,30 +189,29 @@ def _ratio(row: dict, key: str, most: float) -> tuple[str, bool]:
 WORDS = {True: "holds", False: "does not hold", None: NOT_MEASURED}
 
 
-def machine(about: dict) -> Block:
+def machine(about: dict) -> str:
     """The machine and the packages that the times belong to."""
-    return Block("text", f"Measured by `make bench` on {about['cores']} cores of {about['processor']}, one thread, "
-                         f"Python {about['python']}; importing the packages is not counted. Times of another machine "
-                         "differ, ratios less.")
+    return (f"Measured by `make bench` on {about['cores']} cores of {about['processor']}, one thread, Python "
+            f"{about['python']}; importing the packages is not counted. Times of another machine differ, ratios less.")
 
 
-def verdicts(rows: list[dict]) -> Block:
-    """A table."""
+def verdicts(rows: list[dict]) -> str:
+    """A table of verdicts."""
     return table(("claim", "wanted", "measured", ""), (
-        (one["claim"], one["wanted"], one["measured"], WORDS[one["holds"]]) for one in rows))
+        (row["claim"], row["wanted"], row["measured"], WORDS[row["holds"]]) for row in rows))
 
 
-def blocks(name: str, part: dict) -> list[Block]:
+def blocks(name: str, part: dict) -> list[str]:
     """The blocks of a part with all its points."""
     description = "; ".join(f"{key}: {part[key]}" for key in ("error", "reference", "repeats") if key in part)
-    return [Block("heading", f"{name}: {part['title']}"), Block("text", description),
+    return [f"## {name}: {part['title']}", description,
             table(("method", "", "seconds and errors"), _rows(part))]
 
 
 def _rows(part: dict) -> Iterator[tuple[str, ...]]:
-    for of in part.get("lines", ()):
-        yield from ((of["method"], point["label"], _numbers(point)) for point in of["points"])
-        yield from ((of["method"], failed["label"], f"failed: {failed['reason']}") for failed in of["failed"])
+    for line in part.get("lines", ()):
+        yield from ((line["method"], point["label"], _numbers(point)) for point in line["points"])
+        yield from ((line["method"], failed["label"], f"failed: {failed['reason']}") for failed in line["failed"])
     yield from ((row["method"], row.get("scene", ""), _numbers(row)) for row in part.get("rows", ()))
 
 
@@ -228,14 +225,11 @@ MARKS = "os^vDP*X<>hd"
 COLORS = (*(f"C{k}" for k in range(10)), "black", "navy", "darkgreen", "darkred")
 
 
-def draw(parts: dict, folder: Path) -> list[Path]:
-    """Draw the errors of the parts; return the files."""
-    files = []
+def draw(parts: dict) -> None:
+    """Draw the errors of the parts."""
     for name, part in parts.items():
         if "error" in part:
-            files.append(folder / f"bench_{name}.svg")
-            _precision(part).savefig(files[-1], metadata={"Date": None})
-    return files
+            saved_figure(_precision(part), REPORT / f"bench_{name}.svg")
 
 
 def _precision(part: dict) -> Figure:

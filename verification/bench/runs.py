@@ -15,8 +15,7 @@ from repro import timing
 from repro.march.simulation import simulate
 from repro.model import pore
 from repro.scene import Scene, load_scene
-from verification.bench import record
-from verification.bench.record import clock, measured
+from verification.bench.record import clock, measured, reference_of
 from verification.claims.runs import until
 from verification.problems import runs as problems
 
@@ -44,7 +43,7 @@ BY_MINUTES = ("refinement {:g}, {} min", "numerics.refinement={}", "growth.time_
 BY_TOLERANCE = ("refinement {:g}, tolerance {:g}", "numerics.refinement={}", "numerics.tolerance={}")
 OF_PAPER, OF_ACCURATE = ("numerics.preset=paper",), ("numerics.preset=accurate",)
 BUBBLE, MIDPOINT_RULE = "numerics.flow_element=bubble", "numerics.time=midpoint"
-#: Method, labels and keys, sizes, and further changes of the scene.
+#: (method, label and keys, sizes, other changes of the scene).
 METHODS_OF_BASE = (
     (PRESET_PAPER, BY_MINUTES, PAPER, OF_PAPER),
     ("bubble alone", BY_MINUTES, CHANGED, (*OF_PAPER, BUBBLE)),
@@ -62,35 +61,30 @@ METHODS_OF_BASE = (
 SKFEM = ((3, 4), (4, 4), (4, 8), (6, 8))
 
 
-def base_part(quick: bool) -> dict:
-    """The whole base run to 19.4 h: the largest error of eight numbers at 19.2 and 19.4 h; and how long ``wide`` takes.
-
-    ``quick``: to 2 h, against the finest of its own runs.
-    """
-    times = (1.8, 2.0) if quick else TIMES
-    about = {"reference_values": problems.values(times, *OF_ACCURATE).tolist()} if quick else reference()
-    repeats = 1 if quick else BASE_REPEATS
-    lines = measured(jobs(np.array(about["reference_values"]), times, quick), repeats)
-    part = {"title": f"Base to {times[1]:g} h, nothing written", "repeats": repeats, "lines": lines,
-             "error": f"largest of eight numbers at {times[0]:g} and {times[1]:g} h: velocity, conductivity, area, "
-                      "thickness, upstream, downstream relative, effluents over the supply", **about}
-    return part if quick else {**part, "wide": wide()}
+def base_part() -> dict:
+    """The whole base run to 19.4 h: the largest error of eight numbers at 19.2 and 19.4 h; and how long ``wide``
+    takes."""
+    about = reference_of("base", "reference_times", list(TIMES)) or reference()
+    lines = measured(jobs(np.array(about["reference_values"])), BASE_REPEATS)
+    return {"title": f"Base to {TIMES[1]:g} h, nothing written", "repeats": BASE_REPEATS, "lines": lines,
+            "error": f"largest of eight numbers at {TIMES[0]:g} and {TIMES[1]:g} h: velocity, conductivity, area, "
+                     "thickness, upstream, downstream relative, effluents over the supply", **about, "wide": wide()}
 
 
-def jobs(truth: np.ndarray, times, quick: bool) -> dict:
+def jobs(truth: np.ndarray) -> dict:
     """{(method, label): job}."""
     jobs_by_label = {}
     for method, (label, *keys), sizes, changes in METHODS_OF_BASE:
-        for size in sizes[:2] if quick else sizes:
+        for size in sizes:
             sized = map(str.format, keys, size)
-            jobs_by_label[method, label.format(*size)] = partial(_judged, truth, problems.values, times, *changes,
+            jobs_by_label[method, label.format(*size)] = partial(_judged, truth, problems.values, TIMES, *changes,
                                                                  *sized)
     for preset in PRESETS:
-        jobs_by_label[preset, "as it is"] = partial(_judged, truth, problems.values, times,
-                                            f"numerics.preset={preset.split()[1]}")
-    for rings, steps in () if quick else SKFEM:
+        jobs_by_label[preset, "as it is"] = partial(_judged, truth, problems.values, TIMES,
+                                                    f"numerics.preset={preset.split()[1]}")
+    for rings, steps in SKFEM:
         jobs_by_label["scikit-fem: quadratic elements, Runge-Kutta", f"{rings} rings, {steps} steps"] = partial(
-            _judged, truth, whole_run.numbers, whole_run.Pore(), rings, steps, times)
+            _judged, truth, whole_run.numbers, whole_run.Pore(), rings, steps, TIMES)
     return jobs_by_label
 
 
@@ -101,10 +95,7 @@ def _judged(truth: np.ndarray, function, *arguments) -> dict:
 
 
 def reference() -> dict:
-    """Values of the independent run at TIMES and its description; computed once and stored in the record."""
-    previous = record.load()["parts"].get("base", {})
-    if previous.get("reference_times") == list(TIMES):
-        return {key: value for key, value in previous.items() if key.startswith("reference")}
+    """Values of the independent run at TIMES and its description."""
     computed, check = (whole_run.converged(whole_run.Pore(), TIMES, *size).values for size in (REFERENCE, CHECK))
     return {
         "reference": f"scikit-fem's quadratic elements in moving coordinates, Runge-Kutta in time, extrapolated from "
@@ -123,7 +114,8 @@ def wide() -> list[dict]:
 
 SCENES_REPEATS = 31
 FLOW, SUBSTRATES = {"flow": {"head": "1e-3 cm"}}, {"substrates": {}}
-GROWTH, CLEAN, DONOR = {"growth": {"end": "2.4 h"}}, {"aggregate": None}, {"substrates": {"donor": {}}}
+GROWTH, CLEAN = {"growth": {"end": "2.4 h"}}, {"aggregate": None}
+DONOR = {"substrates": {"donor": {}}}
 #: Sections of each scene, None for an absent one; the timed stages that the scene needs.
 SCENES = {"whole": ({**FLOW, **SUBSTRATES, **GROWTH}, {"flow", "transport"}),
           "frozen shape": ({**FLOW, **SUBSTRATES}, {"flow", "transport"}),
@@ -136,19 +128,18 @@ SCENES = {"whole": ({**FLOW, **SUBSTRATES, **GROWTH}, {"flow", "transport"}),
           "mesh only": ({}, set())}
 
 
-def scenes_part(quick: bool) -> dict:
-    """Time of a first solution. It must contain only the stages of the scene.
+def scenes_part() -> dict:
+    """Time of a first solution, in which only the stages of the scene may run.
 
     Base with a seed of 20 um, unchanged, without growth (frozen shape), and without other parts. The time includes the
     mesh.
     """
-    repeats = 3 if quick else SCENES_REPEATS
     jobs = {(f"preset {preset}", name): partial(measure_first_solution, preset, name)
             for preset in problems.PRESETS for name in SCENES}
     rows = [{"scene": point["label"], "method": line["method"], **point}
-            for line in measured(jobs, repeats) for point in line["points"]]
+            for line in measured(jobs, SCENES_REPEATS) for point in line["points"]]
     return {"title": "What a scene does not need: seconds of a first solution, mesh included", "rows": rows,
-            "repeats": repeats}
+            "repeats": SCENES_REPEATS}
 
 
 def scene_of(preset: str, sections: dict) -> dict:
@@ -169,31 +160,32 @@ def measure_first_solution(preset: str, name: str) -> dict:
     return {"stages": stages, "took": took, "unneeded": sorted(set(stages) - needed - {"meshing"})}
 
 
-#: Number of steps, their length (h), and the part of them that is ignored.
-MANY_STEPS, QUICK_STEPS = 180, 16
+#: Number of steps.
+MANY_STEPS = 180
+#: Length of a step (h), and the part of the steps that is ignored.
 LENGTH, WARM = 0.001, 0.25
+#: Largest slope over the size of one nodal field.
 PART = 0.1
 MEMORY_PRESETS = {"paper": 0.4, "accurate": 0.25}
 
 
-def memory_part(quick: bool) -> dict:
-    """No allocation that grows with the number of steps: live memory of a long run of an aggregate that hardly grows.
+def memory_part() -> dict:
+    """Live memory of a long run of an aggregate that hardly grows. It must not grow with the number of steps.
 
     The slope of the allocated memory (tracemalloc, numpy's arrays included) against the step, after the first ones: the
     median of the slopes between all pairs (Theil and Sen), which is robust to single jumps. Storing one nodal field per
     step would take 8 bytes per node and step; the bound is a tenth of that.
     """
-    steps = QUICK_STEPS if quick else MANY_STEPS
-    rows = [grown(preset, refinement, steps) for preset, refinement in MEMORY_PRESETS.items()]
+    rows = [memory_slope(preset, refinement) for preset, refinement in MEMORY_PRESETS.items()]
     return {"title": "Live memory against the number of steps, after the first quarter", "rows": rows, "repeats": 1}
 
 
-def grown(preset: str, refinement: float, steps: int) -> dict:
-    """Slope (bytes per step) of a run of ``steps`` steps."""
+def memory_slope(preset: str, refinement: float) -> dict:
+    """Slope (bytes per step) of a run of MANY_STEPS steps."""
     scene = load_scene("base", [f"numerics.preset={preset}", f"numerics.refinement={refinement}",
                                 "aggregate.radius=20 um", f"growth.time_step={LENGTH} h",
-                                *until(*(LENGTH * np.arange(1, steps + 1)))])
-    live = np.zeros(steps + 1)
+                                *until(*(LENGTH * np.arange(1, MANY_STEPS + 1)))])
+    live = np.zeros(MANY_STEPS + 1)
     tracemalloc.start()
     try:
         for count, instant in enumerate(simulate(scene)):
@@ -203,13 +195,12 @@ def grown(preset: str, refinement: float, steps: int) -> dict:
             live[count] = tracemalloc.get_traced_memory()[0]
     finally:
         tracemalloc.stop()
-    return {"method": f"preset {preset}", "steps": count, "slope": theilslopes(live[round(WARM * steps):]).slope,
+    return {"method": f"preset {preset}", "steps": count, "slope": theilslopes(live[round(WARM * MANY_STEPS):]).slope,
             "bound": PART * 8 * nodes}
 
 
-#: {target number of nodes: steps timed after the first}; with 0 the first step is timed, with its orderings.
+#: {target number of nodes: timed steps after the first}. With 0 the first step is timed, which orders the nodes.
 SIZES = {600: 5, 2500: 3, 10_000: 2, 40_000: 1, 160_000: 0}
-QUICK = {300: 1}
 #: Preset and Jacobian of Newton's methods: a reused Jacobian makes the floor and the step cheaper.
 METHODS = {"preset paper": "paper fresh", "order 2, midpoint (accurate)": "accurate reused",
            "order 2, midpoint, fresh derivatives": "accurate fresh"}
@@ -220,16 +211,15 @@ RADIUS, STEP = 20.0, 0.2
 REFINED = {"paper": (0.0265, 0.526), "accurate": (0.0109, 0.544)}
 
 
-def size_part(quick: bool) -> dict:
+def size_part() -> dict:
     """Cost against size: one growth step of 12 min of an aggregate of 20 um, by stage.
 
     The first step, which orders the nodes, is omitted unless it is the only one. The floor of a step is the time that
     factorising and solving its linear systems takes.
     """
-    sizes = QUICK if quick else SIZES
     lines = []
     for method, kind in METHODS.items():
-        points = [measure(kind, nodes, steps) for nodes, steps in sizes.items()]
+        points = [measure(kind, nodes, steps) for nodes, steps in SIZES.items()]
         lines.append({"method": method, "points": points, "failed": []})
     return {"title": f"Cost of a growth step of 12 min, aggregate of {RADIUS:g} um in a pore of 50 um", "lines": lines,
             "repeats": "median of 5 steps (600 nodes) to 1; 160 000 nodes: the first step"}

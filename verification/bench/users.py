@@ -2,11 +2,11 @@
 
     -D lap C + u dC/dx + X q(C_A, C_D) = 0       for both substrates, X in the biomass alone, D the same everywhere
 
-with u = 0 and the supply held at both ends, or with (11)-(12) there. FiPy takes both equations coupled, the uptake
-linearised as its manual advises (Newton's method) and a direct solver. py-pde integrates in time to rest, compiled by
-numba, by Euler's explicit steps (its adaptive Runge-Kutta took longer); and, as one who knows it well would
-do, its Laplacian's matrix is read off for Newton's method (:mod:`reference.diffusion_reaction_pypde`). This package's
-transport is solved on right triangles that halve the square cells of their grids.
+with u = 0 and the supply at both ends, or with (11)-(12) there. FiPy solves the coupled equations with a direct solver.
+The uptake is linearised as its manual recommends (Newton's method). py-pde integrates to the steady state in explicit
+Euler steps compiled by numba; its adaptive Runge-Kutta method took longer. An expert's method uses the matrix of
+py-pde's Laplacian in Newton's method (:mod:`reference.diffusion_reaction_pypde`). This package solves its transport on
+right triangles that halve the square cells of their grids.
 """
 
 from collections.abc import Callable
@@ -43,10 +43,10 @@ from verification.problems.pairs import upright
 #: kinetics in the form of :mod:`reference.monod`.
 DIFFUSIVITY, DENSITY = (8e6, 4e6), 3e4
 SUPPLY, RATES = Pore().supply, Pore().rates
-#: Newton's method of FiPy stops at this change over the supply; its direct solver refines to this residual (its own
-#: default, 1e-5, leaves an error of 1e-3 on fine grids).
-REST, EXACT = 1e-8, 1e-14
-MOST = 40
+#: FiPy: the change over the supply at which Newton's method stops, and the residual to which the direct solver refines.
+#: The default residual, 1e-5, leaves an error of 1e-3 on fine grids.
+CHANGE, RESIDUAL = 1e-8, 1e-14
+MAX_ITERATIONS = 40
 #: Duration of a py-pde run in diffusion times L^2 / D of the domain, with the supply at both ends or with an outlet.
 #: Less than exp(-pi^2 TIMES) or exp(-pi^2 TIMES_OPEN / 4) of the start remains. Then the step over h^2 / D and
 #: dimension, which is stable up to a half, and the number of parts in which the run is observed.
@@ -56,8 +56,11 @@ STABLE, PARTS = 0.4, 100
 
 @dataclass(frozen=True)
 class Problem:
-    """Biomass where ``inside(x, y)``; box: ends (um) along, and across in two dimensions; linear, curved: cells of this
-    package's elements of order 1 and of more, stepped: of py-pde's compiled run; speed: u (um/h)."""
+    """A problem with biomass where ``inside(x, y)``.
+
+    box: ends (um) along, and across in two dimensions; linear, curved: numbers of cells for this package's elements of
+    order 1 and of higher orders; stepped: cells of py-pde's compiled run; speed: u (um/h).
+    """
 
     box: tuple[tuple[float, float], ...]
     inside: Callable[..., np.ndarray]
@@ -72,7 +75,8 @@ class Problem:
         return [round(length / lengths[-1] * across) for length in lengths]
 
     def judged(self, fields, load) -> np.ndarray:
-        """(2,) C in the last cell, mg/L; without flow the uptake, um2 mg/L/h, with load = X times the cells' areas."""
+        """(2,) C in the last cell (mg/L), or without flow the uptake (um2 mg/L/h); load: X times the areas of the
+        cells."""
         if self.speed:
             return fields[:, -1]
         return np.array([np.sum(load * q) for q in uptake(*fields, RATES)])
@@ -93,13 +97,13 @@ def fipy(problem: Problem, across: int) -> np.ndarray:
             one = one + ImplicitSourceTerm(coeff=-X * slope, var=other)
         equations.append(one + _fipy_ends(problem, mesh, field, k))
     equation = equations[0] & equations[1]
-    for _ in range(MOST):
+    for _ in range(MAX_ITERATIONS):
         before = np.array([field.value for field in both])
         for variable, values in zip(linear, _linear(before)):
             variable.setValue(values)
-        equation.sweep(solver=LinearLUSolver(tolerance=EXACT))
+        equation.sweep(solver=LinearLUSolver(tolerance=RESIDUAL))
         fields = np.array([field.value for field in both])
-        if np.abs(fields - before).max() < REST * max(SUPPLY):
+        if np.abs(fields - before).max() < CHANGE * max(SUPPLY):
             break
     return problem.judged(fields, X.value * mesh.cellVolumes)
 
@@ -112,8 +116,8 @@ def _fipy_mesh(problem: Problem, across: int):
 
 
 def _fipy_ends(problem: Problem, mesh, field, k: int):
-    """The supply at both ends; or advection. Its inflow u (C_supply - C) is a source in the first cell. The gradient at
-    the outlet is constrained to zero, because FiPy's outlet passes nothing otherwise."""
+    """The supply at both ends, or the term of advection. Its inflow u (C_supply - C) is a source in the first cell. The
+    gradient at the outlet is constrained to zero, since nothing leaves FiPy's grid otherwise."""
     if not problem.speed:
         field.constrain(SUPPLY[k], mesh.facesLeft | mesh.facesRight)
         return 0.0
@@ -205,7 +209,7 @@ METHODS = {1: "linear elements (paper)", 2: "order 2 (fast, accurate)", 3: "orde
 QUADRATIC = "scikit-fem: quadratic elements"
 
 
-def _compared(problem: Problem, about: tuple[str, str, str], other_codes: dict, truths, scale, quick: bool) -> dict:
+def _compared(problem: Problem, about: tuple[str, str, str], other_codes: dict, truths, scale) -> dict:
     """A part of the benchmark. about: (title, error, reference), the latter formatted with the finer of both truths and
     their difference; other_codes: {name: (sizes, solve)}, ``solve(cells)`` returns (2,) numbers; truths: the reference,
     coarser first. py-pde's compiled run comes once, on one grid: numba compiles for longer than it runs.
@@ -226,15 +230,14 @@ def _compared(problem: Problem, about: tuple[str, str, str], other_codes: dict, 
                         partial(solve_with_repro, problem, order=order))
                for order, method in METHODS.items()} | other_codes
     jobs = {(method, f"{cells} cells"): partial(solved, solve, cells)
-            for method, (sizes, solve) in methods.items() for cells in (sizes[:1] if quick else sizes)}
-    once = {} if quick else {(COMPILED, f"{problem.stepped} cells"): stepped}
-    repeats = 1 if quick else REPEATS
+            for method, (sizes, solve) in methods.items() for cells in sizes}
+    once = {(COMPILED, f"{problem.stepped} cells"): stepped}
     title, judged, reference = about
-    return {"title": title, "error": judged, "reference": reference.format(*truth, error(coarse)), "repeats": repeats,
-            "lines": measured(jobs, repeats) + measured(once, 1)}
+    return {"title": title, "error": judged, "reference": reference.format(*truth, error(coarse)), "repeats": REPEATS,
+            "lines": measured(jobs, REPEATS) + measured(once, 1)}
 
 
-#: Runs of a job that count.
+#: Counted runs of a job.
 REPEATS = 3
 HALF = WIDTH = 64.0
 SIDE = 32.0
@@ -250,9 +253,9 @@ BOX = Problem(((-HALF, HALF), (0.0, WIDTH)), _inside, (8, 16, 32, 64, 96), (2, 4
 COARSE, FINE = 32, 64
 
 
-def box_part(quick: bool) -> dict:
-    """Diffusion and dual Monod uptake in a box with a block of biomass, whose sides follow the cells: what FiPy and
-    py-pde can do as well; error of what is taken up."""
+def box_part() -> dict:
+    """Diffusion and dual Monod uptake in a box with a block of biomass. The sides of the block follow the cells of FiPy
+    and py-pde. The error is that of the uptake."""
     truths = [quadratic(cells) for cells in (COARSE, FINE)]
     cells = (8, 16, 32, 64)
     other_codes = {QUADRATIC: ((4, 8, 16), quadratic), "fipy": (cells, partial(fipy, BOX)),
@@ -261,7 +264,7 @@ def box_part(quick: bool) -> dict:
              "what is taken up of each substrate, relative, the larger error",
              f"quadratic elements of scikit-fem, {FINE} cells across: {{:.9g}} and {{:.9g}} um2 mg/L/h; from {COARSE} "
              "cells on they change by {:.1e}")
-    return _compared(BOX, about, other_codes, truths, truths[1], quick)
+    return _compared(BOX, about, other_codes, truths, truths[1])
 
 
 def _newton(cells: int) -> np.ndarray:
@@ -290,7 +293,7 @@ CHANNEL = Problem((ENDS,), lambda x, *y: (x > 0) & (x < STRIP), (15, 30, 60, 120
                   SPEED)
 
 
-def channel_part(quick: bool) -> dict:
+def channel_part() -> dict:
     """Plug flow through a strip of biomass with dual Monod uptake, one-dimensional: error of the effluents.
 
     Other codes solve it in one dimension; this package uses a ribbon of one cell across, with more than twice the
@@ -301,7 +304,7 @@ def channel_part(quick: bool) -> dict:
              "effluents over the supply, the larger error",
              "scipy's solve_bvp, tolerance 1e-9: {:.9f} and {:.9f} mg/L; from 1e-7 on they change by {:.1e} of the "
              "supply")
-    return _compared(CHANNEL, about, other_codes, [reference(1e-7), reference(1e-9)], SUPPLY, quick)
+    return _compared(CHANNEL, about, other_codes, [reference(1e-7), reference(1e-9)], SUPPLY)
 
 
 def reference(tolerance: float) -> np.ndarray:

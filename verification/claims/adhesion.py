@@ -9,13 +9,14 @@ of the pore: a plug with this permeability conducts as much as a plug with the r
 from __future__ import annotations
 
 import numpy as np
-from shapely.affinity import translate
 
+from repro.fem.outline import BOTTOM
 from repro.model import adhesion
 from verification.claims import FEW, FEW_WORDS, Finding, at_least, at_most, claim
 from verification.claims.levels import COMPARED, PAIRED
-from verification.claims.rheology import PLUG, conductivity_change
+from verification.claims.rheology import PLUG, conductivity_change, outline_shift
 from verification.claims.runs import BASE, PLOTTED, Body, Run, body, contact_time, polygon, uncovered, until
+from verification.problems.runs import contact_length
 
 DEFINED = "2026-11-25 23:18"
 #: Hour at which bonded and sliding aggregates are compared.
@@ -40,7 +41,8 @@ def tightly_bound() -> Finding:
               at_least(f"mean distortion at {HOUR} h, less one (%)", "highly distorted",
                        100 * (distortion(bonded) - 1), 100 * HIGHLY, HIGHLY_WORDS),
               at_most(f"length of contact at {HOUR} h, over that with sliding (%)", "preventing extension",
-                      100 * contact_length(bonded) / contact_length(sliding), 100 * (1 - HIGHLY), HIGHLY_WORDS))
+                      100 * contact_length(bonded.outline, BOTTOM) / contact_length(sliding.outline, BOTTOM),
+                      100 * (1 - HIGHLY), HIGHLY_WORDS))
     return Finding(checks, reason="the geometry differs less, or its difference is not known well enough",
                    note="On a wall along which the aggregate slides, the mean distortion is "
                         f"{100 * (distortion(sliding) - 1):.2g} %.")
@@ -51,12 +53,6 @@ def distortion(aggregate: Body) -> float:
     stretch = np.linalg.svd(aggregate.strained.F, compute_uv=False)[..., 0] / np.sqrt(aggregate.strained.J)
     weight = aggregate.pore.body.at.dx * aggregate.strained.J
     return float(np.sum(weight * stretch) / weight.sum())
-
-
-def contact_length(aggregate: Body) -> float:
-    """Length (um) of contact with the lower wall."""
-    outline = aggregate.outline
-    return float(np.ptp(outline.points[outline.points[:, 1] == 0.0, 0]))
 
 
 @claim("C51", "2.3.3", "finite elements would not perform well there, because of remeshing and the loss of information",
@@ -108,10 +104,12 @@ def body_forces() -> Finding:
     wide at 40 h, a plug at constant velocity, one difference must exceed a few percent. In base at 19.2 h, at constant
     head, no difference may."""
     plug, open_pore = permeable_runs(PLUG, 100.0), permeable_runs((*BASE, *until(PLOTTED)), 50.0)
-    of_plug = {"outlines apart at 40 h, one moved onto the other (% of the area)": area_apart(plug, 40),
+    area_apart = outline_shift(plug[1], 40, plug[0])[2]
+    of_plug = {"outlines apart at 40 h, one moved onto the other (% of the area)": area_apart,
                "time of contact (%)": 100 * abs(contact_time(*plug[1]) / contact_time(*plug[0]) - 1),
                "conductivity at 40 h (%)": abs(conductivity_change(plug[1], (40,), plug[0]))}
-    of_base = max(area_apart(open_pore, PLOTTED), abs(conductivity_change(open_pore[1], (PLOTTED,), open_pore[0])))
+    of_base = max(outline_shift(open_pore[1], PLOTTED, open_pore[0])[2],
+                  abs(conductivity_change(open_pore[1], (PLOTTED,), open_pore[0])))
     name = max(of_plug, key=of_plug.get)
     checks = (at_least("wide: the most of three differences (%)", "may lead to differences", of_plug[name], 100 * FEW,
                        f"more than {FEW_WORDS}"),
@@ -120,9 +118,3 @@ def body_forces() -> Finding:
     return Finding(checks, reason="the difference is a few percent in both, or in none",
                    change="the permeability W^2 / (12 lambda) is not the paper's",
                    note="Wide: " + "; ".join(f"{words} {value:.3g}" for words, value in of_plug.items()) + ".")
-
-
-def area_apart(pair: tuple[Run, Run], hour: float) -> float:
-    """Area (%) that only one of two outlines covers after one is moved along x to the centroid of the other."""
-    first, second = (polygon(body(run, hour).outline) for run in pair)
-    return uncovered(first, translate(second, first.centroid.x - second.centroid.x))

@@ -5,11 +5,9 @@ without oxygen. C63: an aggregate that the flow bends and that returns to its sh
 C65: the loading of its surface.
 """
 
-from dataclasses import replace
-
 import numpy as np
 
-from repro.model import biomass, contact, gear
+from repro.model import biomass, gear
 from repro.model.kinetics import Sink
 from repro.model.transport import Concentrations
 from verification.claims import (
@@ -92,8 +90,8 @@ def first_profiles() -> Finding:
     uniform = Concentrations(*(np.full(len(solved.concentrations.acceptor), supply) for supply in supplies))
     settled = gear.settle(solved.problem, Sink(pore.active), solved.concentrations)
     ends = [gear.advance(solved.problem, pore.active, pore.inert, start, UPDATE) for start in (uniform, settled)]
-    differences = [np.abs(uniform_end - settled_end).max() / supply
-             for uniform_end, settled_end, supply in zip(*(both(end.concentrations) for end in ends), supplies)]
+    uniform_end, settled_end = (both(end.concentrations) for end in ends)
+    differences = np.abs(uniform_end - settled_end).max(axis=1) / supplies
     new_biomass = [float((end.active + end.inert - pore.active - pore.inert).sum()) for end in ends]
     checks = (*(at_most(f"{name} after 12 min, from C_supply and from settled profiles: apart (% of the supply)",
                         "C = C_supply", 100 * value, 100 * TRANSPORT, TRANSPORT_WORDS)
@@ -140,9 +138,9 @@ def returning() -> Finding:
     return."""
     checks, notes = [], []
     for run, hour in STATES:
-        rest = without_fluid_forces(body(run, hour))
+        rest = with_fluid_forces(body(run, hour), "neglected")
         bent = with_fluid_forces(rest)
-        outlines = [polygon(aggregate.outline) for aggregate in (rest, bent, without_fluid_forces(bent))]
+        outlines = [polygon(aggregate.outline) for aggregate in (rest, bent, with_fluid_forces(bent, "neglected"))]
         bent_area, remaining_area = (uncovered(outlines[0], outline) for outline in outlines[1:])
         name = f"{run[0]}, {hour:g} h"
         checks.append(at_most(f"{name}: outlines apart after the flow has stopped, over those under the flow", "regain",
@@ -151,13 +149,6 @@ def returning() -> Finding:
     return Finding(tuple(map(without_limit, checks)),
                    reason="if the flow presses the aggregate against a wall, the contact stays",
                    note=f"Area that only one of the outlines with and without the flow covers: {', '.join(notes)}.")
-
-
-def without_fluid_forces(aggregate: Body) -> Body:
-    """The same aggregate at rest without the fluid's forces."""
-    unforced = replace(aggregate.scene, growth=replace(aggregate.scene.growth, fluid_forces="neglected"))
-    at_rest = contact.expand(contact.Mechanics.of(unforced), aggregate.pore, aggregate.pore.theta).pore
-    return Body(unforced, at_rest, aggregate.solved)
 
 
 #: Thickness over the pore's width up to which the scheme of Chen et al. (1996a) worked.

@@ -33,7 +33,6 @@ from verification.claims import (
     printed,
     without_limit,
 )
-from verification.claims.evaluate import map_in_parallel
 from verification.claims.levels import DEFAULT, Level, at_level
 from verification.claims.runs import (
     BASE,
@@ -49,6 +48,7 @@ from verification.claims.runs import (
 )
 from verification.problems.channels import both, pair
 from verification.problems.meshes import field_at
+from verification.store import map_in_parallel
 
 SUPPLY = 10.0
 #: The paper's distances of the meshed inlet from the aggregate (um): its words; the least of 3.1; that of 210 um [E13].

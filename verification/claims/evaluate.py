@@ -12,8 +12,7 @@ The bar of an error, or of a difference between two runs that should agree, may 
 import importlib
 import pkgutil
 import re
-from collections.abc import Callable, Iterable
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Iterable
 from dataclasses import replace
 from math import inf
 from types import ModuleType
@@ -23,6 +22,7 @@ import numpy as np
 import verification.claims as package
 from verification.claims import CLAIMS, MODEL, Claim, ClaimError, Finding, PaperCheck
 from verification.claims.levels import Level, at_level, forget
+from verification.store import map_in_parallel
 from verification.uncertainty import Bar, Estimate, combined, estimate, spread
 
 MESH_ORDERS, STEP_ORDERS = (1.0, 2.0), (1.0, 1.0)
@@ -120,12 +120,6 @@ def effort(level: Level, ids: list[str]) -> float:
     elements, plus a constant."""
     runs = OF_BASE + any(CLAIMS[id].of_wide for id in ids) + sum(RUNS.get(id, 0) for id in ids)
     return runs * (LEAST + level.size**-2) / level.step
-
-
-def map_in_parallel(function: Callable, *arguments: Iterable) -> list:
-    """Like map, on one process per core."""
-    with ProcessPoolExecutor() as pool:
-        return list(pool.map(function, *arguments))
 
 
 def outcomes_at(level: Level, ids: list[str]) -> dict[str, Outcome]:

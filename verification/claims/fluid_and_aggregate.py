@@ -269,13 +269,13 @@ def _changes(pair: tuple[Body, Body]) -> str:
     return ", ".join(f"{fluid_effect(pair, part):.2g}" for part in DISTANCES)
 
 
-def with_fluid_forces(aggregate: Body) -> Body:
-    """The same aggregate at rest under the fluid's forces. The result does not depend on the path, because the
-    aggregate is elastic. It leaves out the effect of the forces on growth. Raises GrowthError if shape and flow do not
-    agree."""
-    forced = replace(aggregate.scene, growth=replace(aggregate.scene.growth, fluid_forces="included"))
-    at_rest = contact.expand(contact.Mechanics.of(forced), aggregate.pore, aggregate.pore.theta).pore
-    return Body(forced, at_rest, aggregate.solved)
+def with_fluid_forces(aggregate: Body, fluid_forces: str = "included") -> Body:
+    """The same aggregate at rest with the fluid's forces "included" or "neglected". The result does not depend on the
+    path, because the aggregate is elastic. It leaves out the effect of the forces on growth. Raises GrowthError if
+    shape and flow do not agree."""
+    scene = replace(aggregate.scene, growth=replace(aggregate.scene.growth, fluid_forces=fluid_forces))
+    pore = contact.expand(contact.Mechanics.of(scene), aggregate.pore, aggregate.pore.theta).pore
+    return Body(scene, pore, aggregate.solved)
 
 
 def tension(aggregate: Body) -> tuple[float, float, float, float]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from repro.fem import elements
 from repro.fem.mesh import Mesh
-from repro.fem.outline import BOTTOM, FREE, TOP, Outline
+from repro.fem.outline import BOTTOM, FREE, TOP
 from repro.model import biomass
 from repro.model.kinetics import rate_law
 from verification import sensitivity
@@ -41,6 +41,7 @@ from verification.claims.runs import (
     uncovered,
     upstream_part,
 )
+from verification.problems.runs import contact_length
 from verification.uncertainty import Bar
 
 LAST_HOURS = 5.0
@@ -153,12 +154,6 @@ def squeezed() -> Finding:
               without_limit(at_least("least rate at which a contact surface grows (um/h)", "as it grows", rates.min(),
                                      0.0, "both grow in each update")))
     return Finding(checks, change=sensitivity.holds_for_supplies("C29"), reason="it does not hold on every mesh")
-
-
-def contact_length(outline: Outline, wall: int) -> float:
-    """Length (um) of the contact surface with a wall."""
-    x = outline.points[outline.wall == wall, 0]
-    return float(np.ptp(x)) if len(x) else 0.0
 
 
 @claim("C31", "2.3.3, 4", "the shape stays a half-disc until it is limited or squeezed",

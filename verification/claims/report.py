@@ -161,8 +161,7 @@ def distinct(entries: list[dict]) -> dict[tuple[str, str], str]:
         for check in entry["checks"]:
             if check["paper_low"] is not None and check["rests_on"] == PREDICTED:
                 outcomes.setdefault((entry["id"], check["paper"]), set()).add(check["outcome"])
-    return {key: next(kind for kind in (FAILS, REACHES_OVER, HOLDS) if kind in kinds)
-            for key, kinds in outcomes.items()}
+    return {key: min(kinds, key=(FAILS, REACHES_OVER, HOLDS).index) for key, kinds in outcomes.items()}
 
 
 def summary(rows: list[Row]) -> str:

@@ -87,10 +87,10 @@ def _changes(name: str, run: Run) -> tuple[PaperCheck, ...]:
                  for quantity, change in changes.items())
 
 
-def outline_shift(run: Run) -> tuple[float, float, float]:
-    """Compare a run's outline at END with that of WIDE_TO_END: the shift (um) of its centroid downstream, and the area
-    that only one of both covers (%), before and after the shift is removed."""
-    default, variant = (polygon(body(chosen, END).outline) for chosen in (WIDE_TO_END, run))
+def outline_shift(run: Run, hour: float = END, plain: Run = WIDE_TO_END) -> tuple[float, float, float]:
+    """Compare the outline of a run at an hour with that of a plain run: the shift (um) of its centroid downstream, and
+    the area that only one of both covers (%), before and after the shift is removed."""
+    default, variant = (polygon(body(chosen, hour).outline) for chosen in (plain, run))
     moved = variant.centroid.x - default.centroid.x
     return moved, uncovered(default, variant), uncovered(default, translate(variant, -moved))
 

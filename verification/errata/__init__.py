@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from inspect import cleandoc
 
 from verification.claims.runs import BASE, at
-from verification.evidence import writing
 from verification.switches import PLOTTED
 
 SUPPLY = 10.0
@@ -58,11 +57,6 @@ def filled(text: str) -> str:
     lines = textwrap.TextWrapper(120, break_on_hyphens=False, break_long_words=False)
     blocks = text.split("\n\n")
     return "\n\n".join(block if block.startswith("|") else lines.fill(block) for block in blocks) + "\n"
-
-
-def table(head: list[str], rows: list[list]) -> str:
-    """A Markdown table."""
-    return writing.markdown([writing.table(head, (map(str, row) for row in rows))])
 
 
 def percent(ratio: float, digits: int = 2) -> str:

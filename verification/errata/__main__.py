@@ -7,8 +7,9 @@ import numpy as np
 
 import verification.errata as package
 from repro.results import write_text
-from verification.claims.evaluate import import_all, map_in_parallel
+from verification.claims.evaluate import import_all
 from verification.errata import ERRATA, filled
+from verification.store import map_in_parallel
 
 REPORT = Path(__file__).parents[2] / "reference" / "ERRATA.md"
 

@@ -15,7 +15,8 @@ from repro.fem.sizing import ACROSS_AGGREGATE
 from repro.model import growth, mesh_motion
 from verification.claims.growth_mechanics import sliding, stabilised_by
 from verification.claims.runs import BASE, biomass_defects, half_disc, load_packaged
-from verification.errata import Numbers, erratum, percent, small, table
+from verification.errata import Numbers, erratum, percent, small
+from verification.evidence.writing import table
 from verification.problems import meshes, pairs
 from verification.problems.bodies import RADIUS, HalfCylinder, Supported, grow
 from verification.switches import CHOICES

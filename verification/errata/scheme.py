@@ -18,8 +18,8 @@ from verification.errata import (
     percent,
     state,
     state_row,
-    table,
 )
+from verification.evidence.writing import table
 from verification.problems.runs import density
 from verification.switches import CHOICES, NUMBERS, PLOTTED, course, explicit, near, restarting_as_j
 

@@ -21,8 +21,8 @@ from verification.errata import (
     small,
     state,
     state_row,
-    table,
 )
+from verification.evidence.writing import table
 from verification.switches import CHOICES, PLOTTED, changed
 
 SHORT_F, MEAN_INLET = (CHOICES[name].run for name in ("exact F", "mean inlet"))

@@ -24,8 +24,8 @@ KINDS = ("exact", "manufactured", "cross-code", "property")
 STAGES = ("flow", "transport", "growth", "reprojection", "mesh_motion", "coupling", "hard")
 #: Numerics that a case may run with: elements of order 1, 2 and 3, and the presets of whole scenes.
 NUMERICS = ("1", "2", "3", "paper", "fast", "accurate", "exact")
-#: The numerics that a word in a label means, for words that are not names of numerics.
-OF_LABELS = {"linear": "1", "quadratic": "2", "cubic": "3", "order 1": "1", "order 2": "2", "order 3": "3",
+#: The numerics that other words in labels stand for.
+OF_WORDS = {"linear": "1", "quadratic": "2", "cubic": "3", "order 1": "1", "order 2": "2", "order 3": "3",
              "straight": "1", "curved": "2", "of cubic scenes": "3"}
 
 
@@ -48,9 +48,9 @@ class Case:
     references : tuple of str
         Modules of ``reference`` that it uses.
     runs_with : str
-        Those of NUMERICS that it runs with, apart from those that the labels of its variants name.
+        Names of NUMERICS that it runs with and that no label of its variants contains, separated by spaces.
     omitted : str
-        Why it does not run with the others.
+        The reason why it does not run with the other numerics.
     slow : bool
         Whether ``make verify-fast`` leaves it out.
     file : Path
@@ -86,17 +86,17 @@ class Case:
 
     def __post_init__(self):
         if self.kind not in KINDS or not all((self.claim, self.norm, self.mutants)):
-            raise ValueError(f"{self.id}: of an unknown kind, or without claim, norm or mutants")
+            raise ValueError(f"{self.id}: unknown kind, or no claim, norm or mutants")
 
     @property
     def stage(self) -> str:
-        """The one of STAGES that its module belongs to."""
+        """The stage of its module."""
         return next(stage for stage in STAGES if self.file.stem.startswith(stage))
 
     @property
     def numerics(self) -> tuple[str, ...]:
-        """Those of NUMERICS that it runs with. Raises ValueError if ``runs_with`` names another."""
-        words = {OF_LABELS.get(word, word) for label in self.variants for word in label.split(", ")}
+        """The names of NUMERICS that it runs with. Raises ValueError if ``runs_with`` has another word."""
+        words = {OF_WORDS.get(word, word) for label in self.variants for word in label.split(", ")}
         added = {*self.runs_with.split()}
         if not added <= {*NUMERICS}:
             raise ValueError(f"{self.id}: {', '.join(sorted(added - {*NUMERICS}))} are none of {', '.join(NUMERICS)}")
@@ -161,7 +161,7 @@ def cases() -> dict[str, Case]:
 
 
 def _cases_of(function) -> Iterator[Case]:
-    """Yield the cases of a test function: its own, or one for each group of parameter sets with a mark."""
+    """Yield the cases of a test function: its own case, or those in the marks of its parameter sets."""
     marks = getattr(function, "pytestmark", ())
     groups: dict[str, Case] = {}
     for parameters, set_marks in _parameter_sets(marks):
@@ -170,9 +170,9 @@ def _cases_of(function) -> Iterator[Case]:
             id = names["case"].args[0]
             file = Path(function.__code__.co_filename)
             fields = {**_documented(function), **names["case"].kwargs}
-            fresh = Case(id, **fields, slow="slow" in names, file=file)
+            case = Case(id, **fields, slow="slow" in names, file=file)
             test = f"{file.relative_to(ROOT)}::{function.__name__}" + (f"[{parameters}]" if parameters else "")
-            groups.setdefault(id, fresh).variants[label_of(id, parameters)] = test
+            groups.setdefault(id, case).variants[label_of(id, parameters)] = test
     yield from groups.values()
 
 

@@ -50,12 +50,12 @@ class Check:
 
     @property
     def measured(self) -> str:
-        """The number, rounded to a twentieth of its tolerance: stable from run to run."""
+        """The number rounded to a twentieth of its tolerance, the same in every run."""
         return rounded(self.value, self.tolerance / 20)
 
     @property
     def reproducible(self) -> str:
-        """The number rounded to half of its tolerance, as any machine finds it; empty if it is round-off."""
+        """The number rounded to half of its tolerance, the same on every machine; empty if it is round-off."""
         return rounded(self.value, self.tolerance / 2) if self.tolerance >= ROUND_OFF else ""
 
     @property
@@ -169,7 +169,7 @@ def between(quantity: str, value: float, low: float, high: float, origin: str) -
 
 
 def each_at_most(values: Mapping[str, float], bound: float, origin: str, suffix: str = "") -> list[Check]:
-    """Check sizes by name against one bound; the suffix ends each name."""
+    """Check several sizes against one bound. The suffix is added to each name."""
     return [at_most(name + suffix, value, bound, origin) for name, value in values.items()]
 
 
@@ -266,7 +266,7 @@ class Study:
 
     @property
     def reproducible(self) -> str:
-        """Orders to a tenth, as any machine finds them."""
+        """Orders to a tenth, the same on every machine."""
         return f"order {', '.join(f'{order:.1f}' for order in self.orders)}"
 
     def interval(self, digits: int = 3) -> str:

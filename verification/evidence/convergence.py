@@ -17,8 +17,10 @@ from verification.evidence.results import Result
 from verification.evidence.writing import saved_figure
 
 COLUMNS = 2
-MOST_NAMED = 5  # quantities in a legend
-MANY_DECADES = 200.0  # largest over least size from which only powers of ten are labelled
+#: Largest number of quantities in a legend.
+MAX_NAMED = 5
+#: Largest ratio of the sizes with labels besides powers of ten.
+MANY_DECADES = 200.0
 
 
 def series(result: Result) -> dict[str, list[list[float]]]:
@@ -46,13 +48,13 @@ def draw(cases: Mapping[str, Mapping[str, list]], target: Path) -> None:
 
 
 def _panel(axis, case: str, studies: Mapping[str, list]) -> None:
-    """Draw the studies of a case; those of one quantity, up to a comma, have one colour and one entry."""
+    """Draw the studies of a case. Names that are equal up to a comma share a colour and an entry of the legend."""
     names = list(dict.fromkeys(quantity.partition(",")[0] for quantity in studies))
     named: set[str] = set()
     for quantity, (sizes, errors, (order,)) in studies.items():
         name = quantity.partition(",")[0]
         color = f"C{names.index(name) % 10}"
-        label = name if name not in named and len(named) < MOST_NAMED else None
+        label = name if name not in named and len(named) < MAX_NAMED else None
         axis.loglog(sizes, errors, ".-", color=color, lw=0.8, ms=4, label=label)
         axis.loglog(sizes, errors[-1] * (np.array(sizes) / sizes[-1]) ** order, "--", color=color, lw=0.4, alpha=0.6)
         named.add(name)

@@ -1,30 +1,31 @@
 """The matrix of the hard cases with every preset, ``verification/report/hard_cases.json``.
 
-Each cell, a case with a preset, is right, refused or wrong; see :mod:`verification.problems.hard`. "cubic" is the
-preset fast with cubic elements. A case names the parts that a preset may refuse, and ``paper`` may refuse all.
+A cell is a case with a preset. It is right, refused or wrong; see :mod:`verification.problems.hard`. "cubic" is the
+preset fast with cubic elements. A case names the parts that a preset may refuse; ``paper`` may refuse all parts.
 """
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
 
 from verification.evidence.results import Result
-from verification.evidence.writing import REPORT, Block, load, save, table
+from verification.evidence.writing import REPORT, load, save, table
 
 RECORD = REPORT / "hard_cases.json"
 
 
 def record(results: Iterable[Result]) -> None:
-    """Replace the rows of the hard cases among some results."""
+    """Replace the recorded rows of the hard cases that ran."""
     rows = {row["number"]: row for row in load(RECORD, {"cases": []})["cases"]}
     for cells in (result.cells for result in results if result.cells):
         case = next(iter(cells.values()))["case"]
-        verdicts = {preset: {key: cell[key] for key in ("verdict", "accepted")} for preset, cell in cells.items()}
+        verdicts = {preset: {"verdict": cell["verdict"], "accepted": cell["accepted"]}
+                    for preset, cell in cells.items()}
         rows[case["number"]] = {**case, "cells": verdicts}
     save({"cases": [rows[number] for number in sorted(rows)]}, RECORD)
 
 
 def lines(cells: Collection[Mapping]) -> list[tuple[str, str, str, bool]]:
-    """The verdict of each part by preset; then the intervals of the right parts, by preset where they differ. Cells
-    have the form of :meth:`verification.problems.hard.Cell.as_row`."""
+    """Rows of a table: the verdicts of each part, and the intervals of the right parts. Presets share equal intervals.
+    Cells have the form of :meth:`verification.problems.hard.Cell.as_row`."""
     presets = ", ".join(cell["preset"] for cell in cells)
     rows = []
     for parts in zip(*(cell["parts"] for cell in cells)):
@@ -34,22 +35,21 @@ def lines(cells: Collection[Mapping]) -> list[tuple[str, str, str, bool]]:
     for part in (part for cell in cells for part in cell["parts"]):
         for quantity, interval, origin in part["bounds"]:
             bounds.setdefault(f"{part['name']}, {quantity}", []).append((interval, origin))
-    for name, alike in bounds.items():
-        intervals, origins = map(dict.fromkeys, zip(*alike))
+    for name, pairs in bounds.items():
+        intervals, origins = map(dict.fromkeys, zip(*pairs))
         rows.append((name, "; ".join(intervals), "; ".join(origins), True))
     return rows
 
 
-def blocks(matrix: dict) -> Iterator[Block]:
+def blocks(matrix: dict) -> Iterator[str]:
     """The matrix as blocks of a page."""
     presets = tuple(matrix["cases"][0]["cells"])
-    yield Block("heading", "Hard cases")
-    yield Block("text", "Right: the exact value, bound or conserved quantity of the case is met, and so are the "
-                        "balances; refused: an error says which bound was met; wrong: anything else. `make verify` "
-                        "runs them all, and leaves every number in `verification/report/live`; "
-                        "`pytest verification -k hard` runs them alone.")
+    yield "## Hard cases"
+    yield ("Right: the exact value, bound or conserved quantity of the case is met, and so are the balances; refused: "
+           "an error says which bound was met; wrong: anything else. `make verify` runs them all, and leaves every "
+           "number in `verification/report/live`; `pytest verification -k hard` runs them alone.")
     yield table(("", "case", "right is", *presets), (
-        (str(case["number"]), case["title"], case["right_is"], *map(_verdict, map(case["cells"].get, presets)))
+        (case["number"], case["title"], case["right_is"], *map(_verdict, map(case["cells"].get, presets)))
         for case in matrix["cases"]))
 
 

@@ -1,8 +1,8 @@
 """The coverage matrix: ``python -m verification.evidence.matrix`` writes ``verification/report/matrix.md``.
 
-The first table has the cases by the elements and presets that they run with. The second has the paper's equations by
-the modules that solve them, the cases that must fail with a wrong change of these, the references of those cases, and
-the claims of the sections. Every column is derived from the table of modules in ``repro/__init__.py`` and the
+The first table lists the elements and presets that each case runs with. The second lists the paper's equations with the
+modules that solve them, the cases that must fail after a wrong change of these modules, the references of these cases,
+and the claims of the sections. Every column is derived from the table of modules in ``repro/__init__.py`` and the
 registries, and no column may lack an entry (:func:`orphans`).
 """
 
@@ -14,7 +14,7 @@ from itertools import product, starmap
 
 import repro
 from verification.evidence.cases import NUMERICS, Case, cases
-from verification.evidence.writing import REPORT, ROOT, Block, markdown, table
+from verification.evidence.writing import REPORT, ROOT, page, table
 from verification.mutants import runner
 
 FILE = REPORT / "matrix.md"
@@ -124,18 +124,18 @@ def mutants_of(part: Part) -> list[str]:
 
 
 def cases_of(part: Part) -> list[str]:
-    """Ids of the cases that name one of them."""
-    wrong = {*mutants_of(part)}
-    return [case.id for case in cases().values() if wrong & {*case.mutants}]
+    """Ids of the cases that name one of its mutants."""
+    mutants = {*mutants_of(part)}
+    return [case.id for case in cases().values() if mutants & {*case.mutants}]
 
 
 def references_at(part: Part) -> list[str]:
-    """Modules of ``reference`` that these use."""
+    """Modules of ``reference`` that its cases use."""
     return sorted({name for id in cases_of(part) for name in references_of(cases()[id])})
 
 
 def claims_of(part: Part) -> list[str]:
-    """Ids of the claims of its sections; figures, plates and discussion are of the results."""
+    """Ids of the claims of its sections."""
     return [id for id, sections in sorted(claims().items())
             if any(starmap(_within, product(sections, part.sections)))]
 
@@ -146,14 +146,14 @@ def _within(section: str, section_name: str) -> bool:
 
 @cache
 def claims() -> dict[str, list[str]]:
-    """{claim: sections that it is of}."""
+    """{claim: its sections}."""
     from verification.claims import CLAIMS, evaluate
     evaluate.register_all()
     return {claim.id: [*map(_section, claim.where.split(","))] for claim in CLAIMS.values()}
 
 
 def _section(place: str) -> str:
-    """A section's number; 4 for a figure, a plate, the introduction and the discussion."""
+    """The number of a section. Figures, plates, introduction and discussion count as section 4."""
     return place.strip() if re.fullmatch(r"[23][\d.]*|Table 1", place.strip()) else "4"
 
 
@@ -169,24 +169,24 @@ def _imported(name: str) -> set[str]:
 
 
 def orphans() -> list[str]:
-    """Entries that no line of the second table has (of mutants, those that cases catch), and lines without a case."""
+    """Cases, references, claims, and mutants of cases that the second table lacks; and its lines without a case."""
     missing = [f"line {part.name}" for part in parts() if not cases_of(part)]
     references = {path.stem for path in (ROOT / "reference").glob("*.py")} - {"__init__"}
     kinds = {"case": (cases(), cases_of), "mutant": (runner.caught_by("cases"), mutants_of),
              "claim": (claims(), claims_of), "reference": (references, references_at)}
-    for kind, (every, covering) in kinds.items():
-        missing += [f"{kind} {id}" for id in sorted({*every}.difference(*map(covering, parts())))]
+    for kind, (known, ids_of) in kinds.items():
+        missing += [f"{kind} {id}" for id in sorted({*known}.difference(*map(ids_of, parts())))]
     return missing
 
 
 def text() -> str:
     """The page: both tables."""
     head = ("section", "equations", "modules", "cases", "references", "mutants", "claims")
-    blocks = [Block("heading", "Elements and presets"),
-              Block("text", "run: with every `make verify-fast`; slow: with `make verify`; n/a: not applicable."),
+    blocks = ["## Elements and presets",
+              "run: with every `make verify-fast`; slow: with `make verify`; n/a: not applicable.",
               table(("case", *NUMERICS, "not applicable because"), map(row, cases().values())),
-              Block("heading", "Equation, module, case, reference, mutant, claim"), table(head, map(line, parts()))]
-    return f"# What is verified by what, with which elements and presets\n\n{markdown(blocks, 2)}\n"
+              "## Equation, module, case, reference, mutant, claim", table(head, map(line, parts()))]
+    return page("What is verified by what, with which elements and presets", blocks)
 
 
 def main() -> int:

@@ -1,8 +1,8 @@
 """The pages of the verification: a page a stage, an index, the mutants, and the matrix.
 
-Pages are committed. They hold verdicts, orders, intervals, and numbers rounded to half of their tolerance, so that a
-run on another machine writes the same files. All of them follow from ``evidence.json``, which has an entry a case. A
-run of some cases replaces their entries and leaves the others as recorded.
+Pages are committed. They contain verdicts, orders, intervals, and numbers rounded to half of their tolerance. A run on
+another machine therefore writes the same files. All pages follow from ``evidence.json``, which has an entry for each
+case. A run of some cases replaces their entries and does not change the others.
 """
 
 from collections.abc import Iterable, Mapping
@@ -12,7 +12,7 @@ from os.path import commonprefix
 from verification.evidence import convergence, hard_cases, matrix
 from verification.evidence.cases import NUMERICS, Case, cases
 from verification.evidence.results import PASSES, Result
-from verification.evidence.writing import REPORT, Block, link, load, markdown, save, table
+from verification.evidence.writing import REPORT, link, load, page, save, table
 from verification.mutants import runner
 from verification.mutants.runner import Mutant
 
@@ -37,40 +37,38 @@ def write(results: Iterable[Result]) -> None:
     records = {**load(RECORD, {}), **{result.id: entry(result) for result in complete}}
     save({id: records[id] for id in known if id in records}, RECORD)
     hard_cases.record(complete)
-    for stage, cases_of_stage in studies(recorded()).items():
-        convergence.draw(cases_of_stage, REPORT / f"{stage}.svg")
+    for stage in TITLES:
+        if series := studies(of_stage(stage, recorded())):
+            convergence.draw(series, REPORT / f"{stage}.svg")
     for name, text in texts(recorded()).items():
         (REPORT / name).write_text(text, encoding="utf-8")
 
 
 def entry(result: Result) -> dict:
-    """The record of a case: verdict, how many numbers it judged, the errors that stopped variants, and the table."""
+    """The record of a case: verdict, count of judged numbers, errors that stopped variants, table, and studies."""
     stopped = [f"{label}: {error}" if label else error for label, error in result.errors.items()]
     return {"verdict": result.verdict, "numbers": len(result.measured), "errors": stopped,
             "table": grouped(hard_cases.lines(result.cells.values()) if result.cells else lines(result)),
             "studies": convergence.series(result)}
 
 
-def studies(records: Mapping[str, Mapping]) -> dict[str, dict[str, dict]]:
-    """{stage: {case: its series}} of the cases whose records have series."""
-    by_stage = {stage: of_stage(stage, records) for stage in TITLES}
-    series = {stage: {id: record["studies"] for id, record in chosen.items() if record.get("studies")}
-              for stage, chosen in by_stage.items()}
-    return {stage: chosen for stage, chosen in series.items() if chosen}
+def studies(records: Mapping[str, Mapping]) -> dict[str, dict]:
+    """{case: its series} of the cases whose records have series."""
+    return {id: record["studies"] for id, record in records.items() if record.get("studies")}
 
 
 def lines(result: Result) -> list[tuple[str, str, str, bool]]:
-    """(quantity and its reproducible number, interval, origin, whether it holds) of all evidence of a case."""
+    """Rows of the table of a case: quantity with its reproducible number, interval, origin, whether it holds."""
     return [(part.quantity + (f" ({part.reproducible})" if part.reproducible else ""), part.interval(3), part.origin,
              part.holds) for part in result.measured]
 
 
 def grouped(rows: Iterable[tuple[str, str, str, bool]]) -> list[list[str]]:
-    """Rows of a table; quantities with the same interval, origin and outcome share one."""
-    alike: dict[tuple[str, str, str], list[str]] = {}
+    """Rows of a table. Quantities with the same interval, origin and outcome share a row."""
+    names: dict[tuple[str, str, str], list[str]] = {}
     for quantity, interval, origin, holds in rows:
-        alike.setdefault((interval, origin, "yes" if holds else "NO"), []).append(quantity)
-    return [[shared(names), *key] for key, names in alike.items()]
+        names.setdefault((interval, origin, "yes" if holds else "NO"), []).append(quantity)
+    return [[shared(quantities), *key] for key, quantities in names.items()]
 
 
 def recorded() -> dict[str, dict]:
@@ -95,16 +93,15 @@ def texts(records: Mapping[str, Mapping]) -> dict[str, str]:
     for stage, title in TITLES.items():
         chosen = of_stage(stage, records)
         articles = [article(cases()[id], record) for id, record in chosen.items()]
-        head = [Block("text", summary(chosen.values())), *picture(stage, records)]
+        head = [summary(chosen.values()), *picture(stage, chosen)]
         pages[f"{stage}.md"] = title, [*head, *chain.from_iterable(articles)]
-    written = {name: f"# {title}\n\n{markdown(blocks, 2, '.')}\n" for name, (title, blocks) in pages.items()}
-    return {**written, "matrix.md": matrix.text()}
+    return {**{name: page(*parts) for name, parts in pages.items()}, "matrix.md": matrix.text()}
 
 
-def picture(stage: str, records: Mapping[str, Mapping]) -> list[Block]:
-    """The picture of convergence of a stage, if cases have series."""
+def picture(stage: str, records: Mapping[str, Mapping]) -> list[str]:
+    """The picture of convergence of a stage, if the records of its cases have series."""
     caption = "errors against sizes of meshes or steps, a panel a case; dashed: the expected order"
-    return [Block("picture", f"{stage}.svg: {caption}")] if stage in studies(records) else []
+    return [f"![{caption}](./{stage}.svg)"] if studies(records) else []
 
 
 def of_stage(stage: str, records: Mapping[str, Mapping]) -> dict[str, Mapping]:
@@ -112,44 +109,44 @@ def of_stage(stage: str, records: Mapping[str, Mapping]) -> dict[str, Mapping]:
     return {id: record for id, record in records.items() if cases()[id].stage == stage}
 
 
-#: Judgements with pages of their own.
-BESIDES = ((link("The paper's claims", "../../paper_figures/replication.md"), "`make claims`"),
+#: Other pages on what is verified or judged.
+OTHER_PAGES = ((link("The paper's claims", "../../paper_figures/replication.md"), "`make claims`"),
            (link("Ambiguities and misprints of the paper", "../../reference/ERRATA.md"), "`verification.errata`"),
            (link("What the rounding of Table 1 allows", "../sensitivity/sensitivity.md"), "`make sensitivity`"),
            (link("The law for networks", "../../docs/network.md"), "`python -m verification.network`"),
            (link("Mutants made by machine", "sampled.md"), "`make mutants-sampled`"))
 
 
-def index(records: Mapping[str, Mapping]) -> list[Block]:
+def index(records: Mapping[str, Mapping]) -> list[str]:
     """The first page: stages, and a line a case."""
     stages = [(link(title, stage), summary(of_stage(stage, records).values())) for stage, title in TITLES.items()]
     more = ((link("Mutants", "mutants"), mutant_state()),
             (link(OF_READERS, "mutants_read"), "files, columns, charts and messages that users read"),
             (link("Equation, module, case, reference, mutant, claim", "matrix"), "what verifies what, with which "
              "elements and presets"))
-    return [Block("text", f"{INTRODUCTION} Written by `make verify`."),
-            Block("text", f"**{summary(records.values())}**"),
+    return [f"{INTRODUCTION} Written by `make verify`.",
+            f"**{summary(records.values())}**",
             table(("stage", "result"), (*stages, *more)),
-            table(("judged besides", "command"), BESIDES),
+            table(("judged besides", "command"), OTHER_PAGES),
             table(("case", "kind", "runs with", "numbers", "verdict", "must fall short with"),
                   (_index_row(cases()[id], record) for id, record in records.items()))]
 
 
 def _index_row(case: Case, record: Mapping) -> tuple:
     numerics = " ".join(case.numerics) if case.numerics != NUMERICS else "all"
-    return (link(case.id, case.stage, case.id), case.kind, numerics, str(record["numbers"]), record["verdict"],
+    return (link(case.id, case.stage, case.id), case.kind, numerics, record["numbers"], record["verdict"],
             ", ".join(case.mutants))
 
 
-def article(case: Case, record: Mapping) -> list[Block]:
+def article(case: Case, record: Mapping) -> list[str]:
     """A case: its claim, verdict, norm, references and mutants, and a table of quantities, intervals and origins."""
     references = f" References: {', '.join(case.references)}." if case.references else ""
     about = (f"**{record['verdict']}**. {case.claim} ({case.kind}). Norm: {case.norm}.{references} "
              f"Must fail with: {', '.join(case.mutants)}.")
-    stopped = [Block("text", f"Stopped by an error: {error}") for error in record["errors"]]
+    stopped = [f"Stopped by an error: {error}" for error in record["errors"]]
     head = ("quantities", "expected", "origin", "hold")
     judged = [table(head, record["table"])] if record["table"] else []
-    return [Block("heading", case.id), Block("text", about), *stopped, *judged]
+    return [f"## {case.id}", about, *stopped, *judged]
 
 
 def shared(names: list[str]) -> str:
@@ -166,8 +163,8 @@ def shared(names: list[str]) -> str:
 
 
 def listed(labels: list[str]) -> str:
-    """Labels as one list. Neighbours share a number in brackets at their ends, and three or more share the parts after
-    a comma that they end with."""
+    """Labels as one list. Neighbours share a number in brackets at their end. Three or more share the parts
+    after a comma that they end with."""
     split = [label.rpartition(" (") if label.endswith(")") else (label, "", "") for label in labels]
     rows = []
     for ending, group in groupby(split, key=lambda parts: parts[2]):
@@ -197,12 +194,12 @@ def mutant_state() -> str:
     return f"{count} by `make mutants`, {state}."
 
 
-def mutant_blocks(stages: Mapping[str, Iterable[Mutant]]) -> list[Block]:
+def mutant_blocks(stages: Mapping[str, Iterable[Mutant]]) -> list[str]:
     """A table a stage: mutants, and the cases or tests that caught them when they were last run."""
     records = runner.recorded()
-    blocks = [Block("text", mutant_state())]
+    blocks = [mutant_state()]
     for stage, chosen in stages.items():
         rows = [(mutant.id, mutant.says, ", ".join(records[mutant.id]["caught_by"]) or "not caught")
                 for mutant in chosen]
-        blocks += [Block("heading", stage), table(("mutant", "what is wrong with it", "caught by"), rows)]
+        blocks += [f"## {stage}", table(("mutant", "what is wrong with it", "caught by"), rows)]
     return blocks

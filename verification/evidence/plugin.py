@@ -1,9 +1,8 @@
 """The plugin of pytest: the fixture ``record``, the verdict of a case, and the records of a whole session.
 
-Cases call ``record`` with their checks and studies, and fail at their end if one of these does not hold. What is
-recorded travels with the reports of pytest, so that the records of parallel workers come together by themselves. At the
-end of a session ``report/live/measured.json`` holds the numbers of the cases that ran; with ``--pages`` their pages are
-written anew, and all other pages stay as recorded.
+Cases call ``record`` with their checks and studies, and fail at their end if one of these does not hold. The
+reports of pytest carry the evidence from parallel workers to the main process. At the end of a session,
+``report/live/measured.json`` has the numbers of the cases that ran. With ``--pages`` the plugin rewrites their pages.
 """
 
 from collections.abc import Callable
@@ -83,9 +82,9 @@ def pytest_pyfunc_call(pyfuncitem: pytest.Function):
     if pyfuncitem.get_closest_marker("case"):
         recorded = pyfuncitem.stash.get(RECORDED, [])
         pyfuncitem.user_properties.append(("evidence", [results.as_row(part) for part in recorded]))
-        short = "\n".join(results.shortfall(part) for part in recorded if not part.holds)
-        if short or not recorded:
-            pytest.fail(short or "nothing was measured", pytrace=False)
+        failures = "\n".join(results.shortfall(part) for part in recorded if not part.holds)
+        if failures or not recorded:
+            pytest.fail(failures or "nothing was measured", pytrace=False)
     return outcome
 
 

@@ -1,11 +1,15 @@
-"""The results of a session, case by case, and their record ``report/live/measured.json``, which is not committed."""
+"""The results of the cases of a session, and their record ``report/live/measured.json``, which is not committed."""
 
 from __future__ import annotations
 
+import os
 import platform
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass, field, fields
+from datetime import date
 from importlib.metadata import version
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,7 +19,8 @@ from verification.evidence.writing import REPORT, load, save
 
 MEASURED = REPORT / "live" / "measured.json"
 PASSES, FAILS = "passes", "FALLS SHORT"
-PACKAGES = ("numpy", "scipy", "scikit-fem", "shapely", "mmgpy", "fipy", "py-pde", "matplotlib")
+CPUS = Path("/proc/cpuinfo")
+PACKAGES = ("numpy", "scipy", "scikit-fem", "shapely", "mmgpy", "fipy", "py-pde", "numba")
 
 
 def as_row(part: Check | Study) -> dict:
@@ -26,7 +31,7 @@ def as_row(part: Check | Study) -> dict:
 
 
 def from_row(row: dict, label: str = "") -> Check | Study:
-    """The check or the study of a row; the label of its variant ends the name of the quantity."""
+    """The check or study of a row. The label of its variant is added to the name of the quantity."""
     quantity = f"{row['quantity']}, {label}" if label else row["quantity"]
     arrays = {name: np.array(value) for name, value in row.items() if isinstance(value, list)}
     return (Study if arrays else Check)(**{**row, **arrays, "quantity": quantity})
@@ -39,8 +44,8 @@ def shortfall(part: Check | Study) -> str:
 
 @dataclass
 class Result:
-    """What the variants of a case recorded, by label: their evidence, the error that stopped them, and the cells of
-    hard cases; seconds of all of them."""
+    """The results of a case by the labels of its variants: evidence, the error that stopped a variant, and the cell of
+    a hard case. seconds: of all variants together."""
 
     id: str
     evidence: dict[str, list[Check | Study]] = field(default_factory=dict)
@@ -86,7 +91,7 @@ class Result:
 def save_measured(results: Iterable[Result]) -> None:
     """Add the numbers of the cases that ran to the record of this machine."""
     before = load(MEASURED, {"cases": {}})["cases"]
-    save({"environment": environment(), "cases": {**before, **{r.id: _numbers(r) for r in results}}}, MEASURED)
+    save({"environment": machine(), "cases": {**before, **{r.id: _numbers(r) for r in results}}}, MEASURED)
 
 
 def _numbers(result: Result) -> dict:
@@ -96,7 +101,15 @@ def _numbers(result: Result) -> dict:
             **({"messages": messages} if messages else {})}
 
 
-def environment() -> str:
-    """Versions of Python and of the packages that the numbers depend on."""
-    packages = ", ".join(f"{name} {version(name)}" for name in PACKAGES)
-    return f"Python {platform.python_version()}, {platform.system()} {platform.machine()}; {packages}."
+def machine() -> dict:
+    """The machine and the packages that numbers and times belong to."""
+    return {"platform": platform.platform(), "processor": processor(), "cores": os.cpu_count(),
+            "python": platform.python_version(), "versions": {name: version(name) for name in PACKAGES},
+            "threads": os.environ.get("OMP_NUM_THREADS", "not set"), "date": date.today().isoformat()}
+
+
+def processor() -> str:
+    """The processor's model from Linux, else from Python."""
+    text = CPUS.read_text(encoding="utf-8") if CPUS.exists() else ""
+    match = re.search("^model name\\s*: (.*)", text, re.MULTILINE)
+    return match[1].strip() if match else platform.processor() or "unknown"

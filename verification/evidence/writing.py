@@ -1,9 +1,8 @@
-"""One writer: blocks of text, pictures and tables, as Markdown; and records in JSON."""
+"""Writers of pages in Markdown, of records in JSON, and of figures."""
 
 import json
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,50 +14,31 @@ from repro.results.files import atomic_path
 
 ROOT = Path(__file__).parents[2]
 REPORT = ROOT / "verification" / "report"
-Row = tuple[str, ...]
 
 
 def link(text: str, page: str, place: str = "") -> str:
-    """A cell of Markdown that leads to a place on a page of the report: page "flow", place "flow-plug"; or to another
-    file: page "../../docs/network.md"."""
+    """A link in Markdown.
+
+    page: a page of the report, such as "flow", or the path of another page, such as "../../docs/network.md"; place: a
+    heading on it, such as "flow-plug".
+    """
     file = page if page.endswith(".md") else f"{page}.md"
     return f"[{text}]({file}{'#' * bool(place)}{place})"
 
 
-@dataclass(frozen=True)
-class Block:
-    """A piece of a text: a heading, a paragraph, a picture (file and what it shows), or a table (head and rows)."""
-
-    kind: str
-    text: str = ""
-    rows: tuple[Row, ...] = ()
+def page(title: str, blocks: Iterable[str]) -> str:
+    """A page of Markdown from a title and blocks, which are headings, paragraphs, pictures and tables."""
+    return "\n\n".join([f"# {title}", *blocks]) + "\n"
 
 
-def table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> Block:
-    """A table of a head and rows."""
-    return Block("table", rows=(tuple(head), *map(tuple, rows)))
+def table(head: Collection[str], rows: Iterable[Iterable]) -> str:
+    """A table in Markdown."""
+    return "\n".join(map(markdown_row, (head, ["---"] * len(head), *rows)))
 
 
-def markdown(blocks: Iterable[Block], level: int = 3, pictures: str = "verification/report") -> str:
-    """Headings of a level; pictures: where they are from there."""
-    return "\n\n".join(_markdown(block, level, pictures) for block in blocks)
-
-
-def _markdown(block: Block, level: int, pictures: str) -> str:
-    if block.kind == "heading":
-        return f"{'#' * level} {block.text}"
-    if block.kind == "picture":
-        name, _, caption = block.text.partition(": ")
-        return f"![{caption}]({pictures}/{name})"
-    if block.kind != "table":
-        return block.text
-    head, *rows = block.rows
-    return "\n".join(map(markdown_row, (head, ("---",) * len(head), *rows)))
-
-
-def markdown_row(row: Row) -> str:
+def markdown_row(cells: Iterable) -> str:
     """A row of a table."""
-    return "| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |"
+    return "| " + " | ".join(str(cell).replace("|", "\\|") for cell in cells) + " |"
 
 
 def load(file: Path, empty: Any = None) -> Any:
@@ -81,7 +61,7 @@ def saved_figure(figure: Figure, target: Path) -> None:
 
 
 def lines(file: Path) -> list[dict]:
-    """The complete rows of a file; rows that were cut off are skipped."""
+    """The complete rows of a file. Incomplete rows are skipped."""
     rows = []
     for line in file.read_text(encoding="utf-8").splitlines() if file.exists() else []:
         with suppress(json.JSONDecodeError):
@@ -90,7 +70,7 @@ def lines(file: Path) -> list[dict]:
 
 
 def append(row: dict, file: Path) -> None:
-    """Append a row to a file. Each row begins with its line break, so that an interruption loses at most one row."""
+    """Append a row to a file. A row begins with its line break, so an interruption damages at most one row."""
     file.parent.mkdir(parents=True, exist_ok=True)
     with file.open("a", encoding="utf-8") as opened:
         opened.write("\n" + json.dumps(row))

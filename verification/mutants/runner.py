@@ -1,15 +1,14 @@
 """Run mutants in copies of the project, against the cases or the tests that must catch them.
 
-A mutant that cases name is run against these, the quick ones first, until one catches it; with ``--every`` against all
-of them. A mutant that names tests is run against each of these.
+If cases name a mutant, it is run against them, the quick cases first, until one catches it. With ``--every`` it is run
+against all of them. If a mutant names tests, it is run against each of these.
 
-A test catches a mutant by an assertion that fails, a check out of its interval among them, or by an error that
-``repro`` defines. Any other error, an ``AttributeError`` for instance, shows a mutant that does not run, and catches
-nothing.
+A test catches a mutant if an assertion or a check fails, or if ``repro`` raises an error that it defines. Any other
+error, such as an ``AttributeError``, shows that the mutant does not run, and does not count.
 
-The record of a mutant, in ``report/mutants.json``, has a digest of the mutated file and of the tests that caught it,
-with the functions and constants of their modules that they use. It is stale if one of these changes. A change elsewhere
-leaves it fresh, such as another case in the same module. Comments and docstrings of Python files do not count.
+The record of a mutant, in ``report/mutants.json``, has a digest of the mutated file, of the tests that caught it, and
+of the functions and constants of their modules that they use. The record is stale if one of these changes. It stays
+fresh if something else changes, such as another case in the same module. Comments and docstrings do not count.
 """
 
 import argparse
@@ -38,13 +37,14 @@ from verification.evidence.writing import REPORT, ROOT, load, save
 from verification.mutants import Mutant
 
 RECORD = REPORT / "mutants.json"
-#: Beginnings of the messages of failures that catch a mutant: an assertion, `pytest.fail` or `pytest.raises`, a guard.
+#: First words of failures that catch a mutant: of an assertion, of `pytest.fail` or `pytest.raises`, of an error of
+#: repro.
 CATCH = ("assert", "AssertionError", "Failed: ", "repro.")
-#: How the report of a failed fixture begins.
+#: The beginning of the report of a failed fixture.
 IN_FIXTURE = re.compile(r'^failed on (setup|teardown) with "')
 NOT_COPIED = (".git", ".venv", "__pycache__", "live", "out", "cache", "dist", "build", "*.egg-info", ".*_cache",
               ".writing-*")
-#: Seconds on the clock. No case takes a tenth of this, but a mutant may run for ever.
+#: Largest duration (s) of a trial. No case takes a tenth of it, but a mutant may run forever.
 LONGEST = 600.0
 
 
@@ -54,7 +54,7 @@ class MutantError(RuntimeError):
 
 @dataclass(frozen=True)
 class Trial:
-    """A mutant run against one case or test: how that caught it, or why it did not."""
+    """The run of a mutant against one case or test. message: the failure, or the reason why there is none."""
 
     catcher: str
     caught: bool
@@ -75,12 +75,12 @@ class Outcome:
 
     @property
     def missed_by(self) -> list[str]:
-        """The cases or tests that pass with it although they name it."""
+        """The cases or tests that do not catch it."""
         return [trial.catcher for trial in self.trials if not trial.caught]
 
 
 def load_mutants() -> dict[str, tuple[Mutant, ...]]:
-    """Mutants by stage, and those of "results", what users read. Raises MutantError if two have the same id."""
+    """Mutants by stage. "results" are those of what users read. Raises MutantError if two have the same id."""
     stages = {name: import_module(f"verification.mutants.{name}").MUTANTS for name in (*STAGES, "results")}
     ids = [mutant.id for mutants in stages.values() for mutant in mutants]
     if repeated := {id for id in ids if ids.count(id) > 1}:
@@ -109,7 +109,7 @@ def mutated(mutant: Mutant) -> str:
 
 
 def tests_of(mutant: Mutant) -> dict[str, list[str]]:
-    """What must catch a mutant, {case or test: test ids of pytest}, quick cases first."""
+    """{case or test that must catch a mutant: test ids of pytest}, quick cases first."""
     if mutant.tests:
         return {test: [test] for test in mutant.tests}
     naming = [case for case in cases().values() if mutant.id in case.mutants]
@@ -117,7 +117,7 @@ def tests_of(mutant: Mutant) -> dict[str, list[str]]:
 
 
 def run(mutant: Mutant, every: bool = False) -> Outcome:
-    """Run a mutant in a copy of the project until a case catches it, or against ``every`` case, or all of its tests."""
+    """Run a mutant in a copy of the project until a case catches it, or against every case or each of its tests."""
     trials: list[Trial] = []
     with copied() as folder:
         (folder / mutant.file).write_text(mutated(mutant), encoding="utf-8")
@@ -162,7 +162,7 @@ def _message(failure: ElementTree.Element) -> str:
 
 
 def _run_tests(folder: Path, report: Path, tests: Iterable[str]) -> int | None:
-    """The exit status of pytest, or None after a timeout. All processes that it started are ended."""
+    """Return the exit status of pytest, or None after a timeout. All of its processes are ended."""
     command = [sys.executable, "-m", "pytest", "-n0", "-p", "no:cacheprovider", f"--junitxml={report}", *tests]
     environment = {**os.environ, "PYTHONPATH": str(folder), "HOME": str(folder.parent), "PYTHONDONTWRITEBYTECODE": ""}
     child = subprocess.Popen(command, cwd=folder, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
@@ -182,14 +182,12 @@ def main(arguments: list[str] | None = None) -> int:
     known = mutants_by_id()
     parser = argparse.ArgumentParser(prog="python -m verification.mutants", description="Run wrong changes of repro.")
     parser.add_argument("ids", nargs="*", metavar="MUTANT", choices=[*known, []], default=[], help="all by default")
-    parser.add_argument("--every", action="store_true", help="against every case that names it, not to the first catch")
-    parser.add_argument("--tests", action="store_true", help="only those that tests catch, not cases")
-    parser.add_argument("--stale", action="store_true", help="only those whose record is not of the present code")
+    parser.add_argument("--every", action="store_true", help="against every case that names it, not until a catch")
+    parser.add_argument("--stale", action="store_true", help="only mutants without a record of the present code")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="processes; one a core by default")
     chosen = parser.parse_args(arguments)
-    ids = chosen.ids or (caught_by("tests") if chosen.tests else known)
     skipped = fresh() if chosen.stale else ()
-    outcomes = run_all([id for id in ids if id not in skipped], chosen.jobs, chosen.every)
+    outcomes = run_all([id for id in chosen.ids or known if id not in skipped], chosen.jobs, chosen.every)
     return 0 if judge(outcomes) else 1
 
 
@@ -208,12 +206,12 @@ def run_all(ids: Iterable[str], jobs: int, every: bool = False) -> list[Outcome]
 
 def judge(outcomes: list[Outcome]) -> bool:
     """Print the failures. Return whether every case and test caught each mutant that it was run against."""
-    wrong = [f"survives: {outcome.mutant}" for outcome in outcomes if not outcome.caught_by]
-    count = f"{len(outcomes) - len(wrong)} of {len(outcomes)} mutants caught."
-    wrong += [f"{name} passes with {outcome.mutant}, which it names" for outcome in outcomes
+    failures = [f"survives: {outcome.mutant}" for outcome in outcomes if not outcome.caught_by]
+    count = f"{len(outcomes) - len(failures)} of {len(outcomes)} mutants caught."
+    failures += [f"{name} passes with {outcome.mutant}, which it names" for outcome in outcomes
               for name in outcome.missed_by]
-    print("\n".join([*wrong, count]))
-    return bool(outcomes) and not wrong
+    print("\n".join([*failures, count]))
+    return bool(outcomes) and not failures
 
 
 def record(outcome: Outcome) -> None:
@@ -248,8 +246,8 @@ def digest(mutant: Mutant, catchers: Iterable[str]) -> str:
 
 @cache
 def code_of(function: str, text: str) -> str:
-    """The source of a test in the text of its module, and of the functions, classes and assignments there that it uses,
-    directly or through each other. Marks and fixtures of the whole module are among them, imports are not."""
+    """The source of a test, and of the functions, classes and assignments of its module that it uses, directly or
+    through each other. Marks and fixtures of the entire module are included, imports are not."""
     used, parts = {function, "pytestmark"}, set()
     known = _definitions(text)
     while more := {k for k, (bound, _, _) in enumerate(known) if bound & used} - parts:
@@ -271,6 +269,6 @@ def _definitions(text: str) -> list[tuple[set[str], set[str], str]]:
         else:
             continue
         source = "\n".join(lines[first - 1:part.end_lineno])
-        whole = {"pytestmark"} if "autouse=True" in source else set()
-        definitions.append((bound | whole, {*re.findall(r"\w+", source)}, source))
+        module_wide = {"pytestmark"} if "autouse=True" in source else set()
+        definitions.append((bound | module_wide, {*re.findall(r"\w+", source)}, source))
     return definitions

@@ -1,5 +1,6 @@
-"""The law for networks of :mod:`repro.results.network`: its shapes, its table, its error, and independent test shapes.
-`python -m verification.network` writes `repro/results/network.csv` and the page on it.
+"""The laws for networks of :mod:`repro.results.network`: shapes of the fits, tables, errors, and independent tests.
+
+`python -m verification.network` writes `repro/results/network.csv` and the page `docs/network.md`.
 
 law, shapes   the law of resistance: its table, its error, its shapes
 uptakes       the law of uptake

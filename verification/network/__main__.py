@@ -1,15 +1,15 @@
-"""`python -m verification.network`: make the law's table and judge it with shapes that it has not seen; a few minutes.
+"""`python -m verification.network`: make the table of the law, and judge it with shapes outside of the fit; minutes.
 
 Writes the table `repro/results/network.csv`; the page `docs/network.md`; and `verification/network/shapes.csv`, the
 shapes of the fit at one lambda and the test shapes, from which `make figures` draws its picture. The exit status is 1
 if a test shape lies outside the law's bounds.
 
-With an argument it does something else:
+An argument selects another task:
 
-    uptake     solves the states of the law of uptake, fits and judges this law
+    uptake     solves the states of the law of uptake, and fits and judges this law
     histories  writes the histories of the throats in the example with OpenPNM, in the environment of `make network`
-    expected   writes the law and its bounds for ten of these throats
-    throats    runs these ten throats, and compares them with the law; the exit status is 1 if a bound does not hold
+    expected   writes the law and its bounds for ten of the throats
+    throats    runs the ten throats, and compares them with the law; the exit status is 1 if a bound does not hold
     sweep      times all throats as whole runs, on the process pool and on Dask: `sweep 12` to 12 h, by default to 48 h;
                some four minutes on two free cores
 """
@@ -39,7 +39,7 @@ def write_histories() -> int:
 
 
 def uptake_law() -> int:
-    """Draw the states of the fit, fit the law of uptake, then draw other states and judge it."""
+    """Solve states and fit the law of uptake to them. Then solve other states and judge the law."""
     names = list(uptakes.State._fields)
     rows = [list(one) for one in uptakes.states(uptakes.FIT)]
     write_table(uptakes.TABLE, names, rows)
@@ -47,7 +47,7 @@ def uptake_law() -> int:
     bound = uptakes.bound(uptakes.read(uptakes.FIT), transports)
     print(f"fit of {len(rows)} states:\n{transports[0]}\n{transports[1]}\nUPTAKE_BOUND = {bound}", flush=True)
     if (transports, bound) != (TRANSPORTS, UPTAKE_BOUND):
-        print(f"these are not the constants of {TABLE.parent}/network.py: copy them and start again")
+        print(f"{TABLE.parent}/network.py has other constants: copy these and start again")
         return 1
     write_table(uptakes.TABLE, names, rows + [list(one) for one in uptakes.states(uptakes.NEW)])
     write_text(PAGE, page.text())

@@ -10,12 +10,13 @@ from typing import NamedTuple
 import numpy as np
 
 from repro.results import read_table, write_table
+from verification.network.shapes import select
 
 EXAMPLE = Path(__file__).parents[2] / "docs" / "howto" / "openpnm_network.py"
-#: A row per throat and time: its number in the network, and the state of the example, with a step of STEPS[0].
+#: A row for each throat and time, with the state of the example in steps of STEPS[0].
 TABLE = Path(__file__).with_name("histories.csv")
 COLUMNS = ["throat", "time_h", "width_um", "area_um2", "head_loss_um", "acceptor_mg_per_L", "donor_mg_per_L"]
-#: The flow through the network with the step of the example, and with half of it.
+#: The flow through the network in steps of the example, and in steps of half the length.
 FLOWS, FLOW_COLUMNS = Path(__file__).with_name("flows.csv"), ["step_h", "time_h", "flow_um_m_per_d"]
 STEPS = (2.0, 1.0)
 #: Digits of the tables.
@@ -23,8 +24,11 @@ DIGITS = 7
 
 
 class History(NamedTuple):
-    """A throat. number: in the network; width: um; time: (m,) h; area: (m,) um2, by the example; head_loss: (m,) um,
-    negative if the flow is from the throat's second pore to the first; supplies: (2, m) mg/L."""
+    """The history of a throat.
+
+    number: in the network; width: um; time: (m,) h; area: (m,) um2, by the example; head_loss: (m,) um, negative if the
+    flow is from the throat's second pore to the first; supplies: (2, m) mg/L.
+    """
 
     number: int
     width: float
@@ -35,7 +39,7 @@ class History(NamedTuple):
 
     @property
     def flows(self) -> bool:
-        """Does water flow? Not between two inlets, or two outlets."""
+        """Whether water flows. It does not between two inlets or two outlets."""
         return bool((np.abs(self.head_loss) > NO_HEAD).any())
 
     @property
@@ -81,8 +85,7 @@ def read() -> list[History]:
     """The histories of all throats, by their numbers."""
     columns = read_table(TABLE)
     numbers = columns["throat"].astype(int)
-    return [_history(number, {name: values[numbers == number] for name, values in columns.items()})
-            for number in np.unique(numbers).tolist()]
+    return [_history(number, select(columns, numbers == number)) for number in np.unique(numbers).tolist()]
 
 
 def _history(number: int, columns: dict[str, np.ndarray]) -> History:

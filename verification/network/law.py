@@ -1,7 +1,7 @@
-"""The law for networks: its table, from half-discs and the mean of grown plugs; its bounds, from all other shapes of
-the fit; and its judgement by shapes outside of the fit.
+"""The law of resistance for networks, its bounds, and its test.
 
-The fifty test shapes are half-discs, drawn bodies and plugs, and grown shapes. Their sizes, positions, pores,
+The table has half-discs and the mean of grown plugs. The bounds are from all other shapes of the fit. Fifty shapes
+outside of the fit test the law: half-discs, drawn bodies and plugs, and grown shapes. Their sizes, positions, pores,
 velocities and lambdas are random.
 """
 
@@ -16,24 +16,24 @@ from scipy.interpolate import PchipInterpolator
 from repro.results import read_table
 from repro.results.network import added_resistance, share_range
 from verification.network import shapes
-from verification.network.shapes import RATIOS, Growth, Sample, log_uniform
+from verification.network.shapes import RATIOS, Growth, Sample, log_uniform, select
 
 #: Thicknesses over W of the table's half-discs, and areas over W^2 of its plugs. The least area is one at which nearly
 #: all runs are in contact: runs with earlier contact resist more.
 THICKNESSES = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5, 0.55, 0.6, 0.65, 0.7, 0.75, 0.8, 0.85, 0.9, 0.92,
                0.94, 0.96, 0.98)
 PLUGS = (1.6, 1.75, 2.0, 2.25, 2.5, 3.0, 3.5, 4.0, 4.5)
-#: Runs of the fit: corners and inner points of the range of widths, velocities and supplies. None is base or wide.
+#: Runs of the fit at corners and inner points of the range of widths, velocities and supplies. None is base or wide.
 RUNS = (Growth(40, 1, 10, 5, 0, 52), Growth(50, 4, 20, 5, 10, 40), Growth(70, 6, 10, 5, 30, 38),
         Growth(80, 0.5, 20, 8, -20, 45), Growth(100, 1, 10, 8, 0, 55), Growth(100, 2.9, 4, 8, 0, 60),
         Growth(150, 2.9, 10, 10, 0, 40), Growth(150, 1, 20, 10, 0, 40))
-#: Each shape of a run is larger than the one before by 4 %; up to a little more than the table's last plug.
+#: Factor between consecutive shapes of a run, and the largest area over W^2, a little above the last plug of the table.
 APART, MOST = 1.04, 4.7
-#: Added to both bounds: the error of the elements of the compared shapes (`shapes.QUICK`).
+#: The error of the elements of the compared shapes (`shapes.QUICK`), which widens both bounds.
 NUMERICS = 0.008
-#: The bounds at an area are of all shapes up to this many of the table's areas from it. With one, of the first fifty
-#: shapes that the fit had not seen one was outside: a grown body at A / W^2 = 1.47, lambda = 361, 2.8 % under the law,
-#: where the few shapes of the fit that are as close to contact gave a bound of 1.8 %. The seed was then changed.
+#: The bounds at an area include the shapes up to this many areas of the table away. With one, one of the first fifty
+#: test shapes was outside: a grown body at A / W^2 = 1.47, lambda = 361, 2.8 % under the law. The few shapes of the fit
+#: that are as close to contact gave a bound of 1.8 %. The seed was then changed.
 NEIGHBOURS = 2
 TABLE_COLUMNS = ["spanned", "viscosity_ratio", "area_over_width2", "added_length_over_width", "least", "most"]
 
@@ -44,7 +44,7 @@ def half_discs() -> list[Sample]:
 
 
 def other_shapes() -> Iterator[Sample]:
-    """The fit's other shapes: drawn between those of the table and at the corners of their ranges, and grown."""
+    """The other shapes of the fit: drawn between those of the table and at the corners of their ranges, or grown."""
     between = 0.5 * (np.array(THICKNESSES[1:]) + THICKNESSES[:-1])
     for radius, thicker, leaning in product(between, (1.0, *shapes.THICKER), (0.0, shapes.LEANING)):
         if radius * thicker <= shapes.THICKEST:
@@ -53,11 +53,11 @@ def other_shapes() -> Iterator[Sample]:
     for share, ends, upstream in product((2.1, 2.7, 3.2, 3.7, 4.2), shapes.ENDS, (0.5, shapes.UPSTREAM)):
         yield shapes.sample(shapes.drawn(shapes.plug(share, ends, upstream)))
     for run in RUNS:
-        yield from shapes.grown(run, MOST, APART)
+        yield from (shapes.sample(pore, run=run) for pore in shapes.grown(run, MOST, APART))
 
 
 def table_rows(discs: list[Sample], samples: list[Sample]) -> list[list]:
-    """Rows of the table, one per shape and lambda; `discs`: those of the table; `samples`: all others."""
+    """Rows of the table, one per shape and lambda. discs: half-discs of the table; samples: all other shapes."""
     before = [one for one in samples if not one.spanned]
     after = [one for one in samples if one.spanned]
     shares, lengths = np.array([one.share for one in discs]), np.array([one.lengths for one in discs])
@@ -120,27 +120,30 @@ def shape_row(one: Sample, new: int) -> list:
 
 
 def read(unseen: bool) -> dict[str, np.ndarray]:
-    """The columns of the fit's shapes, or of the shapes that the fit has not seen."""
+    """The columns of the shapes of the fit, or of those outside of it."""
     columns = read_table(SHAPES)
-    return {name: values[columns["unseen"] == unseen] for name, values in columns.items()}
+    return select(columns, columns["unseen"] == unseen)
 
 
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """Deviations of some shapes. apart: (n,) ln of r over that of the law; beyond: (n,) apart over the ln of the bound
-    on its side, at most one within the bounds."""
+    """Deviations of shapes from the law.
+
+    apart: (n,) ln of r over that of the law; beyond: (n,) apart over the ln of the bound on its side, at most one
+    within the bounds.
+    """
 
     apart: np.ndarray
     beyond: np.ndarray
 
     @property
     def count(self) -> int:
-        """How many shapes."""
+        """Number of shapes."""
         return len(self.beyond)
 
     @property
     def inside(self) -> int:
-        """How many of them are within the bounds."""
+        """Number of shapes within the bounds."""
         return int((self.beyond <= 1).sum())
 
 
@@ -194,8 +197,9 @@ def _outlined(points: np.ndarray, random: np.random.Generator) -> Sample:
 
 def _grown(random: np.random.Generator) -> Iterator[Sample]:
     """Shapes of a run that are in the law's range, their areas evenly from the first to the last."""
-    run = shapes.drawn_run(random)
-    samples = [one for one in shapes.grown(run, LARGEST, FURTHER, (_ratio(random),)) if _known(one)]
+    run, ratio = shapes.drawn_run(random), _ratio(random)
+    grown = (shapes.sample(pore, (ratio,), run) for pore in shapes.grown(run, LARGEST, FURTHER))
+    samples = [one for one in grown if _known(one)]
     shares = np.array([one.share for one in samples])
     for share in np.linspace(shares[0], shares[-1], OF_EACH):
         yield samples[np.abs(shares - share).argmin()]

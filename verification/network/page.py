@@ -4,7 +4,7 @@ import numpy as np
 
 from repro.results import read_table
 from repro.results.network import FAST, UPTAKE_BOUND, added_resistance, share_range
-from verification.evidence.writing import markdown, table
+from verification.evidence.writing import table
 from verification.network import histories, law, runs, throats, timed, uptakes
 from verification.network.law import RATIO
 
@@ -143,13 +143,13 @@ def _errors(compared: runs.Comparison) -> str:
     head = ("throat", "width (um)", "A / W^2", "area", "flow", "acceptor uptake", "donor uptake", "area in the example")
     widths = {one.number: one.width for one in histories.read()}
     rows = []
+    sides = np.array([compared.law, compared.least, compared.most, compared.run])
     for k, number in enumerate(compared.number.tolist()):
-        sides = (compared.law, compared.least, compared.most, compared.run)
-        errors = [_error(*(part[k, -1, quantity] for part in sides)) for quantity in range(len(throats.QUANTITIES))]
+        errors = [_error(*values) for values in sides[:, k, -1].T]
         share = compared.run[k, -1, 0] / widths[number]**2
-        rows.append((str(number), f"{widths[number]:.1f}", f"{share:.2f}", *errors,
+        rows.append((number, f"{widths[number]:.1f}", f"{share:.2f}", *errors,
                      f"{100 * compared.example_error[k, -1]:+.1f} %"))
-    return markdown([table(head, rows)])
+    return table(head, rows)
 
 
 def _error(value: float, least: float, most: float, run: float) -> str:
@@ -159,7 +159,7 @@ def _error(value: float, least: float, most: float, run: float) -> str:
 
 
 def _laws_apart() -> str:
-    """Both laws at the area and the velocity of the runs, where no error of the growth adds to theirs."""
+    """Both laws at the area and the velocity of the runs, without the error of the growth."""
     resistance, uptake = runs.laws_at_the_runs()
     factor = (resistance.run / resistance.law)[~resistance.holds]
     outside = "" if resistance.holds.all() else (
@@ -185,7 +185,7 @@ def _controls() -> str:
 
 
 def _range_words(resistance: runs.Judgement) -> str:
-    """How many of the states outside the bounds have conditions outside the range."""
+    """Describe whether the states outside of the bounds have conditions outside of the range."""
     inside = int(resistance.in_range[~resistance.holds].sum())
     return "all of them have left" if inside == 0 else f"all but {inside} of them have left"
 
@@ -196,10 +196,11 @@ def _sweep() -> str:
     if not record:
         return ""
     seconds = {(way["way"], way["workers"]): way["seconds"] for way in record["ways"]}
-    pool, dask = ([seconds[name, workers] for workers in (1, 2)] for name in (timed.POOL, timed.DASK))
+    pool = [seconds[timed.POOL, workers] for workers in (1, 2)]
+    dask = [seconds[timed.DASK, workers] for workers in (1, 2)]
     failed = sum(way["unfinished"] for way in record["ways"])
     alike = "all ways give the same table" if record["equal"] else "the tables differ"
-    rows = ((way["way"], str(way["workers"]), f"{way['seconds']:.0f}", f"{record['runs'] / way['seconds']:.2f}",
+    rows = ((way["way"], way["workers"], f"{way['seconds']:.0f}", f"{record['runs'] / way['seconds']:.2f}",
              f"{seconds[way['way'], 1] / way['seconds']:.2f}", f"{way['load']:.1f}") for way in record["ways"])
     head = ("runs made by", "workers", "s", "runs/s", "times faster than one worker", "load")
     return f"""## A sweep of all throats
@@ -208,7 +209,7 @@ def _sweep() -> str:
 over {record["hours"]:g} h, in `fast` with files and page, on the process pool and on a
 Dask scheduler with workers on the same machine:
 
-{markdown([table(head, rows)])}
+{table(head, rows)}
 
 Two workers are {pool[0] / pool[1]:.2f} times faster than one on the process pool, and {dask[0] / dask[1]:.2f} times
 on Dask. Dask takes {dask[1] / pool[1]:.2f} times as long as the pool with two workers. Runs that failed: {failed};
@@ -223,7 +224,7 @@ def _list(times: tuple[float, ...]) -> str:
 
 
 def _numbers(states: dict[str, np.ndarray]) -> str:
-    """How many states there are, and of which kinds."""
+    """The numbers of states of each kind."""
     grown, spanned = states["grown"] == 1, states["spanned"] == 1
     return f"{(~grown).sum()} half-discs, {grown.sum()} grown shapes, {spanned.sum()} of them in contact"
 
@@ -238,4 +239,4 @@ def _markdown_table(spanned: bool) -> str:
     shares = np.array(PAGE_SHARES[spanned])
     head = (f"A / W^2, {'touching both walls' if spanned else 'before contact'}", "r", "least", "most")
     rows = zip(shares, *added_resistance(shares, 1.0, spanned, RATIO))
-    return markdown([table(head, ("{:g} {:.3g} {:.3g} {:.3g}".format(*row).split() for row in rows))])
+    return table(head, ("{:g} {:.3g} {:.3g} {:.3g}".format(*row).split() for row in rows))

@@ -20,15 +20,25 @@ from repro.results.network import added_resistance, uptake
 from repro.scene import Scene, load_scene
 from verification.claims.runs import SUBSTRATES, rows_at
 from verification.network.histories import History, read
-from verification.network.throats import EXPECTED, LENGTH, QUANTITIES, TIMES, VISCOSITY, conditions, resistance
+from verification.network.throats import (
+    EXPECTED,
+    EXPECTED_COLUMNS,
+    LENGTH,
+    QUANTITIES,
+    TIMES,
+    VISCOSITY,
+    conditions,
+    resistance,
+)
 
-#: um: less than that of every throat with flow.
+#: Head loss (um) below that of every throat with flow.
 LEAST_HEAD = 1e-4
-#: The runs of the ten throats at TIMES; a run that ends earlier has no later rows.
+#: The rows of ten runs at TIMES. A run that ends earlier has no later rows.
 TABLE, COLUMNS = Path(__file__).with_name("throats.csv"), ["throat", "time_h", *QUANTITIES]
 
-#: The throat whose aggregate is grown at constant velocities (m/d) too, up to an A / W^2, within some hours.
-CONTROL, SPEEDS, CONTROL_SHARE, LONGEST = 61, (2.0, 1.0, 0.3), 1.25, 120
+#: The throat whose aggregate also grows at constant velocities (m/d), up to an A / W^2, for at most LONGEST hours.
+CONTROL, SPEEDS = 61, (2.0, 1.0, 0.3)
+CONTROL_SHARE, LONGEST = 1.25, 120
 CONTROLS = Path(__file__).with_name("controls.csv")
 CONTROL_COLUMNS = ["velocity_m_per_d", "area_over_width2", "resistance_over_law", "thickness_over_half_disc"]
 
@@ -82,7 +92,7 @@ def controls(all_throats: list[History]) -> Iterator[list]:
 
 
 def _last(one_scene: Scene, width: float) -> list[float]:
-    """Of the last row up to CONTROL_SHARE: A / W^2, r over that of the law, thickness over that of the half-disc."""
+    """A / W^2, r over that of the law and thickness over that of the half-disc, in the last row up to CONTROL_SHARE."""
     rows: list[list[float]] = []
     for report in simulate(one_scene):
         outline, flow = report.pore.outline, report.solved.flow
@@ -97,9 +107,12 @@ def _last(one_scene: Scene, width: float) -> list[float]:
 
 
 class Comparison(NamedTuple):
-    """Ten throats at TIMES. number: (n,) of the throats; in_range: (n, times) are the conditions so far those of the
-    law's shapes? example: (n, times) um2, areas of the example; law, least, most, run: (n, times, quantities);
-    not-a-number where a run has ended."""
+    """Ten throats at TIMES.
+
+    number: (n,) of the throats; in_range: (n, times), whether the conditions so far are those of the shapes behind the
+    law; example: (n, times) um2, areas of the example; law, least, most, run: (n, times, quantities). A run that has
+    ended has not-a-number.
+    """
 
     number: np.ndarray
     in_range: np.ndarray
@@ -116,7 +129,7 @@ class Comparison(NamedTuple):
 
     @property
     def holds(self) -> np.ndarray:
-        """(n, times, quantities) is the run within the bounds?"""
+        """(n, times, quantities) whether the run is within the bounds."""
         return (self.least <= self.run) & (self.run <= self.most)
 
     @property
@@ -126,8 +139,10 @@ class Comparison(NamedTuple):
 
 
 class Judgement(NamedTuple):
-    """Values of the runs and of one law at their areas, in all s states. share: (s,) A / W^2; in_range: (s,) as above;
-    run, law, least, most: (s,) or, of both substrates, (2, s)."""
+    """Values of the runs and of one law at their areas, in all s states.
+
+    share: (s,) A / W^2; in_range: (s,) as in Comparison; run, law, least, most: (s,), or (2, s) for both substrates.
+    """
 
     share: np.ndarray
     in_range: np.ndarray
@@ -138,18 +153,21 @@ class Judgement(NamedTuple):
 
     @property
     def holds(self) -> np.ndarray:
-        """Is the run within the bounds of the law?"""
+        """Whether the run is within the bounds of the law."""
         return (self.least <= self.run) & (self.run <= self.most)
 
 
 def laws_at_the_runs() -> tuple[Judgement, Judgement]:
     """The laws of resistance (r) and of uptake at the areas and velocities of the runs, for all states."""
     of_runs, measured = compared(), read_table(TABLE)
-    by_number = {one.number: one for one in read()}
-    states = [conditions([by_number[int(number)]], int(np.searchsorted(by_number[int(number)].time, time)), time)
-              for number, time in zip(measured["throat"], measured["time_h"])]
-    width, head = (np.concatenate([getattr(at, name) for at in states]) for name in ("width", "head_loss"))
-    supplies = np.concatenate([at.supplies for at in states], axis=1)
+    throats = {one.number: one for one in read()}
+    states = []
+    for number, time in zip(measured["throat"], measured["time_h"]):
+        one = throats[int(number)]
+        states.append(conditions([one], int(np.searchsorted(one.time, time)), time))
+    width = np.concatenate([state.width for state in states])
+    head = np.concatenate([state.head_loss for state in states])
+    supplies = np.concatenate([state.supplies for state in states], axis=1)
     area, speed, *taken = (measured[name] for name in QUANTITIES)
     share, inside = area / width**2, of_runs.in_range[~np.isnan(of_runs.run[:, :, 0])]
     r = resistance(width, head, speed)
@@ -162,14 +180,12 @@ def laws_at_the_runs() -> tuple[Judgement, Judgement]:
 def compared() -> Comparison:
     """The records of law and runs."""
     expected, measured = read_table(EXPECTED), read_table(TABLE)
-    numbers = expected["throat"][expected["time_h"] == TIMES[0]]
-    of_run = {(number, time): row for number, time, *row in zip(*(measured[name] for name in COLUMNS))}
-    none = [np.nan] * len(QUANTITIES)
-    whole = np.array([[of_run.get((number, time), none) for time in TIMES] for number in numbers])
-    sides = [np.stack([_by_throat(expected[f"{name}_{part}"]) for name in QUANTITIES], axis=-1)
-             for part in ("law", "least", "most")]
-    return Comparison(numbers.astype(int), _by_throat(expected["in_range"]) == 1,
-                      _by_throat(expected["example_area_um2"]), *sides, whole)
+    throat, _, in_range, example, *sides = (_by_throat(expected[name]) for name in EXPECTED_COLUMNS)
+    law, least, most = np.reshape(sides, (len(QUANTITIES), 3, *throat.shape)).transpose(1, 2, 3, 0)
+    number, run = throat[:, 0], np.full(law.shape, np.nan)
+    _, rows = (measured["throat"][:, None] == number).nonzero()
+    run[rows, np.searchsorted(TIMES, measured["time_h"])] = np.transpose([measured[name] for name in QUANTITIES])
+    return Comparison(number.astype(int), in_range == 1, example, law, least, most, run)
 
 
 def _by_throat(column: np.ndarray) -> np.ndarray:

@@ -12,9 +12,9 @@ from repro.model.pore import Pore
 from repro.scene import load_scene
 from verification.claims.runs import SUBSTRATES, until
 
-#: Of the table.
+#: Viscosity ratios lambda of the table.
 RATIOS = (100.0, 200.0, 500.0, 1000.0, 2000.0, 5000.0, 10000.0)
-#: Length of the pores over their width: growth upstream has room.
+#: Length of the pores over their width, with space for growth upstream.
 LENGTH = 15.0
 #: Width (um) of the pores of drawn shapes. The results do not depend on it.
 WIDTH = 100.0
@@ -22,12 +22,13 @@ WIDTH = 100.0
 #: to 0.96 they differ from the preset `exact` by 0.2 % and by 0.8 % at most.
 FINE = ('numerics.preset="accurate"', 'numerics.extent="full"')
 QUICK = ('numerics.preset="fast"',)
-#: Ranges of drawn bodies, as growth makes them before contact: thickness over that of the half-disc of
-#: the same area; how far the top leans to either side, over its height. Of drawn plugs: length of the contact surface
-#: with the lower wall less that with the upper one, over W, and the larger share of that on one side.
+#: Ranges of drawn bodies, which growth also makes before contact: thickness over that of the half-disc of the same
+#: area, and displacement of the top to either side over its height.
 THICKER, LEANING = (0.99, 1.03), 0.05
+#: Ranges of drawn plugs: length of the contact surface with the lower wall less that with the upper wall, over W, and
+#: the larger share of this length on one side.
 ENDS, UPSTREAM = (1.15, 1.4), 0.6
-#: Least supply (mg/L) over W^2 (um2): with less growth is limited by diffusion, and bodies are thicker than that.
+#: Least supply (mg/L) over W^2 (um2). With less, diffusion limits growth, and bodies are thicker.
 LEAST_SUPPLY = 1 / 2500
 #: Hours of a drawn run.
 END = 50
@@ -39,8 +40,10 @@ THICKEST = 0.98
 
 @dataclass(frozen=True)
 class Growth:
-    """A run from a half-disc. width: um; velocity: m/d; supply: mg/L of both; radius, position: of the seed, um; end:
-    h, the last of its rows."""
+    """A run from a half-disc.
+
+    width: um; velocity: m/d; supply: mg/L of both substrates; radius, position: of the seed, um; end: h.
+    """
 
     width: float
     velocity: float
@@ -50,7 +53,7 @@ class Growth:
     end: int
 
     def scene(self):
-        """In the preset `fast`, a row an hour."""
+        """The scene in the preset `fast`, with a row every hour."""
         aggregate = {"radius": f"{self.radius} um", "position": f"{self.position} um"}
         supplies = {name: {"supply": f"{self.supply} mg/L"} for name in SUBSTRATES}
         return load_scene({**tables(self.width, aggregate, self.velocity), "substrates": supplies, "growth": {}},
@@ -65,7 +68,7 @@ def drawn_run(random: np.random.Generator) -> Growth:
 
 
 def log_uniform(random: np.random.Generator, low: float, high: float) -> float:
-    """Between two values, evenly in the logarithm."""
+    """A number between two values, whose logarithm is uniform."""
     return float(np.exp(random.uniform(np.log(low), np.log(high))))
 
 
@@ -77,8 +80,11 @@ def tables(width: float, aggregate: dict, velocity: float = 1.0) -> dict:
 
 @dataclass(frozen=True)
 class Sample:
-    """One aggregate. run: the run that grew it, None if drawn; spanned: does it touch both walls? share: A / W^2;
-    ratios, lengths: some lambdas, and r for each."""
+    """An aggregate.
+
+    run: its growth, None if it is drawn; spanned: whether it touches both walls; share: A / W^2; ratios, lengths:
+    lambdas, and r for each of them.
+    """
 
     run: Growth | None
     spanned: bool
@@ -101,7 +107,7 @@ def added_length(space: Space, ratio: float) -> float:
 
 
 def half_disc(thickness: float, width: float = WIDTH, position: float = 0.0, elements=FINE) -> Pore:
-    """On one wall; thickness: over W; position: of its middle (um)."""
+    """A half-disc on the lower wall. thickness: over W; position: of its middle (um)."""
     aggregate = {"radius": f"{thickness * width} um", "position": f"{position} um"}
     return pore.seeded(load_scene(tables(width, aggregate), elements))
 
@@ -134,7 +140,7 @@ def plug(share: float, ends: float, upstream: float) -> np.ndarray:
     return np.vstack([left, right[::-1]])
 
 
-def grown(run: Growth, most: float, apart: float, ratios=RATIOS) -> Iterator[Sample]:
+def grown(run: Growth, most: float, apart: float) -> Iterator[Pore]:
     """Yield shapes of a run up to an area over W^2, each larger than the last by a factor of at least `apart`."""
     last = 0.0
     for instant in simulate(run.scene()):
@@ -143,4 +149,9 @@ def grown(run: Growth, most: float, apart: float, ratios=RATIOS) -> Iterator[Sam
             return
         if share > apart * last:
             last = share
-            yield sample(instant.pore, ratios, run)
+            yield instant.pore
+
+
+def select(columns: dict[str, np.ndarray], rows: np.ndarray) -> dict[str, np.ndarray]:
+    """Some rows of the columns of a table; rows: (n,) bool."""
+    return {name: values[rows] for name, values in columns.items()}

@@ -1,8 +1,8 @@
 """Ten throats of the example of a network as whole runs, against the two laws for networks.
 
-A run has the same seed, and the same head loss and supplies as the example at every time: tables over time that keep
-their values for the step of the example. Its flow follows from its own shape. The law is the example's model of one
-throat with this history, in steps of 6 min: the example itself takes 2 h.
+A run has the seed of the example, and the same head loss and supplies at every time. Its tables over time keep their
+values for a step of the example. Its flow follows from its own shape. The law is the model of the example for one
+throat with this history, in steps of 6 min. The example itself takes steps of 2 h.
 
 **The throats.** Of the 80 throats with flow, those that end with A / W^2 over one (THICK) and the others are put in
 order of A / W^2 at the end. The ten are four of the first and six of the others, at even distances from the first to
@@ -42,9 +42,12 @@ from repro.scene import load_scene
 from verification.network.histories import History, rounded
 
 #: A / W^2 at the end that separates the two groups of throats, and the number of throats from each group.
-THICK, OF_THICK, OF_OTHERS = 1.0, 4, 6
-#: Length of a throat (um), nu (m2/s) and g (m/s2) of the example.
-LENGTH, VISCOSITY, GRAVITY = 600.0, 1e-6, 9.81
+THICK = 1.0
+OF_THICK, OF_OTHERS = 4, 6
+#: Length of a throat (um).
+LENGTH = 600.0
+#: nu (m2/s) and g (m/s2) of the example.
+VISCOSITY, GRAVITY = 1e-6, 9.81
 #: g / (12 nu), m/d per um2 at a slope of 1.
 PER_HEAD = GRAVITY / (12 * VISCOSITY) * 86400 * 1e-12
 #: Steps of the law in each step of the example.
@@ -55,9 +58,11 @@ PRESET = 0.01
 TIMES = (12.0, 24.0, 36.0, 48.0)
 #: Velocities (m/d) and the least supply over W^2 (mg/L/um2) of the shapes behind the law of resistance.
 VELOCITIES, LEAST_SUPPLY = (0.5, 6.0), 1 / 2500
-#: Sides of the bounds: the law itself, the largest and the least.
-LAW, MOST, LEAST = 0, 1, -1
-#: Areas between both bounds at which the other bounds are computed: a larger area takes up more and lets less pass.
+#: Sides of the law: the law itself, and its largest and least value.
+LAW = 0
+MOST, LEAST = 1, -1
+#: Number of areas between both bounds at which the other bounds are computed. A larger area takes up more substrate and
+#: lets less water pass.
 TRIALS = 9
 QUANTITIES = ("area_um2", "velocity_m_per_d", "acceptor_pg_per_m_h", "donor_pg_per_m_h")
 EXPECTED = Path(__file__).with_name("throats_expected.csv")
@@ -70,7 +75,7 @@ EXPECTED_COLUMNS = ["throat", "time_h", "in_range", "example_area_um2",
 
 
 class Conditions(NamedTuple):
-    """What the network prescribes in n throats at a time (h). width: um; head_loss: um; supplies: (2, n) mg/L."""
+    """Conditions in n throats at a time (h). width: (n,) um; head_loss: (n,) um; supplies: (2, n) mg/L."""
 
     time: float
     width: np.ndarray
@@ -79,7 +84,7 @@ class Conditions(NamedTuple):
 
 
 def chosen(all_throats: list[History]) -> list[History]:
-    """The ten throats, by their areas at the end: the largest first."""
+    """The ten throats in the order of their areas at the end, the largest first."""
     ordered = sorted((one for one in all_throats if one.flows), key=lambda one: -one.share)
     thick = [one for one in ordered if one.share > THICK]
     others = ordered[len(thick):]
@@ -109,13 +114,13 @@ def resistance(width: Values, head_loss: Values, speed: Values) -> Values:
 
 
 def velocity(area: np.ndarray, at: Conditions, side: int) -> np.ndarray:
-    """(n,) m/d by the law of resistance. Its most is that of the least resistance."""
+    """(n,) m/d by the law of resistance. The largest velocity is that with the least resistance."""
     added = repro.added_resistance(area, at.width)
     return mean_velocity(at.width, at.head_loss, {LAW: added.length, MOST: added.least, LEAST: added.most}[side])
 
 
 class Taken(NamedTuple):
-    """Of n throats. acceptor, donor: (n,) uptakes, pg/m/h; growth: (n,) um2/h."""
+    """Uptakes of n throats. acceptor, donor: (n,) pg/m/h; growth: (n,) um2/h."""
 
     acceptor: np.ndarray
     donor: np.ndarray
@@ -190,17 +195,17 @@ def expected(throats: list[History]) -> list[list]:
 
 def at_times(throats: list[History]) -> np.ndarray:
     """(times, quantities, n, 3) the law, its least and its most value at TIMES."""
-    of_sides = {side: areas(throats, side) for side in (LAW, LEAST, MOST)}
+    reached = np.array([areas(throats, side) for side in (LAW, LEAST, MOST)])
     indices = np.searchsorted(throats[0].time, TIMES)
-    return np.array([values({side: reached[:, index] for side, reached in of_sides.items()},
-                            conditions(throats, index, time)) for index, time in zip(indices, TIMES)])
+    return np.array([values(reached[:, :, index], conditions(throats, index, time))
+                     for index, time in zip(indices, TIMES)])
 
 
-def values(area: dict[int, np.ndarray], at: Conditions) -> np.ndarray:
-    """(quantities, n, 3) the law, its least and its most value, from the areas (n,) of these sides."""
-    low, high = (1 - PRESET) * area[LEAST], (1 + PRESET) * area[MOST]
+def values(area: np.ndarray, at: Conditions) -> np.ndarray:
+    """(quantities, n, 3) the law, its least and its most value, from the areas (3, n) of these sides."""
+    low, high = (1 - PRESET) * area[1], (1 + PRESET) * area[2]
     trials = np.linspace(low, high, TRIALS)
-    law = np.array(quantities(area[LAW], at, LAW))
+    law = np.array(quantities(area[0], at, LAW))
     least = np.min([quantities(trial, at, LEAST) for trial in trials], axis=0)
     most = np.max([quantities(trial, at, MOST) for trial in trials], axis=0)
     least[1:] *= 1 - PRESET
@@ -215,7 +220,7 @@ def quantities(area: np.ndarray, at: Conditions, side: int) -> tuple[np.ndarray,
 
 
 def in_range(one: History, time: float) -> bool:
-    """Do the conditions up to a time stay within those of the shapes behind the law of resistance?"""
+    """Whether the conditions up to a time are within those of the shapes behind the law of resistance."""
     until = one.time <= time
     added = repro.added_resistance(one.area[until], one.width)
     speed = mean_velocity(one.width, np.abs(one.head_loss[until]), added.length)

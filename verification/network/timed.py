@@ -1,7 +1,7 @@
-"""Time of a sweep: the 100 throats of the example of a network as whole runs of 48 h, on the process pool and on Dask.
+"""Time of a sweep of all 100 throats of the example as whole runs of 48 h, on the process pool and on Dask.
 
-`python -m verification.network sweep` measures it and writes the record. A time is that of the whole sweep, from an
-empty folder to the page, with workers that have made a run before. Dask runs a scheduler and workers on this machine.
+`python -m verification.network sweep` measures it and writes the record. The time is that of the entire sweep, from an
+empty folder to the page. The workers have made a run before. Dask runs a scheduler and workers on this machine.
 """
 
 import os
@@ -16,7 +16,7 @@ from repro.sweeps import driver
 from repro.sweeps.design import Factor, Point
 from repro.sweeps.folder import Sweep
 from repro.sweeps.pool import RunPoints
-from verification.bench.record import machine
+from verification.evidence.results import machine
 from verification.evidence.writing import load, save
 from verification.network import runs
 from verification.network.histories import History
@@ -31,7 +31,7 @@ WARM_UP = 2.0
 
 
 def measure(all_throats: list[History], times: tuple[float, ...] = TIMES) -> dict[str, Any]:
-    """Time each way. load: mean number of processes that used or awaited a core, in the last minute of the way."""
+    """Time each way. load: mean number of processes that used or awaited a core, in the last minute of its sweep."""
     rows, tables = [], []
     with TemporaryDirectory() as folder:
         for name, workers in WAYS:

@@ -1,5 +1,7 @@
-"""Uptake of both substrates by aggregates in throats: whole solutions of drawn states, the fit of the constants of
-`repro.uptake` to a part of them, and its judgement by the others."""
+"""Uptake of both substrates by aggregates in throats: solutions of drawn states, and the law `repro.uptake`.
+
+A part of the states gives the constants of the law. The other part tests it.
+"""
 
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
@@ -11,7 +13,6 @@ from scipy.optimize import least_squares
 
 from repro.march.folding import Fold
 from repro.march.loop import PoreEnd
-from repro.march.simulation import simulate
 from repro.model import pore
 from repro.model.pore import Pore
 from repro.results import read_table
@@ -19,30 +20,37 @@ from repro.results.network import Throats, Transport, share_range, throats_of
 from repro.scene import load_scene
 from verification.claims.runs import SUBSTRATES
 from verification.network import shapes
-from verification.network.shapes import Growth, log_uniform
+from verification.network.shapes import Growth, log_uniform, select
 
 TABLE = Path(__file__).with_name("uptakes.csv")
-#: Ranges of the states: mean velocity (m/d), supply of each substrate (mg/L), width (um), thickness of half-discs over
-#: the width.
-VELOCITIES, SUPPLIES, WIDTHS, THICKNESSES = (1e-4, 10.0), (0.2, 20.0), (40.0, 150.0), (0.05, 0.98)
+#: Ranges of the mean velocity (m/d) and of the supply of each substrate (mg/L).
+VELOCITIES, SUPPLIES = (1e-4, 10.0), (0.2, 20.0)
+#: Ranges of the width (um) and of the thickness of half-discs over the width.
+WIDTHS, THICKNESSES = (40.0, 150.0), (0.05, 0.98)
 #: Parts of the states, and the seed of each.
 FIT, NEW = 0, 1
 SEEDS = {FIT: 20261126, NEW: 20261201}
-#: Numbers for each part: half-discs, runs whose shapes it uses, and states at each shape.
-HALF_DISCS, RUNS, STATES = {FIT: 120, NEW: 25}, {FIT: 4, NEW: 2}, {FIT: 3, NEW: 1}
-#: The factor by which each shape of a run is larger than the one before; the largest area over W^2; and the number of
-#: shapes in NEW, drawn evenly from all of its runs.
-APART, LARGEST, NEW_GROWN = 1.2, 4.5, 25
+#: Half-discs in each part.
+HALF_DISCS = {FIT: 120, NEW: 25}
+#: Runs in each part, and states at each of their shapes.
+RUNS, STATES = {FIT: 4, NEW: 2}, {FIT: 3, NEW: 1}
+#: The factor by which each shape of a run is larger than the one before, and the largest area over W^2.
+APART, LARGEST = 1.2, 4.5
+#: Number of grown shapes in NEW, drawn evenly from all of its runs.
+NEW_GROWN = 25
 #: The bound of the law is the largest error of the fit, over the spread of the bound, times this factor.
 FACTOR = 1.25
-#: Where the fit starts: diffusion through a layer of a tenth of W, and water that is half mixed.
+#: The start of the fit: diffusion through a layer of a tenth of W, and water that is half mixed.
 START = Transport(10.0, 0.5, 0.5, 0.5)
 ARGUMENTS = ("area", "width", "velocity", *SUBSTRATES)
 
 
 class State(NamedTuple):
-    """An aggregate and its uptake. part: FIT or NEW; grown, spanned: 0 or 1; area: um2; width: um;
-    velocity: m/d; acceptor, donor: supplies, mg/L; acceptor_uptake, donor_uptake: pg/m/h."""
+    """An aggregate and its uptake.
+
+    part: FIT or NEW; grown, spanned: 0 or 1; area: um2; width: um; velocity: m/d; acceptor, donor: supplies, mg/L;
+    acceptor_uptake, donor_uptake: pg/m/h.
+    """
 
     part: int
     grown: int
@@ -72,9 +80,9 @@ def states(part: int) -> Iterator[State]:
 
 
 def read(part: int) -> dict[str, np.ndarray]:
-    """The columns of the fit or of a test."""
+    """The columns of the states of a part."""
     columns = read_table(TABLE)
-    return {name: values[columns["part"] == part] for name, values in columns.items()}
+    return select(columns, columns["part"] == part)
 
 
 def throats(columns: dict[str, np.ndarray]) -> Throats:
@@ -89,14 +97,14 @@ def deviations(columns: dict[str, np.ndarray], law: Throats) -> np.ndarray:
 
 
 def fitted(columns: dict[str, np.ndarray]) -> tuple[Transport, Transport]:
-    """The constants before contact and after it, by least squares of the deviations over the spread of the bound, to
-    three digits."""
+    """The constants before and after contact, to three digits. The fit minimises the squares of the deviations over the
+    spread of the bound."""
     spanned = columns["area"] > share_range(False)[1] * columns["width"]**2
     return _fitted(columns, ~spanned), _fitted(columns, spanned)
 
 
 def _fitted(columns: dict[str, np.ndarray], selected: np.ndarray) -> Transport:
-    chosen = {name: values[selected] for name, values in columns.items()}
+    chosen = select(columns, selected)
     spread = throats(chosen).spread()
 
     def residuals(logarithms: np.ndarray) -> np.ndarray:
@@ -129,16 +137,9 @@ def judged(part: int = NEW) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _grown(run: Growth) -> Iterator[Pore]:
-    """Shapes of a run, each larger than the one before by a factor of APART."""
-    last = 0.0
+    """Shapes of a run, which may end at the pore's end or as a fold."""
     with suppress(PoreEnd, Fold):
-        for instant in simulate(run.scene()):
-            area = instant.pore.boundary.area
-            if area > LARGEST * run.width**2:
-                return
-            if area > APART * last:
-                last = area
-                yield instant.pore
+        yield from shapes.grown(run, LARGEST, APART)
 
 
 def solved(body: Pore, velocity: float, supplies: Sequence[float], grown: bool = False, part: int = FIT) -> State:

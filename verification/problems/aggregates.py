@@ -1,4 +1,4 @@
-"""Aggregates in states known by construction, and one update of them without flow or substrates."""
+"""Aggregates in known states, and one update of an aggregate without flow and substrates."""
 
 from dataclasses import replace
 
@@ -18,17 +18,17 @@ from verification.problems import channels, meshes, pairs, runs
 WIDTH = 50.0
 #: X_m of Table 1, mg/L.
 DENSITY = 3e4
-#: Every order of the elements, by its name in scenes.
+#: All orders of elements, by their names in scenes.
 EVERY = combined(channels.ORDERS)
 
 
 def base_scene(*changes: str, order: int = 1):
-    """The base scene with changes. Only (34) and the transfer read it."""
+    """The base scene with changes. Only (34) and the transfer use it."""
     return load_scene("base", (runs.with_elements(channels.WORDS[order]), *changes))
 
 
 def uniform(x, y) -> np.ndarray:
-    """X_m everywhere."""
+    """A density of X_m everywhere."""
     return DENSITY + 0 * x
 
 
@@ -38,7 +38,7 @@ def seed_around(around: Outline, refinement: float, density=uniform, ends=(-75.0
 
 
 def seed_on(grid: Mesh, around: Outline, order: int, density=uniform) -> Pore:
-    """The same on an existing mesh."""
+    """An aggregate at t = 0 with X_A = density(x, y), on an existing mesh."""
     space = Space(grid, order)
     active = density(*reaction_points(space)) * space.reaction.dx
     body = material(space, grid.points[grid.body])

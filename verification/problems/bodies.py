@@ -1,7 +1,7 @@
 """Bodies of straight or curved triangles, their growth from t = 0 in steps, norms over them, and dead loads.
 
-A kind is the order of the elements of a scene. Kind 1 has straight triangles. Kinds 2 and 3 have curved triangles and
-integrate to degree 6 and 8. The dead loads are f0 and t0 of (20), as nodal forces.
+A kind is the order of the elements of a scene. Kind 1 has straight triangles. Kinds 2 and 3 have curved triangles, with
+quadratures of degree 6 and 8. The dead loads are f0 and t0 of (20), as nodal forces.
 """
 
 from collections.abc import Callable
@@ -75,9 +75,9 @@ def on_mesh(grid: Mesh, kind: int, *constrained: np.ndarray) -> Supported:
 
 
 def on_wall(grid: Mesh, kind: int, outline: Outline) -> tuple[Supported, np.ndarray]:
-    """The aggregate of a mesh at t = 0, and the nodes (M,) of its free rim without the contact lines.
+    """The aggregate of a mesh at t = 0, which slides on the walls with its fixed points at rest.
 
-    The aggregate slides on the walls. Its fixed points do not move.
+    Also return the nodes (M,) of its free rim without the contact lines.
     """
     rim = grid.topology.body_loop
     supports = contact.constrained(len(grid.body), rim, outline.wall, outline.fixed)
@@ -126,18 +126,18 @@ class HalfCylinder:
         return neo_hookean.cylinder_radius(R, self.inner, self.outer - self.inner, RADIUS)
 
     def place(self, x, y) -> np.ndarray:
-        """(..., 2) um."""
+        """(..., 2) um, the position of the material point X, Y."""
         R = np.maximum(np.hypot(x, y), 1e-12)
         return np.stack([x, y], axis=-1) * (self.radius(R) / R)[..., None]
 
     def pressure(self, x, y) -> np.ndarray:
-        """P over mu_L. The middle takes the value beside it."""
+        """P over mu_L. The value in the middle is that beside it."""
         R = np.maximum(np.hypot(x, y), 1e-6 * RADIUS)
         flat = neo_hookean.cylinder_pressure(R.ravel(), self.inner, self.outer - self.inner, RADIUS)
         return flat.reshape(np.shape(R))
 
     def at(self, x, y) -> tuple[np.ndarray, np.ndarray]:
-        """Position and pressure."""
+        """(..., 2) um and P over mu_L, at the material point X, Y."""
         return self.place(x, y), self.pressure(x, y)
 
 

@@ -50,9 +50,9 @@ DEGREES = {1: 6, 2: 6, 3: 8}
 
 
 def mesh_with_sides(area: float, size: float, sample: int, ends, width: float, is_biomass, **lines) -> Mesh:
-    """The first of nine random meshes whose triangles follow all lines, so that the biomass has the given area.
+    """The first of nine random meshes whose triangles follow all lines. Its biomass has the given area.
 
-    Raises ValueError if none does.
+    Raises ValueError if the triangles of no mesh follow the lines.
     """
     for attempt in range(9):
         grid = meshes.channel(ends, width, size, is_biomass, **lines, seed=int(1000 * size) + 100 * sample + attempt)
@@ -136,7 +136,7 @@ def length(space: Space, size: float) -> float:
 
 
 def both(state: transport.Concentrations) -> np.ndarray:
-    """(s, n) C of the modelled substrates: (2, n) C_A and C_D."""
+    """(s, n) concentrations of the modelled substrates, (2, n) if both are modelled."""
     return state.fields
 
 
@@ -146,7 +146,7 @@ def in_points(space: Space) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def rms_errors(space: Space, fields: np.ndarray, exact) -> tuple[np.ndarray, np.ndarray]:
-    """Root mean squares (m,) over the mesh: of fields (m, n) less exact(x, y) (m, T, q), and of exact(x, y)."""
+    """Root mean squares (m,) over the mesh of the errors of fields (m, n), and of exact(x, y) (m, T, q)."""
     where, weight, values = in_points(space)
     truth = np.asarray(exact(*np.moveaxis(where, 2, 0)))
     gap = fields[:, space.cells] @ values.T - truth
@@ -202,7 +202,7 @@ def _rim(space: Space) -> np.ndarray:
 
 
 def _constrained_rim(space: Space, pressures: Space) -> ElementSystem:
-    """The system with all velocities of the rim and the first pressure prescribed."""
+    """The system in which all velocities of the rim and the first pressure are prescribed."""
     system = saddle_system(space.cells, pressures.cells, _rim(space))
     constrained = system.constrained.copy()
     constrained[2 * space.count] = True
@@ -212,8 +212,8 @@ def _constrained_rim(space: Space, pressures: Space) -> ElementSystem:
 def _without_flux(space: Space, velocity: np.ndarray) -> np.ndarray:
     """Velocity (n, 2) of the rim without net flux.
 
-    The interpolated values have a small net flux, which a discrete incompressible flow cannot have. Subtract c (x, y)
-    at nodes in the fluid; c is of the order of the interpolation error.
+    The interpolated values have a small net flux, which a discrete incompressible flow cannot have. Therefore c (x, y)
+    is subtracted at nodes in the fluid, where c is of the order of the interpolation error.
     """
     rim = _rim(space)
     values = np.where(rim, velocity, 0.0)

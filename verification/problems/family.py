@@ -1,4 +1,4 @@
-"""Practical pores, drawn by seed, far past contact. Each reaches its end, the pore's end, or a confirmed fold.
+"""Practical pores drawn by seed. Far past contact each run reaches its end, the pore's end, or a confirmed fold.
 
     python -m verification.problems.family 17 18 --limit 60     # these members; all of them without numbers
 
@@ -27,26 +27,29 @@ from repro.results import field_files, read_table
 from repro.runs.execution import run
 from repro.runs.status import COMPLETED
 from repro.scene import Scene, load_scene
-from verification.evidence.writing import REPORT, markdown, table
+from verification.evidence.writing import REPORT, append, lines, table
 from verification.problems.hard import TooLong, limited
 
 SEED, MEMBERS = 28, 100
 RECORD = REPORT / "pores.jsonl"
-#: The end over the time to contact in growth at the supply, and the end (h) without contact.
+#: End of a run over the time to contact with growth at the supply, and the end (h) of a run without contact.
 PAST_CONTACT, LONGEST = 3.0, 200.0
 #: Times of the rows over the end.
 ROWS = (0.2, 0.4, 0.6, 0.8, 1.0)
 DRIVES = ("head", "0.3 m/day", "10 m/day")
-#: Further members, which test the estimate of `repro check`. Its constants were fitted to the first MEMBERS. The aim
-#: was set on 2026-11-26, before these were run: `repro check` expects a fold in at least two thirds of the members that
-#: fold, and in at most a quarter of the others.
+#: Other members, which test the estimate of `repro check`. Its constants were fitted to the first MEMBERS. The aim was
+#: set on 2026-11-26, before these members were run: `repro check` expects a fold in at least two thirds of the members
+#: that fold, and in at most a quarter of the others.
 TESTED = range(100, 140)
 #: Relative difference of two computations of one stretch from the same shape: round-off of the fields in a file.
 SAME = 1e-6
 #: Time (h) of the least stretch in the message of a fold.
 LEAST = re.compile(r"um at t = (\S+) h;")
-#: Verdicts. The last two are errors.
-ARRIVES, PORE_END, FOLD, UNCONFIRMED, FAILED = ("end", "pore's end", "fold", "fold, not confirmed", "failed")
+#: Verdicts of runs that end as the model does.
+ARRIVES, PORE_END = "end", "pore's end"
+FOLD = "fold"
+#: Verdicts that are errors.
+UNCONFIRMED, FAILED = "fold, not confirmed", "failed"
 
 
 @dataclass(frozen=True)
@@ -113,7 +116,7 @@ def run_member(member: Member, limit: float, *changes: str) -> dict:
 
 
 def _run_until_least(member: Member, folder: Path, status: str, changes: Iterable[str]) -> Path:
-    """Run a member until the least stretch of its fold, and return the folder. Later buckles raise the stretch."""
+    """Run a member to the time of its least stretch, and return the folder. Later buckles raise the stretch."""
     creased = folder.with_name("creased")
     run(member.scene(f'growth.end="{LEAST.search(status)[1]} h"', *changes), creased)
     return creased
@@ -135,7 +138,7 @@ def judge(folder: Path, status: str) -> dict:
 
 
 def _course(folder: Path) -> dict:
-    """Times (h) and least stretches of the rows, and whether the last one has contact. Empty without rows."""
+    """Times (h) and least stretches of the rows, and whether the last row has contact; empty without rows."""
     try:
         table = read_table(folder / "timeseries.csv")
     except (OSError, ValueError):
@@ -169,8 +172,7 @@ def is_expected(member: Member) -> bool:
 
 def read_record() -> dict[int, dict]:
     """Recorded rows by number. The last row of a member counts."""
-    rows = (json.loads(line) for line in RECORD.read_text(encoding="utf-8").splitlines())
-    return dict(sorted((row["number"], row) for row in rows))
+    return dict(sorted((row["number"], row) for row in lines(RECORD)))
 
 
 def page(rows: dict[int, dict]) -> str:
@@ -178,38 +180,37 @@ def page(rows: dict[int, dict]) -> str:
     verdicts = Counter(row["verdict"] for row in rows.values())
     counts = ", ".join(f"{verdict}: {count}" for verdict, count in verdicts.most_common())
     folds = [row for row in rows.values() if row["verdict"] in (FOLD, UNCONFIRMED)]
-    cells = [(str(row["number"]), f"{row['width']:.0f}", f"{row['seed']:.0f}", f"{row['supply']:.2g}", row["drive"],
+    cells = [(row["number"], f"{row['width']:.0f}", f"{row['seed']:.0f}", f"{row['supply']:.2g}", row["drive"],
               f"{row['times_h'][-1]:.3g}", "yes" if row["contact"] else "no", f"{row['middle']:.3f}",
               f"{row['mean']:.3f}", "yes" if row["verdict"] == FOLD else "no")
              for row in sorted(folds, key=lambda row: row["width"])]
-    fates = {name: Counter((is_expected(draw_member(number)), row in folds) for number, row in rows.items()
-                           if number in members and row["verdict"] != FAILED)
-             for name, members in (("fitted", range(MEMBERS)), ("not fitted", TESTED))}
+    sentences = [_forecast("fitted", rows, range(MEMBERS)), _forecast("not fitted", rows, TESTED)]
     head = ("member", "width (um)", "seed (um)", "supply (mg/L)", "drive", "fold (h)", "contact before it",
             "least stretch, middle of an edge", "mean over an edge", "confirmed")
     return (f"# Pores of the family\n\nWritten by `python -m verification.problems.family`. {len(rows)} "
-            f"pores: {counts}.\n\n{' '.join(_forecast(name, counted) for name, counted in fates.items())}\n\n"
-            f"{markdown([table(head, cells)])}\n")
+            f"pores: {counts}.\n\n{' '.join(sentences)}\n\n"
+            f"{table(head, cells)}\n")
 
 
-def _forecast(name: str, fates: Counter) -> str:
-    """A sentence on the folds that `repro check` expects. fates: {(expected, folds): number of pores}."""
+def _forecast(name: str, rows: dict[int, dict], members: range) -> str:
+    """A sentence on the folds that `repro check` expects among some members."""
+    fates = Counter((is_expected(draw_member(number)), rows[number]["verdict"] in (FOLD, UNCONFIRMED))
+                    for number in members if number in rows and rows[number]["verdict"] != FAILED)
     expected, others = (fates[forecast, True] + fates[forecast, False] for forecast in (True, False))
     return (f"Of the {expected + others} pores to which its estimate was {name}, `repro check` expects {expected} to "
             f"fold, of which {fates[True, True]} do, and {others} not to, of which {fates[False, True]} do.")
 
 
 def main(numbers: list[int], limit: float) -> int:
-    """Run members, and add a line for each to the record. Return 1 if one has failed."""
-    bad = 0
+    """Run members, and add a line for each to the record. Return 1 if a member fails."""
+    failures = 0
     for number in numbers:
         row = run_member(draw_member(number), limit)
-        bad += row["verdict"] in (UNCONFIRMED, FAILED)
+        failures += row["verdict"] in (UNCONFIRMED, FAILED)
         print(json.dumps(row), flush=True)
-        with RECORD.open("a", encoding="utf-8") as file:
-            file.write(json.dumps(row) + "\n")
+        append(row, RECORD)
     RECORD.with_suffix(".md").write_text(page(read_record()), encoding="utf-8")
-    return int(bad > 0)
+    return int(failures > 0)
 
 
 if __name__ == "__main__":

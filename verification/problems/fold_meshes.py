@@ -1,10 +1,10 @@
-"""End times of the family's runs on other meshes, and the same runs with stress-free biomass.
+"""Ends of the family's runs on other meshes and with stress-free biomass.
 
     python -m verification.problems.fold_meshes 12 13 41 --limit 60
 
-A member runs with the preset fast. Its last state above BEGUN continues on each of MESHES. Another preset has another
-time tolerance too. With stress-free biomass the member runs from t = 0. Each run has a limit of processor time. A line
-of the record names the member, the end of each run, its time (h), and its least stretch.
+A member runs with the preset fast. Its last state with a stretch above BEGUN continues on each of MESHES. Another
+preset also has another time tolerance. With stress-free biomass the member runs from t = 0. Each run has a limit of
+processor time. A line of the record has the member, and the end, time (h) and least stretch of each run.
 """
 
 import argparse
@@ -19,10 +19,11 @@ from repro.march.loop import PoreEnd, RestartState
 from repro.model import remeshing
 from repro.model.remeshing import Remeshing
 from repro.scene import Scene
+from verification.evidence.writing import append
 from verification.problems.family import draw_member
 from verification.problems.hard import TooLong, limited
 
-#: Least stretch at which runs on other meshes begin: smooth surfaces, long before the first crease.
+#: Least stretch at which runs on other meshes begin. The surface is smooth, long before the first crease.
 BEGUN = 0.75
 #: Below a refinement of 0.4 the sizes do not depend on it.
 MESHES = {"fast, refinement 0.45": ("numerics.refinement=0.45",), "accurate": ("numerics.preset=accurate",),
@@ -32,16 +33,17 @@ STRESS_FREE = "growth.new_biomass=stress_free"
 
 def follow(scene: Scene, limit: float, state: RestartState | None = None) -> tuple[dict, RestartState | None]:
     """(end, time and least stretch) of a run, and its last state with a stretch above BEGUN."""
-    last, before, end = state, state, "end"
+    last = above = state
+    end = "end"
     try:
         with limited(limit):
             for last, _ in simulation.steps(scene, state):
                 if last.compression.stretch > BEGUN:
-                    before = last
+                    above = last
     except (Fold, PoreEnd, SimulationError, TooLong) as error:
         end = f"{type(error).__name__}: {error}"
     reached = {"time_h": last.pore.time, "stretch": last.compression.stretch} if last else {}
-    return {"end": end, **reached}, before
+    return {"end": end, **reached}, above
 
 
 def on_mesh_of(scene: Scene, state: RestartState) -> RestartState:
@@ -53,12 +55,12 @@ def on_mesh_of(scene: Scene, state: RestartState) -> RestartState:
 def study(number: int, limit: float) -> dict[str, object]:
     """The ends of all runs of a member. Those on other meshes are left out if the stretch stays above BEGUN."""
     member = draw_member(number)
-    first, before = follow(member.scene(*member.duration), limit)
+    first, above = follow(member.scene(*member.duration), limit)
     ends: dict[str, object] = {"number": number, "fast": first}
-    if before is not None and first["stretch"] <= BEGUN:
+    if above is not None and first["stretch"] <= BEGUN:
         for name, changes in MESHES.items():
             scene = member.scene(*member.duration, *changes)
-            ends[name], _ = follow(scene, 4 * limit, on_mesh_of(scene, before))
+            ends[name], _ = follow(scene, 4 * limit, on_mesh_of(scene, above))
     ends["stress_free"], _ = follow(member.scene(*member.duration, STRESS_FREE), limit)
     return ends
 
@@ -66,10 +68,9 @@ def study(number: int, limit: float) -> dict[str, object]:
 def main(numbers: Iterable[int], limit: float, record: Path) -> None:
     """Print a line for each member, and add it to the record."""
     for number in numbers:
-        line = json.dumps(study(number, limit))
-        print(line, flush=True)
-        with record.open("a", encoding="utf-8") as file:
-            file.write(line + "\n")
+        row = study(number, limit)
+        print(json.dumps(row), flush=True)
+        append(row, record)
 
 
 if __name__ == "__main__":

@@ -1,10 +1,10 @@
-"""Hard cases: runs of scenes, checks of every run, and the accuracy that a preset promises.
+"""Hard cases: their runs, the checks of every run, and the accuracy that a preset promises.
 
 A cell of the matrix is a hard case with a preset. Its verdict is one of three:
 
 right     all checks of its parts hold, and so do the checks of every run (balances, bounds, finite numbers);
 refused   a part stops with an error of ``repro`` that names the bound it met or a change to try;
-wrong     a check fails, another exception is raised, nothing is measured, or a part takes longer than LIMIT.
+wrong     a check fails, another error is raised, nothing is measured, or a part takes longer than LIMIT.
 
 Every hard case is a verification case whose variants are the presets.
 """
@@ -49,7 +49,7 @@ FIXED = ('growth.end="0 h"',)
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """A finished run: its instants, their rows in ``timeseries.csv``, and the message of RunEnd or "".
+    """A finished run: its instants, their rows in ``timeseries.csv``, and the message of RunEnd, or "" without RunEnd.
 
     balance: bound of the defect of the substrates' balances, None if they are not checked; density: bound of
     |(X_A + X_I) / X_m - 1|, larger if a film closes at once under the aggregate.
@@ -134,7 +134,7 @@ def run_packaged(name: str, preset: str, *changes: str, **limits) -> Run:
 
 @cache
 def reference(name: str, *changes: str, refinement: float = 1.0) -> Run:
-    """A finer run on curved triangles. Its error is well under that of ``accurate`` (refinement 0.45, 0.001)."""
+    """A run on finer curved triangles. Its error is well below that of ``accurate`` (refinement 0.45, 0.001)."""
     return run_packaged(name, "accurate", *changes, f"numerics.refinement={refinement}", "numerics.tolerance=0.0005")
 
 
@@ -218,7 +218,7 @@ def _balances(run: Run) -> Iterator[Check]:
 
 
 def _slow(run: Run) -> float:
-    """The Peclet number u W / D, one at most: Newton's tolerance is relative to the larger flux."""
+    """The Peclet number u W / D, at most one. Newton's tolerance is relative to the larger flux."""
     speed = (run.last.get("mean_velocity_m_per_d") or 0.0) / 24e-6
     return min(1.0, peclet(run.scene.substrates, run.scene.pore.width, speed)) if speed else 1.0
 
@@ -253,7 +253,7 @@ def _biomass(run: Run) -> Iterator[Check]:
 def _oxygen_demand(run: Run) -> Check:
     """Check the yield of the midpoint rule.
 
-    Updates do not hold it to round-off: their uptake and growth use the concentrations of both ends of a step.
+    Updates do not have it to round-off, since their uptake and growth use the concentrations of both ends of a step.
     """
     law = run.scene.kinetics
     missing = [abs(ledger.biomass_made - np.subtract(*worth(law, ledger))) / ledger.biomass_after
@@ -264,8 +264,8 @@ def _oxygen_demand(run: Run) -> Check:
 
 MEAN = "J = theta in the mean; Newton's tolerance"
 DENSITY = "J = theta holds in the mean over elements: a local density is off by what an element does not resolve [E7]"
-#: Exact on curved triangles, where masses are transferred. On straight ones a remesh leaves an error in (34), which the
-#: next update removes [E7].
+#: The area is exact on curved triangles, where masses are transferred. On straight triangles a remesh leaves an error
+#: in (34), which the next update removes [E7].
 AREA = {"linear": 1e-4, "quadratic": 1e-8, "cubic": 1e-8}
 
 
@@ -303,6 +303,12 @@ class Part:
     checks: tuple[Check, ...] = ()
     always: tuple[Check, ...] = ()
 
+    @property
+    def bounds(self) -> list[list[str]]:
+        """Name, interval and origin of each of its own checks, if the part is right."""
+        checks = self.checks if self.verdict == RIGHT else ()
+        return [[check.quantity, check.interval(3), check.origin] for check in checks]
+
 
 @dataclass(frozen=True, eq=False)
 class Cell:
@@ -333,8 +339,7 @@ class Cell:
         """The cell in plain types for the pages: case, verdicts, messages, and the intervals of the right parts."""
         case = self.case
         parts = [{"name": part.name, "verdict": part.verdict, "accepted": part not in self.unaccepted,
-                  "bounds": [[check.quantity, check.interval(3), check.origin] for check in part.checks
-                             if part.verdict == RIGHT]} for part in self.parts]
+                  "bounds": part.bounds} for part in self.parts]
         return {"case": {"number": case.number, "id": case.full_id, "title": case.title, "right_is": case.right_is,
                          "failure_is": case.failure_is, "may_refuse": list(case.refusable)},
                 "preset": self.preset, "verdict": self.verdict, "accepted": not self.unaccepted,

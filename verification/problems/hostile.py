@@ -1,4 +1,4 @@
-"""Physically plausible scenes that are hard on the solver, drawn by seed.
+"""Physically plausible scenes that are difficult for the solver, drawn by seed.
 
 They have tables that jump, odd outlines, permeable bodies, transient substrates, soft bodies under the flow, closed
 pores, starved seeds, dense rows, still water or contact. From :data:`FIRST_LATER` on they have one substrate alone,

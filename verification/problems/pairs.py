@@ -1,5 +1,4 @@
-"""Pairs of meshes of one rectangle, one for each relation between meshes that a transfer must handle, and norms on
-them."""
+"""Pairs of meshes of one rectangle for each relation that a transfer must handle, and norms on meshes."""
 
 from collections.abc import Iterator
 
@@ -23,7 +22,7 @@ def grid(size: float, seed: int) -> Grid:
 
 
 def pairs() -> Iterator[tuple[str, Grid, Grid]]:
-    """(relation of the two, old mesh, new mesh)."""
+    """(relation of the meshes, old mesh, new mesh)."""
     first, other = grid(5.0, 1), grid(4.0, 2)
     yield "unrelated", first, other
     yield "the same, in another order", first, (first[0], np.roll(first[1], 1, axis=1)[::-1])

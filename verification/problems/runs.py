@@ -8,7 +8,7 @@ import numpy as np
 
 from reference import averaged_pore, whole_run
 from repro import results
-from repro.fem.outline import TOP
+from repro.fem.outline import TOP, Outline
 from repro.march import midpoint, updates
 from repro.march.balance import Ledger
 from repro.march.loop import Report, StepResult
@@ -105,12 +105,17 @@ def numbers(instant: Report) -> dict[str, float]:
             "conductivity": instant.solved.flow.conductivity}
 
 
+def contact_length(outline: Outline, wall: int) -> float:
+    """Length (um) of the contact surface with a wall; zero without contact."""
+    x = outline.points[outline.wall == wall, 0]
+    return float(np.ptp(x)) if len(x) else 0.0
+
+
 def after_contact(instant: Report) -> dict[str, float]:
-    """Conductivity, tips, and the length of contact with the opposite wall (zero without contact) at an instant."""
+    """Conductivity, tips, and the length of contact with the opposite wall at an instant."""
     outline = instant.pore.boundary
-    on = outline.points[outline.wall == TOP, 0]
     return {"conductivity (m/d)": M_PER_D * instant.solved.flow.conductivity, "upstream tip (um)": outline.upstream,
-            "downstream tip (um)": outline.downstream, "length of contact (um)": float(np.ptp(on)) if len(on) else 0.0}
+            "downstream tip (um)": outline.downstream, "length of contact (um)": contact_length(outline, TOP)}
 
 
 def without_flow(scene: Scene) -> Scene:
@@ -140,7 +145,8 @@ def faster(scene: Scene, factor: float) -> Scene:
 
 
 def supplied_everywhere(scene: Scene) -> Scene:
-    """The scene without flow and with a diffusion of a million times D_A or more: the supply everywhere."""
+    """The scene without flow and with a diffusivity of at least a million times D_A, so that C is the supply
+    everywhere."""
     return with_diffusivities(without_flow(scene), lambda water, biomass: (1e13, 1e13))
 
 
@@ -205,18 +211,19 @@ def biomass_defect(steps: Sequence[Ledger]) -> float:
 
 
 def worth(law: Kinetics, step: Ledger) -> tuple[float, float]:
-    """Biomass that the uptake of a step grows, Y donor, and lets decay, (acceptor - F donor) / d_c."""
+    """Biomass that the uptake of a step makes, Y donor, and that decays with it, (acceptor - F donor) / d_c."""
     acceptor, donor = step.consumed
     return law.yield_coefficient * donor, (acceptor - law.acceptor_to_donor_ratio * donor) / law.decay_oxygen_demand
 
 
 def mass_after(scene: Scene, time: float, acceptor: float | None = None) -> float:
-    """X_A + X_I over that at the start after a time (h), exponential, at the supply or at another acceptor (mg/L)."""
+    """X_A + X_I after a time (h) over the initial value, for exponential growth at the supply or at another acceptor
+    (mg/L)."""
     rise, left = growth_rates(scene.kinetics, scene.substrates, acceptor)
     return np.exp(rise * time) + left / rise * np.expm1(rise * time)
 
 
-#: um/h in m/d.
+#: um/h in m/d, independent of the package.
 M_PER_D = 24e-6
 #: Cells of the averaged pore's aggregate.
 CELLS = 30

@@ -18,7 +18,8 @@ from matplotlib.figure import Figure
 from repro.results import write_json, write_text
 from verification import sensitivity
 from verification.claims import interval
-from verification.evidence.writing import Block, markdown, saved_figure, table
+from verification.evidence import writing
+from verification.evidence.writing import saved_figure, table
 from verification.sensitivity import rounding, wide
 from verification.sensitivity.rounding import INPUTS, ROUNDED, Input, Runs, load_varied
 
@@ -96,17 +97,17 @@ def _bars(axes: Axes, name: str, value: float, resolved: bool) -> None:
 
 
 def page(record: dict) -> str:
-    """The record in words and tables."""
+    """The page of the record."""
     introduction = ("Elasticities d ln(number) / d ln(input), by central differences of the converged solution. ± is "
                     "the bar; an elasticity whose bar exceeds a tenth of it is *not resolved*. `make sensitivity` "
                     "writes this page.")
-    blocks = [Block("text", introduction), Block("text", f"![Tornado diagram]({TARGET.name})"), _table(record)]
+    blocks = [introduction, f"![Tornado diagram]({TARGET.name})", _table(record)]
     for part, section in SECTIONS.items():
         blocks += section(record[part])
-    return f"# Effects of the rounding of Table 1\n\n{markdown(blocks, 2)}\n\n"
+    return writing.page("Effects of the rounding of Table 1", blocks) + "\n"
 
 
-def _table(record: dict) -> Block:
+def _table(record: dict) -> str:
     elasticities = record["elasticities"]
     return table(("input", "rounding (%)", *map(_title_of, elasticities)),
                  (_row(parameter, elasticities) for parameter in INPUTS))
@@ -130,14 +131,14 @@ def _cell(entry: dict | None) -> str:
     return f"{word} (± {entry['bar']:.1g}){by_10_percent}"
 
 
-def _set(one_set: dict) -> Iterator[Block]:
+def _set(one_set: dict) -> Iterator[str]:
     sentence = (f"{'A' if one_set['reached'] else 'No'} set of inputs within the rounding gives all printed numbers of "
                 f"base at once. {'This' if one_set['reached'] else 'The nearest'}")
     sizes = _listed(one_set["sizes"], ".3g")
-    yield Block("heading", "One set of inputs")
-    yield Block("text", f"{sentence} set takes {one_set['share_of_the_rounding']:.2f} times the rounding. It was run "
-                        f"on sizes {sizes} of elements and steps, over those of `accurate`. The bar follows from all "
-                        "of them, and a set counts if the whole bar lies in the interval of the printed digits.")
+    yield "## One set of inputs"
+    yield (f"{sentence} set takes {one_set['share_of_the_rounding']:.2f} times the rounding. It was run on sizes "
+           f"{sizes} of elements and steps, over those of `accurate`. The bar follows from all of them, and a set "
+           "counts if the whole bar lies in the interval of the printed digits.")
     yield table(("number", "printed", "a run with the set", "bar", "on these sizes"), (
         (_title_of(name), "{:g} to {:g}".format(*interval(rounding.PRINTED[name])), f"{value:.4f}",
          f"{one_set['bars'][name]:.1g}", _listed(one_set["on_sizes"][name], ".4f"))
@@ -149,41 +150,41 @@ def _listed(values: list[float], form: str) -> str:
     return ", ".join(format(value, form) for value in values)
 
 
-def _supplies(by_supply: dict) -> Iterator[Block]:
-    yield Block("heading", "The supply of Figure 6, which is not printed")
+def _supplies(by_supply: dict) -> Iterator[str]:
+    yield "## The supply of Figure 6, which is not printed"
     yield table(("supply of both (K_s)", "contact (h)", "ends at contact (um)", "least acceptor then (K_s)"), (
         (supply, f"{result['contact_time']:.1f}", f"{result['upstream']:.0f} to {result['downstream']:.0f}",
          f"{result['acceptor_min']:.2g}") for supply, result in by_supply.items()))
-    yield Block("text", f"![Outlines with each supply]({OUTLINES.name})")
+    yield f"![Outlines with each supply]({OUTLINES.name})"
     yield from _verdicts(by_supply)
 
 
-def _verdicts(by_supply: dict[str, dict]) -> Iterator[Block]:
+def _verdicts(by_supply: dict[str, dict]) -> Iterator[str]:
     """Which claims about wide hold with which supplies."""
     every, some, none = (", ".join(ids) or "none" for ids in wide.verdicts(by_supply))
-    yield Block("text", "Of the claims about this run, each judged again with the converged solution at one size, to "
-                f"{wide.AFTER} h after contact or until the aggregate reaches an end of the pore, these hold with "
-                f"all supplies: {every}; with some: {some}; with none: {none}.")
-    yield Block("text", "Numbers that hold with some supplies and not with all:")
+    yield ("Of the claims about this run, each judged again with the converged solution at one size, to "
+           f"{wide.AFTER} h after contact or until the aggregate reaches an end of the pore, these hold with all "
+           f"supplies: {every}; with some: {some}; with none: {none}.")
+    yield "Numbers that hold with some supplies and not with all:"
     yield table(("claim", *(f"{supply} K_s" for supply in by_supply)), (
         (name, *map({True: "yes", False: "no"}.get, holds)) for name, holds in wide.moving(by_supply)))
 
 
-def _after_contact(rows: list[dict]) -> Iterator[Block]:
-    yield Block("heading", "Accuracy of wide after contact")
-    yield Block("text", "Values from the finest size to the coarsest; means are over whole hours from contact to 45 h. "
-                "A single row jumps if one more edge of the outline joins the wall.")
+def _after_contact(rows: list[dict]) -> Iterator[str]:
+    yield "## Accuracy of wide after contact"
+    yield ("Values from the finest size to the coarsest; means are over whole hours from contact to 45 h. A single row "
+           "jumps if one more edge of the outline joins the wall.")
     yield table(("number", "values", "bar (%)", "accepted (%)", "met"), (
         (row["quantity"], _listed(row["values"], ".4g"), f"{row['bar_percent']:.2g}",
          f"{row['asked_percent']:g}", "yes" if row["kept"] else "no") for row in rows))
 
 
-def _sobol(indices: dict) -> Iterator[Block]:
+def _sobol(indices: dict) -> Iterator[str]:
     widest = max(0.5 * (high - low) for entry in indices["numbers"].values() for _, low, high in entry["total_order"])
-    yield Block("heading", "Sobol indices of base")
-    yield Block("text", f"Total indices of {indices['samples']} samples in `fast`, with intervals of "
-                f"{100 * indices['confidence']:.0f} %: the share of an input in the variance of a number within the "
-                f"rounding. The widest of the intervals is {widest:.2f} to either side.")
+    yield "## Sobol indices of base"
+    yield (f"Total indices of {indices['samples']} samples in `fast`, with intervals of "
+           f"{100 * indices['confidence']:.0f} %: the share of an input in the variance of a number within the "
+           f"rounding. The widest of the intervals is {widest:.2f} to either side.")
     yield table(("number", *indices["inputs"]), (
         (_title_of(name), *map(_index, entry["total_order"])) for name, entry in indices["numbers"].items()))
 
@@ -193,7 +194,7 @@ def _index(bounds: list[float]) -> str:
 
 
 #: Page sections of the parts of the record, in order.
-SECTIONS: dict[str, Callable[..., Iterator[Block]]] = {
+SECTIONS: dict[str, Callable[..., Iterator[str]]] = {
     "one_set": _set, "after_contact": _after_contact, "supplies": _supplies, "sobol": _sobol}
 
 

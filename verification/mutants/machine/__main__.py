@@ -13,8 +13,8 @@ from verification.mutants.machine import reach, record, sample
 
 
 def main() -> int:
-    """Entry point; 0 if enough of the mutants are caught that are not shown to be equivalent."""
-    about = "Mutants made by machine, a sample of them from all of repro/, against the tests that reach them."
+    """Run the session, and return 0 if enough mutants are caught."""
+    about = "Run a sample of machine-made mutants of repro/ against the tests that reach them."
     parser = argparse.ArgumentParser(prog="python -m verification.mutants.machine", description=about)
     parser.parse_args()
     if not importlib.util.find_spec("cosmic_ray"):
@@ -28,7 +28,7 @@ def main() -> int:
 
 
 def execute(folder) -> None:
-    """Make the session of the present source, or go on with it, in a copy of the project."""
+    """Start or continue the session of the present source, in a copy of the project."""
     from cosmic_ray.commands import execute as execute_session
     from cosmic_ray.config import ConfigDict
     from cosmic_ray.work_db import use_db

@@ -1,9 +1,9 @@
 """Which tests reach which line of ``repro/``, and the command that runs the tests of a mutant's line.
 
 The tests run once under coverage.py, whose context is the name of the test. This covers the process of the tests and
-the processes that they start. A mutant is run against the tests that reach its lines, the cheapest first, and then
-against the other tests of their files, because several tests can share a fixture; a line that runs at import belongs to
-the tests that reach its module. This module imports nothing of ``repro/``, in which the mutant is.
+the processes that they start. A mutant is run against the tests that reach its lines, the cheapest first. The other
+tests of their files follow, because several tests can share a fixture. A line that runs at import belongs to the tests
+that reach its module. This module imports nothing from ``repro/``, which contains the mutant.
 """
 
 import difflib
@@ -18,11 +18,11 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 TESTS, DATA = "tests.json", "reach.coverage"
-#: Seconds of the tests that a mutant is run against, as they take without it.
+#: Total duration (s), measured without a mutant, of the tests that a mutant is run against.
 LIMIT = 60.0
 #: Tests that read the text of the code and fail after any change of it.
 OF_TEXT = ("mutants", "architecture", "published", "machine_mutants")
-#: Exit statuses of pytest where no test fails: all pass, or none is left.
+#: Exit statuses of pytest if no test fails: all pass, or none is collected.
 NONE_FAILS = (0, 5)
 SETTINGS = """[run]
 source = repro
@@ -35,7 +35,7 @@ context = ${{TEST-}}
 
 
 def measure(folder: Path) -> None:
-    """Run all tests under coverage.py in the present folder. Keep the data, and the seconds of the tests that pass."""
+    """Run all tests under coverage.py in the present folder. Store the data and the seconds of the tests that pass."""
     settings = folder / "coveragerc"
     settings.write_text(SETTINGS.format(data=folder / DATA), encoding="utf-8")
     report = folder / "junit.xml"
@@ -95,8 +95,8 @@ def main(original: Path, folder: Path) -> int:
 
 
 def pytest_collection_modifyitems(items: list) -> None:
-    """As a plugin of pytest: keep the tests that reach the mutant, in their order. A test that is gone is left out, for
-    instance one that is named after a value which the mutant changes."""
+    """As a plugin of pytest: keep the tests that reach the mutant, in their order. A test may be absent, for instance
+    if it is named after a value that the mutant changes."""
     places = {test: place for place, test in enumerate(json.loads(os.environ["REACHING"]))}
     items[:] = sorted((item for item in items if item.nodeid in places), key=lambda item: places[item.nodeid])
 

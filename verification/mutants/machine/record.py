@@ -6,19 +6,19 @@ from collections.abc import Iterable
 from itertools import chain
 from pathlib import Path
 
-from verification.evidence.writing import REPORT, Block, load, markdown, save, table
+from verification.evidence.writing import REPORT, load, page, save, table
 from verification.mutants.machine.sample import COUNT, SEED
 from verification.mutants.machine.survivors import EQUIVALENT, LEFT
 
 RECORD = REPORT / "sampled.json"
 PAGE = RECORD.with_suffix(".md")
-#: The least share of the mutants to be caught, without those shown to be equivalent; the largest share of the latter.
+#: Least share of caught mutants among those that are not equivalent, and largest share of equivalent mutants.
 CAUGHT, EQUIVALENT_AT_MOST = 0.95, 0.10
 FAILED = re.compile(r"^(?:FAILED|ERROR) (tests/\S+)", re.M)
 INTRODUCTION = (
-    "`make mutants-sampled` draws them from all that cosmic-ray can make of `repro/`, spread over its modules by size, "
-    "and runs each against the tests that reach its line, as coverage.py has recorded them, the cheapest first, for a "
-    "minute. A timeout is a mutant that makes a test run without end, and does not count as caught. `sampled.json` has "
+    "`make mutants-sampled` draws a sample of the mutants that cosmic-ray makes of `repro/`, spread over its modules "
+    "by size. Each mutant is run for a minute against the tests that reach its line according to coverage.py, the "
+    "cheapest first. If a test does not end, the mutant is a timeout and does not count as caught. `sampled.json` has "
     "each mutant with the test that catches it.")
 
 
@@ -41,9 +41,10 @@ def _row(mutation, result) -> dict:
 
 
 def _change(diff: str, operator: str) -> tuple[str, str]:
-    """The lines that a mutant changes, before and after; a decorator with the line that follows it."""
+    """The changed lines before and after. A decorator includes the line that follows it."""
     lines = diff.partition("\n@@")[2].splitlines()[1:]
-    old, new = ("\n".join(line[1:].strip() for line in lines if line.startswith(sign)) for sign in "-+")
+    old = "\n".join(line[1:].strip() for line in lines if line.startswith("-"))
+    new = "\n".join(line[1:].strip() for line in lines if line.startswith("+"))
     if operator.endswith("RemoveDecorator"):
         place = next(place for place, line in enumerate(lines) if line.startswith("-"))
         new = lines[place + 1][1:].strip()
@@ -66,7 +67,7 @@ def key(row: dict) -> tuple[str, str, str]:
 
 
 def shares(verdicts: dict[str, list[dict]]) -> tuple[float, float]:
-    """The share caught of those not shown to be equivalent, and the share of the latter of all."""
+    """The share of caught mutants among those that are not equivalent, and the share of equivalent mutants."""
     total, equivalent = sum(map(len, verdicts.values())), len(verdicts["equivalent"])
     return len(verdicts["caught"]) / max(total - equivalent, 1), equivalent / max(total, 1)
 
@@ -87,7 +88,7 @@ def summary(verdicts: dict[str, list[dict]]) -> str:
 
 
 def write(rows: list[dict]) -> int:
-    """Print the outcome, and write both files if the sample was run to its end; 0 if enough are caught."""
+    """Print the outcome. Write both files if the sample is complete. Return 0 if enough mutants are caught."""
     verdicts = judged(rows)
     print(summary(verdicts))
     for row in [*verdicts["survivor"], *verdicts["timeout"]]:
@@ -106,17 +107,17 @@ def text() -> str:
     caught = Counter(row["file"] for row in verdicts["caught"])
     survivors = [(*_place(row), *LEFT.get(key(row), ("", ""))) for row in verdicts["survivor"]]
     equivalent = [(*_place(row), EQUIVALENT[key(row)]) for row in verdicts["equivalent"]]
-    counts = [(f"`{file}`", str(drawn[file]), str(caught[file])) for file in sorted(drawn)]
-    blocks = [Block("text", INTRODUCTION), Block("text", summary(verdicts)),
+    counts = [(f"`{file}`", drawn[file], caught[file]) for file in sorted(drawn)]
+    blocks = [INTRODUCTION, summary(verdicts),
               *_section("Survivors", survivors, "effect", "why no test"),
               *_section("Shown equivalent", equivalent, "why"),
-              Block("heading", "By module"), table(("module", "mutants", "caught"), counts)]
-    return f"# Mutants made by machine\n\n{markdown(blocks, level=2)}\n"
+              "## By module", table(("module", "mutants", "caught"), counts)]
+    return page("Mutants made by machine", blocks)
 
 
-def _section(title: str, rows: list[tuple[str, ...]], *columns: str) -> list[Block]:
+def _section(title: str, rows: list[tuple[str, ...]], *columns: str) -> list[str]:
     """A table of changes; nothing if there are none."""
-    return [Block("heading", title), table(("where", "was", "is", *columns), rows)] if rows else []
+    return [f"## {title}", table(("where", "was", "is", *columns), rows)] if rows else []
 
 
 def _place(row: dict) -> tuple[str, str, str]:

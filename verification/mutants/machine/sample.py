@@ -1,12 +1,12 @@
 """The sample: work items drawn from all that cosmic-ray can make of ``repro/``, spread over its modules by size.
 
-A module gives as many as it has statements, in proportion, and one at least. Places are drawn first (an operator, a
-number, a condition, a loop) and then one change of each, because a place has as many changes as there are operators to
-replace its own. The draw follows from the seed and from the text of a line and its neighbours alone, so that a change
-of the code elsewhere leaves it as it is.
+The share of a module is proportional to its number of statements, and at least one. Places are drawn first: operators,
+numbers, conditions and loops. Then one change of each place is drawn, because the number of changes differs between
+places. The draw depends on the seed and on the text of a line and its neighbours. A change of the code elsewhere does
+not affect it.
 
-Left out are annotations, imports for types, and changes that leave no value at all ("a @ b" to "a >> b"): no test can
-see these, or every test does.
+Annotations, imports for types, and changes after which no value exists ("a @ b" to "a >> b") are left out, because
+either no test or every test detects them.
 """
 
 import ast
@@ -31,7 +31,7 @@ _SINGLE = {"AddNot", "ReplaceTrueWithFalse", "ReplaceFalseWithTrue", "ReplaceAnd
 
 
 def draw(count: int = COUNT) -> list:
-    """The work items of cosmic-ray that are run, of the modules in the present folder."""
+    """Draw work items of cosmic-ray from the modules in the present folder."""
     from cosmic_ray.commands import init
     from cosmic_ray.work_db import use_db
 
@@ -52,7 +52,7 @@ def statements(text: str) -> int:
 
 
 def shared(sizes: dict, available: dict, count: int) -> dict:
-    """``count`` in proportion to sizes, one at least and no more than are available, by largest remainders."""
+    """Shares of ``count`` in proportion to sizes, at least one and at most those available, by largest remainders."""
     seats = [(name, sizes[name] / (seat + 0.5)) for name in available for seat in range(1, available[name])]
     more = nlargest(count - len(available), seats, key=itemgetter(1))
     return Counter([*available, *(name for name, _ in more)])
@@ -78,7 +78,7 @@ def is_used(operator: str) -> bool:
 
 
 def hidden(text: str) -> list[tuple[tuple[int, int], tuple[int, int]]]:
-    """Where annotations and blocks of imports for types begin and end."""
+    """(start, end) of annotations and of blocks of imports for types."""
     parts: list[Any] = []
     for node in ast.walk(ast.parse(text)):
         parts += [getattr(node, "annotation", None), getattr(node, "returns", None)]
@@ -108,7 +108,7 @@ def _identity(item) -> tuple[str, int]:
 
 
 def _is_python(text: str, item) -> bool:
-    """Whether the changed module compiles: cosmic-ray takes the stars of "**values" and "*, name" for operators."""
+    """Whether the changed module compiles. For cosmic-ray the stars of "**values" and "*, name" are operators."""
     from cosmic_ray.mutating import mutate_code
     from cosmic_ray.plugins import get_operator
 

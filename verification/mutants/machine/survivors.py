@@ -1,13 +1,13 @@
-"""Explained survivors among the machine-made mutants: data, read by :mod:`.record`."""
+"""Explained survivors among the machine-made mutants: data for :mod:`.record`."""
 
-#: Survivors with the same effect as the code, each with the reason, by (file of repro/, old lines, new lines).
+#: Reasons why survivors are equivalent to the code, by (file of repro/, lines before, lines after).
 EQUIVALENT: dict[tuple[str, str, str], str] = {
     ("fem/elements.py", "EDGE_DEGREES = {1: 2, 2: 6, 3: 9}", "EDGE_DEGREES = {1: 3, 2: 6, 3: 9}"):
-        "The same rule: Gauss' two points, which scikit-fem gives for degree 2, are exact to degree 3.",
+        "The same rule: scikit-fem uses two Gauss points for degree 2, which are exact to degree 3.",
     ("fem/linear.py", "dominant = np.tile((np.ones((k, k)) + k * np.eye(k)).ravel(), len(elements))",
      "dominant = np.tile((np.ones((k, k)) + k - np.eye(k)).ravel(), len(elements))"):
         "Identical orders of elimination for every system of base in the three presets. The order follows from the "
-        "positions of the entries; their values only prevent a zero pivot, and the factorisation is not used.",
+        "pattern of the entries. Their values only prevent a zero pivot of a factorisation that is not used further.",
     ("fem/transfer.py", "return np.where(lost[:, None], 99.0, local)",
      "return np.where(lost[:, None], 100.0, local)"):
         "Both values lie outside of every triangle (the search ends between -2 and 3), and both move to the same point "
@@ -15,7 +15,7 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
     ("model/flow.py", "@dataclass(frozen=True, eq=False)", "@dataclass(frozen=True, eq=True)"):
         "Bubble has no fields, and instances are neither compared nor used as keys.",
     ("model/flow.py", "@dataclass(frozen=True, eq=False) class Bubble:", "class Bubble:"):
-        "Bubble has no fields: the decorator then changes only the text representation of the class.",
+        "Bubble has no fields. Without the decorator only its text representation differs.",
     ("model/gear.py", "still = np.zeros_like(fields), np.zeros_like(biomass), np.zeros((2, 4))",
      "still = np.zeros_like(fields), np.zeros_like(biomass), np.zeros(( 1, 4))"):
         "NumPy broadcasts one row of zeros to two rows of zeros.",
@@ -26,7 +26,7 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
      'is_new_mesh = run.series.get("remeshed", run.times * np.nan) >= 1'):
         "The column is 0 or 1, and NaN is neither.",
     ("model/growth.py", "MOST_ITERATIONS = 25", "MOST_ITERATIONS = 24"):
-        "Identical outputs of base in the three presets, whose equilibria take 5, 5 and 3 iterations at most.",
+        "Identical outputs of base in the three presets, whose equilibria take at most 5, 5 and 3 iterations.",
     ("runs/folder.py", '(folder / "fields").mkdir(parents=True, exist_ok=True)',
      '(folder / "fields").mkdir(parents=False, exist_ok=True)'):
         "The folder exists already: the lock creates it with its parents.",
@@ -37,11 +37,10 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
 #: Remaining survivors: (effect, reason why no test catches it).
 LEFT: dict[tuple[str, str, str], tuple[str, str]] = {
     ("runs/__init__.py", "INTERVAL = 60.0", "INTERVAL = 59.0"):
-        ("Checkpoints are written every 59 s, and the help says so.",
-         "The interval is a choice, and the results of a run do not depend on it."),
+        ("Checkpoints are written every 59 s, and the help states this interval.",
+         "The interval is a choice. The results of a run do not depend on it."),
     ("model/transport.py", "woken = (iterate.saturations <= 0) & (predicted <= 0) & (concentrations > 0)",
      "woken = (iterate.saturations <= 0) & (predicted != 0) & (concentrations > 0)"):
-        ("Newton's method continues from another fraction if a fraction was zero and the prediction differs from zero. "
-         "The solution is the same to its tolerance.",
-         "It takes more or fewer iterations in starved pores, and no test bounds their number."),
+        ("Newton's method starts from another fraction if a fraction was zero and its prediction is not. The solution "
+         "is the same to the tolerance.", "The number of iterations in starved pores differs, and no test bounds it."),
 }
