@@ -94,9 +94,9 @@ MUTANTS = (
     *changes(
         "repro/fem/assembly.py",
         ("hard-keys-overflow",
-         "Entries of the sparse matrix have numbers of 32 bits, which end at 46 000 unknowns.",
-         "np.unique(columns * len(rank) + rows, return_inverse=True)",
-         "np.unique(np.minimum(columns * len(rank) + rows, 2**31 - 1), return_inverse=True)")),
+         "Unknowns have numbers of 16 bits, which end at 65 536 unknowns.",
+         "place = np.empty(len(rank), np.int32)",
+         "place = np.empty(len(rank), np.uint16)")),
     *changes(
         "repro/scene/time_table.py",
         ("family-jump-late",
