@@ -31,9 +31,9 @@ AIMS = {"fast": 0.01, "accurate": 0.002, "exact": 0.0005}
 #: error of 0.55 % for `accurate` right after contact, when the length is 12 um. With 4 contact elements `exact` meets
 #: its aim.
 ACCEPTED = {"fast": (0.01, 0.02), "accurate": (0.002, 0.006), "exact": (0.0005, 0.0005)}
-#: Until 2026-11-26 the conductivity of `exact` had its aim as limit, in both pores. Then contact lines beside corners got
-#: other places, and its error in the pore of 40 um became 0.063 %. The reference itself changes by 0.041 % there between
-#: its levels, and it differs from one of size 0.25 by 0.22 % at 22.5 h, by 0.05 % at 24 h, and by 0.02 % at 26 h. So the
+#: Until 2026-11-26 the conductivity of `exact` had its aim as limit in both pores. Then contact lines beside corners
+#: got other places, and its error in the pore of 40 um became 0.063 %. The reference changes by 0.041 % there between
+#: its levels, and differs from one of size 0.25 by 0.22 % at 22.5 h, by 0.05 % at 24 h, and by 0.02 % at 26 h. So the
 #: limit of `exact` is its aim and the measured change of the reference together.
 #: Largest change of the reference between its two levels: of conductivity and tips, of the length of contact.
 REFERENCE_CHANGES = (0.0015, 0.002)
