@@ -82,6 +82,14 @@ def test_a_damaged_run_is_refused_without_being_read(fast, tmp_path, capsys, nam
         repro.load_run(copy)
 
 
+@pytest.mark.parametrize("name, content", [("run.json", b"\xff"), ("ledger.csv", b"start_h\n1\n")])
+def test_a_broken_run_is_refused_by_the_name_of_its_file(fast, tmp_path, capsys, name, content):
+    copy = shutil.copytree(fast, tmp_path / "run")
+    (copy / name).write_bytes(content)
+    line = refusal(tmp_path, capsys, "compare", fast, copy, "--out", tmp_path / "out.html")
+    assert str(copy) in line and name in line
+
+
 def at_work(run, tmp_path):
     """Copy a run and mark it as running."""
     copy = shutil.copytree(run, tmp_path / "run")

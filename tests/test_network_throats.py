@@ -1,16 +1,27 @@
-"""Throats of the example of a network as whole runs: their scenes, the bounds of the law over a history, and the
-judgement."""
+"""Throats of the example of a network as whole runs: their choice, their scenes, the bounds of the law over a
+history, the judgement, and a sweep of them."""
 import numpy as np
 import pytest
 
 from repro.results import read_table
-from verification.network import histories, page, runs, throats
+from verification.network import histories, page, runs, throats, timed
 
 THROATS = histories.read()
 TEN = throats.chosen(THROATS)
 #: To 12 h.
 SHORT = [one._replace(time=one.time[:7], area=one.area[:7], head_loss=one.head_loss[:7], supplies=one.supplies[:, :7])
          for one in TEN]
+
+
+def test_the_ten_throats_are_evenly_spread_over_the_order_of_their_areas():
+    """Four of those with A / W^2 over one and six of the others, with the largest and the smallest of both."""
+    shares = sorted((one.share for one in THROATS if one.flows), reverse=True)
+    thick = sum(share > 1 for share in shares)
+    chosen = [shares.index(one.share) for one in TEN]
+    assert (len(shares), thick, chosen[0], chosen[3], chosen[4], chosen[9]) == (80, 8, 0, 7, 8, 79)
+    assert set(np.diff(chosen[4:])) <= {14, 15}
+    recorded = read_table(throats.EXPECTED)["throat"].reshape(len(throats.TIMES), -1)
+    assert (recorded == [one.number for one in TEN]).all()
 
 
 @pytest.mark.parametrize("part, side", [("law", throats.LAW), ("least", throats.LEAST), ("most", throats.MOST)])
@@ -98,3 +109,15 @@ def test_the_page_says_what_does_not_hold(monkeypatch):
     compared = runs.compared()
     monkeypatch.setattr(page.runs, "compared", lambda: compared._replace(run=2 * compared.run))
     assert "the bounds do not hold for all of them" in page._throats()
+
+
+def test_a_sweep_of_throats_makes_a_run_of_each(tmp_path):
+    """One has no flow. The head loss of a throat that reverses is taken without its sign."""
+    chosen = [THROATS[14], next(one for one in THROATS if not one.flows)]
+    assert (THROATS[14].head_loss < 0).any() and (THROATS[14].head_loss > 0).any()
+    plan = timed.plan(chosen, (1.0,), tmp_path / "sweep")
+    with timed.ready(timed.POOL, 2) as run_points:
+        seconds, unfinished, table = timed.timed(plan, run_points)
+    assert seconds > 0 and unfinished == 0 and table.count(b"\n") >= 5
+    assert [point.scene.at(0.0).flow.head for point in plan.points] == pytest.approx(
+        [abs(THROATS[14].head_loss[0]), runs.LEAST_HEAD])
