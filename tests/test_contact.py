@@ -201,7 +201,7 @@ def test_the_search_takes_over_from_newton(plugged, monkeypatch):
 
 
 def test_newton_gives_up_as_soon_as_no_line_moves(plugged, monkeypatch):
-    """A line beside a corner can stay there with a clearance that is not accepted. The search then takes over."""
+    """If no line moves and a clearance is not accepted, more iterations change nothing. The search takes over."""
     counts = []
     solve = contact_newton.Coupled.solve
 
@@ -218,7 +218,7 @@ def test_newton_gives_up_as_soon_as_no_line_moves(plugged, monkeypatch):
 
 
 def test_lines_advance_the_farther_the_more_biomass_grows(plugged):
-    """A line that came to rest too far, beyond the corner at 0.62 um, would not move when more biomass grows."""
+    """A line that rests too far beyond the corner at 0.62 um would not move if more biomass grows."""
     factors = (1.011, 1.012, 1.013, 1.015, 1.017, 1.019)
     advances = [expanded_by(*plugged, factor).advances[TOP, 1] for factor in factors]
     assert (np.diff(advances) > 0.01).all()
@@ -227,7 +227,7 @@ def test_lines_advance_the_farther_the_more_biomass_grows(plugged):
 
 @pytest.mark.parametrize("factor", [1.017, 1.029])
 def test_newton_places_a_line_whose_clearance_jumps_at_a_corner(factor, plugged, monkeypatch):
-    """Before the corner the line is too short, and beyond it far enough. No search is necessary."""
+    """The line is too short before the corner, and far enough beyond it. The search does not take over."""
     monkeypatch.setattr(contact.growth, "equilibrium", lambda *_, **__: pytest.fail("the search took over"))
     expanded_by(*plugged, factor)
 
@@ -247,7 +247,7 @@ def test_newton_places_a_line_whose_clearance_jumps_at_a_corner(factor, plugged,
     (0.5, 9.0, False, 2.5),
 ])
 def test_a_line_keeps_away_from_corners(start, step, near, place):
-    """It goes to the other side of a corner only from beside it, and near to equilibrium."""
+    """It crosses a corner only from the place beside it, and only close to equilibrium."""
     line = contact_lines.Line(TOP, 0, 1, advance=start)
     assert contact_newton._place(line, start, step, near) == pytest.approx(place, abs=1e-12)
 

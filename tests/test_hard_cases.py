@@ -1,5 +1,5 @@
-"""Hard cases: a part that stops with an error is refused or wrong. The mutants of the hard cases show that one whose
-checks fail is wrong."""
+"""Hard cases: verdicts of parts that stop with an error. The mutants of the hard cases show that a part with failed
+checks is wrong."""
 from unittest.mock import Mock
 
 import pytest

@@ -82,7 +82,7 @@ def test_a_whole_run_gives_the_recorded_values():
 
 
 def test_all_runs_are_within_the_bounds_of_the_law():
-    """A run outside on either side, or one that ended early, is not."""
+    """A run outside of either bound, or a run that ended early, is not."""
     compared = runs.compared()
     assert compared.holds.shape == (10, 4, 4) and compared.holds.all()
     for wrong in (0.99 * compared.least, 1.01 * compared.most, np.nan * compared.law):

@@ -1,4 +1,4 @@
-"""Scenes that need less of the kinetics: one substrate alone, and decay that goes on without acceptor.
+"""Scenes with other kinetics: one substrate alone, and decay without acceptor.
 
 The case hard-family judges the files of runs with one substrate, and `test_longer.py` makes one of them longer.
 """

@@ -253,7 +253,7 @@ def repository_files():
 
 
 def is_file(name):
-    """Return whether the repository has a file of this path, or one whose path ends with it."""
+    """Return whether the repository has a file with this path, or with a path that ends with it."""
     name = name.removeprefix("../")
     return name in repository_files() or any(path.endswith(f"/{name}") for path in repository_files())
 

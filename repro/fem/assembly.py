@@ -120,8 +120,8 @@ class Factored:
 
 def _distinct(rows: np.ndarray, columns: np.ndarray,
               count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Rows and columns of the distinct entries (m,), by column and then by row, and the number of
-    the distinct entry of each (m,)."""
+    """Rows and columns (d,) of the distinct entries among m, sorted by column and then by row; and
+    (m,) the number of the distinct entry of each."""
     order = _counting_sort(rows, count)
     order = order[_counting_sort(columns[order], count)]
     rows = rows[order]
@@ -134,8 +134,10 @@ def _distinct(rows: np.ndarray, columns: np.ndarray,
 
 
 def _counting_sort(keys: np.ndarray, count: int) -> np.ndarray:
-    """(m,) stable order of keys (m,) from 0 to count - 1, in linear time: the transpose of a sparse
-    row sorts its columns by counting. np.argsort takes twice as long."""
+    """(m,) stable order of keys (m,) from 0 to count - 1, in linear time.
+
+    SciPy transposes a sparse row by counting its columns. np.argsort takes twice as long.
+    """
     ends = np.array([0, len(keys)], np.int32)
     entries = np.arange(len(keys), dtype=np.int32)
     return sp.csr_matrix((entries, keys, ends), shape=(1, count)).tocsc().data

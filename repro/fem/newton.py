@@ -51,7 +51,7 @@ class Newton:
 
     tolerance: of the defect; round_off: accepted defect when the iteration stalls; most: largest
     number of iterations; modified_newton: keep the derivative while it suffices? near: (iterations,
-    defect), the iteration gives up if its defect is larger after so many iterations.
+    defect); the method gives up if the defect is larger than this after so many iterations.
     """
 
     tolerance: float

@@ -94,8 +94,8 @@ def _find_step(
 ) -> tuple[tuple[Pore, Solved], StepResult, Solved, StepControl]:
     """Shorten a step until it is accepted.
 
-    The first failure halves the step, and each further one squares the factor (1/4, 1/16 ...):
-    close to a fold, no step succeeds down to the shortest one.
+    Failures shorten the step to 1/2, 1/8, 1/128 ... of its length, down to the shortest one: each
+    factor is the square of the last. Close to a fold every length fails, and few are tried.
 
     Returns its start, possibly on finer elements, the step, the solution after it, and the next
     step control.

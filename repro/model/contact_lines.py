@@ -164,8 +164,8 @@ class Line:
     present trial accurate enough; reach: arcs beyond it where the surface is too near; least: the
     smallest advance; short, far: largest advance that is too short and smallest one that is far
     enough; stalls: has the last trial halved neither the interval between these nor the clearance;
-    trials: the last two, as (advance, clearance); floor: least advance that
-    Newton's method allows, just beyond the last corner at which the line was too short.
+    trials: the last two, as (advance, clearance); floor: least advance that Newton's method allows,
+    just beyond the last corner at which the line rests or was too short.
     """
 
     wall: int

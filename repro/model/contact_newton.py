@@ -32,8 +32,9 @@ from repro.scene import needed
 
 #: Iterations after which the search with whole equilibria takes over.
 MOST_ITERATIONS = 20
-#: Or after so many, if the defect is larger than this. Of 414 solutions in 19 pores that converged,
-#: seven would have been given up; of the processor time of 63 that did not, a quarter is saved.
+#: (iterations, defect): the search also takes over if the defect is larger than this after so many
+#: iterations. In 19 pores this would have stopped seven of 414 solutions that converged. It saves a
+#: quarter of the processor time of 63 that did not.
 EARLY = 12, 0.5
 #: Differences of an advance (arcs) for the derivatives of residual and clearance.
 SMALL = 1e-5
@@ -254,8 +255,8 @@ class Coupled:
         """Steps (arcs) of the lines to the roots of their clearances; moves: (n, 2) um per arc.
 
         If a line stops before its root, the other lines still reach theirs. A line just beyond a
-        corner rests there if its root is closer to the corner. near: is the shape close to
-        equilibrium?
+        corner rests there if its root lies between the places on both sides of the corner. near:
+        is the shape close to equilibrium?
         """
         lines = [self._lines[k] for k in moves]
         rises = np.array([self.placed.clearances(position + MODEST * move, lines)[0] - clearances
@@ -284,7 +285,7 @@ def _nodal(change: np.ndarray, position: np.ndarray) -> np.ndarray:
 
 
 def _fits(line: Line, clearance: float, close: float) -> bool:
-    """Is a line in place? A line is in place at the smallest allowed advance too."""
+    """Is a line in place? At the smallest allowed advance its clearance may be larger."""
     smallest = line.advance <= max(line.least, line.floor)
     return clearance >= -close and (smallest or clearance <= close)
 
@@ -311,9 +312,9 @@ def _beyond_corner(advance: float) -> bool:
 def _place(line: Line, start: float, step: float, near: bool = True) -> float:
     """The place (arcs) of a line after a step (arcs) from ``start``.
 
-    A line that would come closer to a corner than LEAST_PART stops BESIDE beyond it. A line that
-    lies there already goes to BESIDE before the corner. A line leaves either place for the other
-    only near to equilibrium.
+    A line that would come closer to a corner than LEAST_PART stops BESIDE beyond it. If it lies
+    there already, it goes to BESIDE before the corner. It crosses the corner in this way, or back,
+    only close to equilibrium.
     """
     place = max(start + min(max(step, -LONGEST), LONGEST), line.least, line.floor)
     corner = round(place)

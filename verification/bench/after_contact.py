@@ -50,7 +50,7 @@ def methods() -> list[tuple[str, str, tuple[str, ...]]]:
 
 
 def judged(truth: np.ndarray, changes: Sequence[str]) -> dict:
-    """The errors of a run; the time after DRAWN is set apart."""
+    """The errors of a run; the time after DRAWN is not counted."""
     values, at_drawn, end = numbers(changes)
     errors = np.abs(values / truth - 1)
     seconds, cpu = end - at_drawn

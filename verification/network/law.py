@@ -31,9 +31,9 @@ RUNS = (Growth(40, 1, 10, 5, 0, 52), Growth(50, 4, 20, 5, 10, 40), Growth(70, 6,
 APART, MOST = 1.04, 4.7
 #: The error of the elements of the compared shapes (`shapes.QUICK`), which widens both bounds.
 NUMERICS = 0.008
-#: The bounds at an area include the shapes up to this many areas of the table away. With one, one of the first fifty
-#: test shapes was outside: a grown body at A / W^2 = 1.47, lambda = 361, 2.8 % under the law. The few shapes of the fit
-#: that are as close to contact gave a bound of 1.8 %. The seed was then changed.
+#: The bounds at an area include the shapes up to this many areas of the table away. With one area, a shape
+#: among the first fifty test shapes was outside: a grown body at A / W^2 = 1.47, lambda = 361, 2.8 % below the law. The
+#: few shapes of the fit that are as close to contact gave a bound of 1.8 %. Then the seed was changed.
 NEIGHBOURS = 2
 TABLE_COLUMNS = ["spanned", "viscosity_ratio", "area_over_width2", "added_length_over_width", "least", "most"]
 
