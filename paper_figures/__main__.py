@@ -46,7 +46,7 @@ def _draw_figure(name: str, module, folders_of_requests: dict[runs.Request, Path
     data = manifest.figure_hash(figure, caption)
     style.save(figure, OUT, name)
     print(f"{name}: {module.TITLE}", flush=True)
-    commands = (*(request.command() for request in module.RUNS), *page.also(module))
+    commands = (*(request.command() for request in module.RUNS), *page.commands_of_claims(module))
     return (page.Entry(name, module.TITLE, caption, commands, module.CLAIMS),
             manifest.of_figure(module, data, perf_counter() - start, OUT.glob(f"{name}.*")))
 

@@ -61,7 +61,7 @@ its first definition; the later verdict stands beside it.</p>
 """
 
 
-def also(module) -> tuple[str, ...]:
+def commands_of_claims(module) -> tuple[str, ...]:
     """Commands for the numbers that a figure computes with the functions of the claims in COMPUTED."""
     return tuple(f"python -m verification.claims {id}" for id in getattr(module, "COMPUTED", ()))
 

@@ -200,21 +200,27 @@ def test_the_search_takes_over_from_newton(plugged, monkeypatch):
     assert min(clearances(expansion.pore.boundary, rule).values()) >= -contact_lines.CLOSE
 
 
-def test_newton_gives_up_as_soon_as_no_line_moves(plugged, monkeypatch):
-    """If no line moves and a clearance is not accepted, more iterations change nothing. The search takes over."""
-    counts = []
+def record_iterations(monkeypatch):
+    """Return a list to which each solution for contact lines, also a failing one, adds its number of iterations."""
+    iterations = []
     solve = contact_newton.Coupled.solve
 
     def counted(coupled, *arguments):
         try:
             solve(coupled, *arguments)
         finally:
-            counts.append(coupled.iterations)
+            iterations.append(coupled.iterations)
 
-    monkeypatch.setattr(contact_newton.Coupled, "_accepts", lambda coupled: False)
     monkeypatch.setattr(contact_newton.Coupled, "solve", counted)
+    return iterations
+
+
+def test_newton_gives_up_as_soon_as_no_line_moves(plugged, monkeypatch):
+    """If no line moves and a clearance is not accepted, more iterations change nothing. The search takes over."""
+    iterations = record_iterations(monkeypatch)
+    monkeypatch.setattr(contact_newton.Coupled, "_accepts", lambda coupled: False)
     expanded_by(*plugged, 1.03)
-    assert 0 < max(counts) < contact_newton.MOST_ITERATIONS
+    assert 0 < max(iterations) < contact_newton.MOST_ITERATIONS
 
 
 def test_lines_advance_the_farther_the_more_biomass_grows(plugged):
@@ -253,17 +259,8 @@ def test_a_line_keeps_away_from_corners(start, step, near, place):
 
 
 def test_newton_for_lines_gives_up_if_it_is_not_near_the_solution_in_time(plugged, monkeypatch):
-    iterations = []
-    solve = contact_newton.Coupled.solve
-
-    def counted(coupled, *arguments):
-        try:
-            solve(coupled, *arguments)
-        finally:
-            iterations.append(coupled.iterations)
-
+    iterations = record_iterations(monkeypatch)
     monkeypatch.setattr(contact_newton, "EARLY", (2, 0.0))
-    monkeypatch.setattr(contact_newton.Coupled, "solve", counted)
     expanded_by(*plugged, 1.03)
     assert iterations == [2]
 

@@ -44,7 +44,7 @@ def largest_gap(one, other):
 
 @pytest.mark.parametrize("share", [-0.02, -1e-4, 0.0])
 def test_a_small_change_of_the_start_changes_no_state(slab, share):
-    """Three states are steady. From the supply, the start of a run, the one with the most donor is reached. The starts
+    """Three states are steady. A run starts from the supply and reaches the state with the most donor. The starts here
     are the supply and each stable state, changed by a share that varies from node to node."""
     _, problem, density, states = slab
     assert largest_gap(channels.steady(problem, density).donor, states[-1]) < MESH

@@ -104,7 +104,7 @@ def test_the_laws_alone_are_compared_at_the_areas_of_the_runs():
 
 
 def test_the_page_says_what_does_not_hold(monkeypatch):
-    """With other records the words change."""
+    """The words follow from the records."""
     assert "36 of 40" in page.text() and "the law of resistance does not hold" in page.text()
     compared = runs.compared()
     monkeypatch.setattr(page.runs, "compared", lambda: compared._replace(run=2 * compared.run))

@@ -67,7 +67,7 @@ def test_the_area_is_that_of_the_growth(theta):
 
 @pytest.mark.parametrize("theta", [even, uneven])
 def test_a_mirrored_growth_has_mirrored_contact_lines(theta):
-    """Contact lines of an even growth lie evenly about the middle, those of an uneven one do not."""
+    """Even growth has symmetric contact lines, uneven growth has not."""
     growth, mirrored = touching(theta), touching(theta, mirrored=True)
     for one, other in ((growth.lines, mirrored.lines), (growth.tips, mirrored.tips)):
         assert other == pytest.approx(-one[::-1], abs=1e-4)

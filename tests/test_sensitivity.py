@@ -16,7 +16,7 @@ def value_of(scene, path):
 
 
 def test_the_rounded_inputs_are_those_of_table_1():
-    """test_scene.py tests that the scenes have the values of Table 1, in whose units they are written."""
+    """The scenes have the units and values of Table 1, as test_scene.py tests."""
     for rounded in ROUNDED:
         written = scene_tables(load_scene("base"))
         for key in rounded.paths[0].split("."):

@@ -24,7 +24,7 @@ pytestmark = [pytest.mark.thorough, pytest.mark.skipif(browser.CHROMIUM is None,
               pytest.mark.skipif(not PAGES, reason="make docs has built no site")]
 
 
-def settled(window, script):
+def wait_for(window, script):
     """Return the value of a script in the page as soon as it is true; fail after 20 s."""
     end = time.monotonic() + 20
     while not (value := window.attempt(script)):
@@ -48,24 +48,24 @@ def test_every_page_opens_without_an_error_and_loads_nothing_from_elsewhere(wind
 
 
 @cache
-def content(page):
+def read_page(page):
     return page.read_text(encoding="utf-8")
 
 
 def test_figures_are_pictures():
     """No cell prints the name of a figure in place of the figure."""
     for page in PAGES:
-        assert "&lt;Figure size" not in content(page), page
+        assert "&lt;Figure size" not in read_page(page), page
 
 
 def test_every_page_has_one_title():
-    """A script writes that of the page of search."""
+    """The search page gets its title from a script."""
     for page in PAGES:
-        assert content(page).count("<h1") == (page.name != "search.html"), page
+        assert read_page(page).count("<h1") == (page.name != "search.html"), page
 
 
 def test_all_figures_have_a_picture_and_a_caption():
-    page = content(SITE / "docs" / "figures.html")
+    page = read_page(SITE / "docs" / "figures.html")
     figures = re.findall(r'<figure id="(\w+)"><img alt="([^"]+)"[^>]*><figcaption>(.+?)</figcaption>', page, re.S)
     assert [name for name, _, _ in figures] == list(FIGURES)
     assert all(caption.startswith(f"<strong>{title}.</strong> ") for _, title, caption in figures)
@@ -73,8 +73,8 @@ def test_all_figures_have_a_picture_and_a_caption():
 
 
 def test_the_paper_has_links_to_its_references():
-    page = content(SITE / "docs" / "paper.html")
-    cited = set(re.findall(r"@(\w+)", content(ROOT / "docs" / "paper.md").partition("# Summary")[2]))
+    page = read_page(SITE / "docs" / "paper.html")
+    cited = set(re.findall(r"@(\w+)", read_page(ROOT / "docs" / "paper.md").partition("# Summary")[2]))
     assert len(cited) > 5 and "[@" not in page
     assert cited <= set(re.findall(r'href="#(\w+)"', page)) and all(f'id="{key}"' in page for key in cited)
     assert page.count("https://doi.org/") >= len(cited)
@@ -84,26 +84,26 @@ def test_links_lead_to_existing_places():
     """Every link to a file of the site leads to a file, and its fragment to an element."""
     checked = 0
     for page in PAGES:
-        for link in re.findall(r'<a [^>]*href="([^"]+)"', content(page)):
+        for link in re.findall(r'<a [^>]*href="([^"]+)"', read_page(page)):
             name, fragment = urldefrag(unescape(link))
             if not re.match(r"\w+:", name):
                 target = (page.parent / unquote(name)).resolve() if name else page
                 assert target.is_file(), (page, link)
-                assert not fragment or f'id="{unquote(fragment)}"' in content(target), (page, link)
+                assert not fragment or f'id="{unquote(fragment)}"' in read_page(target), (page, link)
                 checked += 1
     assert checked > 1000
 
 
 def test_the_root_leads_to_the_start(window):
     window.show(SITE / "index.html")
-    assert settled(window, "location.pathname.endsWith('/docs/index.html')")
+    assert wait_for(window, "location.pathname.endsWith('/docs/index.html')")
 
 
 def test_the_search_finds_pages(window):
     window.show(SITE / "search.html", "?q=neo-Hookean")
-    assert settled(window, "document.querySelectorAll('#search-results li a').length >= 2")
+    assert wait_for(window, "document.querySelectorAll('#search-results li a').length >= 2")
     window.show(SITE / "search.html", "?q=zzzznothing")
-    assert settled(window, "/did not match/.test(document.getElementById('search-results').innerText)")
+    assert wait_for(window, "/did not match/.test(document.getElementById('search-results').innerText)")
 
 
 ROWS = "[...document.querySelectorAll('article table')].at(-1).tBodies[0].rows"
@@ -125,7 +125,7 @@ def test_a_table_sorts_by_keys_and_filters_its_rows(window):
 
 
 def test_the_register_of_claims_sorts_and_filters(window):
-    """By verdict, with equal verdicts in the order of the claims; back by the number; a filter hides all other rows."""
+    """It sorts by verdict, with equal verdicts in the order of the claims, and back by number. A filter hides rows."""
     window.show(REGISTER)
     table = "document.querySelector('#claims table')"
     heading = f"{table}.tHead.rows[0].cells"
@@ -160,4 +160,4 @@ def test_the_keyboard_alone_opens_a_page(window):
     assert "q" in places and places[-1].endswith("tutorial.html")
     assert window.run("getComputedStyle(document.activeElement).outlineStyle") != "none"
     window.press("Enter")
-    assert settled(window, "location.pathname.endsWith('/docs/tutorial.html')")
+    assert wait_for(window, "location.pathname.endsWith('/docs/tutorial.html')")

@@ -20,14 +20,14 @@ def read_bibliography(text: str) -> dict[str, dict[str, str]]:
             for key, fields in ENTRY.findall(text)}
 
 
-def label(entry: dict[str, str]) -> str:
+def cite(entry: dict[str, str]) -> str:
     """Return the first author and the year, as a sentence cites them."""
-    family = [author.partition(",")[0] for author in entry["author"].split(" and ")]
-    names = " and ".join(family) if len(family) < 3 and "others" not in family else f"{family[0]} and others"
+    families = [author.partition(",")[0] for author in entry["author"].split(" and ")]
+    names = " and ".join(families) if len(families) < 3 and "others" not in families else f"{families[0]} and others"
     return f"{names}, {entry['year']}"
 
 
-def reference(key: str, entry: dict[str, str]) -> str:
+def format_reference(key: str, entry: dict[str, str]) -> str:
     """Return one item of the list of references."""
     names = entry["author"].replace(" and ", "; ").replace("; others", " and others")
     volume = f" {entry['volume']}" if "volume" in entry else ""
@@ -39,11 +39,11 @@ def reference(key: str, entry: dict[str, str]) -> str:
 def render(text: str, bibliography: dict[str, dict[str, str]]) -> str:
     """Return the paper with links for citations, its references, and its sections one level lower."""
     def links(match: re.Match) -> str:
-        return "(" + "; ".join(f"[{label(bibliography[key[1:]])}](#{key[1:]})" for key in match[1].split("; ")) + ")"
+        return "(" + "; ".join(f"[{cite(bibliography[key[1:]])}](#{key[1:]})" for key in match[1].split("; ")) + ")"
 
     cited = dict.fromkeys(key[1:] for match in CITATION.findall(text) for key in match.split("; "))
     body = re.sub(r"^# ", "## ", CITATION.sub(links, text), flags=re.M)
-    return body.rstrip() + "\n\n" + "\n\n".join(reference(key, bibliography[key]) for key in cited) + "\n"
+    return body.rstrip() + "\n\n" + "\n\n".join(format_reference(key, bibliography[key]) for key in cited) + "\n"
 
 
 def render_paper(app, docname: str, source: list[str]) -> None:

@@ -103,7 +103,7 @@ def clock() -> np.ndarray:
 
 
 def timed(job: Callable[[], dict]) -> tuple[float, np.ndarray, dict]:
-    """Wall time of a job; its wall and processor time without the seconds that its output sets apart; and this
+    """Wall time of a job; its wall and processor time less the seconds that its output reports separately; and the
     output."""
     gc.collect()
     start = clock()

@@ -109,7 +109,7 @@ def of_stage(stage: str, records: Mapping[str, Mapping]) -> dict[str, Mapping]:
     return {id: record for id, record in records.items() if cases()[id].stage == stage}
 
 
-#: Other pages on what is verified or judged.
+#: Other pages on verification and judgement.
 OTHER_PAGES = ((link("The paper's claims", "../../paper_figures/replication.md"), "`make claims`"),
            (link("Ambiguities and misprints of the paper", "../../reference/ERRATA.md"), "`verification.errata`"),
            (link("What the rounding of Table 1 allows", "../sensitivity/sensitivity.md"), "`make sensitivity`"),
@@ -163,8 +163,8 @@ def shared(names: list[str]) -> str:
 
 
 def listed(labels: list[str]) -> str:
-    """Labels as one list. Neighbours share a number in brackets at their end. Three or more share the parts
-    after a comma that they end with."""
+    """Labels as one list. Neighbours share a final number in brackets. Three or more labels share their final
+    parts after a comma."""
     split = [label.rpartition(" (") if label.endswith(")") else (label, "", "") for label in labels]
     rows = []
     for ending, group in groupby(split, key=lambda parts: parts[2]):

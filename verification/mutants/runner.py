@@ -80,7 +80,7 @@ class Outcome:
 
 
 def load_mutants() -> dict[str, tuple[Mutant, ...]]:
-    """Mutants by stage. "results" are those of what users read. Raises MutantError if two have the same id."""
+    """Mutants by stage. "results" has those of texts for users. Raises MutantError if two have the same id."""
     stages = {name: import_module(f"verification.mutants.{name}").MUTANTS for name in (*STAGES, "results")}
     ids = [mutant.id for mutants in stages.values() for mutant in mutants]
     if repeated := {id for id in ids if ids.count(id) > 1}:

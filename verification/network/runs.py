@@ -92,7 +92,7 @@ def controls(all_throats: list[History]) -> Iterator[list]:
 
 
 def _last(one_scene: Scene, width: float) -> list[float]:
-    """A / W^2, r over that of the law and thickness over that of the half-disc, in the last row up to CONTROL_SHARE."""
+    """A / W^2, and the ratios of r to the law and thickness to the half-disc, in the last row up to CONTROL_SHARE."""
     rows: list[list[float]] = []
     for report in simulate(one_scene):
         outline, flow = report.pore.outline, report.solved.flow
