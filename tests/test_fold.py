@@ -29,6 +29,7 @@ from repro.runs.status import is_over
 from repro.scene import load_scene
 from tests.shell import read_record, state
 from tests.test_resume import check_parts
+from verification.evidence.writing import append
 from verification.problems import family
 
 SETS = ('numerics.preset="fast"', "numerics.refinement=0.3", 'pore.width="20 um"', 'growth.end="6 h"',
@@ -216,6 +217,15 @@ def test_the_estimate_of_the_rim_is_that_of_a_thin_ring():
     exponent = 10 * numbers.fastest_growth(scene)
     exact = (1 + exponent * numbers.depth(scene) / 40) * np.exp(-exponent / 2)
     assert numbers.rim_stretch(scene, 0.0) == pytest.approx(exact, rel=2e-3)
+
+
+def test_the_last_row_of_a_member_counts(monkeypatch, tmp_path):
+    """Rows are appended, so a member that runs again has several."""
+    record = tmp_path / "pores.jsonl"
+    monkeypatch.setattr(family, "RECORD", record)
+    for row in ({"number": 3, "verdict": "end"}, {"number": 1, "verdict": "end"}, {"number": 3, "verdict": "fold"}):
+        append(row, record)
+    assert family.read_record() == {1: {"number": 1, "verdict": "end"}, 3: {"number": 3, "verdict": "fold"}}
 
 
 @pytest.mark.parametrize(("number", "expected"), [(22, True), (70, True), (90, False)])
