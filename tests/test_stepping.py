@@ -14,6 +14,7 @@ import pytest
 from repro.errors import GrowthError, SimulationError, Unresolved
 from repro.fem.outline import FREE, TOP
 from repro.march import midpoint, simulation, step_control, stepping, updates
+from repro.march.loop import PoreEnd
 from repro.march.midpoint import Attempt
 from repro.march.step_control import EXCESS, StepControl, exceeds_tolerance
 from repro.model import contact, pore, remeshing
@@ -146,21 +147,23 @@ def numbers(state, solved):
     return np.array([state.mass, state.outline.area, state.outline.upstream, solved.fluxes[0].effluent])
 
 
-def test_each_failure_shortens_a_step_by_the_square_of_the_last_factor(monkeypatch):
-    """Steps above 0.02 h fail. The run tries 0.2, 0.2 / 2, 0.1 / 4 and 0.025 / 16 h in this order."""
+@pytest.mark.parametrize("error, lengths", [(GrowthError, [0.2, 0.1, 0.025, 0.0015625]),
+                                            (PoreEnd, [0.2, 0.1, 0.05, 0.025, 0.0125])])
+def test_each_failure_shortens_a_step_by_the_square_of_the_last_factor(error, lengths, monkeypatch):
+    """Steps above 0.02 h fail: 0.2, 0.2 / 2, 0.1 / 4 and 0.025 / 16 h are tried. A step past an end is halved."""
     scene, tried = base(), []
     state = pore.seeded(scene)
 
     def attempt(_, __, ___, duration, *____):
         tried.append(duration)
         if duration > 0.02:
-            raise GrowthError("too long")
+            raise error("too long")
         return Attempt(stepping.StepResult(state, None, None, False, 0, None), 1e-9, None)
 
     monkeypatch.setattr(midpoint, "attempt", attempt)
     result, _, after = stepping._advance(Stages.of(scene), state, None, step_control.StepControl(0.2))
-    assert tried == [0.2, 0.1, 0.025, 0.0015625]
-    assert result.pore.time == 0.0015625 and after.length == pytest.approx(step_control.FASTER * 0.0015625)
+    assert tried == lengths
+    assert result.pore.time == lengths[-1] and after.length == pytest.approx(step_control.FASTER * lengths[-1])
 
 
 def test_a_step_ends_at_contact_within_a_thousandth_of_the_film(monkeypatch):

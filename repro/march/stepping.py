@@ -95,7 +95,8 @@ def _find_step(
     """Shorten a step until it is accepted.
 
     Failures shorten the step to 1/2, 1/8, 1/128 ... of its length, down to the shortest one: each
-    factor is the square of the last. Close to a fold every length fails, and few are tried.
+    factor is the square of the last. Close to a fold every length fails, and few are tried. If a
+    step passes an end of the run, it is halved instead, so that the last state is close to the end.
 
     Returns its start, possibly on finer elements, the step, the solution after it, and the next
     step control.
@@ -139,7 +140,11 @@ def _find_step(
                 length = duration / 2
             else:
                 previous, solved = finer
-        except (RunEnd, StageError, FloatingPointError):
+        except RunEnd:
+            if duration <= shortest:
+                raise
+            length = duration / 2
+        except (StageError, FloatingPointError):
             if duration <= shortest:
                 raise
             length = max(duration * factor, shortest)
