@@ -79,7 +79,7 @@ def _shape_gradients(count, places):
     return np.stack([*corners, *middles], axis=1)
 
 
-def least(stretch, distance, beside=0.05):
+def least(stretch, distance, beside):
     """(2,) least mean, and least value in the middle, of edges farther from contact lines than ``beside`` of the
     surface's length."""
     return stretch[distance > beside].min(axis=0)
