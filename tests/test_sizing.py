@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 
 from repro.fem import sizing as of
-from repro.fem.outline import BOTTOM, FREE, TOP
+from repro.fem.outline import BOTTOM, FREE, TOP, Outline
 from repro.fem.sizing import Sizing
 from repro.model import pore
 from repro.model.pore import resolution
@@ -67,7 +67,7 @@ def test_the_mesher_gets_the_sizes_of_the_scene():
     outline = json.dumps([["-5 um", "0 um"], ["0 um", "4 um"], ["5 um", "0 um"]])
     for seed, middle in (('position="3 um"', 3.0), (f"outline={outline}", None)):
         sizes = replace(pore.sized(load_scene("base", [*changes, f"aggregate={{{seed}}}"])), front=2.0)
-        assert sizes == Sizing(80.0, 0.7, 0.5, 0.2, 2.0, 0.125, middle)
+        assert sizes == Sizing(80.0, 0.7, 0.5, 0.2, 2.0, 0.125, middle, 0.7)
 
 
 @pytest.mark.parametrize("key, unit", [("mean_velocity", "m/day"), ("head", "um")])
@@ -77,3 +77,15 @@ def test_meshes_are_fine_enough_for_the_fastest_later_flow(key, unit):
     changes = [["numerics.preset=fast", f"flow.{key}={value}"] for value in (f"2 {unit}", f"160 {unit}", course)]
     slow, fast, over_time = (resolution(load_scene("base", each, unset=["flow.head"])) for each in changes)
     assert over_time == fast > 1.5 * slow
+
+
+def test_boundary_layers_do_not_refine_films():
+    """In a fast flow all elements are finer than in a slow flow, except those in a film."""
+    slow, fast = (pore.sized(load_scene("base", ["numerics.preset=fast", f"flow.mean_velocity={speed} m/day"],
+                                        unset=["flow.head"])) for speed in (2, 160))
+    assert slow.refinement == slow.film_refinement == fast.film_refinement == 0.2
+    assert fast.refinement > 2 * slow.refinement
+    tip = np.array([[-3.0, 0.0], [3.0, 0.0], [0.0, slow.width - FILM]])
+    outline = Outline(tip, np.array([BOTTOM, BOTTOM, FREE]), np.zeros(3, bool), tip)
+    sizes = [of.film_sizes(outline, sizing)[2] for sizing in (slow, fast)]
+    assert sizes == pytest.approx([FILM / 10 / 0.2] * 2, rel=1e-12)

@@ -37,7 +37,8 @@ class Sizing:
     resolved film (um); gradation: growth of the size with the distance from its source; front:
     further divisor of sizes at the aggregate, for a sharp front of the substrates; contact: size
     beside the contact lines with the opposite wall (um), infinite for none; seed: x (um) of the
-    middle of the half-disc at t = 0, None for another shape.
+    middle of the half-disc at t = 0, None for another shape; film_refinement: divisor of the sizes
+    in films, ``refinement`` by default.
     """
 
     width: float
@@ -47,6 +48,7 @@ class Sizing:
     front: float = 1.0
     contact: float = inf
     seed: float | None = None
+    film_refinement: float | None = None
 
     @property
     def largest(self) -> float:
@@ -119,7 +121,7 @@ def film_sizes(outline: Outline, sizing: Sizing) -> np.ndarray:
     if (outline.wall == TOP).any():
         return np.full(len(outline.points), np.inf)
     film = np.maximum(sizing.width - outline.points[:, 1], sizing.film)
-    return film / ACROSS_FILM / sizing.refinement
+    return film / ACROSS_FILM / (sizing.film_refinement or sizing.refinement)
 
 
 def size_sources(outline: Outline, sizing: Sizing) -> tuple[np.ndarray, np.ndarray]:

@@ -184,7 +184,10 @@ def fastest(drive: Drive, channel: Channel) -> float:
 
 
 def sized(scene: Scene) -> Sizing:
-    """Element sizes of a scene's meshes, without a front of the substrates."""
+    """Element sizes of a scene's meshes, without a front of the substrates.
+
+    Boundary layers refine all elements except those in films: a film is thinner than its layers.
+    """
     seed = scene.aggregate
     middle = seed.position if seed and seed.outline is None else None
     least = film(scene)
@@ -192,7 +195,8 @@ def sized(scene: Scene) -> Sizing:
     if scene.flow and scene.flow.permeability is not None:
         across = max(across, CONTACT_ELEMENTS)
     return Sizing(scene.pore.width, resolution(scene), least, scene.numerics.gradation,
-                  contact=least / across if across else inf, seed=middle)
+                  contact=least / across if across else inf, seed=middle,
+                  film_refinement=scene.numerics.refinement)
 
 
 @dataclass(frozen=True, eq=False)

@@ -202,7 +202,7 @@ def _resolving(refinement: float) -> str:
 def _seed_film(scene: Scene) -> Iterator[Caveat]:
     gap = scene.pore.width - numbers.at_start(scene).thickness
     share = min(1.0, gap / film(scene))
-    nodes = sizing.ACROSS_FILM * resolution(scene) * share * scene.numerics.order
+    nodes = sizing.ACROSS_FILM * scene.numerics.refinement * share * scene.numerics.order
     if nodes < ACROSS_FILM:
         key = "aggregate.radius" if scene.aggregate.outline is None else "aggregate.outline"
         yield Caveat(key, f"the film over the seed, {gap:.2g} um, spans only "

@@ -1394,6 +1394,13 @@ MUTANTS = (
          "across / sizing.front**0.5)",
          DEEPEST)),
     *changes(
+        "repro/model/pore.py",
+        ("films-with-layers",
+         "Boundary layers refine films too.",
+         "film_refinement=scene.numerics.refinement)",
+         "film_refinement=resolution(scene))",
+         "tests/test_sizing.py::test_boundary_layers_do_not_refine_films")),
+    *changes(
         "repro/report/comparison.py",
         ("difference-over-a-sign",
          "A difference from a negative number has the other sign.",

@@ -15,6 +15,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from time import process_time
 
 import numpy as np
 
@@ -104,19 +105,25 @@ def draw_member(number: int) -> Member:
 
 
 def run_member(member: Member, limit: float, *changes: str) -> dict:
-    """Run a member, and judge its end. limit: s of processor time."""
+    """Run a member, and judge its end. limit: s of processor time.
+
+    The row has the processor time of the run with its files ("cpu_s").
+    """
     scene = member.scene(*member.duration, *changes)
+    start = process_time()
     with TemporaryDirectory() as temporary:
         folder = Path(temporary) / "run"
         try:
             with limited(limit):
                 status = run(scene, folder)
+                cpu = process_time() - start
                 judged = judge(folder, status)
                 if judged["verdict"] == UNCONFIRMED:
                     judged = judge(_run_until_least(member, folder, status, changes), status)
         except (SimulationError, TooLong) as error:
             judged = {"verdict": FAILED, "status": str(error)}
-        return {**vars(member), "end_h": scene.growth.end, **judged, **_course(folder)}
+            cpu = process_time() - start
+        return {**vars(member), "end_h": scene.growth.end, "cpu_s": round(cpu, 2), **judged, **_course(folder)}
 
 
 def _run_until_least(member: Member, folder: Path, status: str, changes: Iterable[str]) -> Path:
@@ -194,8 +201,16 @@ def page(rows: dict[int, dict]) -> str:
     head = ("member", "width (um)", "seed (um)", "supply (mg/L)", "drive", "fold (h)", "contact before it",
             "least stretch, middle of an edge", "mean over an edge", "confirmed")
     return (f"# Pores of the family\n\nWritten by `python -m verification.problems.family`. {len(rows)} "
-            f"pores: {counts}.\n\n{' '.join(sentences)}\n\n"
+            f"pores: {counts}.\n\n{' '.join(sentences)}\n\n{_times(rows)}\n\n"
             f"{table(head, cells)}\n")
+
+
+def _times(rows: dict[int, dict]) -> str:
+    """A sentence on the processor times of the runs."""
+    times = {number: row["cpu_s"] for number, row in rows.items()}
+    longest = sorted(times, key=times.__getitem__)[-3:][::-1]
+    return (f"The processor time of a run with its files has a median of {np.median([*times.values()]):.1f} s. The "
+            "longest runs are " + ", ".join(f"member {number} ({times[number]:.1f} s)" for number in longest) + ".")
 
 
 def _forecast(name: str, rows: dict[int, dict], members: range) -> str:
