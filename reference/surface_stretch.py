@@ -18,7 +18,7 @@ def surface_stretch(points, cells, aggregate, before):
     """Compute (stretch, distance, midpoints) of the free edges, (e, 2), (e,) and (e, 2).
 
     The columns of the stretch are its mean over an edge and its value in the middle. The distance is that to the nearer
-    end of the free surface, along it and relative to its length. points: (N, 2); cells: (T, 3 or 6), corners
+    end of the free surface, along the chords of its edges and relative to their length. points: (N, 2); cells: (T, 3 or 6), corners
     counterclockwise, then the midpoints of the edges 01, 12 and 20; aggregate: (T,) True in the aggregate; before:
     (N, 2) positions at t = 0.
     """
@@ -50,7 +50,7 @@ def _along(start, free, points, cells, before):
 
 
 def _edge(present, before, local):
-    """((mean, middle) stretch, length, middle) of an edge of a triangle with nodes (3 or 6, 2) now and at t = 0."""
+    """((mean, middle) stretch, chord, middle) of an edge of a triangle with nodes (3 or 6, 2) now and at t = 0."""
     first, last = CORNERS[EDGES[local, :2]]
     places = first + (GAUSS[:, None] + 1) / 2 * (last - first)
     shape_gradients = _shape_gradients(len(present), places)
@@ -63,7 +63,8 @@ def _edge(present, before, local):
     stretch = np.sqrt(np.linalg.det(gradient)) / stretched
     weight = WEIGHTS / 2 * speed
     middle = present[EDGES[local, 2]] if len(present) == 6 else present[EDGES[local, :2]].mean(axis=0)
-    return (weight @ stretch / weight.sum(), stretch[1]), weight.sum(), middle
+    chord = np.linalg.norm(np.diff(present[EDGES[local, :2]], axis=0))
+    return (weight @ stretch / weight.sum(), stretch[1]), chord, middle
 
 
 def _shape_gradients(count, places):
