@@ -18,9 +18,9 @@ def surface_stretch(points, cells, aggregate, before):
     """Compute (stretch, distance, midpoints) of the free edges, (e, 2), (e,) and (e, 2).
 
     The columns of the stretch are its mean over an edge and its value in the middle. The distance is that to the nearer
-    end of the free surface, along the chords of its edges and relative to their length. points: (N, 2); cells: (T, 3 or 6), corners
-    counterclockwise, then the midpoints of the edges 01, 12 and 20; aggregate: (T,) True in the aggregate; before:
-    (N, 2) positions at t = 0.
+    end of the free surface, along the chords of its edges and relative to their length. points: (N, 2); cells: (T, 3 or
+    6), corners counterclockwise, then the midpoints of the edges 01, 12 and 20; aggregate: (T,) True in the aggregate;
+    before: (N, 2) positions at t = 0.
     """
     ends = np.sort(cells[:, EDGES[:, :2]], axis=2)
     fluid_edges = {tuple(pair) for pair in ends[~aggregate].reshape(-1, 2).tolist()}

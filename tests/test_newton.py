@@ -54,5 +54,5 @@ def test_newton_stops_at_the_tolerance_or_at_round_off(defects, count, converged
 def test_newton_gives_up_if_it_is_not_near_the_solution_in_time(defects, count, converged):
     """After two iterations the defect has to be 0.5 at most."""
     script = Script(defects)
-    last, steps, done = Newton(TOLERANCE, ROUND_OFF, 10, near=(2, 0.5)).solve(script, script.iterates[0])
+    last, steps, done = Newton(TOLERANCE, ROUND_OFF, 10, early=(2, 0.5)).solve(script, script.iterates[0])
     assert (last.number, steps, done) == (count, count, converged)

@@ -50,7 +50,7 @@ class Newton:
     """Newton's method.
 
     tolerance: of the defect; round_off: accepted defect when the iteration stalls; most: largest
-    number of iterations; modified_newton: keep the derivative while it suffices? near: (iterations,
+    number of iterations; modified_newton: keep the derivative while it suffices? early: (iterations,
     defect); the method gives up if the defect is larger than this after so many iterations.
     """
 
@@ -58,7 +58,7 @@ class Newton:
     round_off: float
     most: int
     modified_newton: bool = False
-    near: tuple[int, float] | None = None
+    early: tuple[int, float] | None = None
 
     def solve(self, system: System[State], iterate: State) -> tuple[State, int, bool]:
         """The last iterate, the number of steps, and whether it converged."""
@@ -70,7 +70,7 @@ class Newton:
             stalled = STALLED * last < defect <= self.round_off
             if iterate.complete and (defect <= self.tolerance or stalled):
                 return iterate, count, True
-            if self.near and count == self.near[0] and defect > self.near[1]:
+            if self.early and count == self.early[0] and defect > self.early[1]:
                 return iterate, count, False
             if not self.modified_newton or defect > REQUIRED_REDUCTION * last:
                 factors = None

@@ -111,9 +111,9 @@ def _find_step(
     duration = fit_to_interval(length, remaining, STRETCH)
     factor = 0.5
     while True:
-        largest_change = np.inf if duration <= shortest else EXCESS * tolerance / duration
+        last = duration <= shortest
+        largest_change = np.inf if last else EXCESS * tolerance / duration
         try:
-            last = duration <= shortest
             search = SearchOptions(landing=0.0 if last else LANDED, patient=last)
             trial = midpoint.attempt(stages, previous, solved, duration, largest_change, search)
             estimate = trial.change * duration
@@ -141,11 +141,11 @@ def _find_step(
             else:
                 previous, solved = finer
         except RunEnd:
-            if duration <= shortest:
+            if last:
                 raise
             length = duration / 2
         except (StageError, FloatingPointError):
-            if duration <= shortest:
+            if last:
                 raise
             length = max(duration * factor, shortest)
             factor *= factor

@@ -53,7 +53,7 @@ MOST_ITERATIONS = 25
 #: (iterations, defect): Newton's method gives up if its defect is larger than this after so many
 #: iterations. In 19 pores this would have stopped three of 1240 solutions that converged. It saves
 #: half of the processor time of 117 that did not.
-NEAR = 12, 0.02
+EARLY = 12, 0.02
 #: Halvings in a line search.
 HALVINGS = 8
 #: Sub-steps of a continuation, by ``patient``; an impatient caller shortens its step instead.
@@ -537,7 +537,7 @@ def reach(system: System, start: np.ndarray, theta: np.ndarray, first: Equilibri
 def _continued(system: System, start: np.ndarray, theta: np.ndarray, first: Equilibrium,
                prescribed: np.ndarray, steps: int, modified_newton: bool) -> Equilibrium:
     """Newton's method at theta = start (theta / start)^s for s = 1 / steps ... 1."""
-    newton = Newton(NEWTON, ROUND_OFF, MOST_ITERATIONS, modified_newton, NEAR)
+    newton = Newton(NEWTON, ROUND_OFF, MOST_ITERATIONS, modified_newton, EARLY)
     solution = first
     for part in np.arange(1, steps + 1) / steps:
         target = first.position + part * (prescribed - first.position)

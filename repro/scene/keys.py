@@ -417,7 +417,7 @@ class Numerics:
 #: until contact (see `make bench`), the paper's own scheme.
 PRESETS: dict[str, dict[str, str | float]] = {
     "fast": {"elements": "quadratic", "time": "midpoint", "refinement": 0.2, "tolerance": 0.0075,
-             "jacobian": "reused"},
+             "contact_elements": 1.0, "jacobian": "reused"},
     "accurate": {"elements": "quadratic", "time": "midpoint", "refinement": 0.45,
                  "tolerance": 0.001, "jacobian": "reused"},
     "exact": {"elements": "quadratic", "time": "midpoint", "refinement": 0.7, "tolerance": 0.00025,

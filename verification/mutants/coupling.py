@@ -334,7 +334,7 @@ MUTANTS = (
          "defect >= 0"),
         ("newton-never-gives-up",
          "Newton's method iterates to the end far from the solution.",
-         "if self.near and count",
+         "if self.early and count",
          "if False and count",
          "tests/test_newton.py::test_newton_gives_up_if_it_is_not_near_the_solution_in_time")),
     *changes(
