@@ -57,7 +57,8 @@ def test_water_that_must_pass_a_permeable_body_leaves_concentrations_within_thei
 
 
 @pytest.mark.parametrize("overrides, expected", [
-    ([], 2.0), (["numerics.contact_elements=0"], np.inf), (["flow.biomass=brinkman", "flow.permeability=1e-15 m^2"], 1.0),
+    ([], 2.0), (["numerics.contact_elements=0"], np.inf),
+    (["flow.biomass=brinkman", "flow.permeability=1e-15 m^2"], 1.0),
     (["flow.biomass=brinkman", "flow.permeability=1e-15 m^2", "numerics.contact_elements=4"], 0.5)])
 def test_elements_beside_upper_contact_lines_of_a_permeable_body_are_half_the_least_film_or_less(overrides, expected):
     """Beside an impermeable body fast has elements of the least film, 2 um."""
