@@ -119,6 +119,9 @@ FINE, FAST = "numerics.refinement=2", "numerics.preset=fast"
     ("aggregate.radius", ["flow_only"], "aggregate.radius=49.1 um", "aggregate.radius=49.3 um"),
     ("aggregate.radius", ["flow_only", "aggregate.radius=40 um"], "numerics.refinement=0.41",
      "numerics.refinement=0.39"),
+    # in fast a film of 2 um has four intervals; boundary layers add none
+    ("aggregate.radius", ["wide", FAST, "flow.mean_velocity=60 m/day"], "aggregate.radius=97.9 um",
+     "aggregate.radius=98.1 um"),
     # the mesh of a seed of 40 um extends 75 um to either side
     ("pore.length", ["flow_only", "aggregate.radius=40 um"], "pore.length=231 um", "pore.length=229 um"),
     # the growth rate is 0.19 1/h

@@ -33,7 +33,7 @@ DISTANCES = 2**20
 class Sizing:
     """Element sizes of a mesh.
 
-    width: of the pore (um); refinement: divisor of all sizes; film: thickness of the thinnest
+    width: of the pore (um); refinement: divisor of the sizes; film: thickness of the thinnest
     resolved film (um); gradation: growth of the size with the distance from its source; front:
     further divisor of sizes at the aggregate, for a sharp front of the substrates; contact: size
     beside the contact lines with the opposite wall (um), infinite for none; seed: x (um) of the
@@ -115,7 +115,7 @@ def too_coarse(outline: Outline, sizing: Sizing) -> bool:
 def film_sizes(outline: Outline, sizing: Sizing) -> np.ndarray:
     """(M,) element size (um) in the fluid between each node and the opposite wall.
 
-    It is a tenth of the film's thickness, but at least the size in the thinnest resolved film,
+    It is a tenth of the film's thickness over the refinement there, but at least the size in the thinnest resolved film,
     because thinner films close.
     """
     if (outline.wall == TOP).any():

@@ -3,8 +3,9 @@
 A film of fluid closes if it is thinner than the least film. A wedge beside a contact surface closes
 if its angle is less than the least angle. Both rules together require a gap to the wall of at least
 min(film, tan(angle) d) at the distance d from the contact line. On straight edges, which the paper
-uses, nodes that violate the rule join the wall one by one. On arcs the rule applies everywhere on
-the free surface, and :mod:`repro.model.contact_lines` finds the contact lines, anywhere on an arc.
+uses, all nodes up to the farthest one that violates the rule join the wall. On arcs the rule
+applies everywhere on the free surface, and :mod:`repro.model.contact_lines` finds the contact
+lines, anywhere on an arc.
 """
 
 from __future__ import annotations

@@ -163,7 +163,7 @@ def film(scene: Scene) -> float:
 
 
 def resolution(scene: Scene) -> float:
-    """Divisor of the element sizes: ``numerics.refinement``, or more for boundary layers.
+    """Divisor of the element sizes outside films: ``numerics.refinement``, or more for layers.
 
     The speed is the scene's mean velocity, or that of the clean channel under its head.
     """

@@ -28,8 +28,7 @@ LENGTH = "length of contact (um)"
 #: Relative errors that presets aim at, and those that are accepted: of conductivity and tips, of the length of contact.
 AIMS = {"fast": 0.01, "accurate": 0.002, "exact": 0.0005}
 #: The first limits were 0.5 % of the length for `accurate`, and 0.2 and 0.5 % for `exact`. Finer references showed an
-#: error of 0.55 % for `accurate` right after contact, when the length is 12 um. With 4 contact elements `exact` meets
-#: its aim.
+#: error of 0.55 % for `accurate` right after contact, when the length is 12 um.
 ACCEPTED = {"fast": (0.01, 0.02), "accurate": (0.002, 0.006), "exact": (0.0005, 0.0005)}
 #: Until 2026-11-26 the conductivity of `exact` had its aim as limit in both pores. Then contact lines beside corners
 #: got other places, and its error in the pore of 40 um became 0.063 %. The reference changes by 0.041 % there between

@@ -1401,6 +1401,13 @@ MUTANTS = (
          "film_refinement=resolution(scene))",
          "tests/test_sizing.py::test_boundary_layers_do_not_refine_films")),
     *changes(
+        "repro/preflight/simplifications.py",
+        ("seed-film-with-layers",
+         "The check assumes that boundary layers refine the film over the seed.",
+         "sizing.ACROSS_FILM * scene.numerics.refinement * share",
+         "sizing.ACROSS_FILM * resolution(scene) * share",
+         "tests/test_check.py::test_warnings_are_exactly_where_a_simplification_fails")),
+    *changes(
         "repro/report/comparison.py",
         ("difference-over-a-sign",
          "A difference from a negative number has the other sign.",

@@ -44,7 +44,7 @@ DRIVES = ("head", "0.3 m/day", "10 m/day")
 TESTED = range(100, 140)
 #: Relative difference of two computations of one stretch from the same shape: round-off of the fields in a file.
 SAME = 1e-6
-#: Edges closer to a contact line than this part of the surface's length do not count.
+#: Edges closer to a contact line than this part of the surface's length do not count, as in the run.
 BESIDE = 0.05
 #: Time (h) of the least stretch in the message of a fold.
 LEAST = re.compile(r"um at t = (\S+) h;")
@@ -113,14 +113,15 @@ def run_member(member: Member, limit: float, *changes: str) -> dict:
         folder = Path(temporary) / "run"
         try:
             with limited(limit):
-                status = run(scene, folder)
-                cpu = process_time() - start
+                try:
+                    status = run(scene, folder)
+                finally:
+                    cpu = process_time() - start
                 judged = judge(folder, status)
                 if judged["verdict"] == UNCONFIRMED:
                     judged = judge(_run_until_least(member, folder, status, changes), status)
         except (SimulationError, TooLong) as error:
             judged = {"verdict": FAILED, "status": str(error)}
-            cpu = process_time() - start
         return {**vars(member), "end_h": scene.growth.end, "cpu_s": round(cpu, 2), **judged, **_course(folder)}
 
 
@@ -196,7 +197,7 @@ def page(rows: dict[int, dict]) -> str:
              for row in sorted(folds, key=lambda row: row["width"])]
     sentences = [_forecast("fitted", rows, range(MEMBERS)), _forecast("not fitted", rows, TESTED)]
     head = ("member", "width (um)", "seed (um)", "supply (mg/L)", "drive", "fold (h)", "contact before it",
-            "least stretch, middle of an edge", "mean over an edge", "confirmed")
+            "least stretch of the rows, middle of an edge", "mean over an edge", "confirmed")
     return (f"# Pores of the family\n\nWritten by `python -m verification.problems.family`. {len(rows)} "
             f"pores: {counts}.\n\n{' '.join(sentences)}\n\n{_times(rows)}\n\n"
             f"{table(head, cells)}\n")

@@ -25,7 +25,7 @@ from verification.problems.hard import TooLong, limited
 
 #: Least stretch at which runs on other meshes begin. The surface is smooth, long before the first crease.
 BEGUN = 0.75
-#: Below a refinement of 0.4 the sizes do not depend on it.
+#: Where boundary layers require about 0.4, smaller refinements change only the elements in films.
 MESHES = {"fast, refinement 0.45": ("numerics.refinement=0.45",), "accurate": ("numerics.preset=accurate",),
           "accurate, refinement 0.7": ("numerics.preset=accurate", "numerics.refinement=0.7")}
 STRESS_FREE = "growth.new_biomass=stress_free"
