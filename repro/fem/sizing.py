@@ -115,8 +115,8 @@ def too_coarse(outline: Outline, sizing: Sizing) -> bool:
 def film_sizes(outline: Outline, sizing: Sizing) -> np.ndarray:
     """(M,) element size (um) in the fluid between each node and the opposite wall.
 
-    It is a tenth of the film's thickness over the refinement there, but at least the size in the thinnest resolved film,
-    because thinner films close.
+    It is a tenth of the film's thickness over the refinement there, but at least the size in the
+    thinnest resolved film, because thinner films close.
     """
     if (outline.wall == TOP).any():
         return np.full(len(outline.points), np.inf)

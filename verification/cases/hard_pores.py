@@ -16,8 +16,8 @@ LIMIT = 120.0
 #: Cheap members, in ``make test``. Their surfaces are compressed to 0.97 and 0.93. ``make verify`` runs the others too.
 QUICK = (2, 58)
 REST = tuple(number for number in range(family.MEMBERS) if number not in QUICK)
-#: Members whose fold is not confirmed. The surface of member 8 buckles within one edge: the least stretch of its rows is
-#: 0.581 in the middle and 0.701 in the mean.
+#: Members whose fold is not confirmed. The surface of member 8 buckles within one edge: the least stretch of its rows
+#: is 0.581 in the middle and 0.701 in the mean.
 BUCKLED = (8,)
 #: Fields of the mark that both cases share.
 COMMON = {
