@@ -50,8 +50,9 @@ class Newton:
     """Newton's method.
 
     tolerance: of the defect; round_off: accepted defect when the iteration stalls; most: largest
-    number of iterations; modified_newton: keep the derivative while it suffices? early: (iterations,
-    defect); the method gives up if the defect is larger than this after so many iterations.
+    number of iterations; modified_newton: keep the derivative while it suffices?; early:
+    (iterations, defect); the method gives up if its defect is larger than this after this number of
+    iterations.
     """
 
     tolerance: float

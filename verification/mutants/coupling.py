@@ -336,7 +336,7 @@ MUTANTS = (
          "Newton's method iterates to the end far from the solution.",
          "if self.early and count",
          "if False and count",
-         "tests/test_newton.py::test_newton_gives_up_if_it_is_not_near_the_solution_in_time")),
+         "tests/test_newton.py::test_newton_gives_up_if_its_defect_stays_large")),
     *changes(
         "repro/march/stepping.py",
         ("supply-a-step-late",
