@@ -98,6 +98,7 @@ NARROW = {"pore": {"width": "30 um"}, "aggregate": {"radius": "8 um"}, "flow": {
           "substrates": {"acceptor": {"supply": "8 mg/L"}, "donor": {"supply": "5 mg/L"}}, "growth": {"end": "1 h"}}
 
 
+@pytest.mark.exact_lengths
 def test_a_scene_may_be_a_dict_a_file_or_a_name(tmp_path):
     """It may also be a loaded scene. The dict stays unchanged."""
     original = copy.deepcopy(NARROW)

@@ -65,14 +65,14 @@ def test_the_numbers_of_base_are_those_of_table_1():
     }
     assert set(computed) == set(by_hand)
     for name, value in by_hand.items():
-        assert computed[name].start == pytest.approx(value, rel=1e-12), name
+        assert computed[name].start == pytest.approx(value, rel=1e-9), name
     assert computed["fluid stress over modulus"].end == pytest.approx(998 * 9.81 * 1e-5 / 1e4, rel=1e-12)
 
 
 def test_contact_is_expected_before_it_occurs():
     """Wide touches the opposite wall at 34.3 h; its upstream tip is at 250 um at 45 h."""
     sizes = numbers.at_end(load_scene("wide"))
-    assert 30 < sizes.contact < 34.3 and 250 < sizes.reach <= 300 and sizes.thickness == 100
+    assert 30 < sizes.contact < 34.3 and 250 < sizes.reach <= 300 and sizes.thickness == pytest.approx(100)
 
 
 @pytest.mark.parametrize("name, overrides, keys", [
@@ -156,7 +156,7 @@ def test_an_offset_of_the_seed_adds_to_its_reach():
     for sizes in (numbers.at_start, numbers.at_end):
         assert sizes(aside).reach == pytest.approx(sizes(middle).reach + 90.0, rel=1e-12)
         assert sizes(aside).area == pytest.approx(sizes(middle).area, rel=1e-12)
-    assert numbers.half_length(middle) == 5 + 10 * 5
+    assert numbers.half_length(middle) == pytest.approx(5 + 10 * 5)
 
 
 @pytest.mark.parametrize("preset, least, most", [("paper", 1.0, 1.0), ("fast", 0.5, 2.0)])

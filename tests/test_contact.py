@@ -447,7 +447,7 @@ def test_each_contact_surface_has_its_own_fixed_point(order):
     scene = simulation.shaped(coarse_base(order, 'pore.width="20 um"')[0], leaning)
     pore = seeded(scene)
     x, y = pore.mesh.points[pore.mesh.loop][pore.fixed].T
-    assert y.tolist() == [0.0, 20.0] and x == pytest.approx([-2.0, -1.0], abs=0.3)
+    assert y == pytest.approx([0.0, 20.0]) and x == pytest.approx([-2.0, -1.0], abs=0.3)
     aside = replace(pore, fixed=np.roll(pore.fixed, 2))
     for option, expected in (("kept", aside.fixed), ("rechosen", pore.fixed)):
         numerics = replace(scene.numerics, fixed_point=option)

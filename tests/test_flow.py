@@ -62,7 +62,7 @@ def test_water_that_must_pass_a_permeable_body_leaves_concentrations_within_thei
     (["flow.biomass=brinkman", "flow.permeability=1e-15 m^2", "numerics.contact_elements=4"], 0.5)])
 def test_elements_beside_upper_contact_lines_of_a_permeable_body_are_half_the_least_film_or_less(overrides, expected):
     """Beside an impermeable body fast has elements of the least film, 2 um."""
-    assert pore.sized(load_scene("base", ["numerics.preset=fast", *overrides])).contact == expected
+    assert pore.sized(load_scene("base", ["numerics.preset=fast", *overrides])).contact == pytest.approx(expected)
 
 
 @pytest.mark.parametrize("element, setting", [

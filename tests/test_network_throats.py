@@ -111,6 +111,7 @@ def test_the_page_says_what_does_not_hold(monkeypatch):
     assert "the bounds do not hold for all of them" in page._throats()
 
 
+@pytest.mark.exact_lengths
 def test_a_sweep_of_throats_makes_a_run_of_each(tmp_path):
     """One has no flow. The head loss of a throat that reverses is taken without its sign."""
     chosen = [THROATS[14], next(one for one in THROATS if not one.flows)]

@@ -97,6 +97,7 @@ def test_errors_name_arguments_in_python_and_options_on_the_command_line(tmp_pat
         assert all(option in caught.value.args[0] for option in options)
 
 
+@pytest.mark.exact_lengths
 @pytest.mark.parametrize("call, reached", [
     (lambda folder, **keywords: repro.run("base", folder / "run", SHORT, **keywords), "0.2 of 0.2 h"),
     (lambda folder, **keywords: repro.solve("base", SHORT, **keywords), "0.2 of 0.2 h"),

@@ -283,6 +283,7 @@ def test_results_reach_the_disk_while_a_run_goes_on(tmp_path):
     assert states == [("running", count, count) for count in range(1, len(states) + 1)] and len(states) > 4
 
 
+@pytest.mark.exact_lengths
 @pytest.mark.parametrize("number, status", [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_a_run_ended_by_a_signal_resumes(tmp_path, number, status):
     """It ends with one line and the results so far. The resumed run has the bits of the uninterrupted one."""

@@ -73,6 +73,7 @@ TABLE_1 = {  # worked out by hand: 1 m = 1e6 um, 1 cm2 = 1e8 um2, 1 day = 24 h, 
 EVERYTHING = {"aggregate": {}, "flow": {"head": "1e-3 cm"}, "substrates": {}, "growth": {"end": "1 h"}}
 
 
+@pytest.mark.exact_lengths
 def test_defaults_are_table_1():
     scene = parse_scene(EVERYTHING, "everything", "mine.toml")
     for key, value in TABLE_1.items():
@@ -85,6 +86,7 @@ def test_kinetics_need_substrates_and_an_aggregate():
     assert "[substrates]" in refusal("flow_only", "kinetics.yield_coefficient=0.5")
 
 
+@pytest.mark.exact_lengths
 def test_the_name_of_a_scene_is_the_stem_of_its_file(tmp_path):
     path = write_scene(tmp_path, '\ufeff[pore]\r\nwidth = "0.08 mm"\r\n[aggregate]\r\nradius = "20 µm"\r\n')
     for source in (path, str(path)):
@@ -104,6 +106,7 @@ def test_a_value_cannot_set_another_key():
     assert "pore.width" in refusal("base", 'pore.width="9 um"\nlength="9 um"')
 
 
+@pytest.mark.exact_lengths
 def test_unset_removes_keys_and_sections():
     base = load_scene("base")
     driven = load_scene("base", ["flow.mean_velocity=1 m/day"], unset=["flow.head"])
@@ -152,6 +155,7 @@ def converted(convert, text, unit):
         return "refused"
 
 
+@pytest.mark.exact_lengths
 @pytest.mark.parametrize("text, unit, value", [("5 inch", "um", 127000.0), ("2 kmin", "h", 2000 / 60),
                                                ("14.5 psi", "MPa", 0.09997398075094124)])
 def test_units_that_pint_alone_knows_are_accepted(text, unit, value):

@@ -403,6 +403,7 @@ def test_the_search_for_deep_keys_is_linear_in_the_size(piece):
     assert time.process_time() - start < 10
 
 
+@pytest.mark.exact_lengths
 def test_a_large_file_is_refused_unread(tmp_path):
     path = tmp_path / "mine.toml"
     path.write_bytes(b"[pore]\n#" + b"x" * (files.LARGEST - 8))
@@ -412,6 +413,7 @@ def test_a_large_file_is_refused_unread(tmp_path):
     assert "mine.toml: more than 300000 bytes; a scene has a few thousand" in refusal(path)
 
 
+@pytest.mark.exact_lengths
 def test_a_file_that_is_not_utf_8_is_refused(tmp_path):
     """The message has a command that makes it a scene."""
     for encoding in ("latin-1", "utf-16"):

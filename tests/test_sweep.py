@@ -34,6 +34,9 @@ from tests.shell import read_record, rewrite, rows, start
 from tests.strategies import number
 from tests.test_sweep_cluster import until
 
+#: The runs of a sweep are processes of their own.
+pytestmark = pytest.mark.exact_lengths
+
 SHORT = ["--set", "numerics.preset=fast", "--set", 'growth.end="0.4 h"']
 #: The second flow is too slow to carry substrates, so that its run fails.
 VARY = ["--vary", "flow.mean_velocity=2.9 m/day, 1e-12 m/day, 5.8 m/day"]

@@ -98,6 +98,7 @@ def make_points(*varied, sets=(), source="base"):
     return points(source, list(sets), factors, grid(factors))
 
 
+@pytest.mark.exact_lengths
 def test_varying_one_of_the_pair_replaces_the_other_and_keeps_the_rest():
     """The scene base has a head."""
     (point,) = make_points("flow.mean_velocity=2 m/day", sets=["flow.viscosity_ratio=7"])
