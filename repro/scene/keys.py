@@ -607,7 +607,7 @@ def load_scene(scene: Source, overrides: Sequence[str] = (), *,
     ----------
     scene : Scene, str, Path or dict
         A TOML file, the name of a packaged scene, a dict of tables like those of a file, or a
-        loaded scene.
+        loaded scene. Lists of a dict may be tuples or arrays, its numbers scalars of NumPy.
     overrides : sequence of str, optional
         Changes "KEY=VALUE", like those of ``--set``: dotted keys, values in TOML with units.
     unset : sequence of str, optional
