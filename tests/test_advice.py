@@ -48,7 +48,7 @@ ADVICE = {
     r'or numerics\.time = "midpoint"': "numerics.time=midpoint",
     r'"80 %" keeps their ratio': "substrates.{key}=80 %",
 }
-NO_SETTING = ("no refinement up to 20", "no setting models it")
+NO_SETTING = ("no refinement up to 20",)
 
 
 def drawn(seed):
