@@ -82,7 +82,7 @@ REFUSED = {
         f'substrates.acceptor.diffusivity_in_aggregate="{value}"' for value in (
             "0 %", "-5 %", "100.1 %", "%", "nan %", "1e999999999 %", "1e-999999999 %", "80 %%", "80 % um^2/h", "0.8",
             "eighty %", "9" * 100 + " %")],
-    "kinetics.donor_oxygen_demand = 0.8: more than Y d_c (0.8662) is needed: F is the rest": [
+    "kinetics.donor_oxygen_demand = 0.8: more than Y d_c (0.8662) is needed: F = COD - Y d_c is positive": [
         "kinetics.donor_oxygen_demand=0.8"],
     "a plain number is needed, such as 2.38 (greater than zero)": [
         f"kinetics.donor_oxygen_demand={value}" for value in ("0", "2 mg/mg", "nan")],
@@ -118,7 +118,7 @@ REFUSED = {
     "upstream or downstream, is needed": ["aggregate.position=-1 m"],
     'a length is needed, such as "0 um" (of either sign) (did you mean "20 um"?)': ["aggregate.position=20"],
     'a length is needed, such as "0 um" (of either sign)': ["aggregate.position=5 h", "aggregate.position=inf um"],
-    "aggregate.smooth = true: true is accepted with aggregate.outline alone": ["aggregate.smooth=true"],
+    "aggregate.smooth = true: true is accepted only with aggregate.outline": ["aggregate.smooth=true"],
     "true or false is needed, without quotes (did you mean true?)": ['aggregate.smooth="true"'],
     "aggregate.smooth = 1: true or false is needed": ["aggregate.smooth=1"],
     "a plain number is needed, such as 0 (zero or more, less than 1)": ["aggregate.inert_fraction=1"],
@@ -138,12 +138,12 @@ REFUSED = {
         f"{DONOR}={value}" for value in ('[["0 mg/L", "1 h"]]', '[["0 h"]]', '["0 h", "1 mg/L"]')],
     'or a list of [time, value] pairs such as [["0 h", "10 mg/L"], ["5 h", "10 mg/L"]] (did you mean "3 mg/L"?)': [
         f"{DONOR}=3"],
-    "flow.head (10 um) is given too": ['flow.mean_velocity=[["0 h", "1 m/day"]]'],
-    '"steps" is needed where no table': ["flow.interpolation=linear", "substrates.acceptor.interpolation=linear"],
+    "flow.head (10 um) is set too": ['flow.mean_velocity=[["0 h", "1 m/day"]]'],
+    '"steps" is needed without a table': ["flow.interpolation=linear", "substrates.acceptor.interpolation=linear"],
     # times
     "a list of times is needed": ["output.times=5 h", "output.times=[]", "output.times=[5 h, 6 h]", "output.times=[5]",
                                   'output.times=["5 um"]', 'output.times=["-1 h", "1 h"]', 'output.times=[["1 h"]]'],
-    "none after 19.4 h is accepted: growth.end is 19.4 h": ['output.times=["1 h", "19.5 h"]'],
+    "times up to 19.4 h are accepted: growth.end is 19.4 h": ['output.times=["1 h", "19.5 h"]'],
 }
 
 
@@ -189,7 +189,7 @@ def test_every_key_refuses_values_of_another_kind():
     ("base", ["numerics.elements=cubic", "numerics.transfer=linear"],
      '"conserving" is needed with numerics.elements = "cubic"; "linear" has'),
     ("flow_only", ["substrates={}", "growth.time_step=1 h"], 'growth.end is missing: a time is needed'),
-    ("flow_only", ['output.times=["1 h"]'], "none after 0 h is accepted: there is no [growth]"),
+    ("flow_only", ['output.times=["1 h"]'], "times up to 0 h are accepted: there is no [growth]"),
 ])
 def test_an_entry_that_conflicts_with_the_scene_is_refused(source, overrides, part):
     message = refusal(source, *overrides)
@@ -200,7 +200,7 @@ def test_an_entry_that_conflicts_with_the_scene_is_refused(source, overrides, pa
     ('[flow]\nhead = "1e-3 cm"\nbiomass = "brinkman"\npermeability = "1e-15 m^2"\n[numerics]\npreset = "fast"\n',
      'flow.biomass = "brinkman": "viscous" is needed without'),
     ('[aggregate]\n[substrates.acceptor]\n[kinetics]\nlaw = "Haldane"\n',
-     'kinetics.law = "Haldane": [substrates.donor], which inhibits, is needed'),
+     'kinetics.law = "Haldane": [substrates.donor] is needed'),
     ('[aggregate]\n[substrates.donor]\ninhibition_constant = "5 mg/L"\n', 'kinetics.law = "Haldane" is needed with it'),
     ('[aggregate]\n[substrates.donor]\nsupply = "0.5 mg/L"\n[kinetics]\nlaw = "zero order"\n',
      'substrates.donor.supply = "0.5 mg/L": half_saturation (1 mg/L) or more is needed'),
@@ -261,13 +261,13 @@ PAIRS = [
      "y of point 2 (0 um, 9 um) of aggregate.outline, or more, is needed"),
     (*OUTLINED, "pore.length=9 um", "|x| < half of pore.length (9 um) at point 1",
      "more than twice |x| of point 1 (-5 um, 0 um) of aggregate.outline is needed"),
-    (*OUTLINED, "aggregate.radius=9 um", "aggregate.radius (9 um) is given too; one of them is accepted, not both "
-     "(unset aggregate.radius leaves that out)", "(unset aggregate.outline leaves that out)"),
-    (*OUTLINED, "aggregate.position=9 um", "aggregate.position (9 um) is given too",
+    (*OUTLINED, "aggregate.radius=9 um", "aggregate.radius (9 um) is set too; only one of them is accepted "
+     "(unset aggregate.radius removes it)", "(unset aggregate.outline removes it)"),
+    (*OUTLINED, "aggregate.position=9 um", "aggregate.position (9 um) is set too",
      "0 um is needed with aggregate.outline"),
     ("initial_mesh", "flow.head=1 cm", "flow.mean_velocity=1 m/day",
-     "flow.mean_velocity (1 m/day) is given too; one of them is accepted, not both (unset flow.mean_velocity leaves",
-     "flow.head (10000 um) is given too; one of them is accepted, not both (unset flow.head leaves that out)"),
+     "flow.mean_velocity (1 m/day) is set too; only one of them is accepted (unset flow.mean_velocity removes",
+     "flow.head (10000 um) is set too; only one of them is accepted (unset flow.head removes it)"),
     ("initial_mesh", "flow.mean_velocity=0 m/day", "substrates.boundary=open; numerics.transport=quasi_steady",
      'greater than zero is needed, or numerics.transport = "gear"', '"gear" is needed with flow.mean_velocity = 0'),
     ("initial_mesh", "substrates.boundary=closed", "flow.head=1 cm", '"open" is needed with [flow]',
@@ -276,7 +276,7 @@ PAIRS = [
      '"open" is needed, or numerics.transport = "gear"', '"gear" is needed with substrates.boundary = "closed"'),
     ("initial_mesh", "flow.mean_velocity=0 m/day",
      "substrates.boundary=open; numerics.extent=central; numerics.transport=gear",
-     'numerics.extent = "full" is needed with 0 m/day', '"full" is needed where substrates are there and nothing flo'),
+     'numerics.extent = "full" is needed with 0 m/day', '"full" is needed with substrates in water at rest'),
     ("base", "growth.time_step=1e-4 h", "growth.end=11 h", "growth.end (11 h) over 100000 or more is needed",
      "at most 100000 times growth.time_step (0.0001 h) is needed"),
     ("base", "growth.minimum_film=30 um", "pore.width=20 um", "less than pore.width (20 um) is needed",
@@ -285,17 +285,18 @@ PAIRS = [
      'numerics.flow_element = "stabilised" is needed with it, not "bubble"'),
     ("base", "numerics.transfer=linear", "numerics.elements=quadratic", '"conserving" is needed with numerics.elem',
      'numerics.transfer = "conserving" is needed with it, not "linear"'),
-    ("base", "growth.fluid_forces=included", "growth.new_biomass=stress_free", "which would yield at every update",
+    ("base", "growth.fluid_forces=included", "growth.new_biomass=stress_free",
+     "because the aggregate would yield at every update",
      '"stressed" is needed with growth.fluid_forces = "included"'),
     ("base", "numerics.transfer=bounded", "numerics.preset=accurate", '"conserving" is needed with numerics.elements',
      'numerics.transfer = "conserving" is needed with it, not "bounded"'),
     ("base", "numerics.transport=gear", "numerics.time=midpoint", '"quasi_steady" is needed with numerics.time = "mid',
      '"updates" is needed with numerics.transport = "gear"'),
     ("base", "kinetics.donor_oxygen_demand=1.2", "kinetics.yield_coefficient=1", "more than Y d_c (1.42) is needed",
-     "less than kinetics.donor_oxygen_demand (1.2) is needed of Y d_c (1.42), its product with decay_oxygen_demand"),
+     "a smaller value is needed: Y d_c (1.42) is not less than kinetics.donor_oxygen_demand (1.2)"),
     ("base", "kinetics.donor_oxygen_demand=1.2", "kinetics.decay_oxygen_demand=4", "more than Y d_c (2.44) is needed",
-     "is needed of Y d_c (2.44), its product with yield_coefficient"),
-    ("base", 'output.times=["5 h"]', "growth.end=4 h", "none after 4 h is accepted: growth.end is 4 h",
+     "a smaller value is needed: Y d_c (2.44) is not less than kinetics.donor_oxygen_demand (1.2)"),
+    ("base", 'output.times=["5 h"]', "growth.end=4 h", "times up to 4 h are accepted: growth.end is 4 h",
      "5 h or more, the last of output.times, is needed"),
 ]
 

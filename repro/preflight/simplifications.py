@@ -130,8 +130,8 @@ def _lag(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
 def _transit(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
     transit = computed.get("transit over growth time")  # not of water that stands still
     if transit and transit.start > TRANSIT:
-        yield Caveat("flow", f"water takes {transit.start:.2g} of the time of growth to pass the pore, "
-                     f"above {TRANSIT:g}: steady profiles in each shape (3.3.2) ignore the "
+        yield Caveat("flow", f"water takes {transit.start:.2g} of the time of growth to pass the "
+                     f"pore, above {TRANSIT:g}: steady profiles in each shape (3.3.2) ignore the "
                      "substrates that the pore contained before, so the biomass may err by this "
                      "fraction")
 
