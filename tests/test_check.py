@@ -1,9 +1,11 @@
 """`repro check`: the mesh of the run, numbers computed by hand, and warnings exactly where a simplification fails."""
 
+import itertools
 import json
 import math
 import re
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -95,7 +97,7 @@ FEW = ("substrates.acceptor.half_saturation=2e-3 mg/L", "substrates.donor.half_s
 FINE, FAST = "numerics.refinement=2", "numerics.preset=fast"
 
 
-@pytest.mark.parametrize("key, common, inside, outside", [
+THRESHOLDS = [
     # u W / nu = 0.1 at 173 m/day in 50 um
     ("flow", ["flow_only"], "flow.mean_velocity=170 m/day", "flow.mean_velocity=176 m/day"),
     # 1.5 u (W / 14) / D = 2 at 15 m/day in 100 um, at twice that on elements half as large; never if quadratic
@@ -143,11 +145,77 @@ FINE, FAST = "numerics.refinement=2", "numerics.preset=fast"
      "kinetics.donor_oxygen_demand=2.38", ""),
     ("kinetics.acceptor_to_donor_ratio", [*QUIET, "kinetics.decay_oxygen_demand=1.2"],
      "kinetics.acceptor_to_donor_ratio=1.7", ""),
-])
+    # a strength that the water's forces do not count against
+    *((f"growth.{strength}", [*QUIET, f"growth.{strength}=1 kPa"], "growth.fluid_forces=included", "")
+      for strength in ("bonding_strength", "tensile_strength")),
+]
+
+
+@pytest.mark.parametrize("key, common, inside, outside", THRESHOLDS)
 def test_warnings_are_exactly_where_a_simplification_fails(key, common, inside, outside):
     """Thresholds are computed by hand, and no other warning occurs. "" makes no change to ``common``."""
     inside_keys, outside_keys = (set(examine(*common, *filter(None, [change]))[1]) for change in (inside, outside))
     assert key not in inside_keys and outside_keys - inside_keys == {key}
+
+
+#: Scenes in which every check warns at least once, beside the packaged ones.
+WARNED = [*((name,) for name in packaged_scenes()), *((*common, *filter(None, [outside]))
+          for _, common, _, outside in THRESHOLDS), ("base", "pore.width=200 um", "growth.end=90 h", FAST)]
+#: {part of a scene: words about it in a warning, and the parts that go with it}.
+ABSENT = {
+    "aggregate": ("aggregate|seed|biomass", ["kinetics", "growth"]),
+    "flow": ("flow|conductivity|inlet|outlet|Reynolds|Stokes|fluid|water takes|film", []),
+    "substrates": ("substrate|supply|concentration|acceptor|donor|uptake", ["kinetics", "growth"]),
+    "substrates.acceptor": (r"\bacceptor\b|\(7\)|oxygen|COD", []),
+    "substrates.donor": (r"\bdonor\b|\(8\)", []),
+    "growth": ("grow|run ends|update|contact", []),
+}
+
+
+def without(scene, part):
+    """The scene without a part and what depends on it, or None if the scene has no such part alone."""
+    section, _, kind = part.partition(".")
+    parent = getattr(scene, section)
+    if parent is None or (kind and len(parent.modelled) == 1):
+        return None
+    changed = {section: replace(parent, **{kind: None}) if kind else None}
+    return replace(scene, **changed, **dict.fromkeys(ABSENT[part][1]))
+
+
+def warned(scene):
+    speed = (scene.flow.mean_velocity or CLEAN) if scene.flow else None
+    return simplifications.find_warnings(scene, numbers.numbers(scene, speed))
+
+
+@pytest.mark.parametrize("name, changes", [(each[0], each[1:]) for each in WARNED])
+def test_a_warning_speaks_of_no_part_that_the_scene_leaves_out(name, changes):
+    """Its key is one of the scene, and its text has no word about an absent part. None, one or two parts are removed. A
+    scene without flow and substrates, in which nothing is computed, has no warning."""
+    for parts in itertools.chain.from_iterable(itertools.combinations(ABSENT, count) for count in range(3)):
+        scene = load_scene(name, changes)
+        for part in parts:
+            scene = scene and without(scene, part)
+        absent = [words for part, (words, _) in ABSENT.items() if scene and not simplifications._has(scene, part)]
+        for warning in warned(scene) if scene else ():
+            assert scene.flow or scene.substrates
+            assert simplifications._has(scene, warning.key.rpartition(".")[0] or warning.key)
+            assert not [words for words in absent if re.search(words, warning.text)], (parts, warning)
+
+
+def test_every_check_warns_in_one_of_these_scenes():
+    """Each part that a check needs is one that the scene must have."""
+    quiet = {find.__name__ for find in simplifications.CHECKS}
+    for name, *changes in WARNED:
+        scene = load_scene(name, changes)
+        texts = warned(scene)
+        for find, parts in simplifications.CHECKS.items():
+            if all(simplifications._has(scene, part) for part in parts):
+                speed = (scene.flow.mean_velocity or CLEAN) if scene.flow else None
+                by_name = {number.name: number for number in numbers.numbers(scene, speed)}
+                own = [*find(scene, by_name)]
+                assert all(warning in texts for warning in own)
+                quiet -= {find.__name__} if own else set()
+    assert quiet == set()
 
 
 def test_an_offset_of_the_seed_adds_to_its_reach():

@@ -1,14 +1,18 @@
 """Scenes that are refused: one line names file, key, value and the accepted values."""
+import re
 import subprocess
 import time
 import tomllib
+from functools import reduce
 from pathlib import Path
 
+import numpy as np
+import pint
 import pytest
 
 from repro.cli import main
-from repro.scene import Scene, files, load_scene, load_tables, parse_scene, scene_tables
-from repro.scene.reading import SCOPE, toml
+from repro.scene import Scene, exact, files, load_scene, load_tables, parse_scene, scene_tables, units
+from repro.scene.reading import NOT_MODELLED, SCOPE, toml
 from tests.blocks import ROOT
 from tests.test_scene import refusal, write_scene
 from tests.test_scene_text import fields
@@ -78,16 +82,16 @@ REFUSED = {
         f'substrates.acceptor.diffusivity_in_aggregate="{value}"' for value in (
             "0 %", "-5 %", "100.1 %", "%", "nan %", "1e999999999 %", "1e-999999999 %", "80 %%", "80 % um^2/h", "0.8",
             "eighty %", "9" * 100 + " %")],
-    "kinetics.donor_oxygen_demand = 0.8: more than Y d_c (0.8662) is needed: F is the rest": [
+    "kinetics.donor_oxygen_demand = 0.8: more than Y d_c (0.8662) is needed: F = COD - Y d_c is positive": [
         "kinetics.donor_oxygen_demand=0.8"],
     "a plain number is needed, such as 2.38 (greater than zero)": [
         f"kinetics.donor_oxygen_demand={value}" for value in ("0", "2 mg/mg", "nan")],
     # what is not modelled
     "[growth] takes end,": ["growth.detachment=1 1/day"],
-    f"; detachment {SCOPED}": ["growth.detachment=1 1/day", "detachment_rate=1 1/day"],
-    f"; depth {SCOPED}": ["pore.depth=50 um"],
+    f'; "detachment" {SCOPED}': ["growth.detachment=1 1/day", "detachment_rate=1 1/day"],
+    f'; "depth" {SCOPED}': ["pore.depth=50 um"],
     "did you mean substrates.donor.inhibition_constant?": ["kinetics.inhibition_constant=5 mg/L"],
-    f"; temperature {SCOPED}": ["kinetics.Temperature=20"],
+    f'; "temperature" {SCOPED}': ["kinetics.Temperature=20"],
     "one aggregate is modelled, see `repro docs scope`: a table [": ["aggregate=[{radius=\"5 um\"}, {}]"],
     "; give mg/L (in water 1 ppm is about 1 mg/L, 1 ppb about 1 ug/L)": [
         "substrates.donor.supply=20 ppm", "kinetics.maximum_density=20ppb"],
@@ -114,7 +118,7 @@ REFUSED = {
     "upstream or downstream, is needed": ["aggregate.position=-1 m"],
     'a length is needed, such as "0 um" (of either sign) (did you mean "20 um"?)': ["aggregate.position=20"],
     'a length is needed, such as "0 um" (of either sign)': ["aggregate.position=5 h", "aggregate.position=inf um"],
-    "aggregate.smooth = true: true is accepted with aggregate.outline alone": ["aggregate.smooth=true"],
+    "aggregate.smooth = true: true is accepted only with aggregate.outline": ["aggregate.smooth=true"],
     "true or false is needed, without quotes (did you mean true?)": ['aggregate.smooth="true"'],
     "aggregate.smooth = 1: true or false is needed": ["aggregate.smooth=1"],
     "a plain number is needed, such as 0 (zero or more, less than 1)": ["aggregate.inert_fraction=1"],
@@ -134,12 +138,12 @@ REFUSED = {
         f"{DONOR}={value}" for value in ('[["0 mg/L", "1 h"]]', '[["0 h"]]', '["0 h", "1 mg/L"]')],
     'or a list of [time, value] pairs such as [["0 h", "10 mg/L"], ["5 h", "10 mg/L"]] (did you mean "3 mg/L"?)': [
         f"{DONOR}=3"],
-    "flow.head (10 um) is given too": ['flow.mean_velocity=[["0 h", "1 m/day"]]'],
-    '"steps" is needed where no table': ["flow.interpolation=linear", "substrates.acceptor.interpolation=linear"],
+    "flow.head (10 um) is set too": ['flow.mean_velocity=[["0 h", "1 m/day"]]'],
+    '"steps" is needed without a table': ["flow.interpolation=linear", "substrates.acceptor.interpolation=linear"],
     # times
     "a list of times is needed": ["output.times=5 h", "output.times=[]", "output.times=[5 h, 6 h]", "output.times=[5]",
                                   'output.times=["5 um"]', 'output.times=["-1 h", "1 h"]', 'output.times=[["1 h"]]'],
-    "none after 19.4 h is accepted: growth.end is 19.4 h": ['output.times=["1 h", "19.5 h"]'],
+    "times up to 19.4 h are accepted: growth.end is 19.4 h": ['output.times=["1 h", "19.5 h"]'],
 }
 
 
@@ -185,7 +189,7 @@ def test_every_key_refuses_values_of_another_kind():
     ("base", ["numerics.elements=cubic", "numerics.transfer=linear"],
      '"conserving" is needed with numerics.elements = "cubic"; "linear" has'),
     ("flow_only", ["substrates={}", "growth.time_step=1 h"], 'growth.end is missing: a time is needed'),
-    ("flow_only", ['output.times=["1 h"]'], "none after 0 h is accepted: there is no [growth]"),
+    ("flow_only", ['output.times=["1 h"]'], "times up to 0 h are accepted: there is no [growth]"),
 ])
 def test_an_entry_that_conflicts_with_the_scene_is_refused(source, overrides, part):
     message = refusal(source, *overrides)
@@ -196,7 +200,7 @@ def test_an_entry_that_conflicts_with_the_scene_is_refused(source, overrides, pa
     ('[flow]\nhead = "1e-3 cm"\nbiomass = "brinkman"\npermeability = "1e-15 m^2"\n[numerics]\npreset = "fast"\n',
      'flow.biomass = "brinkman": "viscous" is needed without'),
     ('[aggregate]\n[substrates.acceptor]\n[kinetics]\nlaw = "Haldane"\n',
-     'kinetics.law = "Haldane": [substrates.donor], which inhibits, is needed'),
+     'kinetics.law = "Haldane": [substrates.donor] is needed'),
     ('[aggregate]\n[substrates.donor]\ninhibition_constant = "5 mg/L"\n', 'kinetics.law = "Haldane" is needed with it'),
     ('[aggregate]\n[substrates.donor]\nsupply = "0.5 mg/L"\n[kinetics]\nlaw = "zero order"\n',
      'substrates.donor.supply = "0.5 mg/L": half_saturation (1 mg/L) or more is needed'),
@@ -257,13 +261,13 @@ PAIRS = [
      "y of point 2 (0 um, 9 um) of aggregate.outline, or more, is needed"),
     (*OUTLINED, "pore.length=9 um", "|x| < half of pore.length (9 um) at point 1",
      "more than twice |x| of point 1 (-5 um, 0 um) of aggregate.outline is needed"),
-    (*OUTLINED, "aggregate.radius=9 um", "aggregate.radius (9 um) is given too; one of them is accepted, not both "
-     "(unset aggregate.radius leaves that out)", "(unset aggregate.outline leaves that out)"),
-    (*OUTLINED, "aggregate.position=9 um", "aggregate.position (9 um) is given too",
+    (*OUTLINED, "aggregate.radius=9 um", "aggregate.radius (9 um) is set too; only one of them is accepted "
+     "(unset aggregate.radius removes it)", "(unset aggregate.outline removes it)"),
+    (*OUTLINED, "aggregate.position=9 um", "aggregate.position (9 um) is set too",
      "0 um is needed with aggregate.outline"),
     ("initial_mesh", "flow.head=1 cm", "flow.mean_velocity=1 m/day",
-     "flow.mean_velocity (1 m/day) is given too; one of them is accepted, not both (unset flow.mean_velocity leaves",
-     "flow.head (10000 um) is given too; one of them is accepted, not both (unset flow.head leaves that out)"),
+     "flow.mean_velocity (1 m/day) is set too; only one of them is accepted (unset flow.mean_velocity removes",
+     "flow.head (10000 um) is set too; only one of them is accepted (unset flow.head removes it)"),
     ("initial_mesh", "flow.mean_velocity=0 m/day", "substrates.boundary=open; numerics.transport=quasi_steady",
      'greater than zero is needed, or numerics.transport = "gear"', '"gear" is needed with flow.mean_velocity = 0'),
     ("initial_mesh", "substrates.boundary=closed", "flow.head=1 cm", '"open" is needed with [flow]',
@@ -272,7 +276,7 @@ PAIRS = [
      '"open" is needed, or numerics.transport = "gear"', '"gear" is needed with substrates.boundary = "closed"'),
     ("initial_mesh", "flow.mean_velocity=0 m/day",
      "substrates.boundary=open; numerics.extent=central; numerics.transport=gear",
-     'numerics.extent = "full" is needed with 0 m/day', '"full" is needed where substrates are there and nothing flo'),
+     'numerics.extent = "full" is needed with 0 m/day', '"full" is needed with substrates in water at rest'),
     ("base", "growth.time_step=1e-4 h", "growth.end=11 h", "growth.end (11 h) over 100000 or more is needed",
      "at most 100000 times growth.time_step (0.0001 h) is needed"),
     ("base", "growth.minimum_film=30 um", "pore.width=20 um", "less than pore.width (20 um) is needed",
@@ -281,17 +285,18 @@ PAIRS = [
      'numerics.flow_element = "stabilised" is needed with it, not "bubble"'),
     ("base", "numerics.transfer=linear", "numerics.elements=quadratic", '"conserving" is needed with numerics.elem',
      'numerics.transfer = "conserving" is needed with it, not "linear"'),
-    ("base", "growth.fluid_forces=included", "growth.new_biomass=stress_free", "which would yield at every update",
+    ("base", "growth.fluid_forces=included", "growth.new_biomass=stress_free",
+     "because the aggregate would yield at every update",
      '"stressed" is needed with growth.fluid_forces = "included"'),
     ("base", "numerics.transfer=bounded", "numerics.preset=accurate", '"conserving" is needed with numerics.elements',
      'numerics.transfer = "conserving" is needed with it, not "bounded"'),
     ("base", "numerics.transport=gear", "numerics.time=midpoint", '"quasi_steady" is needed with numerics.time = "mid',
      '"updates" is needed with numerics.transport = "gear"'),
     ("base", "kinetics.donor_oxygen_demand=1.2", "kinetics.yield_coefficient=1", "more than Y d_c (1.42) is needed",
-     "less than kinetics.donor_oxygen_demand (1.2) is needed of Y d_c (1.42), its product with decay_oxygen_demand"),
+     "a smaller value is needed: Y d_c (1.42) is not less than kinetics.donor_oxygen_demand (1.2)"),
     ("base", "kinetics.donor_oxygen_demand=1.2", "kinetics.decay_oxygen_demand=4", "more than Y d_c (2.44) is needed",
-     "is needed of Y d_c (2.44), its product with yield_coefficient"),
-    ("base", 'output.times=["5 h"]', "growth.end=4 h", "none after 4 h is accepted: growth.end is 4 h",
+     "a smaller value is needed: Y d_c (2.44) is not less than kinetics.donor_oxygen_demand (1.2)"),
+    ("base", 'output.times=["5 h"]', "growth.end=4 h", "times up to 4 h are accepted: growth.end is 4 h",
      "5 h or more, the last of output.times, is needed"),
 ]
 
@@ -311,12 +316,146 @@ def test_the_key_that_was_set_is_named(tmp_path, source, first, second, of_first
     *((override, ("mg/L", "`repro docs scope`")) for override in (
         "growth.minimum_contact_angle=3 ppm", "growth.shear_modulus=1 MPaz", "pore.depht=5 um", "numerics=[{}]",
         "pore.width=5 M/s")),
+    *((override, ("moles", "milligrams")) for override in (
+        "growth.end=20 M", "growth.end=20 mol", "pore.width=5 M", "flow.head=5 M", "growth.shear_modulus=5 MPa M")),
+    *((override, ("did you mean",)) for override in (
+        "pore.width=50 mil", "pore.width=50 ppm", "pore.width=50 deg", "growth.end=20 percent", f"{DONOR}=5 mg/kg",
+        "flow.viscosity_ratio=50 %", "flow.viscosity_ratio=50 percent", "flow.viscosity_ratio=5 mil/inch",
+        "flow.viscosity_ratio=1,5", "kinetics.yield_coefficient=0.5 deg")),
     *((override, ("did you mean",)) for override in (
         "pore.width=-50", "pore.width=true", "pore.width={}", "numerics.preset=7", "pore.xyzzy=5 um",
         f"pore.width=0x{'f' * 9000}", "growth.detachment=1 1/day", "substrates.donor.supply=8 mM"))])
 def test_hints_are_given_only_if_they_help(override, unsaid):
     message = refusal("base", override)
     assert not [hint for hint in unsaid if hint in message]
+
+
+# ---------------------------------------------------------------- refusals name the reason
+
+LENGTHS = [["-5 um", "0 um"], ["0 um", "5 um"], ["5 um", "0 um"]]
+#: {place of a quantity, by kind of key: the key, a unit there, and the value with a quantity at that place}.
+PLACES = {
+    "quantity": ("pore.width", "um", lambda one: one),
+    "quantity or table": ("flow.head", "cm", lambda one: one),
+    "share": ("substrates.donor.diffusivity_in_aggregate", "cm^2/day", lambda one: one),
+    "time of a table": (DONOR, "h", lambda one: [["0 h", "1 mg/L"], [one, "2 mg/L"]]),
+    "value of a table": (DONOR, "mg/L", lambda one: [["0 h", one]]),
+    "list of times": ("output.times", "h", lambda one: ["1 h", one]),
+    "x of an outline": ("aggregate.outline", "um", lambda one: [[one, "0 um"], *LENGTHS[1:]]),
+    "y of an outline": ("aggregate.outline", "um", lambda one: [LENGTHS[0], ["0 um", one], LENGTHS[2]]),
+}
+#: {what the message names: quantities without their unit}.
+FAULTS = {
+    "U+00A0 (no-break space)": ["5\u00a0{}", "\u00a05 {}", "5 {}\u00a0"],
+    "U+2009 (thin space)": ["5\u2009{}"],
+    "U+2013 (en dash)": ["\u20135 {}", "5e\u20133 {}"],
+    'the character "," is not accepted; the decimal sign is a point': ["5,5 {}", "1,000 {}"],
+    'the character "%" (percent sign)': ["5 % {}"],
+    "it does not start with a number": ["about 5 {}", "nan {}"],
+    **{f'"{word}" is not accepted in this unit': [f"5 {{}} {word}", f"5 {word} {{}}", f"5 {{}}*{word}"]
+       for word in ("deg", "percent", "ppm", "mil", "rad", "count", "COD", "O2", "N")},
+    '"deg" is not a unit of this kind': ["5 deg"],
+}
+
+
+def refused_value(key, value) -> str:
+    """The message about a value of a dict."""
+    tables = load_tables("base", unset=["aggregate.radius"] if key == "aggregate.outline" else [])
+    *above, last = key.split(".")
+    reduce(lambda table, name: table.setdefault(name, {}), above, tables)[last] = value
+    return refusal(tables)
+
+
+@pytest.mark.parametrize("name, text", [(name, text) for name, texts in FAULTS.items() for text in texts])
+@pytest.mark.parametrize("place", PLACES)
+def test_a_refusal_names_the_character_or_the_word(place, name, text):
+    key, unit, value = PLACES[place]
+    message = refused_value(key, value(text.format(unit)))
+    assert message.startswith(f"scene: {key} = ") and name in message and "did you mean" not in message
+
+
+@pytest.mark.parametrize("place, value", [
+    *((place, value) for place in PLACES for value in (np.float32(5), True, {}, pint.Quantity(5, "um"))),
+    *((place, ("5 um",)) for place in ("quantity", "share", "time of a table", "list of times", "x of an outline"))])
+def test_a_refusal_names_the_type(place, value):
+    key, _, at = PLACES[place]
+    name = {np.float32: "numpy.float32", pint.Quantity: "pint.Quantity"}.get(type(value), type(value).__name__)
+    assert f"it is of the type {name}" in refused_value(key, at(value))
+
+
+@pytest.mark.parametrize("key, value, name", [
+    *((key, value, "tuple") for key, value in {
+        "kinetics.yield_coefficient": (0.5,), "numerics.preset": ("fast",), "aggregate.smooth": (True,)}.items()),
+    ("kinetics.yield_coefficient", pint.Quantity(0.5, ""), "pint.Quantity"),
+    ("kinetics.yield_coefficient", np.array([0.5]), "numpy.ndarray"), ("output.times", {}, "dict"),
+    ("aggregate.outline", True, "bool"), ("aggregate.smooth", np.float64(1), "numpy.float64"),
+    ("numerics.preset", 5.5j, "complex"), ("kinetics.yield_coefficient", 5j, "complex")])
+def test_a_refusal_names_the_type_where_no_quantity_is_needed(key, value, name):
+    assert f"it is of the type {name}" in refused_value(key, value)
+
+
+def test_a_quantity_of_pint_is_suggested_as_a_text():
+    assert '(did you mean "50 micrometer"?)' in refused_value("pore.width", pint.Quantity(50, "um"))
+    assert 'pore.width = 50.0: ' in (message := refused_value("pore.width", np.float32(50)))
+    assert '(did you mean "50.0 um"?)' in message
+
+
+@pytest.mark.parametrize("key, plain, others", [
+    ("kinetics.yield_coefficient", 0.5, [np.float32(0.5), np.float64(0.5)]),
+    ("flow.viscosity_ratio", 500, [np.int64(500), np.uint16(500), np.float16(500)]),
+    ("numerics.preset", "accurate", [np.str_("accurate")]), ("pore.width", "60 um", [np.str_("60 um")]),
+    ("output.times", ["1 h", "30 min"], [("1 h", "30 min"), np.array(["1 h", "30 min"])]),
+    (DONOR, [["0 min", "1 g/m3"], ["60 min", "2 g/m3"]], [
+        (("0 min", "1 g/m3"), ("60 min", "2 g/m3")), np.array([["0 min", "1 g/m3"], ["60 min", "2 g/m3"]])]),
+    ("aggregate.outline", LENGTHS, [tuple(map(tuple, LENGTHS)), np.array(LENGTHS), [*map(np.array, LENGTHS)]])])
+def test_values_of_numpy_and_tuples_are_accepted(key, plain, others):
+    """The scene is the same, in the same units."""
+    unset = ["aggregate.radius"] if key == "aggregate.outline" else []
+    *above, last = key.split(".")
+    scenes = []
+    for value in (plain, *others):
+        tables = load_tables("base", unset=unset)
+        reduce(lambda table, name: table.setdefault(name, {}), above, tables)[last] = value
+        scenes.append(load_scene(tables))
+    assert all(scene == scenes[0] and scene_tables(scene) == scene_tables(scenes[0]) for scene in scenes)
+    assert load_scene("base", unset=unset) != scenes[0]
+
+
+@pytest.mark.parametrize("name", [*(name for name, unit in exact.UNITS.items() if not any(unit[1:])), "percent", "ppm",
+                                  "mil", "count", "bit", "sr", "turn", "dimensionless"])
+def test_a_factor_without_dimension_is_refused(name):
+    """This holds in every position and for every internal unit; an angle alone has such a unit."""
+    for unit in units.NOUNS:
+        for text in (f"5 {unit} {name}", f"5 {name} {unit}", f"5 {unit}*{name}^2", f"5 {unit} / {name}"):
+            with pytest.raises(ValueError, match="in this unit|of this kind" if unit == "rad" else f'"{name}'):
+                units.to_internal(text, unit)
+    if name not in units.ANGLES:
+        pytest.raises(ValueError, units.to_internal, f"5 {name}", "rad")
+
+
+@pytest.mark.parametrize("word", [word for _, words in NOT_MODELLED.values() for word in words.split()])
+def test_a_word_of_another_model_is_answered_with_the_page(word):
+    """A section, a key of a section and a part of its name; the page has the word."""
+    sentence = next(text for text, words in NOT_MODELLED.values() if word in words.split()).format(word=word)
+    for tables in ({f"{word}_1": {}}, {word.upper(): [{}]}, {"flow": {f"{word}_rate": "1 1/h"}},
+                   {"pore": {f"a-{word}": 1}}):
+        assert refusal(tables).endswith(f"; {sentence}, see {SCOPE}")
+    assert re.search(rf"\b{word[:5]}", (ROOT / "docs" / "scope.md").read_text(encoding="utf-8").casefold())
+
+
+@pytest.mark.parametrize("section", [section for section in NOT_MODELLED if section])
+def test_several_tables_of_a_section_are_answered_with_the_page(section):
+    sentence = f"{NOT_MODELLED[section][0]}, see {SCOPE}"
+    for tables in ({section: [{}, {}]}, {section: ({},)}, {section: {"xyzzy": {}}}):
+        assert sentence in refusal(tables)
+    if section != "kinetics":
+        assert sentence in refusal({f"{section}_2": {}}) and sentence in refusal({f"{section.rstrip('s')}s3": {}})
+
+
+@pytest.mark.parametrize("key", ["aggregate", "pore", "kinetics", "substrates", "substrates.donor"])
+def test_a_misspelt_key_is_not_one_of_another_model(key):
+    tables = reduce(lambda inner, name: {name: inner}, reversed((key[:-1] + "x").split(".")), {})
+    assert f"(did you mean {key.rpartition('.')[2]}?)" in refusal(tables)
 
 
 def test_the_page_that_refusals_cite_is_printed(capsys):
@@ -358,6 +497,10 @@ def test_a_file_that_cannot_be_read_is_refused(tmp_path, monkeypatch):
     ('[pore]\nwidth = "50 um\n', 'line 2, column 15): width = "50 um'),
     ("[pore]\r\n\r\n[pore]\r\n", "line 3, column 6): [pore]"),
     ("a = 1\nb = " + "x" * 500, "line 2, column 5): b = xxx"),
+    ('[pore]\nwidth\u00a0= "50 um"', 'width = "50 um"; the character U+00A0 (no-break space) is not accepted'),
+    ('[pore]\r\n\u00a0width = "50 um"', "; the character U+00A0 (no-break space) is not accepted"),
+    ("[pore]\nwidth = \u201c50 um\u201d", "; the character U+201C (left double quotation mark) is not accepted"),
+    ("[pore]\nwidth = \u201350", "; the character U+2013 (en dash) is not accepted"),
     ("", "an empty scene: one section or more is needed of [pore], [aggregate], "), ("\ufeff# no\n", "an empty scene"),
 ])
 def test_a_file_that_is_not_toml_is_refused_with_its_line(tmp_path, text, part):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from repro.fem import sizing
@@ -16,6 +16,9 @@ from repro.preflight import numbers
 from repro.preflight.numbers import Number
 from repro.scene import Kinetics, Scene
 from repro.scene.keys import RATIO
+
+#: The numbers of a scene by their names.
+Numbers = dict[str, Number]
 
 #: (1) neglects inertia, whose ratio to the viscous forces is of the order of the Reynolds number.
 REYNOLDS = 0.1
@@ -60,28 +63,29 @@ class Caveat:
 
 def find_warnings(scene: Scene, computed: list[Number]) -> list[Caveat]:
     """Every simplification that does not hold; computed: the numbers of the scene."""
-    value = {number.name: number.start for number in computed}
-    checks = [_inertia(value), _cells(scene, value), _diffusivities(scene)]
-    if scene.aggregate:
-        checks += [_seed_film(scene), _ends(scene), _drag_layer(scene)]
-    if scene.kinetics:
-        checks += [_fronts(scene), _demand(scene.kinetics)]
-    if scene.growth:
-        checks += [_lag(scene, value), _transit(value), _forces(scene, computed), _steps(scene),
-                   _contact(scene), _fold(scene, value)]
-    return [caveat for check in checks for caveat in check]
+    by_name = {number.name: number for number in computed}
+    return [caveat for find, parts in CHECKS.items() if all(_has(scene, part) for part in parts)
+            for caveat in find(scene, by_name)]
 
 
-def _inertia(value: dict[str, float]) -> Iterator[Caveat]:
-    reynolds = value.get("Reynolds", 0.0)
+def _has(scene: Scene, part: str) -> bool:
+    """Whether a scene has a section or a subsection."""
+    section: object = scene
+    for name in part.split("."):
+        section = section and getattr(section, name)
+    return section is not None
+
+
+def _inertia(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
+    reynolds = computed["Reynolds"].start
     if reynolds > REYNOLDS:
         yield Caveat("flow", f"the Reynolds number is {reynolds:.2g}, above {REYNOLDS:g}: "
                      "Stokes flow (1) neglects inertia, which is about this fraction of the "
                      "viscous forces")
 
 
-def _cells(scene: Scene, value: dict[str, float]) -> Iterator[Caveat]:
-    cell = value.get("cell Peclet", 0.0)
+def _cells(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
+    cell = computed["cell Peclet"].start
     if scene.numerics.elements == "linear" and cell > CELL_PECLET:
         required = scene.numerics.refinement * cell / CELL_PECLET
         yield Caveat("numerics.refinement", f"the cell Peclet number is {cell:.2g}, above "
@@ -90,10 +94,9 @@ def _cells(scene: Scene, value: dict[str, float]) -> Iterator[Caveat]:
                      "themselves")
 
 
-def _diffusivities(scene: Scene) -> Iterator[Caveat]:
+def _diffusivities(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
     """Warn if only one of two related values of Table 1 is changed."""
-    kinds = scene.substrates.modelled if scene.substrates and scene.aggregate else {}
-    for name, substrate in kinds.items():
+    for name, substrate in scene.substrates.modelled.items():
         table = type(substrate)(supply=substrate.supply)
         inside = substrate.diffusivity_in_aggregate
         if substrate.diffusivity != table.diffusivity and inside == table.diffusivity_in_aggregate:
@@ -102,8 +105,9 @@ def _diffusivities(scene: Scene) -> Iterator[Caveat]:
                          'the changed diffusivity in water; "80 %" keeps their ratio (2.2)')
 
 
-def _demand(law: Kinetics) -> Iterator[Caveat]:
-    """Warn if Y or d_c is changed but F = COD - Y d_c (7) is not."""
+def _demand(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
+    """Warn if Y or d_c is changed but F = COD - Y d_c is not; F occurs in (7) alone."""
+    law = scene.kinetics
     table = Kinetics()
     product = law.yield_coefficient * law.decay_oxygen_demand
     table_product = table.yield_coefficient * table.decay_oxygen_demand
@@ -115,43 +119,45 @@ def _demand(law: Kinetics) -> Iterator[Caveat]:
                      "it is computed")
 
 
-def _lag(scene: Scene, value: dict[str, float]) -> Iterator[Caveat]:
-    lag = value["transport over growth time"]
+def _lag(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
+    lag = computed["transport over growth time"].start
     if scene.numerics.transport == "quasi_steady" and lag > LAG:
         yield Caveat("numerics.transport", f"transport takes {lag:.2g} of the time of growth, "
                      f"above {LAG:g}: quasi-steady substrates err by about this fraction; "
                      '"gear" with numerics.time = "updates" integrates them in time')
 
 
-def _transit(value: dict[str, float]) -> Iterator[Caveat]:
-    transit = value.get("transit over growth time", 0.0)
-    if transit > TRANSIT:
-        yield Caveat("flow", f"water takes {transit:.2g} of the time of growth to pass the pore, "
-                     f"above {TRANSIT:g}: steady profiles in each shape (3.3.2) ignore the "
+def _transit(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
+    transit = computed.get("transit over growth time")  # not of water that stands still
+    if transit and transit.start > TRANSIT:
+        yield Caveat("flow", f"water takes {transit.start:.2g} of the time of growth to pass the "
+                     f"pore, above {TRANSIT:g}: steady profiles in each shape (3.3.2) ignore the "
                      "substrates that the pore contained before, so the biomass may err by this "
                      "fraction")
 
 
-def _forces(scene: Scene, computed: list[Number]) -> Iterator[Caveat]:
-    stresses = [max(number.start, number.end or 0.0) for number in computed
-            if number.name == "fluid stress over modulus"]
-    strain = max(stresses, default=0.0)
+def _forces(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
+    stress = computed["fluid stress over modulus"]
+    strain = max(stress.start, stress.end or 0.0)
     if scene.growth.fluid_forces == "neglected" and strain > STRAIN:
+        stressed = scene.growth.new_biomass == "stressed"
+        setting = '"included"' + ("" if stressed else ' with growth.new_biomass = "stressed"')
         yield Caveat("growth.fluid_forces", f"the fluid's stress reaches {strain:.2g} of mu_L, "
                      f"above {STRAIN:g}: it strains the aggregate by about this fraction, and the "
-                     f"scene neglects it (2.3.3); {_included(scene)}")
+                     f"scene neglects it (2.3.3); {setting} models it")
 
 
-def _included(scene: Scene) -> str:
-    """Name the setting that includes fluid forces, if there is one."""
-    if scene.flow and scene.flow.biomass == "brinkman":
-        return 'no setting models it with flow.biomass = "brinkman"'
-    if scene.growth.new_biomass == "stress_free":
-        return '"included" with growth.new_biomass = "stressed" models it'
-    return '"included" models it'
+def _strengths(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
+    """Warn if the forces of the flow do not count against a strength."""
+    for key in ("bonding_strength", "tensile_strength"):
+        is_set = getattr(scene.growth, key) is not None
+        if is_set and scene.growth.fluid_forces == "neglected":
+            yield Caveat(f"growth.{key}", "the flow cannot exceed it, since the scene neglects the "
+                         "fluid's forces, and only the stress of growth counts; "
+                         'growth.fluid_forces = "included" adds the forces')
 
 
-def _fronts(scene: Scene) -> Iterator[Caveat]:
+def _fronts(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
     thickness = numbers.at_end(scene).thickness
     nodes = _interface_size(scene) / scene.numerics.order
     for uptake in numbers.uptakes(scene):
@@ -172,8 +178,8 @@ def _interface_size(scene: Scene) -> float:
     return size / resolution(scene)
 
 
-def _drag_layer(scene: Scene) -> Iterator[Caveat]:
-    permeability = scene.flow.permeability if scene.flow else None
+def _drag_layer(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
+    permeability = scene.flow.permeability
     if permeability is None:
         return
     root = math.sqrt(permeability)
@@ -199,7 +205,7 @@ def _resolving(refinement: float) -> str:
     return f"; no refinement up to {MOST_REFINED:g} resolves it"
 
 
-def _seed_film(scene: Scene) -> Iterator[Caveat]:
+def _seed_film(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
     gap = scene.pore.width - numbers.at_start(scene).thickness
     share = min(1.0, gap / film(scene))
     nodes = sizing.ACROSS_FILM * scene.numerics.refinement * share * scene.numerics.order
@@ -211,18 +217,21 @@ def _seed_film(scene: Scene) -> Iterator[Caveat]:
                      f"{film(scene):g} um (2.3.3)")
 
 
-def _ends(scene: Scene) -> Iterator[Caveat]:
+def _ends(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
+    """Warn if the conditions at the pore's ends, of flow or of substrates, are too near."""
+    if not (scene.flow or scene.substrates):
+        return
     end = numbers.at_end(scene)
     free = min(10 * end.thickness, 1.5 * scene.pore.width)
     if end.reach + free > scene.pore.length / 2:
         when = "by growth.end" if end.reach > numbers.at_start(scene).reach else "from the start"
+        stops = ", and the run ends if the aggregate reaches one of them" if scene.growth else ""
         yield Caveat("pore.length", f"the aggregate may come within {free:.3g} um of the pore's "
                      f"ends {when} (reach {end.reach:.3g} of {scene.pore.length / 2:g} um): the "
-                     "conditions at inlet and outlet (3.1, (11)-(12)) are then too near, and the "
-                     "run stops if the aggregate reaches an end")
+                     f"conditions at the ends (3.1) are then too near{stops}")
 
 
-def _steps(scene: Scene) -> Iterator[Caveat]:
+def _steps(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
     grown = numbers.fastest_growth(scene) * scene.growth.time_step
     if scene.numerics.time == "updates" and grown > GROWTH_IN_A_STEP:
         yield Caveat("growth.time_step", f"the aggregate grows by {100 * grown:.2g} % in a shape "
@@ -241,11 +250,12 @@ def warn_missed_tolerance(scene: Scene, worst: float, count: str = "") -> Iterat
                      f"{worst:.2g} (estimate)")
 
 
-def _fold(scene: Scene, value: dict[str, float]) -> Iterator[Caveat]:
+def _fold(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
     """Warn if growth is expected to compress the rim around a starved core into a fold."""
     if scene.growth.new_biomass != "stressed":
         return
-    uptake = max(value.get(f"Damkoehler, {name}", 0.0) for name in ("acceptor", "donor"))
+    ratios = [number.start for name, number in computed.items() if "Damkoehler" in name]
+    uptake = max(ratios, default=0.0)
     stretch = numbers.rim_stretch(scene, uptake / numbers.at_start(scene).area)
     if stretch < FOLD_EXPECTED:
         yield Caveat("growth.end", f"the surface may fold, which ends the run, before "
@@ -268,10 +278,30 @@ def warn_crease(pore: Pore) -> Iterator[Caveat]:
                  '"stress_free" avoids this')
 
 
-def _contact(scene: Scene) -> Iterator[Caveat]:
+def _contact(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
     contact = numbers.at_end(scene).contact
     if contact is not None and scene.growth.end > AFTER_CONTACT * contact:
         yield Caveat("growth.end", f"contact with the opposite wall is expected from {contact:.3g} "
                      f"h on, long before {scene.growth.end:g} h: then conductivity (2.3.3) is "
                      'accurate to a few percent with numerics.elements = "linear" (preset '
                      "paper), and to 1 % with curved triangles (preset fast)")
+
+
+#: Each check and the parts of a scene that it needs: a warning mentions no part that is left out.
+CHECKS: dict[Callable[[Scene, Numbers], Iterator[Caveat]], tuple[str, ...]] = {
+    _inertia: ("flow",),
+    _cells: ("flow", "substrates"),
+    _diffusivities: ("aggregate", "substrates"),
+    _seed_film: ("aggregate", "flow"),
+    _ends: ("aggregate",),
+    _drag_layer: ("aggregate", "flow"),
+    _fronts: ("kinetics",),
+    _demand: ("kinetics", "substrates.acceptor"),
+    _lag: ("growth",),
+    _transit: ("growth", "flow"),
+    _forces: ("growth", "flow"),
+    _strengths: ("growth", "flow"),
+    _steps: ("growth",),
+    _contact: ("growth", "flow"),
+    _fold: ("growth",),
+}

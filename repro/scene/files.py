@@ -7,7 +7,7 @@ from importlib import resources
 from pathlib import Path
 
 from repro.scene.reading import Place, did_you_mean, elsewhere, quote
-from repro.scene.units import SceneError, nearest
+from repro.scene.units import SceneError, nearest, odd_character
 
 LONGEST_LINE = 80  # characters of a line of a file in a message
 #: Largest size of a file (bytes). The longest accepted outline and tables take 245 000 bytes;
@@ -98,14 +98,17 @@ def line_of_a_deep_key(text: str) -> int:
 
 
 def _line_of(text: str, message: str) -> str:
-    """The line that the parser's message names, or an empty text."""
+    """The line that the parser's message names, with a hint; empty without a line."""
     lines = text.replace("\r\n", "\n").split("\n")
-    line_number = re.search(r"\(at line (\d+)", message)
-    if line_number is None:
+    named = re.search(r"\(at line (\d+), column (\d+)", message)
+    if named is None:
         return ""
-    line = lines[int(line_number[1]) - 1].strip()
+    line = lines[int(named[1]) - 1]
+    letter = line[int(named[2]) - 1:][:1]
+    line = line.strip()
     quotes = '; a value with a unit stands in quotes, such as width = "50 um"'
     hint = quotes if BARE.search(line) else ""
+    hint = hint if letter.isascii() else f"; {odd_character(letter)}"
     return f": {line if len(line) <= LONGEST_LINE else line[:LONGEST_LINE - 3] + '...'}{hint}"
 
 

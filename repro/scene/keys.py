@@ -126,7 +126,7 @@ class Flow:
         about="u_ave, mean over the width; either this or head")
     interpolation: str = choice(
         "steps", "linear", source=NOT_IN_PAPER,
-        about="Between the times of a table of head or mean_velocity: jumps, or an even change")
+        about="Between the times of a table of head or mean_velocity: jumps, or a linear change")
     biomass: str = choice(
         "viscous", "brinkman", source="2.1; the other one is discussed in 5",
         about="What slows the water in the aggregate: a viscosity lambda times its own, or the "
@@ -168,7 +168,7 @@ class Substrate:
                            about="C_supply of the water that comes in, and of all water at t = 0")
     interpolation: str = choice(
         "steps", "linear", source=NOT_IN_PAPER,
-        about="Between the times of a table of supply: jumps, or an even change")
+        about="Between the times of a table of supply: jumps, or a linear change")
     half_saturation: float = quantity(
         "1.0 mg/L", "mg/L", about="K_s of Monod's law", source="(7)-(10), Table 1")
     diffusivity: float = quantity(
@@ -323,13 +323,13 @@ class Growth:
         about="A film of fluid to the opposite wall closes when it is thinner than this")
     fluid_forces: str = choice(
         "neglected", "included", source="(20), (22), 2.3.3; section 5",
-        about="The fluid's traction on the aggregate, or its drag within a permeable one")
+        about="The fluid's traction on a viscous aggregate, or its drag within a permeable one")
     wall: str = choice(
         "sliding", "bonded", source="2.3.3",
-        about="What touches the lower wall slides along it, or stays where it has touched it")
+        about="Biomass on the lower wall slides along it, or keeps its place there")
     bonding_strength: float | None = quantity(
         "1e-3 MPa", "MPa", default=None, source="Section 5, without a value",
-        about="The run ends if a wall must bear more to keep the aggregate, in the mean over "
+        about="The run ends if the traction of a wall exceeds it, in the mean over "
               "pore.width / 20")
     tensile_strength: float | None = quantity(
         "0.01 MPa", "MPa", default=None, source="Section 5, without a value",
@@ -337,7 +337,7 @@ class Growth:
               "pore.width / 20")
     new_biomass: str = choice(
         "stressed", "stress_free", source="2.3, section 5",
-        about="Strain counts from t = 0 (2.3), or new biomass is born without (section 5)")
+        about="Strain counts from t = 0 (2.3), or new biomass has no stress (section 5)")
 
 
 @dataclass(frozen=True)
@@ -355,7 +355,8 @@ class Numerics:
         "updates", "midpoint", source="Section 2, 3.3 have updates",
         about="Every growth.time_step, or second-order steps as long as tolerance allows")
     tolerance: float = number(0.01, UP_TO_1, source=NOT_IN_PAPER,
-                              about="Of a midpoint step: change of the growth rate, times the step")
+                              about="Largest error of a midpoint step: change of the growth rate "
+                                    "times the step")
     transport: str = choice(
         "quasi_steady", "gear", source="2.2; 3.3 has gear",
         about="Substrates at rest in each shape, or the transient predictor-corrector scheme")
@@ -373,11 +374,11 @@ class Numerics:
     fixed_point: str = choice("kept", "rechosen", source="2.3.3 [E20]",
                               about="Which point of a contact surface stays in place")
     solver: str = choice("superlu", "pardiso", source=NOT_IN_PAPER,
-                         about="Of linear systems; the second needs the package pypardiso")
+                         about="Solver of linear systems; the second needs the package pypardiso")
     ordering: str = choice("degree", "metis", source=NOT_IN_PAPER,
-                           about="Of nodes before SuperLU; the second needs the package pymetis")
+                           about="Order of nodes for SuperLU; the second needs the package pymetis")
     refinement: float = number(
-        1.0, UP_TO_20, source="3.1 [E13]", about="Element sizes are divided by it")
+        1.0, UP_TO_20, source="3.1 [E13]", about="Divides the element sizes")
     gradation: float = number(
         0.25, FRACTION, source="3.1 [E13]",
         about="Growth of element sizes with distance from the aggregate; 0: one size everywhere")
@@ -387,7 +388,7 @@ class Numerics:
               "2 at least with a permeable aggregate; 0: as large as elsewhere on the interface")
     jacobian: str = choice(
         "fresh", "reused", source=NOT_IN_PAPER,
-        about="Newton's derivative: of every iterate, or one while it does enough")
+        about="Newton's derivative: new in every iterate, or kept while the iterates converge fast")
     flow_element: str = choice(
         "stabilised", "bubble", source="3.2",
         about="Stabilised linear velocities, or linear ones with a bubble (MINI)")
@@ -437,9 +438,9 @@ class Output:
     times: tuple[float, ...] | None = scene_key(
         Times(),
         source="Figures 4-6",
-        about="Times of the rows and fields wanted, which change no step; left out: every step, "
-        "with midpoint also every 1/4, 1/2, 1, 2, 4 ... growth.time_step, so that there are 24 or "
-        "more after t = 0")
+        about="Times of the requested rows and fields; they change no step. Without it: every "
+        "step, with midpoint also every 1/4, 1/2, 1, 2, 4 ... growth.time_step, so that there are "
+        "24 rows or more after t = 0")
     every: float | None = quantity(
         "1 h", "h", default=None, source=NOT_IN_PAPER,
         about="Interval of rows and fields from t = 0 on, with a last one at growth.end; times "
@@ -607,7 +608,7 @@ def load_scene(scene: Source, overrides: Sequence[str] = (), *,
     ----------
     scene : Scene, str, Path or dict
         A TOML file, the name of a packaged scene, a dict of tables like those of a file, or a
-        loaded scene.
+        loaded scene. Lists of a dict may be tuples or arrays, its numbers scalars of NumPy.
     overrides : sequence of str, optional
         Changes "KEY=VALUE", like those of ``--set``: dotted keys, values in TOML with units.
     unset : sequence of str, optional

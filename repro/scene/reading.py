@@ -4,18 +4,36 @@ A refusal is one line that names the file, the key, the value, the accepted valu
 one, the nearest accepted value.
 """
 import json
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, Field, dataclass, fields, replace
 
-from repro.scene.units import Quantity, Refused, SceneError, nearest, unlike
+from repro.scene.units import (
+    Quantity,
+    Refused,
+    SceneError,
+    as_list,
+    because,
+    nearest,
+    without_numpy,
+)
 
 LONGEST_KEY = 60  # characters of a key in a message
 SCOPE = "`repro docs scope`"
-#: Words in the keys of other models.
-NOT_MODELLED = frozenset({
-    "attachment", "detachment", "erosion", "sloughing", "depth", "dimension", "dimensions",
-    "temperature",
-})
+#: {section: (what a scene has of it, words in the keys of models with more)}. Another table in the
+#: section is refused with the same sentence, and so is a list of tables. A noun with a number, such
+#: as aggregate2, counts as its plural. The last words belong to no section.
+NOT_MODELLED = {
+    "aggregate": ("one aggregate is modelled", "aggregates seeds colony colonies clusters"),
+    "pore": ("one pore is modelled, a straight channel",
+             "pores throat throats grains network column aquifer"),
+    "substrates": ("one acceptor and one donor are modelled",
+                   "substrates acceptors donors nitrate nitrite ammonium sulfate"),
+    "kinetics": ("one species of bacteria is modelled", "strain strains species"),
+    "": ('"{word}" is not modelled',
+         "attachment detachment erosion sloughing depth dimension dimensions temperature inertia "
+         "turbulence precipitation maintenance quorum ph gas"),
+}
 
 
 @dataclass(frozen=True)
@@ -25,6 +43,12 @@ class Place:
     file: str
     key: str = ""
     known: tuple[str, ...] = ()
+
+    @property
+    def single(self) -> str:
+        """What a scene has of the section; empty where it is not in NOT_MODELLED."""
+        section = self.key.partition(".")[0]
+        return NOT_MODELLED[section][0] if section and section in NOT_MODELLED else ""
 
     def below(self, key: str) -> "Place":
         key = key if len(key) <= LONGEST_KEY else key[: LONGEST_KEY - 3] + "..."
@@ -55,13 +79,13 @@ def read_table(kind: type, table: object, place: Place, **extra):
     """
     keys = entries(kind)
     if not isinstance(table, dict):
-        several = isinstance(table, list) and place.key in ("aggregate", "pore")
-        single = f"one {place.key} is modelled, see {SCOPE}: " if several else ""
-        requirement = f"{single}a table [{place.key}] is needed, with the keys {', '.join(keys)}"
+        several = place.single if as_list(table) else ""
+        reason = f"{several}, see {SCOPE}: " if several else ""
+        requirement = f"{reason}a table [{place.key}] is needed, with the keys {', '.join(keys)}"
         raise place.refuse(table, requirement)
     for key in table:
         if key not in keys:
-            raise place.below(key).refuse(table[key], _instead(key, list(keys), place))
+            raise place.below(key).refuse(table[key], _instead(key, table[key], list(keys), place))
     for key, entry in keys.items():
         if key not in table and entry.default is MISSING and entry.default_factory is MISSING:
             raise place.below(key).refuse(MISSING, entry.metadata["kind"].requirement)
@@ -77,8 +101,8 @@ def _read_entry(entry: Field, value: object, place: Place):
         return kind.read(value)
     except Refused as error:
         raise place.refuse(value, str(error)) from None
-    except (ValueError, OverflowError):
-        hint = unlike(kind, value) or did_you_mean(kind.near(value))
+    except (ValueError, OverflowError) as error:
+        hint = because(error) + did_you_mean(kind.near(value))
         raise place.refuse(value, kind.requirement + hint) from None
 
 
@@ -115,13 +139,29 @@ def toml(tables: dict, above: str = "") -> str:
     return "\n\n".join(parts)
 
 
-def _instead(key: str, keys: list[str], place: Place) -> str:
+def _instead(key: str, value: object, keys: list[str], place: Place) -> str:
     table = f"[{place.key}]" if place.key else "a scene"
     message = f"there is no such key; {table} takes {', '.join(keys)}"
-    words = NOT_MODELLED & set(key.casefold().split("_"))
-    if words:
-        return f"{message}; {min(words)} is not modelled, see {SCOPE}"
-    return message + did_you_mean(nearest(key, keys) or elsewhere(key, place.known))
+    is_table = isinstance(value, dict)
+    known = _sections(place.known) if is_table else place.known
+    near = nearest(key, keys) or elsewhere(key, known)
+    sentence = out_of_scope(key) or (place.single if is_table and not near else "")
+    return f"{message}; {sentence}, see {SCOPE}" if sentence else message + did_you_mean(near)
+
+
+def _sections(keys: tuple[str, ...]) -> tuple[str, ...]:
+    return tuple(key for key in keys if any(other.startswith(f"{key}.") for other in keys))
+
+
+def out_of_scope(key: str) -> str:
+    """The sentence of NOT_MODELLED for a key of another model; empty for other keys."""
+    folded = key.casefold()
+    plural = re.sub(r"([a-z])s?[-_]?[0-9]+$", r"\1s", folded)
+    for word in re.findall("[a-z]+", f"{folded} {plural}"):
+        for sentence, words in NOT_MODELLED.values():
+            if word in words.split():
+                return sentence.format(word=word)
+    return ""
 
 
 def elsewhere(key: str, keys: tuple[str, ...]) -> str:
@@ -144,7 +184,13 @@ def did_you_mean(near: str) -> str:
 def quote(value: object, longest: int = 60) -> str:
     """Quote a value in a message: as TOML writes it, shortened."""
     try:
-        text = json.dumps(value, ensure_ascii=False, default=str)
+        text = json.dumps(value, ensure_ascii=False, default=_plain)
     except (ValueError, RecursionError):  # thousands of digits, tables nested by the thousand
         text = type(value).__name__
     return text if len(text) <= longest else text[: longest - 3] + "..."
+
+
+def _plain(value: object) -> object:
+    """A value of another type than those of JSON, as a message shows it."""
+    plain = without_numpy(value)
+    return str(value) if plain is value else plain

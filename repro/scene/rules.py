@@ -18,7 +18,7 @@ if TYPE_CHECKING:
         Substrates,
     )
 
-_NO_STATE = "nothing is supplied, so that no state is steady"
+_NO_STATE = "without a supply no state is steady"
 _UNSTEADY = f', or numerics.transport = "gear": {_NO_STATE}'
 MOST_STEPS = 100_000  # shape updates of a run
 MOST_ROWS = 10_000  # of output.every
@@ -54,8 +54,8 @@ def rules(scene: "Scene") -> Rules:
 def _not_both(other: str, value: str = "") -> str:
     """Requirement of a key that excludes ``other``."""
     setting = f"{other} ({value})" if value else other
-    return (f"{setting} is given too; one of them is accepted, not both "
-            f"(--unset {other} leaves that out)")
+    return (f"{setting} is set too; only one of them is accepted "
+            f"(--unset {other} removes it)")
 
 
 def _aggregate_rules(scene: "Scene") -> Rules:
@@ -67,7 +67,7 @@ def _aggregate_rules(scene: "Scene") -> Rules:
         yield from _outline_rules(aggregate)
         yield from _shape_rules(aggregate.outline, scene.pore)
     inert = aggregate.inert_fraction != 0 and scene.substrates is None
-    requirement = "0 is needed without [substrates], which tell active from inert biomass"
+    requirement = "0 is needed without [substrates]: inert biomass differs in uptake alone"
     yield inert, {"aggregate.inert_fraction": requirement}
 
 
@@ -99,7 +99,7 @@ def _position_rules(aggregate: "Aggregate", pore: "Pore") -> Rules:
         "aggregate.radius": f"less than {half} less the distance of {position} is needed",
         "pore.length": f"more than twice {radius} and the distance of {position} is needed",
     }
-    requirement = "true is accepted with aggregate.outline alone"
+    requirement = "true is accepted only with aggregate.outline"
     yield aggregate.smooth, {"aggregate.smooth": requirement}
 
 
@@ -109,7 +109,7 @@ def _outline_rules(aggregate: "Aggregate") -> Rules:
         "aggregate.radius": _not_both("aggregate.outline"),
         "aggregate.outline": _not_both("aggregate.radius", radius),
     }
-    requirement = "0 um is needed with aggregate.outline, whose points say where it is"
+    requirement = "0 um is needed with aggregate.outline: its points give the position"
     yield aggregate.position != 0, {
         "aggregate.position": requirement,
         "aggregate.outline": _not_both("aggregate.position", f"{aggregate.position:g} um"),
@@ -232,7 +232,7 @@ def _biomass_rules(scene: "Scene", drive: "Flow") -> Rules:
     least = TIGHTEST * scene.pore.width**2
     yield drag and drive.permeability is not None and drive.permeability < 0.999 * least, {
         "flow.permeability": f'"{1e-12 * least:.4g} m^2" or more is needed in a pore '
-                             f"{scene.pore.width:g} um wide: its flow is lost in round-off else",
+                             f"{scene.pore.width:g} um wide: below it round-off hides the flow",
         "pore.width": f"{math.sqrt((drive.permeability or 0.0) / TIGHTEST):.4g} um or less is "
                       f"needed with flow.permeability = {permeable}",
     }
@@ -255,7 +255,7 @@ def _in_words(value: Driven, unit: str, factor: float = 1.0) -> str:
 def _table_rules(section: str, part: "Flow | Substrate", values: tuple[Driven, ...]) -> Rules:
     """Rules of a section's tables over time."""
     constant = not any(isinstance(value, TimeTable) for value in values)
-    requirement = '"steps" is needed where no table of times and values is given'
+    requirement = '"steps" is needed without a table of times and values'
     yield constant and part.interpolation != "steps", {f"{section}.interpolation": requirement}
 
 
@@ -299,18 +299,19 @@ def _demand_rules(law: "Kinetics") -> Rules:
     implied = law.implied_ratio
     demand = f"kinetics.donor_oxygen_demand ({law.donor_oxygen_demand})"
     biomass = law.yield_coefficient * law.decay_oxygen_demand
-    less = f"less than {demand} is needed of Y d_c ({biomass:g}), its product with"
+    less = f"a smaller value is needed: Y d_c ({biomass:g}) is not less than {demand}"
     yield implied is not None and implied <= 0, {
-        "kinetics.donor_oxygen_demand": f"more than Y d_c ({biomass:g}) is needed: F is the rest",
-        "kinetics.yield_coefficient": f"{less} decay_oxygen_demand",
-        "kinetics.decay_oxygen_demand": f"{less} yield_coefficient",
+        "kinetics.donor_oxygen_demand": f"more than Y d_c ({biomass:g}) is needed: F = COD - Y d_c "
+                                        "is positive",
+        "kinetics.yield_coefficient": less,
+        "kinetics.decay_oxygen_demand": less,
     }
 
 
 def _law_rules(law: str, substrates: "Substrates") -> Rules:
     donor = substrates.donor
     yield law == "Haldane" and donor is None, {
-        "kinetics.law": '[substrates.donor], which inhibits, is needed with "Haldane"',
+        "kinetics.law": '[substrates.donor] is needed with "Haldane": the donor inhibits',
         "substrates.acceptor": '[substrates.donor] is needed with kinetics.law = "Haldane"',
     }
     changed = donor is not None and donor.inhibition_constant != INHIBITION
@@ -348,8 +349,8 @@ def _strength_rules(growth: "Growth") -> Rules:
 
 def _force_rules(scene: "Scene") -> Rules:
     yield scene.flow is None, {"growth.fluid_forces": '"neglected" is needed without [flow]'}
-    requirement = ('"neglected" is needed with growth.new_biomass = "stress_free", '
-                   "which would yield at every update")
+    requirement = ('"neglected" is needed with growth.new_biomass = "stress_free", because the '
+                   "aggregate would yield at every update")
     yield scene.growth.new_biomass == "stress_free", {
         "growth.fluid_forces": requirement,
         "growth.new_biomass": '"stressed" is needed with growth.fluid_forces = "included"',
@@ -367,7 +368,7 @@ def _element_keys(requirement: str) -> dict[str, str]:
 
 def _numerics_rules(scene: "Scene") -> Rules:
     yield scene.stagnant and scene.numerics.extent == "central", {
-        "numerics.extent": '"full" is needed where substrates are there and nothing flows',
+        "numerics.extent": '"full" is needed with substrates in water at rest',
         "flow.mean_velocity": 'numerics.extent = "full" is needed with 0 m/day',
     }
     if scene.numerics.order > 1:
@@ -390,7 +391,7 @@ def _output_rules(scene: "Scene") -> Rules:
     end = scene.growth.end if scene.growth else 0.0
     last = max(scene.output.times or (0.0,))
     reason = f"growth.end is {end:g} h" if scene.growth else "there is no [growth]"
-    requirements = {"output.times": f"none after {end:g} h is accepted: {reason}"}
+    requirements = {"output.times": f"times up to {end:g} h are accepted: {reason}"}
     if scene.growth:
         requirements["growth.end"] = f"{last:g} h or more, the last of output.times, is needed"
     yield last > end, requirements

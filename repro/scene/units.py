@@ -5,20 +5,22 @@ angles in rad, and derived quantities accordingly (a velocity in um/h). Values o
 converted here: exactly, and rounded once, so that "1164 min" and "19.4 h" are the same number.
 
 A kind of value has the methods `read` (TOML value -> value of the model; raises ValueError or
-OverflowError if it is not accepted), its inverse `write`, and `near` (the accepted value nearest to
-a refused one, empty if unknown), and the texts `accepted` and `requirement`, which describe the
-accepted values. A section of a scene is a dataclass. The metadata of its fields hold their kind, or
-the dataclass of a subsection, a description, and the source in the paper.
+OverflowError with the reason if it is not accepted), its inverse `write`, and `near` (the accepted
+value nearest to a refused one, empty if unknown), and the texts `accepted` and `requirement`, which
+describe the accepted values. A section of a scene is a dataclass. The metadata of its fields hold
+their kind, or the dataclass of a subsection, a description, and the source in the paper.
 """
 import difflib
 import json
 import math
 import re
-from collections.abc import Callable, Iterable
+import unicodedata
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from decimal import Decimal
 from fractions import Fraction
 from functools import cache, partial
+from numbers import Real
 from typing import ClassVar, NamedTuple
 
 from repro.errors import Refusal
@@ -38,6 +40,7 @@ NOUNS = {
     "rad": "an angle",
 }
 ANGLES = ("deg", "degree", "degrees", "rad", "radian", "radians")  # to pint "ppm" is an angle too
+MASSES = ("mg/L", "1/h")  # units of values that other models give in moles
 LONGEST = 80  # characters of a value with its unit
 MOST_POINTS = 1000  # of an outline
 _DIGITS = r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
@@ -48,9 +51,11 @@ _PRINTED = str.maketrans("\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078
                          "\u207b\u2212\u00b7\u22c5", "0123456789--**")
 _PERCENT = re.compile(rf"({_DIGITS}) *%")
 _QUANTITY = re.compile(rf"({_DIGITS}) *({_UNIT})")
-_MOLES = re.compile(r"[0-9 /](?:[num\u00b5\u03bc]|milli|micro|nano)?"
+_MOLES = re.compile(r"(?<![A-Za-z])(?:[num\u00b5\u03bc]|milli|micro|nano)?"
                     r"(?:mol(?:es?|ars?)?|M)(?![A-Za-z])")
-_PARTS = re.compile(r"[0-9 ]pp[mb](?![A-Za-z])")
+_ODD = re.compile(r"[^A-Za-z0-9\u00b5\u03bc .+*/^-]")
+NO_MOLES = "moles need a molar mass, which is not known here: give milligrams"
+NO_PARTS = "give mg/L (in water 1 ppm is about 1 mg/L, 1 ppb about 1 ug/L)"
 
 
 class Range(NamedTuple):
@@ -93,11 +98,13 @@ class Quantity:
         return f'{NOUNS[self.unit]} is needed, such as "{self.example}" ({self.accepts.words})'
 
     def near(self, value: object) -> str:
-        """Suggest a plain number with the unit of the example."""
+        """Suggest a plain number with the unit of the example, or the text of pint's quantity."""
         endless = isinstance(value, int) and abs(value) >= 10**LONGEST
-        if isinstance(value, bool) or endless or not isinstance(value, int | float | str):
+        if isinstance(value, bool) or endless:
             return ""
-        meant = f"{value} {self.example.split(' ', 1)[1]}"
+        plain = isinstance(value, Real | str) and re.fullmatch(_DIGITS, f"{value}")
+        meant = f"{value} {self.usual_unit}" if plain else ""
+        meant = str(value) if hasattr(value, "units") else meant
         return f'"{meant}"' if _takes(self, meant) else ""
 
     def read(self, value: object) -> float:
@@ -114,7 +121,7 @@ class Quantity:
 
 
 class Refused(ValueError):
-    """A value is not accepted; the message says why."""
+    """A value is not accepted; the message replaces the requirement of its kind."""
 
 
 @dataclass(frozen=True)
@@ -137,11 +144,12 @@ class Timed(Quantity):
         return json.dumps([["0 h", self.example], ["5 h", self.example]])
 
     def read(self, value: object) -> float | TimeTable:  # type: ignore[override]  # or a table
-        if not isinstance(value, list):
+        entries = as_list(value)
+        if entries is None:
             return super().read(value)
-        if not 1 <= len(value) <= MOST_POINTS:
+        if not 1 <= len(entries) <= MOST_POINTS:
             raise Refused(f"a table of 1 to {MOST_POINTS} entries is needed, such as {self._table}")
-        times, values = zip(*map(self._entry, range(1, len(value) + 1), value))
+        times, values = zip(*map(self._entry, range(1, len(entries) + 1), entries))
         if times[0] != 0:
             raise Refused('the time of the first entry of a table must be "0 h"')
         for number, (one, other) in enumerate(zip(times, times[1:]), 2):
@@ -152,14 +160,16 @@ class Timed(Quantity):
 
     def _entry(self, number: int, entry: object) -> tuple[float, float]:
         """Time and value of an entry of a table."""
-        if not isinstance(entry, list) or len(entry) != 2:
+        pair = as_list(entry)
+        if pair is None or len(pair) != 2:
             raise Refused(f"entry {number} of a table must be a time and a value, such as "
                           f'["5 h", "{self.example}"]')
         try:
-            return self.clock.read(entry[0]), super().read(entry[1])
-        except (ValueError, OverflowError):
+            return self.clock.read(pair[0]), super().read(pair[1])
+        except (ValueError, OverflowError) as error:
             raise Refused(f"entry {number} of a table must be a time of zero or more and "
-                          f'{super().accepted}, such as ["5 h", "{self.example}"]') from None
+                          f'{super().accepted}, such as ["5 h", "{self.example}"]'
+                          f"{because(error)}") from None
 
     def write(self, value, unit=""):
         if not isinstance(value, TimeTable):
@@ -188,7 +198,7 @@ class Share(Quantity):
         if match is None:
             return super().read(value)
         if not 0 < float(match[1]) <= 100:
-            raise ValueError("not a share")
+            raise ValueError
         return Fraction(match[1]) / 100
 
 
@@ -212,14 +222,17 @@ class Number:
         return f"a plain number is needed, such as {self.example:g} ({self.accepts.words})"
 
     def near(self, value: object) -> str:
-        """Suggest the number at the start of a text."""
+        """Suggest the number of a text that has no unit or one with a dimension."""
         text = value if isinstance(value, str) and len(value) <= LONGEST else ""
-        match = re.match(_DIGITS, text)
-        return match[0] if match and _takes(self, float(match[0])) else ""
+        match = re.fullmatch(rf"({_DIGITS})(?: *({_UNIT}))?", text)
+        if match is None or not _takes(self, float(match[1])):
+            return ""
+        return "" if match[2] and _has_dimensionless_factor(match[2]) else match[1]
 
     def read(self, value: object) -> float:
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise ValueError("not a number")
+        if isinstance(value, bool) or not isinstance(value, Real):
+            has_moles = isinstance(value, str) and _MOLES.search(value[:LONGEST])
+            raise ValueError(NO_MOLES if has_moles else _fault(value))
         return _within(self.accepts, float(value))
 
     def write(self, value: float) -> float:
@@ -249,9 +262,9 @@ class Choice:
         return f'"{word}"' if word else ""
 
     def read(self, value: object) -> str:
-        if value not in self.words:
-            raise ValueError("not one of the words")
-        return value
+        if not isinstance(value, str) or value not in self.words:
+            raise ValueError(_wrong_type(value))
+        return str(value)
 
     def write(self, value: str) -> str:
         return value
@@ -268,9 +281,10 @@ class Times:
     requirement = 'a list of times is needed, such as ["5 h", "18 h"] (each zero or more)'
 
     def read(self, value: object) -> tuple[float, ...]:
-        if not isinstance(value, list) or not value:
-            raise ValueError("not a list of times")
-        return tuple(sorted({self.each.read(time) for time in value}))
+        times = as_list(value)
+        if not times:
+            raise ValueError(_wrong_type(value))
+        return tuple(sorted(set(_each("entry", self.each.read, times))))
 
     def write(self, value: tuple[float, ...]) -> list[str]:
         return [self.each.write(time) for time in value]
@@ -292,12 +306,14 @@ class Points:
     requirement = f"{accepted}, is needed, such as {json.dumps(example)}"
 
     def read(self, value: object) -> tuple[tuple[float, float], ...]:
-        if not isinstance(value, list) or not 3 <= len(value) <= MOST_POINTS:
-            raise ValueError("not a list of points")
-        return tuple(map(self._point, value))
+        points = as_list(value)
+        if points is None or not 3 <= len(points) <= MOST_POINTS:
+            raise ValueError(_wrong_type(value))
+        return tuple(_each("point", self._point, points))
 
-    def _point(self, pair: object) -> tuple[float, float]:
-        if not isinstance(pair, list) or len(pair) != 2:
+    def _point(self, value: object) -> tuple[float, float]:
+        pair = as_list(value)
+        if pair is None or len(pair) != 2:
             raise ValueError("not a pair of lengths")
         return self.each.read(pair[0]), self.each.read(pair[1])
 
@@ -318,7 +334,7 @@ class Flag:
 
     def read(self, value: object) -> bool:
         if not isinstance(value, bool):
-            raise ValueError("neither true nor false")
+            raise ValueError(_wrong_type(value))
         return value
 
     def write(self, value: bool) -> bool:
@@ -421,7 +437,10 @@ def to_internal(value: object, unit: str) -> float:
     Raises ValueError or OverflowError if the text is not a quantity of this kind.
     """
     digits, from_unit = _parts(value)
-    factor = _conversion(from_unit, unit)
+    try:
+        factor = _conversion(from_unit, unit)
+    except ValueError:
+        raise ValueError(_unfit(from_unit, unit)) from None
     if not math.isfinite(float(digits)):
         raise OverflowError("too large")
     return float(Fraction(digits) * factor) if float(digits) else 0.0
@@ -432,8 +451,68 @@ def _parts(value: object) -> tuple[str, str]:
     text = value.translate(_PRINTED) if isinstance(value, str) and len(value) <= LONGEST else ""
     match = _QUANTITY.fullmatch(text)
     if match is None:
-        raise ValueError("not a number with a unit")
+        raise ValueError(_fault(value))
     return match[1], match[2]
+
+
+def _fault(value: object) -> str:
+    """Return why a value is not a number with a unit; empty if only the unit is missing."""
+    if not isinstance(value, str):
+        return _wrong_type(value)
+    if len(value) > LONGEST:
+        return f"it has more than {LONGEST} characters"
+    odd = _ODD.search(value.translate(_PRINTED))
+    if odd:
+        return odd_character(odd[0])
+    start = re.match(_DIGITS, value)
+    if start is None:
+        return "it does not start with a number"
+    unit = value[start.end():].strip()
+    return f'"{unit}" is not a unit' if unit else ""
+
+
+def odd_character(letter: str) -> str:
+    """Return a sentence that names a letter that is not accepted."""
+    if letter == ",":
+        return 'the character "," is not accepted; the decimal sign is a point'
+    name = unicodedata.name(letter, "a control character").lower()
+    sign = f'"{letter}"' if letter.isascii() and letter.isprintable() else f"U+{ord(letter):04X}"
+    return f"the character {sign} ({name}) is not accepted"
+
+
+def _wrong_type(value: object) -> str:
+    """Name the type of a refused value; empty for numbers, texts and lists."""
+    kind = type(value)
+    if kind in (int, float, str, list):
+        return ""
+    package = kind.__module__.partition(".")[0]
+    name = kind.__name__ if package == "builtins" else f"{package}.{kind.__name__}"
+    return f"it is of the type {name}"
+
+
+def because(error: Exception) -> str:
+    """Return the reason of a refusal after a semicolon; empty without a reason."""
+    return f"; {error}" if str(error) else ""
+
+
+def as_list(value: object) -> list | None:
+    """Return a list, a tuple or an array as a list; None for other values."""
+    plain = without_numpy(value)
+    return list(plain) if isinstance(plain, list | tuple) else None
+
+
+def without_numpy(value):
+    """Return a scalar or an array of NumPy as a number or a list, and other values unchanged."""
+    return value.tolist() if type(value).__module__ == "numpy" else value
+
+
+def _each(noun: str, read: Callable, values: list) -> Iterator:
+    """Read every entry of a list; the reason of a refusal has its number."""
+    for number, value in enumerate(values, 1):
+        try:
+            yield read(value)
+        except (ValueError, OverflowError) as error:
+            raise ValueError(f"{noun} {number} is not accepted{because(error)}") from None
 
 
 def in_unit(value: float, unit: str, to_unit: str) -> str:
@@ -453,9 +532,9 @@ def units_of(tables: object, key: str = "") -> dict[str, str]:
     units: dict[str, str] = {}
     for name, part in tables.items() if isinstance(tables, dict) else ():
         units |= units_of(part, f"{key}.{name}" if key else str(name))
-    first = tables[0] if isinstance(tables, list) and tables else tables
+    first = (as_list(tables) or [tables])[0]
     try:
-        return units or {key: _parts(first[-1] if isinstance(first, list) and first else first)[1]}
+        return units or {key: _parts((as_list(first) or [first])[-1])[1]}
     except ValueError:
         return units
 
@@ -469,16 +548,6 @@ def alike(first: object, second: object) -> bool:
         return math.isclose(to_internal(first, unit), to_internal(second, unit), rel_tol=1e-14)
     except (ValueError, OverflowError):
         return first == second
-
-
-def unlike(kind: Kind, value: object) -> str:
-    """Hint against moles, and against parts per million for a concentration; else empty."""
-    text = value if isinstance(value, str) and len(value) <= LONGEST else ""
-    if _MOLES.search(text):
-        return "; moles need a molar mass, which is not known here: give milligrams"
-    if isinstance(kind, Quantity) and kind.unit == "mg/L" and _PARTS.search(text):
-        return "; give mg/L (in water 1 ppm is about 1 mg/L, 1 ppb about 1 ug/L)"
-    return ""
 
 
 def nearest(word: str, words: Iterable[str]) -> str:
@@ -499,7 +568,7 @@ def _takes(kind: "Quantity | Number", value: object) -> bool:
 
 def _within(accepts: Range, value: float) -> float:
     if not (math.isfinite(value) and accepts.holds(value)):
-        raise ValueError(f"not {accepts.words}")
+        raise ValueError
     return value + 0.0  # no negative zero
 
 
@@ -511,8 +580,46 @@ def _conversion(from_unit: str, unit: str) -> Fraction:
     """
     if unit == "rad" and from_unit not in ANGLES:
         raise ValueError(f"{from_unit} is not a unit of angle")
+    if unit != "rad" and _has_dimensionless_factor(from_unit):
+        raise ValueError(f"{from_unit} has a factor without dimension")
     factor = exact.conversion(from_unit, unit)
     return _by_pint(from_unit, unit) if factor is None else factor
+
+
+def _has_dimensionless_factor(unit: str) -> bool:
+    """Whether a unit has a factor without dimension, such as "percent" or "deg"."""
+    return any(_is_dimensionless(factor["name"]) for factor in exact.FACTOR.finditer(unit))
+
+
+def _is_dimensionless(name: str) -> bool:
+    known = exact.UNITS.get(name)
+    try:
+        return _registry().Unit(name).dimensionless if known is None else not any(known[1:])
+    except Exception:  # not a unit; pint lets errors of its parser through
+        return False
+
+
+def _unfit(from_unit: str, unit: str) -> str:
+    """Return why a unit is not one of the kind of `unit`.
+
+    The reason names the factor without which the unit is accepted, else the whole unit.
+    """
+    if unit in MASSES and _MOLES.search(from_unit):
+        return NO_MOLES
+    if unit == "mg/L" and from_unit in ("ppm", "ppb"):
+        return NO_PARTS
+    for factor in exact.FACTOR.finditer(from_unit):
+        rest = from_unit[:factor.start()] + from_unit[factor.end():]
+        if _converts(rest.lstrip(" *"), unit):
+            return f'"{factor[0].strip(" */")}" is not accepted in this unit'
+    return f'"{from_unit}" is not a unit of this kind'
+
+
+def _converts(from_unit: str, unit: str) -> bool:
+    try:
+        return bool(_conversion(from_unit, unit))
+    except ValueError:
+        return False
 
 
 def _by_pint(from_unit: str, unit: str) -> Fraction:
