@@ -15,6 +15,7 @@ from repro.march.simulation import simulate
 from repro.preflight import checked, cost, modelled, numbers, simplifications
 from repro.preflight.checked import check
 from repro.preflight.modelled import describe_model
+from repro.runs import progress
 from repro.scene import load_scene, packaged_scenes
 from tests import faults
 from tests.shell import refusal
@@ -22,6 +23,12 @@ from tests.strategies import coarse_base
 
 #: Mean velocity of the clean channel of base: (1e-3 cm / 600 um) g W^2 / (12 nu), um/h.
 CLEAN = 1e-5 / 600e-6 * 9.81 * (50e-6) ** 2 / (12 * 1.003e-6) * 3600e6
+
+
+@pytest.fixture(autouse=True)
+def without_progress(monkeypatch):
+    """No line of progress appears, however slow the machine is."""
+    monkeypatch.setattr(progress, "TICK", 600.0)
 
 
 def examine(name, *overrides, speed=None):
