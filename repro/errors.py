@@ -6,6 +6,8 @@ names arguments of Python.
 """
 
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 #: Arguments of Python for options of the command line; others have the name of the option.
 ARGUMENTS = {"--out": "folder", "--set": "overrides", "--force": "force=True",
@@ -35,6 +37,20 @@ class StageError(RuntimeError):
     """
 
     stage = "a stage"
+
+
+@contextmanager
+def failing_as(failure: type[StageError]) -> Iterator[None]:
+    """Turn an arithmetic error into the failure of a stage; for a block, or as a decorator.
+
+    A power, root, logarithm or division fails where an iterate leaves the domain of the stage's
+    equations. A caller that shortens a step, or tries another method, does the same as for an
+    iteration that does not converge.
+    """
+    try:
+        yield
+    except ArithmeticError as error:
+        raise failure(f"an iterate leaves the domain of its equations ({error})") from error
 
 
 class MeshError(StageError):
