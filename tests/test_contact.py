@@ -471,7 +471,7 @@ TOWER = 'aggregate.outline=[["-25 um","0 um"],["-15 um","50 um"],["15 um","50 um
 @pytest.mark.parametrize("preset", ["paper", "fast"])
 @pytest.mark.parametrize("bonded", [True, False])
 def test_a_bonded_lower_wall_leaves_the_upper_wall_sliding(bonded, preset):
-    """A tower from wall to wall swells by 5 %. Both ends of each contact surface move apart by more than 0.5 um, and its
+    """A tower from wall to wall swells by 5 %. The ends of each contact surface move apart by more than 0.5 um, and its
     fixed point stays. No point of the lower wall moves if that wall is bonded."""
     scene = load_scene("base", [TOWER, f"growth.wall={'bonded' if bonded else 'sliding'}", f"numerics.preset={preset}",
                                 "numerics.refinement=0.3"], unset=["aggregate.radius"])
