@@ -41,11 +41,34 @@ class StageError(RuntimeError):
 
 @contextmanager
 def failing_as(failure: type[StageError]) -> Iterator[None]:
-    """Turn an arithmetic error into the failure of a stage; for a block, or as a decorator.
+    """Turn an arithmetic error into the failure of a stage; a decorator of its iterations.
 
-    A power, root, logarithm or division fails where an iterate leaves the domain of the stage's
-    equations. A caller that shortens a step, or tries another method, does the same as for an
-    iteration that does not converge.
+    Parameters
+    ----------
+    failure : type of StageError
+        The error of the stage.
+
+    Yields
+    ------
+    None
+
+    Raises
+    ------
+    StageError
+        The failure, where an iterate leaves the domain of a power, root, logarithm or division. A
+        caller shortens its step, as for an iteration that does not converge.
+
+    Examples
+    --------
+    >>> from repro.errors import GrowthError, failing_as
+    >>> @failing_as(GrowthError)
+    ... def stretch(J):
+    ...     return 1 / J
+    >>> try:
+    ...     stretch(0.0)
+    ... except GrowthError as error:
+    ...     print(error)
+    an iterate leaves the domain of its equations (float division by zero)
     """
     try:
         yield
