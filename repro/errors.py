@@ -6,6 +6,8 @@ names arguments of Python.
 """
 
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 #: Arguments of Python for options of the command line; others have the name of the option.
 ARGUMENTS = {"--out": "folder", "--set": "overrides", "--force": "force=True",
@@ -35,6 +37,43 @@ class StageError(RuntimeError):
     """
 
     stage = "a stage"
+
+
+@contextmanager
+def failing_as(failure: type[StageError]) -> Iterator[None]:
+    """Turn an arithmetic error into the failure of a stage; a decorator of its iterations.
+
+    Parameters
+    ----------
+    failure : type of StageError
+        The error of the stage.
+
+    Yields
+    ------
+    None
+
+    Raises
+    ------
+    StageError
+        The failure, where an iterate leaves the domain of a power, root, logarithm or division. A
+        caller shortens its step, as for an iteration that does not converge.
+
+    Examples
+    --------
+    >>> from repro.errors import GrowthError, failing_as
+    >>> @failing_as(GrowthError)
+    ... def stretch(J):
+    ...     return 1 / J
+    >>> try:
+    ...     stretch(0.0)
+    ... except GrowthError as error:
+    ...     print(error)
+    an iterate leaves the domain of its equations (float division by zero)
+    """
+    try:
+        yield
+    except ArithmeticError as error:
+        raise failure(f"an iterate leaves the domain of its equations ({error})") from error
 
 
 class MeshError(StageError):

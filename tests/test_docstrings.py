@@ -20,7 +20,7 @@ USERS = [f"repro.{name}" for name in dir(repro)]
 METHODS = [f"repro.Results.{name}" for name in ("animate", "fields", "plot", "to_pandas", "to_xarray")]
 #: Functions and classes that CONTRIBUTING.md names, and the classes of the entries of the lists that it names.
 CONTRIBUTORS = [
-    "repro.timing.timed", "repro.errors.StageError", "repro.fem.space.Space",
+    "repro.timing.timed", "repro.errors.StageError", "repro.errors.failing_as", "repro.fem.space.Space",
     "repro.results.quantities.Quantity", "repro.results.quantities.Unit", "repro.results.arrays.Array",
     "repro.report.quantities.Kind",
     "repro.model.uptake_law.UptakeLaw",

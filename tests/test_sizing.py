@@ -7,14 +7,16 @@ import pytest
 from hypothesis import given
 
 from repro.fem import sizing as of
-from repro.fem.outline import BOTTOM, FREE, TOP, Outline
+from repro.fem.outline import BOTTOM, FREE, TOP, Outline, polygon
 from repro.fem.sizing import Sizing
 from repro.model import pore
+from repro.model.contact_lines import surface_ends
 from repro.model.pore import resolution
 from repro.scene import Numerics, load_scene
 from tests import oracles
 from tests.strategies import attached_aggregates, lengths, outlines, refinements, widths
 
+EVERY_GEOMETRY = pytest.mark.parametrize("geometry", [1, 2])
 FILM = 2.0
 #: Aggregates of straight edges, or of arcs.
 either = attached_aggregates(width=widths) | attached_aggregates(width=widths, geometry=2)
@@ -90,3 +92,54 @@ def test_boundary_layers_do_not_refine_films():
     outline = Outline(tip, np.array([BOTTOM, BOTTOM, FREE]), np.zeros(3, bool), tip)
     sizes = [of.film_sizes(outline, sizing)[2] for sizing in (slow, fast)]
     assert sizes == pytest.approx([FILM / 10 / 0.2] * 2)
+
+
+WALLS = pytest.mark.parametrize("wall", [BOTTOM, TOP])
+DIRECTIONS = pytest.mark.parametrize("direction", [1, -1])
+
+
+def rolled(wall, direction, geometry, width=50.0):
+    """A tower that spans the pore, after the edge beyond one of its contact lines has joined the wall."""
+    tower = np.array([[-25.0, 0.0], [-15.0, width], [15.0, width], [25.0, 0.0]])
+    start = of.split(polygon(tower, width, geometry), Sizing(width, 0.7, FILM))
+    line, step = next(end for end in surface_ends(start, wall) if end[1] == direction)
+    joined = (line + step * np.arange(1, geometry + 1)) % len(start.points)
+    points, walls = start.points.copy(), start.wall.copy()
+    outwards = np.sign(points[line, 0] - points[line - step, 0])
+    points[joined] = points[line] + np.outer(np.arange(1, geometry + 1), [outwards, 0.0])
+    walls[joined] = wall
+    return replace(start, points=points, wall=walls), start.points[line]
+
+
+@EVERY_GEOMETRY
+@WALLS
+@DIRECTIONS
+def test_a_corner_of_the_shape_at_t_0_keeps_its_node_on_either_wall(wall, direction, geometry):
+    """Its contact line has moved on, and the elements are coarse. Without the node, the area at t = 0 would shrink."""
+    outline, corner = rolled(wall, direction, geometry)
+    coarse = of.split(outline, Sizing(50.0, 0.3, FILM))
+    assert corner.tolist() in coarse.origin.tolist()
+    before, after = (replace(each, points=each.origin).area for each in (outline, coarse))
+    assert after == pytest.approx(before, rel=1e-12)
+
+
+@EVERY_GEOMETRY
+@pytest.mark.parametrize("degrees, kept", [(29.0, False), (31.0, True)])
+def test_only_a_corner_by_more_than_thirty_degrees_keeps_its_node(degrees, kept, geometry):
+    """On either side of the corner lies straight contact."""
+    x = np.linspace(-10.0, 10.0, 9)
+    y = np.maximum(x, 0.0) * np.tan(np.radians(degrees))
+    base = np.column_stack([x, 0.0 * x])
+    apex = np.array([[0.0, 20.0]])
+    points, origin = np.vstack([base, apex]), np.vstack([np.column_stack([x, y]), apex])
+    wall = np.array([BOTTOM] * 9 + [FREE])
+    corners = Outline(points, wall, np.zeros(10, bool), origin)
+    outline = corners if geometry == 1 else replace(
+        corners, **{name: np.insert(value, np.arange(1, 11), between, axis=0) for name, value, between in (
+            ("points", points, 0.5 * (points + np.roll(points, -1, axis=0))),
+            ("origin", origin, 0.5 * (origin + np.roll(origin, -1, axis=0))),
+            ("wall", wall, np.where(np.arange(10) < 8, BOTTOM, FREE)),
+            ("fixed", np.zeros(10, bool), np.zeros(10, bool)))}, geometry=2)
+    assert outline.corners_at_start[4] == kept
+    starts = [first for first, _ in of.runs(outline)]
+    assert (4 in starts) == kept

@@ -94,6 +94,14 @@ class Outline:
         on = self.wall != FREE
         return on & ~(np.roll(on, 1) & np.roll(on, -1))
 
+    @property
+    def corners_at_start(self) -> np.ndarray:
+        """(edges,) True where the shape of t = 0 turns by more than CORNER at an edge's start."""
+        first, second = arc_derivatives(self.arcs(self.origin))
+        before = np.roll(first + second, 1, axis=0)
+        lengths = np.linalg.norm(before, axis=1) * np.linalg.norm(first, axis=1)
+        return np.sum(before * first, axis=1) < np.cos(CORNER) * lengths
+
     def edge_lengths(self) -> np.ndarray:
         """Length (um) of the straight line from each node to the next."""
         return np.linalg.norm(np.roll(self.points, -1, axis=0) - self.points, axis=1)

@@ -172,7 +172,7 @@ def split(outline: Outline, sizing: Sizing) -> Outline:
     sizes = interface_sizes(polygon, sizing)
     on_wall = outline.edge_wall != FREE
     pieces = []
-    for first, last in runs(polygon):
+    for first, last in runs(outline):
         keep = np.arange(first, last + 1) % len(polygon.points)
         if on_wall[keep[0]]:
             pieces.append(_on_the_wall(outline, keep, sizes, sizing))
@@ -192,11 +192,12 @@ def halved(outline: Outline, cut: np.ndarray) -> Outline:
 
 
 def runs(outline: Outline) -> list[tuple[int, int]]:
-    """Pieces (first, last) of the loop: single interface edges, and stretches of wall between their
-    ends and fixed points."""
-    count = len(outline.points)
-    free_edge = outline.interface_edges()
-    breaks = free_edge | np.roll(free_edge, 1) | outline.fixed
+    """Pieces (first, last) of the loop of corners: single interface edges, and stretches of wall
+    between their ends, fixed points and corners of the shape at t = 0."""
+    polygon = outline.corners
+    count = len(polygon.points)
+    free_edge = polygon.interface_edges()
+    breaks = free_edge | np.roll(free_edge, 1) | polygon.fixed | outline.corners_at_start
     starts = np.flatnonzero(breaks)
     return list(zip(starts, np.append(starts[1:], starts[0] + count)))
 

@@ -25,7 +25,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from repro.errors import NotCovered, OriginFolded
+from repro.errors import NotCovered, OriginFolded, TransferError, failing_as
 from repro.fem import elements, linear
 from repro.fem.assembly import ElementSystem
 from repro.fem.forms import mass
@@ -60,6 +60,7 @@ class Located:
 
 
 @timed("transfer")
+@failing_as(TransferError)
 def located(points: np.ndarray, cells: np.ndarray, where: np.ndarray) -> Located:
     """Locate points (K, 2) um in triangles (T, 3 or 6).
 

@@ -16,7 +16,7 @@ from functools import partial
 
 import numpy as np
 
-from repro.errors import GrowthError, LinearError
+from repro.errors import GrowthError, LinearError, failing_as
 from repro.fem.division import Division
 from repro.fem.mesh import Mesh
 from repro.fem.outline import BOTTOM, FREE, TOP, Outline
@@ -107,6 +107,7 @@ class Expansion:
         return self.division.amounts(amounts, grown.space.table)
 
 
+@failing_as(GrowthError)
 def expand(mechanics: Mechanics, grown: Pore, theta: np.ndarray, guess: Pore | None = None,
            search: SearchOptions = PATIENT) -> Expansion:
     """Expand the aggregate to its new shape under theta (t, q).
@@ -498,6 +499,7 @@ class _Trials:
         return replace(locked.moved(points), pressure=pressure)
 
 
+@failing_as(GrowthError)
 def _parts(growing: np.ndarray) -> np.ndarray:
     """The parts of a growth theta / J (t, q), up to 1."""
     count = growth.GradDiv.parts(growing)

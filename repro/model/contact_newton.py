@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from repro.errors import GrowthError
+from repro.errors import GrowthError, failing_as
 from repro.fem import division as dividing
 from repro.fem.assembly import Factored
 from repro.fem.division import Division
@@ -166,6 +166,7 @@ class Coupled:
         for line in lines:
             line.floor = 0.0
 
+    @failing_as(GrowthError)
     def solve(self, tolerance: float = growth.NEWTON) -> None:
         """Solve to a defect of ``tolerance``, or to round-off. Raises GrowthError if there is no
         convergence."""

@@ -32,7 +32,7 @@ from typing import TypeAlias
 import numpy as np
 import scipy.sparse as sp
 
-from repro.errors import TransportError
+from repro.errors import TransportError, failing_as
 from repro.fem import linear
 from repro.fem.assembly import ElementSystem
 from repro.fem.space import Space
@@ -172,6 +172,7 @@ class System:
 
 
 @timed("transport")
+@failing_as(TransportError)
 def settle(problem: Problem, sink: Sink | None, guess: Concentrations | None) -> Concentrations:
     """Compute steady profiles after a shape update: the scheme with F3 = F4 = 0, until C is steady.
 
@@ -251,6 +252,7 @@ def _nearer(problem: Problem, guess: Concentrations | None) -> Concentrations:
 
 
 @timed("transport")
+@failing_as(TransportError)
 def advance(problem: Problem, active: np.ndarray, inert: np.ndarray, start: Concentrations,
             duration: float, *, tolerance: float = TOLERANCE, fixed_step: float | None = None,
             simultaneous: bool = False) -> Advance:

@@ -6,12 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 
+from repro.errors import GrowthError, failing_as
 from repro.fem.space import Space
 from repro.model import kinetics
 from repro.model.biomass import Rates
 from repro.model.pore import Pore
 
 
+@failing_as(GrowthError)
 def grow(pore: Pore, rates: Rates, duration: float) -> Pore:
     """Integrate (9)-(10) over a duration (h) at constant rates."""
     active, inert = kinetics.grow(pore.active, pore.inert, rates.growth, rates.remains, duration)

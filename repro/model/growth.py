@@ -34,7 +34,7 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
-from repro.errors import GrowthError, LinearError
+from repro.errors import GrowthError, LinearError, failing_as
 from repro.fem import elements
 from repro.fem.assembly import ElementSystem, Factored, saddle_blocks, saddle_system
 from repro.fem.brief import brief
@@ -534,6 +534,7 @@ def reach(system: System, start: np.ndarray, theta: np.ndarray, first: Equilibri
     raise GrowthError(f"{failure}; {_ADVICE[bool(system.pull.any())]}")
 
 
+@failing_as(GrowthError)
 def _continued(system: System, start: np.ndarray, theta: np.ndarray, first: Equilibrium,
                prescribed: np.ndarray, steps: int, modified_newton: bool) -> Equilibrium:
     """Newton's method at theta = start (theta / start)^s for s = 1 / steps ... 1."""

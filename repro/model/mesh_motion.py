@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from repro.errors import MeshError, failing_as
 from repro.fem.assembly import ElementSystem, saddle_blocks, saddle_system
 from repro.fem.forms import each, mass
 from repro.fem.mesh import Mesh
@@ -23,6 +24,7 @@ from repro.timing import timed
 
 
 @timed("mesh motion")
+@failing_as(MeshError)
 def move(mesh: Mesh, body: np.ndarray, compressibility: float, stabilisation: float) -> np.ndarray:
     """Move a mesh with the aggregate, (35).
 

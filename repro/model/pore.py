@@ -305,8 +305,6 @@ def seeded(scene: Scene, front: float = 1.0, outline: Outline | None = None) -> 
     inert = total * (scene.aggregate.inert_fraction if scene.aggregate else 0.0)
     wall = outline.wall if outline else np.empty(0, int)
     fixed = outline.fixed if outline else np.empty(0, bool)
-    if outline and scene.growth and scene.growth.wall == "bonded":
-        fixed = fixed | outline.contact_ends
     body = material(space, mesh.points[mesh.body])
     theta = np.ones((np.count_nonzero(mesh.biomass), len(body.shape.table.weights)))
     return Pore(0.0, space, wall, fixed, total - inert, inert, theta, body,

@@ -16,6 +16,7 @@ from functools import cache, cached_property, lru_cache
 
 import numpy as np
 
+from repro.errors import GrowthError, failing_as
 from repro.fem import elements
 from repro.fem.brief import brief
 from repro.fem.outline import FREE
@@ -67,6 +68,7 @@ class Surface:
 
 
 @lru_cache(maxsize=2)  # a row uses that of its own pore and that of the last step's
+@failing_as(GrowthError)
 def surface(pore: Pore) -> Surface:
     """The free surface of a pore's aggregate, with its stretch since the configuration from which
     strain counts."""

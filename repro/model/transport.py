@@ -27,7 +27,7 @@ from typing import NamedTuple
 import numpy as np
 import scipy.sparse as sp
 
-from repro.errors import LinearError, TransportError, Unresolved
+from repro.errors import LinearError, TransportError, Unresolved, failing_as
 from repro.fem.assembly import ElementSystem, Factored
 from repro.fem.brief import brief
 from repro.fem.forms import Basis, each, mass
@@ -525,6 +525,7 @@ def steady(problem: Problem, sink: Sink | None,
     return solution
 
 
+@failing_as(TransportError)
 def _newton(balance: Balance, state: np.ndarray) -> tuple[np.ndarray, int]:
     """(sn,) the solution by Newton's method from a start, and its number of iterations."""
     newton = Newton(NEWTON, ROUND_OFF, MOST_ITERATIONS, balance.problem.modified_newton)

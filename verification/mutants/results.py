@@ -28,6 +28,8 @@ NEW_MESH = "tests/test_new_mesh_due.py::test_"
 SHRINKING = "tests/test_shrinking.py::test_"
 CACHE_KEYS = "tests/test_cache_keys.py::test_"
 DEEPEST = "tests/test_deepest_level.py::test_elements_are_halved_as_often_as_a_front_needs"
+DOMAINS = "tests/test_domains.py::test_"
+SIZING = "tests/test_sizing.py::test_"
 FOLD = "tests/test_fold.py::test_"
 CHECKPOINT = "tests/test_checkpoint.py::test_"
 OVER = f"{FOLD}a_fold_ends_a_run"
@@ -1170,7 +1172,12 @@ MUTANTS = (
          "An error in Python names options of the command line.",
          "return OPTION.sub(lambda match: ARGUMENTS.get(match[0], match[0][2:]), super().__str__())",
          "return super().__str__()",
-         "tests/test_python_calls.py::test_errors_name_arguments_in_python_and_options_on_the_command_line")),
+         "tests/test_python_calls.py::test_errors_name_arguments_in_python_and_options_on_the_command_line"),
+        ("domain-left-without-its-stage",
+         "An iterate that leaves the domain of its equations is not a failure of its stage.",
+         "except ArithmeticError as error:",
+         "except ZeroDivisionError as error:",
+         f"{DOMAINS}an_equilibrium_from_a_triangle_that_is_turned_over_fails_in_growth")),
     *changes(
         "repro/results/drawing.py",
         ("outline-of-every-triangle",
@@ -1354,7 +1361,32 @@ MUTANTS = (
          "A thin body of any length requires elements of a tenth of its thickness.",
          "max(outline.thickness / ACROSS_AGGREGATE, length / ALONG_INTERFACE)",
          "outline.thickness / ACROSS_AGGREGATE",
-         f"{ODD}a_sliver_needs_no_more_elements_than_its_length[fast-6000]")),
+         f"{ODD}a_sliver_needs_no_more_elements_than_its_length[fast-6000]"),
+        ("corner-at-start-lost",
+         "A corner of the shape at t = 0 loses its node once it has joined a wall.",
+         "polygon.fixed | outline.corners_at_start",
+         "polygon.fixed",
+         f"{SIZING}a_corner_of_the_shape_at_t_0_keeps_its_node_on_either_wall")),
+    *changes(
+        "repro/fem/outline.py",
+        ("corners-by-chance",
+         "Any node where the shape of t = 0 turns counts as its corner.",
+         "< np.cos(CORNER) * lengths",
+         "< np.cos(CORNER / 2) * lengths",
+         f"{SIZING}only_a_corner_by_more_than_thirty_degrees_keeps_its_node")),
+    *changes(
+        "repro/model/contact.py",
+        ("bonded-on-both-walls",
+         "A bonded lower wall pins the points on the upper wall too.",
+         "    target = shape.mesh.points[shape.mesh.body].copy()\n",
+         "    if mechanics.keys.wall == \"bonded\":\n        fixed = fixed | (shape.wall != FREE)\n"
+         "    target = shape.mesh.points[shape.mesh.body].copy()\n",
+         "tests/test_contact.py::test_a_bonded_lower_wall_leaves_the_upper_wall_sliding"),
+        ("search-for-lines-not-reached",
+         "If the growth of a step leaves its domain, Newton's method for the lines ends the step.",
+         "@failing_as(GrowthError)\ndef _parts(",
+         "def _parts(",
+         f"{DOMAINS}contact_lines_from_a_triangle_that_is_turned_over_fail_in_growth")),
     *changes(
         "repro/scene/rules.py",
         ("gap-between-edges-unjudged",

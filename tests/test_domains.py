@@ -1,0 +1,204 @@
+"""An iterate that leaves the domain of a stage's equations is a failure of this stage, and its step is shortened.
+
+A power, root, logarithm or quotient does not exist there: of J < 0, of an area of zero, of a number that overflows.
+"""
+from dataclasses import replace
+from functools import cache, partial
+
+import numpy as np
+import pytest
+
+from repro.errors import GrowthError, MeshError, TransferError, TransportError
+from repro.fem import transfer
+from repro.march import midpoint
+from repro.march.simulation import simulate
+from repro.model import contact, contact_lines, contact_newton, gear, growing, growth, mesh_motion, surface, transport
+from repro.model.biomass import Rates
+from repro.model.contact_lines import Clearance
+from repro.model.kinetics import Sink
+from repro.model.pore import seeded, solve_flow
+from repro.model.uptake_law import LAWS
+from repro.scene import load_scene
+from tests.strategies import coarse_base, half_disc
+
+TOWER = 'aggregate.outline=[["-25 um","0 um"],["-15 um","50 um"],["15 um","50 um"],["25 um","0 um"]]'
+FAST = ["numerics.preset=fast", "numerics.refinement=0.25"]
+OUT_OF_DOMAIN = "an iterate leaves the domain of its equations"
+#: A concentration (mg/L) whose square or exponential overflows.
+HUGE = 1e200
+
+
+@pytest.fixture(autouse=True)
+def _as_in_a_run():
+    """Floating-point errors raise in a run."""
+    with np.errstate(all="raise", under="ignore"):
+        yield
+
+
+def turned_over(points, nodes):
+    """Points with the aggregate's nodes mirrored."""
+    mirrored = points.copy()
+    mirrored[nodes] *= [-1, 1]
+    return mirrored
+
+
+@pytest.mark.parametrize("geometry", [1, 2])
+def test_an_equilibrium_from_a_triangle_that_is_turned_over_fails_in_growth(geometry):
+    body, constrained, _, _ = half_disc(5.0, geometry=geometry)
+    J = body.strained(body.reference).J
+    first = growth.Equilibrium(body.reference * [-1, 1], np.zeros(body.shape.corners), 0)
+    system = growth.System(body, constrained, stabilisation=growth.STABILISATIONS[geometry].on(body, body.reference))
+    with pytest.raises(GrowthError, match=f"{OUT_OF_DOMAIN} .*; try"):
+        growth.reach(system, J, 1.1 * J, first, first.position)
+
+
+@cache
+def tower():
+    """Trials of a tower from wall to wall that has grown by 5 %, its contact lines, and the rule for them."""
+    scene = load_scene("base", [TOWER, *FAST], unset=["aggregate.radius"])
+    start = seeded(scene)
+    grown = replace(start, theta=1.05 * start.theta)
+    rule = Clearance(50.0, scene.growth.minimum_film, scene.growth.minimum_contact_angle)
+    lines = contact_lines.lines_of(grown.boundary)
+    return contact._Trials(contact.Mechanics.of(scene), grown, start, None, True), grown, lines, rule
+
+
+def test_contact_lines_from_a_triangle_that_is_turned_over_fail_in_growth():
+    """The search with whole equilibria then takes over."""
+    trials, grown, lines, rule = tower()
+    bad = turned_over(grown.mesh.points, grown.mesh.body)
+    place = partial(trials._place, grown, grown.wall, lines, rule)
+    with pytest.raises(GrowthError, match=OUT_OF_DOMAIN):
+        contact_newton.Coupled(place, lines, bad, grown.pressure).solve()
+    trials._shapes[-1] = (np.zeros(0), bad, grown.pressure)
+    assert trials.settle(grown.wall, lines, rule) is None and not any(line.advance for line in lines)
+
+
+@cache
+def stirred(law, substrates):
+    """A pore with flow, and the problem of its substrates; None where a law needs the other substrate."""
+    unset = {"both": [], "acceptor": ["substrates.donor"], "donor": ["substrates.acceptor"]}[substrates]
+    scene = load_scene("base", [*FAST, f"kinetics.law={law}"], unset=unset)
+    pore = seeded(scene)
+    carried = solve_flow(pore.space, scene.flow, scene.pore.length, scene.numerics)
+    return pore, transport.problem(pore.space, carried, scene.substrates, scene.kinetics)
+
+
+LAWS_AND_SUBSTRATES = pytest.mark.parametrize("law, substrates", [
+    (law, substrates) for law in LAWS for substrates in ("both", "acceptor", "donor")
+    if (law, substrates) != ("Haldane", "acceptor")])  # its inhibitor is the donor
+
+
+@LAWS_AND_SUBSTRATES
+def test_substrates_whose_uptake_overflows_fail_in_transport(law, substrates):
+    """Biomass that grows over 1e5 h, and concentrations of an iterate that diverges."""
+    pore, problem = stirred(law, substrates)
+    huge = transport.supplied_everywhere(problem).with_fields(np.full((len(problem.both), pore.space.count), HUGE))
+    with pytest.raises(TransportError, match=OUT_OF_DOMAIN):
+        transport.steady(problem, Sink(pore.active, 1e5))
+    with pytest.raises(TransportError, match=OUT_OF_DOMAIN):
+        gear.advance(problem, pore.active, pore.inert, huge, 1.0)
+    if law != "first order":  # its uptake is linear
+        with pytest.raises(TransportError, match=OUT_OF_DOMAIN):
+            gear.settle(problem, Sink(pore.active), huge)
+
+
+@pytest.mark.parametrize("law", [law for law in LAWS if LAWS[law].monotone])
+def test_newtons_method_starts_again_if_its_guess_overflows(law):
+    pore, problem = stirred(law, "both")
+    supplied = transport.supplied_everywhere(problem)
+    huge = supplied.with_fields(np.full_like(supplied.fields, HUGE))
+    computed, expected = (transport.steady(problem, Sink(pore.active), guess) for guess in (huge, supplied))
+    assert computed.fields == pytest.approx(expected.fields, rel=1e-6, abs=1e-9)  # NEWTON is 1e-11 of a row's terms
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_a_mesh_with_a_collapsed_triangle_fails_in_meshing(order):
+    pore = coarse_base(order)[1]
+    triangle = pore.mesh.triangles[np.flatnonzero(~pore.mesh.biomass)[0]]
+    points = pore.mesh.points.copy()
+    points[triangle[2]] = points[triangle[0]]
+    with pytest.raises(MeshError, match=OUT_OF_DOMAIN):
+        mesh_motion.move(pore.mesh.moved(points), points[pore.mesh.body], 1.0, 12.0)
+
+
+def test_a_point_in_a_collapsed_triangle_fails_in_the_transfer():
+    points = np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]])
+    with pytest.raises(TransferError, match=OUT_OF_DOMAIN):
+        transfer.located(points, np.array([[0, 1, 2]]), np.array([[0.5, 0.0]]))
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_a_surface_with_a_triangle_that_is_turned_over_fails_in_growth(order):
+    pore = coarse_base(order)[1]
+    with pytest.raises(GrowthError, match=OUT_OF_DOMAIN):
+        surface.surface(pore.moved(turned_over(pore.mesh.points, pore.mesh.body)))
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_biomass_that_overflows_fails_in_growth(order):
+    pore = coarse_base(order)[1]
+    rates = Rates(np.full_like(pore.active, 0.3), np.zeros_like(pore.active))
+    with pytest.raises(GrowthError, match=OUT_OF_DOMAIN):
+        growing.grow(pore, rates, 1e4)
+
+
+def run(monkeypatch, *changes, unset=()):
+    """[[length, error or None]] of the attempted steps of a run to 0.6 h, and the time of its last row."""
+    attempts, attempt = [], midpoint.attempt
+
+    def record(stages, previous, solved, duration, *options):
+        attempts.append([duration, None])
+        try:
+            return attempt(stages, previous, solved, duration, *options)
+        except Exception as error:
+            attempts[-1][1] = error
+            raise
+
+    monkeypatch.setattr(midpoint, "attempt", record)
+    end = ["growth.end=0.6 h", 'output.times=["0.6 h"]']
+    *_, last = simulate(load_scene("base", [*FAST, *end, *changes], unset=unset))
+    return attempts, last.pore.time
+
+
+def test_a_run_shortens_a_step_in_which_biomass_overflows(monkeypatch):
+    """The first step is 16 000 h. Its exponentials and those of 8000 h overflow."""
+    attempts, end = run(monkeypatch, "growth.time_step=2000 h")
+    assert end == 0.6 and [length for length, _ in attempts[:3]] == [16000.0, 8000.0, 2000.0]
+    assert [type(error) for _, error in attempts[:3]] == [GrowthError, GrowthError, type(None)]
+
+
+def leave_domain(monkeypatch, owner, name, shortest=0.0):
+    """Let a function of a stage leave its domain in each attempted step longer than ``shortest`` (h)."""
+    function, attempt, lengths = getattr(owner, name), midpoint.attempt, [0.0]
+
+    def start(stages, previous, solved, duration, *options):
+        lengths.append(duration)
+        return attempt(stages, previous, solved, duration, *options)
+
+    def fail(*arguments, **options):
+        if lengths[-1] > shortest:
+            np.power(-1.0, -2 / 3)
+        return function(*arguments, **options)
+
+    monkeypatch.setattr(midpoint, "attempt", start)
+    monkeypatch.setattr(owner, name, fail)
+
+
+@pytest.mark.parametrize("owner, name, kind", [
+    (growth.System, "residual", GrowthError), (transport.Balance, "residual", TransportError),
+    (mesh_motion, "saddle_blocks", MeshError), (surface, "_lengths", GrowthError)])
+def test_a_run_shortens_a_step_in_which_a_stage_leaves_its_domain(monkeypatch, owner, name, kind):
+    """The first step is 1.6 h and its half 0.8 h."""
+    leave_domain(monkeypatch, owner, name, shortest=1.0)
+    attempts, end = run(monkeypatch)
+    assert end == 0.6 and [length for length, _ in attempts[:2]] == [1.6, 0.8]
+    assert [type(error) for _, error in attempts[:2]] == [kind, type(None)]
+
+
+def test_a_run_finds_contact_lines_by_equilibria_if_newtons_method_leaves_its_domain(monkeypatch):
+    """No step fails."""
+    leave_domain(monkeypatch, contact_newton.Coupled, "_step")
+    step = ["growth.time_step=0.01 h", "growth.end=0.08 h", 'output.times=["0.08 h"]']
+    attempts, end = run(monkeypatch, TOWER, *step, unset=["aggregate.radius"])
+    assert end == 0.08 and not any(error for _, error in attempts)
