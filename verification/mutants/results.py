@@ -230,6 +230,11 @@ MUTANTS = (
          "tests/test_rows.py::test_stress_is_reported_only_for_strain_since_the_start[1]")),
     *changes(
         "repro/report/quantities.py",
+        ("ledger-joined-middles",
+         "Means over steps are points at the middles of the steps, which straight lines join.",
+         "np.column_stack([start, end]).ravel()",
+         "np.repeat((start + end) / 2, 2)",
+         "tests/test_charts.py::test_means_over_steps_are_drawn_as_steps"),
         ("effluents-chart-of-the-inlet",
          "The chart of the effluents draws the inlet.",
          'Kind("Effluents", "concentration", _pair("effluent_',
