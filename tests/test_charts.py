@@ -133,7 +133,7 @@ LEDGERS = [f"{name}_{part}_ug_per_m_per_h" for name in SUBSTRATES for part in PA
 
 
 @pytest.mark.parametrize("name", LEDGERS)
-@pytest.mark.parametrize("make", [lambda run: quantities.charts_of(run), lambda run: quantities.overlaid([run], ["one"])],
+@pytest.mark.parametrize("make", [quantities.charts_of, lambda run: quantities.overlaid([run], ["one"])],
                          ids=["report", "compare"])
 def test_means_over_steps_are_drawn_as_steps(name, make):
     """A pulse in a short step has its own height and length, in each chart of a ledger on both pages."""
