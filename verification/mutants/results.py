@@ -1507,8 +1507,8 @@ MUTANTS = (
          f"{PAIRS}viscosity_and_drag_dissipate_the_work_of_the_head"),
         ("flow-kept-for-either-form",
          "A mesh keeps one system for both forms of the flow.",
-         '("flow", interface, velocity.order)',
-         '("flow", velocity.order)',
+         '("flow", interface, velocity.order, splits)',
+         '("flow", velocity.order, splits)',
          f"{CACHE_KEYS}sparse_systems_of_one_mesh_are_independent")),
     *changes(
         "repro/model/transport.py",
