@@ -8,7 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from repro.report import charts
+from repro.report import charts, quantities
+from repro.report.reading import Run
+from repro.results.columns import PARTS, SUBSTRATES
 from repro.results.jumps import with_jumps
 from repro.scene import load_scene, scene_tables
 from tests.pages import first_group
@@ -114,6 +116,45 @@ def test_a_jump_of_a_supply_is_drawn_as_a_jump(times, expected):
     assert curve("effluent_donor_mg_per_L", "numerics.transport=gear") == unchanged
     head = 'flow.head=[["0 h", "1e-3 cm"], ["2 h", "2e-3 cm"]]'
     assert curve("mean_velocity_m_per_d", head) == list(expected)
+
+
+def pulsed(count, pulse):
+    """A run of steps with lengths that differ, and rates of 1 in all of them except the step ``pulse``."""
+    ends = np.cumsum(np.where(np.arange(count) % 2, 0.5, 10.0))
+    start = np.append(0.0, ends[:-1])
+    rates = np.where(np.arange(count) == pulse, 5.0, 1.0)
+    ledger = {f"{name}_{part}_pg_per_m": 1e6 * rates * (ends - start) for name in SUBSTRATES for part in PARTS}
+    ledger |= {f"biomass_{part}_pg_per_m": np.ones(count) for part in ("made", "after")}
+    record = {"tables": {}, "scene": "pulsed", "status": "finished"}
+    return Run(None, record, {"time_h": np.array([0.0, ends[-1]])}, {"start_h": start, "end_h": ends, **ledger})
+
+
+LEDGERS = [f"{name}_{part}_ug_per_m_per_h" for name in SUBSTRATES for part in PARTS]
+
+
+@pytest.mark.parametrize("name", LEDGERS)
+@pytest.mark.parametrize("make", [quantities.charts_of, lambda run: quantities.overlaid([run], ["one"])],
+                         ids=["report", "compare"])
+def test_means_over_steps_are_drawn_as_steps(name, make):
+    """A pulse in a short step has its own height and length, in each chart of a ledger on both pages."""
+    kind = next(kind for kind in quantities.KINDS if name in kind.drawn)
+    drawings = [chart for chart in make(pulsed(7, 3)) if chart.title.startswith(kind.title)]
+    label = quantities.KNOWN[name].label
+    (line,) = [line for chart in drawings for line in chart.lines
+               if label in (line.label, chart.title.rpartition(": ")[2])]
+    assert line.times.tolist() == [0, 10, 10, 10.5, 10.5, 20.5, 20.5, 21, 21, 31, 31, 31.5, 31.5, 41.5]
+    assert line.values == pytest.approx([1] * 6 + [5] * 2 + [1] * 6)
+    corners = drawn(replace(drawings[0], lines=[line]))
+    assert (np.diff(corners, axis=0) == 0).any(axis=1).all(), "horizontal and vertical lines only"
+
+
+def test_many_steps_are_merged_to_their_means():
+    run = pulsed(5001, 777)
+    times, values = quantities.mean_rates(run.ledger["start_h"], run.ledger["end_h"],
+                                          run.ledger["donor_out_pg_per_m"])
+    assert len(times) == charts.MOST_POINTS and (times[0], times[-1]) == (0, run.times[-1])
+    assert (times[1:-1:2] == times[2::2]).all()
+    assert values[::2] @ (times[1::2] - times[::2]) == pytest.approx(run.ledger["donor_out_pg_per_m"].sum(), rel=1e-12)
 
 
 def test_many_points_are_thinned_with_both_ends():

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from repro import results
-from repro.cli import main
+from repro.cli import COMMANDS, main
+from repro.cli.docs import PAGES
 from tests.pages import run
 from tests.shell import read_record, refusal, rows, start
 
@@ -112,3 +113,20 @@ def test_tables_of_gears_method_in_a_closed_pore_hold_only_numbers(tmp_path):
     assert (results.read_table(out / "ledger.csv")["donor_stored_pg_per_m"] < 0).all()
     results.write_table(tmp_path / "t.csv", ["a"], [[np.float64(0.1)], [0.1], [np.int64(3)], [None]])
     assert (tmp_path / "t.csv").read_text() == "a\n0.1\n0.1\n3\n\"\"\n"
+
+
+def test_a_bare_command_prints_its_help(capsys):
+    assert main([]) == 0
+    printed, errors = capsys.readouterr()
+    assert printed.startswith("usage: repro ") and not errors
+    assert all(module.__name__.rpartition(".")[2] in printed for module in COMMANDS)
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_printed_pages_have_no_links_to_files(page, capsys):
+    """A terminal cannot follow them. Each names a file of the repository that exists."""
+    assert main(["docs", page]) == 0
+    text = capsys.readouterr().out
+    assert not re.search(r"\]\((?!https?:)", text)
+    files = re.findall(r"\(docs/([^)#]+)\S* in the repository\)", text)
+    assert all((Path("docs") / name).exists() for name in files) and (files or page != "scope")

@@ -93,7 +93,7 @@ def test_a_wrong_request_is_refused_and_nothing_is_written(results, tmp_path, ca
 
 def test_matplotlib_is_an_extra(results, monkeypatch, tmp_path, capsys):
     faults.remove_package(monkeypatch, "matplotlib.pyplot")
-    message = "the package matplotlib is not installed; pip install 'dupin2001-repro[figures]'"
+    message = "the package matplotlib is not installed; pip install matplotlib pillow"
     for draw in (results.plot, lambda: results.plot("donor"), lambda: results.animate("donor", tmp_path / "film.gif")):
         with pytest.raises(ImportError) as caught:
             draw()

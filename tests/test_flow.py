@@ -5,7 +5,10 @@ hard-17-units cover units of length. `test_derived.py` covers the reported quant
 """
 import numpy as np
 import pytest
+from skfem import MeshTri, MeshTri2
 
+from reference import taylor_hood
+from repro.fem.outline import polygon
 from repro.march.simulation import simulate
 from repro.model import flow, pore
 from repro.scene import load_scene
@@ -73,3 +76,46 @@ def test_the_elements_of_a_scene_reach_the_flow(element, setting):
     unit = flow.unit_flow(space, scene.flow.viscosity_ratio, element=element)
     expected = flow.scaled(unit, space.mesh, scene.pore.length, scene.flow)
     assert np.array_equal(pore.solve_flow(space, scene.flow, scene.pore.length, scene.numerics).head, expected.head)
+
+
+#: Drawn bodies (um) in a pore of 50 um; the last two span it.
+BODIES = {
+    "block": [(-10, 0), (-10, 40), (10, 40), (10, 0)],
+    "trapezium": [(-25, 0), (-10, 35), (10, 35), (25, 0)],
+    "overhanging": [(-8, 0), (-20, 35), (20, 35), (8, 0)],
+    "tilted": [(-20, 0), (0, 38), (20, 38), (0, 0)],
+    "spanning, tilted": [(-20, 0), (0, 50), (20, 50), (0, 0)],
+    "spanning, with a waist": [(-20, 0), (-5, 25), (-20, 50), (20, 50), (5, 25), (20, 0)]}
+#: Promised errors of the head loss.
+PROMISED = {"fast": 0.02, "accurate": 0.005}
+
+
+def drawn_body(body, preset, interface):
+    outline = [[f"{x} um", f"{y} um"] for x, y in BODIES[body]]
+    return load_scene({"pore": {"width": "50 um"}, "aggregate": {"outline": outline},
+                       "flow": {"mean_velocity": "1 m/day"}, "numerics": {"preset": preset, "interface": interface}})
+
+
+def meshed_loss(scene):
+    """The loss (1/um) over the meshed part, for a mean velocity of one."""
+    space = pore.seeded(scene).space
+    return flow.unit_flow(space, scene.flow.viscosity_ratio, interface=scene.numerics.interface).loss
+
+
+def graded_loss(scene):
+    """The loss (1/um) by the independent code on a mesh graded to every corner, with edges of W / 1000 at tips."""
+    width = scene.pore.width
+    outline = polygon(np.array(scene.aggregate.outline), width, 2, at_tips=width / 1000, bends=True)
+    mesh = pore.seeded(scene, outline=outline).mesh
+    plane = MeshTri2.from_mesh(MeshTri(mesh.points[: mesh.corners].T.copy(), mesh.triangles.T.copy()))
+    channel = taylor_hood.Channel(plane, mesh.biomass, width, mesh.ends)
+    return taylor_hood.stokes(channel, scene.flow.viscosity_ratio, scene.numerics.interface).loss
+
+
+@pytest.mark.parametrize("interface", ["laplacian", "traction"])
+@pytest.mark.parametrize("body", BODIES)
+def test_drawn_bodies_have_the_promised_head_loss(body, interface):
+    """The presets meet their bounds against an independent code, where the pressure may jump, on a graded mesh."""
+    expected = graded_loss(drawn_body(body, "fast", interface))
+    errors = {preset: meshed_loss(drawn_body(body, preset, interface)) / expected - 1 for preset in PROMISED}
+    assert all(abs(error) <= PROMISED[preset] for preset, error in errors.items()), errors

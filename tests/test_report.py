@@ -89,6 +89,14 @@ def test_the_assumptions_follow_from_the_scene(transport, extent, expected):
     assert [words in sentence for words in ("substrates at rest", "a clean channel outside")] == expected
 
 
+@pytest.mark.parametrize("strengths, detaches", [((), False), (("bonding",), True), (("tensile",), True),
+                                                 (("bonding", "tensile"), True)])
+def test_a_page_does_not_exclude_detachment_in_a_run_with_strengths(strengths, detaches):
+    scene = load_scene("base", [f"growth.{name}_strength=2 kPa" for name in strengths])
+    sentence = run_page._assumed(Run(Path(), {"tables": scene_tables(scene)}, {}, {}))
+    assert ("no detachment" in sentence, "detaches or tears" in sentence) == (not detaches, detaches)
+
+
 def test_each_frame_is_drawn_on_its_own_mesh(fast, paper):
     """The first mesh has triangles of six nodes, the second of three."""
     packed = fields.packed([*fields.index(fast)[:1], *fields.index(paper)[:1]])

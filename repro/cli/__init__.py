@@ -25,7 +25,11 @@ COMMANDS = (run, scene, check, plot, compare, sweep, docs)
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line; returns the exit status."""
     words = sys.argv[1:] if arguments is None else arguments
-    options = _parser().parse_args(words)
+    parser = _parser()
+    options = parser.parse_args(words)
+    if options.command is None:
+        say(parser.format_help().removesuffix("\n"))
+        return 0
     options.command_line = shlex.join(["repro", *words])
     try:
         return options.call(options)
@@ -64,7 +68,7 @@ def _parser() -> argparse.ArgumentParser:
         prog="repro", description="Biological clogging of one pore by the growth of an aggregate "
         "(Dupin, Kitanidis & McCarty 2001).")
     parser.add_argument("--version", action=_Version, nargs=0, help="print the version and exit")
-    commands = parser.add_subparsers(dest="command", required=True)
+    commands = parser.add_subparsers(dest="command")
     for command in COMMANDS:
         command.add(commands)
     return parser

@@ -5,6 +5,7 @@ Without a page, list them.
 
 from __future__ import annotations
 
+import re
 from importlib.resources import files
 
 from repro.runs.progress import say
@@ -31,5 +32,11 @@ def call(options) -> int:
             say(f"{name:14}{subject}")
     else:
         page = files("repro") / "pages" / f"{options.page}.md"
-        say(page.read_text(encoding="utf-8").removesuffix("\n"))
+        say(_without_links(page.read_text(encoding="utf-8").removesuffix("\n")))
     return 0
+
+
+def _without_links(text: str) -> str:
+    """The text with the file of the repository in place of each link to a file, which a terminal
+    cannot follow."""
+    return re.sub(r"\[([^]]+)\]\((?!https?:)([^)]+)\)", r"\1 (docs/\2 in the repository)", text)

@@ -173,19 +173,24 @@ def saddle_blocks(upper: np.ndarray, divergence: np.ndarray,
 
 
 def saddle_system(velocity: np.ndarray, pressure: np.ndarray, constrained: np.ndarray,
-                  order: np.ndarray | None = None, method: Method = DEFAULT) -> ElementSystem:
+                  order: np.ndarray | None = None, method: Method = DEFAULT,
+                  doubled: np.ndarray | None = None) -> ElementSystem:
     """Build the system of a velocity and of a pressure on some of its nodes.
 
-    velocity: (T, a) nodes of each component; pressure: (T, b) nodes, the first ones of the
-    velocity; constrained: (n, 2) prescribed components; order: (n,) nodes in elimination order,
-    if known. Unknowns are numbered x, then y, then pressure; each pressure is eliminated after the
-    components at its node.
+    velocity: (T, a) nodes of each component; pressure: (T, b) numbers of the pressures: nodes, the
+    first ones of the velocity, and then the second pressures of the nodes ``doubled`` (d,), if
+    there are any; constrained: (n, 2) prescribed components; order: (n,) nodes in elimination
+    order, if known. Unknowns are numbered x, then y, then pressure; each pressure is eliminated
+    after the components at its node.
     """
     count = len(constrained)
     pressures = pressure.max() + 1
     place = np.empty(count)
     place[linear.node_order(count, velocity, method) if order is None else order] = np.arange(count)
-    rank = np.concatenate([place, place, place[:pressures] + 0.5])
+    nodes = np.arange(pressures)
+    if doubled is not None:
+        nodes[pressures - len(doubled):] = doubled
+    rank = np.concatenate([place, place, place[nodes] + 0.5])
     unknowns = np.concatenate([velocity, count + velocity, 2 * count + pressure], axis=1)
     both = np.concatenate([constrained[:, 0], constrained[:, 1], np.zeros(pressures, bool)])
     return ElementSystem(unknowns, rank, both, method)

@@ -10,7 +10,7 @@ from repro.errors import RunEnd
 from repro.model import adhesion
 from repro.model.adhesion import Peak
 from repro.model.pore import Pore, Solved
-from repro.scene import Scene
+from repro.scene import Scene, scene_tables
 
 
 class Detachment(RunEnd):
@@ -39,18 +39,19 @@ def detachment(scene: Scene, pore: Pore, solved: Solved) -> Detachment | None:
     if growth.bonding_strength is not None:
         peak = adhesion.wall_peak(scene, pore, solved)
         if peak.value > growth.bonding_strength:
-            return _ended(pore, "detaches", peak, "its wall must bear", "growth.bonding_strength",
-                          growth.bonding_strength)
+            return _ended(scene, pore, "detaches", peak, "its wall must bear", "bonding_strength")
     if growth.tensile_strength is not None:
         peak = adhesion.tensile_peak(scene, pore)
         if peak.value > growth.tensile_strength:
-            return _ended(pore, "tears", peak, "its tensile stress is", "growth.tensile_strength",
-                          growth.tensile_strength)
+            return _ended(scene, pore, "tears", peak, "its tensile stress is", "tensile_strength")
     return None
 
 
-def _ended(pore: Pore, verb: str, peak: Peak, subject: str, key: str,
-           strength: float) -> Detachment:
+def _ended(scene: Scene, pore: Pore, verb: str, peak: Peak, subject: str, key: str) -> Detachment:
+    """The end of a run; the message has the stress in the unit of the strength in the scene."""
+    strength = scene_tables(scene)["growth"][key]
+    number, _, unit = strength.partition(" ")
+    stress = peak.value / getattr(scene.growing.growth, key) * float(number)
     return Detachment(f"the aggregate {verb} at t = {pore.time:g} h: near x = {peak.x:.4g}, y = "
-                      f"{peak.y:.4g} um {subject} {peak.value:.3g} MPa, in the mean over "
-                      f"pore.width / 20; {key} is {strength:g} MPa")
+                      f"{peak.y:.4g} um {subject} {stress:.3g} {unit}, in the mean over "
+                      f"pore.width / 20; growth.{key} is {strength}")

@@ -56,7 +56,7 @@ def move(mesh: Mesh, body: np.ndarray, compressibility: float, stabilisation: fl
 
 
 def _fluid_displacement(mesh: Mesh, prescribed: np.ndarray, gamma: float, c: float) -> np.ndarray:
-    """(f, 2) um, displacement of the fluid's corners; known: (N, 2) um, displacement of the
+    """(f, 2) um, displacement of the fluid's corners; prescribed: (N, 2) um, displacement of the
     aggregate, zero elsewhere."""
     fluid = mesh.topology.fluid
     wet = ~mesh.biomass

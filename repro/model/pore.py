@@ -266,7 +266,8 @@ def initial_outline(scene: Scene, front: float = 1.0) -> Outline | None:
     geometry = scene.numerics.geometry
     if seed.radius is None:
         return polygon(np.array(seed.outline), scene.pore.width, geometry, seed.smooth,
-                       size_at_tips(scene.numerics, scene.pore.width))
+                       size_at_tips(scene.numerics, scene.pore.width),
+                       bends=scene.numerics.interface == "traction")
     across = sizing.ACROSS_AGGREGATE * resolution(scene) * front
     return half_disc(seed.radius, across, geometry, seed.position)
 

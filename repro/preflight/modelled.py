@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from repro.march.simulation import row_times
-from repro.scene import Flow, Scene
+from repro.scene import Flow, Scene, scene_tables
 from repro.scene.time_table import TimeTable
 
 LEFT_OUT = {
@@ -121,9 +121,8 @@ def _growth(scene: Scene) -> Iterator[str]:
     yield f"fluid forces {growth.fluid_forces}"
     yield f"the lower wall {growth.wall}"
     for key in ("bonding_strength", "tensile_strength"):
-        strength = getattr(growth, key)
-        if strength is not None:
-            yield f"{key.replace('_', ' ')} {strength:g} MPa"
+        if getattr(growth, key) is not None:
+            yield f"{key.replace('_', ' ')} {scene_tables(scene)['growth'][key]}"
     yield {"stressed": "strain since t = 0",
            "stress_free": "new biomass without stress (section 5)"}[growth.new_biomass]
 

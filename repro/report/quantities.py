@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from repro.report.charts import Chart, Line
+from repro.report.charts import MOST_POINTS, Chart, Line
 from repro.report.reading import Run
 from repro.results import names
 from repro.results.columns import PARTS, SUBSTRATES
@@ -49,20 +49,29 @@ class Kind:
         return f"{self.axis_name} ({unit})" if unit else self.axis_name
 
 
-def _middle(run: Run) -> np.ndarray:
-    return (run.ledger["start_h"] + run.ledger["end_h"]) / 2
+def mean_rates(start: np.ndarray, end: np.ndarray, amounts: np.ndarray) -> TimeSeries:
+    """Return the mean rates of steps, from start to end (n,) h, as a staircase.
+
+    Each step has two points, at its start and at its end. More than MOST_POINTS / 2 steps are
+    merged to that many, with their common means.
+    """
+    count = min(len(start), MOST_POINTS // 2)
+    first = np.linspace(0, len(start), count, endpoint=False).astype(int)
+    start = start[first]
+    end = np.append(start[1:], end[-1])
+    rates = np.add.reduceat(amounts, first) / (end - start)
+    return np.column_stack([start, end]).ravel(), np.repeat(rates, 2)
 
 
 def _rate(name: str, part: str) -> Quantity:
-    """Divide a part of a substrate's ledger by the length of the step, at the step's middle."""
+    """Divide a part of a substrate's ledger by the length of the step."""
     column = f"{name}_{part}_pg_per_m"
 
     def value(run: Run) -> TimeSeries:
-        lengths = run.ledger["end_h"] - run.ledger["start_h"]
-        return _middle(run), run.ledger[column] / lengths
+        return mean_rates(run.ledger["start_h"], run.ledger["end_h"], run.ledger[column])
 
     return Quantity(f"{name}_{part}_ug_per_m_per_h", f"{name} {PARTS[part][0]} in an hour",
-                    f"{column} / (end_h - start_h), at the middle of the step", value,
+                    f"{column} / (end_h - start_h), from the start to the end of the step", value,
                     PARTS[part][0], signed=True)
 
 

@@ -122,7 +122,9 @@ def _assumed(run: Run) -> str:
     assumptions = [words for (part, key, value), words in ASSUMED.items()
             if tables.get(part, {}).get(key) == value
             and (part != "numerics" or NEEDED[key] in tables)]
-    assumptions.insert(0, "a pore in the plane, one aggregate, no detachment")
+    ends = {"bonding_strength", "tensile_strength"} & tables.get("growth", {}).keys()
+    fate = "a run ends where the aggregate detaches or tears" if ends else "no detachment"
+    assumptions.insert(0, f"a pore in the plane, one aggregate, {fate}")
     return f"Assumed: {'; '.join(assumptions)}."
 
 

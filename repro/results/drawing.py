@@ -34,12 +34,13 @@ EDGES = {3: [[0, 1], [1, 2], [2, 0]], 6: [[0, 3, 1], [1, 4, 2], [2, 5, 0]]}
 
 
 def optional(module: str) -> Any:
-    """Import a module of matplotlib or Pillow. Raises ImportError with the extra to install."""
+    """Import a module of matplotlib or Pillow. Raises ImportError with the packages to install.
+    """
     try:
         return import_module(module)
     except ImportError:
         raise ImportError("the package matplotlib is not installed; "
-                          "pip install 'dupin2001-repro[figures]'") from None
+                          "pip install matplotlib pillow") from None
 
 
 def full_name(name: str, known: Sequence[str]) -> str:

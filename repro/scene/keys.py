@@ -346,8 +346,8 @@ class Numerics:
 
     preset: str = choice(
         "fast", "accurate", "exact", "paper", source="Section 3 is \"paper\"",
-        about="Defaults of this section: errors of about 1 %, of about 0.1 %, under 0.01 % until "
-              "contact, the paper's own scheme")
+        about="Defaults of this section: until contact errors of about 1 %, of about 0.1 %, under "
+              "0.01 %, which are larger after contact; or the paper's own scheme")
     elements: str = choice(
         "linear", "quadratic", "cubic", source="3.2-3.4 have linear ones",
         about="Linear triangles, or curved ones: all quadratic, or velocity and substrates cubic")
@@ -414,8 +414,8 @@ class Numerics:
         return min(self.order, 2)
 
 
-#: Changes of each preset to the defaults above: errors of about 1 %, of about 0.1 %, under 0.01 %
-#: until contact (see `make bench`), the paper's own scheme.
+#: Changes of each preset to the defaults above: until contact errors of about 1 %, of about 0.1 %,
+#: under 0.01 % (see `make bench`); the paper's own scheme.
 PRESETS: dict[str, dict[str, str | float]] = {
     "fast": {"elements": "quadratic", "time": "midpoint", "refinement": 0.2, "tolerance": 0.0075,
              "contact_elements": 1.0, "jacobian": "reused"},

@@ -55,7 +55,7 @@ def _package(address: str):
         return import_module(PACKAGE)
     except ImportError:
         raise SweepError(f"--scheduler {address}: the package {PACKAGE} is not installed; "
-                         "pip install 'dupin2001-repro[dask]'") from None
+                         f"pip install {PACKAGE}") from None
 
 
 async def _ask(distributed, address: str) -> None:
