@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from repro.cli.arguments import path
-from repro.errors import OutputError
+from repro.errors import OutputError, printable
 from repro.runs.progress import say
 
 
@@ -40,14 +40,14 @@ def call(options) -> int:
             _save(results.plot(options.field, time=options.time), options.out)
     except (ImportError, KeyError, ValueError) as error:
         raise OutputError(str(error.args[0])) from error
-    say(f"{options.folder}: drawn in {options.out}")
+    say(printable(f"{options.folder}: drawn in {options.out}"))
     return 0
 
 
 def _save(axes, out: Path) -> None:
     """Save the figure of one or of several axes."""
-    from repro.results.files import atomic_path
+    from repro.results.files import output_path
 
     figure = (axes[0] if isinstance(axes, list) else axes).figure
-    with atomic_path(out) as beside:
+    with output_path(out) as beside:
         figure.savefig(beside, dpi=150)

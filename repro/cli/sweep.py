@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from repro.cli.arguments import add_scene, path
-from repro.errors import Interrupted
+from repro.errors import Interrupted, printable
 from repro.runs.interrupts import on_first_signal
 from repro.runs.progress import say
 
@@ -110,7 +110,7 @@ def _display_events(quiet: bool) -> Iterator[Tell]:
     with tqdm(unit="run", delay=1e-3) as bar:
         def tell(event: dict) -> None:
             if event["event"] == "start":
-                bar.set_description_str(event["scene"], refresh=False)
+                bar.set_description_str(printable(event["scene"]), refresh=False)
                 bar.total = event["total"]
                 bar.initial = event["done"]
             bar.n = event["done"]
@@ -124,15 +124,16 @@ def _ignore_event(event: dict) -> None:
 
 def _print_run(event: dict) -> None:
     if event["event"] == "run":
-        say(f"{event['done']} of {event['total']}: run {event['run']}, {event['values']}: "
-            f"{event['status']}", to_stderr=True)
+        say(printable(f"{event['done']} of {event['total']}: run {event['run']}, "
+                      f"{event['values']}: {event['status']}"), to_stderr=True)
 
 
 def _report(swept: Swept) -> int:
     """Print the failures and the number of runs; return the exit status."""
     for run in swept.failed:
-        say(f"repro: run {run.point.index} ({swept.label(run)}): {run.status}", to_stderr=True)
+        say(printable(f"repro: run {run.point.index} ({swept.label(run)}): {run.status}"),
+            to_stderr=True)
     finished = len(swept.runs) - len(swept.failed)
-    say(f"{swept.source}: {finished} of {len(swept.runs)} runs done, {len(swept.failed)} "
-        f"failed; results in {swept.folder}")
+    say(printable(f"{swept.source}: {finished} of {len(swept.runs)} runs done, "
+                  f"{len(swept.failed)} failed; results in {swept.folder}"))
     return SOME_FAILED if swept.failed else 0
