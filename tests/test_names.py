@@ -76,7 +76,7 @@ def test_wrong_values_of_a_sweep_are_refused(tmp_path, monkeypatch, argument, va
     (repro.run, ("flow_only", "a\0b")), (repro.resume, ("a\0b",)), (repro.load_run, ("a\0b",)),
     (repro.compare, (["a\0b", "c"], "c.html")), (repro.load_scene, ("a\0b",))])
 def test_a_null_byte_in_a_path_is_refused(function, arguments):
-    with pytest.raises((OutputError, SceneError), match="a b: "):
+    with pytest.raises((OutputError, SceneError), match="a.b: "):
         function(*arguments)
 
 
@@ -102,7 +102,7 @@ def test_a_file_that_cannot_be_written_is_refused_before_it_is_drawn(tmp_path, m
     file = out.format(f".{kind}")
     if "folder" in out:
         os.mkdir(file)
-    command = {"png": ["plot", "run", "pressure", "--out", file], "gif": ["plot", "run", "pressure", "--out", file],
+    command = {"png": ["plot", "run", "velocity", "--out", file], "gif": ["plot", "run", "velocity", "--out", file],
                "html": ["compare", "run", "run", "--out", file]}[kind]
     monkeypatch.setattr("repro.report.comparison.build", lambda runs: pytest.fail("the page was built"))
     assert main(command) == 2
