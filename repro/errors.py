@@ -6,6 +6,7 @@ names arguments of Python.
 """
 
 import re
+import shlex
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -13,6 +14,18 @@ from contextlib import contextmanager
 ARGUMENTS = {"--out": "folder", "--set": "overrides", "--force": "force=True",
              "--resume": "repro.resume"}
 OPTION = re.compile(r"(?<![\w'\"-])--(?:out|set|unset|force|resume|vary|samples|seed|scheduler)\b")
+
+
+def printable(text: str) -> str:
+    """Write a text on one line: bytes that are no text as escapes, control characters as spaces."""
+    text = text.encode(errors="backslashreplace").decode()
+    return "".join(letter if letter.isprintable() else " " for letter in text)
+
+
+def shell_word(path: object) -> str:
+    """Write a path as a word of a command: in quotes if necessary, and never an option."""
+    text = str(path)
+    return shlex.quote(f"./{text}" if text.startswith("-") else text)
 
 
 class Refusal(Exception):

@@ -13,8 +13,8 @@ import sys
 from contextlib import suppress
 
 from repro.cli import check, compare, docs, plot, run, scene, sweep
-from repro.errors import Interrupted, OutputError, Refusal, SimulationError
-from repro.runs.progress import in_json, printable, say
+from repro.errors import Interrupted, OutputError, Refusal, SimulationError, printable
+from repro.runs.progress import in_json, say
 from repro.scene import SceneError
 
 #: The modules of the commands. Each has ``add(commands)``, which adds its parser with

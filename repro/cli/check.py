@@ -9,6 +9,7 @@ import json
 from pathlib import Path
 
 from repro.cli.arguments import add_scene
+from repro.errors import printable, shell_word
 from repro.runs.progress import say, while_checking
 from repro.scene import load_scene, packaged_scenes
 
@@ -51,7 +52,7 @@ def _check_run(options, folder: Path) -> int:
     status = read_status(folder)
     files = "its files are unchanged"
     if not is_over(status):
-        files += f"; repro run --resume {folder} continues the run"
+        files += f"; repro run --resume {shell_word(folder)} continues the run"
     record = {"folder": str(folder), "status": status, "unchanged": True}
-    say(json.dumps(record, indent=2) if options.json else f"{folder}: {status}; {files}")
+    say(json.dumps(record, indent=2) if options.json else printable(f"{folder}: {status}; {files}"))
     return 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from repro.cli.arguments import path
+from repro.errors import printable
 from repro.runs.progress import say
 
 
@@ -24,5 +25,5 @@ def call(options) -> int:
     from repro import report
 
     report.compare(options.runs, options.out)
-    say(f"{len(options.runs)} runs compared in {options.out}")
+    say(printable(f"{len(options.runs)} runs compared in {options.out}"))
     return 0

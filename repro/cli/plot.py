@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from repro.cli.arguments import path
-from repro.errors import OutputError
+from repro.errors import OutputError, printable
 from repro.runs.progress import say
 
 
@@ -37,17 +39,18 @@ def call(options) -> int:
                 raise OutputError(f"{options.out}: a film needs FIELD and accepts no --time")
             results.animate(options.field, options.out)
         else:
-            _save(results.plot(options.field, time=options.time), options.out)
+            _save(partial(results.plot, options.field, time=options.time), options.out)
     except (ImportError, KeyError, ValueError) as error:
         raise OutputError(str(error.args[0])) from error
-    say(f"{options.folder}: drawn in {options.out}")
+    say(printable(f"{options.folder}: drawn in {options.out}"))
     return 0
 
 
-def _save(axes, out: Path) -> None:
-    """Save the figure of one or of several axes."""
-    from repro.results.files import atomic_path
+def _save(draw: Callable, out: Path) -> None:
+    """Draw one or several axes, and save their figure."""
+    from repro.results.files import output_path
 
-    figure = (axes[0] if isinstance(axes, list) else axes).figure
-    with atomic_path(out) as beside:
+    with output_path(out) as beside:
+        axes = draw()
+        figure = (axes[0] if isinstance(axes, list) else axes).figure
         figure.savefig(beside, dpi=150)

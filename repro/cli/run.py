@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import math
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from repro.cli.arguments import add_scene, path
@@ -29,9 +30,10 @@ STATUS = """exit status:
        last good state, and a change to try
   2    the input is wrong, or the folder cannot be used: it contains another run or other files, it
        is not writable, another process uses it, or the disk is full
-  130  interrupted (SIGINT, Ctrl-C), or 143, terminated (SIGTERM): the present step is discarded,
-       the results so far and a checkpoint are written, and --resume continues the run; a second
-       signal, after a second or more, ends the process at once"""
+  130  interrupted (SIGINT, Ctrl-C), or 143, terminated (SIGTERM), or 129, 138 or 140, noticed
+       (SIGHUP, SIGUSR1, SIGUSR2): the present step is discarded, the results so far and a
+       checkpoint are written, and --resume continues the run; a second signal, after a second or
+       more, ends the process at once"""
 
 
 def add(commands) -> None:
@@ -70,17 +72,21 @@ def call(options) -> int:
                        "--force are not accepted with it, and --set can change growth.end only")
     if not options.resume and not (options.scene and options.out):
         options.refuse("give SCENE and --out DIR, or --resume DIR")
+    with interrupts.catch_signals() as stop:  # before NumPy starts threads that it would miss
+        _load_and_run(options, stop)
+    return 0
+
+
+def _load_and_run(options, stop: Callable[[], int]) -> None:
     scene = None if options.resume else load_scene(options.scene, options.set, unset=options.unset)
     from repro.runs.execution import Watch
 
-    events = progress.display_events(options.quiet, options.json)
-    with interrupts.catch_signals() as stop, events as tell:
+    with progress.display_events(options.quiet, options.json) as tell:
         try:
             _run(options, scene, Watch(tell, options.checkpoint, stop, stop))
         except MemoryError as error:  # not within a step, which reports its own
             raise SimulationError(f"out of memory ({error}); try a smaller "
                                   "numerics.refinement") from error
-    return 0
 
 
 def _run(options, scene: Scene | None, watch: Watch) -> None:

@@ -13,8 +13,8 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from repro.cli.arguments import add_scene, path
-from repro.errors import Interrupted
-from repro.runs.interrupts import STOP_SIGNALS
+from repro.errors import Interrupted, printable
+from repro.runs.interrupts import on_first_signal
 from repro.runs.progress import say
 
 if TYPE_CHECKING:
@@ -28,7 +28,8 @@ grid. With --samples a range has no N: KEY=a:b UNIT:linear|log. Varying flow.hea
 flow.mean_velocity, and vice versa. The same command continues an interrupted sweep: it makes the
 missing runs and repeats the failed ones. On a cluster, DIR must be on a file system that all
 workers share. Exit status: 0 if every run has finished, 3 if some have failed, 2 if the input is
-wrong, 130 if interrupted, 143 if terminated."""
+wrong, 130 if interrupted (Ctrl-C), 143 if terminated (SIGTERM), 129, 138 or 140 if noticed (SIGHUP,
+SIGUSR1, SIGUSR2). A second signal, after a second or more, ends the sweep at once."""
 
 
 def add(commands) -> None:
@@ -88,25 +89,14 @@ def call(options) -> int:
 
 @contextmanager
 def _end_on_signals(command: str) -> Iterator[None]:
-    """End the sweep on Ctrl-C or SIGTERM; the message gives the command that continues it.
-
-    A second signal ends the process at once.
-    """
-    def end(number: int, frame) -> None:
-        signal.signal(number, signal.SIG_DFL)
+    """End the sweep on the first signal; the message gives the command that continues it."""
+    def end(number: int) -> None:
         cause = "interrupted" if number == signal.SIGINT else "terminated"
         raise Interrupted(f"{cause}; the results so far are written, and {command} continues the "
                           "sweep", number)
 
-    handlers = {number: signal.getsignal(number) for number in STOP_SIGNALS}
-    for number in handlers:
-        if handlers[number] != signal.SIG_IGN:
-            signal.signal(number, end)
-    try:
+    with on_first_signal(end):
         yield
-    finally:
-        for number, handler in handlers.items():
-            signal.signal(number, handler)
 
 
 @contextmanager
@@ -120,7 +110,7 @@ def _display_events(quiet: bool) -> Iterator[Tell]:
     with tqdm(unit="run", delay=1e-3) as bar:
         def tell(event: dict) -> None:
             if event["event"] == "start":
-                bar.set_description_str(event["scene"], refresh=False)
+                bar.set_description_str(printable(event["scene"]), refresh=False)
                 bar.total = event["total"]
                 bar.initial = event["done"]
             bar.n = event["done"]
@@ -134,15 +124,16 @@ def _ignore_event(event: dict) -> None:
 
 def _print_run(event: dict) -> None:
     if event["event"] == "run":
-        say(f"{event['done']} of {event['total']}: run {event['run']}, {event['values']}: "
-            f"{event['status']}", to_stderr=True)
+        say(printable(f"{event['done']} of {event['total']}: run {event['run']}, "
+                      f"{event['values']}: {event['status']}"), to_stderr=True)
 
 
 def _report(swept: Swept) -> int:
     """Print the failures and the number of runs; return the exit status."""
     for run in swept.failed:
-        say(f"repro: run {run.point.index} ({swept.label(run)}): {run.status}", to_stderr=True)
+        say(printable(f"repro: run {run.point.index} ({swept.label(run)}): {run.status}"),
+            to_stderr=True)
     finished = len(swept.runs) - len(swept.failed)
-    say(f"{swept.source}: {finished} of {len(swept.runs)} runs done, {len(swept.failed)} "
-        f"failed; results in {swept.folder}")
+    say(printable(f"{swept.source}: {finished} of {len(swept.runs)} runs done, "
+                  f"{len(swept.failed)} failed; results in {swept.folder}"))
     return SOME_FAILED if swept.failed else 0

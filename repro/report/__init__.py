@@ -18,7 +18,7 @@ from repro.errors import OutputError
 from repro.report import comparison, run_page
 from repro.report.reading import read
 from repro.results import write_text
-from repro.results.files import atomic_path
+from repro.results.files import atomic_path, output_path
 from repro.scene.arguments import typed
 
 __all__ = ["compare", "write"]
@@ -30,7 +30,9 @@ def write(folder: Path) -> Path:
     Raises OutputError if the folder holds no run, or its fields cannot be read.
     """
     target = folder / "report.html"
-    _write(target, run_page.build(read(folder)))
+    text = run_page.build(read(folder))
+    with atomic_path(target) as beside:
+        write_text(beside, text)
     return target
 
 
@@ -75,15 +77,6 @@ def compare(folders: Sequence[str | Path], file: str | Path) -> Path:
     if (target.parent / "run.json").exists():
         raise OutputError(f"{target}: {target.parent} is the folder of a run; a file elsewhere is "
                           "needed")
-    text = comparison.build([read(Path(folder)) for folder in folders])
-    try:
-        _write(target, text)
-    except OSError as error:
-        raise OutputError(f"{target}: {error.strerror or error}; a file that can be written is "
-                          "needed") from error
+    with output_path(target) as beside:
+        write_text(beside, comparison.build([read(Path(folder)) for folder in folders]))
     return target
-
-
-def _write(target: Path, text: str) -> None:
-    with atomic_path(target) as beside:
-        write_text(beside, text)

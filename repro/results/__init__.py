@@ -39,8 +39,8 @@ PACKAGES = ("numpy", "scipy", "scikit-fem", "meshio", "mmgpy", "shapely", "pint"
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text file without changing its line ends."""
-    path.write_text(text, encoding="utf-8", newline="")
+    """Write a text file without changing its line ends. Bytes that are no text are escaped."""
+    path.write_text(text, encoding="utf-8", errors="backslashreplace", newline="")
 
 
 def write_index(path: Path, entries: list[tuple[float, str]]) -> None:

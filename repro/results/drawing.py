@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from repro.errors import printable
 from repro.results import names
-from repro.results.files import atomic_path
+from repro.results.files import output_path
 from repro.results.jumps import with_jumps
 
 if TYPE_CHECKING:
@@ -58,8 +59,13 @@ def curves(results: Results, drawn: Sequence[Sequence[str]], ax: Any = None) -> 
     for panel, columns in zip(axes, drawn):
         _draw_panel(panel, results, columns)
     axes[-1].set_xlabel("time (h)")
-    axes[0].set_title(results.name, loc="left")
+    axes[0].set_title(_plain(results.name), loc="left")
     return axes
+
+
+def _plain(text: str) -> str:
+    """The text as matplotlib draws it on one line, without mathematics between dollars."""
+    return printable(text).replace("$", r"\$")
 
 
 def _panels(count: int) -> list[Any]:
@@ -114,7 +120,7 @@ def field(fields: Mapping[str, np.ndarray], name: str, title: str, ax: Any = Non
     bar.formatter.set_powerlimits((-3, 4))
     ax.set(xlabel="x (um)", ylabel="y (um)", aspect="equal", facecolor="0.85",
            xlim=(left, right), ylim=(bottom, top))
-    ax.set_title(f"{title}: {names.with_unit(name)}", loc="left")
+    ax.set_title(_plain(f"{title}: {names.with_unit(name)}"), loc="left")
     return ax
 
 
@@ -142,7 +148,7 @@ def against(frame: Any, factors: Sequence[Any], name: str, title: str, ax: Any =
         ax.text(0.5, 0.5, "in no run", transform=ax.transAxes, ha="center")
     if others:
         ax.legend(frameon=False, fontsize="small")
-    ax.set_title(title, loc="left")
+    ax.set_title(_plain(title), loc="left")
     ax.grid(alpha=0.3)
     return ax
 
@@ -208,7 +214,7 @@ def film(results: Results, name: str, file: Path, ax: Any = None) -> Any:
             ax.clear()
         ax = field(fields, name, heading(results, time), ax, limits, box)
         images.append(_frame(ax.figure))
-    with atomic_path(file) as beside:
+    with output_path(file) as beside:
         images[0].save(beside, format="GIF", save_all=True, append_images=images[1:],
                        duration=FRAME, loop=0)
     return ax

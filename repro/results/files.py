@@ -18,6 +18,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from tempfile import mkdtemp
 
+from repro.errors import OutputError
+
 #: Prefix of the folders in which files are written before they are moved to their final path.
 WRITING = ".writing-"
 #: Largest files in bytes: JSON, whose objects take many times its length; a table; the fields of
@@ -41,6 +43,25 @@ def atomic_path(path: Path) -> Iterator[Path]:
         os.replace(folder / path.name, path)
     finally:
         shutil.rmtree(folder, ignore_errors=True)
+
+
+@contextmanager
+def output_path(path: Path) -> Iterator[Path]:
+    """:func:`atomic_path` for a file that a user names.
+
+    Raises OutputError, at the start if possible, if the file cannot be written.
+    """
+    try:
+        if "\0" in str(path):
+            raise OSError(errno.EINVAL, "a path has no null byte")
+        if path.is_dir():
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+        with atomic_path(path) as beside:
+            yield beside
+    except OSError as error:
+        reason = error.strerror or error
+        raise OutputError(f"{path}: {reason}; a file that can be written is "
+                          "needed") from error
 
 
 def is_file(path: Path) -> bool:

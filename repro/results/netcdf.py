@@ -30,7 +30,7 @@ def write(path: Path, scene: Scene, rows: list[list]) -> None:
     times = {TIME: variables.pop(TIME)}
     content = xarray.Dataset(variables, times, _provenance(scene))
     encoding = {name: {"_FillValue": None if name == TIME else np.nan} for name in columns}
-    content.to_netcdf(path, engine="scipy", format="NETCDF3_64BIT", encoding=encoding)
+    content.to_netcdf(path.absolute(), engine="scipy", format="NETCDF3_64BIT", encoding=encoding)
 
 
 def _attributes(name: str) -> dict[str, str]:

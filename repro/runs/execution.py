@@ -37,6 +37,7 @@ from repro.runs.folder import (
     prepare,
     refuse_foreign,
     refuse_links,
+    refuse_null,
     remove_temporary,
 )
 from repro.runs.integrity import find_damage
@@ -118,6 +119,7 @@ def run(scene: Source, folder: str | Path, progress: Progress = ignore_progress,
     """
     scene = load_scene(scene)
     folder = Path(folder)
+    refuse_null(folder)
     _require(scene, watch)
     with locked(folder, watch.patience):
         recorder = Recorder(scene, folder, origin=origin)
@@ -188,6 +190,7 @@ def resume(folder: str | Path, overrides: Sequence[str] = (), progress: Progress
     if package versions have changed or a checkpoint cannot be used.
     """
     folder = Path(folder)
+    refuse_null(folder)
     if not is_file(folder / PROVENANCE):
         raise OutputError(f"{folder}: there is no run.json; the folder of a run is needed")
     with locked(folder, watch.patience):

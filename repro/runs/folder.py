@@ -10,15 +10,18 @@ from __future__ import annotations
 import errno
 import os
 import re
+import warnings
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from repro.errors import OutputError
+from repro.errors import OutputError, printable
 from repro.results.files import MOST_TABLE, WRITING, is_file, is_folder, read
 from repro.runs.checkpoint import LAST, NEWEST, PREVIOUS, REFUSED
 
 LOCK = ".lock"
+#: Seconds in which a lock without flock is taken over from a process that has ended.
+TAKE_OVER = 1.0
 PROVENANCE = "run.json"
 REPORT = "report.html"
 SUMS = "fields.sha256"
@@ -137,6 +140,13 @@ def _remove_temporary(temporary: Path) -> None:
         temporary.rmdir()
 
 
+def refuse_null(folder: Path) -> None:
+    """Raise OutputError if a path, which Python may have made, has a null byte."""
+    if "\0" in str(folder):
+        raise OutputError(f"--out {printable(str(folder))}: a path has no null byte; give another "
+                          "folder")
+
+
 @contextmanager
 def folder_errors(folder: Path, kind: type[OutputError] = OutputError) -> Iterator[None]:
     """Convert errors of the file system into an OutputError of a kind, for the folder."""
@@ -176,20 +186,26 @@ def claim(folder: Path, name: str, run_files: set[str]) -> Path:
 def locked(folder: Path, patience: float = 0.0) -> Iterator[None]:
     """Lock a folder; create it if it does not exist.
 
-    The kernel releases the lock when the process ends for any reason. Raises OutputError if another
-    process has the lock for longer than `patience` seconds.
+    The kernel releases the lock when the process ends for any reason. On a file system without
+    flock, the file of the lock names its process, and a process of the same machine that has ended
+    has no lock. Raises OutputError if another process has the lock for longer than `patience`
+    seconds.
     """
-    from filelock import FileLock, Timeout  # its import takes a twentieth of a second
+    from filelock import FileLock, SoftFileLock, Timeout  # its import takes a twentieth of a second
 
-    lock = FileLock(folder / LOCK, timeout=patience)
+    lock = FileLock(folder / LOCK, timeout=max(patience, TAKE_OVER))
     with folder_errors(folder):
         folder.mkdir(parents=True, exist_ok=True)
         _refuse_another_lock(folder / LOCK)
         try:
-            lock.acquire()
+            with warnings.catch_warnings(action="ignore"):  # there is no flock
+                lock.acquire()
         except Timeout:
-            raise OutputError(f"--out {folder}: another process is writing there; wait for its "
-                              "end, or give another folder") from None
+            advice = "wait for its end, or give another folder"
+            if isinstance(lock, SoftFileLock):
+                advice += f"; if no process writes there, remove {folder / LOCK}"
+            raise OutputError(f"--out {folder}: another process is writing there; "
+                              f"{advice}") from None
     try:
         yield
     finally:
@@ -199,6 +215,9 @@ def locked(folder: Path, patience: float = 0.0) -> Iterator[None]:
 
 
 def _refuse_another_lock(path: Path) -> None:
-    """Raise OSError if the path of the lock is a file with content, or not a regular file."""
-    if os.path.lexists(path) and not (is_file(path) and path.stat().st_size == 0):
+    """Raise OSError if the path of the lock is a file with other content, or no regular file."""
+    from filelock import SoftFileLock
+
+    is_lock = is_file(path) and (path.stat().st_size == 0 or SoftFileLock(path).pid is not None)
+    if os.path.lexists(path) and not is_lock:
         raise FileExistsError(errno.EEXIST, f"{path.name} exists and is not a lock")

@@ -16,7 +16,7 @@ from threading import Event, Thread
 from time import monotonic
 from typing import TextIO
 
-from repro.errors import OutputError
+from repro.errors import OutputError, printable
 from repro.polling import polling
 
 Tell = Callable[[dict], None]
@@ -39,20 +39,17 @@ def display_events(quiet: bool, machine: bool):
     return on_a_terminal() if sys.stderr.isatty() else in_lines()
 
 
-def printable(text: str) -> str:
-    """The text on one line, without control characters."""
-    return "".join(letter if letter.isprintable() else " " for letter in text)
-
-
 def say(text: str, *, to_stderr: bool = False) -> None:
     """Print a line to standard output, or to standard error.
 
-    After the reader of a pipe has closed it, further output is discarded. Raises OutputError if
-    standard output fails otherwise, as on a full disk; errors of standard error are ignored.
+    Characters that its encoding lacks are escaped. After the reader of a pipe has closed it,
+    further output is discarded. Raises OutputError if standard output fails otherwise, as on a full
+    disk; errors of standard error are ignored.
     """
     stream = sys.stderr if to_stderr else sys.stdout
+    encoding = getattr(stream, "encoding", None) or "utf-8"
     try:
-        print(text, file=stream, flush=True)
+        print(text.encode(encoding, "backslashreplace").decode(encoding), file=stream, flush=True)
     except OSError as error:
         _discard_output(stream)
         if not to_stderr and not isinstance(error, BrokenPipeError):
@@ -161,11 +158,12 @@ def _call_regularly(tick: Callable[[], None]) -> Iterator[None]:
 def _report_start_and_end(event: dict, say_aside: Callable[[str], None]) -> None:
     """Report that a run resumes, and how it ended."""
     if event["event"] == "start" and event["from_h"] > 0:
-        say_aside(f"{printable(event['scene'])}: resumes from t = {event['from_h']:g} h, "
-              f"step {event['step']}")
+        say_aside(printable(f"{event['scene']}: resumes from t = {event['from_h']:g} h, "
+                            f"step {event['step']}"))
     if event["event"] == "end" and not event["status"].startswith(("failed", "interrupted")):
         suffix = "" if event["changed"] else ", already finished"
-        say(f"{printable(event['scene'])}: {event['status']}{suffix}; results in {event['folder']}")
+        say(printable(f"{event['scene']}: {event['status']}{suffix}; "
+                      f"results in {event['folder']}"))
 
 
 @contextmanager

@@ -8,7 +8,7 @@ from pathlib import Path
 from time import perf_counter
 
 from repro import report, results, timing
-from repro.errors import Interrupted
+from repro.errors import Interrupted, shell_word
 from repro.march.balance import Ledger
 from repro.march.loop import Report, RestartState, sum_counts
 from repro.march.step_control import StepControl, exceeds_tolerance
@@ -330,5 +330,5 @@ def complete_folder(folder: Path, record: dict, run_files: set[str]) -> None:
 def interruption(recorder: Recorder, number: int) -> Interrupted:
     """The exception to raise when a signal asks the run to stop."""
     return Interrupted(f"interrupted by signal {number} at t = {recorder.time:g} h; the "
-                       f"results so far are written, and --resume {recorder.folder} continues the "
-                       "run", number)
+                       "results so far are written, and "
+                       f"--resume {shell_word(recorder.folder)} continues the run", number)

@@ -47,6 +47,8 @@ def _accepts(hint: Any, value: object) -> bool:
         if not isinstance(value, Sequence) or isinstance(value, (str, bytes)):
             return False
         return str not in get_args(hint) or all(isinstance(option, str) for option in value)
+    if kind in NUMBERS and isinstance(value, bool):
+        return False
     return isinstance(value, NUMBERS.get(kind, kind))
 
 

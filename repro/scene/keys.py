@@ -32,6 +32,7 @@ from repro.scene.units import (
     FRACTION,
     FROM_0_TO_10,
     NON_NEGATIVE,
+    PORE_WIDTH,
     POSITIVE_FRACTION,
     UP_TO_1,
     UP_TO_20,
@@ -62,7 +63,7 @@ RATIO = 1.52  # F, mg/mg, Table 1
 class Pore:
     """The channel `0 <= y <= width` (um)."""
 
-    width: float = quantity("100 um", "um", about="W_pore, from wall to wall",
+    width: float = quantity("100 um", "um", PORE_WIDTH, about="W_pore, from wall to wall",
                             source="Table 1 (typically 100 um; 50 um in section 4)")
     length: float = quantity("600 um", "um", about="L_pore, from end to end", source="Table 1")
 
@@ -670,7 +671,8 @@ def parse_scene(tables: dict, name: str, file: str, changed: Sequence[str] = ())
     _refuse_missing(tables, file)
     if "substrates" in tables and "aggregate" in tables:
         tables = {"kinetics": {}, **tables}
-    scene = read_table(Scene, _with_preset(tables), Place(file, known=KEYS), name=name,
+    text = name.encode(errors="backslashreplace").decode()  # bytes in the name of a file
+    scene = read_table(Scene, _with_preset(tables), Place(file, known=KEYS), name=text,
                        units=units_of(tables))
     for broken, requirement in rules(scene):
         if broken:

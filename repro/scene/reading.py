@@ -78,6 +78,8 @@ def read_table(kind: type, table: object, place: Place, **extra):
     Raises SceneError if the table is not accepted.
     """
     keys = entries(kind)
+    if isinstance(table, dict):
+        _refuse_unnamed(table, place)
     if not isinstance(table, dict):
         several = place.single if as_list(table) else ""
         reason = f"{several}, see {SCOPE}: " if several else ""
@@ -91,6 +93,14 @@ def read_table(kind: type, table: object, place: Place, **extra):
             raise place.below(key).refuse(MISSING, entry.metadata["kind"].requirement)
     read = {key: _read_entry(keys[key], table[key], place.below(key)) for key in table}
     return kind(**extra, **read)
+
+
+def _refuse_unnamed(table: dict, place: Place) -> None:
+    """Raise SceneError if a key of a table, which Python may have made, is not a text."""
+    for key in table:
+        if not isinstance(key, str):
+            where = f"[{place.key}]: " if place.key else ""
+            raise SceneError(f"{place.file}: {where}the key {quote(key)}: a text is needed")
 
 
 def _read_entry(entry: Field, value: object, place: Place):

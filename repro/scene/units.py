@@ -23,7 +23,7 @@ from functools import cache, partial
 from numbers import Real
 from typing import ClassVar, NamedTuple
 
-from repro.errors import Refusal
+from repro.errors import Refusal, printable
 from repro.scene import exact
 from repro.scene.time_table import TimeTable
 
@@ -73,6 +73,8 @@ BELOW_1 = Range("zero or more, less than 1", lambda value: 0 <= value < 1)
 UP_TO_1 = Range("greater than zero, at most 1", lambda value: 0 < value <= 1)
 FROM_0_TO_10 = Range("from 0 to 10", lambda value: 0 <= value <= 10)
 UP_TO_20 = Range("greater than zero, at most 20", lambda value: 0 < value <= 20)
+#: Of a pore: below it water is no continuum; above it no pore is meant.
+PORE_WIDTH = Range("from 1 nm to 1 m", lambda value: 1e-3 <= value <= 1e6)
 ACUTE = Range("between 0 and 90 deg", lambda value: 0 < value < math.pi / 2)
 EITHER_SIGN = Range("of either sign", math.isfinite)
 
@@ -428,7 +430,7 @@ class SceneError(Refusal, ValueError):
     """
 
     def __init__(self, message: str):
-        super().__init__("".join(letter if letter.isprintable() else " " for letter in message))
+        super().__init__(printable(message))
 
 
 def to_internal(value: object, unit: str) -> float:

@@ -14,7 +14,7 @@ from repro.results.quantities import unit_of
 from repro.results.tables import package
 from repro.runs.folder import folder_errors
 from repro.runs.machine import require_packages
-from repro.scene import Source, label
+from repro.scene import SceneError, Source, label
 from repro.scene.arguments import typed
 from repro.sweeps import cluster, design, page, pool, table
 from repro.sweeps.folder import Sweep, SweepError, lock_folder
@@ -177,7 +177,7 @@ def sweep(scene: Source, vary: Sequence[str], folder: str | Path, overrides: Seq
     Raises
     ------
     SceneError
-        If a scene is not accepted.
+        If a scene, or the value of an argument, is not accepted.
     OutputError
         If the folder cannot be used, or the scheduler does not answer.
     TypeError
@@ -192,6 +192,7 @@ def sweep(scene: Source, vary: Sequence[str], folder: str | Path, overrides: Seq
     >>> [run.status for run in swept.runs]
     ['completed', 'completed']
     """
+    _refuse_values(vary, workers, seed, clogged)
     factors = [design.parse(text) for text in vary]
     combinations = design.grid(factors) if samples is None else design.latin(factors, samples, seed)
     with ready(scheduler, min(workers or pool.cores(), len(combinations))) as run_points:
@@ -200,6 +201,18 @@ def sweep(scene: Source, vary: Sequence[str], folder: str | Path, overrides: Seq
             require_packages(point.scene)
         plan = Sweep(Path(folder), label(scene), factors, points)
         return run_plan(plan, run_points, clogged, progress, tell)
+
+
+def _refuse_values(vary: Sequence[str], workers: int | None, seed: int, clogged: float) -> None:
+    """Raise SceneError for a value of an argument of :func:`sweep` that is out of range."""
+    if not vary:
+        raise SceneError("--vary: a key with its values is needed")
+    if workers is not None and workers < 1:
+        raise SceneError(f"workers {workers}: an integer, one or more, is needed")
+    if seed < 0:
+        raise SceneError(f"--seed {seed}: an integer, zero or more, is needed")
+    if not 0 < clogged < 1:
+        raise SceneError(f"clogged {clogged}: a number between 0 and 1 is needed")
 
 
 def run_plan(plan: Sweep, run_points: pool.RunPoints, clogged: float = CLOGGED,

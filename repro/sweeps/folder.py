@@ -15,7 +15,7 @@ from repro.errors import OutputError
 from repro.report.reading import read_record
 from repro.results import write_json
 from repro.results.files import atomic_path, is_folder, read_json
-from repro.runs.folder import LOCK, PROVENANCE, find_foreign, folder_errors, locked
+from repro.runs.folder import LOCK, PROVENANCE, find_foreign, folder_errors, locked, refuse_null
 from repro.runs.integrity import find_defect
 from repro.sweeps import single_run
 from repro.sweeps.design import Factor, Point
@@ -52,6 +52,7 @@ def lock_folder(sweep: Sweep):
     Raises OutputError if the folder has other files or another sweep, if another process uses it,
     or if it cannot be written.
     """
+    refuse_null(sweep.folder)
     with folder_errors(sweep.folder, SweepError):
         _check(sweep.folder, _as_json(sweep))
         _refuse_foreign(sweep)

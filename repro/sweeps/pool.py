@@ -20,6 +20,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from repro.runs.interrupts import STOP_SIGNALS
 from repro.sweeps import single_run
 from repro.sweeps.design import Point
 
@@ -48,15 +49,15 @@ def ready(workers: int) -> Iterator[RunPoints]:
 
 
 def _start_server() -> None:
-    """Start the server unless it is running. Ctrl-C does not reach the server or its processes."""
+    """Start the server unless it is running. It blocks STOP_SIGNALS; the runs handle them."""
     if CONTEXT.get_start_method() != "forkserver":
         return
     from multiprocessing import forkserver, resource_tracker
 
     with _isolated():
         CONTEXT.set_forkserver_preload(["repro.sweeps.preload"])
-        resource_tracker.ensure_running()  # it unblocks the signal
-        previous_mask = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+        resource_tracker.ensure_running()  # it unblocks two of the signals
+        previous_mask = signal.pthread_sigmask(signal.SIG_BLOCK, STOP_SIGNALS)
         try:
             forkserver.ensure_running()
         finally:
