@@ -27,7 +27,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from repro.model.kinetics import RateLaw, decay_demand, rate_law
+from repro.model.kinetics import RateLaw, rate_law
 from repro.results import read_table
 from repro.scene import load_scene
 
