@@ -36,7 +36,7 @@ TABLE_1 = {
                  "maximum_density": "30000 mg/L"},
 }
 NAMES = ("acceptor", "donor")
-#: docs/scope.md: the half saturation of uptake of zero order, over that of the scene.
+#: A half saturation, over that of the scene, for which Monod's law is nearly of zero order.
 ZERO_ORDER = 1e-5
 
 #: Round-off of sums over about 1e4 nodes or points.

@@ -127,10 +127,6 @@ class Unresolved(TransportError):
     """The mesh is too coarse for a sharp front of the substrates."""
 
 
-class UnresolvedWithAdvice(Unresolved):
-    """Unresolved, with the refinement that resolves the front or the statement that none does."""
-
-
 class GrowthError(StageError):
     """The solver finds no equilibrium of the aggregate."""
 

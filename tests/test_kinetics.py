@@ -1,15 +1,21 @@
 """Dual Monod kinetics (7)-(10): values against the paper's formulas, derivatives, bounds, and values below zero."""
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.integrate import quad
 
-from repro.model import kinetics
+from repro import load_scene
+from repro.model import kinetics, pore
 from repro.model.uptake_law import LAWS as LAWS_OF_UPTAKE
 from repro.model.uptake_law import UptakeLaw
+from repro.scene import Substrates
 from tests import oracles
 from tests.strategies import between, concentrations, rate_constants, scenes
 
+PRESETS = {1: "paper", 2: "fast", 3: "exact"}
 SCENES = scenes(drives=("none",))  # any constants
 amounts = concentrations | st.floats(-100.0, 0.0)
 
@@ -37,6 +43,27 @@ def test_the_rates_are_those_of_the_paper(scene, acceptor, donor):
     rises = np.array([extended_uptake((0.0, above[1]), scene)[0, 1], extended_uptake((above[0], 0.0), scene)[1, 1]])
     expected = q + np.minimum([acceptor, donor], 0.0) * rises
     assert extended_uptake((acceptor, donor), scene)[:, 0] == pytest.approx(expected, rel=1e-13) and rises.min() >= 0
+
+
+@pytest.mark.parametrize("absent", ["", "acceptor", "donor"])
+@pytest.mark.parametrize("order", [1, 2, 3])
+def test_the_front_of_zero_order_follows_the_mesh_at_a_known_loss(order, absent):
+    """Only this law depends on the mesh. The front (D K / (q X_m))^1/2 is a third of the root of its part's area. With
+    flux^2 = 2 q X_m D int m dC, a layer takes up less than in the limit by K / (2 C)."""
+    scene = load_scene("base", ["kinetics.law=zero order", f"numerics.preset={PRESETS[order]}"])
+    kept = Substrates(**{name: kind for name, kind in scene.substrates.modelled.items() if name != absent})
+    space = pore.seeded(scene).space
+    rates = kinetics.rate_law(kept, scene.kinetics).on(space, kept)
+    areas = space.reaction.dx.sum(axis=1)
+    whole = scene.kinetics.maximum_density * np.array(rates.uptake_at(1.0, 1.0))[rates.modelled]
+    for kind, uptake, one in zip(kept.modelled.values(), whole, rates.both):
+        half = np.ravel(one.half_saturation)
+        assert kind.diffusivity_in_aggregate * half / uptake == pytest.approx(areas / 9, rel=1e-12)
+    supply = 20 * half[0]
+    taken, _ = quad(lambda c: float(one.fraction(np.full((len(half), 1), c))[0, 0]), 0.0, supply, limit=200)
+    assert 1 - np.sqrt(taken / supply) == pytest.approx(1 / 40, rel=0.02)
+    monod = kinetics.rate_law(kept, replace(scene.kinetics, law="dual Monod"))
+    assert monod.on(space, kept) is monod
 
 
 @pytest.mark.parametrize("name", LAWS_OF_UPTAKE)

@@ -173,9 +173,10 @@ def test_shapes_near_contact_are_within_the_bounds(contact_is_given):
 
 
 def test_the_constants_of_the_uptake_are_those_of_the_fit():
-    """A fit to the committed states from another start, to three digits; and the bound, from its largest error."""
+    """Their squares are those of a fit to the committed states from another start; the bound follows from their
+    largest error."""
     states = uptakes.read(uptakes.FIT)
-    assert uptakes.fitted(states) == TRANSPORTS
+    assert uptakes.is_fit(states, TRANSPORTS)
     assert uptakes.bound(states, TRANSPORTS) == UPTAKE_BOUND
 
 
@@ -210,8 +211,39 @@ def test_growth_follows_from_the_uptake():
     made = kinetics.yield_coefficient * taken.donor - decayed
     assert taken.growth == pytest.approx(made / kinetics.maximum_density, rel=1e-12)
     assert taken.growth[0] < 0 < taken.growth[1]
-    for nothing in (repro.uptake(0.0, 60.0, 1.0, 8.0, 5.0), repro.uptake(900.0, 60.0, 0.0, 8.0, 5.0)):
-        assert [float(values) for values in nothing] == [0, 0, 0, 0]
+
+
+@pytest.mark.parametrize("area", [500.0, 4000.0])
+@pytest.mark.parametrize("zeros", [(0,), (1,), (2,), (3,), (2, 3), (0, 3), (1, 3)])
+def test_the_uptake_at_a_zero_is_the_limit(zeros, area):
+    """Area, velocity, acceptor and donor, alone and in pairs, before contact and after it. Decay takes up acceptor
+    without donor."""
+    arguments = np.array([area, 1.0, 8.0, 5.0])
+    at_zero, near = np.array([0.0, 1e-9]) * arguments[list(zeros)][:, None], []
+    for column in at_zero.T:
+        arguments[list(zeros)] = column
+        near.append(repro.uptake(arguments[0], 50.0, *arguments[1:]))
+    largest = 1e-6 * np.array(repro.uptake(area, 50.0, 1.0, 8.0, 5.0))[:3]
+    assert np.array(near[0]) == pytest.approx(np.array(near[1]), rel=2.0**-12, abs=largest.max())
+    assert near[0].bound == pytest.approx(near[1].bound, rel=1e-6) and near[0].bound >= UPTAKE_BOUND
+    assert (near[0].acceptor > 0) == (zeros == (3,))
+
+
+@pytest.mark.parametrize("acceptor", [1e-6, 8.0])
+@pytest.mark.parametrize("donor", [1e-9, 0.01, 5.0])
+def test_a_small_aggregate_takes_up_at_the_rates_of_the_supply(acceptor, donor):
+    """(7)-(10) in closed form. The inner bisection errs by 2^-13 of the demand of decay."""
+    kinetics = repro.load_scene("base").kinetics
+    area = np.array([1e-2, 1e-4, 1e-8, 1e-16, 1e-60])
+    m_a, m_d = acceptor / (acceptor + 1), donor / (donor + 1)
+    rate = kinetics.maximum_utilization_rate * m_a * m_d
+    decay = kinetics.decay_coefficient * m_a
+    demand = 1.52 * rate + kinetics.decay_oxygen_demand * kinetics.degradable_fraction * decay
+    taken = repro.uptake(area, 50.0, 1.0, acceptor, donor)
+    close = {"rel": 2.0**-12 + 1e-2 * (area > 1e-3)}
+    density = kinetics.maximum_density
+    for values, expected in ((taken.donor, rate), (taken.acceptor, demand)):
+        assert (np.abs(values / (density * area * expected) - 1) < close["rel"]).all()
 
 
 @pytest.mark.parametrize("values, message", [

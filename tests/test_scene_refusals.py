@@ -202,8 +202,6 @@ def test_an_entry_that_conflicts_with_the_scene_is_refused(source, overrides, pa
     ('[aggregate]\n[substrates.acceptor]\n[kinetics]\nlaw = "Haldane"\n',
      'kinetics.law = "Haldane": [substrates.donor] is needed'),
     ('[aggregate]\n[substrates.donor]\ninhibition_constant = "5 mg/L"\n', 'kinetics.law = "Haldane" is needed with it'),
-    ('[aggregate]\n[substrates.donor]\nsupply = "0.5 mg/L"\n[kinetics]\nlaw = "zero order"\n',
-     'substrates.donor.supply = "0.5 mg/L": half_saturation (1 mg/L) or more is needed'),
     ('[substrates]\n[growth]\nend = "1 h"\n', ": [aggregate] and [substrates] are needed"),
     ('[aggregate]\n[substrates]\n[growth]\nend = "1 h"\nfluid_forces = "included"\n', "without [flow]"),
     ('[pore]\nwidth = "4 um"\n[aggregate]\n', 'pore.width = "4 um": more than aggregate.radius (5 um)'),

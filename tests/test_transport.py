@@ -130,7 +130,7 @@ def test_a_half_saturation_below_round_off_is_solved_or_refused_as_a_front(order
         assert "the mesh is too coarse for the front in the aggregate" in str(solution)
 
 
-def test_an_update_whose_biomass_meets_an_unresolved_front_gives_advice_that_was_tried(monkeypatch):
+def test_an_update_whose_biomass_meets_an_unresolved_front_gives_advice(monkeypatch):
     """The front is that of the biomass at the end of the step."""
     model = scene("5 um", velocity="1 m/day", growth={"end": "1 h", "time_step": "0.5 h"}, numerics={"refinement": 0.4})
     solve_steady, calls = transport.steady, []
@@ -142,10 +142,9 @@ def test_an_update_whose_biomass_meets_an_unresolved_front_gives_advice_that_was
         return solve_steady(*arguments)
 
     monkeypatch.setattr(transport, "steady", fail_once)
-    with pytest.raises(SimulationError, match="in transport: a front; numerics.refinement = 0.6 resolves this state"):
+    with pytest.raises(SimulationError, match="in transport: a front; try a larger numerics.refinement"):
         list(simulate(model))
-    assert calls[2][1].active.sum() == pytest.approx(calls[1][1].active.sum(), rel=1e-3)
-    assert calls[2][1].active.sum() > 1.005 * calls[0][1].active.sum()
+    assert calls[1][1].active.sum() > 1.005 * calls[0][1].active.sum()
 
 
 @EVERY_ORDER

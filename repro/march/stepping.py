@@ -80,10 +80,10 @@ def _cut_step(stages: Stages, previous: Pore, solved: Solved,
         try:
             trial = midpoint.attempt(stages, previous, solved, end - previous.time)
             break
-        except Unresolved as error:
+        except Unresolved:
             finer = _halve_elements(stages, previous)
             if finer is None:
-                raise remeshing.advise(stages.scene, previous, error) from None
+                raise
             previous, solved = finer
     step, after = _solve_after(stages, _end_at(needed(trial.step, "a shorter step"), end))
     return replace(step, within=passing.within), after
@@ -132,10 +132,10 @@ def _find_step(
                 length = duration * _part_to_contact(*trial.gaps, film)
             else:
                 length = max(duration * allowed_ratio(estimate, tolerance), shortest)
-        except Unresolved as error:
+        except Unresolved:
             finer = _halve_elements(stages, previous)
             if finer is None and duration <= time_step:
-                raise remeshing.advise(stages.scene, previous, error) from None
+                raise
             if finer is None:
                 length = duration / 2
             else:

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
-from repro.errors import GrowthError, Unresolved
+from repro.errors import GrowthError
 from repro.march.balance import Ledger
 from repro.march.folding import refuse_fold
 from repro.march.loop import (
@@ -26,7 +26,7 @@ from repro.march.loop import (
     time_before_end,
 )
 from repro.march.step_control import StepControl
-from repro.model import biomass, gear, pore, remeshing, transport
+from repro.model import biomass, gear, pore, transport
 from repro.model.biomass import Rates
 from repro.model.contact import Expansion
 from repro.model.contact_lines import FirstContact
@@ -77,25 +77,14 @@ def _advance(stages: Stages, previous: Pore, solved: Solved,
     time = next_time(stages.growth, previous.time, stages.scene.corner(previous.time))
     advanced = step(stages, previous, solved, time - previous.time)
     after = contiguous(replace(advanced.pore, time=time))
-    return replace(advanced, pore=after), _solve_after(stages.scene, after), control
-
-
-def _solve_after(scene: Scene, after: Pore) -> Solved:
-    """Solve for flow and substrates.
-
-    Raises Unresolved, with a refinement that resolves them, if the mesh is too coarse.
-    """
-    try:
-        return pore.solve(scene, after)
-    except Unresolved as error:
-        raise remeshing.advise(scene, after, error) from None
+    return replace(advanced, pore=after), pore.solve(stages.scene, after), control
 
 
 def _interpolate(stages: Stages, previous: Pore, solved: Solved, time: float) -> InterpolatedState:
     """Interpolate to a time (h) within a step, by a shorter step from its start."""
     shorter = step(stages, previous, solved, time - previous.time)
     after = replace(shorter.pore, time=time)
-    return InterpolatedState(after, _solve_after(stages.scene, after), shorter.before)
+    return InterpolatedState(after, pore.solve(stages.scene, after), shorter.before)
 
 
 def step(stages: Stages, previous: Pore, solved: Solved, duration: float) -> StepResult:
@@ -157,14 +146,10 @@ def make_biomass(stages: Stages, previous: Pore, solved: Solved,
         transient = gear.advance(problem, previous.active, previous.inert, start, duration)
         after = replace(previous, active=transient.active, inert=transient.inert)
         return after, transient.concentrations, transient.flows
-    first = biomass.rates(previous.space, start, stages.law)
+    first = biomass.rates(previous.space, start, problem.rate_law)
     guess = grow(previous, first, duration)
-    try:
-        end = gear.steady(problem, Sink(guess.active), start)
-    except Unresolved as error:
-        ahead = replace(guess, time=time_before_end(previous, duration))
-        raise remeshing.advise(stages.scene, ahead, error) from None
-    second = biomass.rates(previous.space, end, stages.law)
+    end = gear.steady(problem, Sink(guess.active), start)
+    second = biomass.rates(previous.space, end, problem.rate_law)
     mean = Rates((first.growth + second.growth) / 2, (first.remains + second.remains) / 2)
     at_start = transport.fluxes(problem, Sink(previous.active), start)
     at_end = transport.fluxes(problem, Sink(guess.active), end)

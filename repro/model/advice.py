@@ -10,6 +10,7 @@ from repro.errors import (
     SelfCrossing,
     StageError,
     TurnedOver,
+    Unresolved,
 )
 
 ADVICE: dict[type[StageError], str] = {
@@ -20,6 +21,7 @@ ADVICE: dict[type[StageError], str] = {
     OutsidePore: "; aggregate.outline: give more points, or smooth = false",
     NotCovered: "; try a shorter growth.time_step",
     OriginFolded: "; try a shorter growth.time_step or a larger numerics.refinement",
+    Unresolved: "; try a larger numerics.refinement",
     PackageMissing: ", or leave numerics.solver and numerics.ordering out",
 }
 

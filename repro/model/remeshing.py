@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from repro.errors import StageError, Unresolved, UnresolvedWithAdvice
+from repro.errors import Unresolved
 from repro.fem import sizing, transfer
 from repro.fem.mesh import Mesh
 from repro.fem.outline import FREE
@@ -20,14 +20,12 @@ from repro.fem.transfer import Located
 from repro.model import biomass, growing
 from repro.model.biomass import Amounts
 from repro.model.growth import Body
-from repro.model.pore import Meshing, Pore, Solved, material, resolution, seeded, solve
-from repro.model.transport import UNRESOLVED, Concentrations, concentrations
-from repro.scene import Scene, SceneError, Substrate, Substrates, at_time, load_scene
+from repro.model.pore import Meshing, Pore, Solved, material, seeded, solve
+from repro.model.transport import Concentrations, concentrations
+from repro.scene import Scene, Substrate, Substrates, at_time
 
 #: A front of the substrates divides element sizes at the aggregate by at most this.
 MOST_GRADED = 4.0
-#: Factors of the refinement that are tried for a front that MOST_GRADED does not resolve.
-TRIED = (1.5, 2.0, 3.0)
 #: The largest refinement that scenes accept.
 MOST_REFINED = 20.0
 
@@ -145,10 +143,10 @@ def solve_graded(scene: Scene, pore: Pore) -> tuple[Pore, Solved]:
     while True:
         try:
             return pore, solve(scene, pore)
-        except Unresolved as error:
+        except Unresolved:
             finer = grade(scene, pore)
             if finer is None:
-                raise advise(scene, pore, error) from None
+                raise
             pore = finer
 
 
@@ -161,79 +159,6 @@ def grade(scene: Scene, pore: Pore) -> Pore | None:
     if pore.time == 0:
         return seeded(scene, front)
     return remesh(Remeshing.of(scene), pore, replace(pore, front=front), 0.0)[0]
-
-
-def advise(scene: Scene, pore: Pore, error: Unresolved) -> UnresolvedWithAdvice:
-    """The error with a setting that resolves the present state: a numerics.refinement, or linear
-    elements. Each setting is tried before it is named.
-
-    An error that already carries advice is returned unchanged.
-    """
-    if isinstance(error, UnresolvedWithAdvice):
-        return error
-    candidates = [round(factor * resolution(scene), 2) for factor in TRIED]
-    candidates = [refinement for refinement in candidates if refinement <= MOST_REFINED]
-    for refinement in candidates:
-        finer = replace(scene, numerics=replace(scene.numerics, refinement=refinement))
-        if _resolves(finer, pore):
-            return UnresolvedWithAdvice(
-                f"{error}; numerics.refinement = {refinement:g} resolves this state")
-    failed = f"no numerics.refinement that is accepted (up to {MOST_REFINED:g}) is much larger"
-    if candidates:
-        failed = f"numerics.refinement up to {candidates[-1]:g} does not resolve it"
-    linear = _with_linear(scene)
-    if linear and _resolves(linear, pore):
-        refinement = linear.numerics.refinement
-        return UnresolvedWithAdvice(f'{error}; {failed}; numerics.elements = "linear" with '
-                       f"numerics.refinement = {refinement:g} resolves this state")
-    return UnresolvedWithAdvice(f"{error}; {failed}")
-
-
-def _resolves(scene: Scene, pore: Pore) -> bool:
-    """Do the elements of another scene resolve the present state, with a margin?"""
-    try:
-        solved = solve(scene, _with_elements_of(scene, pore))
-    except StageError:
-        return False
-    return _has_margin(solved)
-
-
-def _with_elements_of(scene: Scene, pore: Pore) -> Pore:
-    """The present state on a new mesh. If the order differs, the biomass is that of t = 0 in the
-    present outline."""
-    if pore.time == 0:
-        return seeded(scene, pore.front if scene.numerics.follows_layers else 1.0)
-    if scene.numerics.order == pore.space.order:
-        return remesh(Remeshing.of(scene), pore, pore, 0.0)[0]
-    fresh = replace(seeded(scene, outline=pore.boundary.corners), time=pore.time)
-    supplied = at_time(scene.growing.substrates, 0.0)
-    state = transfer_substrates(supplied, pore.space, fresh.space, pore.concentrations, 0.0)
-    return replace(fresh, concentrations=state)
-
-
-def _with_linear(scene: Scene) -> Scene | None:
-    """The scene with linear elements of at least the paper's refinement; None if the scene has
-    linear elements already, or if they are not allowed.
-
-    Linear elements lump the uptake at the nodes: behind a front that is thinner than an element
-    their concentrations fall far less below zero than those of higher orders.
-    """
-    if not scene.numerics.follows_layers:
-        return None
-    refinement = max(1.0, scene.numerics.refinement)
-    changes = ["numerics.elements=linear", f"numerics.refinement={refinement!r}"]
-    try:
-        return load_scene(scene, changes)
-    except SceneError:
-        return None
-
-
-def _has_margin(solved: Solved) -> bool:
-    """Do concentrations fall below zero by at most half of the accepted amount?"""
-    state = solved.substrates.concentrations
-    kinds = solved.substrates.problem.both
-    return all(field.min() >= -0.5 * UNRESOLVED * s.supply
-               for field, s in zip(state.fields, kinds))
 
 
 def moved_mesh(meshing: Meshing, previous: Pore, expanded: Pore) -> Mesh | None:

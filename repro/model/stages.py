@@ -9,7 +9,6 @@ from repro.model import biomass, contact, growing, remeshing
 from repro.model.biomass import Rates
 from repro.model.contact import Expansion, Mechanics
 from repro.model.contact_lines import SearchOptions
-from repro.model.kinetics import RateLaw, rate_law
 from repro.model.pore import Pore, Solved
 from repro.model.remeshing import GeneratedMesh, Remeshing
 from repro.scene import Growth, Scene
@@ -19,27 +18,25 @@ from repro.scene import Growth, Scene
 class Stages:
     """The stages of a step of growth.
 
-    scene: for values that depend on the time, and for advice; growth: its section [growth]; law:
-    rates of uptake and growth; mechanics: shape of the grown aggregate; remeshing: mesh after a
-    step.
+    scene: for values that depend on the time, and for advice; growth: its section [growth];
+    mechanics: shape of the grown aggregate; remeshing: mesh after a step.
     """
 
     scene: Scene
     growth: Growth
-    law: RateLaw
     mechanics: Mechanics
     remeshing: Remeshing
 
     @classmethod
     def of(cls, scene: Scene) -> Stages:
         """The stages of a scene with growth."""
-        substrates, kinetics, growth = scene.growing
-        return cls(scene, growth, rate_law(substrates, kinetics), Mechanics.of(scene),
-                   Remeshing.of(scene))
+        _, _, growth = scene.growing
+        return cls(scene, growth, Mechanics.of(scene), Remeshing.of(scene))
 
     def rates(self, pore: Pore, solved: Solved) -> Rates:
         """F3 / X_A and F4 / X_A, 1/h, at the points of the reaction."""
-        return biomass.rates(pore.space, solved.substrates.concentrations, self.law)
+        substrates = solved.substrates
+        return biomass.rates(pore.space, substrates.concentrations, substrates.problem.rate_law)
 
     def expand(self, previous: Pore, grown: Pore, guess: Pore | None = None,
                search: SearchOptions = contact.PATIENT) -> Expansion:

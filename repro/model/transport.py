@@ -173,7 +173,7 @@ def problem(space: Space, flow: Flow | None, substrates: Substrates, kinetics: K
     magnitude = copy(operator)
     magnitude.data = np.abs(operator.data)
     sources = np.concatenate([kind.supply * source for kind in kinds])
-    law = None if kinetics is None else rate_law(substrates, kinetics)
+    law = None if kinetics is None else rate_law(substrates, kinetics).on(space, substrates)
     return Problem(space, matrices, operator, magnitude, sources, inflow, outflow, system,
                    substrates, law, modified_newton)
 

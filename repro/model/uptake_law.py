@@ -48,6 +48,8 @@ class UptakeLaw:
 
     #: Does m(C) never decrease? If it does, several concentrations may be steady.
     monotone: ClassVar[bool] = True
+    #: Is m(C) a step in the limit, so that K follows the mesh?
+    sharp: ClassVar[bool] = False
 
     @classmethod
     def constants(cls, substrate: Substrate) -> tuple[float, ...]:
@@ -80,9 +82,13 @@ class UptakeLaw:
         return cls(*(np.array(column)[:, None, None] for column in columns))
 
     def __iter__(self) -> Iterator[UptakeLaw]:
-        """Iterate over the laws of the single substrates; their constants are numbers."""
-        columns = [getattr(self, field.name).ravel().tolist() for field in fields(self)]
-        return (type(self)(*constants) for constants in zip(*columns))
+        """Iterate over the laws of the single substrates.
+
+        Their constants are numbers, or arrays (r, 1) if they differ between parts of a mesh.
+        """
+        columns = [getattr(self, field.name) for field in fields(self)]
+        for constants in zip(*columns):
+            yield type(self)(*(each.item() if each.size == 1 else each for each in constants))
 
     def fraction(self, concentration: Values) -> Values:
         """Return m of max(C, 0).
@@ -313,20 +319,39 @@ class FirstOrder(UptakeLaw):
         return False
 
 
-class ZeroOrder(Monod):
-    """Uptake of zero order, the limit K -> 0 of Monod's law: K is K_s times LIMIT.
+class ZeroOrder(UptakeLaw):
+    """Uptake of zero order, the limit K -> 0 of m = 1 - exp(-C / K).
 
-    A flux into a layer that uses up C then differs from the limit by the part LIMIT K_s / C of it,
-    times a logarithm: below 1e-4 for supplies of K_s or more.
+    On a mesh, K is the least for which elements resolve the front (:meth:`RateLaw.on`). A layer
+    with C at its surface then takes up less than in the limit, by the part K / (2 C) of its uptake.
+    Without a mesh, K is K_s times LIMIT.
     """
 
-    #: K over the scene's K_s.
+    #: K over the scene's K_s without a mesh.
     LIMIT: ClassVar[float] = 1e-5
+    sharp: ClassVar[bool] = True
 
     @classmethod
     def constants(cls, substrate: Substrate) -> tuple[float, ...]:
-        """Return K (mg/L)."""
+        """Return K (mg/L) without a mesh."""
         return (cls.LIMIT * substrate.half_saturation,)
+
+    def fraction(self, concentration: Values) -> Values:
+        """Return 1 - exp(-C / K)."""
+        return -np.expm1(-np.maximum(concentration, 0.0) / self.half_saturation)
+
+    def slope(self, concentration: Values) -> Values:
+        """Return exp(-C / K) / K, L/mg."""
+        decayed = np.exp(-np.maximum(concentration, 0.0) / self.half_saturation)
+        return decayed / self.half_saturation
+
+    def largest(self, supply: float) -> float:
+        """Return one, for any supply."""
+        return 1.0
+
+    def saturates(self, supply: float) -> bool:
+        """Return True for a supply above K."""
+        return supply > self.half_saturation
 
 
 #: Laws by the values of `kinetics.law`.

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from repro.fem import sizing
 from repro.march.stepping import SHORTEST
 from repro.model.brinkman import ACROSS
+from repro.model.kinetics import THINNEST
 from repro.model.pore import Pore, film, resolution
 from repro.model.remeshing import MOST_REFINED
 from repro.model.surface import CREASE, surface
@@ -46,6 +47,8 @@ ACROSS_FILM = 4.0
 #: layer in which a permeable aggregate slows the water. The water slips on this layer: the flow
 #: through a film of thickness h beside a layer l is at most 1 + 3 l / h times that beside a wall.
 FILM_LOSS = 0.01
+#: The uptake of a layer may be too small by this share if elements widen its front.
+FRONT_LOSS = 0.01
 
 #: A fold is expected below this estimate of the rim's stretch (docs/design.md).
 FOLD_EXPECTED = 0.7
@@ -162,13 +165,27 @@ def _fronts(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
     nodes = _interface_size(scene) / scene.numerics.order
     for uptake in numbers.uptakes(scene):
         layer = uptake.layer
-        if layer < min(nodes, thickness):
+        if uptake.law.sharp:
+            yield from _widened_front(scene, uptake)
+        elif layer < min(nodes, thickness):
             zero_order = uptake.law.saturates(uptake.substrate.supply)
             kind = "zero-order front" if zero_order else "layer of first-order uptake"
             yield Caveat("numerics.refinement", f"the {uptake.name} is used up in a {kind} "
                          f"of thickness (D K_s / (q X_m))^1/2 = {layer:.2g} um, thinner than the "
                          f"{nodes:.2g} um between nodes in the aggregate (a run checks the front "
                          "in its solution)" + _resolving(resolution(scene) * nodes / layer))
+
+
+def _widened_front(scene: Scene, uptake: numbers.Uptake) -> Iterator[Caveat]:
+    """The uptake of a layer that a front of zero order loses on elements of the interface's size:
+    see :meth:`RateLaw.on`."""
+    front = THINNEST * math.sqrt(math.sqrt(3) / 4) * _interface_size(scene)  # equilateral triangles
+    lost = (front / uptake.depth) ** 2 if uptake.depth else 0.0
+    if lost > FRONT_LOSS:
+        yield Caveat("numerics.refinement", f"elements widen the front behind which there is no "
+                     f"{uptake.name} to {front:.2g} um, of {uptake.depth:.2g} um that the supply "
+                     f"reaches: uptake may be {100 * lost:.2g} % too small"
+                     + _resolving(resolution(scene) * (lost / FRONT_LOSS) ** 0.5))
 
 
 def _interface_size(scene: Scene) -> float:

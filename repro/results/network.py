@@ -27,7 +27,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from repro.model.kinetics import RateLaw, decay_demand, rate_law
+from repro.model.kinetics import RateLaw, rate_law
 from repro.results import read_table
 from repro.scene import load_scene
 
@@ -228,11 +228,11 @@ def uptake(area: ArrayLike, width: ArrayLike, velocity: ArrayLike, acceptor: Arr
     for name, supply in zip(("acceptor", "donor"), supplies):
         is_known &= check.within(name, supply, 0.0, LARGEST_SUPPLY)
     results = np.full((4, *share.shape), np.nan)
-    results[:, is_known] = 0.0
-    takes = is_known & (area > 0) & (velocity > 0) & (supplies[0] > 0) & (supplies[1] > 0)
-    throats = throats_of(*(values[takes] for values in (area, width, velocity, *supplies)))
-    results[:3, takes] = throats.uptake()
-    results[3, takes] = throats.bound()
+    results[:3, is_known] = 0.0
+    arguments = (area, width, velocity, *supplies)
+    results[3, is_known] = throats_of(*(values[is_known] for values in arguments)).bound()
+    takes = is_known & (area > 0) & (velocity > 0) & (supplies[0] > 0)
+    results[:3, takes] = throats_of(*(values[takes] for values in arguments)).uptake()
     return Uptake(*results)
 
 
@@ -257,12 +257,14 @@ class Throats(NamedTuple):
         """
         law, _, density = _constants()
         active = density * self.area
-        ratio, decay = law.constants.acceptor_to_donor_ratio, decay_demand(law.constants)
-        limit = self.inflow * self.supplies[0]
+        ratio = law.constants.acceptor_to_donor_ratio
+        decay, _ = active * law.uptake(self.supplies[0], 0.0 * self.area)
+        _, fastest = active * law.uptake(*self.supplies)
+        limits = self.inflow * self.supplies
 
         def acceptor(taken: np.ndarray) -> np.ndarray:
             need = ratio * taken
-            most = need + np.minimum(active * decay, np.maximum(limit - need, 0.0))
+            most = need + np.minimum(decay, np.maximum(limits[0] - need, 0.0))
             return _balance(need, most, DECAY_HALVINGS, lambda trial: (
                 need + active * law.uptake(self.concentration(0, trial), 0.0 * trial)[0]))
 
@@ -270,7 +272,7 @@ class Throats(NamedTuple):
             c_acceptor = self.concentration(0, acceptor(trial))
             return active * law.uptake(c_acceptor, self.concentration(1, trial))[1]
 
-        most = np.minimum(limit / ratio, self.inflow * self.supplies[1])
+        most = np.minimum(np.minimum(limits[0] / ratio, limits[1]), fastest)
         taken = _balance(np.zeros_like(most), most, HALVINGS, donor)
         both = acceptor(taken)
         decayed = (both - ratio * taken) / law.constants.decay_oxygen_demand
@@ -283,7 +285,8 @@ class Throats(NamedTuple):
         sherwood, power, plug, plug_power = self.transport()
         supply, diffusivity = self.supplies[substrate], diffusivities[substrate]
         is_plug = plug * self.inflow / diffusivity * self.share**plug_power
-        used = np.clip(taken / (self.inflow * supply), 1e-12, 1 - 1e-12)
+        used = np.divide(taken, self.inflow * supply, out=np.zeros_like(taken), where=supply > 0)
+        used = np.clip(used, 1e-12, 1 - 1e-12)
         mean = (1 - used - is_plug * used / np.log1p(-used)) / (1 + is_plug)
         resistance = 1 / (sherwood * self.share**power * diffusivity)
         return np.maximum(supply * mean - taken * resistance, 0.0)

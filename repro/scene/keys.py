@@ -259,7 +259,7 @@ class Kinetics:
     law: str = choice(
         "dual Monod", "Haldane", "first order", "zero order", source="(7)-(10) have dual Monod",
         about="m of each substrate: C / (C + K_s); for the donor C / (K_s + C + C^2 / K_i); "
-              "C / K_s; or 1 where there is any (K_s over 100000)")
+              "C / K_s; or 1 where there is any")
     decay: str = choice(
         "with acceptor", "unlimited", source="(9)-(10) have m_A",
         about="Decay in proportion to m_A, none without acceptor; or b everywhere, whose oxygen "

@@ -319,14 +319,6 @@ def _law_rules(law: str, substrates: "Substrates") -> Rules:
         "substrates.donor.inhibition_constant": 'kinetics.law = "Haldane" is needed with it',
         "kinetics.law": '"Haldane" is needed with substrates.donor.inhibition_constant',
     }
-    for name, part in substrates.modelled.items():
-        largest = part.supply.largest if isinstance(part.supply, TimeTable) else part.supply
-        yield law == "zero order" and 0 < largest < part.half_saturation, {
-            f"substrates.{name}.half_saturation": f"at most the supply ({largest:g} mg/L) is "
-                                                  'needed with kinetics.law = "zero order"',
-            f"substrates.{name}.supply": f"half_saturation ({part.half_saturation:g} mg/L) or "
-                                         'more is needed with kinetics.law = "zero order"',
-        }
 
 
 def _step_rules(end: float, step: float) -> Rules:

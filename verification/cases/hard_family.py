@@ -33,11 +33,10 @@ QUICK, REST = (*range(20), *range(164, 172)), (*range(20, 164), *range(172, 190)
 #: by 1.6 %.
 NOT_JUDGED = {172: {"head_loss_cm in fast less that in accurate, relative",
                "conductivity_m_per_d in fast less that in accurate, relative"}}
-NO_HELP = re.compile(r"no setting helps|no numerics\.refinement that is accepted")
+NO_HELP = re.compile("no setting helps")
 FILE = re.compile(r"\S+/\S+\.(?:state|vtu)|fields/\S+\.vtu")
 #: Advice in messages: pattern, key, and values to try, from the present value or the number in the message.
 ADVICE = (
-    (r"numerics\.refinement = ([\d.e+-]+) resolves", "numerics.refinement", lambda present, number: [float(number)]),
     (r"larger numerics\.refinement", "numerics.refinement", lambda present, number: [1.5 * present, 2.5 * present]),
     (r"smaller numerics\.refinement", "numerics.refinement", lambda present, number: [present / 2]),
     (r"larger growth\.shear_modulus", "growth.shear_modulus",

@@ -64,15 +64,17 @@ MUTANTS = (
          "rates = [self._law.own_uptake(s, *self.at(state))[0] for s in (0, 1)]\n"
          "        return self.sink.active[:, None] * np.stack(rates, axis=1)")),
     *changes(
+        "repro/model/kinetics.py",
+        ("zero-order-far-from-its-limit",
+         "fronts of zero order are three times as thick",
+         "THINNEST = 1 / 3",
+         "THINNEST = 1.0")),
+    *changes(
         "repro/model/uptake_law.py",
         ("first-order-bounded",
          "uptake of first order falls behind C / K by 1 % where C = K",
          "        return np.maximum(concentration, 0.0) / self.half_saturation",
          "        return np.maximum(concentration, 0.0) / (0.99 * self.half_saturation + 0.01 * concentration)"),
-        ("zero-order-far-from-its-limit",
-         "uptake of zero order has a tenth of the half saturation",
-         "LIMIT: ClassVar[float] = 1e-5",
-         "LIMIT: ClassVar[float] = 0.1"),
         ("haldane-without-inhibition",
          "Haldane's law has the acceptor's infinite constant for the donor too",
          'getattr(substrate, "inhibition_constant", np.inf)',

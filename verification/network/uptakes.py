@@ -40,6 +40,9 @@ APART, LARGEST = 1.2, 4.5
 NEW_GROWN = 25
 #: The bound of the law is the largest error of the fit, over the spread of the bound, times this factor.
 FACTOR = 1.25
+#: Part by which the least sum of squares may be less than that of the law's constants. Few states are plugs, and the
+#: halvings of the law's intervals move their sum of squares by up to a third.
+FLAT = 0.25
 #: The start of the fit: diffusion through a layer of a tenth of W, and water that is half mixed.
 START = Transport(10.0, 0.5, 0.5, 0.5)
 ARGUMENTS = ("area", "width", "velocity", *SUBSTRATES)
@@ -101,6 +104,19 @@ def fitted(columns: dict[str, np.ndarray]) -> tuple[Transport, Transport]:
     spread of the bound."""
     spanned = columns["area"] > share_range(False)[1] * columns["width"]**2
     return _fitted(columns, ~spanned), _fitted(columns, spanned)
+
+
+def misfit(columns: dict[str, np.ndarray], transports: tuple[Transport, Transport]) -> np.ndarray:
+    """(2,) sums, before contact and after it, of the squares that the fit minimises."""
+    law = throats(columns)._replace(transports=transports)
+    squares = ((deviations(columns, law) / law.spread())**2).sum(axis=0)
+    spanned = columns["area"] > share_range(False)[1] * columns["width"]**2
+    return np.array([squares[~spanned].sum(), squares[spanned].sum()])
+
+
+def is_fit(columns: dict[str, np.ndarray], transports: tuple[Transport, Transport]) -> bool:
+    """Whether another fit has sums of squares that are less by at most the part ``FLAT``."""
+    return bool((misfit(columns, transports) <= (1 + FLAT) * misfit(columns, fitted(columns))).all())
 
 
 def _fitted(columns: dict[str, np.ndarray], selected: np.ndarray) -> Transport:
