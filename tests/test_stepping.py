@@ -14,7 +14,7 @@ import pytest
 from repro.errors import GrowthError, SimulationError, Unresolved
 from repro.fem.outline import FREE, TOP
 from repro.march import midpoint, simulation, step_control, stepping, updates
-from repro.march.loop import PoreEnd
+from repro.march.ends import PoreEnd
 from repro.march.midpoint import Attempt
 from repro.march.step_control import EXCESS, StepControl, exceeds_tolerance
 from repro.model import contact, pore, remeshing
