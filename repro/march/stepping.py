@@ -5,8 +5,8 @@ would use the rates at the start. ``numerics.tolerance`` bounds their difference
 aggregate, times the step. The error of the midpoint rule is of higher order; ``make bench``
 measures it for each tolerance. A step ends when the film between the aggregate and the opposite
 wall first becomes too thin (2.3.3), and at the times of the scene's tables. Rows and the end of the
-run do not change the steps. If a row cannot be interpolated, steps of its own lead to it. They are shortened
-and their elements are graded as in every step.
+run do not change the steps. If a row cannot be interpolated, steps of its own lead to it. They are
+shortened and their elements are graded as in every step.
 """
 
 from __future__ import annotations
