@@ -115,7 +115,8 @@ def test_a_jump_of_a_supply_is_drawn_as_a_jump(times, expected):
     head = 'flow.head=[["0 h", "1e-3 cm"], ["2 h", "2e-3 cm"]]'
     forced = (head, "growth.fluid_forces=included")
     assert curve("mean_velocity_m_per_d", head) == curve("fluid_moment_nN", head) == list(expected)
-    assert curve("wall_traction_max_MPa", head) == unchanged and curve("wall_traction_max_MPa", *forced) == list(expected)
+    stress = "wall_traction_max_MPa"
+    assert curve(stress, head) == unchanged and curve(stress, *forced) == list(expected)
 
 
 def test_many_points_are_thinned_with_both_ends():
