@@ -118,7 +118,7 @@ def test_the_command_draws_the_same(results, tmp_path, capsys):
 @pytest.mark.parametrize("arguments, message", [
     (["doner", "--out", "x.png"], "did you mean donor"), (["--out", "x.gif"], "a film needs FIELD and accepts no"),
     (["donor", "--time", "1", "--out", "x.gif"], "no --time"),
-    (["donor", "--time", "0.25 h", "--out", "x.png"], "0.25 h: not a reported time; the nearest rows are at 0.2 "),
+    (["donor", "--time", "0.21 h", "--out", "x.png"], "0.21 h: not a reported time; the nearest rows are at 0.2 "),
     (["donor", "--time", "12 um", "--out", "x.png"], "time: '12 um': a number of hours or a text such as"),
     (["--out", "x.txt"], "is not supported")])
 def test_the_command_refuses_in_one_line(results, tmp_path, capsys, monkeypatch, arguments, message):

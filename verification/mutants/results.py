@@ -1717,8 +1717,7 @@ MUTANTS = (
          "The fluid pushes the aggregate as it does after a jump at the end of the step.",
          "    return max(previous.time, previous.time + duration - SAME_TIME)\n",
          "    return max(previous.time, previous.time + duration)\n",
-         f"{STEPPING}a_shape_leans_as_the_flow_at_the_end_of_its_step_pushes[updates]",
-         f"{STEPPING}a_shape_leans_as_the_flow_at_the_end_of_its_step_pushes[midpoint]")),
+         "tests/test_ends.py::test_a_jump_is_judged_on_both_sides")),
     *changes(
         "verification/claims/report.py",
         ("first-value-undated",
