@@ -53,7 +53,7 @@ Sections of the paper and their modules, which name the equations that they solv
     2    state of the pore                  repro.model.pore, .stages (the parts of a step)
     2    coupling, 3.3                      repro.march.updates (the paper's shape updates)
          error control (not the paper's)    repro.march.midpoint, .stepping, .step_control
-         the end as a fold                  repro.march.folding, .detachment
+         ends of the model                  repro.march.ends, .folding
          the loop of both                   repro.march.loop, .simulation
     4, 5  results, laws for networks        repro.results, .columns, .arrays, .tables, .network
 
@@ -83,9 +83,9 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from repro.errors import OutputError as OutputError
     from repro.errors import SimulationError as SimulationError
-    from repro.march.detachment import Detachment as Detachment
+    from repro.march.ends import Detachment as Detachment
+    from repro.march.ends import PoreEnd as PoreEnd
     from repro.march.folding import Fold as Fold
-    from repro.march.loop import PoreEnd as PoreEnd
     from repro.march.simulation import simulate
     from repro.preflight.checked import check
     from repro.report import compare
@@ -100,8 +100,8 @@ if TYPE_CHECKING:
 else:
     #: The module of each public name, imported on first use: importing the solver takes half a
     #: second.
-    _MODULES = {"Detachment": "march.detachment", "Fold": "march.folding", "OutputError": "errors",
-                "PoreEnd": "march.loop", "Results": "results.tables",
+    _MODULES = {"Detachment": "march.ends", "Fold": "march.folding", "OutputError": "errors",
+                "PoreEnd": "march.ends", "Results": "results.tables",
                 "Scene": "scene", "SceneError": "scene", "SimulationError": "errors",
                 "added_resistance": "results.network", "check": "preflight.checked",
                 "compare": "report", "load_run": "runs.scripts", "load_scene": "scene",

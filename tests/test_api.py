@@ -55,6 +55,16 @@ def test_another_time_is_refused_by_the_nearest(solved):
         solved.fields(0.55)
 
 
+def test_a_time_may_have_a_unit(solved):
+    """A number is in hours. A text without a unit of time is refused."""
+    assert solved.fields("12 min") is solved.fields(0.2) and solved.fields("0.6 h") is solved.fields(0.6)
+    for text in ("1", "1 um", "soon", "1e999 h"):
+        with pytest.raises(ValueError, match=f"time: '{text}': a number of hours or a text such as"):
+            solved.fields(text)
+    with pytest.raises(TypeError, match="fields: time: float or str is needed, not None"):
+        solved.fields(None)
+
+
 def test_the_nearest_row_replaces_a_time_between_rows(solved):
     """The names of columns complete in IPython, and those of fields as keys of a dict."""
     assert solved.fields(0.55, method="nearest") is solved.fields(0.6)

@@ -328,7 +328,7 @@ def test_a_row_that_cannot_be_interpolated_is_reached_by_steps_of_its_own(plugge
     def fail(*_):
         raise GrowthError("no equilibrium")
 
-    monkeypatch.setattr(midpoint, "_interpolate", fail)
+    monkeypatch.setattr(midpoint, "interpolate", fail)
     reached = rows_at(scene, [15.3, 15.9])
     for one, other in zip(reached, expected):
         assert one.pore.time == other.pore.time

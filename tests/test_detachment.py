@@ -1,6 +1,6 @@
-"""Stresses that walls and biomass bear: means of tractions; strengths that end a run; scenes without strengths.
+"""Stresses that walls and biomass bear: means of tractions; scenes without strengths.
 
-`test_fold.py` tests what a run that has ended leaves, `test_derived.py` the charts of these stresses, and
+`test_ends.py` tests the ends of runs by a strength, `test_derived.py` the charts of these stresses, and
 `test_longer.py` a run with a bonded wall that is made longer.
 """
 
@@ -10,12 +10,7 @@ import pytest
 import repro
 from repro import results
 from repro.model import adhesion
-from repro.preflight.modelled import describe_model
-from repro.runs.status import is_over
 from repro.scene import load_scene
-
-FAST = ["numerics.preset=fast", "growth.wall=bonded"]
-SPARSE = [*FAST, 'output.times=["0 h", "6 h"]', 'growth.end="6 h"']
 
 
 @pytest.mark.parametrize("count", (2, 3))
@@ -43,28 +38,6 @@ def test_means_of_a_traction_are_those_of_its_integral(count):
     point = np.where(np.arange(7) == 3, 10.0, 0.0)
     assert surface.point_means(point, 100.0).max() == pytest.approx(2.0)
     assert surface.means(surface.density(forces), 1e4) == pytest.approx([1.2, 1.2, 1.2])
-
-
-@pytest.mark.parametrize("key, strength, unit, in_MPa, verb, column", [
-    ("bonding_strength", 0.002, "MPa", 1.0, "detaches", "wall_traction_max"),
-    ("bonding_strength", 2.0, "kPa", 1e-3, "detaches", "wall_traction_max"),
-    ("tensile_strength", 500.0, "Pa", 1e-6, "tears", "tensile_stress_max")])
-def test_a_run_ends_where_a_strength_is_exceeded(key, strength, unit, in_MPa, verb, column):
-    """The last row is the first one above the strength, although no row was requested at its time. The status has its
-    time and the place, and stresses in the unit of the strength."""
-    every = repro.solve("base", [*FAST, 'growth.end="6 h"', f"growth.{key}={strength} {unit}"])
-    values = every[f"{column}_MPa"]
-    assert values[-1] > strength * in_MPa
-    sparse = repro.solve("base", [*SPARSE, f"growth.{key}={strength} {unit}"])
-    x, y = (sparse[f"{column}_{axis}_um"][-1] for axis in "xy")
-    assert sparse.status == every.status and is_over(every.status)
-    where = f"near x = {x:.4g}, y = {y:.4g} um"
-    assert sparse.status.startswith(f"the aggregate {verb} at t = {sparse['time_h'][-1]:g} h: {where}")
-    assert sparse.status.endswith(f"growth.{key} is {strength:g} {unit}")
-    assert f" {values[-1] / in_MPa:.3g} {unit}, in the mean" in sparse.status
-    words = describe_model(load_scene("base", [*FAST, f"growth.{key}={strength} {unit}"]))
-    assert f"{key.replace('_', ' ')} {strength:g} {unit}" in str(words)
-    assert len(sparse["time_h"]) == 2 and sparse["time_h"][-1] == every["time_h"][-1]
 
 
 def test_a_scene_without_these_keys_computes_none_of_it(monkeypatch):

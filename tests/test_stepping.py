@@ -14,7 +14,7 @@ import pytest
 from repro.errors import GrowthError, SimulationError, Unresolved
 from repro.fem.outline import FREE, TOP
 from repro.march import midpoint, simulation, step_control, stepping, updates
-from repro.march.loop import PoreEnd
+from repro.march.ends import PoreEnd
 from repro.march.midpoint import Attempt
 from repro.march.step_control import EXCESS, StepControl, exceeds_tolerance
 from repro.model import contact, pore, remeshing
@@ -236,6 +236,28 @@ def test_the_last_step_uses_finer_elements_if_a_front_needs_them(needed, message
         assert [instant.pore.front for instant in scene][-1] == needed
 
 
+@pytest.mark.parametrize("error", [Unresolved("the mesh is too coarse"), GrowthError("no rest")])
+def test_steps_to_a_row_are_graded_and_shortened_like_every_step(error, monkeypatch):
+    """The row cannot be interpolated. Steps of its length fail, on elements of the first size or always."""
+    attempt, tried = midpoint.attempt, []
+
+    def fail(*_):
+        raise error
+
+    def to_the_row(scene, state, solved, duration, *most):
+        tried.append((duration, state.front))
+        if duration == 0.15 and (isinstance(error, GrowthError) or state.front < 2):
+            raise error
+        return attempt(scene, state, solved, duration, *most)
+
+    monkeypatch.setattr(midpoint, "interpolate", fail)
+    monkeypatch.setattr(midpoint, "attempt", to_the_row)
+    changes = ('growth.end="0.3 h"', 'output.times=["0.15 h", "0.3 h"]')
+    _, row, end = simulation.simulate(base(*changes))
+    assert row.pore.time == 0.15 and end.pore.time == 0.3 and end.pore.front == 1
+    assert row.pore.front == (2 if isinstance(error, Unresolved) else 1) and (0.15, 1.0) in tried
+
+
 def test_a_step_ends_at_a_jump_to_the_last_bit():
     """For any start the new value applies after the step. A step shorter by a microhour ends earlier."""
     _, pore = coarse_base(1)
@@ -247,10 +269,11 @@ def test_a_step_ends_at_a_jump_to_the_last_bit():
 
 @pytest.mark.parametrize("time", ["updates", "midpoint"])
 def test_a_shape_leans_as_the_flow_at_the_end_of_its_step_pushes(time):
-    """The lean is the difference between the ends' motion. It is the same under a rising head as under its last value,
-    and a jump at the end of the step has no effect."""
+    """The lean is the difference between the ends' motion. It is the same under a rising head as under its last value.
+    After a jump at the end of the step it is that under the new head, for which the aggregate takes its new shape at
+    once."""
     leans = []
-    for first, last, kind in ((4, 4, "linear"), (1, 4, "linear"), (4, 1, "steps")):
+    for first, last, kind in ((4, 4, "linear"), (1, 4, "linear"), (1, 4, "steps")):
         scene, _ = coarse_base(2, f'flow.head=[["0 h", "{first}e-3 cm"], ["0.2 h", "{last}e-3 cm"]]',
                                f"flow.interpolation={kind}", "growth.fluid_forces=included", f"numerics.time={time}",
                                'growth.end="0.2 h"', 'growth.shear_modulus="1e-3 MPa"', 'output.times=["0.2 h"]')

@@ -36,7 +36,7 @@ plt.show()
 # With the name of a field, `plot` draws the field over the pore at a reported time.
 
 # %% mystnb={"image": {"alt": "the acceptor in the pore at 15.2 h, with the outline of the aggregate"}}
-results.plot("acceptor", time=15)
+results.plot("acceptor", time=15.2)
 plt.show()
 
 # %% [markdown]

@@ -1,4 +1,4 @@
-"""``repro plot FOLDER [FIELD] [--time HOURS] --out FILE``: draw a run in a file."""
+"""``repro plot FOLDER [FIELD] [--time TIME] --out FILE``: draw a run in a file."""
 
 from __future__ import annotations
 
@@ -21,11 +21,20 @@ def add(commands) -> None:
     command.add_argument("folder", metavar="FOLDER", type=path, help="folder of a run")
     command.add_argument("field", metavar="FIELD", nargs="?",
                          help="a field or a column, with or without its unit")
-    command.add_argument("--time", metavar="HOURS", type=float,
-                         help="time of the field; the nearest row is drawn (default: the last)")
+    command.add_argument("--time", metavar="TIME", type=_time,
+                         help='reported time of the field, such as "90 min"; a number without '
+                         "unit is in hours (default: the last)")
     command.add_argument("--out", metavar="FILE", type=path, required=True,
                          help="file to write: .png, .pdf, .svg, or .gif for a film")
     command.set_defaults(call=call)
+
+
+def _time(text: str) -> float | str:
+    """Parse a number of hours; a text with a unit is left to the results."""
+    try:
+        return float(text)
+    except ValueError:
+        return text
 
 
 def call(options) -> int:

@@ -1,8 +1,10 @@
 """Folding of the aggregate's surface: an end of the model, not a failure.
 
-See :mod:`repro.model.surface`. A step that ends below Biot's limit is rejected. A step without a
-smooth equilibrium fails like any other step. If the surface can crease already, the failure is
-reported as a fold. A later failure is reported as a fold too: the surface has buckled in between.
+See :mod:`repro.model.surface`. A run ends where the stretch comes to Biot's limit
+(:mod:`repro.march.ends`). A step without a smooth equilibrium fails like any other step. If the
+surface can crease already, the failure is reported as a fold. A later failure is reported as a fold
+too: the surface has buckled in between. The time of this fold is only known to lie in the failing
+step: one of growth.time_step in the paper's scheme, a thousandth of it in the midpoint rule.
 """
 
 from __future__ import annotations
@@ -67,11 +69,16 @@ class Compression:
         return Compression(present.least, *present.place, pore.time)
 
 
-def refuse_fold(previous: Pore, expanded: Pore) -> None:
-    """Raise Fold if a step from ``previous`` ends below Biot's limit."""
+def refuse_fold(expanded: Pore) -> None:
+    """Raise GrowthError if a step alone compresses the surface below Biot's limit.
+
+    It applies where strain counts from the last shape: a shorter step compresses the surface less.
+    """
     compression = Compression().after(expanded)
-    if compression.stretch < BIOT:
-        raise Fold(_message(compression, previous.time))
+    if expanded.last is not None and compression.stretch < BIOT:
+        raise GrowthError(f"growth in one step compresses the surface to {compression.stretch:.3f} "
+                          f"of its length near x = {compression.x:.4g}, y = {compression.y:.4g} "
+                          "um; try a shorter growth.time_step")
 
 
 @contextmanager
@@ -85,12 +92,12 @@ def folding(compression: Compression, time: float) -> Iterator[None]:
     except (GrowthError, MeshError) as error:
         if compression.stretch >= CREASING:
             raise
-        raise Fold(_message(compression, time)) from error
+        raise Fold(fold_message(f"in the step from t = {time:g} h", compression)) from error
 
 
-def _message(compression: Compression, time: float) -> str:
-    """Message of the Fold in the step from ``time`` (h)."""
-    return (f"the aggregate's surface folds in the step from t = {time:g} h: growth compressed it "
+def fold_message(when: str, compression: Compression) -> str:
+    """Message of a Fold; when: "at t = 1 h" or "in the step from t = 1 h"."""
+    return (f"the aggregate's surface folds {when}: growth compressed it "
             f"to an elastic stretch of {compression.stretch:.3f} near x = {compression.x:.4g}, "
             f"y = {compression.y:.4g} um at t = {compression.time:g} h; "
             f"it creases from {CREASE:g} on and is unstable to all waves below {BIOT:g}, so that "

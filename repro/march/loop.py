@@ -1,14 +1,19 @@
 """The loop of steps of every scheme, and the state from which it restarts bit for bit.
 
 Steps depend neither on the requested rows nor on the end of the run, to the last bit. A row between
-two steps is interpolated in the step that passes it, and no step starts from it. If ``growth.end``
-lies within a step, that step is cut there. Rows before the end still belong to the uncut step, and
-the ledger of the cut step closes like the others. A run to a later end restarts from the state
-before the cut step.
+two steps is interpolated in the step that passes it, and no step starts from it. If a row cannot be
+computed, it is left out with a warning, and the run goes on. If ``growth.end`` or an end of the
+model (:mod:`repro.march.ends`) lies within a step, that step is cut there. Rows before the end
+still belong to the uncut step, and the ledger of the cut step closes like the others. A run to a
+later end restarts from the state before the cut step.
+
+A step ends at a jump of the scene's tables. Its row has the state just after the jump: with forces
+of the fluid the aggregate takes its new equilibrium there, as it does at t = 0 (:func:`settle`).
 """
 
 from __future__ import annotations
 
+import warnings
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -19,18 +24,17 @@ import numpy as np
 
 from repro.errors import RunEnd, SimulationError, StageError
 from repro.fem.brief import brief
-from repro.fem.sizing import ACROSS_PORE
 from repro.march import balance
 from repro.march.balance import Ledger, Limits
-from repro.march.detachment import detachment
+from repro.march.ends import Reached, locate, nearest_end
 from repro.march.folding import Compression, folding, refuse_density
 from repro.march.step_control import StepControl
 from repro.model.advice import with_advice
+from repro.model.contact_lines import SearchOptions
 from repro.model.pore import Pore, Solved, seeded
 from repro.model.remeshing import solve_graded
 from repro.model.stages import Stages
 from repro.scene import Growth, Scene
-from repro.scene import Pore as Channel
 
 
 class Dataclass(Protocol):
@@ -130,35 +134,20 @@ class Scheme:
 
     advance(stages, pore, solved, step_control): makes one step, and returns its StepResult, the
     solution after it and the step control of the next one. The length of the step does not depend
-    on ``growth.end`` or on the requested rows; a step that passes ``growth.end`` is cut there.
+    on ``growth.end`` or on the requested rows; a step that passes ``growth.end`` is cut there. The
+    solution is that before a jump of the scene's tables.
+    cut(stages, pore, solved, time): makes a shorter step to a time (h), and returns its StepResult
+    and the solution after it.
     rows(growth): times (h) of rows besides the ends of steps, without requested ones; first:
     length of the first attempted step, as a multiple of growth.time_step; ends(scene): times (h) at
     which steps end, if known in advance.
     """
 
     advance: Callable[[Stages, Pore, Solved, StepControl], tuple[StepResult, Solved, StepControl]]
+    cut: Callable[[Stages, Pore, Solved, float], tuple[StepResult, Solved]]
     rows: Callable[[Growth], tuple[float, ...]] = lambda _: ()
     first: float = 1.0
     ends: Callable[[Scene], Iterable[float]] = lambda _: ()
-
-
-class PoreEnd(RunEnd):
-    """The aggregate has reached an end of the pore.
-
-    :func:`repro.simulate` raises it after the last Report. It is an end of the model, not a
-    failure: the message names the end of the pore and the time (h).
-
-    Examples
-    --------
-    >>> import repro
-    >>> changes = ['pore.length="120 um"', 'aggregate.radius="9 um"', 'aggregate.position="-50 um"']
-    >>> try:
-    ...     for report in repro.simulate(repro.load_scene("base", changes)):
-    ...         pass
-    ... except repro.PoreEnd as end:
-    ...     print(end)
-    the aggregate reaches the pore's upstream end at t = 0.2 h
-    """
 
 
 def steps(scene: Scene, scheme: Scheme,
@@ -173,9 +162,11 @@ def steps(scene: Scene, scheme: Scheme,
     with stopping(state.pore.time if state else 0.0):
         first_step = scheme.first * scene.growth.time_step if scene.growth else 0.0
         state = state or RestartState(contiguous(seeded(scene)), StepControl(first_step))
-        refined, solved = solve_graded(scene, state.pore)
-        if refined is not state.pore:
-            state = replace(state, pore=contiguous(refined))
+        pore, solved = solve_graded(scene, state.pore)
+        if first and scene.growth:
+            pore, solved = settle(Stages.of(scene), pore, solved)
+        if pore is not state.pore:
+            state = replace(state, pore=contiguous(pore))
     if first:
         pore = replace(state.pore, concentrations=solved.concentrations)
         yield state, Report(pore, solved, None, (), 0, newton_counts(solved))
@@ -183,51 +174,100 @@ def steps(scene: Scene, scheme: Scheme,
         yield from _grow(Stages.of(scene), scheme, state, solved)
 
 
+def settle(stages: Stages, pore: Pore, solved: Solved) -> tuple[Pore, Solved]:
+    """Bring the aggregate to its equilibrium under the forces of the fluid at its time.
+
+    Returns the pore, and flow and substrates in it. Without forces of the fluid nothing changes.
+    """
+    if stages.growth.fluid_forces == "neglected":
+        return pore, solved
+    expanded = stages.expand(pore, pore, search=SearchOptions(landing=-np.inf)).pore
+    expanded = replace(expanded, concentrations=solved.concentrations)
+    settled, _ = stages.new_mesh(pore, expanded, solved)
+    return solve_graded(stages.scene, contiguous(settled))
+
+
 def _grow(stages: Stages, scheme: Scheme, state: RestartState,
           solved: Solved) -> Iterator[tuple[RestartState, Report | None]]:
     """Yield the state after every step from ``state`` on, whose solution is ``solved``."""
     scene = stages.scene
-    density = stages.remeshing.maximum_density
     pore = replace(state.pore, concentrations=solved.concentrations)
-    refuse_end(scene.pore, pore, 1.0 if pore.time > 0 else 0.1)
-    failure = detachment(scene, pore, solved)
+    event = nearest_end(scene, pore, solved)
     requested = scene.requested_times
     rows = row_times(scheme, scene)
     limits = Limits.of(scene)
     bonded = stages.growth.wall == "bonded"
-    while failure is None and stages.growth.end - pore.time > SAME_TIME:
+    while event.margin <= 0 and stages.growth.end - pore.time > SAME_TIME:
         try:
             with stopping(pore.time, bonded), folding(state.compression, state.time):
-                step, after, control = scheme.advance(stages, pore, solved, state.step_control)
+                reached, control = _advance(stages, scheme, state, pore, solved, event.margin)
+                step = reached.step
                 balance.refuse(limits, step.pore, step.ledger)
-                refuse_density(step.pore, density)
-            for time in rows:
-                if state.time + SAME_TIME < time < step.pore.time - SAME_TIME:
-                    with stopping(pore.time, bonded), folding(state.compression, state.time):
-                        inner = step.within(time)
-                        refuse_density(inner.pore, density)
-                    report = make_report(state, inner.pore, inner.solved, inner.before)
-                    state = mark_reported(state, time)
-                    yield state, report
+                refuse_density(step.pore, stages.remeshing.maximum_density)
         except RunEnd:
             if state.ledgers:  # steps that are not reported yet
                 yield mark_reported(state, pore.time), make_report(state, pore, solved, None)
             raise
-        solved = after
+        for time in rows:
+            if state.time + SAME_TIME < time < step.pore.time - SAME_TIME:
+                inner = _row_within(stages, step, time)
+                if inner:
+                    report = make_report(state, inner.pore, inner.solved, inner.before)
+                    state = mark_reported(state, time)
+                    yield state, report
+        solved = reached.solved
+        event = reached.event
         state = _after_step(state, step, solved, control)
         pore = replace(state.pore, concentrations=solved.concentrations)
         row = _row_time_at(rows, pore.time)
-        failure = detachment(scene, pore, solved)
-        ends = failure or pore_end(scene.pore, pore, 1.0)
-        if requested is None or row is not None or ends:
+        if requested is None or row is not None or event.margin > 0:
             reported = pore if row is None else replace(pore, time=row)
             yield mark_reported(state, pore.time), make_report(state, reported, solved, step.before)
             state = mark_reported(state, pore.time)
         else:
             yield state, None
-        refuse_end(scene.pore, pore, 1.0)
-    if failure:
-        raise failure
+    if event.margin > 0:
+        raise event.end
+
+
+def _advance(stages: Stages, scheme: Scheme, state: RestartState, pore: Pore, solved: Solved,
+             margin: float) -> tuple[Reached, StepControl]:
+    """Make one step, or a shorter one to the first end of the model within it.
+
+    margin: at the start of the step (see :mod:`repro.march.ends`).
+    """
+    def reached(step: StepResult, after: Solved) -> Reached:
+        return Reached(step, after, nearest_end(stages.scene, step.pore, after))
+
+    step, after, control = scheme.advance(stages, pore, solved, state.step_control)
+    full = reached(step, after)
+    if full.event.margin > 0:
+        located = locate(lambda time: reached(*scheme.cut(stages, pore, solved, time)), pore.time,
+                         margin, full)
+        return replace(located, step=replace(located.step, within=step.within)), control
+    if stages.scene.jumps(step.pore.time):
+        full = reached(*_after_jump(stages, step, after))
+    return full, control
+
+
+def _after_jump(stages: Stages, step: StepResult, solved: Solved) -> tuple[StepResult, Solved]:
+    """Return the state just after a jump of the scene's tables at the end of a step."""
+    after, jumped = settle(stages, *solve_graded(stages.scene, step.pore))
+    remeshed = step.remeshed or after.mesh.topology is not step.pore.mesh.topology
+    return replace(step, pore=contiguous(after), remeshed=remeshed), jumped
+
+
+def _row_within(stages: Stages, step: StepResult, time: float) -> InterpolatedState | None:
+    """Return the state at a time (h) within a step, or None with a warning if that fails."""
+    try:
+        with np.errstate(all="raise", under="ignore"):
+            inner = step.within(time)
+            refuse_density(inner.pore, stages.remeshing.maximum_density)
+            return inner
+    except (RunEnd, StageError, FloatingPointError) as error:
+        warnings.warn(f"there is no row at t = {time:g} h, since its state cannot be computed: "
+                      f"{error}", stacklevel=2)
+        return None
 
 
 def row_times(scheme: Scheme, scene: Scene) -> tuple[float, ...]:
@@ -315,6 +355,11 @@ def time_before_end(previous: Pore, duration: float) -> float:
     return max(previous.time, previous.time + duration - SAME_TIME)
 
 
+def before_jump(scene: Scene, pore: Pore) -> Pore:
+    """Return the pore at its time, or just before it if the scene's tables jump there."""
+    return replace(pore, time=pore.time - SAME_TIME) if scene.jumps(pore.time) else pore
+
+
 def newton_counts(solved: Solved) -> dict[str, int]:
     """Newton iterations by stage."""
     return {"transport": solved.concentrations.iterations if solved.concentrations else 0}
@@ -326,23 +371,3 @@ def sum_counts(*counts: dict[str, int]) -> dict[str, int]:
     for count in counts:
         total.update(count)
     return dict(sorted(total.items()))
-
-
-def pore_end(channel: Channel, pore: Pore, elements: float) -> str:
-    """Message with the end of the pore that the aggregate has reached; empty if none.
-
-    elements: distance from an end that counts as reached, in elements of the fluid.
-    """
-    outline = pore.boundary
-    end = channel.length / 2
-    near = elements * channel.width / ACROSS_PORE
-    if outline.upstream < near - end or outline.downstream > end - near:
-        side = "upstream" if outline.upstream < near - end else "downstream"
-        return f"the aggregate reaches the pore's {side} end"
-    return ""
-
-
-def refuse_end(channel: Channel, pore: Pore, elements: float) -> None:
-    """Raise PoreEnd if the aggregate has reached an end of the pore (see :func:`pore_end`)."""
-    if message := pore_end(channel, pore, elements):
-        raise PoreEnd(f"{message} at t = {pore.time:g} h")

@@ -19,12 +19,12 @@ from functools import partial
 
 import numpy as np
 
-from repro.errors import RunEnd, StageError
 from repro.fem import transfer
 from repro.fem.space import Space
 from repro.march.balance import Ledger
+from repro.march.ends import refuse_outside
 from repro.march.folding import refuse_density, refuse_fold
-from repro.march.loop import InterpolatedState, PoreEnd, StepResult, pore_end, time_before_end
+from repro.march.loop import InterpolatedState, StepResult, time_before_end
 from repro.model import biomass, contact, contact_lines, pore, remeshing
 from repro.model.biomass import Rates
 from repro.model.contact import Expansion
@@ -34,10 +34,6 @@ from repro.model.pore import Pore, Solved
 from repro.model.remeshing import GeneratedMesh
 from repro.model.stages import Stages
 from repro.model.transport import Concentrations, Flows, Fluxes, integrated
-from repro.scene import needed
-
-#: Numbers of steps to a row that cannot be interpolated.
-OWN_STEPS = (1, 2, 4)
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,9 +94,8 @@ def attempt(stages: Stages, previous: Pore, solved: Solved, duration: float,
     except FirstContact as early:
         return Attempt(None, 0.0, (gap, early.gap))
     expanded = expansion.pore
-    if leaves := pore_end(stages.scene.pore, expanded, 0.1):
-        raise PoreEnd(f"{leaves} in the step from t = {previous.time:g} h")
-    refuse_fold(previous, expanded)
+    refuse_outside(stages.scene.pore, previous, expanded)
+    refuse_fold(expanded)
     expanded = replace(expanded, concentrations=_guess_substrates(solved, half, 1.0))
     new, remeshed = stages.new_mesh(previous, expanded, solved)
     generated = (GeneratedMesh(expanded, new),) if remeshed else ()
@@ -169,38 +164,8 @@ def solve_halfway(stages: Stages, previous: Pore, solved: Solved, first: Rates, 
 
 def interpolate(stages: Stages, previous: Pore, solved: Solved, half: Halfway,
                 time: float) -> InterpolatedState:
-    """Interpolate the pore to a time (h) within a step, and solve there.
-
-    If that fails, several equal steps lead from the start of the step to the time. Each of them has
-    a better initial guess than the entire step. Raises StageError if they fail too.
-    """
-    try:
-        return _interpolate(stages, previous, solved, half, time)
-    except (StageError, FloatingPointError) as error:
-        failure: Exception = error
-    for count in OWN_STEPS:
-        try:
-            return _approach(stages, previous, solved, time, count)
-        except (RunEnd, StageError, FloatingPointError) as error:
-            failure = error
-    raise failure
-
-
-def _approach(stages: Stages, previous: Pore, solved: Solved, time: float,
-              count: int) -> InterpolatedState:
-    """Make a number of equal steps to a time (h)."""
-    duration = (time - previous.time) / count
-    start = previous
-    for _ in range(count):
-        step = needed(attempt(stages, start, solved, duration).step, "a step to the row")
-        start, solved = remeshing.solve_graded(stages.scene, step.pore)
-        start = replace(start, concentrations=solved.concentrations)
-    return InterpolatedState(replace(start, time=time), solved)
-
-
-def _interpolate(stages: Stages, previous: Pore, solved: Solved, half: Halfway,
-                 time: float) -> InterpolatedState:
-    """Interpolate as the step itself advances.
+    """Interpolate the pore to a time (h) within a step, as the step itself advances, and solve
+    there.
 
     If the moved mesh is not acceptable, the nearest of the meshes that the step has generated
     replaces it.

@@ -5,19 +5,29 @@ would use the rates at the start. ``numerics.tolerance`` bounds their difference
 aggregate, times the step. The error of the midpoint rule is of higher order; ``make bench``
 measures it for each tolerance. A step ends when the film between the aggregate and the opposite
 wall first becomes too thin (2.3.3), and at the times of the scene's tables. Rows and the end of the
-run do not change the steps.
+run do not change the steps. If a row cannot be interpolated, steps of its own lead to it. They are
+shortened and their elements are graded as in every step.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from repro.errors import RunEnd, StageError, Unresolved
 from repro.march import midpoint
-from repro.march.loop import SAME_TIME, Scheme, StepResult, contiguous
+from repro.march.loop import (
+    SAME_TIME,
+    InterpolatedState,
+    Scheme,
+    StepResult,
+    before_jump,
+    contiguous,
+)
 from repro.march.step_control import (
     EXCESS,
     STRETCH,
@@ -63,50 +73,57 @@ def _advance(stages: Stages, previous: Pore, solved: Solved,
 
     The length of the full step does not depend on growth.end or on the requested rows.
     """
-    start, step, after, control = _find_step(stages, previous, solved, planned)
+    corner = stages.scene.corner(previous.time)
+    step, after, control = _find_step(stages, previous, solved, planned, corner)
+    within = partial(_row, stages, previous, solved, planned, step.within)
     if step.pore.time - stages.growth.end > SAME_TIME:
-        return *_cut_step(stages, *start, step), planned
-    return step, after, control
+        step, after = _cut(stages, previous, solved, stages.growth.end)
+        control = planned
+    return replace(step, within=within), after, control
 
 
-def _cut_step(stages: Stages, previous: Pore, solved: Solved,
-              passing: StepResult) -> tuple[StepResult, Solved]:
-    """Cut a step that passes growth.end: the step to growth.end, and the solution after it.
+def _row(stages: Stages, previous: Pore, solved: Solved, control: StepControl,
+         within: Callable[[float], InterpolatedState], time: float) -> InterpolatedState:
+    """The state at a time (h) within a step. If it cannot be interpolated, steps lead to it."""
+    try:
+        return within(time)
+    except (StageError, FloatingPointError):
+        pass
+    while time - previous.time > SAME_TIME:
+        step, solved, control = _find_step(stages, previous, solved, control, time)
+        previous = replace(step.pore, concentrations=solved.concentrations)
+    return InterpolatedState(replace(previous, time=time), solved)
 
-    Times within it are still interpolated in the step that passes growth.end.
-    """
-    end = stages.growth.end
+
+def _cut(stages: Stages, previous: Pore, solved: Solved,
+         time: float) -> tuple[StepResult, Solved]:
+    """Make a step to a time (h) before the end of a step that is accepted."""
     while True:
         try:
-            trial = midpoint.attempt(stages, previous, solved, end - previous.time)
+            trial = midpoint.attempt(stages, previous, solved, time - previous.time)
             break
         except Unresolved:
             finer = _halve_elements(stages, previous)
             if finer is None:
                 raise
             previous, solved = finer
-    step, after = _solve_after(stages, _end_at(needed(trial.step, "a shorter step"), end))
-    return replace(step, within=passing.within), after
+    return _solve_after(stages, _end_at(needed(trial.step, "a shorter step"), time))
 
 
-def _find_step(
-        stages: Stages, previous: Pore, solved: Solved, control: StepControl
-) -> tuple[tuple[Pore, Solved], StepResult, Solved, StepControl]:
-    """Shorten a step until it is accepted.
+def _find_step(stages: Stages, previous: Pore, solved: Solved, control: StepControl,
+               corner: float) -> tuple[StepResult, Solved, StepControl]:
+    """Shorten a step until it is accepted. It ends at ``corner`` (h) or before.
 
     Failures shorten the step to 1/2, 1/8, 1/128 ... of its length, down to the shortest one: each
     factor is the square of the last. Close to a fold every length fails, and few are tried. If a
     step passes an end of the run, it is halved instead, so that the last state is close to the end.
 
-    Returns its start, possibly on finer elements, the step, the solution after it, and the next
-    step control.
+    Returns the step, the solution after it, and the next step control.
     """
-    scene = stages.scene
-    tolerance = scene.numerics.tolerance
+    tolerance = stages.scene.numerics.tolerance
     time_step = stages.growth.time_step
     shortest = SHORTEST * time_step
     length = control.length
-    corner = scene.corner(previous.time)
     remaining = corner - previous.time
     duration = fit_to_interval(length, remaining, STRETCH)
     factor = 0.5
@@ -118,15 +135,14 @@ def _find_step(
             trial = midpoint.attempt(stages, previous, solved, duration, largest_change, search)
             estimate = trial.change * duration
             if trial.step:
-                start = previous, solved
                 end = _end_of(previous, duration, corner)
                 step, after = _solve_after(stages, _end_at(trial.step, end))
                 if trial.gaps is not None:  # only contact shortened the step
-                    return start, step, after, control
+                    return step, after, control
                 attempted = replace(control, length=length)
                 following = next_step_size(attempted, duration, estimate, tolerance)
                 following = replace(following, length=max(following.length, shortest))
-                return start, step, after, following
+                return step, after, following
             if trial.gaps:
                 film = stages.growth.minimum_film
                 length = duration * _part_to_contact(*trial.gaps, film)
@@ -165,9 +181,11 @@ def _halve_elements(stages: Stages, previous: Pore) -> tuple[Pore, Solved] | Non
 
 
 def _solve_after(stages: Stages, step: StepResult) -> tuple[StepResult, Solved]:
-    """Solve after a step. A sharp front gets a graded mesh if it needs one."""
-    after, solved = remeshing.solve_graded(stages.scene, step.pore)
-    if after is not step.pore:
+    """Solve after a step, before a jump. A sharp front gets a graded mesh if it needs one."""
+    before = before_jump(stages.scene, step.pore)
+    after, solved = remeshing.solve_graded(stages.scene, before)
+    if after is not before:
+        after = replace(after, time=step.pore.time)
         step = replace(step, pore=contiguous(after), remeshed=True)
     return step, solved
 
@@ -193,4 +211,4 @@ def _end_at(step: StepResult, end: float) -> StepResult:
     return replace(step, pore=contiguous(replace(step.pore, time=end)))
 
 #: The midpoint rule. Without ``output.times`` it reports every step and the times of :func:`rows`.
-SCHEME = Scheme(_advance, rows, FIRST)
+SCHEME = Scheme(_advance, _cut, rows, FIRST)

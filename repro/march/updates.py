@@ -12,17 +12,17 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
-from repro.errors import GrowthError
+from repro.errors import GrowthError, RunEnd
 from repro.march.balance import Ledger
+from repro.march.ends import refuse_outside
 from repro.march.folding import refuse_fold
 from repro.march.loop import (
     SAME_TIME,
     InterpolatedState,
-    PoreEnd,
     Scheme,
     StepResult,
+    before_jump,
     contiguous,
-    pore_end,
     time_before_end,
 )
 from repro.march.step_control import StepControl
@@ -73,11 +73,23 @@ def next_time(growth: Growth, time: float, corner: float) -> float:
 
 def _advance(stages: Stages, previous: Pore, solved: Solved,
              control: StepControl) -> tuple[StepResult, Solved, StepControl]:
-    """Make the step to the next update, or to growth.end."""
+    """Make the step to the next update, or to growth.end; half of it while it passes an end."""
     time = next_time(stages.growth, previous.time, stages.scene.corner(previous.time))
+    while True:
+        try:
+            return *_cut(stages, previous, solved, time), control
+        except RunEnd:
+            if time - previous.time <= SAME_TIME:
+                raise
+            time = (previous.time + time) / 2
+
+
+def _cut(stages: Stages, previous: Pore, solved: Solved,
+         time: float) -> tuple[StepResult, Solved]:
+    """Make a step to a time (h). The solution after it is that before a jump of the tables."""
     advanced = step(stages, previous, solved, time - previous.time)
     after = contiguous(replace(advanced.pore, time=time))
-    return replace(advanced, pore=after), pore.solve(stages.scene, after), control
+    return replace(advanced, pore=after), pore.solve(stages.scene, before_jump(stages.scene, after))
 
 
 def _interpolate(stages: Stages, previous: Pore, solved: Solved, time: float) -> InterpolatedState:
@@ -95,9 +107,8 @@ def step(stages: Stages, previous: Pore, solved: Solved, duration: float) -> Ste
     grown = replace(grown, time=time_before_end(previous, duration))
     expansion = _expand(stages, previous, grown)
     expanded = expansion.pore
-    if leaves := pore_end(stages.scene.pore, expanded, 0.1):
-        raise PoreEnd(f"{leaves} in the step from t = {previous.time:g} h")
-    refuse_fold(previous, expanded)
+    refuse_outside(stages.scene.pore, previous, expanded)
+    refuse_fold(expanded)
     expanded = replace(expanded, concentrations=end)
     after, remeshed = stages.new_mesh(previous, expanded, solved)
     ledger = Ledger(previous.time, previous.time + duration, *flows[:4], previous.mass,
@@ -166,4 +177,4 @@ def _mean_flows(before: Sequence[Fluxes], after: Sequence[Fluxes], duration: flo
 
 
 #: The paper's scheme.
-SCHEME = Scheme(_advance, ends=lambda scene: schedule(scene)[0])
+SCHEME = Scheme(_advance, _cut, ends=lambda scene: schedule(scene)[0])

@@ -53,9 +53,10 @@ class Pore:
     body: the aggregate as it was at t = 0; pressure: (corners,) P / mu_L; concentrations: the last
     known ones, None before the first; front: divisor of the element sizes at the aggregate, for a
     front of the substrates in it; last: (n, 2) um, the aggregate's nodes in the shape from which
-    strain counts, None for the shape of t = 0; line_speeds: (2, 2) um/h, speeds of the contact
-    lines, None if unknown. A row has the lines of one wall, the lower wall first: the line where a
-    free surface begins along the loop, then the line where one ends.
+    strain counts, None for the shape of t = 0; origin_known: is ``body`` the aggregate of t = 0, as
+    it is unless its positions have folded where strain counts from ``last``; line_speeds: (2, 2)
+    um/h, speeds of the contact lines, None if unknown. A row has the lines of one wall, the lower
+    wall first: the line where a free surface begins along the loop, then the line where one ends.
     """
 
     time: float
@@ -71,6 +72,7 @@ class Pore:
     front: float = 1.0
     last: np.ndarray | None = None
     line_speeds: np.ndarray | None = None
+    origin_known: bool = True
 
     @property
     def unstrained(self) -> np.ndarray:

@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from repro.errors import Unresolved
+from repro.errors import OriginFolded, Unresolved
 from repro.fem import sizing, transfer
 from repro.fem.mesh import Mesh
 from repro.fem.outline import FREE
@@ -205,11 +205,11 @@ def remesh(rules: Remeshing, previous: Pore, expanded: Pore, speed: float,
     mesh, outline = rules.meshing.generate(expanded.boundary, expanded.front)
     new = Space(mesh, expanded.space.order)
     at = _located_in(expanded, mesh)
-    body = _material(new, expanded, outline.origin, at)
+    body, origin_known = _material(new, expanded, outline.origin, at)
     supplied = at_time(rules.substrates, expanded.time if speed else 0.0)
     substrates = transfer_substrates(supplied, previous.space, new, expanded.concentrations, speed)
     target = replace(expanded, space=new, wall=outline.wall, fixed=outline.fixed, body=body,
-                     concentrations=substrates)
+                     concentrations=substrates, origin_known=origin_known)
     return _transferred(rules, expanded, target, at, amounts)
 
 
@@ -240,15 +240,23 @@ def _pressure(mesh: Mesh, expanded: Pore, at: Located) -> np.ndarray:
     return pressure
 
 
-def _material(new: Space, expanded: Pore, rim: np.ndarray, at: Located) -> Body:
+def _material(new: Space, expanded: Pore, rim: np.ndarray, at: Located) -> tuple[Body, bool]:
     """The aggregate at t = 0 on a new mesh: interpolated positions inside, and those of the
-    outline, ``rim`` (M, 2) um, on its boundary."""
+    outline, ``rim`` (M, 2) um, on its boundary; and whether it is that of t = 0.
+
+    If these positions fold, and strain does not count from them, the present shape replaces them.
+    """
     mesh = new.mesh
     old = expanded.mesh
     origin = mesh.points.copy()
     origin[mesh.body] = at.field(expanded.origin, old.cells[old.biomass], old.geometry)
     origin[mesh.loop] = rim
-    return material(new, transfer.unfolded(mesh, origin)[mesh.body])
+    try:
+        return material(new, transfer.unfolded(mesh, origin)[mesh.body]), expanded.origin_known
+    except OriginFolded:
+        if expanded.last is None:
+            raise
+        return material(new, mesh.points[mesh.body]), False
 
 
 def transfer_substrates(supplied: Substrates, old: Space, new: Space, state: Concentrations | None,

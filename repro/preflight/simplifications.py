@@ -54,6 +54,8 @@ FRONT_LOSS = 0.01
 FOLD_EXPECTED = 0.7
 #: The key in the warning of a crease.
 CREASED = "growth.new_biomass"
+#: The field that a warning names if positions at t = 0 fold.
+ORIGIN = "position_t0_um"
 
 
 @dataclass(frozen=True)
@@ -282,8 +284,12 @@ def _fold(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
                      "(estimate, `repro docs scope`)")
 
 
-def warn_crease(pore: Pore) -> Iterator[Caveat]:
-    """Warn if creases begin to lower the energy of the surface."""
+def warn_surface(pore: Pore) -> Iterator[Caveat]:
+    """Warn if creases begin to lower the energy of the surface, or if positions at t = 0 fold."""
+    if not pore.origin_known:
+        yield Caveat(ORIGIN, f"from t = {pore.time:.4g} h on the positions at t = 0 fold: fields "
+                     "have no displacement, position at t = 0, theta and J; nothing else depends "
+                     'on them with growth.new_biomass = "stress_free"')
     if pore.outline is None or surface(pore).least >= CREASE:
         return
     crease = surface(pore)

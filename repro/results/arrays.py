@@ -45,6 +45,7 @@ def _has(name: str, state: State) -> bool:
     return getattr(state.solved.concentrations, name, None) is not None
 
 
+ORIGIN = "positions at t = 0"
 #: Parts that an array may need: does a state have them?
 NEEDS: dict[str, Callable[[State], bool]] = {
     "flow": lambda state: state.solved.flow is not None,
@@ -52,6 +53,7 @@ NEEDS: dict[str, Callable[[State], bool]] = {
     "donor": lambda state: _has("donor", state),
     "biomass": lambda state: state.scene.kinetics is not None,
     "growth": lambda state: state.scene.growth is not None,
+    ORIGIN: lambda state: state.scene.growth is not None and state.pore.origin_known,
     "stress": lambda state: bool(state.scene.growth)
     and state.scene.growth.new_biomass == "stressed"}
 
@@ -155,18 +157,18 @@ ARRAYS = (
           partial(_density, "active"), needs="biomass", signed=True),
     Array("inert_biomass", "inert biomass over X_m", f"X_I / X_m: {_FITTED}; zero in the fluid",
           partial(_density, "inert"), needs="biomass", signed=True),
-    Array("displacement_um", "displacement since t = 0", "x - X", _displacement, needs="growth",
+    Array("displacement_um", "displacement since t = 0", "x - X", _displacement, needs=ORIGIN,
           body=True, signed=True),
     Array("position_t0_um", "position at t = 0", "X, where the material was",
-          lambda state: state.pore.body.reference, needs="growth", body=True, signed=True),
+          lambda state: state.pore.body.reference, needs=ORIGIN, body=True, signed=True),
     Array("pressure_MPa", "pressure P of the aggregate", "P (21), linear between the corners",
           _pressure, needs="stress", body=True, signed=True),
     Array("region", "aggregate (1) or fluid (0)", "1 in the aggregate's triangles",
           lambda state: state.pore.mesh.biomass.astype(float), cells=True),
     Array("theta", "expansion theta", "(28)-(29), the mean over the triangle at t = 0",
-          lambda state: state.mean(state.pore.theta), needs="growth", cells=True, body=True),
+          lambda state: state.mean(state.pore.theta), needs=ORIGIN, cells=True, body=True),
     Array("J", "volume ratio J", "det dx/dX, the mean over the triangle at t = 0",
-          lambda state: state.mean(state.strained.J), needs="growth", cells=True, body=True),
+          lambda state: state.mean(state.strained.J), needs=ORIGIN, cells=True, body=True),
     Array("surface_stretch", "elastic stretch along the free surface",
           f"{STRETCH}; in the triangles at the free surface, of two edges the lesser", _stretch,
           needs="growth", cells=True, body=True),
@@ -185,7 +187,8 @@ def fields(scene: Scene, pore: Pore, solved: Solved) -> Grid:
 
     Positions are in um. In the fluid biomass is zero, and displacement, theta, J, stress and
     pressure P are NaN; nodes of the interface belong to the aggregate. Stress and P follow from the
-    strain since t = 0: a scene whose new biomass is born stress-free has neither.
+    strain since t = 0: a scene whose new biomass is born stress-free has neither. If its positions
+    at t = 0 fold on a new mesh, later fields have no displacement, position at t = 0, theta and J.
     """
     state = State(scene, pore, solved)
     modelled = [quantity for quantity in ARRAYS if is_modelled(quantity, NEEDS, state)]

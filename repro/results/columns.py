@@ -107,7 +107,8 @@ _BALANCE = ("(supplied - leaving - consumed - stored) / scale; the worst of the 
 
 #: Columns of ``timeseries.csv``: value takes the scene and a Report.
 SERIES = (
-    Quantity("time_h", "simulated time since the start of the run", "t",
+    Quantity("time_h", "simulated time since the start of the run",
+             "t; a row at a jump of a table has the state just after it, in all columns",
              lambda scene, at: at.pore.time, "time"),
     Quantity("mean_velocity_m_per_d", "mean velocity", "u_ave: flow through a cross-section / W",
              lambda scene, at: at.solved.flow.mean_velocity, "mean velocity", "flow"),

@@ -1,6 +1,7 @@
 """Jumps of reported quantities where a table of the scene jumps, for curves over time.
 
-A row at a jump has the values after it. A curve keeps the value of the row before up to the jump.
+A row at a jump has the state just after it (:mod:`repro.march.loop`). A curve keeps the value of
+the row before up to the jump.
 """
 
 from __future__ import annotations
@@ -11,6 +12,9 @@ from itertools import pairwise
 import numpy as np
 
 DRIVEN = ("mean_velocity_m_per_d", "head_loss_cm")
+#: Columns that jump with the flow, and with its forces if the aggregate bears them.
+FORCES = (*(f"fluid_force_{axis}_uN_per_m" for axis in "xy"), "fluid_moment_nN")
+STRESSES = ("wall_traction_max_MPa", "tensile_stress_max_MPa")
 #: Columns that jump with the flow and the supplies if substrates are quasi-steady.
 CARRIED = tuple(f"{pattern}_mg_per_L" for name in ("acceptor", "donor")
                 for pattern in (f"effluent_{name}", f"inlet_{name}", f"{name}_min",
@@ -36,7 +40,8 @@ def with_jumps(name: str, times: np.ndarray, values: np.ndarray,
 def _jumps(name: str, tables: Mapping[str, dict]) -> list[float]:
     """The times (h) at which a column jumps."""
     flow = _times(tables.get("flow", {}))
-    if name in DRIVEN:
+    bears_forces = tables.get("growth", {}).get("fluid_forces") == "included"
+    if name in (*DRIVEN, *FORCES) or name in STRESSES and bears_forces:
         return flow
     at_rest = tables.get("numerics", {}).get("transport") == "quasi_steady"
     if name not in CARRIED or not at_rest:

@@ -21,6 +21,7 @@ from repro.results.netcdf import TIME
 from repro.results.quantities import plain as unit
 from repro.scene import Source, load_scene, scene_tables
 from repro.scene.arguments import typed
+from repro.scene.units import to_internal
 from repro.timing import progress_bar
 
 #: Number of first and of last times in the table of a notebook.
@@ -100,13 +101,14 @@ class Results(Mapping[str, np.ndarray]):
         """Names of columns that IPython offers."""
         return list(self.columns)
 
-    def fields(self, time: float, method: str | None = None) -> Mapping[str, np.ndarray]:
+    @typed
+    def fields(self, time: float | str, method: str | None = None) -> Mapping[str, np.ndarray]:
         """Return the fields at a reported time.
 
         Parameters
         ----------
-        time : float
-            Hours.
+        time : float or str
+            Hours, or a text with a unit such as "90 min".
         method : str, optional
             "nearest" takes the nearest row; by default, the time must be that of a row.
 
@@ -122,7 +124,7 @@ class Results(Mapping[str, np.ndarray]):
         KeyError
             If the time is not a reported one: names the rows beside it.
         ValueError
-            If the method is another one.
+            If the method is another one, or a text is not a time.
 
         Examples
         --------
@@ -133,8 +135,9 @@ class Results(Mapping[str, np.ndarray]):
         """
         return self._fields[self._row(time, method)]
 
-    def _row(self, time: float, method: str | None) -> int:
-        """Find the row at, or nearest to, a time (h)."""
+    def _row(self, time: float | str, method: str | None = None) -> int:
+        """Find the row at, or nearest to, a time."""
+        time = _hours(time)
         if method not in (None, "nearest"):
             raise ValueError(f'method: None or "nearest" is needed, not {method!r}')
         distance = np.abs(self.time - time)
@@ -151,10 +154,11 @@ class Results(Mapping[str, np.ndarray]):
         beside = self.time[max(after - 1, 0):after + 1]
         near = " and ".join(f"{neighbour:.6g}" for neighbour in beside)
         return (f"the nearest rows are at {near} h, of {count} from {self.time[0]:.6g} to "
-                f'{self.time[-1]:.6g} h; method="nearest" takes the nearest')
+                f"{self.time[-1]:.6g} h")
 
     @typed
-    def plot(self, name: str | None = None, *, time: float | None = None, ax: Any = None) -> Any:
+    def plot(self, name: str | None = None, *, time: float | str | None = None,
+             ax: Any = None) -> Any:
         r"""Draw the run with matplotlib: curves over time, one column, or a field.
 
         Parameters
@@ -162,8 +166,8 @@ class Results(Mapping[str, np.ndarray]):
         name : str, optional
             A column or a field, with its unit or without. By default, the curves of conductivity,
             thickness and effluents are drawn that the scene has.
-        time : float, optional
-            Time of the field in hours; the nearest row is drawn, by default the last one.
+        time : float or str, optional
+            Reported time of the field: hours, or a text with a unit. By default it is the last one.
         ax : matplotlib.axes.Axes or list of these, optional
             Axes to draw in, by default those of a new figure. Curves need as many as they have
             panels.
@@ -178,9 +182,11 @@ class Results(Mapping[str, np.ndarray]):
         ImportError
             If matplotlib is not installed; names the extra to install.
         KeyError
-            If the run has no column and no field of this name.
+            If the run has no column and no field of this name, or no row at this time: names the
+            rows beside it.
         ValueError
-            If a time is given without a field, or ``ax`` has another number of axes.
+            If a time is given without a field, a text is not a time, or ``ax`` has another number
+            of axes.
 
         Examples
         --------
@@ -188,10 +194,10 @@ class Results(Mapping[str, np.ndarray]):
         >>> results = repro.solve("base", ['growth.end="1 h"'])
         >>> [panel.get_ylabel() for panel in results.plot()]
         ['conductivity\n(m/day)', 'thickness\n(um)', 'effluent\n(mg/L)']
-        >>> results.plot("acceptor", time=0.58).get_title(loc="left")
+        >>> results.plot("acceptor", time=0.6).get_title(loc="left")
         'base, t = 0.6 h: acceptor (mg/L)'
         """
-        row = len(self.time) - 1 if time is None else self._row(time, "nearest")
+        row = len(self.time) - 1 if time is None else self._row(time)
         column = drawing.full_name(name or "", list(self.columns))
         if name is None or column:
             if time is not None:
@@ -338,6 +344,17 @@ class Results(Mapping[str, np.ndarray]):
         has_fields = len(self._fields) == len(self.time)
         image = picture.figure(self._fields[-1], self.time[-1]) if has_fields else ""
         return f"<p>{escape(self.name)}, {escape(picture.key_figures(self))}</p>{image}"
+
+
+def _hours(time: float | str) -> float:
+    """Return a time in hours. Raises ValueError if a text is not a time with a unit."""
+    if not isinstance(time, str):
+        return time
+    try:
+        return to_internal(time, "h")
+    except (ValueError, OverflowError):
+        raise ValueError(f'time: {time!r}: a number of hours or a text such as "90 min" is '
+                         "needed") from None
 
 
 def _html_row(head: str, values: np.ndarray) -> str:

@@ -12,7 +12,7 @@ from repro.errors import Interrupted, shell_word
 from repro.march.balance import Ledger
 from repro.march.loop import Report, RestartState, sum_counts
 from repro.march.step_control import StepControl, exceeds_tolerance
-from repro.preflight.simplifications import CREASED, Caveat, warn_crease, warn_missed_tolerance
+from repro.preflight.simplifications import Caveat, warn_missed_tolerance, warn_surface
 from repro.results import field_files, netcdf
 from repro.results.files import atomic_path, is_file, sha256_of
 from repro.runs import checkpoint, state_arrays
@@ -107,12 +107,11 @@ class Recorder:
         return [results.ledger_row(self.scene, ledger) for ledger in ledgers]
 
     def find_crease(self) -> list[Caveat]:
-        """Warn, and record the warning, when the surface first begins to crease."""
-        if any(warning["key"] == CREASED for warning in self.history.warnings):
-            return []
-        warning = list(warn_crease(self.state.pore))
-        self.history.warnings += map(asdict, warning)
-        return warning
+        """Warn, and record the warning, when creases begin or positions at t = 0 first fold."""
+        earlier = {warning["key"] for warning in self.history.warnings}
+        new = [each for each in warn_surface(self.state.pore) if each.key not in earlier]
+        self.history.warnings += map(asdict, new)
+        return new
 
     def _count_missed_tolerance(self, step_control: StepControl) -> None:
         """Count the last step if it misses the tolerance."""

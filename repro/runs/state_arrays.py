@@ -50,7 +50,7 @@ def pack_state(scene: Scene, state: RestartState) -> tuple[dict, Arrays]:
              "guess": guess.iterations if guess else None, "remeshes": int(state.remeshes),
              "iterations": state.iterations, "row_h": float(state.row),
              "ledgers": list(map(astuple, state.ledgers)),
-             "compression": astuple(state.compression)}
+             "origin_known": pore.origin_known, "compression": astuple(state.compression)}
     return plain, arrays
 
 
@@ -83,5 +83,6 @@ def _pore(scene: Scene, plain: dict, arrays: Arrays) -> Pore:
         guess = Concentrations(acceptor, donor, plain["guess"])
     return Pore(time=plain["time_h"], space=space, body=material(space, arrays["reference"]),
                 concentrations=guess, front=plain["front"],
+                origin_known=plain["origin_known"],
                 **{name: arrays[name] for name in OF_PORE},
                 **{name: arrays.get(name) for name in OPTIONAL})

@@ -13,7 +13,7 @@ TIME = r"t = \d+(?:\.\d+)?(?:e[+-]\d+)? h"
 #: The statuses of a run that the model itself ends: :class:`repro.errors.RunEnd`.
 RUN_ENDS = (re.compile("the aggregate reaches the pore's (?:up|down)stream end "
                        f"(?:at|in the step from) {TIME}"),
-            re.compile(f"the aggregate's surface folds in the step from {TIME}: growth .*"),
+            re.compile(f"the aggregate's surface folds (?:at|in the step from) {TIME}: growth .*"),
             re.compile(f"the aggregate (?:detaches|tears) at {TIME}: near x = .*"))
 
 

@@ -576,6 +576,10 @@ class Scene:
         later = [corner for table in self.time_tables for corner in table.times if corner > time]
         return min(later, default=inf)
 
+    def jumps(self, time: float) -> bool:
+        """Return whether a value of its tables jumps at a time (h)."""
+        return any(table.jumps(time) for table in self.time_tables)
+
     def __str__(self) -> str:
         """TOML text with all keys and units; it parses to an equal scene."""
         return toml(scene_tables(self))

@@ -29,6 +29,13 @@ class TimeTable:
         part = (time - start) / (self.times[last + 1] - start)
         return (1 - part) * self.values[last] + part * self.values[last + 1]
 
+    def jumps(self, time: float) -> bool:
+        """Does the value jump at a time (h)?"""
+        if self.linear or time not in self.times:
+            return False
+        after = self.times.index(time)
+        return after > 0 and self.values[after - 1] != self.values[after]
+
     @property
     def largest(self) -> float:
         """The largest value."""

@@ -79,7 +79,7 @@ NUMBERS = (
              lambda run: clogging(run.times, run.relative, run.biomass, 0.5)[0],
              "half conductivity"),
     Quantity("fold_time_h", "time of the fold",
-             "time_h of the last row of a run whose surface folds in the step after it",
+             "time_h of the last row of a run that ends as a fold",
              lambda run: run.times[-1] if run.folded else np.nan, "fold"),
 )
 COLUMNS = [number.name for number in NUMBERS]

@@ -118,9 +118,9 @@ MUTANTS = (
          "np.minimum(self.film, np.tan(self.angle) * distance)",
          "np.minimum(self.film, 0.5 * np.tan(self.angle) * distance)")),
     *changes(
-        "repro/march/folding.py",
+        "repro/march/ends.py",
         ("fold-never",
          "no limit of the stretch ends a run",
-         "if compression.stretch < BIOT:",
-         "if compression.stretch < 0:")),
+         "BIOT / compression.stretch - 1, fold",
+         "-1.0, fold")),
 )

@@ -167,9 +167,9 @@ MUTANTS = (
          "for triangle in np.flatnonzero(flat)[:0]:",
          "tests/test_ragged_outlines.py::test_no_triangle_has_its_nodes_on_one_line")),
     *changes(
-        "repro/march/folding.py",
+        "repro/march/ends.py",
         ("hard-fold-unfounded",
          "A run ends as a fold although its surface is hardly compressed.",
-         "if compression.stretch < BIOT:",
-         "if compression.stretch < 0.99:")),
+         "BIOT / compression.stretch - 1, fold",
+         "0.99 / compression.stretch - 1, fold")),
 )

@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import least_squares
 
+from repro.march.ends import PoreEnd
 from repro.march.folding import Fold
-from repro.march.loop import PoreEnd
 from repro.model import pore
 from repro.model.pore import Pore
 from repro.results import read_table

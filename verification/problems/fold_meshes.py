@@ -14,8 +14,9 @@ from pathlib import Path
 
 from repro.errors import SimulationError
 from repro.march import simulation
+from repro.march.ends import PoreEnd
 from repro.march.folding import Fold
-from repro.march.loop import PoreEnd, RestartState
+from repro.march.loop import RestartState
 from repro.model import remeshing
 from repro.model.remeshing import Remeshing
 from repro.scene import Scene

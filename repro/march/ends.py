@@ -1,0 +1,206 @@
+"""Ends of the model within a run (section 5), which are not failures.
+
+Each end is an event: a margin that is zero at the event and positive after it.
+
+    detachment    traction that a wall must bear / growth.bonding_strength - 1
+    tearing       largest tensile stress / growth.tensile_strength - 1
+    fold          Biot's limit / least elastic stretch of the free surface - 1
+    pore's end    1 - distance to the end / element of the fluid, for each end of the pore
+
+The largest margin is judged at t = 0, at the end of each step, and on both sides of a jump of the
+scene's tables, where the aggregate takes its new equilibrium at once. If it is positive, shorter
+steps from the same start locate its zero (:func:`locate`): the first of all ends. The run ends with
+that state, because the model has no law for what follows. A margin that becomes positive and
+negative again within one step is not noticed.
+
+Two ends have no margin, and are not located. A step without a smooth equilibrium ends a run as a
+fold if the surface can crease (:mod:`repro.march.folding`). Biomass that is born without stress has
+no strain that accumulates, and so no limit of a fold.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from repro.errors import RunEnd, StageError
+from repro.fem.sizing import ACROSS_PORE
+from repro.march.folding import Compression, Fold, fold_message
+from repro.model import adhesion
+from repro.model.adhesion import Peak
+from repro.model.pore import Pore, Solved
+from repro.model.surface import BIOT
+from repro.scene import Pore as Channel
+from repro.scene import Scene, scene_tables
+
+if TYPE_CHECKING:
+    from repro.march.loop import StepResult
+
+#: An end is located if its margin is positive and at most this. The relative error of its time is
+#: this over d ln(stress) / d ln(t). The least numerics.tolerance of a preset is 2.5e-4.
+CLOSE = 1e-4
+#: A margin that rises by more within this part of the time, or within this time (h), jumps.
+SAME_MOMENT = 1e-5
+SHORTEST_MOMENT = 1e-8
+#: A trial divides the interval into parts of at least this fraction.
+LEAST_PART = 0.02
+#: Least distance (elements of the fluid) to an end of the pore for which a mesh is generated.
+LEAST_ELEMENTS = 0.1
+
+
+class PoreEnd(RunEnd):
+    """The aggregate has reached an end of the pore.
+
+    :func:`repro.simulate` raises it after the last Report. It is an end of the model, not a
+    failure: the message names the end of the pore and the time (h). The aggregate is then one
+    element of the fluid from that end.
+
+    Examples
+    --------
+    >>> import repro
+    >>> changes = ['pore.length="120 um"', 'aggregate.radius="9 um"', 'aggregate.position="-50 um"']
+    >>> try:
+    ...     for report in repro.simulate(repro.load_scene("base", changes)):
+    ...         pass
+    ... except repro.PoreEnd as end:
+    ...     print(end)
+    the aggregate reaches the pore's upstream end at t = 0 h
+    """
+
+
+class Detachment(RunEnd):
+    """The aggregate detaches from a wall, or tears.
+
+    :func:`repro.simulate` raises it after the last Report. It is an end of the model, not a
+    failure: the message names the time (h), the place (um), the stress there and the strength that
+    it exceeds. It needs ``growth.bonding_strength`` or ``growth.tensile_strength``.
+
+    Examples
+    --------
+    >>> import repro
+    >>> changes = ["growth.wall=bonded", 'growth.bonding_strength="1 kPa"', "numerics.preset=fast"]
+    >>> reports = repro.simulate(repro.load_scene("base", changes))
+    >>> try:
+    ...     times = [report.pore.time for report in reports]
+    ... except repro.Detachment as end:
+    ...     print(str(end)[:25])
+    the aggregate detaches at
+    """
+
+
+@dataclass(frozen=True)
+class Event:
+    """An end of a run: its margin in a state, and the exception that reports it there."""
+
+    margin: float
+    end: RunEnd
+
+
+@dataclass(frozen=True, eq=False)
+class Reached:
+    """A step, the solution at its end, and the end of the run that is nearest there."""
+
+    step: StepResult
+    solved: Solved
+    event: Event
+
+    @property
+    def time(self) -> float:
+        """Time (h) of the end of the step."""
+        return self.step.pore.time
+
+
+def nearest_end(scene: Scene, pore: Pore, solved: Solved) -> Event:
+    """The end with the largest margin in a state of a scene with growth."""
+    return max(_events(scene, pore, solved), key=lambda event: event.margin)
+
+
+def _events(scene: Scene, pore: Pore, solved: Solved) -> Iterator[Event]:
+    """All ends that the scene models."""
+    for side in ("upstream", "downstream"):
+        end = PoreEnd(f"the aggregate reaches the pore's {side} end at t = {pore.time:g} h")
+        yield Event(1 - elements_to_end(scene.pore, pore, side), end)
+    if pore.last is None:
+        compression = Compression().after(pore)
+        fold = Fold(fold_message(f"at t = {pore.time:g} h", compression))
+        yield Event(BIOT / compression.stretch - 1, fold)
+    growth = scene.growing.growth
+    if growth.bonding_strength is not None:
+        peak = adhesion.wall_peak(scene, pore, solved)
+        yield _detachment(scene, pore, peak, "bonding_strength", "detaches", "its wall must bear")
+    if growth.tensile_strength is not None:
+        peak = adhesion.tensile_peak(scene, pore)
+        yield _detachment(scene, pore, peak, "tensile_strength", "tears", "its tensile stress is")
+
+
+def _detachment(scene: Scene, pore: Pore, peak: Peak, key: str, verb: str,
+                subject: str) -> Event:
+    """The event of a strength; its message has the stress in the unit that the scene gives."""
+    strength = scene_tables(scene)["growth"][key]
+    number, _, unit = strength.partition(" ")
+    ratio = peak.value / getattr(scene.growing.growth, key)
+    end = Detachment(f"the aggregate {verb} at t = {pore.time:g} h: near x = {peak.x:.4g}, y = "
+                     f"{peak.y:.4g} um {subject} {ratio * float(number):.3g} {unit}, in the mean "
+                     f"over pore.width / 20; growth.{key} is {strength}")
+    return Event(ratio - 1, end)
+
+
+def elements_to_end(channel: Channel, pore: Pore, side: str) -> float:
+    """Distance of the aggregate from an end of the pore, in elements of the fluid."""
+    outline = pore.boundary
+    tip = -outline.upstream if side == "upstream" else outline.downstream
+    return (channel.length / 2 - tip) * ACROSS_PORE / channel.width
+
+
+def refuse_outside(channel: Channel, previous: Pore, expanded: Pore) -> None:
+    """Raise PoreEnd if a shape is too close to an end of the pore for a mesh.
+
+    The step from ``previous`` is then too long: the event lies within it.
+    """
+    for side in ("upstream", "downstream"):
+        if elements_to_end(channel, expanded, side) < LEAST_ELEMENTS:
+            raise PoreEnd(f"the aggregate reaches the pore's {side} end in the step from "
+                          f"t = {previous.time:g} h")
+
+
+def locate(reach: Callable[[float], Reached], start: float, margin: float,
+           passed: Reached) -> Reached:
+    """Locate the first event in a step, by the Illinois variant of regula falsi.
+
+    Parameters
+    ----------
+    reach : callable
+        Makes a shorter step from the same start to a time (h).
+    start, margin : float
+        Start of the step (h), and the largest margin there, which is not positive.
+    passed : Reached
+        The full step, at whose end the largest margin is positive.
+
+    Returns
+    -------
+    Reached
+        The step to the event. Its margin is positive and at most CLOSE, or jumps there. If a
+        shorter step fails, it is the shortest one that has passed the event.
+    """
+    low, high = margin - CLOSE / 2, passed.event.margin - CLOSE / 2
+    side = 0
+    while passed.event.margin > CLOSE:
+        interval = passed.time - start
+        if interval <= max(SAME_MOMENT * passed.time, SHORTEST_MOMENT):
+            break
+        part = min(max(low / (low - high), LEAST_PART), 1 - LEAST_PART)
+        try:
+            trial = reach(start + part * interval)
+        except (RunEnd, StageError, FloatingPointError):
+            break
+        value = trial.event.margin - CLOSE / 2
+        if trial.event.margin > 0:
+            passed, high = trial, value
+            low *= 0.5 if side > 0 else 1.0
+            side = 1
+        else:
+            start, low = trial.time, value
+            high *= 0.5 if side < 0 else 1.0
+            side = -1
+    return passed
