@@ -49,11 +49,12 @@ def test_means_of_a_traction_are_those_of_its_integral(count):
     ("tensile_strength", 5e-4, "tears", "tensile_stress_max")])
 def test_a_run_ends_where_a_strength_is_exceeded(key, strength, verb, column):
     """The last row is the first one above the strength, although no row was requested at its time. The status has its
-    time and the place."""
-    every = repro.solve("base", [*FAST, 'growth.end="6 h"', f"growth.{key}={strength} MPa"])
+    time and the place. The other strength is so large that nothing exceeds it."""
+    both = [*(f"growth.{each}_strength=1 MPa" for each in ("bonding", "tensile")), f"growth.{key}={strength} MPa"]
+    every = repro.solve("base", [*FAST, 'growth.end="6 h"', *both])
     values = every[f"{column}_MPa"]
     assert values[-1] > strength
-    sparse = repro.solve("base", [*SPARSE, f"growth.{key}={strength} MPa"])
+    sparse = repro.solve("base", [*SPARSE, *both])
     x, y = (sparse[f"{column}_{axis}_um"][-1] for axis in "xy")
     assert sparse.status == every.status and is_over(every.status)
     where = f"near x = {x:.4g}, y = {y:.4g} um"

@@ -4,6 +4,7 @@ error.
 The scene is a plug between the walls that grows uniformly. Its free surfaces keep their length, so their elastic
 stretch is theta^(-1/2)."""
 import re
+from contextlib import nullcontext
 from dataclasses import replace
 from functools import cache
 
@@ -15,7 +16,7 @@ from repro.cli import main
 from repro.errors import GrowthError, LinearError, MeshError, SimulationError
 from repro.march import loop
 from repro.march.balance import Ledger
-from repro.march.folding import Compression
+from repro.march.folding import Compression, refuse_density, refuse_fold
 from repro.march.loop import InterpolatedState, RestartState, Scheme, StepResult
 from repro.march.step_control import StepControl
 from repro.model import contact
@@ -23,7 +24,7 @@ from repro.model.pore import seeded, solve
 from repro.model.surface import BIOT, CREASE, surface
 from repro.preflight import numbers
 from repro.preflight.numbers import evaluate_at_largest
-from repro.preflight.simplifications import find_warnings
+from repro.preflight.simplifications import find_warnings, warn_crease
 from repro.results import read_table
 from repro.runs.status import is_over
 from repro.scene import load_scene
@@ -111,9 +112,10 @@ def continue_run(theta, advance, earlier=None):
 
 
 @pytest.mark.parametrize("error, theta, kind", [
-    (GrowthError, 3.0, repro.Fold), (MeshError, 3.0, repro.Fold), (LinearError, 3.0, SimulationError),
-    (GrowthError, 1.5, SimulationError), (MeshError, 1.5, SimulationError)])
+    (GrowthError, 2.175, repro.Fold), (MeshError, 2.175, repro.Fold), (LinearError, 3.0, SimulationError),
+    (GrowthError, 2.15, SimulationError), (MeshError, 2.15, SimulationError)])
 def test_a_failed_step_is_a_fold_only_if_the_surface_creases(error, theta, kind):
+    """The thetas are 0.6 % from that of a stretch of 0.68."""
     def advance(scene, pore, solved, step_control):
         raise error("no")
 
@@ -152,8 +154,27 @@ def multiplied(factor, pore, within):
     return StepResult(after, None, ledger, False, 0, within)
 
 
+@pytest.mark.parametrize("theta", [2.35, 2.42])
+def test_the_warning_of_creases_begins_at_their_stretch(theta):
+    """The stretches are 0.8 % above and 0.6 % below 0.647."""
+    assert bool(list(warn_crease(compressed(theta)))) == (theta**-0.5 < CREASE)
+
+
+@pytest.mark.parametrize("theta", [3.35, 3.41])
+def test_a_step_may_end_just_above_biots_limit_and_not_below(theta):
+    """The stretches are 0.4 % above and 0.5 % below 0.544."""
+    with pytest.raises(repro.Fold) if theta**-0.5 < BIOT else nullcontext():
+        refuse_fold(compressed(1.5), compressed(theta))
+
+
+@pytest.mark.parametrize("factor", [0.52, 1.94])
+def test_a_density_just_within_its_bounds_is_accepted(factor):
+    pore = multiplied(factor, compressed(1.5), None).pore
+    refuse_density(pore, plug().kinetics.maximum_density)
+
+
 @pytest.mark.parametrize("theta, kind", [(3.0, repro.Fold), (1.5, SimulationError)])
-@pytest.mark.parametrize("factor", [0.4, 2.5])
+@pytest.mark.parametrize("factor", [0.48, 2.06])
 def test_no_row_has_a_density_out_of_bounds(theta, kind, factor):
     """This holds at the end of a step and within it."""
     def too_dense(scene, pore, solved, step_control):

@@ -10,7 +10,9 @@ from itertools import pairwise
 
 import numpy as np
 
-DRIVEN = ("mean_velocity_m_per_d", "head_loss_cm")
+#: Columns that jump with the flow.
+DRIVEN = ("mean_velocity_m_per_d", "head_loss_cm", "fluid_force_x_uN_per_m",
+          "fluid_force_y_uN_per_m", "fluid_moment_nN")
 #: Columns that jump with the flow and the supplies if substrates are quasi-steady.
 CARRIED = tuple(f"{pattern}_mg_per_L" for name in ("acceptor", "donor")
                 for pattern in (f"effluent_{name}", f"inlet_{name}", f"{name}_min",
