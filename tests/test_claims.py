@@ -77,11 +77,12 @@ SYNTHETIC = {"time_h": HOURS, "aggregate_area_um2": AREA, "conductivity_m_per_d"
 #: The last shape with a film and the first without, with a 20th of the conductivity.
 TOUCHING = {"time_h": np.array([36.0, 36.1]), "aggregate_area_um2": np.array([9000.0, 9100.0]),
             "conductivity_m_per_d": 24e-6 * clean(SCENE) * 50 / np.array([9000.0, 20 * 9100.0])}
-#: Two steps: supplies 10 mg/L of 1 and 3 um2 of water, of which 0.4 and 0.2 are taken up; biomass that lacks 2 %.
+#: Two steps: supplies 10 mg/L of 1 and 3 um2 of water, of which 40 and 20 % are taken up; biomass that lacks 2 %.
 STEPS = {"end_h": np.array([1.0, 2.0]), "biomass_before_pg_per_m": np.array([100.0, 150.0]),
          "biomass_made_pg_per_m": np.array([50.0, 40.0]), "biomass_after_pg_per_m": np.array([150.0, 186.2])}
 STEPS |= {f"{name}_supplied_pg_per_m": np.array([10.0, 30.0]) for name in ("acceptor", "donor")}
-STEPS |= {f"{name}_{part}_pg_per_m": share * np.array([10.0, 30.0]) for name, left in (("acceptor", 0.6), ("donor", 0.8))
+STEPS |= {f"{name}_{part}_pg_per_m": share * np.array([10.0, 30.0])
+          for name, left in (("acceptor", 0.6), ("donor", 0.8))
           for part, share in (("out", left), ("consumed", 1 - left))}
 #: A run whose effluents are constant and whose area grows as its biomass does, X_m times.
 EVEN = {"aggregate_area_um2": np.array([100.0, 150.0, 190.0]) / SCENE.kinetics.maximum_density,

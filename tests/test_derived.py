@@ -505,7 +505,7 @@ def test_the_columns_of_the_wall_traction_are_what_their_names_say(order, state,
 
 @EVERY_ORDER
 def test_each_part_of_the_wall_traction_counts(order):
-    """The forces of the water and the bond each change the largest traction by 0.5 % or more, and it is on both walls."""
+    """The water's forces and the bond each change the largest traction by 0.5 % or more, and it is on both walls."""
     scene, instant = late_instant(order)
     peaks = [derived_wall_traction(bearing(scene, changes), instant) for changes in BEARING.values()]
     values = [value for value, _, _ in peaks]

@@ -10,8 +10,8 @@ import pytest
 import paper_figures
 from paper_figures import __main__ as figures
 from paper_figures import claims, figure_6, runs, states, style
-from repro import cli, load_scene, results, run
 from reference import layered_channel
+from repro import cli, load_scene, results, run
 from repro.scene import scene_hash
 from verification.claims import report
 
@@ -165,7 +165,8 @@ def of_fields(short):
         "figure_4": (["initial_mesh"], [f"{start['meshed_length_um']:.0f} µm between",
                                         f"of {start['downstream_um'] - start['upstream_um']:.0f} µm",
                                         f"{start['nodes']:.0f} nodes"]),
-        "figure_5": (["base"], ["at t = 0.6 h", "shape of 0.4 h", *(f"{row[U]:.2f} m/d" for row in (first, shaped, last))]),
+        "figure_5": (["base"], ["at t = 0.6 h", "shape of 0.4 h",
+                                *(f"{row[U]:.2f} m/d" for row in (first, shaped, last))]),
         "figure_6": (3 * ["wide"], [f"({letter}) {supply} K_s: {course}" for letter, supply in
                                     zip("abc", (5, 10, 40))]),
         "plate_1": (["base"], ["at t = 0.6 h", "that of 0.4 h", f"at 0.4 h, with less biomass in the same shape, "

@@ -314,7 +314,7 @@ PAIRS = [
      "is needed of Y d_c (2.44), its product with yield_coefficient"),
     ("base", 'output.times=["5 h"]', "growth.end=4 h", "none after 4 h is accepted: growth.end is 4 h",
      "5 h or more, the last of output.times, is needed"),
-    *(("base", f"growth.{key}=1 kPa", "growth.new_biomass=stress_free", 'growth.new_biomass = "stressed" is needed with',
+    *(("base", f"growth.{key}=1 kPa", "growth.new_biomass=stress_free", 'new_biomass = "stressed" is needed with it',
        f'"stressed" is needed with growth.{key} = 0.001 MPa') for key in ("bonding_strength", "tensile_strength")),
 ]
 

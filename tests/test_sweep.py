@@ -389,14 +389,19 @@ STATUSES = dict.fromkeys([COMPLETED, *ENDS], True) | dict.fromkeys(
 def test_every_status_takes_its_whole_path_through_a_sweep(tmp_path, capsys):
     """Which runs are made again, their rows in both tables, the page, and the exit status with a line for each run that
     is not over. A running run was killed: its table may be cut short."""
-    widths = ", ".join(f"{40 + number} um" for number in range(len(STATUSES)))
+    widths = ", ".join(f"{40 + k} um" for k in range(len(STATUSES)))
     swept = sweep_of(tmp_path, widths)
     for point, status in zip(swept.points, STATUSES):
         record_end(swept, point, status, rows=2)
     made = []
-    results_of = driver.run_plan(swept, lambda points, folder: ((made.append(point.index), (point, "failed: again"))[1]
-                                                            for point in points))
-    unfinished = [number for number, over in enumerate(STATUSES.values(), 1) if not over]
+
+    def run_points(missing, folder):
+        for point in missing:
+            made.append(point.index)
+            yield point, "failed: again"
+
+    results_of = driver.run_plan(swept, run_points)
+    unfinished = [index for index, over in enumerate(STATUSES.values(), 1) if not over]
     assert made == unfinished == [run.point.index for run in results_of.failed]
     expected = ["failed: again" if status == RUNNING else status for status in STATUSES]
     lines = rows(tmp_path / "runs.csv")
@@ -404,15 +409,15 @@ def test_every_status_takes_its_whole_path_through_a_sweep(tmp_path, capsys):
     assert [line["status"] for line in lines if line["fold_time_h"]] == ENDS[2:3]
     killed = [*STATUSES].index(RUNNING) + 1
     assert [row["run"] for row in rows(tmp_path / "table.csv")] == [
-        str(number) for number in range(1, len(STATUSES) + 1) for _ in range(2 * (number != killed))]
+        str(index) for index in range(1, len(STATUSES) + 1) for _ in range(2 * (index != killed))]
     cells = re.findall(r'<td class="text( bad)?">(.*?)</td></tr>', (tmp_path / "summary.html").read_text())
     assert cells == [("", html.escape(status)) if over else (" bad", html.escape(status.partition(":")[0]))
                      for status, over in zip(expected, STATUSES.values())]
     assert _report(results_of) == SOME_FAILED == 3
     printed = capsys.readouterr()
-    for number, status in enumerate(expected, 1):
-        line = f"repro: run {number} (pore.width = {39 + number} um): {status}\n"
-        assert (line in printed.err) == (number in unfinished)
+    for index, status in enumerate(expected, 1):
+        line = f"repro: run {index} (pore.width = {39 + index} um): {status}\n"
+        assert (line in printed.err) == (index in unfinished)
     assert f"{len(STATUSES) - len(unfinished)} of {len(STATUSES)} runs done, {len(unfinished)} failed" in printed.out
 
 
