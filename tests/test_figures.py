@@ -154,6 +154,14 @@ def test_the_numbers_of_a_caption_are_those_of_its_runs(name, unlike):
     in_order(expected, MODULES[name].caption(*[*unlike][:count]))
 
 
+def test_the_course_of_a_run_names_its_contact(unlike, monkeypatch):
+    """Between its rows."""
+    monkeypatch.setattr(figure_6, "upstream_share", lambda folder: 0.625)
+    ends = [value(1, f"{end}_um", 51.0) for end in ("upstream", "downstream")]
+    expected = ["contact between 0 and 10.2 h", "from {:.0f} to {:.0f} µm at 51 h".format(*ends), "62.5 % of the area"]
+    in_order(expected, figure_6._course([*unlike][1]))
+
+
 def of_fields(short):
     """{figure: (folders, numbers of its caption in their order)} of captions with numbers of fields, from the rows."""
     first, shaped, last = ({name: values[k] for name, values in results.read_table(

@@ -410,7 +410,9 @@ def test_every_status_takes_its_whole_path_through_a_sweep(tmp_path, capsys):
     killed = [*STATUSES].index(RUNNING) + 1
     assert [row["run"] for row in rows(tmp_path / "table.csv")] == [
         str(index) for index in range(1, len(STATUSES) + 1) for _ in range(2 * (index != killed))]
-    cells = re.findall(r'<td class="text( bad)?">(.*?)</td></tr>', (tmp_path / "summary.html").read_text())
+    text = (tmp_path / "summary.html").read_text()
+    assert f"{len(STATUSES) - len(unfinished)} of {len(STATUSES)} runs have come to their end" in text
+    cells = re.findall(r'<td class="text( bad)?">(.*?)</td></tr>', text)
     assert cells == [("", html.escape(status)) if over else (" bad", html.escape(status.partition(":")[0]))
                      for status, over in zip(expected, STATUSES.values())]
     assert _report(results_of) == SOME_FAILED == 3
