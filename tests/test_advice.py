@@ -94,9 +94,9 @@ def setting(warned):
 
 @pytest.mark.parametrize("preset", PRESETS)
 def test_the_advice_of_check_is_accepted_and_helps(preset):
-    """In 50 scenes the advice of a warning silences it; every kind of advice occurs, and so does its absence."""
+    """In 30 scenes the advice of a warning silences it; every kind of advice occurs, and so does its absence."""
     kinds = set()
-    for seed in range(50):
+    for seed in range(30):
         changes = drawn(seed, preset)
         for warned in warnings(changes):
             more = setting(warned)
@@ -114,10 +114,10 @@ def test_the_advice_of_check_is_accepted_and_helps(preset):
 
 @pytest.mark.parametrize("preset", PRESETS)
 def test_the_advice_against_a_lack_of_memory_is_accepted_and_helps(monkeypatch, preset):
-    """In 40 scenes the refusal names a refinement that is accepted without a warning, or states that there is none; a
+    """In 20 scenes the refusal names a refinement that is accepted without a warning, or states that there is none; a
     quarter of the scene's refinement then does not fit either."""
     outcomes = set()
-    for seed in range(40):
+    for seed in range(20):
         scene = load_scene("base", [*drawn(seed, preset), "numerics.refinement=5"], unset=["flow.head"])
         try:
             free = memory.expected_bytes(scene) / random.Random(seed).choice((1.1, 3, 30))
