@@ -127,8 +127,8 @@ def test_steps_from_the_first_on_agree_with_small_steps(order):
                        for step in (None, gear.FIRST / 4))
     assert len(computed.steps) < len(small.steps) / 4
     assert computed.flows.consumed == pytest.approx(small.flows.consumed, rel=5.1e-4)
-    made, expected = (end.active.sum() / pore.active.sum() - 1 for end in (computed, small))
-    assert made == pytest.approx(expected, rel=5.1e-4)
+    growth, expected = (end.active.sum() / pore.active.sum() - 1 for end in (computed, small))
+    assert growth == pytest.approx(expected, rel=5.1e-4)
 
 
 @EVERY_ORDER

@@ -90,9 +90,9 @@ def test_still_water_supplies_a_pore_and_its_mirror_image_alike(order):
 @pytest.mark.parametrize("interface", ["laplacian", "traction"])
 @pytest.mark.parametrize("order, permeability", [(1, None), (2, None), (2, 40.0)])
 def test_a_pore_and_its_mirror_images_conduct_alike(order, permeability, interface, spans, image):
-    """Stokes flow is reversible. The rules of a viscous and of a permeable body hold on either side and wall, and a body
-    may lie on either wall. The profile is prescribed at the inlet alone: what this changes at the aggregate, 1.5 widths
-    from it, has decayed by exp(-4.2 1.5) < 0.002."""
+    """Stokes flow is reversible. The rules of a viscous and of a permeable body hold on either side, and a body may lie
+    on either wall. The profile is prescribed at the inlet alone. This changes the flow at the aggregate, 1.5 widths
+    downstream, by less than exp(-4.2 1.5) = 0.002."""
     scene, seed = seed_of(order, spans)
     drive = replace(scene.flow, permeability=permeability, viscosity_ratio=None if permeability else 20.0)
     numerics = replace(scene.numerics, interface=interface)

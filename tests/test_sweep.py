@@ -393,16 +393,16 @@ def test_every_status_takes_its_whole_path_through_a_sweep(tmp_path, capsys):
     swept = sweep_of(tmp_path, widths)
     for point, status in zip(swept.points, STATUSES):
         record_end(swept, point, status, rows=2)
-    made = []
+    repeated = []
 
     def run_points(missing, folder):
         for point in missing:
-            made.append(point.index)
+            repeated.append(point.index)
             yield point, "failed: again"
 
-    results_of = driver.run_plan(swept, run_points)
+    again = driver.run_plan(swept, run_points)
     unfinished = [index for index, over in enumerate(STATUSES.values(), 1) if not over]
-    assert made == unfinished == [run.point.index for run in results_of.failed]
+    assert repeated == unfinished == [run.point.index for run in again.failed]
     expected = ["failed: again" if status == RUNNING else status for status in STATUSES]
     lines = rows(tmp_path / "runs.csv")
     assert [line["status"] for line in lines] == expected
@@ -415,7 +415,7 @@ def test_every_status_takes_its_whole_path_through_a_sweep(tmp_path, capsys):
     cells = re.findall(r'<td class="text( bad)?">(.*?)</td></tr>', text)
     assert cells == [("", html.escape(status)) if over else (" bad", html.escape(status.partition(":")[0]))
                      for status, over in zip(expected, STATUSES.values())]
-    assert _report(results_of) == SOME_FAILED == 3
+    assert _report(again) == SOME_FAILED == 3
     printed = capsys.readouterr()
     for index, status in enumerate(expected, 1):
         line = f"repro: run {index} (pore.width = {39 + index} um): {status}\n"
@@ -424,8 +424,8 @@ def test_every_status_takes_its_whole_path_through_a_sweep(tmp_path, capsys):
 
 
 def test_every_end_of_the_model_is_among_the_statuses():
-    kinds = {kind.__name__ for kind in RunEnd.__subclasses__()}
-    assert kinds == {"PoreEnd", "Fold", "Detachment"} and all(any(end.fullmatch(s) for s in ENDS) for end in RUN_ENDS)
+    assert {repro.PoreEnd, repro.Fold, repro.Detachment} == {*RunEnd.__subclasses__()}
+    assert all(any(end.fullmatch(status) for status in ENDS) for end in RUN_ENDS)
 
 
 def test_a_run_without_rows_has_the_status_of_its_folder_or_attempt(tmp_path):
