@@ -84,9 +84,13 @@ STEPS |= {f"{name}_supplied_pg_per_m": np.array([10.0, 30.0]) for name in ("acce
 STEPS |= {f"{name}_{part}_pg_per_m": share * np.array([10.0, 30.0])
           for name, left in (("acceptor", 0.6), ("donor", 0.8))
           for part, share in (("out", left), ("consumed", 1 - left))}
-#: A run whose effluents are constant and whose area grows as its biomass does, X_m times.
+#: A run whose area grows as its biomass does, X_m times. Its effluents are those at the starts of steps; the mean of a
+#: step is 6 and 8 mg/L.
 EVEN = {"aggregate_area_um2": np.array([100.0, 150.0, 190.0]) / SCENE.kinetics.maximum_density,
-        "effluent_acceptor_mg_per_L": np.full(3, 6.0), "effluent_donor_mg_per_L": np.full(3, 8.0)}
+        "effluent_acceptor_mg_per_L": np.array([6.2, 6.1, 5.9]), "effluent_donor_mg_per_L": np.array([8.3, 8.1, 7.9])}
+#: Effluents at the ends of steps, (2, 2) mg/L.
+AT_ENDS = np.array([[5.8, 5.9], [7.7, 7.9]])
+AGAINST = (10 - AT_ENDS) / [[4], [2]]
 FOLDING = folds.StretchHistory(HOURS, 1 - HOURS / 100, np.exp(HOURS / 8), 1.0, "")
 CREASED = np.exp(100 * (1 - 0.647) / 8)
 #: {name: (value of a function of claims, its closed form)}; the error of linear interpolation is none.
@@ -107,10 +111,10 @@ VALUES = {
     "defects of the biomass": (lambda: runs.biomass_defects(("wide",)), [0.0, -3.8 / 186.2]),
     "time of contact": (lambda: runs.contact_time("wide"), 36.1),
     "nearest row": (lambda: runs.nearest(("wide",), 12.9), 12.0),
-    "errors of the bookkeeping": (lambda: book().ratio_errors(), np.zeros((3, 2))),
-    "errors of corrected effluents": (lambda: book().ratio_errors(1.01)[:2], np.repeat(
-        [[4 / (10 - 6.06) - 1], [2 / (10 - 8.08) - 1]], 2, axis=1)),
-    "corrections": (lambda: book().corrections(), np.ones((2, 2))),
+    "errors of the bookkeeping": (lambda: book().ratio_errors(), np.vstack([
+        1 / AGAINST - 1, AGAINST[:1] / AGAINST[1:] - 1])),
+    "errors of corrected effluents": (lambda: book().ratio_errors(1.01)[:2], [[4], [2]] / (10 - 1.01 * AT_ENDS) - 1),
+    "corrections": (lambda: book().corrections(), [[6], [8]] / AT_ENDS),
     "dM_CA / dM_CD": (lambda: scheme.ratio_of(1.01, 4.0, 6.0), (10 - 4.04) / (10 - 6.06)),
     "expansion while smooth": (lambda: folds.smooth_expansion(FOLDING), CREASED),
     "expansion without creases": (lambda: folds.smooth_expansion(replace(FOLDING, stretch=np.ones(21))), np.exp(5.0)),

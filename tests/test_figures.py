@@ -162,10 +162,15 @@ def test_the_course_of_a_run_names_its_contact(unlike, monkeypatch):
     in_order(expected, figure_6._course([*unlike][1]))
 
 
+def row_at(folder, time):
+    """A row whose numbers differ by column and time (h)."""
+    return {name: 1 + k + 0.1 * time for k, name in enumerate(results.COLUMNS)}
+
+
 def of_fields(short):
     """{figure: (folders, numbers of its caption in their order)} of captions with numbers of fields, from the rows."""
-    first, shaped, last = ({name: values[k] for name, values in results.read_table(
-        short["base"] / "timeseries.csv").items()} for k in (0, -2, -1))
+    last = {name: values[-1] for name, values in results.read_table(short["base"] / "timeseries.csv").items()}
+    first, shaped, end = (row_at(None, time) for time in (0.0, 0.4, 0.6))
     wide = results.read_table(short["wide"] / "timeseries.csv")
     start = {name: values[0] for name, values in results.read_table(short["initial_mesh"] / "timeseries.csv").items()}
     course = f"no contact, from {wide['upstream_um'][-1]:.0f} to {wide['downstream_um'][-1]:.0f} µm at 0.4 h"
@@ -174,7 +179,7 @@ def of_fields(short):
                                         f"of {start['downstream_um'] - start['upstream_um']:.0f} µm",
                                         f"{start['nodes']:.0f} nodes"]),
         "figure_5": (["base"], ["at t = 0.6 h", "shape of 0.4 h",
-                                *(f"{row[U]:.2f} m/d" for row in (first, shaped, last))]),
+                                *(f"{row[U]:.2f} m/d" for row in (first, shaped, end))]),
         "figure_6": (3 * ["wide"], [f"({letter}) {supply} K_s: {course}" for letter, supply in
                                     zip("abc", (5, 10, 40))]),
         "plate_1": (["base"], ["at t = 0.6 h", "that of 0.4 h", f"at 0.4 h, with less biomass in the same shape, "
@@ -186,6 +191,7 @@ def of_fields(short):
 def test_the_numbers_of_captions_about_fields_are_those_of_rows(short, monkeypatch):
     """Every figure is here, above, or has numbers of the model alone."""
     monkeypatch.setattr(figure_6, "EVERY", 0.2)
+    monkeypatch.setattr(states, "row", row_at)
     captions = of_fields(short)
     assert {*captions, *CAPTIONS, *OF_MODEL} == {*MODULES}
     for name, (scenes, expected) in captions.items():
