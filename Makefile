@@ -12,6 +12,8 @@ OLDEST_TESTS := tests/test_python_calls.py tests/test_drawing.py tests/test_fiel
 PIP := $(BIN) -m pip install -q --disable-pip-version-check
 
 export MPLBACKEND := Agg
+# Slow cases and long runs may take longer than a test that hangs (pyproject.toml).
+SLOW := -o faulthandler_timeout=3600
 # The linear algebra is sparse: threads in the dense kernels only slow it down.
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
@@ -38,7 +40,7 @@ sensitivity: $(STAMP) ## effects of the rounding of Table 1: elasticities, one s
 	@$(BIN) -m verification.sensitivity
 
 verify: $(STAMP) ## run the verification cases against independent references, and write their pages
-	@$(BIN) -m pytest verification -n logical --dist worksteal --pages
+	@$(BIN) -m pytest verification -n logical --dist worksteal --pages $(SLOW)
 
 verify-fast: $(STAMP) ## run the quick verification cases, which are part of make test
 	@$(BIN) -m pytest verification -n logical --dist worksteal -m "not slow"
@@ -54,7 +56,7 @@ test: $(STAMP) ## run the tests and the quick verification cases on all cores
 	@$(BIN) -m pytest tests verification -n logical --dist worksteal -m "not slow"
 
 test-thorough: $(STAMP) ## the same with more random examples, and the slow tests
-	@HYPOTHESIS_PROFILE=thorough $(BIN) -m pytest tests verification -n logical --dist worksteal -m "not slow"
+	@HYPOTHESIS_PROFILE=thorough $(BIN) -m pytest tests verification -n logical --dist worksteal -m "not slow" $(SLOW)
 
 oldest: $(OLDEST) ## run quick tests with the oldest accepted versions of the dependencies
 	@$(dir $(OLDEST))bin/python -m pytest $(OLDEST_TESTS)

@@ -57,7 +57,9 @@ def run_and_wait(*arguments, **options) -> tuple[int, str, str]:
 
 def wait_for(condition, process: subprocess.Popen) -> None:
     """Wait until a condition is true or the process has ended."""
+    end = time.monotonic() + 120
     while not condition() and process.poll() is None:
+        assert time.monotonic() < end, "it took too long"
         time.sleep(0.01)
 
 

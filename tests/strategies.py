@@ -1,13 +1,17 @@
 """Shapes and scenes that tests share: hypothesis strategies and a few fixed examples."""
 import math
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 from hypothesis import settings
 from hypothesis import strategies as st
+from skfem.quadrature import get_quadrature
+from skfem.refdom import RefTri
 
 from repro.fem import mesher, sizing
-from repro.fem.mesh import curved
+from repro.fem.mesh import Mesh, curved
 from repro.fem.outline import BOTTOM, FREE, TOP, Outline
 from repro.fem.outline import half_disc as half_disc_outline
 from repro.fem.sizing import Sizing
@@ -156,6 +160,36 @@ def mirrored(outline):
 
     return Outline(back(outline.points) * [-1, 1], back(outline.wall), back(outline.fixed),
                    back(outline.origin) * [-1, 1], outline.geometry)
+
+
+def mirror_image(at, along):
+    """The mirror image of a pore: x -> -x if ``along``, else y -> W - y. Nodes keep their numbers."""
+    mesh, order = at.mesh, at.space.order
+    about, sign = ([0.0, 0.0], [-1, 1]) if along else ([0.0, mesh.width], [1, -1])
+    turned = [0, 2, 1, 5, 4, 3][: mesh.cells.shape[1]]
+    ends = tuple(-x for x in mesh.ends[::-1]) if along else mesh.ends
+
+    def back(values):
+        return np.roll(values[::-1], 1 - mesh.geometry)
+
+    def exchanged(values):
+        """Values at quadrature points, which are those of a triangle with two corners exchanged."""
+        rules = (get_quadrature(RefTri, degree)[0].T for degree in range(2, 20))
+        points = next((rule for rule in rules if len(rule) == values.shape[1]), np.zeros((1, 2)))
+        return values[:, [int(np.abs(points - point[::-1]).sum(axis=1).argmin()) for point in points]]
+
+    image = Mesh.of(about + mesh.points * sign, mesh.cells[:, turned], mesh.biomass, back(mesh.loop), mesh.width, ends,
+                    mesh.topology.method)
+    space = Space(image, order)
+    walls = {FREE: FREE, BOTTOM: BOTTOM if along else TOP, TOP: TOP if along else BOTTOM}
+    return replace(at, space=space, wall=np.array([walls[wall] for wall in back(at.wall).tolist()]),
+                   fixed=back(at.fixed), active=exchanged(at.active), inert=exchanged(at.inert),
+                   theta=exchanged(at.theta), body=pore.material(space, about + at.body.reference * sign),
+                   last=None if at.last is None else about + at.last * sign, line_speeds=None)
+
+
+#: Mirror images of a pore: along the flow, and across it.
+MIRRORS = {"along": partial(mirror_image, along=True), "across": partial(mirror_image, along=False)}
 
 
 def seed(radius, refinement=1.0, geometry=1):

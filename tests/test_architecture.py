@@ -1,6 +1,7 @@
-"""Rules of the package, checked in its source: imports between rooms, declared and locked dependencies."""
+"""Rules of the package, checked in its source: imports, declared and locked dependencies, an end for hanging tests."""
 import ast
 import re
+import subprocess
 import sys
 import tomllib
 from graphlib import CycleError, TopologicalSorter
@@ -166,3 +167,13 @@ def test_the_lower_bounds_are_the_oldest_versions_tested():
     pinned = dict(PIN.findall(LOCKS[3]))
     bounds = {normal(each): re.search(r">=([\d.]+)$", each)[1] for each in RUNTIME + EXTRAS["figures"]}
     assert bounds.items() <= pinned.items()
+
+
+@pytest.mark.parametrize("processes", ["-n0", "-n1"])
+def test_a_test_that_hangs_fails(tmp_path, processes):
+    """With the settings of pyproject.toml, whose limit is shorter here. The output names the place."""
+    (tmp_path / "test_endless.py").write_text("def test_endless():\n    while True:\n        pass\n")
+    command = [sys.executable, "-m", "pytest", "-c", ROOT / "pyproject.toml", "--rootdir", tmp_path, processes,
+               "-o", "faulthandler_timeout=0.5", "-p", "no:cacheprovider", tmp_path]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    assert ended.returncode == 1 and "test_endless.py" in ended.stderr and "passed" not in ended.stdout

@@ -2,8 +2,11 @@
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
+import shapely
 
+from reference import layered_channel
 from verification import claims, sensitivity
 from verification.claims import (
     CHANGED,
@@ -16,8 +19,16 @@ from verification.claims import (
     ClaimError,
     Finding,
     after_contact,
+    assumed,
+    discussed,
+    folds,
+    permeability,
     report,
+    rheology,
+    runs,
+    scheme,
 )
+from verification.claims.permeability import clean
 from verification.uncertainty import Bar
 
 
@@ -53,6 +64,85 @@ def test_a_number_that_a_run_does_not_reach_is_a_lower_bound(end, low, high, out
     assert check.is_lower_bound and check.outcome == outcome and check.holds == (outcome == "holds")
     assert report.value_text(check.value, check.bar.high) == f"not reached by {end:g}"
     assert report.inside(end, end, None) and not report.inside(end - 1, end, None)
+
+
+# Functions of claims on one synthetic run.
+SCENE = runs.load_packaged("wide")
+HOURS = np.linspace(0.0, 40.0, 21)
+#: Area e^(t / 8) um2 times 100; K / K_clean = 50 / area; effluents, and a height, that are linear in the area.
+AREA = 100 * np.exp(HOURS / 8)
+SYNTHETIC = {"time_h": HOURS, "aggregate_area_um2": AREA, "conductivity_m_per_d": 24e-6 * clean(SCENE) * 50 / AREA,
+             "effluent_acceptor_mg_per_L": 10 - AREA / 2000, "effluent_donor_mg_per_L": 10 - AREA / 3000,
+             "mean_velocity_m_per_d": 2 + HOURS, "thickness_um": AREA / 200, "contact": 1.0 * (HOURS > 35)}
+#: The last shape with a film and the first without, with a 20th of the conductivity.
+TOUCHING = {"time_h": np.array([36.0, 36.1]), "aggregate_area_um2": np.array([9000.0, 9100.0]),
+            "conductivity_m_per_d": 24e-6 * clean(SCENE) * 50 / np.array([9000.0, 20 * 9100.0])}
+#: Two steps: supplies 10 mg/L of 1 and 3 um2 of water, of which 40 and 20 % are taken up; biomass that lacks 2 %.
+STEPS = {"end_h": np.array([1.0, 2.0]), "biomass_before_pg_per_m": np.array([100.0, 150.0]),
+         "biomass_made_pg_per_m": np.array([50.0, 40.0]), "biomass_after_pg_per_m": np.array([150.0, 186.2])}
+STEPS |= {f"{name}_supplied_pg_per_m": np.array([10.0, 30.0]) for name in ("acceptor", "donor")}
+STEPS |= {f"{name}_{part}_pg_per_m": share * np.array([10.0, 30.0])
+          for name, left in (("acceptor", 0.6), ("donor", 0.8))
+          for part, share in (("out", left), ("consumed", 1 - left))}
+#: A run whose area grows as its biomass does, X_m times. Its effluents are those at the starts of steps; the mean of a
+#: step is 6 and 8 mg/L.
+EVEN = {"aggregate_area_um2": np.array([100.0, 150.0, 190.0]) / SCENE.kinetics.maximum_density,
+        "effluent_acceptor_mg_per_L": np.array([6.2, 6.1, 5.9]), "effluent_donor_mg_per_L": np.array([8.3, 8.1, 7.9])}
+#: Effluents at the ends of steps, (2, 2) mg/L.
+AT_ENDS = np.array([[5.8, 5.9], [7.7, 7.9]])
+AGAINST = (10 - AT_ENDS) / [[4], [2]]
+FOLDING = folds.StretchHistory(HOURS, 1 - HOURS / 100, np.exp(HOURS / 8), 1.0, "")
+CREASED = np.exp(100 * (1 - 0.647) / 8)
+#: {name: (value of a function of claims, its closed form)}; the error of linear interpolation is none.
+VALUES = {
+    "steepness": (lambda: permeability.steepness(("wide",)),
+                  1 + np.log(20) / np.log(1.1)),
+    "steepness over a layer's": (lambda: permeability.as_layers_fall(("wide",), "wide").value, (
+        1 + np.log(20) / np.log(1.1)) * np.log(1.1) / np.log(layered_channel.gradient(1.0, 9100 / 6e4, 2000.0)
+                                                            / layered_channel.gradient(1.0, 9100 / 6.6e4, 2000.0))),
+    "filled at a reduction": (lambda: discussed.filled_at(0.02), 50 / 0.02 / 6e4),
+    "shares": (lambda: discussed.shares(SYNTHETIC), AREA / 20000),
+    "share of the aggregate": (lambda: discussed.share_of_aggregate(0.1), 6e3 / 20000),
+    "spread": (lambda: discussed.spread_in_percent(np.array([[1.0, 4.0], [3.0, 5.0], [2.0, 4.5]])), [200.0, 25.0]),
+    "conductivity at a thickness": (lambda: assumed.conductivity_ratio_at(("wide",), AREA[7] / 2e4), 50 / AREA[7]),
+    "change of the conductivity": (lambda: rheology.conductivity_change(("changed",), (10.0, 20.0), ("wide",)), 20.0),
+    "acceptor consumed": (lambda: permeability.consumed(SYNTHETIC), (2 + HOURS) * AREA / 2000),
+    "specific growth": (lambda: permeability.specific_growth(SYNTHETIC), np.full(20, 1 / 8)),
+    "defects of the biomass": (lambda: runs.biomass_defects(("wide",)), [0.0, -3.8 / 186.2]),
+    "time of contact": (lambda: runs.contact_time("wide"), 36.1),
+    "nearest row": (lambda: runs.nearest(("wide",), 12.9), 12.0),
+    "errors of the bookkeeping": (lambda: book().ratio_errors(), np.vstack([
+        1 / AGAINST - 1, AGAINST[:1] / AGAINST[1:] - 1])),
+    "errors of corrected effluents": (lambda: book().ratio_errors(1.01)[:2], [[4], [2]] / (10 - 1.01 * AT_ENDS) - 1),
+    "corrections": (lambda: book().corrections(), [[6], [8]] / AT_ENDS),
+    "dM_CA / dM_CD": (lambda: scheme.ratio_of(1.01, 4.0, 6.0), (10 - 4.04) / (10 - 6.06)),
+    "expansion while smooth": (lambda: folds.smooth_expansion(FOLDING), CREASED),
+    "expansion without creases": (lambda: folds.smooth_expansion(replace(FOLDING, stretch=np.ones(21))), np.exp(5.0)),
+    "part upstream": (lambda: runs.upstream_part(shapely.box(-1, 0, 1, 1), shapely.box(-4, 0, 2, 1)), 0.75),
+    "uncovered": (lambda: runs.uncovered(shapely.box(0, 0, 4, 1), shapely.box(1, 0, 5, 1)), 50.0),
+    "in-plane stress": (lambda: runs.in_plane(np.array([[5.0, 1.0, 7.0, 1.5]])), [2.5]),
+    "equivalent stress": (lambda: runs.equivalent(np.array([[0.0, 0.0, 3.0, 0.0], [0.0, 0.0, 0.0, 2.0]])),
+                          [3.0, 12**0.5]),
+}
+
+
+def book():
+    return scheme.bookkeeping(("even",))
+
+
+@pytest.mark.parametrize("name", VALUES)
+def test_a_function_of_claims_gives_its_closed_form_on_a_synthetic_run(name, monkeypatch):
+    changed = SYNTHETIC | {"conductivity_m_per_d": 1.2 * SYNTHETIC["conductivity_m_per_d"]}
+    tables = {"wide": SYNTHETIC, "changed": changed, "even": EVEN}
+    replaced = {"series": lambda run: tables[run], "around_contact": lambda run: TOUCHING,
+                "load_packaged": lambda run: SCENE, "ledger": lambda run: STEPS,
+                "at": lambda run, time: {key: column[HOURS == time][0] for key, column in tables[run[0]].items()}}
+    for module in (runs, permeability, discussed, assumed, rheology, scheme):
+        for function, value in replaced.items():
+            if hasattr(module, function):
+                monkeypatch.setattr(module, function, value)
+    computed, expected = VALUES[name]
+    assert computed() == pytest.approx(expected, rel=1e-9, abs=1e-12)
 
 
 # The committed record.

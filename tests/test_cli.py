@@ -1,5 +1,6 @@
 """The command line: its output and its refusals."""
 
+import inspect
 import os
 import re
 from pathlib import Path
@@ -7,9 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import repro
 from repro import results
-from repro.cli import COMMANDS, main
+from repro.cli import COMMANDS, _parser, main
 from repro.cli.docs import PAGES
+from repro.runs.execution import Watch
+from repro.sweeps.driver import run_plan
 from tests.pages import run
 from tests.shell import read_record, refusal, rows, start
 
@@ -54,6 +58,34 @@ def test_a_folder_with_other_files_is_left_alone(tmp_path, capsys, before, name)
     mine.parent.mkdir(exist_ok=True)
     mine.write_text("years of work")
     assert mine.name in refusal(tmp_path, capsys, "run", "flow_only", "--out", tmp_path / "run")
+
+
+def options_of(command):
+    """The options of a command."""
+    parser = next(action for action in _parser()._actions if action.dest == "command").choices[command]
+    return [action for action in parser._actions if action.dest != "help"]
+
+
+#: Functions of Python with the parameters that a command has as options.
+FUNCTIONS = {"sweep": [repro.sweep, run_plan], "run": [Watch, repro.run, repro.resume], "plot": [repro.Results.plot],
+             "check": [repro.check], "compare": [repro.compare]}
+#: Parameters that are options of another name.
+NAMES = {"interval": "checkpoint"}
+
+
+@pytest.mark.parametrize("command", FUNCTIONS)
+def test_a_default_is_the_same_in_the_help_the_command_and_python(command):
+    """The help states each default that is a number. An empty list of options is an empty tuple in Python."""
+    options = {action.dest: action for action in options_of(command)}
+    for name, option in options.items():
+        number = re.search(r"\(default: ([\d.]+|%\(default\)g)\)", option.help)
+        assert bool(number) == isinstance(option.default, int | float) or option.default is False, name
+        assert not number or number[1] in ("%(default)g", f"{option.default:g}"), name
+    for function in FUNCTIONS[command]:
+        for name, parameter in inspect.signature(function).parameters.items():
+            option = options.get(NAMES.get(name, name))
+            if option and parameter.default is not inspect.Parameter.empty:
+                assert parameter.default == option.default or not (parameter.default or option.default), name
 
 
 def test_unset_and_set_combine(tmp_path, capsys):

@@ -1,5 +1,6 @@
 """Comparisons of runs: their charts, the reported differences, and refusals."""
 
+import html
 import os
 import re
 import shutil
@@ -13,6 +14,8 @@ from repro import results
 from repro.cli import main
 from repro.report import comparison, quantities
 from repro.report.reading import Run, read
+from repro.results import columns
+from repro.results.names import with_unit
 from tests.faults import limit_memory
 from tests.shell import flip, read_record, refusal, rewrite
 
@@ -145,6 +148,26 @@ def test_runs_are_compared_under_their_own_names_with_signs():
                            ("least acceptor concentration", ["-8", "-12", "-50 %", "-4", "+50 %"])):
         (row,) = re.findall(f"<tr><td>{name}.*?</tr>", page_text)
         assert re.findall('class="value">([^<]*)<', row) == expected
+
+
+def compared_as(quantity):
+    """How a column is compared whose value rises from 4 to 5; empty if it is not."""
+    decides = quantity.formula.startswith("1 if")
+    if decides or quantity.name in ("time_h", "nodes") or quantity.words.startswith("relative defect"):
+        return ""
+    return "+1 um" if re.match("place of|(up|down)stream end", quantity.words) else "+25 %"
+
+
+def test_every_column_is_compared_as_what_it_is():
+    """The words of a column tell whether it is a coordinate, a defect or neither."""
+    runs = [Run(Path(name), {"scene": name, "status": "completed", "tables": {}},
+                {column: np.array([0.0, value]) for column in results.COLUMNS} | {"time_h": np.array([0.0, 3.0])}, {})
+            for name, value in (("one", 4.0), ("other", 5.0))]
+    text = html.unescape(comparison.build(runs))
+    for quantity in columns.SERIES:
+        rows = re.findall(f"<tr><td>{re.escape(with_unit(quantity.name))}</td>(.*?)</tr>", text)
+        differences = [re.findall('class="value">([^<]*)<', row)[-1] for row in rows]
+        assert differences == [compared_as(quantity)] * bool(compared_as(quantity)), quantity.name
 
 
 @pytest.mark.parametrize("first, value, is_coordinate, text", [

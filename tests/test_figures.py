@@ -10,6 +10,7 @@ import pytest
 import paper_figures
 from paper_figures import __main__ as figures
 from paper_figures import claims, figure_6, runs, states, style
+from reference import layered_channel
 from repro import cli, load_scene, results, run
 from repro.scene import scene_hash
 from verification.claims import report
@@ -81,6 +82,7 @@ def unlike(monkeypatch):
     for k in range(7):
         hours = np.linspace(0.0, 50.0 + k, 5 + k)
         columns = {name: (2.0 + k + j) * np.exp(-hours / (20.0 + 3 * k + j)) for j, name in enumerate(results.COLUMNS)}
+        columns["aggregate_area_um2"] = 1500 * columns["aggregate_area_um2"]
         tables[Path(f"run {k}")] = columns | {"time_h": hours, "contact": 1.0 * (np.arange(len(hours)) > 0) * (k < 2)}
     monkeypatch.setattr(states, "series", tables.__getitem__)
     return tables
@@ -101,3 +103,96 @@ def test_a_curve_matches_its_legends(unlike):
             table = tables[line.get_color()]
             expected = table["time_h"], table[column.format(kinds[line.get_linestyle()])]
             assert np.array_equal(line.get_xydata().T, expected)
+
+
+def value(k, name, hours):
+    """The value of a column in run k of ``unlike`` at a time (h)."""
+    j = results.COLUMNS.index(name)
+    return (1500 if name == "aggregate_area_um2" else 1) * (2.0 + k + j) * np.exp(-hours / (20.0 + 3 * k + j))
+
+
+def fall(k):
+    return f"{value(k, K, 0.0) / value(k, K, 50.0 + k):.3g}"
+
+
+def area_rate(k):
+    """The constant rate (1/h) at which the area of run k falls."""
+    return -1 / (20.0 + 3 * k + results.COLUMNS.index("aggregate_area_um2"))
+
+
+K, U = "conductivity_m_per_d", "mean_velocity_m_per_d"
+FILLED = value(0, "aggregate_area_um2", 50.0) / (100 * 600)
+#: {figure: (number of runs, numbers of its caption in their order)}. Contact is at the second row: 12.5 h in the first
+#: run, 10.2 h in the second.
+CAPTIONS = {
+    "time_series": (2, ["50 h", "51 h", f"a factor of {fall(0)} in Base and {fall(1)} in Wide",
+                        "at 12.5 h and 10.2 h."]),
+    "discussion_biomass": (1, ["from 0 to 50 h", f"fills {100 * FILLED:.1f} %", f"by a factor of {fall(0)};",
+                               f"by a factor of {layered_channel.gradient(1.0, FILLED, 2000.0) / 12:.2g}.",
+                               f"takes up {100 * (1 - value(0, 'effluent_acceptor_mg_per_L', 50.0) / 10):.0f} %"]),
+    "discussion_head": (2, ["continued to 50 h", "is that of 12.5 h",
+                            f"from {value(0, U, 0.0):.3g} to {value(0, U, 50.0):.2g} m/d",
+                            f"from {area_rate(0):.2g} to {area_rate(0):.2g} 1/h"]),
+    "discussion_permeable": (3, ["; ".join("{:.3g}, {:.3g}, {:.3g} m/d at {:g} h".format(
+        *(value(k, K, hours) for k in range(3)), hours) for hours in (20, 34, 40))]),
+    "discussion_rheology": (7, ["to 50 h", *(f"{time} h and {value(k, K, 50.0 + k):.3g} m/d" for k, time in enumerate(
+        ["12.5", "10.2", *5 * ["inf"]]))]),
+}
+#: Figures whose captions have numbers of the model alone, or of records with tests of their own.
+OF_MODEL = {"figure_2", "figure_3", "discussion_folds", "discussion_tearing", "discussion_transfer", "network"}
+
+
+def in_order(expected, caption):
+    for words in expected:
+        assert words in caption, (words, caption)
+        caption = caption.partition(words)[2]
+
+
+@pytest.mark.parametrize("name", CAPTIONS)
+def test_the_numbers_of_a_caption_are_those_of_its_runs(name, unlike):
+    count, expected = CAPTIONS[name]
+    in_order(expected, MODULES[name].caption(*[*unlike][:count]))
+
+
+def test_the_course_of_a_run_names_its_contact(unlike, monkeypatch):
+    """Between its rows."""
+    monkeypatch.setattr(figure_6, "upstream_share", lambda folder: 0.625)
+    ends = [value(1, f"{end}_um", 51.0) for end in ("upstream", "downstream")]
+    expected = ["contact between 0 and 10.2 h", "from {:.0f} to {:.0f} µm at 51 h".format(*ends), "62.5 % of the area"]
+    in_order(expected, figure_6._course([*unlike][1]))
+
+
+def row_at(folder, time):
+    """A row whose numbers differ by column and time (h)."""
+    return {name: 1 + k + 0.1 * time for k, name in enumerate(results.COLUMNS)}
+
+
+def of_fields(short):
+    """{figure: (folders, numbers of its caption in their order)} of captions with numbers of fields, from the rows."""
+    last = {name: values[-1] for name, values in results.read_table(short["base"] / "timeseries.csv").items()}
+    first, shaped, end = (row_at(None, time) for time in (0.0, 0.4, 0.6))
+    wide = results.read_table(short["wide"] / "timeseries.csv")
+    start = {name: values[0] for name, values in results.read_table(short["initial_mesh"] / "timeseries.csv").items()}
+    course = f"no contact, from {wide['upstream_um'][-1]:.0f} to {wide['downstream_um'][-1]:.0f} µm at 0.4 h"
+    return {
+        "figure_4": (["initial_mesh"], [f"{start['meshed_length_um']:.0f} µm between",
+                                        f"of {start['downstream_um'] - start['upstream_um']:.0f} µm",
+                                        f"{start['nodes']:.0f} nodes"]),
+        "figure_5": (["base"], ["at t = 0.6 h", "shape of 0.4 h",
+                                *(f"{row[U]:.2f} m/d" for row in (first, shaped, end))]),
+        "figure_6": (3 * ["wide"], [f"({letter}) {supply} K_s: {course}" for letter, supply in
+                                    zip("abc", (5, 10, 40))]),
+        "plate_1": (["base"], ["at t = 0.6 h", "that of 0.4 h", f"at 0.4 h, with less biomass in the same shape, "
+                    f"{shaped['effluent_acceptor_mg_per_L']:.2f} and {shaped['effluent_donor_mg_per_L']:.2f} mg/L"]),
+        "plate_2": (["base"], ["from 0.4 to 0.6 h", f"is {last['meshed_length_um']:.0f} µm long",
+                               f"{-last['upstream_um']:.2f} µm upstream and {last['downstream_um']:.2f} µm"])}
+
+
+def test_the_numbers_of_captions_about_fields_are_those_of_rows(short, monkeypatch):
+    """Every figure is here, above, or has numbers of the model alone."""
+    monkeypatch.setattr(figure_6, "EVERY", 0.2)
+    monkeypatch.setattr(states, "row", row_at)
+    captions = of_fields(short)
+    assert {*captions, *CAPTIONS, *OF_MODEL} == {*MODULES}
+    for name, (scenes, expected) in captions.items():
+        in_order(expected, MODULES[name].caption(*(short[scene] for scene in scenes)))

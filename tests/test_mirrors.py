@@ -4,6 +4,9 @@ The mirror of a pore is x -> -x: areas, numbers and warnings stay the same, the 
 number is its negative: the ends of its interval change places and signs.
 """
 
+from dataclasses import replace
+from functools import cache
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -11,8 +14,12 @@ from hypothesis import strategies as st
 
 from repro import PoreEnd, load_scene, simulate
 from repro.fem import sizing
+from repro.fem.outline import BOTTOM, TOP
+from repro.march.simulation import shaped
+from repro.model import contact, pore
 from repro.preflight import numbers, simplifications
-from tests.strategies import outlines
+from tests.strategies import EVERY_ORDER, MIRRORS, outlines
+from tests.test_derived import SHAPE, SPANNING, drawn
 from verification import claims, sensitivity
 from verification.network import law
 
@@ -31,6 +38,68 @@ def test_a_run_ends_at_either_end_of_the_pore_and_names_it(time, from_end, momen
     changes = [*HASTY, f"numerics.time={time}", f"aggregate.position={sign * (100 - from_end)} um"]
     with pytest.raises(PoreEnd, match=f"^the aggregate reaches the pore's {side} end {moment}"):
         list(simulate(load_scene("base", changes)))
+
+
+@cache
+def seed_of(order, spans):
+    """(scene, its pore at t = 0): an asymmetric aggregate between both walls, or one that almost spans the pore. Its
+    fixed points are chosen anew in each step."""
+    scene = shaped(drawn(order), SPANNING if spans else SHAPE)
+    return replace(scene, numerics=replace(scene.numerics, fixed_point="rechosen")), pore.seeded(scene)
+
+
+@cache
+def grown(order, spans, image):
+    """An aggregate, or its mirror image, after uneven growth that moves all of its contact lines."""
+    scene, seed = seed_of(order, spans)
+    x, y = seed.mesh.points[seed.mesh.cells[seed.mesh.biomass, :3]].mean(axis=1).T
+    growth = 1.5 + 0.01 * x + 0.005 * y if spans else 1.02 + 0.001 * x
+    seed = replace(seed, theta=growth[:, None] * seed.theta)
+    seed = MIRRORS[image](seed) if image else seed
+    return contact.expand(contact.Mechanics.of(scene), seed, seed.theta).pore
+
+
+@pytest.mark.parametrize("spans, image", [*((True, image) for image in MIRRORS), (False, "along")])
+@pytest.mark.parametrize("order", [1, 2])
+def test_contact_advances_alike_in_a_pore_and_its_mirror_image(order, spans, image):
+    """Contact by nodes and by lines, the first contact included: each rule holds on either side and either wall, to the
+    defect of Newton's method."""
+    expected, computed = MIRRORS[image](grown(order, spans, None)), grown(order, spans, image)
+    assert np.array_equal(computed.wall, expected.wall) and np.array_equal(computed.fixed, expected.fixed)
+    assert computed.boundary.points == pytest.approx(expected.boundary.points, abs=1e-6)
+    _, seed = seed_of(order, spans)
+    assert expected.contact
+    if not spans:
+        return
+    before, after = (np.array([[x[at.wall == wall].min(), x[at.wall == wall].max()] for wall in (BOTTOM, TOP)])
+                     for at in (seed, grown(order, True, None)) for x in [at.boundary.points[:, 0]])
+    assert (np.abs(after - before) > 0.1).all(), "each line has moved"
+
+
+@EVERY_ORDER
+def test_still_water_supplies_a_pore_and_its_mirror_image_alike(order):
+    """Without flow both ends hold the supply. Nodes keep their numbers."""
+    scene, seed = seed_of(order, True)
+    one, other = (pore.solve(replace(scene, flow=None), at).concentrations for at in (seed, MIRRORS["along"](seed)))
+    assert other.acceptor == pytest.approx(one.acceptor, abs=1e-8) and other.donor == pytest.approx(one.donor, abs=1e-8)
+    assert np.ptp(one.donor) > 0.5
+
+
+@pytest.mark.parametrize("image", MIRRORS)
+@pytest.mark.parametrize("spans", [True, False])
+@pytest.mark.parametrize("interface", ["laplacian", "traction"])
+@pytest.mark.parametrize("order, permeability", [(1, None), (2, None), (2, 40.0)])
+def test_a_pore_and_its_mirror_images_conduct_alike(order, permeability, interface, spans, image):
+    """Stokes flow is reversible. The rules of a viscous and of a permeable body hold on either side, and a body may lie
+    on either wall. The profile is prescribed at the inlet alone. This changes the flow at the aggregate, 1.5 widths
+    downstream, by less than exp(-4.2 1.5) = 0.002."""
+    scene, seed = seed_of(order, spans)
+    drive = replace(scene.flow, permeability=permeability, viscosity_ratio=None if permeability else 20.0)
+    numerics = replace(scene.numerics, interface=interface)
+    one, other = (pore.solve_flow(at.space, drive, scene.pore.length, numerics) for at in (seed, MIRRORS[image](seed)))
+    assert other.conductivity == pytest.approx(one.conductivity, rel=1e-8 if image == "across" else 0.002)
+    if image == "across":
+        assert other.velocity * [1, -1] == pytest.approx(one.velocity, abs=1e-8 * np.abs(one.velocity).max())
 
 
 def scene_with_outline(name, points, *changes):

@@ -30,7 +30,7 @@ def scene(width, points, preset="fast", refinement=None):
 def ragged(seed):
     """Width (um) and points of an outline that its scene accepts; every fourth one spans the pore."""
     draw = random.Random(seed)
-    while True:
+    for _ in range(10_000):
         width, half, count = draw.uniform(15, 120), draw.uniform(0.15, 1.2), draw.randint(3, 12)
         x = sorted(draw.uniform(-half, half) for _ in range(count))
         y = [draw.choice([draw.uniform(0.05, 0.5), draw.uniform(0.5, 0.97)]) for _ in x]

@@ -74,9 +74,23 @@ LIST = "a list of 3 to 1000 points [x, y], each a pair of lengths, is needed, su
     ([["-5 um", "0 um"], ["0 um", "9 um"], ["0 um", "2 um"], ["0 um", "8 um"], ["5 um", "0 um"]], "nor touches"),
     ([BUMP[0], ["0 um", "50 um"], BUMP[3]], "two points or more in a row, or none, on the upper wall"),
     ([BUMP[0], ["-4 um", "50 um"], ["0 um", "9 um"], ["4 um", "50 um"], BUMP[3]], "two points or more in a row"),
+    # the same at the other end; tests/test_odd_outlines.py has gaps to walls and ends
+    ([*BUMP[:3], ["300 um", "0 um"]], "|x| < half of pore.length (600 um) at point 4 (300 um, 0 um) is needed"),
+    ([BUMP[0], ["0 um", "50.1 um"], BUMP[3]], "0 < y <= pore.width (50 um) at point 2 (0 um, 50.1 um) is needed"),
+    ([BUMP[0], ["-5.01 um", "0.04 um"], *BUMP[1:]], "(50 um) or more is needed from point 1 to the next"),
+    ([*BUMP[:3], ["5.01 um", "0.04 um"], BUMP[3]], "(50 um) or more is needed from point 4 to the next"),
 ])
 def test_points_that_are_no_outline_are_refused(tmp_path, points, part):
     """One line names file, key, value and the accepted values."""
     path = write_scene(tmp_path, toml(points))
     message = refusal(path)
     assert message.startswith(f"{path}: aggregate.outline = {json.dumps(points)[:30]}") and part in message
+
+
+@pytest.mark.parametrize("points", [
+    [["-299.99 um", "0 um"], *BUMP[1:]], [*BUMP[:3], ["299.99 um", "0 um"]],
+    [BUMP[0], ["0 um", "0.006 um"], ["4 um", "9 um"], BUMP[3]], [BUMP[0], ["0 um", "49.994 um"], BUMP[3]],
+    [BUMP[0], ["-5.01 um", "0.06 um"], *BUMP[1:]], [["-0.03 um", "0 um"], *BUMP[1:3], ["0.03 um", "0 um"]]])
+def test_points_just_within_their_bounds_are_accepted(points):
+    """At either end, beside either wall, and between neighbours."""
+    assert scene_of(outline=points).aggregate.outline

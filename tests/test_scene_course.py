@@ -1,17 +1,24 @@
 """Supplies, head and mean velocity as tables over time: reading, writing, and runs with them. `test_longer.py` makes a
 run with a table longer."""
 import json
+import math
+from dataclasses import replace
 from math import inf
 from operator import attrgetter
 
 import numpy as np
 import pytest
 
+from repro import results
 from repro.march import updates
+from repro.march.loop import Report
 from repro.march.simulation import simulate
 from repro.model import pore
 from repro.preflight.checked import check
+from repro.preflight.modelled import describe_model
 from repro.preflight.numbers import evaluate_at_largest
+from repro.results.jumps import with_jumps
+from repro.results.names import DEFECTS
 from repro.scene import Scene, load_scene, parse_scene, scene_tables
 from repro.scene.text import scene_text
 from repro.scene.time_table import TimeTable
@@ -44,6 +51,36 @@ def test_every_key_that_takes_a_table_follows_its_sections_interpolation(key):
         loaded = load_scene("base", [f"{key}={table}", f"{section}.interpolation={word}"], unset=without)
         assert [attrgetter(key)(loaded.at(time)) for time in (0, 0.5, 1, 2, 9)] == pytest.approx(expected, rel=1e-15)
         assert attrgetter(key)(loaded.largest) == 6 and [loaded.corner(time) for time in (0, 1, 4)] == [1, 4, inf]
+
+
+@pytest.mark.parametrize("key", TIMED)
+def test_the_columns_that_a_table_changes_at_once_are_drawn_with_a_jump(key):
+    """Two rows of one state, with the values before and after the jump, tell which columns jump. Bounds of substrates
+    may be zero in both."""
+    without = ["flow.head"] if key.endswith("mean_velocity") else []
+    size = 1e5 if without else 5.0
+    table = json.dumps([[time, TIMED[key].write(value)] for time, value in (("0 h", size), ("2 h", 2 * size))])
+    loaded = load_scene("base", [f"{key}={table}", "growth.tensile_strength=1 MPa", "numerics.refinement=0.3",
+                                 "aggregate.radius=20 um"], unset=without)
+    seed = pore.seeded(loaded)
+    rows = []
+    for time in (0.0, 2.0):
+        at = replace(seed, time=time)
+        rows.append(results.row(loaded, Report(at, pore.solve(loaded, at), None, (), 0, {})))
+    changed = {column for column, before in rows[0].items()
+               if before is not None and not math.isclose(before, rows[1][column], rel_tol=1e-6, abs_tol=1e-9)}
+    times, values = np.array([1.0, 3.0]), np.array([1.0, 2.0])
+    drawn = {column for column in rows[0] if len(with_jumps(column, times, values, scene_tables(loaded))[0]) > 2}
+    assert changed - {"time_h", *DEFECTS} - drawn == set(), "these jump"
+    assert {column for column in drawn - changed if rows[0][column] or rows[1][column]} == set(), "these do not"
+
+
+@pytest.mark.parametrize("key", TIMED)
+def test_check_describes_every_table(key):
+    without = ["flow.head"] if key.endswith("mean_velocity") else []
+    table = json.dumps([[time, TIMED[key].write(value)] for time, value in (("0 h", 1e4), ("2 h", 3e4))])
+    described = dict(describe_model(load_scene("base", [f"{key}={table}"], unset=without)))
+    assert ", in steps, the last from 2 h" in described[key.partition(".")[0]]
 
 
 def test_the_times_of_all_tables_of_a_scene_are_its_corners():

@@ -175,19 +175,17 @@ def test_every_key_refuses_values_of_another_kind():
      'flow.biomass = "viscous" is needed with it'),
     ("base", ["flow.biomass=brinkman", "flow.permeability=1e-15 m^2"],
      'flow.biomass = "brinkman": numerics.elements = "quadratic" or "cubic" is needed'),
-    ("base", ["growth.new_biomass=stress_free", "growth.bonding_strength=1 kPa"],
-     'growth.bonding_strength = "1 kPa": growth.new_biomass = "stressed" is needed with it'),
     ("base", ["numerics.preset=fast", "flow.biomass=brinkman", "flow.permeability=2.49e-20 m^2"],
      'flow.permeability = "2.49e-20 m^2": "2.5e-20 m^2" or more is needed in a pore 50 um wide'),
     ("base", ["kinetics.donor_oxygen_demand=0.8", "kinetics.acceptor_to_donor_ratio=1.52"],
      "more than Y d_c (0.8662) is needed"),
-    ("base", ["substrates.acceptor.diffusivity_in_aggregate=1e-200 %", "substrates.acceptor.diffusivity=1e-200 um^2/h"],
-     'diffusivity_in_aggregate = "1e-200 %": greater than zero is needed'),
     ("base", ["flow.permeability=0 m^2"], "a permeability"),
+    ("base", ['flow.head=[["0 h", "1 cm"], ["2 h", "2 cm"]]', "flow.mean_velocity=1 m/day"],
+     "flow.mean_velocity = \"1 m/day\": flow.head (a table) is set too"),
+    ("base", ["flow.head=1 cm", 'flow.mean_velocity=[["0 h", "1 m/day"], ["2 h", "2 m/day"]]'],
+     "flow.head (10000 um) is set too"),
     ("flow_only", ["growth.end=1 h"], "growth = "),
     ("flow_only", ["aggregate.inert_fraction=0.3"], "aggregate.inert_fraction = 0.3: 0 is needed without [substrates]"),
-    ("base", ["numerics.elements=cubic", "numerics.transfer=linear"],
-     '"conserving" is needed with numerics.elements = "cubic"; "linear" has'),
     ("flow_only", ["substrates={}", "growth.time_step=1 h"], 'growth.end is missing: a time is needed'),
     ("flow_only", ['output.times=["1 h"]'], "times up to 0 h are accepted: there is no [growth]"),
 ])
@@ -238,6 +236,34 @@ def test_a_file_is_refused_by_its_own_key(tmp_path, text, part):
 def test_values_at_the_bounds_are_accepted(source, overrides):
     scene = load_scene(source, overrides)
     assert parse_scene(scene_tables(scene), scene.name, "again") == scene
+
+
+SUBSTRATES = ("acceptor", "donor")
+FALLING = '[["0 h", "0.9 mg/L"], ["1 h", "0.1 mg/L"]]'
+#: Members of rules that hold for several keys or elements: the key that is named, and entries of --set on base.
+#: tests/test_scene_aggregate.py has those of outlines.
+MEMBERS = [
+    *((f"substrates.{name}.diffusivity_in_aggregate", [f"substrates.{name}.diffusivity_in_aggregate=1e-200 %",
+                                                       f"substrates.{name}.diffusivity=1e-200 um^2/h"])
+      for name in SUBSTRATES),
+    *((f"{key}.interpolation", [f"{key}.interpolation=linear"])
+      for key in ("flow", *(f"substrates.{name}" for name in SUBSTRATES))),
+    *((f"substrates.{name}.supply", ["kinetics.law=zero order", f"substrates.{name}.supply={supply}"])
+      for name in SUBSTRATES for supply in ("0.9 mg/L", FALLING)),
+    *((f"numerics.{key}", [f"numerics.elements={elements}", f"numerics.{key}={value}"])
+      for key, values in (("transfer", ("linear", "bounded")), ("flow_element", ("bubble",))) for value in values
+      for elements in ("quadratic", "cubic"))]
+
+
+@pytest.mark.parametrize("key, entries", MEMBERS)
+def test_every_member_of_a_rule_is_refused(key, entries):
+    assert refusal("base", *entries).startswith(f"base: {key} = ")
+
+
+@pytest.mark.parametrize("name", SUBSTRATES)
+def test_a_supply_that_reaches_half_saturation_at_any_time_is_accepted_of_zero_order(name):
+    rising = FALLING.replace("0.1", "1")
+    assert load_scene("base", ["kinetics.law=zero order", f"substrates.{name}.supply={rising}"])
 
 
 OUTLINED = ("initial_mesh --unset aggregate.radius",
@@ -296,6 +322,8 @@ PAIRS = [
      "a smaller value is needed: Y d_c (2.44) is not less than kinetics.donor_oxygen_demand (1.2)"),
     ("base", 'output.times=["5 h"]', "growth.end=4 h", "times up to 4 h are accepted: growth.end is 4 h",
      "5 h or more, the last of output.times, is needed"),
+    *(("base", f"growth.{key}=1 kPa", "growth.new_biomass=stress_free", 'new_biomass = "stressed" is needed with it',
+       f'"stressed" is needed with growth.{key} = 0.001 MPa') for key in ("bonding_strength", "tensile_strength")),
 ]
 
 

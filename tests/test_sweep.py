@@ -20,12 +20,14 @@ import numpy as np
 import pytest
 
 import repro
-from repro import cli, results
+from repro import results
 from repro.cli import main
+from repro.cli.sweep import SOME_FAILED, _report
+from repro.errors import RunEnd
 from repro.runs import execution
 from repro.runs.machine import THREADS
-from repro.runs.status import is_fold
-from repro.sweeps import page, pool, single_run, table
+from repro.runs.status import COMPLETED, FAILED, INTERRUPTED, RUN_ENDS, RUNNING
+from repro.sweeps import driver, page, pool, single_run, table
 from repro.sweeps.design import grid, latin, parse, points
 from repro.sweeps.folder import Sweep
 from tests import shell
@@ -377,15 +379,56 @@ def record_end(swept, point, status, rows=1):
     return recorder
 
 
-def test_unfinished_runs_of_a_sweep_are_made_again(tmp_path):
-    """The pore's end counts only as the complete sentence."""
-    swept = sweep_of(tmp_path, "40 um, 50 um, 60 um, 70 um, 80 um, 90 um, 95 um")
-    end = "the aggregate reaches the pore's downstream end at t = 0 h"
-    statuses = ("completed", "failed: x", "interrupted", end, f"{end}!", end.replace("= 0", "= 1"),
-                end.replace("at t", "in the step from t"))
-    for point, status in zip(swept.points, statuses):
-        record_end(swept, point, status)
-    assert [point.index for point in swept.missing()] == [2, 3, 5]
+#: Every status of a run, and whether the run is over. An end of the model counts only as the complete sentence.
+ENDS = ["the aggregate reaches the pore's downstream end at t = 0 h",
+        "the aggregate reaches the pore's upstream end in the step from t = 1.5 h",
+        "the aggregate's surface folds in the step from t = 2 h: growth compressed it near x = 3 um",
+        "the aggregate detaches at t = 1e-05 h: near x = 3, y = 0 um its wall must bear 2 MPa",
+        "the aggregate tears at t = 12 h: near x = 3, y = 0 um its tensile stress is 2 MPa"]
+STATUSES = dict.fromkeys([COMPLETED, *ENDS], True) | dict.fromkeys(
+    [f"{FAILED}x", INTERRUPTED, RUNNING, f"{ENDS[0]}!", ENDS[2].partition(":")[0], ENDS[4].partition(":")[0]], False)
+
+
+def test_every_status_takes_its_whole_path_through_a_sweep(tmp_path, capsys):
+    """Which runs are made again, their rows in both tables, the page, and the exit status with a line for each run that
+    is not over. A running run was killed: its table may be cut short."""
+    widths = ", ".join(f"{40 + k} um" for k in range(len(STATUSES)))
+    swept = sweep_of(tmp_path, widths)
+    for point, status in zip(swept.points, STATUSES):
+        record_end(swept, point, status, rows=2)
+    repeated = []
+
+    def run_points(missing, folder):
+        for point in missing:
+            repeated.append(point.index)
+            yield point, "failed: again"
+
+    again = driver.run_plan(swept, run_points)
+    unfinished = [index for index, over in enumerate(STATUSES.values(), 1) if not over]
+    assert repeated == unfinished == [run.point.index for run in again.failed]
+    expected = ["failed: again" if status == RUNNING else status for status in STATUSES]
+    lines = rows(tmp_path / "runs.csv")
+    assert [line["status"] for line in lines] == expected
+    assert [line["status"] for line in lines if line["fold_time_h"]] == ENDS[2:3]
+    killed = [*STATUSES].index(RUNNING) + 1
+    assert [row["run"] for row in rows(tmp_path / "table.csv")] == [
+        str(index) for index in range(1, len(STATUSES) + 1) for _ in range(2 * (index != killed))]
+    text = (tmp_path / "summary.html").read_text()
+    assert f"{len(STATUSES) - len(unfinished)} of {len(STATUSES)} runs have come to their end" in text
+    cells = re.findall(r'<td class="text( bad)?">(.*?)</td></tr>', text)
+    assert cells == [("", html.escape(status)) if over else (" bad", html.escape(status.partition(":")[0]))
+                     for status, over in zip(expected, STATUSES.values())]
+    assert _report(again) == SOME_FAILED == 3
+    printed = capsys.readouterr()
+    for index, status in enumerate(expected, 1):
+        line = f"repro: run {index} (pore.width = {39 + index} um): {status}\n"
+        assert (line in printed.err) == (index in unfinished)
+    assert f"{len(STATUSES) - len(unfinished)} of {len(STATUSES)} runs done, {len(unfinished)} failed" in printed.out
+
+
+def test_every_end_of_the_model_is_among_the_statuses():
+    assert {repro.PoreEnd, repro.Fold, repro.Detachment} == {*RunEnd.__subclasses__()}
+    assert all(any(end.fullmatch(status) for status in ENDS) for end in RUN_ENDS)
 
 
 def test_a_run_without_rows_has_the_status_of_its_folder_or_attempt(tmp_path):
@@ -394,13 +437,6 @@ def test_a_run_without_rows_has_the_status_of_its_folder_or_attempt(tmp_path):
     record_end(swept, swept.points[0], "failed: x", rows=0)
     for messages, second in (({}, "not run"), ({1: "failed: y", 2: "failed: z"}, "failed: z")):
         assert [run.status for run in table.read_runs(swept, messages, 0.1)] == ["failed: x", second, "not run"]
-
-
-def test_rows_of_a_run_that_failed_are_in_the_table(tmp_path):
-    swept = sweep_of(tmp_path, "40 um, 50 um")
-    record_end(swept, swept.points[1], "failed: x")
-    table.write(swept, table.read_runs(swept, {}, 0.1))
-    assert [row["run"] for row in rows(tmp_path / "table.csv")] == ["2"]
 
 
 def test_a_sweep_converts_to_tables_and_pictures(tmp_path):
@@ -443,8 +479,6 @@ def test_events_of_a_run():
     value = {number.name: number.reported(folded) for number in table.NUMBERS}
     assert value["half_conductivity_time_h"] == pytest.approx(1 + np.log(1.6) / np.log(4))
     assert value["fold_time_h"] == 2 and np.isnan(value["contact_time_h"]) and np.isnan(value["clogging_time_h"])
-    status = "the aggregate's surface folds in the step from t = 2 h: growth compressed it near x = 3 um"
-    assert is_fold(status) and not is_fold("completed")
 
 
 def test_marks_of_the_page_have_the_colour_of_their_key(tmp_path):
@@ -466,9 +500,3 @@ def test_marks_of_the_page_have_the_colour_of_their_key(tmp_path):
         assert {named[level] == value for _, level, _, value, _ in marks} == {True}
         for kind, _, run, _, message in marks:
             assert (kind, message) == (("polygon", "after 8 h") if run == "3" else ("circle", "5 h"))
-
-
-def test_the_default_seed_of_a_hypercube_is_0():
-    """The help states this."""
-    options = cli._parser().parse_args(["sweep", "base", "--vary", "pore.width=1:2 um:log", "--out", "x"])
-    assert options.seed == 0
