@@ -32,6 +32,7 @@ from repro.model.contact_lines import (
 )
 from repro.model.contact_newton import BESIDE, Coupled, Placed
 from repro.model.pore import Pore, material
+from repro.model.support import Support
 from repro.model.traction import Fluid
 from repro.scene import Growth, Numerics, Scene
 
@@ -218,6 +219,7 @@ def _equilibrium(mechanics: Mechanics, grown: Pore, start: Pore, forces: np.ndar
     locked, target = _constraints(mechanics, grown, start)
     rest = growth.equilibrium(body, target_J, start.mesh.points[nodes], start.pressure[inside],
                               locked, target, forces=forces, last=last, patient=patient,
+                              supports=_supports(mechanics, start, forces),
                               modified_newton=mechanics.numerics.jacobian == "reused")
     return _placed(grown, start, rest), rest.iterations
 
@@ -424,7 +426,8 @@ class _Trials:
         body, theta = _strained_from(keys, locked, locked.theta)
         reference = grown.origin if keys.new_biomass == "stressed" else grown.mesh.points
         prescribed, target = _constraints(self._mechanics, locked, locked)
-        system = growth.System(body, prescribed, forces=forces)
+        supports = _supports(self._mechanics, locked, forces)
+        system = growth.System(body, prescribed, forces=forces, supports=supports)
         return Placed(grown, locked, division, reference, system, theta, target, rule)
 
     def _locked(self, grown: Pore, contact: Contact) -> tuple[Pore, Division | None,
@@ -580,6 +583,25 @@ def _constraints(mechanics: Mechanics, grown: Pore,
     target[rim[shape.wall == BOTTOM], 1] = 0.0
     target[rim[shape.wall == TOP], 1] = mechanics.width
     return constrained(len(target), rim, shape.wall, fixed), target
+
+
+def _supports(mechanics: Mechanics, shape: Pore, forces: np.ndarray | None) -> list[Support]:
+    """The supports of the contact surfaces that slide and have a fixed point.
+
+    A surface of a single node has no length; the node bears its force. Without ``forces`` (n, 2)
+    one surface alone bears none, because the forces of growth along the pore add up to zero.
+    """
+    outline = shape.boundary
+    rim = shape.mesh.topology.body_loop
+    bonded = mechanics.keys.wall == "bonded"
+    supports = []
+    for wall in [TOP] if bonded else [BOTTOM, TOP]:
+        edges = rim[outline.edges_on(wall)]
+        points = rim[outline.fixed & (outline.wall == wall)]
+        if len(edges) and len(points):
+            supports.append(Support(int(points[0]), edges))
+    alone = len(supports) == 1 and not bonded
+    return [] if alone and forces is None else supports
 
 
 def constrained(count: int, rim: np.ndarray, wall: np.ndarray, fixed: np.ndarray) -> np.ndarray:
