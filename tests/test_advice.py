@@ -45,6 +45,7 @@ ADVICE = {
     r'"included" models it$': "growth.fluid_forces=included",
     r'"included" with growth\.new_biomass = "stressed"': (
         "growth.new_biomass=stressed", "growth.fluid_forces=included"),
+    r'growth\.wall = "bonded" computes': "growth.wall=bonded",
     r'or numerics\.time = "midpoint"': "numerics.time=midpoint",
     r'"80 %" keeps their ratio': "substrates.{key}=80 %",
 }
@@ -71,6 +72,8 @@ def drawn(seed):
         changes += ["flow.biomass=brinkman", f"flow.permeability={between(1e-11, 1e-7) * width**2} um^2"]
     elif draw.random() < 0.3:
         changes.append("growth.new_biomass=stress_free")
+    if draw.random() < 0.3 and "growth.new_biomass=stress_free" not in changes:
+        changes.append("growth.fluid_forces=included")
     return changes
 
 
@@ -103,7 +106,8 @@ def test_the_advice_of_check_is_accepted_and_helps():
             start = warned.text[:40]
             assert not any(again.key == warned.key and again.text.startswith(start)
                            for again in warnings([*changes, *more])), (seed, warned)
-    assert kinds >= {*NO_SETTING, "numerics.refinement", "numerics.transport", "growth.fluid_forces"}
+    assert kinds >= {*NO_SETTING, "numerics.refinement", "numerics.transport", "growth.fluid_forces",
+                     "growth.wall"}
 
 
 def test_the_advice_against_a_lack_of_memory_is_accepted_and_helps(monkeypatch):

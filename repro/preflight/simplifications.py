@@ -30,6 +30,9 @@ LAG = 0.05
 TRANSIT = 0.05
 #: Largest strain of the aggregate, roughly, due to the neglected forces.
 STRAIN = 0.01
+#: Drag on a half-cylinder on a wall in shear flow, over the wall's shear and the radius: 6.73 in
+#: reference/half_cylinder.py, for a radius much smaller than the pore's width.
+DRAG = 6.73
 #: Largest growth in a shape update. The update uses the rates at its start and errs by about half
 #: of the growth.
 GROWTH_IN_A_STEP = 0.1
@@ -67,8 +70,8 @@ def find_warnings(scene: Scene, computed: list[Number]) -> list[Caveat]:
     if scene.kinetics:
         checks += [_fronts(scene), _demand(scene.kinetics)]
     if scene.growth:
-        checks += [_lag(scene, value), _transit(value), _forces(scene, computed), _steps(scene),
-                   _contact(scene), _fold(scene, value)]
+        checks += [_lag(scene, value), _transit(value), _forces(scene, computed),
+                   _support(scene, computed), _steps(scene), _contact(scene), _fold(scene, value)]
     return [caveat for check in checks for caveat in check]
 
 
@@ -140,6 +143,20 @@ def _forces(scene: Scene, computed: list[Number]) -> Iterator[Caveat]:
         yield Caveat("growth.fluid_forces", f"the fluid's stress reaches {strain:.2g} of mu_L, "
                      f"above {STRAIN:g}: it strains the aggregate by about this fraction, and the "
                      f"scene neglects it (2.3.3); {_included(scene)}")
+
+
+def _support(scene: Scene, computed: list[Number]) -> Iterator[Caveat]:
+    """Warn if the shape depends on how a wall bears the water's force on a sliding aggregate."""
+    growth = scene.growth
+    if growth.fluid_forces == "neglected" or growth.wall == "bonded":
+        return
+    stress = next(number for number in computed if number.name == "fluid stress over modulus")
+    force = DRAG * stress.start + (stress.end or 0.0)
+    if force > STRAIN:
+        yield Caveat("growth.wall", f"the water's force reaches {force:.2g} of mu_L times the "
+                     f"aggregate's thickness, above {STRAIN:g}: a sliding aggregate is kept in "
+                     "place by a uniform traction, which is an assumption, and its shape depends "
+                     'on it by about this fraction; growth.wall = "bonded" computes the traction')
 
 
 def _included(scene: Scene) -> str:
