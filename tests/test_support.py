@@ -1,5 +1,5 @@
-"""The uniform traction that keeps a sliding contact surface in place: a closed form on both walls, its limit as the mesh
-is refined, and where it acts. `test_derived.py` tests the traction that a run reports."""
+"""The uniform traction that keeps a sliding contact surface in place: a closed form on both walls, its limit as the
+mesh is refined, and where it acts. `test_derived.py` tests the traction that a run reports."""
 from dataclasses import replace
 from functools import cache
 
@@ -13,10 +13,10 @@ from repro.scene import load_scene
 from tests.strategies import EVERY_ORDER, ORDERS, body_of, coarse_base, meshed
 from tests.strategies import seed as disc
 
-def block(order, *changes, lean=0.0):
-    """(scene, seed): a block of 20 by 20 um from wall to wall, whose upper side lies ``lean`` um downstream."""
-    corners = [(-10, 0), (-10 + lean, 20), (10 + lean, 20), (10, 0)]
-    text = ", ".join(f'["{x} um", "{y} um"]' for x, y in corners)
+
+def block(order, *changes):
+    """(scene, seed): a block of 20 by 20 um from wall to wall."""
+    text = ", ".join(f'["{x} um", "{y} um"]' for x, y in [(-10, 0), (-10, 20), (10, 20), (10, 0)])
     scene = load_scene("base", [f"aggregate.outline=[{text}]", 'pore.width="20 um"', "numerics.refinement=0.3",
                                 f'numerics.elements="{ORDERS[order]}"', *changes],
                        unset=["aggregate.radius"])
@@ -124,7 +124,7 @@ def test_without_forces_one_surface_alone_moves_as_without_a_traction(order):
 @pytest.mark.parametrize("wall, walls", [("sliding", [BOTTOM, TOP]), ("bonded", [TOP])])
 @EVERY_ORDER
 def test_a_traction_acts_on_each_surface_that_slides(order, walls, wall):
-    """On its own nodes alone, with the resultant 1; a bonded surface has none, and each of its points bears its force."""
+    """On its own nodes alone, with the resultant 1. A bonded surface has none: each of its points bears its force."""
     scene, seed = block(order, f'growth.wall="{wall}"')
     seed = replace(seed, fixed=seed.fixed & ~seed.boundary.contact_ends)
     position = seed.mesh.points[seed.mesh.body]

@@ -445,7 +445,8 @@ class System:
         count = len(iterate.residual)
         loads = [support.load(iterate.position, count) for support in self.supports]
         points = np.array([support.point for support in self.supports])
-        return Supported(*vars(factors).values(), np.column_stack(loads), points)
+        return Supported(factors.system, factors.elements, factors.solver, np.column_stack(loads),
+                         points)
 
     def advanced(self, iterate: Iterate, factors: Factored, fresh: bool) -> Iterate:
         """The longest of the steps 1, 1/2, ... with det F > 0 that does not raise the residual

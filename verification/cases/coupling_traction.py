@@ -12,7 +12,6 @@ from scipy.integrate import simpson
 
 from reference import layered_channel
 from repro.fem.mesh import Mesh
-from repro.fem.newton import relative
 from repro.fem.outline import FREE, Outline
 from repro.fem.space import Space
 from repro.march.loop import Report
