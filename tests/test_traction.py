@@ -25,13 +25,18 @@ def test_a_shape_without_equilibrium_under_the_forces_is_refused(order):
         contact.expand(contact.Mechanics.of(scene), seed, 1.1 * seed.theta)
 
 
-@pytest.mark.parametrize("noise, agrees", [(1e-4, True), (1.0, False)])
+@pytest.mark.parametrize("noise, agrees", [(1e-2, True), (1.0, False)])
 @EVERY_ORDER
 def test_rounds_that_do_not_reduce_the_move_end(monkeypatch, order, noise, agrees):
-    """Forces that change at random in every round move the nodes by 1e-3 of the thickness times the noise. Below 1e-6
-    this is round-off, above it an error gives advice."""
+    """Forces that change at random at every node move the nodes by 3e-5 of the thickness times the noise. Below 1e-6
+    this counts as round-off, above it an error gives advice."""
     exact, random = traction.forces, np.random.default_rng(1)
-    monkeypatch.setattr(traction, "forces", lambda *at: exact(*at) * (1 + noise * random.uniform(-1, 1)))
+
+    def noisy(*at):
+        forces = exact(*at)
+        return forces * (1 + noise * random.uniform(-1, 1, forces.shape))
+
+    monkeypatch.setattr(traction, "forces", noisy)
     scene, seed = dense_base(order, "1e5 mg/cm^3")
     mechanics = contact.Mechanics.of(scene)
     if agrees:
@@ -43,8 +48,8 @@ def test_rounds_that_do_not_reduce_the_move_end(monkeypatch, order, noise, agree
 
 @pytest.mark.parametrize("gain", [-0.9, 0.3, 0.8, 0.95])
 def test_rounds_agree_whatever_part_of_a_change_returns(gain):
-    """Forces f and their response 1 + gain f agree at f = 1 / (1 - gain), in two modes, one with half of the gain. If each
-    round took the last response, 12 rounds would leave gain^12 of the error. The secant leaves a tenth of that."""
+    """Forces f and their response 1 + gain f agree at f = 1 / (1 - gain), in two modes, one with half of the gain. If
+    each round took the last response, 12 rounds would leave gain^12 of the error. The secant leaves a tenth of that."""
     rounds, exact = contact._Rounds(), 1 / (1 - gain * np.array([1.0, 0.5]))
     forces = np.zeros(2)
     for _ in range(12):

@@ -167,8 +167,8 @@ def expand(mechanics: Mechanics, grown: Pore, theta: np.ndarray, guess: Pore | N
             around = traction.surroundings(fluid.meshing, grown, shape.pore)
         last = shape
     raise GrowthError("the fluid's forces and the shape do not agree: after "
-                      f"{len(rounds.moves)} rounds a node still moves by {rounds.moves[-1]:.2g} um, "
-                      "and more rounds do not reduce this: the aggregate is too soft for this "
+                      f"{len(rounds.moves)} rounds a node still moves by {rounds.moves[-1]:.2g} "
+                      "um, and more rounds do not reduce this: the aggregate is too soft for this "
                       "flow; try a larger growth.shear_modulus, or "
                       'growth.fluid_forces = "neglected"')
 
