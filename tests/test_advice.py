@@ -43,6 +43,7 @@ ADVICE = {
     r'"included" models it$': "growth.fluid_forces=included",
     r'"included" with growth\.new_biomass = "stressed"': (
         "growth.new_biomass=stressed", "growth.fluid_forces=included"),
+    r'growth\.wall = "bonded" computes': "growth.wall=bonded",
     r'or numerics\.time = "midpoint"': "numerics.time=midpoint",
     r'"80 %" keeps their ratio': "substrates.{key}=80 %",
 }
@@ -72,6 +73,8 @@ def drawn(seed, preset):
         changes += ["flow.biomass=brinkman", f"flow.permeability={between(1e-11, 1e-7) * width**2} um^2"]
     elif draw.random() < 0.3:
         changes.append("growth.new_biomass=stress_free")
+    if draw.random() < 0.3 and "growth.new_biomass=stress_free" not in changes:
+        changes.append("growth.fluid_forces=included")
     return changes
 
 
@@ -105,9 +108,8 @@ def test_the_advice_of_check_is_accepted_and_helps(preset):
             start = warned.text[:40]
             assert not any(again.key == warned.key and again.text.startswith(start)
                            for again in warnings([*changes, *more])), (seed, warned)
-    permeable = {"no setting models it"} if preset != "paper" else set()
-    assert kinds >= {"no refinement up to 20", *permeable, "numerics.refinement", "numerics.transport",
-                     "growth.fluid_forces"}
+    assert kinds >= {"no refinement up to 20", "numerics.refinement", "numerics.transport", "growth.fluid_forces",
+                     "growth.wall"}
 
 
 @pytest.mark.parametrize("preset", PRESETS)

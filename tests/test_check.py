@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from reference import half_cylinder
 from repro.cli import main
 from repro.march.simulation import simulate
 from repro.preflight import checked, cost, modelled, numbers, simplifications
@@ -98,6 +99,7 @@ QUIET_WIDE = ("wide", *QUIET[1:])
 QUICK = (*QUIET, "kinetics.maximum_density=30 mg/L", "growth.time_step=1e-4 h", "growth.end=1e-3 h")
 FASTER = "kinetics.maximum_utilization_rate=3400 1/day"
 FORCED = (*QUIET, "growth.end=24 h")
+FORCED_SLIDING = (*FORCED, "growth.fluid_forces=included")
 PERMEABLE = ("flow_only", "aggregate.radius=20 um", "flow.biomass=brinkman", "numerics.elements=quadratic")
 COARSE_PERMEABLE = (*PERMEABLE, "numerics.refinement=0.5")
 FEW = ("substrates.acceptor.half_saturation=2e-3 mg/L", "substrates.donor.half_saturation=2e-3 mg/L")
@@ -124,6 +126,9 @@ THRESHOLDS = [
     # the head's pressure over mu_L is 0.01 at 0.0979 Pa / 9.79 Pa; the aggregate in contact bears all of it
     ("growth.fluid_forces", FORCED, "growth.shear_modulus=9.9 Pa", "growth.shear_modulus=9.6 Pa"),
     ("growth.fluid_forces", [*FORCED, "growth.shear_modulus=4 Pa"], "growth.fluid_forces=included", ""),
+    # drag of 6.73 times the shear of 4.03e-3 Pa, and the head's pressure, over mu_L: 0.01 at 12.5 Pa
+    ("growth.wall", FORCED_SLIDING, "growth.shear_modulus=12.7 Pa", "growth.shear_modulus=12.3 Pa"),
+    ("growth.wall", [*FORCED_SLIDING, "growth.shear_modulus=4 Pa"], "growth.wall=bonded", ""),
     # a film of 1 um has five intervals; in a coarse mesh a film of 2 um has three
     ("aggregate.radius", ["flow_only"], "aggregate.radius=49.1 um", "aggregate.radius=49.3 um"),
     ("aggregate.radius", ["flow_only", "aggregate.radius=40 um"], "numerics.refinement=0.41",
@@ -223,6 +228,11 @@ def test_every_check_warns_in_one_of_these_scenes():
                 assert all(warning in texts for warning in own)
                 quiet -= {find.__name__} if own else set()
     assert quiet == set()
+
+
+def test_the_drag_in_the_warning_is_that_on_a_small_half_cylinder():
+    drag, _, _ = half_cylinder.solve(1e-3).load()
+    assert simplifications.DRAG == pytest.approx(drag, rel=2e-3)  # the rest is of the order of R / W
 
 
 def test_an_offset_of_the_seed_adds_to_its_reach():

@@ -219,7 +219,7 @@ def test_newton_gives_up_as_soon_as_no_line_moves(plugged, monkeypatch):
     """If no line moves and a clearance is not accepted, more iterations change nothing. The search takes over."""
     iterations = record_iterations(monkeypatch)
     monkeypatch.setattr(contact_newton.Coupled, "_accepts", lambda coupled: False)
-    expanded_by(*plugged, 1.03)
+    expanded_by(*plugged, 1.1)
     assert 0 < max(iterations) < contact_newton.MOST_ITERATIONS
 
 

@@ -432,7 +432,7 @@ def traction_integral(mesh, edges, forces):
 def traction_peak(pore, height, forces, bonded):
     """(value, x) of the largest mean over W / 20 of (max(pull, 0)^2 + shear^2)^(1/2), in MPa and um, on one wall.
 
-    A wall that slides bears forces along itself at single points."""
+    On a wall along which the aggregate slides, the shear is uniform."""
     mesh, edges = pore.mesh, edges_on_wall(pore.mesh, height)
     x, T = traction_integral(mesh, edges, (-1 if height == 0.0 else 1) * forces[:, 1])
     length = min(mesh.width / 20, x[-1] - x[0])
@@ -445,8 +445,7 @@ def traction_peak(pore, height, forces, bonded):
         x, T = traction_integral(mesh, edges, forces[:, 0])
         shear = np.interp(starts + length, x, T) - np.interp(starts, x, T)
     else:
-        within = (places >= starts[:, None] - 1e-9) & (places <= starts[:, None] + length + 1e-9)
-        shear = within @ forces[nodes, 0]
+        shear = forces[nodes, 0].sum() * length / (x[-1] - x[0])
     bears = np.hypot(np.maximum(pull, 0), shear) / length
     return bears.max(), starts[bears.argmax()] + length / 2
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TypeAlias
 
 import numpy as np
@@ -116,6 +117,38 @@ class Factored:
             right = right - self.system.product(self.elements, x)
         x[order] = self.solver.solve(right[order])
         return x
+
+
+@dataclass(frozen=True, eq=False)
+class Supported(Factored):
+    """K of a system in which multiples of loads balance the rows of some prescribed unknowns.
+
+    loads: (n, m); rows: (m,) of the prescribed unknowns. With B = K^-1 L, one more solution for
+    each load, the solution is x - B s. The multiples s balance the rows.
+    """
+
+    loads: np.ndarray
+    rows: np.ndarray
+
+    @cached_property
+    def _responses(self) -> np.ndarray:
+        """(n, m) B."""
+        return np.column_stack([super(Supported, self).solve(load) for load in self.loads.T])
+
+    @cached_property
+    def _per_multiple(self) -> np.ndarray:
+        """(m, m) forces in the rows for a multiple of one."""
+        forces = [load - self.system.product(self.elements, response)
+                  for load, response in zip(self.loads.T, self._responses.T)]
+        return np.column_stack(forces)[self.rows]
+
+    def solve(self, right: np.ndarray, value: np.ndarray | None = None) -> np.ndarray:
+        """x (n,) of K x + L s = b (n,), in the rows ``rows`` too; the prescribed unknowns as in
+        :meth:`Factored.solve`."""
+        x = super().solve(right, value)
+        unbalanced = right - self.system.product(self.elements, x)
+        multiples = np.linalg.solve(self._per_multiple, unbalanced[self.rows])
+        return x - self._responses @ multiples
 
 
 def _distinct(rows: np.ndarray, columns: np.ndarray,

@@ -88,6 +88,11 @@ class Outline:
             return self.wall[1::2]
         return np.where(self.wall == np.roll(self.wall, -1), self.wall, FREE)
 
+    def edges_on(self, wall: int) -> np.ndarray:
+        """(e, 2 or 3) numbers of the nodes of each edge on a wall, along the loop."""
+        edges = self.arcs(np.arange(len(self.points)))[self.edge_wall == wall]
+        return edges[:, :: 3 - self.geometry].astype(int)
+
     @property
     def contact_ends(self) -> np.ndarray:
         """(M,) True at the ends of the contact surfaces."""

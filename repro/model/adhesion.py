@@ -2,16 +2,15 @@
 
 The equilibrium (22), tested with the nodal functions, gives the forces of the walls on the
 aggregate: at a node on a wall, the force of the stress minus that of the fluid. They are the
-consistent nodal forces of a traction t, on a bonded wall in both directions, on a sliding wall
-across it. Along a sliding wall, one point keeps each contact surface in place. At a point x of a
-contact surface, the wall bears
+consistent nodal forces of a traction t. On a bonded wall it has both directions. On a sliding wall
+it acts across the wall, and a uniform shear keeps each contact surface in place
+(:mod:`repro.model.support`). At a point x of a contact surface, the wall bears
 
     ((max(pull, 0))^2 + shear^2)^(1/2)
 
 with the means of the pull, from the aggregate into the wall, and of the shear over a length of W /
-20 around x. The stress at a contact line may be singular, and so may the force at a point. A mean
-over a length converges as the mesh is refined. The tensile stress is a mean too, over the triangles
-within W / 20 of a point.
+20 around x. The stress at a contact line may be singular. A mean over a length converges as the
+mesh is refined. The tensile stress is a mean too, over the triangles within W / 20 of a point.
 
 Without ``growth.fluid_forces`` the equilibrium has no forces of the fluid, and walls bear the
 stress of growth alone.
@@ -134,20 +133,17 @@ def wall_peak(scene: Scene, pore: Pore, solved: Solved) -> Peak:
 def _peak_on(pore: Pore, wall: int, forces: np.ndarray, bonded: bool) -> Peak:
     """Largest mean stress that one wall bears, with its coordinates."""
     outline = pore.boundary
-    edges = np.flatnonzero(outline.edge_wall == wall)
-    x = outline.arcs(outline.points[:, 0])[edges]
-    order = np.argsort(x.min(axis=1))
-    nodes = outline.arcs(pore.mesh.loop)[edges][order].astype(int)
-    if outline.geometry == 1:
-        nodes = nodes[:, [0, 2]]
+    x = pore.mesh.points[:, 0]
+    nodes = pore.mesh.loop[outline.edges_on(wall)]
+    nodes = nodes[np.argsort(x[nodes].min(axis=1))]
     nodes = nodes[:, ::-1] if wall == TOP else nodes
-    surface = _Surface(pore.mesh.points[:, 0], nodes)
+    surface = _Surface(x, nodes)
     inward = 1.0 if wall == TOP else -1.0
     pull = surface.means(surface.density(inward * forces[:, 1]), pore.mesh.width)
     if bonded:
         shear = surface.means(surface.density(forces[:, 0]), pore.mesh.width)
     else:
-        shear = surface.point_means(forces[:, 0], pore.mesh.width)
+        shear = surface.mean(forces[:, 0])
     bears = np.hypot(np.maximum(pull, 0.0), shear)
     worst = int(bears.argmax())
     middle = surface.middles(pore.mesh.width)[worst]
@@ -211,13 +207,10 @@ class _Surface:
         ahead = np.interp(starts + length, places, total)
         return (ahead - np.interp(starts, places, total)) / length
 
-    def point_means(self, forces: np.ndarray, width: float) -> np.ndarray:
-        """(w,) means of forces (N,) at single points of the surface."""
-        starts, length = self._windows(width)
+    def mean(self, forces: np.ndarray) -> np.ndarray:
+        """Mean over the whole surface of a traction with nodal forces (N,) per depth."""
         surface_nodes = np.unique(self.nodes)
-        x = self.x[surface_nodes]
-        within = (x >= starts[:, None]) & (x <= starts[:, None] + length)
-        return within @ forces[surface_nodes] / length
+        return forces[surface_nodes].sum() / np.ptp(self.x[surface_nodes])
 
 
 def tensile_peak(scene: Scene, pore: Pore) -> Peak:

@@ -32,6 +32,7 @@ from repro.model.contact_lines import (
 )
 from repro.model.contact_newton import BESIDE, Coupled, Placed
 from repro.model.pore import Pore, material
+from repro.model.support import Support
 from repro.model.traction import Fluid
 from repro.scene import Growth, Numerics, Scene
 
@@ -39,13 +40,16 @@ from repro.scene import Growth, Numerics, Scene
 CONTACT_ROUNDS = 60
 #: Largest number of times that contact lines go back after a trial that fails.
 RETREATS = 6
-#: Rounds of shape and fluid forces.
-FORCE_ROUNDS = 12
-#: Rounds after which contact lines stay in place, because each new search may move them by up to
-#: its tolerance.
+#: Rounds of shape and fluid forces after which contact lines stay in place, because each new
+#: search may move them by up to its tolerance.
 SETTLING_ROUNDS = 4
-#: Largest move of a node in the last round, over the aggregate's thickness.
+#: Shape and flow agree if the last round moves no node by more than this, over the aggregate's
+#: thickness.
 FORCE_REST = 1e-8
+#: Or by more than this, if further rounds do not reduce the move because of round-off.
+FORCE_ROUND_OFF = 1e-6
+#: The move stalls if two rounds do not reduce it by this factor.
+FORCE_REDUCTION = 0.5
 PATIENT = SearchOptions()
 #: Defect at which each part of theta except the last counts as reached.
 PARTLY = 1e-3
@@ -136,7 +140,9 @@ def expand(mechanics: Mechanics, grown: Pore, theta: np.ndarray, guess: Pore | N
 
     Notes
     -----
-    With fluid forces, shape and flow are computed in turn until both agree.
+    With fluid forces, shape and flow are computed in turn until both agree. A shape changes its
+    forces by a part of the change that gave the shape, up to 0.6 of it after contact. The forces of
+    a round are therefore those at which the secant through the last two rounds predicts agreement.
     """
     start = grown if guess is None else guess
     fluid = mechanics.fluid
@@ -145,25 +151,69 @@ def expand(mechanics: Mechanics, grown: Pore, theta: np.ndarray, guess: Pore | N
     around = traction.surroundings(fluid.meshing, grown, grown)
     last = Expansion(grown, 0, 0.0)
     iterations = 0
-    for number in range(FORCE_ROUNDS):
+    rounds = _Rounds()
+    while not rounds.stalled:
         around = traction.follow(fluid.meshing, around, last.pore)
-        forces = traction.forces(fluid, around, last.pore)
+        response = traction.forces(fluid, around, last.pore)
         if last.division is not None:
-            forces = _gathered(last.division, forces)
-        shape = _at_rest(mechanics, grown, theta, start, forces, search)
-        stationary = number + 1 >= SETTLING_ROUNDS
+            response = _gathered(last.division, response)
+        shape = _at_rest(mechanics, grown, theta, start, rounds.next_forces(response), search)
+        rounds.moves.append(float(np.abs(shape.position - last.position).max()))
+        stationary = len(rounds.moves) >= SETTLING_ROUNDS
         search = replace(search, advances=shape.advances, stationary=stationary)
         iterations += shape.iterations
-        moved = np.abs(shape.position - last.position).max()
-        if moved <= FORCE_REST * shape.pore.boundary.thickness:
+        if rounds.agree(shape.pore.boundary.thickness):
             return replace(shape, iterations=iterations)
         if last.pore is grown or not shape.pore.boundary.same_contact(last.pore.boundary):
             around = traction.surroundings(fluid.meshing, grown, shape.pore)
         last = shape
-    raise GrowthError(f"the fluid's forces and the shape do not agree after {FORCE_ROUNDS} rounds, "
-                      f"a node still moves by {moved:.2g} um: the aggregate is too soft for this "
+    raise GrowthError("the fluid's forces and the shape do not agree: after "
+                      f"{len(rounds.moves)} rounds a node still moves by {rounds.moves[-1]:.2g} "
+                      "um, and more rounds do not reduce this: the aggregate is too soft for this "
                       "flow; try a larger growth.shear_modulus, or "
                       'growth.fluid_forces = "neglected"')
+
+
+@dataclass
+class _Rounds:
+    """Rounds of fluid forces and the shape under them.
+
+    forces: (n, 2) of each round; responses: those of the flow around its shape; moves: um, the
+    largest move of a node in each round.
+    """
+
+    forces: list[np.ndarray] = field(default_factory=list)
+    responses: list[np.ndarray] = field(default_factory=list)
+    moves: list[float] = field(default_factory=list)
+
+    def next_forces(self, response: np.ndarray) -> np.ndarray:
+        """Forces of the next round, from those of the flow around the last shape.
+
+        The secant through the last two rounds predicts that they differ least from their response.
+        """
+        if not self.forces:
+            self.forces.append(response)
+            return response
+        self.responses.append(response)
+        forces = response
+        if len(self.responses) > 1:
+            difference = response - self.forces[-1]
+            change = difference - (self.responses[-2] - self.forces[-2])
+            size = max(np.vdot(change, change), np.finfo(float).tiny)
+            forces = response - np.vdot(change, difference) / size * (response - self.responses[-2])
+        self.forces.append(forces)
+        return forces
+
+    @property
+    def stalled(self) -> bool:
+        """Does the move no longer decrease? The first rounds, in which lines move, do not count."""
+        settled = len(self.moves) > SETTLING_ROUNDS + 2
+        return settled and self.moves[-1] > FORCE_REDUCTION * self.moves[-3]
+
+    def agree(self, thickness: float) -> bool:
+        """Do forces and shape agree, for an aggregate of a thickness (um)?"""
+        move = self.moves[-1] / thickness
+        return move <= FORCE_REST or self.stalled and move <= FORCE_ROUND_OFF
 
 
 def _gathered(division: Division, loads: np.ndarray) -> np.ndarray:
@@ -219,6 +269,7 @@ def _equilibrium(mechanics: Mechanics, grown: Pore, start: Pore, forces: np.ndar
     locked, target = _constraints(mechanics, grown, start)
     rest = growth.equilibrium(body, target_J, start.mesh.points[nodes], start.pressure[inside],
                               locked, target, forces=forces, last=last, patient=patient,
+                              supports=_supports(mechanics, start, forces),
                               modified_newton=mechanics.numerics.jacobian == "reused")
     return _placed(grown, start, rest), rest.iterations
 
@@ -425,7 +476,8 @@ class _Trials:
         body, theta = _strained_from(keys, locked, locked.theta)
         reference = grown.origin if keys.new_biomass == "stressed" else grown.mesh.points
         prescribed, target = _constraints(self._mechanics, locked, locked)
-        system = growth.System(body, prescribed, forces=forces)
+        supports = _supports(self._mechanics, locked, forces)
+        system = growth.System(body, prescribed, forces=forces, supports=supports)
         return Placed(grown, locked, division, reference, system, theta, target, rule)
 
     def _locked(self, grown: Pore, contact: Contact) -> tuple[Pore, Division | None,
@@ -582,6 +634,25 @@ def _constraints(mechanics: Mechanics, grown: Pore,
     target[rim[shape.wall == BOTTOM], 1] = 0.0
     target[rim[shape.wall == TOP], 1] = mechanics.width
     return constrained(len(target), rim, shape.wall, fixed), target
+
+
+def _supports(mechanics: Mechanics, shape: Pore, forces: np.ndarray | None) -> list[Support]:
+    """The supports of the contact surfaces that slide and have a fixed point.
+
+    A surface of a single node has no length; the node bears its force. Without ``forces`` (n, 2)
+    one surface alone bears none, because the forces of growth along the pore add up to zero.
+    """
+    outline = shape.boundary
+    rim = shape.mesh.topology.body_loop
+    bonded = mechanics.keys.wall == "bonded"
+    supports = []
+    for wall in [TOP] if bonded else [BOTTOM, TOP]:
+        edges = rim[outline.edges_on(wall)]
+        points = rim[outline.fixed & (outline.wall == wall)]
+        if len(edges) and len(points):
+            supports.append(Support(int(points[0]), edges))
+    alone = len(supports) == 1 and not bonded
+    return [] if alone and forces is None else supports
 
 
 def constrained(count: int, rim: np.ndarray, wall: np.ndarray, fixed: np.ndarray) -> np.ndarray:

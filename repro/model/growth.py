@@ -27,7 +27,7 @@ energy of plane expansion, J^(1/3) + J^(-2/3) / 2, is concave.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Generic, TypeVar
@@ -36,13 +36,14 @@ import numpy as np
 
 from repro.errors import GrowthError, LinearError, failing_as
 from repro.fem import elements
-from repro.fem.assembly import ElementSystem, Factored, saddle_blocks, saddle_system
+from repro.fem.assembly import ElementSystem, Factored, Supported, saddle_blocks, saddle_system
 from repro.fem.brief import brief
 from repro.fem.elements import Table
 from repro.fem.forms import Basis, basis, each, product
 from repro.fem.linear import DEFAULT, Method
 from repro.fem.mesh import gradients, triangle_areas
 from repro.fem.newton import Newton, relative
+from repro.model.support import Support, balanced
 from repro.timing import timed
 
 #: Newton's method stops at this residual against the size of its terms.
@@ -330,12 +331,15 @@ class System:
 
     def __init__(self, body: Body, constrained: np.ndarray, *,
                  stabilisation: PressureGradient | GradDiv = GradDiv(),
-                 forces: np.ndarray | None = None, system: ElementSystem | None = None):
+                 forces: np.ndarray | None = None, supports: Sequence[Support] = (),
+                 system: ElementSystem | None = None):
         """constrained: (n, 2) True where a coordinate is prescribed; forces: (n, 2) um, nodal
-        forces over mu_L that do not depend on the shape (the t0 of (20)), none by default; system:
-        the sparse system without constraints, if it is known."""
+        forces over mu_L that do not depend on the shape (the t0 of (20)), none by default;
+        supports: of the contact surfaces, at points with prescribed x; system: the sparse system
+        without constraints, if it is known."""
         self.body = body
         self.constrained = constrained
+        self.supports = supports
         self.stabilisation = stabilisation
         none = np.zeros(body.shape.corners, bool)
         rows = np.concatenate([constrained[:, 0], constrained[:, 1], none])
@@ -359,7 +363,7 @@ class System:
 
     def _iterate(self, position: np.ndarray, pressure: np.ndarray) -> Iterate:
         lag = np.where(self.constrained, self.target - position, 0.0)
-        residual = self.residual(position, pressure)
+        residual = balanced(self.supports, position, self.residual(position, pressure))
         return Iterate(position, pressure, residual, self.sizes, lag, self.free)
 
     def _stiffening(self) -> np.ndarray:
@@ -435,7 +439,14 @@ class System:
 
     def factored(self, iterate: Iterate) -> Factored:
         """The derivative, factorised."""
-        return self.sparse.factored(self.tangent(iterate.position, iterate.pressure))
+        factors = self.sparse.factored(self.tangent(iterate.position, iterate.pressure))
+        if not self.supports:
+            return factors
+        count = len(iterate.residual)
+        loads = [support.load(iterate.position, count) for support in self.supports]
+        points = np.array([support.point for support in self.supports])
+        return Supported(factors.system, factors.elements, factors.solver, np.column_stack(loads),
+                         points)
 
     def advanced(self, iterate: Iterate, factors: Factored, fresh: bool) -> Iterate:
         """The longest of the steps 1, 1/2, ... with det F > 0 that does not raise the residual
@@ -462,8 +473,8 @@ class System:
 @timed("growth")
 def equilibrium(body: Body, theta: np.ndarray, position: np.ndarray, pressure: np.ndarray,
                 constrained: np.ndarray, prescribed: np.ndarray, *, last: np.ndarray | None = None,
-                forces: np.ndarray | None = None, modified_newton: bool = False,
-                patient: bool = True) -> Equilibrium:
+                forces: np.ndarray | None = None, supports: Sequence[Support] = (),
+                modified_newton: bool = False, patient: bool = True) -> Equilibrium:
     """Solve for the equilibrium of an aggregate under an expansion, (14)-(27).
 
     Parameters
@@ -483,6 +494,8 @@ def equilibrium(body: Body, theta: np.ndarray, position: np.ndarray, pressure: n
         The last known shape, um; the start by default.
     forces : (n, 2) float, optional
         Nodal forces over mu_L, um; none by default.
+    supports : sequence of Support, optional
+        Tractions that keep points with prescribed x in place; otherwise each point bears its force.
     modified_newton : bool
         Does Newton's method keep its derivative while the defect falls fast enough?
     patient : bool
@@ -509,7 +522,8 @@ def equilibrium(body: Body, theta: np.ndarray, position: np.ndarray, pressure: n
     method = STABILISATIONS[body.shape.geometry]
     last_shape = position if last is None else last
     parts = method.parts(theta / start)
-    system = System(body, constrained, stabilisation=method.on(body, last_shape), forces=forces)
+    system = System(body, constrained, stabilisation=method.on(body, last_shape), forces=forces,
+                    supports=supports)
     first = Equilibrium(position, pressure, 0)
     return reach(system, start, theta, first, prescribed, parts, modified_newton, patient)
 

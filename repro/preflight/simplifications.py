@@ -34,6 +34,9 @@ LAG = 0.05
 TRANSIT = 0.05
 #: Largest strain of the aggregate, roughly, due to the neglected forces.
 STRAIN = 0.01
+#: Drag on a half-cylinder on a wall in shear flow, over the wall's shear and the radius: 6.73 in
+#: reference/half_cylinder.py, for a radius much smaller than the pore's width.
+DRAG = 6.73
 #: Largest growth in a shape update. The update uses the rates at its start and errs by about half
 #: of the growth.
 GROWTH_IN_A_STEP = 0.1
@@ -160,6 +163,19 @@ def _strengths(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
             yield Caveat(f"growth.{key}", "the flow cannot exceed it, since the scene neglects the "
                          "fluid's forces, and only the stress of growth counts; "
                          'growth.fluid_forces = "included" adds the forces')
+
+
+def _support(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
+    """Warn if the shape depends on how a wall bears the water's force on a sliding aggregate."""
+    if scene.growth.fluid_forces == "neglected" or scene.growth.wall == "bonded":
+        return
+    stress = computed["fluid stress over modulus"]
+    force = DRAG * stress.start + (stress.end or 0.0)
+    if force > STRAIN:
+        yield Caveat("growth.wall", f"the water's force reaches {force:.2g} of mu_L times the "
+                     f"aggregate's thickness, above {STRAIN:g}: a sliding aggregate is kept in "
+                     "place by a uniform traction, which is an assumption, and its shape depends "
+                     'on it by about this fraction; growth.wall = "bonded" computes the traction')
 
 
 def _fronts(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
@@ -324,6 +340,7 @@ CHECKS: dict[Callable[[Scene, Numbers], Iterator[Caveat]], tuple[str, ...]] = {
     _transit: ("growth", "flow"),
     _forces: ("growth", "flow"),
     _strengths: ("growth", "flow"),
+    _support: ("growth", "flow"),
     _steps: ("growth",),
     _contact: ("growth", "flow"),
     _fold: ("growth",),

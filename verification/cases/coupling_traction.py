@@ -12,7 +12,6 @@ from scipy.integrate import simpson
 
 from reference import layered_channel
 from repro.fem.mesh import Mesh
-from repro.fem.newton import relative
 from repro.fem.outline import FREE, Outline
 from repro.fem.space import Space
 from repro.march.loop import Report
@@ -299,12 +298,12 @@ def _defects(*changes: str) -> tuple[float, float]:
     defects = []
     stabilisation = growth.STABILISATIONS[body.shape.geometry].on(body, seed.mesh.points[nodes])
     place, pressure = grown.mesh.points[nodes], grown.pressure[seed.mesh.topology.body_corners]
-    iterate = growth.System(body, constrained_dofs, stabilisation=stabilisation).under(theta, place, place, pressure)
     for pore_of_flow in (grown, seed):
         fluid = traction.Fluid.of(scene)
         forces = traction.forces(fluid, traction.surroundings(fluid.meshing, seed, pore_of_flow), pore_of_flow)
-        load = np.concatenate([forces.T.ravel(), np.zeros(len(pressure))])
-        defects.append(relative((iterate.residual - load)[iterate.free], (iterate.size + np.abs(load))[iterate.free]))
+        supports = contact._supports(contact.Mechanics.of(scene), grown, forces)
+        system = growth.System(body, constrained_dofs, stabilisation=stabilisation, forces=forces, supports=supports)
+        defects.append(system.under(theta, place, place, pressure).defect)
     return tuple(defects)
 
 

@@ -5,9 +5,23 @@ from verification.mutants import changes
 CONTACT_TESTS = "tests/test_contact.py::test_"
 FOLD_TESTS = "tests/test_fold.py::test_"
 ENDS = "tests/test_ends.py::test_"
+SUPPORT_TESTS = "tests/test_support.py::test_"
+ROUNDS_TESTS = "tests/test_traction.py::test_rounds_"
 SMALLEST_CONTACT = f"{CONTACT_TESTS}the_contact_surface_is_the_smallest_that_leaves_enough_fluid"
 
 MUTANTS = (
+    *changes(
+        "repro/model/support.py",
+        ("support-uneven",
+         "The traction along a sliding surface grows from one end to the other.",
+         "forces = position[self.edges, 0] @ ALONG[self.edges.shape[1]].T",
+         "forces = position[self.edges, 0] ** 2 @ ALONG[self.edges.shape[1]].T",
+         f"{SUPPORT_TESTS}simple_shear_between_two_walls_is_exact[2]"),
+        ("support-without-a-residual",
+         "The defect of Newton's method counts the force at a point instead of the traction.",
+         "residual = residual - load * (residual[support.point] / load[support.point])",
+         "residual = residual - 0.0 * load",
+         f"{SUPPORT_TESTS}simple_shear_between_two_walls_is_exact[1]")),
     *changes(
         "repro/march/updates.py",
         ("rates-at-the-start",
@@ -89,6 +103,26 @@ MUTANTS = (
          "if grown.contact and not search.stationary:",
          "if grown.contact:",
          f"{CONTACT_TESTS}stationary_lines_stay_where_the_last_round_of_fluid_forces_left_them"),
+        ("support-of-the-lower-wall-alone",
+         "Only the lower contact surface is kept in place by a traction; a point keeps the upper one.",
+         "for wall in [TOP] if bonded else [BOTTOM, TOP]:",
+         "for wall in [TOP] if bonded else [BOTTOM]:",
+         f"{SUPPORT_TESTS}simple_shear_between_two_walls_is_exact[2]"),
+        ("bonded-wall-is-supported",
+         "A bonded surface has a uniform traction, too.",
+         "for wall in [TOP] if bonded else [BOTTOM, TOP]:",
+         "for wall in [BOTTOM, TOP]:",
+         f"{SUPPORT_TESTS}a_traction_acts_on_each_surface_that_slides[2-bonded-walls1]"),
+        ("forces-of-the-last-response",
+         "Each round takes the forces of the flow around the last shape; a soft aggregate needs too many rounds.",
+         "if len(self.responses) > 1:",
+         "if len(self.responses) > 99:",
+         f"{ROUNDS_TESTS}agree_whatever_part_of_a_change_returns[0.8]"),
+        ("round-off-is-no-agreement",
+         "Rounds that round-off keeps from reducing the move end with an error.",
+         "self.stalled and move <= FORCE_ROUND_OFF",
+         "self.stalled and move <= FORCE_REST",
+         f"{ROUNDS_TESTS}that_do_not_reduce_the_move_end[2-0.01-True]"),
         ("bonded-slides",
          "A bonded surface slides along the lower wall.",
          "fixed = fixed | (before[rim, 1] == 0.0)",
@@ -462,6 +496,11 @@ MUTANTS = (
          "The traction is a mean over so short a length that it has no limit at a contact line.",
          "LENGTH = 1 / 20",
          "LENGTH = 1 / 20000"),
+        ("shear-on-a-sliding-wall-forgotten",
+         "A wall along which the aggregate slides bears no shear.",
+         "return forces[surface_nodes].sum() / np.ptp(self.x[surface_nodes])",
+         "return 0.0 * forces[surface_nodes].sum()",
+         "tests/test_detachment.py::test_means_of_a_traction_are_those_of_its_integral"),
         ("means-over-the-width",
          "The traction is the mean over the pore's width.",
          "length = min(LENGTH * width, places[-1] - places[0])",
