@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from repro import results
+from repro import solve as solve_scene
 from repro.march.balance import Ledger
 from repro.march.loop import Report
 from repro.model import transport
@@ -90,3 +91,11 @@ def test_stress_is_reported_only_for_strain_since_the_start(order):
     grids = [results.fields(*coarse_base(order, f"growth.new_biomass={kind}"), NOTHING) for kind in kinds]
     stressed, free = ({*grid.point_data, *grid.cell_data} for grid in grids)
     assert len(stressed - free) == 6 and free == {name for name in stressed if not name.endswith("_MPa")}
+
+
+@pytest.mark.parametrize("preset", ["fast", "paper"])
+def test_a_row_with_another_mesh_than_the_last_row_has_a_new_mesh(preset):
+    """Rows within a step show the new meshes of this step."""
+    run = solve_scene("base", [f"numerics.preset={preset}", "growth.end=4 h", "output.every=0.1 h"])
+    jumps = np.diff(run["nodes"], prepend=run["nodes"][0]) != 0
+    assert jumps.any() and (run["remeshed"] == jumps).all()

@@ -24,6 +24,7 @@ import numpy as np
 
 from repro.errors import RunEnd, SimulationError, StageError
 from repro.fem.brief import brief
+from repro.fem.mesh import Topology
 from repro.march import balance
 from repro.march.balance import Ledger, Limits
 from repro.march.ends import Reached, locate, nearest_end
@@ -69,6 +70,8 @@ class Report:
         Number of new meshes since the last report.
     iterations : dict of str to int
         Newton iterations since the last report, by stage.
+    new_mesh : bool
+        Is the mesh another one than in the last report?
     """
 
     pore: Pore
@@ -77,6 +80,7 @@ class Report:
     ledgers: tuple[Ledger, ...]
     remeshes: int
     iterations: dict[str, int]
+    new_mesh: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,6 +201,7 @@ def _grow(stages: Stages, scheme: Scheme, state: RestartState,
     rows = row_times(scheme, scene)
     limits = Limits.of(scene)
     bonded = stages.growth.wall == "bonded"
+    shown = pore.mesh.topology
     while event.margin <= 0 and stages.growth.end - pore.time > SAME_TIME:
         try:
             with stopping(pore.time, bonded), folding(state.compression, state.time):
@@ -206,13 +211,17 @@ def _grow(stages: Stages, scheme: Scheme, state: RestartState,
                 refuse_density(step.pore, stages.remeshing.maximum_density)
         except RunEnd:
             if state.ledgers:  # steps that are not reported yet
-                yield mark_reported(state, pore.time), make_report(state, pore, solved, None)
+                report = make_report(state, pore, solved, None, shown)
+                yield mark_reported(state, pore.time), report
             raise
+        if state.row > pore.time + SAME_TIME:  # resumed within the step
+            shown = step.within(state.row).pore.mesh.topology
         for time in rows:
             if state.time + SAME_TIME < time < step.pore.time - SAME_TIME:
                 inner = _row_within(stages, step, time)
                 if inner:
-                    report = make_report(state, inner.pore, inner.solved, inner.before)
+                    report = make_report(state, inner.pore, inner.solved, inner.before, shown)
+                    shown = inner.pore.mesh.topology
                     state = mark_reported(state, time)
                     yield state, report
         solved = reached.solved
@@ -222,8 +231,10 @@ def _grow(stages: Stages, scheme: Scheme, state: RestartState,
         row = _row_time_at(rows, pore.time)
         if requested is None or row is not None or event.margin > 0:
             reported = pore if row is None else replace(pore, time=row)
-            yield mark_reported(state, pore.time), make_report(state, reported, solved, step.before)
+            report = make_report(state, reported, solved, step.before, shown)
+            shown = pore.mesh.topology
             state = mark_reported(state, pore.time)
+            yield state, report
         else:
             yield state, None
     if event.margin > 0:
@@ -296,9 +307,10 @@ def _after_step(state: RestartState, step: StepResult, solved: Solved,
 
 
 def make_report(state: RestartState, pore: Pore, solved: Solved,
-                before: tuple[Pore, Solved] | None) -> Report:
-    """Report the steps of a state since the last report."""
-    return Report(pore, solved, before, state.ledgers, state.remeshes, state.iterations)
+                before: tuple[Pore, Solved] | None, shown: Topology) -> Report:
+    """Report the steps of a state since the last report, whose mesh has the topology ``shown``."""
+    return Report(pore, solved, before, state.ledgers, state.remeshes, state.iterations,
+                  pore.mesh.topology is not shown)
 
 
 def mark_reported(state: RestartState, time: float) -> RestartState:

@@ -139,7 +139,8 @@ def _with_a_film(scene: Scene, before: RestartState, contact: RestartState) -> R
 def _solved(scene: Scene, state: RestartState) -> Report:
     """A state as the instant of a row."""
     solved = pore.solve(scene, state.pore)
-    return loop.make_report(state, replace(state.pore, concentrations=solved.concentrations), solved, None)
+    after = replace(state.pore, concentrations=solved.concentrations)
+    return loop.make_report(state, after, solved, None, after.mesh.topology)
 
 
 @cached
