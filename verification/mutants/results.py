@@ -388,9 +388,9 @@ MUTANTS = (
     *changes(
         "repro/model/growth.py",
         ("too-soft-without-advice",
-         "Where the fluid's forces leave no equilibrium, a refinement is advised, which does not help.",
-         "_ADVICE[bool(system.pull.any())]",
-         "_ADVICE[False]",
+         "Where the fluid's forces leave no equilibrium, the message does not advise a larger modulus.",
+         'TOO_SOFT if system.pull.any() else ""',
+         '""',
          "verification/cases/hard_family.py::test_family[seed 171]")),
     *changes(
         "repro/model/advice.py",
