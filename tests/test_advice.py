@@ -62,13 +62,14 @@ FOLLOWED = {
     "model/gear.py": {"try a larger numerics.refinement":
                       "tests/test_advice.py::test_a_larger_refinement_helps_where_a_substrate_becomes_negative"},
     "model/growth.py": {"try a larger growth.shear_modulus": "members 151 and 171 of the hard family"},
-    "model/pore.py": {"leave [flow] out": ENTRIES},
+    "model/pore.py": {"leave [flow] out": "tests/test_transport.py::test_too_slow_a_flow_is_refused"},
     "model/remeshing.py": {
         "{}; numerics.refinement = {} resolves this state":
             "tests/test_advice.py::test_an_unresolved_front_gets_advice_once",
         "does not resolve it": FRONTS, 'numerics.elements = "linear"': FRONTS},
     "preflight/memory.py": {
-        "try smooth = false": SPLINES, "needs at most half of them": FITS, "no numerics.refinement that resolves": FITS},
+        "try smooth = false": SPLINES, "needs at most half of them": FITS,
+        "no numerics.refinement that resolves": FITS},
     "preflight/resolved.py": {"resolves the flow": RAGGED, "does not resolve the flow": RAGGED},
     "preflight/simplifications.py": {
         "would resolve it": DRAWN, "no refinement up to": DRAWN, "keeps their ratio": DRAWN, "integrates them": DRAWN,
@@ -91,19 +92,21 @@ FOLLOWED = {
     "runs/machine.py": {"or leave the key out": PACKAGES},
     "runs/recorder.py": {"continues the run": SIGNALS},
     "scene/rules.py": {"removes it": ENTRIES, "pip install": PACKAGES},
-    "scene/text.py": {"remove it to set the key": "tests/test_scene_text.py::test_every_key_may_be_made_active_at_once"},
+    "scene/text.py": {"remove it to set the key":
+                      "tests/test_scene_text.py::test_every_key_may_be_made_active_at_once"},
     "scene/units.py": {"give milligrams": ENTRIES, "give mg/L": ENTRIES},
     "sweeps/cluster.py": {"pip install": PACKAGES},
-    "sweeps/design.py": {"leave :{} out": ENTRIES},
+    "sweeps/design.py": {"leave :{} out":
+                         "tests/test_sweep_design.py::test_each_stratum_of_each_range_has_one_value"},
     "sweeps/folder.py": {"so not of this sweep; move it away": SWEEPS, "not of a run; move it away": SWEEPS,
                          "of another scene; move it away": SWEEPS},
 }
 #: What a sentence of advice contains. A requirement ("... is needed") is no advice: the rule that refuses explains it.
 ADVISES = re.compile(r"""
-    (^|[;:,(]\ ?)(and\ |or\ )?(try|give|choose|replace|leave|remove|use|repeat|move|wait|run(?!\ \{))\ 
+    (^|[;:,(]\ ?)(and\ |or\ )?(try|give|choose|replace|leave|remove|use|repeat|move|wait|run(?!\ \{))\s
     | \b(try|helps?|avoids|resolves?|adds\ the|keeps\ their|integrates\ them|models\ it|by\ themselves)\b
-    | \b(is\ another\ model|removes\ it|makes\ a\ run|continues\ the\ (run|sweep)|pip\ install|needs\ at\ most)\b | \ does$
-    | \bor\ --resume""", re.VERBOSE)
+    | \b(is\ another\ model|removes\ it|makes\ a\ run|continues\ the\ (run|sweep)|pip\ install)\b
+    | \b(needs\ at\ most|or\ --resume)\b | \ does$""", re.VERBOSE)
 #: Arguments of functions and fields that hold texts of the manual.
 MANUAL = {"about", "description", "epilog", "help", "source"}
 ROOT = Path(__file__).parents[1]

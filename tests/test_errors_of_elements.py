@@ -35,7 +35,7 @@ def test_an_error_of_the_elements_stops_a_run_with_the_keys_that_help(kind):
 
 
 @pytest.mark.parametrize("kind", [*ADVICE, OriginFolded])
-def test_on_a_bonded_wall_the_cause_is_stated_where_places_fold(kind):
+def test_on_a_bonded_wall_no_refinement_is_advised_where_places_fold(kind):
     """A larger refinement stops base there sooner or later. All other advice is that of a sliding wall."""
     messages = []
     for bonded in (False, True):

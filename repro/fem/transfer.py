@@ -304,7 +304,7 @@ class Pieces:
 
 def _pieces(points: np.ndarray, triangles: np.ndarray, new_points: np.ndarray,
             new_triangles: np.ndarray) -> Pieces:
-    """Common pieces of two meshes. Raises TransferError if the meshes do not cover the same area."""
+    """Common pieces of two meshes. Raises TransferError if they do not cover the same area."""
     corners, old, new = supermesh(points, triangles, new_points, new_triangles)
     edge = corners[:, 1:] - corners[:, :1]
     area = 0.5 * np.abs(edge[:, 0, 0] * edge[:, 1, 1] - edge[:, 0, 1] * edge[:, 1, 0])
