@@ -61,7 +61,9 @@ FOLLOWED = {
         "no setting helps": "member 61 of the hard family, without advice"},
     "model/gear.py": {"try a larger numerics.refinement":
                       "tests/test_advice.py::test_a_larger_refinement_helps_where_a_substrate_becomes_negative"},
-    "model/growth.py": {"try a larger growth.shear_modulus": "members 151 and 171 of the hard family"},
+    "model/growth.py": {
+        "try a larger growth.shear_modulus": "members 151 and 171 of the hard family",
+        "try a shorter growth.time_step": "tests/test_advice.py::test_a_shorter_step_helps_a_plug_that_grows_fast"},
     "model/pore.py": {"leave [flow] out": "tests/test_transport.py::test_too_slow_a_flow_is_refused"},
     "model/remeshing.py": {
         "{}; numerics.refinement = {} resolves this state":
@@ -425,3 +427,15 @@ def test_a_shorter_step_helps_where_the_aggregate_passes_the_opposite_wall():
         list(simulate(scene))
     last = list(simulate(load_scene(scene, ["growth.time_step=1 h"])))[-1].pore
     assert last.time == 5 and last.boundary.thickness < 50
+
+
+def test_a_shorter_step_helps_a_plug_that_grows_fast():
+    """It grows to six times its area in 5 h. One step has no equilibrium, and a larger refinement does not help."""
+    scene = load_scene("base", [
+        "numerics.preset=paper", "numerics.refinement=0.3", "pore.length=6000 um", "flow.head=1 cm",
+        'aggregate.outline=[["-25 um","0 um"],["-15 um","50 um"],["15 um","50 um"],["25 um","0 um"]]',
+        "kinetics.maximum_utilization_rate=14 1/day", "growth.time_step=5 h", "growth.end=5 h",
+        *(f"substrates.{name}.supply=1000 mg/L" for name in ("acceptor", "donor"))], unset=["aggregate.radius"])
+    with pytest.raises(SimulationError, match="in growth: .*; try a shorter growth.time_step"):
+        list(simulate(scene))
+    assert [*simulate(load_scene(scene, ["growth.time_step=0.5 h"]))][-1].pore.time == 5
