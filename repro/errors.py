@@ -95,14 +95,6 @@ class MeshError(StageError):
     stage = "meshing"
 
 
-class TurnedOver(MeshError):
-    """A triangle of a mesh is turned over."""
-
-
-class SelfCrossing(MeshError):
-    """An outline of the aggregate crosses itself."""
-
-
 class OutsidePore(MeshError):
     """The curve through the points of an outline leaves the pore."""
 
@@ -137,10 +129,6 @@ class TransferError(StageError):
     """Fields cannot be transferred from one mesh to another."""
 
     stage = "transfer between meshes"
-
-
-class NotCovered(TransferError):
-    """Two meshes do not cover the same area."""
 
 
 class OriginFolded(TransferError):

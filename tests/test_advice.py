@@ -1,40 +1,216 @@
-"""Advice appears once, names a value that is accepted and helps, or says that no setting helps.
+"""Every sentence of advice is listed with the scene or the action in which somebody followed it and it helped.
 
-The table lists where the advice of failing runs was followed. Members are those of verification/cases/hard_family.py.
-"Drawn" scenes are changes of base, drawn once: soft bodies in fast flow, steps of hours, and starts near contact.
-All advice for them was tried with a quarter and a twentieth of the step, and ten and a hundred times the modulus.
-
-    message                                     followed in                     result
-    negative substrate: larger refinement       the test of fronts, member 66   runs
-    too soft: larger modulus                    members 151, 171; 3 drawn       both members and 1 of 3 drawn run
-    too soft: shorter step                      3 drawn                         never helped; no longer advised
-    forces and shape disagree: larger modulus   2 drawn                         both run
-    forces and shape disagree: neglected        2 drawn                         both run
-    forces and shape disagree: shorter step     2 drawn                         never helped; no longer advised
-    passes the opposite wall: shorter step      the last test below             runs
-    fold: stress-free biomass                   tests/test_fold.py              runs
-    thin tip: no setting helps                  member 61, 1 drawn              nothing to follow
-    fluid's stress, permeable: "included"       tests below                     runs, and strains the aggregate
-    floating-point error: shorter step          1 drawn (Gear's scheme)         stops later, at 0.03 h
-    floating-point error: larger refinement     1 drawn (Gear's scheme)         did not help; still advised
-
-Not followed, because no scene that fails in this way is known here: triangles turned over, an outline that crosses
-itself, meshes that do not cover each other, places that fold, an equilibrium without fluid forces, growth from a
-triangle that is turned over, all messages of contact lines and of contact surfaces, both of Gear's scheme, a density
-out of bounds, a step that does not balance, and a lack of memory within a run. About 220 drawn scenes with steps of
-hours, or from near contact, show none of these.
+A sentence of advice says what to change. A requirement ("... is needed") is none: the rule that refuses is its reason.
+Members of verification/cases/hard_family.py are scenes of growth to their end.
 """
+import ast
 import math
 import random
 import re
+import tomllib
+from pathlib import Path
 
 import pytest
 
+from repro.cli import main
 from repro.errors import SimulationError
 from repro.march.simulation import simulate
 from repro.model import pore
 from repro.preflight import memory, numbers, simplifications
+from repro.runs import machine
 from repro.scene import SceneError, load_scene, parse_scene
+from tests.shell import refusal, run_python
+
+#: Tests that follow several sentences.
+FOLDERS = "tests/test_advice.py::test_a_run_starts_if_the_advice_about_its_folder_is_followed"
+ENTRIES = "tests/test_advice.py::test_an_entry_is_accepted_if_the_advice_is_followed"
+PACKAGES = "tests/test_advice.py::test_packages_to_install_are_those_that_the_project_names"
+MEMORY = "tests/test_advice.py::test_a_smaller_refinement_helps_against_a_lack_of_memory"
+DRAWN = "tests/test_advice.py::test_the_advice_of_check_is_accepted_and_helps"
+FITS = "tests/test_advice.py::test_the_advice_against_a_lack_of_memory_is_accepted_and_helps"
+THRESHOLDS = "tests/test_check.py::test_warnings_are_exactly_where_a_simplification_fails"
+RAGGED = "tests/test_ragged_outlines.py::test_presets_agree_on_a_ragged_outline_or_a_warning_names_what_resolves_it"
+SPLINES = "tests/test_odd_outlines.py::test_a_spline_that_is_no_outline_is_refused_before_anything_is_written"
+STRESS_FREE = "tests/test_fold.py::test_a_run_stopped_after_every_step_equals_the_uninterrupted_run"
+SIGNALS = "tests/test_resume.py::test_a_run_ended_by_a_signal_resumes"
+LONGER = "tests/test_longer.py::test_the_command_makes_a_run_longer"
+LOCKS = "tests/test_folder.py::test_a_killed_run_leaves_no_lock_that_counts"
+SWEEPS = "tests/test_sweep.py::test_a_folder_of_another_run_is_refused"
+
+#: {file of repro: {part of its advice: the test that follows it, or the scene in which it was followed}}.
+FOLLOWED = {
+    "cli/check.py": {"continues the run": SIGNALS},
+    "cli/run.py": {"or --resume DIR": SIGNALS, "--resume continues the run": SIGNALS, "makes a run longer": LONGER,
+                   "try a smaller numerics.refinement": MEMORY},
+    "cli/sweep.py": {"continues the sweep": "tests/test_sweep.py::test_a_signal_ends_a_sweep_quietly"},
+    "fem/linear.py": {"pip install": PACKAGES},
+    "march/folding.py": {'growth.new_biomass = "stress_free" does': STRESS_FREE},
+    "march/loop.py": {"try a smaller numerics.refinement": MEMORY},
+    "march/updates.py": {"try a shorter growth.time_step":
+                         "tests/test_advice.py::test_a_shorter_step_helps_where_the_aggregate_passes_the_opposite_wall"},
+    "model/advice.py": {
+        "try smooth = false": SPLINES,
+        "leave numerics.solver and numerics.ordering out": PACKAGES,
+        'growth.wall = "sliding" is another model': "base: it stops at 14 h on a bonded wall, not on a sliding one"},
+    "model/contact.py": {
+        'growth.shear_modulus, or growth.fluid_forces = "neglected"': "two drawn scenes of soft bodies in fast flow",
+        "no setting helps": "member 61 of the hard family, without advice"},
+    "model/gear.py": {"try a larger numerics.refinement":
+                      "tests/test_advice.py::test_a_larger_refinement_helps_where_a_substrate_becomes_negative"},
+    "model/growth.py": {
+        "try a larger growth.shear_modulus": "members 151 and 171 of the hard family",
+        "try a shorter growth.time_step": "tests/test_advice.py::test_a_shorter_step_helps_a_plug_that_grows_fast"},
+    "model/pore.py": {"leave [flow] out": "tests/test_transport.py::test_too_slow_a_flow_is_refused"},
+    "preflight/memory.py": {
+        "try smooth = false": SPLINES, "needs at most half of them": FITS,
+        "no numerics.refinement that resolves": FITS},
+    "preflight/resolved.py": {"resolves the flow": RAGGED, "does not resolve the flow": RAGGED},
+    "preflight/simplifications.py": {
+        "would resolve it": DRAWN, "no refinement up to": DRAWN, "keeps their ratio": DRAWN, "integrates them": DRAWN,
+        "models it": DRAWN, "refine by themselves": THRESHOLDS, "replace F by": THRESHOLDS,
+        "adds the forces": THRESHOLDS, "choose a shorter one": THRESHOLDS, '"stress_free" avoids this': STRESS_FREE},
+    "results/drawing.py": {"pip install": PACKAGES},
+    "results/tables.py": {"pip install": PACKAGES},
+    "runs/execution.py": {
+        "--resume makes a run longer": LONGER, "give a later one": LONGER, "run another scene": FOLDERS,
+        "give a new folder": FOLDERS, "with --force": "tests/test_resume.py::test_only_force_repeats_a_damaged_run",
+        "try a smaller numerics.refinement": MEMORY},
+    "runs/folder.py": {
+        "move the folder away": FOLDERS, "give a new folder": FOLDERS, "move the files": FOLDERS,
+        "so no run has written it; move it away": FOLDERS, "{}: no run has written it; move it away": FOLDERS,
+        "give another folder": FOLDERS, "wait for its end": LOCKS,
+        "if no process writes there, remove": "tests/test_names.py::test_a_folder_that_is_locked_elsewhere_is_refused",
+        "and use --resume": "tests/test_folder.py::test_foreign_files_are_not_replaced",
+        "use --resume": "tests/test_machine.py::test_a_limit_of_file_sizes_ends_a_run_in_one_line",
+        "repeat the command": "tests/test_machine.py::test_a_limit_of_file_sizes_ends_a_run_in_one_line"},
+    "runs/machine.py": {"or leave the key out": PACKAGES},
+    "runs/recorder.py": {"continues the run": SIGNALS},
+    "scene/rules.py": {"removes it": ENTRIES, "pip install": PACKAGES},
+    "scene/text.py": {"remove it to set the key":
+                      "tests/test_scene_text.py::test_every_key_may_be_made_active_at_once"},
+    "scene/units.py": {"give milligrams": ENTRIES, "give mg/L": ENTRIES},
+    "sweeps/cluster.py": {"pip install": PACKAGES},
+    "sweeps/design.py": {"leave :{} out":
+                         "tests/test_sweep_design.py::test_each_stratum_of_each_range_has_one_value"},
+    "sweeps/folder.py": {"so not of this sweep; move it away": SWEEPS, "not of a run; move it away": SWEEPS,
+                         "of another scene; move it away": SWEEPS},
+}
+#: What a sentence of advice contains. A requirement ("... is needed") is no advice: the rule that refuses explains it.
+ADVISES = re.compile(r"""
+    (^|[;:,(]\ ?)(and\ |or\ )?(try|give|choose|replace|leave|remove|use|repeat|move|wait|run(?!\ \{))\s
+    | \b(try|helps?|avoids|resolves?|adds\ the|computes\ the|keeps\ their|integrates\ them|models\ it|by\ themselves)\b
+    | \b(is\ another\ model|removes\ it|makes\ a\ run|continues\ the\ (run|sweep)|pip\ install)\b
+    | \b(needs\ at\ most|or\ --resume)\b | \ does$""", re.VERBOSE)
+#: Arguments of functions and fields that hold texts of the manual.
+MANUAL = {"about", "description", "epilog", "help", "source"}
+ROOT = Path(__file__).parents[1]
+
+
+def texts(node):
+    """Every text in a syntax tree with {} in place of values, except docstrings and the manual."""
+    if isinstance(node, ast.JoinedStr):
+        yield "".join(part.value if isinstance(part, ast.Constant) else "{}" for part in node.values)
+    elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+        yield node.value
+    elif not isinstance(node, ast.keyword) or node.arg not in MANUAL:
+        for child in ast.iter_child_nodes(node):
+            if not (isinstance(child, ast.Expr) and isinstance(child.value, ast.Constant)):
+                yield from texts(child)
+
+
+def test_every_sentence_of_advice_was_followed():
+    """Each sentence has a row, each row has a sentence, and the tests of the rows exist."""
+    unlisted, unused = [], {(file, part) for file, rows in FOLLOWED.items() for part in rows}
+    for path in (ROOT / "repro").rglob("*.py"):
+        file = path.relative_to(ROOT / "repro").as_posix()
+        for text in texts(ast.parse(path.read_text(encoding="utf-8"))):
+            if ADVISES.search(text) and " " in text:
+                parts = {part for part in FOLLOWED.get(file, ()) if part in text}
+                unused -= {(file, part) for part in parts}
+                unlisted += [] if parts else [(file, text)]
+    assert not unlisted and not unused
+    for place in {place for rows in FOLLOWED.values() for place in rows.values() if "::" in place}:
+        module, _, name = place.partition("::")
+        assert f"def {name}(" in (ROOT / module).read_text(encoding="utf-8"), place
+
+
+@pytest.mark.parametrize("refused, accepted, advice", [
+    (["pore.width=50 um", "flow.mean_velocity=1 m/day"], ["--unset flow.head"], "(unset flow.head removes it)"),
+    (["substrates.acceptor.supply=0.3 mmol/L"], ["substrates.acceptor.supply=9.6 mg/L"], "give milligrams"),
+    (["substrates.acceptor.supply=9.6 ppm"], ["substrates.acceptor.supply=9.6 mg/L"], "give mg/L"),
+])
+def test_an_entry_is_accepted_if_the_advice_is_followed(refused, accepted, advice):
+    with pytest.raises(SceneError) as refusal_of_entry:
+        load_scene("base", refused)
+    assert advice in str(refusal_of_entry.value)
+    unset = [entry.removeprefix("--unset ") for entry in accepted if entry.startswith("--unset ")]
+    load_scene("base", refused if unset else accepted, unset=unset)
+
+
+def test_packages_to_install_are_those_that_the_project_names():
+    """They are optional dependencies. A scene without the keys that need them can be run."""
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["optional-dependencies"]
+    named = {re.match(r"[\w-]+", entry)[0] for entries in extras.values() for entry in entries}
+    assert named >= {*machine.OPTIONAL.values(), "matplotlib", "pillow", "xarray", "distributed"}
+    for key, choice in machine.OPTIONAL:
+        scene = load_scene("base", [f"numerics.{key}={choice}"])
+        machine.require_packages(load_scene(scene, unset=[f"numerics.{key}"]))
+
+
+@pytest.mark.parametrize("name, content, options, advice", [
+    ("thesis.tex", "mine", [], "which is not of a run; give a new folder"),
+    ("run.json", '{"files": "thesis.tex"}', ["--force"], "lists no files of a run; move the folder away"),
+    ("report.html", None, ["--force"], "it is not a regular file, so no run has written it; move it away"),
+    ("fields/fields_0099.vtu", "mine", ["--force"], "no run has written it; move it away"),
+    ("fields", "mine", ["--force"], "move the files of the run into one"),
+])
+def test_a_run_starts_if_the_advice_about_its_folder_is_followed(tmp_path, capsys, name, content, options, advice):
+    """The folder contains a foreign file or, for the last three, a run with a foreign file in place of its own."""
+    path = tmp_path / "run" / name
+    path.parent.mkdir(parents=True)
+    command = ["run", "flow_only", "--quiet", "--out"]
+    if "folder" not in advice:
+        assert main([*command, str(tmp_path / "run")]) == 0
+    if path.exists():
+        path.rename(tmp_path / "own")
+    path.mkdir() if content is None else path.write_text(content)
+    assert advice in refusal(tmp_path, capsys, *command, tmp_path / "run", *options)
+    if "give a new folder" in advice:
+        assert main([*command, str(tmp_path / "new")]) == 0
+    path.rename(tmp_path / "elsewhere")
+    assert main([*command, str(tmp_path / "run"), *options]) == 0
+
+
+@pytest.mark.thorough
+def test_a_smaller_refinement_helps_against_a_lack_of_memory():
+    """A process may use 100 MB more than the program."""
+    code = """
+import resource, scipy.sparse.linalg, repro.march.simulation as simulation, repro
+used = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()
+resource.setrlimit(resource.RLIMIT_AS, (used + 100 * 2**20,) * 2)
+for refinement in (4, 0.3):
+    scene = repro.load_scene("base", ["numerics.preset=fast", "growth.end=0 h", f"numerics.refinement={refinement}"])
+    try:
+        print(len(list(simulation.simulate(scene))))
+    except repro.SimulationError as error:
+        print(error)
+"""
+    refused, rows = run_python(code).stdout.splitlines()
+    assert refused.endswith("; try a smaller numerics.refinement") and rows == "1"
+
+
+def test_a_larger_refinement_helps_where_a_substrate_becomes_negative():
+    """First-order uptake exhausts the donor within an element."""
+    scene = load_scene("base", [
+        "numerics.preset=paper", "numerics.refinement=0.367", "numerics.transport=gear", "aggregate.radius=30 um",
+        "growth.time_step=0.1 h", "growth.end=0.1 h", "kinetics.law=first order", "flow.mean_velocity=0.659 m/day",
+        "kinetics.maximum_utilization_rate=32.6 1/day",
+        "substrates.acceptor.supply=7.45 mg/L", "substrates.acceptor.half_saturation=1.56 mg/L",
+        "substrates.donor.supply=1.31 mg/L", "substrates.donor.half_saturation=5.81e-4 mg/L"], unset=["flow.head"])
+    with pytest.raises(SimulationError, match="the donor becomes negative .*; try a larger numerics.refinement"):
+        list(simulate(scene))
+    assert [*simulate(load_scene(scene, ["numerics.refinement=1"]))][-1].pore.time == 0.1
+
 
 #: {pattern of a warning: the settings that it advises}.
 ADVICE = {
@@ -180,3 +356,15 @@ def test_a_shorter_step_helps_where_the_aggregate_passes_the_opposite_wall():
         list(simulate(scene))
     last = list(simulate(load_scene(scene, ["growth.time_step=1 h"])))[-1].pore
     assert last.time == 5 and last.boundary.thickness < 50
+
+
+def test_a_shorter_step_helps_a_plug_that_grows_fast():
+    """It grows to six times its area in 5 h. One step has no equilibrium, and a larger refinement does not help."""
+    scene = load_scene("base", [
+        "numerics.preset=paper", "numerics.refinement=0.3", "pore.length=6000 um", "flow.head=1 cm",
+        'aggregate.outline=[["-25 um","0 um"],["-15 um","50 um"],["15 um","50 um"],["25 um","0 um"]]',
+        "kinetics.maximum_utilization_rate=14 1/day", "growth.time_step=5 h", "growth.end=5 h",
+        *(f"substrates.{name}.supply=1000 mg/L" for name in ("acceptor", "donor"))], unset=["aggregate.radius"])
+    with pytest.raises(SimulationError, match="in growth: .*; try a shorter growth.time_step"):
+        list(simulate(scene))
+    assert [*simulate(load_scene(scene, ["growth.time_step=0.5 h"]))][-1].pore.time == 5

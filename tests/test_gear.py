@@ -188,6 +188,19 @@ def test_a_substrate_may_be_used_up_to_nothing(changes, unset):
     assert last.pore.time == starved.growth.end and last.pore.mass == pytest.approx(before.pore.mass, rel=1e-13)
 
 
+@EVERY_ORDER
+@pytest.mark.parametrize("species", [0, 1])
+def test_uptake_where_a_substrate_is_negative_has_the_slope_of_its_law(species, order):
+    """The secant, uptake over concentration, is that of positive concentrations alone, and overflows elsewhere."""
+    pore, problem = case.__wrapped__(order=order, kinetics={"maximum_utilization_rate": "500 1/day"})
+    system = gear.System(problem, pore.active, None, None, living=False)
+    fields = np.full((2, pore.space.count), 10.0)
+    fields[species] = -10.0
+    with np.errstate(all="raise"):
+        secant, slope = (gear._sink(system, pore.active, fields, species, positive)[0] for positive in (True, False))
+    assert np.array_equal(secant, slope) and secant.max() > 0
+
+
 @pytest.mark.parametrize("order, accepted, least, refused", [
     (1, 9.9e-6, 0.1, 10.003e-6), (2, 10.005e-6, -5e-3, 10.05e-6), (3, 10.005e-6, -5e-3, 10.05e-6)], ids="123")
 def test_gears_method_bounds_undershoots_by_each_substrates_supply(order, accepted, least, refused):

@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from repro.cli import main
 from repro.errors import SimulationError
 from repro.fem import mesher, sizing
 from repro.march.simulation import simulate
@@ -156,7 +157,9 @@ def test_a_spline_that_is_no_outline_is_refused_before_anything_is_written(tmp_p
     path.write_text(f'[pore]\nwidth = "100 um"\n[aggregate]\nsmooth = true\noutline = {json.dumps(outline)}\n')
     out = ["--out", tmp_path / "run"] if command == "run" else []
     message = refusal(tmp_path, capsys, command, path, *out)
-    assert needed in message and "give more points, or smooth = false" in message
+    assert needed in message and "try smooth = false" in message
+    path.write_text(path.read_text().replace("true", "false"))
+    assert main(["check", str(path)]) == 0
 
 
 def test_check_estimates_a_large_mesh_instead_of_making_it(monkeypatch):

@@ -131,6 +131,8 @@ def test_a_folder_of_another_run_is_refused(copied, capsys):
     shutil.rmtree(last)
     shutil.copytree(first, last)
     assert f"{last}: it holds the run of another scene; move it away" in refused(copied, capsys, *VARY, *SHORT)
+    shutil.rmtree(last)
+    assert sweep(copied, *VARY, *SHORT, "--quiet") == 3 and read_record(last)["status"] == "completed"
 
 
 def refused(out, capsys, *arguments):

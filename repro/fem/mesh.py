@@ -15,7 +15,7 @@ from functools import cache, cached_property
 import numpy as np
 from skfem import MeshTri
 
-from repro.errors import TurnedOver
+from repro.errors import MeshError
 from repro.fem import elements
 from repro.fem.assembly import ElementSystem
 from repro.fem.brief import brief
@@ -419,11 +419,11 @@ class Mesh:
         return np.isin(self.loop[1::2], self.cells[self.turned_over(), 3:])
 
     def checked(self) -> Mesh:
-        """The mesh itself. Raises TurnedOver if a triangle is turned over."""
+        """The mesh itself. Raises MeshError if a triangle is turned over."""
         bad = np.flatnonzero(self.turned_over())
         if len(bad):
             x, y = self.points[self.cells[bad[0]]].mean(axis=0)
-            raise TurnedOver(f"a triangle near x = {x:.4g}, y = {y:.4g} um is turned over")
+            raise MeshError(f"a triangle near x = {x:.4g}, y = {y:.4g} um is turned over")
         return self
 
     def acceptable(self) -> bool:

@@ -17,7 +17,7 @@ import numpy as np
 import shapely
 from mmgpy import MmgMesh2D
 
-from repro.errors import MeshError, SelfCrossing
+from repro.errors import MeshError
 from repro.fem import sizing as sizes_of
 from repro.fem.linear import DEFAULT, Method
 from repro.fem.mesh import Mesh, curved, triangle_areas
@@ -108,11 +108,11 @@ def around(outline: Outline | None, ends: tuple[float, float], sizing: Sizing,
 
 
 def check_outline(outline: Outline, ends: tuple[float, float], width: float) -> None:
-    """Raise SelfCrossing if an outline crosses itself, MeshError if it leaves the meshed part."""
+    """Raise MeshError if an outline crosses itself or leaves the meshed part."""
     polygon = shapely.Polygon(outline.points)
     if not polygon.is_valid:
-        raise SelfCrossing("the outline of the aggregate crosses itself: "
-                           f"{shapely.is_valid_reason(polygon)}")
+        raise MeshError("the outline of the aggregate crosses itself, and contact is modelled with "
+                        f"the walls alone: {shapely.is_valid_reason(polygon)}")
     inside = ends[0] < outline.upstream and outline.downstream < ends[1]
     if not inside or outline.points[:, 1].min() < 0 or outline.points[:, 1].max() > width:
         raise MeshError(f"the aggregate, x from {outline.upstream:.4g} to "

@@ -25,7 +25,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from repro.errors import NotCovered, OriginFolded, TransferError, failing_as
+from repro.errors import OriginFolded, TransferError, failing_as
 from repro.fem import elements, linear
 from repro.fem.assembly import ElementSystem
 from repro.fem.forms import mass
@@ -80,7 +80,7 @@ def located(points: np.ndarray, cells: np.ndarray, where: np.ndarray) -> Located
     first = best[np.unique(place[best], return_index=True)[1]]
     if len(first) < len(where):
         x, y = where[np.setdiff1d(np.arange(len(where)), place)[0]]
-        raise NotCovered(f"x = {x:.4g}, y = {y:.4g} um of the new mesh is not in the old one")
+        raise TransferError(f"x = {x:.4g}, y = {y:.4g} um of the new mesh is not in the old one")
     return Located(cell[first], _inside(local[first]))
 
 
@@ -223,7 +223,7 @@ def project(points: np.ndarray, triangles: np.ndarray, fields: np.ndarray,
             new_points: np.ndarray, new_triangles: np.ndarray) -> np.ndarray:
     """(K, m) Galerkin projection of nodal fields (N, m) onto another mesh of the same polygon.
 
-    Raises NotCovered where the two meshes do not cover the same area.
+    Raises TransferError where the two meshes do not cover the same area.
     """
     pieces = _pieces(points, triangles, new_points, new_triangles)
     right = _loads(pieces, points, triangles, fields, new_points, new_triangles)
@@ -304,14 +304,14 @@ class Pieces:
 
 def _pieces(points: np.ndarray, triangles: np.ndarray, new_points: np.ndarray,
             new_triangles: np.ndarray) -> Pieces:
-    """Common pieces of two meshes. Raises NotCovered if the meshes do not cover the same area."""
+    """Common pieces of two meshes. Raises TransferError if they do not cover the same area."""
     corners, old, new = supermesh(points, triangles, new_points, new_triangles)
     edge = corners[:, 1:] - corners[:, :1]
     area = 0.5 * np.abs(edge[:, 0, 0] * edge[:, 1, 1] - edge[:, 0, 1] * edge[:, 1, 0])
     before = triangle_areas(points, triangles).sum()
     after = triangle_areas(new_points, new_triangles).sum()
     if max(abs(area.sum() / before - 1), abs(area.sum() / after - 1)) > COVER:
-        raise NotCovered(f"the old mesh covers {before:.12g} um2, the new one {after:.12g} um2, "
+        raise TransferError(f"the old mesh covers {before:.12g} um2, the new one {after:.12g} um2, "
                          f"their common pieces {area.sum():.12g} um2")
     return Pieces(corners, old, new, area)
 

@@ -138,8 +138,7 @@ def refuse(limits: Limits, after: Pore, ledger: Ledger) -> None:
         message = ", ".join(f"{part:.2g} of the {name}" for name, part in wrong.items())
         first, last = after.mesh.ends
         raise BalanceError(f"the step to t = {ledger.end:g} h does not balance between x = "
-                           f"{first:.4g} and {last:.4g} um: it lacks {message}; try a shorter "
-                           "growth.time_step or a larger numerics.refinement, and report it")
+                           f"{first:.4g} and {last:.4g} um: it lacks {message}")
 
 
 def accepted_demand(limits: Limits, ledger: Ledger) -> float:

@@ -78,7 +78,7 @@ def refuse_fold(expanded: Pore) -> None:
     if expanded.last is not None and compression.stretch < BIOT:
         raise GrowthError(f"growth in one step compresses the surface to {compression.stretch:.3f} "
                           f"of its length near x = {compression.x:.4g}, y = {compression.y:.4g} "
-                          "um; try a shorter growth.time_step")
+                          "um")
 
 
 @contextmanager
@@ -114,5 +114,4 @@ def refuse_density(pore: Pore, maximum_density: float) -> None:
     low, high = DENSITIES
     if least < low or largest > high:
         raise GrowthError(f"the density of biomass comes to {least:.2g} to {largest:.2g} X_m, out "
-                          f"of {low:g} to {high:g}: a triangle has collapsed; try a shorter "
-                          "growth.time_step or a larger numerics.refinement")
+                          f"of {low:g} to {high:g}: a triangle has collapsed")

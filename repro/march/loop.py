@@ -355,8 +355,7 @@ def stopping(time: float, bonded: bool = False) -> Iterator[None]:
         message = f"{stopped}, in {error.stage}: {with_advice(error, bonded)}"
         raise SimulationError(message) from error
     except FloatingPointError as error:
-        raise SimulationError(f"{stopped} by a floating-point error ({error}); try a shorter "
-                              "growth.time_step or a larger numerics.refinement") from error
+        raise SimulationError(f"{stopped} by a floating-point error ({error})") from error
     except MemoryError as error:
         raise SimulationError(f"{stopped}, out of memory ({error}); "
                               "try a smaller numerics.refinement") from error

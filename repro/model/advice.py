@@ -2,25 +2,10 @@
 
 from __future__ import annotations
 
-from repro.errors import (
-    NotCovered,
-    OriginFolded,
-    OutsidePore,
-    PackageMissing,
-    SelfCrossing,
-    StageError,
-    TurnedOver,
-    Unresolved,
-)
+from repro.errors import OriginFolded, OutsidePore, PackageMissing, StageError, Unresolved
 
 ADVICE: dict[type[StageError], str] = {
-    TurnedOver: "; try a larger numerics.refinement or a shorter growth.time_step",
-    SelfCrossing: "; a shorter growth.time_step or a larger numerics.refinement helps a coarse "
-                  "outline; nothing helps where two parts of the surface meet: contact is modelled "
-                  "with the walls alone",
-    OutsidePore: "; aggregate.outline: give more points, or smooth = false",
-    NotCovered: "; try a shorter growth.time_step",
-    OriginFolded: "; try a shorter growth.time_step or a larger numerics.refinement",
+    OutsidePore: "; aggregate.outline: try smooth = false",
     Unresolved: "; try a larger numerics.refinement",
     PackageMissing: ", or leave numerics.solver and numerics.ordering out",
 }

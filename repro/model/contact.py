@@ -253,8 +253,7 @@ def _close_by_nodes(mechanics: Mechanics, grown: Pore, start: Pore, forces: np.n
             return Expansion(replace(shape, fixed=_with_new_surface(shape.boundary)), iterations,
                              gaps[0])
         shape = replace(shape, wall=np.where(joins != FREE, joins, shape.wall))
-    raise GrowthError(f"the contact surfaces still change after {CONTACT_ROUNDS} rounds; "
-                      "try a shorter growth.time_step")
+    raise GrowthError(f"the contact surfaces still change after {CONTACT_ROUNDS} rounds")
 
 
 def _equilibrium(mechanics: Mechanics, grown: Pore, start: Pore, forces: np.ndarray | None, *,
@@ -309,8 +308,7 @@ def _close_by_lines(mechanics: Mechanics, grown: Pore, start: Pore, forces: np.n
             if not line.accepted:
                 line.step()
         shape = trials.solve(wall, lines)
-    raise GrowthError(f"the contact lines still move after {CONTACT_ROUNDS} trials; "
-                      "try a shorter growth.time_step")
+    raise GrowthError(f"the contact lines still move after {CONTACT_ROUNDS} trials")
 
 
 def _refuse_late(gap: float, film: float, search: SearchOptions) -> None:

@@ -41,8 +41,7 @@ BEYOND = 1.05
 LEAST_REACH = 0.5
 #: Secant steps keep this fraction of the interval away from its ends.
 INSIDE = 0.03
-MEET = ("two contact lines meet and trap fluid between them; "
-        "try a shorter growth.time_step")
+MEET = "two contact lines meet and trap fluid between them"
 #: Parameters of an arc at which the clearance is computed: the second shows the angle at the line.
 PLACES = np.append([0.0, 1e-3], np.linspace(0.0, 1.0, 9)[1:])
 AT_PLACES = parabola(PLACES)

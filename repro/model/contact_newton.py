@@ -183,8 +183,7 @@ class Coupled:
             hopeless = self.iterations == EARLY[0] and iterate.defect > EARLY[1]
             if hopeless or self.iterations == MOST_ITERATIONS or solved and not moving:
                 raise GrowthError("Newton's method for the contact lines stands at a defect of "
-                                  f"{iterate.defect:.2g} after {self.iterations} iterations; "
-                                  "try a shorter growth.time_step")
+                                  f"{iterate.defect:.2g} after {self.iterations} iterations")
             if iterate.defect > REQUIRED_REDUCTION * last:
                 self._factors = None
             last = iterate.defect
@@ -219,8 +218,7 @@ class Coupled:
                 self.position = position
                 self.pressure = pressure
                 return bool(steps.any())
-        raise GrowthError("no step of contact lines keeps det F > 0; "
-                          "try a shorter growth.time_step")
+        raise GrowthError("no step of contact lines keeps det F > 0")
 
     def _with_lines(self, iterate: growth.Iterate, factors: Factored,
                     change: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

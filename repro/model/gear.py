@@ -224,7 +224,7 @@ def settle(problem: Problem, sink: Sink | None, guess: Concentrations | None) ->
         rate = change / new.step
         last = change
     raise TransportError(f"the profiles still change by {change:.2g} of the supply a step after "
-                         f'{MOST_STEPS} steps; try numerics.transport = "quasi_steady"')
+                         f"{MOST_STEPS} steps")
 
 
 def steady(problem: Problem, sink: Sink | None, guess: Concentrations | None) -> Concentrations:
@@ -439,8 +439,7 @@ def _sink(system: System, active: np.ndarray, fields: np.ndarray, s: int,
     substrate = values[s]
     uptake, slope = law.own_uptake(s, *values)
     if positive:
-        tiny = np.finfo(float).tiny
-        secant = np.where(substrate > tiny, uptake / np.maximum(substrate, tiny), slope)
+        secant = np.divide(uptake, substrate, out=slope, where=substrate > np.finfo(float).tiny)
         return active * secant, np.zeros_like(active)
     return active * slope, active * (uptake - slope * substrate)
 

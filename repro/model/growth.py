@@ -517,8 +517,7 @@ def equilibrium(body: Body, theta: np.ndarray, position: np.ndarray, pressure: n
     """
     start = body.strained(position).J
     if start.min() <= 0 or theta.min() <= 0:
-        raise GrowthError("growth starts from a triangle that is turned over or from theta <= 0; "
-                          "try a shorter growth.time_step")
+        raise GrowthError("growth starts from a triangle that is turned over or from theta <= 0")
     method = STABILISATIONS[body.shape.geometry]
     last_shape = position if last is None else last
     parts = method.parts(theta / start)
@@ -528,9 +527,9 @@ def equilibrium(body: Body, theta: np.ndarray, position: np.ndarray, pressure: n
     return reach(system, start, theta, first, prescribed, parts, modified_newton, patient)
 
 
-#: Settings to try if there is no equilibrium, by whether the fluid's forces act.
-_ADVICE = {False: "try a shorter growth.time_step or a larger numerics.refinement",
-           True: "the aggregate may be too soft for this flow: try a larger growth.shear_modulus"}
+#: What helps if there is no equilibrium, under the fluid's forces and without them.
+TOO_SOFT = "; the aggregate may be too soft for this flow: try a larger growth.shear_modulus"
+TOO_LONG = "; try a shorter growth.time_step"
 
 
 def reach(system: System, start: np.ndarray, theta: np.ndarray, first: Equilibrium,
@@ -545,7 +544,8 @@ def reach(system: System, start: np.ndarray, theta: np.ndarray, first: Equilibri
                               modified_newton)
         except (GrowthError, LinearError) as error:
             failure = str(error)
-    raise GrowthError(f"{failure}; {_ADVICE[bool(system.pull.any())]}")
+    advice = TOO_SOFT if system.pull.any() else TOO_LONG
+    raise GrowthError(failure + advice)
 
 
 @failing_as(GrowthError)

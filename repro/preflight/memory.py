@@ -133,7 +133,7 @@ def require_outline(scene: Scene) -> None:
     if curve is not None and not curve.is_valid:
         location = shapely.is_valid_reason(curve)
         raise SceneError(f"{scene.name}: the spline through the points of aggregate.outline "
-                         f"crosses itself ({location}); give more points, or smooth = false")
+                         f"crosses itself ({location}); try smooth = false")
 
 
 def require_memory(scene: Scene, warn: Callable[[str], None]) -> None:
@@ -158,7 +158,7 @@ def _fitting(scene: Scene, free: float) -> str:
         coarser = replace(scene, numerics=replace(scene.numerics, refinement=refinement))
         if expected_bytes(coarser) <= WARNED * free:
             return f"numerics.refinement = {refinement:g} needs at most half of them"
-    return "no numerics.refinement that resolves the pore fits; a smaller pore is needed"
+    return "no numerics.refinement that resolves the pore fits"
 
 
 def free_bytes(root: Path = Path("/")) -> float:

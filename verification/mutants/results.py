@@ -386,11 +386,18 @@ MUTANTS = (
          "    space = pore.seeded(scene).space",
          "tests/test_progress.py::test_a_check_reports_between_its_stages_without_its_thread")),
     *changes(
+        "repro/model/gear.py",
+        ("secant-below-zero",
+         "Where a substrate is negative, its uptake is divided by the smallest number, which overflows.",
+         "np.divide(uptake, substrate, out=slope, where=substrate > np.finfo(float).tiny)",
+         "uptake / np.maximum(substrate, np.finfo(float).tiny)",
+         "tests/test_gear.py::test_uptake_where_a_substrate_is_negative_has_the_slope_of_its_law")),
+    *changes(
         "repro/model/growth.py",
         ("too-soft-without-advice",
-         "Where the fluid's forces leave no equilibrium, a refinement is advised, which does not help.",
-         "_ADVICE[bool(system.pull.any())]",
-         "_ADVICE[False]",
+         "Where the fluid's forces leave no equilibrium, a shorter step is advised, which does not help.",
+         "TOO_SOFT if system.pull.any() else TOO_LONG",
+         "TOO_LONG",
          "verification/cases/hard_family.py::test_family[seed 171]")),
     *changes(
         "repro/model/advice.py",
