@@ -50,6 +50,7 @@ FOLLOWED = {
                          "tests/test_advice.py::test_a_shorter_step_helps_where_the_aggregate_passes_the_opposite_wall"},
     "model/advice.py": {
         "try smooth = false": SPLINES,
+        "try a larger numerics.refinement": "tests/test_advice.py::test_an_unresolved_front_gets_advice_once_and_it_helps",
         "leave numerics.solver and numerics.ordering out": PACKAGES,
         'growth.wall = "sliding" is another model': "base: it stops at 14 h on a bonded wall, not on a sliding one"},
     "model/contact.py": {
@@ -68,7 +69,7 @@ FOLLOWED = {
     "preflight/simplifications.py": {
         "would resolve it": DRAWN, "no refinement up to": DRAWN, "keeps their ratio": DRAWN, "integrates them": DRAWN,
         "models it": DRAWN, "refine by themselves": THRESHOLDS, "replace F by": THRESHOLDS,
-        "adds the forces": THRESHOLDS, "choose a shorter one": THRESHOLDS, '"stress_free" avoids this': STRESS_FREE},
+        "adds the forces": THRESHOLDS, "computes the traction": DRAWN, "choose a shorter one": THRESHOLDS, '"stress_free" avoids this': STRESS_FREE},
     "results/drawing.py": {"pip install": PACKAGES},
     "results/tables.py": {"pip install": PACKAGES},
     "runs/execution.py": {
