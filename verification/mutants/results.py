@@ -563,6 +563,11 @@ MUTANTS = (
          "tests/test_checkpoint.py::test_altered_fields_are_refused")),
     *changes(
         "repro/runs/folder.py",
+        ("ended-process-locks",
+         "Without flock the lock of a process that has ended is never taken over.",
+         "is_file(path) and (path.stat().st_size == 0 or SoftFileLock(path).pid is not None)",
+         "is_file(path) and path.stat().st_size == 0",
+         "tests/test_names.py::test_a_killed_run_without_flock_goes_on[how0]"),
         ("whole-folder-own",
          "A folder with foreign files counts as the folder of a run.",
          "return sorted(name for name in names if name not in run_files or not is_file(folder / name))",
@@ -883,7 +888,7 @@ MUTANTS = (
         "repro/model/pore.py",
         ("meshes-for-the-first-velocity",
          "Meshes are fine enough for the flow at t = 0 and ignore a later value of a table.",
-         "fastest(scene.flow, scene.pore)",
+         "fastest(needed(scene.flow, \"a flow\"), scene.pore)",
          "fastest(scene.at(0.0).flow, scene.pore)",
          "tests/test_sizing.py::test_meshes_are_fine_enough_for_the_fastest_later_flow[head-um]")),
     *changes(
@@ -1171,6 +1176,27 @@ MUTANTS = (
          "isinstance(value, (str, bytes)):",
          "isinstance(value, bytes):",
          "tests/test_python_calls.py::test_a_wrong_type_is_refused_by_the_name_of_its_argument")),
+    *changes(
+        "repro/runs/interrupts.py",
+        ("usr1-ends-a-run",
+         "SIGUSR1 ends a process that has not saved its state.",
+         'for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGUSR1", "SIGUSR2")',
+         'for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGUSR2")',
+         "tests/test_names.py::test_every_signal_stops_every_command_and_saves[SIGUSR1-sweep]")),
+    *changes(
+        "repro/scene/keys.py",
+        ("bytes-in-names",
+         "Bytes of a file's name that are no text stay in the name of its scene.",
+         'text = name.encode(errors="backslashreplace").decode()',
+         "text = name",
+         "tests/test_names.py::test_names_of_any_bytes_pass_through_commands")),
+    *changes(
+        "repro/model/pore.py",
+        ("layers-without-a-mesh",
+         "Boundary layers that no mesh resolves are not refused.",
+         "if layers > FINEST_LAYERS:",
+         "if False:",
+         "tests/test_check.py::test_extreme_peclet_numbers_are_refused_by_their_keys[diffusivity]")),
     *changes(
         "repro/errors.py",
         ("options-in-python",
