@@ -1196,7 +1196,7 @@ MUTANTS = (
          "Boundary layers that no mesh resolves are not refused.",
          "if layers > FINEST_LAYERS:",
          "if False:",
-         "tests/test_check.py::test_extreme_peclet_numbers_are_refused_by_their_keys[diffusivity]")),
+         "tests/test_check.py::test_extreme_peclet_numbers_are_refused_by_their_keys[flow.head=1e160 cm]")),
     *changes(
         "repro/errors.py",
         ("options-in-python",
