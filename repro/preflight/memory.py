@@ -161,8 +161,8 @@ def _fitting(scene: Scene, free: float) -> str:
     """Name the largest tried refinement that fits into the free memory (bytes), or the keys that
     make the boundary layers too thin for any."""
     if resolution(scene) > scene.numerics.refinement:
-        return f"no numerics.refinement that resolves the boundary layers fits: " \
-               f"{thin_layers(scene)}"
+        return ("no numerics.refinement that resolves the boundary layers fits: "
+                f"{thin_layers(scene)}")
     for factor in COARSER:
         refinement = float(f"{scene.numerics.refinement * factor:.2g}")
         coarser = replace(scene, numerics=replace(scene.numerics, refinement=refinement))
