@@ -178,8 +178,9 @@ def is_newer(run, before):
 
 
 @pytest.mark.parametrize("command", ["run", "resume", "sweep"])
-@pytest.mark.parametrize("number", [pytest.param(number, marks=() if number == signal.SIGUSR1 else pytest.mark.thorough)
-                                    for number in SIGNALS])
+@pytest.mark.parametrize("number", [
+    pytest.param(number, id=number.name, marks=() if number == signal.SIGUSR1 else pytest.mark.thorough)
+    for number in SIGNALS])
 def test_every_signal_stops_every_command_and_saves(tmp_path, command, number):
     """The run ends with 128 + the number of the signal, has a checkpoint, and its command continues it."""
     out = tmp_path / "out"
