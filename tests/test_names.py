@@ -1,9 +1,11 @@
 """Names of files with any bytes, in any encoding of the terminal, and file systems without flock."""
 
+import errno
 import io
 import os
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -16,6 +18,7 @@ import repro
 from repro.cli import main
 from repro.errors import OutputError
 from repro.results.files import read_sealed
+from repro.runs.folder import locked
 from repro.scene import SceneError
 from tests.shell import BRIEF, flags, start, wait_for
 
@@ -154,6 +157,20 @@ def test_a_killed_run_without_flock_goes_on(tmp_path, without_flock, how):
     done = without("run", "--quiet", *(word.format(out=out) for word in how), env=without_flock)
     assert (done.returncode, done.stderr) == (0, "") and not (out / ".lock").exists()
     assert read_sealed(out / "run.json")["status"] == "completed"
+
+
+def test_a_lock_of_an_ended_process_is_taken_over_where_files_cannot_be_exchanged(tmp_path, monkeypatch):
+    """A file system without flock may lack the exchange of two files as well."""
+    def flock(file, how):
+        raise OSError(errno.ENOSYS, os.strerror(errno.ENOSYS))
+
+    monkeypatch.setattr("fcntl.flock", flock)
+    monkeypatch.setattr("filelock._soft.exchange_supported", lambda: False)
+    ended = subprocess.run([sys.executable, "-c", "import os; print(os.getpid())"], capture_output=True, text=True,
+                           check=True)
+    (tmp_path / ".lock").write_text(f"{ended.stdout.strip()}\n{socket.gethostname()}\n")
+    with locked(tmp_path):
+        assert (tmp_path / ".lock").read_text().startswith(f"{os.getpid()}\n")
 
 
 @pytest.mark.parametrize("content, advice", [("123\nelsewhere\n", True), ("", True), ("my notes", False)])
