@@ -4,6 +4,7 @@ import itertools
 import json
 import math
 import re
+import signal
 import time
 from dataclasses import replace
 
@@ -12,12 +13,15 @@ import pytest
 
 from reference import half_cylinder
 from repro.cli import main
+from repro.errors import SimulationError
 from repro.march.simulation import simulate
 from repro.preflight import checked, cost, modelled, numbers, simplifications
 from repro.preflight.checked import check
 from repro.preflight.modelled import describe_model
+from repro.results.tables import solve
 from repro.runs import progress
-from repro.scene import load_scene, packaged_scenes
+from repro.scene import SceneError, load_scene, packaged_scenes, scene_tables
+from repro.scene.units import units_of
 from tests import faults
 from tests.shell import refusal
 from tests.strategies import coarse_base
@@ -408,3 +412,42 @@ def test_the_warning_of_a_thin_layer_names_its_kind(half, kind):
     values = numbers.numbers(scene, scene.flow.mean_velocity or 1e4)
     texts = [w.text for w in simplifications.find_warnings(scene, values) if "donor is used up" in w.text]
     assert len(texts) == 1 and f"in a {kind} " in texts[0]
+
+
+BASE = load_scene("base", ["numerics.preset=fast"])
+#: The unit of every key of base that has one.
+UNITS = units_of(scene_tables(BASE))
+
+
+@pytest.mark.parametrize("change", [
+    "flow.head=1e160 cm", "flow.gravity=1e30 m/s^2", "flow.kinematic_viscosity=1e-300 cm^2/s",
+    *(f"substrates.{name}.{key}=1e-30 cm^2/s" for name in ("acceptor", "donor")
+      for key in ("diffusivity", "diffusivity_in_aggregate"))])
+def test_extreme_peclet_numbers_are_refused_by_their_keys(change):
+    """No mesh that sparse matrices can index resolves the layers; a run in memory is refused as well."""
+    key = re.match(r"[a-z_.]+?(?=_in_aggregate|=)", change)[0]
+    for function, error in ((check, SceneError), (solve, SimulationError)):
+        with pytest.raises(error, match=f"boundary layers: the Peclet number u W / D is .*{re.escape(key)}"):
+            function(BASE, [change])
+
+
+def test_a_peclet_number_that_memory_limits_is_refused_by_its_keys():
+    with pytest.raises(SceneError, match="MB of memory are needed .* boundary layers fits: .* flow.mean_velocity"):
+        check("base", ["numerics.preset=fast", "flow.mean_velocity=1e12 m/day"], unset=["flow.head"])
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("value", ["1e-300", "1e-30", "1e30", "1e160"])
+@pytest.mark.parametrize("key", UNITS)
+@pytest.mark.parametrize("preset", ["paper", "fast"])
+def test_extreme_values_are_checked_or_refused_in_one_line(capsys, preset, key, value):
+    """A check that does not end within 60 s of processor time fails."""
+    signal.signal(signal.SIGPROF, lambda *arguments: pytest.fail("the check does not end"))
+    signal.setitimer(signal.ITIMER_PROF, 60.0)
+    try:
+        status = main(["check", "--json", "base", "--set", f"numerics.preset={preset}",
+                       "--set", f"{key}={value} {UNITS[key]}"])
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+    printed = capsys.readouterr()
+    assert (status == 0 and json.loads(printed.out)) or (status == 2 and printed.err.count("\n") == 1)

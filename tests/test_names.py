@@ -1,9 +1,11 @@
 """Names of files with any bytes, in any encoding of the terminal, and file systems without flock."""
 
+import errno
 import io
 import os
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -16,6 +18,7 @@ import repro
 from repro.cli import main
 from repro.errors import OutputError
 from repro.results.files import read_sealed
+from repro.runs.folder import locked
 from repro.scene import SceneError
 from tests.shell import BRIEF, flags, start, wait_for
 
@@ -25,27 +28,26 @@ NAMES = {"bytes": os.fsdecode(b"\xff\xfe x"), "newline": "a\nb\t'\x1b[2J$x_", "e
 TERMINALS = ("ascii", "latin-1", "utf-8")
 
 
-def session(folder, monkeypatch, name, terminal):
-    """Run every command with a name as its scene, folder and file, on a terminal that refuses other characters."""
+def session(folder, monkeypatch, name, terminal, *more):
+    """Run commands with a name as their scene, folder and file, on a terminal that refuses other characters."""
     monkeypatch.chdir(folder)
     shutil.copy(Path(repro.__file__).parent / "scene" / "packaged" / "flow_only.toml", f"{name}.toml")
     commands = [["run", f"--out={name}", "--set", "output.timeseries=netcdf", "--", f"{name}.toml"],
                 ["run", f"--out={name}2", "--", f"{name}.toml"], ["run", f"--resume={name}"],
                 ["check", "--", f"{name}.toml"], ["check", "--", name], ["check", "--json", "--", name],
                 ["scene", "--", f"{name}.toml"], ["compare", f"--out={name}.html", "--", name, f"{name}2"],
-                ["docs", "quantities"], ["plot", f"--out={name}.png", "--", name, "velocity"],
-                ["sweep", f"--out={name}3", "--vary", "pore.width=50 um", "--workers", "1", "--", f"{name}.toml"]]
+                ["docs", "quantities"], ["plot", f"--out={name}.png", "--", name, "velocity"], *more]
     for command in commands:
         for stream in ("stdout", "stderr"):
             errors = "strict" if stream == "stdout" else "backslashreplace"
             monkeypatch.setattr(sys, stream, io.TextIOWrapper(io.BytesIO(), terminal, errors))
         assert main(command) == 0, (command, sys.stderr.buffer.getvalue())
-    assert Path(f"{name}.html").is_file() and Path(f"{name}3", "summary.html").is_file()
+    assert Path(f"{name}.html").is_file()
     return read_sealed(Path(name, "run.json"))
 
 
 @pytest.mark.filterwarnings("ignore:Glyph")
-def test_names_of_any_bytes_pass_through_every_command(tmp_path, monkeypatch):
+def test_names_of_any_bytes_pass_through_commands(tmp_path, monkeypatch):
     """Pages, tables, pictures and NetCDF are written, and the file of the scene is still known by its bytes."""
     record = session(tmp_path, monkeypatch, NAMES["bytes"], "ascii")
     assert record["scene"] == "\\udcff\\udcfe x" and os.path.isfile(record["origin"]["file"])
@@ -56,7 +58,10 @@ def test_names_of_any_bytes_pass_through_every_command(tmp_path, monkeypatch):
 @pytest.mark.parametrize("terminal", TERMINALS)
 @pytest.mark.parametrize("kind", NAMES)
 def test_all_names_and_terminals(tmp_path, monkeypatch, kind, terminal):
-    session(tmp_path, monkeypatch, NAMES[kind], terminal)
+    name = NAMES[kind]
+    session(tmp_path, monkeypatch, name, terminal, ["sweep", f"--out={name}3", "--vary", "pore.width=50 um",
+                                                    "--workers", "1", "--", f"{name}.toml"])
+    assert Path(f"{name}3", "summary.html").is_file()
 
 
 @pytest.mark.parametrize("argument, values", [
@@ -105,6 +110,7 @@ def test_a_file_that_cannot_be_written_is_refused_before_it_is_drawn(tmp_path, m
     command = {"png": ["plot", "run", "velocity", "--out", file], "gif": ["plot", "run", "velocity", "--out", file],
                "html": ["compare", "run", "run", "--out", file]}[kind]
     monkeypatch.setattr("repro.report.comparison.build", lambda runs: pytest.fail("the page was built"))
+    monkeypatch.setattr("repro.results.drawing.field", lambda *arguments: pytest.fail("a field was drawn"))
     assert main(command) == 2
     assert "a file that can be written is needed" in capsys.readouterr().err
     assert not [path for path in tmp_path.rglob(".writing-*")] and run
@@ -153,6 +159,20 @@ def test_a_killed_run_without_flock_goes_on(tmp_path, without_flock, how):
     assert read_sealed(out / "run.json")["status"] == "completed"
 
 
+def test_a_lock_of_an_ended_process_is_taken_over_where_files_cannot_be_exchanged(tmp_path, monkeypatch):
+    """A file system without flock may lack the exchange of two files as well."""
+    def flock(file, how):
+        raise OSError(errno.ENOSYS, os.strerror(errno.ENOSYS))
+
+    monkeypatch.setattr("fcntl.flock", flock)
+    monkeypatch.setattr("filelock._soft.exchange_supported", lambda: False)
+    ended = subprocess.run([sys.executable, "-c", "import os; print(os.getpid())"], capture_output=True, text=True,
+                           check=True)
+    (tmp_path / ".lock").write_text(f"{ended.stdout.strip()}\n{socket.gethostname()}\n")
+    with locked(tmp_path):
+        assert (tmp_path / ".lock").read_text().startswith(f"{os.getpid()}\n")
+
+
 @pytest.mark.parametrize("content, advice", [("123\nelsewhere\n", True), ("", True), ("my notes", False)])
 def test_a_folder_that_is_locked_elsewhere_is_refused(tmp_path, without_flock, content, advice):
     """The message says how to go on, and that helps; a file that is no lock is left alone."""
@@ -175,8 +195,9 @@ def is_newer(run, before):
 
 
 @pytest.mark.parametrize("command", ["run", "resume", "sweep"])
-@pytest.mark.parametrize("number", [pytest.param(number, marks=() if number == signal.SIGUSR1 else pytest.mark.thorough)
-                                    for number in SIGNALS])
+@pytest.mark.parametrize("number", [
+    pytest.param(number, id=number.name, marks=() if number == signal.SIGUSR1 else pytest.mark.thorough)
+    for number in SIGNALS])
 def test_every_signal_stops_every_command_and_saves(tmp_path, command, number):
     """The run ends with 128 + the number of the signal, has a checkpoint, and its command continues it."""
     out = tmp_path / "out"

@@ -9,7 +9,7 @@ from typing import overload
 
 import numpy as np
 
-from repro.errors import TransportError
+from repro.errors import MeshError, TransportError
 from repro.fem import mesher, sizing
 from repro.fem.brief import brief
 from repro.fem.linear import Method
@@ -35,6 +35,9 @@ SLOWEST = 1e-8
 #: (Leveque). With four elements across the pore and this factor, concentrations upstream of an
 #: aggregate exceed the supply by less than 0.01 %.
 BOUNDARY_LAYER = 0.15
+#: A mesh that resolves thinner layers has more nodes than 32-bit indices of sparse matrices count:
+#: more than the square of this.
+FINEST_LAYERS = 2.0**15.5
 #: By order of the elements: edges at the tips of an outline are the pore's width over this and over
 #: the square of the refinement (W / 200 in the presets paper and fast), but no shorter than W over
 #: ``MOST_AT_TIPS``.
@@ -167,13 +170,30 @@ def film(scene: Scene) -> float:
 def resolution(scene: Scene) -> float:
     """Divisor of the element sizes outside films: ``numerics.refinement``, or more for layers.
 
-    The speed is the scene's mean velocity, or that of the clean channel under its head.
+    The speed is the scene's mean velocity, or that of the clean channel under its head. Raises
+    MeshError if no mesh resolves the layers.
     """
     if not (scene.numerics.follows_layers and scene.flow and scene.substrates):
         return scene.numerics.refinement
-    speed = fastest(scene.flow, scene.pore)
-    layers = peclet(scene.substrates, scene.pore.width, speed) ** (1 / 3)
-    return max(scene.numerics.refinement, BOUNDARY_LAYER * layers)
+    layers = BOUNDARY_LAYER * _largest_peclet(scene) ** (1 / 3)
+    if layers > FINEST_LAYERS:
+        raise MeshError(f"no mesh resolves the boundary layers: {thin_layers(scene)}")
+    return max(scene.numerics.refinement, layers)
+
+
+def _largest_peclet(scene: Scene) -> float:
+    speed = fastest(needed(scene.flow, "a flow"), scene.pore)
+    return peclet(needed(scene.substrates, "substrates"), scene.pore.width, speed)
+
+
+def thin_layers(scene: Scene) -> str:
+    """Name the Peclet number of a scene with flow and substrates, and the keys that reduce it."""
+    by_head = "flow.head or flow.gravity, a larger flow.kinematic_viscosity"
+    driven = needed(scene.flow, "a flow").head is not None
+    substrates = needed(scene.substrates, "substrates").modelled
+    diffusivities = " and ".join(f"substrates.{name}.diffusivity*" for name in substrates)
+    return (f"the Peclet number u W / D is {_largest_peclet(scene):.2g}; a smaller "
+            f"{by_head if driven else 'flow.mean_velocity'}, or larger {diffusivities} are needed")
 
 
 def fastest(drive: Drive, channel: Channel) -> float:

@@ -27,7 +27,7 @@ from repro.fem import sizing
 from repro.fem.outline import Outline
 from repro.fem.sizing import ACROSS_AGGREGATE, ACROSS_PORE, SPLIT
 from repro.model.advice import with_advice
-from repro.model.pore import initial_outline, resolution, sized
+from repro.model.pore import initial_outline, resolution, sized, thin_layers
 from repro.preflight import numbers
 from repro.scene import Scene, SceneError, needed
 
@@ -123,9 +123,10 @@ def expected_bytes(scene: Scene) -> float:
 
 
 def require_outline(scene: Scene) -> None:
-    """Raise SceneError if the curve through the points of an outline crosses itself or leaves the
-    pore; rules of the scene check the points."""
+    """Raise SceneError if no mesh resolves the boundary layers, or if the curve through the points
+    of an outline crosses itself or leaves the pore; rules of the scene check the points."""
     try:
+        resolution(scene)
         outline = initial_outline(scene)
         curve = None if outline is None else shapely.Polygon(outline.corners.points)
     except MeshError as error:
@@ -143,16 +144,25 @@ def require_memory(scene: Scene, warn: Callable[[str], None]) -> None:
     """
     free = free_bytes()
     expected = expected_bytes(scene)
-    need = (f"about {expected / MB:.0f} MB of memory are needed ({expected_nodes(scene):.0f} "
-            f"nodes), {free / MB:.0f} MB are free")
+    need = (f"about {_count(expected / MB)} MB of memory are needed "
+            f"({_count(expected_nodes(scene))} nodes), {free / MB:.0f} MB are free")
     if expected > free:
         raise SceneError(f"{scene.name}: {need}; {_fitting(scene, free)}")
     if expected > WARNED * free:
         warn(f"{scene.name}: {need}")
 
 
+def _count(number: float) -> str:
+    """Write a number as an integer, or with an exponent if it has more than nine digits."""
+    return f"{number:.0f}" if number < 1e9 else f"{number:.1e}"
+
+
 def _fitting(scene: Scene, free: float) -> str:
-    """Name the largest tried refinement that fits into the free memory (bytes)."""
+    """Name the largest tried refinement that fits into the free memory (bytes), or the keys that
+    make the boundary layers too thin for any."""
+    if resolution(scene) > scene.numerics.refinement:
+        return ("no numerics.refinement that resolves the boundary layers fits: "
+                f"{thin_layers(scene)}")
     for factor in COARSER:
         refinement = float(f"{scene.numerics.refinement * factor:.2g}")
         coarser = replace(scene, numerics=replace(scene.numerics, refinement=refinement))

@@ -203,6 +203,15 @@ def film(results: Results, name: str, file: Path, ax: Any = None) -> Any:
 
     Colours and the view are the same in all frames.
     """
+    with output_path(file) as beside:
+        images, ax = _frames(results, name, ax)
+        images[0].save(beside, format="GIF", save_all=True, append_images=images[1:],
+                       duration=FRAME, loop=0)
+    return ax
+
+
+def _frames(results: Results, name: str, ax: Any) -> tuple[list, Any]:
+    """The pictures of all rows, and the axes with the last one."""
     rows = [(time, results.fields(time)) for time in results.time]
     bounds = np.array([value_range(magnitude(fields[name])) for _, fields in rows])
     boxes = np.array([corners(fields) for _, fields in rows])
@@ -214,10 +223,7 @@ def film(results: Results, name: str, file: Path, ax: Any = None) -> Any:
             ax.clear()
         ax = field(fields, name, heading(results, time), ax, limits, box)
         images.append(_frame(ax.figure))
-    with output_path(file) as beside:
-        images[0].save(beside, format="GIF", save_all=True, append_images=images[1:],
-                       duration=FRAME, loop=0)
-    return ax
+    return images, ax
 
 
 def _frame(figure: Any) -> Any:
