@@ -50,7 +50,8 @@ FOLLOWED = {
                          "tests/test_advice.py::test_a_shorter_step_helps_where_the_aggregate_passes_the_opposite_wall"},
     "model/advice.py": {
         "try smooth = false": SPLINES,
-        "try a larger numerics.refinement": "tests/test_advice.py::test_an_unresolved_front_gets_advice_once_and_it_helps",
+        "try a larger numerics.refinement":
+            "tests/test_advice.py::test_an_unresolved_front_gets_advice_once_and_it_helps",
         "leave numerics.solver and numerics.ordering out": PACKAGES,
         'growth.wall = "sliding" is another model': "base: it stops at 14 h on a bonded wall, not on a sliding one"},
     "model/contact.py": {
@@ -61,7 +62,10 @@ FOLLOWED = {
     "model/growth.py": {
         "try a larger growth.shear_modulus": "members 151 and 171 of the hard family",
         "try a shorter growth.time_step": "tests/test_advice.py::test_a_shorter_step_helps_a_plug_that_grows_fast"},
-    "model/pore.py": {"leave [flow] out": "tests/test_transport.py::test_too_slow_a_flow_is_refused"},
+    "model/pore.py": {
+        "leave [flow] out": "tests/test_transport.py::test_too_slow_a_flow_is_refused",
+        "no mesh resolves the boundary layers":
+            "tests/test_check.py::test_extreme_peclet_numbers_are_refused_by_their_keys"},
     "preflight/memory.py": {
         "try smooth = false": SPLINES, "needs at most half of them": FITS,
         "no numerics.refinement that resolves": FITS},
@@ -69,7 +73,8 @@ FOLLOWED = {
     "preflight/simplifications.py": {
         "would resolve it": DRAWN, "no refinement up to": DRAWN, "keeps their ratio": DRAWN, "integrates them": DRAWN,
         "models it": DRAWN, "refine by themselves": THRESHOLDS, "replace F by": THRESHOLDS,
-        "adds the forces": THRESHOLDS, "computes the traction": DRAWN, "choose a shorter one": THRESHOLDS, '"stress_free" avoids this': STRESS_FREE},
+        "adds the forces": THRESHOLDS, "computes the traction": DRAWN, "choose a shorter one": THRESHOLDS,
+        '"stress_free" avoids this': STRESS_FREE},
     "results/drawing.py": {"pip install": PACKAGES},
     "results/tables.py": {"pip install": PACKAGES},
     "runs/execution.py": {
@@ -250,7 +255,7 @@ def drawn(seed, preset):
         changes += ["flow.biomass=brinkman", f"flow.permeability={between(1e-11, 1e-7) * width**2} um^2"]
     elif draw.random() < 0.3:
         changes.append("growth.new_biomass=stress_free")
-    if draw.random() < 0.3 and "growth.new_biomass=stress_free" not in changes:
+    if draw.random() < 0.6 and "growth.new_biomass=stress_free" not in changes:
         changes.append("growth.fluid_forces=included")
     return changes
 
