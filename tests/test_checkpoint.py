@@ -12,8 +12,8 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from repro.errors import CheckpointError
-from repro.march.loop import SAME_TIME
 from repro.march.simulation import steps
+from repro.march.state import SAME_TIME
 from repro.runs import checkpoint, state_arrays
 from repro.runs.checkpoint import NEWEST, PREVIOUS, decode, encode
 from repro.runs.execution import Watch, run
