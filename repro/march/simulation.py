@@ -113,8 +113,9 @@ def row_times(scene: Scene) -> tuple[float, ...]:
 
 def rows_within(scene: Scene) -> set[float]:
     """Return the times (h) of rows that may lie within a step, not at a known end of one."""
-    times = set(row_times(scene))
-    return times and times - {0.0, *_scheme(scene).ends(scene)}
+    if scene.growth is None:
+        return set()
+    return set(row_times(scene)) - {0.0, *_scheme(scene).ends(scene)}
 
 
 def _scheme(scene: Scene) -> Scheme:

@@ -38,6 +38,20 @@ READERS = "tests/test_vtk.py::test_every_reader_reads_what_was_computed"
 
 MUTANTS = (
     *changes(
+        "repro/model/pore.py",
+        ("growth-in-every-scene",
+         "A scene without growth imports its mechanics.",
+         "from repro.model import flow\n",
+         "from repro.model import flow, growth  # noqa: F401\n",
+         "tests/test_loaded_modules.py::test_a_simulation_loads_the_modules_of_its_sections_alone")),
+    *changes(
+        "repro/march/simulation.py",
+        ("scene-at-rest-twice",
+         "A run without growth that is resumed has its row a second time.",
+         "    if state is None:\n        with stopping",
+         "    if True:\n        with stopping",
+         "tests/test_checkpoint.py::test_a_scene_without_growth_has_no_row_after_its_state")),
+    *changes(
         "repro/model/grading.py",
         ("front-halved-once",
          "Elements are halved once at most for a front.",
