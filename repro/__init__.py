@@ -40,9 +40,9 @@ Sections of the paper and their modules, which name the equations that they solv
     3.5  transfer to a new mesh             repro.fem.transfer
     2.1, 3.2  flow             (1)-(6)      repro.model.flow, .brinkman
     2.2  kinetics              (7)-(10)     repro.model.uptake_law, .kinetics
-    2.2  substrates            (7)-(13)     repro.model.transport (at rest in each shape)
+    2.2  substrates            (7)-(13)     repro.model.transport, .substrates (at rest)
     3.3  transient scheme      (7)-(13)     repro.model.gear (predictor-corrector)
-    2.3, 3.4  growth           (14)-(27)    repro.model.growth
+    2.3, 3.4  growth           (14)-(27)    repro.model.growth, .body
     3.4  biomass               (28)-(34)    repro.model.biomass, .growing
     2.3.2  fluid forces        (20), (22)   repro.model.traction
     2.3.3  contact                          repro.model.contact, .contact_lines, .contact_newton
@@ -50,12 +50,12 @@ Sections of the paper and their modules, which name the equations that they solv
     5    adhesion, tearing                  repro.model.adhesion
          limits of the surface              repro.model.surface
     3.5  mesh motion           (35)         repro.model.mesh_motion
-    3.1, 3.5  remeshing                     repro.model.remeshing
+    3.1, 3.5  remeshing                     repro.model.remeshing, .grading
     2    state of the pore                  repro.model.pore, .stages (the parts of a step)
     2    coupling, 3.3                      repro.march.updates (the paper's shape updates)
          error control (not the paper's)    repro.march.midpoint, .stepping, .step_control
          ends of the model                  repro.march.ends, .folding
-         the loop of both                   repro.march.loop, .simulation
+         the loop of both                   repro.march.loop, .state, .simulation
     4, 5  results, laws for networks        repro.results, .columns, .arrays, .tables, .network
 
 Data flow:

@@ -1,8 +1,8 @@
 """Errors of the package: numerical failures by stage, ends of a run, and failures of files.
 
-:func:`repro.march.loop.stopping` adds the time to a failure, and :mod:`repro.model.advice` adds the
-keys of a scene that help. The message of a refusal names options of the command line; its ``str``
-names arguments of Python.
+:func:`repro.march.state.stopping` adds the time to a failure, and :mod:`repro.model.advice` adds
+the keys of a scene that help. The message of a refusal names options of the command line; its
+``str`` names arguments of Python.
 """
 
 import re

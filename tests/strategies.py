@@ -226,7 +226,7 @@ def boundary_edge_counts(triangles):
 
 
 def body_of(grid, around, order=None):
-    """(growth.Body, constrained (n, 2), rim (M,)): the unstrained aggregate, its constrained dofs (2.3.3: y on the
+    """(Body, constrained (n, 2), rim (M,)): the unstrained aggregate, its constrained dofs (2.3.3: y on the
     walls and x at fixed points) and its boundary nodes. order: that of the concentrations, by default the mesh's."""
     body = pore.material(Space(grid, order or grid.geometry), grid.points[grid.body])
     rim = grid.topology.body_loop
@@ -234,7 +234,7 @@ def body_of(grid, around, order=None):
 
 
 def half_disc(radius, refinement=1.0, width=50.0, geometry=1):
-    """(growth.Body, constrained, rim, outline) of a half-disc on the lower wall."""
+    """(Body, constrained, rim, outline) of a half-disc on the lower wall."""
     grid, around = meshed(seed(radius, refinement, geometry), width, refinement)
     return *body_of(grid, around), around
 

@@ -12,8 +12,8 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from repro.errors import CheckpointError
-from repro.march.loop import SAME_TIME
 from repro.march.simulation import steps
+from repro.march.state import SAME_TIME
 from repro.runs import checkpoint, state_arrays
 from repro.runs.checkpoint import NEWEST, PREVIOUS, decode, encode
 from repro.runs.execution import Watch, run
@@ -173,3 +173,9 @@ def test_the_least_stretch_is_kept():
     state = next(state for state, _ in steps(scene) if state.pore.time > 0)
     assert state.compression.stretch < 1 and state.compression.time == state.pore.time
     assert state_arrays.unpack_state(scene, *state_arrays.pack_state(scene, state)).compression == state.compression
+
+
+def test_a_scene_without_growth_has_no_row_after_its_state():
+    scene = load_scene("flow_only")
+    ((state, report),) = steps(scene)
+    assert report.pore.time == 0 and [*steps(scene, state)] == []

@@ -13,8 +13,8 @@ from repro.fem.division import Division
 from repro.fem.outline import BOTTOM, FREE, TOP, Outline, polygon
 from repro.fem.space import Space
 from repro.march import midpoint, simulation
-from repro.march.loop import RestartState
 from repro.march.simulation import simulate
+from repro.march.state import RestartState
 from repro.march.step_control import StepControl
 from repro.model import contact, contact_lines, contact_newton
 from repro.model.contact_lines import Clearance, Contact, surface_ends

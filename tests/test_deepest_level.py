@@ -8,7 +8,7 @@ import pytest
 from repro import load_scene
 from repro.errors import Unresolved
 from repro.march.simulation import simulate
-from repro.model import pore, remeshing
+from repro.model import grading, pore
 from repro.preflight import numbers, simplifications
 
 #: A dense aggregate of 20 um that exhausts its supply in a front as thin as the root of the half saturation.
@@ -42,7 +42,7 @@ def test_elements_are_halved_as_often_as_a_front_needs(half, level, time):
     Effluents agree with those of elements as small everywhere."""
     scene = fronted(half)
     first = replace(pore.seeded(scene), time=time)
-    graded, solved = remeshing.solve_graded(scene, first)
+    graded, solved = grading.solve_graded(scene, first)
     assert round(np.log2(at_rim(first) / at_rim(graded))) == np.log2(level)
     assert within_bounds(graded, solved) and graded.mass == pytest.approx(first.mass, rel=1e-3)
     if level > 1:

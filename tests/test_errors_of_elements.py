@@ -7,7 +7,7 @@ import pytest
 import repro
 from repro.errors import MeshError, OriginFolded, SimulationError
 from repro.march import loop
-from repro.march.loop import stopping
+from repro.march.state import stopping
 from repro.model.advice import ADVICE
 from repro.scene import load_scene, scene_tables
 

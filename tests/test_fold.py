@@ -16,8 +16,9 @@ from repro.errors import GrowthError, LinearError, MeshError, SimulationError
 from repro.march import loop
 from repro.march.balance import Ledger
 from repro.march.ends import CLOSE, nearest_end
-from repro.march.folding import Compression, refuse_density
-from repro.march.loop import InterpolatedState, RestartState, Scheme, StepResult
+from repro.march.folding import most_compressed, refuse_density
+from repro.march.loop import Scheme
+from repro.march.state import Compression, InterpolatedState, RestartState, StepResult
 from repro.march.step_control import StepControl
 from repro.model import contact
 from repro.model.pore import seeded, solve
@@ -105,7 +106,7 @@ def continue_run(theta, advance, earlier=None):
     earlier: theta of the most compressed plug of the run; None: the present one.
     """
     rows = []
-    compression = Compression().after(compressed(earlier or theta))
+    compression = most_compressed(Compression(), compressed(earlier or theta))
     start = RestartState(compressed(theta), StepControl(1.0), compression=compression)
     with pytest.raises((repro.Fold, SimulationError)) as ending:
         rows.extend(instant for _, instant in loop.steps(plug(), Scheme(advance, None), start) if instant)
@@ -128,12 +129,13 @@ def test_a_failed_step_is_a_fold_only_if_the_surface_creases(error, theta, kind)
 def test_the_least_stretch_of_a_run_stays():
     """It stays when the surface is less compressed later, and after a row. Where strain counts from the last shape, it
     does not stay."""
-    creased = Compression().after(compressed(3.0))
+    creased = most_compressed(Compression(), compressed(3.0))
     state = RestartState(compressed(3.0), StepControl(1.0), compression=creased)
     assert loop.mark_reported(state, 1.0).compression == creased
     later = compressed(1.5)
-    assert creased.after(later) == creased
-    assert creased.after(replace(later, last=later.body.reference)).stretch == surface(later).least > creased.stretch
+    assert most_compressed(creased, later) == creased
+    restarted = most_compressed(creased, replace(later, last=later.body.reference))
+    assert restarted.stretch == surface(later).least > creased.stretch
 
 
 def test_a_failed_step_of_a_buckled_surface_is_a_fold():

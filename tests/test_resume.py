@@ -16,7 +16,7 @@ from repro import timing
 from repro.cli import main
 from repro.errors import Interrupted, SimulationError
 from repro.march.simulation import steps
-from repro.model import growth, traction
+from repro.model import flow, growth, traction
 from repro.results import columns
 from repro.results.quantities import Quantity
 from repro.runs import execution
@@ -109,7 +109,7 @@ def drag(scene, result):
     drive = scene.flow
     head_per_rate = drive.kinematic_viscosity / drive.gravity
     forces = traction.nodal(result.pore.space, result.solved.flow, head_per_rate, "laplacian")
-    return -traction.MPA_PER_UM * drive.density * drive.gravity * forces[result.pore.mesh.body, 0].sum()
+    return -flow.MPA_PER_UM * drive.density * drive.gravity * forces[result.pore.mesh.body, 0].sum()
 
 
 DRAG = Quantity("drag", "force on the water", "-", drag, needs="aggregate and flow", signed=True)

@@ -8,7 +8,7 @@ import pytest
 from repro import results
 from repro import solve as solve_scene
 from repro.march.balance import Ledger
-from repro.march.loop import Report
+from repro.march.state import Report
 from repro.model import transport
 from repro.model.pore import Solved, seeded, solve
 from repro.scene import load_scene

@@ -11,8 +11,8 @@ import pytest
 
 from repro import results
 from repro.march import updates
-from repro.march.loop import Report
 from repro.march.simulation import simulate
+from repro.march.state import Report
 from repro.model import pore
 from repro.preflight.checked import check
 from repro.preflight.modelled import describe_model

@@ -17,7 +17,7 @@ from repro.march import midpoint, simulation, step_control, stepping, updates
 from repro.march.ends import PoreEnd
 from repro.march.midpoint import Attempt
 from repro.march.step_control import EXCESS, StepControl, exceeds_tolerance
-from repro.model import contact, pore, remeshing
+from repro.model import contact, grading, pore, remeshing
 from repro.model.pore import solve
 from repro.model.stages import Stages
 from repro.scene import load_scene
@@ -100,7 +100,7 @@ def long_step():
     """Base in `fast` and its step from 1.6 to 9.6 h, which generates meshes half way and at its end."""
     scene = load_scene("base", (FAST,))
     state = next(state for state, _ in simulation.steps(scene) if state.pore.time > 1)
-    pore, solved = remeshing.solve_graded(scene, state.pore)
+    pore, solved = grading.solve_graded(scene, state.pore)
     return midpoint.attempt(Stages.of(scene), replace(pore, concentrations=solved.concentrations), solved, 8.0).step
 
 

@@ -20,7 +20,7 @@ from scipy.interpolate import CubicSpline
 
 from repro.fem.outline import Outline
 from repro.march import updates
-from repro.march.loop import Report
+from repro.march.state import Report
 from repro.model import mesh_motion, pore
 from repro.model.pore import Pore, Solved
 from repro.model.stages import Stages

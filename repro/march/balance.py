@@ -9,14 +9,17 @@ error of the code or of its use.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from repro.errors import BalanceError
 from repro.model.pore import Pore
-from repro.model.transport import Problem
 from repro.model.uptake_law import uptake_law
 from repro.scene import Kinetics, Numerics, Scene, Substrate, Substrates, at_largest
+
+if TYPE_CHECKING:
+    from repro.model.transport import Problem
 
 #: Largest accepted defect.
 LARGEST = 1e-6

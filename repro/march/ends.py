@@ -22,20 +22,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from repro.errors import RunEnd, StageError
 from repro.fem.sizing import ACROSS_PORE
-from repro.march.folding import Compression, Fold, fold_message
+from repro.march.folding import Fold, fold_message, most_compressed
+from repro.march.state import Compression, StepResult
 from repro.model import adhesion
 from repro.model.adhesion import Peak
 from repro.model.pore import Pore, Solved
 from repro.model.surface import BIOT
 from repro.scene import Pore as Channel
 from repro.scene import Scene, scene_tables
-
-if TYPE_CHECKING:
-    from repro.march.loop import StepResult
 
 #: An end is located if its margin is positive and at most this. The relative error of its time is
 #: this over d ln(stress) / d ln(t). The least numerics.tolerance of a preset is 2.5e-4.
@@ -122,7 +119,7 @@ def _events(scene: Scene, pore: Pore, solved: Solved) -> Iterator[Event]:
         end = PoreEnd(f"the aggregate reaches the pore's {side} end at t = {pore.time:g} h")
         yield Event(1 - elements_to_end(scene.pore, pore, side), end)
     if pore.last is None:
-        compression = Compression().after(pore)
+        compression = most_compressed(Compression(), pore)
         fold = Fold(fold_message(f"at t = {pore.time:g} h", compression))
         yield Event(BIOT / compression.stretch - 1, fold)
     growth = scene.growing.growth

@@ -11,9 +11,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 
 from repro.errors import GrowthError, MeshError, RunEnd
+from repro.march.state import Compression
 from repro.model.pore import Pore
 from repro.model.surface import BIOT, CREASE, surface
 
@@ -42,31 +42,18 @@ class Fold(RunEnd):
     """
 
 
-@dataclass(frozen=True)
-class Compression:
-    """The least elastic stretch of a run's free surface so far.
+def most_compressed(earlier: Compression, pore: Pore) -> Compression:
+    """Return an earlier compression, or that of a later pore with a smaller stretch.
 
-    x, y: um, its place; time: h. A surface may buckle after it creases. Its stretch then rises
-    again until the buckles meet, so the present stretch does not show a fold.
+    Where strain counts from the last shape, compression does not accumulate: that of the later pore
+    is returned.
     """
-
-    stretch: float = 1.0
-    x: float = 0.0
-    y: float = 0.0
-    time: float = 0.0
-
-    def after(self, pore: Pore) -> Compression:
-        """Return this compression, or that of a later pore with a smaller stretch.
-
-        Where strain counts from the last shape, compression does not accumulate: that of the later
-        pore is returned.
-        """
-        if pore.outline is None:
-            return self
-        present = surface(pore)
-        if pore.last is None and present.least >= self.stretch:
-            return self
-        return Compression(present.least, *present.place, pore.time)
+    if pore.outline is None:
+        return earlier
+    present = surface(pore)
+    if pore.last is None and present.least >= earlier.stretch:
+        return earlier
+    return Compression(present.least, *present.place, pore.time)
 
 
 def refuse_fold(expanded: Pore) -> None:
@@ -74,7 +61,7 @@ def refuse_fold(expanded: Pore) -> None:
 
     It applies where strain counts from the last shape: a shorter step compresses the surface less.
     """
-    compression = Compression().after(expanded)
+    compression = most_compressed(Compression(), expanded)
     if expanded.last is not None and compression.stretch < BIOT:
         raise GrowthError(f"growth in one step compresses the surface to {compression.stretch:.3f} "
                           f"of its length near x = {compression.x:.4g}, y = {compression.y:.4g} "

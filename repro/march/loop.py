@@ -1,4 +1,4 @@
-"""The loop of steps of every scheme, and the state from which it restarts bit for bit.
+"""The loop of steps of every scheme.
 
 Steps depend neither on the requested rows nor on the end of the run, to the last bit. A row between
 two steps is interpolated in the step that passes it, and no step starts from it. If a row cannot be
@@ -14,122 +14,35 @@ of the fluid the aggregate takes its new equilibrium there, as it does at t = 0 
 from __future__ import annotations
 
 import warnings
-from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
-from dataclasses import Field, dataclass, field, fields, replace
-from typing import ClassVar, Protocol, TypeVar
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from repro.errors import RunEnd, SimulationError, StageError
-from repro.fem.brief import brief
+from repro.errors import RunEnd, StageError
 from repro.fem.mesh import Topology
 from repro.march import balance
-from repro.march.balance import Ledger, Limits
+from repro.march.balance import Limits
 from repro.march.ends import Reached, locate, nearest_end
-from repro.march.folding import Compression, folding, refuse_density
+from repro.march.folding import folding, most_compressed, refuse_density
+from repro.march.state import (
+    SAME_TIME,
+    InterpolatedState,
+    Report,
+    RestartState,
+    StepResult,
+    contiguous,
+    initial_report,
+    newton_counts,
+    stopping,
+    sum_counts,
+)
 from repro.march.step_control import StepControl
-from repro.model.advice import with_advice
 from repro.model.contact_lines import SearchOptions
+from repro.model.grading import solve_graded
 from repro.model.pore import Pore, Solved, seeded
-from repro.model.remeshing import solve_graded
 from repro.model.stages import Stages
 from repro.scene import Growth, Scene
-
-
-class Dataclass(Protocol):
-    """An instance of any dataclass."""
-
-    __dataclass_fields__: ClassVar[dict[str, Field]]
-
-
-Data = TypeVar("Data", bound=Dataclass)
-
-#: Two times (h) this close are the same time.
-SAME_TIME = 1e-9
-
-
-@brief
-@dataclass(frozen=True, eq=False)
-class Report:
-    """State of the pore at a reported time, for one row of results.
-
-    Attributes
-    ----------
-    pore : Pore
-        Pore at the reported time ``pore.time`` (h).
-    solved : Solved
-        Flow and substrates in the geometry of ``pore``.
-    before : (Pore, Solved) or None
-        Pore and solution at the end of the last step, grown but not yet expanded (Plate 1). None
-        at t = 0, and if the next step fails.
-    ledgers : tuple of Ledger
-        Mass balances of the steps since the last report.
-    remeshes : int
-        Number of new meshes since the last report.
-    iterations : dict of str to int
-        Newton iterations since the last report, by stage.
-    new_mesh : bool
-        Is the mesh another one than in the last report?
-    """
-
-    pore: Pore
-    solved: Solved
-    before: tuple[Pore, Solved] | None
-    ledgers: tuple[Ledger, ...]
-    remeshes: int
-    iterations: dict[str, int]
-    new_mesh: bool = False
-
-
-@dataclass(frozen=True, eq=False)
-class InterpolatedState:
-    """Pore and solution interpolated within a step; ``before``: both before the expansion."""
-
-    pore: Pore
-    solved: Solved
-    before: tuple[Pore, Solved] | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class StepResult:
-    """Result of one step: the new pore, pore and solution before the expansion, and the ledger.
-
-    within: interpolates the state to a time (h) within the step.
-    """
-
-    pore: Pore
-    before: tuple[Pore, Solved] | None
-    ledger: Ledger
-    remeshed: bool
-    iterations: int
-    within: Callable[[float], InterpolatedState]
-
-
-@brief
-@dataclass(frozen=True, eq=False)
-class RestartState:
-    """Complete state from which a run restarts after a step.
-
-    pore: pore after the step, with the initial guess of its substrates; step_control: of the next
-    step; ledgers, remeshes, iterations: of the steps since the last Report; row: time (h) of that
-    Report, later than ``pore.time`` if it lies within the next step; compression: the least stretch
-    of the surface so far.
-    """
-
-    pore: Pore
-    step_control: StepControl
-    ledgers: tuple[Ledger, ...] = ()
-    remeshes: int = 0
-    iterations: dict[str, int] = field(default_factory=dict)
-    row: float = 0.0
-    compression: Compression = Compression()
-
-    @property
-    def time(self) -> float:
-        """Simulated time (h) that the run has reached."""
-        return max(self.pore.time, self.row)
 
 
 @dataclass(frozen=True)
@@ -158,24 +71,23 @@ def steps(scene: Scene, scheme: Scheme,
           state: RestartState | None = None) -> Iterator[tuple[RestartState, Report | None]]:
     """Yield the state after every step from t = 0 or ``state`` on, with a Report if one is due.
 
-    Raises SimulationError if a stage fails. After the last Report, raises PoreEnd if the aggregate
-    reaches an end of the pore, Fold if its surface folds, and Detachment if it leaves a wall or
-    tears.
+    The scene has growth. Raises SimulationError if a stage fails. After the last Report, raises
+    PoreEnd if the aggregate reaches an end of the pore, Fold if its surface folds, and Detachment
+    if it leaves a wall or tears.
     """
     first = state is None
     with stopping(state.pore.time if state else 0.0):
-        first_step = scheme.first * scene.growth.time_step if scene.growth else 0.0
-        state = state or RestartState(contiguous(seeded(scene)), StepControl(first_step))
+        stages = Stages.of(scene)
+        first_step = StepControl(scheme.first * stages.growth.time_step)
+        state = state or RestartState(contiguous(seeded(scene)), first_step)
         pore, solved = solve_graded(scene, state.pore)
-        if first and scene.growth:
-            pore, solved = settle(Stages.of(scene), pore, solved)
+        if first:
+            pore, solved = settle(stages, pore, solved)
         if pore is not state.pore:
             state = replace(state, pore=contiguous(pore))
     if first:
-        pore = replace(state.pore, concentrations=solved.concentrations)
-        yield state, Report(pore, solved, None, (), 0, newton_counts(solved))
-    if scene.growth:
-        yield from _grow(Stages.of(scene), scheme, state, solved)
+        yield state, initial_report(state, solved)
+    yield from _grow(stages, scheme, state, solved)
 
 
 def settle(stages: Stages, pore: Pore, solved: Solved) -> tuple[Pore, Solved]:
@@ -283,10 +195,8 @@ def _row_within(stages: Stages, step: StepResult, time: float) -> InterpolatedSt
 
 def row_times(scheme: Scheme, scene: Scene) -> tuple[float, ...]:
     """Return the times (h) of rows after t = 0, ascending: those of [output], or the scheme's."""
-    if scene.growth is None:
-        return ()
     requested = scene.requested_times
-    return scheme.rows(scene.growth) if requested is None else requested
+    return scheme.rows(scene.growing.growth) if requested is None else requested
 
 
 def _row_time_at(rows: tuple[float, ...], time: float) -> float | None:
@@ -303,7 +213,7 @@ def _after_step(state: RestartState, step: StepResult, solved: Solved,
     ledgers = (*state.ledgers, step.ledger)
     remeshes = state.remeshes + step.remeshed
     return RestartState(step.pore, control, ledgers, remeshes, counts, state.row,
-                        state.compression.after(step.pore))
+                        most_compressed(state.compression, step.pore))
 
 
 def make_report(state: RestartState, pore: Pore, solved: Solved,
@@ -318,49 +228,6 @@ def mark_reported(state: RestartState, time: float) -> RestartState:
     return RestartState(state.pore, state.step_control, row=time, compression=state.compression)
 
 
-def contiguous(pore: Pore) -> Pore:
-    """Return the same pore with contiguous arrays.
-
-    A sum over a strided view may differ in the last bit from that over its copy in a checkpoint.
-    """
-    state = pore.concentrations
-    mesh = _contiguous_arrays(pore.mesh)
-    body = _contiguous_arrays(pore.body)
-    copied = replace(_contiguous_arrays(pore), concentrations=state and _contiguous_arrays(state))
-    if body is not pore.body:
-        copied = replace(copied, body=body)
-    return copied if mesh is pore.mesh else replace(copied, space=replace(pore.space, mesh=mesh))
-
-
-def _contiguous_arrays(data: Data) -> Data:
-    """Return a dataclass with its strided arrays copied, or the same object if it has none."""
-    arrays = {each.name: getattr(data, each.name) for each in fields(data) if each.init}
-    strided = {name: np.ascontiguousarray(array) for name, array in arrays.items()
-               if isinstance(array, np.ndarray) and not array.flags.forc}
-    return replace(data, **strided) if strided else data
-
-
-@contextmanager
-def stopping(time: float, bonded: bool = False) -> Iterator[None]:
-    """Turn the failure of a step that starts at ``time`` (h) into a SimulationError.
-
-    bonded: whether the aggregate is bonded to the lower wall, for the advice in the message. Stage
-    errors, floating-point errors and lack of memory count as failures.
-    """
-    stopped = f"stopped in the step from t = {time:g} h"
-    try:
-        with np.errstate(all="raise", under="ignore"):
-            yield
-    except StageError as error:
-        message = f"{stopped}, in {error.stage}: {with_advice(error, bonded)}"
-        raise SimulationError(message) from error
-    except FloatingPointError as error:
-        raise SimulationError(f"{stopped} by a floating-point error ({error})") from error
-    except MemoryError as error:
-        raise SimulationError(f"{stopped}, out of memory ({error}); "
-                              "try a smaller numerics.refinement") from error
-
-
 def time_before_end(previous: Pore, duration: float) -> float:
     """Time (h) just before the end of a step, before a jump of the scene's tables there."""
     return max(previous.time, previous.time + duration - SAME_TIME)
@@ -369,16 +236,3 @@ def time_before_end(previous: Pore, duration: float) -> float:
 def before_jump(scene: Scene, pore: Pore) -> Pore:
     """Return the pore at its time, or just before it if the scene's tables jump there."""
     return replace(pore, time=pore.time - SAME_TIME) if scene.jumps(pore.time) else pore
-
-
-def newton_counts(solved: Solved) -> dict[str, int]:
-    """Newton iterations by stage."""
-    return {"transport": solved.concentrations.iterations if solved.concentrations else 0}
-
-
-def sum_counts(*counts: dict[str, int]) -> dict[str, int]:
-    """Add counts, key by key."""
-    total: Counter[str] = Counter()
-    for count in counts:
-        total.update(count)
-    return dict(sorted(total.items()))

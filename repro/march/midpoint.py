@@ -24,11 +24,13 @@ from repro.fem.space import Space
 from repro.march.balance import Ledger
 from repro.march.ends import refuse_outside
 from repro.march.folding import refuse_density, refuse_fold
-from repro.march.loop import InterpolatedState, StepResult, time_before_end
+from repro.march.loop import time_before_end
+from repro.march.state import InterpolatedState, StepResult
 from repro.model import biomass, contact, contact_lines, pore, remeshing
 from repro.model.biomass import Rates
 from repro.model.contact import Expansion
 from repro.model.contact_lines import FirstContact, SearchOptions
+from repro.model.grading import solve_graded
 from repro.model.growing import grow
 from repro.model.pore import Pore, Solved
 from repro.model.remeshing import GeneratedMesh
@@ -178,7 +180,7 @@ def interpolate(stages: Stages, previous: Pore, solved: Solved, half: Halfway,
     expanded = replace(expanded, concentrations=_guess_substrates(solved, half, part))
     nearest = sorted(half.generated, key=lambda each: abs(each.shape.time - time))
     inner, _ = stages.new_mesh(previous, expanded, solved, nearest)
-    return InterpolatedState(*remeshing.solve_graded(stages.scene, inner))
+    return InterpolatedState(*solve_graded(stages.scene, inner))
 
 
 def _carry_rates_back(middle: Pore, previous: Pore, half: Expansion, rates: Rates) -> Rates:

@@ -4,21 +4,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from repro.fem.linear import Method
-from repro.march import loop, stepping, updates
-from repro.march.loop import Report, RestartState, Scheme
-from repro.march.step_control import STRETCH
+from repro.march.state import Report, RestartState, contiguous, initial_report, stopping
+from repro.march.step_control import STRETCH, StepControl
+from repro.model.grading import solve_graded
+from repro.model.pore import seeded
 from repro.scene import Scene, Source, load_scene, parse_scene, scene_tables
 from repro.scene.arguments import typed
 
+if TYPE_CHECKING:
+    from repro.march.loop import Scheme
+
 #: Points (x, y), um.
 Shape = Sequence[tuple[float, float]] | np.ndarray
-
-#: Schemes by the values of ``numerics.time``.
-SCHEMES = {"updates": updates.SCHEME, "midpoint": stepping.SCHEME}
 
 
 @typed
@@ -103,16 +105,26 @@ def same_rows(one: Scene, other: Scene, time: float) -> bool:
 
 def row_times(scene: Scene) -> tuple[float, ...]:
     """Return the times (h) of rows after t = 0: :func:`repro.march.loop.row_times`."""
+    if scene.growth is None:
+        return ()
+    from repro.march import loop
     return loop.row_times(_scheme(scene), scene)
 
 
 def rows_within(scene: Scene) -> set[float]:
     """Return the times (h) of rows that may lie within a step, not at a known end of one."""
+    if scene.growth is None:
+        return set()
     return set(row_times(scene)) - {0.0, *_scheme(scene).ends(scene)}
 
 
 def _scheme(scene: Scene) -> Scheme:
-    return SCHEMES[scene.numerics.time]
+    """Return the scheme of ``numerics.time``."""
+    if scene.numerics.time == "updates":
+        from repro.march import updates
+        return updates.SCHEME
+    from repro.march import stepping
+    return stepping.SCHEME
 
 
 def steps(scene: Scene,
@@ -122,4 +134,17 @@ def steps(scene: Scene,
     A run restarts from any of these states bit for bit.
     """
     Method(scene.numerics.solver, scene.numerics.ordering).checked()
+    if scene.growth is None:
+        return _at_rest(scene, state)
+    from repro.march import loop  # a scene without growth loads no part of it
     return loop.steps(scene, _scheme(scene), state)
+
+
+def _at_rest(scene: Scene,
+             state: RestartState | None) -> Iterator[tuple[RestartState, Report | None]]:
+    """Yield the state at t = 0 of a scene without growth, unless ``state`` is that state."""
+    if state is None:
+        with stopping(0.0):
+            pore, solved = solve_graded(scene, contiguous(seeded(scene)))
+            state = RestartState(contiguous(pore), StepControl(0.0))
+        yield state, initial_report(state, solved)

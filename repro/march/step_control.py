@@ -16,6 +16,9 @@ import numpy as np
 #: Limits of the ratio of consecutive steps.
 FASTER = 5.0
 SLOWER = 0.2
+#: Least length of a step over growth.time_step. A step that fails or errs too much is shortened and
+#: repeated, down to this length. A warning reports a step of this length that misses the tolerance.
+SHORTEST = 1e-3
 #: Length of a step over the length that its estimate allows.
 SAFETY = 0.9
 #: Largest accepted estimate, in tolerances. A step may be longer than its ideal length by a factor

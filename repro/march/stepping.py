@@ -20,33 +20,25 @@ import numpy as np
 
 from repro.errors import RunEnd, StageError, Unresolved
 from repro.march import midpoint
-from repro.march.loop import (
-    SAME_TIME,
-    InterpolatedState,
-    Scheme,
-    StepResult,
-    before_jump,
-    contiguous,
-)
+from repro.march.loop import Scheme, before_jump
+from repro.march.state import SAME_TIME, InterpolatedState, StepResult, contiguous
 from repro.march.step_control import (
     EXCESS,
+    SHORTEST,
     STRETCH,
     StepControl,
     allowed_ratio,
     fit_to_interval,
     next_step_size,
 )
-from repro.model import remeshing
 from repro.model.contact_lines import SearchOptions
+from repro.model.grading import grade, solve_graded
 from repro.model.pore import Pore, Solved
 from repro.model.stages import Stages
 from repro.scene import Growth, needed
 
 #: Length of the first attempted step over growth.time_step.
 FIRST = 8.0
-#: Least length of a step over growth.time_step. A step that fails or errs too much is shortened and
-#: repeated, down to this length. A warning reports a step of this length that misses the tolerance.
-SHORTEST = 1e-3
 #: Least number of rows after t = 0 without ``output.times``.
 LEAST = 24
 #: Least film after a step that makes contact, over the minimum film.
@@ -173,17 +165,17 @@ def _halve_elements(stages: Stages, previous: Pore) -> tuple[Pore, Solved] | Non
 
     None if they have been halved as often as allowed.
     """
-    finer = remeshing.grade(stages.scene, previous)
+    finer = grade(stages.scene, previous)
     if finer is None:
         return None
-    graded, solved = remeshing.solve_graded(stages.scene, finer)
+    graded, solved = solve_graded(stages.scene, finer)
     return replace(graded, concentrations=solved.concentrations), solved
 
 
 def _solve_after(stages: Stages, step: StepResult) -> tuple[StepResult, Solved]:
     """Solve after a step, before a jump. A sharp front gets a graded mesh if it needs one."""
     before = before_jump(stages.scene, step.pore)
-    after, solved = remeshing.solve_graded(stages.scene, before)
+    after, solved = solve_graded(stages.scene, before)
     if after is not before:
         after = replace(after, time=step.pore.time)
         step = replace(step, pore=contiguous(after), remeshed=True)

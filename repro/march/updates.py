@@ -16,17 +16,10 @@ from repro.errors import GrowthError, RunEnd
 from repro.march.balance import Ledger
 from repro.march.ends import refuse_outside
 from repro.march.folding import refuse_fold
-from repro.march.loop import (
-    SAME_TIME,
-    InterpolatedState,
-    Scheme,
-    StepResult,
-    before_jump,
-    contiguous,
-    time_before_end,
-)
+from repro.march.loop import Scheme, before_jump, time_before_end
+from repro.march.state import SAME_TIME, InterpolatedState, StepResult, contiguous
 from repro.march.step_control import StepControl
-from repro.model import biomass, gear, pore, transport
+from repro.model import biomass, gear, pore, substrates, transport
 from repro.model.biomass import Rates
 from repro.model.contact import Expansion
 from repro.model.contact_lines import FirstContact
@@ -159,7 +152,7 @@ def make_biomass(stages: Stages, previous: Pore, solved: Solved,
         return after, transient.concentrations, transient.flows
     first = biomass.rates(previous.space, start, problem.rate_law)
     guess = grow(previous, first, duration)
-    end = gear.steady(problem, Sink(guess.active), start)
+    end = substrates.steady(problem, Sink(guess.active), start)
     second = biomass.rates(previous.space, end, problem.rate_law)
     mean = Rates((first.growth + second.growth) / 2, (first.remains + second.remains) / 2)
     at_start = transport.fluxes(problem, Sink(previous.active), start)

@@ -70,7 +70,7 @@ def fluid_forces(scene: Scene, pore: Pore, solved: Solved) -> np.ndarray:
     of_head = traction.on_aggregate(pore.space, water, drive, scene.numerics.interface)
     if drive.permeability is None:
         of_head = of_head + _beside_contact(pore, water)
-    return traction.MPA_PER_UM * drive.density * drive.gravity * of_head[pore.mesh.body]
+    return flow.MPA_PER_UM * drive.density * drive.gravity * of_head[pore.mesh.body]
 
 
 def _beside_contact(pore: Pore, water: Flow) -> np.ndarray:

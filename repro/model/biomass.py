@@ -21,7 +21,7 @@ import numpy as np
 from repro.fem import transfer
 from repro.fem.space import Space
 from repro.fem.transfer import Located
-from repro.model.kinetics import RateLaw, Sink
+from repro.model.kinetics import RateLaw
 from repro.model.transport import Concentrations
 
 Amounts: TypeAlias = tuple[np.ndarray, ...]
@@ -54,11 +54,6 @@ def rates(space: Space, state: Concentrations, law: RateLaw) -> Rates:
 def change(first: Rates, second: Rates, weight: np.ndarray) -> float:
     """Mean difference (1/h) of two rates over the aggregate; weight: (r, q) of the points."""
     return float(np.vdot(weight, np.abs(second.total - first.total)) / weight.sum())
-
-
-def sink(active: np.ndarray | None, duration: float = 0.0) -> Sink | None:
-    """The sink due to active masses (r, q) over a duration (h); None without biomass."""
-    return None if active is None else Sink(active, duration)
 
 
 def transfer_amounts(method: str, old: Space, new: Space, at: Located, amounts: Amounts,

@@ -22,6 +22,7 @@ from repro.fem.mesh import Mesh
 from repro.fem.outline import BOTTOM, FREE, TOP, Outline
 from repro.fem.space import Space
 from repro.model import contact_lines, growth, traction
+from repro.model.body import Body, Shape
 from repro.model.contact_lines import (
     Clearance,
     Contact,
@@ -409,7 +410,7 @@ class _Trials:
         self._start = start.mesh.points, start.pressure
         self._shapes = [(np.zeros(0), *self._start)]
         self._divided: Division | None = None
-        self._shape: growth.Shape | None = None
+        self._shape: Shape | None = None
         self.iterations = 0
 
     def solve(self, wall: np.ndarray, lines: Sequence[Line]) -> Expansion:
@@ -557,13 +558,13 @@ def _parts(growing: np.ndarray) -> np.ndarray:
 
 
 def divided(grown: Pore, division: Division, contact: Contact,
-            shape: growth.Shape | None = None) -> Pore:
+            shape: Shape | None = None) -> Pore:
     """The pore on the divided mesh, with the walls of a contact; shape: the aggregate's connections
     there, if they are known."""
     space = Space(division.mesh, grown.space.order)
     table = grown.space.table
     reference = division.nodal(grown.origin)[space.mesh.body]
-    body = growth.Body(shape, reference) if shape else material(space, reference)
+    body = Body(shape, reference) if shape else material(space, reference)
     last = grown.last
     if last is not None:
         last = division.nodal(_on_mesh(division.parent, last))[space.mesh.body]
@@ -592,7 +593,7 @@ def _divided_loads(division: Division, loads: np.ndarray) -> np.ndarray:
     return division.divided_loads(_on_mesh(division.parent, loads))[division.topology.body]
 
 
-def _strained_from(keys: Growth, grown: Pore, theta: np.ndarray) -> tuple[growth.Body, np.ndarray]:
+def _strained_from(keys: Growth, grown: Pore, theta: np.ndarray) -> tuple[Body, np.ndarray]:
     """Configuration from which strain counts, and the expansion since then.
 
     The configuration is that of t = 0 or the present one (section 5). The expansion since the

@@ -25,6 +25,7 @@ from repro.fem.division import Division
 from repro.fem.newton import REQUIRED_REDUCTION, STALLED
 from repro.fem.outline import Outline
 from repro.model import contact_lines, growth
+from repro.model.body import Body, Shape
 from repro.model.contact_lines import CLOSE, FIRST_TRIAL, LEAST_PART, Clearance, Line
 from repro.model.pore import Pore
 from repro.polling import poll
@@ -101,17 +102,17 @@ class Placed:
         number = int(np.searchsorted(division.arcs, self._arc(line)))
         rows, triangle = division.halves(number)
         body = self.system.body
-        shape = growth.Shape(body.shape.cells[rows], body.shape.corners, body.shape.degree)
+        shape = Shape(body.shape.cells[rows], body.shape.corners, body.shape.degree)
         moved = triangle.divided_at(division.t[number] + SMALL * line.direction)
         nodes = self.reference[self.grown.mesh.cells[triangle.cell]]
         reference = body.reference.copy()
         reference[shape.cells] = moved.nodes(nodes)
-        after = growth.Body(shape, reference)
+        after = Body(shape, reference)
         amount = (self.grown.theta * self.grown.body.at.dx)[rows[0]]
         parts = dividing.split(amount, moved, self.grown.space.table)
         change = (self.system.partial_residual(after, np.stack(parts) / after.at.dx, position,
                                                pressure)
-                  - self.system.partial_residual(growth.Body(shape, body.reference),
+                  - self.system.partial_residual(Body(shape, body.reference),
                                                  self.theta[rows], position, pressure))
         return change / SMALL
 

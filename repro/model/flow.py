@@ -48,6 +48,9 @@ from repro.model.brinkman import Permeable
 from repro.scene import Flow as Drive
 from repro.timing import timed
 
+#: rho g in MPa/um, for rho in mg/L and g in um/h^2.
+MPA_PER_UM = 1e-3 * 1e-6 / 3600**2 * 1e-12
+
 
 @brief
 @dataclass(frozen=True, eq=False)

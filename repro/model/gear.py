@@ -36,7 +36,6 @@ from repro.errors import TransportError, failing_as
 from repro.fem import linear
 from repro.fem.assembly import ElementSystem
 from repro.fem.space import Space
-from repro.model import transport
 from repro.model.kinetics import Sink
 from repro.model.transport import (
     UNRESOLVED,
@@ -225,18 +224,6 @@ def settle(problem: Problem, sink: Sink | None, guess: Concentrations | None) ->
         last = change
     raise TransportError(f"the profiles still change by {change:.2g} of the supply a step after "
                          f"{MOST_STEPS} steps")
-
-
-def steady(problem: Problem, sink: Sink | None, guess: Concentrations | None) -> Concentrations:
-    """Solve for steady concentrations; if several exist, for those that the guess leads to.
-
-    With a law of uptake that is not monotone several states may be steady. :func:`settle` then
-    leads to one of them, with the biomass at rest, and Newton's method starts from there.
-    Parameters, result and errors are those of :func:`repro.model.transport.steady`.
-    """
-    if problem.law is not None and not problem.law.both.monotone:
-        guess = settle(problem, sink, guess)
-    return transport.steady(problem, sink, guess)
 
 
 def _nearer(problem: Problem, guess: Concentrations | None) -> Concentrations:

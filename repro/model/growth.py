@@ -28,21 +28,17 @@ energy of plane expansion, J^(1/3) + J^(-2/3) / 2, is concave.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
-from functools import cached_property
+from dataclasses import dataclass, replace
 from typing import Generic, TypeVar
 
 import numpy as np
 
 from repro.errors import GrowthError, LinearError, failing_as
-from repro.fem import elements
-from repro.fem.assembly import ElementSystem, Factored, Supported, saddle_blocks, saddle_system
-from repro.fem.brief import brief
-from repro.fem.elements import Table
-from repro.fem.forms import Basis, basis, each, product
-from repro.fem.linear import DEFAULT, Method
+from repro.fem.assembly import ElementSystem, Factored, Supported, saddle_blocks
+from repro.fem.forms import Basis, each, product
 from repro.fem.mesh import gradients, triangle_areas
 from repro.fem.newton import Newton, relative
+from repro.model.body import Body, Strained
 from repro.model.support import Support, balanced
 from repro.timing import timed
 
@@ -71,75 +67,6 @@ MOST_POINTS = 0.95
 
 
 @dataclass(frozen=True, eq=False)
-class Shape:
-    """Connections of the aggregate's own mesh. cells: (t, 3 or 6), corners numbered first; corners:
-    their number; degree: of the quadrature; method: of the linear systems."""
-
-    cells: np.ndarray
-    corners: int
-    degree: int
-    method: Method = DEFAULT
-    _constrained: dict[str, ElementSystem] = field(init=False, repr=False, default_factory=dict)
-
-    @property
-    def geometry(self) -> int:
-        """1: straight triangles, linear displacements; 2: curved ones, quadratic displacements."""
-        return 1 if self.cells.shape[1] == 3 else 2
-
-    @property
-    def triangles(self) -> np.ndarray:
-        """(t, 3) corners."""
-        return self.cells[:, :3]
-
-    @property
-    def table(self) -> Table:
-        """The displacements' functions where they are integrated."""
-        return elements.table(self.geometry, self.geometry, self.degree)
-
-    @cached_property
-    def unconstrained(self) -> ElementSystem:
-        """The sparse system of positions and pressure, nothing prescribed."""
-        constrained = np.zeros((int(self.cells.max()) + 1, 2), bool)
-        return saddle_system(self.cells, self.triangles, constrained, method=self.method)
-
-    def constrained(self, rows: np.ndarray) -> ElementSystem:
-        """The system with prescribed unknowns ``rows`` (2n + corners,). The last one is kept."""
-        last = self._constrained.get("last")
-        if last is None or not np.array_equal(last.constrained, rows):
-            last = self.unconstrained.with_constrained(rows)
-            self._constrained["last"] = last
-        return last
-
-
-@brief
-@dataclass(frozen=True, eq=False)
-class Body:
-    """The aggregate in its reference configuration: positions (n, 2) um of its nodes, on the mesh
-    of ``shape``."""
-
-    shape: Shape
-    reference: np.ndarray
-
-    @cached_property
-    def at(self) -> Basis:
-        """The displacements' functions in the reference configuration."""
-        cells = self.shape.cells
-        return basis(cells, len(self.reference), self.reference[cells], self.shape.table)
-
-    @cached_property
-    def pressures(self) -> Basis:
-        """The linear functions of the pressure."""
-        linear = self.shape.table.linear
-        return Basis(self.shape.triangles, self.shape.corners, linear, self.at.dx)
-
-    def strained(self, position: np.ndarray) -> Strained:
-        """The deformation (t, q, 2, 2) from the reference to positions (n, 2) um, with its terms in
-        the stress."""
-        F = self.at.gradient(position)
-        return Strained(elements.by_component(F.transpose(1, 3, 0, 2)))
-
-
-@dataclass(frozen=True, eq=False)
 class Equilibrium:
     """position: (n, 2) um; pressure: (corners,) P / mu_L; iterations: of Newton's method, over all
     sub-steps."""
@@ -147,40 +74,6 @@ class Equilibrium:
     position: np.ndarray
     pressure: np.ndarray
     iterations: int
-
-
-@dataclass(frozen=True, eq=False)
-class Strained:
-    """Plane deformations F (..., 2, 2) and their terms in the stress, each computed once, on first
-    use, so that J can be tested before a division by it."""
-
-    F: np.ndarray
-
-    @cached_property
-    def J(self) -> np.ndarray:
-        """(...) det F."""
-        return elements.determinant(self.F)
-
-    @cached_property
-    def H(self) -> np.ndarray:
-        """(..., 2, 2) F^-T."""
-        return elements.inverse_transpose(self.F, self.J)
-
-    @cached_property
-    def A(self) -> np.ndarray:
-        """(...) J^(-2/3)."""
-        return self.J ** (-2 / 3)
-
-    @cached_property
-    def trace(self) -> np.ndarray:
-        """(...) tr C."""
-        return np.sum(self.F**2, axis=(-2, -1)) + 1
-
-    def piola(self, P: np.ndarray) -> np.ndarray:
-        """First Piola-Kirchhoff stress (..., 2, 2) at a pressure P (...), both over mu_L: the
-        derivative of (21) by F."""
-        volumetric = P * self.J - self.A * self.trace / 3
-        return self.A[..., None, None] * self.F + volumetric[..., None, None] * self.H
 
 
 def internal_forces(body: Body, theta: np.ndarray, position: np.ndarray,
@@ -246,11 +139,6 @@ class PressureGradient:
         """Sub-steps of a growth theta / J (t, q)."""
         return 1
 
-    @staticmethod
-    def degree(order: int) -> int:
-        """Degree of the quadrature of growth: one point of each triangle."""
-        return elements.GRADIENT_DEGREES[1]
-
 
 @dataclass(frozen=True, eq=False)
 class GradDiv:
@@ -269,11 +157,6 @@ class GradDiv:
         """Sub-steps of a growth theta / J (t, q), of at most FACTOR each in most points."""
         apart = np.quantile(np.abs(np.log(growth)), MOST_POINTS)
         return max(1, int(np.ceil(apart / np.log(FACTOR))))
-
-    @staticmethod
-    def degree(order: int) -> int:
-        """Degree of the quadrature of growth: that of the reaction of an order."""
-        return elements.DEGREES[max(2, order)]
 
 
 #: By the geometry of the triangles.

@@ -20,7 +20,15 @@ from repro.fem.forms import each, mass
 from repro.fem.mesh import Mesh
 from repro.fem.space import Space
 from repro.model.flow import divergence
+from repro.model.pore import Meshing
 from repro.timing import timed
+
+
+def moved(meshing: Meshing, mesh: Mesh, body: np.ndarray) -> Mesh:
+    """Move a mesh with its aggregate, whose nodes are at ``body`` (n, 2) um, by a scene's rules."""
+    numerics = meshing.numerics
+    constants = numerics.mesh_compressibility, numerics.flow_stabilisation
+    return mesh.moved(move(mesh, body, *constants))
 
 
 @timed("mesh motion")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import inf
-from typing import overload
+from typing import TYPE_CHECKING, overload
 
 import numpy as np
 
@@ -17,12 +17,15 @@ from repro.fem.mesh import Mesh
 from repro.fem.outline import TOP, Outline, half_disc, polygon
 from repro.fem.sizing import Sizing
 from repro.fem.space import Space
-from repro.model import biomass, flow, gear, growth, mesh_motion, transport
+from repro.model import flow
+from repro.model.body import Body, Shape, growth_degree
 from repro.model.flow import Bubble, Flow, Stabilised
-from repro.model.transport import Concentrations, Fluxes, Problem
 from repro.scene import Flow as Drive
 from repro.scene import MissingError, Numerics, Scene, Substrates, at_largest, needed
 from repro.scene import Pore as Channel
+
+if TYPE_CHECKING:
+    from repro.model.transport import Concentrations, Fluxes, Problem
 
 #: A permeable aggregate that spans the pore draws the water in at its upper contact lines: elements
 #: beside them are no larger than the least film over this.
@@ -31,6 +34,8 @@ CONTACT_ELEMENTS = 2.0
 MINIMUM_FILM = 2.0
 #: Under this Peclet number u W / D the supply of the inlet is round-off.
 SLOWEST = 1e-8
+#: The largest refinement that scenes accept.
+MOST_REFINED = 20.0
 #: Refinement of order 2 and 3 over Pe^(1/3): the concentration boundary layer is W Pe^(-1/3) thick
 #: (Leveque). With four elements across the pore and this factor, concentrations upstream of an
 #: aggregate exceed the supply by less than 0.01 %.
@@ -69,7 +74,7 @@ class Pore:
     active: np.ndarray
     inert: np.ndarray
     theta: np.ndarray
-    body: growth.Body
+    body: Body
     pressure: np.ndarray
     concentrations: Concentrations | None = None
     front: float = 1.0
@@ -274,11 +279,6 @@ class Meshing:
         sizes = replace(self.sizes, front=front)
         return mesher.generate(outline, ends, sizes, numerics.geometry, method)
 
-    def move(self, mesh: Mesh, body: np.ndarray) -> Mesh:
-        """Move a mesh with its aggregate, whose nodes are at ``body`` (n, 2) um (3.5)."""
-        constants = self.numerics.mesh_compressibility, self.numerics.flow_stabilisation
-        return mesh.moved(mesh_motion.move(mesh, body, *constants))
-
 
 def initial_outline(scene: Scene, front: float = 1.0) -> Outline | None:
     """The aggregate's boundary at t = 0, None in a clean channel; front: as :attr:`Pore.front`."""
@@ -334,12 +334,12 @@ def seeded(scene: Scene, front: float = 1.0, outline: Outline | None = None) -> 
                 np.zeros(mesh.corners), front=front)
 
 
-def material(space: Space, reference: np.ndarray) -> growth.Body:
+def material(space: Space, reference: np.ndarray) -> Body:
     """The aggregate of a mesh; reference: (n, 2) um, its nodes in the reference configuration."""
     topology = space.mesh.topology
-    degree = growth.STABILISATIONS[space.mesh.geometry].degree(space.order)
-    shape = growth.Shape(topology.body_cells, len(topology.body_corners), degree, topology.method)
-    return growth.Body(shape, reference)
+    degree = growth_degree(space.mesh.geometry, space.order)
+    shape = Shape(topology.body_cells, len(topology.body_corners), degree, topology.method)
+    return Body(shape, reference)
 
 
 def solve(scene: Scene, pore: Pore, over: float = 0.0) -> Solved:
@@ -370,16 +370,10 @@ def solve(scene: Scene, pore: Pore, over: float = 0.0) -> Solved:
         carried = solve_flow(pore.space, scene.flow, scene.pore.length, numerics)
     if scene.substrates is None:
         return Solved(carried, None, None)
-    problem = transport.problem(pore.space, carried, scene.substrates, scene.kinetics,
-                                numerics.inlet, numerics.jacobian == "reused")
-    sink = biomass.sink(pore.active if scene.kinetics else None, over)
-    if numerics.transport == "gear":
-        state = gear.settle(problem, sink, pore.concentrations)
-    else:
-        if carried:
-            refuse_no_supply(peclet(scene.substrates, scene.pore.width, carried.mean_velocity))
-        state = gear.steady(problem, sink, pore.concentrations)
-    return Solved(carried, problem, state, transport.fluxes(problem, sink, state))
+    if carried and numerics.transport != "gear":
+        refuse_no_supply(peclet(scene.substrates, scene.pore.width, carried.mean_velocity))
+    from repro.model import substrates  # a scene without [substrates] does not load them
+    return Solved(carried, *substrates.solve(scene, pore, carried, over))
 
 
 def peclet(substrates: Substrates, width: float, speed: float) -> float:

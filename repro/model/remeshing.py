@@ -11,23 +11,18 @@ from functools import cached_property
 
 import numpy as np
 
-from repro.errors import OriginFolded, Unresolved
+from repro.errors import OriginFolded
 from repro.fem import sizing, transfer
 from repro.fem.mesh import Mesh
 from repro.fem.outline import FREE
 from repro.fem.space import Space
 from repro.fem.transfer import Located
-from repro.model import biomass, growing
+from repro.model import biomass, growing, mesh_motion
 from repro.model.biomass import Amounts
-from repro.model.growth import Body
-from repro.model.pore import Meshing, Pore, Solved, material, seeded, solve
+from repro.model.body import Body
+from repro.model.pore import Meshing, Pore, material
 from repro.model.transport import Concentrations, concentrations
 from repro.scene import Scene, Substrate, Substrates, at_time
-
-#: A front of the substrates divides element sizes at the aggregate by at most this.
-MOST_GRADED = 4.0
-#: The largest refinement that scenes accept.
-MOST_REFINED = 20.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,33 +129,6 @@ def _located_in(pore: Pore, mesh: Mesh) -> Located:
     return transfer.located(old.points, old.cells[old.biomass], mesh.points[mesh.body])
 
 
-def solve_graded(scene: Scene, pore: Pore) -> tuple[Pore, Solved]:
-    """Solve flow and substrates. If the mesh is too coarse for a front of the substrates, elements
-    of order 2 and 3 get a mesh graded to it.
-
-    Raises Unresolved if no graded mesh resolves the front.
-    """
-    while True:
-        try:
-            return pore, solve(scene, pore)
-        except Unresolved:
-            finer = grade(scene, pore)
-            if finer is None:
-                raise
-            pore = finer
-
-
-def grade(scene: Scene, pore: Pore) -> Pore | None:
-    """The same pore on elements half as large at the aggregate; None if they may not be halved
-    again."""
-    front = 2 * pore.front
-    if not scene.numerics.follows_layers or front > MOST_GRADED:
-        return None
-    if pore.time == 0:
-        return seeded(scene, front)
-    return remesh(Remeshing.of(scene), pore, replace(pore, front=front), 0.0)[0]
-
-
 def moved_mesh(meshing: Meshing, previous: Pore, expanded: Pore) -> Mesh | None:
     """The mesh, moved with the aggregate; None if a new mesh is needed."""
     outline = expanded.boundary
@@ -170,7 +138,7 @@ def moved_mesh(meshing: Meshing, previous: Pore, expanded: Pore) -> Mesh | None:
             or not outline.same_contact(previous.boundary)
             or sizing.too_coarse(outline.corners, meshing.sizes)):
         return None
-    moved = meshing.move(mesh, expanded.mesh.points[mesh.body])
+    moved = mesh_motion.moved(meshing, mesh, expanded.mesh.points[mesh.body])
     return moved if moved.acceptable() else None
 
 

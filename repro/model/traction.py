@@ -31,14 +31,12 @@ import numpy as np
 from repro.fem import elements, transfer
 from repro.fem.mesh import Mesh
 from repro.fem.space import Space
-from repro.model import pore, remeshing
-from repro.model.flow import Flow, pressure_space
+from repro.model import mesh_motion, pore, remeshing
+from repro.model.flow import MPA_PER_UM, Flow, pressure_space
 from repro.model.pore import Meshing, Pore
 from repro.scene import Flow as Drive
 from repro.scene import Scene, at_time, needed
 
-#: rho g in MPa/um, for rho in mg/L and g in um/h^2.
-MPA_PER_UM = 1e-3 * 1e-6 / 3600**2 * 1e-12
 #: Distance of a shape from the mesh, over W, beyond which the mesh moves with it.
 ROUND_OFF = 1e-14
 
@@ -100,7 +98,7 @@ def follow(meshing: Meshing, around: Surroundings, shaped: Pore) -> Surroundings
     places = np.einsum("ka,kai->ki", around.share, positions[around.nodes])
     if np.abs(places - mesh.points[mesh.body]).max() <= ROUND_OFF * mesh.width:
         return around
-    mesh = meshing.move(mesh, places)
+    mesh = mesh_motion.moved(meshing, mesh, places)
     if mesh.areas.min() <= 0 or mesh.turned_over().any():
         return _generated(meshing, shaped)
     return replace(around, mesh=mesh)

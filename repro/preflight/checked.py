@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 
 from repro.errors import SimulationError
 from repro.fem.linear import Method
-from repro.march.loop import stopping
+from repro.march.state import stopping
 from repro.model import pore
 from repro.polling import poll
 from repro.preflight import cost

@@ -19,11 +19,10 @@ from time import perf_counter
 from typing import TypeAlias
 
 from repro.errors import RunEnd
-from repro.march.loop import Report, RestartState
 from repro.march.simulation import rows_within
 from repro.march.simulation import steps as iterate_steps
-from repro.march.step_control import exceeds_tolerance
-from repro.march.stepping import SHORTEST
+from repro.march.state import Report, RestartState
+from repro.march.step_control import SHORTEST, exceeds_tolerance
 from repro.polling import poll
 from repro.preflight import numbers
 from repro.preflight.memory import MB, expected_bytes

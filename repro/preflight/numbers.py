@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 from repro.fem.sizing import meshed_extent
+from repro.model.flow import MPA_PER_UM
 from repro.model.kinetics import rate_law
 from repro.model.pore import film, initial_outline, sized
-from repro.model.traction import MPA_PER_UM
 from repro.model.uptake_law import UptakeLaw
 from repro.scene import Scene, Substrate, at_largest, at_time
 

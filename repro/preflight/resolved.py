@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from repro.errors import StageError
 from repro.model import pore
-from repro.model.remeshing import MOST_REFINED
+from repro.model.pore import MOST_REFINED
 from repro.polling import poll
 from repro.preflight.memory import first_nodes
 from repro.preflight.simplifications import Caveat

@@ -7,11 +7,10 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from repro.fem import sizing
-from repro.march.stepping import SHORTEST
+from repro.march.step_control import SHORTEST
 from repro.model.brinkman import ACROSS
 from repro.model.kinetics import THINNEST
-from repro.model.pore import Pore, film, resolution
-from repro.model.remeshing import MOST_REFINED
+from repro.model.pore import MOST_REFINED, Pore, film, resolution
 from repro.model.surface import CREASE, surface
 from repro.preflight import numbers
 from repro.preflight.numbers import Number

@@ -8,7 +8,8 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from repro.model import adhesion, flow, growth
+from repro.model import flow
+from repro.model.body import Strained
 from repro.model.pore import Pore, Solved
 from repro.model.surface import STRETCH, surface
 from repro.results.field_files import Grid
@@ -18,14 +19,17 @@ from repro.scene import Scene
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """A scene with the state of its pore, from which the arrays are computed."""
+    """A scene with the state of its pore, from which the arrays are computed.
+
+    Stresses import the mechanics: a scene without growth does not load them.
+    """
 
     scene: Scene
     pore: Pore
     solved: Solved
 
     @cached_property
-    def strained(self) -> growth.Strained:
+    def strained(self) -> Strained:
         """Deformation of the aggregate since t = 0, at the quadrature points (t, q) of growth."""
         mesh = self.pore.mesh
         return self.pore.body.strained(mesh.points[mesh.body])
@@ -33,7 +37,14 @@ class State:
     @cached_property
     def stress(self) -> np.ndarray:
         """(t, q, 4) MPa, components xx, yy, zz, xy at the same points."""
+        from repro.model import adhesion
         return adhesion.stress(self.scene, self.pore)
+
+    @property
+    def largest_principal(self) -> np.ndarray:
+        """(t, q) MPa, largest principal stress at the same points."""
+        from repro.model import growth
+        return growth.largest_principal(self.stress)
 
     def mean(self, value: np.ndarray) -> np.ndarray:
         """(t,) means of values (t, q) over each of the aggregate's triangles at t = 0."""
@@ -177,7 +188,7 @@ ARRAYS = (
       for k, axes in enumerate(("xx", "yy", "zz", "xy"))),
     Array("largest_principal_stress_MPa", "largest principal stress",
           "largest eigenvalue of the Cauchy stress, the mean over the triangle at t = 0",
-          lambda state: state.mean(growth.largest_principal(state.stress)), needs="stress",
+          lambda state: state.mean(state.largest_principal), needs="stress",
           cells=True, body=True, signed=True),
 )
 

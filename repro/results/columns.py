@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from types import ModuleType
 
 from repro.march import balance
 from repro.march.balance import Ledger
-from repro.march.loop import Report
-from repro.model import adhesion
+from repro.march.state import Report
 from repro.model.surface import BESIDE, BIOT, CREASE, STRETCH, surface
 from repro.results.quantities import Quantity, is_modelled
 from repro.scene import Growth, Scene
@@ -92,8 +92,14 @@ def _peak(name: str, words: str, formula: str, label: str, peak: Callable) -> li
                        f"{axis} of {label}", "adhesion", signed=axis == "x") for axis in "xy")]
 
 
+def _adhesion() -> ModuleType:
+    """Import the stresses of an aggregate, which a scene without growth does not load."""
+    from repro.model import adhesion
+    return adhesion
+
+
 def _load(part: str, scene: Scene, at: Report) -> float:
-    return getattr(adhesion.fluid_load(scene, at.pore, at.solved), part)
+    return getattr(_adhesion().fluid_load(scene, at.pore, at.solved), part)
 
 
 def _composition(index: int, scene: Scene, at: Report) -> float:
@@ -172,11 +178,11 @@ SERIES = (
     *_peak("wall_traction_max", "largest traction that a wall must bear",
            "largest (max(pull, 0)^2 + shear^2)^(1/2), means over W / 20 along the contact surface",
            "wall traction",
-           lambda scene, at: adhesion.wall_peak(scene, at.pore, at.solved)),
+           lambda scene, at: _adhesion().wall_peak(scene, at.pore, at.solved)),
     *_peak("tensile_stress_max", "largest tensile stress of the aggregate",
            "largest eigenvalue of the Cauchy stress, in the mean over the triangles whose middles "
            "are within W / 20 of one", "tensile stress",
-           lambda scene, at: adhesion.tensile_peak(scene, at.pore)),
+           lambda scene, at: _adhesion().tensile_peak(scene, at.pore)),
     *(Quantity(f"fluid_force_{axis}_uN_per_m", f"force of the fluid on the aggregate, {axis}",
                "integral of the water's stress over the interface, or of its drag over a permeable "
                "aggregate; the head is zero at the outlet of the meshed part",

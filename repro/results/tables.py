@@ -13,8 +13,8 @@ import numpy as np
 
 from repro import results
 from repro.errors import RunEnd
-from repro.march.loop import SAME_TIME
 from repro.march.simulation import simulate
+from repro.march.state import SAME_TIME
 from repro.results import drawing, names, picture
 from repro.results.field_files import Grid
 from repro.results.netcdf import TIME

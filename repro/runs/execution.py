@@ -16,8 +16,8 @@ from time import perf_counter
 
 from repro import results, timing
 from repro.errors import CheckpointError, Interrupted, OutputError, RunEnd, SimulationError
-from repro.march.loop import Report, RestartState
 from repro.march.simulation import ends_soon, same_rows, steps
+from repro.march.state import Report, RestartState
 from repro.polling import polling
 from repro.preflight import simplifications
 from repro.preflight.memory import require_memory, require_outline

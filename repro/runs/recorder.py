@@ -10,7 +10,7 @@ from time import perf_counter
 from repro import report, results, timing
 from repro.errors import Interrupted, shell_word
 from repro.march.balance import Ledger
-from repro.march.loop import Report, RestartState, sum_counts
+from repro.march.state import Report, RestartState, sum_counts
 from repro.march.step_control import StepControl, exceeds_tolerance
 from repro.preflight.simplifications import Caveat, warn_missed_tolerance, warn_surface
 from repro.results import field_files, netcdf

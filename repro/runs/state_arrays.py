@@ -14,11 +14,9 @@ from repro.fem.linear import Method
 from repro.fem.mesh import Mesh
 from repro.fem.space import Space
 from repro.march.balance import Ledger
-from repro.march.folding import Compression
-from repro.march.loop import RestartState
+from repro.march.state import Compression, RestartState
 from repro.march.step_control import StepControl
 from repro.model.pore import Pore, material
-from repro.model.transport import Concentrations
 from repro.runs.checkpoint import Arrays
 from repro.scene import Scene, scene_hash
 
@@ -79,6 +77,7 @@ def _pore(scene: Scene, plain: dict, arrays: Arrays) -> Pore:
     space = Space(mesh, numerics.order)
     guess = None
     if plain["guess"] is not None:
+        from repro.model.transport import Concentrations  # a scene without [substrates] has none
         acceptor, donor = map(arrays.get, OF_GUESS)
         guess = Concentrations(acceptor, donor, plain["guess"])
     return Pore(time=plain["time_h"], space=space, body=material(space, arrays["reference"]),

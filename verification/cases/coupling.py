@@ -21,8 +21,8 @@ from repro.fem import linear
 from repro.fem.outline import FREE
 from repro.fem.space import Space
 from repro.march import midpoint
-from repro.march.loop import Report
 from repro.march.simulation import shaped, simulate
+from repro.march.state import Report
 from repro.model import flow, pore
 from repro.model.stages import Stages
 from repro.scene import Scene, load_scene

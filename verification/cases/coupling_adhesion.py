@@ -11,7 +11,7 @@ import pytest
 from reference import half_cylinder
 from repro.fem.outline import BOTTOM, FREE
 from repro.march.simulation import shaped
-from repro.model import adhesion, contact, growth, pore, traction
+from repro.model import adhesion, contact, flow, growth, pore, traction
 from repro.model.pore import Pore, Solved
 from verification.evidence.cases import parametrize
 from verification.evidence.checks import at_least, at_most, each_at_most, largest, study
@@ -67,9 +67,9 @@ def _load_errors(radius: float, *changes: str) -> tuple[float, float, float]:
     load = adhesion.fluid_load(scene, seed, solved)
     drive = scene.flow
     shear = 6 * solved.flow.mean_velocity / WIDTH
-    scale = traction.MPA_PER_UM * drive.density * drive.kinematic_viscosity * shear * radius
+    scale = flow.MPA_PER_UM * drive.density * drive.kinematic_viscosity * shear * radius
     drag, _, moment = half_cylinder.solve(radius / WIDTH).load()
-    middle = traction.MPA_PER_UM * drive.density * drive.gravity * solved.flow.meshed_loss / 2
+    middle = flow.MPA_PER_UM * drive.density * drive.gravity * solved.flow.meshed_loss / 2
     return (abs(load.x / scale - drag) / drag, abs(load.y / (middle * 2 * radius) + 1),
             abs(load.moment / scale / radius - moment) / drag)
 

@@ -19,8 +19,8 @@ from scipy.sparse.csgraph import connected_components
 
 from repro.fem.outline import BOTTOM, FREE, TOP
 from repro.march.balance import Ledger
-from repro.march.loop import Report
 from repro.march.simulation import simulate
+from repro.march.state import Report
 from repro.model import pore, remeshing
 from repro.model.contact_lines import CLOSE
 from repro.model.remeshing import Remeshing

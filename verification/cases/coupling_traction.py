@@ -14,8 +14,8 @@ from reference import layered_channel
 from repro.fem.mesh import Mesh
 from repro.fem.outline import FREE, Outline
 from repro.fem.space import Space
-from repro.march.loop import Report
 from repro.march.simulation import simulate
+from repro.march.state import Report
 from repro.model import contact, flow, growth, mesh_motion, pore, traction
 from repro.model.flow import Flow
 from verification.cases import flow as flow_cases
@@ -324,7 +324,7 @@ def test_traction_remeshed(changes, record):
     fine = loaded_scene(*changes, f"numerics.refinement={max(REMESHED_FROM, 3 * coarse.numerics.refinement)}")
     mesh, _ = pore.Meshing.of(fine).generate(grown.outline)
     forces = nodal_forces(fine, Space(mesh, grown.space.order))[0]
-    scale = traction.MPA_PER_UM * fine.flow.density * fine.flow.gravity / fine.growth.shear_modulus
+    scale = flow.MPA_PER_UM * fine.flow.density * fine.flow.gravity / fine.growth.shear_modulus
     new = _sums(mesh.points[mesh.loop], scale * forces[mesh.loop])
     places = grown.mesh.points[seed.mesh.body]
     both = [traction.forces(fluid, traction.surroundings(fluid.meshing, seed, grown), grown)

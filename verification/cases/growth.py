@@ -21,6 +21,7 @@ import pytest
 from reference import neo_hookean
 from repro.fem import elements
 from repro.model import growth
+from repro.model.body import Shape
 from verification.evidence.cases import parametrize
 from verification.evidence.checks import Check, around, at_most, each_at_most, largest, refine, studies, study
 from verification.problems import bodies
@@ -290,7 +291,7 @@ def _stress():
     F, P, G = _near_one()
     corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
     numbers = np.arange(3 * len(F))
-    shape = growth.Shape(numbers.reshape(-1, 3), len(numbers), elements.GRADIENT_DEGREES[1])
+    shape = Shape(numbers.reshape(-1, 3), len(numbers), elements.GRADIENT_DEGREES[1])
     body = Supported(shape, np.tile(corners, (len(F), 1)), np.zeros((len(numbers), 2), bool))
     place, move = ((corners @ matrix.mT).reshape(-1, 2) for matrix in (F, G))
     _, forces, _ = _along(body, body.constant(1.0), place, np.repeat(P, 3), move, body.resting)
@@ -470,5 +471,5 @@ def _changed(change: np.ndarray, kind: int) -> growth.Equilibrium:
     cells = body.cells
     if np.linalg.det(change) < 0:
         cells = cells[:, MIRRORED[: cells.shape[1]]]
-    transformed = replace(body, shape=growth.Shape(cells, body.corners, body.shape.degree))
+    transformed = replace(body, shape=Shape(cells, body.corners, body.shape.degree))
     return bodies.grow(_turned(transformed, change), transformed.field(_theta))

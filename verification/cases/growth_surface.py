@@ -10,9 +10,9 @@ import pytest
 from reference import surface_stability, surface_stretch
 from repro.errors import RunEnd
 from repro.march.folding import Fold
-from repro.march.loop import Report
 from repro.march.simulation import simulate
-from repro.march.stepping import SHORTEST
+from repro.march.state import Report
+from repro.march.step_control import SHORTEST
 from repro.model import contact, growth, pore
 from repro.model.surface import BIOT, CREASE, surface
 from repro.preflight import numbers

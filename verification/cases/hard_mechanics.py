@@ -16,7 +16,7 @@ from repro.fem.outline import FREE, TOP, Outline, polygon
 from repro.fem.sizing import ACROSS_FILM
 from repro.fem.space import Space
 from repro.march import midpoint, simulation, stepping
-from repro.march.loop import Report
+from repro.march.state import Report
 from repro.model import contact, flow, growth, pore, remeshing
 from repro.model.contact_lines import CLOSE, Clearance, lines_of
 from repro.model.remeshing import Remeshing

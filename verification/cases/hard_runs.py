@@ -14,7 +14,7 @@ from repro.fem.mesh import POOR, POOR_ALLOWED, Mesh
 from repro.fem.outline import FREE, half_disc
 from repro.fem.space import Space
 from repro.march import midpoint
-from repro.march.loop import StepResult
+from repro.march.state import StepResult
 from repro.model import flow, pore, remeshing
 from repro.model.pore import Pore
 from repro.model.remeshing import Remeshing

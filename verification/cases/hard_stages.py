@@ -11,7 +11,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from reference import layered_channel, slab
-from repro.model import biomass, flow, transport
+from repro.model import flow, transport
 from repro.model.kinetics import Sink
 from repro.results import M_PER_D
 from verification.evidence.checks import Check, at_least, at_most, between, largest
@@ -42,7 +42,7 @@ def same_root(run: Run) -> Check:
     problem, state = solved.problem, channels.both(solved.concentrations)
     supplies = problem.supply.reshape(2, -1)
     starts = (transport.Concentrations(*(part * supplies)) for part in (0.0, 1.0, -7.6))
-    solutions = [channels.both(transport.steady(problem, biomass.sink(run.end.pore.active), start)) for start in starts]
+    solutions = [channels.both(transport.steady(problem, Sink(run.end.pore.active), start)) for start in starts]
     return at_most("largest difference of C over the supply, from four starts",
                    largest((np.array(solutions) - state) / supplies), 1e-6,
                    "uptake is monotone: one solution; Newton's tolerance, times the system's condition")

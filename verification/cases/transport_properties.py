@@ -15,7 +15,7 @@ import pytest
 
 from reference.monod import uptake
 from repro.errors import Unresolved
-from repro.model import biomass, gear, kinetics, pore, remeshing, transport
+from repro.model import biomass, gear, grading, kinetics, pore, transport
 from repro.model.kinetics import Sink
 from repro.model.transport import Balance, Concentrations
 from repro.scene import Scene, load_scene
@@ -204,7 +204,7 @@ def _front(half: str, *numerics: str):
 def _resolved(scene: Scene, factor: float):
     """Ledgers with a multiple of the scene's refinement."""
     scene = replace(scene, numerics=replace(scene.numerics, refinement=factor * scene.numerics.refinement))
-    return remeshing.solve_graded(scene, pore.seeded(scene))[1].fluxes
+    return grading.solve_graded(scene, pore.seeded(scene))[1].fluxes
 
 
 def _half_disc(width: float, radius: float, speed: str, *changes: str) -> Scene:

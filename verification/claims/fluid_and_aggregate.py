@@ -17,7 +17,8 @@ from scipy.spatial import KDTree
 
 from repro.fem.mesh import gradients
 from repro.model import contact, growth
-from repro.model.traction import MPA_PER_UM
+from repro.model.body import Shape
+from repro.model.flow import MPA_PER_UM
 from verification.claims import FEW, FEW_WORDS, Finding, at_least, at_most, claim
 from verification.claims.levels import ABOUT_WIDE, CONVERGED, PAIRED, Level, at_level
 from verification.claims.runs import (
@@ -185,8 +186,8 @@ class Peak:
 def averaged(aggregate: Body, distance: float, places: np.ndarray) -> np.ndarray:
     """(p, 4) Cauchy stress over mu_L, means over the part of the aggregate within a distance (um) of places (p, 2)."""
     body = aggregate.pore.body
-    shape = growth.Shape(body.shape.cells, body.shape.corners, DEGREE)
-    finer = replace(aggregate, pore=replace(aggregate.pore, body=growth.Body(shape, body.reference)))
+    shape = Shape(body.shape.cells, body.shape.corners, DEGREE)
+    finer = replace(aggregate, pore=replace(aggregate.pore, body=replace(body, shape=shape)))
     where, areas = meshes.quadrature_points(aggregate.grid.points[aggregate.triangles], shape.table)
     within = KDTree(places).sparse_distance_matrix(KDTree(where.reshape(-1, 2)), distance, output_type="coo_matrix")
     weights = sp.csr_array((areas.ravel()[within.col], (within.row, within.col)), shape=within.shape)

@@ -14,7 +14,7 @@ import numpy as np
 
 from repro.errors import RunEnd
 from repro.march import simulation
-from repro.march.loop import Report
+from repro.march.state import Report
 from repro.model.surface import CREASE, surface
 from verification.claims import Finding, PaperCheck, at_least, between, claim, without_limit
 from verification.claims.growth_mechanics import TOTAL

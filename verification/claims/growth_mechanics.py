@@ -15,6 +15,7 @@ from repro.fem.mesher import generate
 from repro.fem.outline import half_disc as seed
 from repro.fem.sizing import ACROSS_AGGREGATE, GRADATION, Sizing
 from repro.model import growth
+from repro.model.body import Shape
 from verification import sensitivity
 from verification.claims import CLOSED, OF_SCHEME, Finding, at_least, at_most, between, claim, near, without_limit
 from verification.claims.levels import ABOUT_WIDE, ALONE, BESIDE, current
@@ -55,7 +56,7 @@ def sliding(points: np.ndarray, triangles: np.ndarray) -> Supported:
     """A body that slides on the wall y = 0 with its middle fixed (2.3.3): points (n, 2) um, triangles (t, 3)."""
     on_wall = np.abs(points[:, 1]) < 1e-9 * RADIUS
     middle = on_wall & (np.abs(points[:, 0]) < 1e-9 * RADIUS)
-    shape = growth.Shape(triangles, len(points), GRADIENT_DEGREES[1])
+    shape = Shape(triangles, len(points), GRADIENT_DEGREES[1])
     return Supported(shape, points, np.column_stack([middle, on_wall]))
 
 

@@ -21,7 +21,7 @@ from repro.fem.outline import half_disc as seed
 from repro.fem.sizing import ACROSS_AGGREGATE
 from repro.fem.space import Space
 from repro.march import loop, simulation, updates
-from repro.march.loop import Report, RestartState
+from repro.march.state import Report, RestartState
 from repro.model import flow, pore, remeshing, transport
 from repro.model.kinetics import Sink
 from repro.model.pore import Pore, Solved, solve

@@ -11,6 +11,12 @@ SMALLEST_CONTACT = f"{CONTACT_TESTS}the_contact_surface_is_the_smallest_that_lea
 
 MUTANTS = (
     *changes(
+        "repro/model/flow.py",
+        ("forces-thousandfold",
+         "The density in mg/L is treated as a density in kg/m3.",
+         "MPA_PER_UM = 1e-3 * 1e-6",
+         "MPA_PER_UM = 1e-6")),
+    *changes(
         "repro/model/support.py",
         ("support-uneven",
          "The traction along a sliding surface grows from one end to the other.",
@@ -280,7 +286,7 @@ MUTANTS = (
          f"{ENDS}a_row_at_a_jump_has_the_state_just_after_it"),
         ("strain-free-under-forces",
          "At t = 0 the aggregate has no strain under forces of the fluid.",
-         "        if first and scene.growth:\n            pore, solved = settle(Stages.of(scene), pore, solved)\n",
+         "        if first:\n            pore, solved = settle(stages, pore, solved)\n",
          "",
          f"{ENDS}a_row_at_a_jump_has_the_state_just_after_it"),
         ("ends-of-steps-alone",
@@ -455,10 +461,6 @@ MUTANTS = (
          "The aggregate's own triangles push it too.",
          "wet = ~mesh.biomass",
          "wet = mesh.biomass | True"),
-        ("forces-thousandfold",
-         "The density in mg/L is treated as a density in kg/m3.",
-         "MPA_PER_UM = 1e-3 * 1e-6",
-         "MPA_PER_UM = 1e-6"),
         ("drag-left-to-the-surface",
          "The water pushes a permeable aggregate at its surface, as if the aggregate were impermeable.",
          "    if drive.permeability is None:\n        return nodal",

@@ -4,7 +4,7 @@ from verification.mutants import changes
 
 MUTANTS = (
     *changes(
-        "repro/model/growth.py",
+        "repro/model/body.py",
         ("third-power",
          "the deviatoric stress carries J^(-1/3) for J^(-2/3)",
          "return self.J ** (-2 / 3)",
@@ -16,7 +16,9 @@ MUTANTS = (
         ("untransposed",
          "H is F^-1 in place of its transpose",
          "return elements.inverse_transpose(self.F, self.J)",
-         "return np.swapaxes(elements.inverse_transpose(self.F, self.J), -2, -1)"),
+         "return np.swapaxes(elements.inverse_transpose(self.F, self.J), -2, -1)")),
+    *changes(
+        "repro/model/growth.py",
         ("stress-across",
          "the stress across the plane carries J^(-2/3) for J^(-5/3)",
          "across = J ** (-5 / 3)",

@@ -4,6 +4,12 @@ from verification.mutants import changes
 
 MUTANTS = (
     *changes(
+        "repro/model/substrates.py",
+        ("haldane-by-newton-alone",
+         "by Haldane's law Newton's method starts from the guess, not from a state that is reached in time",
+         "        guess = settle(problem, sink, guess)\n    return transport.steady",
+         "        pass\n    return transport.steady")),
+    *changes(
         "repro/model/transport.py",
         ("fluid-diffusivity",
          "the biomass has the diffusivity of water",
@@ -195,10 +201,6 @@ MUTANTS = (
          "+ 0 * rise * rates[:, None]")),
     *changes(
         "repro/model/gear.py",
-        ("haldane-by-newton-alone",
-         "by Haldane's law Newton's method starts from the guess, not from a state that is reached in time",
-         "        guess = settle(problem, sink, guess)\n    return transport.steady",
-         "        pass\n    return transport.steady"),
         ("carry-of-bdf2",
          "the weight of the last increment in Gear's formula is wrong",
          "return ratio**2 / (1 + 2 * ratio), (1",

@@ -13,8 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from repro.march.loop import Report, RunEnd
+from repro.errors import RunEnd
 from repro.march.simulation import simulate
+from repro.march.state import Report
 from repro.results import M_PER_D, read_table
 from repro.results.network import added_resistance, uptake
 from repro.scene import Scene, load_scene

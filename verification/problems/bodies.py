@@ -16,6 +16,7 @@ from repro.fem.mesh import Mesh
 from repro.fem.outline import FREE, Outline
 from repro.fem.space import Space
 from repro.model import contact, growth, pore
+from repro.model.body import Body
 from verification.evidence.cases import combined
 from verification.evidence.checks import largest
 from verification.problems import meshes
@@ -33,7 +34,7 @@ DEGREE, BENT = 6, 0.075
 
 
 @dataclass(frozen=True, eq=False)
-class Supported(growth.Body):
+class Supported(Body):
     """A body in its reference configuration; constrained (n, 2) is True where a coordinate is prescribed."""
 
     constrained: np.ndarray

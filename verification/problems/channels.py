@@ -20,7 +20,7 @@ import numpy as np
 from repro.fem.assembly import ElementSystem, saddle_system
 from repro.fem.mesh import Mesh
 from repro.fem.space import Space
-from repro.model import flow, gear, transport
+from repro.model import flow, substrates, transport
 from repro.model.kinetics import Sink
 from repro.scene import load_scene
 from verification.problems import meshes
@@ -94,7 +94,7 @@ def steady(problem: transport.Problem, density: float, guess=None) -> transport.
     terms. At Peclet 0.1 and little uptake this may be 1e-8 of the supply, more than the error of the mesh.
     """
     sink = Sink(uniform_masses(problem.space, density))
-    concentrations = gear.steady(problem, sink, guess)
+    concentrations = substrates.steady(problem, sink, guess)
     if problem.space.order == 1:
         return concentrations
     balance = transport.Balance(problem, sink)

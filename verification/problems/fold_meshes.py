@@ -16,7 +16,7 @@ from repro.errors import SimulationError
 from repro.march import simulation
 from repro.march.ends import PoreEnd
 from repro.march.folding import Fold
-from repro.march.loop import RestartState
+from repro.march.state import RestartState
 from repro.model import remeshing
 from repro.model.remeshing import Remeshing
 from repro.scene import Scene

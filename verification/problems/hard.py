@@ -21,8 +21,8 @@ import pytest
 
 from reference import poiseuille
 from repro.errors import RunEnd, SimulationError, StageError
-from repro.march.loop import Report
 from repro.march.simulation import simulate
+from repro.march.state import Report
 from repro.model.pore import Pore, Solved, peclet, seeded, solve
 from repro.results import M_PER_D, row
 from repro.scene import Scene, load_scene

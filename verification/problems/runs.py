@@ -11,8 +11,8 @@ from repro import results
 from repro.fem.outline import TOP, Outline
 from repro.march import midpoint, updates
 from repro.march.balance import Ledger
-from repro.march.loop import Report, StepResult
 from repro.march.simulation import simulate
+from repro.march.state import Report, StepResult
 from repro.model.pore import Pore, Solved, seeded
 from repro.model.stages import Stages
 from repro.scene import Kinetics, Scene, Substrates, load_scene

@@ -37,7 +37,7 @@ from scipy.optimize import linprog
 from scipy.stats import sobol_indices, uniform
 
 from repro.march import simulation, updates
-from repro.march.loop import RestartState
+from repro.march.state import RestartState
 from repro.model import pore
 from repro.model.kinetics import rate_law
 from repro.model.stages import Stages

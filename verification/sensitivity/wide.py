@@ -23,7 +23,7 @@ import shapely
 
 from repro.errors import RunEnd
 from repro.march import simulation
-from repro.march.loop import RestartState
+from repro.march.state import RestartState
 from verification.claims import CLAIMS, Finding, evaluate
 from verification.claims.evaluate import MESH_ORDERS, unnumbered
 from verification.claims.levels import CONVERGED, Level, at_level, converged, forget
