@@ -182,8 +182,8 @@ def expand(mechanics: Mechanics, grown: Pore, theta: np.ndarray, guess: Pore | N
 class _Rounds:
     """Rounds of fluid forces and the shape under them.
 
-    forces: (n, 2) of each round; responses: those of the flow around its shape; moves: um, the
-    largest move of a node in each round.
+    forces: (n, 2) of each round; responses: those of the flow around the shape before each round;
+    moves: um, the largest move of a node in each round.
     """
 
     forces: list[np.ndarray] = field(default_factory=list)
@@ -193,20 +193,21 @@ class _Rounds:
     def next_forces(self, response: np.ndarray) -> np.ndarray:
         """Forces of the next round, from those of the flow around the last shape.
 
-        Anderson acceleration: the combination of the last rounds whose forces differ least from
-        their response (Walker and Ni 2011, SIAM J. Numer. Anal. 49, 1715).
+        Once contact lines stay in place, Anderson acceleration combines the last rounds so that
+        their forces differ least from their response (Walker and Ni 2011, SIAM J. Numer. Anal. 49,
+        1715). Before, the forces are the response.
         """
-        if not self.forces:
-            self.forces.append(response)
-            return response
+        rounds = slice(max(SETTLING_ROUNDS, len(self.forces) - FORCE_WINDOW), None)
         self.responses.append(response)
-        responses = np.array([each.ravel() for each in self.responses[-FORCE_WINDOW:]])
-        forces = np.array([each.ravel() for each in self.forces[-FORCE_WINDOW:]])
-        changes = np.diff(responses - forces, axis=0)
-        weights = np.linalg.lstsq(changes.T, responses[-1] - forces[-1])[0]
-        correction = weights @ np.diff(responses, axis=0)
-        self.forces.append(response - correction.reshape(response.shape))
-        return self.forces[-1]
+        forces = response
+        if len(self.forces[rounds]) > 1:
+            responses = np.array(self.responses[1:][rounds])
+            differences = responses - self.forces[rounds]
+            changes = np.diff(differences, axis=0).reshape(len(differences) - 1, -1)
+            weights = np.linalg.lstsq(changes.T, differences[-1].ravel())[0]
+            forces = response - np.tensordot(weights, np.diff(responses, axis=0), 1)
+        self.forces.append(forces)
+        return forces
 
     @property
     def stalled(self) -> bool:
