@@ -47,11 +47,12 @@ def test_rounds_that_do_not_reduce_the_move_end(monkeypatch, order, noise, agree
         contact.expand(mechanics, seed, 1.1 * seed.theta)
 
 
-def test_a_closed_pore_may_have_larger_forces_than_the_open_one(monkeypatch):
+@EVERY_ORDER
+def test_a_closed_pore_may_have_larger_forces_than_the_open_one(monkeypatch, order):
     """A step ends where the film is 1.999 um thick, 1.998 to 2 are allowed. The closed pore's forces lift the
-    aggregate without contact by 0.07 um. The contact stays nevertheless."""
-    scene = load_scene("base", ["numerics.preset=fast", "numerics.contact_elements=0", "pore.width=7.0487 um",
-                                "growth.fluid_forces=included"])
+    aggregate without contact by more than 0.01 um. The contact stays nevertheless."""
+    scene = load_scene("base", ["numerics.preset=fast", f"numerics.elements={ORDERS[order]}", "pore.width=7.0487 um",
+                                "numerics.contact_elements=0", "growth.fluid_forces=included"])
     seed = pore.seeded(scene)
 
     def lifting(_fluid, _around, shaped):
@@ -62,7 +63,7 @@ def test_a_closed_pore_may_have_larger_forces_than_the_open_one(monkeypatch):
     search = contact_lines.SearchOptions(landing=LANDED)
     closed = contact.expand(contact.Mechanics.of(scene), seed, 1.02 * seed.theta, search=search)
     assert closed.pore.contact
-    assert closed.gap < 1.95 < LANDED * scene.growth.minimum_film
+    assert closed.gap < 1.99 < LANDED * scene.growth.minimum_film
 
 
 GAINS = np.array([0.9, -0.8, 0.5])
@@ -108,7 +109,7 @@ def test_rounds_about_a_jump_end(jump, agrees):
 
 
 def test_rounds_take_the_last_response_while_contact_lines_move():
-    """Each of these rounds has contact lines of its own. Their responses do not show how forces change the next ones."""
+    """Each of these rounds has contact lines of its own. They do not show how forces change the later responses."""
     rounds, responses = contact._Rounds(), np.random.default_rng(1).normal(size=(contact.SETTLING_ROUNDS + 2, 4, 2))
     for response in responses:
         assert rounds.next_forces(response) is response

@@ -117,7 +117,7 @@ MUTANTS = (
          "The film before contact counts under the forces of the closed pore, and steps to contact fail.",
          "landing = -np.inf if shape.pore.contact else search.landing",
          "landing = search.landing",
-         "tests/test_traction.py::test_a_closed_pore_may_have_larger_forces_than_the_open_one"),
+         "tests/test_traction.py::test_a_closed_pore_may_have_larger_forces_than_the_open_one[2]"),
         ("forces-of-the-last-response",
          "Each round takes the forces of the flow around the last shape; a soft aggregate needs too many rounds.",
          "if len(self.forces[rounds]) > 1:",
