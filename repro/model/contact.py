@@ -49,7 +49,9 @@ SETTLING_ROUNDS = 4
 FORCE_REST = 1e-8
 #: Or by more than this, if further rounds do not reduce the move because of round-off.
 FORCE_ROUND_OFF = 1e-6
-#: The move stalls if two rounds do not reduce it by this factor.
+#: Rounds of forces that are combined, and within which the least move must fall.
+FORCE_WINDOW = 5
+#: The move stalls if FORCE_WINDOW rounds do not reduce the least move by this factor.
 FORCE_REDUCTION = 0.5
 PATIENT = SearchOptions()
 #: Defect at which each part of theta except the last counts as reached.
@@ -142,8 +144,9 @@ def expand(mechanics: Mechanics, grown: Pore, theta: np.ndarray, guess: Pore | N
     Notes
     -----
     With fluid forces, shape and flow are computed in turn until both agree. A shape changes its
-    forces by a part of the change that gave the shape, up to 0.6 of it after contact. The forces of
-    a round are therefore those at which the secant through the last two rounds predicts agreement.
+    forces by a part of the change that gave the shape, up to 0.6 of it after contact. Anderson
+    acceleration therefore chooses the forces of a round. After the first contact the film's
+    thickness counts under the forces of the open pore, because a closed pore has larger forces.
     """
     start = grown if guess is None else guess
     fluid = mechanics.fluid
@@ -161,7 +164,8 @@ def expand(mechanics: Mechanics, grown: Pore, theta: np.ndarray, guess: Pore | N
         shape = _at_rest(mechanics, grown, theta, start, rounds.next_forces(response), search)
         rounds.moves.append(float(np.abs(shape.position - last.position).max()))
         stationary = len(rounds.moves) >= SETTLING_ROUNDS
-        search = replace(search, advances=shape.advances, stationary=stationary)
+        landing = -np.inf if shape.pore.contact else search.landing
+        search = replace(search, advances=shape.advances, stationary=stationary, landing=landing)
         iterations += shape.iterations
         if rounds.agree(shape.pore.boundary.thickness):
             return replace(shape, iterations=iterations)
@@ -179,8 +183,8 @@ def expand(mechanics: Mechanics, grown: Pore, theta: np.ndarray, guess: Pore | N
 class _Rounds:
     """Rounds of fluid forces and the shape under them.
 
-    forces: (n, 2) of each round; responses: those of the flow around its shape; moves: um, the
-    largest move of a node in each round.
+    forces: (n, 2) of each round; responses: those of the flow around the shape before each round;
+    moves: um, the largest move of a node in each round.
     """
 
     forces: list[np.ndarray] = field(default_factory=list)
@@ -190,26 +194,29 @@ class _Rounds:
     def next_forces(self, response: np.ndarray) -> np.ndarray:
         """Forces of the next round, from those of the flow around the last shape.
 
-        The secant through the last two rounds predicts that they differ least from their response.
+        Once contact lines stay in place, Anderson acceleration combines the last rounds so that
+        their forces differ least from their response (Walker and Ni 2011, SIAM J. Numer. Anal. 49,
+        1715). Before, the forces are the response.
         """
-        if not self.forces:
-            self.forces.append(response)
-            return response
+        rounds = slice(max(SETTLING_ROUNDS, len(self.forces) - FORCE_WINDOW), None)
         self.responses.append(response)
         forces = response
-        if len(self.responses) > 1:
-            difference = response - self.forces[-1]
-            change = difference - (self.responses[-2] - self.forces[-2])
-            size = max(np.vdot(change, change), np.finfo(float).tiny)
-            forces = response - np.vdot(change, difference) / size * (response - self.responses[-2])
+        if len(self.forces[rounds]) > 1:
+            responses = np.array(self.responses[1:][rounds])
+            differences = responses - self.forces[rounds]
+            changes = np.diff(differences, axis=0).reshape(len(differences) - 1, -1)
+            weights = np.linalg.lstsq(changes.T, differences[-1].ravel())[0]
+            forces = response - np.tensordot(weights, np.diff(responses, axis=0), 1)
         self.forces.append(forces)
         return forces
 
     @property
     def stalled(self) -> bool:
-        """Does the move no longer decrease? The first rounds, in which lines move, do not count."""
-        settled = len(self.moves) > SETTLING_ROUNDS + 2
-        return settled and self.moves[-1] > FORCE_REDUCTION * self.moves[-3]
+        """Do the last FORCE_WINDOW rounds not reduce the least move? The first rounds, in which
+        contact lines move, do not count."""
+        settled = self.moves[SETTLING_ROUNDS:]
+        before = settled[:-FORCE_WINDOW]
+        return bool(before) and min(settled[-FORCE_WINDOW:]) > FORCE_REDUCTION * min(before)
 
     def agree(self, thickness: float) -> bool:
         """Do forces and shape agree, for an aggregate of a thickness (um)?"""
