@@ -44,9 +44,8 @@ Sections of the paper and their modules, which name the equations that they solv
     3.3  transient scheme      (7)-(13)     repro.model.gear (predictor-corrector)
     2.3, 3.4  growth           (14)-(27)    repro.model.growth, .body
     3.4  biomass               (28)-(34)    repro.model.biomass, .growing
-    2.3.2  fluid forces        (20), (22)   repro.model.traction
+    2.3.2  fluid forces        (20), (22)   repro.model.traction, .support (along a wall)
     2.3.3  contact                          repro.model.contact, .contact_lines, .contact_newton
-           force along a wall               repro.model.support
     5    adhesion, tearing                  repro.model.adhesion
          limits of the surface              repro.model.surface
     3.5  mesh motion           (35)         repro.model.mesh_motion

@@ -120,7 +120,8 @@ def free_outlet(grid: Mesh) -> tuple[np.ndarray, float]:
     pair = flow.Linear(space, flow.Stabilised().mobility(grid, viscosity, "traction"))
     elements = flow.stokes(space, viscosity, "traction", pair.lower)
     system = saddle_system(space.cells, space.cells, constrained)
-    solution = system.solve(elements, np.zeros(3 * count), pair.prescribed())
+    value = np.append(pair.prescribed(), np.zeros(count))
+    solution = system.solve(elements, np.zeros(3 * count), value)
     ends = [np.trapezoid(solution[2 * count + nodes], grid.points[nodes, 1])
             for nodes in (topology.inlet, topology.outlet)]
     return solution[: 2 * count].reshape(2, -1).T, float(ends[0] - ends[1]) / grid.width
