@@ -89,9 +89,11 @@ LAWS_AND_SUBSTRATES = pytest.mark.parametrize("law, substrates", [
     if (law, substrates) != ("Haldane", "acceptor")])  # its inhibitor is the donor
 
 
-@LAWS_AND_SUBSTRATES
+@pytest.mark.parametrize("law, substrates", [
+    each for each in LAWS_AND_SUBSTRATES.args[1] if each[0] != "zero order"])
 def test_substrates_whose_uptake_overflows_fail_in_transport(law, substrates):
-    """Biomass that grows over 1e5 h, and concentrations of an iterate that diverges."""
+    """Biomass that grows over 1e5 h, and concentrations of an iterate that diverges. Uptake of zero order is
+    bounded."""
     pore, problem = stirred(law, substrates)
     huge = transport.supplied_everywhere(problem).with_fields(np.full((len(problem.both), pore.space.count), HUGE))
     with pytest.raises(TransportError, match=OUT_OF_DOMAIN):

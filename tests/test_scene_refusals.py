@@ -239,7 +239,6 @@ def test_values_at_the_bounds_are_accepted(source, overrides):
 
 
 SUBSTRATES = ("acceptor", "donor")
-FALLING = '[["0 h", "0.9 mg/L"], ["1 h", "0.1 mg/L"]]'
 #: Members of rules that hold for several keys or elements: the key that is named, and entries of --set on base.
 #: tests/test_scene_aggregate.py has those of outlines.
 MEMBERS = [
@@ -248,8 +247,6 @@ MEMBERS = [
       for name in SUBSTRATES),
     *((f"{key}.interpolation", [f"{key}.interpolation=linear"])
       for key in ("flow", *(f"substrates.{name}" for name in SUBSTRATES))),
-    *((f"substrates.{name}.supply", ["kinetics.law=zero order", f"substrates.{name}.supply={supply}"])
-      for name in SUBSTRATES for supply in ("0.9 mg/L", FALLING)),
     *((f"numerics.{key}", [f"numerics.elements={elements}", f"numerics.{key}={value}"])
       for key, values in (("transfer", ("linear", "bounded")), ("flow_element", ("bubble",))) for value in values
       for elements in ("quadratic", "cubic"))]
@@ -258,12 +255,6 @@ MEMBERS = [
 @pytest.mark.parametrize("key, entries", MEMBERS)
 def test_every_member_of_a_rule_is_refused(key, entries):
     assert refusal("base", *entries).startswith(f"base: {key} = ")
-
-
-@pytest.mark.parametrize("name", SUBSTRATES)
-def test_a_supply_that_reaches_half_saturation_at_any_time_is_accepted_of_zero_order(name):
-    rising = FALLING.replace("0.1", "1")
-    assert load_scene("base", ["kinetics.law=zero order", f"substrates.{name}.supply={rising}"])
 
 
 OUTLINED = ("initial_mesh --unset aggregate.radius",

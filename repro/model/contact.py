@@ -179,7 +179,7 @@ def expand(mechanics: Mechanics, grown: Pore, theta: np.ndarray, guess: Pore | N
                       'growth.fluid_forces = "neglected"')
 
 
-@dataclass
+@dataclass(eq=False)
 class _Rounds:
     """Rounds of fluid forces and the shape under them.
 

@@ -16,7 +16,7 @@ Velocities of order 2 or 3 with a pressure of one order less (Taylor-Hood) need 
 viscosity jumps, the pressure jumps too. Each node of the interface therefore has a pressure of the
 fluid and one of the biomass. With a single pressure the head loss errs by up to 1 % if the
 aggregate spans the pore, and by 2 to 5 % if it bends (traction form), on every mesh that was tried.
-A permeable aggregate has the viscosity of water, and its pressure does not jump. Linear velocities
+An aggregate with the viscosity of water has no jump, permeable ones among them. Linear velocities
 with a linear pressure do: tau = h_tau^2 / (c nu_r). The paper prints no constant c [E13];
 ``reference/ERRATA.md`` reports its effect. By the second line ``w = u - tau grad p`` is
 divergence-free for every linear q: w carries the substrates.
@@ -35,7 +35,7 @@ G = sum g_i g_i^T, the integral of b is 9/20 |tau|, that of grad b grad b^T is 8
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -60,7 +60,8 @@ class Flow:
     mean_velocity: um/h; velocity: (n, 2) um/h at the nodes of its space; head: (m,) um at the nodes
     of the pressure's order, the mesh's corners first; correction: (T, 2) um/h, tau grad p, so that
     w = u - correction, None where u itself carries the substrates; meshed_loss, head_loss: um, over
-    the meshed part and the whole pore; conductivity: um/h.
+    the meshed part and the whole pore; conductivity: um/h; biomass_head: (m,) um, as head, on the
+    interface that of the biomass; None if the head does not jump there.
     """
 
     mean_velocity: float
@@ -70,19 +71,21 @@ class Flow:
     meshed_loss: float
     head_loss: float
     conductivity: float
+    biomass_head: np.ndarray | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class UnitFlow:
     """Flow of mean velocity one: velocity (n, 2) and correction (T, 2) without unit, pressure (m,)
-    in 1/um at the nodes of its own order (on the interface, that of the fluid), and its loss over
-    the meshed part, 1/um. The head loss (6) is this loss times nu_water / g times the mean
-    velocity."""
+    in 1/um at the nodes of its own order (on the interface, that of the fluid), its loss over the
+    meshed part, 1/um, and the pressure with that of the biomass on the interface if it jumps. The
+    head loss (6) is this loss times nu_water / g times the mean velocity."""
 
     velocity: np.ndarray
     pressure: np.ndarray
     correction: np.ndarray | None
     loss: float
+    biomass_pressure: np.ndarray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,7 +234,7 @@ def unit_flow(velocity: Space, viscosity_ratio: float = 1.0, *, interface: str =
     mesh = velocity.mesh
     viscosity = np.where(mesh.biomass, viscosity_ratio, 1.0)
     pair = PAIRS[velocity.order].on(velocity, viscosity, element, interface)
-    splits = velocity.order > 1 and permeability is None
+    splits = velocity.order > 1 and permeability is None and viscosity_ratio != 1
     system = mesh.topology.system(("flow", interface, velocity.order, splits),
                                   lambda: _system(velocity, interface, splits))
     if permeability is None:
@@ -246,8 +249,14 @@ def unit_flow(velocity: Space, viscosity_ratio: float = 1.0, *, interface: str =
     solution = value + system.solve(blocks, -load)
     n = velocity.count
     u = solution[: 2 * n].reshape(2, n).T
-    in_fluid = solution[2 * n:][: pressure_space(velocity).count]
-    return pair.unit(u, in_fluid, work(load, solution, mesh.width))
+    pressure = pressure_space(velocity)
+    of_fluid, second = np.split(solution[2 * n:], [pressure.count])
+    unit = pair.unit(u, of_fluid, work(load, solution, mesh.width))
+    if not splits:
+        return unit
+    of_biomass = of_fluid.copy()
+    of_biomass[interface_nodes(pressure)] = second
+    return replace(unit, biomass_pressure=of_biomass)
 
 
 def stokes(velocity: Space, viscosity: np.ndarray, interface: str,
@@ -311,8 +320,10 @@ def scaled(unit: UnitFlow, mesh: Mesh, length: float, drive: Drive) -> Flow:
     at_outlet = Space(mesh, 1).outlet.mean(unit.pressure[: mesh.corners])
     head = scale * (unit.pressure - at_outlet)
     correction = None if unit.correction is None else speed * unit.correction
+    of_biomass = unit.biomass_pressure
     return Flow(speed, speed * unit.velocity, head, correction, scale * unit.loss,
-                scale * total_loss, length / (viscosity * total_loss))
+                scale * total_loss, length / (viscosity * total_loss),
+                None if of_biomass is None else scale * (of_biomass - at_outlet))
 
 
 def solve(velocity: Space, drive: Drive, length: float, *, interface: str = "laplacian",

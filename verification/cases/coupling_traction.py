@@ -82,6 +82,8 @@ def _by_biomass(scene, state: pore.Pore, solution: Flow) -> np.ndarray:
     mesh = state.mesh
     exchanged = replace(mesh, topology=replace(mesh.topology, biomass=~mesh.biomass))
     viscosity = scene.flow.viscosity_ratio * scene.flow.kinematic_viscosity / scene.flow.gravity
+    if solution.biomass_head is not None:
+        solution = replace(solution, head=solution.biomass_head)
     return traction.nodal(Space(exchanged, state.space.order), solution, viscosity, scene.numerics.interface)
 
 
