@@ -45,7 +45,7 @@ FOLLOWED = {
     "cli/sweep.py": {"continues the sweep": "tests/test_sweep.py::test_a_signal_ends_a_sweep_quietly"},
     "fem/linear.py": {"pip install": PACKAGES},
     "march/folding.py": {'growth.new_biomass = "stress_free" does': STRESS_FREE},
-    "march/loop.py": {"try a smaller numerics.refinement": MEMORY},
+    "march/state.py": {"try a smaller numerics.refinement": MEMORY},
     "march/updates.py": {"try a shorter growth.time_step":
                          "tests/test_advice.py::test_a_shorter_step_helps_where_the_aggregate_passes_the_opposite_wall"},
     "model/advice.py": {

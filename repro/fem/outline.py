@@ -20,6 +20,9 @@ from repro.fem.brief import brief
 FREE = 0
 BOTTOM = 1
 TOP = 2
+#: A corner of the shape at t = 0 that keeps its node turns by more than this. The samples of a spline
+#: turn by up to 47 degrees at a tip (member 11 of the hostile scenes).
+SHARP = np.pi / 3
 
 
 @brief
@@ -101,11 +104,11 @@ class Outline:
 
     @property
     def corners_at_start(self) -> np.ndarray:
-        """(edges,) True where the shape of t = 0 turns by more than CORNER at an edge's start."""
+        """(edges,) True where the shape of t = 0 turns by more than SHARP at an edge's start."""
         first, second = arc_derivatives(self.arcs(self.origin))
         before = np.roll(first + second, 1, axis=0)
         lengths = np.linalg.norm(before, axis=1) * np.linalg.norm(first, axis=1)
-        return np.sum(before * first, axis=1) < np.cos(CORNER) * lengths
+        return np.sum(before * first, axis=1) < np.cos(SHARP) * lengths
 
     def edge_lengths(self) -> np.ndarray:
         """Length (um) of the straight line from each node to the next."""

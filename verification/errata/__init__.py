@@ -22,7 +22,10 @@ Numbers = dict[str, str]
 @dataclass(frozen=True)
 class Erratum:
     """An entry: its text, the function that computes the numbers in ``consequence``, and whether it takes less than
-    about two seconds and no run. An empty part is left out."""
+    about two seconds and no run. An empty part is left out.
+
+    spread: bound of the relative difference of its numbers between meshes that differ by round-off.
+    """
 
     id: str
     title: str
@@ -31,6 +34,7 @@ class Erratum:
     printed: str = ""
     reading: str = ""
     quick: bool = False
+    spread: float = 0.05
 
     def markdown(self) -> str:
         """Compute the numbers and return the entry."""

@@ -290,8 +290,8 @@ def chain(method: str) -> tuple[np.ndarray, float]:
         {table}
 
         With most values of gamma the mesh stays acceptable under the printed sign. Near a resonance the
-        displacements are far too large.""",
-    quick=True)
+        displacements are far too large. The mesh decides which values of gamma are near a resonance.""",
+    quick=True, spread=10.0)
 def compressibility_sign() -> Numbers:
     """Mesh motion with both signs of gamma."""
     grid = half_disc(load_packaged("initial_mesh"), 10.0, 75.0)

@@ -93,7 +93,7 @@ def interface_difference(grid: Mesh) -> str:
         {table}
 
         Without u_y = 0 the flow spreads at the outlet like a jet that leaves the channel.""",
-    quick=True)
+    quick=True, spread=0.2)
 def outlet() -> Numbers:
     """Poiseuille flow in three forms on two meshes."""
     rows = []

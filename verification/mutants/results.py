@@ -1440,9 +1440,9 @@ MUTANTS = (
         "repro/fem/outline.py",
         ("corners-by-chance",
          "Any node where the shape of t = 0 turns counts as its corner.",
-         "< np.cos(CORNER) * lengths",
-         "< np.cos(CORNER / 2) * lengths",
-         f"{SIZING}only_a_corner_by_more_than_thirty_degrees_keeps_its_node")),
+         "< np.cos(SHARP) * lengths",
+         "< np.cos(SHARP / 2) * lengths",
+         f"{SIZING}only_a_corner_by_more_than_sixty_degrees_keeps_its_node")),
     *changes(
         "repro/model/contact.py",
         ("bonded-on-both-walls",
