@@ -101,5 +101,4 @@ def refuse_density(pore: Pore, maximum_density: float) -> None:
     low, high = DENSITIES
     if least < low or largest > high:
         raise GrowthError(f"the density of biomass comes to {least:.2g} to {largest:.2g} X_m, out "
-                          f"of {low:g} to {high:g}: a triangle has collapsed; try a larger "
-                          "numerics.refinement")
+                          f"of {low:g} to {high:g}: a triangle has collapsed")
