@@ -20,8 +20,8 @@ from repro.fem.brief import brief
 FREE = 0
 BOTTOM = 1
 TOP = 2
-#: A corner of the shape at t = 0 that keeps its node turns by more than this. The samples of a spline
-#: turn by up to 47 degrees at a tip (member 11 of the hostile scenes).
+#: A corner of the shape at t = 0 that keeps its node turns by more than this. The samples of a
+#: spline turn by up to 47 degrees at a tip (member 11 of the hostile scenes).
 SHARP = np.pi / 3
 
 
