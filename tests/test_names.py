@@ -173,6 +173,7 @@ def test_a_lock_of_an_ended_process_is_taken_over_where_files_cannot_be_exchange
         assert (tmp_path / ".lock").read_text().startswith(f"{os.getpid()}\n")
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("content, advice", [("123\nelsewhere\n", True), ("", True), ("my notes", False)])
 def test_a_folder_that_is_locked_elsewhere_is_refused(tmp_path, without_flock, content, advice):
     """The message says how to go on, and that helps; a file that is no lock is left alone."""

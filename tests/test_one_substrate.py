@@ -84,6 +84,7 @@ def test_check_states_what_is_assumed():
     assert "none without acceptor" in paper["kinetics"]
 
 
+@pytest.mark.thorough  # a ratio of times, which other work on the machine disturbs
 @pytest.mark.parametrize("name", OTHER)
 def test_a_solution_of_one_substrate_costs_at_most_0_6_of_two(name):
     """Processor time of assembly and solution at more than 2500 nodes, the least of five, in turns."""
