@@ -13,8 +13,8 @@ from repro.preflight import numbers, simplifications
 
 #: A dense aggregate of 20 um that exhausts its supply in a front as thin as the root of the half saturation.
 DENSE = ["numerics.preset=fast", "aggregate.radius=20 um", "kinetics.maximum_density=400 g/L"]
-#: Half saturations (mg/L), factors by which their front may refine the elements at the aggregate, and times (h). The
-#: thinnest front is resolved by either factor, as the last bit of the mesh decides.
+#: Half saturations (mg/L), factors by which their front may refine the elements at the aggregate, and times (h).
+#: The last bit of the mesh decides whether factor 2 or 4 resolves the thinnest front.
 LEVELS = [(0.1, (1,), 0.0), (0.0175, (2,), 0.0), (0.01, (2, 4), 0.0), (0.01, (2, 4), 0.5)]
 
 

@@ -43,7 +43,7 @@ class Fold(RunEnd):
 
 
 def most_compressed(earlier: Compression, pore: Pore) -> Compression:
-    """Return an earlier compression, or that of a later pore with a smaller stretch.
+    """Return the compression of a pore if its stretch is smaller than an earlier one.
 
     Where strain counts from the last shape, compression does not accumulate: that of the later pore
     is returned.
@@ -64,8 +64,7 @@ def refuse_fold(expanded: Pore) -> None:
     compression = most_compressed(Compression(), expanded)
     if expanded.last is not None and compression.stretch < BIOT:
         raise GrowthError(f"growth in one step compresses the surface to {compression.stretch:.3f} "
-                          f"of its length near x = {compression.x:.4g}, y = {compression.y:.4g} "
-                          "um")
+                          f"of its length near x = {compression.x:.4g}, y = {compression.y:.4g} um")
 
 
 @contextmanager

@@ -16,9 +16,10 @@ Velocities of order 2 or 3 with a pressure of one order less (Taylor-Hood) need 
 viscosity jumps, the pressure jumps too. Each node of the interface therefore has a pressure of the
 fluid and one of the biomass. With a single pressure the head loss errs by up to 1 % if the
 aggregate spans the pore, and by 2 to 5 % if it bends (traction form), on every mesh that was tried.
-An aggregate with the viscosity of water has no jump, permeable ones among them. Linear velocities
-with a linear pressure do: tau = h_tau^2 / (c nu_r). The paper prints no constant c [E13];
-``reference/ERRATA.md`` reports its effect. By the second line ``w = u - tau grad p`` is
+The pressure does not jump if the aggregate has the viscosity of water, as permeable ones have.
+
+Linear velocities with a linear pressure need tau = h_tau^2 / (c nu_r). The paper prints no constant
+c [E13]; ``reference/ERRATA.md`` reports its effect. By the second line ``w = u - tau grad p`` is
 divergence-free for every linear q: w carries the substrates.
 
 Linear velocities with a bubble b = 27 L1 L2 L3 in each triangle (MINI: Arnold, Brezzi and Fortin

@@ -17,8 +17,8 @@ LIMIT = 120.0
 QUICK = (2, 58)
 REST = tuple(number for number in range(family.MEMBERS) if number not in QUICK)
 #: Members whose fold need not be confirmed. The surface of member 8 buckles within one edge: the least stretch of its
-#: rows is 0.581 in the middle of an edge and 0.701 in its mean, on both sides of the limit of 0.647. Which row is the
-#: last one depends on the last bit, and with it whether the mean falls below the limit.
+#: rows is 0.581 in the middle of an edge and 0.701 in its mean, on both sides of the limit of 0.647. The last bit
+#: decides at which row the run ends, and so whether the mean falls below the limit.
 BUCKLED = (8,)
 #: Fields of the mark that both cases share.
 COMMON = {
