@@ -30,16 +30,18 @@ NOT_RUN = {"verdict": "not run", "numbers": 0, "errors": [], "table": []}
 
 
 def write(results: Iterable[Result]) -> None:
-    """Record the cases that ran with every variant, and write all pages."""
+    """Record the cases that ran with every variant, write all pages, and draw the pictures whose series changed."""
     known = cases()
+    before = recorded()
     complete = [result.in_order(known[result.id].variants) for result in results
                 if result.evidence.keys() >= known[result.id].variants.keys()]
     records = {**load(RECORD, {}), **{result.id: entry(result) for result in complete}}
     save({id: records[id] for id in known if id in records}, RECORD)
     hard_cases.record(complete)
     for stage in TITLES:
-        if series := studies(of_stage(stage, recorded())):
-            convergence.draw(series, REPORT / f"{stage}.svg")
+        series, target = studies(of_stage(stage, recorded())), REPORT / f"{stage}.svg"
+        if series and (series != studies(of_stage(stage, before)) or not target.exists()):
+            convergence.draw(series, target)
     for name, text in texts(recorded()).items():
         (REPORT / name).write_text(text, encoding="utf-8")
 
