@@ -36,7 +36,8 @@ TABLE_1 = {
                  "maximum_density": "30000 mg/L"},
 }
 NAMES = ("acceptor", "donor")
-#: A half saturation, over that of the scene, for which Monod's law is nearly of zero order.
+#: A half saturation, over that of the scene, for which Monod's law is nearly of zero order. It serves for bounds of m
+#: alone: the uptake of so steep a law is not compared (STEP).
 ZERO_ORDER = 1e-5
 
 #: Round-off of sums over about 1e4 nodes or points.

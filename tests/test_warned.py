@@ -8,6 +8,7 @@ from unittest.mock import Mock
 import pytest
 
 from repro.cli import main
+from repro.march import loop
 from repro.march.simulation import steps
 from repro.march.step_control import StepControl
 from repro.preflight import simplifications
@@ -136,4 +137,15 @@ def test_the_worst_step_that_misses_the_tolerance_is_reported(tmp_path):
     for estimate in (0.03, 0.5, 0.04, 0.001):
         recorder._count_missed_tolerance(StepControl(1.0, 1.0, estimate))
     assert recorder.history.missed == 3 and not recorder.contact
-    assert "errs by 0.5 (estimate)" in recorder.warn_missed_tolerance()[0].text
+    assert "errs by 0.5 (estimate)" in recorder.late_warnings()[0].text
+
+
+def test_a_row_that_is_left_out_is_reported(tmp_path, capsys, monkeypatch):
+    """Once on standard error and in run.json, at the end. The run completes."""
+    monkeypatch.setattr(loop, "_row_within", lambda *_: None)
+    folder = pages.run(tmp_path, "base", "growth.end=0.4 h", 'output.times=["0.05 h", "0.13 h", "0.4 h"]')
+    record = read_record(folder)
+    text = "there is no row at 0.05, 0.13 h: the state there could not be computed, and the run went on without it"
+    assert record["status"] == "completed" and record["rows"] == 2
+    assert [entry["text"] for entry in record["warnings"] if entry["key"] == "output.times"] == [text]
+    assert capsys.readouterr().err.count(f"output.times: {text}") == 1

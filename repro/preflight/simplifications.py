@@ -284,6 +284,14 @@ def warn_missed_tolerance(scene: Scene, worst: float, count: str = "") -> Iterat
                      f"{worst:.2g} (estimate)")
 
 
+def warn_missing_rows(times: list[float]) -> Iterator[Caveat]:
+    """Warn about requested times (h) at which no state could be computed."""
+    if times:
+        listed = ", ".join(f"{time:g}" for time in times)
+        yield Caveat("output.times", f"there is no row at {listed} h: the state there could not "
+                     "be computed, and the run went on without it")
+
+
 def _fold(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
     """Warn if growth is expected to compress the rim around a starved core into a fold."""
     if scene.growth.new_biomass != "stressed":

@@ -10,9 +10,14 @@ from time import perf_counter
 from repro import report, results, timing
 from repro.errors import Interrupted, shell_word
 from repro.march.balance import Ledger
-from repro.march.state import Report, RestartState, sum_counts
+from repro.march.state import SAME_TIME, Report, RestartState, sum_counts
 from repro.march.step_control import StepControl, exceeds_tolerance
-from repro.preflight.simplifications import Caveat, warn_missed_tolerance, warn_surface
+from repro.preflight.simplifications import (
+    Caveat,
+    warn_missed_tolerance,
+    warn_missing_rows,
+    warn_surface,
+)
 from repro.results import field_files, netcdf
 from repro.results.files import atomic_path, is_file, sha256_of
 from repro.runs import checkpoint, state_arrays
@@ -119,10 +124,17 @@ class Recorder:
             self.history.missed += 1
             self.history.worst = max(self.history.worst, step_control.estimate)
 
-    def warn_missed_tolerance(self) -> list[Caveat]:
-        """Warn if any step so far misses the tolerance."""
+    def late_warnings(self) -> list[Caveat]:
+        """Warn if any step so far misses the tolerance, and if any requested row is missing."""
         count = f" in {self.history.missed} of {self.steps} steps"
-        return list(warn_missed_tolerance(self.scene, self.history.worst, count))
+        return [*warn_missed_tolerance(self.scene, self.history.worst, count),
+                *warn_missing_rows(self._missing_rows())]
+
+    def _missing_rows(self) -> list[float]:
+        """Requested times (h) so far that have no row."""
+        times = [row[results.COLUMNS.index("time_h")] for row in self.history.rows]
+        return [time for time in self.scene.requested_times or () if time < self.time - SAME_TIME
+                and not any(abs(time - present) <= SAME_TIME for present in times)]
 
     def _add_fields(self, reported: Report) -> None:
         self._write_fields(self.history.index, "fields", reported.pore, reported.solved)
@@ -167,7 +179,7 @@ class Recorder:
         the fields, each checkpoint contains its own, and the page does not exist yet.
         """
         history = self._current_history()
-        warnings = history.warnings + [asdict(warning) for warning in self.warn_missed_tolerance()]
+        warnings = history.warnings + [asdict(warning) for warning in self.late_warnings()]
         files = self._files(is_over(status))
         record = {
             **results.provenance(self.scene), "conditions": self.conditions, "status": status,

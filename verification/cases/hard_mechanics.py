@@ -232,18 +232,35 @@ TIGHT = HardCase(
     mutants=("hard-film-without-elements",))
 
 
+SOFT = 'growth.shear_modulus="100 Pa"'
+#: um, measured between two runs with the usual modulus, with and without forces.
+SCATTER = 2e-3
+
+
 def forced(preset: str, seed: int) -> Iterator:
-    """Through contact under the fluid's forces, with random width and flow. The film of 3 um closes at 2 um."""
+    """Through contact under the fluid's forces, with random width and flow. The film of 3 um closes at 2 um.
+
+    The shift is that of a soft aggregate. With the usual modulus it is smaller than the scatter of the tips between two
+    unrelated meshes, 1e-3 um, and its sign is that of the scatter. The paper's scheme does not reach contact with this
+    modulus: its rounds of shape and forces do not agree while nodes join the wall.
+    """
     random = np.random.default_rng(seed)
     width = random.uniform(25.0, 100.0)
     changes = (f'pore.width="{width} um"', f'aggregate.radius="{width - 3} um"', 'growth.end="0.4 h"',
                f'flow.mean_velocity="{random.uniform(0.5, 5.0)} m/day"', 'output.times=["0.4 h"]')
-    pushed, free = (hard.run_packaged("wide", preset, *changes, f'growth.fluid_forces="{word}"', density=CLOSING)
-                    for word in ("included", "neglected"))
+    pushed, free = _with_and_without_forces(preset, *changes)
     yield pushed, contact_rests(pushed)
     yield hard.close(pushed, free, preset, "aggregate_area_um2", *EFFLUENTS)
-    shift = sum(pushed.last[tip] - free.last[tip] for tip in SHAPE[2:]) / 2
-    yield at_least("shift of the aggregate downstream by the forces, um", shift, 0.0, "the flow pushes it downstream")
+    if preset != "paper":
+        pushed, free = _with_and_without_forces(preset, *changes, SOFT)
+        shift = sum(pushed.last[tip] - free.last[tip] for tip in SHAPE[2:]) / 2
+        yield at_least("shift of a soft aggregate downstream by the forces, um", shift, SCATTER,
+                       "the flow pushes it downstream, farther than unrelated meshes scatter")
+
+
+def _with_and_without_forces(preset: str, *changes: str) -> list[Run]:
+    return [hard.run_packaged("wide", preset, *changes, f'growth.fluid_forces="{word}"', density=CLOSING)
+            for word in ("included", "neglected")]
 
 
 FORCED = HardCase(
