@@ -59,7 +59,8 @@ def test_the_page_has_the_warnings_at_its_head(tmp_path, checked, recwarn):
 
 
 def test_a_run_without_warnings_has_an_empty_list(tmp_path, capsys):
-    assert read_record(pages.run(tmp_path, "flow_only"))["warnings"] == [] and capsys.readouterr().err == ""
+    assert read_record(pages.run(tmp_path, "flow_only"))["warnings"] == []
+    assert "warning" not in capsys.readouterr().err
     assert "aria-label=\"warnings\"" not in text_of(tmp_path / "run")
 
 
