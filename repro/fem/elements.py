@@ -1,9 +1,10 @@
-"""Lagrange elements of order 1, 2 and 3 on straight or curved triangles, at quadrature points.
+"""Lagrange elements, linear (order 1) or quadratic (2), on straight or curved triangles, at
+quadrature points.
 
-Shape functions, their derivatives and the quadratures are scikit-fem's (``ElementTriP1``, ``P2``,
-``P3``). A curved triangle has the nodes of ``ElementTriP2``, as those of scikit-fem's ``MeshTri2``:
-the map from the unit triangle is x(s, t) = sum_a x_a N_a(s, t), and gradients are grad N = N_,st
-(x_,st)^-1.
+Shape functions, their derivatives and the quadratures are scikit-fem's (``ElementTriP1``,
+``ElementTriP2``). A curved triangle has the nodes of ``ElementTriP2``, as those of scikit-fem's
+``MeshTri2``: the map from the unit triangle is x(s, t) = sum_a x_a N_a(s, t), and gradients are
+grad N = N_,st (x_,st)^-1.
 """
 
 from __future__ import annotations
@@ -12,22 +13,19 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from skfem import ElementTriP1, ElementTriP2, ElementTriP3
+from skfem import ElementTriP1, ElementTriP2
 from skfem.quadrature import get_quadrature_line, get_quadrature_tri
 
-ELEMENTS = {1: ElementTriP1(), 2: ElementTriP2(), 3: ElementTriP3()}
-#: Degrees of the quadrature on triangles and on edges, for each order of the functions: products of
-#: two functions and a coefficient that is nearly linear.
-DEGREES = {1: 2, 2: 6, 3: 8}
-EDGE_DEGREES = {1: 2, 2: 6, 3: 9}
+ELEMENTS = {1: ElementTriP1(), 2: ElementTriP2()}
+#: Degrees of the quadrature on triangles and on edges, by the order of the functions or of the map:
+#: products of two functions and a coefficient that is nearly linear.
+DEGREES = {1: 2, 2: 6}
 #: Degrees for gradients: lower for linear functions on straight triangles, where they are constant.
-GRADIENT_DEGREES = {1: 1, 2: 6, 3: 8}
-#: Least degrees by the order of the map: on straight triangles (1) it is linear.
-MAP_DEGREES = {1: 1, 2: DEGREES[2]}
+GRADIENT_DEGREES = {1: 1, 2: 6}
 #: The corner at the other end of the edges 01, 12 and 20.
 NEXT = [1, 2, 0]
 #: Shape functions of an edge among those of a triangle: the edge 01.
-ON_EDGE = {1: [0, 1], 2: [0, 3, 1], 3: [0, 3, 4, 1]}
+ON_EDGE = {1: [0, 1], 2: [0, 3, 1]}
 
 
 def nodes(order: int) -> np.ndarray:
@@ -97,20 +95,14 @@ def table(order: int, geometry: int, degree: int) -> Table:
 
 
 @cache
-def vertex_table(order: int, geometry: int) -> Table:
-    """Like :func:`table`, but at the corners, which lumps the integrals."""
-    return _tabulated(order, geometry, nodes(1), np.full(3, 1 / 6))
+def vertex_table(geometry: int) -> Table:
+    """Like :func:`table` of linear functions, but at the corners, which lumps the integrals."""
+    return _tabulated(1, geometry, nodes(1), np.full(3, 1 / 6))
 
 
 def _tabulated(order: int, geometry: int, where: np.ndarray, weights: np.ndarray) -> Table:
     return Table(weights, values(order, where), derivatives(order, where), values(geometry, where),
                  derivatives(geometry, where), values(1, where))
-
-
-@cache
-def values_on(order: int, of: Table) -> np.ndarray:
-    """(q, k) shape functions of another order at the points of a table."""
-    return values(order, of.linear[:, 1:])
 
 
 @cache
@@ -125,23 +117,22 @@ def linear_fit(of: Table) -> np.ndarray:
 @cache
 def edge_table(order: int) -> tuple[np.ndarray, np.ndarray]:
     """(p, e) shape functions of an edge's nodes at its quadrature points, and the weights (p,)."""
-    (s,), weights = get_quadrature_line(EDGE_DEGREES[order])
+    (s,), weights = get_quadrature_line(DEGREES[order])
     along = values(order, np.column_stack([s, 0 * s]))
     return along[:, ON_EDGE[order]], weights
 
 
 @cache
-def side_table(order: int, geometry: int, side: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Shape functions (p, k) of a triangle at the quadrature points of its side 01, 12 or 20.
+def side_table(geometry: int, side: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The functions (p, g) that map a triangle, at the quadrature points of its side 01, 12 or 20.
 
-    Also returns the weights (p,) and the derivatives (p, g), along the side, of the functions that
-    map the triangle.
+    Also returns the weights (p,) and the derivatives (p, g) along the side.
     """
-    (s,), weights = get_quadrature_line(EDGE_DEGREES[order])
+    (s,), weights = get_quadrature_line(DEGREES[geometry])
     corners = nodes(1)
     direction = corners[NEXT[side]] - corners[side]
     where = corners[side] + s[:, None] * direction
-    return values(order, where), weights, derivatives(geometry, where) @ direction
+    return values(geometry, where), weights, derivatives(geometry, where) @ direction
 
 
 def by_component(tensor: np.ndarray) -> np.ndarray:

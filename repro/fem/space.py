@@ -1,4 +1,4 @@
-"""Functions of order 1, 2 or 3 on a mesh: nodes, and bases for the forms of :mod:`repro.fem.forms`.
+"""Functions of order 1 or 2 on a mesh: nodes, and bases for the forms of :mod:`repro.fem.forms`.
 
 Every integral of a weak form is a sum over quadrature points. Element matrices equal those of
 scikit-fem's assembly with the same quadrature. The reaction of the substrates is integrated by one
@@ -29,7 +29,7 @@ class Space:
     mesh : Mesh
         Triangles with straight or curved sides; coordinates in um.
     order : int
-        Degree of the functions: 1, 2 or 3.
+        Degree of the functions: 1, or on curved sides also 2.
 
     Examples
     --------
@@ -42,6 +42,15 @@ class Space:
 
     mesh: Mesh
     order: int
+
+    @staticmethod
+    def of(mesh: Mesh) -> Space:
+        """Return the functions whose nodes are those of the mesh.
+
+        They are linear on straight triangles and quadratic on curved ones, as velocity and
+        concentrations are.
+        """
+        return Space(mesh, mesh.geometry)
 
     @property
     def dofs(self) -> Dofs:
@@ -61,8 +70,8 @@ class Space:
     @cached_property
     def table(self) -> Table:
         """The functions at the quadrature points for products."""
-        degree = max(elements.DEGREES[self.order], elements.MAP_DEGREES[self.mesh.geometry])
-        return elements.table(self.order, self.mesh.geometry, degree)
+        geometry = self.mesh.geometry
+        return elements.table(self.order, geometry, elements.DEGREES[geometry])
 
     @cached_property
     def at(self) -> Basis:
@@ -72,8 +81,7 @@ class Space:
     @property
     def gradient_degree(self) -> int:
         """Degree of the quadrature of gradients; it has one point on straight linear triangles."""
-        of_map = elements.MAP_DEGREES[self.mesh.geometry]
-        return max(elements.GRADIENT_DEGREES[self.order], of_map)
+        return elements.GRADIENT_DEGREES[self.mesh.geometry]
 
     @cached_property
     def gradient_table(self) -> Table:
@@ -98,7 +106,7 @@ class Space:
     @cached_property
     def points(self) -> np.ndarray:
         """(count, 2) um, places of the nodes."""
-        return self.of_mesh(self.mesh.points)
+        return self.mesh.points[: self.count]
 
     @property
     def integration(self) -> Lumped | Quadrature:
@@ -112,31 +120,9 @@ class Space:
 
     def lumped(self, where: np.ndarray | slice = slice(None)) -> np.ndarray:
         """(corners,) um2, a third of the area of the triangles ``where`` around each corner."""
-        of = elements.vertex_table(1, self.mesh.geometry)
+        of = elements.vertex_table(self.mesh.geometry)
         dx = elements.weights(self.mesh.points[self.mesh.cells[where]], of)
         return np.bincount(self.mesh.triangles[where].ravel(), dx.ravel(), self.mesh.corners)
-
-    def values_at(self, of: Table) -> np.ndarray:
-        """(q, k) these functions at the points of another table."""
-        return elements.values_on(self.order, of)
-
-    def of_mesh(self, field: np.ndarray) -> np.ndarray:
-        """(count, ...) values at the space's nodes, from a field (N, ...) at the mesh's own."""
-        if self.order == self.mesh.geometry:
-            return field
-        up = elements.values(self.mesh.geometry, elements.nodes(self.order))
-        all_values = np.empty((self.count, *field.shape[1:]))
-        all_values[self.cells] = np.einsum("ab,tb...->ta...", up, field[self.mesh.cells])
-        return all_values
-
-    def to_mesh(self, field: np.ndarray) -> np.ndarray:
-        """(N, ...) values of a field (count, ...) at the mesh's own nodes."""
-        if self.order == self.mesh.geometry:
-            return field
-        down = elements.values(self.order, elements.nodes(self.mesh.geometry))
-        nodal = np.empty((len(self.mesh.points), *field.shape[1:]))
-        nodal[self.mesh.cells] = np.einsum("ab,tb...->ta...", down, field[self.cells])
-        return nodal
 
     @cached_property
     def inlet(self) -> End:
@@ -267,8 +253,7 @@ class Quadrature:
     def to_points(self, nodal: np.ndarray) -> np.ndarray:
         """(r, q) values at the points, from a field (N,) at the mesh's nodes."""
         mesh = self.space.mesh
-        values = elements.values_on(mesh.geometry, self.space.table)
-        return nodal[mesh.cells[mesh.biomass]] @ values.T
+        return nodal[mesh.cells[mesh.biomass]] @ self.space.table.values.T
 
     def to_growth_points(self, field: np.ndarray) -> np.ndarray:
         """Return the field (r, q) itself: growth is integrated at the same points."""

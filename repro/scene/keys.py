@@ -350,8 +350,8 @@ class Numerics:
         about="Defaults of this section: until contact errors of about 1 %, of about 0.1 %, under "
               "0.01 %, which are larger after contact; or the paper's own scheme")
     elements: str = choice(
-        "linear", "quadratic", "cubic", source="3.2-3.4 have linear ones",
-        about="Linear triangles, or curved ones: all quadratic, or velocity and substrates cubic")
+        "linear", "quadratic", source="3.2-3.4 have linear ones",
+        about="Straight linear triangles, or curved quadratic ones")
     time: str = choice(
         "updates", "midpoint", source="Section 2, 3.3 have updates",
         about="Every growth.time_step, or second-order steps as long as tolerance allows")
@@ -401,18 +401,13 @@ class Numerics:
 
     @property
     def order(self) -> int:
-        """Degree of velocity and concentrations on a triangle."""
-        return {"linear": 1, "quadratic": 2, "cubic": 3}[self.elements]
+        """1: linear elements on straight triangles; 2: quadratic ones on curved triangles."""
+        return 1 if self.elements == "linear" else 2
 
     @property
     def follows_layers(self) -> bool:
         """Are elements refined at boundary layers and fronts? Linear ones, the paper's, are not."""
         return self.elements != "linear"
-
-    @property
-    def geometry(self) -> int:
-        """1: straight triangles; 2: curved ones, with quadratic maps."""
-        return min(self.order, 2)
 
 
 #: Changes of each preset to the defaults above: until contact errors of about 1 %, of about 0.1 %,

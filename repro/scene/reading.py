@@ -8,6 +8,7 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, Field, dataclass, fields, replace
 
+from repro.scene import former
 from repro.scene.units import (
     Quantity,
     Refused,
@@ -107,6 +108,8 @@ def _read_entry(entry: Field, value: object, place: Place):
     if "section" in entry.metadata:
         return read_table(entry.metadata["section"], value, place)
     kind = entry.metadata["kind"]
+    if requirement := former.instead_of_choice(place.key, value):
+        raise place.refuse(value, requirement)
     try:
         return kind.read(value)
     except Refused as error:
