@@ -1,9 +1,8 @@
-"""Lagrange elements, linear (order 1) or quadratic (2), on straight or curved triangles, at
-quadrature points.
+"""Linear elements on straight triangles, quadratic ones on curved triangles, at quadrature points.
 
 Shape functions, their derivatives and the quadratures are scikit-fem's (``ElementTriP1``,
-``ElementTriP2``). A curved triangle has the nodes of ``ElementTriP2``, as those of scikit-fem's
-``MeshTri2``: the map from the unit triangle is x(s, t) = sum_a x_a N_a(s, t), and gradients are
+``ElementTriP2``). Elements are isoparametric, as those of its ``MeshTri2``: the functions of order
+1 or 2 also map the unit triangle, x(s, t) = sum_a x_a N_a(s, t), and gradients are
 grad N = N_,st (x_,st)^-1.
 """
 
@@ -17,8 +16,8 @@ from skfem import ElementTriP1, ElementTriP2
 from skfem.quadrature import get_quadrature_line, get_quadrature_tri
 
 ELEMENTS = {1: ElementTriP1(), 2: ElementTriP2()}
-#: Degrees of the quadrature on triangles and on edges, by the order of the functions or of the map:
-#: products of two functions and a coefficient that is nearly linear.
+#: Degrees of the quadrature on triangles and on edges, by order: products of two functions and a
+#: coefficient that is nearly linear.
 DEGREES = {1: 2, 2: 6}
 #: Degrees for gradients: lower for linear functions on straight triangles, where they are constant.
 GRADIENT_DEGREES = {1: 1, 2: 6}
@@ -74,35 +73,30 @@ def quadrature(degree: int) -> tuple[np.ndarray, np.ndarray]:
 class Table:
     """Functions of an order at quadrature points of the unit triangle.
 
-    weights: (q,); values: (q, k), derivatives: (q, k, 2) of the functions; shape: (q, g), and
-    map_derivatives: (q, g, 2), of the functions that map the triangle; linear: (q, 3) barycentric
-    coordinates.
+    weights: (q,); values: (q, k), derivatives: (q, k, 2) of the functions; linear: (q, 3)
+    barycentric coordinates.
     """
 
     weights: np.ndarray
     values: np.ndarray
     derivatives: np.ndarray
-    shape: np.ndarray
-    map_derivatives: np.ndarray
     linear: np.ndarray
 
 
 @cache
-def table(order: int, geometry: int, degree: int) -> Table:
-    """Functions of an order on triangles of a geometry (1: straight, 2: curved), at the points of
-    the quadrature of a degree."""
-    return _tabulated(order, geometry, *quadrature(degree))
+def table(order: int, degree: int) -> Table:
+    """Functions of an order at the points of the quadrature of a degree."""
+    return _tabulated(order, *quadrature(degree))
 
 
 @cache
-def vertex_table(geometry: int) -> Table:
-    """Like :func:`table` of linear functions, but at the corners, which lumps the integrals."""
-    return _tabulated(1, geometry, nodes(1), np.full(3, 1 / 6))
+def vertex_table(order: int) -> Table:
+    """Like :func:`table`, but at the corners, which lumps the integrals."""
+    return _tabulated(order, nodes(1), np.full(3, 1 / 6))
 
 
-def _tabulated(order: int, geometry: int, where: np.ndarray, weights: np.ndarray) -> Table:
-    return Table(weights, values(order, where), derivatives(order, where), values(geometry, where),
-                 derivatives(geometry, where), values(1, where))
+def _tabulated(order: int, where: np.ndarray, weights: np.ndarray) -> Table:
+    return Table(weights, *evaluated(order, where), values(1, where))
 
 
 @cache
@@ -123,16 +117,16 @@ def edge_table(order: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 @cache
-def side_table(geometry: int, side: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The functions (p, g) that map a triangle, at the quadrature points of its side 01, 12 or 20.
+def side_table(order: int, side: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Shape functions (p, k) of a triangle at the quadrature points of its side 01, 12 or 20.
 
-    Also returns the weights (p,) and the derivatives (p, g) along the side.
+    Also returns the weights (p,) and the derivatives (p, k) along the side.
     """
-    (s,), weights = get_quadrature_line(DEGREES[geometry])
+    (s,), weights = get_quadrature_line(DEGREES[order])
     corners = nodes(1)
     direction = corners[NEXT[side]] - corners[side]
     where = corners[side] + s[:, None] * direction
-    return values(geometry, where), weights, derivatives(geometry, where) @ direction
+    return values(order, where), weights, derivatives(order, where) @ direction
 
 
 def by_component(tensor: np.ndarray) -> np.ndarray:
@@ -155,20 +149,20 @@ def inverse_transpose(matrix: np.ndarray, det: np.ndarray) -> np.ndarray:
     return cofactors / det[..., None, None]
 
 
-def jacobian(corners: np.ndarray, map_derivatives: np.ndarray) -> np.ndarray:
-    """(T, q, 2, 2) d x_i / d (s, t)_k of triangles with nodes (T, g, 2).
+def jacobian(corners: np.ndarray, derivatives: np.ndarray) -> np.ndarray:
+    """(T, q, 2, 2) d x_i / d (s, t)_k of triangles with nodes (T, k, 2).
 
-    map_derivatives: (q, g, 2), as in a :class:`Table`.
+    derivatives: (q, k, 2), as in a :class:`Table`.
     """
-    return by_component(corners.transpose(2, 0, 1)[:, None] @ map_derivatives.transpose(2, 1, 0))
+    return by_component(corners.transpose(2, 0, 1)[:, None] @ derivatives.transpose(2, 1, 0))
 
 
 def mapped(corners: np.ndarray, tabulated: Table) -> tuple[np.ndarray, np.ndarray]:
     """Weights (T, q) um2 of the points, and gradients (T, q, 2, k) 1/um of the functions.
 
-    corners: (T, g, 2) um, nodes of triangles, none of which is turned over.
+    corners: (T, k, 2) um, nodes of triangles, none of which is turned over.
     """
-    J = jacobian(corners, tabulated.map_derivatives)
+    J = jacobian(corners, tabulated.derivatives)
     det = determinant(J)
     turned = inverse_transpose(J, det)
     # A few products of large matrices take less time than many of small ones.
@@ -180,4 +174,4 @@ def mapped(corners: np.ndarray, tabulated: Table) -> tuple[np.ndarray, np.ndarra
 
 def weights(corners: np.ndarray, tabulated: Table) -> np.ndarray:
     """(T, q) um2, the weights dx without the gradients."""
-    return determinant(jacobian(corners, tabulated.map_derivatives)) * tabulated.weights
+    return determinant(jacobian(corners, tabulated.derivatives)) * tabulated.weights

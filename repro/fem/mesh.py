@@ -28,9 +28,9 @@ POOR_ALLOWED = 6
 
 @dataclass(frozen=True, eq=False)
 class Dofs:
-    """Nodes of linear or quadratic functions. cells: (T, k), corners of the mesh first; count: of
-    all nodes; inlet, outlet: (E, 2 or 3) nodes of their edges, from the lower wall up; walls: nodes
-    of both walls; method: of the linear systems."""
+    """Nodes of a mesh. cells: (T, 3 or 6), corners first; count: of all nodes; inlet, outlet: (E, 2
+    or 3) nodes of their edges, from the lower wall up; walls: nodes of both walls; method: of the
+    linear systems."""
 
     cells: np.ndarray
     count: int
@@ -92,7 +92,6 @@ class Topology:
     outlet: np.ndarray
     walls: np.ndarray
     method: Method = DEFAULT
-    _dofs: dict[int, Dofs] = field(init=False, repr=False, default_factory=dict)
     _systems: dict[Hashable, ElementSystem] = field(init=False, repr=False, default_factory=dict)
 
     @property
@@ -188,11 +187,10 @@ class Topology:
         edge_keys = np.minimum(first, second) * self.corners + np.maximum(first, second)
         return ascending[np.searchsorted(keys, edge_keys)]
 
-    def dofs(self, order: int) -> Dofs:
-        """Nodes of linear (order 1) or quadratic (2) functions."""
-        if order not in self._dofs:
-            self._dofs[order] = _linear(self) if order == 1 else _quadratic(self)
-        return self._dofs[order]
+    @cached_property
+    def dofs(self) -> Dofs:
+        """Nodes of the ends and of the walls."""
+        return _corners(self) if self.geometry == 1 else _corners_and_middles(self)
 
     def system(self, key: Hashable, make: Callable[[], ElementSystem]) -> ElementSystem:
         """A sparse system on these connections, built by ``make`` on first use."""
@@ -201,22 +199,18 @@ class Topology:
         return self._systems[key]
 
 
-def _linear(topology: Topology) -> Dofs:
-    """Number the nodes of linear functions: the corners."""
+def _corners(topology: Topology) -> Dofs:
+    """The nodes of straight triangles."""
     inlet, outlet = (np.column_stack([line[:-1], line[1:]])
                      for line in (topology.inlet, topology.outlet))
-    return Dofs(topology.triangles, topology.corners, inlet, outlet, topology.walls,
-                topology.method)
+    return Dofs(topology.cells, topology.corners, inlet, outlet, topology.walls, topology.method)
 
 
-def _quadratic(topology: Topology) -> Dofs:
-    """Number the nodes of quadratic functions, those of a curved mesh: the corners, then the middle
-    of every edge."""
-    middles = topology.corners + topology.cell_edges
-    cells = np.column_stack([topology.triangles, middles])
+def _corners_and_middles(topology: Topology) -> Dofs:
+    """The nodes of curved triangles: corners, then the middle of every edge."""
     inlet, outlet = (_with_middles(topology, line) for line in (topology.inlet, topology.outlet))
     walls = np.concatenate([topology.walls, _middles_on_walls(topology)])
-    return Dofs(cells, topology.corners + len(topology.edges), inlet, outlet, walls,
+    return Dofs(topology.cells, topology.corners + len(topology.edges), inlet, outlet, walls,
                 topology.method)
 
 
@@ -357,7 +351,7 @@ class Mesh:
 
     def area(self) -> float:
         """Area of the aggregate, um2."""
-        of = elements.table(1, self.geometry, elements.DEGREES[self.geometry])
+        of = elements.table(self.geometry, elements.DEGREES[self.geometry])
         return float(elements.weights(self.points[self.cells[self.biomass]], of).sum())
 
     def with_middles(self, field: np.ndarray) -> np.ndarray:
@@ -406,9 +400,9 @@ class Mesh:
 @cache
 def checked_map_derivatives(geometry: int) -> np.ndarray:
     """Derivatives of the maps' shape functions at a triangle's nodes and quadrature points."""
-    of = elements.table(geometry, geometry, elements.GRADIENT_DEGREES[geometry])
+    of = elements.table(geometry, elements.GRADIENT_DEGREES[geometry])
     at_nodes = elements.derivatives(geometry, elements.nodes(geometry))
-    return np.concatenate([at_nodes, of.map_derivatives])
+    return np.concatenate([at_nodes, of.derivatives])
 
 
 def triangle_areas(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Functions of order 1 or 2 on a mesh: nodes, and bases for the forms of :mod:`repro.fem.forms`.
+"""The functions of a mesh: nodes, and bases for the forms of :mod:`repro.fem.forms`.
 
 Every integral of a weak form is a sum over quadrature points. Element matrices equal those of
 scikit-fem's assembly with the same quadrature. The reaction of the substrates is integrated by one
@@ -22,14 +22,14 @@ from repro.fem.mesh import Dofs, Mesh
 @brief
 @dataclass(frozen=True, eq=False)
 class Space:
-    """Continuous functions of an order on a mesh, by their values at the nodes of ``dofs``.
+    """Continuous functions on a mesh, by their values at its nodes.
+
+    They are linear on straight triangles and quadratic on curved ones.
 
     Parameters
     ----------
     mesh : Mesh
         Triangles with straight or curved sides; coordinates in um.
-    order : int
-        Degree of the functions: 1, or on curved sides also 2.
 
     Examples
     --------
@@ -41,37 +41,36 @@ class Space:
     """
 
     mesh: Mesh
-    order: int
 
-    @staticmethod
-    def of(mesh: Mesh) -> Space:
-        """Return the functions whose nodes are those of the mesh.
-
-        They are linear on straight triangles and quadratic on curved ones, as velocity and
-        concentrations are.
-        """
-        return Space(mesh, mesh.geometry)
+    @property
+    def order(self) -> int:
+        """Degree of the functions: 1 or 2."""
+        return self.mesh.geometry
 
     @property
     def dofs(self) -> Dofs:
-        """Nodes."""
-        return self.mesh.topology.dofs(self.order)
+        """Nodes of the ends and of the walls."""
+        return self.mesh.topology.dofs
 
     @property
     def cells(self) -> np.ndarray:
         """(T, k) nodes of each triangle."""
-        return self.dofs.cells
+        return self.mesh.cells
+
+    @property
+    def points(self) -> np.ndarray:
+        """(count, 2) um, places of the nodes."""
+        return self.mesh.points
 
     @property
     def count(self) -> int:
         """Number of nodes."""
-        return self.dofs.count
+        return len(self.mesh.points)
 
     @cached_property
     def table(self) -> Table:
         """The functions at the quadrature points for products."""
-        geometry = self.mesh.geometry
-        return elements.table(self.order, geometry, elements.DEGREES[geometry])
+        return elements.table(self.order, elements.DEGREES[self.order])
 
     @cached_property
     def at(self) -> Basis:
@@ -81,12 +80,12 @@ class Space:
     @property
     def gradient_degree(self) -> int:
         """Degree of the quadrature of gradients; it has one point on straight linear triangles."""
-        return elements.GRADIENT_DEGREES[self.mesh.geometry]
+        return elements.GRADIENT_DEGREES[self.order]
 
     @cached_property
     def gradient_table(self) -> Table:
         """The functions at the quadrature points for gradients."""
-        return elements.table(self.order, self.mesh.geometry, self.gradient_degree)
+        return elements.table(self.order, self.gradient_degree)
 
     @cached_property
     def gradients_at(self) -> Basis:
@@ -96,17 +95,12 @@ class Space:
         return self._mapped(self.gradient_table)
 
     def _mapped(self, of: Table) -> Basis:
-        return basis(self.cells, self.count, self.mesh.points[self.mesh.cells], of)
+        return basis(self.cells, self.count, self.points[self.cells], of)
 
     @cached_property
     def stiffness(self) -> np.ndarray:
         """(T, k, k) of (grad u, grad v), without unit."""
         return self.gradients_at.stiffness(self.gradients_at.dx)
-
-    @cached_property
-    def points(self) -> np.ndarray:
-        """(count, 2) um, places of the nodes."""
-        return self.mesh.points[: self.count]
 
     @property
     def integration(self) -> Lumped | Quadrature:
@@ -120,7 +114,7 @@ class Space:
 
     def lumped(self, where: np.ndarray | slice = slice(None)) -> np.ndarray:
         """(corners,) um2, a third of the area of the triangles ``where`` around each corner."""
-        of = elements.vertex_table(self.mesh.geometry)
+        of = elements.vertex_table(self.order)
         dx = elements.weights(self.mesh.points[self.mesh.cells[where]], of)
         return np.bincount(self.mesh.triangles[where].ravel(), dx.ravel(), self.mesh.corners)
 
@@ -268,8 +262,7 @@ class Quadrature:
         space = self.space
         mesh = space.mesh
         biomass = mesh.biomass
-        degree = elements.DEGREES[space.order] + degrees
-        of = elements.table(space.order, mesh.geometry, degree)
+        of = elements.table(space.order, elements.DEGREES[space.order] + degrees)
         dx = elements.weights(mesh.points[mesh.cells[biomass]], of)
         fit = elements.linear_fit(space.table).T @ of.linear.T
         return Basis(space.cells[biomass], space.count, of.values, dx), fit

@@ -42,7 +42,7 @@ class Shape:
     @property
     def table(self) -> Table:
         """The displacements' functions where they are integrated."""
-        return elements.table(self.geometry, self.geometry, self.degree)
+        return elements.table(self.geometry, self.degree)
 
     @cached_property
     def unconstrained(self) -> ElementSystem:

@@ -310,7 +310,7 @@ def scaled(unit: UnitFlow, mesh: Mesh, length: float, drive: Drive) -> Flow:
     if speed is None:
         speed = drive.driving_head / (viscosity * total_loss)
     scale = viscosity * speed
-    at_outlet = Space(mesh, 1).outlet.mean(unit.pressure)
+    at_outlet = Space(mesh.straight).outlet.mean(unit.pressure)
     head = scale * (unit.pressure - at_outlet)
     correction = None if unit.correction is None else speed * unit.correction
     of_biomass = unit.biomass_pressure

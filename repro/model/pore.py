@@ -125,7 +125,7 @@ class Pore:
 
     def moved(self, points: np.ndarray) -> Pore:
         """The pore with the nodes of its mesh at ``points`` (N, 2) um."""
-        return replace(self, space=Space.of(self.mesh.moved(points)))
+        return replace(self, space=Space(self.mesh.moved(points)))
 
     def composition(self, maximum_density: float) -> tuple[float, float, float]:
         """Share of X_I in the biomass, and the least and the largest (X_A + X_I) / X_m. The
@@ -322,7 +322,7 @@ def seeded(scene: Scene, front: float = 1.0, outline: Outline | None = None) -> 
     """
     meshing = Meshing.of(scene)
     mesh, outline = meshing.generate(outline or initial_outline(scene, front), front)
-    space = Space.of(mesh)
+    space = Space(mesh)
     density = scene.kinetics.maximum_density if scene.kinetics else 0.0
     total = density * space.reaction.dx
     inert = total * (scene.aggregate.inert_fraction if scene.aggregate else 0.0)

@@ -109,7 +109,7 @@ def forces(fluid: Fluid, around: Surroundings, shaped: Pore) -> np.ndarray:
     mesh = around.mesh
     drive = at_time(fluid.drive, shaped.time)
     numerics = fluid.meshing.numerics
-    space = Space.of(mesh)
+    space = Space(mesh)
     flow_field = pore.solve_flow(space, drive, fluid.meshing.channel.length, numerics)
     on = on_aggregate(space, flow_field, drive, numerics.interface)[mesh.body]
     total = np.zeros((len(shaped.mesh.body), 2))
