@@ -197,7 +197,8 @@ def doubled(mesh: Mesh, corners: np.ndarray) -> np.ndarray:
 def divergence(velocity: Space) -> np.ndarray:
     """(T, 3, 2k) element matrices of (q, div u): columns u_x of all nodes, then u_y."""
     at = velocity.gradients_at
-    return product(velocity.gradient_table.linear, at.dx, at.div)
+    q = velocity.gradient_table.linear
+    return product(q, at.dx, at.div)
 
 
 def viscous(velocity: Space, viscosity: np.ndarray, interface: str) -> np.ndarray:

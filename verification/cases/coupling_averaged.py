@@ -25,7 +25,7 @@ from repro.model import flow, pore
 from repro.scene import Scene
 from verification.evidence.cases import parametrize
 from verification.evidence.checks import at_least, at_most, between, refine, studies, study
-from verification.problems import runs
+from verification.problems import meshes, runs
 from verification.problems.channels import NAMES, SCENE
 
 TIMES = (2.0, 4.0, 6.0, 8.0, 10.0, 12.0, 14.0, 16.0, 18.0, 19.4)
