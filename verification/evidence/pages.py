@@ -152,7 +152,7 @@ def article(case: Case, record: Mapping) -> list[str]:
 
 
 def shared(names: list[str]) -> str:
-    """Names as one list. Names that begin alike up to a comma share the beginning, "C: linear; cubic", and beginnings
+    """Names as one list. Names that begin alike up to a comma share the beginning, "C: linear; quadratic", and beginnings
     with the same list share the list."""
     begins: dict[str, list[str]] = {}
     for name in names:
