@@ -21,6 +21,7 @@ from typing import NamedTuple
 
 from repro.scene.arguments import typed
 from repro.scene.files import key_of, leave_out, override, packaged_scenes, read_tables
+from repro.scene.former import with_former
 from repro.scene.needed import MissingError, needed
 from repro.scene.reading import Place, dotted, entries, read_table, toml, write_table
 from repro.scene.rules import rules
@@ -721,9 +722,11 @@ def scene_tables(scene: Scene) -> dict:
 def scene_hash(scene: Scene) -> str:
     """Hash (16 hexadecimal digits) of all values of a scene, without its name.
 
-    A key of `LATER` counts if it differs from its default, so that recorded hashes stay valid.
+    A key of `LATER` counts if it differs from its default, and a former key counts with its last
+    value, so that recorded hashes stay valid.
     """
-    tables = {key: _without_later(key, table) for key, table in write_table(scene).items()}
+    written = with_former(write_table(scene))
+    tables = {key: _without_later(key, table) for key, table in written.items()}
     canonical = json.dumps(tables, sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.sha256(canonical.encode()).hexdigest()[:16]
 

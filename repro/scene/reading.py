@@ -88,7 +88,10 @@ def read_table(kind: type, table: object, place: Place, **extra):
         raise place.refuse(table, requirement)
     for key in table:
         if key not in keys:
-            raise place.below(key).refuse(table[key], _instead(key, table[key], list(keys), place))
+            below = place.below(key)
+            requirement = former.instead_of_key(below.key)
+            raise below.refuse(table[key],
+                               requirement or _instead(key, table[key], list(keys), place))
     for key, entry in keys.items():
         if key not in table and entry.default is MISSING and entry.default_factory is MISSING:
             raise place.below(key).refuse(MISSING, entry.metadata["kind"].requirement)

@@ -31,6 +31,7 @@ DEEPEST = "tests/test_deepest_level.py::test_elements_are_halved_as_often_as_a_f
 DOMAINS = "tests/test_domains.py::test_"
 SIZING = "tests/test_sizing.py::test_"
 FOLD = "tests/test_fold.py::test_"
+FORMER = "tests/test_former.py::test_"
 CHECKPOINT = "tests/test_checkpoint.py::test_"
 OVER = f"{FOLD}a_fold_ends_a_run"
 EXPECTED = f"{FOLD}check_expects_a_fold_of_a_starved_core"
@@ -329,6 +330,32 @@ MUTANTS = (
          "(pore.width * pore.length)",
          "pore.width**2",
          "tests/test_sweep.py::test_biomass_and_contact_are_read_from_the_rows")),
+    *changes(
+        "repro/scene/former.py",
+        ("former-key-not-in-hashes",
+         "The hash of a scene does not count a former key, so that runs of earlier versions are of another scene.",
+         "{**tables[section], key: former.value}",
+         "tables[section]",
+         f"{FORMER}the_hash_counts_former_keys"),
+        ("former-value-read-past",
+         "A run of an earlier version loads as one of this version, whatever its former key says.",
+         "table.get(key) == former.value",
+         "key in table",
+         f"{FORMER}a_run_of_an_earlier_version_loads_plots_and_compares")),
+    *changes(
+        "repro/scene/reading.py",
+        ("former-choice-unnamed",
+         "The refusal of a former choice lists the present ones alone.",
+         "if requirement := former.instead_of_choice(place.key, value):",
+         'if requirement := "":',
+         f"{FORMER}a_former_key_or_choice_is_refused_with_what_to_write")),
+    *changes(
+        "repro/report/reading.py",
+        ("former-keys-in-records",
+         "The record of a run of an earlier version keeps its former keys.",
+         'without_former(record.get("tables"))',
+         'record.get("tables")',
+         f"{FORMER}a_run_of_an_earlier_version_is_known_and_continues")),
     *changes(
         "repro/scene/keys.py",
         ("interval-without-its-end",
@@ -1784,8 +1811,8 @@ MUTANTS = (
         "repro/scene/keys.py",
         ("hash-without-output",
          "The hash of a scene leaves out the output.",
-         "for key, table in write_table(scene).items()}\n    canonical",
-         'for key, table in write_table(scene).items()\n              if key != "output"}\n    canonical',
+         "for key, table in written.items()}\n    canonical",
+         'for key, table in written.items()\n              if key != "output"}\n    canonical',
          f"{CACHE_KEYS}every_value_of_a_scene_counts_in_its_hash")),
     *changes(
         "repro/results/network.py",
