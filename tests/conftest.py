@@ -12,6 +12,8 @@ from tests import browser, pages
 matplotlib.use("Agg")
 SLOW_MACHINES_MAY = {"deadline": None, "suppress_health_check": [HealthCheck.too_slow]}
 settings.register_profile("ci", derandomize=True, max_examples=20, **SLOW_MACHINES_MAY)
+#: The tests that a mutant names include thorough ones, with as many examples as usual.
+settings.register_profile("mutants", settings.get_profile("ci"))
 settings.register_profile("thorough", print_blob=True, max_examples=200, **SLOW_MACHINES_MAY)
 signal.signal(signal.SIGINT, signal.default_int_handler)  # processes in the background ignore it
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))
@@ -47,8 +49,8 @@ def pytest_runtest_setup():
 
 
 def pytest_collection_modifyitems(items):
-    """Skip tests marked thorough, except in make test-thorough."""
-    if os.environ.get("HYPOTHESIS_PROFILE") != "thorough":
+    """Skip tests marked thorough, except in make test-thorough and make mutants."""
+    if os.environ.get("HYPOTHESIS_PROFILE") not in ("thorough", "mutants"):
         for item in items:
             if item.get_closest_marker("thorough"):
                 item.add_marker(pytest.mark.skip(reason="for make test-thorough"))

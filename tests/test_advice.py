@@ -337,7 +337,8 @@ def test_forces_of_the_fluid_are_advised_and_act_on_a_permeable_aggregate():
     assert 0.25 < math.dist(*tops) / (stress * 20) < 4
 
 
-@pytest.mark.parametrize("radius, start", [(20, "t = 0 h"), (12, r"t = 2\.\d+ h")])
+@pytest.mark.parametrize("radius, start", [
+    (20, "t = 0 h"), pytest.param(12, r"t = 2\.\d+ h", marks=pytest.mark.thorough)])
 def test_an_unresolved_front_gets_advice_once_and_it_helps(radius, start):
     """This includes a front within a step, which first tries the mesh of its start. With three times the refinement the
     first scene has a row."""

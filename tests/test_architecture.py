@@ -4,6 +4,7 @@ import re
 import subprocess
 import sys
 import tomllib
+from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from importlib.metadata import packages_distributions
 
@@ -37,6 +38,7 @@ def source_files(folder, pattern="*.py"):
     return [path for path in paths if path.is_file() and not GENERATED.intersection(path.relative_to(ROOT).parts)]
 
 
+@cache
 def modules():
     """{dotted name: source} of all Python files, including "repro.fem.__init__"."""
     files = [path for folder in FOLDERS for path in source_files(folder)]
@@ -134,11 +136,14 @@ def test_no_imports_form_a_circle():
     assert "repro.fem.elements" in circle(sources | {"repro.fem.elements": again})
 
 
+distributions = cache(packages_distributions)
+
+
 @pytest.mark.parametrize("folder", FOLDERS)
 def test_every_import_is_declared(folder):
     """`repro` needs only the runtime dependencies and `paper_figures` one extra; the others may use all extras."""
     extras = {"repro": [], "paper_figures": EXTRAS["figures"]}.get(folder, [r for rs in EXTRAS.values() for r in rs])
-    provided = packages_distributions()
+    provided = distributions()
     names = set().union(*(top_level_imports(path.read_text(encoding="utf-8")) for path in source_files(folder)))
     outside = names - {*sys.stdlib_module_names, *FOLDERS}
     used = {normal(distribution) for name in outside for distribution in provided.get(name, [name])}
@@ -169,7 +174,7 @@ def test_the_lower_bounds_are_the_oldest_versions_tested():
     assert bounds.items() <= pinned.items()
 
 
-@pytest.mark.parametrize("processes", ["-n0", "-n1"])
+@pytest.mark.parametrize("processes", ["-n0", pytest.param("-n1", marks=pytest.mark.thorough)])
 def test_a_test_that_hangs_fails(tmp_path, processes):
     """With the settings of pyproject.toml, whose limit is shorter here. The output names the place."""
     (tmp_path / "test_endless.py").write_text("def test_endless():\n    while True:\n        pass\n")

@@ -113,7 +113,8 @@ def write_to(out, *arguments):
     return process.returncode, stderr
 
 
-@pytest.mark.parametrize("arguments", [*WRITERS, ["sweep", "initial_mesh", "--vary", "pore.width=40 um, 50 um"]])
+@pytest.mark.parametrize("arguments", [
+    *WRITERS, pytest.param(["sweep", "initial_mesh", "--vary", "pore.width=40 um, 50 um"], marks=pytest.mark.thorough)])
 def test_a_closed_output_is_no_failure(tmp_path, arguments):
     """The output is closed as by `| head -0`. A sweep continues to its end."""
     end, pipe = os.pipe()

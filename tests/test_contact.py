@@ -277,6 +277,7 @@ def test_stationary_lines_stay_where_the_last_round_of_fluid_forces_left_them(pl
     assert kept == pytest.approx(asked, rel=1e-9)
 
 
+@pytest.mark.thorough
 def test_a_run_stops_within_a_step_in_contact(plugged, tmp_path):
     """At most three systems (motion of the mesh, flow, substrates) are factorised between two polls. A run that stops
     there resumes with the bits of an uninterrupted run."""
@@ -321,6 +322,7 @@ def test_rows_through_contact_decide_nothing(width, end, count):
     assert np.array_equal(same.pore.active, last.pore.active)
 
 
+@pytest.mark.thorough
 def test_a_row_that_cannot_be_interpolated_is_reached_by_steps_of_its_own(plugged, monkeypatch):
     scene = plugged[0]
     expected = rows_at(scene, [15.3, 15.9])
@@ -384,8 +386,9 @@ def without_newton(monkeypatch):
     monkeypatch.setattr(contact._Trials, "settle", lambda *_: None)
 
 
-@pytest.mark.parametrize("method, preset", [("newton", "fast"), ("search", "fast"),
-                                            pytest.param("newton", "accurate", marks=pytest.mark.thorough)])
+@pytest.mark.parametrize("method, preset", [
+    ("newton", "fast"), pytest.param("search", "fast", marks=pytest.mark.thorough),
+    pytest.param("newton", "accurate", marks=pytest.mark.thorough)])
 def test_the_contact_surface_is_the_smallest_that_leaves_enough_fluid(method, preset, monkeypatch):
     """After every step no clearance is negative, and lines that have advanced have zero clearance."""
     if method == "search":

@@ -67,6 +67,7 @@ def test_a_field_has_its_colours_and_the_outline(elements, name):
     assert ax.get_title(loc="left").startswith("base, t = 0.2 h: ") and ax.child_axes
 
 
+@pytest.mark.thorough
 def test_a_film_has_every_row_in_one_view_and_one_palette(results, tmp_path):
     """The pixels of the colour bar and of the axes do not change."""
     ax = results.animate("donor", tmp_path / "film.gif")

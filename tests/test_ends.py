@@ -202,7 +202,8 @@ UNSTEADY = ("_balance", "_overshoot_mg_per_L", "_max_x_um", "_max_y_um", "_min_x
 
 
 @SCHEMES
-@pytest.mark.parametrize("name", JUMPS)
+@pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.thorough if name == "head" else [])
+                                  for name in JUMPS])
 def test_a_row_at_a_jump_has_the_state_just_after_it(name, scheme):
     """All columns at the jump, and at t = 0, are those 1e-5 h later, and the jumping ones differ from those 1e-5 h
     before the jump. In 1e-5 h no column changes by 1e-4."""

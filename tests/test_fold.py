@@ -50,6 +50,7 @@ def warned(folder):
     return [entry["text"] for entry in read_record(folder)["warnings"] if entry["key"] == "growth.new_biomass"]
 
 
+@pytest.mark.thorough
 def test_a_fold_ends_a_run(tmp_path, capsys):
     """The last state is written; it lies at Biot's limit, to the accuracy of events. The independent stretches confirm
     it. The exit status is 0. The warning appears once, when creases begin. The same command and --resume leave
@@ -77,7 +78,8 @@ def test_a_fold_ends_a_run(tmp_path, capsys):
     assert main(command) == 0 and main(["run", "--resume", str(folder)]) == 0 and state(folder) == before
 
 
-@pytest.mark.parametrize("rheology", [pytest.param("stressed", marks=pytest.mark.thorough), "stress_free"])
+@pytest.mark.thorough
+@pytest.mark.parametrize("rheology", ["stressed", "stress_free"])
 def test_a_run_stopped_after_every_step_equals_the_uninterrupted_run(tmp_path, rheology):
     """A checkpoint also holds the warning and the last shape, which is the reference of strain for stress-free biomass.
     That run completes, and its smallest stretch is that of the last step."""

@@ -36,6 +36,7 @@ from tests.shell import (
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="for Linux alone")
 
 
+@pytest.mark.thorough
 def test_a_killed_run_leaves_no_lock_that_counts(tmp_path, capsys):
     """While it runs, another process is refused with status 2. After SIGKILL the lock's file remains without effect."""
     out = tmp_path / "run"
@@ -123,7 +124,7 @@ def test_a_checkpoint_that_is_no_file_is_refused(out, capsys, make):
         out / "fields", capsys, "run", "--resume", out)
 
 
-@pytest.mark.parametrize("content", [None, b"<VTKFile"])
+@pytest.mark.parametrize("content", [pytest.param(None, marks=pytest.mark.thorough), b"<VTKFile"])
 def test_altered_fields_are_reported_and_computed_again(out, short, capsys, content):
     """So are missing fields. The resume starts from the last good state, here t = 0, and ends with the bits of an
     uninterrupted run."""
@@ -181,11 +182,11 @@ def full(*_):
     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
-@pytest.mark.parametrize("module, name, file", [(field_files, "write", r"fields/fields_\d{4}\.vtu"),
-                                                (results, "write_table", "timeseries.csv"),
-                                                (written.os, "replace", r"fields/fields_\d{4}\.vtu"),
-                                                (checkpoint.os, "fsync", r"fields/fields_\d{4}\.vtu"),
-                                                (checkpoint, "write", NEWEST)])
+@pytest.mark.parametrize("module, name, file", [
+    (results, "write_table", "timeseries.csv"), (written.os, "replace", r"fields/fields_\d{4}\.vtu"),
+    *(pytest.param(*place, marks=pytest.mark.thorough) for place in (
+        (field_files, "write", r"fields/fields_\d{4}\.vtu"), (checkpoint.os, "fsync", r"fields/fields_\d{4}\.vtu"),
+        (checkpoint, "write", NEWEST)))])
 def test_a_full_disk_is_reported_with_the_file_and_nothing_is_lost(short, tmp_path, monkeypatch, module, name, file):
     """The run stops, names the file, leaves no half-written one, and resumes when there is space."""
     out, works = tmp_path / "run", getattr(module, name)

@@ -198,12 +198,12 @@ def test_a_limit_of_address_space_ends_a_run_in_one_line(tmp_path):
     assert re.search(r"about \d+ MB of memory are needed.* \d+ MB are free", message), message
 
 
-MORE = [pytest.param(size, "", marks=pytest.mark.thorough) for size in (0, 8_000, 40_000)]
+MORE = [pytest.param(size, which, marks=pytest.mark.thorough)
+        for size, which in ((0, ""), (500, ""), (8_000, ""), (40_000, ""), (100_000, "report.html: "))]
 
 
 @LINUX
-@pytest.mark.parametrize("most, which", [(500, ""), (20_000, "fields_0000.vtu: "),
-                                         (100_000, "report.html: "), *MORE])
+@pytest.mark.parametrize("most, which", [(20_000, "fields_0000.vtu: "), *MORE])
 def test_a_limit_of_file_sizes_ends_a_run_in_one_line(tmp_path, most, which):
     """Any file may be the one that cannot grow: fields are the first above 20 kB, the page of a finished run the last.
     Without the limit the run goes on to its end, by either command, and has all files that it lists."""
@@ -255,6 +255,7 @@ print(json.dumps([[name for name, seconds in timing.seconds.items() if seconds >
 """
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", bench_runs.SCENES)
 def test_a_scene_runs_and_imports_only_its_own_parts(name):
     """The stages that run, and the columns that are filled, are those of the scene's sections. Without growth nothing
@@ -276,7 +277,7 @@ def test_a_scene_runs_and_imports_only_its_own_parts(name):
 @pytest.mark.parametrize("arguments, needed", [
     (["--help"], set()), (["sweep", "--help"], set()), (["scene", "base"], set()),
     (["run", "base", "--set", "pore.width=3"], set()), (["check", *SHORT], SOLVER),
-    (["run", *SHORT, "--set", 'growth.end="3 h"'], SOLVER | FILES)])
+    pytest.param(["run", *SHORT, "--set", 'growth.end="3 h"'], SOLVER | FILES, marks=pytest.mark.thorough)])
 def test_a_command_imports_only_the_modules_that_it_needs(tmp_path, arguments, needed):
     """A command without a run imports no solver, and one without fields no meshio. The run has remeshes, fields and a
     page."""

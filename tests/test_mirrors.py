@@ -59,7 +59,8 @@ def grown(order, spans, image):
     return contact.expand(contact.Mechanics.of(scene), seed, seed.theta).pore
 
 
-@pytest.mark.parametrize("spans, image", [*((True, image) for image in MIRRORS), (False, "along")])
+@pytest.mark.parametrize("spans, image", [
+    *((True, image) for image in MIRRORS), pytest.param(False, "along", marks=pytest.mark.thorough)])
 @pytest.mark.parametrize("order", [1, 2])
 def test_contact_advances_alike_in_a_pore_and_its_mirror_image(order, spans, image):
     """Contact by nodes and by lines, the first contact included: each rule holds on either side and either wall, to the

@@ -1,5 +1,5 @@
-"""The verification can fail: mutants apply to the present code. The cases that name them catch five of them, and the
-test that it names catches one."""
+"""The verification can fail: mutants apply to the present code. The cases that name them catch some of them, and the
+tests that they name catch others."""
 import ast
 
 import pytest
@@ -10,9 +10,9 @@ from verification.mutants import runner
 
 KNOWN = runner.mutants_by_id()
 OF_CASES, OF_TESTS = map(runner.caught_by, ("cases", "tests"))
-#: One mutant from each of five stages, caught by cases of less than a second, and one caught by a test.
-TRIED = ("inlet-not-scaled", "yield-dropped", "stress-transposed", "lumped-mass", "interface-slips",
-         "pickles-read")
+#: One mutant from each of five stages, caught by cases of less than a second, and one caught by a test. make test runs
+#: the first two.
+TRIED = ("stress-transposed", "pickles-read", "inlet-not-scaled", "yield-dropped", "lumped-mass", "interface-slips")
 
 
 @pytest.mark.parametrize("id", KNOWN)
@@ -53,7 +53,8 @@ def test_an_assertion_or_a_guard_catches_and_a_broken_or_absent_test_does_not(tm
     assert trial.caught is caught and trial.message.startswith(message), trial
 
 
-@pytest.mark.parametrize("id", TRIED)
+@pytest.mark.parametrize("id", [
+    *TRIED[:2], *(pytest.param(id, marks=pytest.mark.thorough) for id in TRIED[2:])])
 def test_a_mutant_is_caught_by_every_case_that_names_it(id):
     """The cases, or the tests that it names, run in a process on a copy of the code, as in `make mutants`."""
     outcome = runner.run(KNOWN[id], every=True)

@@ -195,7 +195,8 @@ def is_newer(run, before):
     return any(path.stat().st_mtime > before for path in run.rglob("fields_*.vtu"))
 
 
-@pytest.mark.parametrize("command", ["run", "resume", "sweep"])
+@pytest.mark.parametrize("command", ["run", *(pytest.param(command, marks=pytest.mark.thorough)
+                                             for command in ("resume", "sweep"))])
 @pytest.mark.parametrize("number", [
     pytest.param(number, id=number.name, marks=() if number == signal.SIGUSR1 else pytest.mark.thorough)
     for number in SIGNALS])

@@ -172,6 +172,7 @@ def test_shapes_near_contact_are_within_the_bounds(contact_is_given):
     assert kinds.count(1) >= 10 and kinds.count(0) >= 10
 
 
+@pytest.mark.thorough
 def test_the_constants_of_the_uptake_are_those_of_the_fit():
     """Their squares are those of a fit to the committed states from another start; the bound follows from their
     largest error."""

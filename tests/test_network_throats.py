@@ -24,6 +24,7 @@ def test_the_ten_throats_are_evenly_spread_over_the_order_of_their_areas():
     assert (recorded == [one.number for one in TEN]).all()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("part, side", [("law", throats.LAW), ("least", throats.LEAST), ("most", throats.MOST)])
 def test_the_recorded_areas_are_those_of_the_law_and_its_bounds(part, side):
     """At 12 h, advanced here with steps twice as long. The method is of second order: with steps five times as long it

@@ -162,6 +162,7 @@ def test_a_spline_that_is_no_outline_is_refused_before_anything_is_written(tmp_p
     assert main(["check", str(path)]) == 0
 
 
+@pytest.mark.thorough
 def test_check_estimates_a_large_mesh_instead_of_making_it(monkeypatch):
     """Above 20 000 nodes check estimates their number, and its report states this."""
     counts = []

@@ -26,7 +26,7 @@ def base(*changes, order=2):
     return load_scene("base", (*sets, *changes))
 
 
-@pytest.mark.parametrize("count", [0.0, 8.0])
+@pytest.mark.parametrize("count", [pytest.param(0.0, marks=pytest.mark.thorough), 8.0])
 def test_elements_beside_contact_lines_are_as_small_as_requested(count):
     """Edges beside the upper contact lines of a new mesh have at most the least film over the requested number. If no
     number is set, they are as large as elsewhere."""

@@ -95,8 +95,9 @@ def test_a_long_step_is_not_silent(capsys, monkeypatch):
     assert capsys.readouterr() == ("", "")
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("columns, pattern", [
-    pytest.param(60, r"base 0\.6/0\.6 h \d\d:\d\d<\d\d:\d\d, step \d+, mesh \d, contact *", marks=pytest.mark.thorough),
+    (60, r"base 0\.6/0\.6 h \d\d:\d\d<\d\d:\d\d, step \d+, mesh \d, contact *"),
     (120, r".*base 100%\|.*\| 0\.6 of 0\.6 h \[\d\d:\d\d < \d\d:\d\d, step \d+, remeshes \d, contact\].*"),
 ])
 def test_a_terminal_shows_a_bar(tmp_path, columns, pattern):
@@ -155,7 +156,8 @@ def test_signals_are_caught_and_handlers_are_restored():
     assert not signal.pthread_sigmask(signal.SIG_BLOCK, ())
 
 
-@pytest.mark.parametrize("closed, options", [("stdout", ["--json"]), ("stdout", []), ("stderr", [])])
+@pytest.mark.parametrize("closed, options", [
+    ("stdout", ["--json"]), *(pytest.param(closed, [], marks=pytest.mark.thorough) for closed in ("stdout", "stderr"))])
 def test_a_run_goes_on_after_its_reader_closes(tmp_path, closed, options):
     """The reader of standard output or standard error closes its pipe; the run goes on to its end."""
     process = start_run("base", "--set", 'numerics.preset="fast"', "--out", tmp_path / "run", *options)

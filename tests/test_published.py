@@ -161,6 +161,7 @@ def test_the_examples_of_the_readme_run(tmp_path, capsys, monkeypatch):
     assert 160 < float(conductivity.removesuffix(" m/d")) < 175 and shape == "(783,)"
 
 
+@pytest.mark.thorough
 def test_the_examples_of_the_tutorial_run(tmp_path, capsys, monkeypatch):
     """Its commands, scene and Python run one after the other in one folder."""
     monkeypatch.chdir(tmp_path)

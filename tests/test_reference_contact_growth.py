@@ -44,7 +44,7 @@ def test_a_straight_wedge_lacks_what_its_slope_lacks(slope, expected):
     assert missing == pytest.approx([expected, expected], abs=2e-3)
 
 
-@pytest.mark.parametrize("theta", [even, uneven])
+@pytest.mark.parametrize("theta", [pytest.param(even, marks=pytest.mark.thorough), uneven])
 def test_the_gap_is_as_large_as_required_everywhere_and_no_larger_at_one_place(theta):
     """The gap is compared on a denser set of points than that of the solution."""
     angle, (x, y) = contact_growth.outline(touching(theta).equilibrium, 500)
@@ -65,7 +65,7 @@ def test_the_area_is_that_of_the_growth(theta):
     assert area == pytest.approx(np.sum(theta(*basis.global_coordinates()) * basis.dx), rel=1e-3)
 
 
-@pytest.mark.parametrize("theta", [even, uneven])
+@pytest.mark.parametrize("theta", [pytest.param(even, marks=pytest.mark.thorough), uneven])
 def test_a_mirrored_growth_has_mirrored_contact_lines(theta):
     """Even growth has symmetric contact lines, uneven growth has not."""
     growth, mirrored = touching(theta), touching(theta, mirrored=True)

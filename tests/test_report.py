@@ -179,6 +179,7 @@ def test_storage_is_drawn_only_if_it_is_not_zero(paper):
     assert "acceptor_stored_ug_per_m_per_h" not in quantities.series(read(paper))
 
 
+@pytest.mark.thorough
 def test_contact_is_marked(tmp_path):
     out = run(tmp_path, "wide", FAST, 'pore.width="20 um"', 'aggregate.radius="17.9 um"', 'growth.end="1 h"')
     series = results.read_table(out / "timeseries.csv")

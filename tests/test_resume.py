@@ -56,11 +56,11 @@ SCENES = {
     "paper, rows within steps": ('growth.end="0.7 h"', 'output.times=["0.05 h", "0.1 h", "0.4 h", "0.47 h"]'),
     "fast, unreported steps, contact": ('numerics.preset="fast"', "numerics.tolerance=0.0001", *CONTACT,
                                         'output.times=["0.6 h"]'),
+}
+THOROUGH_SCENES = {
     "gear": ('numerics.transport="gear"', 'growth.end="0.4 h"'),
     "to the pore's end": ("aggregate.radius=40 um", "pore.length=90 um", "growth.time_step=1 h", "growth.end=9 h",
                           "numerics.refinement=0.5"),
-}
-THOROUGH_SCENES = {
     "fast, rows within steps": ('numerics.preset="fast"', 'growth.end="9.7 h"'),
     "quadratic, contact": ('numerics.preset="fast"', "numerics.tolerance=0.0005", *CONTACT,
                            'output.times=["0.05 h", "0.3 h", "0.6 h"]'),
@@ -286,7 +286,8 @@ def test_results_reach_the_disk_while_a_run_goes_on(tmp_path):
 
 
 @pytest.mark.exact_lengths
-@pytest.mark.parametrize("number, status", [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+@pytest.mark.parametrize("number, status", [
+    pytest.param(signal.SIGINT, 130, marks=pytest.mark.thorough), (signal.SIGTERM, 143)])
 def test_a_run_ended_by_a_signal_resumes(tmp_path, number, status):
     """It ends with one line and the results so far. The resumed run has the bits of the uninterrupted one."""
     process = start_run("base", "--set", "growth.end=1.6 h", "--out", tmp_path)

@@ -93,7 +93,7 @@ def test_stress_is_reported_only_for_strain_since_the_start(order):
     assert len(stressed - free) == 6 and free == {name for name in stressed if not name.endswith("_MPa")}
 
 
-@pytest.mark.parametrize("preset", ["fast", "paper"])
+@pytest.mark.parametrize("preset", ["fast", pytest.param("paper", marks=pytest.mark.thorough)])
 def test_a_row_with_another_mesh_than_the_last_row_has_a_new_mesh(preset):
     """Rows within a step show the new meshes of this step."""
     run = solve_scene("base", [f"numerics.preset={preset}", "growth.end=4 h", "output.every=0.1 h"])

@@ -175,6 +175,7 @@ def test_every_key_refuses_values_of_another_kind():
      'flow.biomass = "viscous" is needed with it'),
     ("base", ["flow.biomass=brinkman", "flow.permeability=1e-15 m^2"],
      'flow.biomass = "brinkman": numerics.elements = "quadratic" is needed'),
+    ("base", ["numerics.elements=cubic"], 'numerics.elements = "cubic": this choice was removed; write "quadratic"'),
     ("base", ["numerics.preset=fast", "flow.biomass=brinkman", "flow.permeability=2.49e-20 m^2"],
      'flow.permeability = "2.49e-20 m^2": "2.5e-20 m^2" or more is needed in a pore 50 um wide'),
     ("base", ["kinetics.donor_oxygen_demand=0.8", "kinetics.acceptor_to_donor_ratio=1.52"],

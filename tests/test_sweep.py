@@ -259,6 +259,7 @@ def test_biomass_and_contact_are_read_from_the_rows(finished, tmp_path):
     assert 0 < summary.numbers["clogging_time_h"] < summary.numbers["contact_time_h"]
 
 
+@pytest.mark.thorough
 def test_a_killed_run_fails_alone(tmp_path):
     """The other runs are made, even if the process that forks them is killed."""
     out = tmp_path / "sweep"
@@ -300,6 +301,7 @@ def hostile_folder(tmp_path):
     return working_folder, notes
 
 
+@pytest.mark.thorough
 def test_nothing_is_imported_from_the_working_folder(tmp_path):
     """This holds for a sweep that the command starts, and for one that a script without a guard starts. The script is
     not run again."""
@@ -356,7 +358,8 @@ def cut_off(out, how, *arguments):
     return process.returncode, stderr
 
 
-@pytest.mark.parametrize("how, ends, word", [(signal.SIGTERM, 143, "terminated"), (signal.SIGINT, 130, "interrupted")])
+@pytest.mark.parametrize("how, ends, word", [
+    (signal.SIGTERM, 143, "terminated"), pytest.param(signal.SIGINT, 130, "interrupted", marks=pytest.mark.thorough)])
 def test_a_signal_ends_a_sweep_quietly(tmp_path, how, ends, word):
     """It prints one line with the command that continues it, and writes the tables of its runs so far."""
     out = tmp_path / "sweep"

@@ -88,7 +88,8 @@ def missed_tolerance(record):
     return [warning["text"] for warning in record["warnings"] if warning["key"] == "numerics.tolerance"]
 
 
-@pytest.mark.parametrize("options", [[], ["--json"], ["--quiet"]])
+@pytest.mark.parametrize("options", [
+    [], *(pytest.param([option], marks=pytest.mark.thorough) for option in ("--json", "--quiet"))])
 def test_a_missed_tolerance_is_reported_with_the_largest_estimate(tmp_path, capsys, options):
     """The warning, once on standard error, in run.json and on the page, has the number of these steps and their largest
     estimate."""
@@ -111,6 +112,7 @@ def test_a_missed_tolerance_is_reported_with_the_largest_estimate(tmp_path, caps
     assert float(match[3]) == pytest.approx(max(short), rel=0.06)
 
 
+@pytest.mark.thorough
 def test_a_resumed_run_counts_the_steps_before(tmp_path):
     scene = load_scene("base", MISSED)
     interrupt_run(scene, tmp_path, after=9)

@@ -320,6 +320,7 @@ STEPS = (0.8, 0.4, 0.2, 0.1)
 SLOWER = (16.0, 8.0, 4.0, 2.0)
 
 
+@pytest.mark.slow
 @pytest.mark.case(
     "coupling-quasi-steady", kind="property", mutants=("rates-two-percent-low",), runs_with="paper",
     omitted="fast, accurate, exact: the transient scheme requires updates")

@@ -110,6 +110,7 @@ def _wall_shear(grid: Mesh, velocity: np.ndarray) -> float:
     return total
 
 
+@pytest.mark.slow
 @pytest.mark.case(
     "coupling-traction-layer", kind="exact", mutants=("traction-pressure-left-out", "traction-transposed-gradient"),
     references=("layered_channel",))

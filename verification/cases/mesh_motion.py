@@ -152,6 +152,7 @@ BOTH = "0.1 % between codes"
 SEGMENT_MOTIONS = {"grows": lambda x, y: np.array([x, y]), "slides": lambda x, y: np.array([RADIUS + 0 * x, 0 * y])}
 
 
+@pytest.mark.slow
 @pytest.mark.case(
     "mesh_motion-half-disc", kind="cross-code", mutants=("gamma-sign", "twice-the-divergence", "gamma-inverted"),
     references=("quadratic_mesh_motion",))

@@ -24,6 +24,8 @@ KINDS = ("exact", "manufactured", "cross-code", "property")
 STAGES = ("flow", "transport", "growth", "reprojection", "mesh_motion", "coupling", "hard")
 #: Numerics that a case may run with: elements of order 1 and 2, and the presets of whole scenes.
 NUMERICS = ("1", "2", "paper", "fast", "accurate", "exact")
+#: Variants with this word in their label are slow, whatever the case: the preset differs from accurate in its sizes.
+SLOW = "exact"
 #: The numerics that other words in labels stand for.
 OF_WORDS = {"linear": "1", "quadratic": "2", "order 1": "1", "order 2": "2", "straight": "1", "curved": "2"}
 
@@ -105,6 +107,8 @@ class Case:
 def parametrize(names: str, variants: Mapping[str, tuple]) -> pytest.MarkDecorator:
     """Parametrize a case over a table, whose labels become the ids of the variants.
 
+    A variant with the preset exact is slow.
+
     Parameters
     ----------
     names : str
@@ -129,7 +133,8 @@ def parametrize(names: str, variants: Mapping[str, tuple]) -> pytest.MarkDecorat
     """
     *first, last = names.split(", ")
     rows = {label: (*row[:len(first)], row[len(first):]) if last[0] == "*" else row for label, row in variants.items()}
-    sets = [pytest.param(*row, id=label) for label, row in rows.items()]
+    sets = [pytest.param(*row, id=label, marks=pytest.mark.slow if SLOW in label else ())
+            for label, row in rows.items()]
     return pytest.mark.parametrize([*first, last.lstrip("*")], sets)
 
 
@@ -169,7 +174,7 @@ def _cases_of(function) -> Iterator[Case]:
             id = names["case"].args[0]
             file = Path(function.__code__.co_filename)
             fields = {**_documented(function), **names["case"].kwargs}
-            case = Case(id, **fields, slow="slow" in names, file=file)
+            case = Case(id, **fields, slow="slow" in names and SLOW not in parameters, file=file)
             test = f"{file.relative_to(ROOT)}::{function.__name__}" + (f"[{parameters}]" if parameters else "")
             groups.setdefault(id, case).variants[label_of(id, parameters)] = test
     yield from groups.values()

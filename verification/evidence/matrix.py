@@ -13,7 +13,7 @@ from functools import cache
 from itertools import product, starmap
 
 import repro
-from verification.evidence.cases import NUMERICS, Case, cases
+from verification.evidence.cases import NUMERICS, SLOW, Case, cases
 from verification.evidence.writing import REPORT, ROOT, page, table
 from verification.mutants import runner
 
@@ -78,8 +78,14 @@ def _file(module: str) -> str:
 
 def row(case: Case) -> tuple[str, ...]:
     """A line of the first table."""
-    run = "slow" if case.slow else "run"
-    return (case.id, *(run if name in case.numerics else "n/a" for name in NUMERICS), reasons(case))
+    return (case.id, *(_cell(case, name) for name in NUMERICS), reasons(case))
+
+
+def _cell(case: Case, name: str) -> str:
+    """Whether a case runs with the numerics of a name."""
+    if name not in case.numerics:
+        return "n/a"
+    return "slow" if case.slow or name == SLOW else "run"
 
 
 def reasons(case: Case) -> str:

@@ -165,7 +165,8 @@ def _run_tests(folder: Path, report: Path, tests: Iterable[str]) -> int | None:
     """Return the exit status of pytest, or None after a timeout. All of its processes are ended."""
     command = [sys.executable, "-m", "pytest", "-n0", "-p", "no:cacheprovider", "-o", "faulthandler_timeout=0",
                f"--junitxml={report}", *tests]
-    environment = {**os.environ, "PYTHONPATH": str(folder), "HOME": str(folder.parent), "PYTHONDONTWRITEBYTECODE": ""}
+    environment = {**os.environ, "PYTHONPATH": str(folder), "HOME": str(folder.parent), "PYTHONDONTWRITEBYTECODE": "",
+                   "HYPOTHESIS_PROFILE": "mutants"}
     child = subprocess.Popen(command, cwd=folder, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
                              stderr=subprocess.DEVNULL, start_new_session=True)
     try:
