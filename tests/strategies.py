@@ -27,7 +27,7 @@ standard = st.just(50.0)  # the width of section 4
 lengths = st.floats(300.0, 1000.0)
 refinements = st.floats(0.4, 2.0)
 #: Orders of velocity and concentrations, and their names in scenes.
-ORDERS = {1: "linear", 2: "quadratic", 3: "cubic"}
+ORDERS = {1: "linear", 2: "quadratic"}
 EVERY_ORDER = pytest.mark.parametrize("order", ORDERS)
 
 
@@ -164,7 +164,7 @@ def mirrored(outline):
 
 def mirror_image(at, along):
     """The mirror image of a pore: x -> -x if ``along``, else y -> W - y. Nodes keep their numbers."""
-    mesh, order = at.mesh, at.space.order
+    mesh = at.mesh
     about, sign = ([0.0, 0.0], [-1, 1]) if along else ([0.0, mesh.width], [1, -1])
     turned = [0, 2, 1, 5, 4, 3][: mesh.cells.shape[1]]
     ends = tuple(-x for x in mesh.ends[::-1]) if along else mesh.ends
@@ -180,7 +180,7 @@ def mirror_image(at, along):
 
     image = Mesh.of(about + mesh.points * sign, mesh.cells[:, turned], mesh.biomass, back(mesh.loop), mesh.width, ends,
                     mesh.topology.method)
-    space = Space(image, order)
+    space = Space(image)
     walls = {FREE: FREE, BOTTOM: BOTTOM if along else TOP, TOP: TOP if along else BOTTOM}
     return replace(at, space=space, wall=np.array([walls[wall] for wall in back(at.wall).tolist()]),
                    fixed=back(at.fixed), active=exchanged(at.active), inert=exchanged(at.inert),
@@ -204,14 +204,14 @@ def meshed(around, width=50.0, refinement=1.0, ends=None, film=2.0):
 
 
 def space_of(grid, order):
-    """Space of an order on a mesh. Orders above 1 curve a straight mesh; the mid-edge nodes stay on its edges."""
-    return Space(grid if order == 1 or grid.geometry == 2 else curved(grid, None), order)
+    """Space of an order on a mesh. Order 2 curves a straight mesh; the mid-edge nodes stay on its edges."""
+    return Space(grid if order == grid.geometry else curved(grid, None))
 
 
 def bent_inside(grid, by=0.2):
     """Move the mid-edge nodes of inner edges of a curved mesh by up to ``by`` um; no element turns over."""
     points, random = grid.points.copy(), np.random.default_rng(1)
-    dofs = grid.topology.dofs(2)
+    dofs = grid.topology.dofs
     outer = np.concatenate([dofs.inlet.ravel(), dofs.outlet.ravel(), dofs.walls, grid.loop])
     inner = np.setdiff1d(np.arange(grid.corners, len(points)), outer)
     points[inner] += random.uniform(-by, by, (len(inner), 2))
@@ -225,10 +225,10 @@ def boundary_edge_counts(triangles):
     return sorted((count[edge_index] == 1).reshape(-1, 3).sum(axis=1))
 
 
-def body_of(grid, around, order=None):
+def body_of(grid, around):
     """(Body, constrained (n, 2), rim (M,)): the unstrained aggregate, its constrained dofs (2.3.3: y on the
-    walls and x at fixed points) and its boundary nodes. order: that of the concentrations, by default the mesh's."""
-    body = pore.material(Space(grid, order or grid.geometry), grid.points[grid.body])
+    walls and x at fixed points) and its boundary nodes."""
+    body = pore.material(Space(grid), grid.points[grid.body])
     rim = grid.topology.body_loop
     return body, contact.constrained(len(grid.body), rim, around.wall, around.fixed), rim
 

@@ -93,14 +93,14 @@ def disc():
     return meshed(seed(20.0, 0.3, 2), refinement=0.3)[0]
 
 
-def velocity(order, interface, mesh):
+def velocity(interface, mesh):
     """Velocity of the flow on a mesh."""
-    return flow.unit_flow(Space(mesh, order), 10.0, interface=interface).velocity
+    return flow.unit_flow(Space(mesh), 10.0, interface=interface).velocity
 
 
-def concentrations(order, boundary, flowing, mesh):
+def concentrations(boundary, flowing, mesh):
     """Concentrations of both substrates on a mesh."""
-    space = Space(mesh, order)
+    space = Space(mesh)
     carried = flow.solve(space, WIDE.flow, 600.0) if flowing else None
     substrates = replace(BASE.substrates, boundary=boundary)
     problem = transport.problem(space, carried, substrates, BASE.kinetics)
@@ -120,10 +120,9 @@ def motion(mesh):
 
 
 #: Computations on one mesh that need different sparse systems.
-SOLVES = {"flow, Laplacian": partial(velocity, 2, "laplacian"), "flow, traction": partial(velocity, 2, "traction"),
-          "flow, cubic": partial(velocity, 3, "laplacian"), "held ends": partial(concentrations, 2, "open", False),
-          "flow through": partial(concentrations, 2, "open", True), "cubic": partial(concentrations, 3, "open", True),
-          "closed": partial(concentrations, 2, "closed", False), "motion": motion}
+SOLVES = {"flow, Laplacian": partial(velocity, "laplacian"), "flow, traction": partial(velocity, "traction"),
+          "held ends": partial(concentrations, "open", False), "flow through": partial(concentrations, "open", True),
+          "closed": partial(concentrations, "closed", False), "motion": motion}
 
 
 @pytest.fixture(scope="module")

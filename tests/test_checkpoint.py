@@ -23,8 +23,7 @@ from tests.faults import limit_memory
 
 TIMES = ('growth.end="0.6 h"', 'output.times=["0.2 h", "0.6 h"]')
 LATER = ('growth.end="14 h"', 'output.times=["2 h", "14 h"]')
-PRESETS = {"paper": ('numerics.preset="paper"', *TIMES), "fast": ('numerics.preset="fast"', *LATER),
-           "cubic": ('numerics.preset="fast"', 'numerics.elements="cubic"', *LATER)}
+PRESETS = {"paper": ('numerics.preset="paper"', *TIMES), "fast": ('numerics.preset="fast"', *LATER)}
 
 
 @pytest.fixture(scope="module", params=PRESETS)

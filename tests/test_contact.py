@@ -148,7 +148,7 @@ def test_a_division_changes_no_shape_and_no_field(plugged, division):
     assert division.restricted(division.nodal(field)) == pytest.approx(field, rel=1e-11)
     amounts = division.amounts(pore.active, pore.space.table)
     assert amounts.sum() == pytest.approx(pore.active.sum(), rel=1e-14)
-    density = amounts / Space(mesh, pore.space.order).reaction.dx
+    density = amounts / Space(mesh).reaction.dx
     before = pore.active / pore.space.reaction.dx
     assert before.min() * 0.99 < density.min() and density.max() < before.max() * 1.01
 

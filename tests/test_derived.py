@@ -331,21 +331,20 @@ def water_loads(scene, instant):
     places, weights = rule(8)
     slopes, determinants = gradients(space.order, mesh.points, cells, places)
     grad = np.einsum("tkc,tqki->tqci", flow.velocity[space.cells[wet]], slopes)
-    head_order = max(1, space.order - 1)
-    head_cells = mesh.cells[:, : len(NODES[head_order])][wet]
-    head = flow.head[head_cells] @ functions(head_order, places)[0].T
+    corners_of = mesh.cells[:, :3][wet]
+    head = flow.head[corners_of] @ functions(1, places)[0].T
     stress = drive.kinematic_viscosity / drive.gravity * rate_of(scene, grad) - head[..., None, None] * np.eye(2)
     loads = -nodal_loads(mesh, cells, places, stress, determinants * weights)
     body = set(mesh.body.tolist())
     s, gauss = np.polynomial.legendre.leggauss(6)
-    for triangle, corners in zip(cells, head_cells):
+    for triangle, corners in zip(cells, corners_of):
         for k in range(3):
             a, b = triangle[k], triangle[(k + 1) % 3]
             y = mesh.points[[a, b], 1]
             on_wall = (y == 0.0).all() or (y == mesh.width).all()
             if on_wall and (a in body) != (b in body):
                 along = [NODES[1][k] + (NODES[1][(k + 1) % 3] - NODES[1][k]) * (1 + t) / 2 for t in s]
-                inside = functions(head_order, along)[0] @ flow.head[corners]
+                inside = functions(1, along)[0] @ flow.head[corners]
                 values = functions(mesh.geometry, along)[0]
                 half = abs(mesh.points[a, 0] - mesh.points[b, 0]) / 2
                 node = 0 if a in body else 1
@@ -530,9 +529,8 @@ def derived_arrays(scene, instant):
     def plane(vectors):
         return np.column_stack([vectors, np.where(np.isnan(vectors[:, 0]), np.nan, 0.0)])
 
-    head_order = max(1, pore.space.order - 1)  # its nodes are the corners or all nodes of the mesh
     derived = {"velocity_m_per_d": plane(at_nodes(flow.velocity)) * 24 / 1e6,
-             "head_cm": at_nodes(flow.head, head_order, mesh.cells[:, : len(NODES[head_order])]) / 1e4,
+             "head_cm": at_nodes(flow.head, 1, mesh.cells[:, :3]) / 1e4,
              "acceptor_mg_per_L": at_nodes(state.acceptor), "donor_mg_per_L": at_nodes(state.donor),
              "displacement_um": plane(only(mesh.points[inside] - body.reference, inside, len(mesh.points))),
              "position_t0_um": plane(only(body.reference, inside, len(mesh.points))),

@@ -20,7 +20,7 @@ from repro.model.pore import seeded, solve
 from repro.runs.execution import Recorder
 from tests import oracles
 from tests.shell import read_record
-from tests.strategies import ORDERS, rate_constants
+from tests.strategies import rate_constants
 from tests.test_derived import functions, jacobians, rule, rule_with
 
 #: Supply and uptake (um2 mg/L) of a step of 12 min, so large that diffusion is negligible.
@@ -141,12 +141,11 @@ def test_counts_in_the_record_include_every_step(tmp_path):
 
 
 @cache
-def starved(order):
+def starved():
     """(scene, seed, its solution) of an uneven aggregate with a front of both substrates in it."""
-    sharp, refinement = {2: (1e-3, 0.4), 3: (2e-3, 0.3)}[order]
     substrates = [f"substrates.{name}.{key}={value} mg/L" for name, supply in (("acceptor", 0.6), ("donor", 0.5))
-                  for key, value in (("supply", supply), ("half_saturation", sharp))]
-    scene = load_scene("base", [f"numerics.elements={ORDERS[order]}", f"numerics.refinement={refinement}",
+                  for key, value in (("supply", supply), ("half_saturation", 1e-3))]
+    scene = load_scene("base", ["numerics.elements=quadratic", "numerics.refinement=0.4",
                                 "aggregate.radius=20 um", *substrates])
     seed = seeded(scene)
     x = seed.space.reaction.evaluate(seed.space.points[:, 0])
@@ -173,11 +172,10 @@ def quadratures_apart(scene, pore, state):
     return abs(fine - coarse) / coarse
 
 
-@pytest.mark.parametrize("order", [2, 3])
-def test_two_quadratures_of_the_uptake_may_differ_by_five_percent(order):
+def test_two_quadratures_of_the_uptake_may_differ_by_five_percent():
     """Substrates that fill a strip of 2 um alone are mixed with the supply until both differ by 4.9 and 5.1 %. Linear
     elements lump the uptake at their nodes, so both quadratures are the same there."""
-    scene, pore, solved = starved(order)
+    scene, pore, solved = starved()
     sink = Sink(pore.active)
     x = pore.space.points[:, 0]
 
@@ -192,10 +190,9 @@ def test_two_quadratures_of_the_uptake_may_differ_by_five_percent(order):
             transport._refuse_unresolved(solved.problem, sink, mixed(middle, part))
 
 
-@pytest.mark.parametrize("order", [2, 3])
-def test_the_difference_of_two_quadratures_in_a_solution_decides(order, monkeypatch):
+def test_the_difference_of_two_quadratures_in_a_solution_decides(monkeypatch):
     """It is about 0.1 % in these fronts. A limit a thousandth below it refuses the solution, one above accepts it."""
-    scene, pore, solved = starved(order)
+    scene, pore, solved = starved()
     difference = quadratures_apart(scene, pore, solved.concentrations)
     assert difference > 1e-4
     for part, refused in ((1.001, False), (0.999, True)):

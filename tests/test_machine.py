@@ -51,7 +51,7 @@ def test_a_package_uninstalled_since_is_reported_at_a_resume(tmp_path, monkeypat
 
 @pytest.mark.parametrize("name, sets", [
     ("base", ["preset=paper"]), ("base", ["preset=paper", "refinement=2"]), ("base", ["preset=fast"]),
-    ("base", ["preset=fast", "refinement=1"]), ("base", ["preset=accurate", "elements=cubic"]),
+    ("base", ["preset=fast", "refinement=1"]), ("base", ["preset=accurate"]),
     ("base", ["preset=paper", "gradation=0", "refinement=0.4"]), ("base", ["preset=paper", "extent=full"]),
     ("flow_only", ["preset=paper", "refinement=2"]), ("wide", ["preset=accurate"])])
 def test_the_estimated_nodes_are_those_of_the_mesh(name, sets):

@@ -62,8 +62,8 @@ THOROUGH_SCENES = {
     "to the pore's end": ("aggregate.radius=40 um", "pore.length=90 um", "growth.time_step=1 h", "growth.end=9 h",
                           "numerics.refinement=0.5"),
     "fast, rows within steps": ('numerics.preset="fast"', 'growth.end="9.7 h"'),
-    "cubic, contact": ('numerics.preset="fast"', 'numerics.elements="cubic"', "numerics.tolerance=0.0005", *CONTACT,
-                       'output.times=["0.05 h", "0.3 h", "0.6 h"]'),
+    "quadratic, contact": ('numerics.preset="fast"', "numerics.tolerance=0.0005", *CONTACT,
+                           'output.times=["0.05 h", "0.3 h", "0.6 h"]'),
     "paper": ('growth.end="6 h"',),
     "accurate": ('numerics.preset="accurate"', 'growth.end="4 h"'),
     "linear midpoint": ('numerics.time="midpoint"', "numerics.tolerance=0.0001", 'numerics.transfer="linear"',
@@ -71,8 +71,8 @@ THOROUGH_SCENES = {
     "rechosen": ('numerics.fixed_point="rechosen"', *CONTACT),
     "quadratic gear": ('numerics.elements="quadratic"', "numerics.refinement=0.3", 'numerics.transport="gear"',
                        'growth.fluid_forces="included"', 'growth.end="0.6 h"'),
-    "cubic, stress-free": ('numerics.elements="cubic"', "numerics.refinement=0.3",
-                           'growth.new_biomass="stress_free"', *CONTACT),
+    "quadratic, stress-free": ('numerics.elements="quadratic"', "numerics.refinement=0.3",
+                               'growth.new_biomass="stress_free"', *CONTACT),
 }
 
 

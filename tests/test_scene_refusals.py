@@ -174,7 +174,8 @@ def test_every_key_refuses_values_of_another_kind():
     ("base", ["flow.biomass=brinkman", "flow.permeability=1e-15 m^2", "flow.viscosity_ratio=5"],
      'flow.biomass = "viscous" is needed with it'),
     ("base", ["flow.biomass=brinkman", "flow.permeability=1e-15 m^2"],
-     'flow.biomass = "brinkman": numerics.elements = "quadratic" or "cubic" is needed'),
+     'flow.biomass = "brinkman": numerics.elements = "quadratic" is needed'),
+    ("base", ["numerics.elements=cubic"], 'numerics.elements = "cubic": this choice was removed; write "quadratic"'),
     ("base", ["numerics.preset=fast", "flow.biomass=brinkman", "flow.permeability=2.49e-20 m^2"],
      'flow.permeability = "2.49e-20 m^2": "2.5e-20 m^2" or more is needed in a pore 50 um wide'),
     ("base", ["kinetics.donor_oxygen_demand=0.8", "kinetics.acceptor_to_donor_ratio=1.52"],
@@ -247,9 +248,8 @@ MEMBERS = [
       for name in SUBSTRATES),
     *((f"{key}.interpolation", [f"{key}.interpolation=linear"])
       for key in ("flow", *(f"substrates.{name}" for name in SUBSTRATES))),
-    *((f"numerics.{key}", [f"numerics.elements={elements}", f"numerics.{key}={value}"])
-      for key, values in (("transfer", ("linear", "bounded")), ("flow_element", ("bubble",))) for value in values
-      for elements in ("quadratic", "cubic"))]
+    *((f"numerics.{key}", ["numerics.elements=quadratic", f"numerics.{key}={value}"])
+      for key, values in (("transfer", ("linear", "bounded")), ("flow_element", ("bubble",))) for value in values)]
 
 
 @pytest.mark.parametrize("key, entries", MEMBERS)

@@ -112,7 +112,7 @@ def test_each_wall_bears_half_of_the_force_on_a_block(wall):
 def test_without_forces_one_surface_alone_moves_as_without_a_traction(order):
     """The forces of growth along the pore add up to zero, so the traction is zero."""
     scene, seed = coarse_base(order)
-    slope = seed.body.reference[seed.body.shape.cells, 0] @ seed.body.shape.table.shape.T
+    slope = seed.body.reference[seed.body.shape.cells, 0] @ seed.body.shape.table.values.T
     grown = replace(seed, theta=seed.theta * (1.2 + 0.02 * slope))
     mechanics = contact.Mechanics.of(scene)
     none = np.zeros((len(seed.mesh.body), 2))

@@ -92,7 +92,7 @@ def test_projection_refuses_meshes_of_different_shapes():
        st.lists(st.floats(0.4, 0.9), min_size=2, max_size=4))
 def test_repeated_remeshes_keep_the_biomass(scene, seed, refinements):
     """X_A is uneven and X_I even. The conserving transfer keeps totals to 1e-11, the paper's keeps bounds, and both
-    keep X_I even. With order 2 and 3 the masses add up to X_m: both totals stay and no share is negative. The area of
+    keep X_I even. With order 2 the masses add up to X_m: both totals stay and no share is negative. The area of
     the outline stays, and substrates stay between zero and the supply."""
     previous = pore.seeded(scene)
     solved = pore.solve(scene, previous)
@@ -109,7 +109,7 @@ def test_repeated_remeshes_keep_the_biomass(scene, seed, refinements):
 
 
 def with_uneven_biomass(scene, previous, uneven):
-    """The pore with X_I = 7 mg/L and uneven X_A. With order 2 and 3 both add up to X_m, as in growth."""
+    """The pore with X_I = 7 mg/L and uneven X_A. With order 2 both add up to X_m, as in growth."""
     dx, density = previous.space.reaction.dx, scene.kinetics.maximum_density
     if previous.space.order == 1:
         return replace(previous, active=uneven * density * dx, inert=7.0 * dx)
@@ -135,7 +135,7 @@ def check_biomass(scene, previous, remeshed):
 
 
 def check_substrates(scene, remeshed):
-    """Check bounds: linear interpolants keep them; interpolants of order 2 and 3 may overshoot."""
+    """Check bounds: linear interpolants keep them; those of order 2 may overshoot."""
     room = 1e-12 if remeshed.space.order == 1 else OVERSHOOT
     substrates = (scene.substrates.acceptor, scene.substrates.donor)
     fields = (remeshed.concentrations.acceptor, remeshed.concentrations.donor)

@@ -1,9 +1,9 @@
-"""Lagrange elements of order 1, 2 and 3 on straight or curved triangles, at quadrature points.
+"""Linear elements on straight triangles, quadratic ones on curved triangles, at quadrature points.
 
-Shape functions, their derivatives and the quadratures are scikit-fem's (``ElementTriP1``, ``P2``,
-``P3``). A curved triangle has the nodes of ``ElementTriP2``, as those of scikit-fem's ``MeshTri2``:
-the map from the unit triangle is x(s, t) = sum_a x_a N_a(s, t), and gradients are grad N = N_,st
-(x_,st)^-1.
+Shape functions, their derivatives and the quadratures are scikit-fem's (``ElementTriP1``,
+``ElementTriP2``). Elements are isoparametric, as those of its ``MeshTri2``: the functions of order
+1 or 2 also map the unit triangle, x(s, t) = sum_a x_a N_a(s, t), and gradients are
+grad N = N_,st (x_,st)^-1.
 """
 
 from __future__ import annotations
@@ -12,22 +12,19 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from skfem import ElementTriP1, ElementTriP2, ElementTriP3
+from skfem import ElementTriP1, ElementTriP2
 from skfem.quadrature import get_quadrature_line, get_quadrature_tri
 
-ELEMENTS = {1: ElementTriP1(), 2: ElementTriP2(), 3: ElementTriP3()}
-#: Degrees of the quadrature on triangles and on edges, for each order of the functions: products of
-#: two functions and a coefficient that is nearly linear.
-DEGREES = {1: 2, 2: 6, 3: 8}
-EDGE_DEGREES = {1: 2, 2: 6, 3: 9}
+ELEMENTS = {1: ElementTriP1(), 2: ElementTriP2()}
+#: Degrees of the quadrature on triangles and on edges, by order: products of two functions and a
+#: coefficient that is nearly linear.
+DEGREES = {1: 2, 2: 6}
 #: Degrees for gradients: lower for linear functions on straight triangles, where they are constant.
-GRADIENT_DEGREES = {1: 1, 2: 6, 3: 8}
-#: Least degrees by the order of the map: on straight triangles (1) it is linear.
-MAP_DEGREES = {1: 1, 2: DEGREES[2]}
+GRADIENT_DEGREES = {1: 1, 2: 6}
 #: The corner at the other end of the edges 01, 12 and 20.
 NEXT = [1, 2, 0]
 #: Shape functions of an edge among those of a triangle: the edge 01.
-ON_EDGE = {1: [0, 1], 2: [0, 3, 1], 3: [0, 3, 4, 1]}
+ON_EDGE = {1: [0, 1], 2: [0, 3, 1]}
 
 
 def nodes(order: int) -> np.ndarray:
@@ -76,41 +73,30 @@ def quadrature(degree: int) -> tuple[np.ndarray, np.ndarray]:
 class Table:
     """Functions of an order at quadrature points of the unit triangle.
 
-    weights: (q,); values: (q, k), derivatives: (q, k, 2) of the functions; shape: (q, g), and
-    map_derivatives: (q, g, 2), of the functions that map the triangle; linear: (q, 3) barycentric
-    coordinates.
+    weights: (q,); values: (q, k), derivatives: (q, k, 2) of the functions; linear: (q, 3)
+    barycentric coordinates.
     """
 
     weights: np.ndarray
     values: np.ndarray
     derivatives: np.ndarray
-    shape: np.ndarray
-    map_derivatives: np.ndarray
     linear: np.ndarray
 
 
 @cache
-def table(order: int, geometry: int, degree: int) -> Table:
-    """Functions of an order on triangles of a geometry (1: straight, 2: curved), at the points of
-    the quadrature of a degree."""
-    return _tabulated(order, geometry, *quadrature(degree))
+def table(order: int, degree: int) -> Table:
+    """Functions of an order at the points of the quadrature of a degree."""
+    return _tabulated(order, *quadrature(degree))
 
 
 @cache
-def vertex_table(order: int, geometry: int) -> Table:
+def vertex_table(order: int) -> Table:
     """Like :func:`table`, but at the corners, which lumps the integrals."""
-    return _tabulated(order, geometry, nodes(1), np.full(3, 1 / 6))
+    return _tabulated(order, nodes(1), np.full(3, 1 / 6))
 
 
-def _tabulated(order: int, geometry: int, where: np.ndarray, weights: np.ndarray) -> Table:
-    return Table(weights, values(order, where), derivatives(order, where), values(geometry, where),
-                 derivatives(geometry, where), values(1, where))
-
-
-@cache
-def values_on(order: int, of: Table) -> np.ndarray:
-    """(q, k) shape functions of another order at the points of a table."""
-    return values(order, of.linear[:, 1:])
+def _tabulated(order: int, where: np.ndarray, weights: np.ndarray) -> Table:
+    return Table(weights, *evaluated(order, where), values(1, where))
 
 
 @cache
@@ -125,23 +111,22 @@ def linear_fit(of: Table) -> np.ndarray:
 @cache
 def edge_table(order: int) -> tuple[np.ndarray, np.ndarray]:
     """(p, e) shape functions of an edge's nodes at its quadrature points, and the weights (p,)."""
-    (s,), weights = get_quadrature_line(EDGE_DEGREES[order])
+    (s,), weights = get_quadrature_line(DEGREES[order])
     along = values(order, np.column_stack([s, 0 * s]))
     return along[:, ON_EDGE[order]], weights
 
 
 @cache
-def side_table(order: int, geometry: int, side: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def side_table(order: int, side: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Shape functions (p, k) of a triangle at the quadrature points of its side 01, 12 or 20.
 
-    Also returns the weights (p,) and the derivatives (p, g), along the side, of the functions that
-    map the triangle.
+    Also returns the weights (p,) and the derivatives (p, k) along the side.
     """
-    (s,), weights = get_quadrature_line(EDGE_DEGREES[order])
+    (s,), weights = get_quadrature_line(DEGREES[order])
     corners = nodes(1)
     direction = corners[NEXT[side]] - corners[side]
     where = corners[side] + s[:, None] * direction
-    return values(order, where), weights, derivatives(geometry, where) @ direction
+    return values(order, where), weights, derivatives(order, where) @ direction
 
 
 def by_component(tensor: np.ndarray) -> np.ndarray:
@@ -164,20 +149,20 @@ def inverse_transpose(matrix: np.ndarray, det: np.ndarray) -> np.ndarray:
     return cofactors / det[..., None, None]
 
 
-def jacobian(corners: np.ndarray, map_derivatives: np.ndarray) -> np.ndarray:
-    """(T, q, 2, 2) d x_i / d (s, t)_k of triangles with nodes (T, g, 2).
+def jacobian(corners: np.ndarray, derivatives: np.ndarray) -> np.ndarray:
+    """(T, q, 2, 2) d x_i / d (s, t)_k of triangles with nodes (T, k, 2).
 
-    map_derivatives: (q, g, 2), as in a :class:`Table`.
+    derivatives: (q, k, 2), as in a :class:`Table`.
     """
-    return by_component(corners.transpose(2, 0, 1)[:, None] @ map_derivatives.transpose(2, 1, 0))
+    return by_component(corners.transpose(2, 0, 1)[:, None] @ derivatives.transpose(2, 1, 0))
 
 
 def mapped(corners: np.ndarray, tabulated: Table) -> tuple[np.ndarray, np.ndarray]:
     """Weights (T, q) um2 of the points, and gradients (T, q, 2, k) 1/um of the functions.
 
-    corners: (T, g, 2) um, nodes of triangles, none of which is turned over.
+    corners: (T, k, 2) um, nodes of triangles, none of which is turned over.
     """
-    J = jacobian(corners, tabulated.map_derivatives)
+    J = jacobian(corners, tabulated.derivatives)
     det = determinant(J)
     turned = inverse_transpose(J, det)
     # A few products of large matrices take less time than many of small ones.
@@ -189,4 +174,4 @@ def mapped(corners: np.ndarray, tabulated: Table) -> tuple[np.ndarray, np.ndarra
 
 def weights(corners: np.ndarray, tabulated: Table) -> np.ndarray:
     """(T, q) um2, the weights dx without the gradients."""
-    return determinant(jacobian(corners, tabulated.map_derivatives)) * tabulated.weights
+    return determinant(jacobian(corners, tabulated.derivatives)) * tabulated.weights

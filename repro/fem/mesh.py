@@ -28,9 +28,9 @@ POOR_ALLOWED = 6
 
 @dataclass(frozen=True, eq=False)
 class Dofs:
-    """Nodes of functions of one order. cells: (T, k), corners of the mesh first; count: of all
-    nodes; inlet, outlet: (E, order + 1) nodes of their edges, from the lower wall up; walls: nodes
-    of both walls; method: of the linear systems."""
+    """Nodes of a mesh. cells: (T, 3 or 6), corners first; count: of all nodes; inlet, outlet: (E, 2
+    or 3) nodes of their edges, from the lower wall up; walls: nodes of both walls; method: of the
+    linear systems."""
 
     cells: np.ndarray
     count: int
@@ -53,7 +53,7 @@ class Dofs:
 
     @cached_property
     def beside_inlet(self) -> tuple[np.ndarray, np.ndarray]:
-        """(E,) triangle of each edge of the inlet, and (E, order + 1) places of the edge's nodes
+        """(E,) triangle of each edge of the inlet, and (E, 2 or 3) places of the edge's nodes
         among those of the triangle."""
         return _beside(self.cells, self.inlet)
 
@@ -92,7 +92,6 @@ class Topology:
     outlet: np.ndarray
     walls: np.ndarray
     method: Method = DEFAULT
-    _dofs: dict[int, Dofs] = field(init=False, repr=False, default_factory=dict)
     _systems: dict[Hashable, ElementSystem] = field(init=False, repr=False, default_factory=dict)
 
     @property
@@ -188,11 +187,10 @@ class Topology:
         edge_keys = np.minimum(first, second) * self.corners + np.maximum(first, second)
         return ascending[np.searchsorted(keys, edge_keys)]
 
-    def dofs(self, order: int) -> Dofs:
-        """Nodes of functions of an order, 1, 2 or 3."""
-        if order not in self._dofs:
-            self._dofs[order] = _numbered(self, order)
-        return self._dofs[order]
+    @cached_property
+    def dofs(self) -> Dofs:
+        """Nodes of the ends and of the walls."""
+        return _corners(self) if self.geometry == 1 else _corners_and_middles(self)
 
     def system(self, key: Hashable, make: Callable[[], ElementSystem]) -> ElementSystem:
         """A sparse system on these connections, built by ``make`` on first use."""
@@ -201,70 +199,35 @@ class Topology:
         return self._systems[key]
 
 
-def _numbered(topology: Topology, order: int) -> Dofs:
-    """Number the nodes of functions of an order.
-
-    An edge has order - 1 nodes. The one near the corner with the lower number has the number of
-    the edge; a second one has this number plus the count of edges. The nodes of order 2 are thus
-    among those of order 3, and are the nodes of a curved mesh.
-    """
-    make = {1: _linear, 2: _quadratic, 3: _cubic}[order]
-    cells, count = make(topology)
-    inlet, outlet = (_along(topology, line, order) for line in (topology.inlet, topology.outlet))
-    return Dofs(cells, count, inlet, outlet, _on_walls(topology, order), topology.method)
+def _corners(topology: Topology) -> Dofs:
+    """The nodes of straight triangles."""
+    inlet, outlet = (np.column_stack([line[:-1], line[1:]])
+                     for line in (topology.inlet, topology.outlet))
+    return Dofs(topology.cells, topology.corners, inlet, outlet, topology.walls, topology.method)
 
 
-def _linear(topology: Topology) -> tuple[np.ndarray, int]:
-    """(T, 3) nodes, the corners, and their count."""
-    return topology.triangles, topology.corners
+def _corners_and_middles(topology: Topology) -> Dofs:
+    """The nodes of curved triangles: corners, then the middle of every edge."""
+    inlet, outlet = (_with_middles(topology, line) for line in (topology.inlet, topology.outlet))
+    walls = np.concatenate([topology.walls, _middles_on_walls(topology)])
+    return Dofs(topology.cells, topology.corners + len(topology.edges), inlet, outlet, walls,
+                topology.method)
 
 
-def _quadratic(topology: Topology) -> tuple[np.ndarray, int]:
-    """(T, 6) nodes, corners and edges, and their count."""
-    middles = topology.corners + topology.cell_edges
-    return np.column_stack([topology.triangles, middles]), topology.corners + len(topology.edges)
-
-
-def _cubic(topology: Topology) -> tuple[np.ndarray, int]:
-    """(T, 10) nodes in scikit-fem's order, whose third edge runs from corner 0 to corner 2; and
-    their count."""
-    first = topology.corners
-    many = len(topology.edges)
-    starts = topology.triangles[:, [0, 1, 0]]
-    ends = topology.triangles[:, [1, 2, 2]]
-    edge_nodes = first + topology.cell_edges
-    near = edge_nodes + many * (starts > ends)
-    far = edge_nodes + many * (starts < ends)
-    centre = first + 2 * many + np.arange(len(edge_nodes))
-    on_edges = np.stack([near, far], axis=2).reshape(-1, 6)
-    count = first + 2 * many + len(edge_nodes)
-    return np.column_stack([topology.triangles, on_edges, centre]), count
-
-
-def _along(topology: Topology, line: np.ndarray, order: int) -> np.ndarray:
-    """(E, order + 1) nodes of the edges of a line of corners."""
+def _with_middles(topology: Topology, line: np.ndarray) -> np.ndarray:
+    """(E, 3) nodes of the edges of a line of corners."""
     a = line[:-1]
     b = line[1:]
-    if order == 1:
-        return np.column_stack([a, b])
-    middle = topology.corners + topology.edge_numbers(a, b)
-    if order == 2:
-        return np.column_stack([a, middle, b])
-    many = len(topology.edges)
-    return np.column_stack([a, middle + many * (a > b), middle + many * (a < b), b])
+    return np.column_stack([a, topology.corners + topology.edge_numbers(a, b), b])
 
 
-def _on_walls(topology: Topology, order: int) -> np.ndarray:
-    """Nodes of both walls: those of edges with one triangle, between corners of one wall."""
-    if order == 1:
-        return topology.walls
+def _middles_on_walls(topology: Topology) -> np.ndarray:
+    """Middles on both walls: those of edges with one triangle, between corners of one wall."""
     on = np.zeros(topology.corners, bool)
     on[topology.walls] = True
     single = np.bincount(topology.cell_edges.ravel(), minlength=len(topology.edges)) == 1
     along = single & on[topology.edges].all(axis=1) & ~_across(topology)
-    middles = topology.corners + np.flatnonzero(along)
-    nodes = [topology.walls, middles]
-    return np.concatenate(nodes if order == 2 else [*nodes, middles + len(topology.edges)])
+    return topology.corners + np.flatnonzero(along)
 
 
 def _across(topology: Topology) -> np.ndarray:
@@ -388,7 +351,7 @@ class Mesh:
 
     def area(self) -> float:
         """Area of the aggregate, um2."""
-        of = elements.table(1, self.geometry, elements.DEGREES[self.geometry])
+        of = elements.table(self.geometry, elements.DEGREES[self.geometry])
         return float(elements.weights(self.points[self.cells[self.biomass]], of).sum())
 
     def with_middles(self, field: np.ndarray) -> np.ndarray:
@@ -437,9 +400,9 @@ class Mesh:
 @cache
 def checked_map_derivatives(geometry: int) -> np.ndarray:
     """Derivatives of the maps' shape functions at a triangle's nodes and quadrature points."""
-    of = elements.table(geometry, geometry, elements.GRADIENT_DEGREES[geometry])
+    of = elements.table(geometry, elements.GRADIENT_DEGREES[geometry])
     at_nodes = elements.derivatives(geometry, elements.nodes(geometry))
-    return np.concatenate([at_nodes, of.map_derivatives])
+    return np.concatenate([at_nodes, of.derivatives])
 
 
 def triangle_areas(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:

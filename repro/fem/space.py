@@ -1,4 +1,4 @@
-"""Functions of order 1, 2 or 3 on a mesh: nodes, and bases for the forms of :mod:`repro.fem.forms`.
+"""The functions of a mesh: nodes, and bases for the forms of :mod:`repro.fem.forms`.
 
 Every integral of a weak form is a sum over quadrature points. Element matrices equal those of
 scikit-fem's assembly with the same quadrature. The reaction of the substrates is integrated by one
@@ -22,14 +22,14 @@ from repro.fem.mesh import Dofs, Mesh
 @brief
 @dataclass(frozen=True, eq=False)
 class Space:
-    """Continuous functions of an order on a mesh, by their values at the nodes of ``dofs``.
+    """Continuous functions on a mesh, by their values at its nodes.
+
+    They are linear on straight triangles and quadratic on curved ones.
 
     Parameters
     ----------
     mesh : Mesh
         Triangles with straight or curved sides; coordinates in um.
-    order : int
-        Degree of the functions: 1, 2 or 3.
 
     Examples
     --------
@@ -41,28 +41,36 @@ class Space:
     """
 
     mesh: Mesh
-    order: int
+
+    @property
+    def order(self) -> int:
+        """Degree of the functions: 1 or 2."""
+        return self.mesh.geometry
 
     @property
     def dofs(self) -> Dofs:
-        """Nodes."""
-        return self.mesh.topology.dofs(self.order)
+        """Nodes of the ends and of the walls."""
+        return self.mesh.topology.dofs
 
     @property
     def cells(self) -> np.ndarray:
         """(T, k) nodes of each triangle."""
-        return self.dofs.cells
+        return self.mesh.cells
+
+    @property
+    def points(self) -> np.ndarray:
+        """(count, 2) um, places of the nodes."""
+        return self.mesh.points
 
     @property
     def count(self) -> int:
         """Number of nodes."""
-        return self.dofs.count
+        return len(self.mesh.points)
 
     @cached_property
     def table(self) -> Table:
         """The functions at the quadrature points for products."""
-        degree = max(elements.DEGREES[self.order], elements.MAP_DEGREES[self.mesh.geometry])
-        return elements.table(self.order, self.mesh.geometry, degree)
+        return elements.table(self.order, elements.DEGREES[self.order])
 
     @cached_property
     def at(self) -> Basis:
@@ -72,13 +80,12 @@ class Space:
     @property
     def gradient_degree(self) -> int:
         """Degree of the quadrature of gradients; it has one point on straight linear triangles."""
-        of_map = elements.MAP_DEGREES[self.mesh.geometry]
-        return max(elements.GRADIENT_DEGREES[self.order], of_map)
+        return elements.GRADIENT_DEGREES[self.order]
 
     @cached_property
     def gradient_table(self) -> Table:
         """The functions at the quadrature points for gradients."""
-        return elements.table(self.order, self.mesh.geometry, self.gradient_degree)
+        return elements.table(self.order, self.gradient_degree)
 
     @cached_property
     def gradients_at(self) -> Basis:
@@ -88,17 +95,12 @@ class Space:
         return self._mapped(self.gradient_table)
 
     def _mapped(self, of: Table) -> Basis:
-        return basis(self.cells, self.count, self.mesh.points[self.mesh.cells], of)
+        return basis(self.cells, self.count, self.points[self.cells], of)
 
     @cached_property
     def stiffness(self) -> np.ndarray:
         """(T, k, k) of (grad u, grad v), without unit."""
         return self.gradients_at.stiffness(self.gradients_at.dx)
-
-    @cached_property
-    def points(self) -> np.ndarray:
-        """(count, 2) um, places of the nodes."""
-        return self.of_mesh(self.mesh.points)
 
     @property
     def integration(self) -> Lumped | Quadrature:
@@ -112,31 +114,9 @@ class Space:
 
     def lumped(self, where: np.ndarray | slice = slice(None)) -> np.ndarray:
         """(corners,) um2, a third of the area of the triangles ``where`` around each corner."""
-        of = elements.vertex_table(1, self.mesh.geometry)
+        of = elements.vertex_table(self.order)
         dx = elements.weights(self.mesh.points[self.mesh.cells[where]], of)
         return np.bincount(self.mesh.triangles[where].ravel(), dx.ravel(), self.mesh.corners)
-
-    def values_at(self, of: Table) -> np.ndarray:
-        """(q, k) these functions at the points of another table."""
-        return elements.values_on(self.order, of)
-
-    def of_mesh(self, field: np.ndarray) -> np.ndarray:
-        """(count, ...) values at the space's nodes, from a field (N, ...) at the mesh's own."""
-        if self.order == self.mesh.geometry:
-            return field
-        up = elements.values(self.mesh.geometry, elements.nodes(self.order))
-        all_values = np.empty((self.count, *field.shape[1:]))
-        all_values[self.cells] = np.einsum("ab,tb...->ta...", up, field[self.mesh.cells])
-        return all_values
-
-    def to_mesh(self, field: np.ndarray) -> np.ndarray:
-        """(N, ...) values of a field (count, ...) at the mesh's own nodes."""
-        if self.order == self.mesh.geometry:
-            return field
-        down = elements.values(self.order, elements.nodes(self.mesh.geometry))
-        nodal = np.empty((len(self.mesh.points), *field.shape[1:]))
-        nodal[self.mesh.cells] = np.einsum("ab,tb...->ta...", down, field[self.cells])
-        return nodal
 
     @cached_property
     def inlet(self) -> End:
@@ -267,8 +247,7 @@ class Quadrature:
     def to_points(self, nodal: np.ndarray) -> np.ndarray:
         """(r, q) values at the points, from a field (N,) at the mesh's nodes."""
         mesh = self.space.mesh
-        values = elements.values_on(mesh.geometry, self.space.table)
-        return nodal[mesh.cells[mesh.biomass]] @ values.T
+        return nodal[mesh.cells[mesh.biomass]] @ self.space.table.values.T
 
     def to_growth_points(self, field: np.ndarray) -> np.ndarray:
         """Return the field (r, q) itself: growth is integrated at the same points."""
@@ -283,8 +262,7 @@ class Quadrature:
         space = self.space
         mesh = space.mesh
         biomass = mesh.biomass
-        degree = elements.DEGREES[space.order] + degrees
-        of = elements.table(space.order, mesh.geometry, degree)
+        of = elements.table(space.order, elements.DEGREES[space.order] + degrees)
         dx = elements.weights(mesh.points[mesh.cells[biomass]], of)
         fit = elements.linear_fit(space.table).T @ of.linear.T
         return Basis(space.cells[biomass], space.count, of.values, dx), fit

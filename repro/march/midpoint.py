@@ -145,7 +145,7 @@ def solve_halfway(stages: Stages, previous: Pore, solved: Solved, first: Rates, 
     shape = expansion.pore
     mesh = remeshing.moved_mesh(stages.remeshing.meshing, previous, shape)
     if mesh is not None:
-        middle = replace(previous, space=Space(mesh, previous.space.order), time=shape.time)
+        middle = replace(previous, space=Space(mesh), time=shape.time)
     else:
         amounts = tuple(expansion.amounts(amount, previous)
                         for amount in (previous.active, previous.inert))

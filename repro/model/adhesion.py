@@ -84,11 +84,11 @@ def _beside_contact(pore: Pore, water: Flow) -> np.ndarray:
     outline = pore.boundary
     ends = np.zeros(len(mesh.points), bool)
     ends[mesh.loop[outline.contact_ends]] = True
-    head = flow.pressure_space(pore.space).to_mesh(water.head)
+    head = mesh.with_middles(water.head)
     for side in range(3):
         beside = ends[mesh.triangles].any(axis=1)
         cells = mesh.cells[~mesh.biomass & mesh.on_wall(side) & beside]
-        values, weights, along = elements.side_table(mesh.geometry, mesh.geometry, side)
+        values, weights, along = elements.side_table(mesh.geometry, side)
         dx = np.abs(mesh.points[cells, 0] @ along.T) * weights
         loads = (dx * (head[cells] @ values.T)) @ values
         up = np.where(mesh.points[cells[:, side], 1] == 0.0, 1.0, -1.0)

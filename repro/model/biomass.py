@@ -79,7 +79,7 @@ def transfer_amounts(method: str, old: Space, new: Space, at: Located, amounts: 
 
     Notes
     -----
-    With higher orders the new mesh has the density X_m everywhere, which removes the error of
+    With quadratic elements the new mesh has the density X_m everywhere, which removes the error of
     J = theta within a triangle. Each amount keeps its share of the biomass and its sum.
     """
     return TRANSFERS[old.order](method, old, new, at, amounts, density)
@@ -127,4 +127,4 @@ def _conserved(share: np.ndarray, weight: np.ndarray, total: float) -> np.ndarra
 
 
 #: Transfers by the order of the functions.
-TRANSFERS = {1: _by_densities, 2: _by_shares, 3: _by_shares}
+TRANSFERS = {1: _by_densities, 2: _by_shares}

@@ -42,7 +42,7 @@ class Shape:
     @property
     def table(self) -> Table:
         """The displacements' functions where they are integrated."""
-        return elements.table(self.geometry, self.geometry, self.degree)
+        return elements.table(self.geometry, self.degree)
 
     @cached_property
     def unconstrained(self) -> ElementSystem:
@@ -119,9 +119,3 @@ class Strained:
         derivative of (21) by F."""
         volumetric = P * self.J - self.A * self.trace / 3
         return self.A[..., None, None] * self.F + volumetric[..., None, None] * self.H
-
-
-def growth_degree(geometry: int, order: int) -> int:
-    """Degree of the quadrature of growth: one point of each straight triangle; on curved ones, that
-    of the reaction of an order."""
-    return elements.GRADIENT_DEGREES[1] if geometry == 1 else elements.DEGREES[max(2, order)]

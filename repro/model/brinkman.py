@@ -1,4 +1,4 @@
-"""A permeable aggregate instead of a viscous one: Brinkman's drag, for velocities of order 2 and 3.
+"""A permeable aggregate instead of a viscous one: Brinkman's drag, for quadratic velocities.
 
 The biomass, of permeability k, adds its drag ``(u / k, v)`` to a(u, v) of :mod:`repro.model.flow`.
 Along the interface and the walls the velocity changes within layers of thickness sqrt(k). A
@@ -27,9 +27,9 @@ import numpy as np
 from repro.fem import elements
 from repro.fem.space import Space
 
-#: Longest edge over the thickness of the layer, by order. In one dimension a node overshoots where
-#: an element is more than 6.3 (quadratic) or 5.1 (cubic) times as long as the layer is thick.
-ACROSS = {2: 6.0, 3: 5.0}
+#: Longest edge over the thickness of the layer. In one dimension a node overshoots where a
+#: quadratic element is more than 6.3 times as long as the layer is thick.
+ACROSS = 6.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +43,7 @@ class Permeable:
     def thickness(self) -> np.ndarray:
         """(T,) um, thickness d of the layer as each triangle represents it, at least sqrt(k)."""
         longest = np.linalg.norm(self.velocity.mesh.sides, axis=2).max(axis=1)
-        return np.maximum(np.sqrt(self.permeability), longest / ACROSS[self.velocity.order])
+        return np.maximum(np.sqrt(self.permeability), longest / ACROSS)
 
     @cached_property
     def widened(self) -> np.ndarray:
@@ -85,7 +85,7 @@ class Permeable:
         for side in range(3):
             chosen = np.flatnonzero(self.widened & mesh.on_wall(side))
             d = self.thickness[chosen]
-            values, weights, along = elements.side_table(velocity.order, mesh.geometry, side)
+            values, weights, along = elements.side_table(mesh.geometry, side)
             dx = np.abs(mesh.points[mesh.cells[chosen], 0] @ along.T) * weights
             products = values[:, :, None] * values[:, None, :]
             factor = d / (root * (d - root))

@@ -568,7 +568,7 @@ def divided(grown: Pore, division: Division, contact: Contact,
             shape: Shape | None = None) -> Pore:
     """The pore on the divided mesh, with the walls of a contact; shape: the aggregate's connections
     there, if they are known."""
-    space = Space(division.mesh, grown.space.order)
+    space = Space(division.mesh)
     table = grown.space.table
     reference = division.nodal(grown.origin)[space.mesh.body]
     body = Body(shape, reference) if shape else material(space, reference)

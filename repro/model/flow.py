@@ -12,7 +12,7 @@ phi g / nu_water,
            or (nu_r (grad u + grad u^T), grad v)    "traction"
 
 with nu_r = 1 or lambda; :mod:`repro.model.brinkman` adds the drag of a permeable aggregate.
-Velocities of order 2 or 3 with a pressure of one order less (Taylor-Hood) need no tau. Where the
+Quadratic velocities with a linear pressure (Taylor-Hood) need no tau. Where the
 viscosity jumps, the pressure jumps too. Each node of the interface therefore has a pressure of the
 fluid and one of the biomass. With a single pressure the head loss errs by up to 1 % if the
 aggregate spans the pore, and by 2 to 5 % if it bends (traction form), on every mesh that was tried.
@@ -58,11 +58,11 @@ MPA_PER_UM = 1e-3 * 1e-6 / 3600**2 * 1e-12
 class Flow:
     """Flow through the pore.
 
-    mean_velocity: um/h; velocity: (n, 2) um/h at the nodes of its space; head: (m,) um at the nodes
-    of the pressure's order, the mesh's corners first; correction: (T, 2) um/h, tau grad p, so that
-    w = u - correction, None where u itself carries the substrates; meshed_loss, head_loss: um, over
-    the meshed part and the whole pore; conductivity: um/h; biomass_head: (m,) um, as head, on the
-    interface that of the biomass; None if the head does not jump there.
+    mean_velocity: um/h; velocity: (n, 2) um/h at the nodes of its space; head: (m,) um at the
+    mesh's corners; correction: (T, 2) um/h, tau grad p, so that w = u - correction, None where u
+    itself carries the substrates; meshed_loss, head_loss: um, over the meshed part and the whole
+    pore; conductivity: um/h; biomass_head: (m,) um, as head, on the interface that of the biomass;
+    None if the head does not jump there.
     """
 
     mean_velocity: float
@@ -78,9 +78,9 @@ class Flow:
 @dataclass(frozen=True, eq=False)
 class UnitFlow:
     """Flow of mean velocity one: velocity (n, 2) and correction (T, 2) without unit, pressure (m,)
-    in 1/um at the nodes of its own order (on the interface, that of the fluid), its loss over the
-    meshed part, 1/um, and the pressure with that of the biomass on the interface if it jumps. The
-    head loss (6) is this loss times nu_water / g times the mean velocity."""
+    in 1/um at the corners (on the interface, that of the fluid), its loss over the meshed part,
+    1/um, and the pressure with that of the biomass on the interface if it jumps. The head loss (6)
+    is this loss times nu_water / g times the mean velocity."""
 
     velocity: np.ndarray
     pressure: np.ndarray
@@ -148,12 +148,12 @@ class Linear:
         mesh = self.velocity.mesh
         slope = np.einsum("tai,ta->ti", mesh.gradients, pressure[mesh.triangles])
         correction = np.einsum("tij,tj->ti", self.tau, slope)
-        return UnitFlow(u, pressure, correction, _drop(pressure_space(self.velocity), pressure))
+        return UnitFlow(u, pressure, correction, _drop(self.velocity, pressure))
 
 
 @dataclass(frozen=True, eq=False)
 class TaylorHood:
-    """Velocity of order 2 or 3 with a pressure of one order less, which needs no tau."""
+    """Quadratic velocity with a linear pressure, which needs no tau."""
 
     velocity: Space
     lower: None = None
@@ -174,7 +174,7 @@ class TaylorHood:
 
 
 #: By the order of the velocity.
-PAIRS: dict[int, type[Linear] | type[TaylorHood]] = {1: Linear, 2: TaylorHood, 3: TaylorHood}
+PAIRS: dict[int, type[Linear] | type[TaylorHood]] = {1: Linear, 2: TaylorHood}
 
 
 def poiseuille_loss(length: float, width: float) -> float:
@@ -182,28 +182,22 @@ def poiseuille_loss(length: float, width: float) -> float:
     return 12 * length / width**2
 
 
-def pressure_space(velocity: Space) -> Space:
-    """Space of the pressure, one order below the velocity's, at least linear."""
-    return Space(velocity.mesh, max(1, velocity.order - 1))
+def interface_corners(mesh: Mesh) -> np.ndarray:
+    """(d,) corners that fluid and biomass share."""
+    return np.intersect1d(mesh.triangles[mesh.biomass], mesh.triangles[~mesh.biomass])
 
 
-def interface_nodes(pressure: Space) -> np.ndarray:
-    """(d,) nodes of the pressure that fluid and biomass share."""
-    biomass = pressure.mesh.biomass
-    return np.intersect1d(pressure.cells[biomass], pressure.cells[~biomass])
-
-
-def doubled(pressure: Space, nodes: np.ndarray) -> np.ndarray:
-    """(T, k) numbers of the pressures: in biomass, ``nodes`` (d,) have the last d numbers."""
-    own = np.arange(pressure.count)
-    own[nodes] = pressure.count + np.arange(len(nodes))
-    return np.where(pressure.mesh.biomass[:, None], own[pressure.cells], pressure.cells)
+def doubled(mesh: Mesh, corners: np.ndarray) -> np.ndarray:
+    """(T, 3) numbers of the pressures: in biomass, ``corners`` (d,) have the last d numbers."""
+    own = np.arange(mesh.corners)
+    own[corners] = mesh.corners + np.arange(len(corners))
+    return np.where(mesh.biomass[:, None], own[mesh.triangles], mesh.triangles)
 
 
 def divergence(velocity: Space) -> np.ndarray:
-    """(T, m, 2k) element matrices of (q, div u): columns u_x of all nodes, then u_y."""
+    """(T, 3, 2k) element matrices of (q, div u): columns u_x of all nodes, then u_y."""
     at = velocity.gradients_at
-    q = pressure_space(velocity).values_at(velocity.gradient_table)
+    q = velocity.gradient_table.linear
     return product(q, at.dx, at.div)
 
 
@@ -229,14 +223,14 @@ def unit_flow(velocity: Space, viscosity_ratio: float = 1.0, *, interface: str =
               permeability: float | None = None) -> UnitFlow:
     """Stokes flow of mean velocity one through the meshed part, (1)-(5); see :func:`solve`.
 
-    permeability: of the biomass (um2); velocities of order 2 and 3 then have its drag in place of
-    a viscosity.
+    permeability: of the biomass (um2); quadratic velocities then have its drag in place of a
+    viscosity.
     """
     mesh = velocity.mesh
     viscosity = np.where(mesh.biomass, viscosity_ratio, 1.0)
     pair = PAIRS[velocity.order].on(velocity, viscosity, element, interface)
     splits = velocity.order > 1 and permeability is None and viscosity_ratio != 1
-    system = mesh.topology.system(("flow", interface, velocity.order, splits),
+    system = mesh.topology.system(("flow", interface, splits),
                                   lambda: _system(velocity, interface, splits))
     if permeability is None:
         blocks = stokes(velocity, viscosity, interface, pair.lower)
@@ -250,21 +244,20 @@ def unit_flow(velocity: Space, viscosity_ratio: float = 1.0, *, interface: str =
     solution = value + system.solve(blocks, -load)
     n = velocity.count
     u = solution[: 2 * n].reshape(2, n).T
-    pressure = pressure_space(velocity)
-    of_fluid, second = np.split(solution[2 * n:], [pressure.count])
+    of_fluid, second = np.split(solution[2 * n:], [mesh.corners])
     unit = pair.unit(u, of_fluid, work(load, solution, mesh.width))
     if not splits:
         return unit
     of_biomass = of_fluid.copy()
-    of_biomass[interface_nodes(pressure)] = second
+    of_biomass[interface_corners(mesh)] = second
     return replace(unit, biomass_pressure=of_biomass)
 
 
 def stokes(velocity: Space, viscosity: np.ndarray, interface: str,
            lower: np.ndarray | None, more: np.ndarray | None = None) -> np.ndarray:
-    """(T, 2k + m, 2k + m) element matrices of velocity and pressure.
+    """(T, 2k + 3, 2k + 3) element matrices of velocity and pressure.
 
-    viscosity: (T,) nu_r; lower: (T, m, m) of (tau grad p, grad q), None without tau; more: (T, 2k,
+    viscosity: (T,) nu_r; lower: (T, 3, 3) of (tau grad p, grad q), None without tau; more: (T, 2k,
     2k) added to a(u, v).
     """
     blocks = saddle_blocks(viscous(velocity, viscosity, interface), divergence(velocity), lower)
@@ -282,10 +275,10 @@ def _system(velocity: Space, interface: str, splits: bool) -> ElementSystem:
     constrained[np.concatenate([dofs.walls, velocity.inlet.nodes])] = True
     if interface == "traction":
         constrained[velocity.outlet.nodes, 1] = True
-    pressure = pressure_space(velocity)
-    nodes = interface_nodes(pressure) if splits else np.empty(0, int)
-    return saddle_system(velocity.cells, doubled(pressure, nodes), constrained, dofs.elimination,
-                         velocity.mesh.topology.method, nodes)
+    mesh = velocity.mesh
+    corners = interface_corners(mesh) if splits else np.empty(0, int)
+    return saddle_system(velocity.cells, doubled(mesh, corners), constrained, dofs.elimination,
+                         mesh.topology.method, corners)
 
 
 def prescribed(velocity: Space) -> np.ndarray:
@@ -318,7 +311,7 @@ def scaled(unit: UnitFlow, mesh: Mesh, length: float, drive: Drive) -> Flow:
     if speed is None:
         speed = drive.driving_head / (viscosity * total_loss)
     scale = viscosity * speed
-    at_outlet = Space(mesh, 1).outlet.mean(unit.pressure[: mesh.corners])
+    at_outlet = Space(mesh.straight).outlet.mean(unit.pressure)
     head = scale * (unit.pressure - at_outlet)
     correction = None if unit.correction is None else speed * unit.correction
     of_biomass = unit.biomass_pressure

@@ -56,7 +56,7 @@ from repro.timing import timed
 TOLERANCE = 1e-3
 #: A concentration may be below zero by this part of its supply, by the order of the elements. The
 #: lumped reaction of linear ones keeps them positive.
-BELOW_ZERO = {1: 0.0, 2: UNRESOLVED, 3: UNRESOLVED}
+BELOW_ZERO = {1: 0.0, 2: UNRESOLVED}
 #: Bounds on the ratio of successive steps.
 LONGER = 2.0
 SHORTER = 0.2
@@ -228,8 +228,8 @@ def settle(problem: Problem, sink: Sink | None, guess: Concentrations | None) ->
 
 def _nearer(problem: Problem, guess: Concentrations | None) -> Concentrations:
     """The guess, or C_supply everywhere if there is no guess or if constrained nodes would jump by
-    more than SETTLING. No step is short enough for a larger jump; quadratic and cubic
-    concentrations beside it would fall below zero."""
+    more than SETTLING. No step is short enough for a larger jump; quadratic concentrations beside
+    it would fall below zero."""
     supplied = supplied_everywhere(problem)
     if guess is None:
         return supplied

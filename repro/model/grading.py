@@ -13,8 +13,8 @@ MOST_GRADED = 4.0
 
 
 def solve_graded(scene: Scene, pore: Pore) -> tuple[Pore, Solved]:
-    """Solve flow and substrates. If the mesh is too coarse for a front of the substrates, elements
-    of order 2 and 3 get a mesh graded to it.
+    """Solve flow and substrates. If the mesh is too coarse for a front of the substrates, quadratic
+    elements get a mesh graded to it.
 
     Raises Unresolved if no graded mesh resolves the front.
     """

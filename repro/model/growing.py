@@ -55,7 +55,7 @@ def _gain_of_area(space: Space, before: np.ndarray, total: np.ndarray,
 
 
 #: Growth of theta in a step, by the order of the functions.
-GAINS = {1: _gain_of_area, 2: _gain_of_mass, 3: _gain_of_mass}
+GAINS = {1: _gain_of_area, 2: _gain_of_mass}
 
 
 def restart_theta(pore: Pore, maximum_density: float) -> np.ndarray:

@@ -68,7 +68,7 @@ def _fluid_displacement(mesh: Mesh, prescribed: np.ndarray, gamma: float, c: flo
     aggregate, zero elsewhere."""
     fluid = mesh.topology.fluid
     wet = ~mesh.biomass
-    space = Space(mesh, 1)
+    space = Space(mesh)
     laplace = space.stiffness[wet]
     lower = each(mesh.circumdiameter[wet] ** 2 / c, laplace) + gamma * mass(mesh.areas[wet])
     elements = saddle_blocks(laplace, divergence(space)[wet], lower)

@@ -18,7 +18,7 @@ from repro.fem.outline import TOP, Outline, half_disc, polygon
 from repro.fem.sizing import Sizing
 from repro.fem.space import Space
 from repro.model import flow
-from repro.model.body import Body, Shape, growth_degree
+from repro.model.body import Body, Shape
 from repro.model.flow import Bubble, Flow, Stabilised
 from repro.scene import Flow as Drive
 from repro.scene import MissingError, Numerics, Scene, Substrates, at_largest, needed
@@ -36,7 +36,7 @@ MINIMUM_FILM = 2.0
 SLOWEST = 1e-8
 #: The largest refinement that scenes accept.
 MOST_REFINED = 20.0
-#: Refinement of order 2 and 3 over Pe^(1/3): the concentration boundary layer is W Pe^(-1/3) thick
+#: Refinement of order 2 over Pe^(1/3): the concentration boundary layer is W Pe^(-1/3) thick
 #: (Leveque). With four elements across the pore and this factor, concentrations upstream of an
 #: aggregate exceed the supply by less than 0.01 %.
 BOUNDARY_LAYER = 0.15
@@ -46,7 +46,7 @@ FINEST_LAYERS = 2.0**15.5
 #: By order of the elements: edges at the tips of an outline are the pore's width over this and over
 #: the square of the refinement (W / 200 in the presets paper and fast), but no shorter than W over
 #: ``MOST_AT_TIPS``.
-AT_TIPS = {1: 200.0, 2: 5000.0, 3: 5000.0}
+AT_TIPS = {1: 200.0, 2: 5000.0}
 MOST_AT_TIPS = 20_000.0
 
 
@@ -125,7 +125,7 @@ class Pore:
 
     def moved(self, points: np.ndarray) -> Pore:
         """The pore with the nodes of its mesh at ``points`` (N, 2) um."""
-        return replace(self, space=Space(self.mesh.moved(points), self.space.order))
+        return replace(self, space=Space(self.mesh.moved(points)))
 
     def composition(self, maximum_density: float) -> tuple[float, float, float]:
         """Share of X_I in the biomass, and the least and the largest (X_A + X_I) / X_m. The
@@ -277,7 +277,7 @@ class Meshing:
         ends = sizing.meshed_extent(outline, self.channel.width, self.channel.length, is_full)
         method = Method(numerics.solver, numerics.ordering)
         sizes = replace(self.sizes, front=front)
-        return mesher.generate(outline, ends, sizes, numerics.geometry, method)
+        return mesher.generate(outline, ends, sizes, numerics.order, method)
 
 
 def initial_outline(scene: Scene, front: float = 1.0) -> Outline | None:
@@ -285,7 +285,7 @@ def initial_outline(scene: Scene, front: float = 1.0) -> Outline | None:
     seed = scene.aggregate
     if seed is None:
         return None
-    geometry = scene.numerics.geometry
+    geometry = scene.numerics.order
     if seed.radius is None:
         return polygon(np.array(seed.outline), scene.pore.width, geometry, seed.smooth,
                        size_at_tips(scene.numerics, scene.pore.width),
@@ -322,7 +322,7 @@ def seeded(scene: Scene, front: float = 1.0, outline: Outline | None = None) -> 
     """
     meshing = Meshing.of(scene)
     mesh, outline = meshing.generate(outline or initial_outline(scene, front), front)
-    space = Space(mesh, scene.numerics.order)
+    space = Space(mesh)
     density = scene.kinetics.maximum_density if scene.kinetics else 0.0
     total = density * space.reaction.dx
     inert = total * (scene.aggregate.inert_fraction if scene.aggregate else 0.0)
@@ -337,8 +337,8 @@ def seeded(scene: Scene, front: float = 1.0, outline: Outline | None = None) -> 
 def material(space: Space, reference: np.ndarray) -> Body:
     """The aggregate of a mesh; reference: (n, 2) um, its nodes in the reference configuration."""
     topology = space.mesh.topology
-    degree = growth_degree(space.mesh.geometry, space.order)
-    shape = Shape(topology.body_cells, len(topology.body_corners), degree, topology.method)
+    shape = Shape(topology.body_cells, len(topology.body_corners), space.gradient_degree,
+                  topology.method)
     return Body(shape, reference)
 
 

@@ -93,7 +93,7 @@ def new_mesh(rules: Remeshing, previous: Pore, expanded: Pore, speed: float,
     """
     mesh = moved_mesh(rules.meshing, previous, expanded)
     if mesh is not None:
-        return replace(expanded, space=Space(mesh, previous.space.order)), False
+        return replace(expanded, space=Space(mesh)), False
     for generated_mesh in generated:
         pore = _on_generated(rules, generated_mesh, expanded)
         if pore is not None:
@@ -115,7 +115,7 @@ def _on_generated(rules: Remeshing, generated: GeneratedMesh, expanded: Pore) ->
     mesh = moved_mesh(rules.meshing, start, start.moved(points))
     if mesh is None:
         return None
-    target = replace(start, space=Space(mesh, start.space.order))
+    target = replace(start, space=Space(mesh))
     return _transferred(rules, expanded, target, generated.at)[0]
 
 
@@ -171,7 +171,7 @@ def remesh(rules: Remeshing, previous: Pore, expanded: Pore, speed: float,
     so that the next update removes the error of the constraint and it does not accumulate [E7].
     """
     mesh, outline = rules.meshing.generate(expanded.boundary, expanded.front)
-    new = Space(mesh, expanded.space.order)
+    new = Space(mesh)
     at = _located_in(expanded, mesh)
     body, origin_known = _material(new, expanded, outline.origin, at)
     supplied = at_time(rules.substrates, expanded.time if speed else 0.0)

@@ -32,7 +32,7 @@ from repro.fem import elements, transfer
 from repro.fem.mesh import Mesh
 from repro.fem.space import Space
 from repro.model import mesh_motion, pore, remeshing
-from repro.model.flow import MPA_PER_UM, Flow, pressure_space
+from repro.model.flow import MPA_PER_UM, Flow
 from repro.model.pore import Meshing, Pore
 from repro.scene import Flow as Drive
 from repro.scene import Scene, at_time, needed
@@ -109,7 +109,7 @@ def forces(fluid: Fluid, around: Surroundings, shaped: Pore) -> np.ndarray:
     mesh = around.mesh
     drive = at_time(fluid.drive, shaped.time)
     numerics = fluid.meshing.numerics
-    space = Space(mesh, shaped.space.order)
+    space = Space(mesh)
     flow_field = pore.solve_flow(space, drive, fluid.meshing.channel.length, numerics)
     on = on_aggregate(space, flow_field, drive, numerics.interface)[mesh.body]
     total = np.zeros((len(shaped.mesh.body), 2))
@@ -134,8 +134,8 @@ def seepage(space: Space, solution: Flow, drag: float) -> np.ndarray:
     mesh = space.mesh
     cells = mesh.cells[mesh.biomass]
     velocity = solution.velocity[space.cells[mesh.biomass]]
-    functions = elements.values_on(mesh.geometry, space.table)
-    of_water = np.einsum("tq,qb,tbi->tqi", space.at.dx[mesh.biomass], space.at.values, velocity)
+    functions = space.at.values
+    of_water = np.einsum("tq,qb,tbi->tqi", space.at.dx[mesh.biomass], functions, velocity)
     local = drag * np.einsum("tqi,qa->tai", of_water, functions)
     return np.column_stack([np.bincount(cells.ravel(), local[..., i].ravel(), len(mesh.points))
                             for i in (0, 1)])
@@ -148,15 +148,13 @@ def nodal(space: Space, solution: Flow, viscosity: float, interface: str) -> np.
     """
     mesh = space.mesh
     wet = ~mesh.biomass
-    pressure = pressure_space(space)
     at = space.gradients_at
-    grad = np.einsum("tai,tqka->tqik", solution.velocity[space.cells[wet]], at.gradients[wet])
+    gradients = at.gradients[wet]
+    grad = np.einsum("tai,tqka->tqik", solution.velocity[space.cells[wet]], gradients)
     if interface == "traction":
         grad = grad + np.swapaxes(grad, 2, 3)
-    head = solution.head[pressure.cells[wet]] @ pressure.values_at(space.gradient_table).T
+    head = solution.head[mesh.triangles[wet]] @ space.gradient_table.linear.T
     stress = viscosity * grad - head[..., None, None] * np.eye(2)
-    of = elements.table(mesh.geometry, mesh.geometry, space.gradient_degree)
-    _, gradients = elements.mapped(mesh.points[mesh.cells[wet]], of)
     local = -np.einsum("tq,tqik,tqka->tai", at.dx[wet], stress, gradients)
     nodes = mesh.cells[wet].ravel()
     return np.column_stack([np.bincount(nodes, local[..., i].ravel(), len(mesh.points))

@@ -1,6 +1,6 @@
 """Substrates (2.2, 3.3): advection, diffusion and uptake of acceptor and donor, (7)-(13).
 
-For one substrate and every nodal function N_i, order 2 and 3 satisfy the conserving form
+For one substrate and every nodal function N_i, order 2 satisfies the conserving form
 
     (D grad C, grad N_i) - (C w, grad N_i) + <u_x C, N_i>_outlet + (q(C) X_A, N_i)_biomass
         = <u_x C_supply, N_i>_inlet
@@ -54,7 +54,7 @@ UNRESOLVED = 1e-3
 #: A concentration above its supply by more than this part of the supply is not resolved either.
 OVERSHOOT = 0.02
 #: Largest accepted concentration over its supply, by the order of the elements.
-HIGHEST = {1: np.inf, 2: 1 + OVERSHOOT, 3: 1 + OVERSHOOT}
+HIGHEST = {1: np.inf, 2: 1 + OVERSHOOT}
 #: The uptake is not resolved if a quadrature of a degree higher by FINER differs by more than this.
 #: Both quadratures use the same concentrations, which are not solved for again with the finer one.
 #: In base with fronts of half saturations from 1e-1 to 1e-6 of the supply, biomass made in 2 h was
@@ -167,7 +167,7 @@ def problem(space: Space, flow: Flow | None, substrates: Substrates, kinetics: K
     carried, source, inflow, outflow = _through(space, flow, inlet)
     matrices = tuple(diffusion(space, kind) + carried for kind in kinds)
     constrained = flow is None and substrates.boundary == "open"
-    uncoupled = topology.system(("both", space.order, count), lambda: _apart(space, count))
+    uncoupled = topology.system(("both", count), lambda: _apart(space, count))
     operator = uncoupled.matrix(matrices)
     system = coupled_system(space, constrained, count)
     magnitude = copy(operator)
@@ -232,7 +232,7 @@ def divergence_free(space: Space, velocity: np.ndarray) -> np.ndarray:
     load = at.assemble(at.flux(np.moveaxis(u * at.dx, 0, 2)[:, None]))
     load += space.inlet.assembled(velocity[:, 0])
     load -= space.outlet.assembled(velocity[:, 0])
-    system = space.mesh.topology.system(("potential", space.order), lambda: _potential(space))
+    system = space.mesh.topology.system("potential", lambda: _potential(space))
     psi = system.solve(space.stiffness, load)
     return u - np.moveaxis(at.gradient(psi[:, None])[:, 0], 2, 0)
 
@@ -280,7 +280,7 @@ def _shifted(cells: np.ndarray, space: Space, count: int) -> tuple[np.ndarray, .
 def coupled_system(space: Space, constrained: bool, count: int) -> ElementSystem:
     """The system of ``count`` substrates with uptake; constrained: is the supply prescribed at the
     ends?"""
-    return space.mesh.topology.system(("transport", space.order, constrained, count),
+    return space.mesh.topology.system(("transport", constrained, count),
                                       lambda: _system(space, constrained, count))
 
 

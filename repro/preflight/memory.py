@@ -31,8 +31,8 @@ from repro.model.pore import initial_outline, resolution, sized, thin_layers
 from repro.preflight import numbers
 from repro.scene import Scene, SceneError, needed
 
-#: Bytes per node at the peak of a run, by the order of elements: measured at 800 to 50 000 nodes.
-PER_NODE = {1: 25e3, 2: 25e3, 3: 65e3}
+#: Bytes per node at the peak of a run, measured at 800 to 50 000 nodes.
+PER_NODE = 25e3
 #: Bytes of a run that do not depend on its mesh.
 LEAST = 30e6
 #: Nodes of six-node triangles per corner.
@@ -106,7 +106,7 @@ def _nodes(scene: Scene, thickness: float, extent: float,
         largest = min([largest, *(size for size, _ in surface)])
     corners = length * pore.width / (HEXAGON * largest**2) + 2 * (length + pore.width) / largest
     corners += sum(_graded(piece, near, largest, numerics.gradation) for near, piece in surface)
-    return float(corners) * (PER_CORNER if numerics.geometry == 2 else 1.0)
+    return float(corners) * (PER_CORNER if numerics.order == 2 else 1.0)
 
 
 def _graded(surface: float, near: float, largest: float, gradation: float) -> float:
@@ -119,7 +119,7 @@ def _graded(surface: float, near: float, largest: float, gradation: float) -> fl
 
 def expected_bytes(scene: Scene) -> float:
     """Estimated memory (bytes) of a run without the program."""
-    return LEAST + PER_NODE[scene.numerics.order] * expected_nodes(scene)
+    return LEAST + PER_NODE * expected_nodes(scene)
 
 
 def require_outline(scene: Scene) -> None:

@@ -130,8 +130,8 @@ def _growth(scene: Scene) -> Iterator[str]:
 def _numerics(scene: Scene) -> Iterator[str]:
     numerics = scene.numerics
     yield f"preset {numerics.preset}"
-    yield {"linear": "linear triangles (3.2-3.4)", "quadratic": "quadratic curved triangles",
-           "cubic": "curved triangles, velocity and substrates cubic"}[numerics.elements]
+    yield {"linear": "linear triangles (3.2-3.4)",
+           "quadratic": "quadratic curved triangles"}[numerics.elements]
     yield f"refinement {numerics.refinement:g}"
     if scene.growth:
         yield (f"a shape update every {60 * scene.growth.time_step:.4g} min"

@@ -218,7 +218,7 @@ def _drag_layer(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
         return
     root = math.sqrt(permeability)
     size = _interface_size(scene)
-    thickness = size / ACROSS[scene.numerics.order]
+    thickness = size / ACROSS
     gap = max(scene.pore.width - numbers.at_end(scene).thickness, film(scene))
     loss = 3 * (root - permeability / thickness) / gap
     if loss > FILM_LOSS:

@@ -13,6 +13,7 @@ from repro.errors import OutputError
 from repro.results import COLUMNS, parse_table
 from repro.results.files import MOST_TABLE, read_sealed, sha256
 from repro.results.files import read as read_file
+from repro.scene import without_former
 
 Content = TypeVar("Content")
 NEEDED = "the folder of a run is needed or, for a new run, another folder"
@@ -47,9 +48,12 @@ def read(folder: Path) -> Run:
 
 
 def read_record(folder: Path, parse: Callable[[Path], dict] = read_sealed) -> dict:
-    """Read ``run.json``. Raises OutputError if it is missing or has changed since it was written.
+    """Read ``run.json``, of this version or an earlier one.
+
+    Raises OutputError if it is missing or has changed since it was written.
     """
-    return _read(folder, "run.json", parse)
+    record = _read(folder, "run.json", parse)
+    return record | {"tables": without_former(record.get("tables"))}
 
 
 def _table(folder: Path, name: str, record: dict) -> dict[str, np.ndarray]:

@@ -8,7 +8,6 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from repro.model import flow
 from repro.model.body import Strained
 from repro.model.pore import Pore, Solved
 from repro.model.surface import STRETCH, surface
@@ -119,11 +118,11 @@ def _three(plane: np.ndarray) -> np.ndarray:
 
 
 def _head(state: State) -> np.ndarray:
-    return flow.pressure_space(state.pore.space).to_mesh(state.solved.flow.head)
+    return state.pore.mesh.with_middles(state.solved.flow.head)
 
 
 def _concentration(name: str, state: State) -> np.ndarray:
-    return state.pore.space.to_mesh(getattr(state.solved.concentrations, name))
+    return getattr(state.solved.concentrations, name)
 
 
 def _density(name: str, state: State) -> np.ndarray:
@@ -158,7 +157,7 @@ _CAUCHY = "of mu_L (J^(-5/3) (F F^T - tr C / 3) + P / mu_L), the mean over the t
 
 ARRAYS = (
     Array("velocity_m_per_d", "velocity", "u (1)-(5)",
-          lambda state: state.pore.space.to_mesh(state.solved.flow.velocity), needs="flow",
+          lambda state: state.solved.flow.velocity, needs="flow",
           signed=True),
     Array("head_cm", "head", "phi (1)-(5), zero in the mean over the outlet of the meshed part",
           _head, needs="flow", signed=True),

@@ -74,7 +74,7 @@ def _pore(scene: Scene, plain: dict, arrays: Arrays) -> Pore:
     first, last = plain["ends_um"]
     mesh = Mesh.of(arrays["points"], arrays["cells"], arrays["biomass"], arrays["loop"],
                    scene.pore.width, (first, last), method)
-    space = Space(mesh, numerics.order)
+    space = Space(mesh)
     guess = None
     if plain["guess"] is not None:
         from repro.model.transport import Concentrations  # a scene without [substrates] has none

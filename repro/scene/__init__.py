@@ -4,6 +4,7 @@
     units       quantities with units
     time_table  values over time
     exact       the units that scenes use, as exact fractions
+    former      keys and choices of earlier versions
     reading     conversion of TOML tables to dataclasses and back
     rules       constraints between keys
     needed      optional sections that a stage requires
@@ -13,6 +14,7 @@
 """
 
 from repro.scene.files import packaged_scenes
+from repro.scene.former import without_former
 from repro.scene.keys import (
     KEYS,
     NOT_IN_PAPER,
@@ -45,4 +47,4 @@ __all__ = ["KEYS", "NOT_IN_PAPER", "PRESETS", "Acceptor", "Aggregate", "Donor", 
            "Kinetics", "MissingError", "Numerics", "Output", "Pore", "Scene", "SceneError",
            "Source", "Substrate", "Substrates", "at_largest", "at_time", "label", "load_scene",
            "load_tables", "needed", "packaged_scenes", "parse_scene", "scene_hash",
-           "scene_tables"]
+           "scene_tables", "without_former"]

@@ -21,6 +21,7 @@ from typing import NamedTuple
 
 from repro.scene.arguments import typed
 from repro.scene.files import key_of, leave_out, override, packaged_scenes, read_tables
+from repro.scene.former import with_former
 from repro.scene.needed import MissingError, needed
 from repro.scene.reading import Place, dotted, entries, read_table, toml, write_table
 from repro.scene.rules import rules
@@ -350,8 +351,8 @@ class Numerics:
         about="Defaults of this section: until contact errors of about 1 %, of about 0.1 %, under "
               "0.01 %, which are larger after contact; or the paper's own scheme")
     elements: str = choice(
-        "linear", "quadratic", "cubic", source="3.2-3.4 have linear ones",
-        about="Linear triangles, or curved ones: all quadratic, or velocity and substrates cubic")
+        "linear", "quadratic", source="3.2-3.4 have linear ones",
+        about="Straight linear triangles, or curved quadratic ones")
     time: str = choice(
         "updates", "midpoint", source="Section 2, 3.3 have updates",
         about="Every growth.time_step, or second-order steps as long as tolerance allows")
@@ -401,18 +402,13 @@ class Numerics:
 
     @property
     def order(self) -> int:
-        """Degree of velocity and concentrations on a triangle."""
-        return {"linear": 1, "quadratic": 2, "cubic": 3}[self.elements]
+        """1: linear elements on straight triangles; 2: quadratic ones on curved triangles."""
+        return 1 if self.elements == "linear" else 2
 
     @property
     def follows_layers(self) -> bool:
         """Are elements refined at boundary layers and fronts? Linear ones, the paper's, are not."""
         return self.elements != "linear"
-
-    @property
-    def geometry(self) -> int:
-        """1: straight triangles; 2: curved ones, with quadratic maps."""
-        return min(self.order, 2)
 
 
 #: Changes of each preset to the defaults above: until contact errors of about 1 %, of about 0.1 %,
@@ -726,9 +722,11 @@ def scene_tables(scene: Scene) -> dict:
 def scene_hash(scene: Scene) -> str:
     """Hash (16 hexadecimal digits) of all values of a scene, without its name.
 
-    A key of `LATER` counts if it differs from its default, so that recorded hashes stay valid.
+    A key of `LATER` counts if it differs from its default, and a former key counts with its last
+    value, so that recorded hashes stay valid.
     """
-    tables = {key: _without_later(key, table) for key, table in write_table(scene).items()}
+    written = with_former(write_table(scene))
+    tables = {key: _without_later(key, table) for key, table in written.items()}
     canonical = json.dumps(tables, sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.sha256(canonical.encode()).hexdigest()[:16]
 

@@ -8,6 +8,7 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, Field, dataclass, fields, replace
 
+from repro.scene import former
 from repro.scene.units import (
     Quantity,
     Refused,
@@ -87,7 +88,10 @@ def read_table(kind: type, table: object, place: Place, **extra):
         raise place.refuse(table, requirement)
     for key in table:
         if key not in keys:
-            raise place.below(key).refuse(table[key], _instead(key, table[key], list(keys), place))
+            below = place.below(key)
+            requirement = former.instead_of_key(below.key)
+            raise below.refuse(table[key],
+                               requirement or _instead(key, table[key], list(keys), place))
     for key, entry in keys.items():
         if key not in table and entry.default is MISSING and entry.default_factory is MISSING:
             raise place.below(key).refuse(MISSING, entry.metadata["kind"].requirement)
@@ -107,6 +111,8 @@ def _read_entry(entry: Field, value: object, place: Place):
     if "section" in entry.metadata:
         return read_table(entry.metadata["section"], value, place)
     kind = entry.metadata["kind"]
+    if requirement := former.instead_of_choice(place.key, value):
+        raise place.refuse(value, requirement)
     try:
         return kind.read(value)
     except Refused as error:

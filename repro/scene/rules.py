@@ -238,9 +238,9 @@ def _biomass_rules(scene: "Scene", drive: "Flow") -> Rules:
     }
     alone = scene.aggregate is None
     yield drag and alone, {"flow.biomass": '"viscous" is needed without [aggregate]'}
-    requirement = '"quadratic" or "cubic" is needed with flow.biomass = "brinkman"'
+    requirement = '"quadratic" is needed with flow.biomass = "brinkman"'
     yield drag and scene.numerics.order == 1, {
-        "flow.biomass": 'numerics.elements = "quadratic" or "cubic" is needed with it',
+        "flow.biomass": 'numerics.elements = "quadratic" is needed with it',
         "numerics.elements": requirement,
         "numerics.preset": f'numerics.elements = {requirement}',
     }

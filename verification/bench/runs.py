@@ -35,7 +35,6 @@ CHANGED = ((0.7, 24), (1.0, 48), (1.0, 12))
 MIDPOINT = ((0.35, 0.03), (0.5, 0.03), (0.7, 0.01), (1.0, 0.01), (1.4, 0.003), (2.0, 0.002))
 QUADRATIC = ((0.15, 0.02), (0.15, 0.01), (0.2, 0.01), (0.3, 0.005), (0.45, 0.002), (0.45, 0.001), (0.6, 0.0005),
              (0.8, 0.0002))
-CUBIC = ((0.1, 0.01), (0.2, 0.0075), (0.3, 0.005), (0.45, 0.001))
 #: Refinements of order 2 in the paper's updates of 12 min.
 UPDATES = ((0.15,), (0.3,), (0.45,))
 #: Labels of sizes, and the keys of the scene that they set.
@@ -52,7 +51,6 @@ METHODS_OF_BASE = (
     ("bounded transfer alone", BY_MINUTES, CHANGED[::2], (*OF_PAPER, "numerics.transfer=bounded")),
     ("order 2, midpoint", BY_TOLERANCE, QUADRATIC, OF_ACCURATE),
     ("order 2, midpoint, fresh derivatives", BY_TOLERANCE, QUADRATIC[1:6:2], (*OF_ACCURATE, "numerics.jacobian=fresh")),
-    ("order 3, midpoint", BY_TOLERANCE, CUBIC, (*OF_ACCURATE, "numerics.elements=cubic")),
     ("order 2, midpoint, one element size everywhere", BY_TOLERANCE, QUADRATIC[1:4],
      (*OF_ACCURATE, "numerics.gradation=0")),
     ("order 2 in updates of 12 min", ("refinement {:g}", "numerics.refinement={}"), UPDATES,

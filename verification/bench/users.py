@@ -188,8 +188,8 @@ SCENE = load_scene("base", [f"substrates.{name}.{key}={d} um^2/h" for name, d in
 
 
 def solve_with_repro(problem: Problem, across: int, order: int) -> list[float]:
-    """(2,) judged numbers, by linear (order 1), quadratic or cubic elements on halved squares. In one dimension the
-    mesh is a row of squares."""
+    """(2,) judged numbers, by linear (order 1) or quadratic elements on halved squares. In one dimension the mesh is a
+    row of squares."""
     ends, (along, *rows) = problem.box[0], problem.cells(across)
     rows = rows or [1]
     width = rows[0] * np.ptp(ends) / along
@@ -205,7 +205,7 @@ def solve_with_repro(problem: Problem, across: int, order: int) -> list[float]:
 
 #: Methods of this package, by the order of their elements.
 COMPILED = "py-pde, compiled"
-METHODS = {1: "linear elements (paper)", 2: "order 2 (fast, accurate)", 3: "order 3"}
+METHODS = {1: "linear elements (paper)", 2: "order 2 (fast, accurate)"}
 QUADRATIC = "scikit-fem: quadratic elements"
 
 

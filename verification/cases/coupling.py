@@ -118,7 +118,7 @@ def test_equal_viscosities(changes, record):
     grid = last.pore.mesh
     computed = last.solved.flow
     bare = replace(grid, topology=replace(grid.topology, biomass=np.zeros_like(grid.biomass)))
-    empty = flow.unit_flow(Space(bare, last.pore.space.order), 7.0)
+    empty = flow.unit_flow(Space(bare), 7.0)
     record(at_most("u", np.abs(computed.velocity / computed.mean_velocity - empty.velocity).max(), 1e-13,
                    runs.ROUND_OFF),
            at_most("mean velocity", abs(computed.mean_velocity / _poiseuille(scene) - 1), 5e-3,
@@ -301,7 +301,7 @@ FIRST_ORDER = ('substrates.acceptor.half_saturation="1e-9 mg/L"', 'substrates.do
 def _lopsided(sign: float, *changes: str) -> dict[str, float]:
     """Conductivity, and C at the outlet and the inlet, with uptake of first order."""
     scene = load_scene("base", (*changes, *FIRST_ORDER))
-    scene = shaped(scene, _outline(sign, 80 * scene.numerics.geometry))
+    scene = shaped(scene, _outline(sign, 80 * scene.numerics.order))
     solved = pore.solve(scene, pore.seeded(scene))
     donor = solved.fluxes[1]
     return {"conductivity": solved.flow.conductivity, "effluent": donor.effluent, "inlet": donor.inlet}
@@ -463,23 +463,21 @@ def _reference():
 @pytest.mark.slow
 @pytest.mark.case(
     "coupling-presets", kind="cross-code",
-    mutants=("curved-rates-of-the-start", "fluid-diffusivity", "uptake-without-decay", "cubic-shown-less",
-             "exact-steps-of-accurate"), references=("whole_run",), runs_with="2",
+    mutants=("curved-rates-of-the-start", "fluid-diffusivity", "uptake-without-decay", "exact-steps-of-accurate"),
+    references=("whole_run",), runs_with="2",
     omitted="paper, order 1: its error is that of linear elements, see bench")
 @parametrize(
-    "bound, preset, *changes",
-    {"fast": (1e-2, "fast"), "accurate": (1e-3, "accurate"),
-     "accurate, cubic": (1e-3, "accurate", runs.with_elements("cubic")), "exact": (1e-4, "exact")})
-def test_presets(bound, preset, changes, record):
-    """Each of the eight numbers of base is within 1 % with preset fast, within 0.1 % with accurate, with quadratic and
-    with cubic velocities and concentrations, and within 0.01 % with exact.
+    "bound, preset", {"fast": (1e-2, "fast"), "accurate": (1e-3, "accurate"), "exact": (1e-4, "exact")})
+def test_presets(bound, preset, record):
+    """Each of the eight numbers of base is within 1 % with preset fast, within 0.1 % with accurate, and within 0.01 %
+    with exact.
 
     Norm: largest difference at 19.2 and 19.4 h to an independent solver, extrapolated in space and time: relative, of
     effluents over the supply.
     """
     expected, error = _reference()
     record(at_most("error of the reference", error, 5e-5, "half of the bound for exact"))
-    computed = runs.values(TIMES, runs.with_preset(preset), *changes)
+    computed = runs.values(TIMES, runs.with_preset(preset))
     for name, errors in zip(whole_run.NAMES, runs.errors(computed, expected).T):
         record(at_most(name, errors.max(), bound, "the error that the preset promises"))
 

@@ -20,13 +20,12 @@ from repro import results
 from repro.fem import mesher
 from repro.fem.outline import polygon
 from repro.fem.sizing import Sizing
-from repro.fem.space import Space
 from repro.march.simulation import shaped, simulate
 from repro.model import flow, pore
 from repro.scene import Scene
 from verification.evidence.cases import parametrize
 from verification.evidence.checks import at_least, at_most, between, refine, studies, study
-from verification.problems import runs
+from verification.problems import meshes, runs
 from verification.problems.channels import NAMES, SCENE
 
 TIMES = (2.0, 4.0, 6.0, 8.0, 10.0, 12.0, 14.0, 16.0, 18.0, 19.4)
@@ -159,8 +158,7 @@ MIXING_TIMES = (5.0, 10.0, 15.0, 19.4)
 @pytest.mark.case(
     "coupling-averaged-run", kind="cross-code", mutants=("rates-two-percent-low",),
     references=("averaged_pore", "poiseuille", "taylor_hood"), runs_with="1 2",
-    omitted="fast: its own error in time would show; exact: accurate has a smaller tolerance here; order 3: "
-            "coupling-averaged-refined")
+    omitted="fast: its own error in time would show; exact: accurate has a smaller tolerance here")
 @pytest.mark.parametrize("preset", ("paper", "accurate"))
 def test_averaged_run(preset, record):
     """The whole base run is that of the averaged pore (FiPy, solve_ivp) up to the square of the transverse Thiele
@@ -296,25 +294,24 @@ SLENDER = (0.25, 0.177, 0.125, 0.0884)
 @pytest.mark.case(
     "coupling-averaged-flow", kind="cross-code", mutants=("extent-not-subtracted",),
     references=("averaged_pore", "layered_channel", "poiseuille", "taylor_hood"),
-    omitted="order 1: its own error is as large as the measured difference")
-@parametrize("order", {f"order {order}": (order,) for order in (2, 3)})
-def test_averaged_flow(order, record):
+    runs_with="2", omitted="order 1: its own error is as large as the measured difference")
+def test_averaged_flow(record):
     """The head loss of a long aggregate is that of developed flow in each section, and the next term is that of
     extended lubrication theory, coefficient included.
 
     Norm: head loss of the whole pore less that of lubrication, over the excess of the latter over a clean channel;
-    refinement 2.5 over the order of the elements; a bump 8 (1 - s^2)^2 um high in 20 um.
+    refinement 1.25; a bump 8 (1 - s^2)^2 um high in 20 um.
 
-    Triangles are straight: the ends of the bump lie flat on the wall, which arcs would cross.
+    Sides are straight: the ends of the bump lie flat on the wall, which arcs would cross.
     """
-    losses, thin, extension = np.array([_losses(order, aspect) for aspect in SLENDER]).T
+    losses, thin, extension = np.array([*map(_losses, SLENDER)]).T
     clean = poiseuille.head_loss(LENGTH, WIDTH, 1.0, 1.0)
     record(between("gap over that of extended lubrication, the most slender", (losses - thin)[-1] / extension[-1],
                    0.94, 1.02, "mesh, 2 %; the next term, 1 %; lambda = 2000 for a rigid wall, 0.4 %"),
            study("loss", SLENDER, (losses - thin) / (thin - clean), 2, THIN_SQUARE, ceiling=1.5e-2))
 
 
-def _losses(order: int, aspect: float) -> tuple[float, float, float]:
+def _losses(aspect: float) -> tuple[float, float, float]:
     """Loss per mean velocity: of the package, of lubrication theory, and the term that its extension adds.
 
     In a channel with one wall y = h(x) the stream function in powers of the slope, to the second, gives the loss
@@ -322,9 +319,9 @@ def _losses(order: int, aspect: float) -> tuple[float, float, float]:
     """
     half, reach = LOW / aspect, LOW / aspect + LONG
     outline = polygon(bump(half, lambda s: LOW * (1 - s**2) ** 2, round(48 / np.sqrt(aspect))), WIDTH)
-    grid, _ = mesher.generate(outline, (-reach, reach), Sizing(WIDTH, 2.5 / order, 2.0))
+    grid, _ = mesher.generate(outline, (-reach, reach), Sizing(WIDTH, 1.25, 2.0))
     drive = replace(thin_scene("linear", 0.5).flow, mean_velocity=1.0, kinematic_viscosity=1.0, gravity=1.0)
-    solution = flow.solve(Space(grid, order), drive, LENGTH)
+    solution = flow.solve(meshes.space_on(grid, 2), drive, LENGTH)
     s, weight = np.polynomial.legendre.leggauss(200)
     height, slope = LOW * (1 - s**2) ** 2, -4 * aspect * s * (1 - s**2)
     thin = half * weight @ layered_channel.gradient(WIDTH, height, RATIO)
@@ -382,11 +379,11 @@ ACCEPTOR = 10.0
 CELLS = 16
 ACCURACY = 1e-5
 THIELE = "the square of the transverse Thiele number: 1.2 % of the area of base over 64; and as much for the elements"
-#: Bounds by preset, for a supply that jumps and for one that changes linearly; "cubic" is fast with cubic elements.
+#: Bounds by preset, for a supply that jumps and for one that changes linearly.
 HALF = 5e-3, "half of the 1 % that the preset may err by"
 SUPPLIED = {"steps": {preset: (4e-4, THIELE) for preset in runs.WITH_EXACT},
             "linear": {"paper": (1e-3, "second order in 12 min: a quarter of it with 6 min"), "fast": HALF,
-                       "accurate": (5e-4, "half of the 0.1 % that the preset may err by"), "cubic": HALF}}
+                       "accurate": (5e-4, "half of the 0.1 % that the preset may err by")}}
 
 
 @pytest.mark.slow

@@ -58,7 +58,7 @@ def errors(computed, expected) -> dict[str, float]:
 @pytest.mark.slow
 @pytest.mark.case(
     "coupling-after-contact", kind="property", mutants=("fast-too-coarse",), runs_with="2 fast accurate exact",
-    omitted="paper, order 1: nodes join the wall one by one, see growth-contact-lines; 3: its cost")
+    omitted="paper, order 1: nodes join the wall one by one, see growth-contact-lines")
 @parametrize("width", {f"{width} um": (width,) for width in PORES})
 def test_after_contact(width, record):
     """After contact, conductivity, tips and length of contact agree with those on finer levels of elements and steps.

@@ -18,10 +18,11 @@ from repro.scene import Scene, load_scene
 from verification.cases.flow import ENDS, FORMS, LENGTH, ORDERS, RATIO, WIDTH, drive
 from verification.evidence.cases import combined, parametrize
 from verification.evidence.checks import at_least, at_most, each_at_most
+from verification.evidence.writing import ROOT, load
 from verification.problems import meshes, runs
 
 #: Refinement of the meshes of each order.
-REFINED = {1: 1.0, 2: 0.5, 3: 0.4}
+REFINED = {1: 1.0, 2: 0.5}
 #: Every order with both forms of [E2], and the elements and form of scenes with a preset.
 EVERY = {**combined(ORDERS, FORMS), **{preset: (runs.with_preset(preset), "laplacian") for preset in runs.PRESETS}}
 
@@ -41,7 +42,7 @@ def _around(radius: float, elements: int | str, lean: float = 0.0, reach: float 
         if not lean:
             return pore.seeded(scene).space
         order, refinement = scene.numerics.order, scene.numerics.refinement
-    return Space(meshes.half_disc(radius, refinement, (-reach, reach), WIDTH, geometry=min(order, 2), lean=lean), order)
+    return Space(meshes.half_disc(radius, refinement, (-reach, reach), WIDTH, geometry=order, lean=lean))
 
 
 #: Radii (um) of half-discs with bounds of the flux defect of linear u on a coarse mesh; the bound for a plug.
@@ -54,7 +55,7 @@ DISCS, DROP = {40.0: 0.012, 46.0: 0.008}, 0.003
 @parametrize("numerics, interface", EVERY)
 def test_sections(numerics, interface, record):
     """The same flux passes every section of a pore with or without a plug: to round-off for w = u - tau grad p of
-    linear elements and for u itself of quadratic and cubic ones, the outlet included, in both forms.
+    linear elements and for u itself of quadratic ones, the outlet included, in both forms.
 
     Norm: largest relative error of the flux through 25 sections, and through the outlet.
     """
@@ -88,7 +89,8 @@ def flux_error(space: Space, carried: np.ndarray) -> float:
     """
     grid = space.mesh
     _, weight, _ = meshes.fine(space)
-    slopes = elements.mapped(grid.points[grid.cells], elements.table(1, grid.geometry, meshes.FINE))[1]
+    J = elements.jacobian(grid.points[grid.cells], elements.table(grid.geometry, meshes.FINE).derivatives)
+    slopes = elements.inverse_transpose(J, elements.determinant(J)) @ elements.derivatives(1, np.zeros((1, 2)))[0].T
     carries = np.einsum("tqi,tqia->ta", weight[..., None] * carried, slopes)
     sections = np.linspace(-65.0, 65.0, 25)[:, None]
     ramps = np.clip((sections + 5.0 - grid.points[: grid.corners, 0]) / 10.0, 0.0, 1.0)
@@ -98,8 +100,8 @@ def flux_error(space: Space, carried: np.ndarray) -> float:
 @pytest.mark.case("flow-energy", kind="property", mutants=("correction-not-scaled", "loss-per-width"))
 @parametrize("numerics, interface", EVERY)
 def test_energy(numerics, interface, record):
-    """The work of the inlet is the dissipation by viscosity and stabilisation, with order 2 and 3 also the head loss
-    times the flux, and the flow is linear in its drive.
+    """The work of the inlet is the dissipation by viscosity and stabilisation, with order 2 also the head loss times
+    the flux, and the flow is linear in its drive.
 
     Norm: relative difference.
     """
@@ -127,7 +129,7 @@ def _power(space: Space, unit: flow.UnitFlow, interface: str) -> tuple[float, fl
     grid, cells = space.mesh, space.cells
     viscosity, count = np.where(grid.biomass, RATIO, 1.0), cells.shape[1]
     blocks = flow.stokes(space, viscosity, interface, None)
-    moving, pressure = np.hstack([*unit.velocity.T[:, cells]]), unit.pressure[flow.pressure_space(space).cells]
+    moving, pressure = np.hstack([*unit.velocity.T[:, cells]]), unit.pressure[grid.triangles]
     upper = np.einsum("tab,ta,tb->", blocks[:, : 2 * count, : 2 * count], moving, moving)
     forces = np.einsum("tij,tj->ti", blocks, np.hstack([moving, pressure]))
     force = np.bincount(cells.ravel(), forces[:, :count].ravel(), space.count)
@@ -149,7 +151,7 @@ def test_reversed(numerics, interface, record):
     Norm: L2 of the difference of both velocities, in the middle and everywhere.
     """
     space = _around(25.0, numerics, 0.6, 150.0)
-    mirror = Space(_mirrored(space.mesh), space.order)
+    mirror = Space(_mirrored(space.mesh))
     forward, mirrored = (flow.unit_flow(each, RATIO, interface=interface).velocity for each in (space, mirror))
     _, weight, shape = meshes.fine(space)
     difference, total = (np.einsum("tq,tqi->t", weight, (shape @ field[space.cells]) ** 2)
@@ -194,7 +196,7 @@ ACCURATE = runs.with_preset("accurate")
 #: Bounds of the difference from the loss with one element size, and changes of the scene. The bounds are half of the
 #: error that the presets paper and fast promise, and the error that accurate promises.
 SCHEMES = {"paper": (5e-3, runs.with_preset("paper")), "fast": (5e-3, runs.with_preset("fast")),
-           "accurate": (1e-3, ACCURATE), "cubic": (1e-3, ACCURATE, runs.with_elements("cubic"))}
+           "accurate": (1e-3, ACCURATE)}
 
 
 @pytest.mark.case(
@@ -202,7 +204,7 @@ SCHEMES = {"paper": (5e-3, runs.with_preset("paper")), "fast": (5e-3, runs.with_
 @parametrize("bound, *numerics", SCHEMES)
 def test_graded(bound, numerics, record):
     """Elements that grow with the distance from a half-disc give the loss of elements of one size, with less than half
-    of the nodes, on straight triangles and on curved ones of order 2 and 3.
+    of the nodes, on straight triangles and on curved ones.
 
     Norm: relative difference of the loss; nodes over those of graded sizes; largest over least edge.
     """
@@ -222,6 +224,8 @@ def _graded(*numerics: str) -> tuple[float, int]:
 #: Flow enters a permeable aggregate in the gussets beside its upper contact lines.
 TIGHT_RUN = ("pore.width=100 um", "aggregate.radius=40 um", "flow.mean_velocity=5.06 m/day",
              "flow.biomass=brinkman", "flow.permeability=5.67e-17 m^2")
+#: um, of cubic elements on a finer mesh around the last shape of the run.
+HEAD_LOSS = load(ROOT / "reference" / "cubic.json", {})["values"]["flow-permeable-run, head loss (um)"]
 
 
 @pytest.mark.slow
@@ -230,11 +234,11 @@ TIGHT_RUN = ("pore.width=100 um", "aggregate.radius=40 um", "flow.mean_velocity=
     omitted="the other presets have finer elements")
 def test_permeable_run(record):
     """A run in which the water must pass through an aggregate with layers of 7.5 nm continues from the film to its end:
-    concentrations stay within their bounds, the velocity is nowhere reversed, and the head loss is that of a finer
-    mesh.
+    concentrations stay within their bounds, the velocity is nowhere reversed, and the head loss is that of cubic
+    elements on a finer mesh.
 
-    Norm: concentrations over the supply; relative difference of the head loss from that of a finer mesh; least velocity
-    along the pore in the aggregate over the largest.
+    Norm: concentrations over the supply; relative difference of the head loss from that recorded in
+    reference/cubic.json; least velocity along the pore in the aggregate over the largest.
     """
     overrides = ["numerics.preset=fast", *TIGHT_RUN]
     instants = list(simulate(load_scene("base", overrides, unset=["flow.head"])))
@@ -244,9 +248,4 @@ def test_permeable_run(record):
     end, solution = instants[-1].pore, instants[-1].solved.flow
     along = solution.velocity[np.unique(end.space.cells[end.mesh.biomass]), 0]
     record(at_least("least velocity", along.min() / along.max(), -0.01, "no node overshoots on a line of elements"))
-    scene = load_scene("base", [*overrides, "numerics.refinement=0.6", "numerics.contact_elements=10"],
-                       unset=["flow.head"])
-    fine_mesh, _ = pore.Meshing.of(scene).generate(end.boundary)
-    finer = pore.solve_flow(Space(fine_mesh, 3), scene.flow, scene.pore.length, scene.numerics)
-    record(at_most("head loss", abs(solution.head_loss / finer.head_loss - 1), 0.01,
-                   "the error that fast promises: 1 %"))
+    record(at_most("head loss", abs(solution.head_loss / HEAD_LOSS - 1), 0.01, "the error that fast promises: 1 %"))

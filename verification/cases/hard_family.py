@@ -160,7 +160,7 @@ COMMON = {
                 "family-decay-limited", "family-absent-donor-limits"),
     "references": ("run_files",), "runs_with": "2 fast accurate",
     "omitted": "members have quadratic triangles, straight ones run where advice names them; hard-01 to hard-23 run "
-               "orders 1 and 3, paper and exact"}
+               "order 1, paper and exact"}
 MARKS = {QUICK: (pytest.mark.case("hard-family", **COMMON),),
          REST: (pytest.mark.case("hard-family-rest", **COMMON), pytest.mark.slow)}
 

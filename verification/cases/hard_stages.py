@@ -151,7 +151,7 @@ def slab_front(preset: str) -> list:
 
 FRONT = "the jump of C'' at the front: s h^2 / (8 D_B)"
 #: Element sizes, um.
-SIZES = {"paper": 6.0, "fast": 12.0, "accurate": 5.0, "cubic": 12.0}
+SIZES = {"paper": 6.0, "fast": 12.0, "accurate": 5.0}
 ZERO_ORDER = HardCase(
     3, "zero-order", "Half saturations of a millionth of the supply: fronts of zero order",
     "The closed form of zero-order uptake in a slab, and the effluents of a finer run around half-discs",
@@ -298,7 +298,7 @@ def rigid(preset: str) -> list:
                    for ratio in (1e5, 1e9))
     layers = [layered_channel.gradient(soft.scene.pore.width, 80.0, ratio) for ratio in (1e5, 1e9)]
     state = stiff.end.pore
-    grid, speed = state.mesh, np.hypot(*state.space.to_mesh(stiff.end.solved.flow.velocity).T)
+    grid, speed = state.mesh, np.hypot(*stiff.end.solved.flow.velocity.T)
     through = speed[np.setdiff1d(grid.body, grid.loop)].max()
     return [soft, stiff,
             between("conductivity at 1e9 over that at 1e5", stiff.last[DRIVE[0]] / soft.last[DRIVE[0]],
@@ -327,7 +327,7 @@ def plugged(preset: str, size: float) -> Iterator[Check]:
     yield at_most("head loss against Poiseuille's", abs(solution.loss / exact - 1), lost, origin)
 
 
-#: Quadratic and cubic velocities contain the parabola.
+#: Quadratic velocities contain the parabola.
 EXACT = (1e-10, 1e-10, "round-off: the elements hold a parabola")
 #: Bounds of the errors of velocity and head of the paper's scheme in a plug, by element size (um): 3.3 and 12.3 % were
 #: measured on a coarse mesh, and are of second order.

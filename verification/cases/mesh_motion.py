@@ -24,7 +24,7 @@ from verification.problems import meshes
 #: gamma of (35) and c of the stabilisation in scenes, and the values of gamma that cases compare (E13).
 GAMMA, STABILISATION = 1.0, 100.0
 GAMMAS = (0.1, GAMMA, 10.0)
-#: Straight triangles, those of linear elements, and curved ones, those of order 2 and 3.
+#: Straight triangles, those of linear elements, and curved ones, those of quadratic elements.
 EITHER = {"straight": (1,), "curved": (2,)}
 
 
@@ -40,8 +40,7 @@ LINEAR = "the field is linear: round-off"
 
 
 @pytest.mark.case(
-    "mesh_motion-plug", kind="exact", mutants=("walls-held", "outlet-moves", "interface-slips", "middles-left-behind"),
-    runs_with="3")
+    "mesh_motion-plug", kind="exact", mutants=("walls-held", "outlet-moves", "interface-slips", "middles-left-behind"))
 @parametrize("geometry", EITHER)
 def test_plug(geometry, record):
     """A plug that slides and stretches along the pore, and a layer that thickens under a wall, stretch the fluid beside
@@ -79,7 +78,7 @@ MOTIONS = {"slides": (np.eye(2), (3.0, 1.0)),
            "is stretched": ([[1.5, 0.1], [-0.2, 0.7]], (1.0, -2.0))}
 
 
-@pytest.mark.case("mesh_motion-pocket", kind="exact", mutants=("interface-slips", "stale-fluid"), runs_with="3")
+@pytest.mark.case("mesh_motion-pocket", kind="exact", mutants=("interface-slips", "stale-fluid"))
 @parametrize("geometry", EITHER)
 def test_pocket(geometry, record):
     """Fluid that an aggregate encloses follows every rigid and every linear motion of it, on straight triangles and on
@@ -112,7 +111,7 @@ CEILINGS = {0.01: 3e-3, 0.1: 3e-3, 1.0: 2e-3, 10.0: 1.2e-3}
 
 @pytest.mark.case(
     "mesh_motion-waves", kind="exact", mutants=("gamma-sign", "gamma-inverted", "twice-the-divergence", "walls-held"),
-    references=("sliding_waves",), runs_with="3")
+    references=("sliding_waves",))
 @parametrize("geometry", EITHER)
 def test_waves(geometry, record):
     """Between a plug whose faces are bent by a wave and the ends of the mesh the fluid is displaced as the closed form
@@ -136,7 +135,7 @@ def _wave(x, y, gamma: float) -> np.ndarray:
 def _wave_error(size: float, seed: int, gamma: float, geometry: int, label: str) -> dict[str, float]:
     grid = _nodes(meshes.plug((-END, END), NARROW, FACE, size, seed=10 * seed + round(size)), geometry)
     computed = moved(grid, grid.points + _wave(*grid.points.T, gamma), gamma) - grid.points
-    return {label: meshes.field_error(Space(grid, geometry), computed, lambda x, y: _wave(x, y, gamma), ~grid.biomass)}
+    return {label: meshes.field_error(Space(grid), computed, lambda x, y: _wave(x, y, gamma), ~grid.biomass)}
 
 
 RADIUS = 25.0
@@ -156,7 +155,7 @@ SEGMENT_MOTIONS = {"grows": lambda x, y: np.array([x, y]), "slides": lambda x, y
 @pytest.mark.slow
 @pytest.mark.case(
     "mesh_motion-half-disc", kind="cross-code", mutants=("gamma-sign", "twice-the-divergence", "gamma-inverted"),
-    references=("quadratic_mesh_motion",), runs_with="3")
+    references=("quadratic_mesh_motion",))
 @parametrize("geometry", EITHER)
 def test_half_disc(geometry, record):
     """Around a half-disc that grows, or slides along the wall, the displacement of the fluid is that of an independent
@@ -179,8 +178,7 @@ def _comparison(geometry: int, contact: float, levels, motion: str, gamma: float
 
 @pytest.mark.slow
 @pytest.mark.case(
-    "mesh_motion-corner", kind="cross-code", mutants=("gamma-inverted",), references=("quadratic_mesh_motion",),
-    runs_with="3")
+    "mesh_motion-corner", kind="cross-code", mutants=("gamma-inverted",), references=("quadratic_mesh_motion",))
 @parametrize("geometry", EITHER)
 def test_corner(geometry, record):
     """Around an aggregate whose contact angle is 60 degrees the order falls to twice the exponent of the fluid's corner
@@ -221,7 +219,7 @@ def _difference(level: tuple[float, int], contact: float, geometry: int, gamma: 
     grid, motion = _segment(contact, refinement, geometry), SEGMENT_MOTIONS[name]
     reference = _reference_motion(RADIUS, contact, PORE, SEGMENT_END, parts, gamma, motion)
     moved_by = moved(grid, grid.points + motion(*grid.points.T).T, gamma) - grid.points
-    computed = meshes.field_at(Space(grid, grid.geometry), moved_by, reference.points)
+    computed = meshes.field_at(Space(grid), moved_by, reference.points)
     return {"size": meshes.mean_size(grid),
             "apart": meshes.relative(computed, reference.displacement, reference.weights)}
 
@@ -234,7 +232,7 @@ STEPS = 18
 
 @pytest.mark.case(
     "mesh_motion-growth", kind="property", mutants=("stale-fluid", "outlet-moves"),
-    references=("quadratic_mesh_motion",), runs_with="3")
+    references=("quadratic_mesh_motion",))
 @parametrize("geometry", EITHER)
 def test_growth(geometry, record):
     """If a half-disc doubles its area or slides by its radius in 18 steps (under a narrow film: grows by 30 % or slides
@@ -276,7 +274,7 @@ def _journey_checks(name: str, first: Mesh, last: Mesh) -> list:
 
 def _area(grid: Mesh) -> float:
     """Area (um2) of all triangles, including their bent edges."""
-    return meshes.fine(Space(grid, grid.geometry))[1].sum()
+    return meshes.fine(Space(grid))[1].sum()
 
 
 STRIDES = (0.08, 0.04, 0.02, 0.01)
@@ -284,7 +282,7 @@ STRIDES = (0.08, 0.04, 0.02, 0.01)
 
 @pytest.mark.case(
     "mesh_motion-round-trip", kind="property", mutants=("stale-forms", "stale-fluid"),
-    references=("quadratic_mesh_motion",), runs_with="3")
+    references=("quadratic_mesh_motion",))
 @parametrize("geometry", EITHER)
 def test_round_trip(geometry, record):
     """After a motion and its reverse the nodes return to second order in the length of the motion, because the reverse
@@ -314,7 +312,7 @@ HALF_BENT = "the map is one to one while it is bent by less than half the height
 @pytest.mark.case(
     "mesh_motion-criterion", kind="exact",
     mutants=("more-poor-triangles", "turned-over-accepted", "quality-halved", "remeshed-too-late",
-             "bent-over-accepted"), runs_with="1 2 3")
+             "bent-over-accepted"), runs_with="1 2")
 def test_criterion(record):
     """An equilateral triangle stretched by s in any direction has the quality 2 s / (1 + s^2). A mesh with seven
     triangles stretched by more than 3, or with one turned over, is not acceptable; with six it is. A curved triangle of

@@ -70,19 +70,18 @@ from verification.problems.channels import (
     uniform_masses,
 )
 
-LINEAR = {"linear": 1}
-HIGHER = {word: order for word, order in ORDERS.items() if order > 1}
+LINEAR, QUADRATIC = {"linear": 1}, {"quadratic": 2}
 PECLETS = {f"Pe = {peclet:g}": peclet for peclet in (0.1, 1.0, 5.0)}
 DENSITIES = {f"X = {density:g} mg/L": density for density in (3e3, 3e4, 3e5)}
-#: Peclet number and density of the starved slab, and of the slab that FiPy and elements of order 2 and 3 share.
+#: Peclet number and density of the starved slab, and of the slab that FiPy and quadratic elements share.
 STARVED, SHARED = (0.1, 3e5), (1.0, 3e4)
 ITSELF_STARVED = "C_A in the starved slab over itself"
 LAW = replace(SCENE.kinetics, yield_coefficient=1e-12)
 #: h: 0.07, 0.2 and 0.7 s. Water diffuses across the slab in 0.6 s, and crosses it in 0.1 to 6 s.
 TIMES = (2e-5, 6e-5, 2e-4)
-#: Last errors: of linear elements by the density X, of other elements by their order.
+#: Last errors: of linear elements by the density X, and of quadratic elements.
 CEILINGS = {3e3: 1e-6, 3e4: 3e-5, 3e5: 4e-4}
-HIGHER_CEILINGS = {2: 1e-7, 3: 1e-9}
+QUADRATIC_CEILING = 1e-7
 
 
 def reference_arguments(peclet: float, density: float):
@@ -119,16 +118,14 @@ def exact(peclet: float, density: float, tolerance: float):
 
 
 #: Random meshes of each size (um), their ends, and solve_bvp's tolerance. At Peclet 5 solve_bvp accepts no smaller one.
-#: Cubic elements are judged at Peclet 1 and on coarser meshes, because solve_bvp is accurate to about 1e-11.
-COLLOCATED = {1: (SAMPLES, CROSSED, 1e-8), 2: ({3.2: 12, 1.6: 6, 0.8: 3, 0.4: 1}, WIDE, 1e-10),
-              3: ({6.4: 12, 3.2: 8, 1.6: 4, 0.8: 2}, WIDE, 1e-12)}
+COLLOCATED = {1: (SAMPLES, CROSSED, 1e-8), 2: ({3.2: 12, 1.6: 6, 0.8: 3, 0.4: 1}, WIDE, 1e-10)}
 
 
 def collocation(order: int, peclet: float, density: float):
     samples, ends, tolerance = COLLOCATED[order]
     errors = refine(_distances, samples, order, peclet, density, ends, tolerance)
     if order > 1:
-        yield studies(errors, {"C": (*EXPECTED[order], HIGHER_CEILINGS[order])})
+        yield studies(errors, {"C": (*EXPECTED[order], QUADRATIC_CEILING)})
         return
     yield studies(errors, each(*EXPECTED[1], CEILINGS[density]))
     if (peclet, density) == STARVED:
@@ -138,7 +135,7 @@ def collocation(order: int, peclet: float, density: float):
 @pytest.mark.case(
     "transport-monod-collocation", kind="cross-code",
     mutants=("decay-demand", "no-inlet-flux", "ratio-on-the-donor-only", "reaction-in-the-fluid",
-             "exchanged-substrates"), references=("channel_bvp",), omitted="orders 2, 3: transport-monod-higher")
+             "exchanged-substrates"), references=("channel_bvp",), omitted="order 2: transport-monod-higher")
 @parametrize("*setup", combined(LINEAR, PECLETS, DENSITIES))
 def test_monod_collocation(setup, record):
     """Dual Monod uptake under plug flow is solve_bvp's at Peclet 0.1, 1, 5 times Thiele numbers 0.6, 1.9, 6, from low
@@ -155,13 +152,10 @@ def test_monod_collocation(setup, record):
     "transport-monod-higher", kind="cross-code",
     mutants=("uptake-without-decay", "fluid-diffusivity", "reaction-evenly-weighted"), references=("channel_bvp",),
     omitted="order 1: transport-monod-collocation")
-@parametrize(
-    "*setup",
-    {**combined({"quadratic": 2}, {"Pe = 0.5": 0.5, "Pe = 1": 1.0, "Pe = 5": 5.0}, DENSITIES),
-     **combined({"cubic": 3}, {"Pe = 1": 1.0}, DENSITIES)})
+@parametrize("*setup", combined(QUADRATIC, {"Pe = 0.5": 0.5, "Pe = 1": 1.0, "Pe = 5": 5.0}, DENSITIES))
 def test_monod_higher(setup, record):
-    """Dual Monod uptake under plug flow on quadratic and cubic triangles is solve_bvp's, to third and fourth order, at
-    Peclet 0.5, 1, 5 (cubic: 1) times Thiele numbers 0.6, 1.9, 6, from low uptake to starved.
+    """Dual Monod uptake under plug flow on quadratic triangles is solve_bvp's, to third order, at Peclet 0.5, 1, 5
+    times Thiele numbers 0.6, 1.9, 6, from low uptake to starved.
 
     Norm: root mean square over the mesh of both substrates less solve_bvp, over the supply.
     """
@@ -196,8 +190,8 @@ SUBSTRATES = substrates_with(acceptor={"diffusivity": 8e6, "diffusivity_in_aggre
 ITSELF = "donor in the biomass, over itself"
 #: Cells (um) with the number of meshes of equally long elements around the block.
 BLOCK = {2.0: 6, 1.0: 4, 0.5: 2, 0.25: 1}
-#: Elements (um) of order 2 and 3 by shape. Their error is less than a tenth of that of the finest cells.
-FINE_AROUND = {"block": {2: 0.5, 3: 1.0}, "half-disc": {2: 1 / 3, 3: 2 / 3}}
+#: Quadratic elements (um) by shape. Their error is less than a tenth of that of the finest cells.
+FINE_AROUND = {"block": 0.5, "half-disc": 1 / 3}
 #: Cells (um), and the refinement that makes elements twice as long on average around the half-disc.
 DISC = {4 / 3: 0.35, 2 / 3: 0.77, 1 / 3: 1.55, 1 / 6: 3.1}
 CUT = ("second order: the uptake of py-pde's cut cells is right, and its position errs to either side (with entire "
@@ -206,20 +200,18 @@ CUT = ("second order: the uptake of py-pde's cut cells is right, and its positio
 BLOCKS = {"X = 1e+05 mg/L, linear": ("block", 1, 1e5, 2e-5, 2e-5, 3e-5),
           "X = 1e+06 mg/L, linear": ("block", 1, 1e6, 1e-4, 1e-4, 3e-4),
           "X = 4e+06 mg/L, linear": ("block", 1, 4e6, 2e-4, 2e-4, 1e-3),
-          "X = 1e+06 mg/L, quadratic": ("block", 2, 1e6, 1e-4, 1e-4, 3e-4),
-          "X = 1e+06 mg/L, cubic": ("block", 3, 1e6, 1e-4, 1e-4, 3e-4)}
+          "X = 1e+06 mg/L, quadratic": ("block", 2, 1e6, 1e-4, 1e-4, 3e-4)}
 HALF_DISCS = {"X = 1e+05 mg/L, linear": ("half-disc", 1, 1e5, 2e-5, 2e-5, 3e-5),
               "X = 1e+06 mg/L, linear": ("half-disc", 1, 1e6, 1e-4, 1e-4, 4e-4),
               "X = 1e+07 mg/L, linear": ("half-disc", 1, 1e7, 3e-4, 3e-4, 1e-2),
-              "X = 1e+06 mg/L, quadratic": ("half-disc", 2, 1e6, 1e-5, 1.5e-5, 4e-5),
-              "X = 1e+06 mg/L, cubic": ("half-disc", 3, 1e6, 1e-5, 1.5e-5, 4e-5)}
+              "X = 1e+06 mg/L, quadratic": ("half-disc", 2, 1e6, 1e-5, 1.5e-5, 4e-5)}
 
 
 def finite_differences(shape: str, order: int, density: float, *ceilings: float):
     """Checks and studies against py-pde.
 
-    Around the half-disc only the finest cells are compared with elements of order 2 and 3, because the error of py-pde
-    changes sign from size to size.
+    Around the half-disc only the finest cells are compared with quadratic elements, because the error of py-pde changes
+    sign from size to size.
     """
     names, suffix = (*NAMES, ITSELF), ", of py-pde less ours"
     if order > 1 and shape == "half-disc":
@@ -240,7 +232,7 @@ def finite_differences(shape: str, order: int, density: float, *ceilings: float)
 @parametrize("*setup", BLOCKS)
 def test_block(setup, record):
     """Diffusion into a block of biomass on a wall is py-pde's, both codes refined together, at Thiele numbers 0.7, 2.2
-    and 4.3; with quadratic and cubic elements the rest state of the transient scheme is the limit of py-pde's cells.
+    and 4.3; with quadratic elements the rest state of the transient scheme is the limit of py-pde's cells.
 
     Norm: root mean square over py-pde's cells over the supply; that of C_D in the biomass over itself; several meshes a
     size.
@@ -255,7 +247,7 @@ def test_block(setup, record):
 @parametrize("*setup", HALF_DISCS)
 def test_half_disc(setup, record):
     """Diffusion into a half-disc is py-pde's, both codes refined together, at Thiele numbers 0.7, 2.2 and 7; with
-    quadratic and cubic elements the rest state of the transient scheme is the limit of py-pde's cells.
+    quadratic elements the rest state of the transient scheme is the limit of py-pde's cells.
 
     Norm: root mean square over py-pde's cells over the supply; that of C_D in the biomass over itself.
     """
@@ -288,7 +280,7 @@ def _rest_state(cell: float, number: int, density: float, shape: str, order: int
 def _differences(cell: float, number: int, density: float, shape: str, order: int) -> dict[str, float]:
     """Differences of both substrates over their supply, and of the scarce donor in the biomass over itself."""
     points, expected, part = _pypde(cell, density, shape)
-    elements = cell if order == 1 else FINE_AROUND[shape][order]
+    elements = cell if order == 1 else FINE_AROUND[shape]
     space, fields = _rest_state(elements, number, density, shape, order)
     computed = meshes.field_at(space, fields.T, points).T
     ratio = (computed / expected)[1, part == 1] - 1
@@ -297,10 +289,10 @@ def _differences(cell: float, number: int, density: float, shape: str, order: in
 
 #: Steps of each of the three intervals.
 STEPS = (16, 32, 64, 128)
-#: Twice FiPy's cells (um), and the elements (um) of order 2 and 3, whose error is less than a tenth of FiPy's.
-CELLS, FINE = (4.0, 2.5, 5 / 3, 1.0), {2: 1.0, 3: 5 / 3}
+#: Twice FiPy's cells (um), and the quadratic elements (um), whose error is less than a tenth of FiPy's.
+CELLS, FINE = (4.0, 2.5, 5 / 3, 1.0), 1.0
 #: Steady and in time: elements (um) with the number of meshes of each, origin of the second order, last error of linear
-#: elements by density, and that against elements of order 2 and 3.
+#: elements by density, and that against quadratic elements.
 AGAINST_FIPY = {
     False: (SAMPLES, "both codes are of second order", {3e3: 1e-6, 3e4: 6e-6, 3e5: 5e-5}, 6e-6),
     True: (dict(zip(CELLS, (4, 3, 2, 1))), "both codes are of second order; the error in time is a tenth",
@@ -312,7 +304,7 @@ def mass(space: Space) -> np.ndarray:
     if space.order == 1:
         return np.diag(space.lumped())
     grid = space.mesh.fem
-    basis = Basis(MeshTri(grid.p, grid.t), ELEMENTS[space.order], intorder=8)  # sorted, as edges of order 3 must be
+    basis = Basis(MeshTri(grid.p, grid.t), ELEMENTS[space.order], intorder=8)
     _, nodes = cKDTree(basis.doflocs.T).query(space.points)
     return poisson.mass.assemble(basis).toarray()[np.ix_(nodes, nodes)]
 
@@ -344,7 +336,7 @@ IN_TIME = {f"Pe = {peclet:g}, X = {density:g} mg/L, {word}": (ORDERS[word], pecl
            for word, size, peclet, density, ceiling in (
                ("linear", CELLS[0], 0.1, 3e5, 2e-5), ("linear", CELLS[0], 1.0, 3e4, 3e-6),
                ("linear", CELLS[0], 5.0, 3e5, 1e-5), ("quadratic", CELLS[0], 1.0, 3e4, 3e-6),
-               ("quadratic", CELLS[0], 5.0, 3e5, 1e-5), ("cubic", 5.0, 1.0, 3e4, 3e-6), ("cubic", 5.0, 5.0, 3e5, 1e-5))}
+               ("quadratic", CELLS[0], 5.0, 3e5, 1e-5))}
 
 
 @pytest.mark.slow
@@ -354,8 +346,8 @@ IN_TIME = {f"Pe = {peclet:g}, X = {density:g} mg/L, {word}": (ORDERS[word], pecl
     references=("monod",))
 @parametrize("order, peclet, density, size, ceiling", IN_TIME)
 def test_gear_in_time(order, peclet, density, size, ceiling, record):
-    """On a given mesh the modified Gear scheme's concentrations, linear, quadratic and cubic, are those of scipy's
-    integrator with scikit-fem's mass matrix, with an error of second order in the step.
+    """On a given mesh the modified Gear scheme's concentrations, linear and quadratic, are those of scipy's integrator
+    with scikit-fem's mass matrix, with an error of second order in the step.
 
     Norm: largest over three times of the root mean square over the nodes, over the supply.
     """
@@ -384,7 +376,7 @@ def _at_cells(x, size: float, number: int, order: int, *arguments) -> np.ndarray
 
 
 def _rows(timed: bool) -> dict[str, tuple]:
-    rows = {**combined(LINEAR, PECLETS, DENSITIES), **combined(HIGHER, {"Pe = 1": 1.0}, {"X = 30000 mg/L": 3e4})}
+    rows = {**combined(LINEAR, PECLETS, DENSITIES), **combined(QUADRATIC, {"Pe = 1": 1.0}, {"X = 30000 mg/L": 3e4})}
     return {label: (timed, *row) for label, row in rows.items()}
 
 
@@ -410,7 +402,7 @@ def finite_volumes(timed: bool, order: int, peclet: float, density: float):
 @parametrize("*setup", _rows(False))
 def test_monod_fipy(setup, record):
     """Dual Monod uptake under plug flow is FiPy's, both codes refined together, at Peclet 0.1, 1, 5 times Thiele
-    numbers 0.6, 1.9, 6, from low uptake to starved; that of quadratic and cubic elements, on one mesh, is the limit of
+    numbers 0.6, 1.9, 6, from low uptake to starved; that of quadratic elements, on one mesh, is the limit of
     FiPy's cells.
 
     Norm: root mean square over FiPy's cells, at five heights, of each substrate over its supply, and in the starved
@@ -426,8 +418,8 @@ def test_monod_fipy(setup, record):
 @parametrize("*setup", _rows(True))
 def test_gear_fipy(setup, record):
     """Transient profiles of both substrates are FiPy's, both codes refined together in space, at Peclet 0.1, 1, 5 times
-    Thiele numbers 0.6, 1.9, 6; and refined in time, where FiPy's own scheme is of first order; those of quadratic and
-    cubic elements, on one mesh, are the limit of FiPy's cells.
+    Thiele numbers 0.6, 1.9, 6; and refined in time, where FiPy's own scheme is of first order; those of quadratic
+    elements, on one mesh, are the limit of FiPy's cells.
 
     Norm: largest over three times of the root mean square over FiPy's cells, at five heights, over the supply; several
     meshes a size.
@@ -438,10 +430,10 @@ def test_gear_fipy(setup, record):
 def _from_fipy(size: float, number: int, order: int, peclet: float, density: float, timed: bool) -> dict[str, float]:
     """Differences from FiPy, over the supply, and of C_A in the slab over itself.
 
-    Both codes are refined together, or FiPy's cells are compared with one mesh of quadratic or cubic elements.
+    Both codes are refined together, or FiPy's cells are compared with one mesh of quadratic elements.
     """
     x, expected = _fipy(size, peclet, density, timed)
-    elements, steps = (size, STEPS[-1] / size) if order == 1 else (FINE[order], STEPS[-1])
+    elements, steps = (size, STEPS[-1] / size) if order == 1 else (FINE, STEPS[-1])
     computed = _at_cells(x, elements, number, order, peclet, density, round(timed * steps))
     inside = (x > 0) & (x < SLAB)
     ratio = computed[-1, 0][:, inside] / expected[-1, 0, inside]
@@ -473,8 +465,8 @@ MIXED_NORM = "largest relative difference, twice a day for five days"
 @cache
 def box_around(order: int) -> Space:
     """A box with a seed on its lower wall."""
-    seed = outline.half_disc(RADIUS, ACROSS_AGGREGATE * 0.5, min(order, 2))
-    return Space(meshes.around(seed, 0.3, (-WELL_MIXED, WELL_MIXED), WELL_MIXED)[0], order)
+    seed = outline.half_disc(RADIUS, ACROSS_AGGREGATE * 0.5, order)
+    return Space(meshes.around(seed, 0.3, (-WELL_MIXED, WELL_MIXED), WELL_MIXED)[0])
 
 
 @cache
@@ -528,7 +520,7 @@ def well_mixed(order: int):
 @pytest.mark.case(
     "transport-well-mixed", kind="cross-code", norm=f"{MIXED_NORM}; X at constant C: relative, after five days",
     mutants=("inert-fraction", "yield-dropped", "remains-of-the-start", "growth-in-one-increment"),
-    references=("monod",), omitted="orders 2, 3: transport-well-mixed-higher")
+    references=("monod",), omitted="order 2: transport-well-mixed-higher")
 @parametrize("order", combined(LINEAR))
 def test_well_mixed(order, record):
     """In a closed, well-mixed pore C_A, C_D, X_A and X_I follow the four ordinary equations over days, with an error of
@@ -542,9 +534,9 @@ def test_well_mixed(order, record):
     "transport-well-mixed-higher", kind="cross-code", norm=MIXED_NORM,
     mutants=("storage-diagonal", "inert-fraction", "remains-of-the-start"), references=("monod",),
     omitted="order 1: transport-well-mixed")
-@parametrize("order", combined(HIGHER))
+@parametrize("order", combined(QUADRATIC))
 def test_well_mixed_higher(order, record):
-    """With quadratic and cubic concentrations C_A, C_D, X_A and X_I of the well-mixed pore follow the four ordinary
+    """With quadratic concentrations C_A, C_D, X_A and X_I of the well-mixed pore follow the four ordinary
     equations, too.
     """
     record(well_mixed(order))

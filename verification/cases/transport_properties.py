@@ -32,7 +32,6 @@ STARVED = [(radius, *supplies) for radius in (27.0, 42.0)
 #: Changes of the scene base, whose preset is paper: elements of each order (curved ones are coarser), and presets.
 KINDS = {"linear, paper": ('numerics.elements="linear"',),
          "quadratic": ('numerics.elements="quadratic"', "numerics.refinement=0.5"),
-         "cubic": ('numerics.elements="cubic"', "numerics.refinement=0.4"),
          "fast": ('numerics.preset="fast"',), "accurate": ('numerics.preset="accurate"',)}
 ROUND_OFF = "the sum of the weak form over its test functions; rows are solved to 1e-13 of terms 1e3 times the supply"
 
@@ -60,8 +59,8 @@ def _defect(flux) -> float:
 @parametrize("kind", combined(KINDS))
 def test_balance(kind, record):
     """The supply equals out + consumed to round-off, with flow and without, and with the printed inlet (11) if its
-    (u_ave - u_x) C is counted [E4]. In the transient scheme it equals out + consumed + stored. Both hold with linear,
-    quadratic and cubic elements.
+    (u_ave - u_x) C is counted [E4]. In the transient scheme it equals out + consumed + stored. Both hold with linear
+    and quadratic elements.
 
     Norm: supplied - out - consumed over supplied; in time, less stored.
     """
@@ -108,7 +107,7 @@ def _in_time(seed, solved):
 def test_starved(kind, radius, supplies, record):
     """Starved pores (0.35 m/d, radius 27 and 42 um, supplies of 0.15 and 10 mg/L) have one steady state, with C >= 0
     and a balance that closes to round-off. It does not depend on the start of Newton's method, and the transient scheme
-    comes to rest in it. With quadratic and cubic elements C is not below the accepted undershoot.
+    comes to rest in it. With quadratic elements C is not below the accepted undershoot.
 
     Norm: least C over the supply; balance as above; largest relative difference between ways to the steady state.
     """
@@ -144,17 +143,14 @@ PAPER, FAST, ACCURATE = map(runs.with_preset, runs.PRESETS)
 FINER = "numerics.refinement=0.45"
 SOLVED = {"fast": ((FAST, "numerics.refinement=0.25"), 1e-2), "accurate": ((FAST, FINER), 1e-3),
           "linear": ((PAPER,), 1e-2)}
-CUBIC = {"cubic": ((FAST, runs.with_elements("cubic"), FINER), 1e-3)}
-#: Half saturations, and the least one, at which cubic elements would take minutes.
-HALVES = {f"K_s = {half}": half for half in ("1e-2 mg/L", "1e-3 mg/L")}
-LEAST = {"K_s = 1e-5 mg/L": "1e-5 mg/L"}
+HALVES = {f"K_s = {half}": half for half in ("1e-2 mg/L", "1e-3 mg/L", "1e-5 mg/L")}
 
 
 @pytest.mark.case("transport-proportion", kind="property", mutants=("unpaired",), runs_with="2 paper")
-@parametrize("half, solved", combined({"K_s = 1e-2 mg/L": "1e-2 mg/L"}, {**SOLVED, **CUBIC}))
+@parametrize("half, solved", combined({"K_s = 1e-2 mg/L": "1e-2 mg/L"}, SOLVED))
 def test_proportion(half, solved, record):
     """Behind a front where the donor is used up, at half saturations of a hundredth of its supply, both are taken up in
-    their proportion, with linear, quadratic and cubic elements.
+    their proportion, with linear and quadratic elements.
 
     Norm: consumed acceptor over F times consumed donor, less one.
     """
@@ -170,11 +166,11 @@ def proportion(half: str, *numerics: str) -> Check:
 
 @pytest.mark.slow
 @pytest.mark.case("transport-curved-front", kind="property", mutants=("unpaired",), runs_with="2 paper")
-@parametrize("half, solved", combined(HALVES, {**SOLVED, **CUBIC}) | combined(LEAST, SOLVED))
+@parametrize("half, solved", combined(HALVES, SOLVED))
 def test_curved_front(half, solved, record):
     """Behind a front where the donor is used up, to half saturations of a millionth of the supply, both are taken up in
-    their proportion, with linear and quadratic elements (cubic: a ten-thousandth), and effluents are within the
-    presets' accuracy. If a mesh is refused, the refinement is that of the refusal.
+    their proportion, with linear and quadratic elements, and effluents are within the presets' accuracy. If a mesh is
+    refused, the refinement is that of the refusal.
 
     Norm: consumed acceptor over F times consumed donor, less one; difference of effluents over the larger supply, to a
     mesh of refinement 1.3.
@@ -225,7 +221,6 @@ TENTH = "a tenth of the error that preset fast promises"
 #: A half-disc under fast water: numerics, bound of the difference of effluents and consumption from those of quadratic
 #: elements of refinement 2.5, and its origin.
 FASTEST = {"quadratic, accurate": ((ACCURATE, runs.with_elements("quadratic"), FINER), 1e-3, WITHIN),
-           "cubic": ((ACCURATE, runs.with_elements("cubic"), FINER), 1e-3, WITHIN),
            "fast": ((FAST,), 1e-3, TENTH + ": its elements there are accurate's")}
 
 
@@ -235,8 +230,7 @@ FASTEST = {"quadratic, accurate": ((ACCURATE, runs.with_elements("quadratic"), F
     omitted="order 1 and paper: linear elements are not graded to boundary layers")
 @parametrize("speed, preset", combined({speed: speed for speed in ("2.9 m/day", "29 m/day", "290 m/day")}, FASTEST))
 def test_curved_peclet(speed, preset, record):
-    """In fast water (u W / D to 3e4) the presets accurate, with quadratic and with cubic elements, and fast resolve
-    boundary layers to 0.1 %.
+    """In fast water (u W / D to 3e4) the presets accurate and fast resolve boundary layers to 0.1 %.
 
     Norm: difference of effluents, over the supply, and of consumption, relative, to a mesh of refinement 2.5.
     """
@@ -250,19 +244,17 @@ def test_curved_peclet(speed, preset, record):
 #: Numerics, bound of the balance, and bound of the difference of effluents from quadratic elements twice finer.
 CONSERVES = 1e-11, "round-off: the form conserves"
 HALF_DISCS = {
-    "cubic": ((ACCURATE, runs.with_elements("cubic")), CONSERVES, 1e-5,
-              "a hundredth of the error that preset accurate promises"),
     "quadratic": ((ACCURATE, "numerics.refinement=0.9"), CONSERVES, 0.0, "the others are compared with this solution"),
     "linear, paper": ((PAPER,), (1e-9, ROUND_OFF), 1e-2, "1 %, the error that preset paper promises"),
     "fast": ((FAST,), CONSERVES, 1e-3, TENTH),
     "accurate": ((ACCURATE,), CONSERVES, 1e-4, "a tenth of the error that preset accurate promises")}
 
 
-@pytest.mark.case("transport-cubic-half-disc", kind="property", mutants=("outlet-forgotten",))
+@pytest.mark.case("transport-curved-half-disc", kind="property", mutants=("outlet-forgotten",))
 @parametrize("numerics, round_off, bound, why", HALF_DISCS)
-def test_cubic_half_disc(numerics, round_off, bound, why, record):
-    """Around a half-disc, under the flow of cubic velocities, each substrate is in balance to round-off, and the
-    effluents are those of quadratic elements on a mesh twice finer. Those of the presets agree within their errors.
+def test_curved_half_disc(numerics, round_off, bound, why, record):
+    """Around a half-disc each substrate is in balance to round-off, and the effluents of the presets are those of
+    quadratic elements on a mesh twice finer within their errors.
 
     Norm: (in - out - consumed) over in; difference over the supply to quadratic concentrations.
     """

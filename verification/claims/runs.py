@@ -251,7 +251,7 @@ class Body(Reported):
 
     def concentration(self, name: str) -> np.ndarray:
         """(N,) mg/L of a substrate."""
-        return self.pore.space.to_mesh(getattr(self.solved.concentrations, name))
+        return getattr(self.solved.concentrations, name)
 
 
 def body_of(scene: Scene, report: Report) -> Body:
@@ -320,7 +320,7 @@ def solution(scene, grid: Mesh, active: np.ndarray, carried_by_u: bool = False) 
     """
     flow_field = flow_in(scene, grid)
     carrier = replace(flow_field, correction=0 * flow_field.correction) if carried_by_u else flow_field
-    space = Space(grid, scene.numerics.order)
+    space = Space(grid)
     problem = transport.problem(space, carrier, scene.substrates, scene.kinetics, scene.numerics.inlet)
     sink = Sink(space.integration.to_points(active) * space.reaction.dx)
     state = transport.steady(problem, sink)
@@ -329,7 +329,7 @@ def solution(scene, grid: Mesh, active: np.ndarray, carried_by_u: bool = False) 
 
 def flow_in(scene, grid: Mesh) -> flow.Flow:
     """Flow under the scene's drive."""
-    return pore.solve_flow(Space(grid, scene.numerics.order), scene.flow, scene.pore.length, scene.numerics)
+    return pore.solve_flow(Space(grid), scene.flow, scene.pore.length, scene.numerics)
 
 
 def full_biomass(scene, grid: Mesh) -> np.ndarray:
@@ -343,8 +343,8 @@ def half_disc(scene, radius: float, reach: float) -> Mesh:
     """The mesh around a half-disc, to the distance ``reach`` (um) on both sides, or to the pore's ends."""
     end = min(radius + reach, scene.pore.length / 2)
     numerics = scene.numerics
-    outline = seed(radius, ACROSS_AGGREGATE * numerics.refinement, numerics.geometry)
-    return mesher.generate(outline, (-end, end), pore.sized(scene), numerics.geometry)[0]
+    outline = seed(radius, ACROSS_AGGREGATE * numerics.refinement, numerics.order)
+    return mesher.generate(outline, (-end, end), pore.sized(scene), numerics.order)[0]
 
 
 def plug(scene, first: float, last: float) -> Mesh:

@@ -65,7 +65,7 @@ def interface_forms() -> Numbers:
 
 def in_forms(grid: Mesh, ratio: float) -> list[flow.UnitFlow]:
     """Unit flow in both forms, laplacian first."""
-    return [flow.unit_flow(Space(grid, 1), ratio, interface=form) for form in ("laplacian", "traction")]
+    return [flow.unit_flow(Space(grid), ratio, interface=form) for form in ("laplacian", "traction")]
 
 
 def losses(grid: Mesh) -> list[float]:
@@ -112,7 +112,7 @@ def outlet() -> Numbers:
 
 def free_outlet(grid: Mesh) -> tuple[np.ndarray, float]:
     """Velocity and loss of unit flow in a clean channel, traction form, nothing prescribed at the outlet."""
-    space, count = Space(grid, 1), len(grid.points)
+    space, count = Space(grid), len(grid.points)
     topology = grid.topology
     constrained = np.zeros((count, 2), bool)
     constrained[topology.walls] = constrained[topology.inlet] = True

@@ -22,13 +22,12 @@ FOLDER = ROOT / "verification" / "cases"
 KINDS = ("exact", "manufactured", "cross-code", "property")
 #: Modules of a stage begin with its name: flow.py, flow_codes.py.
 STAGES = ("flow", "transport", "growth", "reprojection", "mesh_motion", "coupling", "hard")
-#: Numerics that a case may run with: elements of order 1, 2 and 3, and the presets of whole scenes.
-NUMERICS = ("1", "2", "3", "paper", "fast", "accurate", "exact")
+#: Numerics that a case may run with: elements of order 1 and 2, and the presets of whole scenes.
+NUMERICS = ("1", "2", "paper", "fast", "accurate", "exact")
 #: Variants with this word in their label are slow, whatever the case: the preset differs from accurate in its sizes.
 SLOW = "exact"
 #: The numerics that other words in labels stand for.
-OF_WORDS = {"linear": "1", "quadratic": "2", "cubic": "3", "order 1": "1", "order 2": "2", "order 3": "3",
-             "straight": "1", "curved": "2", "of cubic scenes": "3"}
+OF_WORDS = {"linear": "1", "quadratic": "2", "order 1": "1", "order 2": "2", "straight": "1", "curved": "2"}
 
 
 @dataclass(frozen=True)

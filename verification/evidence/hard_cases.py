@@ -1,7 +1,7 @@
 """The matrix of the hard cases with every preset, ``verification/report/hard_cases.json``.
 
-A cell is a case with a preset. It is right, refused or wrong; see :mod:`verification.problems.hard`. "cubic" is the
-preset fast with cubic elements. A case names the parts that a preset may refuse; ``paper`` may refuse all parts.
+A cell is a case with a preset. It is right, refused or wrong; see :mod:`verification.problems.hard`. A case names the
+parts that a preset may refuse; ``paper`` may refuse all parts.
 """
 
 from collections.abc import Collection, Iterable, Iterator, Mapping

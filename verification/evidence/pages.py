@@ -152,8 +152,8 @@ def article(case: Case, record: Mapping) -> list[str]:
 
 
 def shared(names: list[str]) -> str:
-    """Names as one list. Names that begin alike up to a comma share the beginning, "C: linear; cubic", and beginnings
-    with the same list share the list."""
+    """Names as one list. Names that begin alike up to a comma share the beginning, "C: linear; quadratic", and
+    beginnings with the same list share the list."""
     begins: dict[str, list[str]] = {}
     for name in names:
         begins.setdefault(name.partition(", ")[0], []).append(name)

@@ -39,7 +39,7 @@ def seed_around(around: Outline, refinement: float, density=uniform, ends=(-75.0
 
 def seed_on(grid: Mesh, around: Outline, order: int, density=uniform) -> Pore:
     """An aggregate at t = 0 with X_A = density(x, y), on an existing mesh."""
-    space = Space(grid, order)
+    space = Space(grid)
     active = density(*reaction_points(space)) * space.reaction.dx
     body = material(space, grid.points[grid.body])
     return Pore(0.0, space, around.wall, around.fixed, active, 0 * active, np.ones_like(body.at.dx), body,

@@ -3,7 +3,7 @@
 The one-dimensional cases share narrow channels with random meshes and a slab of biomass from wall to wall. Their
 references do not depend on y. Errors are averaged over several unrelated meshes of each size, because in a channel a
 few elements wide the errors of single meshes scatter by a factor of 2. Linear concentrations are on straight
-triangles, and those of order 2 and 3 on curved ones, as in runs of the package.
+triangles, and quadratic ones on curved triangles, as in runs of the package.
 
 Boxes have the exact velocity prescribed all around, for exact solutions of Stokes flow without inlet and outlet. The
 element matrices of every form and order, the stabilisation, the assembly and the solver are those of ``repro``. Only
@@ -31,22 +31,20 @@ NAMES = ("acceptor", "donor")
 HEIGHTS = 5
 #: Under plug flow the slab is 0 < x < SLAB; without flow |x| < SLAB, between films of fluid of thickness FILM or none.
 CROSSED, FILM = (-20.0, 60.0), 20.0
-#: Ends of the channel with more fluid, for order 2 and 3.
+#: Ends of the channel with more fluid, for order 2.
 WIDE = (-40.0, 80.0)
 #: Element sizes (um) and the number of meshes of each. Coarse meshes are cheap and scatter most.
 SAMPLES = {4.0: 12, 2.0: 6, 1.0: 3, 0.5: 1}
 FINEST = min(SAMPLES)
 SECOND = "linear elements, lumped reaction: second order"
-WORDS = {1: "linear", 2: "quadratic", 3: "cubic"}
+WORDS = {1: "linear", 2: "quadratic"}
 #: Every order, by its word.
 ORDERS = {word: order for order, word in WORDS.items()}
 #: Expected orders and their reasons: concentrations in L2, and effluents and uptake (twice the order of the gradient).
-EXPECTED = {1: (2, SECOND), 2: (3, "quadratic elements: third order in L2"),
-            3: (4, "cubic elements: fourth order in L2")}
-FUNCTIONAL = {1: (2, SECOND), 2: (4, "twice the order of the gradient: fourth"),
-              3: (6, "twice the order of the gradient: sixth")}
-#: Degrees of the quadrature in which errors of an order are integrated.
-DEGREES = {1: 6, 2: 6, 3: 8}
+EXPECTED = {1: (2, SECOND), 2: (3, "quadratic elements: third order in L2")}
+FUNCTIONAL = {1: (2, SECOND), 2: (4, "twice the order of the gradient: fourth")}
+#: Degree of the quadrature in which errors are integrated.
+DEGREE = 6
 
 
 def mesh_with_sides(area: float, size: float, sample: int, ends, width: float, is_biomass, **lines) -> Mesh:
@@ -142,7 +140,7 @@ def both(state: transport.Concentrations) -> np.ndarray:
 
 def in_points(space: Space) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Quadrature of errors: points (T, q, 2) um, weights (T, q) um2 and functions (q, k)."""
-    return meshes.fine(space, degree=DEGREES[space.order])
+    return meshes.fine(space, degree=DEGREE)
 
 
 def rms_errors(space: Space, fields: np.ndarray, exact) -> tuple[np.ndarray, np.ndarray]:
@@ -166,28 +164,26 @@ def box_errors(grid: Mesh, order: int, ratio: float, interface: str, exact: Call
     order: of the velocity; ratio: of the viscosities; exact(x, y): velocity (..., 2), pressure (...) and force
     (..., 2), all dimensionless.
     """
-    space = Space(grid, order)
-    pressures = flow.pressure_space(space)
-    u, p = _box_flow(space, pressures, ratio, interface, exact)
+    space = meshes.space_on(grid, order)
+    u, p = _box_flow(space, ratio, interface, exact)
     where, weight, shape = meshes.fine(space)
     truth, level, _ = exact(*np.moveaxis(where, 2, 0))
-    heads = p[pressures.cells] @ meshes.fine(pressures)[2].T
+    heads = p[space.mesh.triangles] @ meshes.fine_linear(space).T
     computed, expected = (field - np.average(field, weights=weight) for field in (heads, level))
     return {"velocity": meshes.relative(shape @ u[space.cells], truth, weight),
             "pressure": meshes.relative(computed, expected, weight)}
 
 
-def _box_flow(space: Space, pressures: Space, ratio: float, interface: str, exact: Callable
-              ) -> tuple[np.ndarray, np.ndarray]:
-    """Velocity (n, 2) and pressure (m,), both at the nodes of their orders."""
+def _box_flow(space: Space, ratio: float, interface: str, exact: Callable) -> tuple[np.ndarray, np.ndarray]:
+    """Velocity (n, 2) at the nodes and pressure (m,) at the corners."""
     grid = space.mesh
     viscosity = np.where(grid.biomass, ratio, 1.0)
     tau = flow.Stabilised().mobility(grid, viscosity, interface)
     lower = flow.Linear(space, tau).lower if space.order == 1 else None
     blocks = flow.stokes(space, viscosity, interface, lower)
-    system = grid.topology.system(("box", space.order), lambda: _constrained_rim(space, pressures))
+    system = grid.topology.system("box", lambda: _constrained_rim(space))
     fields = _load(space, exact), _without_flux(space, exact(*space.points.T)[0])
-    right, value = (np.append(field.T, np.zeros(pressures.count)) for field in fields)
+    right, value = (np.append(field.T, np.zeros(grid.corners)) for field in fields)
     solution = system.solve(blocks, right, value)
     velocity, pressure = np.split(solution, [2 * space.count])
     return velocity.reshape(2, -1).T, pressure
@@ -201,9 +197,9 @@ def _rim(space: Space) -> np.ndarray:
     return on
 
 
-def _constrained_rim(space: Space, pressures: Space) -> ElementSystem:
+def _constrained_rim(space: Space) -> ElementSystem:
     """The system in which all velocities of the rim and the first pressure are prescribed."""
-    system = saddle_system(space.cells, pressures.cells, _rim(space))
+    system = saddle_system(space.cells, space.mesh.triangles, _rim(space))
     constrained = system.constrained.copy()
     constrained[2 * space.count] = True
     return system.with_constrained(constrained)

@@ -36,10 +36,9 @@ PRESETS = tuple(NUMERICS)
 LENIENT = "paper"
 #: Relative error that a preset promises in velocity, conductivity, area, thickness and tips, and in effluents over the
 #: supply. The paper states none: linear triangles of its sizes were measured 1 to 4 % off in the head loss.
-TOLERANCE = {"paper": 0.04, "fast": 0.01, "accurate": 0.001, "cubic": 0.01}
+TOLERANCE = {"paper": 0.04, "fast": 0.01, "accurate": 0.001}
 PROMISED = {"paper": "linear triangles: 1 to 4 % in the head loss",
-            "fast": "what fast is for: 1 %", "accurate": "what accurate is for: 0.1 %",
-            "cubic": "as fast: 1 %"}
+            "fast": "what fast is for: 1 %", "accurate": "what accurate is for: 0.1 %"}
 #: Bounds of concentrations over the supply that the stages document (UNRESOLVED, OVERSHOOT).
 LOWEST, HIGHEST = -1e-3, 1.02
 BALANCE = 1e-9
@@ -266,7 +265,7 @@ MEAN = "J = theta in the mean; Newton's tolerance"
 DENSITY = "J = theta holds in the mean over elements: a local density is off by what an element does not resolve [E7]"
 #: The area is exact on curved triangles, where masses are transferred. On straight triangles a remesh leaves an error
 #: in (34), which the next update removes [E7].
-AREA = {"linear": 1e-4, "quadratic": 1e-8, "cubic": 1e-8}
+AREA = {"linear": 1e-4, "quadratic": 1e-8}
 
 
 def solved_seed(scene: Scene) -> tuple[Pore, Solved]:
@@ -420,4 +419,4 @@ def parametrize(*cases: HardCase) -> pytest.MarkDecorator:
     return pytest.mark.parametrize("case, preset", sets)
 
 
-NORM = "numbers of each part with all presets, and with fast on cubic elements; refused parts are left out"
+NORM = "numbers of each part with all presets; refused parts are left out"

@@ -7,7 +7,7 @@ Edges may follow lines or a circle between fluid and biomass. An edge between ne
 edge if no other node lies in the circle around it, so nodes nearer to the curve than CLEARANCE are left out. A mesh
 with a triangle across the curve is refused.
 
-Fields of order 1, 2 or 3 have norms of their errors and values at points.
+Fields of order 1 or 2 have norms of their errors and values at points.
 """
 
 from dataclasses import replace
@@ -80,15 +80,15 @@ def plug(ends, width: float, half: float, size: float, make=channel, seed: int =
     return make(ends, width, size, lambda x, y: np.abs(x) < half, across=(-half, half), seed=seed)
 
 
-def space_on(straight: Mesh, order: int) -> Space:
-    """A space of an order on a straight mesh. Orders 2 and 3 take its triangles as curved ones."""
-    return Space(straight if order == 1 else curved(straight, None), order)
+def space_on(grid: Mesh, order: int) -> Space:
+    """A space of an order on a mesh. Order 2 takes straight triangles as curved ones."""
+    return Space(grid if order == grid.geometry else curved(grid, None))
 
 
 def half_disc(radius: float, refinement: float, ends, width: float, *, geometry: int = 1, lean: float = 0.0) -> Mesh:
     """The package's mesh around a half-disc on the lower wall, sheared by ``lean``.
 
-    Triangles are straight (geometry 1) or curved (2 and 3). The thinnest resolved film is 2 um thick.
+    Triangles are straight (geometry 1) or curved (2). The thinnest resolved film is 2 um thick.
     """
     upright = seed(radius, refinement, geometry)
     points = upright.points + lean * upright.points[:, [1]] * [1.0, 0.0]
@@ -96,8 +96,8 @@ def half_disc(radius: float, refinement: float, ends, width: float, *, geometry:
 
 
 def seed(radius: float, refinement: float, order: int = 1) -> outline.Outline:
-    """The outline of a half-disc: straight edges for order 1, arcs for orders 2 and 3."""
-    return outline.half_disc(radius, sizing.ACROSS_AGGREGATE * refinement, min(order, 2))
+    """The outline of a half-disc: straight edges for order 1, arcs for order 2."""
+    return outline.half_disc(radius, sizing.ACROSS_AGGREGATE * refinement, order)
 
 
 def around(seed: outline.Outline, refinement: float, ends, width: float) -> tuple[Mesh, outline.Outline]:
@@ -107,7 +107,7 @@ def around(seed: outline.Outline, refinement: float, ends, width: float) -> tupl
 
 def half_disc_space(radius: float, refinement: float, ends, width: float, order: int) -> Space:
     """A space of an order on the package's mesh around a half-disc."""
-    return Space(half_disc(radius, refinement, ends, width, geometry=order), order)
+    return Space(half_disc(radius, refinement, ends, width, geometry=order))
 
 
 #: The least distance of a node from the curve over the element size. It exceeds 0.5 because edges on the curve are a
@@ -170,19 +170,18 @@ def _mesh(points, triangles, is_biomass, ends, width: float, loop=()) -> Mesh:
     return Mesh.of(points, triangles, biomass, np.array(loop, int), width, tuple(map(float, ends)))
 
 
-#: Degree of the quadrature for fields of any order (products of two cubic fields, curved triangles), and for fields of
-#: order 1.
+#: Degree of the quadrature for fields of any order on curved triangles, and for fields of order 1.
 FINE, LINEAR = 10, 6
 
 
 def quadrature_points(nodes: np.ndarray, table: elements.Table) -> tuple[np.ndarray, np.ndarray]:
     """Points (t, q, 2) um and weights (t, q) um2 of a table on triangles with nodes (t, g, 2) in either orientation."""
-    return np.einsum("qa,tai->tqi", table.shape, nodes), np.abs(elements.weights(nodes, table))
+    return np.einsum("qa,tai->tqi", table.values, nodes), np.abs(elements.weights(nodes, table))
 
 
 def quadrature(points: np.ndarray, triangles: np.ndarray):
     """Points (t, q, 2), weights (t, q) and nodal functions (q, 3) on straight triangles."""
-    table = elements.table(1, 1, LINEAR)
+    table = elements.table(1, LINEAR)
     return *quadrature_points(points[triangles], table), table.values
 
 
@@ -191,8 +190,13 @@ def fine(space: Space, chosen=slice(None), degree: int = FINE):
 
     The quadrature has the given degree on the triangles ``chosen``, straight or curved.
     """
-    mesh, table = space.mesh, elements.table(space.order, space.mesh.geometry, degree)
+    mesh, table = space.mesh, elements.table(space.order, degree)
     return *quadrature_points(mesh.points[mesh.cells[chosen]], table), table.values
+
+
+def fine_linear(space: Space) -> np.ndarray:
+    """(q, 3) linear functions of the corners, those of a pressure, at the points of :func:`fine`."""
+    return elements.table(space.order, FINE).linear
 
 
 def relative(computed: np.ndarray, exact: np.ndarray, weight: np.ndarray) -> float:
@@ -225,15 +229,23 @@ def field_at(space: Space, values: np.ndarray, where: np.ndarray) -> np.ndarray:
     The package locates the triangle of each point. The map of the triangle confirms it, and the coordinates of the
     nodes give their numbers. Raises ValueError if a point lies elsewhere.
     """
-    mesh = space.mesh
+    return _values_at(space.mesh, space.order, space.points, values, where)
+
+
+def pressure_at(mesh: Mesh, values: np.ndarray, where: np.ndarray) -> np.ndarray:
+    """:func:`field_at` for a field (corners,) that is linear in each triangle."""
+    return _values_at(mesh, 1, mesh.points[: mesh.corners], values, where)
+
+
+def _values_at(mesh: Mesh, order: int, points: np.ndarray, values: np.ndarray, where: np.ndarray) -> np.ndarray:
     at = transfer.located(mesh.points, mesh.cells, where)
     nodes = mesh.points[mesh.cells[at.triangle]]
     mapped = np.einsum("ka,kai->ki", elements.values(mesh.geometry, at.local), nodes)
     if np.abs(mapped - where).max() > 1e-6:
         raise ValueError("a point does not lie in the triangle that was located")
-    dof_points = np.einsum("da,kai->kdi", elements.values(mesh.geometry, elements.nodes(space.order)), nodes)
-    numbers = cKDTree(space.points).query(dof_points)[1]
-    return np.einsum("kd,kd...->k...", elements.values(space.order, at.local), values[numbers])
+    dof_points = np.einsum("da,kai->kdi", elements.values(mesh.geometry, elements.nodes(order)), nodes)
+    numbers = cKDTree(points).query(dof_points)[1]
+    return np.einsum("kd,kd...->k...", elements.values(order, at.local), values[numbers])
 
 
 def section_means(space: Space, values: np.ndarray, x: np.ndarray, count: int = 16) -> np.ndarray:

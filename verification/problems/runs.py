@@ -22,17 +22,17 @@ from verification.problems import channels, meshes
 ROUND_OFF = "round-off"
 #: The velocity of base at t = 0, 2.9 m/d, in um/h.
 SPEED = 2.9e6 / 24
-#: Elements of order 1, 2 and 3, by their names in scenes.
-ELEMENTS = ("linear", "quadratic", "cubic")
+#: Elements of order 1 and 2, by their names in scenes.
+ELEMENTS = ("linear", "quadratic")
 
 
 def with_elements(elements: str) -> str:
-    """The change of a scene that sets its elements: linear, quadratic or cubic."""
+    """The change of a scene that sets its elements: linear or quadratic."""
     return f'numerics.elements="{elements}"'
 
 
 def coarser(elements: str, refinement: float, linear: float = 1.0) -> str:
-    """The change of a scene that sets the refinement of quadratic and cubic elements, or that of linear ones."""
+    """The change of a scene that sets the refinement of quadratic elements, or that of linear ones."""
     return f"numerics.refinement={linear if elements == 'linear' else refinement}"
 
 
@@ -44,9 +44,8 @@ def with_preset(preset: str) -> str:
 PRESETS = ("paper", "fast", "accurate")
 #: Presets with quadratic elements and the midpoint rule.
 QUADRATIC = ("fast", "accurate", "exact")
-#: Changes of a scene, by label: the presets, and fast with cubic elements.
-NUMERICS = {**{preset: (with_preset(preset),) for preset in PRESETS},
-            "cubic": (with_preset("fast"), with_elements("cubic"))}
+#: Changes of a scene, by label: the presets.
+NUMERICS = {preset: (with_preset(preset),) for preset in PRESETS}
 WITH_EXACT = {**NUMERICS, "exact": (with_preset("exact"),)}
 
 

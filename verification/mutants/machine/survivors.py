@@ -2,8 +2,6 @@
 
 #: Reasons why survivors are equivalent to the code, by (file of repro/, lines before, lines after).
 EQUIVALENT: dict[tuple[str, str, str], str] = {
-    ("fem/elements.py", "EDGE_DEGREES = {1: 2, 2: 6, 3: 9}", "EDGE_DEGREES = {1: 3, 2: 6, 3: 9}"):
-        "The same rule: scikit-fem uses two Gauss points for degree 2, which are exact to degree 3.",
     ("fem/linear.py", "dominant = np.tile((np.ones((k, k)) + k * np.eye(k)).ravel(), len(elements))",
      "dominant = np.tile((np.ones((k, k)) + k - np.eye(k)).ravel(), len(elements))"):
         "Identical orders of elimination for every system of base in the three presets. The order follows from the "

@@ -1,0 +1,106 @@
+"""Keys and choices of earlier versions: scenes are refused with what to write instead, old runs still load."""
+import shutil
+
+import pytest
+
+import repro
+from repro.cli import main
+from repro.report import comparison
+from repro.report.reading import read
+from repro.scene import KEYS, former, load_scene, scene_hash
+from repro.scene.reading import entries
+from tests.pages import cached_run
+from tests.shell import files, flags, read_record, refusal, rewrite
+
+CHANGES = ("growth.end=0.4 h", "numerics.preset=fast")
+SCENE = load_scene("base", CHANGES)
+
+
+@pytest.fixture
+def removed(monkeypatch):
+    """A key and a choice of an imagined earlier version."""
+    monkeypatch.setitem(former.KEYS, "numerics.colour", former.Former("blue", "leave it out"))
+    monkeypatch.setitem(former.CHOICES, ("numerics.inlet", "plug"), 'write "mean"')
+
+
+@pytest.fixture
+def earlier(removed, tmp_path):
+    """The folder of a run, and a function that changes keys of [numerics] in its record."""
+    folder = tmp_path / "earlier"
+    shutil.copytree(cached_run(SCENE), folder)
+
+    def change(**keys):
+        record = read_record(folder)
+        numerics = {**record["tables"]["numerics"], **keys}
+        rewrite(folder, tables={**record["tables"], "numerics": numerics})
+
+    return folder, change
+
+
+@pytest.mark.parametrize("key, value, instead", [
+    ("colour", "red", "this key was removed; leave it out"), ("colour", "blue", "this key was removed; leave it out"),
+    ("inlet", "plug", 'this choice was removed; write "mean"')])
+def test_a_former_key_or_choice_is_refused_with_what_to_write(removed, tmp_path, capsys, key, value, instead):
+    """Whatever its value, in one line with exit status 2; from --set, a file and Python."""
+    line = f'numerics.{key} = "{value}": {instead}\n'
+    assert refusal(tmp_path, capsys, "run", "base", "--set", f"numerics.{key}={value}", "--out", tmp_path / "run"
+                   ) == f"repro: base: {line}"
+    scene = tmp_path / "mine.toml"
+    scene.write_text(f'[numerics]\n{key} = "{value}"\n')
+    assert refusal(tmp_path, capsys, "check", scene) == f"repro: {scene}: {line}"
+    with pytest.raises(repro.SceneError) as error:
+        load_scene({"numerics": {key: value}})
+    assert f"{error.value}\n" == f"scene: {line}"
+
+
+@pytest.mark.parametrize("value", [["plug"], {"plug": 1}, 3, None])
+def test_a_value_of_another_type_is_no_former_choice(removed, value):
+    with pytest.raises(repro.SceneError, match="\"local\" or \"mean\" is needed"):
+        load_scene({"numerics": {"inlet": value}})
+
+
+def test_no_former_key_is_a_key_of_a_scene():
+    """Each names a section that every scene has; no former choice is one of its key's."""
+    assert not former.KEYS.keys() & set(KEYS)
+    assert {key.partition(".")[0] for key in former.KEYS} <= {"pore", "numerics", "output"}
+    for key, choice in former.CHOICES:
+        section, _, name = key.partition(".")
+        words = entries(type(getattr(SCENE, section)))[name].metadata["kind"].words
+        assert choice not in words and any(f'"{word}"' in former.CHOICES[key, choice] for word in words)
+
+
+@pytest.mark.parametrize("keys, shown", [({"colour": "blue"}, []), ({"colour": "red"}, ["numerics.colour"]),
+                                         ({"inlet": "plug"}, ["numerics.inlet"])])
+def test_a_run_of_an_earlier_version_loads_plots_and_compares(earlier, tmp_path, keys, shown):
+    """Only a value that present scenes do not have is a difference from a run of this version."""
+    folder, change = earlier
+    change(**keys)
+    results, present = repro.load_run(folder), repro.load_run(cached_run(SCENE))
+    assert dict(results.columns).keys() == dict(present.columns).keys() and len(results.time) > 1
+    assert (results["aggregate_area_um2"] == present["aggregate_area_um2"]).all()
+    assert results.fields(results.time[-1])["places_um"].shape == present.fields(present.time[-1])["places_um"].shape
+    assert [key for key, *_ in comparison.differences([read(cached_run(SCENE)), read(folder)])] == shown
+    for command in (["plot", folder, "--out", tmp_path / "mine.svg"],
+                    ["compare", folder, cached_run(SCENE), "--out", tmp_path / "both.html"]):
+        assert main([*map(str, command)]) == 0
+
+
+def test_a_run_of_an_earlier_version_is_known_and_continues(earlier, tmp_path, capsys):
+    """If its key has the value of present scenes: its hash counts the key, and a longer run needs no change."""
+    folder, change = earlier
+    change(colour="blue")
+    before = files(folder)
+    assert read_record(folder)["hash"] == scene_hash(SCENE)
+    assert main(["run", "base", *flags(*CHANGES), "--out", str(folder)]) == 0 and files(folder) == before
+    assert repro.resume(folder, ["growth.end=0.6 h"]).time[-1] == 0.6
+    change(colour="red")
+    assert 'numerics.colour = "red": this key was removed' in refusal(tmp_path, capsys, "run", "--resume", folder)
+
+
+def test_the_hash_counts_former_keys(monkeypatch):
+    """With the value that every scene has; so that removing a key changes no hash."""
+    before = scene_hash(SCENE)
+    monkeypatch.setitem(former.KEYS, "numerics.colour", former.Former("blue", "leave it out"))
+    blue = scene_hash(SCENE)
+    monkeypatch.setitem(former.KEYS, "numerics.colour", former.Former("red", "leave it out"))
+    assert len({before, blue, scene_hash(SCENE)}) == 3
