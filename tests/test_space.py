@@ -33,6 +33,17 @@ def test_products_of_two_functions_are_integrated_exactly(meshes, kind):
     assert np.abs(space.at.mass(space.at.dx) - exact).max() < 1e-13 * exact.max()
 
 
+@pytest.mark.parametrize("kind", ["linear", "straight sides", "made", "bent"])
+def test_products_of_two_gradients_are_integrated(meshes, kind):
+    """Exactly on straight sides. On curved ones they are no polynomials, and err by less than 0.01 %, the error that
+    the preset exact promises."""
+    mesh = meshes[kind]
+    dx, gradients = elements.mapped(mesh.points[mesh.cells], elements.table(mesh.geometry, 14))
+    exact = np.einsum("tq,tqka,tqkb->tab", dx, gradients, gradients)
+    bound = 1e-12 if kind in ("linear", "straight sides") else 1e-4
+    assert np.abs(Space(mesh).stiffness - exact).max() < bound * np.abs(exact).max()
+
+
 def test_ends_and_walls_of_a_minimal_mesh_have_their_nodes():
     """A channel of two triangles, whose ends join both walls and whose walls join both ends."""
     corners = np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 1.0], [0.0, 1.0]])

@@ -2,6 +2,7 @@
 
 from verification.mutants import changes
 
+GRADIENTS = "tests/test_space.py::test_products_of_two_gradients_are_integrated"
 PERMEABLE = "tests/test_flow.py::"
 
 MUTANTS = (
@@ -81,8 +82,8 @@ MUTANTS = (
          "unit.correction"),
         ("quadratic-stabilised",
          "Quadratic elements are stabilised, although they are stable.",
-         "2: TaylorHood}",
-         "2: Linear}"),
+         "interface, pair.lower)",
+         "interface, Linear.on(velocity, viscosity, element, interface).lower)"),
         ("curved-straight-divergence",
          "The divergence is that of one point a triangle, not integrated.",
          "return product(q, at.dx, at.div)",
@@ -157,7 +158,8 @@ MUTANTS = (
         ("gradients-of-degree-2",
          "Gradients are integrated by a rule of degree 2 at most.",
          "return elements.GRADIENT_DEGREES[self.order]",
-         "return min(2, elements.GRADIENT_DEGREES[self.order])")),
+         "return min(2, elements.GRADIENT_DEGREES[self.order])",
+         f"{GRADIENTS}[made]", f"{GRADIENTS}[bent]")),
     *changes(
         "repro/fem/sizing.py",
         ("gradation-ignored",
