@@ -75,8 +75,6 @@ CHOICES = {
                       note=F_EXACT),
     "linear transfer": Switch("transfer at a remesh", "conserving", "linear", 'numerics.transfer="linear"', False,
                               "[E8]"),
-    "bounded transfer": Switch("transfer at a remesh", "conserving", "bounded", 'numerics.transfer="bounded"', False,
-                               "the projection limited by flux-corrected transport"),
     "stress-free": Switch("new biomass", "stressed", "stress-free", 'growth.new_biomass="stress_free"',
                           note="section 5"),
     "bubble": Switch("flow element", "stabilised (c = 100)", "bubble (MINI)", 'numerics.flow_element="bubble"',

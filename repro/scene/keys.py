@@ -362,7 +362,7 @@ class Numerics:
     transport: str = choice(
         "quasi_steady", "gear", source="2.2; 3.3 has gear",
         about="Substrates at rest in each shape, or the transient predictor-corrector scheme")
-    transfer: str = choice("conserving", "linear", "bounded", source="3.5 is linear [E8]",
+    transfer: str = choice("conserving", "linear", source="3.5 is linear [E8]",
                            about="How X_A and X_I go to a new mesh")
     extent: str | None = choice(
         "central", "full", default=None, source="3.1",
