@@ -83,8 +83,6 @@ CHOICES = {
                       note="(7)-(10); not the paper's"),
     "unlimited decay": Switch("decay", "with acceptor", "unlimited", 'kinetics.decay="unlimited"',
                               note="(9), (10); not the paper's"),
-    "rechosen": Switch("fixed point", "kept", "rechosen", 'numerics.fixed_point="rechosen"',
-                       note="2.3.3; in base always the same node, because the contact surface stays symmetric"),
     "midpoint": Switch("steps in time", "updates of 12 min", "midpoint, tolerance 0.01", 'numerics.time="midpoint"',
                        False, "first order in the step against second"),
 }

@@ -15,7 +15,10 @@ class Former(NamedTuple):
 
 
 #: By dotted keys.
-KEYS: dict[str, Former] = {}
+KEYS: dict[str, Former] = {
+    "numerics.fixed_point": Former(
+        "kept", "leave it out: the point in the middle of a new contact surface stays in place"),
+}
 #: What to write instead of a choice, by its dotted key and the choice.
 CHOICES: dict[tuple[str, str], str] = {
     ("numerics.transfer", "bounded"):

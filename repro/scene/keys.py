@@ -373,8 +373,6 @@ class Numerics:
                             about="What of the flow is continuous across the interface")
     inlet: str = choice(
         "local", "mean", source="(11) [E4]", about="u_x(y) or u_ave in the inlet condition")
-    fixed_point: str = choice("kept", "rechosen", source="2.3.3 [E20]",
-                              about="Which point of a contact surface stays in place")
     solver: str = choice("superlu", "pardiso", source=NOT_IN_PAPER,
                          about="Solver of linear systems; the second needs the package pypardiso")
     ordering: str = choice("degree", "metis", source=NOT_IN_PAPER,
