@@ -44,6 +44,7 @@ FOLLOWED = {
                    "try a smaller numerics.refinement": MEMORY},
     "cli/sweep.py": {"continues the sweep": "tests/test_sweep.py::test_a_signal_ends_a_sweep_quietly"},
     "fem/linear.py": {"pip install": PACKAGES},
+    "scene/former.py": {"leave it out": "tests/test_former.py::test_the_advice_is_accepted"},
     "march/folding.py": {'growth.new_biomass = "stress_free" does': STRESS_FREE},
     "march/state.py": {"try a smaller numerics.refinement": MEMORY},
     "march/updates.py": {"try a shorter growth.time_step":
@@ -52,7 +53,7 @@ FOLLOWED = {
         "try smooth = false": SPLINES,
         "try a larger numerics.refinement":
             "tests/test_advice.py::test_an_unresolved_front_gets_advice_once_and_it_helps",
-        "leave numerics.solver and numerics.ordering out": PACKAGES,
+        "leave numerics.solver out": PACKAGES,
         'growth.wall = "sliding" is another model': "base: it stops at 14 h on a bonded wall, not on a sliding one"},
     "model/contact.py": {
         'growth.shear_modulus, or growth.fluid_forces = "neglected"': "two drawn scenes of soft bodies in fast flow",

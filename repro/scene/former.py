@@ -18,6 +18,7 @@ class Former(NamedTuple):
 KEYS: dict[str, Former] = {
     "numerics.fixed_point": Former(
         "kept", "leave it out: the point in the middle of a new contact surface stays in place"),
+    "numerics.ordering": Former("degree", "leave it out: SuperLU orders the nodes"),
 }
 #: What to write instead of a choice, by its dotted key and the choice.
 CHOICES: dict[tuple[str, str], str] = {

@@ -375,8 +375,6 @@ class Numerics:
         "local", "mean", source="(11) [E4]", about="u_x(y) or u_ave in the inlet condition")
     solver: str = choice("superlu", "pardiso", source=NOT_IN_PAPER,
                          about="Solver of linear systems; the second needs the package pypardiso")
-    ordering: str = choice("degree", "metis", source=NOT_IN_PAPER,
-                           about="Order of nodes for SuperLU; the second needs the package pymetis")
     refinement: float = number(
         1.0, UP_TO_20, source="3.1 [E13]", about="Divides the element sizes")
     gradation: float = number(
