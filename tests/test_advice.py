@@ -92,7 +92,7 @@ FOLLOWED = {
         "repeat the command": "tests/test_machine.py::test_a_limit_of_file_sizes_ends_a_run_in_one_line"},
     "runs/machine.py": {"or leave the key out": PACKAGES},
     "runs/recorder.py": {"continues the run": SIGNALS},
-    "scene/rules.py": {"removes it": ENTRIES, "pip install": PACKAGES},
+    "scene/rules.py": {"removes it": ENTRIES},
     "scene/text.py": {"remove it to set the key":
                       "tests/test_scene_text.py::test_every_key_may_be_made_active_at_once"},
     "scene/units.py": {"give milligrams": ENTRIES, "give mg/L": ENTRIES},

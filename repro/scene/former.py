@@ -19,6 +19,8 @@ KEYS: dict[str, Former] = {
     "numerics.fixed_point": Former(
         "kept", "leave it out: the point in the middle of a new contact surface stays in place"),
     "numerics.ordering": Former("degree", "leave it out: SuperLU orders the nodes"),
+    "output.timeseries": Former(
+        "csv", "leave it out, and write NetCDF by repro.load_run(FOLDER).to_netcdf(FILE)"),
 }
 #: What to write instead of a choice, by its dotted key and the choice.
 CHOICES: dict[tuple[str, str], str] = {

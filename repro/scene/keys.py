@@ -443,10 +443,6 @@ class Output:
         "1 h", "h", default=None, source=NOT_IN_PAPER,
         about="Interval of rows and fields from t = 0 on, with a last one at growth.end; times "
         "adds others")
-    timeseries: str = choice(
-        "csv", "netcdf", source=NOT_IN_PAPER,
-        about="timeseries.csv alone, or timeseries.nc besides, which needs the package xarray")
-
 
     def requested(self, end: float) -> tuple[float, ...] | None:
         """Return the requested times (h), ascending, to the time `end`; None: every step."""
