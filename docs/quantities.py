@@ -6,7 +6,7 @@ from repro.runs.history import COUNTS
 from repro.sweeps.table import NUMBERS
 
 TABLES = {
-    "Columns of `timeseries.csv`, `timeseries.nc` and `table.csv`": SERIES,
+    "Columns of `timeseries.csv` and `table.csv`": SERIES,
     "Columns of `ledger.csv`, a row a step": LEDGER,
     "Arrays of the `.vtu` files": ARRAYS,
     "Further quantities on pages": DERIVED,

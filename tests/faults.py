@@ -4,9 +4,7 @@ import tracemalloc
 from contextlib import contextmanager
 from types import SimpleNamespace
 
-import numpy as np
 import scipy.sparse as sp
-from scipy.sparse.csgraph import reverse_cuthill_mckee
 from scipy.sparse.linalg import splu
 
 from repro import results
@@ -33,27 +31,10 @@ def replace_version(monkeypatch, name):
 
 
 def replace_package(monkeypatch, name):
-    """Replace an optional package by SciPy: "pymetis" orders nodes by reverse Cuthill-McKee; "pypardiso" factors with
-    reordered columns and partial pivoting."""
-    module = {"pymetis": _ordering, "pypardiso": _factoring}[name]()
+    """Replace the optional package pypardiso by SciPy, which factors with reordered columns and partial pivoting."""
+    module = {"pypardiso": _factoring}[name]()
     monkeypatch.setitem(sys.modules, name, module)
     return module
-
-
-def _ordering():
-    calls = []
-
-    def nested_dissection(graph):
-        calls.append(graph)
-        count = len(graph.indptr) - 1
-        matrix = sp.csr_array((np.ones(len(graph.indices)), graph.indices, graph.indptr), shape=(count, count))
-        order = reverse_cuthill_mckee(matrix, symmetric_mode=True)
-        return order.tolist(), np.argsort(order).tolist()
-
-    def adjacency(indptr, indices):
-        return SimpleNamespace(indptr=indptr, indices=indices)
-
-    return SimpleNamespace(nested_dissection=nested_dissection, CSRAdjacency=adjacency, calls=calls)
 
 
 def _factoring():

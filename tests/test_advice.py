@@ -44,6 +44,7 @@ FOLLOWED = {
                    "try a smaller numerics.refinement": MEMORY},
     "cli/sweep.py": {"continues the sweep": "tests/test_sweep.py::test_a_signal_ends_a_sweep_quietly"},
     "fem/linear.py": {"pip install": PACKAGES},
+    "scene/former.py": {"leave it out": "tests/test_former.py::test_the_advice_is_accepted"},
     "march/folding.py": {'growth.new_biomass = "stress_free" does': STRESS_FREE},
     "march/state.py": {"try a smaller numerics.refinement": MEMORY},
     "march/updates.py": {"try a shorter growth.time_step":
@@ -52,7 +53,7 @@ FOLLOWED = {
         "try smooth = false": SPLINES,
         "try a larger numerics.refinement":
             "tests/test_advice.py::test_an_unresolved_front_gets_advice_once_and_it_helps",
-        "leave numerics.solver and numerics.ordering out": PACKAGES,
+        "leave numerics.solver out": PACKAGES,
         'growth.wall = "sliding" is another model': "base: it stops at 14 h on a bonded wall, not on a sliding one"},
     "model/contact.py": {
         'growth.shear_modulus, or growth.fluid_forces = "neglected"': "two drawn scenes of soft bodies in fast flow",
@@ -91,7 +92,7 @@ FOLLOWED = {
         "repeat the command": "tests/test_machine.py::test_a_limit_of_file_sizes_ends_a_run_in_one_line"},
     "runs/machine.py": {"or leave the key out": PACKAGES},
     "runs/recorder.py": {"continues the run": SIGNALS},
-    "scene/rules.py": {"removes it": ENTRIES, "pip install": PACKAGES},
+    "scene/rules.py": {"removes it": ENTRIES},
     "scene/text.py": {"remove it to set the key":
                       "tests/test_scene_text.py::test_every_key_may_be_made_active_at_once"},
     "scene/units.py": {"give milligrams": ENTRIES, "give mg/L": ENTRIES},

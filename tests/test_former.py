@@ -1,5 +1,6 @@
 """Keys and choices of earlier versions: scenes are refused with what to write instead, old runs still load."""
 import shutil
+from dataclasses import replace
 
 import pytest
 
@@ -7,7 +8,7 @@ import repro
 from repro.cli import main
 from repro.report import comparison
 from repro.report.reading import read
-from repro.scene import KEYS, former, load_scene, scene_hash
+from repro.scene import KEYS, former, load_scene, load_tables, scene_hash
 from repro.scene.reading import entries
 from tests.pages import cached_run
 from tests.shell import files, flags, read_record, refusal, rewrite
@@ -67,6 +68,20 @@ def test_no_former_key_is_a_key_of_a_scene():
         section, _, name = key.partition(".")
         words = entries(type(getattr(SCENE, section)))[name].metadata["kind"].words
         assert choice not in words and any(f'"{word}"' in former.CHOICES[key, choice] for word in words)
+
+
+@pytest.mark.parametrize("key, value, instead", [
+    *((key, each.value, None) for key, each in former.KEYS.items()),
+    *((*named, text.split('"')[1]) for named, text in former.CHOICES.items())])
+def test_the_advice_is_accepted(key, value, instead):
+    """Without a former key, and with the other choice, the scene is accepted."""
+    change = f"{key}={value}"
+    with pytest.raises(repro.SceneError, match=f"{key} = .*was removed"):
+        load_scene("base", [change])
+    if instead is None:
+        assert replace(load_scene(load_tables("base", [change]), unset=[key]), name="base") == load_scene("base")
+    else:
+        assert load_scene("base", [f"{key}={instead}"])
 
 
 @pytest.mark.parametrize("keys, shown", [({"colour": "blue"}, []), ({"colour": "red"}, ["numerics.colour"]),

@@ -24,28 +24,25 @@ from tests.shell import SHORT, files, interrupt_run, read_record, refusal, run_a
 from verification.bench import runs as bench_runs
 
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="for Linux alone")
-CHOICES = [("numerics.solver=pardiso", "pypardiso"), ("numerics.ordering=metis", "pymetis")]
 
 
-@pytest.mark.parametrize("entry, package", CHOICES)
 @pytest.mark.parametrize("command", [["run", "base"], ["sweep", "base", "--vary", "pore.width=50 um, 60 um"]])
-def test_an_absent_package_is_reported_before_anything_is_written(tmp_path, capsys, monkeypatch, command, entry,
-                                                                        package):
+def test_an_absent_package_is_reported_before_anything_is_written(tmp_path, capsys, monkeypatch, command):
     """The command prints one line, exits with status 2 and makes no folder."""
-    faults.remove_package(monkeypatch, package)
-    key, _, choice = entry.partition("=")
-    message = f'base: {key} = "{choice}": the package {package} is not installed; pip install {package}'
-    assert message in refusal(tmp_path, capsys, *command, "--set", entry, "--out", tmp_path / "out")
+    faults.remove_package(monkeypatch, "pypardiso")
+    message = 'base: numerics.solver = "pardiso": the package pypardiso is not installed; pip install pypardiso'
+    out = tmp_path / "out"
+    assert message in refusal(tmp_path, capsys, *command, "--set", "numerics.solver=pardiso", "--out", out)
 
 
 def test_a_package_uninstalled_since_is_reported_at_a_resume(tmp_path, monkeypatch):
-    scene = load_scene("base", ("numerics.preset=fast", "numerics.ordering=metis"))
+    scene = load_scene("base", ("numerics.preset=fast", "numerics.solver=pardiso"))
     with monkeypatch.context() as patch:
         patch.setattr(machine, "find_spec", lambda name: name)
-        faults.replace_package(patch, "pymetis")
+        faults.replace_package(patch, "pypardiso")
         interrupt_run(scene, tmp_path, after=1)
-    faults.remove_package(monkeypatch, "pymetis")
-    with pytest.raises(SceneError, match="pymetis is not installed"):
+    faults.remove_package(monkeypatch, "pypardiso")
+    with pytest.raises(SceneError, match="pypardiso is not installed"):
         resume(tmp_path)
 
 
@@ -288,10 +285,9 @@ def test_a_command_imports_only_the_modules_that_it_needs(tmp_path, arguments, n
 
 
 @pytest.mark.parametrize("preset", ["fast", "paper"])
-def test_the_chosen_solver_and_ordering_reach_every_system(preset, monkeypatch):
+def test_the_chosen_solver_reaches_every_system(preset, monkeypatch):
     """Flow, transport, growth and mesh motion of a run factorise by no other method."""
-    for package in ("pymetis", "pypardiso"):
-        faults.replace_package(monkeypatch, package)
+    faults.replace_package(monkeypatch, "pypardiso")
     methods = []
     factorise = linear.Solver._first
 
@@ -301,6 +297,6 @@ def test_the_chosen_solver_and_ordering_reach_every_system(preset, monkeypatch):
 
     monkeypatch.setattr(linear.Solver, "_first", record_method)
     for _ in simulate(load_scene("base", [f"numerics.preset={preset}", "numerics.solver=pardiso",
-                                          "numerics.ordering=metis", 'growth.end="0.5 h"'])):
+                                          'growth.end="0.5 h"'])):
         pass
-    assert len(methods) > 10 and set(methods) == {linear.Method("pardiso", "metis")}
+    assert len(methods) > 10 and set(methods) == {linear.Method("pardiso")}

@@ -42,10 +42,9 @@ def test_a_run_ends_at_either_end_of_the_pore_and_names_it(time, from_end, momen
 
 @cache
 def seed_of(order, spans):
-    """(scene, its pore at t = 0): an asymmetric aggregate between both walls, or one that almost spans the pore. Its
-    fixed points are chosen anew in each step."""
+    """(scene, its pore at t = 0): an asymmetric aggregate between both walls, or one that almost spans the pore."""
     scene = shaped(drawn(order), SPANNING if spans else SHAPE)
-    return replace(scene, numerics=replace(scene.numerics, fixed_point="rechosen")), pore.seeded(scene)
+    return scene, pore.seeded(scene)
 
 
 @cache

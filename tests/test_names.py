@@ -32,7 +32,7 @@ def session(folder, monkeypatch, name, terminal, *more):
     """Run commands with a name as their scene, folder and file, on a terminal that refuses other characters."""
     monkeypatch.chdir(folder)
     shutil.copy(Path(repro.__file__).parent / "scene" / "packaged" / "flow_only.toml", f"{name}.toml")
-    commands = [["run", f"--out={name}", "--set", "output.timeseries=netcdf", "--", f"{name}.toml"],
+    commands = [["run", f"--out={name}", "--", f"{name}.toml"],
                 ["run", f"--out={name}2", "--", f"{name}.toml"], ["run", f"--resume={name}"],
                 ["check", "--", f"{name}.toml"], ["check", "--", name], ["check", "--json", "--", name],
                 ["scene", "--", f"{name}.toml"], ["compare", f"--out={name}.html", "--", name, f"{name}2"],
@@ -43,6 +43,8 @@ def session(folder, monkeypatch, name, terminal, *more):
             monkeypatch.setattr(sys, stream, io.TextIOWrapper(io.BytesIO(), terminal, errors))
         assert main(command) == 0, (command, sys.stderr.buffer.getvalue())
     assert Path(f"{name}.html").is_file()
+    repro.load_run(name).to_netcdf(f"{name}.nc")
+    assert Path(f"{name}.nc").is_file()
     return read_sealed(Path(name, "run.json"))
 
 

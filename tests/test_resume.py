@@ -68,7 +68,6 @@ THOROUGH_SCENES = {
     "accurate": ('numerics.preset="accurate"', 'growth.end="4 h"'),
     "linear midpoint": ('numerics.time="midpoint"', "numerics.tolerance=0.0001", 'numerics.transfer="linear"',
                         *CONTACT),
-    "rechosen": ('numerics.fixed_point="rechosen"', *CONTACT),
     "quadratic gear": ('numerics.elements="quadratic"', "numerics.refinement=0.3", 'numerics.transport="gear"',
                        'growth.fluid_forces="included"', 'growth.end="0.6 h"'),
     "quadratic, stress-free": ('numerics.elements="quadratic"', "numerics.refinement=0.3",

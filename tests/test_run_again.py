@@ -66,7 +66,8 @@ def test_other_versions_are_refused_with_their_differences(tmp_path, capsys, mon
 
 
 def test_a_forced_run_removes_only_the_listed_files(tmp_path):
-    """It is computed again. Other files in the folder, and the target of a link, stay."""
+    """It is computed again. Other files in the folder, and the target of a link, stay. A file that a run of an earlier
+    version has written and listed is removed."""
     out = tmp_path / "run"
     reference = cached_run(SCENE)
     run(load_scene("base", ('numerics.preset="fast"', 'growth.end="6 h"')), out)
@@ -75,8 +76,9 @@ def test_a_forced_run_removes_only_the_listed_files(tmp_path):
     (out / "link.txt").symlink_to(tmp_path / "victim")
     for name, content in foreign.items():
         (out / name).write_bytes(content)
+    (out / "timeseries.nc").touch()
     record = read_record(out)
-    rewrite(out, files=[*record["files"], "../victim", "link.txt", "notes.txt"])
+    rewrite(out, files=[*record["files"], "timeseries.nc", "../victim", "link.txt", "notes.txt"])
     pages.run(tmp_path, "base", *BRIEF, options=["--force"])
     assert (out / "link.txt").is_symlink() and {name: (out / name).read_bytes() for name in foreign} == foreign
     assert {name: content for name, content in files(out).items() if name not in foreign} == files(reference)
@@ -86,7 +88,7 @@ def test_a_forced_run_removes_only_the_listed_files(tmp_path):
 
 def test_a_forced_run_is_refused_if_its_names_are_those_of_other_files(tmp_path, capsys):
     run(SCENE, tmp_path)
-    for name in ("fields/fields_0077.vtu", "timeseries.nc"):
+    for name in ("fields/fields_0077.vtu", "before_expansion.pvd"):
         (tmp_path / name).write_text("years of work")
         assert f"{name}: no run has written it" in refusal(
             tmp_path, capsys, "run", "base", *SETS, "--force", "--out", tmp_path)

@@ -249,7 +249,7 @@ MEMBERS = [
     *((f"{key}.interpolation", [f"{key}.interpolation=linear"])
       for key in ("flow", *(f"substrates.{name}" for name in SUBSTRATES))),
     *((f"numerics.{key}", ["numerics.elements=quadratic", f"numerics.{key}={value}"])
-      for key, values in (("transfer", ("linear", "bounded")), ("flow_element", ("bubble",))) for value in values)]
+      for key, value in (("transfer", "linear"), ("flow_element", "bubble")))]
 
 
 @pytest.mark.parametrize("key, entries", MEMBERS)
@@ -303,8 +303,8 @@ PAIRS = [
     ("base", "growth.fluid_forces=included", "growth.new_biomass=stress_free",
      "because the aggregate would yield at every update",
      '"stressed" is needed with growth.fluid_forces = "included"'),
-    ("base", "numerics.transfer=bounded", "numerics.preset=accurate", '"conserving" is needed with numerics.elements',
-     'numerics.transfer = "conserving" is needed with it, not "bounded"'),
+    ("base", "numerics.transfer=linear", "numerics.preset=accurate", '"conserving" is needed with numerics.elements',
+     'numerics.transfer = "conserving" is needed with it, not "linear"'),
     ("base", "numerics.transport=gear", "numerics.time=midpoint", '"quasi_steady" is needed with numerics.time = "mid',
      '"updates" is needed with numerics.transport = "gear"'),
     ("base", "kinetics.donor_oxygen_demand=1.2", "kinetics.yield_coefficient=1", "more than Y d_c (1.42) is needed",

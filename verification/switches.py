@@ -75,8 +75,6 @@ CHOICES = {
                       note=F_EXACT),
     "linear transfer": Switch("transfer at a remesh", "conserving", "linear", 'numerics.transfer="linear"', False,
                               "[E8]"),
-    "bounded transfer": Switch("transfer at a remesh", "conserving", "bounded", 'numerics.transfer="bounded"', False,
-                               "the projection limited by flux-corrected transport"),
     "stress-free": Switch("new biomass", "stressed", "stress-free", 'growth.new_biomass="stress_free"',
                           note="section 5"),
     "bubble": Switch("flow element", "stabilised (c = 100)", "bubble (MINI)", 'numerics.flow_element="bubble"',
@@ -85,8 +83,6 @@ CHOICES = {
                       note="(7)-(10); not the paper's"),
     "unlimited decay": Switch("decay", "with acceptor", "unlimited", 'kinetics.decay="unlimited"',
                               note="(9), (10); not the paper's"),
-    "rechosen": Switch("fixed point", "kept", "rechosen", 'numerics.fixed_point="rechosen"',
-                       note="2.3.3; in base always the same node, because the contact surface stays symmetric"),
     "midpoint": Switch("steps in time", "updates of 12 min", "midpoint, tolerance 0.01", 'numerics.time="midpoint"',
                        False, "first order in the step against second"),
 }

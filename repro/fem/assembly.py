@@ -219,7 +219,7 @@ def saddle_system(velocity: np.ndarray, pressure: np.ndarray, constrained: np.nd
     count = len(constrained)
     pressures = pressure.max() + 1
     place = np.empty(count)
-    place[linear.node_order(count, velocity, method) if order is None else order] = np.arange(count)
+    place[linear.node_order(count, velocity) if order is None else order] = np.arange(count)
     nodes = np.arange(pressures)
     if doubled is not None:
         nodes[pressures - len(doubled):] = doubled

@@ -6,9 +6,8 @@ times faster than SciPy's default, and safe as long as pressure blocks are negat
 solver checks the residual and refines the solution once. If that does not suffice, it factors the
 system again with partial pivoting.
 
-Optional packages are faster on large meshes: METIS (package pymetis) orders nodes by nested
-dissection, PARDISO (package pypardiso) factors. A :class:`Method` selects them; a mesh passes it to
-all systems solved on it.
+PARDISO (the optional package pypardiso) factors large matrices faster. A :class:`Method` selects
+the solver; a mesh passes it to all systems solved on it.
 """
 
 from __future__ import annotations
@@ -41,21 +40,18 @@ STAGE = "factorise and solve"
 
 @dataclass(frozen=True)
 class Method:
-    """solver: "superlu" or "pardiso" factors; ordering: "degree" or "metis" orders the nodes."""
+    """solver: "superlu" or "pardiso" factors."""
 
     solver: str = "superlu"
-    ordering: str = "degree"
 
     def checked(self) -> Method:
-        """The method itself. Raises PackageMissing if one of its packages is not installed."""
+        """The method itself. Raises PackageMissing if its package is not installed."""
         if self.solver == "pardiso":
             _package("pypardiso")
-        if self.ordering == "metis":
-            _package("pymetis")
         return self
 
 
-#: The method without optional packages.
+#: The method without an optional package.
 DEFAULT = Method()
 
 
@@ -72,32 +68,17 @@ def pairs(elements: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.repeat(elements, k, axis=1), np.tile(elements, (1, k))
 
 
-def node_order(count: int, elements: np.ndarray, method: Method = DEFAULT) -> np.ndarray:
-    """(count,) nodes in a fill-reducing order, from the elements (T, k) that couple them; each node
-    is in at least one element."""
+def node_order(count: int, elements: np.ndarray) -> np.ndarray:
+    """(count,) nodes by SuperLU's minimum degree, from the elements (T, k) that couple them; each
+    node is in at least one element."""
     k = elements.shape[1]
     rows, columns = (part.ravel() for part in pairs(elements))
+    # SuperLU orders a matrix by factorising it; this one has a dominant diagonal.
     dominant = np.tile((np.ones((k, k)) + k * np.eye(k)).ravel(), len(elements))
     graph = sp.csc_array((dominant, (rows, columns)), shape=(count, count))
-    return (_dissected if method.ordering == "metis" else _by_degree)(graph)
-
-
-def _by_degree(graph: sp.csc_array) -> np.ndarray:
-    """SuperLU's minimum-degree order of a symmetric matrix, whose diagonal must dominate."""
-    symmetric = {"SymmetricMode": True}
     factor = splu(sp.csc_matrix(graph), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
-                  options=symmetric)
+                  options={"SymmetricMode": True})
     return np.argsort(factor.perm_c)
-
-
-def _dissected(graph: sp.csc_array) -> np.ndarray:
-    """Nested dissection by METIS, which takes the graph without its diagonal."""
-    matrix = sp.coo_array(graph)
-    away = matrix.row != matrix.col
-    places = matrix.row[away], matrix.col[away]
-    graph = sp.csr_array((matrix.data[away], places), shape=graph.shape)
-    metis = _package("pymetis")
-    return np.asarray(metis.nested_dissection(metis.CSRAdjacency(graph.indptr, graph.indices))[0])
 
 
 class Factors(Protocol):

@@ -42,7 +42,7 @@ class Dofs:
     @cached_property
     def elimination(self) -> np.ndarray:
         """(count,) nodes in elimination order."""
-        return node_order(self.count, self.cells, self.method)
+        return node_order(self.count, self.cells)
 
     @cached_property
     def places(self) -> np.ndarray:

@@ -8,14 +8,7 @@ projection
 
 integrated exactly over the common pieces of both meshes. If both meshes cover the same polygon,
 it keeps the total, constants and linear fields to round-off. It may overshoot where a field is
-steep. The bounded transfer is the same, limited by flux-corrected transport (Zalesak 1979;
-Kuzmin 2012): with m_ij the mass matrix, m_i its row sums and b_i = (X_old, N_i), the projection is
-
-    m_i X_i = b_i + sum_j f_ij,        f_ij = m_ij (X_i - X_j) = -f_ji
-
-where b_i / m_i is a mean of the old field around node i, bounded by its values there. Each f_ij is
-multiplied by the largest alpha_ij = alpha_ji from 0 to 1 that Zalesak's limiter allows. This keeps
-the total and all bounds.
+steep.
 """
 
 from __future__ import annotations
@@ -34,9 +27,6 @@ from repro.timing import timed
 
 #: The common pieces of two meshes must cover both to this relative accuracy.
 COVER = 1e-9
-#: A projection that exceeds its bounds by less than this part of the field's largest value is not
-#: limited.
-OVERSHOOT = 1e-14
 #: Largest number of Newton steps that locate a point in a curved triangle.
 NEWTON_STEPS = 12
 #: Length of the last step on the unit triangle; the error after it is the square of this.
@@ -228,67 +218,6 @@ def project(points: np.ndarray, triangles: np.ndarray, fields: np.ndarray,
     pieces = _pieces(points, triangles, new_points, new_triangles)
     right = _loads(pieces, points, triangles, fields, new_points, new_triangles)
     return _solve_mass(new_points, new_triangles, right)
-
-
-def project_bounded(points: np.ndarray, triangles: np.ndarray, fields: np.ndarray,
-                    new_points: np.ndarray, new_triangles: np.ndarray) -> np.ndarray:
-    """Like :func:`project`, but the old values around a node bound each field there."""
-    pieces = _pieces(points, triangles, new_points, new_triangles)
-    right = _loads(pieces, points, triangles, fields, new_points, new_triangles)
-    projected = _solve_mass(new_points, new_triangles, right)
-    lowest, highest = _bounds(pieces, triangles, fields, new_triangles)
-    areas = triangle_areas(new_points, new_triangles)
-    lumped = np.bincount(new_triangles.ravel(), np.repeat(areas / 3, 3), len(new_points))
-    ends, coupling = _edges(new_triangles, areas)
-    for column, (least, most) in enumerate(zip(lowest.T, highest.T)):
-        room = OVERSHOOT * np.abs(fields[:, column]).max()
-        values = projected[:, column]
-        if (values < least - room).any() or (values > most + room).any():
-            flux = coupling * (projected[ends[:, 0], column] - projected[ends[:, 1], column])
-            mean = right[:, column] / lumped
-            projected[:, column] = _limited(mean, lumped, ends, flux, least, most)
-        projected[:, column] = np.clip(projected[:, column], least, most)  # round-off
-    return projected
-
-
-def _edges(triangles: np.ndarray, areas: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(e, 2) nodes of every edge, and (e,) the entry of the mass matrix that couples them, um2."""
-    pairs = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)
-    ends, edge_numbers = np.unique(np.sort(pairs, axis=1), axis=0, return_inverse=True)
-    return ends, np.bincount(edge_numbers.ravel(), np.repeat(areas / 12, 3), len(ends))
-
-
-def _bounds(pieces: Pieces, triangles: np.ndarray, fields: np.ndarray,
-            new_triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Bounds (K, m) of each field at the new nodes.
-
-    They are the least and the largest old nodal value in the old triangles that overlap the new
-    triangles of a node.
-    """
-    shape = (new_triangles.max() + 1, fields.shape[1])
-    least = np.full(shape, np.inf)
-    most = np.full(shape, -np.inf)
-    values = fields[triangles[pieces.old]]
-    for corner in new_triangles[pieces.new].T:
-        np.minimum.at(least, corner, values.min(axis=1))
-        np.maximum.at(most, corner, values.max(axis=1))
-    return least, most
-
-
-def _limited(low: np.ndarray, lumped: np.ndarray, ends: np.ndarray, flux: np.ndarray,
-             least: np.ndarray, most: np.ndarray) -> np.ndarray:
-    """(K,) values ``low`` plus limited fluxes (e,), um2 times the field, from the second of the two
-    ``ends`` into the first. The limits keep them from ``least`` to ``most`` (K,)."""
-    first, second = ends.T
-    into = [np.bincount(first, np.maximum(sign * flux, 0), len(low))
-            + np.bincount(second, np.maximum(-sign * flux, 0), len(low)) for sign in (1, -1)]
-    room = [lumped * np.maximum(most - low, 0), lumped * np.maximum(low - least, 0)]
-    up, down = (np.minimum(1.0, r / np.where(p > 0, p, 1.0)) for r, p in zip(room, into))
-    forward = np.minimum(up[first], down[second])
-    backward = np.minimum(down[first], up[second])
-    part = np.where(flux > 0, forward, backward) * flux
-    gain = np.bincount(first, part, len(low)) - np.bincount(second, part, len(low))
-    return low + gain / lumped
 
 
 @dataclass(frozen=True, eq=False)

@@ -133,7 +133,7 @@ def steps(scene: Scene,
 
     A run restarts from any of these states bit for bit.
     """
-    Method(scene.numerics.solver, scene.numerics.ordering).checked()
+    Method(scene.numerics.solver).checked()
     if scene.growth is None:
         return _at_rest(scene, state)
     from repro.march import loop  # a scene without growth loads no part of it

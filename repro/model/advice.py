@@ -7,7 +7,7 @@ from repro.errors import OriginFolded, OutsidePore, PackageMissing, StageError, 
 ADVICE: dict[type[StageError], str] = {
     OutsidePore: "; aggregate.outline: try smooth = false",
     Unresolved: "; try a larger numerics.refinement",
-    PackageMissing: ", or leave numerics.solver and numerics.ordering out",
+    PackageMissing: ", or leave numerics.solver out",
 }
 
 

@@ -27,8 +27,7 @@ from repro.model.transport import Concentrations
 Amounts: TypeAlias = tuple[np.ndarray, ...]
 
 #: Transfers of densities at the nodes of straight triangles, by the values of numerics.transfer.
-METHODS = {"conserving": transfer.project, "bounded": transfer.project_bounded,
-           "linear": transfer.interpolated}
+METHODS = {"conserving": transfer.project, "linear": transfer.interpolated}
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +61,7 @@ def transfer_amounts(method: str, old: Space, new: Space, at: Located, amounts: 
 
     Parameters
     ----------
-    method : {"conserving", "bounded", "linear"}
+    method : {"conserving", "linear"}
         Method of transfer for linear elements.
     old, new : Space
     at : Located

@@ -66,8 +66,8 @@ FIRST_LENGTHS = np.array([1.0, 0.5, 0.25])
 class Mechanics:
     """Data from which the shape of a grown aggregate is computed.
 
-    width: um, of the pore; keys: section [growth] of the scene; numerics: fixed points and Newton's
-    method; fluid: its forces on the aggregate, None if they are neglected.
+    width: um, of the pore; keys: section [growth] of the scene; numerics: Newton's method; fluid:
+    its forces on the aggregate, None if they are neglected.
     """
 
     width: float
@@ -234,7 +234,7 @@ def _at_rest(mechanics: Mechanics, grown: Pore, theta: np.ndarray, start: Pore,
     """The new shape under constant nodal forces (n, 2) um, over mu_L; None for no forces."""
     stressed = mechanics.keys.new_biomass == "stressed"
     last = None if stressed else grown.mesh.points[grown.mesh.body]
-    grown = replace(grown, theta=theta, fixed=_fixed_points(mechanics.numerics, grown), last=last)
+    grown = replace(grown, theta=theta, last=last)
     return CLOSINGS[grown.boundary.geometry](mechanics, grown, start, forces, search)
 
 
@@ -670,13 +670,6 @@ def constrained(count: int, rim: np.ndarray, wall: np.ndarray, fixed: np.ndarray
     prescribed[rim[fixed], 0] = True
     prescribed[rim[wall != FREE], 1] = True
     return prescribed
-
-
-def _fixed_points(numerics: Numerics, grown: Pore) -> np.ndarray:
-    """(M,) fixed points: the previous ones, or the present middles of the contact surfaces."""
-    if numerics.fixed_point == "kept":
-        return grown.fixed
-    return middle_of(grown.boundary, BOTTOM) | middle_of(grown.boundary, TOP)
 
 
 def _with_new_surface(outline: Outline) -> np.ndarray:

@@ -275,7 +275,7 @@ class Meshing:
         numerics = self.numerics
         is_full = numerics.extent == "full"
         ends = sizing.meshed_extent(outline, self.channel.width, self.channel.length, is_full)
-        method = Method(numerics.solver, numerics.ordering)
+        method = Method(numerics.solver)
         sizes = replace(self.sizes, front=front)
         return mesher.generate(outline, ends, sizes, numerics.order, method)
 

@@ -98,7 +98,7 @@ def check(scene: Source, overrides: Sequence[str] = (), *,
     estimated = first_nodes(scene) > MOST_MESHED
     try:
         with stopping(0.0):
-            Method(scene.numerics.solver, scene.numerics.ordering).checked()
+            Method(scene.numerics.solver).checked()
             nodes, triangles = _mesh_size(scene, estimated)
             poll()
         trial = cost.run_trial(scene, nodes)

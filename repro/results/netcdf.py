@@ -1,4 +1,4 @@
-"""The time series as NetCDF with CF conventions; reading it back gives the CSV table.
+"""Results as NetCDF with CF conventions; reading the file gives the columns to the last bit.
 
 The coordinate is the simulated time in hours since the start of the run. It lacks the "since ..."
 of a CF time axis, because simulated time has no date.
@@ -7,41 +7,34 @@ of a CF time axis, because simulated time has no date.
 from __future__ import annotations
 
 import json
-from importlib import import_module
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from repro import results
-from repro.results import names
-from repro.scene import Scene
+from repro.errors import printable
+from repro.results.files import output_path
 
 CONVENTIONS = "CF-1.11"
-PACKAGE = "xarray"  # optional: a scene that asks for it is refused where it is not installed
 TIME = "time_h"
 
 
-def write(path: Path, scene: Scene, rows: list[list]) -> None:
-    """Write ``rows`` of ``results.COLUMNS``; quantities that are not modelled are NaN."""
-    xarray = import_module(PACKAGE)
-    table = np.array(rows, dtype=float)  # None becomes NaN
-    columns = dict(zip(results.COLUMNS, table.reshape(len(rows), len(results.COLUMNS)).T))
-    variables = {name: (TIME, column, _attributes(name)) for name, column in columns.items()}
-    times = {TIME: variables.pop(TIME)}
-    content = xarray.Dataset(variables, times, _provenance(scene))
-    encoding = {name: {"_FillValue": None if name == TIME else np.nan} for name in columns}
-    content.to_netcdf(path.absolute(), engine="scipy", format="NETCDF3_64BIT", encoding=encoding)
+def write(path: Path, dataset: Any, tables: Mapping[str, dict],
+          provenance: Mapping[str, Any]) -> None:
+    """Write a dataset over TIME with its scene.
 
-
-def _attributes(name: str) -> dict[str, str]:
-    return {"long_name": names.words(name), "units": names.udunits(name)}
-
-
-def _provenance(scene: Scene) -> dict[str, str]:
-    """Attributes of the whole file; the scene's tables and the versions as JSON."""
-    record = results.provenance(scene)
-    return {"Conventions": CONVENTIONS, "title": f"Clogging of one pore: {scene.name}",
-            "source": f"dupin2001-repro {record['versions']['dupin2001-repro']}",
-            "scene": scene.name, "scene_hash": record["hash"],
-            "scene_tables": json.dumps(record["tables"]),
-            "versions": json.dumps(record["versions"])}
+    tables: of the scene; provenance: its hash and the versions of the packages, empty if unknown.
+    Raises OutputError if the file cannot be written.
+    """
+    about = {"Conventions": CONVENTIONS, "title": f"Clogging of one pore: {dataset.scene}",
+             "status": printable(dataset.status), "scene_tables": json.dumps(tables)}
+    if provenance:
+        versions = provenance["versions"]
+        about |= {"source": f"dupin2001-repro {versions['dupin2001-repro']}",
+                  "scene_hash": provenance["hash"], "versions": json.dumps(versions)}
+    encoding = {name: {"_FillValue": None if name == TIME else np.nan}
+                for name in dataset.variables}
+    with output_path(path) as beside:
+        dataset.astype(float).assign_attrs(about).to_netcdf(
+            beside.absolute(), engine="scipy", format="NETCDF3_64BIT", encoding=encoding)

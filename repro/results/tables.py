@@ -15,7 +15,7 @@ from repro import results
 from repro.errors import RunEnd
 from repro.march.simulation import simulate
 from repro.march.state import SAME_TIME
-from repro.results import drawing, names, picture
+from repro.results import drawing, names, netcdf, picture
 from repro.results.field_files import Grid
 from repro.results.netcdf import TIME
 from repro.results.quantities import plain as unit
@@ -45,6 +45,8 @@ class Results(Mapping[str, np.ndarray]):
         Folder of the run; None if it is not on the disk.
     tables : mapping, optional
         Tables of the scene, with units; curves jump where its tables over time do.
+    provenance : mapping, optional
+        ``hash`` of the scene and ``versions`` of the packages, for :meth:`to_netcdf`.
 
     Notes
     -----
@@ -60,7 +62,8 @@ class Results(Mapping[str, np.ndarray]):
 
     def __init__(self, name: str, rows: list[dict[str, float | None]],
                  fields: Sequence[Mapping[str, np.ndarray]], status: str,
-                 folder: Path | None = None, tables: Mapping[str, dict] | None = None):
+                 folder: Path | None = None, tables: Mapping[str, dict] | None = None,
+                 provenance: Mapping[str, Any] | None = None):
         self.columns: dict[str, np.ndarray] = {}
         for key in results.COLUMNS:
             values = [row[key] for row in rows]
@@ -71,6 +74,7 @@ class Results(Mapping[str, np.ndarray]):
         self.status = status
         self.folder = folder
         self.tables = tables or {}
+        self.provenance = provenance or {}
         self._fields = fields
 
     def __getitem__(self, name: str) -> np.ndarray:
@@ -320,6 +324,37 @@ class Results(Mapping[str, np.ndarray]):
         about = {"scene": self.name, "status": self.status}
         return package("xarray").Dataset(columns, times, about)
 
+    @typed
+    def to_netcdf(self, file: str | Path) -> None:
+        """Write the columns as NetCDF with CF conventions.
+
+        The file has the variables of :meth:`to_xarray`, the scene and its hash, and the versions of
+        the packages.
+
+        Parameters
+        ----------
+        file : str or Path
+            File to write; an existing one is replaced.
+
+        Raises
+        ------
+        ImportError
+            If xarray is not installed.
+        OutputError
+            If the file cannot be written.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> import repro, xarray
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     _ = repro.run("flow_only", f"{folder}/run")
+        ...     repro.load_run(f"{folder}/run").to_netcdf(f"{folder}/run.nc")
+        ...     xarray.load_dataset(f"{folder}/run.nc").mean_velocity_m_per_d.item()
+        2.9
+        """
+        netcdf.write(Path(file), self.to_xarray(), self.tables, self.provenance)
+
     def __repr__(self) -> str:
         size = f"{len(self.time)} rows, {len(self)} columns"
         return f"<Results of {self.name}: {size}, {self.status}>"
@@ -420,7 +455,8 @@ def solve(scene: Source, overrides: Sequence[str] = (), *, unset: Sequence[str] 
                 show(instant.pore.time, duration)
         except RunEnd as end:
             status = str(end)
-    return Results(scene.name, rows, fields, status, tables=scene_tables(scene))
+    return Results(scene.name, rows, fields, status, tables=scene_tables(scene),
+                   provenance=results.provenance(scene))
 
 
 def arrays(content: Grid) -> dict[str, np.ndarray]:

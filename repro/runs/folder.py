@@ -29,7 +29,9 @@ SUMS = "fields.sha256"
 CHECKPOINTS = (NEWEST, PREVIOUS, REFUSED)
 #: Every file that a run may write, except its fields.
 RUN_FILES = (PROVENANCE, "timeseries.csv", "ledger.csv", "fields.pvd", "before_expansion.pvd", SUMS,
-             "timeseries.nc", REPORT, *CHECKPOINTS, LAST)
+             REPORT, *CHECKPOINTS, LAST)
+#: Further files that the runs of earlier versions have written.
+FORMER_FILES = ("timeseries.nc",)
 FIELDS = re.compile(r"fields/(?:fields|before_expansion)_\d{4,}\.vtu")
 #: A line of SUMS, in the format of sha256sum.
 SUM = re.compile(rf"([0-9a-f]{{64}})  ({FIELDS.pattern})")
@@ -49,7 +51,8 @@ def list_written_files(folder: Path, record: dict) -> set[str]:
         raise OutputError(f"{folder}: run.json lists no files of a run; move the folder away, or "
                           "name another")
     listed = map(str, record["files"])
-    names = {name for name in listed if name in RUN_FILES or FIELDS.fullmatch(name)}
+    names = {name for name in listed
+             if name in (*RUN_FILES, *FORMER_FILES) or FIELDS.fullmatch(name)}
     if SUMS in names and is_file(folder / SUMS):
         names |= read_sums(folder).keys()
     return names | {PROVENANCE, *CHECKPOINTS}

@@ -30,7 +30,7 @@ REMARK = re.compile(r"""
     | '[^'\\\n]*(?:\\.[^'\\\n]*)*'
     """, re.VERBOSE | re.DOTALL)
 #: {(key of numerics, choice): the optional package that it needs}
-OPTIONAL = {("ordering", "metis"): "pymetis", ("solver", "pardiso"): "pypardiso"}
+OPTIONAL = {("solver", "pardiso"): "pypardiso"}
 
 
 def require_packages(scene: Scene) -> None:

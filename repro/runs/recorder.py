@@ -18,7 +18,7 @@ from repro.preflight.simplifications import (
     warn_missing_rows,
     warn_surface,
 )
-from repro.results import field_files, netcdf
+from repro.results import field_files
 from repro.results.files import atomic_path, is_file, sha256_of
 from repro.runs import checkpoint, state_arrays
 from repro.runs.folder import (
@@ -232,8 +232,6 @@ class Recorder:
 
     def finish(self, status: str) -> None:
         """Write all files at the end of a run."""
-        if self.scene.output.timeseries == "netcdf":
-            self._write("timeseries.nc", netcdf.write, self.scene, self.history.rows)
         self._write(SUMS, _write_sums, self.history.hashes)
         complete_folder(self.folder, self.save(status), self.run_files)
 
@@ -311,9 +309,8 @@ def pack_checkpoint(scene: Scene, state: RestartState,
 
 def _unwritten_files(scene: Scene) -> set[str]:
     """Names of the optional files that a run of this scene does not write."""
-    optional = {"timeseries.nc": scene.output.timeseries != "netcdf",
-              "ledger.csv": scene.growth is None, checkpoint.LAST: scene.growth is None,
-              "before_expansion.pvd": not scene.requested_times}
+    optional = {"ledger.csv": scene.growth is None, checkpoint.LAST: scene.growth is None,
+                "before_expansion.pvd": not scene.requested_times}
     return {name for name, is_absent in optional.items() if is_absent}
 
 

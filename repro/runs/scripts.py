@@ -181,7 +181,7 @@ def load_run(folder: str | Path) -> Results:
             for values in np.column_stack(list(run.series.values())).tolist()]
     files = _Files(run.folder, run.times, listed_fields)
     return Results(run.record["scene"], rows, files, run.record["status"], Path(folder),
-                   run.record["tables"])
+                   run.record["tables"], run.record)
 
 
 def _none_if_nan(value: float) -> float | None:

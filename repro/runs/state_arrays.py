@@ -70,7 +70,7 @@ def _ledger(parts: list) -> Ledger:
 
 def _pore(scene: Scene, plain: dict, arrays: Arrays) -> Pore:
     numerics = scene.numerics
-    method = Method(numerics.solver, numerics.ordering)
+    method = Method(numerics.solver)
     first, last = plain["ends_um"]
     mesh = Mesh.of(arrays["points"], arrays["cells"], arrays["biomass"], arrays["loop"],
                    scene.pore.width, (first, last), method)

@@ -362,7 +362,7 @@ class Numerics:
     transport: str = choice(
         "quasi_steady", "gear", source="2.2; 3.3 has gear",
         about="Substrates at rest in each shape, or the transient predictor-corrector scheme")
-    transfer: str = choice("conserving", "linear", "bounded", source="3.5 is linear [E8]",
+    transfer: str = choice("conserving", "linear", source="3.5 is linear [E8]",
                            about="How X_A and X_I go to a new mesh")
     extent: str | None = choice(
         "central", "full", default=None, source="3.1",
@@ -373,12 +373,8 @@ class Numerics:
                             about="What of the flow is continuous across the interface")
     inlet: str = choice(
         "local", "mean", source="(11) [E4]", about="u_x(y) or u_ave in the inlet condition")
-    fixed_point: str = choice("kept", "rechosen", source="2.3.3 [E20]",
-                              about="Which point of a contact surface stays in place")
     solver: str = choice("superlu", "pardiso", source=NOT_IN_PAPER,
                          about="Solver of linear systems; the second needs the package pypardiso")
-    ordering: str = choice("degree", "metis", source=NOT_IN_PAPER,
-                           about="Order of nodes for SuperLU; the second needs the package pymetis")
     refinement: float = number(
         1.0, UP_TO_20, source="3.1 [E13]", about="Divides the element sizes")
     gradation: float = number(
@@ -442,10 +438,6 @@ class Output:
         "1 h", "h", default=None, source=NOT_IN_PAPER,
         about="Interval of rows and fields from t = 0 on, with a last one at growth.end; times "
         "adds others")
-    timeseries: str = choice(
-        "csv", "netcdf", source=NOT_IN_PAPER,
-        about="timeseries.csv alone, or timeseries.nc besides, which needs the package xarray")
-
 
     def requested(self, end: float) -> tuple[float, ...] | None:
         """Return the requested times (h), ascending, to the time `end`; None: every step."""

@@ -1,7 +1,6 @@
 """Constraints between the keys of a scene."""
 import math
 from collections.abc import Iterator
-from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 from repro.scene.time_table import TimeTable
@@ -390,9 +389,6 @@ def _output_rules(scene: "Scene") -> Rules:
     shortest = max(end / MOST_ROWS, SHORTEST_STEP)
     requirement = f"{shortest:.3g} h or more is needed: at most {MOST_ROWS} rows are accepted"
     yield (scene.output.every or math.inf) < shortest, {"output.every": requirement}
-    missing = scene.output.timeseries == "netcdf" and find_spec("xarray") is None
-    requirement = '"csv" is needed, or the package xarray: pip install xarray'
-    yield missing, {"output.timeseries": requirement}
 
 
 def _steady(scene: "Scene") -> bool:

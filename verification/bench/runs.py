@@ -48,7 +48,6 @@ METHODS_OF_BASE = (
     ("bubble alone", BY_MINUTES, CHANGED, (*OF_PAPER, BUBBLE)),
     ("midpoint alone", BY_TOLERANCE, MIDPOINT, (*OF_PAPER, MIDPOINT_RULE)),
     ("midpoint and bubble", BY_TOLERANCE, MIDPOINT[2:5], (*OF_PAPER, MIDPOINT_RULE, BUBBLE)),
-    ("bounded transfer alone", BY_MINUTES, CHANGED[::2], (*OF_PAPER, "numerics.transfer=bounded")),
     ("order 2, midpoint", BY_TOLERANCE, QUADRATIC, OF_ACCURATE),
     ("order 2, midpoint, fresh derivatives", BY_TOLERANCE, QUADRATIC[1:6:2], (*OF_ACCURATE, "numerics.jacobian=fresh")),
     ("order 2, midpoint, one element size everywhere", BY_TOLERANCE, QUADRATIC[1:4],

@@ -178,7 +178,7 @@ ROUND, REFINEMENTS = 20.0, (0.75, 1.3, 2.3, 4.0)
 #: Refinement of the old mesh over that of the new one: three unrelated pairs of meshes a size.
 OLD = (0.7, 0.8, 0.9)
 #: Transfers that a scene may have, by the order of its elements.
-TRANSFERS = {1: ("conserving", "bounded", "linear"), 2: ("conserving",)}
+TRANSFERS = {1: ("conserving", "linear"), 2: ("conserving",)}
 #: (a, b, c) of linear fields a + b x + c y: X_A and X_I (mg/L) of linear elements; X_A and X_I whose sum is X_m; the
 #: pressure over mu_L.
 KINDS = {"active": (25000.0, 100.0, -200.0), "inert": (3000.0, -20.0, 50.0)}

@@ -8,7 +8,10 @@ The module also gives the aggregate, the pore and the stresses of a run at a tim
 aggregates of a prescribed shape.
 """
 
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, replace
+from unittest import mock
 
 import numpy as np
 import shapely
@@ -22,6 +25,7 @@ from repro.fem.sizing import ACROSS_AGGREGATE
 from repro.fem.space import Space
 from repro.march import loop, simulation, updates
 from repro.march.state import Report, RestartState
+from repro.model import contact as mechanics
 from repro.model import flow, pore, remeshing, transport
 from repro.model.kinetics import Sink
 from repro.model.pore import Pore, Solved, solve
@@ -46,6 +50,9 @@ ROWS = {"base": (0.2, *map(float, range(1, 20)), 19.2, 19.4), "wide": tuple(map(
 #: Hours after wide's contact of which conductivities are means: those of `verification.sensitivity.wide`, to the end of
 #: Figure 6, every second shape update of the paper.
 AFTER = tuple(round(35 + 2 * UPDATE * number, 1) for number in range(26))
+#: A change that no key of a scene makes: the fixed points are at all times the present middles of the contact surfaces
+#: [E20].
+RECHOSEN = "fixed points rechosen"
 #: Beginnings of the keys whose changes have no effect until the aggregate is near the opposite wall; and the thickness
 #: over the pore's width up to which it is not near.
 LATE, NEAR = ("growth.minimum_film", "growth.minimum_contact_angle"), 0.9
@@ -74,6 +81,7 @@ WIDE_TO_END = ("wide", rows_at(*range(5, 31, 5), *range(31, 35), *sorted({*AFTER
 def load_packaged(name: str, *changes: str) -> Scene:
     """A packaged scene with the KEY=VALUE of --set, in the elements and steps of the present level."""
     level = current()
+    changes = tuple(change for change in changes if change != RECHOSEN)
     changes = (*level.wide, *changes) if name == "wide" else changes
     if level.kind == CONVERGED:
         return _with_rows(load_scene(name, (*converged(level.size), *changes)))
@@ -117,14 +125,28 @@ def history(*run: str) -> History:
     instants: list[Report] = []
     contact = None
     begun = before = far = None if plain == run else history(*plain).far
-    for state, instant in simulation.steps(scene, begun):
-        if instant:
-            instants.append(instant)
-        if contact is None and before is not None and state.pore.contact:
-            contact = tuple(_solved(scene, touching) for touching in (_with_a_film(scene, before, state), state))
-        before = state
-        far = state if state.pore.boundary.thickness <= NEAR * scene.pore.width else far
+    with _rechosen() if RECHOSEN in run else nullcontext():
+        for state, instant in simulation.steps(scene, begun):
+            if instant:
+                instants.append(instant)
+            if contact is None and before is not None and state.pore.contact:
+                contact = tuple(_solved(scene, touching) for touching in (_with_a_film(scene, before, state), state))
+            before = state
+            far = state if state.pore.boundary.thickness <= NEAR * scene.pore.width else far
     return History(scene, tuple(instants), contact, far)
+
+
+@contextmanager
+def _rechosen() -> Iterator[None]:
+    """RECHOSEN, in every search for a shape."""
+    at_rest = mechanics._at_rest
+
+    def about_middles(keys: mechanics.Mechanics, grown: Pore, *rest) -> mechanics.Expansion:
+        middles = [mechanics.middle_of(grown.boundary, wall) for wall in (BOTTOM, TOP)]
+        return at_rest(keys, replace(grown, fixed=np.logical_or(*middles)), *rest)
+
+    with mock.patch.object(mechanics, "_at_rest", about_middles):
+        yield
 
 
 def _with_a_film(scene: Scene, before: RestartState, contact: RestartState) -> RestartState:
