@@ -1,7 +1,7 @@
 """Active and inert biomass, X_A and X_I ((9)-(10), (28)-(34)): masses at the reaction's points.
 
 A mass stays with its material when the aggregate changes its shape. At the nodes of linear elements
-this is (34), X'_i = X_i S_i / S'_i with the lumped areas S; elements of higher order apply it at
+this is (34), X'_i = X_i S_i / S'_i with the lumped areas S; quadratic elements apply it at
 every quadrature point. Densities are masses over the points' weights (um2). Uptake and growth use
 the same masses at the same points, so that
 

@@ -143,12 +143,11 @@ def _sides(film: float) -> dict[str, float]:
 
 #: Thiele's modulus, film (um), and the last errors of C and of the uptake, for each order.
 THIELE = {1: ((0.1, 0.0, 3e-7, 3e-7), (1.0, 0.0, 4e-5, 4e-5), (10.0, 0.0, 4e-3, 4e-3), (1.0, FILM, 3e-5, 3e-5)),
-          2: ((0.1, 0.0, 1e-12, 3e-12), (1.0, 0.0, 1e-8, 1e-11), (10.0, 0.0, 2e-5, 3e-7), (1.0, FILM, 7e-9, 1e-11)),
-          3: ((1.0, 0.0, 2e-11, 3e-12), (10.0, 0.0, 2e-7, 1e-10), (1.0, FILM, 2e-11, 3e-12))}
+          2: ((0.1, 0.0, 1e-12, 3e-12), (1.0, 0.0, 1e-8, 1e-11), (10.0, 0.0, 2e-5, 3e-7), (1.0, FILM, 7e-9, 1e-11))}
 #: Words of the labels for films.
 FILMED = {0.0: "", FILM: f", films of {FILM:g} um"}
 #: Element sizes (um) with the number of meshes of each.
-THIELE_MESHES = {1: SAMPLES, 2: {4.0: 8, 2.0: 4, 1.0: 2, 0.5: 1}, 3: SAMPLES}
+THIELE_MESHES = {1: SAMPLES, 2: {4.0: 8, 2.0: 4, 1.0: 2, 0.5: 1}}
 NORM = "L2 of C over the mesh, relative; uptake, relative; several meshes a size"
 
 
@@ -167,7 +166,7 @@ def first_order(order: int, modulus: float, film: float, ceiling: float, uptake_
     errors = refine(_slab_errors, THIELE_MESHES[order], order, film, kappa * LARGE, LARGE, exact, "taken up")
     yield studies(errors, {"C": (*EXPECTED[order], ceiling)})
     expected, why = FUNCTIONAL[order]
-    if order == 1 or (order == 2 and modulus > 1):
+    if order == 1 or modulus > 1:
         yield studies(errors, {"taken up": (around(expected, order * BAND), why, uptake_ceiling)})
     else:  # soon at round-off
         yield at_most("taken up", errors["taken up"][-1], uptake_ceiling, why)
