@@ -320,6 +320,7 @@ def test_the_advice_against_a_lack_of_memory_is_accepted_and_helps(monkeypatch, 
     assert outcomes == {True, False}
 
 
+@pytest.mark.thorough
 def test_forces_of_the_fluid_are_advised_and_act_on_a_permeable_aggregate():
     """In a minute of growth, which moves the top by 0.03 um, the force strains the seed by the ratio of the warning,
     which is an estimate of its order: within a factor of four."""

@@ -108,6 +108,7 @@ def test_an_entry_without_a_later_end_is_refused(entry, expected):
     assert expected in str(refused.value) and state(shorter) == before
 
 
+@pytest.mark.thorough
 def test_the_command_makes_a_run_longer(tmp_path, capsys):
     """The record has the last setting. The same end changes nothing. A run without growth has no end to change. A
     longer run in the folder of a shorter one is refused with a hint at --resume."""

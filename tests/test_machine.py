@@ -199,6 +199,7 @@ MORE = [pytest.param(size, which, marks=pytest.mark.thorough)
         for size, which in ((0, ""), (500, ""), (8_000, ""), (40_000, ""), (100_000, "report.html: "))]
 
 
+@pytest.mark.thorough
 @LINUX
 @pytest.mark.parametrize("most, which", [(20_000, "fields_0000.vtu: "), *MORE])
 def test_a_limit_of_file_sizes_ends_a_run_in_one_line(tmp_path, most, which):

@@ -156,6 +156,7 @@ def test_signals_are_caught_and_handlers_are_restored():
     assert not signal.pthread_sigmask(signal.SIG_BLOCK, ())
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("closed, options", [
     ("stdout", ["--json"]), *(pytest.param(closed, [], marks=pytest.mark.thorough) for closed in ("stdout", "stderr"))])
 def test_a_run_goes_on_after_its_reader_closes(tmp_path, closed, options):

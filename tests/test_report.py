@@ -255,6 +255,7 @@ def write_fields(path, points, cells, nodal, region):
     field_files.write(path, Grid(np.pad(points, ((0, 0), (0, 1))), cells, nodal, celled))
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("kind, count", [
     pytest.param("triangle", 101_000, marks=pytest.mark.thorough), ("triangle6", 26_000)])
 def test_a_page_of_a_fine_mesh_is_small_and_accurate(tmp_path, monkeypatch, kind, count):

@@ -358,6 +358,7 @@ def cut_off(out, how, *arguments):
     return process.returncode, stderr
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("how, ends, word", [
     (signal.SIGTERM, 143, "terminated"), pytest.param(signal.SIGINT, 130, "interrupted", marks=pytest.mark.thorough)])
 def test_a_signal_ends_a_sweep_quietly(tmp_path, how, ends, word):

@@ -396,7 +396,7 @@ def inclusion(disc: tuple, ratio: float, interface: str):
 @pytest.mark.case(
     "flow-inclusion", kind="exact", mutants=("traction-transposed", "normal-stress-halved"),
     references=("viscous_inclusion",), omitted="order 2: flow-inclusion-quadratic")
-@parametrize("*setup", combined(POLYGON, SOFT_AND_STIFF, FORMS))
+@parametrize("*setup", combined(POLYGON, SOFT_AND_STIFF, FORMS), slow=viscous(RATIO))
 def test_inclusion(setup, record):
     """A viscous disc under pure shear strains as the closed form says, for lambda = 10 and 2000 in both forms.
 
@@ -456,7 +456,7 @@ def manufactured(setup: tuple, ratio: float, interface: str):
 @pytest.mark.case(
     "flow-manufactured", kind="manufactured", mutants=("saddle-sign",), references=("manufactured_flow",),
     omitted="order 2: flow-manufactured-quadratic")
-@parametrize("*setup", combined(SETUPS, SOFT_AND_STIFF, FORMS))
+@parametrize("*setup", combined(SETUPS, SOFT_AND_STIFF, FORMS), slow=viscous(RATIO))
 def test_manufactured(setup, record):
     """If only the viscosity jumps, all orders are full, for lambda = 10 and 2000 in both forms.
 

@@ -264,6 +264,7 @@ def test_bubble(interface, record):
                    "(2) tested with linear ramps, round-off"))
 
 
+@pytest.mark.slow
 @pytest.mark.case(
     "flow-bubble-layers", kind="exact", mutants=("bubble-of-water", "bubble-tenfold"), references=("layered_channel",),
     runs_with="1", omitted="the bubble belongs to linear velocities")

@@ -185,6 +185,7 @@ def half_cylinder(top: float):
         "outline": (2, SECOND, 2e-4), "place": (2, SECOND, 2e-4), "pressure": (1.5, LAYER, 3e-3)})
 
 
+@pytest.mark.slow
 @pytest.mark.case(
     "growth-half-cylinder", kind="exact",
     claim=CLAIM.format(36),

@@ -156,6 +156,7 @@ def energy_and_constraint(gamma: float) -> tuple[Callable, Callable]:
     return lambda theta: matrix(theta)[np.ix_(free, free)], lambda theta: matrix(theta)[last:, free]
 
 
+@pytest.mark.slow
 @pytest.mark.case(
     "growth-surface-stability", kind="cross-code", mutants=("biot-of-a-layer", "grad-div-dropped"),
     references=("surface_stability",), runs_with="2",

@@ -27,7 +27,7 @@ from verification.problems.hard import TooLong, limited
 #: Processor time (s) of one run: a hundred times the median.
 LIMIT = 30.0
 #: Cheap members, in ``make test``. ``make verify`` runs the others too.
-QUICK = (0, *range(2, 10), *range(164, 171))
+QUICK = (0, 2, 3, 6, 8, 9, *range(164, 171))
 REST = tuple(seed for seed in range(190) if seed not in QUICK)
 #: Checks that are not judged. By zero order the growth of 172 jumps at a front in the aggregate, on which ``fast``
 #: puts a few elements: its thickness is wrong by 0.2 %, and the head loss of the film above it, a sixth of the width,

@@ -112,7 +112,7 @@ CEILINGS = {0.01: 3e-3, 0.1: 3e-3, 1.0: 2e-3, 10.0: 1.2e-3}
 @pytest.mark.case(
     "mesh_motion-waves", kind="exact", mutants=("gamma-sign", "gamma-inverted", "twice-the-divergence", "walls-held"),
     references=("sliding_waves",))
-@parametrize("geometry", EITHER)
+@parametrize("geometry", EITHER, slow=["straight"])
 def test_waves(geometry, record):
     """Between a plug whose faces are bent by a wave and the ends of the mesh the fluid is displaced as the closed form
     says, for every gamma, sliding along walls and ends, on straight triangles and on curved ones.
@@ -233,7 +233,7 @@ STEPS = 18
 @pytest.mark.case(
     "mesh_motion-growth", kind="property", mutants=("stale-fluid", "outlet-moves"),
     references=("quadratic_mesh_motion",))
-@parametrize("geometry", EITHER)
+@parametrize("geometry", EITHER, slow=["straight"])
 def test_growth(geometry, record):
     """If a half-disc doubles its area or slides by its radius in 18 steps (under a narrow film: grows by 30 % or slides
     by half of its radius), no triangle turns over, no gap opens, and the nodes of walls, inlet and outlet stay on their

@@ -24,8 +24,8 @@ KINDS = ("exact", "manufactured", "cross-code", "property")
 STAGES = ("flow", "transport", "growth", "reprojection", "mesh_motion", "coupling", "hard")
 #: Numerics that a case may run with: elements of order 1 and 2, and the presets of whole scenes.
 NUMERICS = ("1", "2", "paper", "fast", "accurate", "exact")
-#: Variants with this word in their label are slow, whatever the case: the preset differs from accurate in its sizes.
-SLOW = "exact"
+#: Words in labels of slow variants, in a table that has ``fast``: they have the same elements.
+LIKE_FAST = ("quadratic", "accurate", "exact")
 #: The numerics that other words in labels stand for.
 OF_WORDS = {"linear": "1", "quadratic": "2", "order 1": "1", "order 2": "2", "straight": "1", "curved": "2"}
 
@@ -52,8 +52,6 @@ class Case:
         Names of NUMERICS that it runs with and that no label of its variants contains, separated by spaces.
     omitted : str
         The reason why it does not run with the other numerics.
-    slow : bool
-        Whether ``make verify-fast`` leaves it out.
     file : Path
         The module that it is defined in.
     variants : dict
@@ -81,9 +79,9 @@ class Case:
     references: tuple[str, ...] = ()
     runs_with: str = ""
     omitted: str = ""
-    slow: bool = False
     file: Path = FOLDER
     variants: dict[str, str] = field(default_factory=dict)
+    slow_variants: list[str] = field(default_factory=list)
 
     def __post_init__(self):
         if self.kind not in KINDS or not all((self.claim, self.norm, self.mutants)):
@@ -97,17 +95,27 @@ class Case:
     @property
     def numerics(self) -> tuple[str, ...]:
         """The names of NUMERICS that it runs with. Raises ValueError if ``runs_with`` has another word."""
-        words = {OF_WORDS.get(word, word) for label in self.variants for word in label.split(", ")}
+        return self._numerics(self.variants)
+
+    @property
+    def quick_numerics(self) -> tuple[str, ...]:
+        """The names of NUMERICS that ``make verify-fast`` runs it with."""
+        quick = [label for label in self.variants if label not in self.slow_variants]
+        return self._numerics(quick) if quick else ()
+
+    def _numerics(self, labels: Iterable[str]) -> tuple[str, ...]:
+        words = {OF_WORDS.get(word, word) for label in labels for word in label.split(", ")}
         added = {*self.runs_with.split()}
         if not added <= {*NUMERICS}:
             raise ValueError(f"{self.id}: {', '.join(sorted(added - {*NUMERICS}))} are none of {', '.join(NUMERICS)}")
         return tuple(name for name in NUMERICS if name in words | added)
 
 
-def parametrize(names: str, variants: Mapping[str, tuple]) -> pytest.MarkDecorator:
+def parametrize(names: str, variants: Mapping[str, tuple], slow: Iterable[str] = ()) -> pytest.MarkDecorator:
     """Parametrize a case over a table, whose labels become the ids of the variants.
 
-    A variant with the preset exact is slow.
+    ``make verify-fast`` leaves out slow variants: those with a word of ``slow`` in their labels, and those with the
+    elements of ``fast`` in a table that has ``fast``.
 
     Parameters
     ----------
@@ -115,7 +123,9 @@ def parametrize(names: str, variants: Mapping[str, tuple]) -> pytest.MarkDecorat
         Names of the arguments, separated by ", ". A last name with a star, as in "bound, *changes", takes the tuple of
         the remaining values.
     variants : dict
-        The table, {label: values}: a tuple of one value per name.
+        The table, {label: values}: a tuple of one value per name. Commas separate the words of a label.
+    slow : iterable of str
+        Words of the labels of further slow variants.
 
     Returns
     -------
@@ -133,7 +143,9 @@ def parametrize(names: str, variants: Mapping[str, tuple]) -> pytest.MarkDecorat
     """
     *first, last = names.split(", ")
     rows = {label: (*row[:len(first)], row[len(first):]) if last[0] == "*" else row for label, row in variants.items()}
-    sets = [pytest.param(*row, id=label, marks=pytest.mark.slow if SLOW in label else ())
+    words = {word for label in rows for word in label.split(", ")}
+    late = (*slow, *(LIKE_FAST if "fast" in words else ()))
+    sets = [pytest.param(*row, id=label, marks=pytest.mark.slow if {*late} & {*label.split(", ")} else ())
             for label, row in rows.items()]
     return pytest.mark.parametrize([*first, last.lstrip("*")], sets)
 
@@ -174,9 +186,13 @@ def _cases_of(function) -> Iterator[Case]:
             id = names["case"].args[0]
             file = Path(function.__code__.co_filename)
             fields = {**_documented(function), **names["case"].kwargs}
-            case = Case(id, **fields, slow="slow" in names and SLOW not in parameters, file=file)
+            case = Case(id, **fields, file=file)
+            case = groups.setdefault(id, case)
+            label = label_of(id, parameters)
             test = f"{file.relative_to(ROOT)}::{function.__name__}" + (f"[{parameters}]" if parameters else "")
-            groups.setdefault(id, case).variants[label_of(id, parameters)] = test
+            case.variants[label] = test
+            if "slow" in names:
+                case.slow_variants.append(label)
     yield from groups.values()
 
 

@@ -13,7 +13,7 @@ from functools import cache
 from itertools import product, starmap
 
 import repro
-from verification.evidence.cases import NUMERICS, SLOW, Case, cases
+from verification.evidence.cases import NUMERICS, Case, cases
 from verification.evidence.writing import REPORT, ROOT, page, table
 from verification.mutants import runner
 
@@ -85,7 +85,7 @@ def _cell(case: Case, name: str) -> str:
     """Whether a case runs with the numerics of a name."""
     if name not in case.numerics:
         return "n/a"
-    return "slow" if case.slow or name == SLOW else "run"
+    return "run" if name in case.quick_numerics else "slow"
 
 
 def reasons(case: Case) -> str:

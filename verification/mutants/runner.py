@@ -113,7 +113,7 @@ def tests_of(mutant: Mutant) -> dict[str, list[str]]:
     if mutant.tests:
         return {test: [test] for test in mutant.tests}
     naming = [case for case in cases().values() if mutant.id in case.mutants]
-    return {case.id: [*case.variants.values()] for case in sorted(naming, key=lambda case: case.slow)}
+    return {case.id: [*case.variants.values()] for case in sorted(naming, key=lambda case: not case.quick_numerics)}
 
 
 def run(mutant: Mutant, every: bool = False) -> Outcome:
