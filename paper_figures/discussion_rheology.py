@@ -81,7 +81,7 @@ def caption(*folders: Path) -> str:
     results = "; ".join(f"{label}: {contact(folder):g} h and {table['conductivity_m_per_d'][-1]:.3g} m/d"
                      for label, folder, table in zip(LABELS, folders, tables))
     return (f"Wide ({figure_6.ASSUMED}) to {tables[0]['time_h'][-1]:g} h with one change at a time: new biomass is "
-            "stress-free (section 5), the fixed midpoints of the contact surfaces are chosen anew at every update, or "
-            "the least film or contact angle of 2.3.3 is halved or doubled. (a) The last outlines; (b) the "
+            "stress-free (section 5), or the least film or contact angle of 2.3.3 is halved or doubled; C41 also "
+            "chooses the fixed midpoints of the contact surfaces anew. (a) The last outlines; (b) the "
             "conductivity around contact; (c) its change in percent, linear up to 1 % and logarithmic beyond; the "
             f"peaks are contact at another time. First row in contact, and conductivity at the end: {results}.")
