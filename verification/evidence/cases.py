@@ -56,6 +56,8 @@ class Case:
         The module that it is defined in.
     variants : dict
         {label: test id of pytest}.
+    slow_variants : list of str
+        Labels of the variants that ``make verify-fast`` leaves out.
 
     Raises
     ------
