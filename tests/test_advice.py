@@ -276,7 +276,8 @@ def setting(warned):
     return []
 
 
-@pytest.mark.parametrize("preset", PRESETS)
+@pytest.mark.parametrize("preset", [
+    pytest.param(preset, marks=pytest.mark.thorough if preset in ("accurate", "exact") else ()) for preset in PRESETS])
 def test_the_advice_of_check_is_accepted_and_helps(preset):
     """In 30 scenes the advice of a warning silences it; every kind of advice occurs, and so does its absence."""
     kinds = set()

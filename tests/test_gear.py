@@ -176,8 +176,8 @@ def test_the_defect_of_biomass_at_an_exhausted_substrate_is_accepted(step):
 
 @pytest.mark.parametrize("changes, unset", [
     (['substrates.acceptor.supply=[["0 h", "10 mg/L"], ["0.4 h", "0 mg/L"]]', 'growth.end="1.4 h"'], ()),
-    (["aggregate.radius=20 um", "substrates.boundary=closed", "pore.length=200 um", "numerics.extent=full",
-      'growth.end="9.2 h"'], ["flow"])])
+    pytest.param(["aggregate.radius=20 um", "substrates.boundary=closed", "pore.length=200 um", "numerics.extent=full",
+                  'growth.end="9.2 h"'], ["flow"], marks=pytest.mark.thorough)])
 def test_a_substrate_may_be_used_up_to_nothing(changes, unset):
     """Without supply, or in a closed pore with an aggregate, the acceptor falls until it underflows. The run continues,
     biomass no longer grows, and the donor remains."""

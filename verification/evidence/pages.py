@@ -90,8 +90,10 @@ def texts(records: Mapping[str, Mapping]) -> dict[str, str]:
     """Every page: {file: Markdown}."""
     stages = runner.load_mutants()
     read = {"results": stages.pop("results")}
-    pages = {"REPORT.md": ("Verification", index(records)), "mutants.md": ("Mutants", mutant_blocks(stages)),
-             "mutants_read.md": (OF_READERS, mutant_blocks(read))}
+    state = mutant_state()
+    pages = {"REPORT.md": ("Verification", index(records, state)),
+             "mutants.md": ("Mutants", mutant_blocks(stages, state)),
+             "mutants_read.md": (OF_READERS, mutant_blocks(read, state))}
     for stage, title in TITLES.items():
         chosen = of_stage(stage, records)
         articles = [article(cases()[id], record) for id, record in chosen.items()]
@@ -119,10 +121,10 @@ OTHER_PAGES = ((link("The paper's claims", "../../paper_figures/replication.md")
            (link("Mutants made by machine", "sampled.md"), "`make mutants-sampled`"))
 
 
-def index(records: Mapping[str, Mapping]) -> list[str]:
-    """The first page: stages, and a line a case."""
+def index(records: Mapping[str, Mapping], state: str) -> list[str]:
+    """The first page: stages, the state of the mutants, and a line a case."""
     stages = [(link(title, stage), summary(of_stage(stage, records).values())) for stage, title in TITLES.items()]
-    more = ((link("Mutants", "mutants"), mutant_state()),
+    more = ((link("Mutants", "mutants"), state),
             (link(OF_READERS, "mutants_read"), "files, columns, charts and messages that users read"),
             (link("Equation, module, case, reference, mutant, claim", "matrix"), "what verifies what, with which "
              "elements and presets"))
@@ -196,10 +198,10 @@ def mutant_state() -> str:
     return f"{count} by `make mutants`, {state}."
 
 
-def mutant_blocks(stages: Mapping[str, Iterable[Mutant]]) -> list[str]:
+def mutant_blocks(stages: Mapping[str, Iterable[Mutant]], state: str) -> list[str]:
     """A table a stage: mutants, and the cases or tests that caught them when they were last run."""
     records = runner.recorded()
-    blocks = [mutant_state()]
+    blocks = [state]
     for stage, chosen in stages.items():
         rows = [(mutant.id, mutant.says, ", ".join(records[mutant.id]["caught_by"]) or "not caught")
                 for mutant in chosen]
