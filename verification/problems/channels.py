@@ -161,8 +161,10 @@ def at_heights(space: Space, fields: np.ndarray, x) -> np.ndarray:
 def box_errors(grid: Mesh, order: int, ratio: float, interface: str, exact: Callable) -> dict[str, float]:
     """Relative L2 errors of the velocity, and of the pressure without its mean.
 
-    Unlike in :func:`repro.model.flow.unit_flow`, a node of the interface has one pressure here for both orders. A jump of
-    the pressure therefore limits the orders of the errors. order: of the velocity; ratio: of the viscosities; exact(x, y): velocity (..., 2), pressure (...) and force
+    Unlike in :func:`repro.model.flow.unit_flow`, a node of the interface has one pressure here for both orders. A jump
+    of the pressure therefore limits the orders of the errors.
+
+    order: of the velocity; ratio: of the viscosities; exact(x, y): velocity (..., 2), pressure (...) and force
     (..., 2), all dimensionless.
     """
     space = meshes.space_on(grid, order)
