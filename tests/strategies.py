@@ -11,7 +11,7 @@ from skfem.quadrature import get_quadrature
 from skfem.refdom import RefTri
 
 from repro.fem import mesher, sizing
-from repro.fem.mesh import Mesh, curved
+from repro.fem.mesh import Mesh
 from repro.fem.outline import BOTTOM, FREE, TOP, Outline
 from repro.fem.outline import half_disc as half_disc_outline
 from repro.fem.sizing import Sizing
@@ -201,11 +201,6 @@ def meshed(around, width=50.0, refinement=1.0, ends=None, film=2.0):
     """(Mesh, refined outline) with the extent of 3.1; straight or curved like the outline."""
     ends = sizing.meshed_extent(around, width, LENGTH) if ends is None else ends
     return mesher.generate(around, ends, Sizing(width, refinement, film), around.geometry if around else 1)
-
-
-def space_of(grid, order):
-    """Space of an order on a mesh. Order 2 curves a straight mesh; the mid-edge nodes stay on its edges."""
-    return Space(grid if order == grid.geometry else curved(grid, None))
 
 
 def bent_inside(grid, by=0.2):

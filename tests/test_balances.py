@@ -24,7 +24,7 @@ ANY_ORDER = tuple(ORDERS.values())
 
 
 def resolved_instants(scene):
-    """Yield the instants of a run up to the time at which its mesh is too coarse, which higher orders report."""
+    """Yield the instants of a run up to the time at which its mesh is too coarse, which quadratic elements report."""
     try:
         yield from simulate(scene)
     except SimulationError as error:

@@ -132,8 +132,8 @@ def rate_of(scene, gradient):
 
 
 def pressure_drop(scene, pore, flow):
-    """Head loss (um) over the meshed part. Linear elements: the difference of the ends' mean heads. Higher orders: the
-    viscous work, nu / g times the integral of nu_r grad u : (grad u [+ grad u^T]), over the flow."""
+    """Head loss (um) over the meshed part. Linear elements: the difference of the ends' mean heads. Quadratic elements:
+    the viscous work, nu / g times the integral of nu_r grad u : (grad u [+ grad u^T]), over the flow."""
     space = pore.space
     if space.order == 1:
         first, last = (integrate_over_end(space, x, flow.head) / scene.pore.width for x in pore.mesh.ends)

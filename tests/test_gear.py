@@ -36,7 +36,7 @@ def case(radius="20 um", velocity="2.9 m/day", boundary="open", order=1, **secti
 
 
 def storage(problem):
-    """(n,) areas (um2) of the nodes: the lumped mass, or the integrals of the functions of higher orders."""
+    """(n,) areas (um2) of the nodes: the lumped mass, or the integrals of quadratic functions."""
     space = problem.space
     if space.order == 1:
         return space.lumped()

@@ -360,7 +360,7 @@ def cut_off(out, how, *arguments):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("how, ends, word", [
-    (signal.SIGTERM, 143, "terminated"), pytest.param(signal.SIGINT, 130, "interrupted", marks=pytest.mark.thorough)])
+    (signal.SIGTERM, 143, "terminated"), (signal.SIGINT, 130, "interrupted")])
 def test_a_signal_ends_a_sweep_quietly(tmp_path, how, ends, word):
     """It prints one line with the command that continues it, and writes the tables of its runs so far."""
     out = tmp_path / "sweep"

@@ -17,8 +17,9 @@ from repro.model import pore, transport
 from repro.model.kinetics import Sink
 from repro.model.pore import solve
 from repro.model.transport import Concentrations
-from tests.strategies import EVERY_ORDER, ORDERS, coarse_base, scene, space_of
+from tests.strategies import EVERY_ORDER, ORDERS, coarse_base, scene
 from tests.test_derived import integrate_over_end, node_coordinates
+from verification.problems.meshes import space_on
 
 FINE = {1: 1.0, 2: 0.45}
 
@@ -67,7 +68,7 @@ def right_triangles():
 def test_couplings_that_are_exactly_zero_stay_in_the_matrix(order):
     """In right triangles nothing diffuses along the hypotenuse, so that without flow these entries are zero. The steady
     state without biomass is the supply."""
-    space = space_of(right_triangles(), order)
+    space = space_on(right_triangles(), order)
     problem = transport.problem(space, None, scene().substrates, scene().kinetics)
     concentrations = transport.steady(problem, Sink(np.zeros_like(space.reaction.dx)))
     assert concentrations.acceptor == pytest.approx(10.0, rel=1e-12)

@@ -146,7 +146,7 @@ def test_a_row_that_is_left_out_is_reported(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(loop, "_row_within", lambda *_: None)
     folder = pages.run(tmp_path, "base", "growth.end=0.4 h", 'output.times=["0.05 h", "0.13 h", "0.4 h"]')
     record = read_record(folder)
-    text = "there is no row at 0.05, 0.13 h: the state there could not be computed, and the run went on without it"
+    text = "the run has no row at 0.05, 0.13 h, because the state at this time could not be computed"
     assert record["status"] == "completed" and record["rows"] == 2
     assert [entry["text"] for entry in record["warnings"] if entry["key"] == "output.times"] == [text]
     assert capsys.readouterr().err.count(f"output.times: {text}") == 1

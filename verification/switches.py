@@ -247,4 +247,4 @@ def uneven(scene: Scene, bulge: float) -> Pore:
     seed = pore.initial_outline(scene)
     points = seed.points * (1 + bulge * np.cos(3 * np.arctan2(*seed.points.T[::-1])))[:, None]
     pore_parts = pore.Meshing.of(scene).generate(replace(seed, points=points, origin=points.copy()))
-    return aggregates.seed_on(*pore_parts, scene.numerics.order)
+    return aggregates.seed_on(*pore_parts)

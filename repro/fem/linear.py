@@ -40,7 +40,7 @@ STAGE = "factorise and solve"
 
 @dataclass(frozen=True)
 class Method:
-    """solver: "superlu" or "pardiso" factors."""
+    """solver: the package that factorises the matrices, "superlu" or "pardiso"."""
 
     solver: str = "superlu"
 
@@ -75,8 +75,8 @@ def node_order(count: int, elements: np.ndarray) -> np.ndarray:
     rows, columns = (part.ravel() for part in pairs(elements))
     # SuperLU orders a matrix by factorising it; this one has a dominant diagonal.
     dominant = np.tile((np.ones((k, k)) + k * np.eye(k)).ravel(), len(elements))
-    graph = sp.csc_array((dominant, (rows, columns)), shape=(count, count))
-    factor = splu(sp.csc_matrix(graph), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
+    graph = sp.csc_matrix((dominant, (rows, columns)), shape=(count, count))
+    factor = splu(graph, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
                   options={"SymmetricMode": True})
     return np.argsort(factor.perm_c)
 

@@ -29,15 +29,13 @@ POOR_ALLOWED = 6
 @dataclass(frozen=True, eq=False)
 class Dofs:
     """Nodes of a mesh. cells: (T, 3 or 6), corners first; count: of all nodes; inlet, outlet: (E, 2
-    or 3) nodes of their edges, from the lower wall up; walls: nodes of both walls; method: of the
-    linear systems."""
+    or 3) nodes of their edges, from the lower wall up; walls: nodes of both walls."""
 
     cells: np.ndarray
     count: int
     inlet: np.ndarray
     outlet: np.ndarray
     walls: np.ndarray
-    method: Method
 
     @cached_property
     def elimination(self) -> np.ndarray:
@@ -203,15 +201,14 @@ def _corners(topology: Topology) -> Dofs:
     """The nodes of straight triangles."""
     inlet, outlet = (np.column_stack([line[:-1], line[1:]])
                      for line in (topology.inlet, topology.outlet))
-    return Dofs(topology.cells, topology.corners, inlet, outlet, topology.walls, topology.method)
+    return Dofs(topology.cells, topology.corners, inlet, outlet, topology.walls)
 
 
 def _corners_and_middles(topology: Topology) -> Dofs:
     """The nodes of curved triangles: corners, then the middle of every edge."""
     inlet, outlet = (_with_middles(topology, line) for line in (topology.inlet, topology.outlet))
     walls = np.concatenate([topology.walls, _middles_on_walls(topology)])
-    return Dofs(topology.cells, topology.corners + len(topology.edges), inlet, outlet, walls,
-                topology.method)
+    return Dofs(topology.cells, topology.corners + len(topology.edges), inlet, outlet, walls)
 
 
 def _with_middles(topology: Topology, line: np.ndarray) -> np.ndarray:

@@ -288,8 +288,8 @@ def warn_missing_rows(times: list[float]) -> Iterator[Caveat]:
     """Warn about requested times (h) at which no state could be computed."""
     if times:
         listed = ", ".join(f"{time:g}" for time in times)
-        yield Caveat("output.times", f"there is no row at {listed} h: the state there could not "
-                     "be computed, and the run went on without it")
+        yield Caveat("output.times", f"the run has no row at {listed} h, because the state at "
+                     "this time could not be computed")
 
 
 def _fold(scene: Scene, computed: Numbers) -> Iterator[Caveat]:

@@ -6,7 +6,7 @@
     names         words and units of all quantities, by name
     tables        results in Python
     drawing       curves, fields and films with matplotlib
-    netcdf        the time series as NetCDF
+    netcdf        results as NetCDF, by `Results.to_netcdf`
 
 Writers use :func:`repro.results.files.atomic_path`, so that a file is complete or absent. An empty
 field of a table is a quantity that the scene does not model.

@@ -7,6 +7,8 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from time import perf_counter
 
+import numpy as np
+
 from repro import report, results, timing
 from repro.errors import Interrupted, shell_word
 from repro.march.balance import Ledger
@@ -132,9 +134,11 @@ class Recorder:
 
     def _missing_rows(self) -> list[float]:
         """Requested times (h) so far that have no row."""
-        times = [row[results.COLUMNS.index("time_h")] for row in self.history.rows]
-        return [time for time in self.scene.requested_times or () if time < self.time - SAME_TIME
-                and not any(abs(time - present) <= SAME_TIME for present in times)]
+        requested = np.array(self.scene.requested_times or ())
+        past = requested[requested < self.time - SAME_TIME]
+        present = [row[results.COLUMNS.index("time_h")] for row in self.history.rows]
+        nearest = np.append(present, np.inf)[np.searchsorted(present, past - SAME_TIME)]
+        return past[nearest > past + SAME_TIME].tolist()
 
     def _add_fields(self, reported: Report) -> None:
         self._write_fields(self.history.index, "fields", reported.pore, reported.solved)

@@ -1,14 +1,14 @@
 """Keys and choices of earlier versions, and what to write instead.
 
 A scene that names one of them is refused. The runs of earlier versions keep them in ``run.json``:
-their hashes stay valid, and a former key is read past if it has the value of every present scene.
+their hashes stay valid, and the reader drops a former key if its value is the present behaviour.
 """
 from collections.abc import Iterator
 from typing import NamedTuple
 
 
 class Former(NamedTuple):
-    """A former key: the value that every scene has now, and what to write instead of the key."""
+    """A former key: the value that is the present behaviour, and what to write instead."""
 
     value: str
     instead: str
@@ -51,7 +51,7 @@ def with_former(tables: dict) -> dict:
 
 
 def without_former(tables: object) -> object:
-    """Return the tables of a record without the former keys that say what every scene has now.
+    """Return the tables of a record without the former keys whose value is the present behaviour.
 
     Tables that a user has altered may be anything.
     """

@@ -59,7 +59,7 @@ class Problem:
     """A problem with biomass where ``inside(x, y)``.
 
     box: ends (um) along, and across in two dimensions; linear, curved: numbers of cells for this package's elements of
-    order 1 and of higher orders; stepped: cells of py-pde's compiled run; speed: u (um/h).
+    order 1 and 2; stepped: cells of py-pde's compiled run; speed: u (um/h).
     """
 
     box: tuple[tuple[float, float], ...]

@@ -154,7 +154,7 @@ def test_plug(changes, record):
 
 @pytest.mark.case(
     "coupling-seepage-plug", kind="exact", mutants=("drag-left-to-the-surface", "drag-over-twice"),
-    omitted="1: permeable aggregates have higher orders")
+    omitted="1: permeable aggregates have quadratic elements")
 @parametrize("*changes", CURVED)
 def test_seepage(changes, record):
     """Water that seeps evenly through a plug, fixed at its upstream end between walls without friction, causes a

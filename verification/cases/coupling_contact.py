@@ -31,8 +31,8 @@ AIMS = {"fast": 0.01, "accurate": 0.002, "exact": 0.0005}
 #: error of 0.55 % for `accurate` right after contact, when the length is 12 um. Until 2026-11-28 the limits of the
 #: conductivity were the aims. Since the pressure has two values at the interface, the flow no longer adds an error of
 #: the opposite sign. The conductivity is then that of the film and of the contact surface, and has the error of its
-#: length: in the pore of 25 um at 17.5 h `fast` has 1.2 % in the length and 1.1 % in the conductivity. So both have the
-#: same limits. The steps and elements that follow contact lines are the cause, and are not mended here.
+#: length: in the pore of 25 um at 17.5 h `fast` has 1.2 % in the length and 1.1 % in the conductivity. Both
+#: therefore have the same limits. Steps and elements near contact lines cause the error. It is a known limit.
 ACCEPTED = {"fast": (0.02, 0.02), "accurate": (0.006, 0.006), "exact": (0.0005, 0.0005)}
 #: Until 2026-11-26 the conductivity of `exact` had its aim as limit in both pores. Then contact lines beside corners
 #: got other places, and its error in the pore of 40 um became 0.063 %. The reference changes by 0.041 % there between

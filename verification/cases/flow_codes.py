@@ -11,8 +11,8 @@ is of first order, and visible at lambda = 10 alone: a stiff body takes the whol
 The head loss has another error of first order, from both ends (see :mod:`verification.cases.flow`). It equals that of
 the clean channel on the same mesh, so the excess over that loss is free of it.
 
-On curved triangles only the jump remains: order 1/2 in energy, and twice that in the loss and, by
-duality, in L2 of the velocity.
+That concerns linear elements. Quadratic elements have two pressures at each node of the interface, so the jump limits
+them no longer.
 
 Linear velocities with a condensed bubble (MINI) equal those without condensing. With c = 100 the stabilised element's
 tau = h^2 / (100 nu) is within 7 % of the bubble's, h^2 / (106.7 nu), for equilateral triangles, so both err alike on

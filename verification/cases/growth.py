@@ -53,7 +53,7 @@ def _supported(size: float, kind: int):
     """(name, body, function theta -> F and P) of a free body and of a confined one."""
     grid, side = bodies.rectangle(size, 4, kind)
     for name, support, exact in (("free", side["left"], _free), ("confined", side["left"] | side["right"], _confined)):
-        yield name, bodies.on_mesh(grid, kind, support, side["bottom"]), exact
+        yield name, bodies.on_mesh(grid, support, side["bottom"]), exact
 
 
 @pytest.mark.case(
@@ -114,7 +114,7 @@ def _sheared(kind: int, Q: np.ndarray, a: float, b: float, d: float) -> list[Che
     """Check a sheared body turned by Q, a multiple of a right angle. Its former upper end is free along its normal."""
     grid, side = bodies.rectangle(SIZES[kind], 5, kind)
     rim = side["left"] | side["right"] | side["bottom"]
-    body = _turned(bodies.on_mesh(grid, kind, rim | side["top"], rim), Q)
+    body = _turned(bodies.on_mesh(grid, rim | side["top"], rim), Q)
 
     def F(part):
         return Q @ np.array([[a**part, part * b], [0.0, d**part]]) @ Q.T
@@ -147,7 +147,7 @@ def _pulled(kind: int, F: np.ndarray, P: float) -> list[Check]:
     shake = np.random.default_rng(9).uniform(-1, 1, grid.points.shape) * inside[:, None] * SHAKEN[kind]
     J, constrained = np.linalg.det(F), side["left"] | side["bottom"] | side["top"]
     S = J * neo_hookean.cauchy(F, P)[:2, :2] @ np.linalg.inv(F).T
-    body = bodies.on_mesh(grid, kind, constrained, constrained)
+    body = bodies.on_mesh(grid, constrained, constrained)
     forces = bodies.traction(body, grid, lambda x, y: S)
     solution = bodies.equilibrium(body, body.constant(J), (grid.points + shake) @ F.T, forces)
     return exactly(f"F = {F.tolist()}, P = {P:g}", body, solution, F, P)
@@ -347,7 +347,7 @@ def test_curved_taylor(kind, record):
     Norm: remainder of a first-order Taylor expansion; largest difference.
     """
     grid, side = bodies.rectangle(1.6, 4, kind)
-    body = bodies.on_mesh(grid, kind, side["left"], side["bottom"])
+    body = bodies.on_mesh(grid, side["left"], side["bottom"])
     random, theta = np.random.default_rng(6), body.constant(1.4)
     position = grid.points @ np.array([[1.2, 0.1], [0.2, 1.1]])
     push, move = random.standard_normal(body.corners), 0.05 * random.standard_normal(position.shape)

@@ -215,7 +215,7 @@ def _errors(size: float, seed: int, kind: int, exact) -> dict[str, float]:
     """
     grid, side = bodies.rectangle(size, round(1 / size) + seed, kind, 1.0, 1.0, bent=0.0)
     constrained = side["left"] | side["bottom"] | side["top"]
-    body = bodies.on_mesh(grid, kind, constrained, constrained)
+    body = bodies.on_mesh(grid, constrained, constrained)
     forces = bodies.body_force(body, exact.force) + bodies.traction(body, grid, exact.stress)
     solution = bodies.equilibrium(body, body.field(exact.theta), exact.place(*grid.points.T), forces)
     return bodies.errors(body, solution, lambda x, y: (exact.place(x, y), exact.pressure(x, y)))
@@ -234,9 +234,8 @@ def test_manufactured(kind, record):
     Norm: L2 of positions and pressure over the body at t = 0, relative, root mean square over three or four random
     meshes a size.
     """
-    geometry = kind
-    for name, (order, why) in ORDERS[geometry].items():
+    for name, (order, why) in ORDERS[kind].items():
         exact = manufactured_growth.growth(name)
-        place, pressure = CEILINGS[geometry]
-        record(studies(refine(_errors, SIZES[geometry], kind, exact),
-                       {"place": (*PLACES[geometry], place), "pressure": (order, why, pressure)}, f", {name}"))
+        place, pressure = CEILINGS[kind]
+        record(studies(refine(_errors, SIZES[kind], kind, exact),
+                       {"place": (*PLACES[kind], place), "pressure": (order, why, pressure)}, f", {name}"))

@@ -138,7 +138,7 @@ def plugged(preset: str, *changes: str) -> Scene:
 def energy_and_constraint(gamma: float) -> tuple[Callable, Callable]:
     """(energy, constraint), functions of theta, of quadratic places and linear pressures on a block of 1 x 1."""
     grid, side = bodies.rectangle(0.25, 4, 2, 1.0, 1.0, 0.0)
-    body = bodies.on_mesh(grid, 2, side["left"] | side["right"], side["bottom"])
+    body = bodies.on_mesh(grid, side["left"] | side["right"], side["bottom"])
     free = np.flatnonzero(~body.constrained.T.ravel())
     last = 2 * len(body.reference)
 

@@ -240,9 +240,9 @@ SCATTER = 2e-3
 def forced(preset: str, seed: int) -> Iterator:
     """Through contact under the fluid's forces, with random width and flow. The film of 3 um closes at 2 um.
 
-    The shift is that of a soft aggregate. With the usual modulus it is smaller than the scatter of the tips between two
-    unrelated meshes, 1e-3 um, and its sign is that of the scatter. The paper's scheme does not reach contact with this
-    modulus: its rounds of shape and forces do not agree while nodes join the wall.
+    The shift is that of a soft aggregate. Two unrelated meshes differ by 1e-3 um in the tips. With the usual modulus
+    the shift is smaller, so its sign is random. The paper's scheme does not reach contact with the soft one: its rounds
+    of shape and forces do not agree while nodes join the wall.
     """
     random = np.random.default_rng(seed)
     width = random.uniform(25.0, 100.0)
@@ -300,7 +300,7 @@ UPDATE = {1: 1.25, 2: np.inf}
 def seed(preset: str) -> tuple[Supported, np.ndarray]:
     """A half-disc of 20 um on a wall, and the nodes of its free rim."""
     start = pore.seeded(hard.load("wide", preset, f'aggregate.radius="{RADIUS} um"'))
-    return bodies.on_wall(start.mesh, start.space.order, start.outline)
+    return bodies.on_wall(start.mesh, start.outline)
 
 
 def grown(body: Supported, theta: np.ndarray) -> growth.Equilibrium:

@@ -200,8 +200,8 @@ def _plane(coefficients, x: np.ndarray, y: np.ndarray) -> np.ndarray:
      for transfer in transfers})
 def test_remesh_linear(order, transfer, record):
     """A remesh of a linearly moved aggregate keeps linear positions at t = 0, densities and pressure, and theta is
-    det F times the density over X_m, with every transfer. With higher orders X_A + X_I stays X_m, and a linear share of
-    X_I stays linear.
+    det F times the density over X_m, with every transfer. With quadratic elements X_A + X_I stays X_m, and a linear
+    share of X_I stays linear.
 
     Norm: largest relative difference over all nodes or points of the new mesh.
     """
@@ -246,7 +246,7 @@ def _moved_linearly(order: int, kinds: dict):
     "reprojection-remesh-order", kind="manufactured", mutants=("theta-without-density", "corners-for-middles"))
 @parametrize("order", aggregates.EVERY)
 def test_remesh_order(order, record):
-    """A remesh transfers a smooth density to second order, and with higher orders a smooth share of X_I. The next
+    """A remesh transfers a smooth density to second order, and with quadratic elements a smooth share of X_I. The next
     update returns the density to X_m to second order, and the area to the biomass over X_m exactly.
 
     Norm: L2 of the density on the new mesh less the exact one, and of the density over X_m less one after an update

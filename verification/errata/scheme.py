@@ -264,7 +264,7 @@ COLUMNS = {"mean_velocity_m_per_d": "mean velocity, m/d", "conductivity_m_per_d"
     printed="""2.3.3 keeps the middle point of each contact surface fixed, and does not say whether this point stays
         the same material as the surface grows.""",
     reading="""The material point in the middle when the surface first forms (the origin, on the lower wall), for good.
-        Rechosen would be the node nearest to the present middle at every update.""",
+        The alternative, rechosen, takes the node nearest to the present middle at every update.""",
     consequence="Rechosen against kept, where growth is nearly symmetric and where it is not:\n\n{table}")
 def fixed_point() -> Numbers:
     """Base at 19.2 h and wide at 45 h with both choices."""

@@ -24,7 +24,7 @@ KINDS = ("exact", "manufactured", "cross-code", "property")
 STAGES = ("flow", "transport", "growth", "reprojection", "mesh_motion", "coupling", "hard")
 #: Numerics that a case may run with: elements of order 1 and 2, and the presets of whole scenes.
 NUMERICS = ("1", "2", "paper", "fast", "accurate", "exact")
-#: Words in labels of slow variants, in a table that has ``fast``: they have the same elements.
+#: Labels of variants with the elements of ``fast``. They are slow if the table contains ``fast``.
 LIKE_FAST = ("quadratic", "accurate", "exact")
 #: The numerics that other words in labels stand for.
 OF_WORDS = {"linear": "1", "quadratic": "2", "order 1": "1", "order 2": "2", "straight": "1", "curved": "2"}

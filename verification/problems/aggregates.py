@@ -34,10 +34,10 @@ def uniform(x, y) -> np.ndarray:
 
 def seed_around(around: Outline, refinement: float, density=uniform, ends=(-75.0, 75.0), order: int = 1) -> Pore:
     """An aggregate at t = 0 with X_A = density(x, y), on a new mesh around an outline."""
-    return seed_on(*meshes.around(around, refinement, ends, WIDTH), order, density)
+    return seed_on(*meshes.around(around, refinement, ends, WIDTH), density)
 
 
-def seed_on(grid: Mesh, around: Outline, order: int, density=uniform) -> Pore:
+def seed_on(grid: Mesh, around: Outline, density=uniform) -> Pore:
     """An aggregate at t = 0 with X_A = density(x, y), on an existing mesh."""
     space = Space(grid)
     active = density(*reaction_points(space)) * space.reaction.dx

@@ -68,20 +68,20 @@ class Supported(Body):
         return np.zeros(self.corners)
 
 
-def on_mesh(grid: Mesh, kind: int, *constrained: np.ndarray) -> Supported:
+def on_mesh(grid: Mesh, *constrained: np.ndarray) -> Supported:
     """The aggregate of a mesh at t = 0. constrained: (n,) nodes with prescribed x, then nodes with prescribed y."""
     aggregate = pore.material(Space(grid), grid.points[grid.body])
     return Supported(aggregate.shape, aggregate.reference, np.column_stack(constrained))
 
 
-def on_wall(grid: Mesh, kind: int, outline: Outline) -> tuple[Supported, np.ndarray]:
+def on_wall(grid: Mesh, outline: Outline) -> tuple[Supported, np.ndarray]:
     """The aggregate of a mesh at t = 0, which slides on the walls with its fixed points at rest.
 
     Also return the nodes (M,) of its free rim without the contact lines.
     """
     rim = grid.topology.body_loop
     supports = contact.constrained(len(grid.body), rim, outline.wall, outline.fixed)
-    return on_mesh(grid, kind, *supports.T), rim[outline.wall == FREE]
+    return on_mesh(grid, *supports.T), rim[outline.wall == FREE]
 
 
 @cache
@@ -89,7 +89,7 @@ def half_disc(refinement: float, kind: int = 1) -> tuple[Supported, np.ndarray]:
     """:func:`on_wall` of a half-disc with a fixed middle, on a mesh of the package."""
     seed = meshes.seed(RADIUS, refinement, kind)
     grid, outline = meshes.around(seed, refinement, (-ENDS[kind], ENDS[kind]), 50.0)
-    return on_wall(grid, kind, outline)
+    return on_wall(grid, outline)
 
 
 @cache

@@ -88,8 +88,8 @@ def uniform_masses(space: Space, density: float) -> np.ndarray:
 def steady(problem: transport.Problem, density: float, guess=None) -> transport.Concentrations:
     """Steady concentrations over biomass of a uniform density (mg/L).
 
-    Orders 2 and 3 take one more step of Newton's method. The method stops where no row errs by more than 1e-13 of its
-    terms. At Peclet 0.1 and little uptake this may be 1e-8 of the supply, more than the error of the mesh.
+    Quadratic elements take one more step of Newton's method. The method stops where no row errs by more than 1e-13 of
+    its terms. At Peclet 0.1 and little uptake this may be 1e-8 of the supply, more than the error of the mesh.
     """
     sink = Sink(uniform_masses(problem.space, density))
     concentrations = substrates.steady(problem, sink, guess)
@@ -160,6 +160,9 @@ def at_heights(space: Space, fields: np.ndarray, x) -> np.ndarray:
 
 def box_errors(grid: Mesh, order: int, ratio: float, interface: str, exact: Callable) -> dict[str, float]:
     """Relative L2 errors of the velocity, and of the pressure without its mean.
+
+    Unlike in :func:`repro.model.flow.unit_flow`, a node of the interface has one pressure here for both orders. A jump
+    of the pressure therefore limits the orders of the errors.
 
     order: of the velocity; ratio: of the viscosities; exact(x, y): velocity (..., 2), pressure (...) and force
     (..., 2), all dimensionless.
