@@ -722,7 +722,8 @@ OF_STEPS = ("acceptor_balance", "donor_balance", "biomass_balance", "oxygen_dema
 def same_rows(first: Run, second: Run) -> Iterator[Finding]:
     """Check that two runs that differ only in ``output.times`` have identical rows at the same times."""
     rows = [(i, k) for i, time in enumerate(first.times) for k in np.flatnonzero(second.times == time)]
-    yield Finding("rows that both runs have", len(rows), 2, inf, "else less is tested")
+    most = min(2, len(first.times), len(second.times))
+    yield Finding("rows that both runs have", len(rows), most, inf, "else less is tested; a run may end at t = 0")
     columns = [name for name in first.series if name not in OF_STEPS]
     differing = sum(first.series[name][i] != second.series[name][k] for name in columns for i, k in rows)
     yield size("numbers of rows that depend on other rows", differing, 0, "output.times changes no step")
