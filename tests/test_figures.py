@@ -135,8 +135,8 @@ CAPTIONS = {
                             f"from {area_rate(0):.2g} to {area_rate(0):.2g} 1/h"]),
     "discussion_permeable": (3, ["; ".join("{:.3g}, {:.3g}, {:.3g} m/d at {:g} h".format(
         *(value(k, K, hours) for k in range(3)), hours) for hours in (20, 34, 40))]),
-    "discussion_rheology": (7, ["to 50 h", *(f"{time} h and {value(k, K, 50.0 + k):.3g} m/d" for k, time in enumerate(
-        ["12.5", "10.2", *5 * ["inf"]]))]),
+    "discussion_rheology": (6, ["to 50 h", *(f"{time} h and {value(k, K, 50.0 + k):.3g} m/d" for k, time in enumerate(
+        ["12.5", "10.2", *4 * ["inf"]]))]),
 }
 #: Figures whose captions have numbers of the model alone, or of records with tests of their own.
 OF_MODEL = {"figure_2", "figure_3", "discussion_folds", "discussion_tearing", "discussion_transfer", "network"}
