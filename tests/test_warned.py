@@ -138,7 +138,7 @@ def test_the_worst_step_that_misses_the_tolerance_is_reported(tmp_path):
     for estimate in (0.03, 0.5, 0.04, 0.001):
         recorder._count_missed_tolerance(StepControl(1.0, 1.0, estimate))
     assert recorder.history.missed == 3 and not recorder.contact
-    assert "errs by 0.5 (estimate)" in recorder.late_warnings()[0].text
+    assert "errs by 0.5 (estimate)" in recorder.warnings_so_far()[0].text
 
 
 def test_a_row_that_is_left_out_is_reported(tmp_path, capsys, monkeypatch):

@@ -379,7 +379,7 @@ def _record_run(recorder: Recorder, run_steps: ReportedSteps, progress: Progress
 
 def _finish(recorder: Recorder, status: str, watch: Watch) -> str:
     recorder.finish(status)
-    _emit_warnings(recorder.late_warnings(), watch)
+    _emit_warnings(recorder.warnings_so_far(), watch)
     watch.tell({"event": "end", "scene": recorder.scene.name, "status": status,
                 "folder": str(recorder.folder), "time_h": recorder.time, "step": recorder.steps,
                 "rows": len(recorder.history.rows), "changed": True})

@@ -126,7 +126,7 @@ class Recorder:
             self.history.missed += 1
             self.history.worst = max(self.history.worst, step_control.estimate)
 
-    def late_warnings(self) -> list[Caveat]:
+    def warnings_so_far(self) -> list[Caveat]:
         """Warn if any step so far misses the tolerance, and if any requested row is missing."""
         count = f" in {self.history.missed} of {self.steps} steps"
         return [*warn_missed_tolerance(self.scene, self.history.worst, count),
@@ -183,7 +183,7 @@ class Recorder:
         the fields, each checkpoint contains its own, and the page does not exist yet.
         """
         history = self._current_history()
-        warnings = history.warnings + [asdict(warning) for warning in self.late_warnings()]
+        warnings = history.warnings + [asdict(warning) for warning in self.warnings_so_far()]
         files = self._files(is_over(status))
         record = {
             **results.provenance(self.scene), "conditions": self.conditions, "status": status,

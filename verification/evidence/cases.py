@@ -146,8 +146,8 @@ def parametrize(names: str, variants: Mapping[str, tuple], slow: Iterable[str] =
     *first, last = names.split(", ")
     rows = {label: (*row[:len(first)], row[len(first):]) if last[0] == "*" else row for label, row in variants.items()}
     words = {word for label in rows for word in label.split(", ")}
-    late = (*slow, *(LIKE_FAST if "fast" in words else ()))
-    sets = [pytest.param(*row, id=label, marks=pytest.mark.slow if {*late} & {*label.split(", ")} else ())
+    slow_words = {*slow, *(LIKE_FAST if "fast" in words else ())}
+    sets = [pytest.param(*row, id=label, marks=pytest.mark.slow if slow_words & {*label.split(", ")} else ())
             for label, row in rows.items()]
     return pytest.mark.parametrize([*first, last.lstrip("*")], sets)
 
