@@ -3,7 +3,7 @@
 The equilibrium (22), tested with the nodal functions, gives the forces of the walls on the
 aggregate: at a node on a wall, the force of the stress minus that of the fluid. They are the
 consistent nodal forces of a traction t. On a bonded wall it has both directions. On a sliding wall
-it acts across the wall, and a uniform shear keeps each contact surface in place
+it acts across the wall, and a shear keeps each contact surface in place
 (:mod:`repro.model.support`). At a point x of a contact surface, the wall bears
 
     ((max(pull, 0))^2 + shear^2)^(1/2)
@@ -125,12 +125,11 @@ def wall_peak(scene: Scene, pore: Pore, solved: Solved) -> Peak:
     forces = np.zeros_like(pore.mesh.points)
     forces[pore.mesh.body] = wall_forces(scene, pore, solved)
     walls = [wall for wall in (BOTTOM, TOP) if (pore.boundary.edge_wall == wall).any()]
-    bonded = scene.growing.growth.wall == "bonded"
-    peaks = [_peak_on(pore, wall, forces, bonded and wall == BOTTOM) for wall in walls]
+    peaks = [_peak_on(pore, wall, forces) for wall in walls]
     return max(peaks, key=lambda peak: peak.value)
 
 
-def _peak_on(pore: Pore, wall: int, forces: np.ndarray, bonded: bool) -> Peak:
+def _peak_on(pore: Pore, wall: int, forces: np.ndarray) -> Peak:
     """Largest mean stress that one wall bears, with its coordinates."""
     outline = pore.boundary
     x = pore.mesh.points[:, 0]
@@ -140,10 +139,7 @@ def _peak_on(pore: Pore, wall: int, forces: np.ndarray, bonded: bool) -> Peak:
     surface = _Surface(x, nodes)
     inward = 1.0 if wall == TOP else -1.0
     pull = surface.means(surface.density(inward * forces[:, 1]), pore.mesh.width)
-    if bonded:
-        shear = surface.means(surface.density(forces[:, 0]), pore.mesh.width)
-    else:
-        shear = surface.mean(forces[:, 0])
+    shear = surface.means(surface.density(forces[:, 0]), pore.mesh.width)
     bears = np.hypot(np.maximum(pull, 0.0), shear)
     worst = int(bears.argmax())
     middle = surface.middles(pore.mesh.width)[worst]
@@ -206,11 +202,6 @@ class _Surface:
         places = self._places()
         ahead = np.interp(starts + length, places, total)
         return (ahead - np.interp(starts, places, total)) / length
-
-    def mean(self, forces: np.ndarray) -> np.ndarray:
-        """Mean over the whole surface of a traction with nodal forces (N,) per depth."""
-        surface_nodes = np.unique(self.nodes)
-        return forces[surface_nodes].sum() / np.ptp(self.x[surface_nodes])
 
 
 def tensile_peak(scene: Scene, pore: Pore) -> Peak:

@@ -276,7 +276,7 @@ def _equilibrium(mechanics: Mechanics, grown: Pore, start: Pore, forces: np.ndar
     locked, target = _constraints(mechanics, grown, start)
     rest = growth.equilibrium(body, target_J, start.mesh.points[nodes], start.pressure[inside],
                               locked, target, forces=forces, last=last, patient=patient,
-                              supports=_supports(mechanics, start, forces),
+                              supports=_supports(mechanics, body, start, forces),
                               modified_newton=mechanics.numerics.jacobian == "reused")
     return _placed(grown, start, rest), rest.iterations
 
@@ -482,7 +482,7 @@ class _Trials:
         body, theta = _strained_from(keys, locked, locked.theta)
         reference = grown.origin if keys.new_biomass == "stressed" else grown.mesh.points
         prescribed, target = _constraints(self._mechanics, locked, locked)
-        supports = _supports(self._mechanics, locked, forces)
+        supports = _supports(self._mechanics, body, locked, forces)
         system = growth.System(body, prescribed, forces=forces, supports=supports)
         return Placed(grown, locked, division, reference, system, theta, target, rule)
 
@@ -642,8 +642,9 @@ def _constraints(mechanics: Mechanics, grown: Pore,
     return constrained(len(target), rim, shape.wall, fixed), target
 
 
-def _supports(mechanics: Mechanics, shape: Pore, forces: np.ndarray | None) -> list[Support]:
-    """The supports of the contact surfaces that slide and have a fixed point.
+def _supports(mechanics: Mechanics, body: Body, shape: Pore,
+              forces: np.ndarray | None) -> list[Support]:
+    """The supports of the contact surfaces of ``body`` that slide and have a fixed point.
 
     A surface of a single node has no length; the node bears its force. Without ``forces`` (n, 2)
     one surface alone bears none, because the forces of growth along the pore add up to zero.
@@ -656,7 +657,7 @@ def _supports(mechanics: Mechanics, shape: Pore, forces: np.ndarray | None) -> l
         edges = rim[outline.edges_on(wall)]
         points = rim[outline.fixed & (outline.wall == wall)]
         if len(edges) and len(points):
-            supports.append(Support(int(points[0]), edges))
+            supports.append(Support.on(int(points[0]), edges, body.reference))
     alone = len(supports) == 1 and not bonded
     return [] if alone and forces is None else supports
 

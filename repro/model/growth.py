@@ -246,7 +246,7 @@ class System:
 
     def _iterate(self, position: np.ndarray, pressure: np.ndarray) -> Iterate:
         lag = np.where(self.constrained, self.target - position, 0.0)
-        residual = balanced(self.supports, position, self.residual(position, pressure))
+        residual = balanced(self.supports, self.residual(position, pressure))
         return Iterate(position, pressure, residual, self.sizes, lag, self.free)
 
     def _stiffening(self) -> np.ndarray:
@@ -325,11 +325,10 @@ class System:
         factors = self.sparse.factored(self.tangent(iterate.position, iterate.pressure))
         if not self.supports:
             return factors
-        count = len(iterate.residual)
-        loads = [support.load(iterate.position, count) for support in self.supports]
+        loads = np.zeros((len(iterate.residual), len(self.supports)))
+        loads[: len(iterate.position)] = np.column_stack([each.load for each in self.supports])
         points = np.array([support.point for support in self.supports])
-        return Supported(factors.system, factors.elements, factors.solver, np.column_stack(loads),
-                         points)
+        return Supported(factors.system, factors.elements, factors.solver, loads, points)
 
     def advanced(self, iterate: Iterate, factors: Factored, fresh: bool) -> Iterate:
         """The longest of the steps 1, 1/2, ... with det F > 0 that does not raise the residual

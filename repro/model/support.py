@@ -2,16 +2,17 @@
 
 The middle point of each contact surface keeps its x. In plane strain a force at that point would
 indent the aggregate without limit as the mesh is refined. The wall therefore bears the force as a
-uniform traction along the present contact surface. The traction's resultant m is the multiplier of
-the condition on x:
+traction along the contact surface. The traction is uniform per length of the configuration from
+which strain counts. A surface that has grown twice as long as its neighbour bears half of the
+neighbour's traction: its modulus has fallen by the growth, too. (A traction that is uniform along
+the present surface would shear the youngest and softest tissue most.) The traction's resultant m is
+the multiplier of the condition on x:
 
     R + sum_k m_k L_k = 0,    x_k = given
 
-R are the nodal forces without the walls. L_k are those of a uniform traction with the resultant 1
-on the surface k: its shape functions, integrated over its present length and divided by this
-length. Row k gives m_k = -R_k / L_kk.
-
-Newton's method ignores the derivative of L_k by the shape.
+R are the nodal forces without the walls. L_k are the loads of a traction with the resultant 1 on
+the surface k: its shape functions, integrated over its length and divided by this length. They do
+not depend on the shape. Row k gives m_k = -R_k / L_kk.
 """
 
 from __future__ import annotations
@@ -21,33 +22,38 @@ from dataclasses import dataclass
 
 import numpy as np
 
-#: (k, k) integrals of N_a dN_b / ds along an edge with k nodes.
-ALONG = {2: np.array([[-3.0, 3.0], [-3.0, 3.0]]) / 6,
-         3: np.array([[-3.0, 4.0, -1.0], [-4.0, 0.0, 4.0], [1.0, -4.0, 3.0]]) / 6}
+#: (k, k) derivatives dN_b / ds at the k nodes of an edge.
+SLOPES = {2: np.array([[-1.0, 1.0], [-1.0, 1.0]]),
+          3: np.array([[-3.0, 4.0, -1.0], [-1.0, 0.0, 1.0], [1.0, -4.0, 3.0]])}
+#: (k,) weights of the k nodes: the trapezoidal rule, or Simpson's.
+WEIGHTS = {2: np.array([1.0, 1.0]) / 2, 3: np.array([1.0, 4.0, 1.0]) / 6}
 
 
 @dataclass(frozen=True, eq=False)
 class Support:
     """The support of one contact surface.
 
-    point: its fixed node; edges: (e, 2 or 3) nodes of its edges, in one direction. Nodes are
-    numbered as the aggregate's.
+    point: its fixed node; load: (n,) nodal forces along x of a traction with the resultant 1.
     """
 
     point: int
-    edges: np.ndarray
+    load: np.ndarray
 
-    def load(self, position: np.ndarray, count: int) -> np.ndarray:
-        """(count,) forces of a uniform traction along x with the resultant 1, for nodes at
-        ``position`` (n, 2) um; zero beyond x of the nodes."""
-        forces = position[self.edges, 0] @ ALONG[self.edges.shape[1]].T
-        load = np.bincount(self.edges.ravel(), forces.ravel(), count)
-        return load / load.sum()
+    @staticmethod
+    def on(point: int, edges: np.ndarray, reference: np.ndarray) -> Support:
+        """The support of a surface with edges (e, 2 or 3), for nodes at ``reference`` (n, 2) um
+        before they are strained."""
+        nodes = edges.shape[1]
+        lengths = np.linalg.norm(SLOPES[nodes] @ reference[edges], axis=2) * WEIGHTS[nodes]
+        load = np.bincount(edges.ravel(), lengths.ravel(), len(reference))
+        return Support(point, load / load.sum())
 
 
-def balanced(supports: Sequence[Support], position: np.ndarray, residual: np.ndarray) -> np.ndarray:
-    """A residual (2n + corners,) with the tractions that balance the rows of the fixed points."""
+def balanced(supports: Sequence[Support], residual: np.ndarray) -> np.ndarray:
+    """A residual (2n + corners,), x of all nodes first, with the tractions that balance the rows of
+    the fixed points."""
     for support in supports:
-        load = support.load(position, len(residual))
-        residual = residual - load * (residual[support.point] / load[support.point])
+        residual = residual.copy()
+        multiplier = residual[support.point] / support.load[support.point]
+        residual[: len(support.load)] -= multiplier * support.load
     return residual

@@ -173,7 +173,7 @@ def _support(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
     if force > STRAIN:
         yield Caveat("growth.wall", f"the water's force reaches {force:.2g} of mu_L times the "
                      f"aggregate's thickness, above {STRAIN:g}: a sliding aggregate is kept in "
-                     "place by a uniform traction, which is an assumption, and its shape depends "
+                     "place by a traction of an assumed distribution, and its shape depends "
                      'on it by about this fraction; growth.wall = "bonded" computes the traction')
 
 
