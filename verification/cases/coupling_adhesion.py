@@ -95,8 +95,8 @@ def _at_rest(wall: str, *changes: str) -> tuple:
 @parametrize("wall, *changes", {f"{wall}, {kind}": (wall, *changes) for wall in ("sliding", "bonded")
                                 for kind, changes in KINDS.items()})
 def test_balance(wall, changes, record):
-    """The walls alone bear the force and the moment of the water, and only where they touch the aggregate. A wall on which
-    the aggregate slides bears it as a traction that is uniform per length of t = 0.
+    """The walls alone bear the force and the moment of the water, and only where they touch the aggregate. A wall along
+    which the aggregate slides bears it as a traction that is uniform per length of t = 0.
 
     Norm: after a step of uneven growth under the water's forces: sums of the walls' forces and the water's, and of
     their moments, over the water's; defect at free nodes over the water's force at a node; range of the traction per
@@ -118,9 +118,10 @@ def test_balance(wall, changes, record):
                         "the last round moves nodes by 1e-8, and the stress is 1e3 times the water's"))
     if wall == "sliding":
         nodes = state.mesh.topology.body_loop[state.boundary.edges_on(BOTTOM)]
-        traction_along = adhesion._Surface(state.body.reference[:, 0], nodes).density(wall_force[:, 0])[np.unique(nodes)]
-        record(at_most("range of the traction per length of t = 0", np.ptp(traction_along) / np.abs(traction_along.mean()),
-                       1e-3, "uniform, to the balance of forces: 1e-5 of the water's force, at one node of a hundred"))
+        surface = adhesion._Surface(state.body.reference[:, 0], nodes)
+        along = surface.density(wall_force[:, 0])[np.unique(nodes)]
+        record(at_most("range of the traction per length of t = 0", np.ptp(along) / np.abs(along.mean()), 1e-3,
+                       "uniform, to the balance of forces: 1e-5 of the water's force, at one node of a hundred"))
     else:
         along = np.abs(wall_force[rim[state.wall == BOTTOM], 0])
         record(at_least("share of points with a force along the wall", np.mean(along > 1e-3 * along.max()), 0.5,

@@ -18,7 +18,7 @@ from repro.fem.space import Space
 from repro.march import midpoint, simulation, stepping
 from repro.march.state import Report
 from repro.model import contact, flow, growth, pore, remeshing
-from repro.model.contact_lines import CLOSE, Clearance, lines_of
+from repro.model.contact_lines import Clearance, lines_of
 from repro.model.remeshing import Remeshing
 from repro.model.stages import Stages
 from repro.scene import Scene
@@ -126,11 +126,16 @@ def contact_rests(run: Run) -> list[Check]:
 
 
 def _closing(shape: Outline, width: float, film: float, angle: float) -> int:
-    """Number of nodes of a polygon that should join a wall, or of contact lines of arcs with too little clearance."""
+    """Number of nodes of a polygon that should join a wall, or of contact lines of arcs with too little clearance.
+
+    The limit of the clearance is that of a wedge with UNDER less than the least angle, where the gap reaches the film.
+    A row within a step has the arcs of another mesh. Its lines therefore err by more than CLOSE of the search: by 0.007
+    um where wedges close one after the other. (The limit was twice CLOSE, 0.004 um, until that row was seen.)
+    """
     if shape.geometry == 1:
         return np.count_nonzero(contact.closing_nodes(shape, width, film, angle))
-    # Arcs in the rows are shorter than those of the search, so the clearance is evaluated at other points.
-    return sum(clearance < -2 * CLOSE for clearance in _clearances(shape, width, film, angle).values())
+    limit = film * (1 - np.tan(angle - np.deg2rad(UNDER)) / np.tan(angle))
+    return sum(clearance < -limit for clearance in _clearances(shape, width, film, angle).values())
 
 
 def _clearances(shape: Outline, width: float, film: float, angle: float) -> dict[tuple[int, int], float]:
@@ -149,6 +154,8 @@ CONTACT = HardCase(
 
 
 LEAST = 16.7
+#: Degrees by which a wedge differs that must close or must stay.
+UNDER = 0.1
 
 
 def wedge(angle: float, geometry: int) -> Outline:
@@ -162,7 +169,7 @@ def wedge(angle: float, geometry: int) -> Outline:
 def least_angle(preset: str) -> list:
     """The stage alone: sides that join the wall a tenth of a degree under and over the least angle."""
     kind = hard.load("wide", preset).numerics.order
-    under, over = (_sides(wedge(angle, kind)) for angle in (LEAST - 0.1, LEAST + 0.1))
+    under, over = (_sides(wedge(angle, kind)) for angle in (LEAST - UNDER, LEAST + UNDER))
     return [at_least("sides that join, a tenth of a degree under", sum(under), 2, "2.3.3: the wedge closes"),
             at_most("sides that join, a tenth of a degree over", sum(over), 0, "2.3.3: it stays")]
 
