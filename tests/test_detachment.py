@@ -35,7 +35,6 @@ def test_means_of_a_traction_are_those_of_its_integral(count):
     error = 2 / 5 * (x[nodes[:, -1]] - x[nodes[:, 0]]).max() ** 2 / adhesion.PARTS**2 * 0.2 / 8
     assert surface.means(surface.density(forces), 100.0) == pytest.approx(3 - 0.2 * middles, abs=error)
     assert middles.min() == pytest.approx(2.5) and middles.max() == pytest.approx(15.5)
-    assert surface.mean(forces) == pytest.approx(1.2)
     assert surface.means(surface.density(forces), 1e4) == pytest.approx([1.2, 1.2, 1.2])
 
 

@@ -97,7 +97,8 @@ class Placed:
 
     def slope(self, line: Line, position: np.ndarray, pressure: np.ndarray) -> np.ndarray:
         """(2n + corners,) derivative of the residual by the advance (arcs) of a line within an
-        arc, at constant nodal values."""
+        arc, at constant nodal values. It ignores that the load of a support changes with the line.
+        """
         division = needed(self.division, "a divided arc")
         number = int(np.searchsorted(division.arcs, self._arc(line)))
         rows, triangle = division.halves(number)
