@@ -359,13 +359,17 @@ def derived_adhesion(scene, instant):
     mesh = pore.mesh
     sigma, J, initial_areas = stresses(scene, pore)
     areas = J * initial_areas
-    middles = mesh.points[mesh.cells[mesh.biomass, :3]].mean(axis=1)
-    near = np.linalg.norm(middles[:, None] - middles, axis=-1) <= mesh.width / 20
-    means = near @ np.einsum("tq,tqij->tij", areas, sigma).reshape(-1, 9) / (near @ areas.sum(1))[:, None]
-    largest = np.linalg.eigvalsh(means.reshape(-1, 3, 3))[:, -1]
-    x, y = middles[largest.argmax()]
-    loads = water_loads(scene, instant)[mesh.body]
+    cells = mesh.cells[mesh.biomass]
+    shapes = functions(mesh.geometry, rule_with(pore.theta.shape[1])[0])[0]
+    places = np.einsum("qk,tki->tqi", shapes, mesh.points[cells]).reshape(-1, 2)
     of_body = mesh.points[mesh.body]
+    distances = np.linalg.norm(of_body[:, None] - places, axis=-1)
+    weights = np.maximum(1 - (distances / (mesh.width / 20)) ** 2, 0) * areas.ravel()
+    near = weights.any(axis=1)
+    means = weights[near] @ sigma.reshape(-1, 9) / weights[near].sum(axis=1)[:, None]
+    largest = np.linalg.eigvalsh(means.reshape(-1, 3, 3))[:, -1]
+    x, y = of_body[near][largest.argmax()]
+    loads = water_loads(scene, instant)[mesh.body]
     on = of_body[of_body[:, 1] == 0.0, 0]
     arm = of_body - [(on.min() + on.max()) / 2, 0.0]
     force = loads.sum(axis=0)
@@ -378,7 +382,7 @@ def derived_adhesion(scene, instant):
 @EVERY_ORDER
 def test_the_columns_of_adhesion_are_what_their_names_say(order, state):
     """A strength that is never reached adds the columns to a state and changes nothing else. They agree to 1e-6, forces
-    and moments to that of the largest. The body of the first row has no stress, so that its place is any triangle's."""
+    and moments to that of the largest. The body of the first row has no stress, so that its place is any node."""
     scene, instant = instant_in(state, order)
     growth = replace(scene.growth, tensile_strength=1e3)
     row = results.row(replace(scene, growth=growth), instant)

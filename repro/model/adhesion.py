@@ -10,7 +10,7 @@ it acts across the wall, and a shear keeps each contact surface in place
 
 with the means of the pull, from the aggregate into the wall, and of the shear over a length of W /
 20 around x. The stress at a contact line may be singular. A mean over a length converges as the
-mesh is refined. The tensile stress is a mean too, over the triangles within W / 20 of a point.
+mesh is refined. The tensile stress is a weighted mean over the points within W / 20 of a node.
 
 Without ``growth.fluid_forces`` the equilibrium has no forces of the fluid, and walls bear the
 stress of growth alone.
@@ -205,23 +205,26 @@ class _Surface:
 
 
 def tensile_peak(scene: Scene, pore: Pore) -> Peak:
-    """Largest mean of the principal stress over the triangles within W / 20 of a triangle.
+    """Largest principal value of the mean stress around a node.
 
-    The distance is that between the middles of the triangles.
+    The mean has the weight 1 - (d / L)^2 at a distance d < L = W / 20 from the node. It is taken
+    over the points where growth is integrated. On a mesh without a point so near to a node, L is
+    twice the least distance.
     """
     from scipy.spatial import KDTree  # few scenes need it
 
-    mesh = pore.mesh
-    areas = mesh.areas[mesh.biomass]
-    middles = mesh.points[mesh.triangles[mesh.biomass]].mean(axis=1)
-    dx = pore.body.at.dx * pore.body.strained(mesh.points[mesh.body]).J
-    sums = np.einsum("tq,tqk->tk", dx, stress(scene, pore))
-    tree = KDTree(middles)
-    near = tree.sparse_distance_matrix(tree, LENGTH * mesh.width, output_type="coo_matrix")
-    means = np.zeros_like(sums)
-    weight = np.zeros(len(areas))
-    np.add.at(means, near.row, sums[near.col])
-    np.add.at(weight, near.row, dx.sum(axis=1)[near.col])
-    largest = growth.largest_principal(means / weight[:, None])
+    nodes = pore.mesh.points[pore.mesh.body]
+    cells = pore.body.shape.cells
+    places = KDTree((pore.body.shape.table.values @ nodes[cells]).reshape(-1, 2))
+    dx = pore.body.at.dx * pore.body.strained(nodes).J
+    reach = max(LENGTH * pore.mesh.width, 2 * places.query(nodes)[0].min())
+    near = KDTree(nodes).sparse_distance_matrix(places, reach, output_type="coo_matrix")
+    weights = (1 - (near.data / reach) ** 2) * dx.ravel()[near.col]
+    total = np.bincount(near.row, weights, len(nodes))
+    has_points = total > 0
+    sums = [np.bincount(near.row, weights * component[near.col], len(nodes))
+            for component in stress(scene, pore).reshape(-1, 4).T]
+    means = np.column_stack(sums)[has_points] / total[has_points, None]
+    largest = growth.largest_principal(means)
     worst = int(largest.argmax())
-    return Peak(float(largest[worst]), *middles[worst].tolist())
+    return Peak(float(largest[worst]), *nodes[has_points][worst].tolist())

@@ -180,8 +180,8 @@ SERIES = (
            "wall traction",
            lambda scene, at: _adhesion().wall_peak(scene, at.pore, at.solved)),
     *_peak("tensile_stress_max", "largest tensile stress of the aggregate",
-           "largest eigenvalue of the Cauchy stress, in the mean over the triangles whose middles "
-           "are within W / 20 of one", "tensile stress",
+           "largest eigenvalue of the Cauchy stress, in a mean around a node with the weight 1 - "
+           "(d / L)^2 at a distance d < L = W / 20", "tensile stress",
            lambda scene, at: _adhesion().tensile_peak(scene, at.pore)),
     *(Quantity(f"fluid_force_{axis}_uN_per_m", f"force of the fluid on the aggregate, {axis}",
                "integral of the water's stress over the interface, or of its drag over a permeable "
