@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from paper_figures import style
 from repro import added_resistance
-from repro.results.network import share_range
+from repro.network.resistance import share_range
 from verification.network.law import RATIO, SEED, judged, read
 
 TITLE = "Addition. A law for networks: the resistance that an aggregate adds to its pore"

@@ -55,7 +55,7 @@ Sections of the paper and their modules, which name the equations that they solv
          error control (not the paper's)    repro.march.midpoint, .stepping, .step_control
          ends of the model                  repro.march.ends, .folding
          the loop of both                   repro.march.loop, .state, .simulation
-    4, 5  results, laws for networks        repro.results, .columns, .arrays, .tables, .network
+    4, 5  results, laws for networks        repro.results, .columns, .arrays, .tables, repro.network
 
 Data flow:
 
@@ -65,6 +65,7 @@ Data flow:
     repro.march       advances the Pore step by step, and yields Reports: pore, flow, substrates,
                       ledgers
     repro.results     makes rows and fields from Reports, in the units that their names end in
+    repro.network     the laws for throats, which need no run
     repro.preflight   predicts a run: dimensionless numbers, warnings, cost (repro check)
     repro.report      pages that show and compare runs (repro compare)
     repro.runs        a run on the disk: folder, recorder, checkpoints, provenance (repro run)
@@ -87,9 +88,10 @@ if TYPE_CHECKING:
     from repro.march.ends import PoreEnd as PoreEnd
     from repro.march.folding import Fold as Fold
     from repro.march.simulation import simulate
+    from repro.network.resistance import added_resistance
+    from repro.network.uptakes import uptake
     from repro.preflight.checked import check
     from repro.report import compare
-    from repro.results.network import added_resistance, uptake
     from repro.results.tables import Results, solve
     from repro.runs.scripts import load_run, resume, run
     from repro.scene import Scene, load_scene
@@ -103,10 +105,10 @@ else:
     _MODULES = {"Detachment": "march.ends", "Fold": "march.folding", "OutputError": "errors",
                 "PoreEnd": "march.ends", "Results": "results.tables",
                 "Scene": "scene", "SceneError": "scene", "SimulationError": "errors",
-                "added_resistance": "results.network", "check": "preflight.checked",
+                "added_resistance": "network.resistance", "check": "preflight.checked",
                 "compare": "report", "load_run": "runs.scripts", "load_scene": "scene",
                 "resume": "runs.scripts", "run": "runs.scripts", "simulate": "march.simulation",
-                "solve": "results.tables", "sweep": "sweeps.driver", "uptake": "results.network"}
+                "solve": "results.tables", "sweep": "sweeps.driver", "uptake": "network.uptakes"}
 
     def __getattr__(name: str):
         if name == "__version__":

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import repro
-from repro.results.network import CONTACT, TABLE, TRANSPORTS, UPTAKE_BOUND, share_range
+from repro.network.resistance import CONTACT, TABLE, share_range
+from repro.network.uptakes import TRANSPORTS, UPTAKE_BOUND
 from verification.network import __main__ as command
 from verification.network import law, page, shapes, uptakes
 from verification.network.shapes import RATIOS
@@ -42,7 +43,7 @@ def test_velocity_head_width_and_position_drop_out():
 
 @pytest.mark.parametrize("spanned", [False, True])
 def test_the_law_equals_the_table_at_its_rows(spanned):
-    """At every row of `network.csv` the law and its bounds agree to round-off."""
+    """At every row of `resistance.csv` the law and its bounds agree to round-off."""
     with TABLE.open(encoding="utf-8", newline="") as lines:
         rows = [[*map(float, row.values())] for row in csv.DictReader(lines) if row["spanned"] == str(int(spanned))]
     assert len(rows) > 50

@@ -44,7 +44,7 @@ def test_the_bounds_enclose_what_the_bounds_of_both_laws_admit():
         assert (low < value).all() and (value < high).all()
     speeds = [throats.velocity(area, at, side) for side in (throats.LEAST, throats.LAW, throats.MOST)]
     assert (np.diff(speeds, axis=0) > 0).all()
-    inflow = speeds[2] * at.width * throats.UM_PER_HOUR * at.supplies
+    inflow = speeds[2] / throats.M_PER_D * at.width * at.supplies
     assert (most.acceptor <= inflow[0]).all() and (most.donor <= inflow[1]).all()
     assert most.growth == pytest.approx(throats.growth(np.maximum(
         throats.KINETICS.acceptor_to_donor_ratio * most.donor, least_acceptor(area, at)), most.donor))

@@ -120,7 +120,7 @@ def test_wheel_and_source_distribution_are_complete(tmp_path):
     (wheel,), (source,) = ((tmp_path / "dist").glob(kind) for kind in ("*.whl", "*.tar.gz"))
     members = zipfile.ZipFile(wheel).namelist()
     data = {f"repro/scene/packaged/{path.name}" for path in (ROOT / "repro" / "scene" / "packaged").glob("*.toml")}
-    data |= {"repro/results/network.csv", "repro/py.typed"}
+    data |= {"repro/network/resistance.csv", "repro/py.typed"}
     assert {name.partition("/")[0] for name in members} == {"repro", f"dupin2001_repro-{repro.__version__}.dist-info"}
     assert data <= set(members) and len(data) >= 5
     with tarfile.open(source) as archive:

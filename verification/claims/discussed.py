@@ -16,7 +16,7 @@ from repro.fem.mesh import Mesh, curved
 from repro.fem.mesher import unlocked
 from repro.model.pore import sized
 from repro.model.uptake_law import Values
-from repro.results.network import added_resistance, share_range
+from repro.network.resistance import added_resistance, share_range
 from repro.scene import Scene
 from verification.claims import FEW, FEW_WORDS, LATER, Finding, at_least, claim
 from verification.claims.levels import ABOUT_WIDE

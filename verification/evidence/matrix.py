@@ -28,7 +28,7 @@ EXACT = {"flow": SAME, "transport": SAME,
          "hard": "exact: the scheme of accurate, and some times slower; its contact and remeshes: coupling-contact, "
                  "coupling-ledger"}
 #: A line of the table: sections and words, equations, modules, and a remark.
-LINE = re.compile(r"^ {4,}(\S.*?)\s{3,}((?:\(\d+\)[-, ]*)+)?\s*(repro\.[\w.]+(?:, \.\w+)*)(?:[: ].*)?$")
+LINE = re.compile(r"^ {4,}(\S.*?)\s{3,}((?:\(\d+\)[-, ]*)+)?\s*(repro\.[\w.]+(?:, (?:repro)?\.\w+)*)(?:[: ].*)?$")
 #: The sections at the start of its first part: "3.1, 3.5", "2.1-2.3".
 SECTIONS = re.compile(r"(?:Table 1|[\d.]+(?:-[\d.]+)?|, )*")
 #: An import of a module of ``reference``.
@@ -55,7 +55,7 @@ def parts() -> tuple[Part, ...]:
 def _part(name: str, equations: str, names: str) -> Part:
     first, *rest = names.split(", ")
     package = first if _file(first).endswith("/") else first.rpartition(".")[0]
-    files = _file(first), *(_file(package + module) for module in rest)
+    files = _file(first), *(_file(name if name.startswith("repro") else package + name) for name in rest)
     places = SECTIONS.match(name)[0].split(", ")
     sections = tuple(section for place in places for section in _ranged(place) if section)
     return Part(" ".join(name.split()), sections, equations.strip(" ,"), files)

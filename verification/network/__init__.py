@@ -1,6 +1,6 @@
-"""The laws for networks of :mod:`repro.results.network`: shapes of the fits, tables, errors, and independent tests.
+"""The laws for networks of :mod:`repro.network`: shapes of the fits, tables, errors, and independent tests.
 
-`python -m verification.network` writes `repro/results/network.csv` and the page `docs/network.md`.
+`python -m verification.network` writes `repro/network/resistance.csv` and the page `docs/network.md`.
 
 law, shapes   the law of resistance: its table, its error, its shapes
 uptakes       the law of uptake

@@ -1,6 +1,6 @@
 """`python -m verification.network`: make the table of the law, and judge it with shapes outside of the fit; minutes.
 
-Writes the table `repro/results/network.csv`; the page `docs/network.md`; and `verification/network/shapes.csv`, the
+Writes the table `repro/network/resistance.csv`; the page `docs/network.md`; and `verification/network/shapes.csv`, the
 shapes of the fit at one lambda and the test shapes, from which `make figures` draws its picture. The exit status is 1
 if a test shape lies outside the law's bounds.
 
@@ -17,8 +17,9 @@ An argument selects another task:
 import sys
 from pathlib import Path
 
+from repro.network.resistance import TABLE
+from repro.network.uptakes import TRANSPORTS, UPTAKE_BOUND
 from repro.results import write_table, write_text
-from repro.results.network import TABLE, TRANSPORTS, UPTAKE_BOUND
 from verification.network import histories, law, page, runs, throats, timed, uptakes
 
 PAGE = Path(__file__).parents[2] / "docs" / "network.md"
@@ -48,7 +49,7 @@ def uptake_law() -> int:
     bound = uptakes.bound(states, TRANSPORTS)
     print(f"fit of {len(rows)} states:\n{transports[0]}\n{transports[1]}\nUPTAKE_BOUND = {bound}", flush=True)
     if bound != UPTAKE_BOUND or not uptakes.is_fit(states, TRANSPORTS):
-        print(f"{TABLE.parent}/network.py has other constants: copy these and start again")
+        print(f"{TABLE.parent}/uptakes.py has other constants: copy these and start again")
         return 1
     write_table(uptakes.TABLE, names, rows + [list(one) for one in uptakes.states(uptakes.NEW)])
     write_text(PAGE, page.text())

@@ -2,8 +2,9 @@
 
 import numpy as np
 
+from repro.network.resistance import added_resistance, share_range
+from repro.network.uptakes import FAST, UPTAKE_BOUND
 from repro.results import read_table
-from repro.results.network import FAST, UPTAKE_BOUND, added_resistance, share_range
 from verification.evidence.writing import table
 from verification.network import histories, law, runs, throats, timed, uptakes
 from verification.network.law import RATIO
@@ -38,7 +39,7 @@ UPTAKE = """## Uptake
 `repro.uptake(area, width, velocity, acceptor, donor)` computes the uptake of both substrates and the growth of the
 area, with the kinetics of Table 1. It has the rates (7)-(10) at one concentration of each substrate in the aggregate.
 That concentration is below the supply because the inflow is limited and because diffusion to the aggregate needs a
-difference; `repro/results/network.py` has the equations. The range is A / W^2 to 4.5, widths of 40 to 150 um, and up
+difference; `repro/network/uptakes.py` has the equations. The range is A / W^2 to 4.5, widths of 40 to 150 um, and up
 to 10 m/d and 20 mg/L."""
 
 
@@ -53,7 +54,7 @@ def _fit() -> str:
     fit = law.read(unseen=False)
     grown = int(fit["grown"].sum())
     return f"""\
-The table, `repro/results/network.csv`, has r of half-discs and, after contact, the mean of the plugs grown in
+The table, `repro/network/resistance.csv`, has r of half-discs and, after contact, the mean of the plugs grown in
 several runs. The bounds are the least and the largest r over that of the fit's {len(fit["grown"])} shapes, {grown} of
 them grown in pores of 40 to 150 um at 0.5 to 6 m/d and W^2 / 2500 (W in um) to 20 mg/L of both substrates, the others
 drawn: half-discs, bodies from 1 % thinner to 3 % thicker than a half-disc and leaning by up to 5 %, plugs with ends of

@@ -37,7 +37,8 @@ from typing import NamedTuple
 import numpy as np
 
 import repro
-from repro.results.network import UM_PER_HOUR, Uptake
+from repro.network.uptakes import Uptake
+from repro.results import M_PER_D
 from repro.scene import load_scene
 from verification.network.histories import History, rounded
 
@@ -133,7 +134,7 @@ def uptake(area: np.ndarray, at: Conditions, side: int) -> Taken:
     law = repro.uptake(area, at.width, speed, *at.supplies)
     if side == LAW:
         return Taken(law.acceptor, law.donor, law.growth)
-    inflow = speed * at.width * UM_PER_HOUR * at.supplies
+    inflow = speed / M_PER_D * at.width * at.supplies
     return (_most if side == MOST else _least)(area, at.time, law, inflow)
 
 

@@ -5,6 +5,7 @@ A part of the states gives the constants of the law. The other part tests it.
 
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -15,8 +16,9 @@ from repro.march.ends import PoreEnd
 from repro.march.folding import Fold
 from repro.model import pore
 from repro.model.pore import Pore
+from repro.network.resistance import is_plug
+from repro.network.uptakes import Throats, Transport
 from repro.results import read_table
-from repro.results.network import Throats, Transport, share_range, throats_of
 from repro.scene import load_scene
 from verification.claims.runs import SUBSTRATES
 from verification.network import shapes
@@ -45,7 +47,6 @@ FACTOR = 1.25
 FLAT = 0.25
 #: The start of the fit: diffusion through a layer of a tenth of W, and water that is half mixed.
 START = Transport(10.0, 0.5, 0.5, 0.5)
-ARGUMENTS = ("area", "width", "velocity", *SUBSTRATES)
 
 
 class State(NamedTuple):
@@ -90,7 +91,8 @@ def read(part: int) -> dict[str, np.ndarray]:
 
 def throats(columns: dict[str, np.ndarray]) -> Throats:
     """The throats of some states."""
-    return throats_of(*(columns[name] for name in ARGUMENTS))
+    supplies = np.array([columns[name] for name in SUBSTRATES])
+    return Throats(columns["area"], columns["width"], columns["velocity"], supplies)
 
 
 def deviations(columns: dict[str, np.ndarray], law: Throats) -> np.ndarray:
@@ -102,15 +104,15 @@ def deviations(columns: dict[str, np.ndarray], law: Throats) -> np.ndarray:
 def fitted(columns: dict[str, np.ndarray]) -> tuple[Transport, Transport]:
     """The constants before and after contact, to three digits. The fit minimises the squares of the deviations over the
     spread of the bound."""
-    spanned = columns["area"] > share_range(False)[1] * columns["width"]**2
+    spanned = is_plug(throats(columns).share)
     return _fitted(columns, ~spanned), _fitted(columns, spanned)
 
 
 def misfit(columns: dict[str, np.ndarray], transports: tuple[Transport, Transport]) -> np.ndarray:
     """(2,) sums, before contact and after it, of the squares that the fit minimises."""
-    law = throats(columns)._replace(transports=transports)
+    law = replace(throats(columns), transports=transports)
     squares = ((deviations(columns, law) / law.spread())**2).sum(axis=0)
-    spanned = columns["area"] > share_range(False)[1] * columns["width"]**2
+    spanned = is_plug(law.share)
     return np.array([squares[~spanned].sum(), squares[spanned].sum()])
 
 
@@ -125,7 +127,7 @@ def _fitted(columns: dict[str, np.ndarray], selected: np.ndarray) -> Transport:
 
     def residuals(logarithms: np.ndarray) -> np.ndarray:
         one = _constants(logarithms)
-        return (deviations(chosen, throats(chosen)._replace(transports=(one, one))) / spread).ravel()
+        return (deviations(chosen, replace(throats(chosen), transports=(one, one))) / spread).ravel()
 
     start = [np.log(START.sherwood), START.power, np.log(START.plug), START.plug_power]
     logarithms = least_squares(residuals, start, diff_step=1e-2, xtol=1e-6, ftol=1e-6).x
@@ -140,7 +142,7 @@ def _constants(logarithms: np.ndarray) -> Transport:
 
 def bound(columns: dict[str, np.ndarray], transports: tuple[Transport, Transport]) -> float:
     """The law's least bound, to three digits: FACTOR times the largest deviation of the fit over its spread."""
-    law = throats(columns)._replace(transports=transports)
+    law = replace(throats(columns), transports=transports)
     apart = np.expm1(np.abs(deviations(columns, law))).max(axis=0)
     return float(f"{FACTOR * (apart / law.spread()).max():.3g}")
 
