@@ -4,6 +4,8 @@ import base64
 import hashlib
 import json
 import re
+import shutil
+import subprocess
 from html.parser import HTMLParser
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -16,6 +18,7 @@ from repro.results.files import read_sealed
 from repro.runs import execution
 from repro.scene import scene_hash
 
+NODE = shutil.which("node")
 VOID = {"meta", "input", "br", "link", "img", "hr"}
 FAST = 'numerics.preset="fast"'
 HOSTILE = "<script>pwned=1<!--\"'&<img src=x onerror=pwned=1>.toml"
@@ -143,6 +146,13 @@ def first_group(pattern, text):
 def page_data(out):
     """Return the data of the page's script."""
     return json.loads(first_group('<script type="application/json" id="fields">(.*?)</script>', text_of(out)))
+
+
+def evaluate(page, expression, fragment="", width=1200):
+    """Return the value of a JavaScript expression after the scripts of a page, which Node runs without a browser."""
+    script = Path(__file__).with_name("page.js")
+    command = [NODE, script, page, fragment, str(width)]
+    return json.loads(subprocess.run(command, input=expression, stdout=subprocess.PIPE, text=True, check=True).stdout)
 
 
 def decode_numbers(text, kind):

@@ -5,10 +5,12 @@ import json
 import re
 from dataclasses import replace
 
+import matplotlib
 import numpy as np
 import pytest
 
 from repro.report import charts, quantities
+from repro.report.colours import viridis
 from repro.report.reading import Run
 from repro.results.columns import PARTS, SUBSTRATES
 from repro.results.jumps import with_jumps
@@ -171,3 +173,10 @@ def test_many_points_are_thinned_with_both_ends():
 def test_an_axis_begins_at_zero_if_zero_is_near(low, begins):
     first, last = charts._roomy(low, 10.0)
     assert first == begins and last >= 10.0
+
+
+def test_the_colours_of_values_are_those_of_matplotlib():
+    """To 6 of 255, the error of linear colours between a sixteenth of the scale."""
+    colours = np.array([[*bytes.fromhex(colour[1:])] for colour in viridis(256)])
+    assert np.abs(colours - 255 * np.array(matplotlib.colormaps["viridis"].colors)).max() < 6.5
+    assert viridis(5, 0.25, 0.75) == viridis(9)[2:7]

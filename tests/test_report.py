@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import shapely
 
 from repro import report, results
 from repro.fem.mesh import Mesh, curved
@@ -20,13 +21,14 @@ from repro.results.arrays import ARRAYS
 from repro.results.field_files import Grid
 from repro.results.quantities import ending
 from repro.scene import load_scene, scene_tables
-from tests import browser
 from tests.pages import (
     FAST,
     HOSTILE,
+    NODE,
     Page,
     check_alone,
     decode_numbers,
+    evaluate,
     first_group,
     make_hostile,
     page_data,
@@ -282,40 +284,80 @@ def test_a_page_of_a_fine_mesh_is_small_and_accurate(tmp_path, monkeypatch, kind
     assert ((decode_numbers(mesh["body"], "<u1") == 1) == (radius < 20))[np.abs(radius - 20) > 1].all()
 
 
-@pytest.mark.skipif(browser.CHROMIUM is None, reason="Chromium is not installed")
-def test_colours_are_logarithmic_over_two_decades_or_more(flow_only, tmp_path, monkeypatch):
-    """The head is exponential in x. Colours are linear below two decades, and cover at most four decades.
+needs_node = pytest.mark.skipif(NODE is None, reason="Node is not installed")
+#: The drawn bands, as places of their colours and outlines, the script's data of the picture, and its place and scale.
+BANDS = """({
+    bands: part.picture.children.find(part => part.attributes.class === "bands").children.map(
+        path => [data.colours.indexOf(path.attributes.fill), path.attributes.d]),
+    area: areaOf(drawn.pieces), ...part.picture.dataset, box: data.box,
+    unit: [drawn.edge.left, drawn.edge.top, drawn.scale, drawn.tall]})"""
 
-    Colours are read at nodes. They may be 3 of 255 colours apart, because a pixel is up to 0.2 % of the width away.
-    """
+
+def drawn_bands(page, field):
+    """Return the script's data of the picture of a field, and the polygons of each colour."""
+    drawn = evaluate(page, BANDS, f"#field={field}")
+    outlines = {place: [np.array(re.split("[ L]", each), float).reshape(-1, 2) for each in outline[1:-1].split("ZM")]
+                for place, outline in drawn["bands"]}
+    return drawn, {place: list(map(shapely.Polygon, polygons)) for place, polygons in outlines.items()}
+
+
+def in_pixels(drawn, points):
+    """(N, 2) places (um) in the picture, rounded as its outlines are."""
+    left, top, scale, tall = drawn["unit"]
+    low_x, _, low_y, _ = drawn["box"]
+    x, y = points.T
+    pixels = np.column_stack([left + (x - low_x) * scale, top + tall - (y - low_y) * scale])
+    return np.floor(10 * pixels + 0.5) / 10
+
+
+@needs_node
+@pytest.mark.parametrize("name", ["fast", "paper"])
+def test_the_picture_is_the_field(request, name):
+    """Values at the nodes, on straight and curved triangles; the coloured area of the aggregate; the colour of every
+    part of the picture, to the width of a band and rounding to a tenth of a pixel."""
+    out = request.getfixturevalue(name)
+    page, (_, path) = out / "report.html", fields.index(out)[-1]
+    grid = field_files.read(path)
+    drawn, bands = drawn_bands(page, "acceptor_mg_per_L")
+    middles = {place: [list(polygon.centroid.coords[0]) for polygon in polygons if polygon.area > 1]
+               for place, polygons in bands.items()}
+    places = json.dumps([*in_pixels(drawn, grid.points[:, :2]).tolist(), *sum(middles.values(), [])])
+    script = f"{places}.map(([x, y]) => fieldAt(drawn.pieces, x, y))"
+    computed = np.array(evaluate(page, script, "#field=acceptor_mg_per_L"), float)
+    expected, span = grid.point_data["acceptor_mg_per_L"], drawn["high"] - drawn["low"]
+    at_nodes, in_bands = np.split(computed, [len(expected)])
+    inside = np.isfinite(at_nodes)  # nodes on the edge may be rounded to the outside
+    assert inside.mean() > 0.8 and np.abs(at_nodes - expected)[inside].max() < 0.005 * span
+    place = np.repeat([*middles], [*map(len, middles.values())])
+    shares = (in_bands - drawn["low"]) / span
+    assert len(place) > 1000 and np.abs(128 * shares - place - 0.5).max() < 0.6
+    area = sum(polygon.area for polygons in bands.values() for polygon in polygons)
+    assert area == pytest.approx(drawn["area"], rel=2e-3) and drawn["filled"] == pytest.approx(1, abs=1e-3)
+    theta, _ = drawn_bands(page, "theta")
+    low_x, high_x, low_y, high_y = theta["box"]
+    expected_area = results.read_table(out / "timeseries.csv")["aggregate_area_um2"][-1]
+    computed_area = theta["filled"] * (high_x - low_x) * (high_y - low_y)
+    assert computed_area == pytest.approx(expected_area, rel=0.004 if name == "fast" else 0.02)
+
+
+@needs_node
+def test_colours_are_logarithmic_over_two_decades_or_more(flow_only, tmp_path, monkeypatch):
+    """The head is exponential in x. Colours are linear below two decades, and cover at most four decades. A node is a
+    corner of bands that may be neighbours of its own."""
     copy = shutil.copytree(flow_only, tmp_path / "run")
     ((_, file),) = fields.index(copy)
     points, cells = regular_grid(monkeypatch, 1000)
-    nodes = points[((points > 1) & (points < [99, 49])).all(axis=1)]  # the frame of the picture covers the others
-    with browser.Browser() as window:
-        for decades in (1.9, 2.1, 6.0):
-            head = 10 ** (decades * points[:, 0] / 100)
-            write_fields(file, points, cells, {"head_cm": head}, np.zeros(len(cells)))
-            window.show(report.write(copy), "#field=head_cm")
-            assert window.run("document.getElementById('errors').textContent") == ""
-            part = decades * (nodes[:, 0] / 100 - 1)
-            expected = 1 + part / min(decades, 4) if decades > 2 else (10**part - 10**-decades) / (1 - 10**-decades)
-            assert np.abs(colours_at(window, nodes) - 255 * np.maximum(expected, 0)).max() < 3, decades
-
-
-def colours_at(window, points):
-    """(N,) places of the colours that the page shows at some points, from 0 to 255."""
-    script = """(places => {
-        const canvas = document.getElementById("picture"), { size, ratio, edge, scale, tall, box } = drawn;
-        const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
-        const shown = new Uint32Array(data.buffer);
-        return places.map(([x, y]) => TABLE.indexOf(shown[Math.round(edge.left * ratio)
-            + Math.floor((x - box[0]) * scale * ratio) + canvas.width * (Math.round(edge.top * ratio)
-            + Math.floor((tall - (y - box[2]) * scale) * ratio))]));
-    })"""
-    places = np.array(window.run(f"{script}({json.dumps(points.tolist())})"))
-    assert (places >= 0).all()
-    return places
+    for decades in (1.9, 2.1, 6.0):
+        head = 10 ** (decades * points[:, 0] / 100)
+        write_fields(file, points, cells, {"head_cm": head}, np.zeros(len(cells)))
+        drawn, bands = drawn_bands(report.write(copy), "head_cm")
+        part = decades * (points[:, 0] / 100 - 1)
+        expected = 1 + part / min(decades, 4) if decades > 2 else (10**part - 10**-decades) / (1 - 10**-decades)
+        colours = np.repeat([*bands], [*map(len, bands.values())])
+        tree = shapely.STRtree([polygon for polygons in bands.values() for polygon in polygons])
+        nodes, polygons = tree.query(shapely.points(in_pixels(drawn, points)), predicate="intersects")
+        assert {*nodes} == {*range(len(points))}
+        assert np.abs(colours[polygons] + 0.5 - 128 * np.maximum(expected, 0)[nodes]).max() < 1.6, decades
 
 
 def test_each_frame_has_the_aggregate_of_its_own_time(tmp_path, monkeypatch):

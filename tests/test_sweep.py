@@ -506,3 +506,18 @@ def test_marks_of_the_page_have_the_colour_of_their_key(tmp_path):
         assert {named[level] == value for _, level, _, value, _ in marks} == {True}
         for kind, _, run, _, message in marks:
             assert (kind, message) == (("polygon", "after 8 h") if run == "3" else ("circle", "5 h"))
+
+
+def luminance(colour):
+    """Relative luminance of a colour such as "#440154", by WCAG 2.2."""
+    parts = np.array([*bytes.fromhex(colour[1:])]) / 255
+    return np.where(parts <= 0.04045, parts / 12.92, ((parts + 0.055) / 1.055)**2.4) @ [0.2126, 0.7152, 0.0722]
+
+
+def test_lines_are_visible_on_light_and_dark_pages():
+    """Their contrast with the page is 2.5 at least. Lighter lines are those of larger values."""
+    for background, rules in zip(("#ffffff", "#15171a"), page._colours().split("@media"), strict=True):
+        assert rules.count(".dot") == page.LEVELS
+        values = np.array([luminance(colour) for colour in re.findall("stroke: (#.{6})", rules)])
+        lower, upper = np.sort([values, np.full(page.LEVELS, luminance(background))], axis=0)
+        assert (np.diff(values) > 0).all() and ((upper + 0.05) / (lower + 0.05)).min() > 2.5

@@ -3,10 +3,11 @@
     reading       a run's folder: run.json and its tables
     quantities    the charts over time
     charts        line charts as SVG
+    colours       viridis
     fields        the fields of the .vtu files, packed for the page's script
     run_page, comparison   the two kinds of pages
     page          a page in one file that needs no network and escapes all text
-    *.css, *.js   its style and scripts
+    *.css, *.js   its style and scripts, which draw fields as SVG
 """
 
 from __future__ import annotations

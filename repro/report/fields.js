@@ -12,11 +12,23 @@ function rangeOf(field, frame) {
   return high - low > 1e-9 * Math.max(Math.abs(low), Math.abs(high)) ? [low, high] : [low, low];  // round-off is none
 }
 
-// Where a value stands between the first and the last colour: logarithmic from two decades on, over four at most.
+// Where a value stands between the first and the last colour, and the value at such a share: logarithmic from two
+// decades on, over four at most.
 function shareOf(low, high) {
-  if (!(low > 0 && high >= 100 * low)) return { least: low, log: false, at: value => (value - low) / (high - low) };
+  if (!(low > 0 && high >= 100 * low)) {
+    const span = high - low;
+    return { least: low, log: false, at: value => (value - low) / span, value: share => low + share * span };
+  }
   const least = Math.max(low, 1e-4 * high), decades = Math.log(high / least);
-  return { least, log: true, at: value => Math.log(Math.max(value, least) / least) / decades };
+  return { least, log: true, at: value => Math.log(Math.max(value, least) / least) / decades,
+    value: share => least * Math.exp(share * decades) };
+}
+
+// The colours of a range, and the values at which one follows another. One value alone has the colour in the middle.
+function scaleOfColours(low, high) {
+  const colours = data.colours, shares = shareOf(low, high);
+  if (!(high > low)) return { colours: [colours[colours.length >> 1]], limits: [] };
+  return { colours, limits: colours.slice(1).map((_, k) => shares.value((k + 1) / colours.length)) };
 }
 
 function boxOf(points) {
@@ -36,68 +48,66 @@ function scaleOf(box, room) {
   return Math.max(scale, least / (box[3] - box[2]));
 }
 
+// Adds an element to a part of the picture.
+function add(parent, name, attributes, text) {
+  const element = document.createElementNS(part.picture.namespaceURI, name);
+  for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
+  if (text) element.textContent = text;
+  parent.append(element);
+  return element;
+}
+
 let drawn = null; // read by the probe
 function draw() {
   const frame = data.frames[part.frame.value], field = data.fields.find(each => each.name === part.field.value);
   const mesh = meshOf(data.meshes[frame.mesh]), points = pointsOf(frame, data.box), [low, high] = rangeOf(field, frame);
-  const values = valuesOf(frame, field, mesh, field.at === "node" ? points.length / 2 : mesh.body.length);
-  const ratio = Math.min(3, window.devicePixelRatio || 1), edge = { left: 40, right: 12, top: 8, bottom: 98 };
-  const box = boxOf(points), room = Math.max(120, part.picture.parentElement.clientWidth) - edge.left - edge.right;
+  const atNodes = field.at === "node";
+  const values = valuesOf(frame, field, mesh, atNodes ? points.length / 2 : mesh.body.length);
+  const edge = { left: 40, right: 12, top: 8, bottom: 98 }, box = boxOf(points);
+  const room = Math.max(120, part.picture.parentElement.clientWidth) - edge.left - edge.right;
   const scale = scaleOf(box, room), across = scale * (box[1] - box[0]), tall = scale * (box[3] - box[2]);
-  const wide = Math.max(across, room) + edge.left + edge.right;
+  const wide = Math.max(across, room) + edge.left + edge.right, height = tall + edge.top + edge.bottom;
   const place = (x, y) => [edge.left + (x - box[0]) * scale, edge.top + tall - (y - box[2]) * scale];
-  const size = [Math.round(across * ratio), Math.round(tall * ratio)];
-  const pixels = new Float64Array(points.length), places = new Float64Array(points.length);
-  for (let k = 0; k < points.length; k += 2) {
-    [places[k], places[k + 1]] = place(points[k], points[k + 1]);
-    pixels[k] = (places[k] - edge.left) * ratio; pixels[k + 1] = (places[k + 1] - edge.top) * ratio;
-  }
-  part.picture.width = Math.round(wide * ratio);
-  part.picture.height = Math.round((tall + edge.top + edge.bottom) * ratio);
-  part.picture.style.width = `${wide}px`;
-  const pen = part.picture.getContext("2d"), all = filled(mesh, pixels, values, field.at === "node", ...size);
-  pen.putImageData(image(all, low, high, ...size), Math.round(edge.left * ratio), Math.round(edge.top * ratio));
-  pen.setTransform(ratio, 0, 0, ratio, 0, 0);
-  pen.globalCompositeOperation = "destination-over"; // a saved picture has the colour of the page
-  pen.fillStyle = ink("--back"); pen.fillRect(0, 0, wide, tall + edge.top + edge.bottom);
-  pen.globalCompositeOperation = "source-over";
-  pen.font = "12px system-ui, sans-serif";
-  if (part.lines.checked) trace(pen, mesh.edges, places, "rgba(128,128,128,.55)", 0.7);
+  const places = new Float64Array(points.length);
+  for (let k = 0; k < points.length; k += 2) [places[k], places[k + 1]] = place(points[k], points[k + 1]);
+  const pieces = piecesOf(mesh, places, values, atNodes), filled = areaOf(pieces) / (across * tall);
+  part.picture.replaceChildren();
+  for (const [key, value] of Object.entries({ width: wide, height: height, viewBox: `0 0 ${wide} ${height}` }))
+    part.picture.setAttribute(key, value);
+  add(part.picture, "rect", { x: edge.left, y: edge.top, width: across, height: tall, fill: "var(--none)" });
+  colour(pieces, low, high);
+  if (part.lines.checked) trace(mesh.edges, places, "#808080", 0.7);
   if (part.outline.checked)
-    for (const [colour, width] of [["#ffffff", 3], ["#000000", 1.2]]) trace(pen, mesh.rim, places, colour, width);
-  axes(pen, box, place, tall);
-  const long = Math.min(420, room);
-  bar(pen, field, low, high, all.some(isNaN), edge.left + Math.max(0, across - long) / 2, edge.top + tall + 52, long);
-  drawn = { all, size, ratio, edge, scale, tall, across, box, field };
-  cross(pen);
+    for (const [stroke, width] of [["#ffffff", 3], ["#000000", 1.2]]) trace(mesh.rim, places, stroke, width);
+  axes(box, place, tall);
+  const long = Math.min(420, room), left = edge.left + Math.max(0, across - long) / 2;
+  bar(field, low, high, filled < 0.999, left, edge.top + tall + 52, long);
+  const lines = [["#ffffff", 3], ["#000000", 1.2]].map(([stroke, width]) =>
+    add(part.picture, "path", { d: "", stroke, "stroke-width": width }));
+  drawn = { pieces, filled, edge, scale, tall, across, box, field, lines };
+  cross();
   describe(frame, field, low, high);
 }
 
 // A colour of the page.
 function ink(name) { return getComputedStyle(document.documentElement).getPropertyValue(name).trim(); }
 
-function image(all, low, high, width, height) {
-  const pixels = new ImageData(width, height), colours = new Uint32Array(pixels.data.buffer);
-  const dark = matchMedia("(prefers-color-scheme: dark)").matches, none = dark ? 0xff363128 : 0xffe8e4e0;
-  const shares = shareOf(low, high);
-  for (let k = 0; k < all.length; k++) {
-    const share = isNaN(all[k]) ? NaN : high > low ? shares.at(all[k]) : 0.5;
-    colours[k] = isNaN(share) ? none : TABLE[Math.round(Math.max(0, Math.min(1, share)) * 255)];
-  }
-  return pixels;
+// Fills the pieces. The lines around them close the gaps between bands.
+function colour(pieces, low, high) {
+  const { colours, limits } = scaleOfColours(low, high);
+  const group = add(part.picture, "g", { "class": "bands", "stroke-linejoin": "bevel" });
+  bandsOf(pieces, limits).forEach((d, k) => {
+    if (d) add(group, "path", { d, fill: colours[k], stroke: colours[k] });
+  });
 }
 
-function trace(pen, edges, places, ink, width) {
-  pen.strokeStyle = ink;
-  pen.lineWidth = width;
-  pen.beginPath();
-  for (const { a, b, middle } of edges) {
-    const [ax, ay, bx, by] = [places[2 * a], places[2 * a + 1], places[2 * b], places[2 * b + 1]];
-    pen.moveTo(ax, ay);
-    const [mx, my] = [2 * places[2 * middle] - (ax + bx) / 2, 2 * places[2 * middle + 1] - (ay + by) / 2];
-    if (middle < 0) pen.lineTo(bx, by); else pen.quadraticCurveTo(mx, my, bx, by);
-  }
-  pen.stroke();
+function trace(edges, places, stroke, width) {
+  const corner = node => `${tenths(places[2 * node])} ${tenths(places[2 * node + 1])}`;
+  const control = ({ a, b, middle }) => [0, 1].map(k =>
+    tenths(2 * places[2 * middle + k] - (places[2 * a + k] + places[2 * b + k]) / 2)).join(" ");
+  const curve = edge => edge.middle < 0 ? "L" : `Q${control(edge)} `;
+  const d = edges.map(edge => `M${corner(edge.a)}${curve(edge)}${corner(edge.b)}`).join("");
+  add(part.picture, "path", { d, fill: "none", stroke, "stroke-width": width });
 }
 
 function roundTicks(low, high, parts) {
@@ -108,23 +118,26 @@ function roundTicks(low, high, parts) {
   return ticks;
 }
 
-function axes(pen, box, place, tall) {
+function write(x, y, text, anchor, more = {}) {
+  return add(part.picture, "text", { x, y, "text-anchor": anchor, fill: "var(--text)", ...more }, text);
+}
+
+function axes(box, place, tall) {
   const [left, bottom] = place(box[0], box[2]), [right, top] = place(box[1], box[3]);
-  pen.strokeStyle = ink("--faint"); pen.fillStyle = ink("--text"); pen.lineWidth = 1;
-  pen.strokeRect(left, top, right - left, bottom - top);
-  pen.textAlign = "center"; pen.textBaseline = "top";
-  for (const x of roundTicks(box[0], box[1], right - left > 500 ? 10 : 5)) {
-    pen.fillRect(place(x, 0)[0] - 0.5, bottom, 1, 4);
-    pen.fillText(rounded(x), place(x, 0)[0], bottom + 6);
+  const faint = { stroke: "var(--faint)" };
+  add(part.picture, "rect", { x: left, y: top, width: right - left, height: bottom - top, fill: "none", ...faint });
+  for (const value of roundTicks(box[0], box[1], right - left > 500 ? 10 : 5)) {
+    const [x] = place(value, 0);
+    add(part.picture, "path", { d: `M${x} ${bottom}v4`, ...faint });
+    write(x, bottom + 16, rounded(value), "middle");
   }
-  pen.fillText("x (um)", (left + right) / 2, bottom + 21);
-  pen.textAlign = "right"; pen.textBaseline = "middle";
-  for (const y of roundTicks(box[2], box[3], tall > 150 ? 5 : 2)) {
-    pen.fillRect(left - 4, place(0, y)[1] - 0.5, 4, 1);
-    pen.fillText(rounded(y), left - 6, place(0, y)[1]);
+  write((left + right) / 2, bottom + 31, "x (um)", "middle");
+  for (const value of roundTicks(box[2], box[3], tall > 150 ? 5 : 2)) {
+    const [, y] = place(0, value);
+    add(part.picture, "path", { d: `M${left} ${y}h-4`, ...faint });
+    write(left - 6, y + 4, rounded(value), "end");
   }
-  pen.save(); pen.translate(8, (top + bottom) / 2); pen.rotate(-Math.PI / 2);
-  pen.textAlign = "center"; pen.fillText("y (um)", 0, 0); pen.restore();
+  write(0, 0, "y (um)", "middle", { transform: `translate(12 ${(top + bottom) / 2}) rotate(-90)` });
 }
 
 // The values beside the bar: round ones, or powers of ten.
@@ -135,31 +148,25 @@ function barTicks(low, high, shares) {
   return ticks;
 }
 
-function bar(pen, field, least, high, grey, left, top, width) {
-  const shares = shareOf(least, high), low = shares.least;
+function bar(field, least, high, grey, left, top, width) {
+  const shares = shareOf(least, high), low = shares.least, { colours } = scaleOfColours(least, high);
   const why = field.body ? "not defined in the fluid" : "not meshed at this time";
   const name = field.label + (field.unit ? ` (${field.unit})` : "") + (shares.log ? ", log scale" : "")
     + (grey ? `; grey: ${why}` : "");
-  pen.fillStyle = ink("--text"); pen.textAlign = "left"; pen.textBaseline = "top";
-  if (!(high > low)) return void pen.fillText(`${name}: ${rounded(low)} everywhere`, left, top);
-  for (let k = 0; k < width; k++) {
-    pen.fillStyle = `rgb(${colour(k / (width - 1)).map(Math.round).join()})`;
-    pen.fillRect(left + k, top, 1.5, 12);
-  }
-  pen.fillStyle = ink("--text");
+  if (!(high > low)) return void write(left, top + 10, `${name}: ${rounded(low)} everywhere`, "start");
+  const group = add(part.picture, "g", { "shape-rendering": "crispEdges" }), step = width / colours.length;
+  colours.forEach((fill, k) => add(group, "path", { d: `M${left + k * step} ${top}h${step}v12h${-step}Z`, fill }));
   const text = value => (value === low && low > least ? "\u2264 " : "")
     + rounded(Math.abs(value) < 1e-12 * (high - low) ? 0 : value);
-  const wide = value => pen.measureText(text(value)).width, place = value => left + shares.at(value) * width;
+  const wide = value => 6.5 * text(value).length, place = value => left + shares.at(value) * width;
   const first = left + wide(low) + 8, last = left + width - wide(high) - 8; // the ends are exact
   const between = barTicks(low, high, shares).filter(value =>
     place(value) - wide(value) / 2 > first && place(value) + wide(value) / 2 < last);
   for (const value of [low, ...between, high]) {
-    const x = place(value);
-    pen.textAlign = value === low ? "left" : value === high ? "right" : "center";
-    pen.fillRect(Math.min(x, left + width - 1), top + 12, 1, 4);
-    pen.fillText(text(value), x, top + 17);
+    add(part.picture, "path", { d: `M${place(value)} ${top + 12}v4`, stroke: "var(--text)" });
+    write(place(value), top + 27, text(value), value === low ? "start" : value === high ? "end" : "middle");
   }
-  pen.textAlign = "left"; pen.fillText(name, left, top + 32);
+  write(left, top + 42, name, "start");
 }
 
 // Describes the picture, for the reader and, in data attributes, for a test.
@@ -170,10 +177,9 @@ function describe(frame, field, low, high) {
   const range = `${rounded(low)} to ${rounded(high)} ${field.unit}`;
   part.picture.setAttribute("aria-label", `${field.label}, ${range}, at ${text}`);
   const share = value => high > low ? (value - low) / (high - low) : 0;
-  const hashed = (sum, value) => isNaN(value) ? sum : (sum * 31 + Math.round(1e6 * share(value))) % 1000000007;
+  const hashed = (sum, value) => (sum * 31 + Math.round(1e6 * share(value))) % 1000000007;
   Object.assign(part.picture.dataset, { frame: part.frame.value, field: field.name, low, high,
-    seen: drawn.all.reduce(hashed, 7),
-    filled: drawn.all.reduce((sum, value) => sum + !isNaN(value), 0) / drawn.all.length });
+    seen: drawn.pieces.reduce((sum, value, k) => k % 3 === 2 ? hashed(sum, value) : sum, 7), filled: drawn.filled });
   tellAll(frame.time);
 }
 
@@ -184,9 +190,9 @@ function probe(event) {
 
 // Shows the value at a place, in pixels from the upper left corner of the field.
 function read(across, down) {
-  const { all, size, ratio, scale, tall, box, field } = drawn;
-  const inside = across >= 0 && down >= 0 && across * ratio < size[0] && down * ratio < size[1];
-  const value = inside ? all[Math.floor(down * ratio) * size[0] + Math.floor(across * ratio)] : NaN;
+  const { pieces, edge, scale, tall, box, field } = drawn;
+  const inside = across >= 0 && down >= 0 && across < drawn.across && down < tall;
+  const value = inside ? fieldAt(pieces, edge.left + across, edge.top + down) : NaN;
   const x = (box[0] + across / scale).toFixed(1), y = (box[2] + (tall - down) / scale).toFixed(1);
   const words = isNaN(value) ? "none here" : `${field.label} ${rounded(value)} ${field.unit}`;
   part.probe.textContent = inside ? `x = ${x} um, y = ${y} um: ${words}` : "\u00a0";
@@ -200,27 +206,25 @@ function move(event) {
   event.preventDefault();
   const size = event.shiftKey ? 0.1 : 0.02, within = value => Math.min(0.999, Math.max(0.001, value));
   cursor = cursor ? cursor.map((value, k) => within(value + size * STEPS[event.key][k])) : [0.5, 0.5];
-  draw();
+  cross();
   read(cursor[0] * drawn.across, cursor[1] * drawn.tall);
 }
 
-function cross(pen) {
-  if (!cursor) return;
-  const x = drawn.edge.left + cursor[0] * drawn.across, y = drawn.edge.top + cursor[1] * drawn.tall;
-  for (const [colour, width] of [["#ffffff", 3], ["#000000", 1.2]]) {
-    pen.strokeStyle = colour; pen.lineWidth = width;
-    pen.beginPath(); pen.moveTo(x - 7, y); pen.lineTo(x + 7, y); pen.moveTo(x, y - 7); pen.lineTo(x, y + 7); pen.stroke();
-  }
+function cross() {
+  const [x, y] = cursor ? [drawn.edge.left + cursor[0] * drawn.across, drawn.edge.top + cursor[1] * drawn.tall] : [];
+  for (const line of drawn.lines) line.setAttribute("d", cursor ? `M${x - 7} ${y}h14M${x} ${y - 7}v14` : "");
 }
 
+// The saved picture has the colours of the page.
 function save() {
-  part.picture.toBlob(content => {
-    const link = document.createElement("a"), frame = data.frames[part.frame.value];
-    link.href = URL.createObjectURL(content);
-    link.download = `${part.field.value}_${rounded(frame.time)}h.png`;
-    link.click();
-    URL.revokeObjectURL(link.href);
-  });
+  const picture = part.picture.cloneNode(true), frame = data.frames[part.frame.value];
+  const link = document.createElement("a");
+  picture.prepend(add(picture, "rect", { width: "100%", height: "100%", fill: "var(--back)" }));
+  const text = new XMLSerializer().serializeToString(picture).replace(/var\((--\w+)\)/g, (_, name) => ink(name));
+  link.href = URL.createObjectURL(new Blob([text], { type: "image/svg+xml" }));
+  link.download = `${part.field.value}_${rounded(frame.time)}h.svg`;
+  link.click();
+  URL.revokeObjectURL(link.href);
 }
 
 // A fragment such as #frame=3&field=theta chooses the frame and the field.
@@ -246,7 +250,7 @@ for (const id of ["field", "frame", "lines", "outline", "whole", "fixed"]) part[
 part.play.addEventListener("click", play);
 part.save.addEventListener("click", save);
 part.picture.addEventListener("keydown", move);
-part.picture.addEventListener("blur", () => { cursor = null; draw(); });
+part.picture.addEventListener("blur", () => { cursor = null; cross(); });
 part.picture.addEventListener("pointermove", probe);
 part.picture.addEventListener("pointerleave", () => { part.probe.textContent = "\u00a0"; });
 document.addEventListener("timechosen", event => {
@@ -259,6 +263,5 @@ window.addEventListener("load", () => { // the middle, where the aggregate is
   const around = part.picture.parentElement;
   around.scrollLeft = (around.scrollWidth - around.clientWidth) / 2;
 });
-matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
 chosen();
 document.documentElement.dataset.fields = data.fields.length;

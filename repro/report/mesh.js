@@ -1,21 +1,9 @@
-// Triangles of three or six nodes with one value for each node or triangle, and the pixels that they cover.
+// Triangles of three or six nodes with one value for each node or triangle, cut into bands between limits.
 "use strict";
-const LEVELS = 65534, PIECES = 4;
-// viridis
-const STOPS = [[68, 1, 84], [72, 40, 120], [62, 74, 137], [49, 104, 142], [38, 130, 142], [31, 158, 137],
-  [53, 183, 121], [109, 205, 89], [180, 222, 44], [253, 231, 37]];
+const LEVELS = 65534;
 
 function bytes(text) { return Uint8Array.from(atob(text), letter => letter.charCodeAt(0)); }
 function shorts(text) { const raw = bytes(text); return new Uint16Array(raw.buffer); }
-
-function colour(share) {
-  const place = Math.min(1, Math.max(0, share)) * (STOPS.length - 1), k = Math.min(STOPS.length - 2, Math.floor(place));
-  return STOPS[k].map((from, c) => from + (place - k) * (STOPS[k + 1][c] - from));
-}
-const TABLE = Array.from({ length: 256 }, (_, k) => {
-  const [r, g, b] = colour(k / 255);
-  return (255 << 24 | Math.round(b) << 16 | Math.round(g) << 8 | Math.round(r)) >>> 0;
-});
 
 // A mesh: cells, which of them are of the aggregate, its nodes and triangles in ascending order, and
 // its edge with the fluid.
@@ -60,49 +48,93 @@ function valuesOf(frame, field, mesh, count) {
   return nodal;
 }
 
-// Weights of a triangle's nodes at the corners (a, b) of its PIECES x PIECES parts.
+// Weights of a triangle's nodes at a place (a, b).
 function weights(per, a, b) {
   const c = 1 - a - b;
   return per === 3 ? [c, a, b] : [c * (2 * c - 1), a * (2 * a - 1), b * (2 * b - 1), 4 * c * a, 4 * a * b, 4 * b * c];
 }
-const PARTS = { 3: [[[0, 0], [1, 0], [0, 1]]], 6: [] };
-for (let i = 0; i < PIECES; i++) for (let j = 0; i + j < PIECES; j++) {
-  const at = (p, q) => [p / PIECES, q / PIECES];
-  PARTS[6].push([at(i, j), at(i + 1, j), at(i, j + 1)]);
-  if (i + j < PIECES - 1) PARTS[6].push([at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]);
-}
-for (const per of [3, 6]) PARTS[per] = PARTS[per].map(piece => piece.map(([a, b]) => weights(per, a, b)));
 
-// Every pixel's value (Float64Array, NaN outside); places in pixels.
-function filled(mesh, places, values, atNodes, width, height) {
-  const pixels = new Float64Array(width * height).fill(NaN), corner = new Float64Array(9);
-  for (let t = 0; t < mesh.body.length; t++) for (const piece of PARTS[mesh.per]) {
-    for (let v = 0; v < 3; v++) {
-      let x = 0, y = 0, value = 0;
-      piece[v].forEach((weight, i) => {
-        const node = mesh.cells[t * mesh.per + i];
-        x += weight * places[2 * node]; y += weight * places[2 * node + 1];
-        if (atNodes) value += weight * values[node];
-      });
-      corner[3 * v] = x; corner[3 * v + 1] = y; corner[3 * v + 2] = atNodes ? value : values[t];
+// The straight parts of a triangle, as weights at their corners: the whole, or count * count parts of a curved one.
+function partsOf(per, count) {
+  const parts = [], at = (p, q) => weights(per, p / count, q / count);
+  for (let i = 0; i < count; i++) for (let j = 0; i + j < count; j++) {
+    parts.push([at(i, j), at(i + 1, j), at(i, j + 1)]);
+    if (i + j < count - 1) parts.push([at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]);
+  }
+  return parts;
+}
+
+// The straight pieces of a field: x, y and value at three corners, nine numbers each. Pieces without a value are left
+// out. Few triangles are large, so that their curves need more pieces.
+function piecesOf(mesh, places, values, atNodes) {
+  const { cells, per, body } = mesh, parts = partsOf(per, per === 3 ? 1 : body.length > 500 ? 2 : 4), pieces = [];
+  for (let t = 0; t < body.length; t++) for (const part of parts) {
+    const corners = [];
+    for (const share of part) {
+      let x = 0, y = 0, value = atNodes ? 0 : values[t];
+      for (let i = 0; i < per; i++) {
+        const node = cells[t * per + i];
+        x += share[i] * places[2 * node]; y += share[i] * places[2 * node + 1];
+        if (atNodes) value += share[i] * values[node];
+      }
+      corners.push(x, y, value);
     }
-    if (!isNaN(corner[2] + corner[5] + corner[8])) fill(pixels, width, height, corner);
+    if (!isNaN(corners[2] + corners[5] + corners[8])) pieces.push(...corners);
   }
-  return pixels;
+  return Float64Array.from(pieces);
 }
 
-function fill(pixels, width, height, [ax, ay, av, bx, by, bv, cx, cy, cv]) {
-  const area = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay);
-  if (!area) return;
-  const slack = -1e-6, top = Math.max(0, Math.ceil(Math.min(ay, by, cy) - 0.5));
-  const bottom = Math.min(height - 1, Math.floor(Math.max(ay, by, cy) - 0.5));
-  const left = Math.max(0, Math.ceil(Math.min(ax, bx, cx) - 0.5));
-  const right = Math.min(width - 1, Math.floor(Math.max(ax, bx, cx) - 0.5));
-  for (let row = top; row <= bottom; row++) for (let column = left; column <= right; column++) {
-    const x = column + 0.5, y = row + 0.5;
-    const b = ((x - ax) * (cy - ay) - (cx - ax) * (y - ay)) / area;
-    const c = ((bx - ax) * (y - ay) - (x - ax) * (by - ay)) / area;
+function areaOf(pieces) {
+  let area = 0;
+  for (let k = 0; k < pieces.length; k += 9) area += Math.abs(twiceArea(pieces, k)) / 2;
+  return area;
+}
+function twiceArea(p, k) {
+  return (p[k + 3] - p[k]) * (p[k + 7] - p[k + 1]) - (p[k + 6] - p[k]) * (p[k + 4] - p[k + 1]);
+}
+
+// The value at a place; NaN outside of all pieces.
+function fieldAt(p, x, y) {
+  const slack = -1e-6;
+  for (let k = 0; k < p.length; k += 9) {
+    const area = twiceArea(p, k);
+    const b = ((x - p[k]) * (p[k + 7] - p[k + 1]) - (p[k + 6] - p[k]) * (y - p[k + 1])) / area;
+    const c = ((p[k + 3] - p[k]) * (y - p[k + 1]) - (x - p[k]) * (p[k + 4] - p[k + 1])) / area;
     if (b >= slack && c >= slack && 1 - b - c >= slack)
-      pixels[row * width + column] = av + b * (bv - av) + c * (cv - av);
+      return p[k + 2] + b * (p[k + 5] - p[k + 2]) + c * (p[k + 8] - p[k + 2]);
+  }
+  return NaN;
+}
+
+// The outlines of the bands below, between and above ascending limits, one path each.
+function bandsOf(pieces, limits) {
+  const bands = Array.from({ length: limits.length + 1 }, () => []);
+  for (let k = 0; k < pieces.length; k += 9) {
+    const corners = [0, 3, 6].map(i => [pieces[k + i], pieces[k + i + 1], pieces[k + i + 2]]);
+    cut(corners.sort((a, b) => a[2] - b[2]), limits, bands);
+  }
+  return bands.map(band => band.join(""));
+}
+
+// Adds the parts of a piece to their bands. Each limit between its least and largest value cuts it along a line, from
+// the edge between these two corners to one of the other two edges.
+function cut([least, middle, largest], limits, bands) {
+  let band = limits.findIndex(limit => limit > least[2]), started = [least];
+  if (band < 0) band = limits.length;
+  for (let above = false; ; band++) {
+    const ends = band >= limits.length || limits[band] >= largest[2], limit = limits[band];
+    const turns = !above && (ends || middle[2] < limit);
+    above ||= turns;
+    const ended = ends ? [largest] : [between(least, largest, limit),
+      above ? between(middle, largest, limit) : between(least, middle, limit)];
+    bands[band].push(polygon([...started, ...ended, ...(turns ? [middle] : [])]));
+    if (ends) return;
+    started = ended.reverse();
   }
 }
+function between(a, b, value) {
+  const share = (value - a[2]) / (b[2] - a[2]);
+  return [a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1])];
+}
+function tenths(value) { return Math.round(10 * value) / 10; }
+function polygon(corners) { return "M" + corners.map(([x, y]) => tenths(x) + " " + tenths(y)).join("L") + "Z"; }

@@ -10,12 +10,13 @@ from html import escape
 from importlib import resources
 
 
-def page(title: str, body: str, scripts: Sequence[str] = (), style: str = "page.css") -> str:
-    """A page with these scripts and this style of the package.
+def page(title: str, body: str, scripts: Sequence[str] = (), style: str = "page.css",
+         rules: str = "") -> str:
+    """A page with these scripts and this style of the package, and with further rules of style.
 
     The browser runs only scripts whose hash is in the policy.
     """
-    rules = _content(style)
+    rules = _content(style) + rules
     code = list(map(_content, scripts))
     run = "".join(f"<script>{text}</script>\n" for text in code)
     return (f'<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'

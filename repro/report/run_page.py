@@ -7,6 +7,7 @@ import html
 import numpy as np
 
 from repro.report import charts, fields, page, quantities
+from repro.report.colours import viridis
 from repro.report.reading import Run
 from repro.results import names
 
@@ -38,6 +39,9 @@ NEEDED = {"transport": "substrates", "extent": "aggregate"}
 NUMERICS = {"preset": None, "elements": None, "refinement": None, "transport": "substrates",
             "time": "growth", "transfer": "growth"}
 
+#: Colours of a field. Neighbours cannot be told apart.
+BANDS = 128
+
 CONTROLS = """<div class="controls"><label>Field <select id="field"></select></label>
 <label><input type="checkbox" id="lines"> mesh</label>
 <label{aggregate}><input type="checkbox" id="outline" checked> outline of the aggregate</label>
@@ -47,7 +51,8 @@ CONTROLS = """<div class="controls"><label>Field <select id="field"></select></l
 <div class="time"{several}><button type="button" id="play">Play</button>
 <input type="range" id="frame" min="0" value="0" step="1" aria-label="time">\
 <output id="now"></output></div>
-<div class="scroll"><canvas id="picture" role="img" tabindex="0"></canvas></div>\
+<div class="scroll"><svg id="picture" role="img" tabindex="0" font-size="12" \
+font-family="system-ui, sans-serif"></svg></div>\
 <output id="probe" aria-live="polite">&nbsp;</output>"""
 
 
@@ -68,7 +73,8 @@ def _packed(run: Run, spent: int) -> dict:
     if "before_expansion.pvd" in run.record["files"]:
         before = fields.index(run.folder, "before_expansion.pvd")
     packed = fields.packed(fields.index(run.folder), before, spent)
-    return packed | {"start": _first_shown(packed, quantities.contact(run))} if packed else {}
+    start = _first_shown(packed, quantities.contact(run)) if packed else {}
+    return packed | {"start": start, "colours": viridis(BANDS)} if packed else {}
 
 
 def _first_shown(packed: dict, contact: list[float]) -> dict[str, str | int]:

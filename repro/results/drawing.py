@@ -109,19 +109,24 @@ def field(fields: Mapping[str, np.ndarray], name: str, title: str, ax: Any = Non
     """
     values = magnitude(fields[name])
     limits = value_range(values) if limits is None else limits
-    (left, bottom), (right, top) = corners(fields) if box is None else box
+    box = corners(fields) if box is None else box
     if ax is None:
-        height = 0.75 * WIDTH * (top - bottom) / (right - left) + ROOM
-        _, ax = optional(PYPLOT).subplots(figsize=(WIDTH, height), layout="constrained")
+        _, ax = optional(PYPLOT).subplots(figsize=field_size(box), layout="constrained")
     image = _image(ax, fields, values)
     image.set_clim(*limits)
     _draw_outline(ax, fields)
     bar = ax.figure.colorbar(image, cax=ax.inset_axes([1.02, 0, 0.02, 1]))
     bar.formatter.set_powerlimits((-3, 4))
     ax.set(xlabel="x (um)", ylabel="y (um)", aspect="equal", facecolor="0.85",
-           xlim=(left, right), ylim=(bottom, top))
+           xlim=box[:, 0], ylim=box[:, 1])
     ax.set_title(_plain(f"{title}: {names.with_unit(name)}"), loc="left")
     return ax
+
+
+def field_size(box: np.ndarray) -> tuple[float, float]:
+    """Width and height (inches) of the figure of a field in a box (2, 2)."""
+    length, width = box[1] - box[0]
+    return WIDTH, 0.75 * WIDTH * width / length + ROOM
 
 
 def against(frame: Any, factors: Sequence[Any], name: str, title: str, ax: Any = None) -> Any:

@@ -377,7 +377,9 @@ class Results(Mapping[str, np.ndarray]):
         if not len(self.time):
             return ""
         has_fields = len(self._fields) == len(self.time)
-        image = picture.figure(self._fields[-1], self.time[-1]) if has_fields else ""
+        time = self.time[-1]
+        title = drawing.heading(self, time)
+        image = picture.figure(self._fields[-1], title, time) if has_fields else ""
         return f"<p>{escape(self.name)}, {escape(picture.key_figures(self))}</p>{image}"
 
 

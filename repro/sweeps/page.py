@@ -12,6 +12,7 @@ import numpy as np
 
 from repro.report import charts
 from repro.report import page as html
+from repro.report.colours import viridis
 from repro.results import write_text
 from repro.results.files import atomic_path
 from repro.results.quantities import Quantity
@@ -19,8 +20,10 @@ from repro.sweeps.design import Factor, label
 from repro.sweeps.folder import Sweep
 from repro.sweeps.table import NUMBERS, SweepRun
 
-#: Number of colours of a scale, in sweep.css.
+#: Number of colours of a scale.
 LEVELS = 7
+#: The parts of viridis that are visible on a light page and on a dark one.
+ON_LIGHT, ON_DARK = (0.0, 0.65), (0.35, 1.0)
 #: Radius of the dots of runs.
 RADIUS = 4
 #: The numbers in the row of a run.
@@ -47,7 +50,18 @@ first row in which the aggregate touches the opposite wall. Values between the r
 interpolated; <code>output.times</code> adds rows.</p>
 {_conductivity(sweep, runs)}{_clogging(sweep, runs, clogged)}{_last(sweep, runs)}
 {html.section("Runs", _table(sweep, runs))}"""
-    return html.page(title, body, style="sweep.css")
+    return html.page(title, body, style="sweep.css", rules=_colours())
+
+
+def _colours() -> str:
+    """The colours of lines and dots, as rules of style."""
+    dark = _rules(viridis(LEVELS, *ON_DARK))
+    return f"{_rules(viridis(LEVELS, *ON_LIGHT))}@media (prefers-color-scheme: dark) {{\n{dark}}}\n"
+
+
+def _rules(colours: list[str]) -> str:
+    return "".join(f".line{k} {{ stroke: {colour}; }} .dot{k} {{ fill: {colour}; }}\n"
+                   for k, colour in enumerate(colours))
 
 
 def _describe(factor: Factor) -> str:

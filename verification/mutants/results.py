@@ -743,6 +743,20 @@ MUTANTS = (
          "low, decades",
          "tests/test_report.py::test_colours_are_logarithmic_over_two_decades_or_more")),
     *changes(
+        "repro/report/mesh.js",
+        ("bands-without-corners",
+         "A part of a band lacks the middle corner of its triangle.",
+         "polygon([...started, ...ended, ...(turns ? [middle] : [])])",
+         "polygon([...started, ...ended, ...(turns ? [least] : [])])",
+         "tests/test_report.py::test_the_picture_is_the_field[fast]")),
+    *changes(
+        "repro/sweeps/page.py",
+        ("dark-on-dark",
+         "The lines of a sweep have the same colours on dark pages as on light ones.",
+         "viridis(LEVELS, *ON_DARK)",
+         "viridis(LEVELS, *ON_LIGHT)",
+         "tests/test_sweep.py::test_lines_are_visible_on_light_and_dark_pages")),
+    *changes(
         "repro/report/fields.py",
         ("any-file-is-shown",
          "A page reads any file that the index names.",
@@ -1309,7 +1323,7 @@ MUTANTS = (
          'about = {"scene": self.name, "status": "completed"}',
          "tests/test_api.py::test_xarray_has_units_that_udunits_knows")),
     *changes(
-        "repro/results/picture.py",
+        "repro/results/drawing.py",
         ("speed-along",
          "The picture of a speed shows only its component along the pore.",
          "np.linalg.norm(values, axis=1) if values.ndim == 2 else values",
