@@ -422,8 +422,9 @@ def _geometry(scene: Scene, row: dict, fields: Fields) -> Iterator[Finding]:
     yield size("nodes of the row less those of the fields", row["nodes"] - fields.nodes, 0, "the same mesh")
     yield size("area of the mesh over meshed length times width, less one",
                fields.areas.sum() / (row["meshed_length_um"] * width) - 1, SUM, "triangles fill the meshed part")
-    yield excess("nodes", [x.min(), x.max(), y.min(), y.max()], [-length / 2, -inf, 0, -inf],
-                 [inf, length / 2, inf, width], "the pore")
+    half, top = (1 + SUM) * length / 2, (1 + SUM) * width
+    yield excess("nodes", [x.min(), x.max(), y.min(), y.max()], [-half, -inf, 0, -inf], [inf, half, inf, top],
+                 "the pore")
     area = fields.areas[fields.body].sum()
     yield size("aggregate's area in the fields over that of the row, less one", area / row["aggregate_area_um2"] - 1,
                SUM, "quadrature of triangles is exact")

@@ -58,11 +58,9 @@ FOLLOWED = {
     "model/contact.py": {
         'growth.shear_modulus, or growth.fluid_forces = "neglected"': "two drawn scenes of soft bodies in fast flow",
         "no setting helps": "member 61 of the hard family, without advice"},
-    "model/gear.py": {"try a larger numerics.refinement":
-                      "tests/test_advice.py::test_a_larger_refinement_helps_where_a_substrate_becomes_negative"},
-    "model/growth.py": {
-        "try a larger growth.shear_modulus": "members 151 and 171 of the hard family",
-        "try a shorter growth.time_step": "tests/test_advice.py::test_a_shorter_step_helps_a_plug_that_grows_fast"},
+    "model/gear.py": {"try numerics.transport = ":
+                      "tests/test_advice.py::test_profiles_at_rest_help_where_those_in_time_do_not_settle"},
+    "model/growth.py": {"try a larger growth.shear_modulus": "members 151 and 171 of the hard family"},
     "model/pore.py": {
         "leave [flow] out": "tests/test_transport.py::test_too_slow_a_flow_is_refused",
         "no mesh resolves the boundary layers":
@@ -206,17 +204,20 @@ for refinement in (4, 0.3):
     assert refused.endswith("; try a smaller numerics.refinement") and rows == "1"
 
 
-def test_a_larger_refinement_helps_where_a_substrate_becomes_negative():
-    """First-order uptake exhausts the donor within an element."""
+@pytest.mark.parametrize("refinement, half_saturation", [(0.2, 1e-4), (0.367, 2e-4)])
+def test_profiles_at_rest_help_where_those_in_time_do_not_settle(refinement, half_saturation):
+    """First-order uptake exhausts the donor within an element. A larger refinement does not help: refinements of 1 and
+    1.5 fail in these scenes, too."""
     scene = load_scene("base", [
-        "numerics.preset=paper", "numerics.refinement=0.367", "numerics.transport=gear", "aggregate.radius=30 um",
-        "growth.time_step=0.1 h", "growth.end=0.1 h", "kinetics.law=first order", "flow.mean_velocity=0.659 m/day",
-        "kinetics.maximum_utilization_rate=32.6 1/day",
+        "numerics.preset=paper", f"numerics.refinement={refinement}", "numerics.transport=gear",
+        "aggregate.radius=30 um", "growth.time_step=0.1 h", "growth.end=0.1 h", "kinetics.law=first order",
+        "flow.mean_velocity=0.659 m/day", "kinetics.maximum_utilization_rate=100 1/day",
         "substrates.acceptor.supply=7.45 mg/L", "substrates.acceptor.half_saturation=1.56 mg/L",
-        "substrates.donor.supply=1.31 mg/L", "substrates.donor.half_saturation=5.81e-4 mg/L"], unset=["flow.head"])
-    with pytest.raises(SimulationError, match="the donor becomes negative .*; try a larger numerics.refinement"):
+        "substrates.donor.supply=1.31 mg/L", f"substrates.donor.half_saturation={half_saturation} mg/L"],
+        unset=["flow.head"])
+    with pytest.raises(SimulationError, match='the donor .*; try numerics.transport = "quasi_steady"'):
         list(simulate(scene))
-    assert [*simulate(load_scene(scene, ["numerics.refinement=1"]))][-1].pore.time == 0.1
+    assert [*simulate(load_scene(scene, ["numerics.transport=quasi_steady"]))][-1].pore.time == 0.1
 
 
 #: {pattern of a warning: the settings that it advises}.
@@ -341,11 +342,12 @@ def test_forces_of_the_fluid_are_advised_and_act_on_a_permeable_aggregate():
 
 
 @pytest.mark.parametrize("radius, start", [
-    (20, "t = 0 h"), pytest.param(12, r"t = 2\.\d+ h", marks=pytest.mark.thorough)])
+    (20, "t = 0 h"), pytest.param(12, r"t = [12]\.\d+ h", marks=pytest.mark.thorough)])
 def test_an_unresolved_front_gets_advice_once_and_it_helps(radius, start):
     """This includes a front within a step, which first tries the mesh of its start. With three times the refinement the
     first scene has a row."""
-    substrate = {"supply": "0.28 mg/L", "half_saturation": "3e-5 mg/L"}
+    supply, half_saturation = {20: ("0.15 mg/L", "1e-5 mg/L"), 12: ("0.2 mg/L", "3e-6 mg/L")}[radius]
+    substrate = {"supply": supply, "half_saturation": half_saturation}
     scene = parse_scene({
         "pore": {"width": "100 um", "length": "600 um"}, "aggregate": {"radius": f"{radius} um"},
         "flow": {"mean_velocity": "2.9 m/day"}, "substrates": {"acceptor": substrate, "donor": substrate},
@@ -366,15 +368,3 @@ def test_a_shorter_step_helps_where_the_aggregate_passes_the_opposite_wall():
         list(simulate(scene))
     last = list(simulate(load_scene(scene, ["growth.time_step=1 h"])))[-1].pore
     assert last.time == 5 and last.boundary.thickness < 50
-
-
-def test_a_shorter_step_helps_a_plug_that_grows_fast():
-    """It grows to six times its area in 5 h. One step has no equilibrium, and a larger refinement does not help."""
-    scene = load_scene("base", [
-        "numerics.preset=paper", "numerics.refinement=0.3", "pore.length=6000 um", "flow.head=1 cm",
-        'aggregate.outline=[["-25 um","0 um"],["-15 um","50 um"],["15 um","50 um"],["25 um","0 um"]]',
-        "kinetics.maximum_utilization_rate=14 1/day", "growth.time_step=5 h", "growth.end=5 h",
-        *(f"substrates.{name}.supply=1000 mg/L" for name in ("acceptor", "donor"))], unset=["aggregate.radius"])
-    with pytest.raises(SimulationError, match="in growth: .*; try a shorter growth.time_step"):
-        list(simulate(scene))
-    assert [*simulate(load_scene(scene, ["growth.time_step=0.5 h"]))][-1].pore.time == 5

@@ -78,6 +78,7 @@ def test_a_docstring_is_complete(name):
     assert shortcomings(value, must_raise) == []
 
 
+@pytest.mark.exact_lengths
 @pytest.mark.parametrize("name", PUBLIC)
 def test_the_examples_of_a_docstring_run(name, capsys):
     (document,) = doctest.DocTestFinder(recurse=False).find(target(name), name, globs={})

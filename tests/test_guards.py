@@ -144,7 +144,7 @@ def test_counts_in_the_record_include_every_step(tmp_path):
 def starved():
     """(scene, seed, its solution) of an uneven aggregate with a front of both substrates in it."""
     substrates = [f"substrates.{name}.{key}={value} mg/L" for name, supply in (("acceptor", 0.6), ("donor", 0.5))
-                  for key, value in (("supply", supply), ("half_saturation", 1e-3))]
+                  for key, value in (("supply", supply), ("half_saturation", 3e-3))]
     scene = load_scene("base", ["numerics.elements=quadratic", "numerics.refinement=0.4",
                                 "aggregate.radius=20 um", *substrates])
     seed = seeded(scene)

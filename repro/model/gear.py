@@ -358,7 +358,8 @@ def _too_short(system: System, new: Level, difference: np.ndarray, when: str) ->
     why = "becomes negative" if negative else "does not follow its prediction"
     name = list(system.problem.substrates.modelled)[species]
     return TransportError(f"the {name} {why} at x = {x:.4g}, y = {y:.4g} um {when}, even in steps "
-                          f"of {3600 * SHORTEST:g} s; try a larger numerics.refinement")
+                          f"of {3600 * SHORTEST:g} s; try numerics.transport = "
+                          '"quasi_steady", which solves for the profiles at rest')
 
 
 def _corrected(system: System, level: Level, step: float,

@@ -409,9 +409,8 @@ def equilibrium(body: Body, theta: np.ndarray, position: np.ndarray, pressure: n
     return reach(system, start, theta, first, prescribed, parts, modified_newton, patient)
 
 
-#: What helps if there is no equilibrium, under the fluid's forces and without them.
+#: What helps if there is no equilibrium under the fluid's forces.
 TOO_SOFT = "; the aggregate may be too soft for this flow: try a larger growth.shear_modulus"
-TOO_LONG = "; try a shorter growth.time_step"
 
 
 def reach(system: System, start: np.ndarray, theta: np.ndarray, first: Equilibrium,
@@ -426,8 +425,7 @@ def reach(system: System, start: np.ndarray, theta: np.ndarray, first: Equilibri
                               modified_newton)
         except (GrowthError, LinearError) as error:
             failure = str(error)
-    advice = TOO_SOFT if system.pull.any() else TOO_LONG
-    raise GrowthError(failure + advice)
+    raise GrowthError(failure + (TOO_SOFT if system.pull.any() else ""))
 
 
 @failing_as(GrowthError)

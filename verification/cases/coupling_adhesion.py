@@ -172,7 +172,7 @@ def test_seepage(changes, record):
     drag = traction.on_aggregate(seed.space, solved.flow, drive, scene.numerics.interface)[seed.mesh.body]
     total = abs(drag[:, 0].sum() / density / (120.0 * WIDTH) - 1)
     place = seed.mesh.points[seed.mesh.body]
-    prescribed = np.column_stack([place[:, 0] < -60.0 + 1e-9, (place[:, 1] == 0.0) | (place[:, 1] == WIDTH)])
+    prescribed = np.column_stack([place[:, 0] < -60.0 + 1e-9, (place[:, 1] == 0.0) | (place[:, 1] == seed.mesh.width)])
     inside = seed.mesh.topology.body_corners
     equilibrium = growth.equilibrium(seed.body, seed.theta, place, 0 * seed.pressure[inside], prescribed, place,
                               forces=0.1 * drag / (density * 120.0))

@@ -40,6 +40,7 @@ FILE = re.compile(r"\S+/\S+\.(?:state|vtu)|fields/\S+\.vtu")
 ADVICE = (
     (r"larger numerics\.refinement", "numerics.refinement", lambda present, number: [1.5 * present, 2.5 * present]),
     (r"smaller numerics\.refinement", "numerics.refinement", lambda present, number: [present / 2]),
+    (r'numerics\.transport = "quasi_steady"', "numerics.transport", lambda present, number: ["quasi_steady"]),
     (r"larger growth\.shear_modulus", "growth.shear_modulus",
      lambda present, number: [f"{10 * present!r} MPa", f"{100 * present!r} MPa"]),
     (r"shorter growth\.time_step", "growth.time_step",
