@@ -248,8 +248,7 @@ MEMBERS = [
       for name in SUBSTRATES),
     *((f"{key}.interpolation", [f"{key}.interpolation=linear"])
       for key in ("flow", *(f"substrates.{name}" for name in SUBSTRATES))),
-    *((f"numerics.{key}", ["numerics.elements=quadratic", f"numerics.{key}={value}"])
-      for key, value in (("transfer", "linear"), ("flow_element", "bubble")))]
+    ("numerics.transfer", ["numerics.elements=quadratic", "numerics.transfer=linear"])]
 
 
 @pytest.mark.parametrize("key, entries", MEMBERS)
@@ -296,8 +295,6 @@ PAIRS = [
      "at most 100000 times growth.time_step (0.0001 h) is needed"),
     ("base", "growth.minimum_film=30 um", "pore.width=20 um", "less than pore.width (20 um) is needed",
      "more than growth.minimum_film (30 um) is needed"),
-    ("base", "numerics.flow_element=bubble", "numerics.preset=fast", '"stabilised" is needed with numerics.elements',
-     'numerics.flow_element = "stabilised" is needed with it, not "bubble"'),
     ("base", "numerics.transfer=linear", "numerics.elements=quadratic", '"conserving" is needed with numerics.elem',
      'numerics.transfer = "conserving" is needed with it, not "linear"'),
     ("base", "growth.fluid_forces=included", "growth.new_biomass=stress_free",

@@ -77,8 +77,6 @@ CHOICES = {
                               "[E8]"),
     "stress-free": Switch("new biomass", "stressed", "stress-free", 'growth.new_biomass="stress_free"',
                           note="section 5"),
-    "bubble": Switch("flow element", "stabilised (c = 100)", "bubble (MINI)", 'numerics.flow_element="bubble"',
-                     note="the same unknowns; tau is the same to 7 % where triangles are equilateral"),
     "Haldane": Switch("law of uptake", "dual Monod", "Haldane, K_i = 100 mg/L", 'kinetics.law="Haldane"',
                       note="(7)-(10); not the paper's"),
     "unlimited decay": Switch("decay", "with acceptor", "unlimited", 'kinetics.decay="unlimited"',

@@ -21,17 +21,6 @@ The pressure does not jump if the aggregate has the viscosity of water, as perme
 Linear velocities with a linear pressure need tau = h_tau^2 / (c nu_r). The paper prints no constant
 c [E13]; ``reference/ERRATA.md`` reports its effect. By the second line ``w = u - tau grad p`` is
 divergence-free for every linear q: w carries the substrates.
-
-Linear velocities with a bubble b = 27 L1 L2 L3 in each triangle (MINI: Arnold, Brezzi and Fortin
-1984) need no stabilisation. A linear function has a constant gradient, and the integral of grad b
-is zero. Therefore a(u, v) does not couple the bubbles' coefficients beta to the linear part, and
-the test with b is A beta = -(integral of b) grad p, with A the bubble's 2 x 2 block of a. With this
-beta the second line is that of the same system with tau = (integral of b)^2 / |tau| A^-1, and
-w = u - tau grad p is the mean velocity in the triangle, bubble included. With g_i = grad L_i and
-G = sum g_i g_i^T, the integral of b is 9/20 |tau|, that of grad b grad b^T is 81/20 |tau| G, and so
-
-    tau = 1 / (20 nu_r) (tr G)^-1         "laplacian"
-       or 1 / (20 nu_r) (tr G + G)^-1     "traction"
 """
 
 from __future__ import annotations
@@ -102,20 +91,6 @@ class Stabilised:
 
 
 @dataclass(frozen=True, eq=False)
-class Bubble:
-    """Linear velocity with a bubble in each triangle, condensed, and linear pressure."""
-
-    def mobility(self, mesh: Mesh, viscosity: np.ndarray, interface: str) -> np.ndarray:
-        """(T, 2, 2) um2: tau of the condensed bubble, by which grad p drives the bubble's mean
-        velocity."""
-        G = np.einsum("tai,taj->tij", mesh.gradients, mesh.gradients)
-        block = each(np.trace(G, axis1=1, axis2=2), np.eye(2)[None])
-        if interface == "traction":
-            block = block + G
-        return np.linalg.inv(each(20 * viscosity, block))
-
-
-@dataclass(frozen=True, eq=False)
 class Linear:
     """Linear velocity and pressure; tau: (T, 2, 2) um2, by which grad p drives the correction."""
 
@@ -123,7 +98,7 @@ class Linear:
     tau: np.ndarray
 
     @staticmethod
-    def on(velocity: Space, viscosity: np.ndarray, element: Stabilised | Bubble,
+    def on(velocity: Space, viscosity: np.ndarray, element: Stabilised,
            interface: str) -> Linear:
         """The pair with the mobility of an element of linear velocity."""
         return Linear(velocity, element.mobility(velocity.mesh, viscosity, interface))
@@ -159,7 +134,7 @@ class TaylorHood:
     lower: None = None
 
     @staticmethod
-    def on(velocity: Space, viscosity: np.ndarray, element: Stabilised | Bubble,
+    def on(velocity: Space, viscosity: np.ndarray, element: Stabilised,
            interface: str) -> TaylorHood:
         """The pair; it ignores the element of linear velocities."""
         return TaylorHood(velocity)
@@ -219,7 +194,7 @@ def viscous(velocity: Space, viscosity: np.ndarray, interface: str) -> np.ndarra
 
 @timed("flow")
 def unit_flow(velocity: Space, viscosity_ratio: float = 1.0, *, interface: str = "laplacian",
-              element: Stabilised | Bubble = Stabilised(),
+              element: Stabilised = Stabilised(),
               permeability: float | None = None) -> UnitFlow:
     """Stokes flow of mean velocity one through the meshed part, (1)-(5); see :func:`solve`.
 
@@ -321,7 +296,7 @@ def scaled(unit: UnitFlow, mesh: Mesh, length: float, drive: Drive) -> Flow:
 
 
 def solve(velocity: Space, drive: Drive, length: float, *, interface: str = "laplacian",
-          element: Stabilised | Bubble = Stabilised()) -> Flow:
+          element: Stabilised = Stabilised()) -> Flow:
     """Solve the Stokes flow through a pore, (1)-(6).
 
     Parameters
@@ -334,7 +309,7 @@ def solve(velocity: Space, drive: Drive, length: float, *, interface: str = "lap
         Length of the whole pore, um; the part without mesh is a clean channel.
     interface : {"laplacian", "traction"}
         Form of the viscous term [E2].
-    element : Stabilised or Bubble
+    element : Stabilised
         Stabilisation of linear velocities.
 
     Returns

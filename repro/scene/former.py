@@ -18,6 +18,8 @@ class Former(NamedTuple):
 KEYS: dict[str, Former] = {
     "numerics.fixed_point": Former(
         "kept", "leave it out: the point in the middle of a new contact surface stays in place"),
+    "numerics.flow_element": Former(
+        "stabilised", "leave it out: linear velocities are stabilised, quadratic ones are stable"),
     "numerics.ordering": Former("degree", "leave it out: SuperLU orders the nodes"),
     "output.timeseries": Former(
         "csv", "leave it out, and write NetCDF by repro.load_run(FOLDER).to_netcdf(FILE)"),

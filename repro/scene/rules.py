@@ -26,8 +26,6 @@ FINEST = 1e-3  # of the width: the smallest seed, edge of an outline, and gap be
 NEAREST = 1e-4  # of the width: from a point of an outline to a wall that it does not touch
 INHIBITION = 100.0  # mg/L: the default of K_i
 TIGHTEST = 1e-11  # of the square of the width: the smallest permeability
-#: Options that only linear elements have, and their values for all others.
-HIGHER_ORDER = {"transfer": "conserving", "flow_element": "stabilised"}
 
 #: A number or a table over time.
 Driven = float | TimeTable | None
@@ -362,20 +360,16 @@ def _numerics_rules(scene: "Scene") -> Rules:
         "numerics.extent": '"full" is needed with substrates in water at rest',
         "flow.mean_velocity": 'numerics.extent = "full" is needed with 0 m/day',
     }
-    if scene.numerics.order > 1:
-        yield from _higher_order_rules(scene)
+    transfer = scene.numerics.transfer
+    other = f'numerics.transfer = "conserving" is needed with it, not "{transfer}"'
+    yield scene.numerics.order > 1 and transfer != "conserving", {
+        "numerics.transfer": f'"conserving" is needed {_with_elements(scene)}; "linear" has others',
+        **_element_keys(other),
+    }
     yield scene.numerics.time == "midpoint" and scene.numerics.transport == "gear", {
         "numerics.transport": '"quasi_steady" is needed with numerics.time = "midpoint"',
         "numerics.time": '"updates" is needed with numerics.transport = "gear"',
     }
-
-
-def _higher_order_rules(scene: "Scene") -> Rules:
-    for key, only in HIGHER_ORDER.items():
-        value = getattr(scene.numerics, key)
-        requirement = f'"{only}" is needed {_with_elements(scene)}; "linear" has the others'
-        other = f'numerics.{key} = "{only}" is needed with it, not "{value}"'
-        yield value != only, {f"numerics.{key}": requirement, **_element_keys(other)}
 
 
 def _output_rules(scene: "Scene") -> Rules:
