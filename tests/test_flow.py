@@ -68,14 +68,6 @@ def test_elements_beside_upper_contact_lines_of_a_permeable_body_are_half_the_le
     assert pore.sized(load_scene("base", ["numerics.preset=fast", *overrides])).contact == pytest.approx(expected)
 
 
-def test_the_stabilisation_of_a_scene_reaches_the_flow():
-    scene = load_scene("base", ["numerics.preset=paper", "numerics.refinement=0.4", "numerics.flow_stabilisation=12"])
-    space = pore.seeded(scene).space
-    unit = flow.unit_flow(space, scene.flow.viscosity_ratio, element=flow.Stabilised(12.0))
-    expected = flow.scaled(unit, space.mesh, scene.pore.length, scene.flow)
-    assert np.array_equal(pore.solve_flow(space, scene.flow, scene.pore.length, scene.numerics).head, expected.head)
-
-
 #: Drawn bodies (um) in a pore of 50 um; the last two span it.
 BODIES = {
     "block": [(-10, 0), (-10, 40), (10, 40), (10, 0)],

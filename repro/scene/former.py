@@ -10,7 +10,7 @@ from typing import NamedTuple
 class Former(NamedTuple):
     """A former key: the value that is the present behaviour, and what to write instead."""
 
-    value: str
+    value: str | float
     instead: str
 
 
@@ -20,6 +20,8 @@ KEYS: dict[str, Former] = {
         "kept", "leave it out: the point in the middle of a new contact surface stays in place"),
     "numerics.flow_element": Former(
         "stabilised", "leave it out: linear velocities are stabilised, quadratic ones are stable"),
+    "numerics.flow_stabilisation": Former(
+        100.0, "leave it out: it is 100 (repro.model.flow.STABILISATION)"),
     "numerics.ordering": Former("degree", "leave it out: SuperLU orders the nodes"),
     "output.timeseries": Former(
         "csv", "leave it out, and write NetCDF by repro.load_run(FOLDER).to_netcdf(FILE)"),

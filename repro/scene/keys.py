@@ -387,9 +387,6 @@ class Numerics:
     jacobian: str = choice(
         "fresh", "reused", source=NOT_IN_PAPER,
         about="Newton's derivative: new in every iterate, or kept while the iterates converge fast")
-    flow_stabilisation: float = number(
-        100.0, source="3.2 [E13]",
-        about="c of tau = h^2 / (c nu), with which linear elements are stabilised")
     mesh_compressibility: float = number(
         1.0, about="gamma of the mesh motion", source="(35) [E13], [E15]")
 
