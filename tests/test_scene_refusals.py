@@ -66,7 +66,6 @@ REFUSED = {
         "substrates.donor.diffusivity_in_aggregate=-1 cm^2/day", "kinetics.decay_oxygen_demand=0",
         "kinetics.acceptor_to_donor_ratio=0", "kinetics.maximum_density=0 mg/L", "growth.time_step=0 h",
         "growth.shear_modulus=0 MPa", "growth.minimum_film=0 um", "numerics.refinement=0",
-        "numerics.mesh_compressibility=-1",
         'flow.head=[["0 h", "1 cm"], ["2 h", "0 cm"]]'],
     "zero or more": ["substrates.acceptor.supply=-1 mg/L", "kinetics.maximum_utilization_rate=-1 1/day",
                      "kinetics.decay_coefficient=-1 1/day", "growth.end=-1 h"],

@@ -22,6 +22,8 @@ KEYS: dict[str, Former] = {
         "stabilised", "leave it out: linear velocities are stabilised, quadratic ones are stable"),
     "numerics.flow_stabilisation": Former(
         100.0, "leave it out: it is 100 (repro.model.flow.STABILISATION)"),
+    "numerics.mesh_compressibility": Former(
+        1.0, "leave it out: it is 1 (repro.model.mesh_motion.COMPRESSIBILITY)"),
     "numerics.ordering": Former("degree", "leave it out: SuperLU orders the nodes"),
     "output.timeseries": Former(
         "csv", "leave it out, and write NetCDF by repro.load_run(FOLDER).to_netcdf(FILE)"),

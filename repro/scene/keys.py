@@ -387,8 +387,6 @@ class Numerics:
     jacobian: str = choice(
         "fresh", "reused", source=NOT_IN_PAPER,
         about="Newton's derivative: new in every iterate, or kept while the iterates converge fast")
-    mesh_compressibility: float = number(
-        1.0, about="gamma of the mesh motion", source="(35) [E13], [E15]")
 
     @property
     def order(self) -> int:

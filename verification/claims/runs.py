@@ -25,7 +25,7 @@ from repro.fem.space import Space
 from repro.march import loop, simulation, updates
 from repro.march.state import Report, RestartState
 from repro.model import contact as mechanics
-from repro.model import flow, pore, remeshing, transport
+from repro.model import flow, mesh_motion, pore, remeshing, transport
 from repro.model.kinetics import Sink
 from repro.model.pore import Pore, Solved, solve
 from repro.model.remeshing import Remeshing
@@ -50,9 +50,10 @@ ROWS = {"base": (0.2, *map(float, range(1, 20)), 19.2, 19.4), "wide": tuple(map(
 #: Figure 6, every second shape update of the paper.
 AFTER = tuple(round(35 + 2 * UPDATE * number, 1) for number in range(26))
 #: Changes that no key of a scene makes. The fixed points are at all times the present middles of the contact surfaces
-#: [E20]; c of tau has another value [E13].
+#: [E20]; c of tau or gamma of (35) has another value [E13].
 RECHOSEN = "fixed points rechosen"
-CONSTANTS = {f"c = {c}": (flow, "STABILISATION", float(c)) for c in (25, 50, 200, 400)}
+CONSTANTS = {**{f"c = {c}": (flow, "STABILISATION", float(c)) for c in (25, 50, 200, 400)},
+             **{f"gamma = {gamma:g}": (mesh_motion, "COMPRESSIBILITY", gamma) for gamma in (0.1, 10.0)}}
 #: Beginnings of the keys whose changes have no effect until the aggregate is near the opposite wall; and the thickness
 #: over the pore's width up to which it is not near.
 LATE, NEAR = ("growth.minimum_film", "growth.minimum_contact_angle"), 0.9
