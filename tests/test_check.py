@@ -318,8 +318,8 @@ def test_check_describes_values_over_time():
     assert "acceptor (10 mg/L) and donor (3 to 9 mg/L, in steps, the last from 4 h)" in words["substrates"]
     assert "mean velocity of 2.9 m/day" in words["flow"] and words["output"].endswith(", and every 1.6 h")
     assert words["growth"].startswith("to 45 h: ") and "tolerance 0.0075" in words["numerics"]
-    head = ['flow.head=[["0 h", "1 cm"], ["2 h", "4 cm"]]', "flow.interpolation=linear"]
-    words = dict(describe_model(load_scene("base", head)))
+    head = 'flow.head={table=[["0 h", "1 cm"], ["2 h", "4 cm"]], between="linear"}'
+    words = dict(describe_model(load_scene("base", [head])))
     assert "a head of 1 to 4 cm, linear in time, the last from 2 h over" in words["flow"]
 
 

@@ -138,7 +138,10 @@ REFUSED = {
     'or a list of [time, value] pairs such as [["0 h", "10 mg/L"], ["5 h", "10 mg/L"]] (did you mean "3 mg/L"?)': [
         f"{DONOR}=3"],
     "flow.head (10 um) is set too": ['flow.mean_velocity=[["0 h", "1 m/day"]]'],
-    '"steps" is needed without a table': ["flow.interpolation=linear", "substrates.acceptor.interpolation=linear"],
+    '{ table = [["0 h", "1e-3 cm"], ["5 h", "1e-3 cm"]], between = "linear" }': [
+        'flow.head={table="1 cm", between="linear"}', 'flow.head={table=[["0 h", "1 cm"]]}',
+        'flow.head={table=[["0 h", "1 cm"]], between="jumps"}', 'flow.head={table=[["0 h", "1 cm"]], between=1}',
+        'flow.head={table=[["0 h", "1 cm"]], between="linear", after="2 h"}'],
     # times
     "a list of times is needed": ["output.times=5 h", "output.times=[]", "output.times=[5 h, 6 h]", "output.times=[5]",
                                   'output.times=["5 um"]', 'output.times=["-1 h", "1 h"]', 'output.times=[["1 h"]]'],
@@ -245,8 +248,6 @@ MEMBERS = [
     *((f"substrates.{name}.diffusivity_in_aggregate", [f"substrates.{name}.diffusivity_in_aggregate=1e-200 %",
                                                        f"substrates.{name}.diffusivity=1e-200 um^2/h"])
       for name in SUBSTRATES),
-    *((f"{key}.interpolation", [f"{key}.interpolation=linear"])
-      for key in ("flow", *(f"substrates.{name}" for name in SUBSTRATES))),
     ("numerics.transfer", ["numerics.elements=quadratic", "numerics.transfer=linear"])]
 
 

@@ -102,15 +102,6 @@ class Aggregate:
             object.__setattr__(self, "radius", SEED_RADIUS)
 
 
-def _interpolate(section: "Flow | Substrate", *keys: str) -> None:
-    """Set the interpolation of the tables of a section."""
-    linear = section.interpolation == "linear"
-    for key in keys:
-        table = getattr(section, key)
-        if isinstance(table, TimeTable):
-            object.__setattr__(section, key, replace(table, linear=linear))
-
-
 @dataclass(frozen=True)
 class Flow:
     """Section 2.1, (1)-(6): driven by `head` (um, whole pore) or `mean_velocity` (um/h).
@@ -126,9 +117,6 @@ class Flow:
     mean_velocity: float | None = timed_quantity(
         "2.9 m/day", "um/h", NON_NEGATIVE, default=None, source="(3), section 4",
         about="u_ave, mean over the width; either this or head")
-    interpolation: str = choice(
-        "steps", "linear", source=NOT_IN_PAPER,
-        about="Between the times of a table of head or mean_velocity: jumps, or a linear change")
     biomass: str = choice(
         "viscous", "brinkman", source="2.1; the other one is discussed in 5",
         about="What slows the water in the aggregate: a viscosity lambda times its own, or the "
@@ -147,7 +135,6 @@ class Flow:
                               about="rho of water; only growth.fluid_forces needs it")
 
     def __post_init__(self):
-        _interpolate(self, "head", "mean_velocity")
         if self.viscosity_ratio is None and self.biomass == "viscous":
             object.__setattr__(self, "viscosity_ratio", LAMBDA)
 
@@ -168,9 +155,6 @@ class Substrate:
     supply: float = timed_quantity("10 mg/L", "mg/L", NON_NEGATIVE,
                                    source="(11), section 4 (10 K_s)",
                            about="C_supply of the water that comes in, and of all water at t = 0")
-    interpolation: str = choice(
-        "steps", "linear", source=NOT_IN_PAPER,
-        about="Between the times of a table of supply: jumps, or a linear change")
     half_saturation: float = quantity(
         "1.0 mg/L", "mg/L", about="K_s of Monod's law", source="(7)-(10), Table 1")
     diffusivity: float = quantity(
@@ -185,7 +169,6 @@ class Substrate:
         if isinstance(inside, Fraction):
             inside = float(inside * Fraction(self.diffusivity))
             object.__setattr__(self, "diffusivity_in_aggregate", inside)
-        _interpolate(self, "supply")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -572,11 +555,10 @@ class Scene:
 #: Keys added after hashes of scenes were recorded, with their defaults as tables write them.
 LATER: dict[str, dict[str, object]] = {
     "aggregate": {"position": "0.0 um", "smooth": False, "inert_fraction": 0.0},
-    "flow": {"interpolation": "steps", "biomass": "viscous"},
+    "flow": {"biomass": "viscous"},
     "growth": {"wall": "sliding"},
     "numerics": {"contact_elements": 0.0},
-    "substrates.acceptor": {"interpolation": "steps"},
-    "substrates.donor": {"interpolation": "steps", "inhibition_constant": "100.0 mg/L"},
+    "substrates.donor": {"inhibition_constant": "100.0 mg/L"},
     "kinetics": {"law": "dual Monod", "decay": "with acceptor"},
 }
 #: A scene, or its source: a file, a packaged name, a dict of tables.
@@ -706,8 +688,8 @@ def scene_tables(scene: Scene) -> dict:
 def scene_hash(scene: Scene) -> str:
     """Hash (16 hexadecimal digits) of all values of a scene, without its name.
 
-    A key of `LATER` counts if it differs from its default, and a former key counts with its last
-    value, so that recorded hashes stay valid.
+    A key of `LATER` counts if it differs from its default, and a scene counts as earlier versions
+    wrote it, so that recorded hashes stay valid.
     """
     written = with_former(write_table(scene))
     tables = {key: _without_later(key, table) for key, table in written.items()}

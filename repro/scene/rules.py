@@ -13,7 +13,6 @@ if TYPE_CHECKING:
         Kinetics,
         Pore,
         Scene,
-        Substrate,
         Substrates,
     )
 
@@ -205,7 +204,6 @@ def _flow_rules(scene: "Scene", head: Driven, velocity: Driven) -> Rules:
         "flow.mean_velocity": _not_both("flow.head", _in_words(head, "um")),
         "flow.head": _not_both("flow.mean_velocity", _in_words(velocity, "m/day", 24e-6)),
     }
-    yield from _table_rules("flow", scene.flow, (head, velocity))
     yield scene.stagnant and _steady(scene), {
         "flow.mean_velocity": f"greater than zero is needed{_UNSTEADY}",
         "numerics.transport": f'"gear" is needed with flow.mean_velocity = 0: {_NO_STATE}',
@@ -249,18 +247,10 @@ def _in_words(value: Driven, unit: str, factor: float = 1.0) -> str:
     return "a table" if isinstance(value, TimeTable) else f"{factor * value:g} {unit}"
 
 
-def _table_rules(section: str, part: "Flow | Substrate", values: tuple[Driven, ...]) -> Rules:
-    """Rules of a section's tables over time."""
-    constant = not any(isinstance(value, TimeTable) for value in values)
-    requirement = '"steps" is needed without a table of times and values'
-    yield constant and part.interpolation != "steps", {f"{section}.interpolation": requirement}
-
-
 def _boundary_rules(scene: "Scene") -> Rules:
     for name, part in scene.substrates.modelled.items():
         key = f"substrates.{name}.diffusivity_in_aggregate"
         yield part.diffusivity_in_aggregate <= 0, {key: "greater than zero is needed"}
-        yield from _table_rules(f"substrates.{name}", part, (part.supply,))
     closed = scene.substrates.boundary == "closed"
     yield closed and scene.flow is not None, {
         "substrates.boundary": '"open" is needed with [flow]',

@@ -121,7 +121,7 @@ def jumps(random: Random, tables: dict) -> None:
     if random.uniform() < 0.3:
         fed["supply"][-1][1] = "0 mg/L"
     if random.uniform() < 0.5:
-        fed["interpolation"] = "linear"
+        fed["supply"] = {"table": fed["supply"], "between": "linear"}
     rows = sorted({0.0, *_inner(random, 0.8 * end, 2), _hours(drive[key][-1][0])})
     tables["output"] = {"times": [f"{time!r} h" for time in rows]}
 
