@@ -182,7 +182,7 @@ class Scene:
     @property
     def viscosity_ratio(self) -> float | None:
         """Viscosity ratio of the aggregate; None if it is permeable."""
-        permeable = self.section("flow").get("biomass") == "brinkman"
+        permeable = "permeability" in self.section("flow")
         return None if permeable else self.number("flow", "viscosity_ratio")
 
     @property

@@ -104,7 +104,7 @@ QUICK = (*QUIET, "kinetics.maximum_density=30 mg/L", "growth.time_step=1e-4 h", 
 FASTER = "kinetics.maximum_utilization_rate=3400 1/day"
 FORCED = (*QUIET, "growth.end=24 h")
 FORCED_SLIDING = (*FORCED, "growth.fluid_forces=included")
-PERMEABLE = ("flow_only", "aggregate.radius=20 um", "flow.biomass=brinkman", "numerics.elements=quadratic")
+PERMEABLE = ("flow_only", "aggregate.radius=20 um", "numerics.elements=quadratic")
 COARSE_PERMEABLE = (*PERMEABLE, "numerics.refinement=0.5")
 FEW = ("substrates.acceptor.half_saturation=2e-3 mg/L", "substrates.donor.half_saturation=2e-3 mg/L")
 FINE, FAST = "numerics.refinement=2", "numerics.preset=fast"
@@ -392,7 +392,7 @@ def test_a_plug_ends_in_quarter_discs_and_its_pressure_drops_over_its_whole_leng
 @pytest.mark.parametrize("times", ['["5 h", "18 h"]', '["0 h", "5 h", "18 h"]'])
 def test_requested_rows_are_counted_with_that_at_zero(times):
     """The permeability is reported in the units of the scene."""
-    scene, _ = coarse_base(2, f"output.times={times}", "flow.biomass=brinkman", 'flow.permeability="2.5e-15 m^2"')
+    scene, _ = coarse_base(2, f"output.times={times}", 'flow.permeability="2.5e-15 m^2"')
     description = dict(modelled.describe_model(scene))
     assert "rows and fields at 3 times" in description["output"]
     assert "an aggregate with a permeability of 2.5e-15 m2" in description["flow"]

@@ -157,3 +157,15 @@ def test_a_record_with_an_interpolation_is_that_of_the_present_table(key, table,
     {"substrates": {"donor": {"interpolation": "jumps", "supply": "1 mg/L"}}}])
 def test_tables_that_a_user_has_altered_stay_as_they_are(tables):
     assert without_former(tables) == tables
+
+
+@pytest.mark.parametrize("biomass, changes, hash", [
+    ("viscous", [], "258d43232f9734d3"), ("brinkman", ["flow.permeability=1e-15 m^2"], "a38358ec5974b21d")])
+def test_a_record_with_the_kind_of_biomass_is_that_of_the_present_keys(biomass, changes, hash):
+    """Hashes are those of commit f2a81844, which had the key. Without its permeability a former kind stays."""
+    present = load_scene("base", ["numerics.preset=fast", *changes])
+    record = scene_tables(present)
+    record["flow"]["biomass"] = biomass
+    assert parse_scene(without_former(record), "base", "run.json") == present and scene_hash(present) == hash
+    other = {"flow": {"biomass": biomass, **({} if changes else {"permeability": "1e-15 m^2"})}}
+    assert without_former(other) == other

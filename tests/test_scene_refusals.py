@@ -171,14 +171,13 @@ def test_every_key_refuses_values_of_another_kind():
     ("wide", ["flow.mean_velocity=-1 m/day"], "a velocity is needed"),
     ("wide", ['flow.mean_velocity=[["0 h", "1 m/day"], ["2 h", "0 m/day"]]'], "greater than zero is needed"),
     ("initial_mesh", ["flow.viscosity_ratio=5"], "flow.head is missing: it or flow.mean_velocity is needed"),
-    ("base", ["flow.permeability=1e-15 m^2"], 'flow.biomass = "brinkman" is needed with it'),
-    ("base", ["flow.biomass=brinkman"], 'flow.permeability is needed with "brinkman", such as "1e-15 m^2"'),
-    ("base", ["flow.biomass=brinkman", "flow.permeability=1e-15 m^2", "flow.viscosity_ratio=5"],
-     'flow.biomass = "viscous" is needed with it'),
-    ("base", ["flow.biomass=brinkman", "flow.permeability=1e-15 m^2"],
-     'flow.biomass = "brinkman": numerics.elements = "quadratic" is needed'),
+    ("base", ["flow.permeability=1e-15 m^2", "flow.viscosity_ratio=5"],
+     "flow.viscosity_ratio (5.0) is set too; only one of them is accepted"),
+    ("base", ["flow.biomass=brinkman"], "this key was removed; leave it out: an aggregate is permeable with flow.perm"),
+    ("base", ["flow.permeability=1e-15 m^2"],
+     'flow.permeability = "1e-15 m^2": numerics.elements = "quadratic" is needed with it'),
     ("base", ["numerics.elements=cubic"], 'numerics.elements = "cubic": this choice was removed; write "quadratic"'),
-    ("base", ["numerics.preset=fast", "flow.biomass=brinkman", "flow.permeability=2.49e-20 m^2"],
+    ("base", ["numerics.preset=fast", "flow.permeability=2.49e-20 m^2"],
      'flow.permeability = "2.49e-20 m^2": "2.5e-20 m^2" or more is needed in a pore 50 um wide'),
     ("base", ["kinetics.donor_oxygen_demand=0.8", "kinetics.acceptor_to_donor_ratio=1.52"],
      "more than Y d_c (0.8662) is needed"),
@@ -198,8 +197,7 @@ def test_an_entry_that_conflicts_with_the_scene_is_refused(source, overrides, pa
 
 
 @pytest.mark.parametrize("text, part", [
-    ('[flow]\nhead = "1e-3 cm"\nbiomass = "brinkman"\npermeability = "1e-15 m^2"\n[numerics]\npreset = "fast"\n',
-     'flow.biomass = "brinkman": "viscous" is needed without'),
+    ('[flow]\nhead = "1e-3 cm"\npermeability = "1e-15 m^2"\n', "[aggregate] is needed with it"),
     ('[aggregate]\n[substrates.acceptor]\n[kinetics]\nlaw = "Haldane"\n',
      'kinetics.law = "Haldane": [substrates.donor] is needed'),
     ('[aggregate]\n[substrates.donor]\ninhibition_constant = "5 mg/L"\n', 'kinetics.law = "Haldane" is needed with it'),
@@ -220,7 +218,7 @@ def test_a_file_is_refused_by_its_own_key(tmp_path, text, part):
 
 @pytest.mark.parametrize("source, overrides", [
     ("base", ["growth.end=0 h"]),
-    ("base", ["numerics.preset=fast", "flow.biomass=brinkman", "flow.permeability=2.5e-20 m^2"]),
+    ("base", ["numerics.preset=fast", "flow.permeability=2.5e-20 m^2"]),
     ("base", ["growth.end=0 h", 'output.times=["0 h"]']),
     ("base", ['output.times=["19.4 h", "1164 min"]']),
     ("flow_only", ['output.times=["0 h"]']),

@@ -6,9 +6,9 @@ scene: the restart value of theta (28), an explicit increment, and an uneven see
 step or a seed of its own, also once.
 
 Some keys have no switch. With ``growth.wall = "bonded"`` base stops on the paper's mesh at 15.6 h, where a triangle
-beside the contact line collapses; the claims judge it in the converged solution. ``flow.biomass = "brinkman"``, also
-with the fluid's forces, needs quadratic elements. ``growth.bonding_strength`` and ``growth.tensile_strength`` end a run
-and change nothing before. Without one of the substrates there is no effluent of it to compare.
+beside the contact line collapses; the claims judge it in the converged solution. ``flow.permeability``, also with the
+fluid's forces, needs quadratic elements. ``growth.bonding_strength`` and ``growth.tensile_strength`` end a run and
+change nothing before. Without one of the substrates there is no effluent of it to compare.
 """
 
 from collections.abc import Callable

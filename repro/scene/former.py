@@ -22,6 +22,8 @@ IN_TABLE = Former(None, "write it in a table: "
                         "a list has steps")
 #: By dotted keys.
 KEYS: dict[str, Former] = {
+    "flow.biomass": Former(None, "leave it out: an aggregate is permeable with flow.permeability, "
+                                 "else viscous"),
     "flow.interpolation": IN_TABLE,
     "substrates.acceptor.interpolation": IN_TABLE,
     "substrates.donor.interpolation": IN_TABLE,
@@ -93,20 +95,22 @@ def _translated(tables: dict, translate: Callable[[dict], dict]) -> dict:
 
 
 def _earlier(section: dict) -> dict:
-    """A section with the word between the times of its table beside the table."""
-    linear = [key for key, value in section.items() if isinstance(value, dict)]
-    lists = {key: section[key]["table"] for key in linear}
-    return {**section, **lists, "interpolation": "linear"} if linear else section
+    """A section with keys for what a table or a permeability says; none has its default."""
+    lists = {key: value["table"] for key, value in section.items() if isinstance(value, dict)}
+    said = {"interpolation": "linear"} if lists else {}
+    said |= {"biomass": "brinkman"} if "permeability" in section else {}
+    return {**section, **lists, **said}
 
 
 def _present(section: dict) -> dict:
-    """A section with the word between the times of its table within the table."""
-    if section.get("interpolation") not in ("steps", "linear"):
-        return section
+    """A section whose tables and permeability say what keys said."""
     section = dict(section)
-    if section.pop("interpolation") == "linear":
-        section |= {key: {"table": value, "between": "linear"}
-                    for key, value in section.items() if isinstance(value, list)}
+    if section.get("biomass") == ("brinkman" if "permeability" in section else "viscous"):
+        del section["biomass"]
+    if section.get("interpolation") in ("steps", "linear"):
+        if section.pop("interpolation") == "linear":
+            section |= {key: {"table": value, "between": "linear"}
+                        for key, value in section.items() if isinstance(value, list)}
     return section
 
 

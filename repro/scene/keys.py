@@ -107,8 +107,8 @@ class Flow:
     """Section 2.1, (1)-(6): driven by `head` (um, whole pore) or `mean_velocity` (um/h).
 
     The other one is None. A table of the scene is a TimeTable here, and a number in the scene that
-    `Scene.at` returns. `biomass` selects `viscosity_ratio` or `permeability` (um^2); the other one
-    is None.
+    `Scene.at` returns. The aggregate has a `viscosity_ratio` or a `permeability` (um^2); the other
+    one is None.
     """
 
     head: float | None = timed_quantity(
@@ -117,16 +117,13 @@ class Flow:
     mean_velocity: float | None = timed_quantity(
         "2.9 m/day", "um/h", NON_NEGATIVE, default=None, source="(3), section 4",
         about="u_ave, mean over the width; either this or head")
-    biomass: str = choice(
-        "viscous", "brinkman", source="2.1; the other one is discussed in 5",
-        about="What slows the water in the aggregate: a viscosity lambda times its own, or the "
-        "drag of a permeable body")
     viscosity_ratio: float | None = number(
-        LAMBDA, source="2.1, Table 1", stated="default 2000 with biomass = \"viscous\"",
+        LAMBDA, source="2.1, Table 1", stated="default 2000 without permeability",
         default=None, about="lambda, viscosity of the aggregate over that of water")
     permeability: float | None = quantity(
-        "1e-15 m^2", "um^2", default=None, source=NOT_IN_PAPER,
-        about="Of the aggregate, with biomass = \"brinkman\"; at least 1e-11 pore.width^2")
+        "1e-15 m^2", "um^2", default=None, source="Section 5, without a value",
+        about="Of the aggregate, whose drag then slows the water in it instead of a viscosity; at "
+        "least 1e-11 pore.width^2")
     kinematic_viscosity: float = quantity("0.01003 cm^2/s", "um^2/h", about="nu of water",
                                           source="(1), Table 1")
     gravity: float = quantity("9.81 m/s^2", "um/h^2", about="g, the acceleration of gravity",
@@ -135,7 +132,7 @@ class Flow:
                               about="rho of water; only growth.fluid_forces needs it")
 
     def __post_init__(self):
-        if self.viscosity_ratio is None and self.biomass == "viscous":
+        if self.viscosity_ratio is None and self.permeability is None:
             object.__setattr__(self, "viscosity_ratio", LAMBDA)
 
     @property
@@ -555,7 +552,6 @@ class Scene:
 #: Keys added after hashes of scenes were recorded, with their defaults as tables write them.
 LATER: dict[str, dict[str, object]] = {
     "aggregate": {"position": "0.0 um", "smooth": False, "inert_fraction": 0.0},
-    "flow": {"biomass": "viscous"},
     "growth": {"wall": "sliding"},
     "numerics": {"contact_elements": 0.0},
     "substrates.donor": {"inhibition_constant": "100.0 mg/L"},

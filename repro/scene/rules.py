@@ -212,30 +212,24 @@ def _flow_rules(scene: "Scene", head: Driven, velocity: Driven) -> Rules:
 
 def _biomass_rules(scene: "Scene", drive: "Flow") -> Rules:
     """Rules of the aggregate's resistance to flow."""
-    drag = drive.biomass == "brinkman"
-    permeable = f"{drive.permeability} um^2"
-    yield not drag and drive.permeability is not None, {
-        "flow.permeability": 'flow.biomass = "brinkman" is needed with it',
-        "flow.biomass": f'"brinkman" is needed with flow.permeability = {permeable}',
-    }
-    yield drag and drive.permeability is None, {
-        "flow.biomass": 'flow.permeability is needed with "brinkman", such as "1e-15 m^2"'}
+    drag = drive.permeability is not None
+    permeable = f"flow.permeability = {drive.permeability} um^2"
     yield drag and drive.viscosity_ratio is not None, {
-        "flow.viscosity_ratio": 'flow.biomass = "viscous" is needed with it',
-        "flow.biomass": f'"viscous" is needed with flow.viscosity_ratio = {drive.viscosity_ratio}',
+        "flow.permeability": _not_both("flow.viscosity_ratio", f"{drive.viscosity_ratio}"),
+        "flow.viscosity_ratio": _not_both("flow.permeability", f"{drive.permeability} um^2"),
     }
     least = TIGHTEST * scene.pore.width**2
-    yield drag and drive.permeability is not None and drive.permeability < 0.999 * least, {
+    yield drag and drive.permeability < 0.999 * least, {
         "flow.permeability": f'"{1e-12 * least:.4g} m^2" or more is needed in a pore '
                              f"{scene.pore.width:g} um wide: below it round-off hides the flow",
         "pore.width": f"{math.sqrt((drive.permeability or 0.0) / TIGHTEST):.4g} um or less is "
-                      f"needed with flow.permeability = {permeable}",
+                      f"needed with {permeable}",
     }
-    alone = scene.aggregate is None
-    yield drag and alone, {"flow.biomass": '"viscous" is needed without [aggregate]'}
-    requirement = '"quadratic" is needed with flow.biomass = "brinkman"'
+    yield drag and scene.aggregate is None, {
+        "flow.permeability": "[aggregate] is needed with it: it is that of the biomass"}
+    requirement = f'"quadratic" is needed with {permeable}'
     yield drag and scene.numerics.order == 1, {
-        "flow.biomass": 'numerics.elements = "quadratic" is needed with it',
+        "flow.permeability": 'numerics.elements = "quadratic" is needed with it',
         "numerics.elements": requirement,
         "numerics.preset": f'numerics.elements = {requirement}',
     }
