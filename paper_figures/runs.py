@@ -86,7 +86,7 @@ WIDE_FAST = Request("wide", _UNTIL, "wide_fast")
 VARIANTS = {name: Request("wide", (*_UNTIL, change), "wide_" + re.sub(r"\W", "_", name))
             for name, change in rheology.VARIANTS.items() if change != rheology.RECHOSEN}
 PERMEABILITIES = (1e-12 * rheology.PERMEABILITY, 1e-12 * 100.0**2 / 12 / 2000)
-PERMEABLE = tuple(Request("wide", (*_UNTIL, 'flow.biomass="brinkman"', f'flow.permeability="{value:.3g} m^2"'),
+PERMEABLE = tuple(Request("wide", (*_UNTIL, f'flow.permeability="{value:.3g} m^2"'),
                           f"wide_permeable_{value:.0e}") for value in PERMEABILITIES)
 
 

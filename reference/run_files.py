@@ -98,12 +98,13 @@ def number(text) -> float:
 
 
 class TimeCourse:
-    """A quantity over time (h): a constant, or a table of times and values. A value applies from its time on."""
+    """A quantity over time (h): a constant, or a table of times and values. A value applies from its time on, unless
+    the table names what is between them."""
 
-    def __init__(self, entry, linear: bool = False):
-        table = entry if isinstance(entry, list) else [["0 h", entry]]
+    def __init__(self, entry):
+        self.linear = isinstance(entry, dict) and entry["between"] == "linear"
+        table = entry["table"] if isinstance(entry, dict) else entry if isinstance(entry, list) else [["0 h", entry]]
         self.times, self.values = np.array([[number(part) for part in pair] for pair in table]).T
-        self.linear = linear
 
     def at(self, time: float) -> float:
         """The value at a time; at a jump, the value after it."""
@@ -134,8 +135,7 @@ class Scene:
 
     def course(self, section: str, key: str) -> TimeCourse:
         """A quantity, which may be a table over time."""
-        part = self.section(section)
-        return TimeCourse(part.get(key, TABLE_1[section].get(key)), part.get("interpolation") == "linear")
+        return TimeCourse(self.section(section).get(key, TABLE_1[section].get(key)))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -182,7 +182,7 @@ class Scene:
     @property
     def viscosity_ratio(self) -> float | None:
         """Viscosity ratio of the aggregate; None if it is permeable."""
-        permeable = self.section("flow").get("biomass") == "brinkman"
+        permeable = "permeability" in self.section("flow")
         return None if permeable else self.number("flow", "viscosity_ratio")
 
     @property

@@ -254,7 +254,7 @@ def drawn(seed, preset):
     if draw.random() < 0.3:
         changes.append(f"substrates.donor.diffusivity={between(0.1, 3)} cm^2/day")
     if draw.random() < 0.3 and preset != "paper":
-        changes += ["flow.biomass=brinkman", f"flow.permeability={between(1e-11, 1e-7) * width**2} um^2"]
+        changes += [f"flow.permeability={between(1e-11, 1e-7) * width**2} um^2"]
     elif draw.random() < 0.3:
         changes.append("growth.new_biomass=stress_free")
     if draw.random() < 0.6 and "growth.new_biomass=stress_free" not in changes:
@@ -327,7 +327,7 @@ def test_forces_of_the_fluid_are_advised_and_act_on_a_permeable_aggregate():
     """In a minute of growth, which moves the top by 0.03 um, the force strains the seed by the ratio of the warning,
     which is an estimate of its order: within a factor of four."""
     changes = ["numerics.preset=fast", "growth.end=1 min", "growth.time_step=1 min", "growth.shear_modulus=0.3 Pa",
-               "aggregate.radius=20 um", "flow.biomass=brinkman", "flow.permeability=1e-13 m^2"]
+               "aggregate.radius=20 um", "flow.permeability=1e-13 m^2"]
     neglected, included = (load_scene("base", [*changes, f"growth.fluid_forces={word}"])
                            for word in ("neglected", "included"))
     state = pore.seeded(neglected)

@@ -116,7 +116,7 @@ def concentrations(boundary, flowing, mesh):
 
 def motion(mesh):
     """Motion of a mesh."""
-    return mesh_motion.move(mesh, 1.001 * mesh.points[mesh.body], 1e-3, 100.0)
+    return mesh_motion.move(mesh, 1.001 * mesh.points[mesh.body], 1e-3)
 
 
 #: Computations on one mesh that need different sparse systems.

@@ -114,7 +114,8 @@ def test_a_jump_of_a_supply_is_drawn_as_a_jump(times, expected):
     assert curve("effluent_donor_mg_per_L") == list(expected)
     unchanged = [list(times), values.tolist()]
     assert curve("thickness_um") == curve("mean_velocity_m_per_d") == unchanged
-    assert curve("effluent_donor_mg_per_L", "substrates.donor.interpolation=linear") == unchanged
+    linear = f'substrates.donor.supply={{table={supply.partition("=")[2]}, between="linear"}}'
+    assert curve("effluent_donor_mg_per_L", linear) == unchanged
     assert curve("effluent_donor_mg_per_L", "numerics.transport=gear") == unchanged
     head = 'flow.head=[["0 h", "1e-3 cm"], ["2 h", "2e-3 cm"]]'
     forced = (head, "growth.fluid_forces=included")

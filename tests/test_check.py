@@ -105,7 +105,7 @@ QUICK = (*QUIET, "kinetics.maximum_density=30 mg/L", "growth.time_step=1e-4 h", 
 FASTER = "kinetics.maximum_utilization_rate=3400 1/day"
 FORCED = (*QUIET, "growth.end=24 h")
 FORCED_SLIDING = (*FORCED, "growth.fluid_forces=included")
-PERMEABLE = ("flow_only", "aggregate.radius=20 um", "flow.biomass=brinkman", "numerics.elements=quadratic")
+PERMEABLE = ("flow_only", "aggregate.radius=20 um", "numerics.elements=quadratic")
 COARSE_PERMEABLE = (*PERMEABLE, "numerics.refinement=0.5")
 FEW = ("substrates.acceptor.half_saturation=2e-3 mg/L", "substrates.donor.half_saturation=2e-3 mg/L")
 FINE, FAST = "numerics.refinement=2", "numerics.preset=fast"
@@ -319,8 +319,8 @@ def test_check_describes_values_over_time():
     assert "acceptor (10 mg/L) and donor (3 to 9 mg/L, in steps, the last from 4 h)" in words["substrates"]
     assert "mean velocity of 2.9 m/day" in words["flow"] and words["output"].endswith(", and every 1.6 h")
     assert words["growth"].startswith("to 45 h: ") and "tolerance 0.0075" in words["numerics"]
-    head = ['flow.head=[["0 h", "1 cm"], ["2 h", "4 cm"]]', "flow.interpolation=linear"]
-    words = dict(describe_model(load_scene("base", head)))
+    head = 'flow.head={table=[["0 h", "1 cm"], ["2 h", "4 cm"]], between="linear"}'
+    words = dict(describe_model(load_scene("base", [head])))
     assert "a head of 1 to 4 cm, linear in time, the last from 2 h over" in words["flow"]
 
 
@@ -394,7 +394,7 @@ def test_a_plug_ends_in_quarter_discs_and_its_pressure_drops_over_its_whole_leng
 @pytest.mark.parametrize("times", ['["5 h", "18 h"]', '["0 h", "5 h", "18 h"]'])
 def test_requested_rows_are_counted_with_that_at_zero(times):
     """The permeability is reported in the units of the scene."""
-    scene, _ = coarse_base(2, f"output.times={times}", "flow.biomass=brinkman", 'flow.permeability="2.5e-15 m^2"')
+    scene, _ = coarse_base(2, f"output.times={times}", 'flow.permeability="2.5e-15 m^2"')
     description = dict(modelled.describe_model(scene))
     assert "rows and fields at 3 times" in description["output"]
     assert "an aggregate with a permeability of 2.5e-15 m2" in description["flow"]

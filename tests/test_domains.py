@@ -121,7 +121,7 @@ def test_a_mesh_with_a_collapsed_triangle_fails_in_meshing(order):
     points = pore.mesh.points.copy()
     points[triangle[2]] = points[triangle[0]]
     with pytest.raises(MeshError, match=OUT_OF_DOMAIN):
-        mesh_motion.move(pore.mesh.moved(points), points[pore.mesh.body], 1.0, 12.0)
+        mesh_motion.move(pore.mesh.moved(points), points[pore.mesh.body], 1.0)
 
 
 def test_a_point_in_a_collapsed_triangle_fails_in_the_transfer():

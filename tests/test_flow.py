@@ -16,7 +16,7 @@ from repro.scene import load_scene
 
 def in_a_permeable_body(permeability, refinement):
     """Return the conductivity, and the ratio of the smallest to the largest velocity u_x in a half-disc of 20 um."""
-    overrides = ["numerics.preset=fast", "aggregate.radius=20 um", "flow.biomass=brinkman", "growth.end=0 h",
+    overrides = ["numerics.preset=fast", "aggregate.radius=20 um", "growth.end=0 h",
                  f"flow.permeability={permeability} m^2", f"numerics.refinement={refinement}"]
     first = next(simulate(load_scene("base", overrides)))
     along = first.solved.flow.velocity[np.unique(first.pore.space.cells[first.pore.mesh.biomass]), 0]
@@ -40,7 +40,7 @@ def spanning(permeability, out, height):
     outline = str([list(point) for point in left + right]).replace("'", '"')
     return next(simulate(load_scene("base", [
         "numerics.preset=fast", "pore.width=100 um", f"aggregate.outline={outline}", "flow.mean_velocity=5.06 m/day",
-        "flow.biomass=brinkman", f"flow.permeability={permeability} m^2", "growth.end=0 h"],
+        f"flow.permeability={permeability} m^2", "growth.end=0 h"],
         unset=["flow.head", "aggregate.radius"])))
 
 
@@ -61,21 +61,11 @@ def test_water_that_must_pass_a_permeable_body_leaves_concentrations_within_thei
 
 @pytest.mark.parametrize("overrides, expected", [
     ([], 2.0), (["numerics.contact_elements=0"], np.inf),
-    (["flow.biomass=brinkman", "flow.permeability=1e-15 m^2"], 1.0),
-    (["flow.biomass=brinkman", "flow.permeability=1e-15 m^2", "numerics.contact_elements=4"], 0.5)])
+    (["flow.permeability=1e-15 m^2"], 1.0),
+    (["flow.permeability=1e-15 m^2", "numerics.contact_elements=4"], 0.5)])
 def test_elements_beside_upper_contact_lines_of_a_permeable_body_are_half_the_least_film_or_less(overrides, expected):
     """Beside an impermeable body fast has elements of the least film, 2 um."""
     assert pore.sized(load_scene("base", ["numerics.preset=fast", *overrides])).contact == pytest.approx(expected)
-
-
-@pytest.mark.parametrize("element, setting", [
-    (flow.Stabilised(12.0), "numerics.flow_stabilisation=12"), (flow.Bubble(), "numerics.flow_element=bubble")])
-def test_the_elements_of_a_scene_reach_the_flow(element, setting):
-    scene = load_scene("base", ["numerics.preset=paper", "numerics.refinement=0.4", setting])
-    space = pore.seeded(scene).space
-    unit = flow.unit_flow(space, scene.flow.viscosity_ratio, element=element)
-    expected = flow.scaled(unit, space.mesh, scene.pore.length, scene.flow)
-    assert np.array_equal(pore.solve_flow(space, scene.flow, scene.pore.length, scene.numerics).head, expected.head)
 
 
 #: Drawn bodies (um) in a pore of 50 um; the last two span it.

@@ -1,6 +1,8 @@
 """Keys and choices of earlier versions: scenes are refused with what to write instead, old runs still load."""
+import json
 import shutil
 from dataclasses import replace
+from functools import reduce
 
 import pytest
 
@@ -8,7 +10,7 @@ import repro
 from repro.cli import main
 from repro.report import comparison
 from repro.report.reading import read
-from repro.scene import KEYS, former, load_scene, load_tables, scene_hash
+from repro.scene import KEYS, former, load_scene, load_tables, parse_scene, scene_hash, scene_tables, without_former
 from repro.scene.reading import entries
 from tests.pages import cached_run
 from tests.shell import files, flags, read_record, refusal, rewrite
@@ -61,9 +63,9 @@ def test_a_value_of_another_type_is_no_former_choice(removed, value):
 
 
 def test_no_former_key_is_a_key_of_a_scene():
-    """Each names a section that every scene has; no former choice is one of its key's."""
+    """Each with a value names a section that every scene has; no former choice is one of its key's."""
     assert not former.KEYS.keys() & set(KEYS)
-    assert {key.partition(".")[0] for key in former.KEYS} <= {"pore", "numerics", "output"}
+    assert {section for section, *_ in former._parts()} <= {"pore", "numerics", "output"}
     for key, choice in former.CHOICES:
         section, _, name = key.partition(".")
         words = entries(type(getattr(SCENE, section)))[name].metadata["kind"].words
@@ -71,7 +73,7 @@ def test_no_former_key_is_a_key_of_a_scene():
 
 
 @pytest.mark.parametrize("key, value, instead", [
-    *((key, each.value, None) for key, each in former.KEYS.items()),
+    *((f"{section}.{key}", each.value, None) for section, key, each in former._parts()),
     *((*named, text.split('"')[1]) for named, text in former.CHOICES.items())])
 def test_the_advice_is_accepted(key, value, instead):
     """Without a former key, and with the other choice, the scene is accepted."""
@@ -119,3 +121,51 @@ def test_the_hash_counts_former_keys(monkeypatch):
     blue = scene_hash(SCENE)
     monkeypatch.setitem(former.KEYS, "numerics.colour", former.Former("red", "leave it out"))
     assert len({before, blue, scene_hash(SCENE)}) == 3
+
+
+TABLE = [["0.0 h", "0.001 cm"], ["0.4 h", "0.003 cm"]]
+SUPPLY = [["0.0 h", "4 mg/L"], ["4.0 h", "1 mg/L"]]
+#: Hashes of base with these tables, by the key and `interpolation`, in commit f2a81844, which had this key.
+HASHES = {
+    ("flow.head", "steps"): "0f9105cf4e430e86",
+    ("flow.head", "linear"): "0fc732b79f062e1f",
+    ("substrates.acceptor.supply", "steps"): "0bf6ed84376382fe",
+    ("substrates.acceptor.supply", "linear"): "9f31578c8de8dd51",
+    ("substrates.donor.supply", "steps"): "2e9e8a75468e40d8",
+    ("substrates.donor.supply", "linear"): "5a99eddaf4f84575",
+}
+
+
+@pytest.mark.parametrize("key, table", [
+    ("flow.head", TABLE), ("substrates.acceptor.supply", SUPPLY), ("substrates.donor.supply", SUPPLY)])
+@pytest.mark.parametrize("between", ["steps", "linear"])
+def test_a_record_with_an_interpolation_is_that_of_the_present_table(key, table, between):
+    """A scene with the former key is refused with what to write. Hashes are those of the earlier version."""
+    section, _, name = key.rpartition(".")
+    with pytest.raises(repro.SceneError, match=f"{section}.interpolation = .* was removed; write it in a table"):
+        load_scene("base", [f"{section}.interpolation={between}"])
+    present = load_scene("base", [f'{key}={{table={json.dumps(table)}, between="{between}"}}'])
+    record = scene_tables(present)
+    part = reduce(dict.__getitem__, section.split("."), record)
+    part |= {name: table, "interpolation": between}
+    assert parse_scene(without_former(record), "base", "run.json") == present
+    assert scene_hash(present) == HASHES[key, between]
+
+
+@pytest.mark.parametrize("tables", [
+    {"flow": 3, "substrates": []}, {"flow": {"interpolation": ["linear"]}}, {"substrates": {"donor": 3}},
+    {"substrates": {"donor": {"interpolation": "jumps", "supply": "1 mg/L"}}}])
+def test_tables_that_a_user_has_altered_stay_as_they_are(tables):
+    assert without_former(tables) == tables
+
+
+@pytest.mark.parametrize("biomass, changes, hash", [
+    ("viscous", [], "258d43232f9734d3"), ("brinkman", ["flow.permeability=1e-15 m^2"], "a38358ec5974b21d")])
+def test_a_record_with_the_kind_of_biomass_is_that_of_the_present_keys(biomass, changes, hash):
+    """Hashes are those of commit f2a81844, which had the key. Without its permeability a former kind stays."""
+    present = load_scene("base", ["numerics.preset=fast", *changes])
+    record = scene_tables(present)
+    record["flow"]["biomass"] = biomass
+    assert parse_scene(without_former(record), "base", "run.json") == present and scene_hash(present) == hash
+    other = {"flow": {"biomass": biomass, **({} if changes else {"permeability": "1e-15 m^2"})}}
+    assert without_former(other) == other

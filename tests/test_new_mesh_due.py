@@ -88,14 +88,12 @@ def test_a_new_mesh_is_due_if_one_criterion_requires_it(change, criterion, kind)
 
 
 @EVERY_ORDER
-def test_a_mesh_moves_by_the_scenes_constants_unless_it_is_too_coarse(order):
-    """The motion uses gamma of (35) and c of its stabilisation. Edges three times as long as a film of 2.5 um allows
-    are too coarse."""
-    coarse, pore = coarse_base(order, 'pore.width="20 um"', 'aggregate.radius="17.5 um"', "numerics.refinement=0.6",
-                       "numerics.mesh_compressibility=3", "numerics.flow_stabilisation=40")
+def test_a_mesh_moves_by_gamma_unless_it_is_too_coarse(order):
+    """gamma of (35) is 1. Edges three times as long as a film of 2.5 um allows are too coarse."""
+    coarse, pore = coarse_base(order, 'pore.width="20 um"', 'aggregate.radius="17.5 um"', "numerics.refinement=0.6")
     coordinates = pore.mesh.points.copy()
     coordinates[pore.mesh.body] *= 1.001
-    expected = mesh_motion.move(pore.mesh, coordinates[pore.mesh.body], compressibility=3.0, stabilisation=40.0)
+    expected = mesh_motion.move(pore.mesh, coordinates[pore.mesh.body], compressibility=1.0)
     assert np.array_equal(remeshing.moved_mesh(Meshing.of(coarse), pore, pore.moved(coordinates)).points, expected)
     fine = replace(coarse, numerics=replace(coarse.numerics, refinement=1.8))
     assert remeshing.moved_mesh(Meshing.of(fine), pore, pore) is None

@@ -17,7 +17,7 @@ from tests.strategies import ORDERS
 #: An aggregate that leans downstream, beside the middle of the pore.
 POINTS = '[["-10 um", "0 um"], ["-4 um", "18 um"], ["12 um", "28 um"], ["25 um", "14 um"], ["22 um", "0 um"]]'
 BODIES = {"viscous": ["flow.viscosity_ratio=20", "growth.fluid_forces=included"],
-          "permeable": ["flow.biomass=brinkman", "flow.permeability=40 um^2"]}
+          "permeable": ["flow.permeability=40 um^2"]}
 INTERFACES = ("laplacian", "traction")
 #: Linear elements take no permeable body.
 COMBINATIONS = [each for each in product(BODIES, INTERFACES, ORDERS) if each[::2] != ("permeable", 1)]

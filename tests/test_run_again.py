@@ -50,6 +50,9 @@ def test_another_scene_is_refused_with_its_differences(tmp_path, capsys):
     interrupt_run(SCENE, out)
     message = refusal(tmp_path, capsys, "run", "base", *flags(*BRIEF, "growth.end=4 h"), "--out", out)
     assert "growth.end (3 h there, now 4 h)" in message and "--force" in message
+    linear = 'flow.head={table=[["0 h", "1 cm"], ["1 h", "2 cm"]], between="linear"}'
+    message = refusal(tmp_path, capsys, "run", "base", *flags(*BRIEF, linear), "--out", out)
+    assert "flow.head (0.001 cm there, now a table over time)" in message
     message = refusal(tmp_path, capsys, "run", "flow_only", "--out", out)
     assert "flow.mean_velocity (not set there" in message and "growth (a section there, now not set)" in message
 

@@ -66,8 +66,6 @@ TABLE_1 = {  # worked out by hand: 1 m = 1e6 um, 1 cm2 = 1e8 um2, 1 day = 24 h, 
     "numerics.refinement": 0.2,
     "numerics.gradation": 0.25,
     "numerics.contact_elements": 1.0,
-    "numerics.flow_stabilisation": 100.0,
-    "numerics.mesh_compressibility": 1.0,
 }
 #: Every section with its required keys alone.
 EVERYTHING = {"aggregate": {}, "flow": {"head": "1e-3 cm"}, "substrates": {}, "growth": {"end": "1 h"}}

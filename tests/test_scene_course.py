@@ -2,6 +2,7 @@
 run with a table longer."""
 import json
 import math
+import tomllib
 from dataclasses import replace
 from math import inf
 from operator import attrgetter
@@ -29,26 +30,43 @@ from tests.test_scene_text import fields
 DONOR = "substrates.donor.supply"
 STARVED = [["0 h", "10 mg/L"], ["0.3 h", "0 mg/L"], ["0.5 h", "20 mg/L"]]
 RISING = 'flow.head=[["0 h", "1e-3 cm"], ["0.4 h", "3e-3 cm"]]'
+RISE = '{table=[["0 h", "1 m/day"], ["0.5 h", "3 m/day"]], between="linear"}'
 TIMED = {key: kind for key, entry in fields(Scene) if isinstance(kind := entry.metadata.get("kind"), Timed)}
 SHORT = ('growth.end="0.8 h"', 'numerics.preset="fast"', f"{DONOR}={json.dumps(STARVED)}")
 
 
-def test_a_table_is_read_in_units_and_written_back():
-    table = json.dumps([["0 min", "10 mg/L"], ["300 min", "0.02 g/L"]])
-    changes = [f"{DONOR}={table}", "substrates.donor.interpolation=linear"]
-    loaded = load_scene("base", changes)
-    assert loaded.substrates.donor.supply == TimeTable((0.0, 5.0), (10.0, 20.0), True)
+def between(word, table):
+    """A table with what is between its times."""
+    return f'{{ table = {json.dumps(table)}, between = "{word}" }}'
+
+
+@pytest.mark.parametrize("is_linear", [True, False])
+def test_a_table_is_read_in_units_and_written_back(is_linear):
+    entries = [["0 min", "10 mg/L"], ["300 min", "20 mg/L"]]
+    table = between("linear", entries) if is_linear else json.dumps(entries)
+    loaded = load_scene("base", [f"{DONOR}={table}"])
+    assert loaded.substrates.donor.supply == TimeTable((0.0, 5.0), (10.0, 20.0), is_linear)
     assert parse_scene(json.loads(json.dumps(scene_tables(loaded))), "base", "file") == loaded
-    assert f"supply = {table}" in scene_text("base", changes)
+    assert replace(load_scene(tomllib.loads(str(loaded))), name="base") == loaded
+    assert tomllib.loads(scene_text("base", [f"{DONOR}={table}"]))["substrates"]["donor"] == {
+        "supply": tomllib.loads(f"value = {table}")["value"]}
+
+
+def test_a_table_in_steps_may_say_so_and_keeps_its_unit():
+    table = between("steps", [["0 h", "1 g/L"], ["2 h", "2 g/L"]])
+    loaded = load_scene("base", [f"{DONOR}={table}"])
+    assert scene_tables(loaded)["substrates"]["donor"]["supply"] == [["0.0 h", "1 g/L"], ["2.0 h", "2 g/L"]]
+    linear = load_scene("base", [f"{DONOR}={table}", f"{DONOR}.between=linear"])
+    assert scene_tables(linear)["substrates"]["donor"]["supply"]["table"][1][1] == "2 g/L"
+    assert linear.substrates.donor.supply.at(1.0) == 1500.0
 
 
 @pytest.mark.parametrize("key", TIMED)
-def test_every_key_that_takes_a_table_follows_its_sections_interpolation(key):
-    section, _, name = key.rpartition(".")
-    table = json.dumps([[time, TIMED[key].write(value)] for time, value in (("0 h", 2.0), ("1 h", 6.0), ("4 h", 3.0))])
-    without = ["flow.head"] if name == "mean_velocity" else []
+def test_every_key_that_takes_a_table_has_steps_or_changes_linearly(key):
+    table = [[time, TIMED[key].write(value)] for time, value in (("0 h", 2.0), ("1 h", 6.0), ("4 h", 3.0))]
+    without = ["flow.head"] if key.endswith("mean_velocity") else []
     for word, expected in (("steps", [2, 2, 6, 6, 3]), ("linear", [2, 4, 6, 5, 3])):
-        loaded = load_scene("base", [f"{key}={table}", f"{section}.interpolation={word}"], unset=without)
+        loaded = load_scene("base", [f"{key}={between(word, table)}"], unset=without)
         assert [attrgetter(key)(loaded.at(time)) for time in (0, 0.5, 1, 2, 9)] == pytest.approx(expected, rel=1e-15)
         assert attrgetter(key)(loaded.largest) == 6 and [loaded.corner(time) for time in (0, 1, 4)] == [1, 4, inf]
 
@@ -110,7 +128,7 @@ def test_a_time_of_a_table_at_a_multiple_of_the_time_step_ends_one_update(step):
 def test_a_row_within_a_step_has_the_supply_of_its_time(preset):
     """The small seed takes up less than a hundredth of it."""
     table = [["0 h", "10 mg/L"], ["1 h", "2 mg/L"]]
-    loaded = load_scene("base", [f"{DONOR}={json.dumps(table)}", "substrates.donor.interpolation=linear",
+    loaded = load_scene("base", [f"{DONOR}={between('linear', table)}",
                                f"numerics.preset={preset}", 'growth.end="0.5 h"', 'output.times=["0.3 h", "0.5 h"]'])
     _, row, _ = simulate(loaded)
     assert row.solved.fluxes[1].effluent == pytest.approx(7.6, rel=1e-2)
@@ -119,8 +137,8 @@ def test_a_row_within_a_step_has_the_supply_of_its_time(preset):
 @pytest.mark.parametrize("way", ["preset=fast", "preset=paper", "transport=gear"])
 def test_the_supply_of_a_rising_velocity_is_its_integral(way):
     """The mean is 2 m/day, to round-off, for steps of any length."""
-    loaded = load_scene("base", ['flow.mean_velocity=[["0 h", "1 m/day"], ["0.5 h", "3 m/day"]]', 'growth.end="0.5 h"',
-                               "flow.interpolation=linear", f"numerics.{way}"], unset=["flow.head"])
+    loaded = load_scene("base", [f"flow.mean_velocity={RISE}", 'growth.end="0.5 h"', f"numerics.{way}"],
+                        unset=["flow.head"])
     total_supply = np.sum([step.supplied for instant in simulate(loaded) for step in instant.ledgers], axis=0)
     assert total_supply == pytest.approx(np.full(2, 2e6 / 24 * 0.5 * 50 * 10), rel=1e-9)
 

@@ -274,8 +274,9 @@ def test_a_shape_leans_as_the_flow_at_the_end_of_its_step_pushes(time):
     once."""
     leans = []
     for first, last, kind in ((4, 4, "linear"), (1, 4, "linear"), (1, 4, "steps")):
-        scene, _ = coarse_base(2, f'flow.head=[["0 h", "{first}e-3 cm"], ["0.2 h", "{last}e-3 cm"]]',
-                               f"flow.interpolation={kind}", "growth.fluid_forces=included", f"numerics.time={time}",
+        table = f'[["0 h", "{first}e-3 cm"], ["0.2 h", "{last}e-3 cm"]]'
+        scene, _ = coarse_base(2, f'flow.head={{table={table}, between="{kind}"}}',
+                               "growth.fluid_forces=included", f"numerics.time={time}",
                                'growth.end="0.2 h"', 'growth.shear_modulus="1e-4 MPa"', 'output.times=["0.2 h"]')
         _, end = simulation.simulate(scene)
         leans.append(end.pore.outline.upstream + end.pore.outline.downstream)
@@ -296,8 +297,8 @@ def test_the_solution_after_a_step_to_a_jump_is_that_before_it(scheme):
 def test_a_step_grows_as_much_on_a_new_mesh_half_way():
     """In 4 h a seed grows by half and the supply falls to a tenth. The mesh half way is new, since edges are three
     times too long, or the old one."""
-    scene, pore = coarse_base(2, 'substrates.donor.supply=[["0 h", "4 mg/L"], ["4 h", "0.4 mg/L"]]',
-                      "substrates.donor.interpolation=linear")
+    supply = '{table=[["0 h", "4 mg/L"], ["4 h", "0.4 mg/L"]], between="linear"}'
+    scene, pore = coarse_base(2, f"substrates.donor.supply={supply}")
     solved = solve(scene, pore)
     first = Stages.of(scene).rates(pore, solved)
     numerics = [replace(scene.numerics, refinement=part) for part in (0.3, 0.9)]
@@ -315,8 +316,8 @@ def test_a_step_misses_the_tolerance_only_beyond_the_accepted_excess():
 @EVERY_ORDER
 def test_an_update_under_a_table_starts_from_gears_concentrations(order):
     """It uses the supply half way, and not the steady profiles of that supply."""
-    table_of = 'substrates.acceptor.supply=[["0 h", "9 mg/L"], ["1 h", "29 mg/L"]]'
-    scene, pore = coarse_base(order, "numerics.transport=gear", table_of, "substrates.acceptor.interpolation=linear")
+    supply = '{table=[["0 h", "9 mg/L"], ["1 h", "29 mg/L"]], between="linear"}'
+    scene, pore = coarse_base(order, "numerics.transport=gear", f"substrates.acceptor.supply={supply}")
     solved = solve(scene, pore)
     half_way = updates._solve_midway(scene, pore, solved, 0.2)
     assert half_way.concentrations is solved.concentrations and half_way.problem.both[0].supply == pytest.approx(11.0)

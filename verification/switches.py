@@ -6,9 +6,9 @@ scene: the restart value of theta (28), an explicit increment, and an uneven see
 step or a seed of its own, also once.
 
 Some keys have no switch. With ``growth.wall = "bonded"`` base stops on the paper's mesh at 15.6 h, where a triangle
-beside the contact line collapses; the claims judge it in the converged solution. ``flow.biomass = "brinkman"``, also
-with the fluid's forces, needs quadratic elements. ``growth.bonding_strength`` and ``growth.tensile_strength`` end a run
-and change nothing before. Without one of the substrates there is no effluent of it to compare.
+beside the contact line collapses; the claims judge it in the converged solution. ``flow.permeability``, also with the
+fluid's forces, needs quadratic elements. ``growth.bonding_strength`` and ``growth.tensile_strength`` end a run and
+change nothing before. Without one of the substrates there is no effluent of it to compare.
 """
 
 from collections.abc import Callable
@@ -77,8 +77,6 @@ CHOICES = {
                               "[E8]"),
     "stress-free": Switch("new biomass", "stressed", "stress-free", 'growth.new_biomass="stress_free"',
                           note="section 5"),
-    "bubble": Switch("flow element", "stabilised (c = 100)", "bubble (MINI)", 'numerics.flow_element="bubble"',
-                     note="the same unknowns; tau is the same to 7 % where triangles are equilateral"),
     "Haldane": Switch("law of uptake", "dual Monod", "Haldane, K_i = 100 mg/L", 'kinetics.law="Haldane"',
                       note="(7)-(10); not the paper's"),
     "unlimited decay": Switch("decay", "with acceptor", "unlimited", 'kinetics.decay="unlimited"',
@@ -86,11 +84,6 @@ CHOICES = {
     "midpoint": Switch("steps in time", "updates of 12 min", "midpoint, tolerance 0.01", 'numerics.time="midpoint"',
                        False, "first order in the step against second"),
 }
-#: Parameters that the paper does not print [E13]: {key: (symbol, our value, alternatives)}.
-_NUMBERS = {"flow_stabilisation": ("c", 100, (25, 50, 200, 400)), "mesh_compressibility": ("gamma", 1, (0.1, 10)),
-            "refinement": ("refinement", 1, (0.7, 1.4))}
-NUMBERS = [Switch(word, f"{printed_value:g}", f"{value:g}", f"numerics.{key}={value}", False)
-           for key, (word, printed_value, values) in _NUMBERS.items() for value in values]
 #: Runs that differ from the default in the element size alone; the number of the seed's nodes does not change.
 FINENESS = [Switch("mesh", "refinement 1", f"refinement {value}", f"numerics.refinement={value}", False)
             for value in (0.975, 0.98, 0.985, 0.99, 0.995)]
@@ -146,7 +139,7 @@ def reshaped(previous: Pore, outline: Outline) -> Pore:
     places = previous.mesh.points[previous.mesh.body]
     angle = np.arctan2(places[:, 1], places[:, 0])
     factor = _radius(outline)(angle) / _radius(previous.outline)(angle)
-    return previous.moved(mesh_motion.move(previous.mesh, places * factor[:, None], 1.0, 100.0))
+    return previous.moved(mesh_motion.move(previous.mesh, places * factor[:, None], 1.0))
 
 
 def _radius(outline: Outline) -> CubicSpline:

@@ -21,17 +21,6 @@ The pressure does not jump if the aggregate has the viscosity of water, as perme
 Linear velocities with a linear pressure need tau = h_tau^2 / (c nu_r). The paper prints no constant
 c [E13]; ``reference/ERRATA.md`` reports its effect. By the second line ``w = u - tau grad p`` is
 divergence-free for every linear q: w carries the substrates.
-
-Linear velocities with a bubble b = 27 L1 L2 L3 in each triangle (MINI: Arnold, Brezzi and Fortin
-1984) need no stabilisation. A linear function has a constant gradient, and the integral of grad b
-is zero. Therefore a(u, v) does not couple the bubbles' coefficients beta to the linear part, and
-the test with b is A beta = -(integral of b) grad p, with A the bubble's 2 x 2 block of a. With this
-beta the second line is that of the same system with tau = (integral of b)^2 / |tau| A^-1, and
-w = u - tau grad p is the mean velocity in the triangle, bubble included. With g_i = grad L_i and
-G = sum g_i g_i^T, the integral of b is 9/20 |tau|, that of grad b grad b^T is 81/20 |tau| G, and so
-
-    tau = 1 / (20 nu_r) (tr G)^-1         "laplacian"
-       or 1 / (20 nu_r) (tr G + G)^-1     "traction"
 """
 
 from __future__ import annotations
@@ -51,6 +40,8 @@ from repro.timing import timed
 
 #: rho g in MPa/um, for rho in mg/L and g in um/h^2.
 MPA_PER_UM = 1e-3 * 1e-6 / 3600**2 * 1e-12
+#: c of tau, not printed: with 25 to 400 the velocity of base changes by up to 0.8 % [E13].
+STABILISATION = 100.0
 
 
 @brief
@@ -89,50 +80,29 @@ class UnitFlow:
     biomass_pressure: np.ndarray | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class Stabilised:
-    """Linear velocity and pressure with the paper's stabilisation; constant: c in tau = h^2 / (c
-    nu_r)."""
-
-    constant: float = 100.0
-
-    def mobility(self, mesh: Mesh, viscosity: np.ndarray, interface: str) -> np.ndarray:
-        """(T, 2, 2) um2: tau, by which grad p drives the correction."""
-        return each(mesh.circumdiameter**2 / (self.constant * viscosity), np.eye(2)[None])
-
-
-@dataclass(frozen=True, eq=False)
-class Bubble:
-    """Linear velocity with a bubble in each triangle, condensed, and linear pressure."""
-
-    def mobility(self, mesh: Mesh, viscosity: np.ndarray, interface: str) -> np.ndarray:
-        """(T, 2, 2) um2: tau of the condensed bubble, by which grad p drives the bubble's mean
-        velocity."""
-        G = np.einsum("tai,taj->tij", mesh.gradients, mesh.gradients)
-        block = each(np.trace(G, axis1=1, axis2=2), np.eye(2)[None])
-        if interface == "traction":
-            block = block + G
-        return np.linalg.inv(each(20 * viscosity, block))
+def tau(mesh: Mesh, viscosity: np.ndarray | float) -> np.ndarray:
+    """(T,) um2: h^2 / (c nu_r) of each triangle, for its viscosity nu_r."""
+    return mesh.circumdiameter**2 / (STABILISATION * viscosity)
 
 
 @dataclass(frozen=True, eq=False)
 class Linear:
-    """Linear velocity and pressure; tau: (T, 2, 2) um2, by which grad p drives the correction."""
+    """Linear velocity and pressure; tau: (T,) um2, by which grad p drives the correction."""
 
     velocity: Space
     tau: np.ndarray
 
     @staticmethod
-    def on(velocity: Space, viscosity: np.ndarray, element: Stabilised | Bubble,
-           interface: str) -> Linear:
-        """The pair with the mobility of an element of linear velocity."""
-        return Linear(velocity, element.mobility(velocity.mesh, viscosity, interface))
+    def on(velocity: Space, viscosity: np.ndarray) -> Linear:
+        """The pair with the paper's stabilisation; viscosity: (T,) nu_r."""
+        return Linear(velocity, tau(velocity.mesh, viscosity))
 
     @property
     def lower(self) -> np.ndarray:
         """(T, 3, 3) of (tau grad p, grad q)."""
-        gradients = self.velocity.mesh.gradients
-        return each(self.velocity.mesh.areas, gradients @ self.tau @ np.swapaxes(gradients, 1, 2))
+        mesh = self.velocity.mesh
+        driven = each(self.tau, mesh.gradients)
+        return each(mesh.areas, driven @ np.swapaxes(mesh.gradients, 1, 2))
 
     def prescribed(self) -> np.ndarray:
         """:func:`prescribed`, with u_x at the inlet scaled so that the discrete flux is exactly
@@ -147,8 +117,7 @@ class Linear:
         """The flow of a velocity and a pressure, with the loss (6)."""
         mesh = self.velocity.mesh
         slope = np.einsum("tai,ta->ti", mesh.gradients, pressure[mesh.triangles])
-        correction = np.einsum("tij,tj->ti", self.tau, slope)
-        return UnitFlow(u, pressure, correction, _drop(self.velocity, pressure))
+        return UnitFlow(u, pressure, self.tau[:, None] * slope, _drop(self.velocity, pressure))
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,9 +128,8 @@ class TaylorHood:
     lower: None = None
 
     @staticmethod
-    def on(velocity: Space, viscosity: np.ndarray, element: Stabilised | Bubble,
-           interface: str) -> TaylorHood:
-        """The pair; it ignores the element of linear velocities."""
+    def on(velocity: Space, viscosity: np.ndarray) -> TaylorHood:
+        """The pair, which needs no viscosity."""
         return TaylorHood(velocity)
 
     def prescribed(self) -> np.ndarray:
@@ -219,7 +187,6 @@ def viscous(velocity: Space, viscosity: np.ndarray, interface: str) -> np.ndarra
 
 @timed("flow")
 def unit_flow(velocity: Space, viscosity_ratio: float = 1.0, *, interface: str = "laplacian",
-              element: Stabilised | Bubble = Stabilised(),
               permeability: float | None = None) -> UnitFlow:
     """Stokes flow of mean velocity one through the meshed part, (1)-(5); see :func:`solve`.
 
@@ -228,7 +195,7 @@ def unit_flow(velocity: Space, viscosity_ratio: float = 1.0, *, interface: str =
     """
     mesh = velocity.mesh
     viscosity = np.where(mesh.biomass, viscosity_ratio, 1.0)
-    pair = PAIRS[velocity.order].on(velocity, viscosity, element, interface)
+    pair = PAIRS[velocity.order].on(velocity, viscosity)
     splits = velocity.order > 1 and permeability is None and viscosity_ratio != 1
     system = mesh.topology.system(("flow", interface, splits),
                                   lambda: _system(velocity, interface, splits))
@@ -320,8 +287,8 @@ def scaled(unit: UnitFlow, mesh: Mesh, length: float, drive: Drive) -> Flow:
                 None if of_biomass is None else scale * (of_biomass - at_outlet))
 
 
-def solve(velocity: Space, drive: Drive, length: float, *, interface: str = "laplacian",
-          element: Stabilised | Bubble = Stabilised()) -> Flow:
+def solve(velocity: Space, drive: Drive, length: float, *, interface: str = "laplacian"
+          ) -> Flow:
     """Solve the Stokes flow through a pore, (1)-(6).
 
     Parameters
@@ -334,8 +301,6 @@ def solve(velocity: Space, drive: Drive, length: float, *, interface: str = "lap
         Length of the whole pore, um; the part without mesh is a clean channel.
     interface : {"laplacian", "traction"}
         Form of the viscous term [E2].
-    element : Stabilised or Bubble
-        Stabilisation of linear velocities.
 
     Returns
     -------
@@ -346,6 +311,6 @@ def solve(velocity: Space, drive: Drive, length: float, *, interface: str = "lap
     LinearError
         If the system cannot be solved.
     """
-    unit = unit_flow(velocity, drive.viscosity_ratio or 1.0, interface=interface, element=element,
+    unit = unit_flow(velocity, drive.viscosity_ratio or 1.0, interface=interface,
                      permeability=drive.permeability)
     return scaled(unit, velocity.mesh, length, drive)

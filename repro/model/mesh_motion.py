@@ -5,9 +5,9 @@ The displacement d of the fluid's corners solves a compressible pseudo-Stokes pr
     (grad d, grad v) - (P, div v) = 0
     (q, div d) + gamma (P, q) + sum_tau (tau grad P, grad q) = 0
 
-with linear functions and the flow's stabilisation tau = h^2 / c. Interface nodes move with the
-biomass; corners of walls, inlet and outlet slide along their line. gamma is not printed [E13]: 1 by
-default. All edges of the fluid stay straight, except those at the interface.
+with linear functions and the flow's tau = h^2 / c. Interface nodes move with the
+biomass; corners of walls, inlet and outlet slide along their line. gamma is not printed [E13]. All
+edges of the fluid stay straight, except those at the interface.
 """
 
 from __future__ import annotations
@@ -19,21 +19,21 @@ from repro.fem.assembly import ElementSystem, saddle_blocks, saddle_system
 from repro.fem.forms import each, mass
 from repro.fem.mesh import Mesh
 from repro.fem.space import Space
-from repro.model.flow import divergence
-from repro.model.pore import Meshing
+from repro.model.flow import divergence, tau
 from repro.timing import timed
 
+#: gamma, not printed: with 0.1 to 10 the velocity of base changes by up to 0.1 % [E13].
+COMPRESSIBILITY = 1.0
 
-def moved(meshing: Meshing, mesh: Mesh, body: np.ndarray) -> Mesh:
-    """Move a mesh with its aggregate, whose nodes are at ``body`` (n, 2) um, by a scene's rules."""
-    numerics = meshing.numerics
-    constants = numerics.mesh_compressibility, numerics.flow_stabilisation
-    return mesh.moved(move(mesh, body, *constants))
+
+def moved(mesh: Mesh, body: np.ndarray) -> Mesh:
+    """Move a mesh with its aggregate, whose nodes are at ``body`` (n, 2) um."""
+    return mesh.moved(move(mesh, body, COMPRESSIBILITY))
 
 
 @timed("mesh motion")
 @failing_as(MeshError)
-def move(mesh: Mesh, body: np.ndarray, compressibility: float, stabilisation: float) -> np.ndarray:
+def move(mesh: Mesh, body: np.ndarray, compressibility: float) -> np.ndarray:
     """Move a mesh with the aggregate, (35).
 
     Parameters
@@ -43,8 +43,6 @@ def move(mesh: Mesh, body: np.ndarray, compressibility: float, stabilisation: fl
         New positions of the nodes ``mesh.body``, um.
     compressibility : float
         gamma.
-    stabilisation : float
-        c of tau = h^2 / c.
 
     Returns
     -------
@@ -55,7 +53,7 @@ def move(mesh: Mesh, body: np.ndarray, compressibility: float, stabilisation: fl
     points = mesh.points.copy()
     points[mesh.body] = body
     prescribed = points[: mesh.corners] - straight.points
-    moved = _fluid_displacement(straight, prescribed, compressibility, stabilisation)
+    moved = _fluid_displacement(straight, prescribed, compressibility)
     corners = straight.points.copy()
     corners[straight.topology.fluid] += moved
     points = mesh.with_middles(corners)
@@ -63,14 +61,14 @@ def move(mesh: Mesh, body: np.ndarray, compressibility: float, stabilisation: fl
     return points
 
 
-def _fluid_displacement(mesh: Mesh, prescribed: np.ndarray, gamma: float, c: float) -> np.ndarray:
+def _fluid_displacement(mesh: Mesh, prescribed: np.ndarray, gamma: float) -> np.ndarray:
     """(f, 2) um, displacement of the fluid's corners; prescribed: (N, 2) um, displacement of the
     aggregate, zero elsewhere."""
     fluid = mesh.topology.fluid
     wet = ~mesh.biomass
     space = Space(mesh)
     laplace = space.stiffness[wet]
-    lower = each(mesh.circumdiameter[wet] ** 2 / c, laplace) + gamma * mass(mesh.areas[wet])
+    lower = each(tau(mesh, 1.0)[wet], laplace) + gamma * mass(mesh.areas[wet])
     elements = saddle_blocks(laplace, divergence(space)[wet], lower)
     system = mesh.topology.system("mesh motion", lambda: _system(mesh))
     value = np.concatenate([prescribed[fluid, 0], prescribed[fluid, 1], np.zeros(len(fluid))])

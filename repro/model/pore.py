@@ -19,7 +19,7 @@ from repro.fem.sizing import Sizing
 from repro.fem.space import Space
 from repro.model import flow
 from repro.model.body import Body, Shape
-from repro.model.flow import Bubble, Flow, Stabilised
+from repro.model.flow import Flow
 from repro.scene import Flow as Drive
 from repro.scene import MissingError, Numerics, Scene, Substrates, at_largest, needed
 from repro.scene import Pore as Channel
@@ -402,13 +402,10 @@ def solve_flow(space: Space, drive: Drive, length: float, numerics: Numerics) ->
     length : float
         Length of the whole pore, um.
     numerics : Numerics
-        Element of linear velocities and form of the viscous term.
+        Form of the viscous term.
 
     Returns
     -------
     Flow
     """
-    element: Bubble | Stabilised = Stabilised(numerics.flow_stabilisation)
-    if numerics.flow_element == "bubble":
-        element = Bubble()
-    return flow.solve(space, drive, length, interface=numerics.interface, element=element)
+    return flow.solve(space, drive, length, interface=numerics.interface)

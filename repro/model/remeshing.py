@@ -138,7 +138,7 @@ def moved_mesh(meshing: Meshing, previous: Pore, expanded: Pore) -> Mesh | None:
             or not outline.same_contact(previous.boundary)
             or sizing.too_coarse(outline.corners, meshing.sizes)):
         return None
-    moved = mesh_motion.moved(meshing, mesh, expanded.mesh.points[mesh.body])
+    moved = mesh_motion.moved(mesh, expanded.mesh.points[mesh.body])
     return moved if moved.acceptable() else None
 
 

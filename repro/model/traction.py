@@ -98,7 +98,7 @@ def follow(meshing: Meshing, around: Surroundings, shaped: Pore) -> Surroundings
     places = np.einsum("ka,kai->ki", around.share, positions[around.nodes])
     if np.abs(places - mesh.points[mesh.body]).max() <= ROUND_OFF * mesh.width:
         return around
-    mesh = mesh_motion.moved(meshing, mesh, places)
+    mesh = mesh_motion.moved(mesh, places)
     if mesh.areas.min() <= 0 or mesh.turned_over().any():
         return _generated(meshing, shaped)
     return replace(around, mesh=mesh)

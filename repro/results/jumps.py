@@ -52,9 +52,7 @@ def _jumps(name: str, tables: Mapping[str, dict]) -> list[float]:
 
 
 def _times(section: dict) -> list[float]:
-    """The times (h) of the jumps in the tables over time of a section."""
-    if section.get("interpolation") != "steps":
-        return []
+    """The times (h) of the jumps in the tables over time of a section, which are lists."""
     lists = [section[key] for key in ("head", "mean_velocity", "supply")
              if isinstance(section.get(key), list)]
     return sorted({float(later[0].split()[0]) for entries in lists

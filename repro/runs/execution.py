@@ -178,7 +178,7 @@ def _describe(differing: dict[str, list]) -> str:
 
 def _text(value: object) -> str:
     if isinstance(value, dict):
-        return "a section"
+        return "a table over time" if "table" in value else "a section"
     return "not set" if value is None else str(value)
 
 

@@ -1,23 +1,40 @@
 """Keys and choices of earlier versions, and what to write instead.
 
 A scene that names one of them is refused. The runs of earlier versions keep them in ``run.json``:
-their hashes stay valid, and the reader drops a former key if its value is the present behaviour.
+their hashes stay valid, and the reader writes them as the present version would.
 """
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 
 class Former(NamedTuple):
-    """A former key: the value that is the present behaviour, and what to write instead."""
+    """A former key: the value that is the present behaviour, and what to write instead.
 
-    value: str
+    The value is None if other keys of the section say it (:func:`_earlier`, :func:`_present`).
+    """
+
+    value: str | float | None
     instead: str
 
 
+IN_TABLE = Former(None, "write it in a table: "
+                        '{ table = [["0 h", VALUE], ["5 h", VALUE]], between = "linear" }; '
+                        "a list has steps")
 #: By dotted keys.
 KEYS: dict[str, Former] = {
+    "flow.biomass": Former(None, "leave it out: an aggregate is permeable with flow.permeability, "
+                                 "else viscous"),
+    "flow.interpolation": IN_TABLE,
+    "substrates.acceptor.interpolation": IN_TABLE,
+    "substrates.donor.interpolation": IN_TABLE,
     "numerics.fixed_point": Former(
         "kept", "leave it out: the point in the middle of a new contact surface stays in place"),
+    "numerics.flow_element": Former(
+        "stabilised", "leave it out: linear velocities are stabilised, quadratic ones are stable"),
+    "numerics.flow_stabilisation": Former(
+        100.0, "leave it out: it is 100 (repro.model.flow.STABILISATION)"),
+    "numerics.mesh_compressibility": Former(
+        1.0, "leave it out: it is 1 (repro.model.mesh_motion.COMPRESSIBILITY)"),
     "numerics.ordering": Former("degree", "leave it out: SuperLU orders the nodes"),
     "output.timeseries": Former(
         "csv", "leave it out, and write NetCDF by repro.load_run(FOLDER).to_netcdf(FILE)"),
@@ -43,21 +60,22 @@ def instead_of_choice(key: str, value: object) -> str:
 
 
 def with_former(tables: dict) -> dict:
-    """Return the tables of a scene with all former keys, as its hash counts them."""
-    tables = dict(tables)
+    """Return the tables of a scene as earlier versions wrote them, as its hash counts them."""
+    tables = _translated(tables, _earlier)
     for section, key, former in _parts():
         tables[section] = {**tables[section], key: former.value}
     return tables
 
 
 def without_former(tables: object) -> object:
-    """Return the tables of a record without the former keys whose value is the present behaviour.
+    """Return the tables of a record of any version as the present one writes them.
 
-    Tables that a user has altered may be anything.
+    A former key stays if its value is not the present behaviour. Tables that a user has altered may
+    be anything.
     """
     if not isinstance(tables, dict):
         return tables
-    tables = dict(tables)
+    tables = _translated(tables, _present)
     for section, key, former in _parts():
         table = tables.get(section)
         if isinstance(table, dict) and table.get(key) == former.value:
@@ -65,8 +83,40 @@ def without_former(tables: object) -> object:
     return tables
 
 
+def _translated(tables: dict, translate: Callable[[dict], dict]) -> dict:
+    """Return the tables with [flow] and each substrate translated."""
+    tables = dict(tables)
+    if isinstance(tables.get("flow"), dict):
+        tables["flow"] = translate(tables["flow"])
+    if isinstance(tables.get("substrates"), dict):
+        tables["substrates"] = {name: translate(part) if isinstance(part, dict) else part
+                                for name, part in tables["substrates"].items()}
+    return tables
+
+
+def _earlier(section: dict) -> dict:
+    """A section with keys for what a table or a permeability says; none has its default."""
+    lists = {key: value["table"] for key, value in section.items() if isinstance(value, dict)}
+    said = {"interpolation": "linear"} if lists else {}
+    said |= {"biomass": "brinkman"} if "permeability" in section else {}
+    return {**section, **lists, **said}
+
+
+def _present(section: dict) -> dict:
+    """A section whose tables and permeability say what keys said."""
+    section = dict(section)
+    if section.get("biomass") == ("brinkman" if "permeability" in section else "viscous"):
+        del section["biomass"]
+    if section.get("interpolation") in ("steps", "linear"):
+        if section.pop("interpolation") == "linear":
+            section |= {key: {"table": value, "between": "linear"}
+                        for key, value in section.items() if isinstance(value, list)}
+    return section
+
+
 def _parts() -> Iterator[tuple[str, str, Former]]:
-    """Section, key and entry of each former key."""
+    """Section, key and entry of each former key that no other key says."""
     for dotted, former in KEYS.items():
-        section, _, key = dotted.rpartition(".")
-        yield section, key, former
+        if former.value is not None:
+            section, _, key = dotted.rpartition(".")
+            yield section, key, former

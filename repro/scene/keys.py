@@ -102,22 +102,13 @@ class Aggregate:
             object.__setattr__(self, "radius", SEED_RADIUS)
 
 
-def _interpolate(section: "Flow | Substrate", *keys: str) -> None:
-    """Set the interpolation of the tables of a section."""
-    linear = section.interpolation == "linear"
-    for key in keys:
-        table = getattr(section, key)
-        if isinstance(table, TimeTable):
-            object.__setattr__(section, key, replace(table, linear=linear))
-
-
 @dataclass(frozen=True)
 class Flow:
     """Section 2.1, (1)-(6): driven by `head` (um, whole pore) or `mean_velocity` (um/h).
 
     The other one is None. A table of the scene is a TimeTable here, and a number in the scene that
-    `Scene.at` returns. `biomass` selects `viscosity_ratio` or `permeability` (um^2); the other one
-    is None.
+    `Scene.at` returns. The aggregate has a `viscosity_ratio` or a `permeability` (um^2); the other
+    one is None.
     """
 
     head: float | None = timed_quantity(
@@ -126,19 +117,13 @@ class Flow:
     mean_velocity: float | None = timed_quantity(
         "2.9 m/day", "um/h", NON_NEGATIVE, default=None, source="(3), section 4",
         about="u_ave, mean over the width; either this or head")
-    interpolation: str = choice(
-        "steps", "linear", source=NOT_IN_PAPER,
-        about="Between the times of a table of head or mean_velocity: jumps, or a linear change")
-    biomass: str = choice(
-        "viscous", "brinkman", source="2.1; the other one is discussed in 5",
-        about="What slows the water in the aggregate: a viscosity lambda times its own, or the "
-        "drag of a permeable body")
     viscosity_ratio: float | None = number(
-        LAMBDA, source="2.1, Table 1", stated="default 2000 with biomass = \"viscous\"",
+        LAMBDA, source="2.1, Table 1", stated="default 2000 without permeability",
         default=None, about="lambda, viscosity of the aggregate over that of water")
     permeability: float | None = quantity(
-        "1e-15 m^2", "um^2", default=None, source=NOT_IN_PAPER,
-        about="Of the aggregate, with biomass = \"brinkman\"; at least 1e-11 pore.width^2")
+        "1e-15 m^2", "um^2", default=None, source="Section 5, without a value",
+        about="Of the aggregate, whose drag then slows the water in it instead of a viscosity; at "
+        "least 1e-11 pore.width^2")
     kinematic_viscosity: float = quantity("0.01003 cm^2/s", "um^2/h", about="nu of water",
                                           source="(1), Table 1")
     gravity: float = quantity("9.81 m/s^2", "um/h^2", about="g, the acceleration of gravity",
@@ -147,8 +132,7 @@ class Flow:
                               about="rho of water; only growth.fluid_forces needs it")
 
     def __post_init__(self):
-        _interpolate(self, "head", "mean_velocity")
-        if self.viscosity_ratio is None and self.biomass == "viscous":
+        if self.viscosity_ratio is None and self.permeability is None:
             object.__setattr__(self, "viscosity_ratio", LAMBDA)
 
     @property
@@ -168,9 +152,6 @@ class Substrate:
     supply: float = timed_quantity("10 mg/L", "mg/L", NON_NEGATIVE,
                                    source="(11), section 4 (10 K_s)",
                            about="C_supply of the water that comes in, and of all water at t = 0")
-    interpolation: str = choice(
-        "steps", "linear", source=NOT_IN_PAPER,
-        about="Between the times of a table of supply: jumps, or a linear change")
     half_saturation: float = quantity(
         "1.0 mg/L", "mg/L", about="K_s of Monod's law", source="(7)-(10), Table 1")
     diffusivity: float = quantity(
@@ -185,7 +166,6 @@ class Substrate:
         if isinstance(inside, Fraction):
             inside = float(inside * Fraction(self.diffusivity))
             object.__setattr__(self, "diffusivity_in_aggregate", inside)
-        _interpolate(self, "supply")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -387,14 +367,6 @@ class Numerics:
     jacobian: str = choice(
         "fresh", "reused", source=NOT_IN_PAPER,
         about="Newton's derivative: new in every iterate, or kept while the iterates converge fast")
-    flow_element: str = choice(
-        "stabilised", "bubble", source="3.2",
-        about="Stabilised linear velocities, or linear ones with a bubble (MINI)")
-    flow_stabilisation: float = number(
-        100.0, source="3.2 [E13]",
-        about="c of tau = h^2 / (c nu), with which linear elements are stabilised")
-    mesh_compressibility: float = number(
-        1.0, about="gamma of the mesh motion", source="(35) [E13], [E15]")
 
     @property
     def order(self) -> int:
@@ -580,11 +552,9 @@ class Scene:
 #: Keys added after hashes of scenes were recorded, with their defaults as tables write them.
 LATER: dict[str, dict[str, object]] = {
     "aggregate": {"position": "0.0 um", "smooth": False, "inert_fraction": 0.0},
-    "flow": {"interpolation": "steps", "biomass": "viscous"},
     "growth": {"wall": "sliding"},
     "numerics": {"contact_elements": 0.0},
-    "substrates.acceptor": {"interpolation": "steps"},
-    "substrates.donor": {"interpolation": "steps", "inhibition_constant": "100.0 mg/L"},
+    "substrates.donor": {"inhibition_constant": "100.0 mg/L"},
     "kinetics": {"law": "dual Monod", "decay": "with acceptor"},
 }
 #: A scene, or its source: a file, a packaged name, a dict of tables.
@@ -714,8 +684,8 @@ def scene_tables(scene: Scene) -> dict:
 def scene_hash(scene: Scene) -> str:
     """Hash (16 hexadecimal digits) of all values of a scene, without its name.
 
-    A key of `LATER` counts if it differs from its default, and a former key counts with its last
-    value, so that recorded hashes stay valid.
+    A key of `LATER` counts if it differs from its default, and a scene counts as earlier versions
+    wrote it, so that recorded hashes stay valid.
     """
     written = with_former(write_table(scene))
     tables = {key: _without_later(key, table) for key, table in written.items()}

@@ -13,7 +13,6 @@ if TYPE_CHECKING:
         Kinetics,
         Pore,
         Scene,
-        Substrate,
         Substrates,
     )
 
@@ -26,8 +25,6 @@ FINEST = 1e-3  # of the width: the smallest seed, edge of an outline, and gap be
 NEAREST = 1e-4  # of the width: from a point of an outline to a wall that it does not touch
 INHIBITION = 100.0  # mg/L: the default of K_i
 TIGHTEST = 1e-11  # of the square of the width: the smallest permeability
-#: Options that only linear elements have, and their values for all others.
-HIGHER_ORDER = {"transfer": "conserving", "flow_element": "stabilised"}
 
 #: A number or a table over time.
 Driven = float | TimeTable | None
@@ -207,7 +204,6 @@ def _flow_rules(scene: "Scene", head: Driven, velocity: Driven) -> Rules:
         "flow.mean_velocity": _not_both("flow.head", _in_words(head, "um")),
         "flow.head": _not_both("flow.mean_velocity", _in_words(velocity, "m/day", 24e-6)),
     }
-    yield from _table_rules("flow", scene.flow, (head, velocity))
     yield scene.stagnant and _steady(scene), {
         "flow.mean_velocity": f"greater than zero is needed{_UNSTEADY}",
         "numerics.transport": f'"gear" is needed with flow.mean_velocity = 0: {_NO_STATE}',
@@ -216,30 +212,24 @@ def _flow_rules(scene: "Scene", head: Driven, velocity: Driven) -> Rules:
 
 def _biomass_rules(scene: "Scene", drive: "Flow") -> Rules:
     """Rules of the aggregate's resistance to flow."""
-    drag = drive.biomass == "brinkman"
-    permeable = f"{drive.permeability} um^2"
-    yield not drag and drive.permeability is not None, {
-        "flow.permeability": 'flow.biomass = "brinkman" is needed with it',
-        "flow.biomass": f'"brinkman" is needed with flow.permeability = {permeable}',
-    }
-    yield drag and drive.permeability is None, {
-        "flow.biomass": 'flow.permeability is needed with "brinkman", such as "1e-15 m^2"'}
+    drag = drive.permeability is not None
+    permeable = f"flow.permeability = {drive.permeability} um^2"
     yield drag and drive.viscosity_ratio is not None, {
-        "flow.viscosity_ratio": 'flow.biomass = "viscous" is needed with it',
-        "flow.biomass": f'"viscous" is needed with flow.viscosity_ratio = {drive.viscosity_ratio}',
+        "flow.permeability": _not_both("flow.viscosity_ratio", f"{drive.viscosity_ratio}"),
+        "flow.viscosity_ratio": _not_both("flow.permeability", f"{drive.permeability} um^2"),
     }
     least = TIGHTEST * scene.pore.width**2
-    yield drag and drive.permeability is not None and drive.permeability < 0.999 * least, {
+    yield drag and drive.permeability < 0.999 * least, {
         "flow.permeability": f'"{1e-12 * least:.4g} m^2" or more is needed in a pore '
                              f"{scene.pore.width:g} um wide: below it round-off hides the flow",
         "pore.width": f"{math.sqrt((drive.permeability or 0.0) / TIGHTEST):.4g} um or less is "
-                      f"needed with flow.permeability = {permeable}",
+                      f"needed with {permeable}",
     }
-    alone = scene.aggregate is None
-    yield drag and alone, {"flow.biomass": '"viscous" is needed without [aggregate]'}
-    requirement = '"quadratic" is needed with flow.biomass = "brinkman"'
+    yield drag and scene.aggregate is None, {
+        "flow.permeability": "[aggregate] is needed with it: it is that of the biomass"}
+    requirement = f'"quadratic" is needed with {permeable}'
     yield drag and scene.numerics.order == 1, {
-        "flow.biomass": 'numerics.elements = "quadratic" is needed with it',
+        "flow.permeability": 'numerics.elements = "quadratic" is needed with it',
         "numerics.elements": requirement,
         "numerics.preset": f'numerics.elements = {requirement}',
     }
@@ -251,18 +241,10 @@ def _in_words(value: Driven, unit: str, factor: float = 1.0) -> str:
     return "a table" if isinstance(value, TimeTable) else f"{factor * value:g} {unit}"
 
 
-def _table_rules(section: str, part: "Flow | Substrate", values: tuple[Driven, ...]) -> Rules:
-    """Rules of a section's tables over time."""
-    constant = not any(isinstance(value, TimeTable) for value in values)
-    requirement = '"steps" is needed without a table of times and values'
-    yield constant and part.interpolation != "steps", {f"{section}.interpolation": requirement}
-
-
 def _boundary_rules(scene: "Scene") -> Rules:
     for name, part in scene.substrates.modelled.items():
         key = f"substrates.{name}.diffusivity_in_aggregate"
         yield part.diffusivity_in_aggregate <= 0, {key: "greater than zero is needed"}
-        yield from _table_rules(f"substrates.{name}", part, (part.supply,))
     closed = scene.substrates.boundary == "closed"
     yield closed and scene.flow is not None, {
         "substrates.boundary": '"open" is needed with [flow]',
@@ -362,20 +344,16 @@ def _numerics_rules(scene: "Scene") -> Rules:
         "numerics.extent": '"full" is needed with substrates in water at rest',
         "flow.mean_velocity": 'numerics.extent = "full" is needed with 0 m/day',
     }
-    if scene.numerics.order > 1:
-        yield from _higher_order_rules(scene)
+    transfer = scene.numerics.transfer
+    other = f'numerics.transfer = "conserving" is needed with it, not "{transfer}"'
+    yield scene.numerics.order > 1 and transfer != "conserving", {
+        "numerics.transfer": f'"conserving" is needed {_with_elements(scene)}; "linear" has others',
+        **_element_keys(other),
+    }
     yield scene.numerics.time == "midpoint" and scene.numerics.transport == "gear", {
         "numerics.transport": '"quasi_steady" is needed with numerics.time = "midpoint"',
         "numerics.time": '"updates" is needed with numerics.transport = "gear"',
     }
-
-
-def _higher_order_rules(scene: "Scene") -> Rules:
-    for key, only in HIGHER_ORDER.items():
-        value = getattr(scene.numerics, key)
-        requirement = f'"{only}" is needed {_with_elements(scene)}; "linear" has the others'
-        other = f'numerics.{key} = "{only}" is needed with it, not "{value}"'
-        yield value != only, {f"numerics.{key}": requirement, **_element_keys(other)}
 
 
 def _output_rules(scene: "Scene") -> Rules:

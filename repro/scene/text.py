@@ -114,5 +114,8 @@ def _comment(text: str) -> Iterator[str]:
 
 
 def _toml(value: object) -> str:
-    """A number, a text or a list of texts, as TOML writes them, in ASCII."""
+    """A value as TOML writes it in one line, in ASCII."""
+    if isinstance(value, dict):
+        parts = ", ".join(f"{key} = {_toml(part)}" for key, part in value.items())
+        return f"{{ {parts} }}"
     return json.dumps(value)

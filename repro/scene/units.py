@@ -128,14 +128,17 @@ class Refused(ValueError):
 
 @dataclass(frozen=True)
 class Timed(Quantity):
-    """A quantity, or a table of times (h) and values: read as a float, or as a TimeTable."""
+    """A quantity, or a table of times (h) and values: read as a float, or as a TimeTable.
+
+    A list is a table in steps, ``{table = LIST, between = "linear"}`` one that is interpolated.
+    """
 
     clock = Quantity("h", "5 h", NON_NEGATIVE)
 
     @property
     def accepted(self) -> str:
         return (f"{super().accepted}; or a list of [time, value] pairs from 0 h on, such as "
-                f"{self._table}")
+                f"{self._table}, with jumps at these times; or {self._linear}")
 
     @property
     def requirement(self) -> str:
@@ -145,8 +148,15 @@ class Timed(Quantity):
     def _table(self) -> str:
         return json.dumps([["0 h", self.example], ["5 h", self.example]])
 
+    @property
+    def _linear(self) -> str:
+        return f'{{ table = {self._table}, between = "linear" }}'
+
     def read(self, value: object) -> float | TimeTable:  # type: ignore[override]  # or a table
-        entries = as_list(value)
+        between, entries = _table_parts(value)
+        if between not in ("steps", "linear"):
+            raise Refused('a table and what is between its times, "steps" or "linear", are needed, '
+                          f"such as {self._linear}")
         if entries is None:
             return super().read(value)
         if not 1 <= len(entries) <= MOST_POINTS:
@@ -158,7 +168,7 @@ class Timed(Quantity):
             if other <= one:
                 raise Refused(f"times of a table must ascend: {other:g} h of entry {number} is not "
                               f"after {one:g} h")
-        return TimeTable(times, values)
+        return TimeTable(times, values, between == "linear")
 
     def _entry(self, number: int, entry: object) -> tuple[float, float]:
         """Time and value of an entry of a table."""
@@ -176,8 +186,9 @@ class Timed(Quantity):
     def write(self, value, unit=""):
         if not isinstance(value, TimeTable):
             return super().write(value, unit)
-        return [[self.clock.write(time), super(Timed, self).write(one, unit)]
-                for time, one in zip(value.times, value.values)]
+        table = [[self.clock.write(time), super(Timed, self).write(one, unit)]
+                 for time, one in zip(value.times, value.values)]
+        return {"table": table, "between": "linear"} if value.linear else table
 
 
 @dataclass(frozen=True)
@@ -497,6 +508,18 @@ def because(error: Exception) -> str:
     return f"; {error}" if str(error) else ""
 
 
+def _table_parts(value: object) -> tuple[object, list | None]:
+    """Return what is between the times of a table over time, and its entries.
+
+    The word is None if a table has other parts; the entries are None if the value is no table.
+    """
+    if not isinstance(value, dict) or "table" not in value:
+        return "steps", as_list(value)
+    entries, between = as_list(value["table"]), value.get("between")
+    whole = value.keys() == {"table", "between"} and entries is not None
+    return between if whole and isinstance(between, str) else None, entries
+
+
 def as_list(value: object) -> list | None:
     """Return a list, a tuple or an array as a list; None for other values."""
     plain = without_numpy(value)
@@ -532,6 +555,8 @@ def units_of(tables: object, key: str = "") -> dict[str, str]:
     That of a list is the unit of its first entry.
     """
     units: dict[str, str] = {}
+    if isinstance(tables, dict) and "table" in tables:
+        tables = tables["table"]
     for name, part in tables.items() if isinstance(tables, dict) else ():
         units |= units_of(part, f"{key}.{name}" if key else str(name))
     first = (as_list(tables) or [tables])[0]

@@ -164,7 +164,7 @@ def test_seepage(changes, record):
     Norm: sum of the drag over rho nu u / k times the area, less 1; P less the linear stress, over the largest, in the
     middle half of the plug; largest displacement over the width.
     """
-    scene = _plug(60.0, *changes, 'flow.biomass="brinkman"', 'flow.permeability="1e-14 m^2"')
+    scene = _plug(60.0, *changes, 'flow.permeability="1e-14 m^2"')
     seed = pore.seeded(scene)
     solved = water(scene, seed)
     drive = scene.flow

@@ -391,10 +391,10 @@ SUPPLIED = {"steps": {preset: (4e-4, THIELE) for preset in runs.WITH_EXACT},
     "coupling-averaged-supply", kind="cross-code",
     mutants=("supply-of-the-start", "supply-half-way-of-the-start", "supply-a-step-late", "supply-not-yet",
              "row-of-the-end"), references=("averaged_pore", "poiseuille", "taylor_hood"), runs_with="1 2")
-@parametrize("interpolation, bound, origin, *changes",
-             {f"{interpolation}, {preset}": (interpolation, *bound, *runs.WITH_EXACT[preset])
-              for interpolation, bounds in SUPPLIED.items() for preset, bound in bounds.items()})
-def test_averaged_supply(interpolation, bound, origin, changes, record):
+@parametrize("between, bound, origin, *changes",
+             {f"{between}, {preset}": (between, *bound, *runs.WITH_EXACT[preset])
+              for between, bounds in SUPPLIED.items() for preset, bound in bounds.items()})
+def test_averaged_supply(between, bound, origin, changes, record):
     """An aggregate whose supply of donor falls to zero and returns after 2.5 h, by jumps or linearly, starves and
     recovers like its averaged pore (FiPy, solve_ivp).
 
@@ -402,26 +402,26 @@ def test_averaged_supply(interpolation, bound, origin, changes, record):
     and section means of C along the mesh over the acceptor's supply; a seed of 20 um in base at 2.9 m/d, diffusivities
     times 64.
     """
-    scene, moments = supplied(interpolation, *changes), _fed(interpolation, changes[0])
+    scene, moments = supplied(between, *changes), _fed(between, changes[0])
     worst = runs.differences(scene, runs.reports_of(scene), moments)
     record([at_most(name, worst[name], bound, origin) for name in COMPARED])
-    if interpolation == "steps":
+    if between == "steps":
         record(at_least("area at 2 h over that at 4.5 h", moments[1].area / moments[3].area, 1.005,
                         "decay over 2.5 h: else nothing is starved"))
 
 
 @cache
-def _fed(interpolation: str, preset: str) -> list:
+def _fed(between: str, preset: str) -> list:
     """States of the averaged pore, from the seed of a preset."""
-    pieces = [(end, (ACCEPTOR, first), (ACCEPTOR, first if interpolation == "steps" else last))
-            for (_, first), (end, last) in pairwise(COURSES[interpolation])]
-    scene = supplied(interpolation, preset).at(0.0)
+    pieces = [(end, (ACCEPTOR, first), (ACCEPTOR, first if between == "steps" else last))
+            for (_, first), (end, last) in pairwise(COURSES[between])]
+    scene = supplied(between, preset).at(0.0)
     return runs.half_disc(scene, cells=CELLS).run_through(pieces, ROWS, ACCURACY)
 
 
-def supplied(interpolation: str, *changes: str) -> Scene:
+def supplied(between: str, *changes: str) -> Scene:
     """Base with a donor whose supply changes."""
-    table = [[f"{time} h", f"{supply} mg/L"] for time, supply in COURSES[interpolation]]
-    scene = runs.base("7 h", *changes, 'aggregate.radius="20 um"', f"substrates.donor.supply={json.dumps(table)}",
-                     f"substrates.donor.interpolation={interpolation}", times=ROWS)
+    table = json.dumps([[f"{time} h", f"{supply} mg/L"] for time, supply in COURSES[between]])
+    scene = runs.base("7 h", *changes, 'aggregate.radius="20 um"',
+                      f'substrates.donor.supply={{table={table}, between="{between}"}}', times=ROWS)
     return runs.faster(scene, QUICK)

@@ -205,7 +205,7 @@ def test_traction_even(changes, record):
     theta = _uneven(seed, 0.002)
     mechanics = contact.Mechanics.of(scene)
     plain = contact._at_rest(mechanics, seed, theta, seed, None, contact.PATIENT).pore
-    space = seed.moved(mesh_motion.move(seed.mesh, plain.mesh.points[seed.mesh.body], 1.0, 100.0)).space
+    space = seed.moved(mesh_motion.move(seed.mesh, plain.mesh.points[seed.mesh.body], 1.0)).space
     mesh = space.mesh
     at_rest = Flow(0.0, np.zeros((space.count, 2)), np.full(mesh.corners, 5.0), None, 0.0, 0.0, 0.0)
     forces = traction.nodal(space, at_rest, 1.0, "laplacian")

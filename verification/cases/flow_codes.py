@@ -13,30 +13,22 @@ the clean channel on the same mesh, so the excess over that loss is free of it.
 
 That concerns linear elements. Quadratic elements have two pressures at each node of the interface, so the jump limits
 them no longer.
-
-Linear velocities with a condensed bubble (MINI) equal those without condensing. With c = 100 the stabilised element's
-tau = h^2 / (100 nu) is within 7 % of the bubble's, h^2 / (106.7 nu), for equilateral triangles, so both err alike on
-good meshes. The bubble has no constant to choose. On stretched triangles, where the circumscribed circle is a poor
-measure, it errs far less.
 """
 
-from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
-from scipy.sparse import bmat
-from skfem import Basis, ElementTriMini, ElementTriP1, ElementVector, condense, solve
 
-from reference import layered_channel, poiseuille, taylor_hood
+from reference import poiseuille, taylor_hood
 from repro.fem.mesh import Mesh
 from repro.fem.space import Space
 from repro.model import flow, pore
 from verification.cases import flow as flow_cases
 from verification.cases import flow_properties
-from verification.cases.flow import ENDS, ENDS_FIRST, FORMS, LAYER, RATIO, SECOND, SIZES, WIDTH
+from verification.cases.flow import ENDS, ENDS_FIRST, FORMS, RATIO, SECOND, WIDTH
 from verification.evidence.cases import combined, parametrize
-from verification.evidence.checks import at_least, at_most, between, each_at_most, refine, studies
+from verification.evidence.checks import at_most, each_at_most, refine, studies
 from verification.problems import meshes
 
 CORNER = 4
@@ -210,122 +202,3 @@ def _round_errors(refinement: float, draw: int, ratio: float, interface: str) ->
     space = Space(_round(refinement * meshes.SPREAD[draw]))
     solution = flow.unit_flow(space, ratio, interface=interface)
     return _differences(space, solution, _reference_flow(ROUND, ratio, interface, 2, space.mesh.ends, 6))
-
-
-#: Number of meshes of each level of the layer.
-BUBBLE_DRAWS = dict(enumerate((8, 6, 3, 1)))
-STABILISED, BUBBLE = flow.Stabilised(), flow.Bubble()
-
-
-def uncondensed(grid: Mesh, ratio: float, interface: str) -> dict[str, np.ndarray]:
-    """Flow of scikit-fem's MINI element under (3)-(5), with the bubbles as unknowns.
-
-    The fields are the velocity (N, 2) and pressure (N,) at the nodes, and the mean velocity (T, 2) with the bubble.
-    """
-    basis = Basis(grid.fem, ElementVector(ElementTriMini()), intorder=4)
-    k = np.where(grid.biomass, ratio, 1.0)[:, None] * np.ones(basis.dx.shape)
-    B = -taylor_hood.divergence.assemble(basis, basis.with_element(ElementTriP1()))
-    system = bmat([[taylor_hood.viscous(interface).assemble(basis, nu=k), B.T], [B, None]]).tocsc()
-    value = np.zeros(system.shape[0])
-    x, y = grid.points.T
-    u_x, u_y = nodes = basis.nodal_dofs
-    rim = (y == 0) | (y == grid.width) | (x == grid.ends[0])
-    outlet = (x == grid.ends[1]) & (interface == "traction")
-    inlet = grid.topology.inlet
-    profile = y[inlet] * (grid.width - y[inlet])
-    value[u_x[inlet]] = profile * grid.width / np.trapezoid(profile, y[inlet])
-    constrained = np.concatenate([u_x[rim], u_y[rim | outlet]])
-    value = solve(*condense(system, 0 * value, value, D=constrained))
-    velocity, bubbles = value[nodes].T, value[basis.interior_dofs].T
-    mean = velocity[grid.triangles].mean(axis=1) + 9 / 20 * bubbles
-    return {"velocity": velocity, "pressure": value[basis.N:], "mean velocity": mean}
-
-
-@pytest.mark.case(
-    "flow-bubble", kind="cross-code", mutants=("bubble-of-water", "bubble-mean-unweighted", "bubble-block-isotropic"),
-    references=("taylor_hood",), runs_with="1", omitted="the bubble belongs to linear velocities")
-@pytest.mark.parametrize("interface", FORMS)
-def test_bubble(interface, record):
-    """The condensed bubble is scikit-fem's MINI element with its bubbles as unknowns, in both forms, and the mean
-    velocity of each triangle, bubble included, carries the same flux through every section.
-
-    Norm: largest difference over the largest value; largest relative error of the flux through 25 sections.
-    """
-    grid = meshes.cut(flow_properties.ENDS, 50.0, 6.0, lambda x, y: (np.abs(x) < 20) & (y < 25), across=(-20.0, 20.0),
-                      along=(25.0,), seed=5)
-    space = Space(grid)
-    solution = flow.unit_flow(space, RATIO, interface=interface, element=BUBBLE)
-    carried = solution.velocity[grid.triangles].mean(axis=1) - solution.correction
-    computed = {"velocity": solution.velocity, "pressure": solution.pressure, "mean velocity": carried}
-    for name, expected in uncondensed(grid, RATIO, interface).items():
-        record(at_most(name, np.abs(computed[name] - expected).max() / np.abs(expected).max(), 1e-9,
-                       "the same equations: round-off of a system whose viscosities differ by 2000"))
-    record(at_most("flux of the mean velocity", flow_properties.flux_error(space, carried[:, None]), 1e-9,
-                   "(2) tested with linear ramps, round-off"))
-
-
-@pytest.mark.slow
-@pytest.mark.case(
-    "flow-bubble-layers", kind="exact", mutants=("bubble-of-water", "bubble-tenfold"), references=("layered_channel",),
-    runs_with="1", omitted="the bubble belongs to linear velocities")
-def test_bubble_layers(record):
-    """With the bubble the velocity and the loss are of second order, and the velocity's gradient of first. On good
-    triangles its error is that of the stabilised element with c = 100; on triangles stretched eightfold it is many
-    times smaller.
-
-    Norm: middle of a long layer, lambda = 2000, root mean square over random meshes of a size: L2 of u, of grad u, and
-    relative error of the pressure gradient; errors of the stabilised element over the bubble's.
-    """
-    errors, stabilised = (refine(_layer_errors, BUBBLE_DRAWS, element) for element in (BUBBLE, STABILISED))
-    record(studies(errors, {"velocity": (2, SECOND, 1e-3), "gradient": (2, SECOND, 1.2e-3),
-                            "velocity's gradient": (1, "linear elements: first order in H1", 0.1)}))
-    ratio = stabilised["velocity"] / errors["velocity"]
-    for extreme, value in (("least", ratio.min()), ("largest", ratio.max())):
-        record(between(f"stabilised over bubble, {extreme}", value, 0.9, 1.1,
-                       "tau is the same to 7 % where triangles are equilateral"))
-    stretched = _on_long_triangles(STABILISED) / _on_long_triangles(BUBBLE)
-    record(at_least("stabilised over bubble, stretched", stretched, 10.0,
-                    "tau goes as the square of the longest side, the bubble's as that of the shortest: "
-                    "up to the square of the stretch, 64"))
-
-
-def _on_long_triangles(element: flow.Stabilised | flow.Bubble) -> float:
-    """Mean error of the velocity on three meshes."""
-    return np.mean([_layered(_long_triangles(draw), element, 60.0)["velocity"] for draw in range(3)])
-
-
-def _layer_errors(level: int, draw: int, element: flow.Stabilised | flow.Bubble) -> dict[str, float]:
-    return {"size": SIZES[level], **_layered(flow_cases.layer_grid(level, draw), element, flow_cases.MIDDLE)}
-
-
-def _layered(grid: Mesh, element: flow.Stabilised | flow.Bubble, half: float) -> dict[str, float]:
-    """Relative errors for |x| < half (um)."""
-    space = Space(grid)
-    solution = flow.unit_flow(space, RATIO, element=element)
-    slope = _slope_error(grid, solution.velocity[:, 0], flow_cases.middle_of(grid, half))
-    return {**flow_cases.in_the_middle(space, solution, layered_channel, RATIO, half), "velocity's gradient": slope}
-
-
-def _slope_error(grid: Mesh, speed: np.ndarray, chosen: np.ndarray) -> float:
-    """Relative L2 error of grad u_x over some triangles. Exact gradients are differences of the exact velocity."""
-    where, weight, _ = meshes.quadrature(grid.points, grid.triangles[chosen])
-    computed = np.einsum("tai,ta->ti", grid.gradients[chosen], speed[grid.triangles[chosen]])
-    y, step = where[..., 1], 1e-4
-    above, below = (layered_channel.velocity(y + shift, WIDTH, LAYER, RATIO) for shift in (step, -step))
-    exact = np.stack([0 * y, (above - below) / (2 * step)], axis=-1)
-    return meshes.relative(computed[:, None], exact, weight)
-
-
-STRETCH = 8.0
-
-
-@cache
-def _long_triangles(draw: int) -> Mesh:
-    """A mesh of a layer whose triangles are STRETCH times longer than high."""
-    size = SIZES[1]
-    end = flow_cases.LAYER_END / STRETCH
-    rim = end + size
-    short = meshes.cut((-rim, rim), WIDTH, size, lambda x, y: (y < LAYER) & (np.abs(x) < end),
-                       across=(-end, end), along=(LAYER,), seed=7 + draw)
-    ends = (-STRETCH * rim, STRETCH * rim)
-    return replace(short.moved(short.points * [STRETCH, 1.0]), ends=ends)

@@ -223,7 +223,7 @@ def _graded(*numerics: str) -> tuple[float, int]:
 
 #: Flow enters a permeable aggregate in the gussets beside its upper contact lines.
 TIGHT_RUN = ("pore.width=100 um", "aggregate.radius=40 um", "flow.mean_velocity=5.06 m/day",
-             "flow.biomass=brinkman", "flow.permeability=5.67e-17 m^2")
+             "flow.permeability=5.67e-17 m^2")
 #: Head loss (um) around the last shape of the run. Cubic elements on a finer mesh gave it.
 HEAD_LOSS = load(ROOT / "reference" / "cubic.json")["values"]["flow-permeable-run, head loss (um)"]
 

@@ -93,7 +93,7 @@ LAMBDA = 2000
 
 def permeable_runs(run: Run, width: float) -> tuple[Run, Run]:
     """A run in a pore of a width (um) with a permeable aggregate, without and with the drag on the biomass."""
-    permeable = (*run, 'flow.biomass="brinkman"', f'flow.permeability="{width**2 / (12 * LAMBDA)!r} um^2"')
+    permeable = (*run, f'flow.permeability="{width**2 / (12 * LAMBDA)!r} um^2"')
     return permeable, (*permeable, FORCED)
 
 

@@ -109,7 +109,7 @@ PLUG = ("wide", *until(END))
 
 def permeable(run: Run) -> Run:
     """A run with Brinkman's drag and without the pseudoviscosity."""
-    return (*run, 'flow.biomass="brinkman"', f'flow.permeability="{1e-12 * PERMEABILITY:.6g} m^2"')
+    return (*run, f'flow.permeability="{1e-12 * PERMEABILITY:.6g} m^2"')
 
 
 @claim("C42", "5", "a porous material instead of a raised viscosity may lead to differences, depending on the "

@@ -8,8 +8,7 @@ The module also gives the aggregate, the pore and the stresses of a run at a tim
 aggregates of a prescribed shape.
 """
 
-from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from unittest import mock
 
@@ -26,7 +25,7 @@ from repro.fem.space import Space
 from repro.march import loop, simulation, updates
 from repro.march.state import Report, RestartState
 from repro.model import contact as mechanics
-from repro.model import flow, pore, remeshing, transport
+from repro.model import flow, mesh_motion, pore, remeshing, transport
 from repro.model.kinetics import Sink
 from repro.model.pore import Pore, Solved, solve
 from repro.model.remeshing import Remeshing
@@ -50,9 +49,11 @@ ROWS = {"base": (0.2, *map(float, range(1, 20)), 19.2, 19.4), "wide": tuple(map(
 #: Hours after wide's contact of which conductivities are means: those of `verification.sensitivity.wide`, to the end of
 #: Figure 6, every second shape update of the paper.
 AFTER = tuple(round(35 + 2 * UPDATE * number, 1) for number in range(26))
-#: A change that no key of a scene makes: the fixed points are at all times the present middles of the contact surfaces
-#: [E20].
+#: Changes that no key of a scene makes. The fixed points are at all times the present middles of the contact surfaces
+#: [E20]; c of tau or gamma of (35) has another value [E13].
 RECHOSEN = "fixed points rechosen"
+CONSTANTS = {**{f"c = {c}": (flow, "STABILISATION", float(c)) for c in (25, 50, 200, 400)},
+             **{f"gamma = {gamma:g}": (mesh_motion, "COMPRESSIBILITY", gamma) for gamma in (0.1, 10.0)}}
 #: Beginnings of the keys whose changes have no effect until the aggregate is near the opposite wall; and the thickness
 #: over the pore's width up to which it is not near.
 LATE, NEAR = ("growth.minimum_film", "growth.minimum_contact_angle"), 0.9
@@ -81,7 +82,7 @@ WIDE_TO_END = ("wide", rows_at(*range(5, 31, 5), *range(31, 35), *sorted({*AFTER
 def load_packaged(name: str, *changes: str) -> Scene:
     """A packaged scene with the KEY=VALUE of --set, in the elements and steps of the present level."""
     level = current()
-    changes = tuple(change for change in changes if change != RECHOSEN)
+    changes = tuple(change for change in changes if change not in REPLACED)
     changes = (*level.wide, *changes) if name == "wide" else changes
     if level.kind == CONVERGED:
         return _with_rows(load_scene(name, (*converged(level.size), *changes)))
@@ -125,7 +126,9 @@ def history(*run: str) -> History:
     instants: list[Report] = []
     contact = None
     begun = before = far = None if plain == run else history(*plain).far
-    with _rechosen() if RECHOSEN in run else nullcontext():
+    with ExitStack() as stack:
+        for change in REPLACED.keys() & set(run):
+            stack.enter_context(mock.patch.object(*REPLACED[change]))
         for state, instant in simulation.steps(scene, begun):
             if instant:
                 instants.append(instant)
@@ -136,17 +139,17 @@ def history(*run: str) -> History:
     return History(scene, tuple(instants), contact, far)
 
 
-@contextmanager
-def _rechosen() -> Iterator[None]:
-    """RECHOSEN, in every search for a shape."""
-    at_rest = mechanics._at_rest
+_at_rest = mechanics._at_rest
 
-    def about_middles(keys: mechanics.Mechanics, grown: Pore, *rest) -> mechanics.Expansion:
-        middles = [mechanics.middle_of(grown.boundary, wall) for wall in (BOTTOM, TOP)]
-        return at_rest(keys, replace(grown, fixed=np.logical_or(*middles)), *rest)
 
-    with mock.patch.object(mechanics, "_at_rest", about_middles):
-        yield
+def _about_middles(keys: mechanics.Mechanics, grown: Pore, *rest) -> mechanics.Expansion:
+    """The equilibrium of RECHOSEN."""
+    middles = [mechanics.middle_of(grown.boundary, wall) for wall in (BOTTOM, TOP)]
+    return _at_rest(keys, replace(grown, fixed=np.logical_or(*middles)), *rest)
+
+
+#: What the changes without a key replace: the module, the name and the new value.
+REPLACED = {RECHOSEN: (mechanics, "_at_rest", _about_middles), **CONSTANTS}
 
 
 def _with_a_film(scene: Scene, before: RestartState, contact: RestartState) -> RestartState:

@@ -57,9 +57,9 @@ MUTANTS = (
         "repro/model/pore.py",
         ("stale-flow",
          "flow is not solved again after the mesh has moved",
-         "return flow.solve(space, drive, length, interface=numerics.interface, element=element)",
+         "return flow.solve(space, drive, length, interface=numerics.interface)",
          "return space.mesh.topology.system('stale', lambda: flow.solve(\n"
-         "        space, drive, length, interface=numerics.interface, element=element))"),
+         "        space, drive, length, interface=numerics.interface))"),
         ("head-on-the-mesh-alone",
          "the entire head applies to the meshed part alone",
          "return flow.solve(space, drive, length, ",
@@ -77,8 +77,8 @@ MUTANTS = (
          "poiseuille_loss(length, mesh.width)"),
         ("tau-jumps",
          "the stabilisation jumps at the interface even where the viscosity does not",
-         "(self.constant * viscosity)",
-         "(self.constant * viscosity * (1 + mesh.biomass))")),
+         "(STABILISATION * viscosity)",
+         "(STABILISATION * viscosity * (1 + mesh.biomass))")),
     *changes(
         "repro/model/transport.py",
         ("inlet-held",

@@ -33,8 +33,8 @@ MUTANTS = (
         "repro/model/flow.py",
         ("hard-tau-of-water",
          "The stabilisation has water's viscosity in the biomass too: a plug leaks.",
-         "mesh.circumdiameter**2 / (self.constant * viscosity)",
-         "mesh.circumdiameter**2 / (self.constant + 0 * viscosity)")),
+         "mesh.circumdiameter**2 / (STABILISATION * viscosity)",
+         "mesh.circumdiameter**2 / (STABILISATION + 0 * viscosity)")),
     *changes(
         "repro/march/stepping.py",
         ("hard-contact-passed-over",

@@ -181,8 +181,7 @@ def _box_flow(space: Space, ratio: float, interface: str, exact: Callable) -> tu
     """Velocity (n, 2) at the nodes and pressure (m,) at the corners."""
     grid = space.mesh
     viscosity = np.where(grid.biomass, ratio, 1.0)
-    tau = flow.Stabilised().mobility(grid, viscosity, interface)
-    lower = flow.Linear(space, tau).lower if space.order == 1 else None
+    lower = flow.PAIRS[space.order].on(space, viscosity).lower
     blocks = flow.stokes(space, viscosity, interface, lower)
     system = grid.topology.system("box", lambda: _constrained_rim(space))
     fields = _load(space, exact), _without_flux(space, exact(*space.points.T)[0])

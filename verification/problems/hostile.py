@@ -121,7 +121,7 @@ def jumps(random: Random, tables: dict) -> None:
     if random.uniform() < 0.3:
         fed["supply"][-1][1] = "0 mg/L"
     if random.uniform() < 0.5:
-        fed["interpolation"] = "linear"
+        fed["supply"] = {"table": fed["supply"], "between": "linear"}
     rows = sorted({0.0, *_inner(random, 0.8 * end, 2), _hours(drive[key][-1][0])})
     tables["output"] = {"times": [f"{time!r} h" for time in rows]}
 
@@ -146,7 +146,7 @@ def outlines(random: Random, tables: dict) -> None:
 def brinkman(random: Random, tables: dict) -> None:
     """A permeable body, with permeabilities from gravel to clay, which fills up to most of the width."""
     tables["aggregate"]["radius"] = _um(_width(tables) * random.uniform(0.1, 0.9))
-    tables["flow"] |= {"biomass": "brinkman", "permeability": f"{_spread(random, 1e-17, 1e-10):.3g} m^2"}
+    tables["flow"]["permeability"] = f"{_spread(random, 1e-17, 1e-10):.3g} m^2"
 
 
 def gear(random: Random, tables: dict) -> None:

@@ -10,10 +10,6 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
      "return np.where(lost[:, None], 100.0, local)"):
         "Both values lie outside of every triangle (the search ends between -2 and 3), and both move to the same point "
         "of its edge.",
-    ("model/flow.py", "@dataclass(frozen=True, eq=False)", "@dataclass(frozen=True, eq=True)"):
-        "Bubble has no fields, and instances are neither compared nor used as keys.",
-    ("model/flow.py", "@dataclass(frozen=True, eq=False) class Bubble:", "class Bubble:"):
-        "Bubble has no fields. Without the decorator only its text representation differs.",
     ("model/gear.py", "still = np.zeros_like(fields), np.zeros_like(biomass), np.zeros((2, 4))",
      "still = np.zeros_like(fields), np.zeros_like(biomass), np.zeros(( 1, 4))"):
         "NumPy broadcasts one row of zeros to two rows of zeros.",
