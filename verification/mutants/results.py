@@ -448,7 +448,7 @@ MUTANTS = (
     *changes(
         "repro/model/growth.py",
         ("too-soft-without-advice",
-         "Where the fluid's forces leave no equilibrium, a shorter step is advised, which does not help.",
+         "Where the fluid's forces leave no equilibrium, nothing is advised.",
          'TOO_SOFT if system.pull.any() else ""',
          '""',
          "verification/cases/hard_family.py::test_family[seed 171]")),
