@@ -11,7 +11,7 @@ from repro.preflight import numbers
 from repro.report import charts, comparison, quantities
 from repro.report.reading import read
 from repro.results import picture, read_table
-from repro.sweeps import pool, table
+from repro.sweeps import driver, table
 from repro.sweeps.design import grid, parse, points
 from repro.sweeps.folder import Sweep
 from tests.shell import rows
@@ -28,7 +28,7 @@ def decayed(tmp_path_factory):
     """The folder of a sweep of two runs that decay, slowly and fast."""
     out = tmp_path_factory.mktemp("decayed") / "sweep"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(pool, "ready", in_this_process)
+        patch.setattr(driver, "ready", in_this_process)
         assert main(["sweep", "base", "--out", str(out), "--vary", VARIED, "--quiet",
                      *(part for change in HUNGRY for part in ("--set", change))]) == 0
     return out

@@ -3,15 +3,14 @@
 import html
 import json
 import math
-import multiprocessing
 import os
 import re
-import runpy
 import shutil
 import signal
 import subprocess
 import sys
-from contextlib import contextmanager, suppress
+from concurrent.futures import CancelledError
+from contextlib import closing, contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from unittest.mock import Mock
@@ -95,8 +94,8 @@ def test_a_run_of_a_sweep_equals_a_separate_run(finished, tmp_path):
 
 
 @contextmanager
-def in_this_process(workers):
-    """Make the runs one after the other, without a server."""
+def in_this_process(scheduler, workers):
+    """Make the runs one after the other, without further processes."""
     def each(points, folder):
         for point in points:
             yield point, single_run.make(point.scene, folder / point.name)
@@ -106,7 +105,7 @@ def in_this_process(workers):
 
 def test_a_damaged_run_is_made_again(copied, capsys, monkeypatch):
     """The same command makes this run alone again, and the tables are as before."""
-    monkeypatch.setattr(pool, "ready", in_this_process)
+    monkeypatch.setattr(driver, "ready", in_this_process)
     first, _, last = [copied / row["folder"] for row in rows(copied / "runs.csv")]
     before = {path: path.read_bytes() for path in (copied / "table.csv", last / "timeseries.csv", first / "run.json")}
     folders = sorted(copied.glob("runs/*"))
@@ -120,10 +119,10 @@ def test_a_damaged_run_is_made_again(copied, capsys, monkeypatch):
 
 @pytest.mark.parametrize("requested, started", [(None, 2), (400, 2), (1, 1)])
 def test_there_are_no_more_processes_than_runs(tmp_path, monkeypatch, requested, started):
-    monkeypatch.setattr(pool, "ready", Mock(wraps=in_this_process))
+    monkeypatch.setattr(driver, "ready", Mock(wraps=in_this_process))
     monkeypatch.setattr(pool, "cores", lambda: 64)
     repro.sweep("flow_only", ["pore.width=48 um, 50 um"], tmp_path / "sweep", workers=requested)
-    pool.ready.assert_called_once_with(started)
+    driver.ready.assert_called_once_with(None, started)
 
 
 def test_a_folder_of_another_run_is_refused(copied, capsys):
@@ -214,7 +213,7 @@ def test_rows_have_the_inputs_of_their_runs(tmp_path):
 
 def test_every_option_of_the_command_has_its_effect(tmp_path, monkeypatch):
     """Tables and scenes have each width of the hypercube to its last digit."""
-    monkeypatch.setattr(pool, "ready", in_this_process)
+    monkeypatch.setattr(driver, "ready", in_this_process)
     out, varied = tmp_path / "sweep", "pore.width=40:60 um:linear"
     assert sweep(out, "--vary", varied, "--samples", "2", "--seed", "5", "--unset", "aggregate", "--clogged", "0.4",
                  "--quiet", scene="flow_only") == 0
@@ -261,30 +260,77 @@ def test_biomass_and_contact_are_read_from_the_rows(finished, tmp_path):
 
 @pytest.mark.thorough
 def test_a_killed_run_fails_alone(tmp_path):
-    """The other runs are made, even if the process that forks them is killed."""
+    """Its status names the signal, and the other runs are made."""
     out = tmp_path / "sweep"
     process = start("sweep", "base", "--out", out, "--vary", "pore.width=48 um, 50 um, 52 um", "--workers", "1", *SHORT)
     until(lambda: list(out.glob("runs/0001*/fields/*.vtu")))
-    os.kill(max(children(process.pid, 2)), signal.SIGKILL)
-    until(lambda: list(out.glob("runs/0002*/fields/*.vtu")))
-    [os.kill(each, signal.SIGKILL) for each in children(process.pid, 1) if children(each, 1)]
+    (child,) = children(process.pid)
+    os.kill(child, signal.SIGKILL)
     outputs = process.communicate(timeout=60)
     assert process.returncode == 3, outputs
     first, *remaining = [row["status"] for row in rows(out / "runs.csv")]
     assert first == "failed: the process of the run was killed by SIGKILL" and remaining == ["completed"] * 2
 
 
-def children(pid, generation):
-    """The processes that a process has started, or their descendants of a later generation."""
-    status = [Path(f"/proc/{each}/stat") for each in os.listdir("/proc") if each.isdigit()]
+def children(pid):
+    """The processes that a process has started and that have not ended."""
     parents = {}
-    for path in status:
+    for path in [Path(f"/proc/{each}/stat") for each in os.listdir("/proc") if each.isdigit()]:
         with suppress(FileNotFoundError, ProcessLookupError):
             parents[int(path.parent.name)] = int(path.read_text().rpartition(")")[2].split()[1])
-    processes = {pid}
-    for _ in range(generation):
-        processes = {child for child, parent in parents.items() if parent in processes}
-    return processes
+    return [child for child, parent in parents.items() if parent == pid]
+
+
+def two_points():
+    factors = [parse("pore.width=48 um, 50 um")]
+    return points("flow_only", [], factors, grid(factors))
+
+
+def test_a_process_killed_between_runs_costs_none(tmp_path):
+    """Another process makes the next run."""
+    with closing(pool.Processes()) as processes:
+        for point in two_points():
+            assert processes.make(point, tmp_path / point.name) == "completed"
+            (last,) = processes._idle
+            os.kill(last.pid, signal.SIGKILL)
+            os.waitid(os.P_PID, last.pid, os.WEXITED | os.WNOWAIT)
+
+
+def test_a_process_ends_with_its_parent():
+    """Its standard input is a pipe from the parent."""
+    with pool._start() as process:
+        process.stdin.close()
+        try:
+            until(lambda: process.poll() == 1)
+        finally:
+            process.kill()
+
+
+def test_no_run_begins_after_the_end_of_a_sweep(tmp_path):
+    """A thread may take a run just before the sweep ends."""
+    processes = pool.Processes()
+    processes.close()
+    with suppress(CancelledError):
+        processes.make(two_points()[0], tmp_path / "run")
+    assert not (tmp_path / "run").exists() and not processes._started
+
+
+def test_a_sweep_that_ends_early_stops_its_runs(tmp_path, monkeypatch):
+    """An error in the caller's function ends the sweep. The second run is interrupted, the third is not begun, and no
+    process is left when the tables are written."""
+    def tell(event):
+        if event["event"] == "run":
+            until(lambda: list(tmp_path.glob("runs/0002*/run.json")))
+            raise ArithmeticError
+
+    left = []
+    monkeypatch.setattr(table, "write", lambda *written: left.extend(children(os.getpid())))
+    before = children(os.getpid())
+    with pytest.raises(ArithmeticError):
+        repro.sweep("base", ["growth.end=0.2 h, 19 h, 20 h"], tmp_path, ["numerics.preset=fast"], workers=1, tell=tell)
+    (second,) = tmp_path.glob("runs/0002*")
+    assert read_record(second)["status"] == INTERRUPTED and left == before
+    assert not list(tmp_path.glob("runs/0003*"))
 
 
 HOSTILE_MODULE = "import os\nos.mkdir(os.path.join({!r}, f'{{__name__}}-{{os.getpid()}}'))\nraise ImportError\n"
@@ -317,21 +363,16 @@ def test_nothing_is_imported_from_the_working_folder(tmp_path):
     assert list(notes.iterdir()) == [] and len(rows(working_folder / "sweep" / "table.csv")) == 2
 
 
-def test_output_of_c_code_does_not_reach_the_user(tmp_path, capfd):
+def test_output_of_c_code_does_not_reach_the_user(tmp_path, capfd, monkeypatch):
     """It appears on neither output of a run's process. The run's failure is one line with its position."""
     (tmp_path / "noisy.py").write_text(
         "import os\nfrom repro.sweeps import single_run\n"
         "def made(scene, place, watch):\n    os.write(1, b'noise')\n    os.write(2, b'noise')\n    return {}['x']\n"
         "single_run._run_or_resume = made\n")
-    point_list = points("flow_only", [], [parse("pore.width=48 um")], [(48.0,)])
-    end, answer = multiprocessing.get_context("fork").Pipe()
-    child = os.fork()
-    if not child:
-        runpy.run_path(str(tmp_path / "noisy.py"))
-        single_run.send_status(answer, point_list[0].scene, tmp_path / "run", 0.0)
-        os._exit(0)
-    os.waitpid(child, 0)
-    assert end.recv() == "failed: KeyError: 'x' (noisy.py, line 6)" and capfd.readouterr() == ("", "")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(pool, "COMMAND", ("-c", "import noisy; noisy.single_run.serve()"))
+    ((_, status),) = pool.run_points(two_points()[:1], tmp_path, 1)
+    assert status == "failed: KeyError: 'x' (noisy.py, line 6)" and capfd.readouterr() == ("", "")
 
 
 @pytest.mark.parametrize("arrange, why", [

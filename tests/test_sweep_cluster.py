@@ -78,7 +78,7 @@ def test_unusable_workers_are_reported(tmp_path, capsys, monkeypatch, trouble, a
 
 def test_a_worker_with_other_code_makes_no_run():
     """A worker that joins a running sweep has not been checked before."""
-    assert "failed: a worker that joined has version" in cluster.run_on_worker(None, None, "0.0.1-abc")
+    assert "failed: a worker that joined has version" in cluster.run_on_worker("0.0.1-abc", None, None)
 
 
 def free_port():

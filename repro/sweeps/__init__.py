@@ -1,9 +1,8 @@
-"""Many runs of a scene with varied keys, each in its own process and folder.
+"""Many runs of a scene with varied keys, each in its own folder.
 
     design    the runs: a grid, lists, a Latin hypercube
     folder    sweep.json and the folders of the runs
-    single_run  one run in its own process
-    preload   imports shared by these processes
+    single_run  runs in a process of a sweep
     pool      runs on all cores
     cluster   runs on a Dask cluster
     table     table.csv and runs.csv

@@ -1,15 +1,13 @@
 """Runs on a Dask cluster, in a folder that all workers share.
 
-Each run is a process of its own, which a worker starts. If a worker dies, another one resumes its
-run; the lock of the folder admits one process at a time.
+A worker makes its runs in processes of its own. If a worker dies, another one resumes its run; the
+lock of the folder admits one process at a time.
 """
 
 from __future__ import annotations
 
 import asyncio
-import multiprocessing
 import os
-import uuid
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
@@ -20,7 +18,7 @@ from pathlib import Path
 from repro.sweeps import pool, single_run
 from repro.sweeps.design import Point
 from repro.sweeps.folder import SweepError
-from repro.sweeps.pool import RunPoints
+from repro.sweeps.pool import EndedRuns, RunPoints
 
 PACKAGE = "distributed"
 #: Seconds to wait for the answer of a scheduler.
@@ -29,6 +27,8 @@ ANSWER = 2
 PATIENCE = 10
 #: Seconds to wait until the process of a dead worker releases its folder.
 LEAVING = 30
+#: On a worker: the processes that make its runs. They end with the worker.
+_processes = pool.Processes()
 
 
 @contextmanager
@@ -47,7 +47,7 @@ def ready(address: str) -> Iterator[RunPoints]:
         raise SweepError(f"--scheduler {address}: no Dask scheduler answers there; an address such "
                          "as tcp://host:8786 is needed") from error
     with distributed.Client(address, timeout=PATIENCE, set_as_default=False) as client:
-        yield partial(run_points, distributed=distributed, client=client, address=address)
+        yield partial(run_points, client=client, address=address)
 
 
 def _package(address: str):
@@ -65,21 +65,16 @@ async def _ask(distributed, address: str) -> None:
         await asyncio.wait_for(scheduler.identity(), ANSWER)
 
 
-def run_points(points: Sequence[Point], folder: Path, distributed, client,
-         address: str) -> Iterator[tuple[Point, str]]:
-    """Make the runs in `folder`; yields each point with its status when its run ends.
+def run_points(points: Sequence[Point], folder: Path, client, address: str) -> EndedRuns:
+    """Make the runs in `folder`.
 
     Raises SweepError if the cluster has no workers, or if they have another version of this package
     or do not share the folder.
     """
     folder = folder.resolve()
     _check_workers(client, folder, address)
-    futures = {_submit(client, point, folder): point for point in points}
-    try:
-        for future in distributed.as_completed(futures, loop=client.loop):
-            yield futures[future], _result_status(future)
-    finally:
-        client.cancel(list(futures))
+    executor = client.get_executor(pure=False)  # two sweeps may have the same run
+    yield from pool.submit(executor, partial(run_on_worker, single_run.code()), points, folder)
 
 
 def _check_workers(client, folder: Path, address: str) -> None:
@@ -106,24 +101,9 @@ def inspect_worker(path: str) -> tuple[str, bool]:
     return single_run.code(), os.path.exists(path)
 
 
-def _submit(client, point: Point, folder: Path):
-    key = f"repro-sweep-{point.name}-{uuid.uuid4().hex}"  # two sweeps may have the same run
-    return client.submit(run_on_worker, point, folder, single_run.code(), key=key, pure=False)
-
-
-def run_on_worker(point: Point, folder: Path, expected: str) -> str:
-    """On a worker: make a run in its own process; return how the run ended."""
+def run_on_worker(expected: str, point: Point, folder: Path) -> str:
+    """On a worker with the expected code: make a run in a process; return how the run ended."""
     if single_run.code() != expected:
         return (f"failed: a worker that joined has version {single_run.code()} of this package, "
                 f"{expected} is needed")
-    multiprocessing.current_process().daemon = False  # a daemon, as under a nanny, has no children
-    ((_, status),) = pool.run_points([point], folder, 1, patience=LEAVING)
-    return status
-
-
-def _result_status(future) -> str:
-    """Return how a run ended, or the error of its worker."""
-    try:
-        return future.result()
-    except Exception as error:  # any error on a worker is a failure of its run
-        return f"failed: {type(error).__name__}: {' '.join(str(error).split())}"
+    return _processes.make(point, folder, LEAVING)

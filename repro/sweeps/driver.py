@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, closing, nullcontext
 from dataclasses import dataclass
+from functools import partial
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -242,7 +243,9 @@ def _reporter(show: Callable[[float, float], None], tell: Tell | None) -> Tell:
 
 def ready(scheduler: str | None, workers: int) -> AbstractContextManager[pool.RunPoints]:
     """Make the context that makes runs: processes of this machine, or a cluster."""
-    return cluster.ready(scheduler) if scheduler else pool.ready(workers)
+    if scheduler:
+        return cluster.ready(scheduler)
+    return nullcontext(partial(pool.run_points, workers=workers))
 
 
 def _run_missing(plan: Sweep, run_points: pool.RunPoints, statuses: dict[int, str],
@@ -252,16 +255,14 @@ def _run_missing(plan: Sweep, run_points: pool.RunPoints, statuses: dict[int, st
     total = len(plan.points)
     completed = total - len(missing)
     tell({"event": "start", "scene": plan.source, "done": completed, "total": total})
-    for point, status in _run_points(missing, plan.runs, run_points):
-        statuses[point.index] = status
-        tell({"event": "run", "done": completed + len(statuses), "total": total, "run": point.index,
-              "values": design.label(plan.factors, point.values), "status": status})
-
-
-def _run_points(missing: list[design.Point], runs: Path,
-          run_points: pool.RunPoints) -> Iterator[tuple[design.Point, str]]:
-    if missing:
-        yield from run_points(missing, runs)
+    if not missing:
+        return
+    with closing(run_points(missing, plan.runs)) as ended_runs:
+        for point, status in ended_runs:
+            statuses[point.index] = status
+            tell({"event": "run", "done": completed + len(statuses), "total": total,
+                  "run": point.index, "values": design.label(plan.factors, point.values),
+                  "status": status})
 
 
 def _write_results(plan: Sweep, statuses: dict[int, str], clogged: float) -> table.Runs:

@@ -1,39 +1,39 @@
-"""Parallel runs on this machine, each in its own process.
+"""Runs in processes of this machine.
 
-If a process is killed, only its run fails. A server that has imported the package forks the
-processes.
+Each process makes one run at a time. If a process ends, only its run fails, and another process
+makes the next one.
 """
 
 from __future__ import annotations
 
-import multiprocessing
+import json
 import os
 import signal
+import subprocess
 import sys
 import threading
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from functools import partial
-from itertools import islice
-from multiprocessing.connection import wait
+from collections.abc import Callable, Generator, Sequence
+from concurrent.futures import (
+    CancelledError,
+    Executor,
+    Future,
+    ThreadPoolExecutor,
+    as_completed,
+)
+from contextlib import closing, suppress
 from pathlib import Path
-from types import ModuleType
-from typing import Any
 
-from repro.runs.interrupts import STOP_SIGNALS
+from repro.runs.machine import THREADS
+from repro.scene import scene_tables
 from repro.sweeps import single_run
 from repro.sweeps.design import Point
 
-RunPoints = Callable[[Sequence[Point], Path], Iterator[tuple[Point, str]]]
-_METHODS = multiprocessing.get_all_start_methods()
-CONTEXT: Any = multiprocessing.get_context("forkserver" if "forkserver" in _METHODS else "spawn")
-#: Environment of these processes: one thread each, and no module from the working folder. glibc
-#: keeps freed memory for the next step; returning it costs a short run 5 % of its time.
-ENVIRONMENT = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1",
-               "PYTHONSAFEPATH": "1", "MALLOC_MMAP_THRESHOLD_": "1073741824",
-               "MALLOC_TRIM_THRESHOLD_": "1073741824", "MALLOC_TOP_PAD_": "67108864"}
+#: Each point with the status of its run, when the run ends.
+EndedRuns = Generator[tuple[Point, str], None, None]
+RunPoints = Callable[[Sequence[Point], Path], EndedRuns]
+#: The option -P keeps the working folder out of sys.path.
+COMMAND = ("-P", "-c", "from repro.sweeps import single_run; single_run.serve()")
 PATIENCE = 10  # s that a process may take to end
-_starting = threading.Lock()
 
 
 def cores() -> int:
@@ -41,92 +41,101 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-@contextmanager
-def ready(workers: int) -> Iterator[RunPoints]:
-    """Start the server; yields a function that makes runs, `workers` at a time."""
-    _start_server()
-    yield partial(run_points, workers=workers)
+def run_points(points: Sequence[Point], folder: Path, workers: int) -> EndedRuns:
+    """Make the runs in `folder`, `workers` at a time."""
+    with ThreadPoolExecutor(workers) as threads, closing(Processes()) as processes:
+        yield from submit(threads, processes.make, points, folder)
 
 
-def _start_server() -> None:
-    """Start the server unless it is running. It blocks STOP_SIGNALS; the runs handle them."""
-    if CONTEXT.get_start_method() != "forkserver":
-        return
-    from multiprocessing import forkserver, resource_tracker
-
-    with _isolated():
-        CONTEXT.set_forkserver_preload(["repro.sweeps.preload"])
-        resource_tracker.ensure_running()  # it unblocks two of the signals
-        previous_mask = signal.pthread_sigmask(signal.SIG_BLOCK, STOP_SIGNALS)
-        try:
-            forkserver.ensure_running()
-        finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, previous_mask)
-
-
-@contextmanager
-def _isolated() -> Iterator[None]:
-    """Give ENVIRONMENT to processes that start in this block; they do not run the user's script
-    again."""
-    with _starting:
-        main = sys.modules["__main__"]
-        previous = {name: os.environ.get(name) for name in ENVIRONMENT}
-        try:
-            os.environ.update(ENVIRONMENT)
-            sys.modules["__main__"] = ModuleType("__main__")
-            yield
-        finally:
-            sys.modules["__main__"] = main
-            for name, value in previous.items():
-                os.environ.pop(name) if value is None else os.environ.update({name: value})
-
-
-def run_points(points: Sequence[Point], folder: Path, workers: int,
-         patience: float = 0.0) -> Iterator[tuple[Point, str]]:
-    """Make the runs in `folder`; yields each point with its status when its run ends.
-
-    patience: seconds that a run waits for another process that uses its folder.
-    """
-    waiting = iter(points)
-    running: dict[Any, tuple[Point, Any]] = {}
+def submit(executor: Executor, make: Callable[[Point, Path], str], points: Sequence[Point],
+           folder: Path) -> EndedRuns:
+    """Submit the runs to an executor; make: makes the run of a point in its folder."""
+    futures = {executor.submit(make, point, folder / point.name): point for point in points}
     try:
-        while True:
-            for point in islice(waiting, workers - len(running)):
-                answer, process = _start(point, folder, patience)
-                running[answer] = point, process
-            if not running:
-                return
-            for answer in wait(list(running)):
-                point, process = running[answer]
-                status = _receive_status(answer, process)
-                del running[answer]
-                yield point, status
+        for future in as_completed(futures):
+            yield futures[future], _result_status(future)
     finally:
-        _stop([process for _, process in running.values()])
+        for future in futures:
+            future.cancel()
 
 
-def _start(point: Point, folder: Path, patience: float) -> tuple[Any, Any]:
-    """Start the process of a run; return the connection that receives its status, and the process.
-    """
-    answer, end = CONTEXT.Pipe(duplex=False)
-    process = CONTEXT.Process(target=single_run.send_status, daemon=True,
-                              args=(end, point.scene, folder / point.name, patience))
-    _start_server()
-    with _isolated():
-        process.start()
-    end.close()
-    return answer, process
-
-
-def _receive_status(answer: Any, process: Any) -> str:
-    """Receive how a run ended, or describe how its process ended."""
+def _result_status(future: Future[str]) -> str:
+    """Return how a run ended, or the error of the executor."""
     try:
-        status = answer.recv()
-    except EOFError:
-        status = ""
-    answer.close()
-    process.join()
-    return status or _describe_exit(process.exitcode)
+        return future.result()
+    except Exception as error:  # any error of an executor is a failure of its run
+        return f"failed: {type(error).__name__}: {' '.join(str(error).split())}"
+
+
+class Processes:
+    """Processes that make runs. One that has made a run waits for the next."""
+
+    def __init__(self) -> None:
+        self._started: list[subprocess.Popen] = []
+        self._idle: list[subprocess.Popen] = []
+        self._closed = False
+        self._lock = threading.Lock()
+
+    def make(self, point: Point, folder: Path, patience: float = 0.0) -> str:
+        """Make a run in a process; return how the run or its process ended.
+
+        patience: seconds to wait for another process that uses the folder. Raises CancelledError
+        after :meth:`close`.
+        """
+        process = self._take()
+        status = _ask(process, {"scene": point.scene.name, "tables": scene_tables(point.scene),
+                                "folder": str(folder), "patience": patience})
+        if not status:
+            return _describe_exit(process.wait())
+        self._idle.append(process)
+        return status
+
+    def _take(self) -> subprocess.Popen:
+        """Take an idle process, or start one."""
+        with self._lock:
+            if self._closed:
+                raise CancelledError
+            while self._idle:
+                process = self._idle.pop()
+                if process.poll() is None:
+                    return process
+            self._started.append(_start())
+            return self._started[-1]
+
+    def close(self) -> None:
+        """Stop all runs, and wait for the processes; kill those that do not end in time."""
+        with self._lock:
+            self._closed = True
+        for process in self._started:
+            with suppress(OSError):  # it has ended
+                process.stdin.write(single_run.STOP)
+                process.stdin.flush()
+        for process in self._started:
+            with suppress(OSError), process:
+                try:
+                    process.wait(PATIENCE)
+                except subprocess.TimeoutExpired:
+                    process.kill()
+
+
+def _start() -> subprocess.Popen:
+    """Start a process with one thread. It imports nothing from the working folder."""
+    package = str(Path(__file__).parents[2])
+    paths = [path for path in sys.path if os.path.abspath(path) != os.getcwd()]
+    environment = os.environ | dict.fromkeys(THREADS, "1")
+    environment["PYTHONPATH"] = os.pathsep.join([*paths, package])
+    return subprocess.Popen([sys.executable, *COMMAND], env=environment, text=True,
+                            stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                            stderr=subprocess.DEVNULL)
+
+
+def _ask(process: subprocess.Popen, request: dict) -> str:
+    """Let a process make a run; return its status, empty if the process ends before its run."""
+    try:
+        print(json.dumps(request), file=process.stdin, flush=True)
+        return json.loads(process.stdout.readline() or '""')
+    except BrokenPipeError:
+        return ""
 
 
 def _describe_exit(code: int) -> str:
@@ -135,12 +144,3 @@ def _describe_exit(code: int) -> str:
     except ValueError:
         cause = f"ended with status {code}"
     return f"failed: the process of the run {cause}"
-
-
-def _stop(processes: Sequence[Any]) -> None:
-    """Terminate processes; kill those that do not end in time."""
-    for process in processes:
-        process.terminate()
-    for process in processes:
-        process.join(PATIENCE)
-        process.kill()

@@ -5,15 +5,15 @@ A sweep treats the folder of each run as ``repro run`` does.
 
 from __future__ import annotations
 
-import multiprocessing
+import json
 import os
-import sys
+import signal
 import threading
 import traceback
 from collections.abc import Callable
 from importlib.metadata import version
-from multiprocessing.connection import Connection
 from pathlib import Path
+from queue import SimpleQueue
 
 from repro.errors import Interrupted, SimulationError
 from repro.report.reading import read_record
@@ -24,7 +24,10 @@ from repro.runs.integrity import find_damage
 from repro.runs.interrupts import catch_signals
 from repro.runs.machine import source_hash
 from repro.runs.status import INTERRUPTED, is_over
-from repro.scene import Scene, SceneError
+from repro.scene import Scene, SceneError, parse_scene
+
+#: The line that asks a process to stop its run and to end.
+STOP = "\n"
 
 
 def code() -> str:
@@ -66,26 +69,33 @@ def _run_or_resume(scene: Scene, folder: Path, watch: Watch) -> str:
     return resume(folder, watch=watch)
 
 
-def send_status(connection: Connection, scene: Scene, folder: Path, patience: float) -> None:
-    """Make a run in this process, which does nothing else, and send how the run ended.
+def serve() -> None:
+    """Make the runs that standard input lists, one after the other, and answer how each ended.
 
-    Output of libraries is discarded. A signal stops the run, which can then resume. The process
-    ends with its parent, and imports nothing from the working folder.
+    A request is a line of JSON, and so is its answer. Other output goes to standard error. A signal
+    or STOP stops a run, which can then resume; STOP also ends the process. The end of the input, as
+    by the end of the parent, ends the process at once.
     """
-    with catch_signals() as stop:
-        _isolate()
-        connection.send(make(scene, folder, patience, stop))
+    answers = os.fdopen(os.dup(1), "w")
+    os.dup2(2, 1)
+    requests: SimpleQueue[str] = SimpleQueue()
+    stopping = threading.Event()
+    threading.Thread(target=_read_requests, args=(requests, stopping), daemon=True).start()
+    for line in iter(requests.get, STOP):
+        print(json.dumps(_answer(json.loads(line), stopping)), file=answers, flush=True)
 
 
-def _isolate() -> None:
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-    working_folder = os.getcwd()
-    sys.path[:] = [entry for entry in sys.path if os.path.abspath(entry) != working_folder]
-    null_device = os.open(os.devnull, os.O_RDWR)
-    os.dup2(null_device, 1)
-    os.dup2(null_device, 2)
-
-
-def _end_with_parent() -> None:
-    multiprocessing.parent_process().join()
+def _read_requests(requests: SimpleQueue[str], stopping: threading.Event) -> None:
+    with open(0, closefd=False) as lines:
+        for line in lines:
+            if line == STOP:
+                stopping.set()
+            requests.put(line)
     os._exit(1)
+
+
+def _answer(request: dict, stopping: threading.Event) -> str:
+    scene = parse_scene(request["tables"], request["scene"], request["scene"])
+    with catch_signals() as received:
+        return make(scene, Path(request["folder"]), request["patience"],
+                    lambda: received() or signal.SIGTERM * stopping.is_set())
