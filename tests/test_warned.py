@@ -9,7 +9,7 @@ import pytest
 
 from repro.cli import main
 from repro.march import loop
-from repro.march.simulation import steps
+from repro.march.simulation import simulate, steps
 from repro.march.step_control import StepControl
 from repro.preflight import simplifications
 from repro.results import read_table
@@ -142,11 +142,20 @@ def test_the_worst_step_that_misses_the_tolerance_is_reported(tmp_path):
 
 
 def test_a_row_that_is_left_out_is_reported(tmp_path, capsys, monkeypatch):
-    """Once on standard error and in run.json, at the end. The run completes."""
-    monkeypatch.setattr(loop, "_row_within", lambda *_: None)
-    folder = pages.run(tmp_path, "base", "growth.end=0.4 h", 'output.times=["0.05 h", "0.13 h", "0.4 h"]')
+    """Once on standard error and in run.json, at the end, with the reason. The run completes. A run that resumes within
+    the step reports the same, and `simulate` warns of each row."""
+    monkeypatch.setattr(loop, "_row_within", lambda *_: (None, "no rest"))
+    changes = "growth.end=0.4 h", 'output.times=["0.05 h", "0.13 h", "0.4 h"]'
+    folder = pages.run(tmp_path, "base", *changes)
     record = read_record(folder)
-    text = "the run has no row at 0.05, 0.13 h, because the state at this time could not be computed"
+    text = ("the run has no row at 0.05, 0.13 h, because the state at this time could not be computed; at 0.05 h: "
+            "no rest")
     assert record["status"] == "completed" and record["rows"] == 2
     assert [entry["text"] for entry in record["warnings"] if entry["key"] == "output.times"] == [text]
     assert capsys.readouterr().err.count(f"output.times: {text}") == 1
+    interrupt_run(load_scene("base", changes), tmp_path / "resumed", after=2)
+    assert "0.05 h, because" in read_record(tmp_path / "resumed")["warnings"][-1]["text"]
+    resume(tmp_path / "resumed")
+    assert read_record(tmp_path / "resumed")["warnings"] == record["warnings"]
+    with pytest.warns(UserWarning, match=r"no row at t = 0\.(05|13) h, since .*: no rest"):
+        assert [report.pore.time for report in simulate("base", changes)] == [0, 0.4]

@@ -2,7 +2,7 @@
 
 Steps depend neither on the requested rows nor on the end of the run, to the last bit. A row between
 two steps is interpolated in the step that passes it, and no step starts from it. If a row cannot be
-computed, it is left out with a warning, and the run goes on. If ``growth.end`` or an end of the
+computed, the state says why, and the run goes on. If ``growth.end`` or an end of the
 model (:mod:`repro.march.ends`) lies within a step, that step is cut there. Rows before the end
 still belong to the uncut step, and the ledger of the cut step closes like the others. A run to a
 later end restarts from the state before the cut step.
@@ -13,7 +13,6 @@ of the fluid the aggregate takes its new equilibrium there, as it does at t = 0 
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 
@@ -130,12 +129,14 @@ def _grow(stages: Stages, scheme: Scheme, state: RestartState,
             shown = step.within(state.row).pore.mesh.topology
         for time in rows:
             if state.time + SAME_TIME < time < step.pore.time - SAME_TIME:
-                inner = _row_within(stages, step, time)
+                inner, reason = _row_within(stages, step, time)
                 if inner:
                     report = make_report(state, inner.pore, inner.solved, inner.before, shown)
                     shown = inner.pore.mesh.topology
                     state = mark_reported(state, time)
                     yield state, report
+                else:
+                    yield replace(state, missing=(time, reason)), None
         solved = reached.solved
         event = reached.event
         state = _after_step(state, step, solved, control)
@@ -180,17 +181,16 @@ def _after_jump(stages: Stages, step: StepResult, solved: Solved) -> tuple[StepR
     return replace(step, pore=contiguous(after), remeshed=remeshed), jumped
 
 
-def _row_within(stages: Stages, step: StepResult, time: float) -> InterpolatedState | None:
-    """Return the state at a time (h) within a step, or None with a warning if that fails."""
+def _row_within(stages: Stages, step: StepResult,
+                time: float) -> tuple[InterpolatedState | None, str]:
+    """Return the state at a time (h) within a step, or the reason why it cannot be computed."""
     try:
         with np.errstate(all="raise", under="ignore"):
             inner = step.within(time)
             refuse_density(inner.pore, stages.remeshing.maximum_density)
-            return inner
+            return inner, ""
     except (RunEnd, StageError, FloatingPointError) as error:
-        warnings.warn(f"there is no row at t = {time:g} h, since its state cannot be computed: "
-                      f"{error}", stacklevel=2)
-        return None
+        return None, str(error)
 
 
 def row_times(scheme: Scheme, scene: Scene) -> tuple[float, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
@@ -75,7 +76,18 @@ def simulate(scene: Source, overrides: Sequence[str] = (), *, unset: Sequence[st
     scene = load_scene(scene, overrides, unset=unset)
     if shape is not None:
         scene = shaped(scene, shape)
-    return (report for _, report in steps(scene, state) if report)
+    return _reports(steps(scene, state))
+
+
+def _reports(states: Iterator[tuple[RestartState, Report | None]]) -> Iterator[Report]:
+    """Yield the reports, and warn of each row that cannot be computed."""
+    for state, report in states:
+        if state.missing:
+            time, reason = state.missing
+            warnings.warn(f"there is no row at t = {time:g} h, since its state cannot be computed: "
+                          f"{reason}", stacklevel=3)
+        if report:
+            yield report
 
 
 def shaped(scene: Scene, shape: Shape) -> Scene:

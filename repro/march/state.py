@@ -111,7 +111,8 @@ class RestartState:
     pore: pore after the step, with the initial guess of its substrates; step_control: of the next
     step; ledgers, remeshes, iterations: of the steps since the last Report; row: time (h) of that
     Report, later than ``pore.time`` if it lies within the next step; compression: the least stretch
-    of the surface so far.
+    of the surface so far; missing: time (h) of a row within the next step that cannot be computed,
+    and the reason.
     """
 
     pore: Pore
@@ -121,6 +122,7 @@ class RestartState:
     iterations: dict[str, int] = field(default_factory=dict)
     row: float = 0.0
     compression: Compression = Compression()
+    missing: tuple[float, str] | None = None
 
     @property
     def time(self) -> float:

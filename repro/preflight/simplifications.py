@@ -284,12 +284,12 @@ def warn_missed_tolerance(scene: Scene, worst: float, count: str = "") -> Iterat
                      f"{worst:.2g} (estimate)")
 
 
-def warn_missing_rows(times: list[float]) -> Iterator[Caveat]:
-    """Warn about requested times (h) at which no state could be computed."""
-    if times:
-        listed = ", ".join(f"{time:g}" for time in times)
-        yield Caveat("output.times", f"the run has no row at {listed} h, because the state at "
-                     "this time could not be computed")
+def warn_missing_rows(rows: list[tuple[float, str]]) -> Iterator[Caveat]:
+    """Warn about rows that could not be computed; rows: their times (h) and the reasons."""
+    if rows:
+        times = [f"{time:g}" for time, _ in rows]
+        yield Caveat("output.times", f"the run has no row at {', '.join(times)} h, because the "
+                     f"state at this time could not be computed; at {times[0]} h: {rows[0][1]}")
 
 
 def _fold(scene: Scene, computed: Numbers) -> Iterator[Caveat]:

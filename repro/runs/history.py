@@ -19,7 +19,8 @@ class History:
 
     seconds: total wall time; stages: wall time by stage; resumes: when the run was resumed;
     warnings: ``key`` of the scene and ``text`` of each simplification that does not hold; missed:
-    number of steps that do not meet the tolerance; worst: the largest of their error estimates.
+    number of steps that do not meet the tolerance; worst: the largest of their error estimates;
+    missing: time (h) of each row that cannot be computed, and the reason.
     """
 
     rows: Table = field(default_factory=list)
@@ -35,6 +36,7 @@ class History:
     warnings: list[dict[str, str]] = field(default_factory=list)
     missed: int = 0
     worst: float = 0.0
+    missing: list[tuple[float, str]] = field(default_factory=list)
 
 
 #: The counts and times in ``run.json``; ``value`` takes a History.
@@ -61,8 +63,8 @@ def fields_name(kind: str, number: int) -> str:
 
 def restore_history(plain: dict) -> History:
     """Restore a History from ``vars(history)`` after a round trip through JSON."""
-    pairs = {name: list(map(tuple, plain[name])) for name in ("index", "before")}
-    return History(**plain | pairs)
+    lists = ("index", "before", "missing")
+    return History(**plain | {name: list(map(tuple, plain.get(name, ()))) for name in lists})
 
 
 def require_fields(folder: Path, history: History) -> None:

@@ -7,12 +7,10 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from time import perf_counter
 
-import numpy as np
-
 from repro import report, results, timing
 from repro.errors import Interrupted, shell_word
 from repro.march.balance import Ledger
-from repro.march.state import SAME_TIME, Report, RestartState, sum_counts
+from repro.march.state import Report, RestartState, sum_counts
 from repro.march.step_control import StepControl, exceeds_tolerance
 from repro.preflight.simplifications import (
     Caveat,
@@ -106,6 +104,8 @@ class Recorder:
             self.history.ledgers += self._ledger_rows(reported.ledgers)
             self.history.remeshes += int(reported.remeshes)
             self.history.iterations = sum_counts(self.history.iterations, reported.iterations)
+        if state.missing and state.missing not in self.history.missing:  # not before a resume
+            self.history.missing.append(state.missing)
         if self.state and state.step_control != self.state.step_control:
             self._count_missed_tolerance(state.step_control)
         self.state = state
@@ -127,18 +127,10 @@ class Recorder:
             self.history.worst = max(self.history.worst, step_control.estimate)
 
     def warnings_so_far(self) -> list[Caveat]:
-        """Warn if any step so far misses the tolerance, and if any requested row is missing."""
+        """Warn if any step so far misses the tolerance, and if any row is missing."""
         count = f" in {self.history.missed} of {self.steps} steps"
         return [*warn_missed_tolerance(self.scene, self.history.worst, count),
-                *warn_missing_rows(self._missing_rows())]
-
-    def _missing_rows(self) -> list[float]:
-        """Requested times (h) so far that have no row."""
-        requested = np.array(self.scene.requested_times or ())
-        past = requested[requested < self.time - SAME_TIME]
-        present = [row[results.COLUMNS.index("time_h")] for row in self.history.rows]
-        nearest = np.append(present, np.inf)[np.searchsorted(present, past - SAME_TIME)]
-        return past[nearest > past + SAME_TIME].tolist()
+                *warn_missing_rows(self.history.missing)]
 
     def _add_fields(self, reported: Report) -> None:
         self._write_fields(self.history.index, "fields", reported.pore, reported.solved)

@@ -109,7 +109,12 @@ MUTANTS = (
          "Every step on a creased surface gives a warning.",
          'earlier = {warning["key"] for warning in self.history.warnings}',
          "earlier = set()",
-         OVER)),
+         OVER),
+        ("missing-row-counted-again",
+         "A run that resumes within a step lists a missing row of this step twice.",
+         "if state.missing and state.missing not in self.history.missing:",
+         "if state.missing:",
+         "tests/test_warned.py::test_a_row_that_is_left_out_is_reported")),
     *changes(
         "repro/runs/state_arrays.py",
         ("compression-dropped",
