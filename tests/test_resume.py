@@ -246,7 +246,7 @@ def test_checkpoints_follow_at_the_requested_interval(monkeypatch):
         monkeypatch.setattr(execution, "perf_counter", lambda writer=writer: 7.0 * writer.add.call_count)
         monkeypatch.setattr(execution, "_checkpoint",
                             lambda writer, watch, checkpoints=checkpoints: checkpoints.append(writer.add.call_count))
-        execution._record_steps(writer, [(None, None)] * 30, execution.ignore_progress, Watch(interval=interval))
+        execution._record_steps(writer, [(None, None)] * 30, Watch(interval=interval))
         assert checkpoints == expected
 
 

@@ -26,6 +26,8 @@ NEWEST = "checkpoint.state"
 PREVIOUS = "checkpoint.previous"
 REFUSED = "checkpoint.refused"
 LAST = "checkpoint.last"
+#: The checkpoints from which an unfinished run resumes, the newest first.
+STATES = (NEWEST, PREVIOUS)
 KIND, FORMAT = b"dupin2001-repro checkpoint ", b"7"
 MAGIC = KIND + FORMAT + b" "
 #: The array with the JSON text.

@@ -65,8 +65,6 @@ MOST_DESCRIBED = 4
 #: The only key that can be changed after a run has begun.
 END = "growth.end"
 
-Progress = Callable[[float], None]
-
 
 def issue_warnings(event: dict) -> None:
     """Issue warning events as Python warnings, and drop all other events.
@@ -75,10 +73,6 @@ def issue_warnings(event: dict) -> None:
     """
     if event["event"] == "warning" and "key" not in event:
         warnings.warn(event["message"], stacklevel=2)
-
-
-def ignore_progress(time: float) -> None:
-    """Ignore the simulated time."""
 
 
 @dataclass(frozen=True)
@@ -105,17 +99,16 @@ class Watch:
 DEFAULT_WATCH = Watch()
 
 
-def run(scene: Source, folder: str | Path, progress: Progress = ignore_progress,
-        watch: Watch = DEFAULT_WATCH, *, force: bool = False, origin: dict | None = None) -> str:
+def run(scene: Source, folder: str | Path, watch: Watch = DEFAULT_WATCH, *, force: bool = False,
+        origin: dict | None = None) -> str:
     """Run a scene and write its results to a folder.
 
     If the folder already holds a run of the same scene, code and package versions, that run is
     resumed; a finished run is left unchanged. Returns how the run ended.
 
-    progress: called with the simulated time (h) after each step; force: remove the files of any run
-    in the folder first; origin: for ``run.json``, from :func:`origin_of`. Raises the errors of
-    :func:`repro.run`, and Interrupted if ``watch.stop`` asks the run to stop; all results so far
-    are written.
+    force: remove the files of any run in the folder first; origin: for ``run.json``, from
+    :func:`origin_of`. Raises the errors of :func:`repro.run`, and Interrupted if ``watch.stop``
+    asks the run to stop; all results so far are written.
     """
     scene = load_scene(scene)
     folder = Path(folder)
@@ -125,16 +118,16 @@ def run(scene: Source, folder: str | Path, progress: Progress = ignore_progress,
         recorder = Recorder(scene, folder, origin=origin)
         if not is_file(folder / PROVENANCE):
             prepare(folder)
-            return _run_from_start(recorder, progress, watch)
+            return _run_from_start(recorder, watch)
         record = read_record(folder, read_json if force else read_sealed)
         recorder.run_files = list_written_files(folder, record)
         refuse_links(folder, recorder.run_files)
         if force:
             refuse_foreign(folder, recorder.run_files)
-            return _run_from_start(recorder, progress, watch)
+            return _run_from_start(recorder, watch)
         _refuse_another(recorder, record)
         prepare(folder, recorder.run_files)
-        return _continue(recorder, record, progress, watch)
+        return _continue(recorder, record, watch)
 
 
 def origin_of(scene: str | Path, overrides: Sequence[str], unset: Sequence[str]) -> dict:
@@ -182,7 +175,7 @@ def _text(value: object) -> str:
     return "not set" if value is None else str(value)
 
 
-def resume(folder: str | Path, overrides: Sequence[str] = (), progress: Progress = ignore_progress,
+def resume(folder: str | Path, overrides: Sequence[str] = (),
            watch: Watch = DEFAULT_WATCH) -> str:
     """Resume the run in a folder, or make it longer; returns how it ended.
 
@@ -202,8 +195,8 @@ def resume(folder: str | Path, overrides: Sequence[str] = (), progress: Progress
         _warn_changed_file(recorder, watch)
         extended = _extended_scene(scene, overrides, str(folder / PROVENANCE))
         if extended == scene:
-            return _continue(recorder, record, progress, watch)
-        return _extend(recorder, extended, overrides, record, progress, watch)
+            return _continue(recorder, record, watch)
+        return _extend(recorder, extended, overrides, record, watch)
 
 
 def _extended_scene(scene: Scene, overrides: Sequence[str], file: str) -> Scene:
@@ -226,32 +219,18 @@ def _extended_scene(scene: Scene, overrides: Sequence[str], file: str) -> Scene:
 
 
 def _extend(recorder: Recorder, extended: Scene, overrides: Sequence[str], record: dict,
-                progress: Progress, watch: Watch) -> str:
+            watch: Watch) -> str:
     """Continue the run of this ``run.json`` to a later end; return how it ended."""
-    _require(extended, watch)
-    timing.reset()
-    changed = _find_changes(record, recorder, watch)
     earlier = [entry for entry in recorder.origin.get("set", []) if key_of(entry) != END]
     changes = [*earlier, *overrides]
-    changed[END] = [f"{scene.growth.end:g} h" for scene in (recorder.scene, extended)]
-    names: tuple[str, ...] = (checkpoint.NEWEST, checkpoint.PREVIOUS)
-    if recorder.has_last_state:
-        names = (checkpoint.LAST,)
-    with folder_errors(recorder.folder):
-        remove_temporary(recorder.folder)
-        is_restored = _restore(recorder, names, watch)
-    if is_restored and not same_rows(recorder.scene, extended, recorder.time):
-        recorder.forget()  # a longer run has rows at other times
-        is_restored = False
-    recorder.history.resumes.append({"time_h": recorder.time, "changed": changed})
-    if not is_restored:
+    if not _restore(recorder, extended, record, watch):
         recorder.scene = extended
         recorder.origin["set"] = changes
-        return _run_from_start(recorder, progress, watch)
+        return _run_from_start(recorder, watch)
     _warn(recorder, extended, recorder.first_velocity, watch)
     recorder.extend(extended, changes, ends_soon(extended, recorder.state))
     recorder.remove_later_fields()
-    return _record_run(recorder, steps(extended, recorder.state), progress, watch)
+    return _record_run(recorder, steps(extended, recorder.state), watch)
 
 
 def _warn_changed_file(recorder: Recorder, watch: Watch) -> None:
@@ -267,22 +246,15 @@ def _warn_changed_file(recorder: Recorder, watch: Watch) -> None:
                        f"{_describe(differing)}; the run continues with its own scene")
 
 
-def _continue(recorder: Recorder, record: dict, progress: Progress, watch: Watch) -> str:
+def _continue(recorder: Recorder, record: dict, watch: Watch) -> str:
     """Continue the run of this ``run.json`` unless it has finished; return how it ended."""
     if is_over(record["status"]) and _is_unchanged(recorder, record, watch):
         return _complete_finished_run(recorder, record, watch)
-    _require(recorder.scene, watch)
-    timing.reset()
-    changed = _find_changes(record, recorder, watch)
-    with folder_errors(recorder.folder):
-        remove_temporary(recorder.folder)
-        is_restored = _restore(recorder, (checkpoint.NEWEST, checkpoint.PREVIOUS), watch)
-    recorder.history.resumes.append({"time_h": recorder.time, "changed": changed})
-    if not is_restored:
-        return _run_from_start(recorder, progress, watch)
+    if not _restore(recorder, recorder.scene, record, watch):
+        return _run_from_start(recorder, watch)
     recorder.write_record(RUNNING)
     recorder.remove_later_fields()
-    return _record_run(recorder, steps(recorder.scene, recorder.state), progress, watch)
+    return _record_run(recorder, steps(recorder.scene, recorder.state), watch)
 
 
 def _is_unchanged(recorder: Recorder, record: dict, watch: Watch) -> bool:
@@ -291,8 +263,7 @@ def _is_unchanged(recorder: Recorder, record: dict, watch: Watch) -> bool:
     Raises OutputError if they are not and there is no checkpoint from which to resume.
     """
     damage = find_damage(recorder.folder, record)
-    names = (checkpoint.NEWEST, checkpoint.PREVIOUS)
-    if damage and not any(is_file(recorder.folder / name) for name in names):
+    if damage and not any(is_file(recorder.folder / name) for name in checkpoint.STATES):
         raise OutputError(f"{damage}; there is no checkpoint to resume from; run the scene again "
                           "with --force")
     if damage:
@@ -325,7 +296,29 @@ def _find_changes(record: dict, recorder: Recorder, watch: Watch) -> dict[str, l
     return changed
 
 
-def _restore(recorder: Recorder, names: Sequence[str], watch: Watch) -> bool:
+def _restore(recorder: Recorder, scene: Scene, record: dict, watch: Watch) -> bool:
+    """Restore the recorder to continue as the run of a scene, and record the resume.
+
+    Returns False if the run starts again from t = 0.
+    """
+    _require(scene, watch)
+    timing.reset()
+    changed = _find_changes(record, recorder, watch)
+    names: tuple[str, ...] = checkpoint.STATES
+    if scene != recorder.scene:
+        changed[END] = [f"{each.growth.end:g} h" for each in (recorder.scene, scene)]
+        names = (checkpoint.LAST,) if recorder.has_last_state else names
+    with folder_errors(recorder.folder):
+        remove_temporary(recorder.folder)
+        is_restored = _read_checkpoint(recorder, names, watch)
+    if is_restored and not same_rows(recorder.scene, scene, recorder.time):
+        recorder.forget()  # a longer run has rows at other times
+        is_restored = False
+    recorder.history.resumes.append({"time_h": recorder.time, "changed": changed})
+    return is_restored
+
+
+def _read_checkpoint(recorder: Recorder, names: Sequence[str], watch: Watch) -> bool:
     """Restore the recorder from the first valid checkpoint; warn of each refused one."""
     for name in names:
         path = recorder.folder / name
@@ -340,7 +333,7 @@ def _restore(recorder: Recorder, names: Sequence[str], watch: Watch) -> bool:
     return False
 
 
-def _run_from_start(recorder: Recorder, progress: Progress, watch: Watch) -> str:
+def _run_from_start(recorder: Recorder, watch: Watch) -> str:
     """Run from t = 0.
 
     The first state is solved before any file is written. Raises SceneError if it cannot be solved.
@@ -353,16 +346,15 @@ def _run_from_start(recorder: Recorder, progress: Progress, watch: Watch) -> str
         raise SceneError(f"{recorder.scene.name}: it cannot be run: {error}") from error
     recorder.write_record(RUNNING)
     recorder.clear()
-    return _record_run(recorder, chain([first], run_steps), progress, watch)
+    return _record_run(recorder, chain([first], run_steps), watch)
 
 
-def _record_run(recorder: Recorder, run_steps: ReportedSteps, progress: Progress,
-                watch: Watch) -> str:
+def _record_run(recorder: Recorder, run_steps: ReportedSteps, watch: Watch) -> str:
     """Run until the run ends, and write its status; return how it ended."""
     watch.tell({"event": "start", "scene": recorder.scene.name, "folder": str(recorder.folder),
                 "from_h": recorder.time, "end_h": recorder.end, "step": recorder.steps})
     try:
-        status = _simulate(recorder, run_steps, progress, watch)
+        status = _simulate(recorder, run_steps, watch)
     except SimulationError as error:
         message = SimulationError(f"{error}; {recorder.describe_last_state()}")
         _finish(recorder, f"{FAILED}{message}", watch)
@@ -386,8 +378,7 @@ def _finish(recorder: Recorder, status: str, watch: Watch) -> str:
     return status
 
 
-def _simulate(recorder: Recorder, run_steps: ReportedSteps, progress: Progress,
-              watch: Watch) -> str:
+def _simulate(recorder: Recorder, run_steps: ReportedSteps, watch: Watch) -> str:
     """Record every step from the recorder's state on; return how the run ended."""
     def check() -> None:
         if recorder.state and (number := watch.stop_within()):
@@ -395,7 +386,7 @@ def _simulate(recorder: Recorder, run_steps: ReportedSteps, progress: Progress,
 
     try:
         with polling(check):
-            _record_steps(recorder, run_steps, progress, watch)
+            _record_steps(recorder, run_steps, watch)
     except RunEnd as end:
         if not recorder.has_last_state:
             recorder.save_last_state()
@@ -407,8 +398,7 @@ def _simulate(recorder: Recorder, run_steps: ReportedSteps, progress: Progress,
     return COMPLETED
 
 
-def _record_steps(recorder: Recorder, run_steps: ReportedSteps, progress: Progress,
-                  watch: Watch) -> None:
+def _record_steps(recorder: Recorder, run_steps: ReportedSteps, watch: Watch) -> None:
     saved_at = perf_counter()
     for state, reported in run_steps:
         remeshes = recorder.remeshes
@@ -422,7 +412,6 @@ def _record_steps(recorder: Recorder, run_steps: ReportedSteps, progress: Progre
             recorder.save_last_state()
         if recorder.steps > steps_before:  # no row within a step
             _emit_step(recorder, recorder.remeshes > remeshes, recorder.contact > contact, watch)
-        progress(recorder.time)
         if number := watch.stop():
             raise interruption(recorder, number)
         if perf_counter() - saved_at >= watch.interval:

@@ -17,7 +17,7 @@ from pathlib import Path
 
 from repro.errors import OutputError, printable
 from repro.results.files import MOST_TABLE, WRITING, is_file, is_folder, read
-from repro.runs.checkpoint import LAST, NEWEST, PREVIOUS, REFUSED
+from repro.runs.checkpoint import LAST, REFUSED, STATES
 
 LOCK = ".lock"
 #: Seconds in which a lock without flock is taken over from a process that has ended.
@@ -26,7 +26,7 @@ PROVENANCE = "run.json"
 REPORT = "report.html"
 SUMS = "fields.sha256"
 #: Files that are removed when a run has finished.
-CHECKPOINTS = (NEWEST, PREVIOUS, REFUSED)
+CHECKPOINTS = (*STATES, REFUSED)
 #: Every file that a run may write, except its fields.
 RUN_FILES = (PROVENANCE, "timeseries.csv", "ledger.csv", "fields.pvd", "before_expansion.pvd", SUMS,
              REPORT, *CHECKPOINTS, LAST)
