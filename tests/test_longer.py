@@ -8,8 +8,9 @@ from repro import results
 from repro.cli import main
 from repro.errors import Interrupted
 from repro.march.simulation import ends_soon, steps
+from repro.preflight.simplifications import Caveat
 from repro.results import read_table
-from repro.runs import execution
+from repro.runs import execution, recorder
 from repro.runs.checkpoint import LAST, NEWEST, PREVIOUS
 from repro.runs.execution import Watch, resume, run
 from repro.scene import SceneError, load_scene
@@ -64,6 +65,16 @@ def test_a_longer_run_equals_an_uninterrupted_one(tmp_path, name, end):
     assert name != "paper" or resumes[0]["time_h"] >= end - 0.4 - 1e-9, "at most two steps are computed again"
     before = [end, 0.5 * (end + complete.growth.end)]
     assert [one["changed"]["growth.end"][0] for one in resumes] == [f"{time:g} h" for time in before]
+
+
+def test_a_longer_run_keeps_the_warning_about_its_surface(tmp_path, monkeypatch):
+    """The warning has the time at which the crease began."""
+    monkeypatch.setattr(recorder, "warn_surface", lambda pore: [Caveat("crease", f"from t = {pore.time:g} h on")])
+    run(scene("paper", 1.4), tmp_path)
+    resume(tmp_path, overrides=["growth.end=1.8 h"])
+    record = read_record(tmp_path)
+    assert record["resumes"][0]["time_h"] > 0
+    assert [entry["text"] for entry in record["warnings"] if entry["key"] == "crease"] == ["from t = 0 h on"]
 
 
 @pytest.mark.parametrize("after", [1, 3])

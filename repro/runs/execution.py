@@ -161,9 +161,9 @@ def _refuse_another(recorder: Recorder, record: dict) -> None:
             f"folder{longer}, or --force, which removes the files of that run")
 
 
-def _describe(differing: dict[str, list]) -> str:
+def _describe(differing: dict[str, list], earlier: str = "there") -> str:
     """List the first differing keys with both values, and the number of the others."""
-    pairs = [f"{key.removeprefix('tables.')} ({_text(before)} there, now {_text(after)})"
+    pairs = [f"{key.removeprefix('tables.')} ({_text(before)} {earlier}, now {_text(after)})"
              for key, (before, after) in differing.items()]
     more = f" and {len(pairs) - MOST_DESCRIBED} more" if len(pairs) > MOST_DESCRIBED else ""
     return ", ".join(pairs[:MOST_DESCRIBED]) + more
@@ -290,9 +290,9 @@ def _find_changes(record: dict, recorder: Recorder, watch: Watch) -> dict[str, l
     changed = {key: pair for key, pair in differences(before, after).items()
                if not key.startswith("conditions.threads")}
     if changed:
-        pairs = [f"{key} ({old} before, now {new})" for key, (old, new) in changed.items()]
-        watch.warn(f"{recorder.folder}: changed since the run began: {', '.join(pairs)}; the "
-                   "results may differ from those of an uninterrupted run")
+        watch.warn(f"{recorder.folder}: changed since the run began: "
+                   f"{_describe(changed, 'before')}; the results may differ from those of an "
+                   "uninterrupted run")
     return changed
 
 

@@ -18,9 +18,10 @@ class History:
     """Rows of the tables, ``(time in h, file)`` of the fields, their SHA-256, and counts.
 
     seconds: total wall time; stages: wall time by stage; resumes: when the run was resumed;
-    warnings: ``key`` of the scene and ``text`` of each simplification that does not hold; missed:
-    number of steps that do not meet the tolerance; worst: the largest of their error estimates;
-    missing: time (h) of each row that cannot be computed, and the reason.
+    warnings: ``key`` of the scene and ``text`` of each simplification that does not hold; surface:
+    the same of creases, and of positions at t = 0 that fold; missed: number of steps that do not
+    meet the tolerance; worst: the largest of their error estimates; missing: time (h) of each row
+    that cannot be computed, and the reason.
     """
 
     rows: Table = field(default_factory=list)
@@ -34,6 +35,7 @@ class History:
     stages: dict[str, float] = field(default_factory=dict)
     resumes: list[dict] = field(default_factory=list)
     warnings: list[dict[str, str]] = field(default_factory=list)
+    surface: list[dict[str, str]] = field(default_factory=list)
     missed: int = 0
     worst: float = 0.0
     missing: list[tuple[float, str]] = field(default_factory=list)

@@ -115,9 +115,9 @@ class Recorder:
 
     def find_crease(self) -> list[Caveat]:
         """Warn, and record the warning, when creases begin or positions at t = 0 first fold."""
-        earlier = {warning["key"] for warning in self.history.warnings}
+        earlier = {warning["key"] for warning in self.history.surface}
         new = [each for each in warn_surface(self.state.pore) if each.key not in earlier]
-        self.history.warnings += map(asdict, new)
+        self.history.surface += map(asdict, new)
         return new
 
     def _count_missed_tolerance(self, step_control: StepControl) -> None:
@@ -175,7 +175,7 @@ class Recorder:
         the fields, each checkpoint contains its own, and the page does not exist yet.
         """
         history = self._current_history()
-        warnings = history.warnings + [asdict(warning) for warning in self.warnings_so_far()]
+        warnings = [*history.warnings, *history.surface, *map(asdict, self.warnings_so_far())]
         files = self._files(is_over(status))
         record = {
             **results.provenance(self.scene), "conditions": self.conditions, "status": status,

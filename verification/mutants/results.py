@@ -33,7 +33,6 @@ SIZING = "tests/test_sizing.py::test_"
 FOLD = "tests/test_fold.py::test_"
 FORMER = "tests/test_former.py::test_"
 CHECKPOINT = "tests/test_checkpoint.py::test_"
-OVER = f"{FOLD}a_fold_ends_a_run"
 EXPECTED = f"{FOLD}check_expects_a_fold_of_a_starved_core"
 READERS = "tests/test_vtk.py::test_every_reader_reads_what_was_computed"
 
@@ -107,9 +106,9 @@ MUTANTS = (
         "repro/runs/recorder.py",
         ("crease-warned-again",
          "Every step on a creased surface gives a warning.",
-         'earlier = {warning["key"] for warning in self.history.warnings}',
+         'earlier = {warning["key"] for warning in self.history.surface}',
          "earlier = set()",
-         OVER),
+         "tests/test_longer.py::test_a_longer_run_keeps_the_warning_about_its_surface"),
         ("missing-row-counted-again",
          "A run that resumes within a step lists a missing row of this step twice.",
          "if state.missing and state.missing not in self.history.missing:",
