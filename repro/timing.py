@@ -68,10 +68,11 @@ def progress_bar(shown: bool, unit: str) -> Iterator[Callable[[float, float], No
         return
     from tqdm.auto import tqdm
 
-    with tqdm(total=1.0, unit=unit, bar_format=BAR) as bar:
+    with tqdm(total=1.0, unit=unit, bar_format=BAR, delay=1e-3) as bar:
         def show(reached: float, total: float) -> None:
             if total and total != bar.total:
                 bar.reset(total)
+                bar.initial = reached  # the rest gives the remaining time
             bar.n = reached if total else bar.total
             bar.refresh()
 

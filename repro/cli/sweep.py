@@ -18,7 +18,7 @@ from repro.runs.interrupts import on_first_signal
 from repro.runs.progress import say
 
 if TYPE_CHECKING:
-    from repro.sweeps.driver import Swept, Tell
+    from repro.sweeps.driver import Swept
 
 #: Exit status if some runs have failed.
 SOME_FAILED = 3
@@ -80,10 +80,13 @@ def call(options) -> int:
     """Make the sweep."""
     from repro.sweeps.driver import sweep
 
-    with _end_on_signals(options.command_line), _display_events(options.quiet) as tell:
+    on_terminal = sys.stderr.isatty()
+    with _end_on_signals(options.command_line):
         swept = sweep(options.scene, options.vary, options.out, options.set, unset=options.unset,
                       samples=options.samples, seed=options.seed, workers=options.workers,
-                      scheduler=options.scheduler, clogged=options.clogged, tell=tell)
+                      scheduler=options.scheduler, clogged=options.clogged,
+                      progress=on_terminal and not options.quiet,
+                      tell=None if on_terminal or options.quiet else _print_run)
     return _report(swept)
 
 
@@ -97,29 +100,6 @@ def _end_on_signals(command: str) -> Iterator[None]:
 
     with on_first_signal(end):
         yield
-
-
-@contextmanager
-def _display_events(quiet: bool) -> Iterator[Tell]:
-    """Show the progress of a sweep: nothing, a bar on a terminal, or a line for each run."""
-    if quiet or not sys.stderr.isatty():
-        yield _ignore_event if quiet else _print_run
-        return
-    from tqdm import tqdm
-
-    with tqdm(unit="run", delay=1e-3) as bar:
-        def tell(event: dict) -> None:
-            if event["event"] == "start":
-                bar.set_description_str(printable(event["scene"]), refresh=False)
-                bar.total = event["total"]
-                bar.initial = event["done"]
-            bar.n = event["done"]
-            bar.refresh()
-        yield tell
-
-
-def _ignore_event(event: dict) -> None:
-    """Ignore an event of a quiet sweep."""
 
 
 def _print_run(event: dict) -> None:

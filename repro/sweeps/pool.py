@@ -121,7 +121,7 @@ class Processes:
 def _start() -> subprocess.Popen:
     """Start a process with one thread. It imports nothing from the working folder."""
     package = str(Path(__file__).parents[2])
-    paths = [path for path in sys.path if os.path.abspath(path) != os.getcwd()]
+    paths = [path for path in map(str, sys.path) if os.path.abspath(path) != os.getcwd()]
     environment = os.environ | dict.fromkeys(THREADS, "1")
     environment["PYTHONPATH"] = os.pathsep.join([*paths, package])
     return subprocess.Popen([sys.executable, *COMMAND], env=environment, text=True,

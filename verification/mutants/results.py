@@ -1138,8 +1138,8 @@ MUTANTS = (
          "tests/test_sweep.py::test_every_option_of_the_command_has_its_effect"),
         ("sweep-ignores-clogged",
          "The command ignores --clogged.",
-         "clogged=options.clogged, tell",
-         "tell",
+         "scheduler=options.scheduler, clogged=options.clogged,",
+         "scheduler=options.scheduler,",
          "tests/test_sweep.py::test_every_option_of_the_command_has_its_effect")),
     *changes(
         "repro/sweeps/driver.py",
