@@ -48,7 +48,7 @@ def test_an_equilibrium_from_a_triangle_that_is_turned_over_fails_in_growth(geom
     J = body.strained(body.reference).J
     first = growth.Equilibrium(body.reference * [-1, 1], np.zeros(body.shape.corners), 0)
     system = growth.System(body, constrained, stabilisation=growth.STABILISATIONS[geometry].on(body, body.reference))
-    with pytest.raises(GrowthError, match=f"{OUT_OF_DOMAIN} .*; try"):
+    with pytest.raises(GrowthError, match=OUT_OF_DOMAIN):
         growth.reach(system, J, 1.1 * J, first, first.position)
 
 
