@@ -60,6 +60,7 @@ def node_imports(node, name):
     return []
 
 
+@cache
 def imported_names(source, name="here.module"):
     """Return the dotted names that a source imports anywhere in its text."""
     return {imported_name for node in ast.walk(ast.parse(source)) for imported_name in node_imports(node, name)}
@@ -85,6 +86,7 @@ def trespasses(sources):
             if not may_import(module, other)]
 
 
+@cache
 def at_run_time(source):
     """Return a source without the imports that only the type checker needs."""
     tree = ast.parse(source)

@@ -4,6 +4,7 @@ import inspect
 import io
 import pydoc
 from contextlib import redirect_stderr
+from functools import partial
 
 import numpy as np
 import pytest
@@ -66,7 +67,12 @@ def test_a_wrong_type_is_refused_by_the_name_of_its_argument(function, arguments
     assert list(tmp_path.iterdir()) == []
 
 
-def test_numbers_of_numpy_are_accepted():
+def test_numbers_and_arrays_of_numpy_are_accepted():
+    """An array is accepted where a list is, and a truth value of NumPy where one of Python is."""
+    changes, unset = np.array(["flow.mean_velocity=1 m/day"]), np.array(["flow.head"])
+    for call in (repro.check, partial(repro.solve, progress=np.bool_(False))):
+        assert call("flow_only", np.array(["pore.width=40 um"])) is not None
+    assert repro.load_scene("base", changes, unset=unset) == repro.load_scene("base", list(changes), unset=list(unset))
     assert repro.load_scene("base", unset=("flow.head",), overrides=("flow.mean_velocity=1 m/day",)).flow.head is None
     outline = np.array([[-5.0, 0], [0, 5], [5, 0]])
     assert next(repro.simulate("base", SHORT, shape=outline, unset=[])).pore.outline.thickness == pytest.approx(5)

@@ -9,6 +9,8 @@ from numbers import Integral, Real
 from types import NoneType, UnionType
 from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
+from repro.scene.units import without_numpy
+
 Function = TypeVar("Function", bound=Callable[..., Any])
 #: Kinds of numbers that an annotation stands for, NumPy's among them.
 NUMBERS: dict[object, type] = {float: Real, int: Integral}
@@ -19,19 +21,26 @@ LONGEST_VALUE = 60
 def typed(function: Function) -> Function:
     """Check the types of arguments by the annotations of their parameters.
 
-    The decorated function raises TypeError, in one line, for the first argument of a wrong type.
+    An array of NumPy is accepted as a list. The decorated function raises TypeError, in one line,
+    for the first argument of a wrong type.
     """
     parameters = tuple(inspect.signature(function).parameters)
     hints = cache(lambda: get_type_hints(function))
 
+    def checked(name: str, value: object) -> object:
+        if name not in hints() or _accepts(hints()[name], value):
+            return value
+        plain = without_numpy(value)
+        if plain is value or not _accepts(hints()[name], plain):
+            kinds = _words(hints()[name])
+            raise TypeError(f"{function.__name__}: {name}: {kinds} is needed, not {_short(value)}")
+        return plain
+
     @wraps(function)
     def call(*arguments, **keywords):
-        for name, value in (*zip(parameters, arguments), *keywords.items()):
-            if name in hints() and not _accepts(hints()[name], value):
-                kinds = _words(hints()[name])
-                raise TypeError(f"{function.__name__}: {name}: {kinds} is needed, not "
-                                f"{_short(value)}")
-        return function(*arguments, **keywords)
+        named = [checked(name, value) for name, value in zip(parameters, arguments)]
+        return function(*named, *arguments[len(named):],
+                        **{name: checked(name, value) for name, value in keywords.items()})
 
     return call  # type: ignore[return-value]  # it has the parameters of the function
 

@@ -412,7 +412,8 @@ def _equal_steps(scene, steps: int) -> np.ndarray:
     "coupling-midpoint-order", kind="property", mutants=("curved-rates-of-the-start", "midpoint-rates-of-the-start"),
     runs_with="fast",
     omitted="paper: coupling-midpoint-limit; accurate, exact: equal steps have no tolerance, as in fast")
-@pytest.mark.parametrize("elements", runs.ELEMENTS)
+@pytest.mark.parametrize("elements", [pytest.param(each, marks=pytest.mark.slow if each == "quadratic" else ())
+                                      for each in runs.ELEMENTS])
 def test_midpoint_order(elements, record):
     """The midpoint rule is of second order in time, with every kind of elements.
 
