@@ -302,7 +302,7 @@ def _defects(*changes: str) -> tuple[float, float]:
     for pore_of_flow in (grown, seed):
         fluid = traction.Fluid.of(scene)
         forces = traction.forces(fluid, traction.surroundings(fluid.meshing, seed, pore_of_flow), pore_of_flow)
-        supports = contact._supports(contact.Mechanics.of(scene), grown, forces)
+        supports = contact._supports(contact.Mechanics.of(scene), body, grown, forces)
         system = growth.System(body, constrained_dofs, stabilisation=stabilisation, forces=forces, supports=supports)
         defects.append(system.under(theta, place, place, pressure).defect)
     return tuple(defects)
