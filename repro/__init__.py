@@ -34,6 +34,7 @@ Errors: ``SceneError`` (a scene is refused), ``OutputError`` (a folder or file i
 Sections of the paper and their modules, which name the equations that they solve:
 
     section                    equations    module
+    3    the scheme                         repro.schemes.paper (.curved is not the paper's)
     Table 1, 2.1-2.3                        repro.scene: keys with unit, default, range and source
     3.2-3.4  finite elements                repro.fem.elements, .space, .assembly, .linear, .newton
     3.1  mesh                               repro.fem.outline, .sizing, .mesher, .mesh, .division
@@ -59,6 +60,7 @@ Sections of the paper and their modules, which name the equations that they solv
 
 Data flow:
 
+    repro.schemes     the paper's scheme and the curved one, side by side
     repro.scene       reads, checks and converts a .toml file to a Scene in um, h, mg/L, or refuses
                       it in one line (.files, .reading, .units, .rules; .text)
     repro.model.pore  makes the Pore at t = 0 from the Scene: outline, mesh, masses

@@ -57,13 +57,13 @@ def test_quasi_steady_concentrations_lie_between_zero_and_the_supply(scene, rich
     try:
         solved = solve(scene, pore)
     except Unresolved:
-        assert scene.numerics.order > 1
+        assert scene.numerics.scheme.order > 1
         event("unresolved")
         return
     ones = richness * np.ones(pore.space.count)
     guess = transport.Concentrations(*(supply * ones for supply in supplies(scene)))
     again = transport.steady(solved.problem, Sink(pore.active), guess)
-    low, high = (-1e-30, 1e-12) if scene.numerics.order == 1 else (-transport.UNRESOLVED, transport.OVERSHOOT)
+    low, high = (-1e-30, 1e-12) if scene.numerics.scheme.order == 1 else (-transport.UNRESOLVED, transport.OVERSHOOT)
     for field, other, supply in zip(*map(substrate_fields, (solved.concentrations, again)), supplies(scene)):
         assert field.min() >= low * supply and field.max() <= supply * (1 + high)
         assert other == pytest.approx(field, rel=1e-6, abs=1e-12 * supply)

@@ -17,7 +17,7 @@ from repro.march import loop
 from repro.march.balance import Ledger
 from repro.march.ends import CLOSE, nearest_end
 from repro.march.folding import most_compressed, refuse_density
-from repro.march.loop import Scheme
+from repro.march.loop import Stepping
 from repro.march.state import Compression, InterpolatedState, RestartState, StepResult
 from repro.march.step_control import StepControl
 from repro.model import contact
@@ -111,7 +111,7 @@ def continue_run(theta, advance, earlier=None):
     compression = most_compressed(Compression(), compressed(earlier or theta))
     start = RestartState(compressed(theta), StepControl(1.0), compression=compression)
     with pytest.raises((repro.Fold, SimulationError)) as ending:
-        rows.extend(instant for _, instant in loop.steps(plug(), Scheme(advance, None), start) if instant)
+        rows.extend(instant for _, instant in loop.steps(plug(), Stepping(advance, None), start) if instant)
     return ending.value, rows
 
 
@@ -203,7 +203,7 @@ def test_a_row_that_cannot_be_computed_is_left_out(failure, message):
         return multiplied(1.0, pore, within), solved, step_control
 
     start = RestartState(compressed(1.5), StepControl(1.0))
-    states = list(loop.steps(plug(), Scheme(advance, None), start))
+    states = list(loop.steps(plug(), Stepping(advance, None), start))
     missing = [state.missing for state, _ in states if state.missing]
     assert [time for time, _ in missing] == [4.6] and message in missing[0][1]
     assert [report.pore.time for _, report in states if report] == [6.0]

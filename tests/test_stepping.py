@@ -283,7 +283,7 @@ def test_a_shape_leans_as_the_flow_at_the_end_of_its_step_pushes(time):
     assert leans == pytest.approx([leans[0]] * 3, rel=1e-2) and leans[0] > 1e-4
 
 
-@pytest.mark.parametrize("scheme", [stepping.SCHEME, updates.SCHEME], ids=["midpoint", "updates"])
+@pytest.mark.parametrize("scheme", [stepping.STEPPING, updates.STEPPING], ids=["midpoint", "updates"])
 def test_the_solution_after_a_step_to_a_jump_is_that_before_it(scheme):
     """The ends of the model are judged with it, and then with the solution after the jump."""
     scene, pore = coarse_base(2, 'flow.head=[["0 h", "4e-3 cm"], ["0.2 h", "1e-3 cm"]]')

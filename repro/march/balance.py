@@ -121,17 +121,17 @@ def oxygen_demand(kinetics: Kinetics, ledger: Ledger) -> float:
 def refuse(limits: Limits, after: Pore, ledger: Ledger) -> None:
     """Raise BalanceError if a defect of the step that ends in ``after`` is larger than LARGEST.
 
-    Some options have known defects, which are reported and not refused: the substrates with
-    numerics.inlet = "mean" [E4] and the biomass with numerics.transfer = "linear" [E8]. The oxygen
-    demand has the limit of :func:`accepted_demand`.
+    Some schemes have known defects, which are reported and not refused: the substrates with the
+    printed inlet [E4] or carrier, and the biomass with interpolation [E8]. The oxygen demand has
+    the limit of :func:`accepted_demand`.
     """
-    numerics = limits.numerics
+    scheme = limits.numerics.scheme
     defects = {}
-    if numerics.inlet != "mean":
+    if scheme.conserves_substrates:
         for name, kind in limits.substrates.modelled.items():
             exchanged = _exchanged(limits, after, ledger, kind)
             defects[name] = substrate(ledger, ("acceptor", "donor").index(name), exchanged)
-    if numerics.transfer != "linear":
+    if scheme.conserves_biomass:
         defects["biomass"] = biomass(ledger)
     wrong = {name: part for name, part in defects.items() if not abs(part) <= LARGEST}
     demand = oxygen_demand(limits.kinetics, ledger)
@@ -154,7 +154,7 @@ def accepted_demand(limits: Limits, ledger: Ledger) -> float:
     most GEAR supply / K. The accepted defect is this part, and at least GEAR, of the turnover at
     the fastest rate (away from exhaustion at most 4e-4 is measured).
     """
-    if limits.numerics.time == "midpoint":
+    if limits.numerics.scheme.controls_error:
         return LARGEST
     kinetics = limits.kinetics
     scale = demand_scale(kinetics, ledger)

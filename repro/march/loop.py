@@ -45,8 +45,8 @@ from repro.scene import Growth, Scene
 
 
 @dataclass(frozen=True)
-class Scheme:
-    """Time-stepping scheme.
+class Stepping:
+    """How steps are made in time.
 
     advance(stages, pore, solved, step_control): makes one step, and returns its StepResult, the
     solution after it and the step control of the next one. The length of the step does not depend
@@ -66,7 +66,7 @@ class Scheme:
     ends: Callable[[Scene], Iterable[float]] = lambda _: ()
 
 
-def steps(scene: Scene, scheme: Scheme,
+def steps(scene: Scene, stepping: Stepping,
           state: RestartState | None = None) -> Iterator[tuple[RestartState, Report | None]]:
     """Yield the state after every step from t = 0 or ``state`` on, with a Report if one is due.
 
@@ -77,7 +77,7 @@ def steps(scene: Scene, scheme: Scheme,
     first = state is None
     with stopping(state.pore.time if state else 0.0):
         stages = Stages.of(scene)
-        first_step = StepControl(scheme.first * stages.growth.time_step)
+        first_step = StepControl(stepping.first * stages.growth.time_step)
         state = state or RestartState(contiguous(seeded(scene)), first_step)
         pore, solved = solve_graded(scene, state.pore)
         if first:
@@ -86,7 +86,7 @@ def steps(scene: Scene, scheme: Scheme,
             state = replace(state, pore=contiguous(pore))
     if first:
         yield state, initial_report(state, solved)
-    yield from _grow(stages, scheme, state, solved)
+    yield from _grow(stages, stepping, state, solved)
 
 
 def settle(stages: Stages, pore: Pore, solved: Solved) -> tuple[Pore, Solved]:
@@ -102,21 +102,21 @@ def settle(stages: Stages, pore: Pore, solved: Solved) -> tuple[Pore, Solved]:
     return solve_graded(stages.scene, contiguous(settled))
 
 
-def _grow(stages: Stages, scheme: Scheme, state: RestartState,
+def _grow(stages: Stages, stepping: Stepping, state: RestartState,
           solved: Solved) -> Iterator[tuple[RestartState, Report | None]]:
     """Yield the state after every step from ``state`` on, whose solution is ``solved``."""
     scene = stages.scene
     pore = replace(state.pore, concentrations=solved.concentrations)
     event = nearest_end(scene, pore, solved)
     requested = scene.requested_times
-    rows = row_times(scheme, scene)
+    rows = row_times(stepping, scene)
     limits = Limits.of(scene)
     bonded = stages.growth.wall == "bonded"
     shown = pore.mesh.topology
     while event.margin <= 0 and stages.growth.end - pore.time > SAME_TIME:
         try:
             with stopping(pore.time, bonded), folding(state.compression, state.time):
-                reached, control = _advance(stages, scheme, state, pore, solved, event.margin)
+                reached, control = _advance(stages, stepping, state, pore, solved, event.margin)
                 step = reached.step
                 balance.refuse(limits, step.pore, step.ledger)
                 refuse_density(step.pore, stages.remeshing.maximum_density)
@@ -154,7 +154,7 @@ def _grow(stages: Stages, scheme: Scheme, state: RestartState,
         raise event.end
 
 
-def _advance(stages: Stages, scheme: Scheme, state: RestartState, pore: Pore, solved: Solved,
+def _advance(stages: Stages, stepping: Stepping, state: RestartState, pore: Pore, solved: Solved,
              margin: float) -> tuple[Reached, StepControl]:
     """Make one step, or a shorter one to the first end of the model within it.
 
@@ -163,10 +163,10 @@ def _advance(stages: Stages, scheme: Scheme, state: RestartState, pore: Pore, so
     def reached(step: StepResult, after: Solved) -> Reached:
         return Reached(step, after, nearest_end(stages.scene, step.pore, after))
 
-    step, after, control = scheme.advance(stages, pore, solved, state.step_control)
+    step, after, control = stepping.advance(stages, pore, solved, state.step_control)
     full = reached(step, after)
     if full.event.margin > 0:
-        located = locate(lambda time: reached(*scheme.cut(stages, pore, solved, time)), pore.time,
+        located = locate(lambda time: reached(*stepping.cut(stages, pore, solved, time)), pore.time,
                          margin, full)
         return replace(located, step=replace(located.step, within=step.within)), control
     if stages.scene.jumps(step.pore.time):
@@ -193,10 +193,10 @@ def _row_within(stages: Stages, step: StepResult,
         return None, str(error)
 
 
-def row_times(scheme: Scheme, scene: Scene) -> tuple[float, ...]:
+def row_times(stepping: Stepping, scene: Scene) -> tuple[float, ...]:
     """Return the times (h) of rows after t = 0, ascending: those of [output], or the scheme's."""
     requested = scene.requested_times
-    return scheme.rows(scene.growing.growth) if requested is None else requested
+    return stepping.rows(scene.growing.growth) if requested is None else requested
 
 
 def _row_time_at(rows: tuple[float, ...], time: float) -> float | None:

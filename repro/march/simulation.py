@@ -1,4 +1,4 @@
-"""Run a scene with the scheme of its ``numerics.time``."""
+"""Run a scene with its scheme."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from repro.scene import Scene, Source, load_scene, parse_scene, scene_tables
 from repro.scene.arguments import typed
 
 if TYPE_CHECKING:
-    from repro.march.loop import Scheme
+    from repro.march.loop import Stepping
 
 #: Points (x, y), um.
 Shape = Sequence[tuple[float, float]] | np.ndarray
@@ -120,23 +120,23 @@ def row_times(scene: Scene) -> tuple[float, ...]:
     if scene.growth is None:
         return ()
     from repro.march import loop
-    return loop.row_times(_scheme(scene), scene)
+    return loop.row_times(_stepping(scene), scene)
 
 
 def rows_within(scene: Scene) -> set[float]:
     """Return the times (h) of rows that may lie within a step, not at a known end of one."""
     if scene.growth is None:
         return set()
-    return set(row_times(scene)) - {0.0, *_scheme(scene).ends(scene)}
+    return set(row_times(scene)) - {0.0, *_stepping(scene).ends(scene)}
 
 
-def _scheme(scene: Scene) -> Scheme:
-    """Return the scheme of ``numerics.time``."""
-    if scene.numerics.time == "updates":
-        from repro.march import updates
-        return updates.SCHEME
-    from repro.march import stepping
-    return stepping.SCHEME
+def _stepping(scene: Scene) -> Stepping:
+    """Return how the scheme of a scene makes its steps."""
+    if scene.numerics.scheme.controls_error:
+        from repro.march import stepping
+        return stepping.STEPPING
+    from repro.march import updates
+    return updates.STEPPING
 
 
 def steps(scene: Scene,
@@ -149,7 +149,7 @@ def steps(scene: Scene,
     if scene.growth is None:
         return _at_rest(scene, state)
     from repro.march import loop  # a scene without growth loads no part of it
-    return loop.steps(scene, _scheme(scene), state)
+    return loop.steps(scene, _stepping(scene), state)
 
 
 def _at_rest(scene: Scene,

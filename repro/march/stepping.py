@@ -1,4 +1,4 @@
-"""Steps as long as the growth allows (``numerics.time = "midpoint"``): second order in time.
+"""Steps as long as the growth allows (steps = "midpoint"): second order in time.
 
 The midpoint rule integrates (9)-(10) over a step with the rates of the shape half way. Euler's rule
 would use the rates at the start. ``numerics.tolerance`` bounds their difference, averaged over the
@@ -20,7 +20,7 @@ import numpy as np
 
 from repro.errors import RunEnd, StageError, Unresolved
 from repro.march import midpoint
-from repro.march.loop import Scheme, before_jump
+from repro.march.loop import Stepping, before_jump
 from repro.march.state import SAME_TIME, InterpolatedState, StepResult, contiguous
 from repro.march.step_control import (
     EXCESS,
@@ -203,4 +203,4 @@ def _end_at(step: StepResult, end: float) -> StepResult:
     return replace(step, pore=contiguous(replace(step.pore, time=end)))
 
 #: The midpoint rule. Without ``output.times`` it reports every step and the times of :func:`rows`.
-SCHEME = Scheme(_advance, _cut, rows, FIRST)
+STEPPING = Stepping(_advance, _cut, rows, FIRST)

@@ -16,7 +16,7 @@ from repro.errors import GrowthError, RunEnd
 from repro.march.balance import Ledger
 from repro.march.ends import refuse_outside
 from repro.march.folding import refuse_fold
-from repro.march.loop import Scheme, before_jump, time_before_end
+from repro.march.loop import Stepping, before_jump, time_before_end
 from repro.march.state import SAME_TIME, InterpolatedState, StepResult, contiguous
 from repro.march.step_control import StepControl
 from repro.model import biomass, gear, pore, substrates, transport
@@ -169,5 +169,5 @@ def _mean_flows(before: Sequence[Fluxes], after: Sequence[Fluxes], duration: flo
     return integrated(acceptor, donor)
 
 
-#: The paper's scheme.
-SCHEME = Scheme(_advance, _cut, ends=lambda scene: schedule(scene)[0])
+#: The paper's updates.
+STEPPING = Stepping(_advance, _cut, ends=lambda scene: schedule(scene)[0])

@@ -13,7 +13,9 @@ that conserves their sum, or by the paper's interpolation, which does not [E8].
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import TypeAlias
 
 import numpy as np
@@ -26,8 +28,6 @@ from repro.model.transport import Concentrations
 
 Amounts: TypeAlias = tuple[np.ndarray, ...]
 
-#: Transfers of densities at the nodes of straight triangles, by the values of numerics.transfer.
-METHODS = {"conserving": transfer.project, "linear": transfer.interpolated}
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,8 +61,8 @@ def transfer_amounts(method: str, old: Space, new: Space, at: Located, amounts: 
 
     Parameters
     ----------
-    method : {"conserving", "linear"}
-        Method of transfer for linear elements.
+    method : {"projection", "interpolation", "shares"}
+        Transfer of the scheme: of densities at the nodes of straight triangles, or of shares.
     old, new : Space
     at : Located
         The nodes of the new mesh's aggregate in the old mesh.
@@ -78,14 +78,13 @@ def transfer_amounts(method: str, old: Space, new: Space, at: Located, amounts: 
 
     Notes
     -----
-    With quadratic elements the new mesh has the density X_m everywhere, which removes the error of
-    J = theta within a triangle. Each amount keeps its share of the biomass and its sum.
+    With shares the new mesh has the density X_m everywhere, which removes the error of J = theta
+    within a triangle. Each amount keeps its share of the biomass and its sum.
     """
-    return TRANSFERS[old.order](method, old, new, at, amounts, density)
+    return TRANSFERS[method](old, new, at, amounts, density)
 
 
-def _by_shares(method: str, old: Space, new: Space, at: Located, amounts: Amounts,
-               density: float) -> Amounts:
+def _by_shares(old: Space, new: Space, at: Located, amounts: Amounts, density: float) -> Amounts:
     """Transfer the shares of the biomass; the new mesh has the density X_m everywhere."""
     total = amounts[0] + amounts[1]
     shares = np.column_stack([old.integration.to_nodes(amount / total)
@@ -99,13 +98,14 @@ def _by_shares(method: str, old: Space, new: Space, at: Located, amounts: Amount
     return (masses * (1 - inert), masses * inert, *rest)
 
 
-def _by_densities(method: str, old: Space, new: Space, at: Located, amounts: Amounts,
-                  density: float) -> Amounts:
-    """Transfer amounts as densities at the nodes of straight triangles, by ``method``."""
+def _by_densities(carried: Callable[..., np.ndarray], old: Space, new: Space, at: Located,
+                  amounts: Amounts, density: float) -> Amounts:
+    """Transfer amounts as densities at the nodes of straight triangles, by a function of
+    :mod:`repro.fem.transfer`."""
     old_nodes = old.reaction.cells[:, 0]
     new_nodes = new.reaction.cells[:, 0]
     densities = np.column_stack([amount[:, 0] / old.reaction.dx[:, 0] for amount in amounts])
-    projected = METHODS[method](
+    projected = carried(
         old.mesh.points[old_nodes], old.mesh.straight.topology.body_cells, densities,
         new.mesh.points[new_nodes], new.mesh.straight.topology.body_cells)
     return tuple(column[:, None] * new.reaction.dx for column in projected.T)
@@ -125,5 +125,9 @@ def _conserved(share: np.ndarray, weight: np.ndarray, total: float) -> np.ndarra
     return share + deficit / room * share * (1 - share) if abs(deficit) < room else share
 
 
-#: Transfers by the order of the functions.
-TRANSFERS = {1: _by_densities, 2: _by_shares}
+#: By the scheme's transfer.
+TRANSFERS: dict[str, Callable[..., Amounts]] = {
+    "projection": partial(_by_densities, transfer.project),
+    "interpolation": partial(_by_densities, transfer.interpolated),
+    "shares": _by_shares,
+}

@@ -277,7 +277,7 @@ def _equilibrium(mechanics: Mechanics, grown: Pore, start: Pore, forces: np.ndar
     rest = growth.equilibrium(body, target_J, start.mesh.points[nodes], start.pressure[inside],
                               locked, target, forces=forces, last=last, patient=patient,
                               supports=_supports(mechanics, body, start, forces),
-                              modified_newton=mechanics.numerics.jacobian == "reused")
+                              modified_newton=mechanics.numerics.scheme.modified_newton)
     return _placed(grown, start, rest), rest.iterations
 
 

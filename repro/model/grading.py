@@ -32,7 +32,7 @@ def grade(scene: Scene, pore: Pore) -> Pore | None:
     """The same pore on elements half as large at the aggregate; None if they may not be halved
     again."""
     front = 2 * pore.front
-    if not scene.numerics.follows_layers or front > MOST_GRADED:
+    if not scene.numerics.scheme.follows_layers or front > MOST_GRADED:
         return None
     if pore.time == 0:
         return seeded(scene, front)

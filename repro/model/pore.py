@@ -178,7 +178,7 @@ def resolution(scene: Scene) -> float:
     The speed is the scene's mean velocity, or that of the clean channel under its head. Raises
     MeshError if no mesh resolves the layers.
     """
-    if not (scene.numerics.follows_layers and scene.flow and scene.substrates):
+    if not (scene.numerics.scheme.follows_layers and scene.flow and scene.substrates):
         return scene.numerics.refinement
     layers = BOUNDARY_LAYER * _largest_peclet(scene) ** (1 / 3)
     if layers > FINEST_LAYERS:
@@ -277,7 +277,7 @@ class Meshing:
         ends = sizing.meshed_extent(outline, self.channel.width, self.channel.length, is_full)
         method = Method(numerics.solver)
         sizes = replace(self.sizes, front=front)
-        return mesher.generate(outline, ends, sizes, numerics.order, method)
+        return mesher.generate(outline, ends, sizes, numerics.scheme.order, method)
 
 
 def initial_outline(scene: Scene, front: float = 1.0) -> Outline | None:
@@ -285,7 +285,7 @@ def initial_outline(scene: Scene, front: float = 1.0) -> Outline | None:
     seed = scene.aggregate
     if seed is None:
         return None
-    geometry = scene.numerics.order
+    geometry = scene.numerics.scheme.order
     if seed.radius is None:
         return polygon(np.array(seed.outline), scene.pore.width, geometry, seed.smooth,
                        size_at_tips(scene.numerics, scene.pore.width),
@@ -296,7 +296,7 @@ def initial_outline(scene: Scene, front: float = 1.0) -> Outline | None:
 
 def size_at_tips(numerics: Numerics, width: float) -> float:
     """Length (um) of the edges at an outline's tips, in a pore of a width (um)."""
-    finest = min(AT_TIPS[numerics.order] * numerics.refinement**2, MOST_AT_TIPS)
+    finest = min(AT_TIPS[numerics.scheme.order] * numerics.refinement**2, MOST_AT_TIPS)
     return width / finest
 
 

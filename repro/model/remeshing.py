@@ -42,7 +42,8 @@ class Remeshing:
     def of(cls, scene: Scene) -> Remeshing:
         """The remeshing of a scene with growth."""
         substrates, kinetics, _ = scene.growing
-        return cls(Meshing.of(scene), scene.numerics.transfer, kinetics.maximum_density, substrates)
+        return cls(Meshing.of(scene), scene.numerics.scheme.transfer, kinetics.maximum_density,
+                   substrates)
 
 
 @dataclass(frozen=True, eq=False)

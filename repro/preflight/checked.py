@@ -118,7 +118,7 @@ def _mesh_size(scene: Scene, estimated: bool) -> tuple[int, int]:
     """Nodes and triangles of the first mesh."""
     if estimated:
         nodes = round(first_nodes(scene))
-        return nodes, round(nodes / PER_TRIANGLE[scene.numerics.order])
+        return nodes, round(nodes / PER_TRIANGLE[scene.numerics.scheme.order])
     mesh = pore.seeded(scene).mesh
     return len(mesh.points), len(mesh.biomass)
 

@@ -133,7 +133,7 @@ def steps(scene: Scene) -> tuple[int, int]:
 
 def longest_step(scene: Scene) -> float:
     """The longest expected step (h)."""
-    if scene.numerics.time == "updates":
+    if not scene.numerics.scheme.controls_error:
         return scene.growth.time_step
     rate = abs(numbers.fastest_growth(scene.largest))
     allowed = ALLOWED * math.sqrt(scene.numerics.tolerance / 0.01)

@@ -106,7 +106,7 @@ def _nodes(scene: Scene, thickness: float, extent: float,
         largest = min([largest, *(size for size, _ in surface)])
     corners = length * pore.width / (HEXAGON * largest**2) + 2 * (length + pore.width) / largest
     corners += sum(_graded(piece, near, largest, numerics.gradation) for near, piece in surface)
-    return float(corners) * (PER_CORNER if numerics.order == 2 else 1.0)
+    return float(corners) * (PER_CORNER if numerics.scheme.order == 2 else 1.0)
 
 
 def _graded(surface: float, near: float, largest: float, gradation: float) -> float:

@@ -131,11 +131,11 @@ def _numerics(scene: Scene) -> Iterator[str]:
     numerics = scene.numerics
     yield f"preset {numerics.preset}"
     yield {"linear": "linear triangles (3.2-3.4)",
-           "quadratic": "quadratic curved triangles"}[numerics.elements]
+           "quadratic": "quadratic curved triangles"}[numerics.scheme.elements]
     yield f"refinement {numerics.refinement:g}"
     if scene.growth:
         yield (f"a shape update every {60 * scene.growth.time_step:.4g} min"
-               if numerics.time == "updates" else
+               if not numerics.scheme.controls_error else
                f"midpoint steps, tolerance {numerics.tolerance:g}")
         yield f"biomass to new meshes: {numerics.transfer} [E8]"
 

@@ -93,7 +93,7 @@ def _inertia(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
 
 def _cells(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
     cell = computed["cell Peclet"].start
-    if scene.numerics.elements == "linear" and cell > CELL_PECLET:
+    if not scene.numerics.scheme.follows_layers and cell > CELL_PECLET:
         required = scene.numerics.refinement * cell / CELL_PECLET
         yield Caveat("numerics.refinement", f"the cell Peclet number is {cell:.2g}, above "
                      f"{CELL_PECLET:g}: linear elements may overshoot where concentrations are "
@@ -179,7 +179,7 @@ def _support(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
 
 def _fronts(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
     thickness = numbers.at_end(scene).thickness
-    nodes = _interface_size(scene) / scene.numerics.order
+    nodes = _interface_size(scene) / scene.numerics.scheme.order
     for uptake in numbers.uptakes(scene):
         layer = uptake.layer
         if uptake.law.sharp:
@@ -242,7 +242,7 @@ def _resolving(refinement: float) -> str:
 def _seed_film(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
     gap = scene.pore.width - numbers.at_start(scene).thickness
     share = min(1.0, gap / film(scene))
-    nodes = sizing.ACROSS_FILM * scene.numerics.refinement * share * scene.numerics.order
+    nodes = sizing.ACROSS_FILM * scene.numerics.refinement * share * scene.numerics.scheme.order
     if nodes < ACROSS_FILM:
         key = "aggregate.radius" if scene.aggregate.outline is None else "aggregate.outline"
         yield Caveat(key, f"the film over the seed, {gap:.2g} um, spans only "
@@ -267,7 +267,7 @@ def _ends(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
 
 def _steps(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
     grown = numbers.fastest_growth(scene) * scene.growth.time_step
-    if scene.numerics.time == "updates" and grown > GROWTH_IN_A_STEP:
+    if not scene.numerics.scheme.controls_error and grown > GROWTH_IN_A_STEP:
         yield Caveat("growth.time_step", f"the aggregate grows by {100 * grown:.2g} % in a shape "
                      f"update, above {100 * GROWTH_IN_A_STEP:g} %: it uses the rates at "
                      'its start; choose a shorter one, or numerics.time = "midpoint"')

@@ -20,7 +20,7 @@ from repro.scene.units import alike
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 #: The packages that compute the numbers of a run.
-ROOMS = ("scene", "fem", "model", "march", "results")
+ROOMS = ("schemes", "scene", "fem", "model", "march", "results")
 #: A comment, or a string, which may look like one. Each alternative begins with a fixed character.
 REMARK = re.compile(r"""
     \#[^\n]*

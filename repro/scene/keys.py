@@ -50,6 +50,7 @@ from repro.scene.units import (
     timed_quantity,
     units_of,
 )
+from repro.schemes import CURVED, PAPER, Scheme
 
 __all__ = ["Scene", "SceneError", "load_scene", "packaged_scenes", "parse_scene", "scene_hash",
            "scene_tables"]
@@ -368,15 +369,13 @@ class Numerics:
         "fresh", "reused", source=NOT_IN_PAPER,
         about="Newton's derivative: new in every iterate, or kept while the iterates converge fast")
 
-    @property
-    def order(self) -> int:
-        """1: linear elements on straight triangles; 2: quadratic ones on curved triangles."""
-        return 1 if self.elements == "linear" else 2
-
-    @property
-    def follows_layers(self) -> bool:
-        """Are elements refined at boundary layers and fronts? Linear ones, the paper's, are not."""
-        return self.elements != "linear"
+    @cached_property
+    def scheme(self) -> Scheme:
+        """The scheme of these keys."""
+        scheme = PAPER if self.elements == "linear" else CURVED
+        transfer = "interpolation" if self.transfer == "linear" else scheme.transfer
+        return replace(scheme, steps=self.time, inlet=self.inlet, transfer=transfer,
+                       modified_newton=self.jacobian == "reused")
 
 
 #: Changes of each preset to the defaults above: until contact errors of about 1 %, of about 0.1 %,

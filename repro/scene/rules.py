@@ -228,7 +228,7 @@ def _biomass_rules(scene: "Scene", drive: "Flow") -> Rules:
     yield drag and scene.aggregate is None, {
         "flow.permeability": "[aggregate] is needed with it: it is that of the biomass"}
     requirement = f'"quadratic" is needed with {permeable}'
-    yield drag and scene.numerics.order == 1, {
+    yield drag and scene.numerics.scheme.order == 1, {
         "flow.permeability": 'numerics.elements = "quadratic" is needed with it',
         "numerics.elements": requirement,
         "numerics.preset": f'numerics.elements = {requirement}',
@@ -346,7 +346,7 @@ def _numerics_rules(scene: "Scene") -> Rules:
     }
     transfer = scene.numerics.transfer
     other = f'numerics.transfer = "conserving" is needed with it, not "{transfer}"'
-    yield scene.numerics.order > 1 and transfer != "conserving", {
+    yield scene.numerics.scheme.order > 1 and transfer != "conserving", {
         "numerics.transfer": f'"conserving" is needed {_with_elements(scene)}; "linear" has others',
         **_element_keys(other),
     }

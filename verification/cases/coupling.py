@@ -49,7 +49,7 @@ def test_no_growth(changes, record):
     record(at_most("arrays that differ", differing, 0.0, "nothing changes: bit for bit"),
            at_most("X_A", runs.density_drift(scene, last), 1e-14, "(34) multiplies and divides by the same areas"),
            at_most("C over the supply, less 1", _lack(last),
-                   *(LINEAR_BOUND if scene.numerics.order == 1 else HIGHER_BOUND)))
+                   *(LINEAR_BOUND if scene.numerics.scheme.order == 1 else HIGHER_BOUND)))
 
 
 def _lack(instant: Report) -> float:
@@ -86,7 +86,7 @@ def test_clean_channel(changes, record):
 
     Record the order of linear elements, and the errors of the others.
     """
-    if load_scene("base", changes).numerics.order > 1:
+    if load_scene("base", changes).numerics.scheme.order > 1:
         error, lack = _clean(*changes)
         record(at_most("mean velocity", error, 1e-9, PARABOLA))
     else:
@@ -301,7 +301,7 @@ FIRST_ORDER = ('substrates.acceptor.half_saturation="1e-9 mg/L"', 'substrates.do
 def _lopsided(sign: float, *changes: str) -> dict[str, float]:
     """Conductivity, and C at the outlet and the inlet, with uptake of first order."""
     scene = load_scene("base", (*changes, *FIRST_ORDER))
-    scene = shaped(scene, _outline(sign, 80 * scene.numerics.order))
+    scene = shaped(scene, _outline(sign, 80 * scene.numerics.scheme.order))
     solved = pore.solve(scene, pore.seeded(scene))
     donor = solved.fluxes[1]
     return {"conductivity": solved.flow.conductivity, "effluent": donor.effluent, "inlet": donor.inlet}

@@ -93,7 +93,7 @@ def test_density_restored(changes, record):
 
     Record the order of linear elements, and the errors of the others.
     """
-    if runs.base("1 h", *changes).numerics.order > 1:
+    if runs.base("1 h", *changes).numerics.scheme.order > 1:
         error, area = _restored(*changes)
         record(at_most("density", error, 1e-10,
                        "the masses of a new mesh are X_m, and J = theta in each point that the elements allow"))
@@ -317,9 +317,9 @@ def test_wedge(changes, record):
     Norm: one step from a disc of 20 um that stands on a chord, the fluid under it at 8 degrees.
     """
     scene = runs.base("0.2 h", *changes)
-    instants = list(simulate(scene, shape=_disc(20.0, 19.8, 60 * scene.numerics.order)))
+    instants = list(simulate(scene, shape=_disc(20.0, 19.8, 60 * scene.numerics.scheme.order)))
     gaps = [_narrowest(scene, instant.pore, BOTTOM) for instant in instants]
-    error = CLOSE if scene.numerics.order == 2 else 1e-9
+    error = CLOSE if scene.numerics.scheme.order == 2 else 1e-9
     record(at_most("narrowest gap over the least allowed, seed", gaps[0], 0.9, "8 degrees are under 16.7"),
            at_least("the same after a step", gaps[1], 1 - error,
                     "2 um, or 16.7 degrees beside contact; on arcs the search ends at a clearance of CLOSE"),

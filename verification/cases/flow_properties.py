@@ -41,7 +41,7 @@ def _around(radius: float, elements: int | str, lean: float = 0.0, reach: float 
         scene = scene_around(radius, elements)
         if not lean:
             return pore.seeded(scene).space
-        order, refinement = scene.numerics.order, scene.numerics.refinement
+        order, refinement = scene.numerics.scheme.order, scene.numerics.refinement
     return Space(meshes.half_disc(radius, refinement, (-reach, reach), WIDTH, geometry=order, lean=lean))
 
 

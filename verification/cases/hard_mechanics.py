@@ -168,7 +168,7 @@ def wedge(angle: float, geometry: int) -> Outline:
 
 def least_angle(preset: str) -> list:
     """The stage alone: sides that join the wall a tenth of a degree under and over the least angle."""
-    kind = hard.load("wide", preset).numerics.order
+    kind = hard.load("wide", preset).numerics.scheme.order
     under, over = (_sides(wedge(angle, kind)) for angle in (LEAST - UNDER, LEAST + UNDER))
     return [at_least("sides that join, a tenth of a degree under", sum(under), 2, "2.3.3: the wedge closes"),
             at_most("sides that join, a tenth of a degree over", sum(over), 0, "2.3.3: it stays")]
@@ -195,7 +195,7 @@ def in_a_wedge(preset: str) -> list:
 
 def _loss(scene: Scene) -> float:
     """Loss over the meshed part, 1/um."""
-    grid, _ = pore.Meshing.of(scene).generate(wedge(LEAST, scene.numerics.order))
+    grid, _ = pore.Meshing.of(scene).generate(wedge(LEAST, scene.numerics.scheme.order))
     return flow.unit_flow(Space(grid), scene.flow.viscosity_ratio).loss
 
 

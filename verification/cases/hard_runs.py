@@ -97,7 +97,7 @@ def cocircular(preset: str) -> list:
 def _mesh_and_loss(scene: Scene, noise: float) -> tuple[Mesh, float]:
     """(mesh, head loss) around a half-disc of 20 um with noise on its nodes."""
     numerics = scene.numerics
-    shape = half_disc(20.0, sizing.ACROSS_AGGREGATE * numerics.refinement, numerics.order)
+    shape = half_disc(20.0, sizing.ACROSS_AGGREGATE * numerics.refinement, numerics.scheme.order)
     free = shape.wall == FREE
     points = shape.points.copy()
     points[free] += 20.0 * noise * np.random.default_rng(7).uniform(-1, 1, (free.sum(), 2))
@@ -275,7 +275,7 @@ def _first_step(preset: str, *changes: str) -> tuple[Run, StepResult]:
 def huge(preset: str) -> list:
     """One step of 6 min with 1e5 nodes, against the mesh of the preset."""
     run, own_step = _first_step(preset)
-    fine_preset, refinement = HUGE[run.scene.numerics.order]
+    fine_preset, refinement = HUGE[run.scene.numerics.scheme.order]
     fine, fine_step = _first_step(fine_preset, f"numerics.refinement={refinement}")
     outlines = [step.pore.outline for step in (own_step, fine_step)]
     shapes = [(outline.area, outline.thickness, outline.upstream) for outline in outlines]

@@ -132,7 +132,7 @@ def slab_front(preset: str) -> list:
     end, width = HALF + FILM, 1.5 * size
     scene = hard.load("wide", preset, *SHARP, 'kinetics.decay_coefficient="0 1/d"',
                         "kinetics.acceptor_to_donor_ratio=1e-9")
-    space = meshes.space_on(meshes.plug((-end, end), width, HALF, size, seed=1), scene.numerics.order)
+    space = meshes.space_on(meshes.plug((-end, end), width, HALF, size, seed=1), scene.numerics.scheme.order)
     donor, depth = scene.substrates.donor, DEPTH * HALF
     ratio = donor.diffusivity_in_aggregate / donor.diffusivity
     sink = donor.supply * donor.diffusivity_in_aggregate / (depth**2 / 2 + FILM * ratio * depth)
@@ -316,7 +316,7 @@ def plugged(preset: str, size: float) -> Iterator[Check]:
     """The stage alone: biomass from wall to wall, lambda = 2000, elements of W / 4 and W / 7."""
     grid = meshes.plug(ENDS, WIDTH, PLUG, size, seed=3)
     exact = 12 / WIDTH**2 * (ENDS[1] - ENDS[0] + 1999 * 2 * PLUG)
-    space = meshes.space_on(grid, hard.load("wide", preset).numerics.order)
+    space = meshes.space_on(grid, hard.load("wide", preset).numerics.scheme.order)
     solution = flow.unit_flow(space, 2000.0)
     flux = meshes.section_means(space, solution.velocity[:, 0], SECTIONS, 64)
     leak, lost, origin = LEAK[size] if space.order == 1 else EXACT

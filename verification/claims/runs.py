@@ -368,8 +368,8 @@ def half_disc(scene, radius: float, reach: float) -> Mesh:
     """The mesh around a half-disc, to the distance ``reach`` (um) on both sides, or to the pore's ends."""
     end = min(radius + reach, scene.pore.length / 2)
     numerics = scene.numerics
-    outline = seed(radius, ACROSS_AGGREGATE * numerics.refinement, numerics.order)
-    return mesher.generate(outline, (-end, end), pore.sized(scene), numerics.order)[0]
+    outline = seed(radius, ACROSS_AGGREGATE * numerics.refinement, numerics.scheme.order)
+    return mesher.generate(outline, (-end, end), pore.sized(scene), numerics.scheme.order)[0]
 
 
 def plug(scene, first: float, last: float) -> Mesh:

@@ -1731,8 +1731,8 @@ MUTANTS = (
          f"{GUARDS}a_leak_below_the_tolerance_passes_and_a_larger_one_is_refused"),
         ("printed-inlet-excuses-biomass",
          "With the printed inlet the balance of biomass is not checked.",
-         'if numerics.transfer != "linear":',
-         'if numerics.transfer != "linear" and numerics.inlet != "mean":',
+         'if scheme.conserves_biomass:',
+         'if scheme.conserves_biomass and scheme.inlet != "mean":',
          f"{GUARDS}a_stated_defect_lets_no_other_one_pass")),
     *changes(
         "repro/runs/recorder.py",
