@@ -34,7 +34,6 @@ Errors: ``SceneError`` (a scene is refused), ``OutputError`` (a folder or file i
 Sections of the paper and their modules, which name the equations that they solve:
 
     section                    equations    module
-    3    the scheme                         repro.schemes.paper (.curved is not the paper's)
     Table 1, 2.1-2.3                        repro.scene: keys with unit, default, range and source
     3.2-3.4  finite elements                repro.fem.elements, .space, .assembly, .linear, .newton
     3.1  mesh                               repro.fem.outline, .sizing, .mesher, .mesh, .division

@@ -18,6 +18,7 @@ from repro.fem.sizing import Sizing
 from repro.fem.space import Space
 from repro.model import contact, pore
 from repro.scene import load_scene, parse_scene
+from repro.schemes import PAPER
 
 LENGTH = 600.0
 VISCOSITY, DIFFUSIVITY = 2.84e-5, 1e8 / 24  # nu_water / g in um h; 1 cm2/d in um2/h
@@ -108,18 +109,17 @@ def scenes(draw, drives=("none", "head", "mean_velocity"), peclet=3.0, thiele=30
                      "degradable_fraction": draw(st.floats(0.0, 1.0)),
                      "maximum_density": f"{density!r} mg/L"},
         "growth": {"end": f"{step * draw(st.integers(1, steps))!r} min", "time_step": f"{step!r} min"},
-        "numerics": {"preset": "paper", "refinement": draw(st.floats(0.4, 0.7)),
-                     "transfer": draw(st.sampled_from(["conserving", "linear"]))},
+        "numerics": {"preset": "paper", "refinement": draw(st.floats(0.4, 0.7))},
     }
-    kind = draw(st.sampled_from(elements))
-    if kind != "linear":
-        tables["numerics"] |= {"elements": kind, "transfer": "conserving"}
+    transfer, kind = draw(st.sampled_from(["projection", "interpolation"])), draw(st.sampled_from(elements))
+    scheme = replace(PAPER, transfer=transfer) if kind == "linear" and transfer != PAPER.transfer else None
+    tables["numerics"] |= {"elements": kind}
     drive, speed = draw(st.sampled_from(drives)), draw(between(0.01, 1.0)) * peclet * slowest * DIFFUSIVITY / width
     if drive != "none":
         value = speed if drive == "mean_velocity" else 12 * VISCOSITY * length * speed / width**2
         tables["flow"] = {drive: f"{value!r} {'um' if drive == 'head' else 'um/h'}",
                           "viscosity_ratio": draw(between(1.0, 1e4))}
-    return parse_scene(tables, "drawn", "drawn")
+    return parse_scene(tables, "drawn", "drawn", scheme=scheme)
 
 
 @st.composite

@@ -19,6 +19,7 @@ from repro.scene import load_scene
 from tests import oracles
 from tests.strategies import EVERY_ORDER, ORDERS, between, scenes, share
 from tests.test_derived import integrate_over_end, total_uptake
+from verification.problems.schemes import exchange, exchanged
 
 ANY_ORDER = tuple(ORDERS.values())
 
@@ -109,7 +110,7 @@ def assert_ledgers_close(scene, instants):
         assert ledger.biomass_before == pytest.approx(mass(last.pore), rel=1e-13)
         assert ledger.biomass_made == pytest.approx(mass(instant.before[0]) - ledger.biomass_before,
                                                  abs=1e-13 * ledger.biomass_before)
-        if scene.numerics.transfer == "conserving" or not instant.remeshes:
+        if scene.numerics.scheme.conserves_biomass or not instant.remeshes:
             assert ledger.biomass_after == pytest.approx(ledger.biomass_before + ledger.biomass_made, rel=1e-12)
         assert ledger.biomass_after == pytest.approx(mass(instant.pore), rel=1e-13)
 
@@ -147,8 +148,8 @@ def assert_demand(kinetics, ledger, part, round_off):
 @given(scenes(elements=ANY_ORDER))
 def test_the_oxygen_demand_of_the_midpoint_rule_closes_to_round_off(scene):
     """This holds in each step of any scene, because uptake and growth are one integral over the step's mean biomass."""
-    numerics = replace(scene.numerics, time="midpoint", transfer="conserving", tolerance=0.05)
-    for instant in resolved_instants(replace(scene, numerics=numerics)):
+    closing = exchanged(scene, exchange(elements=scene.numerics.elements, steps="midpoint"))
+    for instant in resolved_instants(replace(closing, numerics=replace(closing.numerics, tolerance=0.05))):
         for ledger in instant.ledgers:
             assert_demand(scene.kinetics, ledger, 2e-10, 4e-16)
             assert ledger.biomass_after == pytest.approx(ledger.biomass_before + ledger.biomass_made, rel=1e-9)

@@ -15,10 +15,10 @@ from repro.model import adhesion, pore
 from repro.report import quantities
 from repro.report.reading import Run
 from repro.results.names import KNOWN
-from repro.scene import load_scene
 from tests import oracles
 from tests.pages import AXES, CHARTS, LEDGERS
 from tests.strategies import EVERY_ORDER, MIRRORS, ORDERS, arrays_of, rate_constants
+from verification.problems.schemes import exchange, load_scene
 
 #: An outline that leans upstream and touches the upper wall of a pore of 20 um after some minutes.
 SHAPE = [(-21, 0), (-19, 9), (-12, 17), (-4, 19.2), (3, 18.6), (12, 12), (16, 5), (17, 0)]
@@ -637,7 +637,7 @@ def test_a_leak_in_the_middle_of_three_steps_is_reported_with_its_sign(column, l
 def test_mass_lost_by_a_new_mesh_is_not_production(time):
     """The mass that interpolation loses is a defect of the biomass and no negative production, as the oxygen demand
     shows. Linear elements interpolate masses [E8]."""
-    scene = load_scene("base", ["numerics.refinement=0.5", "numerics.transfer=linear", f"numerics.time={time}",
+    scene = load_scene("base", ["numerics.refinement=0.5", exchange(steps=time, transfer="interpolation"),
                                 'pore.width="20 um"', 'growth.end="0.4 h"', "flow.head=1e-2 cm"])
     instants = list(simulate(scene, shape=SHAPE))
     assert any(instant.remeshes for instant in instants)

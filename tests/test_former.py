@@ -23,7 +23,7 @@ SCENE = load_scene("base", CHANGES)
 def removed(monkeypatch):
     """A key and a choice of an imagined earlier version."""
     monkeypatch.setitem(former.KEYS, "numerics.colour", former.Former("blue", "leave it out"))
-    monkeypatch.setitem(former.CHOICES, ("numerics.inlet", "plug"), 'write "mean"')
+    monkeypatch.setitem(former.CHOICES, ("numerics.interface", "plug"), 'write "traction"')
 
 
 @pytest.fixture
@@ -42,7 +42,7 @@ def earlier(removed, tmp_path):
 
 @pytest.mark.parametrize("key, value, instead", [
     ("colour", "red", "this key was removed; leave it out"), ("colour", "blue", "this key was removed; leave it out"),
-    ("inlet", "plug", 'this choice was removed; write "mean"')])
+    ("interface", "plug", 'this choice was removed; write "traction"')])
 def test_a_former_key_or_choice_is_refused_with_what_to_write(removed, tmp_path, capsys, key, value, instead):
     """Whatever its value, in one line with exit status 2; from --set, a file and Python."""
     line = f'numerics.{key} = "{value}": {instead}\n'
@@ -58,8 +58,8 @@ def test_a_former_key_or_choice_is_refused_with_what_to_write(removed, tmp_path,
 
 @pytest.mark.parametrize("value", [["plug"], {"plug": 1}, 3, None])
 def test_a_value_of_another_type_is_no_former_choice(removed, value):
-    with pytest.raises(repro.SceneError, match="\"local\" or \"mean\" is needed"):
-        load_scene({"numerics": {"inlet": value}})
+    with pytest.raises(repro.SceneError, match="\"laplacian\" or \"traction\" is needed"):
+        load_scene({"numerics": {"interface": value}})
 
 
 def test_no_former_key_is_a_key_of_a_scene():
@@ -73,7 +73,7 @@ def test_no_former_key_is_a_key_of_a_scene():
 
 
 @pytest.mark.parametrize("key, value, instead", [
-    *((f"{section}.{key}", each.value, None) for section, key, each in former._parts()),
+    *((f"{section}.{key}", each.value_in({"preset": "fast"}), None) for section, key, each in former._parts()),
     *((*named, text.split('"')[1]) for named, text in former.CHOICES.items())])
 def test_the_advice_is_accepted(key, value, instead):
     """Without a former key, and with the other choice, the scene is accepted."""
@@ -87,7 +87,7 @@ def test_the_advice_is_accepted(key, value, instead):
 
 
 @pytest.mark.parametrize("keys, shown", [({"colour": "blue"}, []), ({"colour": "red"}, ["numerics.colour"]),
-                                         ({"inlet": "plug"}, ["numerics.inlet"])])
+                                         ({"interface": "plug"}, ["numerics.interface"])])
 def test_a_run_of_an_earlier_version_loads_plots_and_compares(earlier, tmp_path, keys, shown):
     """Only a value that present scenes do not have is a difference from a run of this version."""
     folder, change = earlier
@@ -169,3 +169,16 @@ def test_a_record_with_the_kind_of_biomass_is_that_of_the_present_keys(biomass, 
     assert parse_scene(without_former(record), "base", "run.json") == present and scene_hash(present) == hash
     other = {"flow": {"biomass": biomass, **({} if changes else {"permeability": "1e-15 m^2"})}}
     assert without_former(other) == other
+
+
+@pytest.mark.parametrize("preset, kept, other", [("fast", "reused", "fresh"), ("paper", "fresh", "reused")])
+def test_a_former_value_is_that_of_its_preset(preset, kept, other):
+    """Newton's derivative was a key, and its value depended on the preset. A record with the value of its preset is
+    that of the present scene; the hash of "fast" is that of commit f2a81844. Another value stays."""
+    present = load_scene("base", [f"numerics.preset={preset}"])
+    record = scene_tables(present)
+    record["numerics"]["jacobian"] = kept
+    assert parse_scene(without_former(record), "base", "run.json") == present
+    assert preset == "paper" or scene_hash(present) == "258d43232f9734d3"
+    record["numerics"]["jacobian"] = other
+    assert without_former(record) == record

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from repro import load_scene
 from repro.errors import BalanceError, Unresolved
 from repro.fem import elements
 from repro.march import balance
@@ -22,6 +21,7 @@ from tests import oracles
 from tests.shell import read_record
 from tests.strategies import rate_constants
 from tests.test_derived import functions, jacobians, rule, rule_with
+from verification.problems.schemes import exchange, load_scene
 
 #: Supply and uptake (um2 mg/L) of a step of 12 min, so large that diffusion is negligible.
 SUPPLIED, CONSUMED = (5e12, 3e12), (4e12, 2e12)
@@ -99,11 +99,12 @@ def test_the_demand_of_a_longer_update_may_be_off_by_its_square():
     assert two == pytest.approx(4 * one, rel=0.01)
 
 
-@pytest.mark.parametrize("changes, kind", [(["numerics.inlet=mean"], "acceptor"), (["numerics.inlet=mean"], "donor"),
-                                           (["numerics.transfer=linear"], "biomass")])
-def test_a_stated_defect_lets_no_other_one_pass(changes, kind):
-    """[E4] excuses the substrates only, [E8] the biomass only."""
-    case = base("updates", *changes)
+@pytest.mark.parametrize("change, kind", [
+    *((change, name) for change in (exchange(inlet="mean"), exchange(carrier="u")) for name in ("acceptor", "donor")),
+    (exchange(transfer="interpolation"), "biomass")])
+def test_a_stated_defect_lets_no_other_one_pass(change, kind):
+    """[E4] and u as the carrier excuse the substrates only, [E8] the biomass only."""
+    case = base("updates", change)
     excused = {"acceptor", "donor"} if kind != "biomass" else {"biomass"}
     refuse(case, **{kind: 0.03})
     for other in {"acceptor", "donor", "biomass", "demand"} - excused:

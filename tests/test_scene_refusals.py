@@ -245,8 +245,7 @@ SUBSTRATES = ("acceptor", "donor")
 MEMBERS = [
     *((f"substrates.{name}.diffusivity_in_aggregate", [f"substrates.{name}.diffusivity_in_aggregate=1e-200 %",
                                                        f"substrates.{name}.diffusivity=1e-200 um^2/h"])
-      for name in SUBSTRATES),
-    ("numerics.transfer", ["numerics.elements=quadratic", "numerics.transfer=linear"])]
+      for name in SUBSTRATES)]
 
 
 @pytest.mark.parametrize("key, entries", MEMBERS)
@@ -293,13 +292,9 @@ PAIRS = [
      "at most 100000 times growth.time_step (0.0001 h) is needed"),
     ("base", "growth.minimum_film=30 um", "pore.width=20 um", "less than pore.width (20 um) is needed",
      "more than growth.minimum_film (30 um) is needed"),
-    ("base", "numerics.transfer=linear", "numerics.elements=quadratic", '"conserving" is needed with numerics.elem',
-     'numerics.transfer = "conserving" is needed with it, not "linear"'),
     ("base", "growth.fluid_forces=included", "growth.new_biomass=stress_free",
      "because the aggregate would yield at every update",
      '"stressed" is needed with growth.fluid_forces = "included"'),
-    ("base", "numerics.transfer=linear", "numerics.preset=accurate", '"conserving" is needed with numerics.elements',
-     'numerics.transfer = "conserving" is needed with it, not "linear"'),
     ("base", "numerics.transport=gear", "numerics.time=midpoint", '"quasi_steady" is needed with numerics.time = "mid',
      '"updates" is needed with numerics.transport = "gear"'),
     ("base", "kinetics.donor_oxygen_demand=1.2", "kinetics.yield_coefficient=1", "more than Y d_c (1.42) is needed",

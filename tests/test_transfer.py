@@ -104,7 +104,7 @@ def with_uneven_biomass(scene, previous, uneven):
 def check_biomass(scene, previous, remeshed):
     """Check the properties of the biomass that the scene's transfer guarantees on the new mesh."""
     before, after = (one.active / one.space.reaction.dx for one in (previous, remeshed))
-    if scene.numerics.transfer == "conserving":
+    if scene.numerics.scheme.conserves_biomass:
         assert remeshed.active.sum() == pytest.approx(previous.active.sum(), rel=1e-11)
         assert remeshed.inert.sum() == pytest.approx(previous.inert.sum(), rel=1e-11)
     else:

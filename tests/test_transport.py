@@ -17,17 +17,20 @@ from repro.model import pore, transport
 from repro.model.kinetics import Sink
 from repro.model.pore import solve
 from repro.model.transport import Concentrations
+from repro.schemes import PAPER
 from tests.strategies import EVERY_ORDER, ORDERS, coarse_base, scene
 from tests.test_derived import integrate_over_end, node_coordinates
 from verification.problems.meshes import space_on
+from verification.problems.schemes import exchange, exchanged
 
 FINE = {1: 1.0, 2: 0.45}
 
 
 def solved(radius, supply, velocity, order, inlet="local"):
     """(Pore, Solved) of a fixed shape."""
-    return at_start(scene(radius, "50 um", supply, supply, velocity, numerics={
-        "inlet": inlet, "elements": ORDERS[order], "refinement": 1.0 if order == 1 else 0.5}))
+    numerics = {"elements": ORDERS[order], "refinement": 1.0 if order == 1 else 0.5}
+    plain = scene(radius, "50 um", supply, supply, velocity, numerics=numerics)
+    return at_start(exchanged(plain, exchange(inlet=inlet)))
 
 
 def at_start(scene):
@@ -101,7 +104,7 @@ def test_concentrations_keep_their_bounds_without_elements_for_boundary_layers(m
 def starved(half, order):
     """A seed that the acceptor reaches in part only, with a half saturation that no mesh resolves."""
     model = scene("30 um", "100 um", "1 mg/L", "10 mg/L", "0.5 m/day", numerics={
-        "elements": ORDERS[order], "refinement": 0.4 / order, "transfer": "conserving"})
+        "elements": ORDERS[order], "refinement": 0.4 / order})
     acceptor = replace(model.substrates.acceptor, half_saturation=half)
     return replace(model, substrates=replace(model.substrates, acceptor=acceptor))
 
@@ -165,8 +168,9 @@ def test_without_flow_the_ends_are_means_over_their_height(order):
 def test_the_inlet_is_weighted_with_the_flow_for_any_inlet_condition(order):
     scene, pore = coarse_base(order)
     flow = solve(scene, pore).flow
-    local, mean = (transport.problem(pore.space, flow, scene.substrates, scene.kinetics, inlet).inflow
-                   for inlet in ("local", "mean"))
+    schemes = (replace(PAPER, inlet=inlet) for inlet in ("local", "mean"))
+    local, mean = (transport.problem(pore.space, flow, scene.substrates, scene.kinetics, scheme).inflow
+                   for scheme in schemes)
     assert np.array_equal(mean, local) and mean.sum() == pytest.approx(flow.mean_velocity * scene.pore.width)
 
 

@@ -33,18 +33,19 @@ from verification.evidence.checks import columns
 from verification.problems import aggregates
 from verification.problems.channels import pair
 from verification.problems.runs import next_shape, shape_of
+from verification.problems.schemes import Change, exchange
 
 
 @dataclass(frozen=True)
 class Switch:
-    """choice: the subject of the choice; default, alternative: in words; change: KEY=VALUE of the alternative; state:
+    """choice: the subject of the choice; default, alternative: in words; change: of the scene or of its scheme; state:
     whether both can be compared in one state; note: a remark for the reader; meshes: whether both can use the default's
     meshes."""
 
     choice: str
     default: str
     alternative: str
-    change: str
+    change: Change
     state: bool = True
     note: str = ""
     meshes: bool = True
@@ -55,7 +56,7 @@ class Switch:
         return changed(self.change)
 
 
-def changed(change: str) -> Run:
+def changed(change: Change) -> Run:
     """Base with a change, with rows at t = 0 and for the last two shapes."""
     return (*BASE, change, LAST)
 
@@ -70,10 +71,10 @@ CHOICES = {
     "traction": Switch("interface", "Laplacian form", "traction form", 'numerics.interface="traction"', note="[E2]"),
     "fluid forces": Switch("fluid forces", "neglected", "included", 'growth.fluid_forces="included"',
                            note="(20), (22), C26"),
-    "mean inlet": Switch("inlet condition (11)", "u_x(y)", "u_ave", 'numerics.inlet="mean"', note="[E4]"),
+    "mean inlet": Switch("inlet condition (11)", "u_x(y)", "u_ave", exchange(inlet="mean"), note="[E4]"),
     "exact F": Switch("acceptor to donor ratio F", "1.52", "1.5138", "kinetics.acceptor_to_donor_ratio=1.5138",
                       note=F_EXACT),
-    "linear transfer": Switch("transfer at a remesh", "conserving", "linear", 'numerics.transfer="linear"', False,
+    "linear transfer": Switch("transfer at a remesh", "conserving", "linear", exchange(transfer="interpolation"), False,
                               "[E8]"),
     "stress-free": Switch("new biomass", "stressed", "stress-free", 'growth.new_biomass="stress_free"',
                           note="section 5"),

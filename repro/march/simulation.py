@@ -16,6 +16,7 @@ from repro.model.grading import solve_graded
 from repro.model.pore import seeded
 from repro.scene import Scene, Source, load_scene, parse_scene, scene_tables
 from repro.scene.arguments import typed
+from repro.schemes import Scheme
 
 if TYPE_CHECKING:
     from repro.march.loop import Stepping
@@ -26,7 +27,8 @@ Shape = Sequence[tuple[float, float]] | np.ndarray
 
 @typed
 def simulate(scene: Source, overrides: Sequence[str] = (), *, unset: Sequence[str] = (),
-             shape: Shape | None = None, state: RestartState | None = None) -> Iterator[Report]:
+             scheme: Scheme | None = None, shape: Shape | None = None,
+             state: RestartState | None = None) -> Iterator[Report]:
     """Simulate a scene, and yield a Report at t = 0 and at each reported time.
 
     Reported times are ``output.times``, or the ends of all steps. A Report has the attributes
@@ -41,6 +43,8 @@ def simulate(scene: Source, overrides: Sequence[str] = (), *, unset: Sequence[st
         Changes of the scene, as for :func:`repro.load_scene`.
     unset : sequence of str, optional
         Keys or sections of the scene to leave out.
+    scheme : repro.schemes.Scheme, optional
+        Another scheme than that of the preset, such as ``replace(PAPER, carrier="u")``.
     shape : (K, 2) sequence of float, optional
         Boundary of the aggregate at t = 0, points (x, y) in um from the upstream to the downstream
         end on the lower wall. It replaces the shape of the scene (see ``aggregate.outline``).
@@ -73,7 +77,7 @@ def simulate(scene: Source, overrides: Sequence[str] = (), *, unset: Sequence[st
     >>> [report.pore.time for report in repro.simulate("base", changes)]
     [0.0, 1.0]
     """
-    scene = load_scene(scene, overrides, unset=unset)
+    scene = load_scene(scene, overrides, unset=unset, scheme=scheme)
     if shape is not None:
         scene = shaped(scene, shape)
     return _reports(steps(scene, state))
@@ -97,7 +101,8 @@ def shaped(scene: Scene, shape: Shape) -> Scene:
     for key in ("radius", "position"):
         seed.pop(key, None)
     seed["outline"] = [[f"{float(x)!r} um", f"{float(y)!r} um"] for x, y in shape]
-    return parse_scene({**tables, "aggregate": seed}, scene.name, f"{scene.name} with a shape")
+    return parse_scene({**tables, "aggregate": seed}, scene.name, f"{scene.name} with a shape",
+                       scheme=scene.numerics.exchanged)
 
 
 def ends_soon(scene: Scene, state: RestartState) -> bool:

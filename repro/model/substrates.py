@@ -22,9 +22,7 @@ def solve(scene: Scene, pore: Pore, flow: Flow | None,
     """
     numerics = scene.numerics
     sections = needed(scene.substrates, "[substrates]")
-    scheme = numerics.scheme
-    problem = transport.problem(pore.space, flow, sections, scene.kinetics, scheme.inlet,
-                                scheme.modified_newton)
+    problem = transport.problem(pore.space, flow, sections, scene.kinetics, numerics.scheme)
     sink = Sink(pore.active, over) if scene.kinetics else None
     state = SETTLED[numerics.transport](problem, sink, pore.concentrations)
     return problem, state, transport.fluxes(problem, sink, state)

@@ -19,6 +19,7 @@ C_supply, or nothing passes them ("closed"). With u_ave for the inlet's u_x, (11
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, replace
@@ -38,6 +39,7 @@ from repro.model.flow import Flow
 from repro.model.kinetics import RateLaw, Sink, rate_law
 from repro.model.uptake_law import LARGEST_SATURATION, UptakeLaw
 from repro.scene import Kinetics, Substrate, Substrates, needed
+from repro.schemes import PAPER, Scheme
 from repro.timing import timed
 
 #: Newton's method stops at this residual against the size of its terms.
@@ -140,7 +142,7 @@ def concentrations(substrates: Substrates, fields: np.ndarray,
 
 @timed("transport")
 def problem(space: Space, flow: Flow | None, substrates: Substrates, kinetics: Kinetics | None,
-            inlet: str = "local", modified_newton: bool = False) -> Problem:
+            scheme: Scheme = PAPER) -> Problem:
     """Assemble the linear parts of the substrates' equations in one geometry.
 
     Parameters
@@ -152,10 +154,8 @@ def problem(space: Space, flow: Flow | None, substrates: Substrates, kinetics: K
     substrates : Substrates
     kinetics : Kinetics, optional
         None without biomass.
-    inlet : {"local", "mean"}
-        u_x or u_ave in (11).
-    modified_newton : bool
-        Does Newton's method keep its derivative while the defect falls fast enough?
+    scheme : Scheme
+        Its inlet, carrier and Newton's method.
 
     Returns
     -------
@@ -164,7 +164,7 @@ def problem(space: Space, flow: Flow | None, substrates: Substrates, kinetics: K
     topology = space.mesh.topology
     kinds = tuple(substrates.modelled.values())
     count = len(kinds)
-    carried, source, inflow, outflow = _through(space, flow, inlet)
+    carried, source, inflow, outflow = _through(space, flow, scheme)
     matrices = tuple(diffusion(space, kind) + carried for kind in kinds)
     constrained = flow is None and substrates.boundary == "open"
     uncoupled = topology.system(("both", count), lambda: _apart(space, count))
@@ -175,7 +175,7 @@ def problem(space: Space, flow: Flow | None, substrates: Substrates, kinetics: K
     sources = np.concatenate([kind.supply * source for kind in kinds])
     law = None if kinetics is None else rate_law(substrates, kinetics).on(space, substrates)
     return Problem(space, matrices, operator, magnitude, sources, inflow, outflow, system,
-                   substrates, law, modified_newton)
+                   substrates, law, scheme.modified_newton)
 
 
 def diffusion(space: Space, kind: Substrate) -> np.ndarray:
@@ -185,33 +185,95 @@ def diffusion(space: Space, kind: Substrate) -> np.ndarray:
 
 
 def _through(space: Space, flow: Flow | None,
-             inlet: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+             scheme: Scheme) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """(T, k, k) the advection, and the loads (n,) of the supply, the inflow and the outflow, um2/h;
     zero without flow."""
     if flow is None:
         return np.zeros((1, 1, 1)), *np.zeros((3, space.count))
     u_x = flow.velocity[:, 0]
-    enters = u_x if inlet == "local" else np.full(space.count, flow.mean_velocity)
+    enters = INLETS[scheme.inlet](flow)
     source = space.inlet.assembled(enters)
     inflow = space.inlet.assembled(u_x)
     outflow = space.outlet.assembled(u_x)
-    return advection(space, flow, enters), source, inflow, outflow
+    carrier = CARRIERS[scheme.carrier]
+    return advection(space, flow, enters, carrier), source, inflow, outflow
 
 
-def advection(space: Space, flow: Flow, enters: np.ndarray) -> np.ndarray:
+def local_speed(flow: Flow) -> np.ndarray:
+    """(n,) um/h, u_x(y) in (11)."""
+    return flow.velocity[:, 0]
+
+
+def mean_speed(flow: Flow) -> np.ndarray:
+    """(n,) um/h, u_ave in (11), as printed [E4]."""
+    return np.full(len(flow.velocity), flow.mean_velocity)
+
+
+#: The speed of (11), by the scheme's inlet.
+INLETS = {"local": local_speed, "mean": mean_speed}
+
+
+def advection(space: Space, flow: Flow, enters: np.ndarray, carrier: type[Carrier]) -> np.ndarray:
     """(T, k, k) um2/h of advection, with the conditions at inlet and outlet; enters: (n,) um/h, the
     speed of (11)."""
     if flow.correction is None:
-        return _conserving(space, flow.velocity, enters)
-    return _by_divergence_free(space, flow.velocity, flow.correction, enters)
+        return _conserving(space, flow.velocity, carrier.quadratic(space, flow.velocity), enters)
+    return _by_corners(space, carrier.linear(flow, flow.correction, space.mesh), enters)
 
 
-def _conserving(space: Space, velocity: np.ndarray, enters: np.ndarray) -> np.ndarray:
-    """-(C w, grad v) with w of :func:`divergence_free`, u_x C v over the outlet, and (u_ave - u_x)
-    C v over the inlet where (11) takes u_ave [E4]."""
+class Carrier(ABC):
+    """The velocity that carries the substrates."""
+
+    @staticmethod
+    @abstractmethod
+    def linear(flow: Flow, correction: np.ndarray, mesh: Mesh) -> np.ndarray:
+        """(T, 3, 2) um/h at the corners of straight triangles; correction: (T, 2) tau grad p."""
+
+    @staticmethod
+    @abstractmethod
+    def quadratic(space: Space, velocity: np.ndarray) -> np.ndarray:
+        """(2, T, q) um/h at the quadrature points of curved triangles."""
+
+
+class DivergenceFree(Carrier):
+    """w, whose divergence vanishes against every function of the space."""
+
+    @staticmethod
+    def linear(flow: Flow, correction: np.ndarray, mesh: Mesh) -> np.ndarray:
+        """w = u - tau grad p."""
+        return flow.velocity[mesh.triangles] - correction[:, None, :]
+
+    @staticmethod
+    def quadratic(space: Space, velocity: np.ndarray) -> np.ndarray:
+        """w = u - grad psi."""
+        return divergence_free(space, velocity)
+
+
+class Printed(Carrier):
+    """u, as printed in (7)-(8)."""
+
+    @staticmethod
+    def linear(flow: Flow, correction: np.ndarray, mesh: Mesh) -> np.ndarray:
+        """u, which creates and consumes substrate where its divergence is not zero."""
+        return flow.velocity[mesh.triangles]
+
+    @staticmethod
+    def quadratic(space: Space, velocity: np.ndarray) -> np.ndarray:
+        """u, with which a constant supply is no solution."""
+        return space.at.evaluate(velocity.T)
+
+
+#: By the scheme's carrier.
+CARRIERS: dict[str, type[Carrier]] = {"w": DivergenceFree, "u": Printed}
+
+
+def _conserving(space: Space, velocity: np.ndarray, carrier: np.ndarray,
+                enters: np.ndarray) -> np.ndarray:
+    """-(C w, grad v) with the carrier w (2, T, q), u_x C v over the outlet, and (u_ave - u_x) C v
+    over the inlet where (11) takes u_ave [E4]."""
     dofs = space.dofs
     u_x = velocity[:, 0]
-    matrices = space.at.advection(divergence_free(space, velocity) * -space.at.dx)
+    matrices = space.at.advection(carrier * -space.at.dx)
     _add_at(matrices, dofs.beside_outlet, space.outlet.mass(u_x))
     if np.any(enters[dofs.inlet] != u_x[dofs.inlet]):
         _add_at(matrices, dofs.beside_inlet, space.inlet.mass(enters - u_x))
@@ -244,12 +306,10 @@ def _potential(space: Space) -> ElementSystem:
     return ElementSystem(space.cells, space.dofs.places, constrained, space.mesh.topology.method)
 
 
-def _by_divergence_free(space: Space, velocity: np.ndarray, correction: np.ndarray,
-                        enters: np.ndarray) -> np.ndarray:
-    """(w . grad C, v) with w = u - tau grad p, linear on each triangle, and, lumped, u_x C v over
-    the inlet."""
+def _by_corners(space: Space, w: np.ndarray, enters: np.ndarray) -> np.ndarray:
+    """(w . grad C, v) with w (T, 3, 2), linear on each triangle, and, lumped, u_x C v over the
+    inlet."""
     mesh = space.mesh
-    w = velocity[mesh.triangles] - correction[:, None, :]
     matrices = mass(mesh.areas) @ (w @ np.swapaxes(mesh.gradients, 1, 2))
     loads = space.inlet.load(enters)
     _add_at(matrices, space.dofs.beside_inlet, loads[:, :, None] * np.eye(loads.shape[1]))

@@ -137,7 +137,7 @@ def _numerics(scene: Scene) -> Iterator[str]:
         yield (f"a shape update every {60 * scene.growth.time_step:.4g} min"
                if not numerics.scheme.controls_error else
                f"midpoint steps, tolerance {numerics.tolerance:g}")
-        yield f"biomass to new meshes: {numerics.transfer} [E8]"
+        yield f"biomass to new meshes by {numerics.scheme.transfer} [E8]"
 
 
 def _output(scene: Scene) -> Iterator[str]:

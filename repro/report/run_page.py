@@ -37,7 +37,7 @@ ASSUMED = {
 NEEDED = {"transport": "substrates", "extent": "aggregate"}
 #: The numerics in the head of the page, and the section without which they do not matter.
 NUMERICS = {"preset": None, "elements": None, "refinement": None, "transport": "substrates",
-            "time": "growth", "transfer": "growth"}
+            "time": "growth"}
 
 #: Colours of a field. Neighbours cannot be told apart.
 BANDS = 128

@@ -18,6 +18,7 @@ import csv
 import io
 import json
 import platform
+from dataclasses import asdict
 from functools import cache
 from importlib import metadata
 from pathlib import Path
@@ -97,12 +98,17 @@ def _number(field: str) -> float:
 
 
 def provenance(scene: Scene) -> dict:
-    """The scene as read, its hash, and the versions of the packages that compute its numbers."""
+    """The scene as read, its hash, and the versions of the packages that compute its numbers.
+
+    A scheme that is not that of the preset has an entry of its own.
+    """
     versions = {"dupin2001-repro": version("dupin2001-repro"),
                 "python": platform.python_version()}
     versions |= {name: version(name) for name in PACKAGES}
+    exchanged = scene.numerics.exchanged
+    scheme = {} if exchanged is None else {"scheme": asdict(exchanged)}
     return {"scene": scene.name, "hash": scene_hash(scene), "tables": scene_tables(scene),
-            "versions": versions}
+            "versions": versions, **scheme}
 
 
 @cache

@@ -22,6 +22,7 @@ from repro.results.quantities import plain as unit
 from repro.scene import Source, load_scene, scene_tables
 from repro.scene.arguments import typed
 from repro.scene.units import to_internal
+from repro.schemes import Scheme
 from repro.timing import progress_bar
 
 #: Number of first and of last times in the table of a notebook.
@@ -409,7 +410,7 @@ def package(name: str):
 
 @typed
 def solve(scene: Source, overrides: Sequence[str] = (), *, unset: Sequence[str] = (),
-          progress: bool = False) -> Results:
+          scheme: Scheme | None = None, progress: bool = False) -> Results:
     """Run a scene and keep its rows and fields in memory.
 
     Parameters
@@ -420,6 +421,8 @@ def solve(scene: Source, overrides: Sequence[str] = (), *, unset: Sequence[str] 
         Texts "KEY=VALUE" that set keys of the scene.
     unset : sequence of str
         Keys to leave out.
+    scheme : repro.schemes.Scheme, optional
+        Another scheme than that of the preset, such as ``replace(PAPER, carrier="u")``.
     progress : bool, optional
         Show a bar of the simulated time (h), by ``tqdm.auto``.
 
@@ -444,7 +447,7 @@ def solve(scene: Source, overrides: Sequence[str] = (), *, unset: Sequence[str] 
     >>> results.units["conductivity_m_per_d"]
     'm/d'
     """
-    scene = load_scene(scene, overrides, unset=unset)
+    scene = load_scene(scene, overrides, unset=unset, scheme=scheme)
     duration = scene.growth.end if scene.growth else 0.0
     rows = []
     fields = []

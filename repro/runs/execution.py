@@ -41,7 +41,7 @@ from repro.runs.folder import (
     remove_temporary,
 )
 from repro.runs.integrity import find_damage
-from repro.runs.machine import conditions, differences, require_packages
+from repro.runs.machine import conditions, differences, refuse_exchanged, require_packages
 from repro.runs.recorder import Recorder, complete_folder, interruption
 from repro.runs.status import COMPLETED, FAILED, INTERRUPTED, RUNNING, is_over
 from repro.scene import (
@@ -110,6 +110,7 @@ def run(scene: Source, folder: str | Path, watch: Watch = DEFAULT_WATCH, *, forc
     :func:`origin_of`. Raises the errors of :func:`repro.run`, and Interrupted if ``watch.stop``
     asks the run to stop; all results so far are written.
     """
+    refuse_exchanged(scene)
     scene = load_scene(scene)
     folder = Path(folder)
     refuse_null(folder)

@@ -33,6 +33,13 @@ REMARK = re.compile(r"""
 OPTIONAL = {("solver", "pardiso"): "pypardiso"}
 
 
+def refuse_exchanged(scene: object) -> None:
+    """Raise SceneError if a loaded scene has another scheme than its preset: no file states it."""
+    if isinstance(scene, Scene) and scene.numerics.exchanged is not None:
+        raise SceneError(f"{scene.name}: a run in a folder has the scheme of numerics.preset; "
+                         "repro.solve and repro.simulate take another scheme")
+
+
 def require_packages(scene: Scene) -> None:
     """Raise SceneError if a scene needs an optional package that is not installed."""
     for (key, choice), package in OPTIONAL.items():

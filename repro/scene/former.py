@@ -10,11 +10,19 @@ from typing import NamedTuple
 class Former(NamedTuple):
     """A former key: the value that is the present behaviour, and what to write instead.
 
-    The value is None if other keys of the section say it (:func:`_earlier`, :func:`_present`).
+    The value is None if other keys of the section say it (:func:`_earlier`, :func:`_present`), and
+    a dict if it depends on the preset.
     """
 
-    value: str | float | None
+    value: str | float | dict[str, str] | None
     instead: str
+
+    def value_in(self, section: dict) -> str | float | None:
+        """The value in a section, by its preset."""
+        if not isinstance(self.value, dict):
+            return self.value
+        preset = section.get("preset")
+        return self.value.get(preset) if isinstance(preset, str) else None
 
 
 IN_TABLE = Former(None, "write it in a table: "
@@ -33,9 +41,18 @@ KEYS: dict[str, Former] = {
         "stabilised", "leave it out: linear velocities are stabilised, quadratic ones are stable"),
     "numerics.flow_stabilisation": Former(
         100.0, "leave it out: it is 100 (repro.model.flow.STABILISATION)"),
+    "numerics.inlet": Former(
+        "local", "leave it out; u_ave is scheme=replace(PAPER, inlet=\"mean\") of repro.solve"),
+    "numerics.jacobian": Former(
+        {**dict.fromkeys(("fast", "accurate", "exact"), "reused"), "paper": "fresh"},
+        "leave it out; scheme=replace(CURVED, modified_newton=False) of repro.solve has a new one "
+        "in every iterate"),
     "numerics.mesh_compressibility": Former(
         1.0, "leave it out: it is 1 (repro.model.mesh_motion.COMPRESSIBILITY)"),
     "numerics.ordering": Former("degree", "leave it out: SuperLU orders the nodes"),
+    "numerics.transfer": Former(
+        "conserving", "leave it out; the paper's is scheme=replace(PAPER, "
+                      "transfer=\"interpolation\") of repro.solve"),
     "output.timeseries": Former(
         "csv", "leave it out, and write NetCDF by repro.load_run(FOLDER).to_netcdf(FILE)"),
 }
@@ -43,8 +60,6 @@ KEYS: dict[str, Former] = {
 CHOICES: dict[tuple[str, str], str] = {
     ("numerics.elements", "cubic"):
         'write "quadratic", which takes half of the time and errs as little around an aggregate',
-    ("numerics.transfer", "bounded"):
-        'write "conserving", from which it differed by 0.002 %',
 }
 
 
@@ -63,7 +78,7 @@ def with_former(tables: dict) -> dict:
     """Return the tables of a scene as earlier versions wrote them, as its hash counts them."""
     tables = _translated(tables, _earlier)
     for section, key, former in _parts():
-        tables[section] = {**tables[section], key: former.value}
+        tables[section] = {**tables[section], key: former.value_in(tables[section])}
     return tables
 
 
@@ -78,7 +93,7 @@ def without_former(tables: object) -> object:
     tables = _translated(tables, _present)
     for section, key, former in _parts():
         table = tables.get(section)
-        if isinstance(table, dict) and table.get(key) == former.value:
+        if isinstance(table, dict) and key in table and table[key] == former.value_in(table):
             tables[section] = {name: value for name, value in table.items() if name != key}
     return tables
 

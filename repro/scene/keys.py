@@ -12,7 +12,7 @@ import hashlib
 import json
 from collections.abc import Sequence
 from copy import deepcopy
-from dataclasses import MISSING, dataclass, field, replace
+from dataclasses import MISSING, asdict, dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
 from math import ceil, inf
@@ -343,8 +343,6 @@ class Numerics:
     transport: str = choice(
         "quasi_steady", "gear", source="2.2; 3.3 has gear",
         about="Substrates at rest in each shape, or the transient predictor-corrector scheme")
-    transfer: str = choice("conserving", "linear", source="3.5 is linear [E8]",
-                           about="How X_A and X_I go to a new mesh")
     extent: str | None = choice(
         "central", "full", default=None, source="3.1",
         stated='default "central", or "full" where there are substrates and nothing flows, at '
@@ -352,8 +350,6 @@ class Numerics:
         about="Mesh the part around the aggregate, or the whole pore")
     interface: str = choice("laplacian", "traction", source="(1) [E2]",
                             about="What of the flow is continuous across the interface")
-    inlet: str = choice(
-        "local", "mean", source="(11) [E4]", about="u_x(y) or u_ave in the inlet condition")
     solver: str = choice("superlu", "pardiso", source=NOT_IN_PAPER,
                          about="Solver of linear systems; the second needs the package pypardiso")
     refinement: float = number(
@@ -365,28 +361,31 @@ class Numerics:
         0.0, FROM_0_TO_10, source=NOT_IN_PAPER,
         about="Elements to growth.minimum_film beside the contact lines with the opposite wall, "
               "2 at least with a permeable aggregate; 0: as large as elsewhere on the interface")
-    jacobian: str = choice(
-        "fresh", "reused", source=NOT_IN_PAPER,
-        about="Newton's derivative: new in every iterate, or kept while the iterates converge fast")
+    exchanged: Scheme | None = None  # no key: ``repro.simulate(..., scheme=...)``
 
     @cached_property
     def scheme(self) -> Scheme:
-        """The scheme of these keys."""
+        """The scheme: ``exchanged``, or the one of these keys."""
+        if self.exchanged is not None:
+            return self.exchanged
         scheme = PAPER if self.elements == "linear" else CURVED
-        transfer = "interpolation" if self.transfer == "linear" else scheme.transfer
-        return replace(scheme, steps=self.time, inlet=self.inlet, transfer=transfer,
-                       modified_newton=self.jacobian == "reused")
+        modified_newton = SCHEMES[self.preset].modified_newton
+        return replace(scheme, steps=self.time, modified_newton=modified_newton)
+
+
+#: The scheme of each preset.
+SCHEMES = {"fast": CURVED, "accurate": CURVED, "exact": CURVED, "paper": PAPER}
 
 
 #: Changes of each preset to the defaults above: until contact errors of about 1 %, of about 0.1 %,
 #: under 0.01 % (see `make bench`); the paper's own scheme.
 PRESETS: dict[str, dict[str, str | float]] = {
     "fast": {"elements": "quadratic", "time": "midpoint", "refinement": 0.2, "tolerance": 0.0075,
-             "contact_elements": 1.0, "jacobian": "reused"},
+             "contact_elements": 1.0},
     "accurate": {"elements": "quadratic", "time": "midpoint", "refinement": 0.45,
-                 "tolerance": 0.001, "jacobian": "reused"},
+                 "tolerance": 0.001},
     "exact": {"elements": "quadratic", "time": "midpoint", "refinement": 0.7, "tolerance": 0.00025,
-              "contact_elements": 4.0, "jacobian": "reused"},
+              "contact_elements": 4.0},
     "paper": {},
 }
 
@@ -562,8 +561,8 @@ KEYS = tuple(dotted(Scene))  # every dotted key of a scene, its sections among t
 
 
 @typed
-def load_scene(scene: Source, overrides: Sequence[str] = (), *,
-               unset: Sequence[str] = ()) -> Scene:
+def load_scene(scene: Source, overrides: Sequence[str] = (), *, unset: Sequence[str] = (),
+               scheme: Scheme | None = None) -> Scene:
     """Load a scene, with changes.
 
     Parameters
@@ -575,6 +574,8 @@ def load_scene(scene: Source, overrides: Sequence[str] = (), *,
         Changes "KEY=VALUE", like those of ``--set``: dotted keys, values in TOML with units.
     unset : sequence of str, optional
         Dotted keys or sections to leave out, like those of ``--unset``; before ``overrides``.
+    scheme : repro.schemes.Scheme, optional
+        Another scheme than that of the preset, for :func:`repro.simulate` and :func:`repro.solve`.
 
     Returns
     -------
@@ -595,11 +596,14 @@ def load_scene(scene: Source, overrides: Sequence[str] = (), *,
     >>> scene.pore.width, scene.flow
     (60.0, None)
     """
-    if isinstance(scene, Scene) and not (overrides or unset):
-        return scene
+    if isinstance(scene, Scene):
+        scheme = scheme or scene.numerics.exchanged
+        if scheme is scene.numerics.exchanged and not (overrides or unset):
+            return scene
     file = label(scene)
     tables = load_tables(scene, overrides, unset)
-    return parse_scene(tables, Path(file).stem, file, [key_of(entry) for entry in overrides])
+    changed = [key_of(entry) for entry in overrides]
+    return parse_scene(tables, Path(file).stem, file, changed, scheme)
 
 
 def label(source: Source) -> str:
@@ -623,11 +627,13 @@ def load_tables(source: Source, overrides: Sequence[str] = (), unset: Sequence[s
     return tables
 
 
-def parse_scene(tables: dict, name: str, file: str, changed: Sequence[str] = ()) -> Scene:
+def parse_scene(tables: dict, name: str, file: str, changed: Sequence[str] = (),
+                scheme: Scheme | None = None) -> Scene:
     """Parse and check TOML `tables` as a scene called `name`.
 
     changed: dotted keys that were set last, for example by --set. If keys contradict each other,
-    the error names one of these. Raises SceneError, naming `file`, if the scene is not accepted.
+    the error names one of these. scheme: another one than that of the preset. Raises SceneError,
+    naming `file`, if the scene is not accepted.
     """
     _refuse_missing(tables, file)
     if "substrates" in tables and "aggregate" in tables:
@@ -635,6 +641,8 @@ def parse_scene(tables: dict, name: str, file: str, changed: Sequence[str] = ())
     text = name.encode(errors="backslashreplace").decode()  # bytes in the name of a file
     scene = read_table(Scene, _with_preset(tables), Place(file, known=KEYS), name=text,
                        units=units_of(tables))
+    if scheme is not None:
+        scene = replace(scene, numerics=replace(scene.numerics, exchanged=scheme))
     for broken, requirement in rules(scene):
         if broken:
             key = _to_name(list(requirement), tables, changed)
@@ -684,10 +692,12 @@ def scene_hash(scene: Scene) -> str:
     """Hash (16 hexadecimal digits) of all values of a scene, without its name.
 
     A key of `LATER` counts if it differs from its default, and a scene counts as earlier versions
-    wrote it, so that recorded hashes stay valid.
+    wrote it, so that recorded hashes stay valid. A scheme counts if it is not that of the preset.
     """
     written = with_former(write_table(scene))
     tables = {key: _without_later(key, table) for key, table in written.items()}
+    if scene.numerics.exchanged is not None:
+        tables["scheme"] = asdict(scene.numerics.exchanged)
     canonical = json.dumps(tables, sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.sha256(canonical.encode()).hexdigest()[:16]
 

@@ -330,27 +330,12 @@ def _force_rules(scene: "Scene") -> Rules:
     }
 
 
-def _with_elements(scene: "Scene") -> str:
-    return f'with numerics.elements = "{scene.numerics.elements}"'
-
-
-def _element_keys(requirement: str) -> dict[str, str]:
-    """The same requirement for both keys that choose the elements."""
-    return {"numerics.elements": requirement, "numerics.preset": requirement}
-
-
 def _numerics_rules(scene: "Scene") -> Rules:
     yield scene.stagnant and scene.numerics.extent == "central", {
         "numerics.extent": '"full" is needed with substrates in water at rest',
         "flow.mean_velocity": 'numerics.extent = "full" is needed with 0 m/day',
     }
-    transfer = scene.numerics.transfer
-    other = f'numerics.transfer = "conserving" is needed with it, not "{transfer}"'
-    yield scene.numerics.scheme.order > 1 and transfer != "conserving", {
-        "numerics.transfer": f'"conserving" is needed {_with_elements(scene)}; "linear" has others',
-        **_element_keys(other),
-    }
-    yield scene.numerics.time == "midpoint" and scene.numerics.transport == "gear", {
+    yield scene.numerics.scheme.controls_error and scene.numerics.transport == "gear", {
         "numerics.transport": '"quasi_steady" is needed with numerics.time = "midpoint"',
         "numerics.time": '"updates" is needed with numerics.transport = "gear"',
     }

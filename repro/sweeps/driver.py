@@ -14,7 +14,7 @@ from repro.results import drawing
 from repro.results.quantities import unit_of
 from repro.results.tables import package
 from repro.runs.folder import folder_errors
-from repro.runs.machine import require_packages
+from repro.runs.machine import refuse_exchanged, require_packages
 from repro.scene import SceneError, Source, label
 from repro.scene.arguments import typed
 from repro.sweeps import cluster, design, page, pool, table
@@ -193,6 +193,7 @@ def sweep(scene: Source, vary: Sequence[str], folder: str | Path, overrides: Seq
     >>> [run.status for run in swept.runs]
     ['completed', 'completed']
     """
+    refuse_exchanged(scene)
     _refuse_values(vary, workers, seed, clogged)
     factors = [design.parse(text) for text in vary]
     combinations = design.grid(factors) if samples is None else design.latin(factors, samples, seed)

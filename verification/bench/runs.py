@@ -14,10 +14,11 @@ from reference import whole_run
 from repro import timing
 from repro.march.simulation import simulate
 from repro.model import pore
-from repro.scene import Scene, load_scene
+from repro.scene import Scene
 from verification.bench.record import clock, measured, reference_of
 from verification.claims.runs import until
 from verification.problems import runs as problems
+from verification.problems.schemes import exchange, load_scene
 
 BASE_REPEATS = 3
 TIMES = (19.2, 19.4)
@@ -45,7 +46,8 @@ METHODS_OF_BASE = (
     (PRESET_PAPER, BY_MINUTES, PAPER, OF_PAPER),
     ("midpoint alone", BY_TOLERANCE, MIDPOINT, (*OF_PAPER, MIDPOINT_RULE)),
     ("order 2, midpoint", BY_TOLERANCE, QUADRATIC, OF_ACCURATE),
-    ("order 2, midpoint, fresh derivatives", BY_TOLERANCE, QUADRATIC[1:6:2], (*OF_ACCURATE, "numerics.jacobian=fresh")),
+    ("order 2, midpoint, fresh derivatives", BY_TOLERANCE, QUADRATIC[1:6:2],
+     (*OF_ACCURATE, exchange(modified_newton=False))),
     ("order 2, midpoint, one element size everywhere", BY_TOLERANCE, QUADRATIC[1:4],
      (*OF_ACCURATE, "numerics.gradation=0")),
     ("order 2 in updates of 12 min", ("refinement {:g}", "numerics.refinement={}"), UPDATES,
@@ -194,7 +196,7 @@ def memory_slope(preset: str, refinement: float) -> dict:
 
 #: {target number of nodes: timed steps after the first}. With 0 the first step is timed, which orders the nodes.
 SIZES = {600: 5, 2500: 3, 10_000: 2, 40_000: 1, 160_000: 0}
-#: Preset and Jacobian of Newton's methods: a reused Jacobian makes the floor and the step cheaper.
+#: Preset and derivative of Newton's methods: a reused derivative makes the floor and the step cheaper.
 METHODS = {"preset paper": "paper fresh", "order 2, midpoint (accurate)": "accurate reused",
            "order 2, midpoint, fresh derivatives": "accurate fresh"}
 STAGES = ("flow", "transport", "growth", "mesh motion", "meshing", "transfer")
@@ -220,10 +222,10 @@ def size_part() -> dict:
 
 def measure(kind: str, nodes: int, steps: int) -> dict:
     """Seconds of a step of base with a larger seed on about ``nodes`` nodes, of its stages, and of their floor."""
-    preset, jacobian = kind.split()
+    preset, derivative = kind.split()
     factor, power = REFINED[preset]
     scene = load_scene("base", [f"numerics.preset={preset}", f"numerics.refinement={factor * nodes**power}",
-                                f"numerics.jacobian={jacobian}", f"aggregate.radius={RADIUS} um"])
+                                f"aggregate.radius={RADIUS} um", exchange(modified_newton=derivative == "reused")])
     state, solved = _solved(scene, pore.seeded(scene))
     rows = []
     for _ in range(steps + 1):

@@ -17,6 +17,7 @@ from verification.evidence.cases import parametrize
 from verification.evidence.checks import at_least, at_most, columns, each_at_most, largest, refine, studies
 from verification.problems import aggregates, meshes, runs
 from verification.problems.channels import NAMES, both, pair
+from verification.problems.schemes import exchange
 
 #: Radius of the seed (um), relative increase of biomass in an update, and number of updates: the area grows eightfold.
 RADIUS = 5.0
@@ -121,7 +122,7 @@ def test_growing(order, record):
 
 def _growth_history(transfer: str, order: int) -> dict[str, np.ndarray]:
     """Numbers of every update, by name."""
-    scene = aggregates.base_scene(f'numerics.transfer="{transfer}"', order=order)
+    scene = aggregates.base_scene(*BY[transfer], order=order)
     state, rows = aggregates.seed(SEED, order=order), []
     expected = state.mass
     for _ in range(GROWING_UPDATES):
@@ -179,6 +180,8 @@ ROUND, REFINEMENTS = 20.0, (0.75, 1.3, 2.3, 4.0)
 OLD = (0.7, 0.8, 0.9)
 #: Transfers that a scene may have, by the order of its elements.
 TRANSFERS = {1: ("conserving", "linear"), 2: ("conserving",)}
+#: Changes of a scene by its transfer.
+BY = {"conserving": (), "linear": (exchange(transfer="interpolation"),)}
 #: (a, b, c) of linear fields a + b x + c y: X_A and X_I (mg/L) of linear elements; X_A and X_I whose sum is X_m; the
 #: pressure over mu_L.
 KINDS = {"active": (25000.0, 100.0, -200.0), "inert": (3000.0, -20.0, 50.0)}
@@ -205,7 +208,7 @@ def test_remesh_linear(order, transfer, record):
 
     Norm: largest relative difference over all nodes or points of the new mesh.
     """
-    scene = aggregates.base_scene(f'numerics.transfer="{transfer}"', "numerics.refinement=1.2", order=order)
+    scene = aggregates.base_scene(*BY[transfer], "numerics.refinement=1.2", order=order)
     kinds = KINDS if order == 1 else SHARES
     new = aggregates.remesh(scene, _moved_linearly(order, kinds))
     mesh, inside = new.mesh, new.mesh.topology.body_corners

@@ -17,6 +17,7 @@ from repro.fem.sizing import ACROSS_PORE
 from repro.fem.space import Space
 from repro.model import transport
 from repro.model.kinetics import Sink
+from repro.schemes import PAPER
 from verification.evidence.cases import parametrize
 from verification.evidence.checks import BAND, around, at_most, refine, studies
 from verification.problems import aggregates, meshes
@@ -335,7 +336,7 @@ def _solved(space: Space, peclet: float, inlet: str) -> np.ndarray:
     """(2, n) C computed by the code."""
     mean, velocity, _ = _chosen(peclet)
     carried = prescribed_flow(space, np.column_stack([part(*space.points.T) for part in velocity]), mean)
-    equations = transport.problem(space, carried, SUBSTRATES, SCENE.kinetics, inlet)
+    equations = transport.problem(space, carried, SUBSTRATES, SCENE.kinetics, replace(PAPER, inlet=inlet))
     equations = replace(equations, source=equations.source + _added(space, peclet, inlet).ravel())
     return both(transport.steady(equations, Sink(DENSITY(*aggregates.reaction_points(space)) * space.reaction.dx)))
 

@@ -18,12 +18,13 @@ from repro.errors import Unresolved
 from repro.model import biomass, gear, grading, kinetics, pore, transport
 from repro.model.kinetics import Sink
 from repro.model.transport import Balance, Concentrations
-from repro.scene import Scene, load_scene
+from repro.scene import Scene
 from verification.cases.transport_codes import box_around
 from verification.evidence.cases import combined, parametrize
 from verification.evidence.checks import Check, Study, at_most, each_at_most, study
 from verification.problems import runs
 from verification.problems.channels import NAMES, ORDERS, SCENE, both, rates, substrates_with
+from verification.problems.schemes import exchange, load_scene
 
 SLOW = 0.35e6 / 24
 #: Radius (um) and supplies of acceptor and donor (mg/L) of pores at 0.35 m/d whose biomass could take up far more.
@@ -41,7 +42,7 @@ def _solved(kind: tuple[str, ...], radius: float, acceptor: float = 10.0, donor:
             speed: float | None = runs.SPEED, inlet: str = "local"):
     """(Pore, Solved); speed: um/h, None: no flow."""
     scene = load_scene("base", [f'aggregate.radius="{radius} um"', f'substrates.acceptor.supply="{acceptor} mg/L"',
-                                f'substrates.donor.supply="{donor} mg/L"', f'numerics.inlet="{inlet}"', *kind])
+                                f'substrates.donor.supply="{donor} mg/L"', exchange(inlet=inlet), *kind])
     scene = runs.without_flow(scene) if speed is None else runs.at_velocity(scene, speed)
     seed = pore.seeded(scene)
     return seed, pore.solve(scene, seed)

@@ -31,12 +31,13 @@ from repro.model.pore import Pore, Solved, solve
 from repro.model.remeshing import Remeshing
 from repro.model.stages import Stages
 from repro.results.arrays import State as Reported
-from repro.scene import Scene, load_scene
+from repro.scene import Scene
 from verification.claims.levels import CONVERGED, cached, converged, current
 from verification.evidence.checks import columns
+from verification.problems.schemes import Change, Exchange, load_scene
 
-#: A packaged scene and its changes, KEY=VALUE; and columns of rows, by name.
-Run = tuple[str, ...]
+#: A packaged scene and its changes, KEY=VALUE or choices of its scheme; and columns of rows, by name.
+Run = tuple[Change, ...]
 Columns = dict[str, np.ndarray]
 #: Section 4 and Figure 6.
 BASE, WIDE = ("base",), ("wide",)
@@ -79,8 +80,9 @@ PLATES = (*BASE, LAST)
 WIDE_TO_END = ("wide", rows_at(*range(5, 31, 5), *range(31, 35), *sorted({*AFTER, 40})))
 
 
-def load_packaged(name: str, *changes: str) -> Scene:
-    """A packaged scene with the KEY=VALUE of --set, in the elements and steps of the present level."""
+def load_packaged(name: str, *changes: Change) -> Scene:
+    """A packaged scene with the KEY=VALUE of --set and choices of its scheme, in the elements and steps of the present
+    level."""
     level = current()
     changes = tuple(change for change in changes if change not in REPLACED)
     changes = (*level.wide, *changes) if name == "wide" else changes
@@ -118,11 +120,11 @@ class History:
 
 
 @cached
-def history(*run: str) -> History:
+def history(*run: Change) -> History:
     """Compute one run. If a change is LATE, the run starts from ``far`` of the run without it. Raises SimulationError
     if the run fails."""
     scene = load_packaged(*run)
-    plain = tuple(change for change in run if not change.startswith(LATE))
+    plain = tuple(change for change in run if isinstance(change, Exchange) or not change.startswith(LATE))
     instants: list[Report] = []
     contact = None
     begun = before = far = None if plain == run else history(*plain).far
@@ -344,9 +346,9 @@ def solution(scene, grid: Mesh, active: np.ndarray, carried_by_u: bool = False) 
     carried_by_u: advect with u itself, as the paper writes it, and not with the divergence-free w = u - tau grad p.
     """
     flow_field = flow_in(scene, grid)
-    carrier = replace(flow_field, correction=0 * flow_field.correction) if carried_by_u else flow_field
+    scheme = replace(scene.numerics.scheme, carrier="u" if carried_by_u else "w", modified_newton=False)
     space = Space(grid)
-    problem = transport.problem(space, carrier, scene.substrates, scene.kinetics, scene.numerics.inlet)
+    problem = transport.problem(space, flow_field, scene.substrates, scene.kinetics, scheme)
     sink = Sink(space.integration.to_points(active) * space.reaction.dx)
     state = transport.steady(problem, sink)
     return flow_field, transport.fluxes(problem, sink, state)

@@ -233,7 +233,7 @@ LINEAR = CHOICES["linear transfer"].run
     printed="""At a remesh the values at the new nodes are interpolated linearly in the old mesh (3.5), X_A and
         X_I among them.""",
     reading="""Interpolation does not conserve mass. The default does: it projects X_A and X_I by Galerkin's method
-        over the common pieces of both meshes. `numerics.transfer = "linear"` is the paper's transfer.""",
+        over the common pieces of both meshes. `replace(PAPER, transfer="interpolation")` is the paper's transfer.""",
     consequence="""
         Relative defects of the mass of X_A + X_I, in the worst step or remesh and in a whole run:
 

@@ -108,7 +108,7 @@ def electron_defect(law) -> float:
     printed="(11) supplies u_ave C_supply and takes u_ave C - D dC/dx, uniform over the inlet.",
     reading="""u_x(y) in place of u_ave, since the entering flow is parabolic (3). If the concentration does not vary
         across the inlet, both conditions are equal, and (26) follows from either. Otherwise only u_x(y) supplies as
-        much as (7)-(8) carry away. `numerics.inlet = "mean"` is the printed form.""",
+        much as (7)-(8) carry away. `replace(PAPER, inlet="mean")` is the printed form.""",
     consequence="""
         Base; the balance defect is (supplied - out - consumed) / supplied, with the flow-weighted effluent:
 

@@ -11,9 +11,9 @@ from repro.model import remeshing
 from repro.model.pore import Pore, material, seeded
 from repro.model.remeshing import Remeshing
 from repro.model.stages import Stages
-from repro.scene import load_scene
 from verification.evidence.cases import combined
 from verification.problems import channels, meshes, pairs, runs
+from verification.problems.schemes import Change, load_scene
 
 WIDTH = 50.0
 #: X_m of Table 1, mg/L.
@@ -22,7 +22,7 @@ DENSITY = 3e4
 EVERY = combined(channels.ORDERS)
 
 
-def base_scene(*changes: str, order: int = 1):
+def base_scene(*changes: Change, order: int = 1):
     """The base scene with changes. Only (34) and the transfer use it."""
     return load_scene("base", (runs.with_elements(channels.WORDS[order]), *changes))
 

@@ -15,9 +15,10 @@ from repro.march.simulation import simulate
 from repro.march.state import Report, StepResult
 from repro.model.pore import Pore, Solved, seeded
 from repro.model.stages import Stages
-from repro.scene import Kinetics, Scene, Substrates, load_scene
+from repro.scene import Kinetics, Scene, Substrates
 from verification.evidence.checks import columns
 from verification.problems import channels, meshes
+from verification.problems.schemes import Change, load_scene
 
 ROUND_OFF = "round-off"
 #: The velocity of base at t = 0, 2.9 m/d, in um/h.
@@ -62,7 +63,7 @@ def every(refinement: float, linear: float = 1.0) -> dict[str, tuple[str, ...]]:
 EVERY = every(0.4)
 
 
-def base(end: str, *changes: str, times: Iterable[float] = ()) -> Scene:
+def base(end: str, *changes: Change, times: Iterable[float] = ()) -> Scene:
     """The paper's scene to a time ("6 h"), reported at its end, or at ``times`` (h)."""
     rows = [f"{time} h" for time in times] or [end]
     return load_scene("base", (f'growth.end="{end}"', f"output.times={rows}", *changes))

@@ -1,0 +1,131 @@
+"""Schemes: what each choice changes, where a scheme is refused, and what keeps it."""
+import re
+from dataclasses import asdict, fields, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import repro
+from repro import results
+from repro.march.simulation import shaped, simulate
+from repro.scene import PRESETS, load_scene, scene_hash
+from repro.schemes import CURVED, PAPER, Scheme
+
+BRIEF = ('growth.end="0.4 h"', "numerics.refinement=0.3", 'output.times=["0.4 h"]')
+#: A seed just under the least film, so that BRIEF has a new mesh at contact.
+REMESHED = ("pore.width=20 um", "aggregate.radius=17.98 um", "flow.head=1e-2 cm", *BRIEF)
+
+
+def last_row(scheme, *changes):
+    """The last row of a brief run of base, the larger defect of its substrates and that of its biomass, and the number
+    of new meshes."""
+    preset = "paper" if scheme.elements == "linear" else "fast"
+    scene = load_scene("base", [f"numerics.preset={preset}", *(changes or BRIEF)], scheme=scheme)
+    *_, report = simulate(scene)
+    row = results.row(scene, report)
+    substrates = max(abs(row["acceptor_balance"]), abs(row["donor_balance"]))
+    return row, substrates, abs(row["biomass_balance"]), report.remeshes
+
+
+@pytest.mark.parametrize("scheme", [PAPER, CURVED, replace(CURVED, carrier="u")], ids=["paper", "curved", "curved, u"])
+def test_a_scheme_that_conserves_closes_its_balances(scheme):
+    _, substrates, biomass, remeshes = last_row(scheme, *REMESHED)
+    assert scheme.conserves_substrates and scheme.conserves_biomass
+    assert substrates < 1e-9 and biomass < 1e-12 and remeshes
+
+
+@pytest.mark.parametrize("change", [{"carrier": "u"}, {"inlet": "mean"}])
+def test_a_printed_choice_leaves_a_defect_of_the_substrates_alone(change):
+    """u has sources in linear elements, and u_ave brings more than u_x(y) carries away [E4]."""
+    scheme = replace(PAPER, **change)
+    _, substrates, biomass, _ = last_row(scheme)
+    assert not scheme.conserves_substrates and scheme.conserves_biomass
+    assert substrates > 1e-6 and biomass < 1e-12
+
+
+def test_the_printed_transfer_leaves_a_defect_of_the_biomass_alone():
+    """Linear interpolation to a new mesh [E8]."""
+    scheme = replace(PAPER, transfer="interpolation")
+    _, substrates, biomass, remeshes = last_row(scheme, *REMESHED)
+    assert scheme.conserves_substrates and not scheme.conserves_biomass
+    assert substrates < 1e-9 and biomass > 1e-9 and remeshes
+
+
+@pytest.mark.parametrize("scheme", [PAPER, CURVED], ids=["paper", "curved"])
+def test_carriers_differ(scheme):
+    """w is nearly u, and no bit more: the effluent changes by less than 0.1 % of the supply."""
+    w, u = (last_row(replace(scheme, carrier=carrier))[0]["effluent_acceptor_mg_per_L"] for carrier in ("w", "u"))
+    assert 0 < abs(w - u) < 1e-2
+
+
+def test_the_scheme_makes_the_steps():
+    """The midpoint rule on linear triangles, in fewer steps than updates of 12 min."""
+    schemes = [replace(PAPER, steps=steps) for steps in ("updates", "midpoint")]
+    updates, midpoint = ([*simulate("base", BRIEF, scheme=scheme)][-1].ledgers for scheme in schemes)
+    assert (len(updates), len(midpoint)) == (2, 1) and updates[-1].end == midpoint[-1].end == 0.4
+    assert [scheme.controls_error for scheme in schemes] == [False, True]
+
+
+def test_the_two_schemes_have_the_same_lines():
+    """So that a reader can compare them; and each preset has the scheme of its elements."""
+    names = [field.name for field in fields(Scheme)]
+    for module in ("paper", "curved"):
+        text = (Path(repro.__path__[0]) / "schemes" / f"{module}.py").read_text(encoding="utf-8")
+        lines = re.findall(r"^    (\w+)=", text, re.M)
+        assert sorted(lines) == sorted(names)
+    for preset in PRESETS:
+        scheme = load_scene("base", [f"numerics.preset={preset}"]).numerics.scheme
+        assert scheme == (PAPER if preset == "paper" else CURVED)
+
+
+@pytest.mark.parametrize("change, message", [
+    ({"carrier": "v"}, 'scheme: carrier: "w" or "u" is needed, not \'v\''),
+    ({"elements": "cubic"}, 'scheme: elements: "linear" or "quadratic" is needed, not \'cubic\''),
+    ({"elements": "quadratic"}, 'scheme: transfer with quadratic elements: "shares" is needed, not \'projection\''),
+    ({"transfer": "shares"}, 'scheme: transfer with linear elements: "projection" or "interpolation" is needed, not')])
+def test_a_scheme_that_does_not_exist_is_refused(change, message):
+    with pytest.raises(ValueError) as error:
+        replace(PAPER, **change)
+    assert str(error.value).startswith(message)
+
+
+PRINTED = replace(PAPER, carrier="u")
+
+
+def test_a_scheme_of_another_type_is_refused():
+    for function in (repro.solve, repro.simulate):
+        with pytest.raises(TypeError, match="scheme: Scheme is needed, not 'paper'"):
+            function("base", scheme="paper")
+
+
+def test_rules_of_a_scene_know_its_scheme():
+    """Gear's method needs updates, and a permeability needs quadratic elements."""
+    with pytest.raises(repro.SceneError, match='"quasi_steady" is needed'):
+        load_scene("base", ["numerics.transport=gear"], scheme=replace(PAPER, steps="midpoint"))
+    permeable = ["flow.permeability=1e-15 m^2"]
+    with pytest.raises(repro.SceneError, match='"quadratic" is needed'):
+        load_scene("base", [*permeable, "numerics.preset=fast"], scheme=PAPER)
+    assert load_scene("base", permeable, scheme=CURVED).numerics.scheme is CURVED
+
+
+def test_no_folder_gets_a_run_with_a_scheme_of_its_own(tmp_path):
+    """No file of a run would state it."""
+    scene = load_scene("base", BRIEF, scheme=PRINTED)
+    for function, arguments in ((repro.run, (tmp_path / "run",)),
+                                (repro.sweep, (["pore.width=50 um, 60 um"], tmp_path / "sweep"))):
+        with pytest.raises(repro.SceneError, match="^base: a run in a folder has the scheme of numerics.preset"):
+            function(scene, *arguments)
+    assert not [*tmp_path.iterdir()]
+
+
+def test_a_scheme_stays_with_its_scene():
+    """Through changes of keys and another shape; another scheme replaces it. Hash and provenance state it."""
+    scene = load_scene("base", scheme=PRINTED)
+    outline = np.array([(-5.0, 0.0), (0.0, 5.0), (5.0, 0.0)])
+    for changed in (load_scene(scene, ["pore.width=60 um"]), shaped(scene, outline), load_scene(scene)):
+        assert changed.numerics.scheme == PRINTED
+    assert load_scene(scene, scheme=PAPER).numerics.scheme == PAPER
+    assert scene_hash(scene) != scene_hash(load_scene("base"))
+    assert results.provenance(scene)["scheme"] == asdict(PRINTED)
+    assert "scheme" not in results.provenance(load_scene("base"))
