@@ -160,6 +160,13 @@ def parabola(t: np.ndarray) -> np.ndarray:
     return np.stack([(1 - t) * (1 - 2 * t), 4 * t * (1 - t), t * (2 * t - 1)], axis=-1)
 
 
+def edge_functions(count: int, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(..., count) shape functions of an edge's 2 or 3 nodes at s in [0, 1], and derivatives."""
+    if count == 2:
+        return np.stack([1 - s, s], axis=-1), np.stack([0 * s - 1, 0 * s + 1], axis=-1)
+    return parabola(s), np.stack([4 * s - 3, 4 - 8 * s, 4 * s - 1], axis=-1)
+
+
 def arc_derivatives(nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """First derivative by t at t = 0 and second derivative of arcs with nodes (M, 3, ...)."""
     first, middle, last = np.moveaxis(nodes, 1, 0)

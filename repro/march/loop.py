@@ -2,7 +2,7 @@
 
 Steps depend neither on the requested rows nor on the end of the run, to the last bit. A row between
 two steps is interpolated in the step that passes it, and no step starts from it. If a row cannot be
-computed, the state says why, and the run goes on. If ``growth.end`` or an end of the
+computed, the state has the reason, and the run goes on. If ``growth.end`` or an end of the
 model (:mod:`repro.march.ends`) lies within a step, that step is cut there. Rows before the end
 still belong to the uncut step, and the ledger of the cut step closes like the others. A run to a
 later end restarts from the state before the cut step.

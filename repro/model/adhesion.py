@@ -23,7 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from repro.fem import elements
-from repro.fem.outline import BOTTOM, TOP, parabola
+from repro.fem.outline import BOTTOM, TOP, edge_functions
 from repro.model import flow, growth, traction
 from repro.model.flow import Flow
 from repro.model.pore import Pore, Solved
@@ -155,9 +155,7 @@ class _Surface:
 
     def _at(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(s, k) functions of an edge's nodes at s in [0, 1], and their derivatives."""
-        if self.nodes.shape[1] == 2:
-            return np.stack([1 - s, s], axis=-1), np.stack([0 * s - 1, 0 * s + 1], axis=-1)
-        return parabola(s), np.stack([4 * s - 3, 4 - 8 * s, 4 * s - 1], axis=-1)
+        return edge_functions(self.nodes.shape[1], s)
 
     def density(self, forces: np.ndarray) -> np.ndarray:
         """(N,) traction at the nodes of the surface, from nodal forces (N,) per depth."""

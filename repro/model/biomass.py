@@ -29,7 +29,6 @@ from repro.model.transport import Concentrations
 Amounts: TypeAlias = tuple[np.ndarray, ...]
 
 
-
 @dataclass(frozen=True, eq=False)
 class Rates:
     """Growth of active biomass F3 / X_A and gain of inert biomass F4 / X_A, (r, q) 1/h."""

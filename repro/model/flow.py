@@ -287,8 +287,8 @@ def scaled(unit: UnitFlow, mesh: Mesh, length: float, drive: Drive) -> Flow:
                 None if of_biomass is None else scale * (of_biomass - at_outlet))
 
 
-def solve(velocity: Space, drive: Drive, length: float, *, interface: str = "laplacian"
-          ) -> Flow:
+def solve(velocity: Space, drive: Drive, length: float, *,
+          interface: str = "laplacian") -> Flow:
     """Solve the Stokes flow through a pore, (1)-(6).
 
     Parameters

@@ -5,9 +5,9 @@ The displacement d of the fluid's corners solves a compressible pseudo-Stokes pr
     (grad d, grad v) - (P, div v) = 0
     (q, div d) + gamma (P, q) + sum_tau (tau grad P, grad q) = 0
 
-with linear functions and the flow's tau = h^2 / c. Interface nodes move with the
-biomass; corners of walls, inlet and outlet slide along their line. gamma is not printed [E13]. All
-edges of the fluid stay straight, except those at the interface.
+with linear functions and the flow's tau = h^2 / c. Interface nodes move with the biomass; corners
+of walls, inlet and outlet slide along their line. gamma is not printed [E13]. All edges of the
+fluid stay straight, except those at the interface.
 """
 
 from __future__ import annotations

@@ -3,10 +3,10 @@
 The middle point of each contact surface keeps its x. In plane strain a force at that point would
 indent the aggregate without limit as the mesh is refined. The wall therefore bears the force as a
 traction along the contact surface. The traction is uniform per length of the configuration from
-which strain counts. A surface that has grown twice as long as its neighbour bears half of the
-neighbour's traction: its modulus has fallen by the growth, too. (A traction that is uniform along
-the present surface would shear the youngest and softest tissue most.) The traction's resultant m is
-the multiplier of the condition on x:
+which strain counts. Where growth has doubled the surface's length, the traction is half as large;
+the modulus of this tissue has fallen, too. (A traction that is uniform along the present surface
+would shear the youngest and softest tissue most.) The traction's resultant m is the multiplier of
+the condition on x:
 
     R + sum_k m_k L_k = 0,    x_k = given
 
@@ -22,9 +22,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-#: (k, k) derivatives dN_b / ds at the k nodes of an edge.
-SLOPES = {2: np.array([[-1.0, 1.0], [-1.0, 1.0]]),
-          3: np.array([[-3.0, 4.0, -1.0], [-1.0, 0.0, 1.0], [1.0, -4.0, 3.0]])}
+from repro.fem.outline import edge_functions
+
 #: (k,) weights of the k nodes: the trapezoidal rule, or Simpson's.
 WEIGHTS = {2: np.array([1.0, 1.0]) / 2, 3: np.array([1.0, 4.0, 1.0]) / 6}
 
@@ -44,7 +43,8 @@ class Support:
         """The support of a surface with edges (e, 2 or 3), for nodes at ``reference`` (n, 2) um
         before they are strained."""
         nodes = edges.shape[1]
-        lengths = np.linalg.norm(SLOPES[nodes] @ reference[edges], axis=2) * WEIGHTS[nodes]
+        _, slopes = edge_functions(nodes, np.linspace(0, 1, nodes))
+        lengths = np.linalg.norm(slopes @ reference[edges], axis=2) * WEIGHTS[nodes]
         load = np.bincount(edges.ravel(), lengths.ravel(), len(reference))
         return Support(point, load / load.sum())
 
@@ -52,8 +52,8 @@ class Support:
 def balanced(supports: Sequence[Support], residual: np.ndarray) -> np.ndarray:
     """A residual (2n + corners,), x of all nodes first, with the tractions that balance the rows of
     the fixed points."""
+    residual = residual.copy()
     for support in supports:
-        residual = residual.copy()
         multiplier = residual[support.point] / support.load[support.point]
         residual[: len(support.load)] -= multiplier * support.load
     return residual

@@ -19,7 +19,7 @@ class History:
 
     seconds: total wall time; stages: wall time by stage; resumes: when the run was resumed;
     warnings: ``key`` of the scene and ``text`` of each simplification that does not hold; surface:
-    the same of creases, and of positions at t = 0 that fold; missed: number of steps that do not
+    the same for creases, and for positions at t = 0 that fold; missed: number of steps that do not
     meet the tolerance; worst: the largest of their error estimates; missing: time (h) of each row
     that cannot be computed, and the reason.
     """

@@ -128,9 +128,9 @@ def contact_rests(run: Run) -> list[Check]:
 def _closing(shape: Outline, width: float, film: float, angle: float) -> int:
     """Number of nodes of a polygon that should join a wall, or of contact lines of arcs with too little clearance.
 
-    The limit of the clearance is that of a wedge with UNDER less than the least angle, where the gap reaches the film.
-    A row within a step has the arcs of another mesh. Its lines therefore err by more than CLOSE of the search: by 0.007
-    um where wedges close one after the other. (The limit was twice CLOSE, 0.004 um, until that row was seen.)
+    The limit is the clearance of a wedge whose angle is UNDER below the least angle, where its gap is the film. A row
+    within a step lies on the arcs of another mesh. Where wedges close one after the other its lines err by 0.007 um,
+    more than the search allows (CLOSE, 0.002 um). The limit was twice CLOSE until this row was seen.
     """
     if shape.geometry == 1:
         return np.count_nonzero(contact.closing_nodes(shape, width, film, angle))
@@ -154,7 +154,7 @@ CONTACT = HardCase(
 
 
 LEAST = 16.7
-#: Degrees by which a wedge differs that must close or must stay.
+#: A wedge must close if its angle is this much (degrees) under the least angle, and stay if it is this much over it.
 UNDER = 0.1
 
 
