@@ -193,7 +193,8 @@ class Scene:
     @property
     def midpoint(self) -> bool:
         """Whether the steps are those of the midpoint rule."""
-        return self.section("numerics").get("time") != "updates"
+        numerics = self.section("numerics")
+        return numerics.get("time", "updates" if numerics.get("preset") == "paper" else "midpoint") == "midpoint"
 
     @property
     def closed(self) -> bool:

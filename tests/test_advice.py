@@ -53,6 +53,8 @@ FOLLOWED = {
         "try smooth = false": SPLINES,
         "try a larger numerics.refinement":
             "tests/test_advice.py::test_an_unresolved_front_gets_advice_once_and_it_helps",
+        'numerics.preset = "paper"':
+            "tests/test_advice.py::test_an_unresolved_front_gets_advice_once_and_it_helps",
         "leave numerics.solver out": PACKAGES,
         'growth.wall = "sliding" is another model': "base: it stops at 14 h on a bonded wall, not on a sliding one"},
     "model/contact.py": {
@@ -345,7 +347,7 @@ def test_forces_of_the_fluid_are_advised_and_act_on_a_permeable_aggregate():
     (20, "t = 0 h"), pytest.param(12, r"t = [12]\.\d+ h", marks=pytest.mark.thorough)])
 def test_an_unresolved_front_gets_advice_once_and_it_helps(radius, start):
     """This includes a front within a step, which first tries the mesh of its start. With three times the refinement the
-    first scene has a row."""
+    first scene has a row, and with linear elements both reach their end."""
     supply, half_saturation = {20: ("0.15 mg/L", "1e-5 mg/L"), 12: ("0.2 mg/L", "3e-6 mg/L")}[radius]
     substrate = {"supply": supply, "half_saturation": half_saturation}
     scene = parse_scene({
@@ -357,6 +359,7 @@ def test_an_unresolved_front_gets_advice_once_and_it_helps(radius, start):
     assert str(stopped.value).count("numerics.refinement") == 1
     if radius == 20:
         next(simulate(load_scene(scene, [f"numerics.refinement={3 * scene.numerics.refinement}"])))
+    assert [*simulate(load_scene(scene, ["numerics.preset=paper"]))][-1].pore.time == 3
 
 
 def test_a_shorter_step_helps_where_the_aggregate_passes_the_opposite_wall():

@@ -1,5 +1,6 @@
 """The values of presets, and the midpoint rule with elements of every order."""
 from dataclasses import replace
+from itertools import permutations
 
 import numpy as np
 import pytest
@@ -72,3 +73,11 @@ def test_a_preset_changes_the_defaults():
         assert numerics(preset=preset) == replace(Numerics(), preset=preset, extent="central", **chosen)
     paper = numerics(preset="paper")
     assert (paper.elements, paper.time, paper.refinement) == ("linear", "updates", 1.0)
+
+
+@pytest.mark.parametrize("former, other", list(permutations(PRESETS, 2)))
+def test_another_preset_of_a_loaded_scene_sets_all_its_keys(former, other):
+    """Keys that the scene itself sets keep their values."""
+    loaded = load_scene("base", [f"numerics.preset={former}", "numerics.gradation=0.3"])
+    expected = load_scene("base", [f"numerics.preset={other}", "numerics.gradation=0.3"])
+    assert load_scene(loaded, [f"numerics.preset={other}"]) == expected

@@ -6,7 +6,8 @@ from repro.errors import OriginFolded, OutsidePore, PackageMissing, StageError, 
 
 ADVICE: dict[type[StageError], str] = {
     OutsidePore: "; aggregate.outline: try smooth = false",
-    Unresolved: "; try a larger numerics.refinement",
+    Unresolved: "; try a larger numerics.refinement, or the linear elements of "
+                'numerics.preset = "paper"',
     PackageMissing: ", or leave numerics.solver out",
 }
 

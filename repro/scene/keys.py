@@ -618,6 +618,8 @@ def load_tables(source: Source, overrides: Sequence[str] = (), unset: Sequence[s
     file = label(source)
     if isinstance(source, Scene):
         tables = scene_tables(source)
+        if "numerics.preset" in map(key_of, overrides):
+            tables["numerics"] = _beside_preset(source.numerics)
     else:
         tables = deepcopy(source) if isinstance(source, dict) else read_tables(file)
     for key in unset:
@@ -678,6 +680,15 @@ def _with_preset(tables: dict) -> dict:
     if not isinstance(named, str) or named not in PRESETS:
         return tables  # read_table reports the error
     return {**tables, "numerics": {"preset": named, **PRESETS[named], **numerics}}
+
+
+def _beside_preset(numerics: Numerics) -> dict:
+    """The keys of [numerics] that differ from those of their preset. Another preset sets the
+    others."""
+    preset = {"preset": numerics.preset, **PRESETS[numerics.preset]}
+    of_preset = read_table(Numerics, preset, Place(numerics.preset))
+    return {key: value for key, value in write_table(numerics).items()
+            if getattr(numerics, key) != getattr(of_preset, key)}
 
 
 def scene_tables(scene: Scene) -> dict:

@@ -38,6 +38,7 @@ NO_HELP = re.compile("no setting helps")
 FILE = re.compile(r"\S+/\S+\.(?:state|vtu)|fields/\S+\.vtu")
 #: Advice in messages: pattern, key, and values to try, from the present value or the number in the message.
 ADVICE = (
+    (r'numerics\.preset = "paper"', "numerics.preset", lambda present, number: ["paper"]),
     (r"larger numerics\.refinement", "numerics.refinement", lambda present, number: [1.5 * present, 2.5 * present]),
     (r"smaller numerics\.refinement", "numerics.refinement", lambda present, number: [present / 2]),
     (r'numerics\.transport = "quasi_steady"', "numerics.transport", lambda present, number: ["quasi_steady"]),
@@ -112,9 +113,7 @@ def _refusal(message: str, room: Path) -> Iterator[Check]:
 
 
 def _advised_scenes(tables: dict, message: str) -> Iterator[dict]:
-    """The scene with each piece of advice in turn. Linear elements come with their refinement."""
-    if 'numerics.elements = "linear" with' in message:
-        tables = _changed(tables, "numerics.elements", "linear")
+    """The scene with each piece of advice in turn."""
     for pattern, key, values in ADVICE:
         match = re.search(pattern, message)
         if match:
@@ -122,10 +121,10 @@ def _advised_scenes(tables: dict, message: str) -> Iterator[dict]:
             yield from (_changed(tables, key, value) for value in values(_present(tables, key), number))
 
 
-def _present(tables: dict, key: str) -> float:
+def _present(tables: dict, key: str) -> object:
     """The value of a key in the scene, in the package's units."""
     section, name = key.split(".")
-    return float(getattr(getattr(load_scene(tables), section), name) or 0.0)
+    return getattr(getattr(load_scene(tables), section), name)
 
 
 def _changed(tables: dict, key: str, value) -> dict:

@@ -371,7 +371,12 @@ MUTANTS = (
          "Rows at an interval end before growth.end.",
          "{*intervals, end, *(self.times or ())}",
          "{*intervals, *(self.times or ())}",
-         "tests/test_scene.py::test_rows_at_an_interval")),
+         "tests/test_scene.py::test_rows_at_an_interval"),
+        ("name-of-the-preset-alone",
+         "Another preset of a loaded scene changes the name of the preset alone.",
+         'tables["numerics"] = _beside_preset(source.numerics)',
+         "pass",
+         "tests/test_presets.py::test_another_preset_of_a_loaded_scene_sets_all_its_keys[fast-accurate]")),
     *changes(
         "repro/scene/units.py",
         ("printed-units-refused",
