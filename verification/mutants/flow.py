@@ -57,9 +57,8 @@ MUTANTS = (
          "value[nodes] = 4 * share * (1 - share)"),
         ("upper-wall-slips",
          "The water slips along the upper wall.",
-         "constrained[np.concatenate([dofs.walls, velocity.inlet.nodes])] = True",
-         "constrained[np.concatenate([dofs.walls[velocity.points[dofs.walls, 1] == 0],"
-         " velocity.inlet.nodes])] = True"),
+         "|= [wall.no_slip, True]",
+         "|= [wall.no_slip and wall.normal > 0, True]"),
         ("outlet-free",
          "The traction form leaves the velocity across the outlet free, so that the flow spreads there [E10].",
          "constrained[velocity.outlet.nodes, 1] = True",
