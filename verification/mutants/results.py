@@ -33,6 +33,7 @@ SIZING = "tests/test_sizing.py::test_"
 FOLD = "tests/test_fold.py::test_"
 FORMER = "tests/test_former.py::test_"
 CHECKPOINT = "tests/test_checkpoint.py::test_"
+WALLS = "tests/test_walls.py::test_"
 EXPECTED = f"{FOLD}check_expects_a_fold_of_a_starved_core"
 READERS = "tests/test_vtk.py::test_every_reader_reads_what_was_computed"
 
@@ -1957,4 +1958,42 @@ MUTANTS = (
          "return float(np.interp(end - window, area, K) - closed) / window",
          "return float(np.interp(end - window, area, K) - K[-1]) / window",
          "tests/test_claims.py::test_a_function_of_claims_gives_its_closed_form_on_a_synthetic_run")),
+    *changes(
+        "repro/fem/outline.py",
+        ("upper-seed-clockwise",
+         "The boundary of a seed on the upper wall runs clockwise.",
+         "counterclockwise = int(wall.normal) * np.arange(len(points))",
+         "counterclockwise = np.arange(len(points))",
+         f"{WALLS}a_seed_on_either_wall_has_the_same_boundary_sizes_and_mesh[1-upper]"),
+        ("thickness-from-the-lower-wall",
+         "The thickness of a seed on the upper wall is measured from the lower one.",
+         "np.abs(self._extreme_points[:, 1] - self.points[first, 1]).max()",
+         "np.abs(self._extreme_points[:, 1]).max()",
+         f"{WALLS}a_seed_on_either_wall_has_the_same_boundary_sizes_and_mesh[1-upper]")),
+    *changes(
+        "repro/fem/sizing.py",
+        ("films-at-the-upper-wall-alone",
+         "A film at the lower wall has its small elements at the upper one.",
+         "np.full(len(near), wall.y)",
+         "np.full(len(near), sizing.width)",
+         f"{WALLS}a_seed_on_either_wall_has_the_same_boundary_sizes_and_mesh[1-upper]")),
+    *changes(
+        "repro/fem/mesher.py",
+        ("fluid-over-the-lower-wall-alone",
+         "The fluid around a seed on the upper wall is bounded as around one on the lower wall.",
+         "bounds(outline, [*touched, *free], ends,",
+         "bounds(outline, walls, ends,",
+         f"{WALLS}a_seed_on_either_wall_has_the_same_boundary_sizes_and_mesh[1-upper]")),
+    *changes(
+        "repro/model/contact.py",
+        ("first-contact-with-the-upper-wall-alone",
+         "The first contact is always with the upper wall.",
+         "    nearest, *_ = outline.untouched(rule.walls)",
+         "    *_, nearest = rule.walls",
+         f"{MIRRORS}contact_advances_alike_in_a_pore_and_its_mirror_image[2-False-across]"),
+        ("every-wall-keeps-a-point",
+         "A new contact surface has a fixed point on a wall that keeps none.",
+         "if wall.keeps_point and not outline.fixed",
+         "if not outline.fixed",
+         f"{WALLS}a_new_surface_keeps_a_point_unless_its_wall_keeps_none[2]")),
 )
