@@ -1978,13 +1978,6 @@ MUTANTS = (
          "np.full(len(near), sizing.width)",
          f"{WALLS}a_seed_on_either_wall_has_the_same_boundary_sizes_and_mesh[1-upper]")),
     *changes(
-        "repro/fem/mesher.py",
-        ("fluid-over-the-lower-wall-alone",
-         "The fluid around a seed on the upper wall is bounded as around one on the lower wall.",
-         "bounds(outline, [*touched, *free], ends,",
-         "bounds(outline, walls, ends,",
-         f"{WALLS}a_seed_on_either_wall_has_the_same_boundary_sizes_and_mesh[1-upper]")),
-    *changes(
         "repro/model/contact.py",
         ("first-contact-with-the-upper-wall-alone",
          "The first contact is always with the upper wall.",
