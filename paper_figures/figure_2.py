@@ -8,8 +8,9 @@ from matplotlib.figure import Figure
 
 from paper_figures import runs, style
 from repro import Scene
-from repro.fem.outline import BOTTOM, TOP, Outline, half_disc
+from repro.fem.outline import Outline, half_disc
 from repro.fem.sizing import ACROSS_AGGREGATE
+from repro.fem.walls import BOTTOM, TOP, channel_walls
 from repro.model.contact import closing_nodes
 
 TITLE = "Figure 2. The pore, its domains and boundaries"
@@ -78,7 +79,7 @@ def _closing(axes: Axes, scene: Scene) -> None:
     width = scene.pore.width
     film, angle = scene.growth.minimum_film, scene.growth.minimum_contact_angle
     outline = flattened(width)
-    joins = closing_nodes(outline, width, film, angle) == TOP
+    joins = closing_nodes(outline, channel_walls(width), film, angle) == TOP
     line = outline.points[outline.wall == TOP, 0].max()
     steps = np.array([0, film / np.tan(angle), 3 * film / np.tan(angle)])
     low, high = (line - 3, line + 17), (width - 9.5, width + 2.5)

@@ -9,8 +9,9 @@ from matplotlib.patches import Rectangle
 from paper_figures import runs, style
 from paper_figures.figure_2 import THICKNESS, inflow
 from repro import Scene
-from repro.fem.outline import BOTTOM, Outline, half_disc
+from repro.fem.outline import Outline, half_disc
 from repro.fem.sizing import ACROSS_AGGREGATE, meshed_extent
+from repro.fem.walls import BOTTOM
 
 TITLE = "Figure 3. Conditions at the ends of the pore and of its meshed part"
 RUNS = ()

@@ -12,10 +12,11 @@ from skfem.refdom import RefTri
 
 from repro.fem import mesher, sizing
 from repro.fem.mesh import Mesh
-from repro.fem.outline import BOTTOM, FREE, TOP, Outline
+from repro.fem.outline import Outline
 from repro.fem.outline import half_disc as half_disc_outline
 from repro.fem.sizing import Sizing
 from repro.fem.space import Space
+from repro.fem.walls import BOTTOM, FREE, TOP, channel_walls
 from repro.model import contact, pore
 from repro.scene import load_scene, parse_scene
 from repro.schemes import PAPER
@@ -178,7 +179,7 @@ def mirror_image(at, along):
         points = next((rule for rule in rules if len(rule) == values.shape[1]), np.zeros((1, 2)))
         return values[:, [int(np.abs(points - point[::-1]).sum(axis=1).argmin()) for point in points]]
 
-    image = Mesh.of(about + mesh.points * sign, mesh.cells[:, turned], mesh.biomass, back(mesh.loop), mesh.width, ends,
+    image = Mesh.of(about + mesh.points * sign, mesh.cells[:, turned], mesh.biomass, back(mesh.loop), mesh.walls, ends,
                     mesh.topology.method)
     space = Space(image)
     walls = {FREE: FREE, BOTTOM: BOTTOM if along else TOP, TOP: TOP if along else BOTTOM}
@@ -200,7 +201,8 @@ def seed(radius, refinement=1.0, geometry=1):
 def meshed(around, width=50.0, refinement=1.0, ends=None, film=2.0):
     """(Mesh, refined outline) with the extent of 3.1; straight or curved like the outline."""
     ends = sizing.meshed_extent(around, width, LENGTH) if ends is None else ends
-    return mesher.generate(around, ends, Sizing(width, refinement, film), around.geometry if around else 1)
+    sizes = Sizing(channel_walls(width), refinement, film)
+    return mesher.generate(around, ends, sizes, around.geometry if around else 1)
 
 
 def bent_inside(grid, by=0.2):

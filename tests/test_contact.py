@@ -10,8 +10,9 @@ import pytest
 from repro.errors import GrowthError, Interrupted, SimulationError
 from repro.fem import linear
 from repro.fem.division import Division
-from repro.fem.outline import BOTTOM, FREE, TOP, Outline, polygon
+from repro.fem.outline import Outline, polygon
 from repro.fem.space import Space
+from repro.fem.walls import BOTTOM, FREE, TOP, channel_walls
 from repro.march import midpoint, simulation
 from repro.march.simulation import simulate
 from repro.march.state import RestartState
@@ -44,7 +45,7 @@ def beside_upper_contact(gap):
 
 
 def joins(outline, width=100.0):
-    return contact.closing_nodes(outline, width, FILM, ANGLE).tolist()
+    return contact.closing_nodes(outline, channel_walls(width), FILM, ANGLE).tolist()
 
 
 NONE = [FREE] * 6
@@ -72,7 +73,7 @@ def test_nodes_close_beside_a_contact_surface(name, outline, expected):
     assert joins(mirrored(outline)) == expected[::-1]
 
 
-RULE = Clearance(20.0, FILM, ANGLE)
+RULE = Clearance(channel_walls(20.0), FILM, ANGLE)
 
 
 def clearances(outline, rule=RULE):
@@ -181,7 +182,7 @@ def test_the_residual_changes_with_a_line_as_its_slope_says(plugged, rheology):
     without the support, whose load changes with the line, too."""
     scene, pore = plugged
     scene = load_scene(scene, [f"growth.new_biomass={rheology}"])
-    rule = Clearance(scene.pore.width, scene.growth.minimum_film, scene.growth.minimum_contact_angle)
+    rule = Clearance(channel_walls(scene.pore.width), scene.growth.minimum_film, scene.growth.minimum_contact_angle)
     trials = contact._Trials(contact.Mechanics.of(scene), pore, pore, None, True)
     here, there = (trials._place(pore, pore.wall, grown_lines(pore, advance), rule) for advance in (0.4, 0.4 + 1e-6))
     here.system.supports = there.system.supports = ()
@@ -198,7 +199,7 @@ def test_the_search_takes_over_from_newton(plugged, monkeypatch):
     scene, pore = plugged
     monkeypatch.setattr(contact_newton, "MOST_ITERATIONS", 1)
     expansion = expanded_by(scene, pore, 1.03)
-    rule = Clearance(scene.pore.width, scene.growth.minimum_film, scene.growth.minimum_contact_angle)
+    rule = Clearance(channel_walls(scene.pore.width), scene.growth.minimum_film, scene.growth.minimum_contact_angle)
     assert min(clearances(expansion.pore.boundary, rule).values()) >= -contact_lines.CLOSE
 
 
@@ -373,12 +374,13 @@ def test_loads_do_the_same_work_on_a_divided_mesh(division):
 def test_contact_begins_on_both_sides_of_the_highest_point(plugged):
     """It extends by the minimum film along the free surface, because a single point cannot hold an elastic body."""
     _, pore = plugged
-    free = pore.boundary
-    wall, lines = contact._first_contact(replace(free, wall=np.where(free.wall == TOP, FREE, free.wall)), FILM)
+    *_, upper_wall = pore.mesh.walls
+    free = replace(pore.boundary, wall=np.where(pore.wall == TOP, FREE, pore.wall))
+    wall, lines = contact._first_contact(free, upper_wall, FILM)
     (corner,) = np.flatnonzero(wall == TOP)
     upper = [line for line in lines if line.wall == TOP]
     lengths = {line.direction: contact_lines.to_length(replace(free, wall=wall), line) for line in upper}
-    apart = free.highest - free.points[corner, 0]
+    apart = free.nearest(upper_wall)[1] - free.points[corner, 0]
     assert sorted(lengths.values()) == pytest.approx(sorted([FILM - apart, FILM + apart]), abs=1e-9)
     assert all(line.advance == line.least == line.short > 0 for line in upper)
 
@@ -397,7 +399,7 @@ def test_the_contact_surface_is_the_smallest_that_leaves_enough_fluid(method, pr
         without_newton(monkeypatch)
     scene = load_scene("wide", [f"numerics.preset={preset}", 'pore.width="25 um"', 'growth.end="18.5 h"'])
     keys = scene.growth
-    rule = Clearance(scene.pore.width, keys.minimum_film, keys.minimum_contact_angle)
+    rule = Clearance(channel_walls(scene.pore.width), keys.minimum_film, keys.minimum_contact_angle)
     expansions = []
 
     def record_expansion(*arguments):

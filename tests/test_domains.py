@@ -10,6 +10,7 @@ import pytest
 
 from repro.errors import GrowthError, MeshError, TransferError, TransportError
 from repro.fem import transfer
+from repro.fem.walls import channel_walls
 from repro.march import midpoint
 from repro.march.simulation import simulate
 from repro.model import contact, contact_lines, contact_newton, gear, growing, growth, mesh_motion, surface, transport
@@ -58,7 +59,7 @@ def tower():
     scene = load_scene("base", [TOWER, *FAST], unset=["aggregate.radius"])
     start = seeded(scene)
     grown = replace(start, theta=1.05 * start.theta)
-    rule = Clearance(50.0, scene.growth.minimum_film, scene.growth.minimum_contact_angle)
+    rule = Clearance(channel_walls(50.0), scene.growth.minimum_film, scene.growth.minimum_contact_angle)
     lines = contact_lines.lines_of(grown.boundary)
     return contact._Trials(contact.Mechanics.of(scene), grown, start, None, True), grown, lines, rule
 

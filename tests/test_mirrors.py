@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from repro import PoreEnd, load_scene, simulate
 from repro.fem import sizing
-from repro.fem.outline import BOTTOM, TOP
+from repro.fem.walls import BOTTOM, TOP, channel_walls
 from repro.march.simulation import shaped
 from repro.model import contact, pore
 from repro.preflight import numbers, simplifications
@@ -59,7 +59,8 @@ def grown(order, spans, image):
 
 
 @pytest.mark.parametrize("spans, image", [
-    *((True, image) for image in MIRRORS), pytest.param(False, "along", marks=pytest.mark.thorough)])
+    *((True, image) for image in MIRRORS), (False, "across"),
+    pytest.param(False, "along", marks=pytest.mark.thorough)])
 @pytest.mark.parametrize("order", [1, 2])
 def test_contact_advances_alike_in_a_pore_and_its_mirror_image(order, spans, image):
     """Contact by nodes and by lines, the first contact included: each rule holds on either side and either wall, to the
@@ -146,7 +147,7 @@ def mirror_image(outline):
 def test_sizes_at_an_outline_and_its_mirror_image(drawn, contact, refinement):
     """Sizes agree node by node and in the fluid, with and without small elements beside contact lines."""
     outline, width = drawn
-    sizes = sizing.Sizing(width, refinement, 2.0, contact=contact)
+    sizes = sizing.Sizing(channel_walls(width), refinement, 2.0, contact=contact)
     one, other = (sizing.interface_sizes(each, sizes) for each in (outline, mirror_image(outline)))
     assert one == pytest.approx(other[::-1], rel=1e-9)
     (sources, one), (mirrored, other) = (sizing.size_sources(each, sizes) for each in (outline, mirror_image(outline)))

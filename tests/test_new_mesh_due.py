@@ -6,7 +6,7 @@ import pytest
 
 from repro import load_scene
 from repro.fem import sizing
-from repro.fem.outline import TOP
+from repro.fem.walls import TOP
 from repro.model import mesh_motion, remeshing
 from repro.model.pore import Meshing, seeded, sized
 from repro.model.remeshing import moved_mesh

@@ -5,7 +5,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from repro.fem import outline as of
-from repro.fem.outline import FREE
+from repro.fem.walls import FREE
 from tests.strategies import plug, seed
 
 

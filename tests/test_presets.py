@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from repro.fem import sizing
-from repro.fem.outline import TOP
+from repro.fem.walls import TOP
 from repro.march import midpoint, simulation
 from repro.model import pore, remeshing
 from repro.model.biomass import Rates

@@ -13,6 +13,7 @@ import shapely
 
 from repro import report, results
 from repro.fem.mesh import Mesh, curved
+from repro.fem.walls import channel_walls
 from repro.model import growth
 from repro.report import fields, quantities, run_page
 from repro.report.reading import Run, read
@@ -263,7 +264,8 @@ def test_a_page_of_a_fine_mesh_is_small_and_accurate(tmp_path, monkeypatch, kind
     """1e5 nodes at several times take at most 3 MB; values on the grid are those of the mesh."""
     points, cells = regular_grid(monkeypatch, count)
     if kind == "triangle6":
-        straight = Mesh.of(points, cells, np.zeros(len(cells), bool), np.empty(0, int), 50.0, (0.0, 100.0))
+        walls = channel_walls(50.0)
+        straight = Mesh.of(points, cells, np.zeros(len(cells), bool), np.empty(0, int), walls, (0.0, 100.0))
         mesh = curved(straight, None)
         points, cells = mesh.points, mesh.cells
     middles = points[cells[:, :3]].mean(axis=1)

@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given
 
 from repro.fem import sizing as of
-from repro.fem.outline import BOTTOM, FREE, TOP, Outline, polygon
+from repro.fem.outline import Outline, polygon
 from repro.fem.sizing import Sizing
+from repro.fem.walls import BOTTOM, FREE, TOP, channel_walls
 from repro.model import pore
 from repro.model.contact_lines import surface_ends
 from repro.model.pore import resolution
@@ -29,7 +30,7 @@ def test_refining_an_outline_keeps_its_shape_exactly(drawn, refinement):
     and no edge is too coarse."""
     outline, width = drawn
     outline = replace(outline, origin=outline.points * [0.5, 0.7])
-    sizing = Sizing(width, refinement, FILM)
+    sizing = Sizing(channel_walls(width), refinement, FILM)
     sizes, corners = of.interface_sizes(outline.corners, sizing), outline.corners
     assert (sizes * refinement).max() <= min(outline.thickness / 10, width / 14) * (1 + 1e-12)
     fine = of.split(outline, sizing)
@@ -70,7 +71,7 @@ def test_the_mesher_gets_the_sizes_of_the_scene():
     outline = json.dumps([["-5 um", "0 um"], ["0 um", "4 um"], ["5 um", "0 um"]])
     for seed, middle in (('position="3 um"', 3.0), (f"outline={outline}", None)):
         sizes = replace(pore.sized(load_scene("base", [*changes, f"aggregate={{{seed}}}"])), front=2.0)
-        assert sizes == Sizing(80.0, 0.7, 0.5, 0.2, 2.0, 0.125, middle, 0.7)
+        assert sizes == Sizing(channel_walls(80.0), 0.7, 0.5, 0.2, 2.0, 0.125, middle, 0.7)
 
 
 @pytest.mark.parametrize("key, unit", [("mean_velocity", "m/day"), ("head", "um")])
@@ -101,7 +102,7 @@ DIRECTIONS = pytest.mark.parametrize("direction", [1, -1])
 def rolled(wall, direction, geometry, width=50.0):
     """A tower that spans the pore, after the edge beyond one of its contact lines has joined the wall."""
     tower = np.array([[-25.0, 0.0], [-15.0, width], [15.0, width], [25.0, 0.0]])
-    start = of.split(polygon(tower, width, geometry), Sizing(width, 0.7, FILM))
+    start = of.split(polygon(tower, width, geometry), Sizing(channel_walls(width), 0.7, FILM))
     line, step = next(end for end in surface_ends(start, wall) if end[1] == direction)
     joined = (line + step * np.arange(1, geometry + 1)) % len(start.points)
     points, walls = start.points.copy(), start.wall.copy()
@@ -117,7 +118,7 @@ def rolled(wall, direction, geometry, width=50.0):
 def test_a_corner_of_the_shape_at_t_0_keeps_its_node_on_either_wall(wall, direction, geometry):
     """Its contact line has moved on, and the elements are coarse. Without the node, the area at t = 0 would shrink."""
     outline, corner = rolled(wall, direction, geometry)
-    coarse = of.split(outline, Sizing(50.0, 0.3, FILM))
+    coarse = of.split(outline, Sizing(channel_walls(50.0), 0.3, FILM))
     assert corner.tolist() in coarse.origin.tolist()
     before, after = (replace(each, points=each.origin).area for each in (outline, coarse))
     assert after == pytest.approx(before, rel=1e-12)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from repro.errors import GrowthError, SimulationError, Unresolved
-from repro.fem.outline import FREE, TOP
+from repro.fem.walls import FREE, TOP
 from repro.march import midpoint, simulation, step_control, stepping, updates
 from repro.march.ends import PoreEnd
 from repro.march.midpoint import Attempt

@@ -6,7 +6,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from repro.fem.outline import BOTTOM, FREE, TOP, polygon
+from repro.fem.outline import polygon
+from repro.fem.walls import BOTTOM, FREE, TOP
 from repro.model import contact, growth, pore
 from repro.model.support import Support
 from repro.scene import load_scene
@@ -52,7 +53,7 @@ def test_simple_shear_between_two_walls_is_exact(order):
     rim = seed.mesh.topology.body_loop
     constrained = contact.constrained(len(X), rim, seed.wall, seed.fixed)
     forces = on_sides(seed, g)
-    supports = contact._supports(contact.Mechanics.of(scene), seed.body, seed, forces)
+    supports = contact._supports(seed.body, seed, forces)
     shapes = [growth.equilibrium(seed.body, seed.theta, X, np.zeros(seed.body.shape.corners), constrained, prescribed,
                                  forces=forces, supports=each) for each in (supports, [])]
     exact = X + g * X[:, 1:] * [1.0, 0.0]
@@ -116,8 +117,8 @@ def test_without_forces_one_surface_alone_moves_as_without_a_traction(order):
     grown = replace(seed, theta=seed.theta * (1.2 + 0.02 * slope))
     mechanics = contact.Mechanics.of(scene)
     none = np.zeros((len(seed.mesh.body), 2))
-    assert not contact._supports(mechanics, seed.body, seed, None)
-    assert contact._supports(mechanics, seed.body, seed, none)
+    assert not contact._supports(seed.body, seed, None)
+    assert contact._supports(seed.body, seed, none)
     shapes = [contact._equilibrium(mechanics, grown, grown, forces)[0].mesh.points for forces in (None, none)]
     assert shapes[1] == pytest.approx(shapes[0], abs=1e-9)
 
@@ -129,7 +130,7 @@ def test_a_traction_acts_on_each_surface_that_slides(order, walls, wall):
     scene, seed = block(order, f'growth.wall="{wall}"')
     seed = replace(seed, fixed=seed.fixed & ~seed.boundary.contact_ends)
     position = seed.mesh.points[seed.mesh.body]
-    supports = contact._supports(contact.Mechanics.of(scene), seed.body, seed, None)
+    supports = contact._supports(seed.body, seed, None)
     points = position[[each.point for each in supports]]
     assert points == pytest.approx(np.array([[0.0, 20.0 * (wall == TOP)] for wall in walls]))
     for wall, each in zip(walls, supports):
@@ -151,7 +152,7 @@ def test_the_traction_is_uniform_per_length_of_the_reference(order):
         body, _ = contact._strained_from(mechanics.keys, grown, grown.theta)
         position = grown.mesh.points[grown.mesh.body, 0]
         return [(seed.body.reference[:, 0] @ each.load, position @ each.load)
-                for each in contact._supports(mechanics, body, grown, None)]
+                for each in contact._supports(body, grown, None)]
 
     mean_square = 0.02 * 10.0**2 / 3  # of X; the trapezoidal rule of linear edges, 2.5 um long, adds 0.02 * 2.5^2 / 6
     for reference, present in loaded():
@@ -167,5 +168,5 @@ def test_a_surface_of_one_node_bears_its_force_there():
     wall = seed.wall.copy()
     wall[seed.boundary.points[:, 1].argmax()] = TOP
     touching = replace(seed, wall=wall, fixed=seed.fixed | (wall == TOP))
-    supports = contact._supports(contact.Mechanics.of(scene), seed.body, touching, np.zeros((len(seed.mesh.body), 2)))
+    supports = contact._supports(seed.body, touching, np.zeros((len(seed.mesh.body), 2)))
     assert [seed.mesh.points[seed.mesh.body][each.point, 1] for each in supports] == [0.0]

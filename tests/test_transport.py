@@ -12,6 +12,7 @@ from skfem import MeshTri
 
 from repro.errors import SimulationError, TransportError, Unresolved
 from repro.fem.mesh import Mesh, triangle_areas
+from repro.fem.walls import channel_walls
 from repro.march.simulation import simulate
 from repro.model import pore, transport
 from repro.model.kinetics import Sink
@@ -64,7 +65,7 @@ def right_triangles():
     wrong = triangle_areas(points, triangles) < 0
     triangles[wrong] = triangles[wrong][:, ::-1]
     x = points[triangles, 0].mean(axis=1)
-    return Mesh.of(points, triangles, (x > 10) & (x < 20), np.empty(0, int), 20.0, (0.0, 40.0))
+    return Mesh.of(points, triangles, (x > 10) & (x < 20), np.empty(0, int), channel_walls(20.0), (0.0, 40.0))
 
 
 @EVERY_ORDER

@@ -20,6 +20,7 @@ from repro.fem import elements
 from repro.fem.assembly import ElementSystem
 from repro.fem.brief import brief
 from repro.fem.linear import DEFAULT, Method, node_order
+from repro.fem.walls import Wall, Walls, on_any, width_between
 
 #: Remesh when more than POOR_ALLOWED triangles have a quality under POOR (3.5).
 POOR = 0.6
@@ -239,34 +240,39 @@ def _across(topology: Topology) -> np.ndarray:
 @brief
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """Triangles of fluid and biomass over ``ends`` x [0, width] (um).
+    """Triangles of fluid and biomass between two walls, and over ``ends`` (um) along them.
 
     points: (N, 2) um, places of the nodes, corners first.
     """
 
     points: np.ndarray
     topology: Topology
-    width: float
+    walls: Walls
     ends: tuple[float, float]
 
     @staticmethod
     def of(points: np.ndarray, cells: np.ndarray, biomass: np.ndarray, loop: np.ndarray,
-           width: float, ends: tuple[float, float], method: Method = DEFAULT) -> Mesh:
+           walls: Walls, ends: tuple[float, float], method: Method = DEFAULT) -> Mesh:
         """Build the mesh of triangles with nodes (T, 3 or 6), corners numbered first.
 
         loop: as in :class:`Topology`.
         """
         count = len(points) if cells.shape[1] == 3 else int(cells[:, 3:].min())
         x, y = points[:count].T
+        on_walls = np.flatnonzero(on_any(walls, points[:count]))
 
         def line(level: float) -> np.ndarray:
             nodes = np.flatnonzero(x == level)
             return nodes[np.argsort(y[nodes])]
 
-        walls = np.flatnonzero((y == 0) | (y == width))
-        topology = Topology(cells, count, biomass, loop, line(ends[0]), line(ends[1]), walls,
+        topology = Topology(cells, count, biomass, loop, line(ends[0]), line(ends[1]), on_walls,
                             method)
-        return Mesh(points, topology, width, ends)
+        return Mesh(points, topology, walls, ends)
+
+    @property
+    def width(self) -> float:
+        """W, from wall to wall (um)."""
+        return width_between(self.walls)
 
     @property
     def geometry(self) -> int:
@@ -340,11 +346,16 @@ class Mesh:
         """The triangles between the corners for scikit-fem, corners in the same order."""
         return MeshTri(self.points[: self.corners].T.copy(), self.triangles.T.copy(), sort_t=False)
 
-    def on_wall(self, side: int) -> np.ndarray:
+    def on_wall(self, wall: Wall, side: int) -> np.ndarray:
         """(T,) True where the side 01, 12 or 20 of a triangle lies on a wall."""
         ends = self.triangles[:, [side, elements.NEXT[side]]]
-        rise = np.ptp(self.points[ends, 1], axis=1)
-        return np.isin(ends, self.topology.walls).all(axis=1) & (rise < self.width / 2)
+        farther = wall.gap(self.points[ends]).max(axis=1)
+        return np.isin(ends, self.topology.walls).all(axis=1) & (farther < self.width / 2)
+
+    def nodes_on(self, wall: Wall) -> np.ndarray:
+        """Nodes on a wall."""
+        nodes = self.topology.dofs.walls
+        return nodes[wall.gap(self.points[nodes]) < self.width / 2]
 
     def area(self) -> float:
         """Area of the aggregate, um2."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import TypeAlias
@@ -21,8 +21,9 @@ from repro.errors import MeshError
 from repro.fem import sizing as sizes_of
 from repro.fem.linear import DEFAULT, Method
 from repro.fem.mesh import Mesh, curved, triangle_areas
-from repro.fem.outline import BOTTOM, TOP, Outline
+from repro.fem.outline import Outline
 from repro.fem.sizing import Sizing
+from repro.fem.walls import Wall, Walls
 from repro.timing import timed
 
 #: Element sizes in the first of two meshing passes over the final ones.
@@ -55,7 +56,7 @@ def generate(outline: Outline | None, ends: tuple[float, float], sizing: Sizing,
         return (straight if geometry == 1 else curved(straight, None)), None
     for _ in range(HALVINGS):
         outline = sizes_of.split(outline, sizing)
-        check_outline(outline.corners, ends, sizing.width)
+        check_outline(outline.corners, ends, sizing.walls)
         mesh = around(outline.corners, ends, sizing, method)
         if geometry == 1:
             return mesh, outline
@@ -104,17 +105,17 @@ def around(outline: Outline | None, ends: tuple[float, float], sizing: Sizing,
     (points, triangles, region), places = _fill(points, polygons, element_sizes.at)
     # The outline's points come first among the prescribed ones.
     loop = places[: 0 if outline is None else len(outline.points)]
-    return Mesh.of(points, triangles, region == 2, loop, sizing.width, ends, method)
+    return Mesh.of(points, triangles, region == 2, loop, sizing.walls, ends, method)
 
 
-def check_outline(outline: Outline, ends: tuple[float, float], width: float) -> None:
+def check_outline(outline: Outline, ends: tuple[float, float], walls: Walls) -> None:
     """Raise MeshError if an outline crosses itself or leaves the meshed part."""
     polygon = shapely.Polygon(outline.points)
     if not polygon.is_valid:
         raise MeshError("the outline of the aggregate crosses itself, and contact is modelled with "
                         f"the walls alone: {shapely.is_valid_reason(polygon)}")
     inside = ends[0] < outline.upstream and outline.downstream < ends[1]
-    if not inside or outline.points[:, 1].min() < 0 or outline.points[:, 1].max() > width:
+    if not inside or any(wall.gap(outline.points).min() < 0 for wall in walls):
         raise MeshError(f"the aggregate, x from {outline.upstream:.4g} to "
                         f"{outline.downstream:.4g} um, leaves the meshed part, "
                         f"x from {ends[0]:.4g} to {ends[1]:.4g} um")
@@ -123,51 +124,60 @@ def check_outline(outline: Outline, ends: tuple[float, float], width: float) -> 
 def _boundaries(outline: Outline | None, ends: tuple[float, float],
                 element_sizes: ElementSizes) -> tuple[np.ndarray, list[Polygon]]:
     """All prescribed points (K, 2) and the polygons that they bound."""
-    left, right = ends
-    width = element_sizes.sizing.width
-    corners = np.array([(left, 0.0), (right, 0.0), (right, width), (left, width)])
+    walls = element_sizes.sizing.walls
     if outline is None:
+        corners = _around(walls, ends)
         rim = element_sizes.path(*corners, corners[0])
         return rim, [(np.arange(len(rim)), False)]
     store = _PointStore(outline.points)
-    bounds = _both_sides if (outline.wall == TOP).any() else _over_the_top
-    fluid = bounds(outline, corners, element_sizes, store)
+    free = outline.untouched(walls)
+    touched = [wall for wall in walls if wall not in free]
+    bounds = _on_both_sides if not free else _over_the_top
+    fluid = bounds(outline, [*touched, *free], ends, element_sizes, store)
     return store.points, [*fluid, (np.arange(len(outline.points)), True)]
 
 
-def _over_the_top(outline: Outline, corners: np.ndarray, element_sizes: ElementSizes,
-                  store: _PointStore) -> list[Polygon]:
-    """The fluid around an aggregate that touches only the lower wall."""
-    south_west, south_east, north_east, north_west = corners
-    west, east = _contact(outline, BOTTOM)
-    start = store.add(element_sizes.path(south_west, outline.points[west]))
-    over = store.add(element_sizes.path(south_east, north_east, north_west, south_west))
-    end = store.add(element_sizes.path(outline.points[east], south_east)[1:])
-    top = _backwards(west, east, len(outline.points))
+def _around(walls: Sequence[Wall], ends: tuple[float, float]) -> np.ndarray:
+    """(4, 2) um, corners of the meshed part, counterclockwise from the start of the first wall."""
+    first, second = walls
+    start, end = ends[:: int(first.normal)]
+    return np.array([(start, first.y), (end, first.y), (end, second.y), (start, second.y)])
+
+
+def _over_the_top(outline: Outline, walls: Sequence[Wall], ends: tuple[float, float],
+                  element_sizes: ElementSizes, store: _PointStore) -> list[Polygon]:
+    """The fluid around an aggregate that touches only the first of two walls."""
+    before, after, opposite_after, opposite_before = _around(walls, ends)
+    first, last = _contact(outline, walls[0])
+    start = store.add(element_sizes.path(before, outline.points[first]))
+    over = store.add(element_sizes.path(after, opposite_after, opposite_before, before))
+    end = store.add(element_sizes.path(outline.points[last], after)[1:])
+    top = _backwards(first, last, len(outline.points))
     return [(np.concatenate([start, top, end, over]), False)]
 
 
-def _both_sides(outline: Outline, corners: np.ndarray, element_sizes: ElementSizes,
-                store: _PointStore) -> list[Polygon]:
-    """The fluid upstream and downstream of an aggregate that touches both walls."""
-    south_west, south_east, north_east, north_west = corners
-    west, east = _contact(outline, BOTTOM)
-    upper_west, upper_east = _contact(outline, TOP)
+def _on_both_sides(outline: Outline, walls: Sequence[Wall], ends: tuple[float, float],
+                   element_sizes: ElementSizes, store: _PointStore) -> list[Polygon]:
+    """The fluid before and after an aggregate that touches both walls, along the first one."""
+    before, after, opposite_after, opposite_before = _around(walls, ends)
+    first, last = _contact(outline, walls[0])
+    opposite_first, opposite_last = _contact(outline, walls[1])
     points = outline.points
-    start = store.add(element_sizes.path(south_west, points[west]))
-    close = store.add(element_sizes.path(points[upper_west], north_west, south_west)[1:])
-    out = element_sizes.path(points[east], south_east, north_east, points[upper_east])[1:]
+    start = store.add(element_sizes.path(before, points[first]))
+    close = element_sizes.path(points[opposite_last], opposite_before, before)[1:]
+    close = store.add(close)
+    out = element_sizes.path(points[last], after, opposite_after, points[opposite_first])[1:]
     out = store.add(out)
-    upstream = [start, _backwards(west, upper_west, len(points)), close]
-    downstream = [_backwards(upper_east, east, len(points)), out]
-    return [(np.concatenate(upstream), False), (np.concatenate(downstream), False)]
+    one_side = [start, _backwards(first, opposite_last, len(points)), close]
+    other_side = [_backwards(opposite_first, last, len(points)), out]
+    return [(np.concatenate(one_side), False), (np.concatenate(other_side), False)]
 
 
-def _contact(outline: Outline, wall: int) -> tuple[int, int]:
-    """The outline's first and last node on a wall, by x."""
-    nodes = np.flatnonzero(outline.wall == wall)
-    x = outline.points[nodes, 0]
-    return int(nodes[np.argmin(x)]), int(nodes[np.argmax(x)])
+def _contact(outline: Outline, wall: Wall) -> tuple[int, int]:
+    """The outline's first and last node on a wall, in the direction of the boundary."""
+    nodes = np.flatnonzero(outline.wall == wall.number)
+    along = wall.normal * outline.points[nodes, 0]
+    return int(nodes[np.argmin(along)]), int(nodes[np.argmax(along)])
 
 
 class _PointStore:

@@ -2,8 +2,8 @@
 
 The channel is 0 <= y <= W, -L/2 <= x <= L/2; the origin is below the middle of the seed, on the
 lower wall. Nodes run counterclockwise; each of them is FREE (on the interface with the fluid), or
-touches the lower (BOTTOM) or the upper wall (TOP). Where edges are arcs, corners and middles
-alternate: arc k has the nodes 2 k, 2 k + 1 and 2 k + 2.
+touches a wall (:mod:`repro.fem.walls`). Where edges are arcs, corners and middles alternate: arc k
+has the nodes 2 k, 2 k + 1 and 2 k + 2.
 """
 
 from __future__ import annotations
@@ -16,10 +16,8 @@ import numpy as np
 
 from repro.errors import OutsidePore
 from repro.fem.brief import brief
+from repro.fem.walls import FREE, Wall, Walls, channel_walls, numbers_at, on_any
 
-FREE = 0
-BOTTOM = 1
-TOP = 2
 #: A corner of the shape at t = 0 that keeps its node turns by more than this. The samples of a
 #: spline turn by up to 47 degrees at a tip (member 11 of the hostile scenes).
 SHARP = np.pi / 3
@@ -30,7 +28,7 @@ SHARP = np.pi / 3
 class Outline:
     """Boundary of the aggregate.
 
-    points: (M, 2) um; wall: (M,) FREE, BOTTOM or TOP; fixed: (M,) True where x is always
+    points: (M, 2) um; wall: (M,) number of the wall, or FREE; fixed: (M,) True where x is always
     fixed; origin: (M, 2) um, where the material of each node was at t = 0; geometry: 1, edges are
     straight; 2, they are arcs.
     """
@@ -44,22 +42,34 @@ class Outline:
     @property
     def upstream(self) -> float:
         """Smallest x (um)."""
-        return self._extremes[0]
+        return float(self._extreme_points[:, 0].min())
 
     @property
     def downstream(self) -> float:
         """Largest x (um)."""
-        return self._extremes[1]
+        return float(self._extreme_points[:, 0].max())
 
     @property
     def thickness(self) -> float:
-        """Largest y (um): the paper's R_aggregate."""
-        return self._extremes[2]
+        """Largest distance (um) from the first wall that it touches: the paper's R_aggregate."""
+        touching = self.wall != FREE
+        first = np.flatnonzero(self.wall == self.wall[touching].min())[0]
+        return float(np.abs(self._extreme_points[:, 1] - self.points[first, 1]).max())
 
-    @property
-    def highest(self) -> float:
-        """x of the largest y (um)."""
-        return self._extremes[3]
+    def nearest(self, wall: Wall) -> tuple[float, float]:
+        """The least gap (um) to a wall, and x (um) of this point."""
+        points = self._extreme_points
+        point = points[np.argmin(wall.normal * points[:, 1])]
+        return float(wall.gap(point)), float(point[0])
+
+    def untouched(self, walls: Walls) -> Walls:
+        """The walls that no node touches, the nearest one first."""
+        free = [wall for wall in walls if not (self.wall == wall.number).any()]
+        return tuple(sorted(free, key=lambda wall: self.nearest(wall)[0]))
+
+    def gap(self, walls: Walls) -> float:
+        """The least distance (um) to a wall without contact, zero if it touches all of them."""
+        return min((self.nearest(wall)[0] for wall in self.untouched(walls)), default=0.0)
 
     def same_contact(self, other: Outline) -> bool:
         """Does each node touch the same wall in both outlines?"""
@@ -130,11 +140,11 @@ class Outline:
         return np.stack([values[::2], values[1::2], ends], axis=1)
 
     @cached_property
-    def _extremes(self) -> tuple[float, float, float, float]:
-        x, y = self.points.T
-        if self.geometry == 2:
-            x, y = np.concatenate([self._peaks(), self.points]).T
-        return float(x.min()), float(x.max()), float(y.max()), float(x[y.argmax()])
+    def _extreme_points(self) -> np.ndarray:
+        """(K, 2) um, points among which x and y have their extremes."""
+        if self.geometry == 1:
+            return self.points
+        return np.concatenate([self._peaks(), self.points])
 
     def _peaks(self) -> np.ndarray:
         """(K, 2) um, points within an arc at which x or y is stationary.
@@ -173,11 +183,13 @@ def arc_derivatives(nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return -3 * first + 4 * middle - last, 4 * (first - 2 * middle + last)
 
 
-def half_disc(radius: float, across: float, geometry: int = 1, middle: float = 0.0) -> Outline:
-    """Half-disc of a radius (um) on the lower wall, around x = ``middle`` (um), its fixed point.
+def half_disc(radius: float, across: float, geometry: int = 1, middle: float = 0.0,
+              wall: Wall | None = None) -> Outline:
+    """Half-disc of a radius (um) on a wall, around x = ``middle`` (um), its fixed point.
 
-    across: elements over its radius.
+    across: elements over its radius; wall: the lower one, y = 0, by default.
     """
+    wall = wall or channel_walls(inf)[0]
     edges = 2 * int(np.ceil(np.pi / 2 * across))
     edges = geometry * (edges if geometry == 1 else max(6, edges))
     angle = np.linspace(0.0, np.pi, edges + 1)
@@ -187,9 +199,13 @@ def half_disc(radius: float, across: float, geometry: int = 1, middle: float = 0
     base = np.linspace(-radius, radius, 2 * half + 1)
     base[half] = 0.0
     points = np.vstack([np.column_stack([base, 0.0 * base]), arc[1:-1]])
-    points[:, 0] += middle
-    wall = np.where(np.arange(len(points)) < len(base), BOTTOM, FREE)
-    return Outline(points, wall, np.arange(len(points)) == half, points.copy(), geometry)
+    points = points * [1.0, wall.normal] + [middle, wall.y]
+    counterclockwise = int(wall.normal) * np.arange(len(points))
+    points = points[counterclockwise]
+    wall_numbers = np.where(np.arange(len(points)) < len(base), wall.number, FREE)
+    fixed = np.arange(len(points)) == half
+    return Outline(points, wall_numbers[counterclockwise], fixed[counterclockwise], points.copy(),
+                   geometry)
 
 
 def polygon(corners: np.ndarray, width: float, geometry: int = 1, smooth: bool = False,
@@ -205,20 +221,21 @@ def polygon(corners: np.ndarray, width: float, geometry: int = 1, smooth: bool =
     """
     # Counterclockwise: from the downstream end over the top to the upstream end.
     rim = np.asarray(corners, float)[::-1]
+    walls = channel_walls(width)
     if smooth:
-        rim = _splined(rim, width)
-    rim = _graded_to_corners(rim, width, at_tips, bends)
+        rim = _splined(rim, walls)
+    rim = _graded_to_corners(rim, walls, at_tips, bends)
     base = np.column_stack([np.linspace(rim[-1, 0], rim[0, 0], 3), np.zeros(3)])
     points = np.vstack([base, rim[1:-1]])
-    if points[:, 1].min() < 0 or points[:, 1].max() > width:
+    if any(wall.gap(points).min() < 0 for wall in walls):
         raise OutsidePore("the spline through the points of the outline leaves the pore")
-    wall = np.where(points[:, 1] == width, TOP, FREE)
-    wall[:3] = BOTTOM
-    points, wall = _with_contact_middle(points, wall)
-    fixed = _middles(points, wall)
+    for wall in walls:
+        points = _with_contact_middle(points, wall)
+    wall_numbers = numbers_at(walls, points)
+    fixed = _middles(points, walls)
     if geometry == 2:
-        points, wall, fixed = _with_arc_middles(points, wall, fixed)
-    return Outline(points, wall, fixed, points.copy(), geometry)
+        points, wall_numbers, fixed = _with_arc_middles(points, wall_numbers, fixed)
+    return Outline(points, wall_numbers, fixed, points.copy(), geometry)
 
 
 #: Corners that turn by more than this angle have smaller edges beside them.
@@ -229,7 +246,7 @@ AT_NOTCH = 3.0
 CORNER_RATIO = 3.0
 
 
-def _graded_to_corners(rim: np.ndarray, width: float, least: float, bends: bool) -> np.ndarray:
+def _graded_to_corners(rim: np.ndarray, walls: Walls, least: float, bends: bool) -> np.ndarray:
     """Points (M, 2) on the lines between points (K, 2), closer and closer to each corner.
 
     At a sharp tip the water's velocity gradient grows as the distance to the power of -1/2, and the
@@ -244,9 +261,10 @@ def _graded_to_corners(rim: np.ndarray, width: float, least: float, bends: bool)
     angle = np.arctan2(way[:, 1], way[:, 0])
     turn = (np.diff(angle, prepend=angle[0], append=angle[-1]) + np.pi) % (2 * np.pi) - np.pi
     near = np.where(turn > CORNER, least, np.where(turn < -CORNER, AT_NOTCH * least, inf))
-    top = rim[:, 1] == width
-    near[top] = least
-    if bends or top.any():
+    _, *opposite = walls
+    touching = on_any(opposite, rim)
+    near[touching] = least
+    if bends or touching.any():
         near[[0, -1]] = least
     shares = [_shares(length, *near[k: k + 2])
               for k, length in enumerate(np.linalg.norm(way, axis=1))]
@@ -273,8 +291,8 @@ BETWEEN = 8
 MOST_SPLINED = 1000
 
 
-def _splined(rim: np.ndarray, width: float) -> np.ndarray:
-    """Points (M, 2) on a spline through points (K, 2), straight along the upper wall."""
+def _splined(rim: np.ndarray, walls: Walls) -> np.ndarray:
+    """Points (M, 2) on a spline through points (K, 2), straight along a wall."""
     from scipy.interpolate import CubicSpline  # its import takes 0.25 s; few scenes need it
 
     length = np.sqrt(np.linalg.norm(np.diff(rim, axis=0), axis=1))
@@ -282,34 +300,32 @@ def _splined(rim: np.ndarray, width: float) -> np.ndarray:
     curve = CubicSpline(knots, rim, bc_type="natural")
     between = min(BETWEEN, max(1, MOST_SPLINED // len(rim)))
     pieces = []
-    for k, (start, end) in enumerate(zip(rim, rim[1:])):
-        flat = start[1] == width and end[1] == width
+    for k, start in enumerate(rim[:-1]):
+        flat = any(wall.holds(rim[k: k + 2]).all() for wall in walls)
         t = np.linspace(knots[k], knots[k + 1], between + 1)[:-1]
         pieces.append(start[None] if flat else np.vstack([start, curve(t[1:])]))
     return np.vstack([*pieces, rim[-1]])
 
 
-def _with_contact_middle(points: np.ndarray, wall: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Insert a node in the middle of the upper contact surface, if there is one."""
-    top = np.flatnonzero(wall == TOP)
-    if len(top) == 0:
-        return points, wall
-    x = points[top, 0]
+def _with_contact_middle(points: np.ndarray, wall: Wall) -> np.ndarray:
+    """Insert a node in the middle of the contact surface with a wall, if there is one."""
+    on = np.flatnonzero(wall.holds(points))
+    if len(on) == 0:
+        return points
+    x = points[on, 0]
     middle = 0.5 * (x.min() + x.max())
     if np.isclose(x, middle).any():
-        return points, wall
-    # Along the upper wall the loop runs from downstream to upstream.
-    after = top[np.searchsorted(-x, -middle)]
-    points = np.insert(points, after, [middle, points[after, 1]], axis=0)
-    return points, np.insert(wall, after, TOP)
+        return points
+    after = on[np.searchsorted(wall.normal * x, wall.normal * middle)]
+    return np.insert(points, after, [middle, points[after, 1]], axis=0)
 
 
-def _middles(points: np.ndarray, wall: np.ndarray) -> np.ndarray:
-    """(M,) True at the node in the middle of each contact surface."""
+def _middles(points: np.ndarray, walls: Walls) -> np.ndarray:
+    """(M,) True at the node in the middle of each contact surface that keeps a point."""
     fixed = np.zeros(len(points), bool)
-    for side in (BOTTOM, TOP):
-        on = np.flatnonzero(wall == side)
-        if len(on):
+    for wall in walls:
+        on = np.flatnonzero(wall.holds(points))
+        if len(on) and wall.keeps_point:
             x = points[on, 0]
             fixed[on[np.argmin(np.abs(x - 0.5 * (x.min() + x.max())))]] = True
     return fixed

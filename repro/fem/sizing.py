@@ -11,7 +11,8 @@ from math import inf
 import numpy as np
 from numpy.typing import ArrayLike
 
-from repro.fem.outline import FREE, TOP, Outline, arc_derivatives, parabola
+from repro.fem.outline import Outline, arc_derivatives, parabola
+from repro.fem.walls import FREE, Wall, Walls, width_between
 
 #: Elements across the pore's width, across the aggregate's thickness and across the narrowest film.
 ACROSS_PORE = 14.0
@@ -33,7 +34,7 @@ DISTANCES = 2**20
 class Sizing:
     """Element sizes of a mesh.
 
-    width: of the pore (um); refinement: divisor of the sizes; film: thickness of the thinnest
+    walls: of the pore; refinement: divisor of the sizes; film: thickness of the thinnest
     resolved film (um); gradation: growth of the size with the distance from its source; front:
     further divisor of sizes at the aggregate, for a sharp front of the substrates; contact: size
     beside the contact lines with the opposite wall (um), infinite for none; seed: x (um) of the
@@ -41,7 +42,7 @@ class Sizing:
     in films, ``refinement`` by default.
     """
 
-    width: float
+    walls: Walls
     refinement: float
     film: float
     gradation: float = GRADATION
@@ -49,6 +50,17 @@ class Sizing:
     contact: float = inf
     seed: float | None = None
     film_refinement: float | None = None
+
+    @property
+    def width(self) -> float:
+        """W, from wall to wall (um)."""
+        return width_between(self.walls)
+
+    @property
+    def middle(self) -> np.ndarray | None:
+        """(2,) um, middle of the half-disc at t = 0, None for another shape."""
+        seeded, *_ = self.walls
+        return None if self.seed is None else np.array([self.seed, seeded.y])
 
     @property
     def largest(self) -> float:
@@ -97,10 +109,11 @@ def interface_sizes(outline: Outline, sizing: Sizing) -> np.ndarray:
 
 def _contact_sizes(outline: Outline, sizing: Sizing) -> np.ndarray | float:
     """(M,) size (um) that grows from the contact lines with the opposite wall; inf without them."""
-    top = outline.wall == TOP
-    if sizing.contact == inf or not top.any():
+    seeded, *_ = sizing.walls
+    on = (outline.wall != FREE) & (outline.wall != seeded.number)
+    if sizing.contact == inf or not on.any():
         return inf
-    lines = outline.points[top & ~(np.roll(top, 1) & np.roll(top, -1))]
+    lines = outline.points[on & ~(np.roll(on, 1) & np.roll(on, -1))]
     distance = np.linalg.norm(outline.points[:, None] - lines, axis=2).min(axis=1)
     return sizing.contact + GRADATION * distance
 
@@ -113,32 +126,38 @@ def too_coarse(outline: Outline, sizing: Sizing) -> bool:
 
 
 def film_sizes(outline: Outline, sizing: Sizing) -> np.ndarray:
-    """(M,) element size (um) in the fluid between each node and the opposite wall.
+    """(M,) element size (um) in the fluid between each node and the walls without contact.
 
     It is a tenth of the film's thickness over the refinement there, but at least the size in the
     thinnest resolved film, because thinner films close.
     """
-    if (outline.wall == TOP).any():
-        return np.full(len(outline.points), np.inf)
-    film = np.maximum(sizing.width - outline.points[:, 1], sizing.film)
+    sizes = [_film_sizes(outline, sizing, wall) for wall in outline.untouched(sizing.walls)]
+    return np.min([np.full(len(outline.points), inf), *sizes], axis=0)
+
+
+def _film_sizes(outline: Outline, sizing: Sizing, wall: Wall) -> np.ndarray:
+    """(M,) element size (um) in the fluid between each node and a wall without contact."""
+    film = np.maximum(wall.gap(outline.points), sizing.film)
     return film / ACROSS_FILM / (sizing.film_refinement or sizing.refinement)
 
 
 def size_sources(outline: Outline, sizing: Sizing) -> tuple[np.ndarray, np.ndarray]:
     """Points (K, 2) um with prescribed element sizes, and the sizes (K,) um.
 
-    The points are the interface nodes and, across the fluid, points on the opposite wall, so that a
-    film has elements of one size. Short interface edges are never merged, so the elements around
-    them are small too.
+    The points are the interface nodes and, across the fluid, points on walls without contact, so
+    that a film has elements of one size. Short interface edges are never merged, so the elements
+    around them are small too.
     """
     free = outline.wall == FREE
     near = interface_sizes(outline, sizing)[free]
-    film = film_sizes(outline, sizing)[free]
     edge = outline.edge_lengths()
     near = np.minimum(near, SPLIT * np.maximum(edge, np.roll(edge, 1))[free])
-    across = np.column_stack([outline.points[free, 0], np.full(len(near), sizing.width)])
-    finite = np.isfinite(film)
-    return np.vstack([outline.points[free], across[finite]]), np.concatenate([near, film[finite]])
+    sources = [outline.points[free]]
+    sizes = [near]
+    for wall in outline.untouched(sizing.walls):
+        sources.append(np.column_stack([outline.points[free, 0], np.full(len(near), wall.y)]))
+        sizes.append(_film_sizes(outline, sizing, wall)[free])
+    return np.vstack(sources), np.concatenate(sizes)
 
 
 def graded_size(where: np.ndarray, sources: np.ndarray, sizes: np.ndarray,
@@ -180,7 +199,7 @@ def split(outline: Outline, sizing: Sizing) -> Outline:
             parts = outline.geometry * split_count(polygon, keep, sizes)
             pieces.append((np.full(parts, keep[0]), np.arange(parts) / parts))
     edges, t = zip(*pieces)
-    return placed(outline, np.concatenate(edges), np.concatenate(t), sizing.seed)
+    return placed(outline, np.concatenate(edges), np.concatenate(t), sizing.middle)
 
 
 def halved(outline: Outline, cut: np.ndarray) -> Outline:
@@ -238,10 +257,11 @@ def _parameters(nodes: np.ndarray, x: np.ndarray) -> np.ndarray:
     return t
 
 
-def placed(outline: Outline, edge: np.ndarray, t: np.ndarray, seed: float | None = None) -> Outline:
+def placed(outline: Outline, edge: np.ndarray, t: np.ndarray,
+           seed: np.ndarray | None = None) -> Outline:
     """Place nodes (K,), each at t in [0, 1) of an edge; t = 0 is the edge's first corner.
 
-    seed: as in :class:`Sizing`. A new node between two nodes of the seed's arc gets an origin on
+    seed: as :attr:`Sizing.middle`. A new node between two nodes of the seed's arc gets an origin on
     that arc. A straight edge of the present outline was round at time zero, and the elastic stress
     makes it round again at the next update.
     """
@@ -251,8 +271,7 @@ def placed(outline: Outline, edge: np.ndarray, t: np.ndarray, seed: float | None
                       for part in (outline.points, outline.origin))
     if outline.geometry == 1 and seed is not None:
         ends = outline.arcs(outline.origin)[edge]
-        middle = np.array([seed, 0.0])
-        origin = middle + _on_arc(origin - middle, ends[:, 0] - middle, ends[:, 2] - middle)
+        origin = seed + _on_arc(origin - seed, ends[:, 0] - seed, ends[:, 2] - seed)
     wall = np.where(first, outline.wall[corner], outline.edge_wall[edge])
     on = wall != FREE
     points[on, 1] = outline.points[corner[on], 1]
@@ -268,7 +287,7 @@ def _on_arc(places: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.nda
     """
     radius = np.hypot(*first.T)
     distance = np.hypot(*places.T)
-    arc = np.isclose(radius, np.hypot(*second.T), rtol=1e-9, atol=0) & (places[:, 1] > 0)
+    arc = np.isclose(radius, np.hypot(*second.T), rtol=1e-9, atol=0) & (places[:, 1] != 0)
     return places * np.where(arc, radius / np.where(arc, distance, 1.0), 1.0)[:, None]
 
 

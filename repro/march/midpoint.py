@@ -43,8 +43,8 @@ class Attempt:
     """Attempted step of the midpoint rule.
 
     step: its result, None if the rates change too much or if it ends long after the first contact;
-    change: mean change of the rates over its first half, 1/h; gaps: least distance (um) to the
-    opposite wall before and after the step, if the step makes the first contact with it.
+    change: mean change of the rates over its first half, 1/h; gaps: least distance (um) to a
+    wall without contact before and after the step, if the step makes the first contact with it.
     """
 
     step: StepResult | None
@@ -81,7 +81,7 @@ def attempt(stages: Stages, previous: Pore, solved: Solved, duration: float,
     StageError if a stage fails.
     """
     first = stages.rates(previous, solved)
-    gap = stages.mechanics.width - previous.boundary.thickness
+    gap = previous.boundary.gap(previous.mesh.walls)
     try:
         half = solve_halfway(stages, previous, solved, first, duration, search)
     except FirstContact as early:

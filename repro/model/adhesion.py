@@ -23,7 +23,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from repro.fem import elements
-from repro.fem.outline import BOTTOM, TOP, edge_functions
+from repro.fem.outline import edge_functions
+from repro.fem.walls import Wall
 from repro.model import flow, growth, traction
 from repro.model.flow import Flow
 from repro.model.pore import Pore, Solved
@@ -47,7 +48,7 @@ class Peak:
 @dataclass(frozen=True)
 class Load:
     """Force x, y (MPa um) of the fluid on the aggregate, and its moment about the middle of the
-    contact with the lower wall, counterclockwise (MPa um2); per depth."""
+    contact with the wall of its seed, counterclockwise (MPa um2); per depth."""
 
     x: float
     y: float
@@ -85,14 +86,15 @@ def _beside_contact(pore: Pore, water: Flow) -> np.ndarray:
     ends = np.zeros(len(mesh.points), bool)
     ends[mesh.loop[outline.contact_ends]] = True
     head = mesh.with_middles(water.head)
+    beside = ~mesh.biomass & ends[mesh.triangles].any(axis=1)
     for side in range(3):
-        beside = ends[mesh.triangles].any(axis=1)
-        cells = mesh.cells[~mesh.biomass & mesh.on_wall(side) & beside]
+        inward = np.sum([wall.normal * mesh.on_wall(wall, side) for wall in mesh.walls], axis=0)
+        chosen = beside & (inward != 0)
+        cells = mesh.cells[chosen]
         values, weights, along = elements.side_table(mesh.geometry, side)
         dx = np.abs(mesh.points[cells, 0] @ along.T) * weights
         loads = (dx * (head[cells] @ values.T)) @ values
-        up = np.where(mesh.points[cells[:, side], 1] == 0.0, 1.0, -1.0)
-        np.add.at(forces[:, 1], cells, up[:, None] * loads * ends[cells])
+        np.add.at(forces[:, 1], cells, inward[chosen, None] * loads * ends[cells])
     return forces
 
 
@@ -100,8 +102,9 @@ def fluid_load(scene: Scene, pore: Pore, solved: Solved) -> Load:
     """The force and the moment of the water on the aggregate."""
     forces = fluid_forces(scene, pore, solved)
     outline = pore.boundary
-    on = outline.points[outline.wall == BOTTOM, 0]
-    x, y = (pore.mesh.points[pore.mesh.body] - [(on.min() + on.max()) / 2, 0.0]).T
+    seeded, *_ = pore.mesh.walls
+    on = outline.points[outline.wall == seeded.number, 0]
+    x, y = (pore.mesh.points[pore.mesh.body] - [(on.min() + on.max()) / 2, seeded.y]).T
     moment = float(x @ forces[:, 1] - y @ forces[:, 0])
     return Load(float(forces[:, 0].sum()), float(forces[:, 1].sum()), moment)
 
@@ -124,26 +127,26 @@ def wall_peak(scene: Scene, pore: Pore, solved: Solved) -> Peak:
     """Largest mean stress that a wall bears, with its coordinates."""
     forces = np.zeros_like(pore.mesh.points)
     forces[pore.mesh.body] = wall_forces(scene, pore, solved)
-    walls = [wall for wall in (BOTTOM, TOP) if (pore.boundary.edge_wall == wall).any()]
-    peaks = [_peak_on(pore, wall, forces) for wall in walls]
+    touched = pore.boundary.edge_wall
+    peaks = [_peak_on(pore, wall, forces) for wall in pore.mesh.walls
+             if (touched == wall.number).any()]
     return max(peaks, key=lambda peak: peak.value)
 
 
-def _peak_on(pore: Pore, wall: int, forces: np.ndarray) -> Peak:
+def _peak_on(pore: Pore, wall: Wall, forces: np.ndarray) -> Peak:
     """Largest mean stress that one wall bears, with its coordinates."""
     outline = pore.boundary
     x = pore.mesh.points[:, 0]
-    nodes = pore.mesh.loop[outline.edges_on(wall)]
+    nodes = pore.mesh.loop[outline.edges_on(wall.number)]
     nodes = nodes[np.argsort(x[nodes].min(axis=1))]
-    nodes = nodes[:, ::-1] if wall == TOP else nodes
+    nodes = nodes[:, :: int(wall.normal)]
     surface = _Surface(x, nodes)
-    inward = 1.0 if wall == TOP else -1.0
-    pull = surface.means(surface.density(inward * forces[:, 1]), pore.mesh.width)
+    pull = surface.means(surface.density(-wall.normal * forces[:, 1]), pore.mesh.width)
     shear = surface.means(surface.density(forces[:, 0]), pore.mesh.width)
     bears = np.hypot(np.maximum(pull, 0.0), shear)
     worst = int(bears.argmax())
     middle = surface.middles(pore.mesh.width)[worst]
-    return Peak(float(bears[worst]), float(middle), pore.mesh.width if wall == TOP else 0.0)
+    return Peak(float(bears[worst]), float(middle), wall.y)
 
 
 @dataclass(frozen=True, eq=False)

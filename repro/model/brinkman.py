@@ -21,6 +21,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import product
 
 import numpy as np
 
@@ -82,8 +83,9 @@ class Permeable:
         mesh = velocity.mesh
         blocks = np.zeros((len(mesh.cells), *2 * velocity.cells.shape[1:]))
         root = np.sqrt(self.permeability)
-        for side in range(3):
-            chosen = np.flatnonzero(self.widened & mesh.on_wall(side))
+        no_slip = [wall for wall in mesh.walls if wall.no_slip]
+        for wall, side in product(no_slip, range(3)):
+            chosen = np.flatnonzero(self.widened & mesh.on_wall(wall, side))
             d = self.thickness[chosen]
             values, weights, along = elements.side_table(mesh.geometry, side)
             dx = np.abs(mesh.points[mesh.cells[chosen], 0] @ along.T) * weights

@@ -19,8 +19,9 @@ import numpy as np
 from repro.errors import GrowthError, LinearError, failing_as
 from repro.fem.division import Division
 from repro.fem.mesh import Mesh
-from repro.fem.outline import BOTTOM, FREE, TOP, Outline
+from repro.fem.outline import Outline
 from repro.fem.space import Space
+from repro.fem.walls import FREE, Wall, Walls
 from repro.model import contact_lines, growth, traction
 from repro.model.body import Body, Shape
 from repro.model.contact_lines import (
@@ -66,11 +67,10 @@ FIRST_LENGTHS = np.array([1.0, 0.5, 0.25])
 class Mechanics:
     """Data from which the shape of a grown aggregate is computed.
 
-    width: um, of the pore; keys: section [growth] of the scene; numerics: Newton's method; fluid:
+    keys: section [growth] of the scene; numerics: Newton's method; fluid:
     its forces on the aggregate, None if they are neglected.
     """
 
-    width: float
     keys: Growth
     numerics: Numerics
     fluid: Fluid | None = None
@@ -80,7 +80,7 @@ class Mechanics:
         """The mechanics of a scene with growth."""
         keys = scene.growing.growth
         fluid = Fluid.of(scene) if keys.fluid_forces == "included" else None
-        return cls(scene.pore.width, keys, scene.numerics, fluid)
+        return cls(keys, scene.numerics, fluid)
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,10 +88,10 @@ class Expansion:
     """The aggregate in its new shape.
 
     pore: with the fluid's nodes not yet moved, on the divided mesh if a contact line lies
-    within an arc; iterations: of Newton's method; gap: um, the least distance to the opposite wall
-    before films closed; division: of the mesh of the grown pore, None if it is not divided;
-    advances: {(wall, direction): um} by which contact lines have advanced
-    along the outline of the grown pore.
+    within an arc; iterations: of Newton's method; gap: um, the least distance to a wall without
+    contact before films closed; division: of the mesh of the grown pore, None if it is not divided;
+    advances: {(wall, direction): um} by which contact lines have advanced along the outline of the
+    grown pore.
     """
 
     pore: Pore
@@ -245,7 +245,7 @@ def _close_by_nodes(mechanics: Mechanics, grown: Pore, start: Pore, forces: np.n
     After each equilibrium, the nodes at a film or a wedge that is too thin join the wall.
     """
     keys = mechanics.keys
-    width = mechanics.width
+    walls = grown.mesh.walls
     shape = replace(grown, space=start.space, pressure=start.pressure)
     iterations = 0
     gaps: list[float] = []
@@ -253,13 +253,13 @@ def _close_by_nodes(mechanics: Mechanics, grown: Pore, start: Pore, forces: np.n
         last = None if gaps else grown.mesh.points[grown.mesh.body]
         shape, used = _equilibrium(mechanics, grown, shape, forces, last=last)
         iterations += used
-        gaps.append(width - shape.boundary.thickness)
+        gaps.append(shape.boundary.gap(walls))
         if not shape.contact:
             _refuse_late(gaps[-1], keys.minimum_film, search)
-        joins = closing_nodes(shape.boundary, width, keys.minimum_film, keys.minimum_contact_angle)
+        joins = closing_nodes(shape.boundary, walls, keys.minimum_film, keys.minimum_contact_angle)
         if not joins.any():
-            return Expansion(replace(shape, fixed=_with_new_surface(shape.boundary)), iterations,
-                             gaps[0])
+            rest = replace(shape, fixed=_with_new_surface(shape.boundary, walls))
+            return Expansion(rest, iterations, gaps[0])
         shape = replace(shape, wall=np.where(joins != FREE, joins, shape.wall))
     raise GrowthError(f"the contact surfaces still change after {CONTACT_ROUNDS} rounds")
 
@@ -273,10 +273,10 @@ def _equilibrium(mechanics: Mechanics, grown: Pore, start: Pore, forces: np.ndar
     body, target_J = _strained_from(mechanics.keys, grown, grown.theta)
     nodes = grown.mesh.body
     inside = grown.mesh.topology.body_corners
-    locked, target = _constraints(mechanics, grown, start)
+    locked, target = _constraints(grown, start)
     rest = growth.equilibrium(body, target_J, start.mesh.points[nodes], start.pressure[inside],
                               locked, target, forces=forces, last=last, patient=patient,
-                              supports=_supports(mechanics, body, start, forces),
+                              supports=_supports(body, start, forces),
                               modified_newton=mechanics.numerics.scheme.modified_newton)
     return _placed(grown, start, rest), rest.iterations
 
@@ -285,7 +285,7 @@ def _close_by_lines(mechanics: Mechanics, grown: Pore, start: Pore, forces: np.n
                     search: SearchOptions) -> Expansion:
     """The shape with the smallest contact surfaces that leave no film and no wedge too thin."""
     keys = mechanics.keys
-    rule = Clearance(mechanics.width, keys.minimum_film, keys.minimum_contact_angle)
+    rule = Clearance(grown.mesh.walls, keys.minimum_film, keys.minimum_contact_angle)
     trials = _Trials(mechanics, grown, start, forces, search.patient)
     lines = contact_lines.lines_of(grown.boundary)
     _place_lines(grown.boundary, lines, search)
@@ -294,7 +294,7 @@ def _close_by_lines(mechanics: Mechanics, grown: Pore, start: Pore, forces: np.n
         if expansion is not None:
             return expansion
     shape = trials.solve(grown.wall, lines)
-    gap = rule.width - shape.pore.boundary.thickness
+    gap = shape.pore.boundary.gap(rule.walls)
     wall = grown.wall
     if not grown.contact and gap < rule.film:
         _refuse_late(gap, rule.film, search)
@@ -304,7 +304,8 @@ def _close_by_lines(mechanics: Mechanics, grown: Pore, start: Pore, forces: np.n
         for line in lines:
             line.record(*_clearance(rule, shape.pore.boundary, line))
         if search.stationary or all(line.accepted for line in lines):
-            rest = replace(shape.pore, fixed=_with_new_surface(shape.pore.boundary))
+            fixed = _with_new_surface(shape.pore.boundary, rule.walls)
+            rest = replace(shape.pore, fixed=fixed)
             return replace(shape, pore=rest, iterations=trials.iterations, gap=gap)
         if not tried and all(abs(line.trials[-1][1]) < CLOSE_ENOUGH or line.accepted
                              for line in lines):
@@ -331,20 +332,23 @@ CLOSINGS = {1: _close_by_nodes, 2: _close_by_lines}
 
 def _touch(grown: Pore, shape: Expansion, rule: Clearance, trials: _Trials,
            search: SearchOptions) -> tuple[np.ndarray, list[Line], Expansion]:
-    """The first contact of a shape: walls (M,), contact lines, and the equilibrium with them.
+    """The first contact of a shape with the nearest wall: walls (M,), contact lines, and the
+    equilibrium with them.
 
-    Contact covers at least the least film's thickness on both sides of the highest point, because a
+    Contact covers at least the least film's thickness on both sides of the nearest point, because a
     force at a single point would indent an elastic body without limit. If the body is too pointed
     to be flat over this length, contact covers half of it, or a quarter.
     """
+    outline = shape.pore.boundary
+    nearest, *_ = outline.untouched(rule.walls)
     lengths = rule.film * FIRST_LENGTHS
-    width = _tip_width(shape.pore.boundary, rule.film)
+    width = _tip_width(outline, nearest, rule.film)
     if width < 2 * lengths[-1]:
         raise GrowthError(f"a tip comes into contact that is {width:.2g} um wide at a depth of "
                           f"{rule.film:.2g} um, the least film; the rule for films (2.3.3) does "
                           "not describe so thin a tip, and no setting helps")
     for length in lengths:
-        wall, lines = _first_contact(shape.pore.boundary, length)
+        wall, lines = _first_contact(outline, nearest, length)
         _place_lines(replace(grown.boundary, wall=wall), lines, search)
         try:
             return wall, lines, trials.solve(wall, lines)
@@ -363,34 +367,37 @@ def _place_lines(outline: Outline, lines: Sequence[Line], search: SearchOptions)
             line.advance = BESIDE
 
 
-def _tip_width(outline: Outline, depth: float) -> float:
-    """The width (um) of the aggregate at a depth (um) below its highest point."""
-    x, y = outline.points.T
-    top = int(np.argmax(y))
+def _tip_width(outline: Outline, wall: Wall, depth: float) -> float:
+    """The width (um) of the aggregate at a depth (um) behind its point nearest to a wall."""
+    x = outline.points[:, 0]
+    height = -wall.normal * outline.points[:, 1]
+    tip = int(np.argmax(height))
     sides = []
     for direction in (1, -1):
-        walk = (top + direction * np.arange(len(y))) % len(y)
-        below = int(np.argmax(y[walk] < y[top] - depth))
-        last = walk[below - 1 : below + 1][::-1]
-        sides.append(np.interp(y[top] - depth, y[last], x[last]))
+        walk = (tip + direction * np.arange(len(x))) % len(x)
+        behind = int(np.argmax(height[walk] < height[tip] - depth))
+        last = walk[behind - 1 : behind + 1][::-1]
+        sides.append(np.interp(height[tip] - depth, height[last], x[last]))
     return float(abs(sides[0] - sides[1]))
 
 
-def _first_contact(outline: Outline, length: float) -> tuple[np.ndarray, list[Line]]:
-    """Walls (M,) after the corner next to the highest point has joined the upper wall, and the
-    contact lines at a length (um) on both sides of that point."""
+def _first_contact(outline: Outline, nearest: Wall,
+                   length: float) -> tuple[np.ndarray, list[Line]]:
+    """Walls (M,) after the corner next to the nearest point has joined a wall, and the contact
+    lines at a length (um) on both sides of that point."""
     x = outline.points[:, 0]
-    arc = int(np.argmax(outline.arcs(outline.points)[:, :, 1].max(axis=1)))
+    _, tip = outline.nearest(nearest)
+    arc = int(np.argmin((nearest.normal * outline.arcs(outline.points)[:, :, 1]).min(axis=1)))
     ends = np.array([2 * arc, (2 * arc + 2) % len(x)])
-    corner = int(ends[np.argmin(np.abs(x[ends] - outline.highest))])
+    corner = int(ends[np.argmin(np.abs(x[ends] - tip))])
     wall = outline.wall.copy()
-    wall[corner] = TOP
+    wall[corner] = nearest.number
     touching = replace(outline, wall=wall)
     lines = contact_lines.lines_of(touching)
     for line in lines:
-        if line.wall == TOP:
+        if line.wall == nearest.number:
             outwards = np.sign(x[(corner + line.direction) % len(x)] - x[corner])
-            advance = length + outwards * (outline.highest - x[corner])
+            advance = length + outwards * (tip - x[corner])
             line.start_from(contact_lines.to_arcs(touching, line, max(advance, 0.0)))
     return wall, lines
 
@@ -466,7 +473,7 @@ class _Trials:
         placed = coupled.placed
         points, pressures = placed.on_mesh(coupled.position, coupled.pressure)
         shape = replace(placed.pore.moved(points), pressure=pressures)
-        rest = replace(shape, fixed=_with_new_surface(shape.boundary))
+        rest = replace(shape, fixed=_with_new_surface(shape.boundary, rule.walls))
         return Expansion(rest, self.iterations, 0.0, placed.division, self._lengths(wall, lines))
 
     def _lengths(self, wall: np.ndarray, lines: Sequence[Line]) -> dict[tuple[int, int], float]:
@@ -481,8 +488,8 @@ class _Trials:
         keys = self._mechanics.keys
         body, theta = _strained_from(keys, locked, locked.theta)
         reference = grown.origin if keys.new_biomass == "stressed" else grown.mesh.points
-        prescribed, target = _constraints(self._mechanics, locked, locked)
-        supports = _supports(self._mechanics, body, locked, forces)
+        prescribed, target = _constraints(locked, locked)
+        supports = _supports(body, locked, forces)
         system = growth.System(body, prescribed, forces=forces, supports=supports)
         return Placed(grown, locked, division, reference, system, theta, target, rule)
 
@@ -623,27 +630,24 @@ def _placed(grown: Pore, start: Pore, rest: growth.Equilibrium) -> Pore:
     return replace(start.moved(points), pressure=pressure)
 
 
-def _constraints(mechanics: Mechanics, grown: Pore,
-                 shape: Pore) -> tuple[np.ndarray, np.ndarray]:
+def _constraints(grown: Pore, shape: Pore) -> tuple[np.ndarray, np.ndarray]:
     """(n, 2) True where a coordinate is prescribed, and (n, 2) um, its prescribed value.
 
-    x is prescribed at fixed points, y on the walls (2.3.3). If the wall is bonded, every point that
-    lay on the lower wall before the step keeps its position.
+    x is prescribed at fixed points, y on the walls (2.3.3). Every point that lay on a bonded wall
+    before the step keeps its position.
     """
     rim = shape.mesh.topology.body_loop
     before = grown.mesh.points[grown.mesh.body]
     fixed = shape.fixed
-    if mechanics.keys.wall == "bonded":
-        fixed = fixed | (before[rim, 1] == 0.0)
     target = shape.mesh.points[shape.mesh.body].copy()
+    for wall in shape.mesh.walls:
+        target[rim[shape.wall == wall.number], 1] = wall.y
+        fixed = fixed | (wall.bonded & wall.holds(before[rim]))
     target[rim[fixed], 0] = before[rim[fixed], 0]
-    target[rim[shape.wall == BOTTOM], 1] = 0.0
-    target[rim[shape.wall == TOP], 1] = mechanics.width
     return constrained(len(target), rim, shape.wall, fixed), target
 
 
-def _supports(mechanics: Mechanics, body: Body, shape: Pore,
-              forces: np.ndarray | None) -> list[Support]:
+def _supports(body: Body, shape: Pore, forces: np.ndarray | None) -> list[Support]:
     """The supports of the contact surfaces of ``body`` that slide and have a fixed point.
 
     A surface of a single node has no length; the node bears its force. Without ``forces`` (n, 2)
@@ -651,14 +655,14 @@ def _supports(mechanics: Mechanics, body: Body, shape: Pore,
     """
     outline = shape.boundary
     rim = shape.mesh.topology.body_loop
-    bonded = mechanics.keys.wall == "bonded"
+    walls = shape.mesh.walls
     supports = []
-    for wall in [TOP] if bonded else [BOTTOM, TOP]:
-        edges = rim[outline.edges_on(wall)]
-        points = rim[outline.fixed & (outline.wall == wall)]
+    for wall in walls:
+        edges = rim[outline.edges_on(wall.number)]
+        points = rim[outline.fixed & (outline.wall == wall.number) & (not wall.bonded)]
         if len(edges) and len(points):
             supports.append(Support.on(int(points[0]), edges, body.reference))
-    alone = len(supports) == 1 and not bonded
+    alone = len(supports) == 1 and not any(wall.bonded for wall in walls)
     return [] if alone and forces is None else supports
 
 
@@ -673,12 +677,13 @@ def constrained(count: int, rim: np.ndarray, wall: np.ndarray, fixed: np.ndarray
     return prescribed
 
 
-def _with_new_surface(outline: Outline) -> np.ndarray:
-    """(M,) fixed points, with the middle of the upper contact surface if it has just formed."""
-    top = outline.wall == TOP
-    if top.any() and not outline.fixed[top].any():
-        return outline.fixed | middle_of(outline, TOP)
-    return outline.fixed
+def _with_new_surface(outline: Outline, walls: Walls) -> np.ndarray:
+    """(M,) fixed points, with the middles of contact surfaces that have just formed."""
+    fixed = outline.fixed
+    for wall in walls:
+        if wall.keeps_point and not outline.fixed[outline.wall == wall.number].any():
+            fixed = fixed | middle_of(outline, wall.number)
+    return fixed
 
 
 def middle_of(outline: Outline, wall: int) -> np.ndarray:
@@ -694,21 +699,22 @@ def middle_of(outline: Outline, wall: int) -> np.ndarray:
     return chosen
 
 
-def closing_nodes(outline: Outline, width: float, film: float, angle: float) -> np.ndarray:
+def closing_nodes(outline: Outline, walls: Walls, film: float, angle: float) -> np.ndarray:
     """(M,) wall that each node must join next, or FREE (2.3.3).
 
-    A layer of fluid thinner than ``film`` to the opposite wall closes, and so does a wedge of fluid
-    beside a contact surface whose angle is under ``angle``. Beside contact the gap must
-    not be less than the smaller of film and tan(angle) times the distance from the contact line.
+    A layer of fluid thinner than ``film`` to a wall without contact closes, and so does a wedge of
+    fluid beside a contact surface whose angle is under ``angle``. Beside contact the gap must not
+    be less than the smaller of film and tan(angle) times the distance from the contact line.
     Nodes between closing nodes close too, so that no fluid is trapped.
     """
     joins = np.full(len(outline.points), FREE)
-    for wall, gap in ((BOTTOM, outline.points[:, 1]), (TOP, width - outline.points[:, 1])):
-        lines = contact_lines.surface_ends(outline, wall)
-        if wall == TOP and not lines:
-            joins[(outline.wall == FREE) & (gap < film)] = TOP
+    for wall in walls:
+        gap = wall.gap(outline.points)
+        lines = contact_lines.surface_ends(outline, wall.number)
+        if not lines:
+            joins[(outline.wall == FREE) & (gap < film)] = wall.number
         for line, step in lines:
-            joins[_closing_run(outline, gap, line, step, film, np.tan(angle))] = wall
+            joins[_closing_run(outline, gap, line, step, film, np.tan(angle))] = wall.number
     return joins
 
 

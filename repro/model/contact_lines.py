@@ -20,7 +20,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from repro.errors import GrowthError
-from repro.fem.outline import BOTTOM, FREE, TOP, Outline, parabola
+from repro.fem.outline import Outline, parabola
+from repro.fem.walls import FREE, Walls, numbered
 
 #: A clearance up to this size counts as zero. A line then errs by about CLOSE * film / tan(angle).
 CLOSE = 2e-3
@@ -76,9 +77,9 @@ class FirstContact(Exception):
 
 @dataclass(frozen=True)
 class Clearance:
-    """The rule for a free surface: width (um) of the pore, least film (um), least angle (rad)."""
+    """The rule for a free surface: walls of the pore, least film (um), least angle (rad)."""
 
-    width: float
+    walls: Walls
     film: float
     angle: float
 
@@ -105,10 +106,11 @@ class Clearance:
         outwards = np.sign(outline.points[node, 0] - outline.points[node - direction, 0])
         place, points = self._places(arcs, outwards)
         distance = outwards * (points[:, 0] - arcs[0, 0, 0])
-        gap = points[:, 1] if outline.wall[node] == BOTTOM else self.width - points[:, 1]
+        wall = numbered(self.walls, outline.wall[node])
+        gap = wall.gap(points)
         needs = np.minimum(self.film, np.tan(self.angle) * distance)
         facing = place > 0
-        if outline.wall[last] == outline.wall[node]:
+        if outline.wall[last] == wall.number:
             # Free surface between two lines of one wall belongs to the nearer line.
             facing &= distance <= np.abs(points[:, 0] - outline.points[last, 0])
         ratio = np.full(len(gap), AMPLE)
@@ -158,7 +160,7 @@ def surface_ends(outline: Outline, wall: int) -> list[tuple[int, int]]:
 class Line:
     """A contact line in a search.
 
-    wall: BOTTOM or TOP; node: of the outline, at the previous position of the line; direction: of
+    wall: its number; node: of the outline, at the previous position of the line; direction: of
     the free surface along the outline; advance: arcs, of the present trial; accepted: is the
     present trial accurate enough; reach: arcs beyond it where the surface is too near; least: the
     smallest advance; short, far: largest advance that is too short and smallest one that is far
@@ -267,10 +269,11 @@ def to_arcs(outline: Outline, line: Line, length: float) -> float:
 
 def speeds(advances: Mapping[tuple[int, int], float], duration: float) -> np.ndarray | None:
     """(2, 2) um/h, speeds of lines that have advanced (um) in a duration (h), by wall and
-    direction; None without lines of the upper wall."""
-    if not any(wall == TOP for wall, _ in advances):
+    direction; None with lines of one wall only."""
+    walls = {wall for wall, _ in advances}
+    if len(walls) < 2:
         return None
-    by_line = np.zeros((2, 2))
+    by_line = np.zeros((max(walls), 2))
     for (wall, direction), length in advances.items():
         by_line[wall - 1, (1 - direction) // 2] = length / duration
     return by_line
@@ -281,12 +284,13 @@ def advances_at(by_line: np.ndarray | None, duration: float) -> dict[tuple[int, 
     if by_line is None:
         return {}
     return {(wall, direction): float(by_line[wall - 1, (1 - direction) // 2] * duration)
-            for wall in (BOTTOM, TOP) for direction in (1, -1)}
+            for wall in range(1, len(by_line) + 1) for direction in (1, -1)}
 
 
 def lines_of(outline: Outline) -> list[Line]:
-    """All contact lines of an outline, those of the lower wall first."""
-    return [Line(wall, node, direction) for wall in (BOTTOM, TOP)
+    """All contact lines of an outline, by the numbers of their walls."""
+    walls = np.unique(outline.wall[outline.wall != FREE]).tolist()
+    return [Line(wall, node, direction) for wall in walls
             for node, direction in surface_ends(outline, wall)]
 
 

@@ -238,11 +238,13 @@ def _system(velocity: Space, interface: str, splits: bool) -> ElementSystem:
     """The system with u = 0 on the walls, a parabola at the inlet, and u_y = 0 at the outlet in the
     traction form [E10]; splits: may the pressure jump across the interface?"""
     dofs = velocity.dofs
+    mesh = velocity.mesh
     constrained = np.zeros((velocity.count, 2), bool)
-    constrained[np.concatenate([dofs.walls, velocity.inlet.nodes])] = True
+    constrained[velocity.inlet.nodes] = True
+    for wall in mesh.walls:
+        constrained[mesh.nodes_on(wall)] |= [wall.no_slip, True]
     if interface == "traction":
         constrained[velocity.outlet.nodes, 1] = True
-    mesh = velocity.mesh
     corners = interface_corners(mesh) if splits else np.empty(0, int)
     return saddle_system(velocity.cells, doubled(mesh, corners), constrained, dofs.elimination,
                          mesh.topology.method, corners)
@@ -252,7 +254,8 @@ def prescribed(velocity: Space) -> np.ndarray:
     """(2n,) values of the constrained velocities: the parabola u_x at the inlet (3)."""
     value = np.zeros(2 * velocity.count)
     nodes = velocity.inlet.nodes
-    share = velocity.points[nodes, 1] / velocity.mesh.width
+    wall, *_ = velocity.mesh.walls
+    share = wall.gap(velocity.points[nodes]) / velocity.mesh.width
     value[nodes] = 6 * share * (1 - share)
     return value
 

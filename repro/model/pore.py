@@ -14,9 +14,10 @@ from repro.fem import mesher, sizing
 from repro.fem.brief import brief
 from repro.fem.linear import Method
 from repro.fem.mesh import Mesh
-from repro.fem.outline import TOP, Outline, half_disc, polygon
+from repro.fem.outline import Outline, half_disc, polygon
 from repro.fem.sizing import Sizing
 from repro.fem.space import Space
+from repro.fem.walls import Walls, channel_walls
 from repro.model import flow
 from repro.model.body import Body, Shape
 from repro.model.flow import Flow
@@ -115,8 +116,8 @@ class Pore:
 
     @property
     def contact(self) -> bool:
-        """Does the aggregate touch the opposite wall?"""
-        return bool((self.wall == TOP).any())
+        """Does the aggregate touch all walls?"""
+        return all((self.wall == wall.number).any() for wall in self.mesh.walls)
 
     @property
     def mass(self) -> float:
@@ -165,6 +166,11 @@ class Solved:
     def mean_velocity(self) -> float:
         """Mean velocity, um/h; zero without flow."""
         return self.flow.mean_velocity if self.flow else 0.0
+
+
+def walls_of(scene: Scene) -> Walls:
+    """The walls of a scene's pore."""
+    return channel_walls(scene.pore.width, bool(scene.growth and scene.growth.wall == "bonded"))
 
 
 def film(scene: Scene) -> float:
@@ -221,7 +227,7 @@ def sized(scene: Scene) -> Sizing:
     across = scene.numerics.contact_elements
     if scene.flow and scene.flow.permeability is not None:
         across = max(across, CONTACT_ELEMENTS)
-    return Sizing(scene.pore.width, resolution(scene), least, scene.numerics.gradation,
+    return Sizing(walls_of(scene), resolution(scene), least, scene.numerics.gradation,
                   contact=least / across if across else inf, seed=middle,
                   film_refinement=scene.numerics.refinement)
 

@@ -14,9 +14,9 @@ import numpy as np
 from repro.errors import OriginFolded
 from repro.fem import sizing, transfer
 from repro.fem.mesh import Mesh
-from repro.fem.outline import FREE
 from repro.fem.space import Space
 from repro.fem.transfer import Located
+from repro.fem.walls import FREE
 from repro.model import biomass, growing, mesh_motion
 from repro.model.biomass import Amounts
 from repro.model.body import Body

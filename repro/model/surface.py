@@ -19,7 +19,7 @@ import numpy as np
 from repro.errors import GrowthError, failing_as
 from repro.fem import elements
 from repro.fem.brief import brief
-from repro.fem.outline import FREE
+from repro.fem.walls import FREE
 from repro.model.pore import Pore
 
 #: A crease lowers the energy of a surface that is compressed to this stretch, whatever its size.

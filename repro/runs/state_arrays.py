@@ -16,7 +16,7 @@ from repro.fem.space import Space
 from repro.march.balance import Ledger
 from repro.march.state import Compression, RestartState
 from repro.march.step_control import StepControl
-from repro.model.pore import Pore, material
+from repro.model.pore import Pore, material, walls_of
 from repro.runs.checkpoint import Arrays
 from repro.scene import Scene, scene_hash
 
@@ -73,7 +73,7 @@ def _pore(scene: Scene, plain: dict, arrays: Arrays) -> Pore:
     method = Method(numerics.solver)
     first, last = plain["ends_um"]
     mesh = Mesh.of(arrays["points"], arrays["cells"], arrays["biomass"], arrays["loop"],
-                   scene.pore.width, (first, last), method)
+                   walls_of(scene), (first, last), method)
     space = Space(mesh)
     guess = None
     if plain["guess"] is not None:

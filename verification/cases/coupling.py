@@ -18,8 +18,8 @@ import pytest
 
 from reference import poiseuille, whole_run
 from repro.fem import linear
-from repro.fem.outline import FREE
 from repro.fem.space import Space
+from repro.fem.walls import FREE
 from repro.march import midpoint
 from repro.march.simulation import shaped, simulate
 from repro.march.state import Report

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from reference import half_cylinder
-from repro.fem.outline import BOTTOM, FREE
+from repro.fem.walls import BOTTOM, FREE
 from repro.march.simulation import shaped
 from repro.model import adhesion, contact, flow, growth, pore, traction
 from repro.model.pore import Pore, Solved

@@ -17,7 +17,7 @@ from scipy.interpolate import CubicSpline
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from repro.fem.outline import BOTTOM, FREE, TOP
+from repro.fem.walls import BOTTOM, FREE, TOP
 from repro.march.balance import Ledger
 from repro.march.simulation import simulate
 from repro.march.state import Report

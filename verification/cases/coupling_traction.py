@@ -12,8 +12,9 @@ from scipy.integrate import simpson
 
 from reference import layered_channel
 from repro.fem.mesh import Mesh
-from repro.fem.outline import FREE, Outline
+from repro.fem.outline import Outline
 from repro.fem.space import Space
+from repro.fem.walls import FREE
 from repro.march.simulation import simulate
 from repro.march.state import Report
 from repro.model import contact, flow, growth, mesh_motion, pore, traction
@@ -302,7 +303,7 @@ def _defects(*changes: str) -> tuple[float, float]:
     for pore_of_flow in (grown, seed):
         fluid = traction.Fluid.of(scene)
         forces = traction.forces(fluid, traction.surroundings(fluid.meshing, seed, pore_of_flow), pore_of_flow)
-        supports = contact._supports(contact.Mechanics.of(scene), body, grown, forces)
+        supports = contact._supports(body, grown, forces)
         system = growth.System(body, constrained_dofs, stabilisation=stabilisation, forces=forces, supports=supports)
         defects.append(system.under(theta, place, place, pressure).defect)
     return tuple(defects)

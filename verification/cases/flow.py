@@ -42,6 +42,7 @@ from repro.fem import mesher
 from repro.fem.mesh import Mesh, curved
 from repro.fem.sizing import Sizing
 from repro.fem.space import Space
+from repro.fem.walls import channel_walls
 from repro.model import flow
 from repro.model.brinkman import ACROSS
 from repro.scene import Flow as Drive
@@ -90,7 +91,7 @@ def test_poiseuille(interface, record):
 
 
 def _clean(refinement: float, interface: str) -> dict[str, float]:
-    grid, _ = mesher.generate(None, ENDS, Sizing(WIDTH, refinement, 2.0))
+    grid, _ = mesher.generate(None, ENDS, Sizing(channel_walls(WIDTH), refinement, 2.0))
     return {"size": meshes.mean_size(grid), **_poiseuille_errors(Space(grid), 0.0, interface)}
 
 

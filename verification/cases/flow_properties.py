@@ -166,7 +166,7 @@ def test_reversed(numerics, interface, record):
 def _mirrored(grid: Mesh) -> Mesh:
     """The mesh with inlet and outlet exchanged, nodes numbered as before."""
     cells = grid.cells[:, [2, 1, 0, 4, 3, 5][: grid.cells.shape[1]]]
-    return Mesh.of(grid.points * [-1.0, 1.0], cells, grid.biomass, grid.loop, WIDTH, grid.ends)
+    return Mesh.of(grid.points * [-1.0, 1.0], cells, grid.biomass, grid.loop, grid.walls, grid.ends)
 
 
 RATIOS = np.array([1.0, 2.0, 10.0, 100.0, 2000.0, 1e5])

@@ -17,7 +17,7 @@ import pytest
 from scipy.optimize import brentq
 
 from reference import contact_growth
-from repro.fem.outline import TOP
+from repro.fem.walls import TOP
 from repro.model import contact, pore
 from repro.model.contact_lines import FirstContact
 from repro.scene import load_scene

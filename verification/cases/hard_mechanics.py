@@ -12,9 +12,10 @@ from itertools import pairwise
 import numpy as np
 
 from reference import neo_hookean
-from repro.fem.outline import FREE, TOP, Outline, polygon
+from repro.fem.outline import Outline, polygon
 from repro.fem.sizing import ACROSS_FILM
 from repro.fem.space import Space
+from repro.fem.walls import FREE, TOP, channel_walls
 from repro.march import midpoint, simulation, stepping
 from repro.march.state import Report
 from repro.model import contact, flow, growth, pore, remeshing
@@ -133,14 +134,14 @@ def _closing(shape: Outline, width: float, film: float, angle: float) -> int:
     more than the search allows (CLOSE, 0.002 um). The limit was twice CLOSE until this row was seen.
     """
     if shape.geometry == 1:
-        return np.count_nonzero(contact.closing_nodes(shape, width, film, angle))
+        return np.count_nonzero(contact.closing_nodes(shape, channel_walls(width), film, angle))
     limit = film * (1 - np.tan(angle - np.deg2rad(UNDER)) / np.tan(angle))
     return sum(clearance < -limit for clearance in _clearances(shape, width, film, angle).values())
 
 
 def _clearances(shape: Outline, width: float, film: float, angle: float) -> dict[tuple[int, int], float]:
     """Clearance (um) of all contact lines, by wall and direction."""
-    rule = Clearance(width, film, angle)
+    rule = Clearance(channel_walls(width), film, angle)
     return {line.key: rule.beyond(shape, line.node, line.direction)[0] for line in lines_of(shape)}
 
 
@@ -180,7 +181,7 @@ def _sides(shape: Outline) -> list[bool]:
     if shape.geometry == 2:
         values = _clearances(shape, 20.0, 2.0, angle)
         return [values[TOP, direction] < 0 for direction in (1, -1)]
-    joins = contact.closing_nodes(shape, 20.0, 2.0, angle) != FREE
+    joins = contact.closing_nodes(shape, channel_walls(20.0), 2.0, angle) != FREE
     x = shape.points[:, 0]
     return [bool(joins[x < 0].any()), bool(joins[x > 0].any())]
 

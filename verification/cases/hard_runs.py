@@ -11,8 +11,9 @@ import numpy as np
 
 from repro.fem import sizing, transfer
 from repro.fem.mesh import POOR, POOR_ALLOWED, Mesh
-from repro.fem.outline import FREE, half_disc
+from repro.fem.outline import half_disc
 from repro.fem.space import Space
+from repro.fem.walls import FREE
 from repro.march import midpoint
 from repro.march.state import StepResult
 from repro.model import flow, pore, remeshing

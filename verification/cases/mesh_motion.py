@@ -16,6 +16,7 @@ from repro.fem import outline
 from repro.fem.mesh import Mesh, curved
 from repro.fem.sizing import ACROSS_AGGREGATE
 from repro.fem.space import Space
+from repro.fem.walls import BOTTOM, FREE, channel_walls
 from repro.model import mesh_motion
 from verification.evidence.cases import parametrize
 from verification.evidence.checks import at_least, at_most, largest, refine, studies, study
@@ -200,7 +201,7 @@ def _segment(contact: float, refinement: float, geometry: int) -> Mesh:
     arc = RADIUS * np.column_stack([np.cos(turn), np.sin(turn) - np.cos(contact)])
     base = arc[0, 0] * np.linspace(-1, 1, 4 * geometry + 1)
     points = np.vstack([np.column_stack([base, 0 * base]), arc[1:-1]])
-    wall = np.where(np.arange(len(points)) < len(base), outline.BOTTOM, outline.FREE)
+    wall = np.where(np.arange(len(points)) < len(base), BOTTOM, FREE)
     fixed = np.arange(len(points)) == 2 * geometry
     segment = outline.Outline(points, wall, fixed, points, geometry)
     return meshes.around(segment, refinement, (-SEGMENT_END, SEGMENT_END), PORE)[0]
@@ -357,4 +358,4 @@ def _triangles(stretch: np.ndarray, biomass: bool = False) -> Mesh:
     turned = (np.outer(stretch, x) + 1j * y) * np.exp(1j * np.linspace(0.0, 3.0, count))[:, None]
     points = np.column_stack([turned.real.ravel(), turned.imag.ravel()])
     triangles = np.arange(3 * count).reshape(-1, 3)
-    return Mesh.of(points, triangles, np.full(count, biomass), np.empty(0, int), PORE, REACH)
+    return Mesh.of(points, triangles, np.full(count, biomass), np.empty(0, int), channel_walls(PORE), REACH)

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from repro.fem.outline import FREE
+from repro.fem.walls import FREE
 from repro.model.transport import Concentrations
 from verification.evidence.cases import parametrize
 from verification.evidence.checks import at_least, at_most, columns, each_at_most, largest, refine, studies

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from repro.fem.outline import BOTTOM
+from repro.fem.walls import BOTTOM
 from repro.model import adhesion
 from verification.claims import FEW, FEW_WORDS, Finding, at_least, at_most, claim
 from verification.claims.levels import COMPARED, PAIRED

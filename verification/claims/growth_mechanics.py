@@ -14,6 +14,7 @@ from repro.fem.mesh import triangle_areas
 from repro.fem.mesher import generate
 from repro.fem.outline import half_disc as seed
 from repro.fem.sizing import ACROSS_AGGREGATE, GRADATION, Sizing
+from repro.fem.walls import channel_walls
 from repro.model import growth
 from repro.model.body import Shape
 from verification import sensitivity
@@ -35,7 +36,7 @@ def half_disc(refinement: float) -> Supported:
     """
     refinement /= current().size
     outline = seed(RADIUS, ACROSS_AGGREGATE * refinement)
-    sizing = Sizing(50.0, refinement, 2.0, GRADATION / refinement)
+    sizing = Sizing(channel_walls(50.0), refinement, 2.0, GRADATION / refinement)
     grid, _ = generate(outline, (-2 * RADIUS, 2 * RADIUS), sizing)
     return sliding(grid.points[grid.body], grid.topology.body_cells)
 

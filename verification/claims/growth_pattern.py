@@ -11,7 +11,7 @@ import numpy as np
 
 from repro.fem import elements
 from repro.fem.mesh import Mesh
-from repro.fem.outline import BOTTOM, FREE, TOP
+from repro.fem.walls import BOTTOM, FREE, TOP
 from repro.model import biomass
 from repro.model.kinetics import rate_law
 from verification import sensitivity

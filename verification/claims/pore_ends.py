@@ -212,7 +212,7 @@ def lengthened(mesh: Mesh, end: float, size: float) -> Mesh:
     for line, start in zip((mesh.topology.inlet, mesh.topology.outlet), mesh.ends):
         places = np.linspace(start, np.copysign(end, start), 1 + int(np.ceil((end - abs(start)) / size)))
         mesh = _with_columns(mesh, line, places[1:])
-    return Mesh.of(mesh.points, mesh.cells, mesh.biomass, mesh.loop, mesh.width, (-end, end))
+    return Mesh.of(mesh.points, mesh.cells, mesh.biomass, mesh.loop, mesh.walls, (-end, end))
 
 
 def _with_columns(mesh: Mesh, line: np.ndarray, places: np.ndarray) -> Mesh:

@@ -18,10 +18,11 @@ import shapely
 from repro import results
 from repro.fem import mesher
 from repro.fem.mesh import Mesh
-from repro.fem.outline import BOTTOM, TOP, Outline, parabola
+from repro.fem.outline import Outline, parabola
 from repro.fem.outline import half_disc as seed
 from repro.fem.sizing import ACROSS_AGGREGATE
 from repro.fem.space import Space
+from repro.fem.walls import BOTTOM, TOP
 from repro.march import loop, simulation, updates
 from repro.march.state import Report, RestartState
 from repro.model import contact as mechanics

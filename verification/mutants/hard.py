@@ -156,8 +156,8 @@ MUTANTS = (
          "tests/test_ragged_outlines.py::test_a_spiked_outline_is_the_same_in_every_preset"),
         ("outline-bent-ungraded",
          "An aggregate that bends has no smaller edges at its contact lines.",
-         "if bends or top.any():",
-         "if top.any():",
+         "if bends or touching.any():",
+         "if touching.any():",
          "tests/test_flow.py::test_drawn_bodies_have_the_promised_head_loss")),
     *changes(
         "repro/fem/mesher.py",

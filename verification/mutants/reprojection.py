@@ -76,7 +76,7 @@ MUTANTS = (
          "reach = min(5 * outline.thickness, 1.3 * width)"),
         ("origin-on-the-chord",
          "A node that splits an edge of the seed's arc is put on the chord at t = 0.",
-         "origin = middle + _on_arc(origin - middle, ends[:, 0] - middle, ends[:, 2] - middle)",
+         "origin = seed + _on_arc(origin - seed, ends[:, 0] - seed, ends[:, 2] - seed)",
          "origin = 1.0 * origin")),
     *changes(
         "repro/fem/mesh.py",

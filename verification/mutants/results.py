@@ -33,6 +33,7 @@ SIZING = "tests/test_sizing.py::test_"
 FOLD = "tests/test_fold.py::test_"
 FORMER = "tests/test_former.py::test_"
 CHECKPOINT = "tests/test_checkpoint.py::test_"
+WALLS = "tests/test_walls.py::test_"
 EXPECTED = f"{FOLD}check_expects_a_fold_of_a_starved_core"
 READERS = "tests/test_vtk.py::test_every_reader_reads_what_was_computed"
 
@@ -1527,9 +1528,8 @@ MUTANTS = (
         "repro/model/contact.py",
         ("bonded-on-both-walls",
          "A bonded lower wall pins the points on the upper wall too.",
-         "    target = shape.mesh.points[shape.mesh.body].copy()\n",
-         "    if mechanics.keys.wall == \"bonded\":\n        fixed = fixed | (shape.wall != FREE)\n"
-         "    target = shape.mesh.points[shape.mesh.body].copy()\n",
+         "fixed = fixed | (wall.bonded & wall.holds(before[rim]))",
+         "fixed = fixed | (wall.bonded & (shape.wall != FREE))",
          "tests/test_contact.py::test_a_bonded_lower_wall_leaves_the_upper_wall_sliding"),
         ("search-for-lines-not-reached",
          "If the growth of a step leaves its domain, Newton's method for the lines ends the step.",
@@ -1590,8 +1590,8 @@ MUTANTS = (
         "repro/fem/sizing.py",
         ("one-contact-line",
          "Elements are small beside only one of the contact lines.",
-         "top & ~(np.roll(top, 1) & np.roll(top, -1))",
-         "top & ~np.roll(top, 1)",
+         "on & ~(np.roll(on, 1) & np.roll(on, -1))",
+         "on & ~np.roll(on, 1)",
          f"{MIRRORS}sizes_at_an_outline_and_its_mirror_image"),
         ("edge-after-next",
          "The fluid's elements match the edge after the next one, not the one before.",
@@ -1913,14 +1913,14 @@ MUTANTS = (
     *changes(
         "repro/model/adhesion.py",
         ("moment-about-both-contacts",
-         "The moment of the fluid is about the middle of all contact, not of that with the lower wall.",
-         "on = outline.points[outline.wall == BOTTOM, 0]",
+         "The moment of the fluid is about the middle of all contact, not of that with the seed's wall.",
+         "on = outline.points[outline.wall == seeded.number, 0]",
          "on = outline.points[outline.wall > 0, 0]",
          f"{DERIVED}the_columns_of_adhesion_are_what_their_names_say"),
         ("water-presses-one-way",
          "Beside a contact line the water presses on the upper wall as it does on the lower one.",
-         "up = np.where(mesh.points[cells[:, side], 1] == 0.0, 1.0, -1.0)",
-         "up = np.where(mesh.points[cells[:, side], 1] == 0.0, 1.0, 1.0)",
+         "[wall.normal * mesh.on_wall(wall, side) for wall in mesh.walls]",
+         "[1.0 * mesh.on_wall(wall, side) for wall in mesh.walls]",
          f"{DERIVED}the_columns_of_adhesion_are_what_their_names_say")),
     *changes(
         "repro/model/contact.py",
@@ -1963,4 +1963,35 @@ MUTANTS = (
          "return float(np.interp(end - window, area, K) - closed) / window",
          "return float(np.interp(end - window, area, K) - K[-1]) / window",
          "tests/test_claims.py::test_a_function_of_claims_gives_its_closed_form_on_a_synthetic_run")),
+    *changes(
+        "repro/fem/outline.py",
+        ("upper-seed-clockwise",
+         "The boundary of a seed on the upper wall runs clockwise.",
+         "counterclockwise = int(wall.normal) * np.arange(len(points))",
+         "counterclockwise = np.arange(len(points))",
+         f"{WALLS}a_seed_on_either_wall_has_the_same_boundary_sizes_and_mesh[1-upper]"),
+        ("thickness-from-the-lower-wall",
+         "The thickness of a seed on the upper wall is measured from the lower one.",
+         "np.abs(self._extreme_points[:, 1] - self.points[first, 1]).max()",
+         "np.abs(self._extreme_points[:, 1]).max()",
+         f"{WALLS}a_seed_on_either_wall_has_the_same_boundary_sizes_and_mesh[1-upper]")),
+    *changes(
+        "repro/fem/sizing.py",
+        ("films-at-the-upper-wall-alone",
+         "A film at the lower wall has its small elements at the upper one.",
+         "np.full(len(near), wall.y)",
+         "np.full(len(near), sizing.width)",
+         f"{WALLS}a_seed_on_either_wall_has_the_same_boundary_sizes_and_mesh[1-upper]")),
+    *changes(
+        "repro/model/contact.py",
+        ("first-contact-with-the-upper-wall-alone",
+         "The first contact is always with the upper wall.",
+         "    nearest, *_ = outline.untouched(rule.walls)",
+         "    *_, nearest = rule.walls",
+         f"{MIRRORS}contact_advances_alike_in_a_pore_and_its_mirror_image[2-False-across]"),
+        ("every-wall-keeps-a-point",
+         "A new contact surface has a fixed point on a wall that keeps none.",
+         "if wall.keeps_point and not outline.fixed",
+         "if not outline.fixed",
+         f"{WALLS}a_new_surface_keeps_a_point_unless_its_wall_keeps_none[2]")),
 )

@@ -13,8 +13,9 @@ import numpy as np
 from reference import neo_hookean
 from repro.fem import elements
 from repro.fem.mesh import Mesh
-from repro.fem.outline import FREE, Outline
+from repro.fem.outline import Outline
 from repro.fem.space import Space
+from repro.fem.walls import FREE
 from repro.model import contact, growth, pore
 from repro.model.body import Body
 from verification.evidence.cases import combined

@@ -19,6 +19,7 @@ from scipy.spatial import Delaunay, cKDTree
 from repro.fem import elements, mesher, outline, sizing, transfer
 from repro.fem.mesh import Mesh, curved, triangle_areas
 from repro.fem.space import Space
+from repro.fem.walls import channel_walls
 
 #: Displacement of the lattice's nodes, and the least distance of a lattice node from a line, over the element size.
 JITTER, CLEARANCE = 0.22, 0.45
@@ -102,7 +103,7 @@ def seed(radius: float, refinement: float, order: int = 1) -> outline.Outline:
 
 def around(seed: outline.Outline, refinement: float, ends, width: float) -> tuple[Mesh, outline.Outline]:
     """The package's mesh around an outline, and the outline with its split edges."""
-    return mesher.generate(seed, ends, sizing.Sizing(width, refinement, 2.0), seed.geometry)
+    return mesher.generate(seed, ends, sizing.Sizing(channel_walls(width), refinement, 2.0), seed.geometry)
 
 
 def half_disc_space(radius: float, refinement: float, ends, width: float, order: int) -> Space:
@@ -167,7 +168,7 @@ def _delaunay(points, signed_distances, size: float, is_biomass, ends, width: fl
 
 def _mesh(points, triangles, is_biomass, ends, width: float, loop=()) -> Mesh:
     biomass = is_biomass(*points[triangles].mean(axis=1).T)
-    return Mesh.of(points, triangles, biomass, np.array(loop, int), width, tuple(map(float, ends)))
+    return Mesh.of(points, triangles, biomass, np.array(loop, int), channel_walls(width), tuple(map(float, ends)))
 
 
 #: Degree of the quadrature for fields of any order on curved triangles, and for fields of order 1.

@@ -8,7 +8,8 @@ import numpy as np
 
 from reference import averaged_pore, whole_run
 from repro import results
-from repro.fem.outline import TOP, Outline
+from repro.fem.outline import Outline
+from repro.fem.walls import TOP
 from repro.march import midpoint, updates
 from repro.march.balance import Ledger
 from repro.march.simulation import simulate

@@ -1,0 +1,83 @@
+"""The walls of the pore (2.1), as data: where they are, and what they do.
+
+A stage asks a wall; no stage knows which one it is. The channel is 0 <= y <= W, and a pore has a
+list of two walls: first the one on which seeds sit, then the opposite one. Nodes and contact lines
+name their wall by its number, its place in the list counted from one; FREE is no wall.
+
+No substrate flows through a wall. This is the natural condition of the weak form (11)-(12), so the
+transport asks nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+
+FREE = 0
+BOTTOM = 1
+TOP = 2
+
+
+@dataclass(frozen=True)
+class Wall:
+    """A straight wall along the pore.
+
+    number: of the wall; y: its place (um); normal: y component of its unit normal into the pore, 1
+    or -1. An aggregate's boundary runs counterclockwise, so along a wall it runs in the direction
+    of x if the normal is 1, else against it.
+
+    no_slip: is the velocity along the wall zero, too (5)? bonded: does biomass that touches the
+    wall keep its place, or slide along it (2.3.3)? keeps_point: does the middle of a new contact
+    surface keep its x (2.3.3)?
+    """
+
+    number: int
+    y: float
+    normal: float
+    no_slip: bool = True
+    bonded: bool = False
+    keeps_point: bool = True
+
+    def gap(self, points: np.ndarray) -> np.ndarray:
+        """(...,) um, distances of points (..., 2) from the wall, negative beyond it."""
+        return self.normal * (points[..., 1] - self.y)
+
+    def holds(self, points: np.ndarray) -> np.ndarray:
+        """(...,) True for points (..., 2) exactly on the wall."""
+        return points[..., 1] == self.y
+
+
+#: The walls of a pore: first the one on which seeds sit.
+Walls: TypeAlias = tuple[Wall, ...]
+
+
+def channel_walls(width: float, bonded: bool = False) -> Walls:
+    """The walls of the channel 0 <= y <= ``width`` (um); bonded: biomass to the lower one?"""
+    return Wall(BOTTOM, 0.0, 1.0, bonded=bonded), Wall(TOP, width, -1.0)
+
+
+def numbered(walls: Walls, number: int) -> Wall:
+    """The wall with a number."""
+    return next(wall for wall in walls if wall.number == number)
+
+
+def width_between(walls: Walls) -> float:
+    """W (um), the distance between the two walls of a channel."""
+    first, opposite = walls
+    return abs(opposite.y - first.y)
+
+
+def on_any(walls: Iterable[Wall], points: np.ndarray) -> np.ndarray:
+    """(M,) True for points (M, 2) on one of the walls."""
+    return np.any([wall.holds(points) for wall in walls], axis=0)
+
+
+def numbers_at(walls: Iterable[Wall], points: np.ndarray) -> np.ndarray:
+    """(M,) number of the wall on which each of points (M, 2) lies, FREE on none."""
+    numbers = np.full(len(points), FREE)
+    for wall in walls:
+        numbers[wall.holds(points)] = wall.number
+    return numbers
