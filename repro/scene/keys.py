@@ -683,8 +683,7 @@ def _with_preset(tables: dict) -> dict:
 
 
 def _beside_preset(numerics: Numerics) -> dict:
-    """The keys of [numerics] that differ from those of their preset. Another preset sets the
-    others."""
+    """Return the keys of [numerics] that differ from their preset; another preset sets the rest."""
     preset = {"preset": numerics.preset, **PRESETS[numerics.preset]}
     of_preset = read_table(Numerics, preset, Place(numerics.preset))
     return {key: value for key, value in write_table(numerics).items()
