@@ -18,6 +18,7 @@ from repro.fem.sizing import Sizing
 from repro.fem.space import Space
 from repro.fem.walls import BOTTOM, FREE, TOP, channel_walls
 from repro.model import contact, pore
+from repro.model.energies import NEO_HOOKEAN
 from repro.scene import load_scene, parse_scene
 from repro.schemes import PAPER
 
@@ -185,7 +186,8 @@ def mirror_image(at, along):
     walls = {FREE: FREE, BOTTOM: BOTTOM if along else TOP, TOP: TOP if along else BOTTOM}
     return replace(at, space=space, wall=np.array([walls[wall] for wall in back(at.wall).tolist()]),
                    fixed=back(at.fixed), active=exchanged(at.active), inert=exchanged(at.inert),
-                   theta=exchanged(at.theta), body=pore.material(space, about + at.body.reference * sign),
+                   theta=exchanged(at.theta),
+                   body=pore.material(space, about + at.body.reference * sign, at.body.energy),
                    last=None if at.last is None else about + at.last * sign, line_speeds=None)
 
 
@@ -225,7 +227,7 @@ def boundary_edge_counts(triangles):
 def body_of(grid, around):
     """(Body, constrained (n, 2), rim (M,)): the unstrained aggregate, its constrained dofs (2.3.3: y on the
     walls and x at fixed points) and its boundary nodes."""
-    body = pore.material(Space(grid), grid.points[grid.body])
+    body = pore.material(Space(grid), grid.points[grid.body], NEO_HOOKEAN)
     rim = grid.topology.body_loop
     return body, contact.constrained(len(grid.body), rim, around.wall, around.fixed), rim
 

@@ -13,7 +13,7 @@ from repro.errors import GrowthError, RunEnd
 from repro.fem.sizing import ACROSS_PORE
 from repro.march.ends import CLOSE, Event, Reached, _detachment, locate
 from repro.model.adhesion import Peak
-from repro.model.surface import BIOT
+from repro.model.energies.neo_hookean import BIOT
 from repro.runs.status import is_over
 from repro.scene import load_scene
 from tests.test_fold import SETS as PLUG

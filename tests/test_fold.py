@@ -21,8 +21,9 @@ from repro.march.loop import Stepping
 from repro.march.state import Compression, InterpolatedState, RestartState, StepResult
 from repro.march.step_control import StepControl
 from repro.model import contact
+from repro.model.energies.neo_hookean import BIOT, CREASE
 from repro.model.pore import seeded, solve
-from repro.model.surface import BIOT, CREASE, surface
+from repro.model.surface import surface
 from repro.preflight import numbers
 from repro.preflight.numbers import evaluate_at_largest
 from repro.preflight.simplifications import find_warnings, warn_surface

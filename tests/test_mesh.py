@@ -50,10 +50,13 @@ def test_an_impossible_outline_is_refused_with_its_place(geometry):
     crossed[[-3 * geometry, -2 * geometry]] = crossed[[-2 * geometry, -3 * geometry]]
     with pytest.raises(MeshError, match="crosses itself"):
         meshed(replace(start, points=crossed))
-    with pytest.raises(MeshError, match="leaves the meshed part"):
-        meshed(start, ends=(-4.0, 50.0))
-    with pytest.raises(MeshError, match="leaves the meshed part"):
+    for ends in ((-4.0, 50.0), (-50.0, 4.0)):
+        with pytest.raises(MeshError, match="leaves the meshed part"):
+            meshed(start, ends=ends)
+    with pytest.raises(MeshError, match="passes the wall y = 4.9 um at x = .*, y = 5 um"):
         meshed(start, width=4.9, ends=(-LENGTH / 2, LENGTH / 2))
+    with pytest.raises(MeshError, match="passes the wall y = 0 um at x = .*, y = -0.1 um"):
+        meshed(replace(start, points=start.points - [0.0, 0.1]), ends=(-LENGTH / 2, LENGTH / 2))
 
 
 def test_only_triangles_at_the_aggregate_are_bent():

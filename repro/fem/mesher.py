@@ -109,13 +109,18 @@ def around(outline: Outline | None, ends: tuple[float, float], sizing: Sizing,
 
 
 def check_outline(outline: Outline, ends: tuple[float, float], walls: Walls) -> None:
-    """Raise MeshError if an outline crosses itself or leaves the meshed part."""
+    """Raise MeshError if an outline crosses itself, a wall or an end of the meshed part."""
     polygon = shapely.Polygon(outline.points)
     if not polygon.is_valid:
         raise MeshError("the outline of the aggregate crosses itself, and contact is modelled with "
                         f"the walls alone: {shapely.is_valid_reason(polygon)}")
-    inside = ends[0] < outline.upstream and outline.downstream < ends[1]
-    if not inside or any(wall.gap(outline.points).min() < 0 for wall in walls):
+    for wall in walls:
+        gap = wall.gap(outline.points)
+        if gap.min() < 0:
+            x, y = outline.points[gap.argmin()]
+            raise MeshError(f"the aggregate passes the wall y = {wall.y:g} um at x = {x:.4g}, "
+                            f"y = {y:.4g} um")
+    if not (ends[0] < outline.upstream and outline.downstream < ends[1]):
         raise MeshError(f"the aggregate, x from {outline.upstream:.4g} to "
                         f"{outline.downstream:.4g} um, leaves the meshed part, "
                         f"x from {ends[0]:.4g} to {ends[1]:.4g} um")

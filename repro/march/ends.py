@@ -30,7 +30,6 @@ from repro.march.state import Compression, StepResult
 from repro.model import adhesion
 from repro.model.adhesion import Peak
 from repro.model.pore import Pore, Solved
-from repro.model.surface import BIOT
 from repro.scene import Pore as Channel
 from repro.scene import Scene, scene_tables
 
@@ -118,10 +117,11 @@ def _events(scene: Scene, pore: Pore, solved: Solved) -> Iterator[Event]:
     for side in ("upstream", "downstream"):
         end = PoreEnd(f"the aggregate reaches the pore's {side} end at t = {pore.time:g} h")
         yield Event(1 - elements_to_end(scene.pore, pore, side), end)
-    if pore.last is None:
+    biot = pore.body.energy.biot
+    if pore.last is None and biot is not None:
         compression = most_compressed(Compression(), pore)
         fold = Fold(fold_message(f"at t = {pore.time:g} h", compression))
-        yield Event(BIOT / compression.stretch - 1, fold)
+        yield Event(biot / compression.stretch - 1, fold)
     growth = scene.growing.growth
     if growth.bonding_strength is not None:
         peak = adhesion.wall_peak(scene, pore, solved)

@@ -14,8 +14,9 @@ from contextlib import contextmanager
 
 from repro.errors import GrowthError, MeshError, RunEnd
 from repro.march.state import Compression
+from repro.model.energies.neo_hookean import BIOT, CREASE
 from repro.model.pore import Pore
-from repro.model.surface import BIOT, CREASE, surface
+from repro.model.surface import surface
 
 #: The surface folds if no equilibrium exists and its stretch has been below this, 5 % above CREASE:
 #: the stretch varies by up to 6 % within an edge, and runs stop at up to 0.677 (docs/design.md).
@@ -45,10 +46,10 @@ class Fold(RunEnd):
 def most_compressed(earlier: Compression, pore: Pore) -> Compression:
     """Return the compression of a pore if its stretch is smaller than an earlier one.
 
-    Where strain counts from the last shape, compression does not accumulate: that of the later pore
-    is returned.
+    An energy without limits of the stretch leaves the earlier one. Where strain counts from the
+    last shape, compression does not accumulate: that of the later pore is returned.
     """
-    if pore.outline is None:
+    if pore.outline is None or pore.body.energy.crease is None:
         return earlier
     present = surface(pore)
     if pore.last is None and present.least >= earlier.stretch:

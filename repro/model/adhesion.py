@@ -60,7 +60,7 @@ def stress(scene: Scene, pore: Pore) -> np.ndarray:
     mesh = pore.mesh
     strained = pore.body.strained(mesh.points[mesh.body])
     pressure = pore.pressure[mesh.triangles[mesh.biomass]] @ pore.body.shape.table.linear.T
-    return scene.growing.growth.shear_modulus * growth.cauchy(strained.F, pressure)
+    return scene.growing.growth.shear_modulus * growth.cauchy(strained, pressure)
 
 
 def fluid_forces(scene: Scene, pore: Pore, solved: Solved) -> np.ndarray:

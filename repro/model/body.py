@@ -16,6 +16,7 @@ from repro.fem.brief import brief
 from repro.fem.elements import Table
 from repro.fem.forms import Basis, basis
 from repro.fem.linear import DEFAULT, Method
+from repro.model.energies import NEO_HOOKEAN, Energy
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,10 +64,11 @@ class Shape:
 @dataclass(frozen=True, eq=False)
 class Body:
     """The aggregate in its reference configuration: positions (n, 2) um of its nodes, on the mesh
-    of ``shape``."""
+    of ``shape``, and its elastic energy."""
 
     shape: Shape
     reference: np.ndarray
+    energy: Energy = field(default=NEO_HOOKEAN, kw_only=True)
 
     @cached_property
     def at(self) -> Basis:
@@ -84,7 +86,7 @@ class Body:
         """The deformation (t, q, 2, 2) from the reference to positions (n, 2) um, with its terms in
         the stress."""
         F = self.at.gradient(position)
-        return Strained(elements.by_component(F.transpose(1, 3, 0, 2)))
+        return Strained(elements.by_component(F.transpose(1, 3, 0, 2)), self.energy)
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,6 +95,7 @@ class Strained:
     use, so that J can be tested before a division by it."""
 
     F: np.ndarray
+    energy: Energy = NEO_HOOKEAN
 
     @cached_property
     def J(self) -> np.ndarray:
@@ -105,14 +108,35 @@ class Strained:
         return elements.inverse_transpose(self.F, self.J)
 
     @cached_property
-    def A(self) -> np.ndarray:
+    def isochoric(self) -> np.ndarray:
         """(...) J^(-2/3)."""
         return self.J ** (-2 / 3)
+
+    @cached_property
+    def invariant(self) -> np.ndarray:
+        """(...) I = J^(-2/3) tr C."""
+        return self.isochoric * self.trace
+
+    @property
+    def admissible(self) -> bool:
+        """Is J positive, and I below the limit of the energy?"""
+        return bool(self.J.min() > 0 and (self.invariant < self.energy.largest).all())
+
+    @cached_property
+    def A(self) -> np.ndarray:
+        """(...) a J^(-2/3), see :class:`Energy`."""
+        return self.isochoric * self.energy.slope(self.invariant)
 
     @cached_property
     def trace(self) -> np.ndarray:
         """(...) tr C."""
         return np.sum(self.F**2, axis=(-2, -1)) + 1
+
+    @cached_property
+    def G(self) -> np.ndarray:
+        """(..., 2, 2) J^(-2/3) (F - tr C / 3 H), half of the derivative of I by F."""
+        return self.isochoric[..., None, None] * (
+            self.F - self.trace[..., None, None] / 3 * self.H)
 
     def piola(self, P: np.ndarray) -> np.ndarray:
         """First Piola-Kirchhoff stress (..., 2, 2) at a pressure P (...), both over mu_L: the

@@ -578,7 +578,8 @@ def divided(grown: Pore, division: Division, contact: Contact,
     space = Space(division.mesh)
     table = grown.space.table
     reference = division.nodal(grown.origin)[space.mesh.body]
-    body = Body(shape, reference) if shape else material(space, reference)
+    body = (replace(grown.body, shape=shape, reference=reference) if shape
+            else material(space, reference, grown.body.energy))
     last = grown.last
     if last is not None:
         last = division.nodal(_on_mesh(division.parent, last))[space.mesh.body]

@@ -14,7 +14,7 @@ therefore fail. The search with whole equilibria (:mod:`repro.model.contact_line
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -25,7 +25,7 @@ from repro.fem.division import Division
 from repro.fem.newton import REQUIRED_REDUCTION, STALLED
 from repro.fem.outline import Outline
 from repro.model import contact_lines, growth
-from repro.model.body import Body, Shape
+from repro.model.body import Shape
 from repro.model.contact_lines import CLOSE, FIRST_TRIAL, LEAST_PART, Clearance, Line
 from repro.model.pore import Pore
 from repro.polling import poll
@@ -108,13 +108,13 @@ class Placed:
         nodes = self.reference[self.grown.mesh.cells[triangle.cell]]
         reference = body.reference.copy()
         reference[shape.cells] = moved.nodes(nodes)
-        after = Body(shape, reference)
+        after = replace(body, shape=shape, reference=reference)
         amount = (self.grown.theta * self.grown.body.at.dx)[rows[0]]
         parts = dividing.split(amount, moved, self.grown.space.table)
         change = (self.system.partial_residual(after, np.stack(parts) / after.at.dx, position,
                                                pressure)
-                  - self.system.partial_residual(Body(shape, body.reference),
-                                                 self.theta[rows], position, pressure))
+                  - self.system.partial_residual(replace(body, shape=shape), self.theta[rows],
+                                                 position, pressure))
         return change / SMALL
 
     def on_parent(self, position: np.ndarray,

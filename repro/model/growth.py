@@ -1,25 +1,26 @@
-"""Growth mechanics (2.3, 3.4): the aggregate as an incompressible neo-Hookean body that grows.
+"""Growth mechanics (2.3, 3.4): the aggregate as an incompressible elastic body that grows.
 
 Plane strain, from the configuration of t = 0: F = d phi / d X, J = det F, tr C = F : F + 1.
 The equilibrium makes this potential stationary in phi and P:
 
-    Pi = integral of mu/2 (J^(-2/3) tr C - 3) + P (J - theta) dV
+    Pi = integral of mu w(J^(-2/3) tr C) + P (J - theta) dV
          - 1/2 sum_tau integral of h^2/(12 mu_tau) |grad P|^2 dv
 
 (14)-(17), (21)-(24) and (27), hence J = theta. Signs follow [E5]: the stabilisation makes the
 pressure block negative. Without tractions mu_L only scales P; this module sets it to 1. P is
-linear. With A = mu J^(-2/3) and H = F^-T (dJ = J H : dF), first Piola-Kirchhoff stress and tangent
-are
+linear. The paper's energy is w = (I - 3) / 2; :mod:`repro.model.energies` has others, with a = 2
+dw/dI and c = 4 d2w/dI2. With A = a J^(-2/3), H = F^-T (dJ = J H : dF) and G = J^(-2/3) (F - tr C /
+3 H), first Piola-Kirchhoff stress and tangent are
 
     S = A (F - tr C / 3 H) + P J H
     dS = A (dF - 2/3 (H : dF) F - 2/3 (F : dF) H + 2/9 tr C (H : dF) H + tr C / 3 H dF^T H)
-         + P J ((H : dF) H - H dF^T H)
+         + c (G : dF) G + P J ((H : dF) H - H dF^T H)
 
 *Straight triangles*, linear displacements. [E6]: h, grad and dv are those of the last known shape,
-and the modulus is the incremental one there, mu_tau = mu_L theta^(-2/3); in reference quantities
-the stabilisation grows as J^(5/3). It is kept fixed while an equilibrium is sought.
+and the modulus is the incremental one there, mu_tau = a mu_L theta^(-2/3); in reference quantities
+the stabilisation grows as J^(5/3) / a. It is kept fixed while an equilibrium is sought.
 
-*Curved triangles*, quadratic displacements (Taylor-Hood): no term in |grad P|^2, but P + gamma
+*Curved triangles*, quadratic displacements (Taylor-Hood): no term in |grad P|^2, but P + gamma a
 theta^(-5/3) (J - theta) for P in S. This grad-div stabilisation vanishes where J = theta. Without
 it, modes of J that the linear pressure does not constrain would grow: at a constant shape the
 energy of plane expansion, J^(1/3) + J^(-2/3) / 2, is concave.
@@ -87,19 +88,13 @@ def internal_forces(body: Body, theta: np.ndarray, position: np.ndarray,
     return forces[: position.size].reshape(2, -1).T
 
 
-def piola(F: np.ndarray, P: np.ndarray) -> np.ndarray:
-    """:meth:`Strained.piola` of F (..., 2, 2)."""
-    return Strained(F).piola(P)
-
-
-def cauchy(F: np.ndarray, P: np.ndarray) -> np.ndarray:
+def cauchy(at: Strained, P: np.ndarray) -> np.ndarray:
     """Cauchy stress over mu_L in plane strain: (..., 4) sigma_xx, sigma_yy, sigma_zz, sigma_xy.
 
-    J^-1 S F^T in the plane; across it, where F33 = 1, J^(-5/3) (1 - tr C / 3) + P.
+    J^-1 S F^T in the plane; across it, where F33 = 1, a J^(-5/3) (1 - tr C / 3) + P.
     """
-    J = np.linalg.det(F)
-    sigma = np.einsum("...ik,...jk->...ij", piola(F, P), F) / J[..., None, None]
-    across = J ** (-5 / 3) * (1 - (np.sum(F**2, axis=(-2, -1)) + 1) / 3) + P
+    sigma = np.einsum("...ik,...jk->...ij", at.piola(P), at.F) / at.J[..., None, None]
+    across = at.A / at.J * (1 - at.trace / 3) + P
     return np.stack([sigma[..., 0, 0], sigma[..., 1, 1], across, sigma[..., 0, 1]], axis=-1)
 
 
@@ -132,7 +127,9 @@ class PressureGradient:
     def on(body: Body, last_shape: np.ndarray) -> PressureGradient:
         """The stabilisation on the last known shape (n, 2) um [E6]."""
         expansion = body.strained(last_shape).J[:, 0]
-        return PressureGradient(gradient_stabilisation(last_shape, body.shape.triangles, expansion))
+        matrices = gradient_stabilisation(last_shape, body.shape.triangles, expansion)
+        stiffer = np.broadcast_to(body.energy.grown_slope(expansion), expansion.shape)
+        return PressureGradient(matrices / stiffer[:, None, None])
 
     @staticmethod
     def parts(growth: np.ndarray) -> int:
@@ -249,15 +246,16 @@ class System:
         residual = balanced(self.supports, self.residual(position, pressure))
         return Iterate(position, pressure, residual, self.sizes, lag, self.free)
 
-    def _stiffening(self) -> np.ndarray:
-        """gamma theta^(-5/3)."""
-        return self.stabilisation.gamma * self.theta ** (-5 / 3)
+    def _stiffening(self, theta: np.ndarray) -> np.ndarray:
+        """gamma a theta^(-5/3)."""
+        grown = self.body.energy.grown_slope(theta)
+        return self.stabilisation.gamma * theta ** (-5 / 3) * grown
 
     def _pressed(self, position: np.ndarray, pressure: np.ndarray) -> tuple[Strained, np.ndarray]:
         """The deformation, and P with its stabilisation (t, q)."""
         at = self.strained(position)
         linear = self.body.pressures.evaluate(pressure)
-        return at, linear + self._stiffening() * (at.J - self.theta)
+        return at, linear + self._stiffening(self.theta) * (at.J - self.theta)
 
     def residual(self, position: np.ndarray, pressure: np.ndarray) -> np.ndarray:
         """(2n + corners,): x of all nodes, y, then P of the corners. The caller ensures det F > 0.
@@ -273,7 +271,7 @@ class System:
         """(2n + corners,) residual of a few curved triangles, ``body``, under theta (r, q)."""
         at = body.strained(position)
         P = body.pressures.evaluate(pressure)
-        P += self.stabilisation.gamma * theta ** (-5 / 3) * (at.J - theta)
+        P += self._stiffening(theta) * (at.J - theta)
         stress = at.piola(P)
         forces = self._forces(stress, body.at.weighted)
         gap = body.pressures.load(body.at.dx * (at.J - theta))
@@ -303,11 +301,15 @@ class System:
         PJ = P * at.J
         h = self._pulled(at.H)
         f = self._pulled(at.F)
-        both = 2 / 9 * at.A * at.trace + PJ + self._stiffening() * at.J**2
+        both = 2 / 9 * at.A * at.trace + PJ + self._stiffening(self.theta) * at.J**2
         half = each(dx * both / 2, h) - each(2 / 3 * dx * at.A, f)
         swap = each(dx * (at.A * at.trace / 3 - PJ), h)
         blocks = np.swapaxes(h, 1, 2) @ np.concatenate([half, swap], axis=2)
         K = blocks[:, :, : 2 * k] + np.swapaxes(blocks[:, :, : 2 * k], 1, 2)
+        curvature = self.body.energy.curvature(at.invariant)
+        if curvature is not None:
+            g = self._pulled(at.G)
+            K += np.swapaxes(g, 1, 2) @ each(dx * curvature, g)
         exchanged = K.reshape(-1, 2, k, 2, k)  # the same memory
         exchanged += np.swapaxes(blocks[:, :, 2 * k:].reshape(exchanged.shape), 1, 3)
         plain = self.body.at.stiffness(at.A, self.body.at.weighted)
@@ -331,8 +333,8 @@ class System:
         return Supported(factors.system, factors.elements, factors.solver, loads, points)
 
     def advanced(self, iterate: Iterate, factors: Factored, fresh: bool) -> Iterate:
-        """The longest of the steps 1, 1/2, ... with det F > 0 that does not raise the residual
-        fourfold; the first step carries prescribed coordinates to their target."""
+        """The longest of the steps 1, 1/2, ... to an admissible deformation that does not raise the
+        residual fourfold; the first step carries prescribed coordinates to their target."""
         lag = iterate.lag
         carried = None
         if not iterate.complete:
@@ -343,12 +345,13 @@ class System:
         push = step[2 * n:]
         for length in 0.5 ** np.arange(HALVINGS):
             position = iterate.position + length * move
-            if self.strained(position).J.min() <= 0:
+            if not self.strained(position).admissible:
                 continue
             trial = self._iterate(position, iterate.pressure + length * push)
             if not iterate.complete or trial.length < 4 * iterate.length:
                 return trial
-        raise GrowthError("no step of Newton's method keeps det F > 0 and the residual in bounds "
+        raise GrowthError("no step of Newton's method keeps det F > 0, the strain below the limit "
+                          "of the energy, and the residual in bounds "
                           f"(shortest tried {0.5 ** (HALVINGS - 1):.2g})")
 
 

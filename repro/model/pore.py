@@ -20,6 +20,7 @@ from repro.fem.space import Space
 from repro.fem.walls import Walls, channel_walls
 from repro.model import flow
 from repro.model.body import Body, Shape
+from repro.model.energies import Energy, energy_of
 from repro.model.flow import Flow
 from repro.scene import Flow as Drive
 from repro.scene import MissingError, Numerics, Scene, Substrates, at_largest, needed
@@ -334,18 +335,18 @@ def seeded(scene: Scene, front: float = 1.0, outline: Outline | None = None) -> 
     inert = total * (scene.aggregate.inert_fraction if scene.aggregate else 0.0)
     wall = outline.wall if outline else np.empty(0, int)
     fixed = outline.fixed if outline else np.empty(0, bool)
-    body = material(space, mesh.points[mesh.body])
+    body = material(space, mesh.points[mesh.body], energy_of(scene.growth))
     theta = np.ones((np.count_nonzero(mesh.biomass), len(body.shape.table.weights)))
     return Pore(0.0, space, wall, fixed, total - inert, inert, theta, body,
                 np.zeros(mesh.corners), front=front)
 
 
-def material(space: Space, reference: np.ndarray) -> Body:
+def material(space: Space, reference: np.ndarray, energy: Energy) -> Body:
     """The aggregate of a mesh; reference: (n, 2) um, its nodes in the reference configuration."""
     topology = space.mesh.topology
     shape = Shape(topology.body_cells, len(topology.body_corners), space.gradient_degree,
                   topology.method)
-    return Body(shape, reference)
+    return Body(shape, reference, energy=energy)
 
 
 def solve(scene: Scene, pore: Pore, over: float = 0.0) -> Solved:

@@ -217,15 +217,17 @@ def _material(new: Space, expanded: Pore, rim: np.ndarray, at: Located) -> tuple
     """
     mesh = new.mesh
     old = expanded.mesh
+    energy = expanded.body.energy
     origin = mesh.points.copy()
     origin[mesh.body] = at.field(expanded.origin, old.cells[old.biomass], old.geometry)
     origin[mesh.loop] = rim
     try:
-        return material(new, transfer.unfolded(mesh, origin)[mesh.body]), expanded.origin_known
+        unfolded = transfer.unfolded(mesh, origin)[mesh.body]
+        return material(new, unfolded, energy), expanded.origin_known
     except OriginFolded:
         if expanded.last is None:
             raise
-        return material(new, mesh.points[mesh.body]), False
+        return material(new, mesh.points[mesh.body], energy), False
 
 
 def transfer_substrates(supplied: Substrates, old: Space, new: Space, state: Concentrations | None,

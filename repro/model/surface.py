@@ -2,11 +2,7 @@
 
 It is the stretch of a material line along the surface, divided by J^(1/2). The stretch is relative
 to the configuration from which strain counts. The division removes the growth, which causes no
-stress by itself. At a constant J, the energy (17) in the plane is that of an incompressible
-neo-Hookean solid. Its free surface creases where this stretch falls to 0.647 (Hong, Zhao and Suo,
-Appl. Phys. Lett. 95, 2009; Hohlfeld and Mahadevan, Phys. Rev. Lett. 106, 2011) and is unstable to
-waves of every length at 0.544 (Biot, Appl. Sci. Res. A 12, 1963). ``docs/scope.md`` derives both
-for this energy.
+stress by itself. An energy states its limits (:class:`repro.model.energies.Energy`).
 """
 
 from __future__ import annotations
@@ -22,10 +18,6 @@ from repro.fem.brief import brief
 from repro.fem.walls import FREE
 from repro.model.pore import Pore
 
-#: A crease lowers the energy of a surface that is compressed to this stretch, whatever its size.
-CREASE = 0.647
-#: Below this stretch, small waves of every length lower the energy.
-BIOT = 0.544
 #: Stretches closer to a contact line than this fraction of the free surface's length do not count:
 #: the stress at the line is singular.
 BESIDE = 0.05

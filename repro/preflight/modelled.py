@@ -115,8 +115,9 @@ def _kinetics(scene: Scene) -> Iterator[str]:
 
 def _growth(scene: Scene) -> Iterator[str]:
     growth = scene.growth
-    yield (f"to {growth.end:g} h: an incompressible neo-Hookean body that expands with its "
-           "biomass, (14)-(29)")
+    limit = f" with J_m = {growth.limiting_invariant:g}" if growth.energy == "Gent" else ""
+    yield (f"to {growth.end:g} h: an incompressible {growth.energy} body{limit} that expands with "
+           "its biomass, (14)-(29)")
     yield f"films under {growth.minimum_film:g} um close (2.3.3)"
     yield f"fluid forces {growth.fluid_forces}"
     yield f"the lower wall {growth.wall}"

@@ -9,9 +9,10 @@ from dataclasses import dataclass
 from repro.fem import sizing
 from repro.march.step_control import SHORTEST
 from repro.model.brinkman import ACROSS
+from repro.model.energies.neo_hookean import CREASE
 from repro.model.kinetics import THINNEST
 from repro.model.pore import MOST_REFINED, Pore, film, resolution
-from repro.model.surface import CREASE, surface
+from repro.model.surface import surface
 from repro.preflight import numbers
 from repro.preflight.numbers import Number
 from repro.scene import Kinetics, Scene
@@ -313,9 +314,11 @@ def warn_surface(pore: Pore) -> Iterator[Caveat]:
         yield Caveat(ORIGIN, f"from t = {pore.time:.4g} h on the positions at t = 0 fold: fields "
                      "have no displacement, position at t = 0, theta and J; nothing else depends "
                      'on them with growth.new_biomass = "stress_free"')
-    if pore.outline is None or surface(pore).least >= CREASE:
+    if pore.outline is None or pore.body.energy.crease is None:
         return
     crease = surface(pore)
+    if crease.least >= CREASE:
+        return
     x, y = crease.place
     yield Caveat(CREASED, f"from t = {pore.time:.4g} h on growth compresses the aggregate's "
                  f"surface near x = {x:.4g}, y = {y:.4g} um to an elastic stretch of "

@@ -9,7 +9,8 @@ from types import ModuleType
 from repro.march import balance
 from repro.march.balance import Ledger
 from repro.march.state import Report
-from repro.model.surface import BESIDE, BIOT, CREASE, STRETCH, surface
+from repro.model.energies.neo_hookean import BIOT, CREASE
+from repro.model.surface import BESIDE, STRETCH, surface
 from repro.results.quantities import Quantity, is_modelled
 from repro.scene import Growth, Scene
 
@@ -169,7 +170,8 @@ SERIES = (
              "oxygen demand", "growth", signed=True),
     Quantity("surface_stretch_min", "least elastic stretch along the aggregate's free surface",
              f"least of {STRETCH}, on edges farther from a contact line than {100 * BESIDE:g} % of "
-             f"the free surface's length; below {CREASE:g} it creases, below {BIOT:g} it folds",
+             "the free surface's length; with the neo-Hookean energy it creases below "
+             f"{CREASE:g}, and folds below {BIOT:g}",
              lambda scene, at: surface(at.pore).least, "least stretch", "growth"),
     *(Quantity(f"surface_stretch_min_{axis}_um", f"place of the least surface stretch, {axis}",
                "middle of the edge with the least elastic stretch along the free surface",

@@ -16,6 +16,7 @@ from repro.fem.space import Space
 from repro.march.balance import Ledger
 from repro.march.state import Compression, RestartState
 from repro.march.step_control import StepControl
+from repro.model.energies import energy_of
 from repro.model.pore import Pore, material, walls_of
 from repro.runs.checkpoint import Arrays
 from repro.scene import Scene, scene_hash
@@ -80,7 +81,8 @@ def _pore(scene: Scene, plain: dict, arrays: Arrays) -> Pore:
         from repro.model.transport import Concentrations  # a scene without [substrates] has none
         acceptor, donor = map(arrays.get, OF_GUESS)
         guess = Concentrations(acceptor, donor, plain["guess"])
-    return Pore(time=plain["time_h"], space=space, body=material(space, arrays["reference"]),
+    body = material(space, arrays["reference"], energy_of(scene.growth))
+    return Pore(time=plain["time_h"], space=space, body=body,
                 concentrations=guess, front=plain["front"],
                 origin_known=plain["origin_known"],
                 **{name: arrays[name] for name in OF_PORE},

@@ -24,7 +24,7 @@ from repro.scene.files import key_of, leave_out, override, packaged_scenes, read
 from repro.scene.former import with_former
 from repro.scene.needed import MissingError, needed
 from repro.scene.reading import Place, dotted, entries, read_table, toml, write_table
-from repro.scene.rules import rules
+from repro.scene.rules import LIMITING, rules
 from repro.scene.time_table import TimeTable, at_largest, at_time, time_tables
 from repro.scene.units import (
     ACUTE,
@@ -321,6 +321,12 @@ class Growth:
     new_biomass: str = choice(
         "stressed", "stress_free", source="2.3, section 5",
         about="Strain counts from t = 0 (2.3), or new biomass has no stress (section 5)")
+    energy: str = choice(
+        "neo-Hookean", "Gent", source="(17); section 5 calls others straightforward",
+        about="Elastic energy of the aggregate; Gent's stiffens towards limiting_invariant")
+    limiting_invariant: float = number(
+        LIMITING, source=NOT_IN_PAPER + "; about that of rubber (Gent 1996)",
+        about="J_m of Gent's energy, with energy = \"Gent\": J^(-2/3) tr C stays below 3 + J_m")
 
 
 @dataclass(frozen=True)
@@ -550,7 +556,7 @@ class Scene:
 #: Keys added after hashes of scenes were recorded, with their defaults as tables write them.
 LATER: dict[str, dict[str, object]] = {
     "aggregate": {"position": "0.0 um", "smooth": False, "inert_fraction": 0.0},
-    "growth": {"wall": "sliding"},
+    "growth": {"wall": "sliding", "energy": "neo-Hookean", "limiting_invariant": 100.0},
     "numerics": {"contact_elements": 0.0},
     "substrates.donor": {"inhibition_constant": "100.0 mg/L"},
     "kinetics": {"law": "dual Monod", "decay": "with acceptor"},

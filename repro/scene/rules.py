@@ -24,6 +24,7 @@ SHORTEST_STEP = 1e-6  # h: times closer than 1e-9 h are equal
 FINEST = 1e-3  # of the width: the smallest seed, edge of an outline, and gap between two edges
 NEAREST = 1e-4  # of the width: from a point of an outline to a wall that it does not touch
 INHIBITION = 100.0  # mg/L: the default of K_i
+LIMITING = 100.0  # the default of J_m
 TIGHTEST = 1e-11  # of the square of the width: the smallest permeability
 
 #: A number or a table over time.
@@ -267,6 +268,7 @@ def _growth_rules(scene: "Scene") -> Rules:
     if scene.growth:
         yield from _step_rules(scene.growth.end, scene.growth.time_step)
         yield from _strength_rules(scene.growth)
+        yield from _energy_rules(scene.growth)
     if scene.growth and scene.growth.fluid_forces == "included":
         yield from _force_rules(scene)
     film = scene.growth.minimum_film if scene.growth else 0.0
@@ -318,6 +320,13 @@ def _strength_rules(growth: "Growth") -> Rules:
                              "counts from t = 0",
             "growth.new_biomass": f'"stressed" is needed with growth.{key} = {strength} MPa',
         }
+
+
+def _energy_rules(growth: "Growth") -> Rules:
+    yield growth.energy != "Gent" and growth.limiting_invariant != LIMITING, {
+        "growth.limiting_invariant": 'growth.energy = "Gent" is needed with it',
+        "growth.energy": '"Gent" is needed with growth.limiting_invariant',
+    }
 
 
 def _force_rules(scene: "Scene") -> Rules:

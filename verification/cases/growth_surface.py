@@ -14,7 +14,8 @@ from repro.march.folding import Fold
 from repro.march.simulation import simulate
 from repro.march.state import Report
 from repro.model import contact, growth, pore
-from repro.model.surface import BIOT, CREASE, surface
+from repro.model.energies.neo_hookean import BIOT, CREASE
+from repro.model.surface import surface
 from repro.preflight import numbers
 from repro.scene import Scene, load_scene
 from verification.evidence.checks import around, at_most, between, refine, studies

@@ -15,7 +15,8 @@ import numpy as np
 from repro.errors import RunEnd
 from repro.march import simulation
 from repro.march.state import Report
-from repro.model.surface import CREASE, surface
+from repro.model.energies.neo_hookean import CREASE
+from repro.model.surface import surface
 from verification.claims import Finding, PaperCheck, at_least, between, claim, without_limit
 from verification.claims.growth_mechanics import TOTAL
 from verification.claims.levels import BESIDE_PAIRS, cached

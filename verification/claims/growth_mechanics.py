@@ -16,7 +16,7 @@ from repro.fem.outline import half_disc as seed
 from repro.fem.sizing import ACROSS_AGGREGATE, GRADATION, Sizing
 from repro.fem.walls import channel_walls
 from repro.model import growth
-from repro.model.body import Shape
+from repro.model.body import Shape, Strained
 from verification import sensitivity
 from verification.claims import CLOSED, OF_SCHEME, Finding, at_least, at_most, between, claim, near, without_limit
 from verification.claims.levels import ABOUT_WIDE, ALONE, BESIDE, current
@@ -206,4 +206,4 @@ def nonlinear_part(slope: np.ndarray, P: np.ndarray) -> float:
     xx, yy = slope[:, 0, 0], slope[:, 1, 1]
     xy = 0.5 * (slope[:, 0, 1] + slope[:, 1, 0])
     linear = 2 * np.column_stack([xx, yy, 0 * xx, xy]) + np.outer(P - 2 * (xx + yy) / 3, [1, 1, 1, 0])
-    return float(np.abs(growth.cauchy(np.eye(2) + slope, P) - linear).max() / np.abs(linear).max())
+    return float(np.abs(growth.cauchy(Strained(np.eye(2) + slope), P) - linear).max() / np.abs(linear).max())

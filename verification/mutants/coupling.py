@@ -575,8 +575,8 @@ MUTANTS = (
          "tests/test_origin.py::test_nothing_but_fields_depends_on_positions_at_the_start"),
         ("folded-positions-shown",
          "Fields count from the shape that has replaced the one of t = 0.",
-         "return material(new, mesh.points[mesh.body]), False",
-         "return material(new, mesh.points[mesh.body]), True",
+         "return material(new, mesh.points[mesh.body], energy), False",
+         "return material(new, mesh.points[mesh.body], energy), True",
          "tests/test_origin.py::test_nothing_but_fields_depends_on_positions_at_the_start")),
     *changes(
         "repro/results/tables.py",

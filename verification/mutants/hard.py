@@ -170,6 +170,6 @@ MUTANTS = (
         "repro/march/ends.py",
         ("hard-fold-unfounded",
          "A run ends as a fold although its surface is hardly compressed.",
-         "BIOT / compression.stretch - 1, fold",
+         "biot / compression.stretch - 1, fold",
          "0.99 / compression.stretch - 1, fold")),
 )

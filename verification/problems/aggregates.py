@@ -8,6 +8,7 @@ from repro.fem.mesh import Mesh
 from repro.fem.outline import Outline
 from repro.fem.space import Space
 from repro.model import remeshing
+from repro.model.energies import NEO_HOOKEAN
 from repro.model.pore import Pore, material, seeded
 from repro.model.remeshing import Remeshing
 from repro.model.stages import Stages
@@ -41,7 +42,7 @@ def seed_on(grid: Mesh, around: Outline, density=uniform) -> Pore:
     """An aggregate at t = 0 with X_A = density(x, y), on an existing mesh."""
     space = Space(grid)
     active = density(*reaction_points(space)) * space.reaction.dx
-    body = material(space, grid.points[grid.body])
+    body = material(space, grid.points[grid.body], NEO_HOOKEAN)
     return Pore(0.0, space, around.wall, around.fixed, active, 0 * active, np.ones_like(body.at.dx), body,
                 np.zeros(grid.corners))
 

@@ -18,6 +18,7 @@ from repro.fem.space import Space
 from repro.fem.walls import FREE
 from repro.model import contact, growth, pore
 from repro.model.body import Body
+from repro.model.energies import NEO_HOOKEAN
 from verification.evidence.cases import combined
 from verification.evidence.checks import largest
 from verification.problems import meshes
@@ -71,7 +72,7 @@ class Supported(Body):
 
 def on_mesh(grid: Mesh, *constrained: np.ndarray) -> Supported:
     """The aggregate of a mesh at t = 0. constrained: (n,) nodes with prescribed x, then nodes with prescribed y."""
-    aggregate = pore.material(Space(grid), grid.points[grid.body])
+    aggregate = pore.material(Space(grid), grid.points[grid.body], NEO_HOOKEAN)
     return Supported(aggregate.shape, aggregate.reference, np.column_stack(constrained))
 
 

@@ -1,0 +1,49 @@
+"""Gent's energy: w = -(J_m / 2) ln(1 - (I - 3) / J_m), which stiffens towards a limit of I."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from repro.errors import GrowthError
+from repro.model.energies.energy import Energy
+from repro.scene import Growth
+
+
+@dataclass(frozen=True)
+class Gent(Energy):
+    """A solid whose I stays below 3 + J_m (Gent, Rubber Chem. Technol. 69, 1996).
+
+    limit: J_m. Growth by theta alone has I = theta^(-2/3) (2 theta + 1), since F33 = 1: theta of
+    36 needs J_m above 3.7, theta of 1000 above 17.
+    """
+
+    limit: float
+
+    @staticmethod
+    def of(growth: Growth) -> Gent:
+        """The energy with the limit of a scene."""
+        return Gent(growth.limiting_invariant)
+
+    @property
+    def largest(self) -> float:
+        """I is smaller than this."""
+        return 3 + self.limit
+
+    def slope(self, invariant: np.ndarray) -> np.ndarray:
+        """J_m / (J_m + 3 - I). Raises GrowthError where I is not below its limit."""
+        return self.limit / self._room(invariant)
+
+    def curvature(self, invariant: np.ndarray) -> np.ndarray:
+        """2 J_m / (J_m + 3 - I)^2."""
+        return 2 * self.limit / self._room(invariant) ** 2
+
+    def _room(self, invariant: np.ndarray) -> np.ndarray:
+        """The distance of I from its limit."""
+        room = self.largest - invariant
+        if room.min() <= 0:
+            raise GrowthError(f"the strain reaches the limit of Gent's energy: I - 3 comes to "
+                              f"{np.max(invariant) - 3:.3g}, growth.limiting_invariant is "
+                              f"{self.limit:g}")
+        return room
