@@ -267,6 +267,7 @@ def _growth_rules(scene: "Scene") -> Rules:
     if scene.growth:
         yield from _step_rules(scene.growth.end, scene.growth.time_step)
         yield from _strength_rules(scene.growth)
+        yield from _mirrored_rules(scene.growth, scene.pore.upper_wall)
     if scene.growth and scene.growth.fluid_forces == "included":
         yield from _force_rules(scene)
     film = scene.growth.minimum_film if scene.growth else 0.0
@@ -318,6 +319,19 @@ def _strength_rules(growth: "Growth") -> Rules:
                              "counts from t = 0",
             "growth.new_biomass": f'"stressed" is needed with growth.{key} = {strength} MPa',
         }
+
+
+def _mirrored_rules(growth: "Growth", upper_wall: str) -> Rules:
+    """What is not verified beside a plane of symmetry: the forces that walls and water exert."""
+    unverified = {"fluid_forces": growth.fluid_forces == "included",
+                  "wall": growth.wall == "bonded",
+                  "bonding_strength": growth.bonding_strength is not None,
+                  "tensile_strength": growth.tensile_strength is not None}
+    for key, is_set in unverified.items():
+        yield upper_wall == "symmetry" and is_set, {
+            f"growth.{key}": 'pore.upper_wall = "no slip" is needed with it',
+            "pore.upper_wall": f'"no slip" is needed with growth.{key}: forces on an aggregate '
+                               "beside a plane of symmetry are not verified"}
 
 
 def _force_rules(scene: "Scene") -> Rules:
