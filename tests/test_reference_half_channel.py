@@ -2,8 +2,9 @@
 import numpy as np
 import pytest
 from scipy.integrate import quad, solve_bvp
+from skfem import Basis, ElementTriP2
 
-from reference import half_channel, poiseuille
+from reference import half_channel, poiseuille, taylor_hood
 
 HALF, LAYER = 50.0, 12.5
 LAYERS = pytest.mark.parametrize("layers, parameter", [
@@ -48,3 +49,15 @@ def test_half_of_a_channel_with_two_layers_is_that_channel(layers, parameter):
 def test_without_a_layer_it_is_half_of_poiseuilles_parabola(y):
     assert half_channel.Viscous.velocity(y, HALF, LAYER, 1.0) == pytest.approx(poiseuille.velocity(y, 2 * HALF))
     assert half_channel.Viscous.gradient(HALF, LAYER, 1.0) == pytest.approx(poiseuille.head_loss(1, 2 * HALF, 1, 1))
+
+
+def test_a_mirrored_channel_has_both_half_discs_and_poiseuilles_loss_with_water_in_them():
+    """Curved edges of the image lie on its arc, so areas double to the last digits of the half. Triangles beside the
+    arc are curved, so they do not contain a parabola to round-off."""
+    half = taylor_hood.half_disc(50.0, (-60.0, 70.0), 20.0, 0, corner=1)
+    whole = taylor_hood.mirrored(half)
+    areas = [Basis(channel.mesh, ElementTriP2(), intorder=6).dx.sum(axis=1) for channel in (half, whole)]
+    assert whole.width == 100.0 and areas[1].sum() == pytest.approx(100 * 130, rel=1e-12)
+    assert areas[1][whole.biomass].sum() == pytest.approx(2 * areas[0][half.biomass].sum(), rel=1e-12)
+    assert areas[1][whole.biomass].sum() == pytest.approx(np.pi * 20.0**2, rel=1e-3)
+    assert taylor_hood.stokes(whole, 1.0).loss == pytest.approx(poiseuille.head_loss(130, 100.0, 1, 1), rel=1e-5)

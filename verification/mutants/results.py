@@ -2000,7 +2000,6 @@ MUTANTS = (
          "A plane of symmetry counts as a wall that must bear the traction on it.",
          "if not wall.mirrors and (touched == wall.number).any()]",
          "if (touched == wall.number).any()]",
-         f"{WALLS}a_plane_of_symmetry_bears_nothing_as_a_wall[1]",
          f"{WALLS}a_plane_of_symmetry_bears_nothing_as_a_wall[2]")),
     *changes(
         "repro/model/pore.py",
