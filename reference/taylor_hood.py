@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.spatial import Delaunay
+from scipy.spatial import Delaunay, cKDTree
 from skfem import (
     Basis,
     BilinearForm,
@@ -117,6 +117,25 @@ def _film(mesh, radius):
     """Triangles between the upper part of the half-disc and the wall, and a layer within the half-disc."""
     x, y = mesh.p[:, mesh.t].mean(axis=1)
     return np.flatnonzero((np.abs(x) < 0.75 * radius) & (np.hypot(x, y) > 0.8 * radius))
+
+
+def mirrored(channel):
+    """The channel and its mirror image beyond y = width: twice as wide, with an aggregate on each wall."""
+    half, top = channel.mesh, 2 * channel.width
+    corners, bent = np.split(half.doflocs, [half.nvertices], axis=1)
+    off_the_plane = np.flatnonzero(corners[1] < channel.width * (1 - 1e-9))
+    image = np.arange(half.nvertices)
+    image[off_the_plane] = half.nvertices + np.arange(len(off_the_plane))
+    points = np.hstack([corners, [[0.0], [top]] + corners[:, off_the_plane] * [[1.0], [-1.0]]])
+    both = MeshTri(points, np.hstack([half.t, image[half.t]]))
+    basis = Basis(both, ElementTriP2())
+    places, middles = basis.doflocs.copy(), basis.facet_dofs[0]
+    straight = corners[:, half.facets].mean(axis=1)
+    above = places[1, middles] > channel.width
+    folded = np.where(above, top - places[1, middles], places[1, middles])
+    _, facet = cKDTree(straight.T).query(np.column_stack([places[0, middles], folded]))
+    places[:, middles] = np.where(above, [[0.0], [top]] + bent[:, facet] * [[1.0], [-1.0]], bent[:, facet])
+    return Channel(MeshTri2(places, both.t), np.tile(channel.biomass, 2), top, channel.ends)
 
 
 def stokes(channel, ratio, interface="laplacian"):

@@ -85,7 +85,7 @@ def wedge(degrees, height=20.0, arcs=6):
     """A plug whose sides make an angle with the upper wall in the fluid."""
     side = np.linspace(0, 1, arcs + 1)[:, None]
     left = [-30.0, 0.0] + np.hstack([(side - 1) / np.tan(np.radians(degrees)), side]) * height
-    return polygon(np.vstack([left, left[::-1] * [-1, 1]]), height, 2)
+    return polygon(np.vstack([left, left[::-1] * [-1, 1]]), channel_walls(height), 2)
 
 
 @pytest.mark.parametrize("degrees, clearance", [(16.6, np.tan(np.radians(16.6)) / np.tan(ANGLE) - 1), (16.7, 0.0),
@@ -104,7 +104,7 @@ def test_clearance_sees_a_film_that_runs_along_the_wall(gap, clearance, mirror):
     """The surface leaves the wall steeply, runs along it at a constant distance, and then departs."""
     under = 20.0 - gap
     rim = [[-60.0, 0.0], [-50.0, under], [-5.4, under], [-5.0, 20.0], [5.0, 20.0], [30.0, 0.0]]
-    outline = polygon(np.array(rim), 20.0, 2)
+    outline = polygon(np.array(rim), channel_walls(20.0), 2)
     upstream = -1 if mirror else 1
     values = clearances(mirrored(outline) if mirror else outline)
     assert values[TOP, upstream] == pytest.approx(clearance, abs=1e-9)

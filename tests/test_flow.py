@@ -9,6 +9,7 @@ from skfem import MeshTri, MeshTri2
 
 from reference import taylor_hood
 from repro.fem.outline import polygon
+from repro.fem.walls import channel_walls
 from repro.march.simulation import simulate
 from repro.model import flow, pore
 from repro.scene import load_scene
@@ -95,7 +96,7 @@ def meshed_loss(scene):
 def graded_loss(scene):
     """The loss (1/um) by the independent code on a mesh graded to every corner, with edges of W / 1000 at tips."""
     width = scene.pore.width
-    outline = polygon(np.array(scene.aggregate.outline), width, 2, at_tips=width / 1000, bends=True)
+    outline = polygon(np.array(scene.aggregate.outline), channel_walls(width), 2, at_tips=width / 1000, bends=True)
     mesh = pore.seeded(scene, outline=outline).mesh
     plane = MeshTri2.from_mesh(MeshTri(mesh.points[: mesh.corners].T.copy(), mesh.triangles.T.copy()))
     channel = taylor_hood.Channel(plane, mesh.biomass, width, mesh.ends)

@@ -5,7 +5,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from repro.fem import outline as of
-from repro.fem.walls import FREE
+from repro.fem.walls import FREE, channel_walls
 from tests.strategies import plug, seed
 
 
@@ -39,5 +39,5 @@ def test_a_smooth_seed_is_a_natural_spline_through_its_points(contact):
     pieces = [spline(np.linspace(start, end, 9)[:-1]) for start, end in zip(knots, knots[1:])]
     if contact:
         pieces[2] = [top[0], (-0.5, 20.0)]
-    loop = of.polygon(given, 20.0, smooth=True).points
+    loop = of.polygon(given, channel_walls(20.0), smooth=True).points
     assert np.vstack([loop[2:], loop[:1]])[::-1] == pytest.approx(np.vstack([*pieces, given[-1]]), abs=1e-12)

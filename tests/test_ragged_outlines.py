@@ -10,6 +10,7 @@ import shapely
 from repro.fem import mesher
 from repro.fem.mesh import triangle_areas
 from repro.fem.outline import polygon
+from repro.fem.walls import channel_walls
 from repro.model import pore
 from repro.preflight.resolved import find_unresolved_flow
 from repro.scene import SceneError, load_scene, packaged_scenes, parse_scene
@@ -93,15 +94,15 @@ def test_half_discs_are_not_compared_with_finer_meshes(name, monkeypatch):
 def test_edges_grow_from_a_tip_a_notch_and_no_other_corner():
     """Edges start at 0.1 um at tips and 0.3 um at notches; the lines do not move."""
     points = np.array([(-20, 0), (-10, 20), (0, 5), (5, 20), (9, 29), (30, 0)], float)
-    outline = polygon(points, 50.0, at_tips=0.1)
+    outline = polygon(points, channel_walls(50.0), at_tips=0.1)
     lengths = outline.edge_lengths()
     for corner, shortest in [((-10, 20), 0.1), ((0, 5), 0.3), ((9, 29), 0.1)]:
         k = int(np.flatnonzero((outline.points == corner).all(axis=1))[0])
         assert lengths[[k - 1, k]] == pytest.approx(shortest)
-    assert outline.area == pytest.approx(polygon(points, 50.0).area, rel=1e-12)
+    assert outline.area == pytest.approx(polygon(points, channel_walls(50.0)).area, rel=1e-12)
     k = int(np.flatnonzero((outline.points == (5, 20)).all(axis=1))[0])
     assert lengths[[k - 1, k]].min() > 1
-    assert len(polygon(points, 50.0).points) == len(points) + 1
+    assert len(polygon(points, channel_walls(50.0)).points) == len(points) + 1
 
 
 def test_no_triangle_has_its_nodes_on_one_line():

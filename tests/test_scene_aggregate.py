@@ -30,7 +30,9 @@ def toml(points):
 @pytest.mark.parametrize("name", packaged_scenes())
 def test_hashes_do_not_change(name):
     assert scene_hash(load_scene(name)) == HASHES[name]
-    assert scene_hash(load_scene(name, ["aggregate.position=0 um", "aggregate.smooth=false"])) == HASHES[name]
+    assert scene_hash(load_scene(name, ["aggregate.position=0 um", "aggregate.smooth=false",
+                                         "pore.upper_wall=no slip"])) == HASHES[name]
+    assert scene_hash(load_scene(name, ["pore.upper_wall=symmetry"])) != HASHES[name]
     assert scene_hash(load_scene(name, ["aggregate.position=1 um"])) != HASHES[name]
 
 

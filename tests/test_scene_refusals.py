@@ -27,7 +27,8 @@ MOLES = "; moles need a molar mass, which is not known here: give milligrams"
 #: {part of the message: entries of --set}.
 REFUSED = {
     # unknown keys and sections
-    'pore.widht = "50 um": there is no such key; [pore] takes width, length (did you mean': ['pore.widht="50 um"'],
+    'pore.widht = "50 um": there is no such key; [pore] takes width, length, upper_wall (did you mean': [
+        'pore.widht="50 um"'],
     "[substrates] takes acceptor, donor, boundary": ["substrates.oxygen.supply=1 mg/L"],
     "(did you mean supply?)": ["substrates.donor.suply=1 mg/L"],
     "a scene takes pore, aggregate, flow, substrates, kinetics, growth, numerics, output": ["name=x"],
@@ -303,6 +304,10 @@ PAIRS = [
      "a smaller value is needed: Y d_c (2.44) is not less than kinetics.donor_oxygen_demand (1.2)"),
     ("base", 'output.times=["5 h"]', "growth.end=4 h", "times up to 4 h are accepted: growth.end is 4 h",
      "5 h or more, the last of output.times, is needed"),
+    *(("base", f"growth.{key}={value}", "pore.upper_wall=symmetry", 'pore.upper_wall = "no slip" is needed with it',
+       f'"no slip" is needed with growth.{key}: forces on an aggregate beside a plane of symmetry are not verified')
+      for key, value in (("fluid_forces", "included"), ("wall", "bonded"), ("bonding_strength", "1 kPa"),
+                         ("tensile_strength", "1 kPa"))),
     *(("base", f"growth.{key}=1 kPa", "growth.new_biomass=stress_free", 'new_biomass = "stressed" is needed with it',
        f'"stressed" is needed with growth.{key} = 0.001 MPa') for key in ("bonding_strength", "tensile_strength")),
 ]

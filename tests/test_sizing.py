@@ -102,7 +102,7 @@ DIRECTIONS = pytest.mark.parametrize("direction", [1, -1])
 def rolled(wall, direction, geometry, width=50.0):
     """A tower that spans the pore, after the edge beyond one of its contact lines has joined the wall."""
     tower = np.array([[-25.0, 0.0], [-15.0, width], [15.0, width], [25.0, 0.0]])
-    start = of.split(polygon(tower, width, geometry), Sizing(channel_walls(width), 0.7, FILM))
+    start = of.split(polygon(tower, channel_walls(width), geometry), Sizing(channel_walls(width), 0.7, FILM))
     line, step = next(end for end in surface_ends(start, wall) if end[1] == direction)
     joined = (line + step * np.arange(1, geometry + 1)) % len(start.points)
     points, walls = start.points.copy(), start.wall.copy()

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from repro.fem.outline import polygon
-from repro.fem.walls import BOTTOM, FREE, TOP
+from repro.fem.walls import BOTTOM, FREE, TOP, channel_walls
 from repro.model import contact, growth, pore
 from repro.model.support import Support
 from repro.scene import load_scene
@@ -66,7 +66,8 @@ def outlines(shape, geometry, refinement):
     """A half-disc of 10 um on the lower wall, or a block of 20 by 20 um from wall to wall."""
     if shape == "half-disc":
         return disc(10.0, refinement, geometry), 50.0
-    return polygon(np.array([(-10.0, 0.0), (-10.0, 20.0), (10.0, 20.0), (10.0, 0.0)]), 20.0, geometry), 20.0
+    corners = np.array([(-10.0, 0.0), (-10.0, 20.0), (10.0, 20.0), (10.0, 0.0)])
+    return polygon(corners, channel_walls(20.0), geometry), 20.0
 
 
 @cache

@@ -1,15 +1,18 @@
 """Each rule of a wall holds on either wall of the pore, and a wall does what its fields say."""
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
 
 from repro.fem import mesher, sizing
-from repro.fem.outline import half_disc
+from repro.fem.outline import half_disc, polygon
 from repro.fem.sizing import Sizing
 from repro.fem.space import Space
-from repro.fem.walls import FREE, channel_walls
-from repro.model import contact, flow, pore
+from repro.fem.walls import FREE, channel_walls, whole_width
+from repro.model import adhesion, contact, flow, pore
+from repro.model.contact_lines import Clearance, surface_ends
+from repro.preflight import numbers
 from repro.scene import load_scene
 from tests.strategies import EVERY_ORDER, coarse_base
 
@@ -99,6 +102,98 @@ def test_a_new_surface_keeps_a_point_unless_its_wall_keeps_none(number):
     slack = with_wall(lost, number, keeps_point=False)
     kept = contact._with_new_surface(slack.boundary, slack.mesh.walls)
     assert np.count_nonzero(kept & on) == 0 and np.count_nonzero(kept) == 1
+
+
+PRESETS = {1: "paper", 2: "fast"}
+SYMMETRY = channel_walls(WIDTH, upper="symmetry")
+
+
+def test_a_plane_of_symmetry_is_the_middle_of_a_pore_of_twice_the_width():
+    """Its film reaches the mirror image, its gap does not. The other wall has neither."""
+    points = np.array([[0.0, 0.8 * WIDTH]])
+    lower, plane = SYMMETRY
+    assert whole_width(SYMMETRY) == 2 * WIDTH and whole_width(channel_walls(WIDTH)) == WIDTH
+    assert plane.gap(points) == pytest.approx(0.2 * WIDTH) and plane.film(points) == pytest.approx(0.4 * WIDTH)
+    assert lower.film(points) == lower.gap(points)
+
+
+@EVERY_ORDER
+def test_a_film_closes_at_a_plane_of_symmetry_at_half_of_the_gap(order):
+    """The film to the mirror image is 2.1 um thick where the gap is 1.05 um, and stays open; at 0.95 um it closes. At
+    a wall both close."""
+    closed = {}
+    for gap, upper in product((1.05, 0.95), ("no slip", "symmetry")):
+        scene = load_scene("base", [f"numerics.preset={PRESETS[order]}", "pore.width=20 um", f"pore.upper_wall={upper}",
+                                    f"aggregate.radius={20 - gap} um", "numerics.refinement=0.5"])
+        seed = pore.seeded(scene)
+        shape = contact.expand(contact.Mechanics.of(scene), seed, seed.theta)
+        closed[gap, upper] = shape.pore.contact
+        assert shape.gap == pytest.approx(gap if upper == "no slip" else 2 * gap, rel=1e-3)
+    assert closed == {(1.05, "no slip"): True, (1.05, "symmetry"): False, (0.95, "no slip"): True,
+                      (0.95, "symmetry"): True}
+
+
+def wedge(slope, geometry):
+    """An outline that touches the upper wall over 20 um and leaves it with a slope, with a node 2 um beyond each line
+    and another one 4 um below the wall."""
+    right = np.array([(10.0 + 4.0 / slope, 0.0), (10.0 + 4.0 / slope, WIDTH - 4.0), (12.0, WIDTH - 2.0 * slope),
+                      (10.0, WIDTH)])
+    return polygon(np.vstack([right * [-1, 1], right[::-1]]), channel_walls(WIDTH), geometry)
+
+
+@pytest.mark.parametrize("upper, part", [("no slip", 1.0), ("symmetry", 0.5)])
+def test_a_wedge_closes_at_a_plane_of_symmetry_at_half_of_the_tangent(upper, part):
+    """A body and its mirror image enclose twice the angle of the body and the plane. Straight edges close at nodes,
+    arcs anywhere."""
+    walls, angle = channel_walls(WIDTH, upper=upper), np.radians(16.7)
+    for factor in (0.95, 1.05):
+        slope = factor * part * np.tan(angle)
+        joins = contact.closing_nodes(wedge(slope, 1), walls, 2.0, angle)
+        assert np.count_nonzero(joins) == (2 if factor < 1 else 0)
+        outline = wedge(slope, 2)
+        for node, direction in surface_ends(outline, 2):
+            clearance, _ = Clearance(walls, 2.0, angle).beyond(outline, node, direction)
+            assert clearance == pytest.approx(factor - 1, abs=1e-6)
+
+
+@pytest.mark.parametrize("number", [1, 2])
+def test_a_plane_of_symmetry_bears_nothing_as_a_wall(number):
+    """The traction that walls must bear is that of the other wall, on either side."""
+    mechanics, seed = grown_plug(2)
+    shape = contact.expand(mechanics, seed, seed.theta).pore
+    scene = load_scene("base", ["numerics.preset=fast"])
+    peak = adhesion.wall_peak(scene, with_wall(shape, number, mirrors=True), None)
+    assert peak.value > 0 and peak.y == (20.0 if number == 1 else 0.0)
+
+
+@EVERY_ORDER
+def test_the_mesh_ends_where_that_of_the_pore_with_its_mirror_image_ends(order):
+    """The ends (3.1) are 1.5 widths of that pore away, where its flow is developed. A new mesh is due at its distance,
+    too."""
+    changes = [f"numerics.preset={PRESETS[order]}", "aggregate.radius=20 um", "numerics.refinement=0.3"]
+    meshes = [pore.seeded(load_scene("base", [*changes, *own])).mesh
+              for own in (["pore.upper_wall=symmetry"], ["pore.width=100 um"], [])]
+    half, whole, alone = meshes
+    assert half.ends == whole.ends == pytest.approx((-170, 170)) and alone.ends == pytest.approx((-95, 95))
+    assert [mesh.whole_width for mesh in meshes] == [100, 100, 50]
+
+
+@pytest.mark.parametrize("upper", ["no slip", "symmetry"])
+def test_expected_numbers_are_those_of_the_pore_with_its_mirror_image(upper):
+    """The shear of the water, the extent of the mesh, and the radius at first contact, before a run."""
+    scene = load_scene("base", [f"pore.upper_wall={upper}", "flow.mean_velocity=1 m/day", "aggregate.radius=48.5 um"],
+                       unset=["flow.head"])
+    whole = load_scene(scene, ["pore.width=100 um", "pore.upper_wall=no slip"])
+    speed = scene.flow.mean_velocity
+    shear = {each: numbers.stresses(each, speed)[0] for each in (scene, whole)}
+    assert shear[whole] == pytest.approx(shear[scene] * (1.0 if upper == "symmetry" else 0.5))
+    alike = numbers.half_length(scene) == pytest.approx(numbers.half_length(whole))
+    assert alike == (upper == "symmetry") and pore.fastest(scene.flow, scene.pore) == speed
+    assert (numbers.at_start(scene).contact is None) == (upper == "symmetry")
+    driven = load_scene("base", [f"pore.upper_wall={upper}"])
+    factor = 4.0 if upper == "symmetry" else 1.0
+    clean = load_scene("base")
+    assert pore.fastest(driven.flow, driven.pore) == pytest.approx(factor * pore.fastest(clean.flow, clean.pore))
 
 
 @pytest.mark.parametrize("wall", ["sliding", "bonded"])

@@ -20,7 +20,7 @@ from repro.fem import elements
 from repro.fem.assembly import ElementSystem
 from repro.fem.brief import brief
 from repro.fem.linear import DEFAULT, Method, node_order
-from repro.fem.walls import Wall, Walls, on_any, width_between
+from repro.fem.walls import Wall, Walls, on_any, whole_width, width_between
 
 #: Remesh when more than POOR_ALLOWED triangles have a quality under POOR (3.5).
 POOR = 0.6
@@ -273,6 +273,11 @@ class Mesh:
     def width(self) -> float:
         """W, from wall to wall (um)."""
         return width_between(self.walls)
+
+    @property
+    def whole_width(self) -> float:
+        """W, or the width with the mirror image beyond a plane of symmetry (um)."""
+        return whole_width(self.walls)
 
     @property
     def geometry(self) -> int:

@@ -57,10 +57,10 @@ class Outline:
         return float(np.abs(self._extreme_points[:, 1] - self.points[first, 1]).max())
 
     def nearest(self, wall: Wall) -> tuple[float, float]:
-        """The least gap (um) to a wall, and x (um) of this point."""
+        """The thinnest film (um) at a wall, and x (um) of this point."""
         points = self._extreme_points
         point = points[np.argmin(wall.normal * points[:, 1])]
-        return float(wall.gap(point)), float(point[0])
+        return float(wall.film(point)), float(point[0])
 
     def untouched(self, walls: Walls) -> Walls:
         """The walls that no node touches, the nearest one first."""
@@ -68,7 +68,7 @@ class Outline:
         return tuple(sorted(free, key=lambda wall: self.nearest(wall)[0]))
 
     def gap(self, walls: Walls) -> float:
-        """The least distance (um) to a wall without contact, zero if it touches all of them."""
+        """The thinnest film (um) at a wall without contact, zero if it touches all of them."""
         return min((self.nearest(wall)[0] for wall in self.untouched(walls)), default=0.0)
 
     def same_contact(self, other: Outline) -> bool:
@@ -208,20 +208,19 @@ def half_disc(radius: float, across: float, geometry: int = 1, middle: float = 0
                    geometry)
 
 
-def polygon(corners: np.ndarray, width: float, geometry: int = 1, smooth: bool = False,
+def polygon(corners: np.ndarray, walls: Walls, geometry: int = 1, smooth: bool = False,
             at_tips: float = inf, bends: bool = False) -> Outline:
     """The outline of an aggregate through points (K, 2) um, from lower wall to lower wall.
 
-    The points go from the upstream to the downstream end; those on the upper wall, y = ``width``
-    um, are contact. smooth: a natural cubic spline replaces the straight line between two points
-    unless both are contact. at_tips: length (um) of the edges at tips; edges grow away from
-    tips. bends: the flow bends the aggregate about its contact lines, which then count as tips. The
-    middle of each contact surface is its fixed point. Raises OutsidePore where the curve leaves the
-    pore.
+    The points go from the upstream to the downstream end; those on the upper wall are contact.
+    smooth: a natural cubic spline replaces the straight line between two points unless both are
+    contact. at_tips: length (um) of the edges at tips; edges grow away from tips. bends: the flow
+    bends the aggregate about its contact lines, which then count as tips. The middle of each
+    contact surface is its fixed point, if its wall keeps one. Raises OutsidePore where the curve
+    leaves the pore.
     """
     # Counterclockwise: from the downstream end over the top to the upstream end.
     rim = np.asarray(corners, float)[::-1]
-    walls = channel_walls(width)
     if smooth:
         rim = _splined(rim, walls)
     rim = _graded_to_corners(rim, walls, at_tips, bends)

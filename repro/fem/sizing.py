@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from repro.fem.outline import Outline, arc_derivatives, parabola
-from repro.fem.walls import FREE, Wall, Walls, width_between
+from repro.fem.walls import FREE, Wall, Walls, whole_width, width_between
 
 #: Elements across the pore's width, across the aggregate's thickness and across the narrowest film.
 ACROSS_PORE = 14.0
@@ -57,6 +57,11 @@ class Sizing:
         return width_between(self.walls)
 
     @property
+    def whole_width(self) -> float:
+        """W, or the width with the mirror image beyond a plane of symmetry (um)."""
+        return whole_width(self.walls)
+
+    @property
     def middle(self) -> np.ndarray | None:
         """(2,) um, middle of the half-disc at t = 0, None for another shape."""
         seeded, *_ = self.walls
@@ -73,7 +78,7 @@ def meshed_extent(outline: Outline | None, width: float, length: float,
     """Ends (um) of the part to mesh when a mesh is generated (3.1).
 
     min(10 R, 1.5 W) from the aggregate on both sides, never past the pore's ends; a clean channel
-    is meshed over 3 W.
+    is meshed over 3 W. width: W, with the mirror image beyond a plane of symmetry (um).
     """
     if full:
         return -length / 2, length / 2
@@ -137,7 +142,7 @@ def film_sizes(outline: Outline, sizing: Sizing) -> np.ndarray:
 
 def _film_sizes(outline: Outline, sizing: Sizing, wall: Wall) -> np.ndarray:
     """(M,) element size (um) in the fluid between each node and a wall without contact."""
-    film = np.maximum(wall.gap(outline.points), sizing.film)
+    film = np.maximum(wall.film(outline.points), sizing.film)
     return film / ACROSS_FILM / (sizing.film_refinement or sizing.refinement)
 
 

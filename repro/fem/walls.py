@@ -6,6 +6,10 @@ name their wall by its number, its place in the list counted from one; FREE is n
 
 No substrate flows through a wall. This is the natural condition of the weak form (11)-(12), so the
 transport asks nothing.
+
+A plane of symmetry is the middle of a pore of twice the width. Its mirror image lies beyond it. The
+water slips along the plane, biomass slides along it without a fixed point, and a film that ends
+there is half of the film between the aggregate and its mirror image.
 """
 
 from __future__ import annotations
@@ -31,7 +35,7 @@ class Wall:
 
     no_slip: is the velocity along the wall zero, too (5)? bonded: does biomass that touches the
     wall keep its place, or slide along it (2.3.3)? keeps_point: does the middle of a new contact
-    surface keep its x (2.3.3)?
+    surface keep its x (2.3.3)? mirrors: is it a plane of symmetry?
     """
 
     number: int
@@ -40,10 +44,21 @@ class Wall:
     no_slip: bool = True
     bonded: bool = False
     keeps_point: bool = True
+    mirrors: bool = False
+
+    @property
+    def part(self) -> float:
+        """Part of a film, or of the channel, on this side of it: half at a plane of symmetry."""
+        return 0.5 if self.mirrors else 1.0
 
     def gap(self, points: np.ndarray) -> np.ndarray:
         """(...,) um, distances of points (..., 2) from the wall, negative beyond it."""
         return self.normal * (points[..., 1] - self.y)
+
+    def film(self, points: np.ndarray) -> np.ndarray:
+        """(...,) um, thickness of a film between points (..., 2) and the wall, or between them and
+        their mirror images."""
+        return self.gap(points) / self.part
 
     def holds(self, points: np.ndarray) -> np.ndarray:
         """(...,) True for points (..., 2) exactly on the wall."""
@@ -54,9 +69,18 @@ class Wall:
 Walls: TypeAlias = tuple[Wall, ...]
 
 
-def channel_walls(width: float, bonded: bool = False) -> Walls:
-    """The walls of the channel 0 <= y <= ``width`` (um); bonded: biomass to the lower one?"""
-    return Wall(BOTTOM, 0.0, 1.0, bonded=bonded), Wall(TOP, width, -1.0)
+#: What a wall does, by the words of ``pore.upper_wall``.
+CONDITIONS: dict[str, dict[str, bool]] = {
+    "no slip": {},
+    "symmetry": {"no_slip": False, "keeps_point": False, "mirrors": True}}
+
+
+def channel_walls(width: float, bonded: bool = False, upper: str = "no slip") -> Walls:
+    """The walls of the channel 0 <= y <= ``width`` (um).
+
+    bonded: biomass to the lower one? upper: condition on the upper one, of ``CONDITIONS``.
+    """
+    return Wall(BOTTOM, 0.0, 1.0, bonded=bonded), Wall(TOP, width, -1.0, **CONDITIONS[upper])
 
 
 def numbered(walls: Walls, number: int) -> Wall:
@@ -68,6 +92,15 @@ def width_between(walls: Walls) -> float:
     """W (um), the distance between the two walls of a channel."""
     first, opposite = walls
     return abs(opposite.y - first.y)
+
+
+def whole_width(walls: Walls) -> float:
+    """Distance (um) between the walls on which water does not slip: with a plane of symmetry that
+    of the pore with its mirror image."""
+    width = width_between(walls)
+    for wall in walls:
+        width /= wall.part
+    return width
 
 
 def on_any(walls: Iterable[Wall], points: np.ndarray) -> np.ndarray:

@@ -118,7 +118,9 @@ def _expand(stages: Stages, previous: Pore, grown: Pore) -> Expansion:
     try:
         return stages.expand(previous, grown)
     except FirstContact as early:
-        raise GrowthError(f"the aggregate passes the opposite wall by {-early.gap:.3g} um before "
+        _, opposite = previous.mesh.walls
+        beyond = -early.gap * opposite.part
+        raise GrowthError(f"the aggregate passes the opposite wall by {beyond:.3g} um before "
                           "its contact; try a shorter growth.time_step") from None
 
 

@@ -129,7 +129,7 @@ def wall_peak(scene: Scene, pore: Pore, solved: Solved) -> Peak:
     forces[pore.mesh.body] = wall_forces(scene, pore, solved)
     touched = pore.boundary.edge_wall
     peaks = [_peak_on(pore, wall, forces) for wall in pore.mesh.walls
-             if (touched == wall.number).any()]
+             if not wall.mirrors and (touched == wall.number).any()]
     return max(peaks, key=lambda peak: peak.value)
 
 

@@ -88,7 +88,7 @@ class Expansion:
     """The aggregate in its new shape.
 
     pore: with the fluid's nodes not yet moved, on the divided mesh if a contact line lies
-    within an arc; iterations: of Newton's method; gap: um, the least distance to a wall without
+    within an arc; iterations: of Newton's method; gap: um, the thinnest film at a wall without
     contact before films closed; division: of the mesh of the grown pore, None if it is not divided;
     advances: {(wall, direction): um} by which contact lines have advanced along the outline of the
     grown pore.
@@ -342,7 +342,7 @@ def _touch(grown: Pore, shape: Expansion, rule: Clearance, trials: _Trials,
     outline = shape.pore.boundary
     nearest, *_ = outline.untouched(rule.walls)
     lengths = rule.film * FIRST_LENGTHS
-    width = _tip_width(outline, nearest, rule.film)
+    width = _tip_width(outline, nearest, rule.film * nearest.part)
     if width < 2 * lengths[-1]:
         raise GrowthError(f"a tip comes into contact that is {width:.2g} um wide at a depth of "
                           f"{rule.film:.2g} um, the least film; the rule for films (2.3.3) does "
@@ -710,7 +710,7 @@ def closing_nodes(outline: Outline, walls: Walls, film: float, angle: float) -> 
     """
     joins = np.full(len(outline.points), FREE)
     for wall in walls:
-        gap = wall.gap(outline.points)
+        gap = wall.film(outline.points)
         lines = contact_lines.surface_ends(outline, wall.number)
         if not lines:
             joins[(outline.wall == FREE) & (gap < film)] = wall.number

@@ -67,7 +67,7 @@ class SearchOptions:
 class FirstContact(Exception):
     """The film to the opposite wall is much thinner than the least film at the end of a step.
 
-    gap: um, the least distance to that wall.
+    gap: um, the thickness of that film.
     """
 
     def __init__(self, gap: float):
@@ -107,7 +107,7 @@ class Clearance:
         place, points = self._places(arcs, outwards)
         distance = outwards * (points[:, 0] - arcs[0, 0, 0])
         wall = numbered(self.walls, outline.wall[node])
-        gap = wall.gap(points)
+        gap = wall.film(points)
         needs = np.minimum(self.film, np.tan(self.angle) * distance)
         facing = place > 0
         if outline.wall[last] == wall.number:

@@ -251,11 +251,12 @@ def _system(velocity: Space, interface: str, splits: bool) -> ElementSystem:
 
 
 def prescribed(velocity: Space) -> np.ndarray:
-    """(2n,) values of the constrained velocities: the parabola u_x at the inlet (3)."""
+    """(2n,) values of the constrained velocities: the parabola u_x at the inlet (3), half of it
+    up to a plane of symmetry."""
     value = np.zeros(2 * velocity.count)
     nodes = velocity.inlet.nodes
-    wall, *_ = velocity.mesh.walls
-    share = wall.gap(velocity.points[nodes]) / velocity.mesh.width
+    wall, *_ = [wall for wall in velocity.mesh.walls if wall.no_slip]
+    share = wall.gap(velocity.points[nodes]) / velocity.mesh.whole_width
     value[nodes] = 6 * share * (1 - share)
     return value
 
@@ -276,7 +277,8 @@ def scaled(unit: UnitFlow, mesh: Mesh, length: float, drive: Drive) -> Flow:
     """Scale the unit flow to a scene's head over the whole pore, of a length (um), or to its mean
     velocity: the problem is linear (2.1). The mean head at the outlet is zero (4)."""
     viscosity = drive.kinematic_viscosity / drive.gravity
-    total_loss = unit.loss + poiseuille_loss(length - (mesh.ends[1] - mesh.ends[0]), mesh.width)
+    beyond = length - (mesh.ends[1] - mesh.ends[0])
+    total_loss = unit.loss + poiseuille_loss(beyond, mesh.whole_width)
     speed = drive.mean_velocity
     if speed is None:
         speed = drive.driving_head / (viscosity * total_loss)

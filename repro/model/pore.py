@@ -17,7 +17,7 @@ from repro.fem.mesh import Mesh
 from repro.fem.outline import Outline, half_disc, polygon
 from repro.fem.sizing import Sizing
 from repro.fem.space import Space
-from repro.fem.walls import Walls, channel_walls
+from repro.fem.walls import Walls, channel_walls, whole_width
 from repro.model import flow
 from repro.model.body import Body, Shape
 from repro.model.energies import Energy, energy_of
@@ -171,12 +171,19 @@ class Solved:
 
 def walls_of(scene: Scene) -> Walls:
     """The walls of a scene's pore."""
-    return channel_walls(scene.pore.width, bool(scene.growth and scene.growth.wall == "bonded"))
+    bonded = bool(scene.growth and scene.growth.wall == "bonded")
+    return channel_walls(scene.pore.width, bonded, scene.pore.upper_wall)
 
 
 def film(scene: Scene) -> float:
     """Thickness (um) at which a film closes, and the least that the mesh resolves."""
     return scene.growth.minimum_film if scene.growth else MINIMUM_FILM
+
+
+def least_gap(scene: Scene) -> float:
+    """Distance (um) of the aggregate from the opposite wall at which the film there closes."""
+    _, opposite = walls_of(scene)
+    return film(scene) * opposite.part
 
 
 def resolution(scene: Scene) -> float:
@@ -213,7 +220,8 @@ def fastest(drive: Drive, channel: Channel) -> float:
     largest = at_largest(drive)
     if largest.mean_velocity is not None:
         return largest.mean_velocity
-    loss = flow.poiseuille_loss(channel.length, channel.width)
+    width = whole_width(channel_walls(channel.width, upper=channel.upper_wall))
+    loss = flow.poiseuille_loss(channel.length, width)
     return largest.driving_head * drive.gravity / drive.kinematic_viscosity / loss
 
 
@@ -281,7 +289,8 @@ class Meshing:
         """
         numerics = self.numerics
         is_full = numerics.extent == "full"
-        ends = sizing.meshed_extent(outline, self.channel.width, self.channel.length, is_full)
+        width = self.sizes.whole_width
+        ends = sizing.meshed_extent(outline, width, self.channel.length, is_full)
         method = Method(numerics.solver)
         sizes = replace(self.sizes, front=front)
         return mesher.generate(outline, ends, sizes, numerics.scheme.order, method)
@@ -294,7 +303,7 @@ def initial_outline(scene: Scene, front: float = 1.0) -> Outline | None:
         return None
     geometry = scene.numerics.scheme.order
     if seed.radius is None:
-        return polygon(np.array(seed.outline), scene.pore.width, geometry, seed.smooth,
+        return polygon(np.array(seed.outline), walls_of(scene), geometry, seed.smooth,
                        size_at_tips(scene.numerics, scene.pore.width),
                        bends=scene.numerics.interface == "traction")
     across = sizing.ACROSS_AGGREGATE * resolution(scene) * front

@@ -135,7 +135,7 @@ def moved_mesh(meshing: Meshing, previous: Pore, expanded: Pore) -> Mesh | None:
     outline = expanded.boundary
     mesh = previous.mesh
     channel = meshing.channel
-    if (sizing.extent_too_short(outline, mesh.ends, channel.width, channel.length)
+    if (sizing.extent_too_short(outline, mesh.ends, mesh.whole_width, channel.length)
             or not outline.same_contact(previous.boundary)
             or sizing.too_coarse(outline.corners, meshing.sizes)):
         return None

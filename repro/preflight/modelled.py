@@ -27,6 +27,8 @@ def describe_model(scene: Scene) -> list[tuple[str, str]]:
 
 def _pore(scene: Scene) -> Iterator[str]:
     yield f"a channel {scene.pore.width:g} um wide and {scene.pore.length:g} um long"
+    if scene.pore.upper_wall != "no slip":
+        yield f"its upper wall a plane of {scene.pore.upper_wall}"
     if scene.numerics.extent == "full":
         yield "meshed as a whole"
     elif scene.aggregate:

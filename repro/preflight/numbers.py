@@ -14,9 +14,10 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 from repro.fem.sizing import meshed_extent
+from repro.fem.walls import whole_width
 from repro.model.flow import MPA_PER_UM
 from repro.model.kinetics import rate_law
-from repro.model.pore import film, initial_outline, sized
+from repro.model.pore import initial_outline, least_gap, sized, walls_of
 from repro.model.uptake_law import UptakeLaw
 from repro.scene import Scene, Substrate, at_largest, at_time
 
@@ -64,11 +65,11 @@ def at_start(scene: Scene) -> Sizes:
     """Sizes of the seed."""
     seed = scene.aggregate
     if seed.outline is None:
-        touches = scene.pore.width - seed.radius < film(scene)
+        touches = scene.pore.width - seed.radius < least_gap(scene)
         current = sizes(scene, math.pi / 2 * seed.radius**2, 0.0 if touches else None)
         return replace(current, reach=current.reach + abs(seed.position))
     outline = initial_outline(scene)
-    touches = scene.pore.width - outline.thickness < film(scene)
+    touches = scene.pore.width - outline.thickness < least_gap(scene)
     reach = max(-outline.upstream, outline.downstream)
     return Sizes(outline.area, outline.thickness, reach, 0.0 if touches else None)
 
@@ -85,7 +86,7 @@ def at_end(scene: Scene) -> Sizes:
     step = scene.growth.end / STEPS
     width = scene.pore.width
     full = width * scene.pore.length
-    thin = width - film(scene)
+    thin = width - least_gap(scene)
     area = current.area
     thickness = current.thickness
     contact = current.contact
@@ -167,7 +168,7 @@ def rim_stretch(scene: Scene, uptake: float) -> float:
     rate = max(fastest_growth(scene), 0.0)
     step = scene.growth.end / STEPS
     start = at_start(scene).area
-    touching = scene.pore.width - film(scene)
+    touching = scene.pore.width - least_gap(scene)
     spanning = math.pi / 2 * touching**2
     area, grown, squeezed = start, 0.0, 0.0
     for _ in range(STEPS):
@@ -265,7 +266,7 @@ def half_length(scene: Scene) -> float:
     """Half of the length (um) that is meshed at t = 0."""
     seed = initial_outline(scene)
     is_full = scene.numerics.extent == "full"
-    first, last = meshed_extent(seed, scene.pore.width, scene.pore.length, is_full)
+    first, last = meshed_extent(seed, whole_width(walls_of(scene)), scene.pore.length, is_full)
     return (last - first) / 2
 
 
@@ -277,13 +278,14 @@ def stresses(scene: Scene, speed: float) -> tuple[float, float]:
     """
     drive = scene.flow
     width = scene.pore.width
+    whole = whole_width(walls_of(scene))
     end = at_end(scene)
     modulus = scene.growth.shear_modulus
     viscosity = MPA_PER_UM * drive.density * drive.kinematic_viscosity / modulus
-    gap = max(width - end.thickness, scene.growth.minimum_film)
+    gap = max(width - end.thickness, least_gap(scene))
     film_loss = math.inf if end.contact is not None else (width / gap) ** 3
-    body_loss = drive.viscosity_ratio or 1 + width**2 / 12 / drive.permeability
-    drop = 12 * viscosity * speed * 2 * end.reach / width**2 * min(body_loss, film_loss)
+    body_loss = drive.viscosity_ratio or 1 + whole**2 / 12 / drive.permeability
+    drop = 12 * viscosity * speed * 2 * end.reach / whole**2 * min(body_loss, film_loss)
     if drive.head is not None:
         drop = min(drop, MPA_PER_UM * drive.density * drive.gravity * drive.head / modulus)
-    return 6 * viscosity * speed / width, drop
+    return 6 * viscosity * speed / whole, drop

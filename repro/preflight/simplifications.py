@@ -7,11 +7,12 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from repro.fem import sizing
+from repro.fem.walls import whole_width
 from repro.march.step_control import SHORTEST
 from repro.model.brinkman import ACROSS
 from repro.model.energies.neo_hookean import CREASE
 from repro.model.kinetics import THINNEST
-from repro.model.pore import MOST_REFINED, Pore, film, resolution
+from repro.model.pore import MOST_REFINED, Pore, film, least_gap, resolution, walls_of
 from repro.model.surface import surface
 from repro.preflight import numbers
 from repro.preflight.numbers import Number
@@ -220,7 +221,7 @@ def _drag_layer(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
     root = math.sqrt(permeability)
     size = _interface_size(scene)
     thickness = size / ACROSS
-    gap = max(scene.pore.width - numbers.at_end(scene).thickness, film(scene))
+    gap = max(scene.pore.width - numbers.at_end(scene).thickness, least_gap(scene))
     loss = 3 * (root - permeability / thickness) / gap
     if loss > FILM_LOSS:
         accepted = root / (1 - FILM_LOSS * gap / (3 * root))
@@ -241,7 +242,8 @@ def _resolving(refinement: float) -> str:
 
 
 def _seed_film(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
-    gap = scene.pore.width - numbers.at_start(scene).thickness
+    _, opposite = walls_of(scene)
+    gap = (scene.pore.width - numbers.at_start(scene).thickness) / opposite.part
     share = min(1.0, gap / film(scene))
     nodes = sizing.ACROSS_FILM * scene.numerics.refinement * share * scene.numerics.scheme.order
     if nodes < ACROSS_FILM:
@@ -257,7 +259,7 @@ def _ends(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
     if not (scene.flow or scene.substrates):
         return
     end = numbers.at_end(scene)
-    free = min(10 * end.thickness, 1.5 * scene.pore.width)
+    free = min(10 * end.thickness, 1.5 * whole_width(walls_of(scene)))
     if end.reach + free > scene.pore.length / 2:
         when = "by growth.end" if end.reach > numbers.at_start(scene).reach else "from the start"
         stops = ", and the run ends if the aggregate reaches one of them" if scene.growth else ""

@@ -120,7 +120,8 @@ SERIES = (
     Quantity("mean_velocity_m_per_d", "mean velocity", "u_ave: flow through a cross-section / W",
              lambda scene, at: at.solved.flow.mean_velocity, "mean velocity", "flow"),
     Quantity("head_loss_cm", "head loss over the whole pore",
-             "loss of the meshed part (6) + 12 nu u_ave / (g W^2) times the length outside of it",
+             "loss of the meshed part (6) + 12 nu u_ave / (g W^2) times the length outside of it, "
+             "with 2 W up to a plane of symmetry",
              lambda scene, at: at.solved.flow.head_loss, "head loss", "flow"),
     Quantity("conductivity_m_per_d", "hydraulic conductivity of the pore",
              "u_ave L / head loss, of the whole pore",

@@ -63,11 +63,15 @@ RATIO = 1.52  # F, mg/mg, Table 1
 
 @dataclass(frozen=True)
 class Pore:
-    """The channel `0 <= y <= width` (um)."""
+    """The channel `0 <= y <= width` (um), or the half of one below a plane of symmetry."""
 
     width: float = quantity("100 um", "um", PORE_WIDTH, about="W_pore, from wall to wall",
                             source="Table 1 (typically 100 um; 50 um in section 4)")
     length: float = quantity("600 um", "um", about="L_pore, from end to end", source="Table 1")
+    upper_wall: str = choice(
+        "no slip", "symmetry", source=NOT_IN_PAPER,
+        about="The upper wall: like the lower one, or the middle of a pore of twice the width, "
+              "with the mirror image of the aggregate beyond it")
 
 
 @dataclass(frozen=True)
@@ -555,6 +559,7 @@ class Scene:
 
 #: Keys added after hashes of scenes were recorded, with their defaults as tables write them.
 LATER: dict[str, dict[str, object]] = {
+    "pore": {"upper_wall": "no slip"},
     "aggregate": {"position": "0.0 um", "smooth": False, "inert_fraction": 0.0},
     "growth": {"wall": "sliding", "energy": "neo-Hookean", "limiting_invariant": 100.0},
     "numerics": {"contact_elements": 0.0},

@@ -269,6 +269,7 @@ def _growth_rules(scene: "Scene") -> Rules:
         yield from _step_rules(scene.growth.end, scene.growth.time_step)
         yield from _strength_rules(scene.growth)
         yield from _energy_rules(scene.growth)
+        yield from _mirrored_rules(scene.growth, scene.pore.upper_wall)
     if scene.growth and scene.growth.fluid_forces == "included":
         yield from _force_rules(scene)
     film = scene.growth.minimum_film if scene.growth else 0.0
@@ -327,6 +328,19 @@ def _energy_rules(growth: "Growth") -> Rules:
         "growth.limiting_invariant": 'growth.energy = "Gent" is needed with it',
         "growth.energy": '"Gent" is needed with growth.limiting_invariant',
     }
+
+
+def _mirrored_rules(growth: "Growth", upper_wall: str) -> Rules:
+    """What is not verified beside a plane of symmetry: the forces that walls and water exert."""
+    unverified = {"fluid_forces": growth.fluid_forces == "included",
+                  "wall": growth.wall == "bonded",
+                  "bonding_strength": growth.bonding_strength is not None,
+                  "tensile_strength": growth.tensile_strength is not None}
+    for key, is_set in unverified.items():
+        yield upper_wall == "symmetry" and is_set, {
+            f"growth.{key}": 'pore.upper_wall = "no slip" is needed with it',
+            "pore.upper_wall": f'"no slip" is needed with growth.{key}: forces on an aggregate '
+                               "beside a plane of symmetry are not verified"}
 
 
 def _force_rules(scene: "Scene") -> Rules:

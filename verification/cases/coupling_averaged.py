@@ -319,7 +319,7 @@ def _losses(aspect: float) -> tuple[float, float, float]:
     12 W integral of (1 + 4/5 h'^2) / (W - h)^3 dx.
     """
     half, reach = LOW / aspect, LOW / aspect + LONG
-    outline = polygon(bump(half, lambda s: LOW * (1 - s**2) ** 2, round(48 / np.sqrt(aspect))), WIDTH)
+    outline = polygon(bump(half, lambda s: LOW * (1 - s**2) ** 2, round(48 / np.sqrt(aspect))), channel_walls(WIDTH))
     grid, _ = mesher.generate(outline, (-reach, reach), Sizing(channel_walls(WIDTH), 1.25, 2.0))
     drive = replace(thin_scene("linear", 0.5).flow, mean_velocity=1.0, kinematic_viscosity=1.0, gravity=1.0)
     solution = flow.solve(meshes.space_on(grid, 2), drive, LENGTH)

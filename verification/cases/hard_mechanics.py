@@ -164,7 +164,7 @@ def wedge(angle: float, geometry: int) -> Outline:
     height = 20.0
     side = np.linspace(0, 1, 12 // geometry + 1)[:, None]
     left = [-30.0, 0.0] + np.hstack([(side - 1) / np.tan(np.deg2rad(angle)), side]) * height
-    return polygon(np.vstack([left, left[::-1] * [-1, 1]]), height, geometry)
+    return polygon(np.vstack([left, left[::-1] * [-1, 1]]), channel_walls(height), geometry)
 
 
 def least_angle(preset: str) -> list:

@@ -139,8 +139,8 @@ MUTANTS = (
         "repro/model/flow.py",
         ("family-rest-of-the-pore-forgotten",
          "The unmeshed part of the pore loses no head.",
-         "poiseuille_loss(length - (mesh.ends[1] - mesh.ends[0]), mesh.width)",
-         "poiseuille_loss(0 * length, mesh.width)")),
+         "poiseuille_loss(beyond, mesh.whole_width)",
+         "poiseuille_loss(0 * length, mesh.whole_width)")),
     *changes(
         "repro/march/stepping.py",
         ("family-rows-end-steps",
