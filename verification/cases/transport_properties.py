@@ -24,21 +24,22 @@ from verification.evidence.cases import combined, parametrize
 from verification.evidence.checks import Check, Study, at_most, each_at_most, study
 from verification.problems import runs
 from verification.problems.channels import NAMES, ORDERS, SCENE, both, rates, substrates_with
-from verification.problems.schemes import exchange, load_scene
+from verification.problems.schemes import Change, exchange, load_scene
 
 SLOW = 0.35e6 / 24
 #: Radius (um) and supplies of acceptor and donor (mg/L) of pores at 0.35 m/d whose biomass could take up far more.
 STARVED = [(radius, *supplies) for radius in (27.0, 42.0)
            for supplies in ((0.15, 0.15), (0.15, 10.0), (10.0, 0.15), (10.0, 10.0))]
 #: Changes of the scene base, whose preset is paper: elements of each order (curved ones are coarser), and presets.
-KINDS = {"linear, paper": ('numerics.elements="linear"',),
-         "quadratic": ('numerics.elements="quadratic"', "numerics.refinement=0.5"),
-         "fast": ('numerics.preset="fast"',), "accurate": ('numerics.preset="accurate"',)}
+KINDS: dict[str, tuple[Change, ...]] = {
+    "linear, paper": (),
+    "quadratic": (runs.with_elements("quadratic"), "numerics.refinement=0.5"),
+    "fast": ('numerics.preset="fast"',), "accurate": ('numerics.preset="accurate"',)}
 ROUND_OFF = "the sum of the weak form over its test functions; rows are solved to 1e-13 of terms 1e3 times the supply"
 
 
 @cache
-def _solved(kind: tuple[str, ...], radius: float, acceptor: float = 10.0, donor: float = 10.0,
+def _solved(kind: tuple[Change, ...], radius: float, acceptor: float = 10.0, donor: float = 10.0,
             speed: float | None = runs.SPEED, inlet: str = "local"):
     """(Pore, Solved); speed: um/h, None: no flow."""
     scene = load_scene("base", [f'aggregate.radius="{radius} um"', f'substrates.acceptor.supply="{acceptor} mg/L"',
