@@ -298,7 +298,7 @@ PAIRS = [
      '"stressed" is needed with growth.fluid_forces = "included"'),
     ("base", "numerics.transport=gear", "numerics.preset=fast",
      '"quasi_steady" is needed with the midpoint rule of numerics.preset = "fast"',
-     '"paper" is needed with numerics.transport = "gear"'),
+     '"paper" or "as_printed" is needed with numerics.transport = "gear"'),
     ("base", "kinetics.donor_oxygen_demand=1.2", "kinetics.yield_coefficient=1", "more than Y d_c (1.42) is needed",
      "a smaller value is needed: Y d_c (1.42) is not less than kinetics.donor_oxygen_demand (1.2)"),
     ("base", "kinetics.donor_oxygen_demand=1.2", "kinetics.decay_oxygen_demand=4", "more than Y d_c (2.44) is needed",

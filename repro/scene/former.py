@@ -31,11 +31,13 @@ IN_TABLE = Former(None, "write it in a table: "
 OF_SCHEME = ('leave it out: numerics.preset = "paper" has linear elements and updates, "fast", '
              '"accurate" and "exact" quadratic elements and the midpoint rule; scheme= of '
              "repro.solve has other combinations")
+PRINTED = 'numerics.preset = "as_printed" has the printed one, and'
 
 
 def _by_preset(curved: str, paper: str) -> dict[str, str]:
-    """Values by the preset: those of the curved scheme, and that of the paper's."""
-    return {**dict.fromkeys(("fast", "accurate", "exact"), curved), "paper": paper}
+    """Values by the preset: those of the curved scheme, and those of the paper's."""
+    return {**dict.fromkeys(("fast", "accurate", "exact"), curved),
+            **dict.fromkeys(("paper", "as_printed"), paper)}
 
 
 #: By dotted keys.
@@ -53,7 +55,8 @@ KEYS: dict[str, Former] = {
     "numerics.flow_stabilisation": Former(
         100.0, "leave it out: it is 100 (repro.model.flow.STABILISATION)"),
     "numerics.inlet": Former(
-        "local", "leave it out; u_ave is scheme=replace(PAPER, inlet=\"mean\") of repro.solve"),
+        "local", f"leave it out; {PRINTED} scheme=replace(PAPER, inlet=\"mean\") of repro.solve "
+                 "has it alone"),
     "numerics.jacobian": Former(
         _by_preset("reused", "fresh"),
         "leave it out; scheme=replace(CURVED, modified_newton=False) of repro.solve has a new one "
@@ -63,8 +66,8 @@ KEYS: dict[str, Former] = {
     "numerics.ordering": Former("degree", "leave it out: SuperLU orders the nodes"),
     "numerics.time": Former(_by_preset("midpoint", "updates"), OF_SCHEME),
     "numerics.transfer": Former(
-        "conserving", "leave it out; the paper's is scheme=replace(PAPER, "
-                      "transfer=\"interpolation\") of repro.solve"),
+        "conserving", f"leave it out; {PRINTED} scheme=replace(PAPER, transfer=\"interpolation\") "
+                      "of repro.solve has it alone"),
     "output.timeseries": Former(
         "csv", "leave it out, and write NetCDF by repro.load_run(FOLDER).to_netcdf(FILE)"),
 }

@@ -360,7 +360,7 @@ def _numerics_rules(scene: "Scene") -> Rules:
     yield scene.numerics.scheme.controls_error and scene.numerics.transport == "gear", {
         "numerics.transport": '"quasi_steady" is needed with the midpoint rule of numerics.preset '
                               f'= "{scene.numerics.preset}"',
-        "numerics.preset": '"paper" is needed with numerics.transport = "gear"',
+        "numerics.preset": '"paper" or "as_printed" is needed with numerics.transport = "gear"',
     }
 
 
