@@ -194,7 +194,8 @@ class Scene:
     def midpoint(self) -> bool:
         """Whether the steps are those of the midpoint rule."""
         numerics = self.section("numerics")
-        return numerics.get("time", "updates" if numerics.get("preset") == "paper" else "midpoint") == "midpoint"
+        of_preset = "updates" if numerics.get("preset") in ("paper", "as_printed") else "midpoint"
+        return numerics.get("time", of_preset) == "midpoint"
 
     @property
     def closed(self) -> bool:

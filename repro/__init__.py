@@ -51,6 +51,7 @@ Sections of the paper and their modules, which name the equations that they solv
     3.5  mesh motion           (35)         repro.model.mesh_motion
     3.1, 3.5  remeshing                     repro.model.remeshing, .grading
     2    state of the pore                  repro.model.pore, .stages (the parts of a step)
+         both schemes, as printed           repro.schemes
     2    coupling, 3.3                      repro.march.updates (the paper's shape updates)
          error control (not the paper's)    repro.march.midpoint, .stepping, .step_control
          ends of the model                  repro.march.ends, .folding

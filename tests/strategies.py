@@ -19,8 +19,9 @@ from repro.fem.space import Space
 from repro.fem.walls import BOTTOM, FREE, TOP, channel_walls
 from repro.model import contact, pore
 from repro.model.energies import NEO_HOOKEAN
-from repro.scene import load_scene, parse_scene
+from repro.scene import parse_scene
 from repro.schemes import PAPER
+from verification.problems.schemes import exchange, exchanged, load_scene
 
 LENGTH = 600.0
 VISCOSITY, DIFFUSIVITY = 2.84e-5, 1e8 / 24  # nu_water / g in um h; 1 cm2/d in um2/h
@@ -114,8 +115,7 @@ def scenes(draw, drives=("none", "head", "mean_velocity"), peclet=3.0, thiele=30
         "numerics": {"preset": "paper", "refinement": draw(st.floats(0.4, 0.7))},
     }
     transfer, kind = draw(st.sampled_from(["projection", "interpolation"])), draw(st.sampled_from(elements))
-    scheme = replace(PAPER, transfer=transfer) if kind == "linear" and transfer != PAPER.transfer else None
-    tables["numerics"] |= {"elements": kind}
+    scheme = replace(PAPER, transfer=transfer) if kind == "linear" else exchange(elements=kind).on(PAPER)
     drive, speed = draw(st.sampled_from(drives)), draw(between(0.01, 1.0)) * peclet * slowest * DIFFUSIVITY / width
     if drive != "none":
         value = speed if drive == "mean_velocity" else 12 * VISCOSITY * length * speed / width**2
@@ -249,8 +249,9 @@ def arrays_of(grid):
 
 
 def scene(radius="5 um", width="50 um", acceptor="10 mg/L", donor="10 mg/L", velocity=None, head=None, growth=None,
-          **more):
-    """A scene with [pore], [aggregate], [substrates] and, optionally, [flow] and [growth]."""
+          order=None, **more):
+    """A scene with [pore], [aggregate], [substrates] and, optionally, [flow] and [growth]. order: of the elements, by
+    default that of the preset."""
     tables = {"pore": {"width": width}, "aggregate": {"radius": radius},
               "substrates": {"acceptor": {"supply": acceptor}, "donor": {"supply": donor}}, **more}
     if velocity or head:
@@ -258,11 +259,12 @@ def scene(radius="5 um", width="50 um", acceptor="10 mg/L", donor="10 mg/L", vel
     if growth:
         tables["growth"] = growth
     tables["numerics"] = {"preset": "paper", **tables.get("numerics", {})}
-    return parse_scene(tables, "test", "test.toml")
+    plain = parse_scene(tables, "test", "test.toml")
+    return exchanged(plain, exchange(elements=ORDERS[order])) if order else plain
 
 
 def coarse_base(order, *changes, unset=()):
     """(scene, its seed): base with coarse elements of an order, and supplies that differ."""
     scene = load_scene("base", ['substrates.acceptor.supply="9 mg/L"', 'substrates.donor.supply="4 mg/L"',
-                                "numerics.refinement=0.3", f"numerics.elements={ORDERS[order]}", *changes], unset=unset)
+                                "numerics.refinement=0.3", exchange(elements=ORDERS[order]), *changes], unset=unset)
     return scene, pore.seeded(scene)

@@ -225,12 +225,12 @@ def test_profiles_at_rest_help_where_those_in_time_do_not_settle(refinement, hal
 #: {pattern of a warning: the settings that it advises}.
 ADVICE = {
     r"numerics\.refinement = ([\d.e+]+) would resolve it": "numerics.refinement={}",
-    r'"gear" with numerics\.time = "updates" integrates': ("numerics.time=updates", "numerics.transport=gear"),
+    r'"gear" with numerics\.preset = "paper" integrates': ("numerics.preset=paper", "numerics.transport=gear"),
     r'"included" models it$': "growth.fluid_forces=included",
     r'"included" with growth\.new_biomass = "stressed"': (
         "growth.new_biomass=stressed", "growth.fluid_forces=included"),
     r'growth\.wall = "bonded" computes': "growth.wall=bonded",
-    r'or numerics\.time = "midpoint"': "numerics.time=midpoint",
+    r'or numerics\.preset = "fast"': "numerics.preset=fast",
     r'"80 %" keeps their ratio': "substrates.{key}=80 %",
 }
 NO_SETTING = ("no refinement up to 20",)

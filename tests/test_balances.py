@@ -15,11 +15,10 @@ from repro.model import transport
 from repro.model.kinetics import Sink
 from repro.model.pore import seeded, solve
 from repro.results import row
-from repro.scene import load_scene
 from tests import oracles
 from tests.strategies import EVERY_ORDER, ORDERS, between, scenes, share
 from tests.test_derived import integrate_over_end, total_uptake
-from verification.problems.schemes import exchange, exchanged
+from verification.problems.schemes import exchange, exchanged, load_scene
 
 ANY_ORDER = tuple(ORDERS.values())
 
@@ -148,7 +147,7 @@ def assert_demand(kinetics, ledger, part, round_off):
 @given(scenes(elements=ANY_ORDER))
 def test_the_oxygen_demand_of_the_midpoint_rule_closes_to_round_off(scene):
     """This holds in each step of any scene, because uptake and growth are one integral over the step's mean biomass."""
-    closing = exchanged(scene, exchange(elements=scene.numerics.elements, steps="midpoint"))
+    closing = exchanged(scene, exchange(steps="midpoint"))
     for instant in resolved_instants(replace(closing, numerics=replace(closing.numerics, tolerance=0.05))):
         for ledger in instant.ledgers:
             assert_demand(scene.kinetics, ledger, 2e-10, 4e-16)
@@ -183,7 +182,7 @@ def test_a_balance_of_round_off_is_not_a_defect(order, name, k):
     than eps times the sum of the magnitudes of the terms. Defects are relative to at least the floor, of which this
     round-off is 1e-6."""
     other = ("acceptor", "donor")[1 - k]
-    elements = f"numerics.elements={ORDERS[order]}", f"numerics.refinement={0.5 / order}"
+    elements = exchange(elements=ORDERS[order]), f"numerics.refinement={0.5 / order}"
     scene = load_scene("base", [*elements, 'pore.length="200 um"', 'growth.end="12 min"',
                                'kinetics.decay_coefficient="0 1/d"', f'substrates.{other}.supply="0 mg/L"'],
                        unset=["flow"])

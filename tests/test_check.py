@@ -105,7 +105,7 @@ QUICK = (*QUIET, "kinetics.maximum_density=30 mg/L", "growth.time_step=1e-4 h", 
 FASTER = "kinetics.maximum_utilization_rate=3400 1/day"
 FORCED = (*QUIET, "growth.end=24 h")
 FORCED_SLIDING = (*FORCED, "growth.fluid_forces=included")
-PERMEABLE = ("flow_only", "aggregate.radius=20 um", "numerics.elements=quadratic")
+PERMEABLE = ("flow_only", "numerics.preset=fast", "numerics.refinement=1", "aggregate.radius=20 um")
 COARSE_PERMEABLE = (*PERMEABLE, "numerics.refinement=0.5")
 FEW = ("substrates.acceptor.half_saturation=2e-3 mg/L", "substrates.donor.half_saturation=2e-3 mg/L")
 FINE, FAST = "numerics.refinement=2", "numerics.preset=fast"

@@ -22,7 +22,7 @@ from verification.problems.schemes import exchange, load_scene
 
 #: An outline that leans upstream and touches the upper wall of a pore of 20 um after some minutes.
 SHAPE = [(-21, 0), (-19, 9), (-12, 17), (-4, 19.2), (3, 18.6), (12, 12), (16, 5), (17, 0)]
-SETS = ['numerics.time="midpoint"', 'pore.width="20 um"', 'pore.length="400 um"', 'growth.end="1.2 h"',
+SETS = [exchange(steps="midpoint"), 'pore.width="20 um"', 'pore.length="400 um"', 'growth.end="1.2 h"',
         'output.times=["0 h", "1.2 h"]', 'substrates.acceptor.supply="9 mg/L"', 'substrates.donor.supply="4 mg/L"',
         'growth.shear_modulus="0.003 MPa"', "aggregate.inert_fraction=0.2"]
 
@@ -32,7 +32,7 @@ SPANNING = [(-21, 0), (-19, 9), (-9, 20), (3, 20), (12, 12), (16, 5), (17, 0)]
 
 
 def drawn(order):
-    return load_scene("base", [f"numerics.elements={ORDERS[order]}",
+    return load_scene("base", [exchange(elements=ORDERS[order]),
                                f"numerics.refinement={0.7 if order == 1 else 0.2}", *SETS])
 
 

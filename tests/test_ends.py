@@ -15,9 +15,9 @@ from repro.march.ends import CLOSE, Event, Reached, _detachment, locate
 from repro.model.adhesion import Peak
 from repro.model.energies.neo_hookean import BIOT
 from repro.runs.status import is_over
-from repro.scene import load_scene
 from tests.test_fold import SETS as PLUG
 from tests.test_resume import check_parts
+from verification.problems.schemes import exchange, load_scene
 
 SCHEMES = pytest.mark.parametrize("scheme", ["updates", "midpoint"])
 #: Long steps on coarse curved elements.
@@ -73,7 +73,7 @@ def ended(name, scheme, *changes):
     """A case with a scheme: its rows, ledgers and status."""
     case = CASES[name]
     times = f"output.times={[f'{time!r} h' for time in (*TIMES, case.end)]}"
-    return rows_of(load_scene("base", [*case.changes, times, *case.limit, f"numerics.time={scheme}", *changes],
+    return rows_of(load_scene("base", [*case.changes, times, *case.limit, exchange(steps=scheme), *changes],
                               unset=case.unset))
 
 
@@ -106,7 +106,7 @@ def test_rows_before_an_end_are_those_of_the_full_step():
     """They are those of a run without the strength, to the last bit."""
     case = CASES["detachment"]
     times = f"output.times={[f'{time!r} h' for time in (*TIMES, case.end)]}"
-    without, _, status = rows_of(load_scene("base", [*case.changes, times, "numerics.time=midpoint"]))
+    without, _, status = rows_of(load_scene("base", [*case.changes, times]))
     rows, _, _ = ended("detachment", "midpoint")
     assert status == "completed" and len(rows) > 3 and rows[:-1] == without[:len(rows) - 1]
 
@@ -115,7 +115,7 @@ def test_rows_before_an_end_are_those_of_the_full_step():
 @pytest.mark.parametrize("name", ["detachment", "upstream"])
 def test_a_run_stopped_after_every_step_ends_at_the_same_event(name, tmp_path):
     case = CASES[name]
-    check_parts(load_scene("base", [*case.changes, *case.limit, "numerics.time=midpoint"]), tmp_path)
+    check_parts(load_scene("base", [*case.changes, *case.limit]), tmp_path)
 
 
 @pytest.mark.parametrize("first", ["detachment", "tearing"])
@@ -209,7 +209,7 @@ def test_a_row_at_a_jump_has_the_state_just_after_it(name, scheme):
     before the jump. In 1e-5 h no column changes by 1e-4."""
     changes, unset, jumping = JUMPS[name]
     times = [0.0, 1e-5, 0.4 - 1e-5, 0.4, 0.4 + 1e-5]
-    scene = load_scene("base", [*changes, f"numerics.time={scheme}",
+    scene = load_scene("base", [*changes, exchange(steps=scheme),
                                 f"output.times={[f'{time!r} h' for time in times]}"], unset=unset)
     first, soon, before, jump, after, *_ = rows_of(scene)[0]
     for key in first.keys() - OF_STEPS:
@@ -225,7 +225,7 @@ def test_a_row_at_a_jump_has_the_state_just_after_it(name, scheme):
 @cache
 def strength():
     """MPa, the traction after 0.3 h under the strong flow."""
-    changes = [*FORCED, *BONDED_WALL, "numerics.time=updates", "growth.end=0.3 h", "flow.head=12e-3 cm",
+    changes = [*FORCED, *BONDED_WALL, "growth.end=0.3 h", "flow.head=12e-3 cm",
                'output.times=["0.3 h"]']
     return rows_of(load_scene("base", changes))[0][1]["wall_traction_max_MPa"]
 
@@ -237,7 +237,7 @@ def test_a_jump_is_judged_on_both_sides(rising, scheme):
     strong flow. After a jump up it ends at the jump."""
     heads = ("4e-3 cm", "12e-3 cm") if rising else ("12e-3 cm", "4e-3 cm")
     table = f'flow.head=[["0 h", "{heads[0]}"], ["0.4 h", "{heads[1]}"]]'
-    changes = [*FORCED, *BONDED_WALL, f"numerics.time={scheme}", table, f"growth.bonding_strength={strength()!r} MPa",
+    changes = [*FORCED, *BONDED_WALL, exchange(steps=scheme), table, f"growth.bonding_strength={strength()!r} MPa",
                'output.times=["0.4001 h"]']
     rows, _, status = rows_of(load_scene("base", changes))
     assert status.startswith("the aggregate detaches")
@@ -247,6 +247,6 @@ def test_a_jump_is_judged_on_both_sides(rising, scheme):
 @SCHEMES
 def test_a_wall_that_is_too_weak_for_the_flow_ends_a_run_at_once(scheme):
     """The traction at t = 0 is that of the aggregate's equilibrium under the forces of the fluid."""
-    scene = load_scene("base", [*FORCED, f"numerics.time={scheme}", "growth.bonding_strength=1e-9 MPa"])
+    scene = load_scene("base", [*FORCED, exchange(steps=scheme), "growth.bonding_strength=1e-9 MPa"])
     rows, _, status = rows_of(scene)
     assert len(rows) == 1 and status.startswith("the aggregate detaches at t = 0 h")

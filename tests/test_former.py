@@ -1,4 +1,4 @@
-"""Keys and choices of earlier versions: scenes are refused with what to write instead, old runs still load."""
+"""Keys of earlier versions: scenes are refused with what to write instead, old runs still load."""
 import json
 import shutil
 from dataclasses import replace
@@ -11,7 +11,6 @@ from repro.cli import main
 from repro.report import comparison
 from repro.report.reading import read
 from repro.scene import KEYS, former, load_scene, load_tables, parse_scene, scene_hash, scene_tables, without_former
-from repro.scene.reading import entries
 from tests.pages import cached_run
 from tests.shell import files, flags, read_record, refusal, rewrite
 
@@ -21,9 +20,8 @@ SCENE = load_scene("base", CHANGES)
 
 @pytest.fixture
 def removed(monkeypatch):
-    """A key and a choice of an imagined earlier version."""
+    """A key of an imagined earlier version."""
     monkeypatch.setitem(former.KEYS, "numerics.colour", former.Former("blue", "leave it out"))
-    monkeypatch.setitem(former.CHOICES, ("numerics.interface", "plug"), 'write "traction"')
 
 
 @pytest.fixture
@@ -40,54 +38,37 @@ def earlier(removed, tmp_path):
     return folder, change
 
 
-@pytest.mark.parametrize("key, value, instead", [
-    ("colour", "red", "this key was removed; leave it out"), ("colour", "blue", "this key was removed; leave it out"),
-    ("interface", "plug", 'this choice was removed; write "traction"')])
-def test_a_former_key_or_choice_is_refused_with_what_to_write(removed, tmp_path, capsys, key, value, instead):
+@pytest.mark.parametrize("value", ["red", "blue"])
+def test_a_former_key_is_refused_with_what_to_write(removed, tmp_path, capsys, value):
     """Whatever its value, in one line with exit status 2; from --set, a file and Python."""
-    line = f'numerics.{key} = "{value}": {instead}\n'
-    assert refusal(tmp_path, capsys, "run", "base", "--set", f"numerics.{key}={value}", "--out", tmp_path / "run"
+    line = f'numerics.colour = "{value}": this key was removed; leave it out\n'
+    assert refusal(tmp_path, capsys, "run", "base", "--set", f"numerics.colour={value}", "--out", tmp_path / "run"
                    ) == f"repro: base: {line}"
     scene = tmp_path / "mine.toml"
-    scene.write_text(f'[numerics]\n{key} = "{value}"\n')
+    scene.write_text(f'[numerics]\ncolour = "{value}"\n')
     assert refusal(tmp_path, capsys, "check", scene) == f"repro: {scene}: {line}"
     with pytest.raises(repro.SceneError) as error:
-        load_scene({"numerics": {key: value}})
+        load_scene({"numerics": {"colour": value}})
     assert f"{error.value}\n" == f"scene: {line}"
 
 
-@pytest.mark.parametrize("value", [["plug"], {"plug": 1}, 3, None])
-def test_a_value_of_another_type_is_no_former_choice(removed, value):
-    with pytest.raises(repro.SceneError, match="\"laplacian\" or \"traction\" is needed"):
-        load_scene({"numerics": {"interface": value}})
-
-
 def test_no_former_key_is_a_key_of_a_scene():
-    """Each with a value names a section that every scene has; no former choice is one of its key's."""
+    """Each with a value names a section that every scene has."""
     assert not former.KEYS.keys() & set(KEYS)
     assert {section for section, *_ in former._parts()} <= {"pore", "numerics", "output"}
-    for key, choice in former.CHOICES:
-        section, _, name = key.partition(".")
-        words = entries(type(getattr(SCENE, section)))[name].metadata["kind"].words
-        assert choice not in words and any(f'"{word}"' in former.CHOICES[key, choice] for word in words)
 
 
-@pytest.mark.parametrize("key, value, instead", [
-    *((f"{section}.{key}", each.value_in({"preset": "fast"}), None) for section, key, each in former._parts()),
-    *((*named, text.split('"')[1]) for named, text in former.CHOICES.items())])
-def test_the_advice_is_accepted(key, value, instead):
-    """Without a former key, and with the other choice, the scene is accepted."""
+@pytest.mark.parametrize("key, value", [
+    (f"{section}.{key}", each.value_in({"preset": "fast"})) for section, key, each in former._parts()])
+def test_the_advice_is_accepted(key, value):
+    """Without a former key the scene is accepted."""
     change = f"{key}={value}"
     with pytest.raises(repro.SceneError, match=f"{key} = .*was removed"):
         load_scene("base", [change])
-    if instead is None:
-        assert replace(load_scene(load_tables("base", [change]), unset=[key]), name="base") == load_scene("base")
-    else:
-        assert load_scene("base", [f"{key}={instead}"])
+    assert replace(load_scene(load_tables("base", [change]), unset=[key]), name="base") == load_scene("base")
 
 
-@pytest.mark.parametrize("keys, shown", [({"colour": "blue"}, []), ({"colour": "red"}, ["numerics.colour"]),
-                                         ({"interface": "plug"}, ["numerics.interface"])])
+@pytest.mark.parametrize("keys, shown", [({"colour": "blue"}, []), ({"colour": "red"}, ["numerics.colour"])])
 def test_a_run_of_an_earlier_version_loads_plots_and_compares(earlier, tmp_path, keys, shown):
     """Only a value that present scenes do not have is a difference from a run of this version."""
     folder, change = earlier
@@ -171,14 +152,18 @@ def test_a_record_with_the_kind_of_biomass_is_that_of_the_present_keys(biomass, 
     assert without_former(other) == other
 
 
-@pytest.mark.parametrize("preset, kept, other", [("fast", "reused", "fresh"), ("paper", "fresh", "reused")])
-def test_a_former_value_is_that_of_its_preset(preset, kept, other):
-    """Newton's derivative was a key, and its value depended on the preset. A record with the value of its preset is
-    that of the present scene; the hash of "fast" is that of commit f2a81844. Another value stays."""
+@pytest.mark.parametrize("key, preset, kept, other", [
+    (key, *case) for key, fast, paper in (("jacobian", "reused", "fresh"), ("elements", "quadratic", "linear"),
+                                          ("time", "midpoint", "updates"))
+    for case in (("fast", fast, paper), ("paper", paper, fast))])
+def test_a_former_value_is_that_of_its_preset(key, preset, kept, other):
+    """Newton's derivative, elements and steps were keys, and their values depended on the preset. A record with the
+    value of its preset is that of the present scene; the hash of "fast" is that of commit f2a81844, which had these
+    keys. Another value stays."""
     present = load_scene("base", [f"numerics.preset={preset}"])
     record = scene_tables(present)
-    record["numerics"]["jacobian"] = kept
+    record["numerics"][key] = kept
     assert parse_scene(without_former(record), "base", "run.json") == present
     assert preset == "paper" or scene_hash(present) == "258d43232f9734d3"
-    record["numerics"]["jacobian"] = other
+    record["numerics"][key] = other
     assert without_former(record) == record

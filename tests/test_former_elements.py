@@ -33,5 +33,5 @@ def test_a_run_with_cubic_elements_loads_plots_and_compares(cubic, tmp_path):
 
 
 def test_a_run_with_cubic_elements_does_not_go_on(cubic, tmp_path, capsys):
-    assert ('numerics.elements = "cubic": this choice was removed; write "quadratic"'
+    assert ('numerics.elements = "cubic": this key was removed; leave it out'
             in refusal(tmp_path, capsys, "run", "--resume", cubic))

@@ -12,23 +12,23 @@ from repro.model import gear, transport
 from repro.model.kinetics import Sink
 from repro.model.pore import seeded, solve_flow
 from repro.model.transport import Concentrations
-from repro.scene import load_scene
 from tests import strategies
-from tests.strategies import EVERY_ORDER, ORDERS
+from tests.strategies import EVERY_ORDER
+from verification.problems.schemes import exchange, load_scene
 
 SECOND = 1 / 3600
 
 
 def coarse(order):
     """Return the numerics of a coarse mesh."""
-    return {"refinement": 0.5 if order == 1 else 0.25, "transport": "gear", "elements": ORDERS[order]}
+    return {"refinement": 0.5 if order == 1 else 0.25, "transport": "gear"}
 
 
 @cache
 def case(radius="20 um", velocity="2.9 m/day", boundary="open", order=1, **sections):
     """(Pore, Problem) on a coarse mesh."""
     substrates = {"boundary": boundary, **sections.get("substrates", {})}
-    scene = strategies.scene(radius, velocity=velocity, numerics=coarse(order),
+    scene = strategies.scene(radius, velocity=velocity, numerics=coarse(order), order=order,
                              **{**sections, "substrates": {"acceptor": {}, "donor": {}, **substrates}})
     pore = seeded(scene)
     carried = solve_flow(pore.space, scene.flow, scene.pore.length, scene.numerics) if scene.flow else None
@@ -148,7 +148,7 @@ def test_without_flow_the_ends_of_the_pore_hold_the_supply(preset, method):
     """Far from the aggregate diffusion is one-dimensional: C falls linearly from the end of the pore, at 300 um, where
     half of the uptake enters. At 1.5 W the transverse profile has decayed to exp(-1.5 pi) of a drop of 1 mg/L."""
     scene = load_scene("base", ["aggregate.radius=20 um", "growth.end=0.2 h", f"numerics.preset={preset}",
-                               "numerics.time=updates", f"numerics.transport={method}"], unset=["flow"])
+                               exchange(steps="updates"), f"numerics.transport={method}"], unset=["flow"])
     first = next(simulate(scene))
     state, space = first.solved.concentrations, first.pore.space
     x = np.abs(space.points[:, 0])
@@ -168,7 +168,7 @@ def test_the_defect_of_biomass_at_an_exhausted_substrate_is_accepted(step):
                "substrates.acceptor.supply=1.753 mg/L", "substrates.acceptor.half_saturation=0.494 mg/L",
                "substrates.donor.supply=0.3695 mg/L", "substrates.donor.half_saturation=0.121 mg/L",
                "kinetics.maximum_utilization_rate=12 1/day", "kinetics.maximum_density=1.009e4 mg/L",
-               "numerics.preset=fast", "numerics.time=updates", "numerics.transport=gear",
+               "numerics.preset=fast", exchange(steps="updates"), "numerics.transport=gear",
                f"growth.time_step={step}", 'growth.end="0.34 h"']
     *_, last = simulate(load_scene("base", changes, unset=["flow"]))
     assert last.pore.time == 0.34 and last.solved.concentrations.donor.max() < 0.01

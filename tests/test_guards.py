@@ -25,8 +25,7 @@ from verification.problems.schemes import exchange, load_scene
 
 #: Supply and uptake (um2 mg/L) of a step of 12 min, so large that diffusion is negligible.
 SUPPLIED, CONSUMED = (5e12, 3e12), (4e12, 2e12)
-WAYS = {"midpoint": ["numerics.time=midpoint"], "updates": ["numerics.time=updates"],
-        "gear": ["numerics.time=updates", "numerics.transport=gear"]}
+WAYS = {"midpoint": [exchange(steps="midpoint")], "updates": [], "gear": ["numerics.transport=gear"]}
 
 
 @cache
@@ -146,7 +145,7 @@ def starved():
     """(scene, seed, its solution) of an uneven aggregate with a front of both substrates in it."""
     substrates = [f"substrates.{name}.{key}={value} mg/L" for name, supply in (("acceptor", 0.6), ("donor", 0.5))
                   for key, value in (("supply", supply), ("half_saturation", 3e-3))]
-    scene = load_scene("base", ["numerics.elements=quadratic", "numerics.refinement=0.4",
+    scene = load_scene("base", [exchange(elements="quadratic"), "numerics.refinement=0.4",
                                 "aggregate.radius=20 um", *substrates])
     seed = seeded(scene)
     x = seed.space.reaction.evaluate(seed.space.points[:, 0])

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from repro import PoreEnd, load_scene, simulate
+from repro import PoreEnd, simulate
 from repro.fem import sizing
 from repro.fem.walls import BOTTOM, TOP, channel_walls
 from repro.march.simulation import shaped
@@ -22,6 +22,7 @@ from tests.strategies import EVERY_ORDER, MIRRORS, outlines
 from tests.test_derived import SHAPE, SPANNING, drawn
 from verification import claims, sensitivity
 from verification.network import law
+from verification.problems.schemes import exchange, load_scene
 
 SIDES = pytest.mark.parametrize("sign, side", [(-1, "upstream"), (1, "downstream")])
 #: Four steps of an hour and a half in a short pore.
@@ -35,7 +36,7 @@ HASTY = ["numerics.refinement=0.5", "pore.length=200 um", "growth.end=6 h", "gro
 def test_a_run_ends_at_either_end_of_the_pore_and_names_it(time, from_end, moment, sign, side):
     """A seed of 5 um grows towards an end. With its middle 8.7 um from the end, a step ends within an element of the
     end. With its middle at 5.3 um, the first step itself passes the end."""
-    changes = [*HASTY, f"numerics.time={time}", f"aggregate.position={sign * (100 - from_end)} um"]
+    changes = [*HASTY, exchange(steps=time), f"aggregate.position={sign * (100 - from_end)} um"]
     with pytest.raises(PoreEnd, match=f"^the aggregate reaches the pore's {side} end {moment}"):
         list(simulate(load_scene("base", changes)))
 

@@ -4,18 +4,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from repro import load_scene
 from repro.fem import sizing
 from repro.fem.walls import TOP
 from repro.model import mesh_motion, remeshing
 from repro.model.pore import Meshing, seeded, sized
 from repro.model.remeshing import moved_mesh
 from tests.strategies import EVERY_ORDER, coarse_base
+from verification.problems.schemes import exchange, load_scene
 
 
 def grown_seed(elements):
     """(scene, its seed)."""
-    scene = load_scene("base", ["aggregate.radius=20 um", "numerics.refinement=0.5", f"numerics.elements={elements}"])
+    scene = load_scene("base", ["aggregate.radius=20 um", "numerics.refinement=0.5", exchange(elements=elements)])
     return scene, seeded(scene)
 
 

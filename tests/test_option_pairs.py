@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from repro.model import pore, traction
-from repro.scene import load_scene
 from tests.strategies import ORDERS
+from verification.problems.schemes import exchange, load_scene
 
 #: An aggregate that leans downstream, beside the middle of the pore.
 POINTS = '[["-10 um", "0 um"], ["-4 um", "18 um"], ["12 um", "28 um"], ["25 um", "14 um"], ["22 um", "0 um"]]'
@@ -27,7 +27,7 @@ COMBINATIONS = [each for each in product(BODIES, INTERFACES, ORDERS) if each[::2
 def solved(body, interface, order, *changes):
     """(scene, pore, its solution) on a coarse mesh."""
     scene = load_scene("base", [
-        f"aggregate.outline={POINTS}", f"numerics.elements={ORDERS[order]}", f"numerics.interface={interface}",
+        f"aggregate.outline={POINTS}", exchange(elements=ORDERS[order]), f"numerics.interface={interface}",
         f"numerics.refinement={0.5 if order == 1 else 0.2}",
         "growth.shear_modulus=1e-3 MPa", *BODIES[body], *changes], unset=["aggregate.radius"])
     state = pore.seeded(scene)

@@ -11,20 +11,17 @@ from repro.march import midpoint, simulation
 from repro.model import pore, remeshing
 from repro.model.biomass import Rates
 from repro.model.contact import Expansion
-from repro.scene import PRESETS, Numerics, load_scene, parse_scene
+from repro.scene import PRESETS, Numerics, parse_scene
 from tests.strategies import ORDERS, scene
 from tests.test_scene import EVERYTHING
 from verification.problems.aggregates import reaction_points
-
-
-def elements(order):
-    """Numerics with elements of an order, of the size of preset fast."""
-    return {"preset": "fast", "elements": ORDERS[order], "refinement": 0.5 if order == 1 else 0.2}
+from verification.problems.schemes import exchange, load_scene
 
 
 def base(*changes, order=2):
-    sets = [f"numerics.{key}={value}" for key, value in elements(order).items()]
-    return load_scene("base", (*sets, *changes))
+    """Base with elements of an order, of the size of preset fast."""
+    refinement = f"numerics.refinement={0.5 if order == 1 else 0.2}"
+    return load_scene("base", ("numerics.preset=fast", exchange(elements=ORDERS[order]), refinement, *changes))
 
 
 @pytest.mark.parametrize("count", [pytest.param(0.0, marks=pytest.mark.thorough), 8.0])
@@ -32,7 +29,7 @@ def test_elements_beside_contact_lines_are_as_small_as_requested(count):
     """Edges beside the upper contact lines of a new mesh have at most the least film over the requested number. If no
     number is set, they are as large as elsewhere."""
     scene_in_contact = scene("17.9 um", "20 um", velocity="2.9 m/day", growth={"end": "0.2 h"},
-                 numerics={**elements(2), "contact_elements": count})
+                 numerics={"preset": "fast", "contact_elements": count})
     film = scene_in_contact.growth.minimum_film
     last = next(instant.pore for instant in reversed(list(simulation.simulate(scene_in_contact))) if instant.remeshes)
     outline = last.outline.corners
@@ -67,12 +64,11 @@ def numerics(**changes):
 
 
 def test_a_preset_changes_the_defaults():
-    """A preset changes only the keys that it names; the extent follows from the flow. Preset paper is the paper's
-    scheme."""
+    """A preset changes only the keys that it names; the extent follows from the flow. Preset paper has the sizes of
+    3.1."""
     for preset, chosen in PRESETS.items():
         assert numerics(preset=preset) == replace(Numerics(), preset=preset, extent="central", **chosen)
-    paper = numerics(preset="paper")
-    assert (paper.elements, paper.time, paper.refinement) == ("linear", "updates", 1.0)
+    assert numerics(preset="paper").refinement == 1.0
 
 
 @pytest.mark.parametrize("former, other", list(permutations(PRESETS, 2)))

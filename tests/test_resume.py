@@ -66,11 +66,9 @@ THOROUGH_SCENES = {
                            'output.times=["0.05 h", "0.3 h", "0.6 h"]'),
     "paper": ('growth.end="6 h"',),
     "accurate": ('numerics.preset="accurate"', 'growth.end="4 h"'),
-    "linear midpoint": ('numerics.time="midpoint"', "numerics.tolerance=0.0001", *CONTACT[:2], 'growth.end="0.25 h"'),
-    "quadratic gear": ('numerics.elements="quadratic"', "numerics.refinement=0.3", 'numerics.transport="gear"',
-                       'growth.fluid_forces="included"', 'growth.end="0.6 h"'),
-    "quadratic, stress-free": ('numerics.elements="quadratic"', "numerics.refinement=0.3",
-                               'growth.new_biomass="stress_free"', *CONTACT),
+    "gear with forces": ("numerics.refinement=0.3", 'numerics.transport="gear"', 'growth.fluid_forces="included"',
+                         'growth.end="0.6 h"'),
+    "fast, stress-free": ('numerics.preset="fast"', 'growth.new_biomass="stress_free"', *CONTACT),
 }
 
 

@@ -16,6 +16,8 @@ from repro.runs.machine import differences
 from repro.scene import SceneError, exact, load_scene, parse_scene, scene_hash, scene_tables, units
 from repro.scene.text import scene_text
 from tests.test_scene_text import parsed
+from verification.problems.schemes import exchange
+from verification.problems.schemes import load_scene as load_exchanged
 
 
 def refusal(source, *overrides, unset=()) -> str:
@@ -203,8 +205,8 @@ def test_a_scene_is_shown_in_the_units_of_its_text():
 @pytest.mark.parametrize("scheme", ["updates", "midpoint"])
 def test_rows_at_an_interval(entries, times, scheme):
     """They end with growth.end, and output.times adds others."""
-    changes = ["growth.end=0.35 h", "numerics.refinement=0.3", f"numerics.time={scheme}", *entries]
-    assert tuple(report.pore.time for report in simulate("base", changes)) == times
+    changes = ["growth.end=0.35 h", "numerics.refinement=0.3", exchange(steps=scheme), *entries]
+    assert tuple(report.pore.time for report in simulate(load_exchanged("base", changes))) == times
 
 
 def test_an_interval_with_too_many_rows_is_refused():

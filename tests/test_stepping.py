@@ -21,8 +21,9 @@ from repro.model import contact, grading, pore, remeshing
 from repro.model.pore import solve
 from repro.model.stages import Stages
 from repro.scene import load_scene
-from tests.strategies import EVERY_ORDER, ORDERS, coarse_base, scene
+from tests.strategies import EVERY_ORDER, coarse_base, scene
 from tests.test_state import alike
+from verification.problems.schemes import exchange
 
 FAST = 'numerics.preset="fast"'
 THOROUGH = partial(pytest.param, marks=pytest.mark.thorough)
@@ -203,9 +204,9 @@ def test_a_failure_of_the_shortest_step_stops_the_run(monkeypatch, error, messag
 @pytest.mark.parametrize("order", [1, THOROUGH(2)])
 def test_a_film_too_thin_from_the_start_closes(order):
     """It closes without growth: without a supply the aggregate neither grows nor decays."""
-    numerics = {"preset": "fast", "elements": ORDERS[order], "refinement": 0.6 if order == 1 else 0.2}
+    numerics = {"preset": "fast", "refinement": 0.6 if order == 1 else 0.2}
     first, *_, last = simulation.simulate(scene("18.5 um", "20 um", "0 mg/L", "0 mg/L", velocity="2.9 m/day",
-                                                growth={"end": "0.1 h"}, numerics=numerics))
+                                                growth={"end": "0.1 h"}, numerics=numerics, order=order))
     assert last.pore.contact and last.pore.mass == pytest.approx(first.pore.mass, rel=1e-9)
 
 
@@ -276,7 +277,7 @@ def test_a_shape_leans_as_the_flow_at_the_end_of_its_step_pushes(time):
     for first, last, kind in ((4, 4, "linear"), (1, 4, "linear"), (1, 4, "steps")):
         table = f'[["0 h", "{first}e-3 cm"], ["0.2 h", "{last}e-3 cm"]]'
         scene, _ = coarse_base(2, f'flow.head={{table={table}, between="{kind}"}}',
-                               "growth.fluid_forces=included", f"numerics.time={time}",
+                               "growth.fluid_forces=included", exchange(steps=time),
                                'growth.end="0.2 h"', 'growth.shear_modulus="1e-4 MPa"', 'output.times=["0.2 h"]')
         _, end = simulation.simulate(scene)
         leans.append(end.pore.outline.upstream + end.pore.outline.downstream)

@@ -10,16 +10,16 @@ from repro.fem.outline import polygon
 from repro.fem.walls import BOTTOM, FREE, TOP, channel_walls
 from repro.model import contact, growth, pore
 from repro.model.support import Support
-from repro.scene import load_scene
 from tests.strategies import EVERY_ORDER, ORDERS, body_of, coarse_base, meshed
 from tests.strategies import seed as disc
+from verification.problems.schemes import exchange, load_scene
 
 
 def block(order, *changes):
     """(scene, seed): a block of 20 by 20 um from wall to wall."""
     text = ", ".join(f'["{x} um", "{y} um"]' for x, y in [(-10, 0), (-10, 20), (10, 20), (10, 0)])
     scene = load_scene("base", [f"aggregate.outline=[{text}]", 'pore.width="20 um"', "numerics.refinement=0.3",
-                                f'numerics.elements="{ORDERS[order]}"', *changes],
+                                exchange(elements=ORDERS[order]), *changes],
                        unset=["aggregate.radius"])
     return scene, pore.seeded(scene)
 

@@ -6,13 +6,13 @@ import pytest
 from repro.errors import GrowthError, StageError
 from repro.march.stepping import LANDED
 from repro.model import contact, contact_lines, pore, traction
-from repro.scene import load_scene
 from tests.strategies import EVERY_ORDER, ORDERS
+from verification.problems.schemes import exchange, load_scene
 
 
 def dense_base(order, density):
     """Base with coarse elements of an order, in water of a density, and its seed."""
-    scene = load_scene("base", ["numerics.preset=paper", f"numerics.elements={ORDERS[order]}",
+    scene = load_scene("base", ["numerics.preset=paper", exchange(elements=ORDERS[order]),
                                f"numerics.refinement={0.6 if order == 1 else 0.3}", "growth.time_step=24 min",
                                "growth.fluid_forces=included", f"flow.density={density}"])
     return scene, pore.seeded(scene)
@@ -51,7 +51,7 @@ def test_rounds_that_do_not_reduce_the_move_end(monkeypatch, order, noise, agree
 def test_a_closed_pore_may_have_larger_forces_than_the_open_one(monkeypatch, order):
     """A step ends where the film is 1.999 um thick, 1.998 to 2 are allowed. The closed pore's forces lift the
     aggregate without contact by more than 0.01 um. The contact stays nevertheless."""
-    scene = load_scene("base", ["numerics.preset=fast", f"numerics.elements={ORDERS[order]}", "pore.width=7.0487 um",
+    scene = load_scene("base", ["numerics.preset=fast", exchange(elements=ORDERS[order]), "pore.width=7.0487 um",
                                 "numerics.contact_elements=0", "growth.fluid_forces=included"])
     seed = pore.seeded(scene)
 

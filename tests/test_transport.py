@@ -19,7 +19,7 @@ from repro.model.kinetics import Sink
 from repro.model.pore import solve
 from repro.model.transport import Concentrations
 from repro.schemes import PAPER
-from tests.strategies import EVERY_ORDER, ORDERS, coarse_base, scene
+from tests.strategies import EVERY_ORDER, coarse_base, scene
 from tests.test_derived import integrate_over_end, node_coordinates
 from verification.problems.meshes import space_on
 from verification.problems.schemes import exchange, exchanged
@@ -29,8 +29,8 @@ FINE = {1: 1.0, 2: 0.45}
 
 def solved(radius, supply, velocity, order, inlet="local"):
     """(Pore, Solved) of a fixed shape."""
-    numerics = {"elements": ORDERS[order], "refinement": 1.0 if order == 1 else 0.5}
-    plain = scene(radius, "50 um", supply, supply, velocity, numerics=numerics)
+    numerics = {"refinement": 1.0 if order == 1 else 0.5}
+    plain = scene(radius, "50 um", supply, supply, velocity, numerics=numerics, order=order)
     return at_start(exchanged(plain, exchange(inlet=inlet)))
 
 
@@ -80,8 +80,8 @@ def test_couplings_that_are_exactly_zero_stay_in_the_matrix(order):
 
 def thick(velocity, order=2, refinement=None):
     """A half-disc of 60 um in a pore of 100 um."""
-    numerics = {"elements": ORDERS[order], "refinement": refinement or FINE[order]}
-    return scene("60 um", "100 um", velocity=velocity, numerics=numerics)
+    numerics = {"refinement": refinement or FINE[order]}
+    return scene("60 um", "100 um", velocity=velocity, numerics=numerics, order=order)
 
 
 @EVERY_ORDER
@@ -105,7 +105,7 @@ def test_concentrations_keep_their_bounds_without_elements_for_boundary_layers(m
 def starved(half, order):
     """A seed that the acceptor reaches in part only, with a half saturation that no mesh resolves."""
     model = scene("30 um", "100 um", "1 mg/L", "10 mg/L", "0.5 m/day", numerics={
-        "elements": ORDERS[order], "refinement": 0.4 / order})
+        "refinement": 0.4 / order}, order=order)
     acceptor = replace(model.substrates.acceptor, half_saturation=half)
     return replace(model, substrates=replace(model.substrates, acceptor=acceptor))
 

@@ -82,7 +82,7 @@ CHOICES = {
                       note="(7)-(10); not the paper's"),
     "unlimited decay": Switch("decay", "with acceptor", "unlimited", 'kinetics.decay="unlimited"',
                               note="(9), (10); not the paper's"),
-    "midpoint": Switch("steps in time", "updates of 12 min", "midpoint, tolerance 0.01", 'numerics.time="midpoint"',
+    "midpoint": Switch("steps in time", "updates of 12 min", "midpoint, tolerance 0.01", exchange(steps="midpoint"),
                        False, "first order in the step against second"),
 }
 #: Runs that differ from the default in the element size alone; the number of the seed's nodes does not change.

@@ -81,6 +81,10 @@ def _substrates(scene: Scene) -> Iterator[str]:
     else:
         yield {"open": "the supply prescribed at both ends",
                "closed": "closed ends"}[scene.substrates.boundary]
+    scheme = scene.numerics.scheme
+    if scene.flow and not scheme.conserves_substrates:
+        inlet = {"mean": "u_ave", "local": "u_x(y)"}[scheme.inlet]
+        yield f"carried by {scheme.carrier}, with {inlet} in (11): not conserved [E4]"
     yield {"quasi_steady": "steady in each shape",
            "gear": "integrated in time (3.3, Gear)"}[scene.numerics.transport]
 

@@ -131,9 +131,11 @@ def _demand(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
 def _lag(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
     lag = computed["transport over growth time"].start
     if scene.numerics.transport == "quasi_steady" and lag > LAG:
+        permeable = scene.flow is not None and scene.flow.permeability is not None
+        remedy = '; "gear" with numerics.preset = "paper" integrates them in time'
         yield Caveat("numerics.transport", f"transport takes {lag:.2g} of the time of growth, "
-                     f"above {LAG:g}: quasi-steady substrates err by about this fraction; "
-                     '"gear" with numerics.time = "updates" integrates them in time')
+                     f"above {LAG:g}: quasi-steady substrates err by about this fraction"
+                     f"{'' if permeable else remedy}")
 
 
 def _transit(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
@@ -273,7 +275,7 @@ def _steps(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
     if not scene.numerics.scheme.controls_error and grown > GROWTH_IN_A_STEP:
         yield Caveat("growth.time_step", f"the aggregate grows by {100 * grown:.2g} % in a shape "
                      f"update, above {100 * GROWTH_IN_A_STEP:g} %: it uses the rates at "
-                     'its start; choose a shorter one, or numerics.time = "midpoint"')
+                     'its start; choose a shorter one, or numerics.preset = "fast"')
 
 
 def warn_missed_tolerance(scene: Scene, worst: float, count: str = "") -> Iterator[Caveat]:
@@ -334,8 +336,8 @@ def _contact(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
     if contact is not None and scene.growth.end > AFTER_CONTACT * contact:
         yield Caveat("growth.end", f"contact with the opposite wall is expected from {contact:.3g} "
                      f"h on, long before {scene.growth.end:g} h: then conductivity (2.3.3) is "
-                     'accurate to a few percent with numerics.elements = "linear" (preset '
-                     "paper), and to 1 % with curved triangles (preset fast)")
+                     "accurate to a few percent with the linear triangles of numerics.preset "
+                     '= "paper", and to 1 % with the curved ones of "fast"')
 
 
 #: Each check and the parts of a scene that it needs: a warning mentions no part that is left out.

@@ -77,7 +77,7 @@ def _value(column: int) -> str:
 
 
 def flat(tables: object, key: str = "") -> dict[str, object]:
-    """Nested tables as {"numerics.time": value}; lists stay unchanged."""
+    """Nested tables as {"numerics.preset": value}; lists stay unchanged."""
     if not isinstance(tables, dict):
         return {key: tables}
     flattened: dict[str, object] = {}

@@ -35,7 +35,8 @@ ASSUMED = {
     ("numerics", "extent", "central"): "a clean channel outside of the meshed part (3.1)",
 }
 NEEDED = {"transport": "substrates", "extent": "aggregate"}
-#: The numerics in the head of the page, and the section without which they do not matter.
+#: The numerics in the head of the page, and the section without which they do not matter. Runs of
+#: earlier versions may have elements and time.
 NUMERICS = {"preset": None, "elements": None, "refinement": None, "transport": "substrates",
             "time": "growth"}
 

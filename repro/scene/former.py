@@ -1,4 +1,4 @@
-"""Keys and choices of earlier versions, and what to write instead.
+"""Keys of earlier versions, and what to write instead.
 
 A scene that names one of them is refused. The runs of earlier versions keep them in ``run.json``:
 their hashes stay valid, and the reader writes them as the present version would.
@@ -28,6 +28,18 @@ class Former(NamedTuple):
 IN_TABLE = Former(None, "write it in a table: "
                         '{ table = [["0 h", VALUE], ["5 h", VALUE]], between = "linear" }; '
                         "a list has steps")
+OF_SCHEME = ('leave it out: numerics.preset = "paper" has linear elements and updates, "fast", '
+             '"accurate" and "exact" quadratic elements and the midpoint rule; scheme= of '
+             "repro.solve has other combinations")
+PRINTED = 'numerics.preset = "as_printed" has the printed one, and'
+
+
+def _by_preset(curved: str, paper: str) -> dict[str, str]:
+    """Values by the preset: those of the curved scheme, and those of the paper's."""
+    return {**dict.fromkeys(("fast", "accurate", "exact"), curved),
+            **dict.fromkeys(("paper", "as_printed"), paper)}
+
+
 #: By dotted keys.
 KEYS: dict[str, Former] = {
     "flow.biomass": Former(None, "leave it out: an aggregate is permeable with flow.permeability, "
@@ -35,6 +47,7 @@ KEYS: dict[str, Former] = {
     "flow.interpolation": IN_TABLE,
     "substrates.acceptor.interpolation": IN_TABLE,
     "substrates.donor.interpolation": IN_TABLE,
+    "numerics.elements": Former(_by_preset("quadratic", "linear"), OF_SCHEME),
     "numerics.fixed_point": Former(
         "kept", "leave it out: the point in the middle of a new contact surface stays in place"),
     "numerics.flow_element": Former(
@@ -42,36 +55,27 @@ KEYS: dict[str, Former] = {
     "numerics.flow_stabilisation": Former(
         100.0, "leave it out: it is 100 (repro.model.flow.STABILISATION)"),
     "numerics.inlet": Former(
-        "local", "leave it out; u_ave is scheme=replace(PAPER, inlet=\"mean\") of repro.solve"),
+        "local", f"leave it out; {PRINTED} scheme=replace(PAPER, inlet=\"mean\") of repro.solve "
+                 "has it alone"),
     "numerics.jacobian": Former(
-        {**dict.fromkeys(("fast", "accurate", "exact"), "reused"), "paper": "fresh"},
+        _by_preset("reused", "fresh"),
         "leave it out; scheme=replace(CURVED, modified_newton=False) of repro.solve has a new one "
         "in every iterate"),
     "numerics.mesh_compressibility": Former(
         1.0, "leave it out: it is 1 (repro.model.mesh_motion.COMPRESSIBILITY)"),
     "numerics.ordering": Former("degree", "leave it out: SuperLU orders the nodes"),
+    "numerics.time": Former(_by_preset("midpoint", "updates"), OF_SCHEME),
     "numerics.transfer": Former(
-        "conserving", "leave it out; the paper's is scheme=replace(PAPER, "
-                      "transfer=\"interpolation\") of repro.solve"),
+        "conserving", f"leave it out; {PRINTED} scheme=replace(PAPER, transfer=\"interpolation\") "
+                      "of repro.solve has it alone"),
     "output.timeseries": Former(
         "csv", "leave it out, and write NetCDF by repro.load_run(FOLDER).to_netcdf(FILE)"),
-}
-#: What to write instead of a choice, by its dotted key and the choice.
-CHOICES: dict[tuple[str, str], str] = {
-    ("numerics.elements", "cubic"):
-        'write "quadratic", which takes half of the time and errs as little around an aggregate',
 }
 
 
 def instead_of_key(key: str) -> str:
     """Requirement where a scene has a former key; empty for other keys."""
     return f"this key was removed; {KEYS[key].instead}" if key in KEYS else ""
-
-
-def instead_of_choice(key: str, value: object) -> str:
-    """Requirement where a scene has a former choice; empty for other values."""
-    named = (key, value) if isinstance(value, str) else None
-    return f"this choice was removed; {CHOICES[named]}" if named in CHOICES else ""
 
 
 def with_former(tables: dict) -> dict:

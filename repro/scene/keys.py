@@ -17,7 +17,7 @@ from fractions import Fraction
 from functools import cached_property
 from math import ceil, inf
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from repro.scene.arguments import typed
 from repro.scene.files import key_of, leave_out, override, packaged_scenes, read_tables
@@ -50,7 +50,7 @@ from repro.scene.units import (
     timed_quantity,
     units_of,
 )
-from repro.schemes import CURVED, PAPER, Scheme
+from repro.schemes import CURVED, PAPER, PRINTED, Scheme
 
 __all__ = ["Scene", "SceneError", "load_scene", "packaged_scenes", "parse_scene", "scene_hash",
            "scene_tables"]
@@ -298,7 +298,7 @@ class Growth:
         source="Section 4")
     time_step: float = quantity(
         "12 min", "h", source="Section 2, Table 1",
-        about="Delta t between shape updates; with numerics.time = \"midpoint\" the first one")
+        about="Delta t between shape updates; the first step of the midpoint rule")
     shear_modulus: float = quantity(
         "0.01 MPa", "MPa", source="(14)-(24), Table 1",
         about="mu_L; it scales the stresses and, without fluid_forces, moves nothing")
@@ -338,15 +338,10 @@ class Numerics:
     """Section 3: how it is solved."""
 
     preset: str = choice(
-        "fast", "accurate", "exact", "paper", source="Section 3 is \"paper\"",
+        "fast", "accurate", "exact", "paper", "as_printed", source="Section 3 is \"paper\"",
         about="Defaults of this section: until contact errors of about 1 %, of about 0.1 %, under "
-              "0.01 %, which are larger after contact; or the paper's own scheme")
-    elements: str = choice(
-        "linear", "quadratic", source="3.2-3.4 have linear ones",
-        about="Straight linear triangles, or curved quadratic ones")
-    time: str = choice(
-        "updates", "midpoint", source="Section 2, 3.3 have updates",
-        about="Every growth.time_step, or second-order steps as long as tolerance allows")
+              "0.01 %, which are larger after contact; the paper's own scheme, which conserves "
+              "mass; or this scheme as printed, which does not [E4, E8]")
     tolerance: float = number(0.01, UP_TO_1, source=NOT_IN_PAPER,
                               about="Largest error of a midpoint step: change of the growth rate "
                                     "times the step")
@@ -373,30 +368,23 @@ class Numerics:
               "2 at least with a permeable aggregate; 0: as large as elsewhere on the interface")
     exchanged: Scheme | None = None  # no key: ``repro.simulate(..., scheme=...)``
 
-    @cached_property
+    @property
     def scheme(self) -> Scheme:
-        """The scheme: ``exchanged``, or the one of these keys."""
-        if self.exchanged is not None:
-            return self.exchanged
-        scheme = PAPER if self.elements == "linear" else CURVED
-        modified_newton = SCHEMES[self.preset].modified_newton
-        return replace(scheme, steps=self.time, modified_newton=modified_newton)
+        """The scheme: ``exchanged``, or the one of the preset."""
+        return self.exchanged or SCHEMES[self.preset]
 
 
 #: The scheme of each preset.
-SCHEMES = {"fast": CURVED, "accurate": CURVED, "exact": CURVED, "paper": PAPER}
-
-
+SCHEMES = {"fast": CURVED, "accurate": CURVED, "exact": CURVED, "paper": PAPER,
+           "as_printed": PRINTED}
 #: Changes of each preset to the defaults above: until contact errors of about 1 %, of about 0.1 %,
-#: under 0.01 % (see `make bench`); the paper's own scheme.
-PRESETS: dict[str, dict[str, str | float]] = {
-    "fast": {"elements": "quadratic", "time": "midpoint", "refinement": 0.2, "tolerance": 0.0075,
-             "contact_elements": 1.0},
-    "accurate": {"elements": "quadratic", "time": "midpoint", "refinement": 0.45,
-                 "tolerance": 0.001},
-    "exact": {"elements": "quadratic", "time": "midpoint", "refinement": 0.7, "tolerance": 0.00025,
-              "contact_elements": 4.0},
+#: under 0.01 % (see `make bench`); the paper's own scheme; and with its transient substrates (3.3).
+PRESETS: dict[str, dict[str, Any]] = {
+    "fast": {"refinement": 0.2, "tolerance": 0.0075, "contact_elements": 1.0},
+    "accurate": {"refinement": 0.45, "tolerance": 0.001},
+    "exact": {"refinement": 0.7, "tolerance": 0.00025, "contact_elements": 4.0},
     "paper": {},
+    "as_printed": {"transport": "gear"},
 }
 
 
@@ -654,7 +642,7 @@ def parse_scene(tables: dict, name: str, file: str, changed: Sequence[str] = (),
     text = name.encode(errors="backslashreplace").decode()  # bytes in the name of a file
     scene = read_table(Scene, _with_preset(tables), Place(file, known=KEYS), name=text,
                        units=units_of(tables))
-    if scheme is not None:
+    if scheme is not None and scheme != scene.numerics.scheme:
         scene = replace(scene, numerics=replace(scene.numerics, exchanged=scheme))
     for broken, requirement in rules(scene):
         if broken:
@@ -695,8 +683,7 @@ def _with_preset(tables: dict) -> dict:
 
 def _beside_preset(numerics: Numerics) -> dict:
     """Return the keys of [numerics] that differ from their preset; another preset sets the rest."""
-    preset = {"preset": numerics.preset, **PRESETS[numerics.preset]}
-    of_preset = read_table(Numerics, preset, Place(numerics.preset))
+    of_preset = Numerics(numerics.preset, **PRESETS[numerics.preset])
     return {key: value for key, value in write_table(numerics).items()
             if getattr(numerics, key) != getattr(of_preset, key)}
 

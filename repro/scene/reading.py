@@ -111,8 +111,6 @@ def _read_entry(entry: Field, value: object, place: Place):
     if "section" in entry.metadata:
         return read_table(entry.metadata["section"], value, place)
     kind = entry.metadata["kind"]
-    if requirement := former.instead_of_choice(place.key, value):
-        raise place.refuse(value, requirement)
     try:
         return kind.read(value)
     except Refused as error:

@@ -228,11 +228,10 @@ def _biomass_rules(scene: "Scene", drive: "Flow") -> Rules:
     }
     yield drag and scene.aggregate is None, {
         "flow.permeability": "[aggregate] is needed with it: it is that of the biomass"}
-    requirement = f'"quadratic" is needed with {permeable}'
+    requirement = '"fast", "accurate" or "exact" is needed with'
     yield drag and scene.numerics.scheme.order == 1, {
-        "flow.permeability": 'numerics.elements = "quadratic" is needed with it',
-        "numerics.elements": requirement,
-        "numerics.preset": f'numerics.elements = {requirement}',
+        "flow.permeability": f"numerics.preset = {requirement} it: it needs quadratic elements",
+        "numerics.preset": f"{requirement} {permeable}, which needs quadratic elements",
     }
 
 
@@ -359,8 +358,9 @@ def _numerics_rules(scene: "Scene") -> Rules:
         "flow.mean_velocity": 'numerics.extent = "full" is needed with 0 m/day',
     }
     yield scene.numerics.scheme.controls_error and scene.numerics.transport == "gear", {
-        "numerics.transport": '"quasi_steady" is needed with numerics.time = "midpoint"',
-        "numerics.time": '"updates" is needed with numerics.transport = "gear"',
+        "numerics.transport": '"quasi_steady" is needed with the midpoint rule of numerics.preset '
+                              f'= "{scene.numerics.preset}"',
+        "numerics.preset": '"paper" or "as_printed" is needed with numerics.transport = "gear"',
     }
 
 

@@ -1,6 +1,7 @@
 """The two schemes that solve a scene, to be compared side by side.
 
-    paper     linear triangles, stabilised flow, updates of the shape, contact by nodes
+    paper     linear triangles, stabilised flow, updates of the shape, contact by nodes; and the
+              same as printed, which does not conserve mass
     curved    curved quadratic triangles, Taylor-Hood flow, midpoint rule, contact lines
     scheme    what a scheme chooses, and which choices go together
 
@@ -9,7 +10,7 @@ A preset of a scene is one of these schemes and a few numbers. Other combination
 """
 
 from repro.schemes.curved import CURVED
-from repro.schemes.paper import PAPER
+from repro.schemes.paper import PAPER, PRINTED
 from repro.schemes.scheme import Scheme
 
-__all__ = ["CURVED", "PAPER", "Scheme"]
+__all__ = ["CURVED", "PAPER", "PRINTED", "Scheme"]

@@ -53,10 +53,10 @@ class Scheme:
     Examples
     --------
     >>> from dataclasses import replace
-    >>> from repro.schemes import PAPER
-    >>> printed = replace(PAPER, carrier="u", transfer="interpolation")
-    >>> printed.conserves_substrates, printed.conserves_biomass
-    (False, False)
+    >>> from repro.schemes import PRINTED
+    >>> projected = replace(PRINTED, transfer="projection")
+    >>> projected.conserves_substrates, projected.conserves_biomass
+    (False, True)
     """
 
     elements: str

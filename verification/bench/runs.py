@@ -40,7 +40,7 @@ UPDATES = ((0.15,), (0.3,), (0.45,))
 BY_MINUTES = ("refinement {:g}, {} min", "numerics.refinement={}", "growth.time_step={} min")
 BY_TOLERANCE = ("refinement {:g}, tolerance {:g}", "numerics.refinement={}", "numerics.tolerance={}")
 OF_PAPER, OF_ACCURATE = ("numerics.preset=paper",), ("numerics.preset=accurate",)
-MIDPOINT_RULE = "numerics.time=midpoint"
+MIDPOINT_RULE = exchange(steps="midpoint")
 #: (method, label and keys, sizes, other changes of the scene).
 METHODS_OF_BASE = (
     (PRESET_PAPER, BY_MINUTES, PAPER, OF_PAPER),
@@ -51,7 +51,7 @@ METHODS_OF_BASE = (
     ("order 2, midpoint, one element size everywhere", BY_TOLERANCE, QUADRATIC[1:4],
      (*OF_ACCURATE, "numerics.gradation=0")),
     ("order 2 in updates of 12 min", ("refinement {:g}", "numerics.refinement={}"), UPDATES,
-     (*OF_ACCURATE, "numerics.time=updates")))
+     (*OF_ACCURATE, exchange(steps="updates"))))
 #: Rings and steps to 19.2 h of scikit-fem's run.
 SKFEM = ((3, 4), (4, 4), (4, 8), (6, 8))
 

@@ -440,7 +440,7 @@ def test_midpoint_limit(changes, record):
 
     Norm: relative difference at 3.2 h from a seed of 25 um, base, no remesh.
     """
-    short = ('numerics.time="midpoint"', "numerics.tolerance=0.00003")
+    short = (exchange(steps="midpoint"), "numerics.tolerance=0.00003")
     reports = [runs.last(runs.base("3.2 h", 'aggregate.radius="25 um"', *changes, *setting))
              for setting in (short, *((f'growth.time_step="{step} h"',) for step in STEPS))]
     record(at_most("remeshes, all runs", sum(instant.remeshes for instant in reports), 0.0,

@@ -136,7 +136,7 @@ def _yield_defect(scene: Scene, ledgers: list[Ledger]) -> float:
 
 def _closed(scene: Scene, ledgers: list[Ledger]) -> list:
     """Checks of the worst step of a run."""
-    bound, why = YIELD_BOUNDS.get((scene.numerics.transport, scene.numerics.time), (CLOSED, CLOSES))
+    bound, why = YIELD_BOUNDS.get((scene.numerics.transport, scene.numerics.scheme.steps), (CLOSED, CLOSES))
     return [at_most("substrates", runs.substrate_defect(ledgers), CLOSED, CLOSES),
             at_most("biomass", runs.biomass_defect(ledgers), CLOSED, CLOSES),
             at_most("new biomass against uptake", _yield_defect(scene, ledgers), bound, why)]
@@ -154,7 +154,7 @@ def _of_base(preset: str):
     """Checks of base. For updates, the worst step has a lower bound too, and an order in the step size."""
     scene, ledgers, remeshes = _base(preset, STEPS[2])
     yield _closed(scene, ledgers)
-    if scene.numerics.time == "updates":
+    if not scene.numerics.scheme.controls_error:
         expected = (runs.growth_rates(scene.kinetics, scene.substrates)[0] * STEPS[2]) ** 2 / 12
         yield between("new biomass against uptake, over (r step)^2 / 12", _yield_defect(scene, ledgers) / expected,
                       0.95, 1.0, "r at the supply; that of the seed is 1 % lower, and falls as the pore clogs")

@@ -48,7 +48,7 @@ def reference_solution(level: int) -> contact_growth.Touching:
 def grown(elements: str, refinement: float) -> contact.Expansion:
     """The package's aggregate in contact."""
     scene = load_scene("wide", [f"numerics.preset={'paper' if elements == 'linear' else 'accurate'}",
-                                f"numerics.elements={elements}", f"numerics.refinement={refinement}",
+                                f"numerics.refinement={refinement}",
                                 f'pore.width="{HEIGHT} um"', f'aggregate.radius="{bodies.RADIUS} um"'])
     mechanics, seed = contact.Mechanics.of(scene), pore.seeded(scene)
     where, _ = meshes.quadrature_points(seed.body.reference[seed.body.shape.cells], seed.body.shape.table)

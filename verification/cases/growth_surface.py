@@ -17,10 +17,11 @@ from repro.model import contact, growth, pore
 from repro.model.energies.neo_hookean import BIOT, CREASE
 from repro.model.surface import surface
 from repro.preflight import numbers
-from repro.scene import Scene, load_scene
+from repro.scene import Scene
 from verification.evidence.checks import around, at_most, between, refine, studies
 from verification.problems import bodies
-from verification.problems.runs import ELEMENTS, NUMERICS
+from verification.problems.runs import ELEMENTS, NUMERICS, with_elements
+from verification.problems.schemes import Change, load_scene
 
 
 def imposed(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -60,7 +61,7 @@ def along_the_rim(shape: str, angle: np.ndarray) -> np.ndarray:
 
 def mapped_errors(refinement: float, elements: str, shape: str) -> dict[str, float]:
     """Errors of the stretch on a half-disc deformed by a map."""
-    scene = load_scene("base", ["numerics.preset=accurate", f"numerics.elements={elements}",
+    scene = load_scene("base", ["numerics.preset=accurate", with_elements(elements),
                                 f"numerics.refinement={refinement}", f'aggregate.radius="{RADIUS} um"'])
     seed = pore.seeded(scene)
     deformed = surface(seed.moved(MAPS[shape](*seed.mesh.points.T)[0]))
@@ -116,7 +117,7 @@ def test_surface_confined(elements, record):
     Norm: largest difference of stretches.
     """
     for rheology in ("stressed", "stress_free"):
-        scene = plugged("fast", f"numerics.elements={elements}", f"growth.new_biomass={rheology}")
+        scene = plugged("fast", with_elements(elements), f"growth.new_biomass={rheology}")
         state = pore.seeded(scene)
         since = 1.0
         for theta in THETAS:
@@ -127,7 +128,7 @@ def test_surface_confined(elements, record):
             since = theta if rheology == "stress_free" else 1.0
 
 
-def plugged(preset: str, *changes: str) -> Scene:
+def plugged(preset: str, *changes: Change) -> Scene:
     """A plug of 20 um in a pore of 20 um. Its large supply makes it grow at the same rate everywhere."""
     corners = "[[\"-10 um\", \"0 um\"], [\"-10 um\", \"20 um\"], [\"10 um\", \"20 um\"], [\"10 um\", \"0 um\"]]"
     supplies = [f'substrates.{name}.supply="1e6 mg/L"' for name in ("acceptor", "donor")]

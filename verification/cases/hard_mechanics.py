@@ -75,7 +75,7 @@ def film_closes(preset: str, simulator: Callable) -> Iterator:
     yield run, contact_rests(run)
     yield hard.close(run, fine, preset, "aggregate_area_um2", *EFFLUENTS)
     yield _edge_wide(run, fine, preset)
-    if run.scene.numerics.time == "midpoint":
+    if run.scene.numerics.scheme.controls_error:
         least = run.scene.growth.minimum_film
         thinnest = min((after / least for _, after in landings(run)), default=0.0)
         yield between("film when it closes over the least that stays", thinnest, stepping.LANDED, 1.0,
@@ -97,7 +97,7 @@ def _edge_wide(computed: Run, fine: Run, preset: str) -> Iterator:
     loss = computed.scene.pore.length * hard.clean_conductivity(computed.scene) / fine.last[DRIVE[0]]
     surface_length, expected = (_contact_length(run.end.pore.outline) for run in (computed, fine))
     fall = -np.diff([width - line["thickness_um"] for line in computed.rows if not line["contact"]]).min(initial=0.0)
-    share, late = LATE[computed.scene.numerics.time]
+    share, late = LATE[computed.scene.numerics.scheme.steps]
     tolerance = 2 * edge + share * np.sqrt(8 * width * fall)
     yield at_most("length of the contact surface against a finer run, um", abs(surface_length - expected), tolerance,
                   f"an edge of the interface at each end{late}")
@@ -412,7 +412,7 @@ def long_steps(preset: str) -> list:
     changes = ('aggregate.radius="25 um"', 'growth.end="3 h"', 'output.times=["3 h"]')
     run = hard.run_packaged("base", preset, *changes, 'growth.time_step="3 h"')
     fine = hard.reference("base", *changes)
-    late = UPDATES[run.scene.numerics.time]
+    late = UPDATES[run.scene.numerics.scheme.steps]
     return [run, hard.close(run, fine, preset, *SHAPE),
             hard.close(run, fine, preset, *DRIVE, allowed=TOLERANCE[preset] + late)]
 

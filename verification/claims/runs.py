@@ -341,13 +341,10 @@ def equivalent(stresses: np.ndarray) -> np.ndarray:
 Both = tuple[transport.Fluxes, transport.Fluxes]
 
 
-def solution(scene, grid: Mesh, active: np.ndarray, carried_by_u: bool = False) -> tuple[flow.Flow, Both]:
-    """Flow under the scene's drive, then the ledger of both steady substrates over X_A (N,) mg/L.
-
-    carried_by_u: advect with u itself, as the paper writes it, and not with the divergence-free w = u - tau grad p.
-    """
+def solution(scene, grid: Mesh, active: np.ndarray) -> tuple[flow.Flow, Both]:
+    """Flow under the scene's drive, then the ledger of both steady substrates over X_A (N,) mg/L."""
     flow_field = flow_in(scene, grid)
-    scheme = replace(scene.numerics.scheme, carrier="u" if carried_by_u else "w", modified_newton=False)
+    scheme = replace(scene.numerics.scheme, modified_newton=False)
     space = Space(grid)
     problem = transport.problem(space, flow_field, scene.substrates, scene.kinetics, scheme)
     sink = Sink(space.integration.to_points(active) * space.reaction.dx)

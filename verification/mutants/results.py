@@ -353,13 +353,6 @@ MUTANTS = (
          "",
          f"{FORMER}a_run_of_an_earlier_version_loads_plots_and_compares")),
     *changes(
-        "repro/scene/reading.py",
-        ("former-choice-unnamed",
-         "The refusal of a former choice lists the present ones alone.",
-         "if requirement := former.instead_of_choice(place.key, value):",
-         'if requirement := "":',
-         f"{FORMER}a_former_key_or_choice_is_refused_with_what_to_write")),
-    *changes(
         "repro/report/reading.py",
         ("former-keys-in-records",
          "The record of a run of an earlier version keeps its former keys.",

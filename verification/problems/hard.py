@@ -244,8 +244,8 @@ def _biomass(run: Run) -> Iterator[Check]:
         apart = max(abs(i.pore.mass / maximum_density / i.pore.outline.area - 1) for i in run.instants)
         yield at_most("biomass after - before - made, over after", largest(run.column("biomass_balance")), BALANCE,
                       MEAN)
-        yield at_most("area against biomass over X_m", apart, AREA[run.scene.numerics.elements], MEAN)
-        if run.scene.numerics.time == "midpoint":
+        yield at_most("area against biomass over X_m", apart, AREA[run.scene.numerics.scheme.elements], MEAN)
+        if run.scene.numerics.scheme.controls_error:
             yield _oxygen_demand(run)
 
 

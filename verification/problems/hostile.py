@@ -91,7 +91,7 @@ def _updates(tables: dict, transport: str) -> None:
     """Set three steps of the paper's scheme."""
     step = _hours(tables["growth"]["end"]) / 3
     tables["growth"]["time_step"] = f"{step!r} h"
-    tables["numerics"] |= {"time": "updates", "transport": transport}
+    tables["numerics"] |= {"preset": "paper", "transport": transport}
 
 
 def _width(tables: dict) -> float:

@@ -19,7 +19,7 @@ from repro.model.stages import Stages
 from repro.scene import Kinetics, Scene, Substrates
 from verification.evidence.checks import columns
 from verification.problems import channels, meshes
-from verification.problems.schemes import Change, load_scene
+from verification.problems.schemes import Change, Exchange, exchange, load_scene
 
 ROUND_OFF = "round-off"
 #: The velocity of base at t = 0, 2.9 m/d, in um/h.
@@ -28,9 +28,9 @@ SPEED = 2.9e6 / 24
 ELEMENTS = ("linear", "quadratic")
 
 
-def with_elements(elements: str) -> str:
+def with_elements(elements: str) -> Exchange:
     """The change of a scene that sets its elements: linear or quadratic."""
-    return f'numerics.elements="{elements}"'
+    return exchange(elements=elements)
 
 
 def coarser(elements: str, refinement: float, linear: float = 1.0) -> str:
@@ -51,12 +51,12 @@ NUMERICS = {preset: (with_preset(preset),) for preset in PRESETS}
 WITH_EXACT = {**NUMERICS, "exact": (with_preset("exact"),)}
 
 
-def kinds(refinement: float, linear: float = 1.0) -> dict[str, tuple[str, ...]]:
+def kinds(refinement: float, linear: float = 1.0) -> dict[str, tuple[Change, ...]]:
     """Changes of a scene, by label: every kind of elements with the paper's scheme and a refinement."""
     return {kind: (with_elements(kind), coarser(kind, refinement, linear)) for kind in ELEMENTS}
 
 
-def every(refinement: float, linear: float = 1.0) -> dict[str, tuple[str, ...]]:
+def every(refinement: float, linear: float = 1.0) -> dict[str, tuple[Change, ...]]:
     """:func:`kinds` and the presets."""
     return {**kinds(refinement, linear), **{preset: (with_preset(preset),) for preset in QUADRATIC}}
 
@@ -76,8 +76,8 @@ def standing(x: np.ndarray, y: np.ndarray) -> np.ndarray:
 
 
 def step(scene: Scene, pore: Pore, solved: Solved, hours: float) -> StepResult:
-    """A step by the scene's ``numerics.time``. A step of the midpoint rule is accepted whatever its error estimate."""
-    if scene.numerics.time == "updates":
+    """A step by the scene's scheme. A step of the midpoint rule is accepted whatever its error estimate."""
+    if not scene.numerics.scheme.controls_error:
         return updates.step(Stages.of(scene), pore, solved, hours)
     return midpoint.attempt(Stages.of(scene), pore, solved, hours).step
 
@@ -266,7 +266,7 @@ EIGHT = ("mean_velocity_m_per_d", "conductivity_m_per_d", "aggregate_area_um2", 
          "downstream_um", "effluent_acceptor_mg_per_L", "effluent_donor_mg_per_L")
 
 
-def values(times: Sequence[float], *changes: str) -> np.ndarray:
+def values(times: Sequence[float], *changes: Change) -> np.ndarray:
     """(times, 8) values of EIGHT in the table of a run of base, at some times (h). The last is the end."""
     scene = base(f"{times[-1]} h", *changes, times=times)
     return np.array([itemgetter(*EIGHT)(results.row(scene, instant)) for instant in reports_of(scene)])

@@ -3,8 +3,9 @@
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-from repro.scene import Scene, Source
+from repro.scene import Scene, Source, load_tables
 from repro.scene import load_scene as load_plain
+from repro.scene.keys import SCHEMES
 from repro.schemes import CURVED, PAPER, Scheme
 
 #: The scheme that has elements.
@@ -20,7 +21,7 @@ class Exchange:
     def on(self, scheme: Scheme) -> Scheme:
         """The scheme with these choices. With other elements it has their transfer."""
         choices = dict(self.choices)
-        if "elements" in choices:
+        if choices.get("elements", scheme.elements) != scheme.elements:
             choices = {"transfer": WITH_ELEMENTS[choices["elements"]].transfer, **choices}
         return replace(scheme, **choices)
 
@@ -38,14 +39,26 @@ def load_scene(source: Source, changes: Iterable[Change] = (), unset: Iterable[s
     """A scene with changes of its keys and of its scheme."""
     changes = tuple(changes)
     keys = [change for change in changes if isinstance(change, str)]
-    scene = load_plain(source, keys, unset=list(unset))
     exchanges = [change for change in changes if isinstance(change, Exchange)]
-    return exchanged(scene, *exchanges)
+    unset = list(unset)
+    if not exchanges:
+        return load_plain(source, keys, unset=unset)
+    return load_plain(source, keys, unset=unset, scheme=_exchanged(_scheme(source, keys, unset), exchanges))
 
 
 def exchanged(scene: Scene, *exchanges: Exchange) -> Scene:
     """The scene with other choices of its scheme."""
-    scheme = scene.numerics.scheme
+    return load_plain(scene, scheme=_exchanged(scene.numerics.scheme, exchanges))
+
+
+def _scheme(source: Source, keys: list[str], unset: list[str]) -> Scheme:
+    """The scheme of a scene with changes of its keys. The rules of keys ask the exchanged scheme, not this one."""
+    if isinstance(source, Scene) and source.numerics.exchanged:
+        return source.numerics.exchanged
+    return SCHEMES[load_tables(source, keys, unset).get("numerics", {}).get("preset", "fast")]
+
+
+def _exchanged(scheme: Scheme, exchanges: Iterable[Exchange]) -> Scheme:
     for each in exchanges:
         scheme = each.on(scheme)
-    return load_plain(scene, scheme=scheme) if exchanges else scene
+    return scheme
