@@ -266,7 +266,9 @@ def drawn(seed, preset):
 
 def warnings(changes):
     scene = load_scene("base", changes, unset=["flow.head"])
-    return simplifications.find_warnings(*numbers.evaluate_at_largest(scene, pore.fastest(scene.flow, scene.pore)))
+    width = scene.pore.width
+    plug = numbers.Sizes(scene.growth.end, 3 * width**2, width, 1.5 * width, True)
+    return simplifications.find_warnings(scene, pore.fastest(scene.flow, scene.pore), plug)
 
 
 def setting(warned):
@@ -333,8 +335,9 @@ def test_forces_of_the_fluid_are_advised_and_act_on_a_permeable_aggregate():
     neglected, included = (load_scene("base", [*changes, f"growth.fluid_forces={word}"])
                            for word in ("neglected", "included"))
     state = pore.seeded(neglected)
-    computed = numbers.numbers(neglected, pore.solve(neglected, state).flow.mean_velocity)
-    keys = [[warning.key for warning in simplifications.find_warnings(scene, computed)]
+    speed, sizes = pore.solve(neglected, state).flow.mean_velocity, numbers.reached(state)
+    computed = numbers.numbers(neglected, speed, sizes)
+    keys = [[warning.key for warning in simplifications.find_warnings(scene, speed, sizes)]
             for scene in (neglected, included)]
     assert ["growth.fluid_forces" in each for each in keys] == [True, False]
     stress = next(number.end for number in computed if number.name == "fluid stress over modulus")

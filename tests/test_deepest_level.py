@@ -9,7 +9,8 @@ from repro import load_scene
 from repro.errors import Unresolved
 from repro.march.simulation import simulate
 from repro.model import grading, pore
-from repro.preflight import numbers, simplifications
+from repro.preflight import simplifications
+from repro.preflight.numbers import Sizes
 
 #: A dense aggregate of 20 um that exhausts its supply in a front as thin as the root of the half saturation.
 DENSE = ["numerics.preset=fast", "aggregate.radius=20 um", "kinetics.maximum_density=400 g/L"]
@@ -65,17 +66,18 @@ def test_growth_by_uptake_of_zero_order_runs_past_sharp_fronts():
                "substrates": {"acceptor": {"supply": "0.758 mg/L"}, "donor": {"supply": "3.77 mg/L"}},
                "kinetics": {"law": "zero order"}, "numerics": {"preset": "fast"}}
     scene = load_scene(pore_of)
-    warned = [w.text for w in widened_fronts(scene)]
+    grown = Sizes(3.0, 32 * np.pi, 25.0, 25.0, False)
+    warned = [w.text for w in widened_fronts(scene, grown)]
     pattern = r"acceptor .* ([\d.]+) % too small; numerics\.refinement = ([\d.]+) would"
     lost, advised = re.search(pattern, warned[0]).groups()
     assert len(warned) == 1 and float(lost) > 1
-    assert widened_fronts(load_scene(scene, [f"numerics.refinement={advised}"])) == []
+    assert widened_fronts(load_scene(scene, [f"numerics.refinement={advised}"]), grown) == []
     finer = load_scene(scene, [f"numerics.refinement={2 * scene.numerics.refinement}"])
     made, expected = (last.pore.mass - first.pore.mass for first, *_, last in map(list, map(simulate, (scene, finer))))
     assert made == pytest.approx(expected, rel=float(lost) / 100) and made > 0
 
 
-def widened_fronts(scene):
+def widened_fronts(scene, sizes=None):
     """The warnings of fronts of zero order."""
-    values = numbers.numbers(scene, scene.flow.mean_velocity)
-    return [caveat for caveat in simplifications.find_warnings(scene, values) if "widen the front" in caveat.text]
+    found = simplifications.find_warnings(scene, scene.flow.mean_velocity, sizes)
+    return [caveat for caveat in found if "widen the front" in caveat.text]

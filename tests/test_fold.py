@@ -24,9 +24,7 @@ from repro.model import contact
 from repro.model.energies.neo_hookean import BIOT, CREASE
 from repro.model.pore import seeded, solve
 from repro.model.surface import surface
-from repro.preflight import numbers
-from repro.preflight.numbers import evaluate_at_largest
-from repro.preflight.simplifications import find_warnings, warn_surface
+from repro.preflight.simplifications import warn_surface
 from repro.results import read_table
 from repro.runs.status import is_over
 from repro.scene import load_scene
@@ -232,33 +230,6 @@ def test_distances_on_a_surface_count_from_its_contact_lines(theta):
     assert upstream.any() and (~upstream).any() and profile.place[1] in profile.middles[:, 1]
 
 
-#: A wide, slow pore that folds before the end of its run, at 77 h with fast.
-STARVED = ('numerics.preset="fast"', 'pore.length="2.4 mm"', 'aggregate.radius="10 um"',
-           'flow.mean_velocity="0.3 m/day"', 'growth.end="90 h"')
-
-
-@pytest.mark.parametrize("changes, speed, expected", [
-    ((), 12500.0, True), (("growth.new_biomass=stress_free",), 12500.0, False),
-    (('growth.end="32 h"',), 12500.0, False), (('flow.mean_velocity="10 m/day"',), 416667.0, False),
-    (('flow.mean_velocity="10 m/day"', 'growth.end="900 h"'), 416667.0, False)])
-def test_check_expects_a_fold_of_a_starved_core(changes, speed, expected):
-    """Not in a short run, nor where the flow supplies the core, however long after contact the run ends."""
-    scene = load_scene("wide", [*STARVED, *changes])
-    warnings = find_warnings(*evaluate_at_largest(scene, speed))
-    messages = [warning.text for warning in warnings if "surface may fold" in warning.text]
-    assert len(messages) == expected and all("76.2 um into" in text for text in messages)
-
-
-def test_the_estimate_of_the_rim_is_that_of_a_thin_ring():
-    """A ring of the depth d of the supply grows by exp(mu t) on a core that does not. The radius rises by mu d t."""
-    both = [f'substrates.{name}.{key}="{value} mg/L"' for name in ("acceptor", "donor")
-            for key, value in (("supply", 0.5), ("half_saturation", 1e-3))]
-    scene = load_scene("wide", [*STARVED, *both, 'aggregate.radius="40 um"', 'growth.end="10 h"'])
-    exponent = 10 * numbers.fastest_growth(scene)
-    exact = (1 + exponent * numbers.depth(scene) / 40) * np.exp(-exponent / 2)
-    assert numbers.rim_stretch(scene, 0.0) == pytest.approx(exact, rel=2e-3)
-
-
 def test_the_last_row_of_a_member_counts(monkeypatch, tmp_path):
     """Rows are appended, so a member that runs again has several."""
     record = tmp_path / "pores.jsonl"
@@ -266,9 +237,3 @@ def test_the_last_row_of_a_member_counts(monkeypatch, tmp_path):
     for row in ({"number": 3, "verdict": "end"}, {"number": 1, "verdict": "end"}, {"number": 3, "verdict": "fold"}):
         append(row, record)
     assert family.read_record() == {1: {"number": 1, "verdict": "end"}, 3: {"number": 3, "verdict": "fold"}}
-
-
-@pytest.mark.parametrize(("number", "expected"), [(22, True), (70, True), (90, False)])
-def test_the_family_reads_the_forecast_of_check(number, expected):
-    """Members 22 and 70 fold before and after contact; member 90 stays almost uncompressed."""
-    assert family.is_expected(family.draw_member(number)) is expected

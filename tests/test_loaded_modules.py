@@ -18,7 +18,7 @@ PARTS = {
     "substrates": {f"repro.model.{name}" for name in ("kinetics", "substrates", "transport", "uptake_law")},
     "gear": {"repro.model.gear"}}
 #: Modules that every run with files loads: balances and limits of the surface are in the words of columns, the page
-#: interpolates fields, and `repro.preflight` takes its numbers from the laws of uptake. Order 44 restructures these.
+#: interpolates fields, and `repro.preflight` takes its numbers from the laws of uptake.
 LOADED_TODAY = {"repro.march.balance", "repro.model.surface", "repro.fem.transfer", "repro.model.kinetics",
                 "repro.model.uptake_law"}
 AT_REST = "unset=['growth'], overrides=['numerics.preset=paper'"

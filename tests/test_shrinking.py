@@ -5,9 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from repro import load_scene, simulate
 from repro.cli import main
-from repro.preflight import numbers
 from repro.report import charts, comparison, quantities
 from repro.report.reading import read
 from repro.results import picture, read_table
@@ -97,12 +95,3 @@ def test_a_pore_that_first_conducts_more_clogs_at_half_of_the_start(relative, ex
     times = np.arange(float(len(relative)))
     clogged = table.clogging(times, np.array(relative), 10 - times, 0.5)
     assert clogged == pytest.approx((expected, 10 - expected), rel=1e-12, nan_ok=True)
-
-
-@pytest.mark.parametrize("supply", ["0 mg/L", "0.1 mg/L"])
-def test_the_bound_at_the_end_holds_for_a_decaying_aggregate(supply):
-    """`repro check` bounds the size of the aggregate: a part of the decaying biomass becomes inert."""
-    scene = load_scene("base", ["numerics.preset=fast", f"substrates.donor.supply={supply}", "growth.end=48 h",
-                                "kinetics.decay_coefficient=1 1/day", 'output.times=["48 h"]'])
-    first, *_, last = (instant.pore.boundary.area for instant in simulate(scene))
-    assert last < 0.7 * first and numbers.at_end(scene).area >= last

@@ -73,10 +73,11 @@ def test_a_resume_keeps_the_warnings(tmp_path, checked):
     assert lasting_record(tmp_path) == lasting_record(cached_run(scene))
 
 
-def test_a_failure_of_the_warnings_ends_no_run(monkeypatch):
-    monkeypatch.setattr(simplifications, "find_warnings", Mock(side_effect=OverflowError("math range error")))
-    (warning,) = execution.find_warnings(load_scene("flow_only"), 1.0)
-    assert warning.key == "scene" and "math range error" in warning.text
+def test_a_failure_of_the_warnings_ends_no_run(tmp_path, monkeypatch):
+    monkeypatch.setattr(simplifications.numbers, "numbers", Mock(side_effect=OverflowError("math range error")))
+    run(load_scene("flow_only"), tmp_path)
+    (warning,) = read_record(tmp_path)["warnings"]
+    assert warning["key"] == "scene" and "math range error" in warning["text"]
 
 
 #: The error of the shortest step, 1 h / 1000, is 4e-11. The last step is cut, and rows lie within steps.

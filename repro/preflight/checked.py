@@ -1,9 +1,9 @@
-"""Check a scene before it is run: model, first mesh, numbers, simplifications, and cost."""
+"""Check a scene before it is run: model, first mesh, numbers, simplifications, cost, outlook."""
 
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 
 from repro.errors import SimulationError
@@ -15,7 +15,8 @@ from repro.preflight import cost
 from repro.preflight.cost import Cost
 from repro.preflight.memory import first_nodes, require_memory, require_outline
 from repro.preflight.modelled import describe_model
-from repro.preflight.numbers import Number, evaluate_at_largest
+from repro.preflight.numbers import Number, evaluate_at_largest, reached
+from repro.preflight.outlook import LIMIT, Look, Outlook
 from repro.preflight.resolved import find_unresolved_flow
 from repro.preflight.simplifications import Caveat, find_warnings, warn_missed_tolerance
 from repro.scene import Scene, Source, label, load_scene
@@ -34,7 +35,8 @@ class SceneCheck:
     """Result of :func:`check`; ``print`` shows it.
 
     modelled: (section, words); nodes, triangles: of the first mesh, with six nodes for each curved
-    triangle; estimated: True if these numbers are estimates because the mesh is too large to make.
+    triangle; estimated: True if these numbers are estimates because the mesh is too large to make;
+    outlook: of a coarse run, None if none was made.
     """
 
     scene: str
@@ -45,6 +47,7 @@ class SceneCheck:
     warnings: list[Caveat]
     cost: Cost
     estimated: bool = False
+    outlook: Outlook | None = None
 
     def __str__(self) -> str:
         return report(self)
@@ -59,9 +62,9 @@ class SceneCheck:
 
 
 @typed
-def check(scene: Source, overrides: Sequence[str] = (), *,
-          unset: Sequence[str] = ()) -> SceneCheck:
-    """Check a scene before it is run.
+def check(scene: Source, overrides: Sequence[str] = (), *, unset: Sequence[str] = (),
+          run: bool = True) -> SceneCheck:
+    """Check a scene before it is run, and run it coarsely for a few seconds.
 
     Parameters
     ----------
@@ -71,12 +74,16 @@ def check(scene: Source, overrides: Sequence[str] = (), *,
         Changes of the scene, as for :func:`repro.load_scene`.
     unset : sequence of str, optional
         Keys or sections of the scene to leave out.
+    run : bool, optional
+        Make the first steps of a scene with growth, and run it with the preset ``sketch`` for at
+        most 5 s of wall time.
 
     Returns
     -------
     SceneCheck
         The model in words, the size of the first mesh, the dimensionless numbers, a warning for
-        each simplification that does not hold, and the cost (s, MB). ``print`` shows it.
+        each simplification that does not hold, the cost (s, MB), and the outlook: the time (h) to
+        which the coarse run looked, why no farther, and the time of contact. ``print`` shows it.
 
     Raises
     ------
@@ -90,8 +97,14 @@ def check(scene: Source, overrides: Sequence[str] = (), *,
     >>> repro.check("flow_only").warnings
     []
     """
-    file = label(scene)
-    scene = load_scene(scene, overrides, unset=unset)
+    return examine(load_scene(scene, overrides, unset=unset), label(scene), run, lambda _: None)
+
+
+def examine(scene: Scene, file: str, run: bool, report: Callable[[float], None]) -> SceneCheck:
+    """Check a loaded scene, as :func:`check` does.
+
+    file: its name in messages; report: receives each time (h) that the coarse run reaches.
+    """
     memory_warnings: list[str] = []
     require_outline(scene)
     require_memory(scene, memory_warnings.append)
@@ -101,15 +114,22 @@ def check(scene: Source, overrides: Sequence[str] = (), *,
             Method(scene.numerics.solver).checked()
             nodes, triangles = _mesh_size(scene, estimated)
             poll()
-        trial = cost.run_trial(scene, nodes)
+        trial = cost.run_trial(scene, nodes, run)
         flow = trial.first.solved.flow
+        velocity = flow.mean_velocity if flow else None
         poll()
-        largest, computed = evaluate_at_largest(scene, flow.mean_velocity if flow else None)
-        caveats = [*find_warnings(largest, computed), *find_unresolved_flow(scene),
+        unresolved = [*find_unresolved_flow(scene)]
+        look = Look(scene) if run and scene.growth else None
+        outlook = look.run(report, LIMIT) if look else None
+        end = reached(look.pore) if look and look.pore else None
+        caveats = [*find_warnings(scene, velocity, end), *unresolved,
                    *warn_missed_tolerance(scene, trial.worst, " in the first steps"),
-                   *(Caveat("numerics.refinement", text) for text in memory_warnings)]
+                   *(Caveat("numerics.refinement", text) for text in memory_warnings),
+                   *(look.warnings.values() if look else ())]
+        _, computed = evaluate_at_largest(scene, velocity, end)
+        estimate = cost.estimate_cost(scene, trial, nodes, look)
         return SceneCheck(scene.name, describe_model(scene), nodes, triangles, computed, caveats,
-                          cost.estimate_cost(scene, trial, nodes), estimated)
+                          estimate, estimated, outlook)
     except (SimulationError, ArithmeticError) as error:
         raise SceneError(f"{file}: it cannot be run: {error}") from error
 
@@ -131,8 +151,10 @@ def report(checked: SceneCheck) -> str:
     nodes = f"about {checked.nodes}" if checked.estimated else f"{checked.nodes}"
     lines += ["", f"Mesh at t = 0: {nodes} nodes, {checked.triangles} triangles", ""]
     lines += _cost(checked.cost)
+    if checked.outlook:
+        lines += ["", *_outlook(checked.outlook)]
     if checked.numbers:
-        lines += ["", *_numbers(checked.numbers)]
+        lines += ["", *_numbers(checked.numbers, checked.outlook)]
     lines += ["", *_warnings(checked.warnings)]
     return "\n".join(lines)
 
@@ -142,14 +164,23 @@ def _item(name: str, words: str) -> list[str]:
 
 
 def _cost(estimate: Cost) -> Iterator[str]:
+    memory = f"{estimate.memory:.0f} MB in addition to the program"
+    if estimate.steps is None:
+        yield f"Cost, roughly: {memory}"
+        return
     steps = f"{estimate.steps} steps" if estimate.steps else "no step"
     yield (f"Cost, roughly: {_seconds(estimate.seconds)} ({steps}) without writing files; "
-           f"{estimate.memory:.0f} MB in addition to the program")
-    explanation = ("The time of the first state and steps is measured, and multiplied by the "
-                   "expected number of steps. A step in contact with the opposite wall counts "
-                   f"{cost.IN_CONTACT:g} times. The estimate is right within a factor of three in "
-                   "the paper's pores.")
-    yield from textwrap.wrap(explanation, WIDTH, initial_indent="  ", subsequent_indent="  ")
+           f"{memory}")
+    yield "  The estimate is right within a factor of three in the paper's pores."
+
+
+def _outlook(outlook: Outlook) -> Iterator[str]:
+    reason = outlook.stopped or "the end of the run"
+    look = f"Outlook of a coarse run (preset sketch, {outlook.seconds:.1f} s)"
+    yield from textwrap.wrap(f"{look}: to t = {outlook.time:.4g} h: {reason}", WIDTH,
+                             subsequent_indent="  ")
+    if outlook.contact is not None:
+        yield f"  contact with the opposite wall from t = {outlook.contact:.3g} h on"
 
 
 def _seconds(value: float) -> str:
@@ -159,9 +190,9 @@ def _seconds(value: float) -> str:
     return f"{value / 60:.0f} min" if value < 7200 else f"{value / 3600:.0f} h"
 
 
-def _numbers(computed: list[Number]) -> Iterator[str]:
-    has_end = any(number.end is not None for number in computed)
-    yield f"Numbers{'':23}{'t = 0':>9}{'at end, at most' if has_end else '':>17}".rstrip()
+def _numbers(computed: list[Number], outlook: Outlook | None) -> Iterator[str]:
+    later = f"at {outlook.time:.4g} h" if outlook else ""
+    yield f"Numbers{'':23}{'t = 0':>9}{later:>17}".rstrip()
     for number in computed:
         end = "" if number.end is None else f"{number.end:.2g}"
         yield f"  {number.name:28}{number.start:>9.2g}{end:>17}".rstrip()

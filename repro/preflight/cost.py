@@ -1,12 +1,11 @@
-"""Estimate the cost of a run on this machine: time the first solves, and estimate the steps.
+"""Estimate the cost of a run on this machine from its first steps and a coarse run.
 
-    seconds = first state + (steps until contact + IN_CONTACT x steps after it + ROW x rows)
-                            x one step x REMESHING
+    seconds = first state + one step x (steps x cost of a step over the first ones)
 
-The first step of the midpoint rule is growth.time_step; it doubles up to the length that the
-tolerance allows. Only rows within steps count. The factors are fitted to the packaged scenes, where
-the estimate is right within a factor of three. The estimated memory is the amount that must be free
-when a run begins.
+The first state and steps are made with the scene's own preset and timed. The coarse run
+(:mod:`repro.preflight.outlook`) shows how many steps there are, and how much more than the first
+ones they cost with new and larger meshes and in contact. The estimated memory is the amount that
+must be free when a run begins.
 """
 
 from __future__ import annotations
@@ -24,27 +23,18 @@ from repro.march.simulation import steps as iterate_steps
 from repro.march.state import Report, RestartState
 from repro.march.step_control import SHORTEST, exceeds_tolerance
 from repro.polling import poll
-from repro.preflight import numbers
 from repro.preflight.memory import MB, expected_bytes
+from repro.preflight.outlook import MOST_NODES, Look
 from repro.scene import Scene, needed
 
 #: The state after a step and, if the step is reported, its row.
 ReportedStep: TypeAlias = tuple[RestartState, Report | None]
 
-#: Cost of a later step over the first one: new meshes, and larger ones.
-REMESHING = 1.5
-#: Cost of a step in contact, whose contact lines move and whose stages both have new meshes.
-IN_CONTACT = 4.0
-#: Cost of a row within a step: one of the step's two equilibria and solutions.
-ROW = 0.5
-#: Length of a midpoint step at tolerance 0.01, times the growth rate; it scales with the root of
-#: the tolerance.
-ALLOWED = 0.5
 #: Length of the trial over growth.time_step. Its first step is slow; the fastest one counts.
 FIRST_STEPS = 3
 MOST_STEPS = 9  # of the trial, if its steps are shorter
-#: The trial replaces a larger mesh by a coarser one. Time grows with the nodes to this power.
-MOST_NODES = 5000
+#: The trial replaces a mesh of more than MOST_NODES by a coarser one. Time grows with the nodes to
+#: this power.
 POWER = 1.2
 COARSER = 0.9
 
@@ -67,23 +57,26 @@ class Trial:
 
 @dataclass(frozen=True)
 class Cost:
-    """Estimated steps, seconds and memory (MB, without the program) of a run."""
+    """Estimated steps, seconds and memory (MB, without the program) of a run.
 
-    steps: int
-    seconds: float
+    steps, seconds: None if no step has been made.
+    """
+
+    steps: int | None
+    seconds: float | None
     memory: float
 
 
-def run_trial(scene: Scene, nodes: int) -> Trial:
+def run_trial(scene: Scene, nodes: int, advance: bool = True) -> Trial:
     """Make the first state and steps of the scene, or of a coarser one if it has too many nodes.
 
-    Raises SimulationError if a stage fails.
+    advance: make steps? Raises SimulationError if a stage fails.
     """
     if nodes > MOST_NODES:
         size = scene.numerics.refinement * COARSER * math.sqrt(MOST_NODES / nodes)
         scene = replace(scene, numerics=replace(scene.numerics, refinement=size))
     if scene.growth:
-        end = min(scene.growth.end, FIRST_STEPS * scene.growth.time_step)
+        end = min(scene.growth.end, FIRST_STEPS * scene.growth.time_step) if advance else 0.0
         scene = replace(scene, growth=replace(scene.growth, end=end),
                         output=replace(scene.output, times=(end,), every=None))
     clock = [perf_counter()]
@@ -109,42 +102,47 @@ def _until_the_end(run: Iterator[ReportedStep]) -> Iterator[ReportedStep]:
         return
 
 
-def estimate_cost(scene: Scene, trial: Trial, nodes: int) -> Cost:
-    """Estimate the cost of a run from its trial and the nodes of its first mesh."""
-    free, touching = steps(scene)
-    node_ratio = nodes / trial.nodes
-    factor = (free + IN_CONTACT * touching + ROW * len(rows_within(scene))) * REMESHING
-    seconds = (trial.start + factor * trial.step) * node_ratio**POWER
-    return Cost(free + touching, seconds, expected_bytes(scene) / MB)
+def estimate_cost(scene: Scene, trial: Trial, nodes: int, look: Look | None) -> Cost:
+    """Estimate the cost of a run from its trial, the nodes of its first mesh, and a coarse run.
+
+    look: None if none was made.
+    """
+    growth = look.growth if look and look.steps else None
+    memory = expected_bytes(scene, growth) / MB
+    if scene.growth and scene.growth.end and not (look and look.steps):
+        return Cost(None, None, memory)
+    steps, ratio = expect_steps(scene, look) if look else (0.0, 1.0)
+    factor = ratio * (steps + len(rows_within(scene)) / 2) if steps else 0.0
+    seconds = (trial.start + factor * trial.step) * (nodes / trial.nodes)**POWER
+    return Cost(math.ceil(steps - 1e-9), seconds, memory)
 
 
-def steps(scene: Scene) -> tuple[int, int]:
-    """Number of steps before and after the expected contact with the opposite wall."""
-    if scene.growth is None or scene.growth.end == 0:
-        return 0, 0
-    end = scene.growth.end
-    contact = numbers.at_end(scene.largest).contact
-    free = end if contact is None else min(contact, end)
-    longest = longest_step(scene)
-    total = _count(min(scene.growth.time_step, longest), longest, end)
-    touching = min(total, math.ceil((end - free) / longest - 1e-9))
-    return total - touching, touching
+def expect_steps(scene: Scene, look: Look) -> tuple[float, float]:
+    """Expected number of steps, and their mean cost over that of the first ones.
+
+    A row within a step costs one of the step's two stages, which is half a step. The time that the
+    coarse run did not reach counts like the second half of its steps.
+    """
+    if not look.steps:
+        return 0.0, 1.0
+    counts = [_count(scene, look.scene, length) for length, _ in look.steps]
+    costs = [count * seconds for count, (_, seconds) in zip(counts, look.steps)]
+    half = len(counts) // 2
+    covered = sum(length for length, _ in look.steps)
+    remaining = 0.0 if look.ends else needed(scene.growth, "growth").end - covered
+    share = remaining / sum(length for length, _ in look.steps[half:])
+    count = sum(counts) + share * sum(counts[half:])
+    first = min(seconds for _, seconds in look.steps[:FIRST_STEPS])
+    return count, (sum(costs) + share * sum(costs[half:])) / (first * count)
 
 
-def longest_step(scene: Scene) -> float:
-    """The longest expected step (h)."""
+def _count(scene: Scene, coarse: Scene, length: float) -> float:
+    """Expected number of steps within a step (h) of the coarse run.
+
+    Steps of the midpoint rule scale with the root of the tolerance.
+    """
+    time_step = needed(scene.growth, "growth").time_step
     if not scene.numerics.scheme.controls_error:
-        return scene.growth.time_step
-    rate = abs(numbers.fastest_growth(scene.largest))
-    allowed = ALLOWED * math.sqrt(scene.numerics.tolerance / 0.01)
-    allowed_length = max(allowed / rate, SHORTEST * scene.growth.time_step) if rate else math.inf
-    return min(scene.growth.end, allowed_length)
-
-
-def _count(first: float, longest: float, duration: float) -> int:
-    """Number of steps in a duration (h) if each doubles until the longest is reached."""
-    ramp = math.ceil(math.log2(longest / first))
-    covered = first * (2**ramp - 1)
-    if covered >= duration:
-        return math.ceil(math.log2(duration / first + 1) - 1e-9)
-    return ramp + math.ceil((duration - covered) / longest - 1e-9)
+        return length / time_step
+    finer = math.sqrt(coarse.numerics.tolerance / scene.numerics.tolerance)
+    return min(finer, max(1.0, length / (SHORTEST * time_step)))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import chain
 
 from repro.fem import sizing
 from repro.fem.walls import whole_width
@@ -15,7 +16,7 @@ from repro.model.kinetics import THINNEST
 from repro.model.pore import MOST_REFINED, Pore, film, least_gap, resolution, walls_of
 from repro.model.surface import surface
 from repro.preflight import numbers
-from repro.preflight.numbers import Number
+from repro.preflight.numbers import Number, Sizes
 from repro.scene import Kinetics, Scene
 from repro.scene.keys import RATIO
 
@@ -41,9 +42,6 @@ DRAG = 6.73
 #: Largest growth in a shape update. The update uses the rates at its start and errs by about half
 #: of the growth.
 GROWTH_IN_A_STEP = 0.1
-#: The bound on the time of contact is 10 % early in the paper's pores. An end later than this many
-#: times the bound is long after contact.
-AFTER_CONTACT = 1.2
 #: With fewer distances between nodes across a film, its flow (the cube of its thickness) depends on
 #: the mesh.
 ACROSS_FILM = 4.0
@@ -53,9 +51,6 @@ ACROSS_FILM = 4.0
 FILM_LOSS = 0.01
 #: The uptake of a layer may be too small by this share if elements widen its front.
 FRONT_LOSS = 0.01
-
-#: A fold is expected below this estimate of the rim's stretch (docs/design.md).
-FOLD_EXPECTED = 0.7
 #: The key in the warning of a crease.
 CREASED = "growth.new_biomass"
 #: The field that a warning names if positions at t = 0 fold.
@@ -70,11 +65,25 @@ class Caveat:
     text: str
 
 
-def find_warnings(scene: Scene, computed: list[Number]) -> list[Caveat]:
-    """Every simplification that does not hold; computed: the numbers of the scene."""
+def find_warnings(scene: Scene, velocity: float | None, end: Sizes | None = None) -> list[Caveat]:
+    """Find the simplifications that do not hold at the sizes ``end`` or at t = 0.
+
+    velocity: mean velocity (um/h) at t = 0, None without flow. A check that warns at both has the
+    numbers of ``end``.
+    """
+    checks = _apply(scene, velocity, None)
+    if end:
+        checks = [later or first for first, later in zip(checks, _apply(scene, velocity, end))]
+    return list(chain(*checks))
+
+
+def _apply(scene: Scene, velocity: float | None, end: Sizes | None) -> list[list[Caveat]]:
+    """The warnings of each check at t = 0, or at the sizes ``end``."""
+    largest, computed = numbers.evaluate_at_largest(scene, velocity, end)
     by_name = {number.name: number for number in computed}
-    return [caveat for find, parts in CHECKS.items() if all(_has(scene, part) for part in parts)
-            for caveat in find(scene, by_name)]
+    sizes = end or numbers.at_start(largest)
+    return [list(find(largest, by_name, sizes)) for find, parts in CHECKS.items()
+            if all(_has(scene, part) for part in parts)]
 
 
 def _has(scene: Scene, part: str) -> bool:
@@ -85,7 +94,7 @@ def _has(scene: Scene, part: str) -> bool:
     return section is not None
 
 
-def _inertia(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
+def _inertia(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
     reynolds = computed["Reynolds"].start
     if reynolds > REYNOLDS:
         yield Caveat("flow", f"the Reynolds number is {reynolds:.2g}, above {REYNOLDS:g}: "
@@ -93,7 +102,7 @@ def _inertia(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
                      "viscous forces")
 
 
-def _cells(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
+def _cells(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
     cell = computed["cell Peclet"].start
     if not scene.numerics.scheme.follows_layers and cell > CELL_PECLET:
         required = scene.numerics.refinement * cell / CELL_PECLET
@@ -103,7 +112,7 @@ def _cells(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
                      "themselves")
 
 
-def _diffusivities(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
+def _diffusivities(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
     """Warn if only one of two related values of Table 1 is changed."""
     for name, substrate in scene.substrates.modelled.items():
         table = type(substrate)(supply=substrate.supply)
@@ -114,7 +123,7 @@ def _diffusivities(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
                          'the changed diffusivity in water; "80 %" keeps their ratio (2.2)')
 
 
-def _demand(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
+def _demand(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
     """Warn if Y or d_c is changed but F = COD - Y d_c is not; F occurs in (7) alone."""
     law = scene.kinetics
     table = Kinetics()
@@ -128,7 +137,7 @@ def _demand(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
                      "it is computed")
 
 
-def _lag(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
+def _lag(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
     lag = computed["transport over growth time"].start
     if scene.numerics.transport == "quasi_steady" and lag > LAG:
         permeable = scene.flow is not None and scene.flow.permeability is not None
@@ -138,7 +147,7 @@ def _lag(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
                      f"{'' if permeable else remedy}")
 
 
-def _transit(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
+def _transit(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
     transit = computed.get("transit over growth time")  # not of water that stands still
     if transit and transit.start > TRANSIT:
         yield Caveat("flow", f"water takes {transit.start:.2g} of the time of growth to pass the "
@@ -147,7 +156,7 @@ def _transit(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
                      "fraction")
 
 
-def _forces(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
+def _forces(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
     stress = computed["fluid stress over modulus"]
     strain = max(stress.start, stress.end or 0.0)
     if scene.growth.fluid_forces == "neglected" and strain > STRAIN:
@@ -158,7 +167,7 @@ def _forces(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
                      f"scene neglects it (2.3.3); {setting} models it")
 
 
-def _strengths(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
+def _strengths(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
     """Warn if the forces of the flow do not count against a strength."""
     for key in ("bonding_strength", "tensile_strength"):
         is_set = getattr(scene.growth, key) is not None
@@ -168,7 +177,7 @@ def _strengths(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
                          'growth.fluid_forces = "included" adds the forces')
 
 
-def _support(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
+def _support(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
     """Warn if the shape depends on how a wall bears the water's force on a sliding aggregate."""
     if scene.growth.fluid_forces == "neglected" or scene.growth.wall == "bonded":
         return
@@ -181,13 +190,13 @@ def _support(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
                      'on it by about this fraction; growth.wall = "bonded" computes the traction')
 
 
-def _fronts(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
-    thickness = numbers.at_end(scene).thickness
-    nodes = _interface_size(scene) / scene.numerics.scheme.order
+def _fronts(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
+    thickness = sizes.thickness
+    nodes = _interface_size(scene, thickness) / scene.numerics.scheme.order
     for uptake in numbers.uptakes(scene):
         layer = uptake.layer
         if uptake.law.sharp:
-            yield from _widened_front(scene, uptake)
+            yield from _widened_front(scene, uptake, thickness)
         elif layer < min(nodes, thickness):
             zero_order = uptake.law.saturates(uptake.substrate.supply)
             kind = "zero-order front" if zero_order else "layer of first-order uptake"
@@ -197,10 +206,12 @@ def _fronts(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
                          "in its solution)" + _resolving(resolution(scene) * nodes / layer))
 
 
-def _widened_front(scene: Scene, uptake: numbers.Uptake) -> Iterator[Caveat]:
+def _widened_front(scene: Scene, uptake: numbers.Uptake,
+                   thickness: float) -> Iterator[Caveat]:
     """The uptake of a layer that a front of zero order loses on elements of the interface's size:
     see :meth:`RateLaw.on`."""
-    front = THINNEST * math.sqrt(math.sqrt(3) / 4) * _interface_size(scene)  # equilateral triangles
+    size = _interface_size(scene, thickness)
+    front = THINNEST * math.sqrt(math.sqrt(3) / 4) * size  # equilateral triangles
     lost = (front / uptake.depth) ** 2 if uptake.depth else 0.0
     if lost > FRONT_LOSS:
         yield Caveat("numerics.refinement", f"elements widen the front behind which there is no "
@@ -209,21 +220,20 @@ def _widened_front(scene: Scene, uptake: numbers.Uptake) -> Iterator[Caveat]:
                      + _resolving(resolution(scene) * (lost / FRONT_LOSS) ** 0.5))
 
 
-def _interface_size(scene: Scene) -> float:
-    """The largest size (um) of elements at the interface."""
-    thickness = numbers.at_end(scene).thickness
+def _interface_size(scene: Scene, thickness: float) -> float:
+    """The size (um) of elements at the interface of an aggregate of a thickness (um)."""
     size = min(thickness / sizing.ACROSS_AGGREGATE, scene.pore.width / sizing.ACROSS_PORE)
     return size / resolution(scene)
 
 
-def _drag_layer(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
+def _drag_layer(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
     permeability = scene.flow.permeability
     if permeability is None:
         return
     root = math.sqrt(permeability)
-    size = _interface_size(scene)
+    size = _interface_size(scene, sizes.thickness)
     thickness = size / ACROSS
-    gap = max(scene.pore.width - numbers.at_end(scene).thickness, least_gap(scene))
+    gap = max(scene.pore.width - sizes.thickness, least_gap(scene))
     loss = 3 * (root - permeability / thickness) / gap
     if loss > FILM_LOSS:
         accepted = root / (1 - FILM_LOSS * gap / (3 * root))
@@ -243,7 +253,7 @@ def _resolving(refinement: float) -> str:
     return f"; no refinement up to {MOST_REFINED:g} resolves it"
 
 
-def _seed_film(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
+def _seed_film(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
     _, opposite = walls_of(scene)
     gap = (scene.pore.width - numbers.at_start(scene).thickness) / opposite.part
     share = min(1.0, gap / film(scene))
@@ -256,21 +266,23 @@ def _seed_film(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
                      f"{film(scene):g} um (2.3.3)")
 
 
-def _ends(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
+def _ends(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
     """Warn if the conditions at the pore's ends, of flow or of substrates, are too near."""
     if not (scene.flow or scene.substrates):
         return
-    end = numbers.at_end(scene)
-    free = min(10 * end.thickness, 1.5 * whole_width(walls_of(scene)))
-    if end.reach + free > scene.pore.length / 2:
-        when = "by growth.end" if end.reach > numbers.at_start(scene).reach else "from the start"
-        stops = ", and the run ends if the aggregate reaches one of them" if scene.growth else ""
-        yield Caveat("pore.length", f"the aggregate may come within {free:.3g} um of the pore's "
-                     f"ends {when} (reach {end.reach:.3g} of {scene.pore.length / 2:g} um): the "
-                     f"conditions at the ends (3.1) are then too near{stops}")
+    for reached in (numbers.at_start(scene), sizes):
+        free = min(10 * reached.thickness, 1.5 * whole_width(walls_of(scene)))
+        if reached.reach + free > scene.pore.length / 2:
+            when = f"at t = {reached.time:.3g} h" if reached.time else "from the start"
+            stops = ", and the run ends if the aggregate reaches one of them"
+            yield Caveat("pore.length", f"the aggregate is within {free:.3g} um of the pore's ends "
+                         f"{when} (reach {reached.reach:.3g} of {scene.pore.length / 2:g} um): the "
+                         "conditions at the ends (3.1) are then too near"
+                         + (stops if scene.growth else ""))
+            return
 
 
-def _steps(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
+def _steps(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
     grown = numbers.fastest_growth(scene) * scene.growth.time_step
     if not scene.numerics.scheme.controls_error and grown > GROWTH_IN_A_STEP:
         yield Caveat("growth.time_step", f"the aggregate grows by {100 * grown:.2g} % in a shape "
@@ -297,21 +309,6 @@ def warn_missing_rows(rows: list[tuple[float, str]]) -> Iterator[Caveat]:
                      f"state at this time could not be computed; at {times[0]} h: {rows[0][1]}")
 
 
-def _fold(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
-    """Warn if growth is expected to compress the rim around a starved core into a fold."""
-    if scene.growth.new_biomass != "stressed":
-        return
-    ratios = [number.start for name, number in computed.items() if "Damkoehler" in name]
-    uptake = max(ratios, default=0.0)
-    stretch = numbers.rim_stretch(scene, uptake / numbers.at_start(scene).area)
-    if stretch < FOLD_EXPECTED:
-        yield Caveat("growth.end", f"the surface may fold, which ends the run, before "
-                     f"{scene.growth.end:g} h: the supply reaches {numbers.depth(scene):.3g} um "
-                     f"into an aggregate of up to {numbers.at_end(scene).thickness:.3g} um, and "
-                     f"growth may compress the rim to an elastic stretch of {stretch:.2f} or less "
-                     "(estimate, `repro docs scope`)")
-
-
 def warn_surface(pore: Pore) -> Iterator[Caveat]:
     """Warn if creases begin to lower the energy of the surface, or if positions at t = 0 fold."""
     if not pore.origin_known:
@@ -331,17 +328,8 @@ def warn_surface(pore: Pore) -> Iterator[Caveat]:
                  '"stress_free" avoids this')
 
 
-def _contact(scene: Scene, computed: Numbers) -> Iterator[Caveat]:
-    contact = numbers.at_end(scene).contact
-    if contact is not None and scene.growth.end > AFTER_CONTACT * contact:
-        yield Caveat("growth.end", f"contact with the opposite wall is expected from {contact:.3g} "
-                     f"h on, long before {scene.growth.end:g} h: then conductivity (2.3.3) is "
-                     "accurate to a few percent with the linear triangles of numerics.preset "
-                     '= "paper", and to 1 % with the curved ones of "fast"')
-
-
 #: Each check and the parts of a scene that it needs: a warning mentions no part that is left out.
-CHECKS: dict[Callable[[Scene, Numbers], Iterator[Caveat]], tuple[str, ...]] = {
+CHECKS: dict[Callable[[Scene, Numbers, Sizes], Iterator[Caveat]], tuple[str, ...]] = {
     _inertia: ("flow",),
     _cells: ("flow", "substrates"),
     _diffusivities: ("aggregate", "substrates"),
@@ -356,6 +344,4 @@ CHECKS: dict[Callable[[Scene, Numbers], Iterator[Caveat]], tuple[str, ...]] = {
     _strengths: ("growth", "flow"),
     _support: ("growth", "flow"),
     _steps: ("growth",),
-    _contact: ("growth", "flow"),
-    _fold: ("growth",),
 }

@@ -19,11 +19,9 @@ from repro.errors import CheckpointError, Interrupted, OutputError, RunEnd, Simu
 from repro.march.simulation import ends_soon, same_rows, steps
 from repro.march.state import Report, RestartState
 from repro.polling import polling
-from repro.preflight import simplifications
 from repro.preflight.memory import require_memory, require_outline
-from repro.preflight.numbers import evaluate_at_largest
 from repro.preflight.resolved import find_unresolved_flow
-from repro.preflight.simplifications import Caveat
+from repro.preflight.simplifications import Caveat, find_warnings
 from repro.report.reading import read_record
 from repro.results.files import is_file, read_json, read_sealed
 from repro.runs import INTERVAL, checkpoint
@@ -421,8 +419,12 @@ def _record_steps(recorder: Recorder, run_steps: ReportedSteps, watch: Watch) ->
 
 
 def _warn(recorder: Recorder, scene: Scene, velocity: float | None, watch: Watch) -> None:
-    """Report and record the simplifications that do not hold, as in ``repro check``."""
-    scene_warnings = find_warnings(scene, velocity)
+    """Report and record the simplifications that do not hold at t = 0."""
+    try:
+        scene_warnings = [*find_warnings(scene, velocity), *find_unresolved_flow(scene)]
+    except ArithmeticError as error:
+        text = f"its dimensionless numbers cannot be computed ({error})"
+        scene_warnings = [Caveat("scene", text)]
     recorder.history.warnings = [asdict(warning) for warning in scene_warnings]
     _emit_warnings(scene_warnings, watch)
 
@@ -431,18 +433,6 @@ def _emit_warnings(scene_warnings: list[Caveat], watch: Watch) -> None:
     for warning in scene_warnings:
         message = f"{warning.key}: {warning.text}"
         watch.tell({"event": "warning", "key": warning.key, "message": message})
-
-
-def find_warnings(scene: Scene, velocity: float | None) -> list[Caveat]:
-    """Find the simplifications of a scene that do not hold.
-
-    velocity: mean velocity (um/h) at t = 0, None without flow.
-    """
-    try:
-        largest, computed = evaluate_at_largest(scene, velocity)
-        return [*simplifications.find_warnings(largest, computed), *find_unresolved_flow(scene)]
-    except ArithmeticError as error:
-        return [Caveat("scene", f"its dimensionless numbers cannot be computed ({error})")]
 
 
 def _emit_step(recorder: Recorder, remeshed: bool, contact: bool, watch: Watch) -> None:

@@ -117,24 +117,29 @@ def in_lines() -> Iterator[Tell]:
 
 
 @contextmanager
-def while_checking(scene: str) -> Iterator[None]:
+def while_checking(scene: str) -> Iterator[Callable[[float], None]]:
     """Print a line after each second of a check, from a thread and at each poll.
+
+    Yields a function that receives the time (h) to which the check has looked.
 
     A thread waits while compiled code, such as the mesher, has the interpreter. The check polls
     between its stages, so that one of them is the longest silence.
     """
     begun = printed_at = monotonic()
+    work = "first state and steps are computed"
+
+    def reach(time: float) -> None:
+        nonlocal work
+        work = f"looked to t = {time:.3g} h"
 
     def tick() -> None:
         nonlocal printed_at
         if monotonic() - printed_at > TICK:
             printed_at = monotonic()
-            say(f"{printable(scene)}: first state and steps are computed, "
-                f"{printed_at - begun:.0f} s",
-                to_stderr=True)
+            say(f"{printable(scene)}: {work}, {printed_at - begun:.0f} s", to_stderr=True)
 
     with _call_regularly(tick), polling(tick):
-        yield
+        yield reach
 
 
 @contextmanager

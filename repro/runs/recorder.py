@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable
+from contextlib import suppress
 from dataclasses import asdict, replace
 from pathlib import Path
 from time import perf_counter
@@ -12,8 +13,10 @@ from repro.errors import Interrupted, shell_word
 from repro.march.balance import Ledger
 from repro.march.state import Report, RestartState, sum_counts
 from repro.march.step_control import StepControl, exceeds_tolerance
+from repro.preflight.numbers import reached
 from repro.preflight.simplifications import (
     Caveat,
+    find_warnings,
     warn_missed_tolerance,
     warn_missing_rows,
     warn_surface,
@@ -127,10 +130,20 @@ class Recorder:
             self.history.worst = max(self.history.worst, step_control.estimate)
 
     def warnings_so_far(self) -> list[Caveat]:
-        """Warn if any step so far misses the tolerance, and if any row is missing."""
+        """Warn if any step so far misses the tolerance, if any row is missing, and of each
+        simplification that holds at t = 0 and not at the present size."""
         count = f" in {self.history.missed} of {self.steps} steps"
         return [*warn_missed_tolerance(self.scene, self.history.worst, count),
-                *warn_missing_rows(self.history.missing)]
+                *warn_missing_rows(self.history.missing), *self._warn_of_growth()]
+
+    def _warn_of_growth(self) -> list[Caveat]:
+        if self.scene.growth is None or not (self.state and self.history.rows):
+            return []
+        with suppress(ArithmeticError):  # the warnings at t = 0 report it
+            earlier = {warning["key"] for warning in self.history.warnings}
+            later = find_warnings(self.scene, self.first_velocity, reached(self.state.pore))
+            return [each for each in later if each.key not in earlier]
+        return []
 
     def _add_fields(self, reported: Report) -> None:
         self._write_fields(self.history.index, "fields", reported.pore, reported.solved)

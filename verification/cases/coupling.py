@@ -465,14 +465,16 @@ def _reference():
 @pytest.mark.slow
 @pytest.mark.case(
     "coupling-presets", kind="cross-code",
-    mutants=("curved-rates-of-the-start", "fluid-diffusivity", "uptake-without-decay", "exact-steps-of-accurate"),
+    mutants=("curved-rates-of-the-start", "fluid-diffusivity", "uptake-without-decay", "exact-steps-of-accurate",
+             "sketch-steps-too-long"),
     references=("whole_run",), runs_with="2",
     omitted="paper, order 1: its error is that of linear elements, see bench")
 @parametrize(
-    "bound, preset", {"fast": (1e-2, "fast"), "accurate": (1e-3, "accurate"), "exact": (1e-4, "exact")})
+    "bound, preset", {"sketch": (1e-2, "sketch"), "fast": (1e-2, "fast"), "accurate": (1e-3, "accurate"),
+                      "exact": (1e-4, "exact")})
 def test_presets(bound, preset, record):
-    """Each of the eight numbers of base is within 1 % with preset fast, within 0.1 % with accurate, and within 0.01 %
-    with exact.
+    """Each of the eight numbers of base is within 1 % with presets sketch and fast, within 0.1 % with accurate, and
+    within 0.01 % with exact.
 
     Norm: largest difference at 19.2 and 19.4 h to an independent solver, extrapolated in space and time: relative, of
     effluents over the supply.

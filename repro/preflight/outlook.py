@@ -1,0 +1,118 @@
+"""Look ahead: run a scene coarsely, with the preset ``sketch``, for a few seconds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from time import perf_counter
+from typing import Any
+
+from repro.errors import RunEnd, SimulationError
+from repro.march.simulation import steps
+from repro.model.pore import Pore
+from repro.polling import polling
+from repro.preflight.memory import first_nodes
+from repro.preflight.simplifications import Caveat, warn_surface
+from repro.scene import PRESETS, Scene, needed
+from repro.schemes import CURVED
+
+#: Wall time (s) of a look.
+LIMIT = 5.0
+#: Steps on a mesh with more nodes take a good part of this time.
+MOST_NODES = 5000
+
+
+class _OutOfTime(Exception):
+    """The time of a look is over."""
+
+
+@dataclass(frozen=True)
+class Outlook:
+    """What a coarse run of a scene shows.
+
+    time: simulated time (h) that it reached; stopped: why it went no farther, empty at growth.end;
+    contact: time (h) at which the aggregate first touches the opposite wall, None without contact;
+    seconds: its wall time.
+    """
+
+    time: float
+    stopped: str
+    contact: float | None
+    seconds: float
+
+
+class Look:
+    """A coarse run of a scene, step by step.
+
+    pore: after the last step, None before the first state; steps: length (h) and wall time (s) of
+    each; growth: of the nodes, the largest mesh over the first one; ends: does the model end before
+    growth.end?
+    """
+
+    def __init__(self, scene: Scene):
+        self.scene = sketched(scene)
+        self.pore: Pore | None = None
+        self.steps: list[tuple[float, float]] = []
+        self.growth = 1.0
+        self.ends = False
+        self.contact: float | None = None
+        self.warnings: dict[str, Caveat] = {}
+
+    def run(self, report: Callable[[float], None], limit: float) -> Outlook:
+        """Make steps for ``limit`` s; report: receives the time (h) after each."""
+        start = perf_counter()
+        stopped = self._stop(report, start + limit)
+        time = self.pore.time if self.pore else 0.0
+        return Outlook(time, stopped, self.contact, perf_counter() - start)
+
+    def _stop(self, report: Callable[[float], None], deadline: float) -> str:
+        """Make steps until the deadline or an end; return why they stop, "" at growth.end."""
+        def check() -> None:
+            if perf_counter() > deadline:
+                raise _OutOfTime
+
+        if first_nodes(self.scene) > MOST_NODES:
+            return "its meshes are too large"
+        try:
+            with polling(check):
+                self._run(report)
+        except RunEnd as end:
+            self.ends = True
+            return f"the run ends there: {end}"
+        except _OutOfTime:
+            return "its time is over"
+        except (SimulationError, ArithmeticError) as error:
+            return f"it fails there: {error.__cause__ or error}"
+        return ""
+
+    def _run(self, report: Callable[[float], None]) -> None:
+        nodes = []
+        started = perf_counter()
+        for state, _ in steps(self.scene):
+            before, self.pore = self.pore, state.pore
+            nodes.append(len(state.pore.mesh.points))
+            self.growth = max(nodes) / nodes[0]
+            if self.contact is None and state.pore.contact:
+                self.contact = state.pore.time
+            self.warnings = {each.key: each for each in warn_surface(state.pore)} | self.warnings
+            ended = perf_counter()
+            if before is not None and state.pore.time > before.time:
+                self.steps.append((state.pore.time - before.time, ended - started))
+            started = ended
+            report(state.pore.time)
+
+
+def sketched(scene: Scene) -> Scene:
+    """The scene with the numbers of the preset ``sketch`` and a row at its end alone.
+
+    The curved scheme looks for the paper's. Gear's scheme needs updates of the shape.
+    """
+    numerics = scene.numerics
+    scheme = numerics.scheme if numerics.scheme.order == CURVED.order else CURVED
+    steady = numerics.transport == "quasi_steady"
+    scheme = replace(scheme, steps="midpoint" if steady else "updates")
+    coarse: dict[str, Any] = {"contact_elements": 0.0, **PRESETS["sketch"]}
+    numerics = replace(numerics, preset="sketch", **coarse, exchanged=scheme)
+    end = needed(scene.growth, "growth").end
+    output = replace(scene.output, times=(end,), every=None)
+    return replace(scene, numerics=numerics, output=output)
