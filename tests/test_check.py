@@ -295,7 +295,7 @@ def test_the_outlook_has_the_time_of_contact():
 
 
 def test_a_look_ends_within_a_step():
-    outlook = Look(load_scene("base")).run(pytest.fail, 0.0)
+    outlook = Look(load_scene("base")).run(lambda _: pytest.fail("it does not end"), 0.0)
     assert (outlook.time, outlook.stopped, outlook.contact) == (0.0, "its time is over", None)
 
 
