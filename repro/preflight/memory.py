@@ -37,8 +37,8 @@ PER_NODE = 25e3
 LEAST = 30e6
 #: Nodes of six-node triangles per corner.
 PER_CORNER = 4.0
-#: The largest mesh of a run over its first one. Of 88 pores of verification/problems/family.py, in
-#: coarse runs past contact, it is at most 5.1. A longer pore may need more.
+#: The largest mesh of a run over its first one. Of 100 pores of verification/problems/family.py,
+#: in coarse runs past contact, it is at most 5.1. A longer pore may need more.
 GROWTH = 5.1
 #: Pieces of each edge of an outline, each with its own size.
 PIECES = 16
