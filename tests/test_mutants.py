@@ -19,9 +19,9 @@ TRIED = ("stress-transposed", "pickles-read", "inlet-not-scaled", "yield-dropped
 @pytest.mark.parametrize("id", KNOWN)
 def test_a_mutant_applies_to_the_code_in_one_place_says_what_is_wrong_and_is_still_python(id):
     mutant = KNOWN[id]
-    assert (ROOT / mutant.file).read_text(encoding="utf-8").count(mutant.old) == 1 and mutant.old != mutant.new
-    if mutant.file.endswith(".py"):
-        compile(runner.mutated(mutant), mutant.file, "exec")
+    file, text = runner.mutated(mutant)
+    if file.endswith(".py"):
+        compile(text, file, "exec")
     assert mutant.file.startswith(("repro/", "verification/")) and len(mutant.says.split()) > 2
 
 

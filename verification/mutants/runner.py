@@ -35,6 +35,7 @@ from repro.runs.machine import statements
 from verification.evidence.cases import STAGES, cases
 from verification.evidence.writing import REPORT, ROOT, load, save
 from verification.mutants import Mutant
+from verification.mutants.anchors import AnchorError, change
 
 RECORD = REPORT / "mutants.json"
 #: First words of failures that catch a mutant: of an assertion, of `pytest.fail` or `pytest.raises`, of an error of
@@ -98,14 +99,12 @@ def caught_by(catchers: str) -> dict[str, Mutant]:
     return {id: mutant for id, mutant in mutants_by_id().items() if bool(mutant.tests) == (catchers == "tests")}
 
 
-def mutated(mutant: Mutant) -> str:
-    """The changed text of the file. Raises MutantError unless the text to change occurs exactly once."""
-    text = (ROOT / mutant.file).read_text(encoding="utf-8")
-    count = text.count(mutant.old)
-    if count != 1 or mutant.old == mutant.new:
-        raise MutantError(f"{mutant.id}: the text to change occurs {count} times in {mutant.file}, not once, or it "
-                          "stays the same; adapt the mutant to the code")
-    return text.replace(mutant.old, mutant.new)
+def mutated(mutant: Mutant) -> tuple[str, str]:
+    """The changed file and its text. Raises MutantError unless the code to change is in one place."""
+    try:
+        return change(ROOT, mutant.file, mutant.function, mutant.old, mutant.new)
+    except AnchorError as error:
+        raise MutantError(f"{mutant.id} is stale: {error}; adapt it to the code of {mutant.file}") from None
 
 
 def tests_of(mutant: Mutant) -> dict[str, list[str]]:
@@ -120,7 +119,8 @@ def run(mutant: Mutant, every: bool = False) -> Outcome:
     """Run a mutant in a copy of the project until a case catches it, or against every case or each of its tests."""
     trials: list[Trial] = []
     with copied() as folder:
-        (folder / mutant.file).write_text(mutated(mutant), encoding="utf-8")
+        file, text = mutated(mutant)
+        (folder / file).write_text(text, encoding="utf-8")
         for catcher, tests in tests_of(mutant).items():
             trials.append(trial(folder, catcher, tests))
             if trials[-1].caught and not (every or mutant.tests):
@@ -237,8 +237,8 @@ def fresh() -> set[str]:
 def digest(mutant: Mutant, catchers: Iterable[str]) -> str:
     """16 hexadecimal digits of the mutated file and of the code of some cases or tests."""
     tests = chain.from_iterable(cases()[name].variants.values() if name in cases() else [name] for name in catchers)
-    text = mutated(mutant)
-    hashed = hashlib.sha256((statements(text) if mutant.file.endswith(".py") else text).encode())
+    changed, text = mutated(mutant)
+    hashed = hashlib.sha256((statements(text) if changed.endswith(".py") else text).encode())
     for test in sorted({test.partition("[")[0] for test in tests}):
         file, _, function = test.partition("::")
         text = (ROOT / file).read_text(encoding="utf-8") if (ROOT / file).is_file() else ""
