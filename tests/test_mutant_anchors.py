@@ -62,8 +62,10 @@ def test_an_expression_stays_one_operand(tmp_path):
     ("System.assemble", "mesh.size - self.scale", "mesh.size", CODE.replace("size", "count"), "first = mesh.count"),
     ("total", "a * b", "a + b", CODE.replace("total", "summed"), "a + b"),
     ("System.assemble", "mesh.size - self.scale", "mesh.size", CODE.replace("System", "Matrix"), "first = mesh.size\n"),
+    ("System.scaled", "System.scale", "1.0", f"{CODE}\n    def scaled(self, a):\n        return System.scale".replace(
+        "System", "Matrix"), "return 1.0"),
     ("", "LIMIT = 2.0", "LIMIT = 1.0", CODE.replace("LIMIT", "MOST"), "MOST = 1.0")],
-    ids=["layout", "variable", "attribute", "function", "class", "constant"])
+    ids=["layout", "variable", "attribute", "function", "class", "class in its code", "constant"])
 def test_a_change_of_layout_or_of_a_name_leaves_a_mutant_valid(tmp_path, function, old, new, code, expected):
     file, text = changed(tmp_path, function, old, new, code)
     assert file == "repro/a.py" and expected in text and ast.dump(ast.parse(text)) != ast.dump(ast.parse(code))

@@ -6,9 +6,9 @@ and comments do not matter. An f-string is compared as a whole. Only the source 
 If the function lacks the old code, its names may have changed. Then code matches that differs in names of variables and
 attributes alone, consistently, if the old names have left the function. The new code takes the new names.
 
-If the file lacks the function, the old code must be elsewhere with the same names. It is sought in functions of the
-same name in the file, in the whole file, in functions of the same name in the package, and in the whole package. The
-first of these that has the code must have it once.
+If the file lacks the function, the old code is sought in functions of the same name in other classes of the file, in
+the whole file, in functions of the same name in the package, and in the whole package. The first of these that has the
+code must have it once. Only in the first of them may names have changed.
 
 The text of a file that is not Python is replaced as it is, and must occur once.
 """
@@ -118,7 +118,7 @@ def _search(root: Path, file: Path, function: str) -> Iterator[tuple[list[Scope]
     for files in (own, package.rglob("*.py")):
         scopes = [_whole(each) if isinstance(each, Path) else each for each in files]
         parts = [(name.split(".")[-1], part) for scope in scopes for name, part in _functions(scope)]
-        yield [part for name, part in parts if name and name == function.split(".")[-1]], False
+        yield [part for name, part in parts if name and name == function.split(".")[-1]], files is own
         yield scopes, False
 
 

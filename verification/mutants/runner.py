@@ -1,7 +1,8 @@
 """Run mutants in copies of the project, against the cases or the tests that must catch them.
 
 If cases name a mutant, it is run against them, the quick cases first, until one catches it. With ``--every`` it is run
-against all of them. If a mutant names tests, it is run against each of these.
+against all of them. The slow variants of a case run only if its quick ones pass, and both stop at the first failure. If
+a mutant names tests, it is run against each of these.
 
 A test catches a mutant if an assertion or a check fails, or if ``repro`` raises an error that it defines. Any other
 error, such as an ``AttributeError``, shows that the mutant does not run, and does not count.
@@ -32,7 +33,7 @@ from tempfile import TemporaryDirectory
 from xml.etree import ElementTree
 
 from repro.runs.machine import statements
-from verification.evidence.cases import STAGES, cases
+from verification.evidence.cases import STAGES, Case, cases
 from verification.evidence.writing import REPORT, ROOT, load, save
 from verification.mutants import Mutant
 from verification.mutants.anchors import AnchorError, change
@@ -107,12 +108,22 @@ def mutated(mutant: Mutant) -> tuple[str, str]:
         raise MutantError(f"{mutant.id} is stale: {error}; adapt it to the code of {mutant.file}") from None
 
 
-def tests_of(mutant: Mutant) -> dict[str, list[str]]:
-    """{case or test that must catch a mutant: test ids of pytest}, quick cases first."""
+def tests_of(mutant: Mutant) -> dict[str, list[list[str]]]:
+    """{case or test that must catch a mutant: groups of test ids of pytest}, quick cases first.
+
+    The groups of a case are its quick and its slow variants.
+    """
     if mutant.tests:
-        return {test: [test] for test in mutant.tests}
+        return {test: [[test]] for test in mutant.tests}
     naming = [case for case in cases().values() if mutant.id in case.mutants]
-    return {case.id: [*case.variants.values()] for case in sorted(naming, key=lambda case: not case.quick_numerics)}
+    return {case.id: _groups(case) for case in sorted(naming, key=lambda case: not case.quick_numerics)}
+
+
+def _groups(case: Case) -> list[list[str]]:
+    """The quick and the slow variants of a case, as far as it has any."""
+    groups = [[test for label, test in case.variants.items() if (label in case.slow_variants) == slow]
+              for slow in (False, True)]
+    return [group for group in groups if group]
 
 
 def run(mutant: Mutant, every: bool = False) -> Outcome:
@@ -121,9 +132,13 @@ def run(mutant: Mutant, every: bool = False) -> Outcome:
     with copied() as folder:
         file, text = mutated(mutant)
         (folder / file).write_text(text, encoding="utf-8")
-        for catcher, tests in tests_of(mutant).items():
-            trials.append(trial(folder, catcher, tests))
-            if trials[-1].caught and not (every or mutant.tests):
+        for catcher, groups in tests_of(mutant).items():
+            for tests in groups:
+                last = trial(folder, catcher, tests)
+                if last.caught:
+                    break
+            trials.append(last)
+            if last.caught and not (every or mutant.tests):
                 break
     return Outcome(mutant.id, tuple(trials))
 
@@ -138,10 +153,17 @@ def copied() -> Iterator[Path]:
 
 
 def trial(folder: Path, catcher: str, tests: Iterable[str]) -> Trial:
-    """Run some tests in a copy, and read from the report of pytest whether one catches the mutant."""
+    """Run some tests in a copy until one fails, and read from the report of pytest whether one catches the mutant. If
+    the failure does not count, all of them run."""
+    first = _trial(folder, catcher, [*tests, "-x"])
+    return _trial(folder, catcher, [*tests]) if first.message.startswith("broken") else first
+
+
+def _trial(folder: Path, catcher: str, arguments: list[str]) -> Trial:
+    """Run pytest once, with some arguments."""
     report = folder.parent / "report.xml"
     report.unlink(missing_ok=True)
-    status = _run_tests(folder, report, tests)
+    status = _run_tests(folder, report, arguments)
     if status is None:
         return Trial(catcher, False, f"not done after {LONGEST:g} s")
     if not report.exists():
@@ -161,10 +183,10 @@ def _message(failure: ElementTree.Element) -> str:
     return IN_FIXTURE.sub("", failure.get("message", "")).partition("\n")[0]
 
 
-def _run_tests(folder: Path, report: Path, tests: Iterable[str]) -> int | None:
+def _run_tests(folder: Path, report: Path, arguments: Iterable[str]) -> int | None:
     """Return the exit status of pytest, or None after a timeout. All of its processes are ended."""
     command = [sys.executable, "-m", "pytest", "-n0", "-p", "no:cacheprovider", "-o", "faulthandler_timeout=0",
-               f"--junitxml={report}", *tests]
+               f"--junitxml={report}", *arguments]
     environment = {**os.environ, "PYTHONPATH": str(folder), "HOME": str(folder.parent), "PYTHONDONTWRITEBYTECODE": "",
                    "HYPOTHESIS_PROFILE": "mutants"}
     child = subprocess.Popen(command, cwd=folder, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
