@@ -19,6 +19,7 @@ import contextlib
 import math
 import textwrap
 from collections.abc import Iterator
+from itertools import accumulate
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -131,7 +132,7 @@ def _functions(scope: Scope, name: str = "") -> Iterator[tuple[str, Scope]]:
     """Yield the qualified names and parts of a file, of its functions and of its classes. That of the file is ""."""
     if isinstance(scope.part, ast.Module | ast.FunctionDef | ast.ClassDef):
         yield name, scope
-    for node in ast.iter_child_nodes(scope.part):
+    for node in (each for each in ast.iter_child_nodes(scope.part) if not isinstance(each, ast.expr)):
         inner = f"{name}.{node.name}".lstrip(".") if isinstance(node, ast.FunctionDef | ast.ClassDef) else name
         yield from _functions(scope._replace(part=node), inner)
 
@@ -193,26 +194,29 @@ def _alike(old: Any, code: Any, names: Names) -> bool:
 
 
 def _replace(place: Place, new: list[Any], code: str) -> str:
-    """The source of a file with the new code in a place. Its tree is that of the file with the new nodes."""
+    """The source of a file with the new code in a place. Its statement there has the tree with the new nodes."""
     if place.names:
         for node in (node for each in new for node in ast.walk(each)):
             for field, key in [*_named(node)]:
                 setattr(node, field, place.names.get(key, key[1]))
         code = "\n".join(map(ast.unparse, new))
-    before = ast.dump(place.scope.tree)
+    if [*map(ast.dump, place.nodes)] == [*map(ast.dump, new)]:
+        raise AnchorError("the change is none")
+    around = next(part for part in place.scope.tree.body if any(node is place.nodes[0] for node in ast.walk(part)))
+    index = place.scope.tree.body.index(around)
     value = getattr(place.parent, place.field)
     if isinstance(value, list):
         first = next(k for k, node in enumerate(value) if node is place.nodes[0])
         value[first:first + len(place.nodes)] = new
     else:
         setattr(place.parent, place.field, new[0])
-    after = ast.dump(place.scope.tree)
-    if before == after:
-        raise AnchorError("the change is none")
+    changed = place.scope.tree.body
+    after = [*map(ast.dump, changed[index:index + len(new)])]
     code = textwrap.dedent(code).strip()
     for text in (_with_text(place, code), _with_text(place, f"({code})")):
         with contextlib.suppress(SyntaxError):
-            if ast.dump(ast.parse(text)) == after:
+            body = ast.parse(text).body
+            if len(body) == len(changed) and [*map(ast.dump, body[index:index + len(new)])] == after:
                 return text
     raise AnchorError("the new code has another meaning in its place; change a larger part")
 
@@ -220,7 +224,7 @@ def _replace(place: Place, new: list[Any], code: str) -> str:
 def _with_text(place: Place, text: str) -> str:
     """The source of a file with a text in a place, indented as its first node."""
     source = place.scope.file.read_bytes()
-    starts = [0, *(k + 1 for k, byte in enumerate(source) if byte == ord("\n"))]
+    starts = [0, *accumulate(len(line) + 1 for line in source.split(b"\n"))]
     first, last = place.nodes[0], place.nodes[-1]
     line = min([first.lineno, *(each.lineno for each in getattr(first, "decorator_list", ()))])
     start, end = starts[line - 1] + first.col_offset, starts[last.end_lineno - 1] + last.end_col_offset
