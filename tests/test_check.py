@@ -21,7 +21,7 @@ from repro.preflight import checked, cost, modelled, numbers, outlook, simplific
 from repro.preflight.checked import check
 from repro.preflight.modelled import describe_model
 from repro.preflight.numbers import Sizes
-from repro.preflight.outlook import Look, sketched
+from repro.preflight.outlook import CoarseRun, sketched
 from repro.results.tables import solve
 from repro.runs import progress
 from repro.scene import SceneError, load_scene, packaged_scenes, scene_tables
@@ -263,7 +263,7 @@ def test_an_offset_of_the_seed_adds_to_its_reach():
     ([FAST, "numerics.tolerance=0.01"], [1.0, 1.0, (1.0, 3.0), (1.0, 3.0)], (8, 20 / 8))])
 def test_steps_are_expected_from_those_of_the_coarse_run(changes, lengths, expected):
     scene = load_scene("base", ["growth.end=8 h", *changes])
-    look = Look(scene)
+    look = CoarseRun(scene)
     look.steps = [length if isinstance(length, tuple) else (length, 1.0) for length in lengths]
     assert cost.expect_steps(scene, look) == pytest.approx(expected, rel=1e-12)
     look.ends = True
@@ -287,7 +287,7 @@ def test_the_outlook_has_the_time_of_contact():
     """It is that of the preset fast, to a per cent. The mesh and all steps belong to the coarse run."""
     scene = load_scene("wide", ["aggregate.radius=17.5 um", "pore.width=20 um", "growth.end=1 h", FAST])
     expected = next(state.pore.time for state, _ in simulation.steps(scene) if state.pore.contact)
-    times, look = [], Look(scene)
+    times, look = [], CoarseRun(scene)
     outlook = look.run(times.append, 300.0)
     assert outlook.stopped == "" and outlook.time == times[-1] == 1 and times[0] == 0
     assert outlook.contact == pytest.approx(expected, rel=0.01) and expected < 0.9
@@ -295,7 +295,7 @@ def test_the_outlook_has_the_time_of_contact():
 
 
 def test_a_look_ends_within_a_step():
-    outlook = Look(load_scene("base")).run(lambda _: pytest.fail("it does not end"), 0.0)
+    outlook = CoarseRun(load_scene("base")).run(lambda _: pytest.fail("it does not end"), 0.0)
     assert (outlook.time, outlook.stopped, outlook.contact) == (0.0, "its time is over", None)
 
 
@@ -312,7 +312,7 @@ def test_the_outlook_says_how_a_run_ends():
 def test_the_outlook_of_a_pore_has_its_recorded_end(number, stopped):
     """A pore of the family ends as in fast, and within 5 % of the time."""
     member = family.draw_member(number)
-    outlook = Look(member.scene(*member.duration)).run(lambda _: None, 300.0)
+    outlook = CoarseRun(member.scene(*member.duration)).run(lambda _: None, 300.0)
     row = family.read_record()[number]
     assert outlook.time == pytest.approx(row["times_h"][-1], rel=0.05) and stopped in outlook.stopped
     assert row["status"] == "completed" if stopped == "" else stopped in row["status"]

@@ -34,7 +34,7 @@ CONTRIBUTORS = [
 PUBLIC = USERS + METHODS + CONTRIBUTORS
 #: Names in CONTRIBUTING.md that a contributor writes or reads, and does not call. The keys of Substrate, Acceptor and
 #: Donor state unit, default, range and source in their entries.
-NOT_CALLED = {"caption", "draw", "derived_row", "case", "Substrate", "Acceptor", "Donor", "Stages", "Energy"}
+NOT_CALLED = {"caption", "draw", "derived_row", "case", "Substrate", "Acceptor", "Donor", "Stages", "Energy", "Wall"}
 #: Checks of numpydoc that do not apply: one sentence can be enough (ES01), and texts link what they name (SA01).
 OMITTED = {"ES01", "SA01"}
 UNIT = re.compile(r"\bunits?\b|\b(um|um2|h|s|mg/L|L/mg|MPa|m/d|hours)\b", re.I)

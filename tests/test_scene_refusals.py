@@ -176,7 +176,7 @@ def test_every_key_refuses_values_of_another_kind():
      "flow.viscosity_ratio (5.0) is set too; only one of them is accepted"),
     ("base", ["flow.biomass=brinkman"], "this key was removed; leave it out: an aggregate is permeable with flow.perm"),
     ("base", ["flow.permeability=1e-15 m^2"],
-     'flow.permeability = "1e-15 m^2": numerics.preset = "fast", "accurate" or "exact" is needed with it'),
+     'flow.permeability = "1e-15 m^2": numerics.preset = "fast", "accurate", "exact" or "sketch" is needed with it'),
     ("base", ["numerics.elements=cubic"], 'numerics.elements = "cubic": this key was removed; leave it out'),
     ("base", ["numerics.preset=fast", "flow.permeability=2.49e-20 m^2"],
      'flow.permeability = "2.49e-20 m^2": "2.5e-20 m^2" or more is needed in a pore 50 um wide'),

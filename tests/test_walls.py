@@ -185,7 +185,7 @@ def test_expected_numbers_are_those_of_the_pore_with_its_mirror_image(upper):
                        unset=["flow.head"])
     whole = load_scene(scene, ["pore.width=100 um", "pore.upper_wall=no slip"])
     speed = scene.flow.mean_velocity
-    shear = {each: numbers.stresses(each, speed)[0] for each in (scene, whole)}
+    shear = {each: numbers.stresses(each, speed, None)[0] for each in (scene, whole)}
     assert shear[whole] == pytest.approx(shear[scene] * (1.0 if upper == "symmetry" else 0.5))
     alike = numbers.half_length(scene) == pytest.approx(numbers.half_length(whole))
     assert alike == (upper == "symmetry") and pore.fastest(scene.flow, scene.pore) == speed

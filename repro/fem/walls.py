@@ -69,7 +69,7 @@ class Wall:
 Walls: TypeAlias = tuple[Wall, ...]
 
 
-#: What a wall does, by the words of ``pore.upper_wall``.
+#: What a wall does, by its word in a scene.
 CONDITIONS: dict[str, dict[str, bool]] = {
     "no slip": {},
     "symmetry": {"no_slip": False, "keeps_point": False, "mirrors": True}}

@@ -120,12 +120,12 @@ class Strained:
     @property
     def admissible(self) -> bool:
         """Is J positive, and I below the limit of the energy?"""
-        return bool(self.J.min() > 0 and (self.invariant < self.energy.largest).all())
+        return bool(self.J.min() > 0 and (self.invariant < self.energy.invariant_limit).all())
 
     @cached_property
     def A(self) -> np.ndarray:
         """(...) a J^(-2/3), see :class:`Energy`."""
-        return self.isochoric * self.energy.slope(self.invariant)
+        return self.isochoric * self.energy.stiffness(self.invariant)
 
     @cached_property
     def trace(self) -> np.ndarray:

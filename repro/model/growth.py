@@ -128,8 +128,8 @@ class PressureGradient:
         """The stabilisation on the last known shape (n, 2) um [E6]."""
         expansion = body.strained(last_shape).J[:, 0]
         matrices = gradient_stabilisation(last_shape, body.shape.triangles, expansion)
-        stiffer = np.broadcast_to(body.energy.grown_slope(expansion), expansion.shape)
-        return PressureGradient(matrices / stiffer[:, None, None])
+        relative_modulus = np.broadcast_to(body.energy.growth_stiffness(expansion), expansion.shape)
+        return PressureGradient(matrices / relative_modulus[:, None, None])
 
     @staticmethod
     def parts(growth: np.ndarray) -> int:
@@ -248,7 +248,7 @@ class System:
 
     def _stiffening(self, theta: np.ndarray) -> np.ndarray:
         """gamma a theta^(-5/3)."""
-        grown = self.body.energy.grown_slope(theta)
+        grown = self.body.energy.growth_stiffness(theta)
         return self.stabilisation.gamma * theta ** (-5 / 3) * grown
 
     def _pressed(self, position: np.ndarray, pressure: np.ndarray) -> tuple[Strained, np.ndarray]:

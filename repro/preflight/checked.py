@@ -16,7 +16,7 @@ from repro.preflight.cost import Cost
 from repro.preflight.memory import first_nodes, require_memory, require_outline
 from repro.preflight.modelled import describe_model
 from repro.preflight.numbers import Number, evaluate_at_largest, reached
-from repro.preflight.outlook import LIMIT, Look, Outlook
+from repro.preflight.outlook import LIMIT, CoarseRun, Outlook
 from repro.preflight.resolved import find_unresolved_flow
 from repro.preflight.simplifications import Caveat, find_warnings, warn_missed_tolerance
 from repro.scene import Scene, Source, label, load_scene
@@ -82,8 +82,9 @@ def check(scene: Source, overrides: Sequence[str] = (), *, unset: Sequence[str] 
     -------
     SceneCheck
         The model in words, the size of the first mesh, the dimensionless numbers, a warning for
-        each simplification that does not hold, the cost (s, MB), and the outlook: the time (h) to
-        which the coarse run looked, why no farther, and the time of contact. ``print`` shows it.
+        each simplification that does not hold, the cost (s, MB), and the outlook: the simulated
+        time (h) at which the coarse run stopped, the reason, and the time of contact. ``print``
+        shows it.
 
     Raises
     ------
@@ -119,15 +120,15 @@ def examine(scene: Scene, file: str, run: bool, report: Callable[[float], None])
         velocity = flow.mean_velocity if flow else None
         poll()
         unresolved = [*find_unresolved_flow(scene)]
-        look = Look(scene) if run and scene.growth else None
-        outlook = look.run(report, LIMIT) if look else None
-        end = reached(look.pore) if look and look.pore else None
+        coarse = CoarseRun(scene) if run and scene.growth else None
+        outlook = coarse.run(report, LIMIT) if coarse else None
+        end = reached(coarse.pore) if coarse and coarse.pore else None
         caveats = [*find_warnings(scene, velocity, end), *unresolved,
                    *warn_missed_tolerance(scene, trial.worst, " in the first steps"),
                    *(Caveat("numerics.refinement", text) for text in memory_warnings),
-                   *(look.warnings.values() if look else ())]
+                   *(coarse.warnings.values() if coarse else ())]
         _, computed = evaluate_at_largest(scene, velocity, end)
-        estimate = cost.estimate_cost(scene, trial, nodes, look)
+        estimate = cost.estimate_cost(scene, trial, nodes, coarse)
         return SceneCheck(scene.name, describe_model(scene), nodes, triangles, computed, caveats,
                           estimate, estimated, outlook)
     except (SimulationError, ArithmeticError) as error:
@@ -176,8 +177,8 @@ def _cost(estimate: Cost) -> Iterator[str]:
 
 def _outlook(outlook: Outlook) -> Iterator[str]:
     reason = outlook.stopped or "the end of the run"
-    look = f"Outlook of a coarse run (preset sketch, {outlook.seconds:.1f} s)"
-    yield from textwrap.wrap(f"{look}: to t = {outlook.time:.4g} h: {reason}", WIDTH,
+    heading = f"Outlook of a coarse run (preset sketch, {outlook.seconds:.1f} s)"
+    yield from textwrap.wrap(f"{heading}: to t = {outlook.time:.4g} h: {reason}", WIDTH,
                              subsequent_indent="  ")
     if outlook.contact is not None:
         yield f"  contact with the opposite wall from t = {outlook.contact:.3g} h on"

@@ -24,7 +24,7 @@ from repro.march.state import Report, RestartState
 from repro.march.step_control import SHORTEST, exceeds_tolerance
 from repro.polling import poll
 from repro.preflight.memory import MB, expected_bytes
-from repro.preflight.outlook import MOST_NODES, Look
+from repro.preflight.outlook import MOST_NODES, CoarseRun
 from repro.scene import Scene, needed
 
 #: The state after a step and, if the step is reported, its row.
@@ -102,37 +102,39 @@ def _until_the_end(run: Iterator[ReportedStep]) -> Iterator[ReportedStep]:
         return
 
 
-def estimate_cost(scene: Scene, trial: Trial, nodes: int, look: Look | None) -> Cost:
+def estimate_cost(scene: Scene, trial: Trial, nodes: int, coarse: CoarseRun | None) -> Cost:
     """Estimate the cost of a run from its trial, the nodes of its first mesh, and a coarse run.
 
-    look: None if none was made.
+    coarse: None if none was made.
     """
-    growth = look.growth if look and look.steps else None
+    growth = coarse.node_growth if coarse and coarse.steps else None
     memory = expected_bytes(scene, growth) / MB
-    if scene.growth and scene.growth.end and not (look and look.steps):
+    if scene.growth and scene.growth.end and not trial.step:
         return Cost(None, None, memory)
-    steps, ratio = expect_steps(scene, look) if look else (0.0, 1.0)
+    steps, ratio = expect_steps(scene, coarse) if coarse else (0.0, 1.0)
     factor = ratio * (steps + len(rows_within(scene)) / 2) if steps else 0.0
     seconds = (trial.start + factor * trial.step) * (nodes / trial.nodes)**POWER
     return Cost(math.ceil(steps - 1e-9), seconds, memory)
 
 
-def expect_steps(scene: Scene, look: Look) -> tuple[float, float]:
+def expect_steps(scene: Scene, coarse: CoarseRun) -> tuple[float, float]:
     """Expected number of steps, and their mean cost over that of the first ones.
 
     A row within a step costs one of the step's two stages, which is half a step. The time that the
-    coarse run did not reach counts like the second half of its steps.
+    coarse run did not reach counts like the second half of its steps. Where it has none, steps are
+    expected to be as long as growth.time_step and to cost as much as the first ones.
     """
-    if not look.steps:
-        return 0.0, 1.0
-    counts = [_count(scene, look.scene, length) for length, _ in look.steps]
-    costs = [count * seconds for count, (_, seconds) in zip(counts, look.steps)]
+    if not coarse.steps:
+        growth = needed(scene.growth, "growth")
+        return growth.end / growth.time_step, 1.0
+    counts = [_count(scene, coarse.scene, length) for length, _ in coarse.steps]
+    costs = [count * seconds for count, (_, seconds) in zip(counts, coarse.steps)]
     half = len(counts) // 2
-    covered = sum(length for length, _ in look.steps)
-    remaining = 0.0 if look.ends else needed(scene.growth, "growth").end - covered
-    share = remaining / sum(length for length, _ in look.steps[half:])
+    covered = sum(length for length, _ in coarse.steps)
+    remaining = 0.0 if coarse.ends else needed(scene.growth, "growth").end - covered
+    share = remaining / sum(length for length, _ in coarse.steps[half:])
     count = sum(counts) + share * sum(counts[half:])
-    first = min(seconds for _, seconds in look.steps[:FIRST_STEPS])
+    first = min(seconds for _, seconds in coarse.steps[:FIRST_STEPS])
     return count, (sum(costs) + share * sum(costs[half:])) / (first * count)
 
 

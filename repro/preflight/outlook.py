@@ -1,4 +1,4 @@
-"""Look ahead: run a scene coarsely, with the preset ``sketch``, for a few seconds."""
+"""Run a scene coarsely, with the preset ``sketch``, for a few seconds."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import Any
 
-from repro.errors import RunEnd, SimulationError
+from repro.errors import RunEnd, SimulationError, StageError
 from repro.march.simulation import steps
 from repro.model.pore import Pore
 from repro.polling import polling
@@ -16,19 +16,19 @@ from repro.preflight.simplifications import Caveat, warn_surface
 from repro.scene import PRESETS, Scene, needed
 from repro.schemes import CURVED
 
-#: Wall time (s) of a look.
+#: Wall time (s) of a coarse run.
 LIMIT = 5.0
 #: Steps on a mesh with more nodes take a good part of this time.
 MOST_NODES = 5000
 
 
 class _OutOfTime(Exception):
-    """The time of a look is over."""
+    """The time of a coarse run is over."""
 
 
 @dataclass(frozen=True)
 class Outlook:
-    """What a coarse run of a scene shows.
+    """Result of a coarse run.
 
     time: simulated time (h) that it reached; stopped: why it went no farther, empty at growth.end;
     contact: time (h) at which the aggregate first touches the opposite wall, None without contact;
@@ -41,19 +41,19 @@ class Outlook:
     seconds: float
 
 
-class Look:
+class CoarseRun:
     """A coarse run of a scene, step by step.
 
     pore: after the last step, None before the first state; steps: length (h) and wall time (s) of
-    each; growth: of the nodes, the largest mesh over the first one; ends: does the model end before
-    growth.end?
+    each; node_growth: nodes of the largest mesh over those of the first one; ends: does the model
+    end before growth.end?
     """
 
     def __init__(self, scene: Scene):
         self.scene = sketched(scene)
         self.pore: Pore | None = None
         self.steps: list[tuple[float, float]] = []
-        self.growth = 1.0
+        self.node_growth = 1.0
         self.ends = False
         self.contact: float | None = None
         self.warnings: dict[str, Caveat] = {}
@@ -71,17 +71,17 @@ class Look:
             if perf_counter() > deadline:
                 raise _OutOfTime
 
-        if first_nodes(self.scene) > MOST_NODES:
-            return "its meshes are too large"
         try:
+            if first_nodes(self.scene) > MOST_NODES:
+                return "the meshes of the preset sketch are too large"
             with polling(check):
                 self._run(report)
         except RunEnd as end:
             self.ends = True
             return f"the run ends there: {end}"
         except _OutOfTime:
-            return "its time is over"
-        except (SimulationError, ArithmeticError) as error:
+            return f"its {LIMIT:g} s are over"
+        except (SimulationError, StageError, ArithmeticError) as error:
             return f"it fails there: {error.__cause__ or error}"
         return ""
 
@@ -91,7 +91,7 @@ class Look:
         for state, _ in steps(self.scene):
             before, self.pore = self.pore, state.pore
             nodes.append(len(state.pore.mesh.points))
-            self.growth = max(nodes) / nodes[0]
+            self.node_growth = max(nodes) / nodes[0]
             if self.contact is None and state.pore.contact:
                 self.contact = state.pore.time
             self.warnings = {each.key: each for each in warn_surface(state.pore)} | self.warnings
@@ -105,7 +105,8 @@ class Look:
 def sketched(scene: Scene) -> Scene:
     """The scene with the numbers of the preset ``sketch`` and a row at its end alone.
 
-    The curved scheme looks for the paper's. Gear's scheme needs updates of the shape.
+    A scene with the paper's scheme is run with the curved one. Gear's scheme needs updates of the
+    shape.
     """
     numerics = scene.numerics
     scheme = numerics.scheme if numerics.scheme.order == CURVED.order else CURVED

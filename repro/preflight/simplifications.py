@@ -11,7 +11,6 @@ from repro.fem import sizing
 from repro.fem.walls import whole_width
 from repro.march.step_control import SHORTEST
 from repro.model.brinkman import ACROSS
-from repro.model.energies.neo_hookean import CREASE
 from repro.model.kinetics import THINNEST
 from repro.model.pore import MOST_REFINED, Pore, film, least_gap, resolution, walls_of
 from repro.model.surface import surface
@@ -286,8 +285,8 @@ def _steps(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
     grown = numbers.fastest_growth(scene) * scene.growth.time_step
     if not scene.numerics.scheme.controls_error and grown > GROWTH_IN_A_STEP:
         yield Caveat("growth.time_step", f"the aggregate grows by {100 * grown:.2g} % in a shape "
-                     f"update, above {100 * GROWTH_IN_A_STEP:g} %: it uses the rates at "
-                     'its start; choose a shorter one, or numerics.preset = "fast"')
+                     f"update, above {100 * GROWTH_IN_A_STEP:g} %: an update uses the "
+                     'rates at its start; choose a shorter one, or numerics.preset = "fast"')
 
 
 def warn_missed_tolerance(scene: Scene, worst: float, count: str = "") -> Iterator[Caveat]:
@@ -315,15 +314,16 @@ def warn_surface(pore: Pore) -> Iterator[Caveat]:
         yield Caveat(ORIGIN, f"from t = {pore.time:.4g} h on the positions at t = 0 fold: fields "
                      "have no displacement, position at t = 0, theta and J; nothing else depends "
                      'on them with growth.new_biomass = "stress_free"')
-    if pore.outline is None or pore.body.energy.crease is None:
+    limit = pore.body.energy.crease
+    if pore.outline is None or limit is None:
         return
     crease = surface(pore)
-    if crease.least >= CREASE:
+    if crease.least >= limit:
         return
     x, y = crease.place
     yield Caveat(CREASED, f"from t = {pore.time:.4g} h on growth compresses the aggregate's "
                  f"surface near x = {x:.4g}, y = {y:.4g} um to an elastic stretch of "
-                 f"{crease.least:.3f}, below {CREASE:g}: a crease there would lower the energy, "
+                 f"{crease.least:.3f}, below {limit:g}: a crease there would lower the energy, "
                  "and only a surface without flaws stays smooth; "
                  '"stress_free" avoids this')
 

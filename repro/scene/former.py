@@ -28,8 +28,8 @@ class Former(NamedTuple):
 IN_TABLE = Former(None, "write it in a table: "
                         '{ table = [["0 h", VALUE], ["5 h", VALUE]], between = "linear" }; '
                         "a list has steps")
-OF_SCHEME = ('leave it out: numerics.preset = "paper" has linear elements and updates, "fast", '
-             '"accurate" and "exact" quadratic elements and the midpoint rule; scheme= of '
+OF_SCHEME = ('leave it out: numerics.preset = "paper" and "as_printed" have linear elements and '
+             "updates, the other presets quadratic elements and the midpoint rule; scheme= of "
              "repro.solve has other combinations")
 PRINTED = 'numerics.preset = "as_printed" has the printed one, and'
 

@@ -228,7 +228,7 @@ def _biomass_rules(scene: "Scene", drive: "Flow") -> Rules:
     }
     yield drag and scene.aggregate is None, {
         "flow.permeability": "[aggregate] is needed with it: it is that of the biomass"}
-    requirement = '"fast", "accurate" or "exact" is needed with'
+    requirement = '"fast", "accurate", "exact" or "sketch" is needed with'
     yield drag and scene.numerics.scheme.order == 1, {
         "flow.permeability": f"numerics.preset = {requirement} it: it needs quadratic elements",
         "numerics.preset": f"{requirement} {permeable}, which needs quadratic elements",

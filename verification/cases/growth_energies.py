@@ -16,12 +16,13 @@ from verification.evidence.cases import parametrize
 from verification.evidence.checks import around, at_least, at_most, each_at_most, largest, refine, studies, study
 from verification.problems import bodies
 
-#: J_m. Growth by theta = 36 alone has I - 3 = 3.7; the half-cylinder below comes to 5.3.
+#: J_m. Growth by theta = 36 alone has I - 3 = 3.7; the half-cylinder below comes to 4.2.
 LIMIT = 8.0
-#: Error of the pressure on the finest straight triangles. The first bound was 4e-3, and 4.1e-3 was seen: at the rim a
-#: is 1.7, so the pressure is that much larger than the neo-Hookean one, whose bound is 3e-3.
-LAYER = 5.1e-3
-#: [[a, b], [0, d]] by a, b, d: sheared, squeezed, and grown to 36 times the area. I - 3 comes to 3.3, 1.6 and 4.3.
+#: Error of the pressure on the finest straight triangles, from the layer at the rim in which the stabilisation imposes
+#: dP/dn = 0. It is proportional to the slope of P there over the norm of P, which is 2.08 times that of the neo-Hookean
+#: body, whose bound is 3e-3. The first bound, without this factor, was 4e-3; 4.1e-3 was seen.
+LAYER = 6.2e-3
+#: [[a, b], [0, d]] by a, b, d: sheared, squeezed, and grown to 36 times the area. I - 3 comes to 3.1, 2.4 and 4.5.
 SHEARS = ((1.0, 1.8, 1.1), (0.7, 0.4, 2.5), (5.0, 2.0, 7.2))
 
 
@@ -62,7 +63,7 @@ def test_gent_patch(kind, record):
 @parametrize("kind", bodies.EVERY, slow=("curved",))
 def test_gent_half_cylinder(kind, record):
     """A half-disc with Gent's energy that grows by theta(R), 36 on the rim and 12 in the middle, becomes the exact
-    half-disc, with the exact pressure. That of the neo-Hookean body differs from it by more than a tenth.
+    half-disc, with the exact pressure. That of the neo-Hookean body differs from it by more than a tenth in L2.
     """
     reference = bodies.HalfCylinder(12.0, 36.0)
 
@@ -79,10 +80,11 @@ def test_gent_half_cylinder(kind, record):
               2: {"place": (around(3, 0.4), "quadratic places: third order in L2", 1e-5),
                   "pressure": (2, "linear pressure: second order in L2", 2e-3)}}
     record(studies(refine(errors, REFINEMENTS[kind]), orders[kind]))
-    R = np.linspace(0.1, 0.9, 9) * bodies.RADIUS
-    change = gent.cylinder_pressure(R, 12.0, 24.0, bodies.RADIUS, LIMIT) / neo_hookean.cylinder_pressure(
-        R, 12.0, 24.0, bodies.RADIUS) - 1
-    record(at_least("difference from the neo-Hookean pressure", np.abs(change).max(), 0.1, "the energy matters here"))
+    R = np.linspace(0.01, 1.0, 100) * bodies.RADIUS
+    plain = neo_hookean.cylinder_pressure(R, 12.0, 24.0, bodies.RADIUS)
+    change = gent.cylinder_pressure(R, 12.0, 24.0, bodies.RADIUS, LIMIT) - plain
+    difference = np.sqrt(np.sum(R * change**2) / np.sum(R * plain**2))
+    record(at_least("difference from the neo-Hookean pressure", difference, 0.1, "the energy matters here"))
 
 
 @pytest.mark.case(

@@ -19,6 +19,7 @@ import contextlib
 import math
 import textwrap
 from collections.abc import Iterator
+from functools import lru_cache
 from itertools import accumulate
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -124,7 +125,12 @@ def _search(root: Path, file: Path, function: str) -> Iterator[tuple[list[Scope]
 
 
 def _whole(file: Path) -> Scope:
-    tree = ast.parse(file.read_text(encoding="utf-8"))
+    return _parsed(file, file.read_text(encoding="utf-8"))
+
+
+@lru_cache(maxsize=4)  # neighbouring rows change one file
+def _parsed(file: Path, text: str) -> Scope:
+    tree = ast.parse(text)
     return Scope(file, tree, tree)
 
 
@@ -204,21 +210,31 @@ def _replace(place: Place, new: list[Any], code: str) -> str:
         raise AnchorError("the change is none")
     around = next(part for part in place.scope.tree.body if any(node is place.nodes[0] for node in ast.walk(part)))
     index = place.scope.tree.body.index(around)
-    value = getattr(place.parent, place.field)
-    if isinstance(value, list):
-        first = next(k for k, node in enumerate(value) if node is place.nodes[0])
-        value[first:first + len(place.nodes)] = new
-    else:
-        setattr(place.parent, place.field, new[0])
-    changed = place.scope.tree.body
-    after = [*map(ast.dump, changed[index:index + len(new)])]
+    with _changed_tree(place, new) as changed:
+        count = len(changed)
+        after = [*map(ast.dump, changed[index:index + len(new)])]
     code = textwrap.dedent(code).strip()
     for text in (_with_text(place, code), _with_text(place, f"({code})")):
         with contextlib.suppress(SyntaxError):
             body = ast.parse(text).body
-            if len(body) == len(changed) and [*map(ast.dump, body[index:index + len(new)])] == after:
+            if len(body) == count and [*map(ast.dump, body[index:index + len(new)])] == after:
                 return text
     raise AnchorError("the new code has another meaning in its place; change a larger part")
+
+
+@contextlib.contextmanager
+def _changed_tree(place: Place, new: list[Any]) -> Iterator[list[ast.stmt]]:
+    """The statements of a file with the new nodes in a place, within a context."""
+    value = getattr(place.parent, place.field)
+    if isinstance(value, list):
+        first = next(k for k, node in enumerate(value) if node is place.nodes[0])
+        value[first:first + len(place.nodes)] = new
+        yield place.scope.tree.body
+        value[first:first + len(new)] = place.nodes
+    else:
+        setattr(place.parent, place.field, new[0])
+        yield place.scope.tree.body
+        setattr(place.parent, place.field, value)
 
 
 def _with_text(place: Place, text: str) -> str:

@@ -1728,11 +1728,11 @@ MUTANTS = (
          "check reports a hundredth of the growth in a step.",
          "_steps",
          'Caveat("growth.time_step", f"the aggregate grows by {100 * grown:.2g} % in a shape "\n'
-         '       f"update, above {100 * GROWTH_IN_A_STEP:g} %: it uses the rates at "\n'
-         "       'its start; choose a shorter one, or numerics.preset = \"fast\"')",
+         '       f"update, above {100 * GROWTH_IN_A_STEP:g} %: an update uses the "\n'
+         "       'rates at its start; choose a shorter one, or numerics.preset = \"fast\"')",
          'Caveat("growth.time_step", f"the aggregate grows by {grown:.2g} % in a shape "\n'
-         '       f"update, above {100 * GROWTH_IN_A_STEP:g} %: it uses the rates at "\n'
-         "       'its start; choose a shorter one, or numerics.preset = \"fast\"')",
+         '       f"update, above {100 * GROWTH_IN_A_STEP:g} %: an update uses the "\n'
+         "       'rates at its start; choose a shorter one, or numerics.preset = \"fast\"')",
          "tests/test_check.py::test_a_warning_states_its_numbers"),
         ("diffusivity-said",
          "check reports the ratio of Table 1 as that of the scene.",

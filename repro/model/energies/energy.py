@@ -27,7 +27,7 @@ class Energy(ABC):
     biot: ClassVar[float | None] = None
 
     @property
-    def largest(self) -> float:
+    def invariant_limit(self) -> float:
         """I is smaller than this."""
         return np.inf
 
@@ -37,14 +37,14 @@ class Energy(ABC):
         """The energy of a scene's section [growth]."""
 
     @abstractmethod
-    def slope(self, invariant: np.ndarray) -> np.ndarray | float:
+    def stiffness(self, invariant: np.ndarray) -> np.ndarray | float:
         """(...) a = 2 dw/dI at I (...)."""
 
     @abstractmethod
     def curvature(self, invariant: np.ndarray) -> np.ndarray | None:
         """(...) c = 4 d2w/dI2 at I (...); None if it is zero everywhere."""
 
-    def grown_slope(self, theta: np.ndarray) -> np.ndarray | float:
+    def growth_stiffness(self, theta: np.ndarray) -> np.ndarray | float:
         """(...) a where the aggregate has grown by theta (...) with the same shape: the modulus of
         small strains there is a theta^(-2/3) mu_L."""
-        return self.slope(theta ** (-2 / 3) * (2 * theta + 1))
+        return self.stiffness(theta ** (-2 / 3) * (2 * theta + 1))

@@ -27,11 +27,11 @@ class Gent(Energy):
         return Gent(growth.limiting_invariant)
 
     @property
-    def largest(self) -> float:
+    def invariant_limit(self) -> float:
         """I is smaller than this."""
         return 3 + self.limit
 
-    def slope(self, invariant: np.ndarray) -> np.ndarray:
+    def stiffness(self, invariant: np.ndarray) -> np.ndarray:
         """J_m / (J_m + 3 - I). Raises GrowthError where I is not below its limit."""
         return self.limit / self._room(invariant)
 
@@ -41,7 +41,7 @@ class Gent(Energy):
 
     def _room(self, invariant: np.ndarray) -> np.ndarray:
         """The distance of I from its limit."""
-        room = self.largest - invariant
+        room = self.invariant_limit - invariant
         if room.min() <= 0:
             raise GrowthError(f"the strain reaches the limit of Gent's energy: I - 3 comes to "
                               f"{np.max(invariant) - 3:.3g}, growth.limiting_invariant is "

@@ -34,14 +34,14 @@ class NeoHookean(Energy):
         """The energy, which has no constant but mu_L."""
         return NEO_HOOKEAN
 
-    def slope(self, invariant: np.ndarray) -> float:
+    def stiffness(self, invariant: np.ndarray) -> float:
         """1 everywhere."""
         return 1.0
 
     def curvature(self, invariant: np.ndarray) -> None:
         """Zero everywhere."""
 
-    def grown_slope(self, theta: np.ndarray) -> float:
+    def growth_stiffness(self, theta: np.ndarray) -> float:
         """1 everywhere."""
         return 1.0
 
