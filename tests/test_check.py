@@ -291,12 +291,12 @@ def test_the_outlook_has_the_time_of_contact():
     outlook = look.run(times.append, 300.0)
     assert outlook.stopped == "" and outlook.time == times[-1] == 1 and times[0] == 0
     assert outlook.contact == pytest.approx(expected, rel=0.01) and expected < 0.9
-    assert look.pore.contact and look.growth >= 1 and sum(length for length, _ in look.steps) == pytest.approx(1)
+    assert look.pore.contact and look.node_growth >= 1 and sum(length for length, _ in look.steps) == pytest.approx(1)
 
 
 def test_a_look_ends_within_a_step():
     outlook = CoarseRun(load_scene("base")).run(lambda _: pytest.fail("it does not end"), 0.0)
-    assert (outlook.time, outlook.stopped, outlook.contact) == (0.0, "its time is over", None)
+    assert (outlook.time, outlook.stopped, outlook.contact) == (0.0, "its 0 s are over", None)
 
 
 def test_the_outlook_says_how_a_run_ends():

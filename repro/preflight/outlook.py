@@ -61,12 +61,14 @@ class CoarseRun:
     def run(self, report: Callable[[float], None], limit: float) -> Outlook:
         """Make steps for ``limit`` s; report: receives the time (h) after each."""
         start = perf_counter()
-        stopped = self._stop(report, start + limit)
+        stopped = self._stop(report, limit)
         time = self.pore.time if self.pore else 0.0
         return Outlook(time, stopped, self.contact, perf_counter() - start)
 
-    def _stop(self, report: Callable[[float], None], deadline: float) -> str:
-        """Make steps until the deadline or an end; return why they stop, "" at growth.end."""
+    def _stop(self, report: Callable[[float], None], limit: float) -> str:
+        """Make steps for ``limit`` s or to an end; return why they stop, "" at growth.end."""
+        deadline = perf_counter() + limit
+
         def check() -> None:
             if perf_counter() > deadline:
                 raise _OutOfTime
@@ -80,7 +82,7 @@ class CoarseRun:
             self.ends = True
             return f"the run ends there: {end}"
         except _OutOfTime:
-            return f"its {LIMIT:g} s are over"
+            return f"its {limit:g} s are over"
         except (SimulationError, StageError, ArithmeticError) as error:
             return f"it fails there: {error.__cause__ or error}"
         return ""
