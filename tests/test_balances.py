@@ -143,7 +143,7 @@ def assert_demand(kinetics, ledger, part, round_off):
     assert abs(spent - demanded) <= part * size + round_off * ledger.biomass_before
 
 
-@share(0.25)
+@share(0.1)
 @given(scenes(elements=ANY_ORDER))
 def test_the_oxygen_demand_of_the_midpoint_rule_closes_to_round_off(scene):
     """This holds in each step of any scene, because uptake and growth are one integral over the step's mean biomass."""

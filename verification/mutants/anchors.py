@@ -147,13 +147,16 @@ def _places(scope: Scope, old: list[Any], renames: bool) -> list[Place]:
     """The places of a scope that have the old code, or else those that have it with other names."""
     inside = [*ast.walk(scope.part)]
     ids, present = {*map(id, inside)}, {key for node in inside for _, key in _named(node)}
-    places = []
-    for parent, field, nodes in _runs(scope.tree, len(old), isinstance(old[0], ast.stmt)):
-        names: Names = {}
-        if id(nodes[0]) in ids and _alike(old, nodes, names):
-            changed = {key: new for key, new in names.items() if key[1] != new}
-            if not changed or renames and _may_change(changed, names, present):
-                places.append(Place(scope, parent, field, nodes, changed))
+    places: list[Place] = []
+    for tree in (scope.part, scope.tree):  # the old code may be the function itself
+        for parent, field, nodes in _runs(tree, len(old), isinstance(old[0], ast.stmt)):
+            names: Names = {}
+            if id(nodes[0]) in ids and _alike(old, nodes, names):
+                changed = {key: new for key, new in names.items() if key[1] != new}
+                if not changed or renames and _may_change(changed, names, present):
+                    places.append(Place(scope, parent, field, nodes, changed))
+        if places:
+            break
     return [place for place in places if not place.names] or places
 
 

@@ -253,7 +253,8 @@ def recorded() -> dict[str, dict]:
 def fresh() -> set[str]:
     """The mutants whose record is of the present code."""
     known = mutants_by_id()
-    return {id for id, entry in recorded().items() if entry["digest"] == digest(known[id], entry["caught_by"])}
+    records = sorted(recorded().items(), key=lambda record: known[record[0]].file)  # a file is parsed once
+    return {id for id, entry in records if entry["digest"] == digest(known[id], entry["caught_by"])}
 
 
 def digest(mutant: Mutant, catchers: Iterable[str]) -> str:
