@@ -20,7 +20,7 @@ def add(commands) -> None:
         "check", help="validate a scene and describe its run, or check the files of a run",
         description="Validate a scene, run it coarsely for at most 5 s (preset sketch), and print "
         "its model, its first mesh, its dimensionless numbers, a warning for each simplification "
-        "that does not hold, the cost of a run, and the time to which the coarse run looked. "
+        "that does not hold, the cost of a run, and when and why the coarse run stopped. "
         "Exit status: 0 if the scene can be run, with or without warnings; 2 if not. If SCENE is "
         "the folder of a run, compare the SHA-256 of its files with the recorded ones instead. "
         "Exit status: 0 if all files are unchanged; 2 if not.")

@@ -48,7 +48,7 @@ class Wall:
 
     @property
     def part(self) -> float:
-        """Part of a film, or of the channel, on this side of it: half at a plane of symmetry."""
+        """The part of a film or a channel on this side of the wall: half at a plane of symmetry."""
         return 0.5 if self.mirrors else 1.0
 
     def gap(self, points: np.ndarray) -> np.ndarray:
@@ -95,8 +95,8 @@ def width_between(walls: Walls) -> float:
 
 
 def whole_width(walls: Walls) -> float:
-    """Distance (um) between the walls on which water does not slip: with a plane of symmetry that
-    of the pore with its mirror image."""
+    """Width (um) of the pore. With a plane of symmetry it is that of the pore and its mirror image.
+    """
     width = width_between(walls)
     for wall in walls:
         width /= wall.part

@@ -330,7 +330,7 @@ def _energy_rules(growth: "Growth") -> Rules:
 
 
 def _mirrored_rules(growth: "Growth", upper_wall: str) -> Rules:
-    """What is not verified beside a plane of symmetry: the forces that walls and water exert."""
+    """Beside a plane of symmetry, forces of walls and water are not verified, so not accepted."""
     unverified = {"fluid_forces": growth.fluid_forces == "included",
                   "wall": growth.wall == "bonded",
                   "bonding_strength": growth.bonding_strength is not None,

@@ -45,6 +45,6 @@ class Energy(ABC):
         """(...) c = 4 d2w/dI2 at I (...); None if it is zero everywhere."""
 
     def growth_stiffness(self, theta: np.ndarray) -> np.ndarray | float:
-        """(...) a where the aggregate has grown by theta (...) with the same shape: the modulus of
-        small strains there is a theta^(-2/3) mu_L."""
+        """(...) a after growth by theta (...) without a change of shape. Small strains then have
+        the modulus a theta^(-2/3) mu_L."""
         return self.stiffness(theta ** (-2 / 3) * (2 * theta + 1))
