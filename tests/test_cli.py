@@ -103,7 +103,7 @@ def test_unset_and_set_combine(tmp_path, capsys):
 
 
 #: Commands that write to standard output: a long text, lines, JSON.
-WRITERS = [["scene", "base"], ["scene"], ["check", "base"], ["check", "base", "--json"]]
+WRITERS = [["scene", "base"], ["scene"], ["check", "base", "--no-run"], ["check", "base", "--no-run", "--json"]]
 
 
 def write_to(out, *arguments):

@@ -28,7 +28,7 @@ TWICE = "aggregate_area_um2"
     "coupling-symmetry", kind="property", runs_with="1 2", omitted="exact: accurate has its elements and its steps",
     mutants=("plane-is-a-wall", "plane-keeps-a-point", "inlet-without-the-mirror-image",
              "unmeshed-without-the-mirror-image"))
-@parametrize("preset, bound", PRESETS)
+@parametrize("preset, bound", PRESETS, slow=("paper",))
 def test_symmetry(preset, bound, record):
     """A column below a plane of symmetry grows, clogs its pore and takes up substrates as it does with its mirror
     image in a pore of twice the width.

@@ -57,10 +57,11 @@ def test_gent_patch(kind, record):
             f", a, b, d = {a:g}, {b:g}, {d:g}"))
 
 
+@pytest.mark.slow
 @pytest.mark.case(
     "growth-gent-half-cylinder", kind="exact", references=("gent",), mutants=("gent-limit-of-the-trace",),
     norm="L2 of positions and of the pressure over the body at t = 0, relative")
-@parametrize("kind", bodies.EVERY, slow=("curved",))
+@parametrize("kind", bodies.EVERY)
 def test_gent_half_cylinder(kind, record):
     """A half-disc with Gent's energy that grows by theta(R), 36 on the rim and 12 in the middle, becomes the exact
     half-disc, with the exact pressure. That of the neo-Hookean body differs from it by more than a tenth in L2.

@@ -40,9 +40,10 @@ class AnchorError(ValueError):
 
 
 class Scope(NamedTuple):
-    """A part of a file: a function, or all of it."""
+    """A part of a file: a function, or all of it. lines: the number of lines of the file."""
 
     file: Path
+    lines: int
     tree: ast.Module
     part: ast.AST
 
@@ -131,7 +132,7 @@ def _whole(file: Path) -> Scope:
 @lru_cache(maxsize=4)  # neighbouring rows change one file
 def _parsed(file: Path, text: str) -> Scope:
     tree = ast.parse(text)
-    return Scope(file, tree, tree)
+    return Scope(file, len(text.split("\n")), tree, tree)
 
 
 def _functions(scope: Scope, name: str = "") -> Iterator[tuple[str, Scope]]:
@@ -211,33 +212,38 @@ def _replace(place: Place, new: list[Any], code: str) -> str:
         code = "\n".join(map(ast.unparse, new))
     if [*map(ast.dump, place.nodes)] == [*map(ast.dump, new)]:
         raise AnchorError("the change is none")
-    around = next(part for part in place.scope.tree.body if any(node is place.nodes[0] for node in ast.walk(part)))
-    index = place.scope.tree.body.index(around)
-    with _changed_tree(place, new) as changed:
-        count = len(changed)
-        after = [*map(ast.dump, changed[index:index + len(new)])]
+    tree, line = place.scope.tree, place.nodes[0].lineno
+    whole = place.nodes if place.parent is tree else [next(part for part in tree.body if part.end_lineno >= line)]
+    with _changed_tree(place, new):
+        after = [*map(ast.dump, new if place.parent is tree else whole)]
+    above, below = _first_line(whole[0]) - 1, place.scope.lines - whole[-1].end_lineno
     code = textwrap.dedent(code).strip()
     for text in (_with_text(place, code), _with_text(place, f"({code})")):
+        lines = text.split("\n")
         with contextlib.suppress(SyntaxError):
-            body = ast.parse(text).body
-            if len(body) == count and [*map(ast.dump, body[index:index + len(new)])] == after:
+            if [*map(ast.dump, ast.parse("\n".join(lines[above:len(lines) - below])).body)] == after:
                 return text
     raise AnchorError("the new code has another meaning in its place; change a larger part")
 
 
 @contextlib.contextmanager
-def _changed_tree(place: Place, new: list[Any]) -> Iterator[list[ast.stmt]]:
-    """The statements of a file with the new nodes in a place, within a context."""
+def _changed_tree(place: Place, new: list[Any]) -> Iterator[None]:
+    """Put new nodes in a place, within a context."""
     value = getattr(place.parent, place.field)
     if isinstance(value, list):
         first = next(k for k, node in enumerate(value) if node is place.nodes[0])
         value[first:first + len(place.nodes)] = new
-        yield place.scope.tree.body
+        yield
         value[first:first + len(new)] = place.nodes
     else:
         setattr(place.parent, place.field, new[0])
-        yield place.scope.tree.body
+        yield
         setattr(place.parent, place.field, value)
+
+
+def _first_line(node: Any) -> int:
+    """The line where a node begins, with its decorators."""
+    return min([node.lineno, *(each.lineno for each in getattr(node, "decorator_list", ()))])
 
 
 def _with_text(place: Place, text: str) -> str:
@@ -245,7 +251,6 @@ def _with_text(place: Place, text: str) -> str:
     source = place.scope.file.read_bytes()
     starts = [0, *accumulate(len(line) + 1 for line in source.split(b"\n"))]
     first, last = place.nodes[0], place.nodes[-1]
-    line = min([first.lineno, *(each.lineno for each in getattr(first, "decorator_list", ()))])
-    start, end = starts[line - 1] + first.col_offset, starts[last.end_lineno - 1] + last.end_col_offset
+    start, end = starts[_first_line(first) - 1] + first.col_offset, starts[last.end_lineno - 1] + last.end_col_offset
     indented = textwrap.indent(text, first.col_offset * " ").lstrip(" ")
     return (source[:start] + indented.encode() + source[end:]).decode()

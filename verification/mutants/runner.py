@@ -7,9 +7,10 @@ a mutant names tests, it is run against each of these.
 A test catches a mutant if an assertion or a check fails, or if ``repro`` raises an error that it defines. Any other
 error, such as an ``AttributeError``, shows that the mutant does not run, and does not count.
 
-The record of a mutant, in ``report/mutants.json``, has a digest of the mutated file, of the tests that caught it, and
-of the functions and constants of their modules that they use. The record is stale if one of these changes. It stays
-fresh if something else changes, such as another case in the same module. Comments and docstrings do not count.
+The record of a mutant, in ``report/mutants.json``, has the changed file, and a digest of this file, of the change, of
+the tests that caught it, and of the functions and constants of their modules that they use. The record is stale if one
+of these changes. It stays fresh if something else changes, such as another case in the same module. Comments and
+docstrings do not count.
 """
 
 import argparse
@@ -240,33 +241,47 @@ def judge(outcomes: list[Outcome]) -> bool:
 
 def record(outcome: Outcome) -> None:
     """Replace the record of a mutant."""
-    entry = {"caught_by": outcome.caught_by, "digest": digest(mutants_by_id()[outcome.mutant], outcome.caught_by)}
+    mutant = mutants_by_id()[outcome.mutant]
+    file, _ = mutated(mutant)
+    entry = {"file": file, "caught_by": outcome.caught_by, "digest": digest(mutant, file, outcome.caught_by)}
     save({**recorded(), outcome.mutant: entry}, RECORD)
 
 
 def recorded() -> dict[str, dict]:
-    """{mutant: {"caught_by": [case or test, ...], "digest": digits}} of all mutants."""
+    """{mutant: {"file": file, "caught_by": [case or test, ...], "digest": digits}} of all mutants."""
     records = load(RECORD, {})
-    return {id: records.get(id, {"caught_by": [], "digest": ""}) for id in mutants_by_id()}
+    return {id: records.get(id, {"file": "", "caught_by": [], "digest": ""}) for id in mutants_by_id()}
 
 
 def fresh() -> set[str]:
     """The mutants whose record is of the present code."""
     known = mutants_by_id()
-    records = sorted(recorded().items(), key=lambda record: known[record[0]].file)  # a file is parsed once
-    return {id for id, entry in records if entry["digest"] == digest(known[id], entry["caught_by"])}
+    return {id for id, entry in recorded().items()
+            if entry["digest"] == digest(known[id], entry["file"], entry["caught_by"])}
 
 
-def digest(mutant: Mutant, catchers: Iterable[str]) -> str:
-    """16 hexadecimal digits of the mutated file and of the code of some cases or tests."""
+def digest(mutant: Mutant, file: str, catchers: Iterable[str]) -> str:
+    """16 hexadecimal digits of a mutant, of the file that it changes and of the code of some cases or tests."""
     tests = chain.from_iterable(cases()[name].variants.values() if name in cases() else [name] for name in catchers)
-    changed, text = mutated(mutant)
-    hashed = hashlib.sha256((statements(text) if changed.endswith(".py") else text).encode())
+    hashed = hashlib.sha256(repr((mutant.function, mutant.old, mutant.new)).encode() + _code_of_file(file))
     for test in sorted({test.partition("[")[0] for test in tests}):
-        file, _, function = test.partition("::")
-        text = (ROOT / file).read_text(encoding="utf-8") if (ROOT / file).is_file() else ""
-        hashed.update(statements(code_of(function, text)).encode())
+        in_file, _, function = test.partition("::")
+        hashed.update(_code_of_test(function, in_file))
     return hashed.hexdigest()[:16]
+
+
+@cache
+def _code_of_file(file: str) -> bytes:
+    """A file without comments and docstrings if it is in Python."""
+    text = (ROOT / file).read_text(encoding="utf-8") if (ROOT / file).is_file() else ""
+    return (statements(text) if file.endswith(".py") else text).encode()
+
+
+@cache
+def _code_of_test(function: str, file: str) -> bytes:
+    """The code of a test and of all that it uses, without comments and docstrings."""
+    text = (ROOT / file).read_text(encoding="utf-8") if (ROOT / file).is_file() else ""
+    return statements(code_of(function, text)).encode()
 
 
 @cache
