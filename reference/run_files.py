@@ -275,8 +275,9 @@ class Fields:
         return self.at_nodes[name][self.cells[self.body]] @ SHAPES.T
 
     def wall(self, y: float) -> np.ndarray:
-        """Nodes on a wall."""
-        return np.flatnonzero(self.points[:, 1] == y)
+        """Nodes on a wall, to round-off."""
+        places = self.points[:, 1]
+        return np.flatnonzero(np.abs(places - y) <= SUM * places.max())
 
     def end(self, outlet: bool) -> tuple[np.ndarray, np.ndarray]:
         """Sides (E, 3) at an end of the mesh, corners first, and their lengths (E,), um."""
