@@ -159,9 +159,8 @@ LEAST = 16.7
 UNDER = 0.1
 
 
-def wedge(angle: float, geometry: int) -> Outline:
-    """A plug 20 um high. Its sides meet the upper wall at an angle (degrees) in the fluid."""
-    height = 20.0
+def wedge(angle: float, geometry: int, height: float = 20.0) -> Outline:
+    """A plug as high (um) as its pore. Its sides meet the upper wall at an angle (degrees) in the fluid."""
     side = np.linspace(0, 1, 12 // geometry + 1)[:, None]
     left = [-30.0, 0.0] + np.hstack([(side - 1) / np.tan(np.deg2rad(angle)), side]) * height
     return polygon(np.vstack([left, left[::-1] * [-1, 1]]), channel_walls(height), geometry)
@@ -196,7 +195,7 @@ def in_a_wedge(preset: str) -> list:
 
 def _loss(scene: Scene) -> float:
     """Loss over the meshed part, 1/um."""
-    grid, _ = pore.Meshing.of(scene).generate(wedge(LEAST, scene.numerics.scheme.order))
+    grid, _ = pore.Meshing.of(scene).generate(wedge(LEAST, scene.numerics.scheme.order, scene.pore.width))
     return flow.unit_flow(Space(grid), scene.flow.viscosity_ratio).loss
 
 
