@@ -385,6 +385,16 @@ def test_contact_begins_on_both_sides_of_the_highest_point(plugged):
     assert all(line.advance == line.least == line.short > 0 for line in upper)
 
 
+def test_contact_begins_beside_a_line_that_lies_within_an_arc():
+    """Lines on the first wall divide arcs in the shape that comes too near to the other wall."""
+    scene = load_scene("wide", ["numerics.preset=fast", "pore.width=25 um", "aggregate.radius=22.8 um"])
+    pore = seeded(scene)
+    search = contact_lines.SearchOptions(landing=-np.inf, advances={(BOTTOM, 1): 0.7, (BOTTOM, -1): 0.7})
+    expansion = contact.expand(contact.Mechanics.of(scene), pore, 1.02 * pore.theta, search=search)
+    assert expansion.division is not None and expansion.pore.contact
+    assert len(expansion.pore.wall) > len(pore.wall)
+
+
 def without_newton(monkeypatch):
     """The search with whole equilibria places all contact lines."""
     monkeypatch.setattr(contact._Trials, "settle", lambda *_: None)

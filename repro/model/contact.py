@@ -339,7 +339,7 @@ def _touch(grown: Pore, shape: Expansion, rule: Clearance, trials: _Trials,
     force at a single point would indent an elastic body without limit. If the body is too pointed
     to be flat over this length, contact covers half of it, or a quarter.
     """
-    outline = shape.pore.boundary
+    outline = replace(grown.boundary, points=shape.position[grown.mesh.loop])
     nearest, *_ = outline.untouched(rule.walls)
     lengths = rule.film * FIRST_LENGTHS
     width = _tip_width(outline, nearest, rule.film * nearest.part)
