@@ -11,7 +11,7 @@ from repro import Scene
 from repro.fem.outline import Outline, half_disc
 from repro.fem.sizing import ACROSS_AGGREGATE
 from repro.fem.walls import BOTTOM, TOP, channel_walls
-from repro.model.contact import closing_nodes
+from repro.model.closing_by_nodes import closing_nodes
 
 TITLE = "Figure 2. The pore, its domains and boundaries"
 RUNS = ()

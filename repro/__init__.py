@@ -47,7 +47,9 @@ Sections of the paper and their modules, which name the equations that they solv
     2.3  energies              (17)         repro.model.energies
     3.4  biomass               (28)-(34)    repro.model.biomass, .growing
     2.3.2  fluid forces        (20), (22)   repro.model.traction, .support (along a wall)
-    2.3.3  contact                          repro.model.contact, .contact_lines, .contact_newton
+    2.3, 3.4  shape in contact              repro.model.contact, .mechanics (one equilibrium)
+    2.3.3  closing of films                 repro.model.closing_by_nodes, .closing_by_lines
+           contact lines                    repro.model.contact_lines, .contact_newton
     5    adhesion, tearing                  repro.model.adhesion
          limits of the surface              repro.model.surface
     3.5  mesh motion           (35)         repro.model.mesh_motion

@@ -17,7 +17,7 @@ from repro.fem.outline import half_disc as half_disc_outline
 from repro.fem.sizing import Sizing
 from repro.fem.space import Space
 from repro.fem.walls import BOTTOM, FREE, TOP, channel_walls
-from repro.model import contact, pore
+from repro.model import mechanics, pore
 from repro.model.energies import NEO_HOOKEAN
 from repro.scene import parse_scene
 from repro.schemes import PAPER
@@ -229,7 +229,7 @@ def body_of(grid, around):
     walls and x at fixed points) and its boundary nodes."""
     body = pore.material(Space(grid), grid.points[grid.body], NEO_HOOKEAN)
     rim = grid.topology.body_loop
-    return body, contact.constrained(len(grid.body), rim, around.wall, around.fixed), rim
+    return body, mechanics.constrained(len(grid.body), rim, around.wall, around.fixed), rim
 
 
 def half_disc(radius, refinement=1.0, width=50.0, geometry=1):

@@ -57,9 +57,9 @@ FOLLOWED = {
             "tests/test_advice.py::test_an_unresolved_front_gets_advice_once_and_it_helps",
         "leave numerics.solver out": PACKAGES,
         'growth.wall = "sliding" is another model': "base: it stops at 14 h on a bonded wall, not on a sliding one"},
+    "model/closing_by_lines.py": {"no setting helps": "member 61 of the hard family, without advice"},
     "model/contact.py": {
-        'growth.shear_modulus, or growth.fluid_forces = "neglected"': "two drawn scenes of soft bodies in fast flow",
-        "no setting helps": "member 61 of the hard family, without advice"},
+        'growth.shear_modulus, or growth.fluid_forces = "neglected"': "two drawn scenes of soft bodies in fast flow"},
     "model/gear.py": {"try numerics.transport = ":
                       "tests/test_advice.py::test_profiles_at_rest_help_where_those_in_time_do_not_settle"},
     "model/growth.py": {"try a larger growth.shear_modulus": "members 151 and 171 of the hard family"},

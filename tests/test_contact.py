@@ -17,8 +17,11 @@ from repro.march import midpoint, simulation
 from repro.march.simulation import simulate
 from repro.march.state import RestartState
 from repro.march.step_control import StepControl
-from repro.model import contact, contact_lines, contact_newton
-from repro.model.contact_lines import Clearance, Contact, surface_ends
+from repro.model import closing_by_lines, contact, contact_lines, contact_newton, growth
+from repro.model.closing_by_lines import ByLines, divided
+from repro.model.closing_by_nodes import closing_nodes
+from repro.model.contact_lines import PATIENT, Clearance, Contact, surface_ends
+from repro.model.mechanics import Mechanics
 from repro.model.pore import initial_outline, seeded
 from repro.runs.execution import Watch, resume, run
 from repro.runs.state_arrays import pack_state, unpack_state
@@ -45,7 +48,7 @@ def beside_upper_contact(gap):
 
 
 def joins(outline, width=100.0):
-    return contact.closing_nodes(outline, channel_walls(width), FILM, ANGLE).tolist()
+    return closing_nodes(outline, channel_walls(width), FILM, ANGLE).tolist()
 
 
 NONE = [FREE] * 6
@@ -159,7 +162,7 @@ def test_a_division_also_divides_the_reference_of_strain(plugged, division):
     last = 1.01 * pore.mesh.points[pore.mesh.body]
     free = np.full(2, FREE)
     touching = Contact(pore.wall, division.arcs, division.t, free, free)
-    parted = contact.divided(replace(pore, last=last), division, touching)
+    parted = divided(replace(pore, last=last), division, touching)
     assert parted.unstrained == pytest.approx(1.01 * division.mesh.points[division.mesh.body], rel=1e-13)
 
 
@@ -173,7 +176,7 @@ def grown_lines(pore, advance):
 
 def expanded_by(scene, pore, factor, guess=None):
     """The new shape of a pore whose biomass has grown by a factor."""
-    return contact.expand(contact.Mechanics.of(scene), pore, factor * pore.theta, guess)
+    return contact.expand(Mechanics.of(scene), pore, factor * pore.theta, guess)
 
 
 @pytest.mark.parametrize("rheology", ["stressed", "stress_free"])
@@ -182,9 +185,8 @@ def test_the_residual_changes_with_a_line_as_its_slope_says(plugged, rheology):
     without the support, whose load changes with the line, too."""
     scene, pore = plugged
     scene = load_scene(scene, [f"growth.new_biomass={rheology}"])
-    rule = Clearance(channel_walls(scene.pore.width), scene.growth.minimum_film, scene.growth.minimum_contact_angle)
-    trials = contact._Trials(contact.Mechanics.of(scene), pore, pore, None, True)
-    here, there = (trials._place(pore, pore.wall, grown_lines(pore, advance), rule) for advance in (0.4, 0.4 + 1e-6))
+    closing = ByLines(Mechanics.of(scene), pore, pore, None, PATIENT)
+    here, there = (closing._place(pore, pore.wall, grown_lines(pore, advance)) for advance in (0.4, 0.4 + 1e-6))
     here.system.supports = there.system.supports = ()
     position, pressure = here.divided(pore.mesh.points, 0.3 + 0 * pore.pressure)
     position = position + 0.01 * np.sin(position)
@@ -237,7 +239,7 @@ def test_lines_advance_the_farther_the_more_biomass_grows(plugged):
 @pytest.mark.parametrize("factor", [1.029])
 def test_newton_places_a_line_whose_clearance_jumps_at_a_corner(factor, plugged, monkeypatch):
     """The line is too short before the corner, and far enough beyond it. The search does not take over."""
-    monkeypatch.setattr(contact.growth, "equilibrium", lambda *_, **__: pytest.fail("the search took over"))
+    monkeypatch.setattr(growth, "equilibrium", lambda *_, **__: pytest.fail("the search took over"))
     expanded_by(*plugged, factor)
 
 
@@ -275,7 +277,7 @@ def test_stationary_lines_stay_where_the_last_round_of_fluid_forces_left_them(pl
     moved = expanded_by(scene, pore, 1.03).advances
     asked = {key: 0.8 * advance for key, advance in moved.items()}
     search = contact_lines.SearchOptions(stationary=True, advances=asked)
-    kept = contact.expand(contact.Mechanics.of(scene), pore, 1.03 * pore.theta, search=search).advances
+    kept = contact.expand(Mechanics.of(scene), pore, 1.03 * pore.theta, search=search).advances
     assert max(abs(asked[key] - moved[key]) for key in moved) > 0.05
     assert kept == pytest.approx(asked, rel=1e-9)
 
@@ -376,7 +378,7 @@ def test_contact_begins_on_both_sides_of_the_highest_point(plugged):
     _, pore = plugged
     *_, upper_wall = pore.mesh.walls
     free = replace(pore.boundary, wall=np.where(pore.wall == TOP, FREE, pore.wall))
-    wall, lines = contact._first_contact(free, upper_wall, FILM)
+    wall, lines = closing_by_lines._first_contact(free, upper_wall, FILM)
     (corner,) = np.flatnonzero(wall == TOP)
     upper = [line for line in lines if line.wall == TOP]
     lengths = {line.direction: contact_lines.to_length(replace(free, wall=wall), line) for line in upper}
@@ -390,14 +392,14 @@ def test_contact_begins_beside_a_line_that_lies_within_an_arc():
     scene = load_scene("wide", ["numerics.preset=fast", "pore.width=25 um", "aggregate.radius=22.8 um"])
     pore = seeded(scene)
     search = contact_lines.SearchOptions(landing=-np.inf, advances={(BOTTOM, 1): 0.7, (BOTTOM, -1): 0.7})
-    expansion = contact.expand(contact.Mechanics.of(scene), pore, 1.02 * pore.theta, search=search)
+    expansion = contact.expand(Mechanics.of(scene), pore, 1.02 * pore.theta, search=search)
     assert expansion.division is not None and expansion.pore.contact
     assert len(expansion.pore.wall) > len(pore.wall)
 
 
 def without_newton(monkeypatch):
     """The search with whole equilibria places all contact lines."""
-    monkeypatch.setattr(contact._Trials, "settle", lambda *_: None)
+    monkeypatch.setattr(ByLines, "settle", lambda *_: None)
 
 
 @pytest.mark.parametrize("method, preset", [
@@ -451,9 +453,9 @@ def test_a_trial_starts_from_a_shape_in_which_no_triangle_is_turned_over():
     """The last trial's shape is the first guess; a mirrored shape cannot be the start."""
     scene = load_scene("base", ['numerics.preset="fast"'])
     seed = seeded(scene)
-    trials = contact._Trials(contact.Mechanics.of(scene), seed, seed, None, True)
-    trials._shapes = [(np.zeros(2), seed.mesh.points * [-1.0, 1.0], seed.pressure)]
-    assert np.array_equal(trials._first(seed, np.zeros(2)).mesh.points, seed.mesh.points)
+    closing = ByLines(Mechanics.of(scene), seed, seed, None, PATIENT)
+    closing._shapes = [(np.zeros(2), seed.mesh.points * [-1.0, 1.0], seed.pressure)]
+    assert np.array_equal(closing._first(seed, None, np.zeros(2)).mesh.points, seed.mesh.points)
 
 
 @EVERY_ORDER
@@ -466,7 +468,7 @@ def test_each_contact_surface_has_its_own_fixed_point(order):
     x, y = pore.mesh.points[pore.mesh.loop][pore.fixed].T
     assert y == pytest.approx([0.0, 20.0]) and x == pytest.approx([-2.0, -1.0], abs=0.3)
     aside = replace(pore, fixed=np.roll(pore.fixed, pore.mesh.geometry))
-    shape = contact.expand(contact.Mechanics.of(scene), aside, 1.02 * aside.theta).pore
+    shape = contact.expand(Mechanics.of(scene), aside, 1.02 * aside.theta).pore
     before, after = (one.mesh.points[one.mesh.loop][one.fixed] for one in (aside, shape))
     assert len(before) == 2 and after == pytest.approx(before, abs=1e-9) and abs(before[:, 0] - x).min() > 0.3
 
@@ -493,7 +495,7 @@ def test_a_bonded_lower_wall_leaves_the_upper_wall_sliding(bonded, preset):
     scene = load_scene("base", [TOWER, f"growth.wall={'bonded' if bonded else 'sliding'}", f"numerics.preset={preset}",
                                 "numerics.refinement=0.3"], unset=["aggregate.radius"])
     start = seeded(scene)
-    expansion = contact.expand(contact.Mechanics.of(scene), start, 1.05 * start.theta)
+    expansion = contact.expand(Mechanics.of(scene), start, 1.05 * start.theta)
     outline = start.boundary
     moves = (expansion.position[start.mesh.loop] - outline.points)[:, 0]
     for wall in (BOTTOM, TOP):

@@ -10,13 +10,14 @@ import pytest
 
 from repro.errors import GrowthError, MeshError, TransferError, TransportError
 from repro.fem import transfer
-from repro.fem.walls import channel_walls
 from repro.march import midpoint
 from repro.march.simulation import simulate
-from repro.model import contact, contact_lines, contact_newton, gear, growing, growth, mesh_motion, surface, transport
+from repro.model import contact_lines, contact_newton, gear, growing, growth, mesh_motion, surface, transport
 from repro.model.biomass import Rates
-from repro.model.contact_lines import Clearance
+from repro.model.closing_by_lines import ByLines
+from repro.model.contact_lines import PATIENT
 from repro.model.kinetics import Sink
+from repro.model.mechanics import Mechanics
 from repro.model.pore import seeded, solve_flow
 from repro.model.uptake_law import LAWS
 from repro.scene import load_scene
@@ -55,24 +56,23 @@ def test_an_equilibrium_from_a_triangle_that_is_turned_over_fails_in_growth(geom
 
 @cache
 def tower():
-    """Trials of a tower from wall to wall that has grown by 5 %, its contact lines, and the rule for them."""
+    """The closing of a tower from wall to wall that has grown by 5 %, the tower, and its contact lines."""
     scene = load_scene("base", [TOWER, *FAST], unset=["aggregate.radius"])
     start = seeded(scene)
     grown = replace(start, theta=1.05 * start.theta)
-    rule = Clearance(channel_walls(50.0), scene.growth.minimum_film, scene.growth.minimum_contact_angle)
     lines = contact_lines.lines_of(grown.boundary)
-    return contact._Trials(contact.Mechanics.of(scene), grown, start, None, True), grown, lines, rule
+    return ByLines(Mechanics.of(scene), grown, start, None, PATIENT), grown, lines
 
 
 def test_contact_lines_from_a_triangle_that_is_turned_over_fail_in_growth():
     """The search with whole equilibria then takes over."""
-    trials, grown, lines, rule = tower()
+    closing, grown, lines = tower()
     bad = turned_over(grown.mesh.points, grown.mesh.body)
-    place = partial(trials._place, grown, grown.wall, lines, rule)
+    place = partial(closing._place, grown, grown.wall, lines)
     with pytest.raises(GrowthError, match=OUT_OF_DOMAIN):
         contact_newton.Coupled(place, lines, bad, grown.pressure).solve()
-    trials._shapes[-1] = (np.zeros(0), bad, grown.pressure)
-    assert trials.settle(grown.wall, lines, rule) is None and not any(line.advance for line in lines)
+    closing._shapes[-1] = (np.zeros(0), bad, grown.pressure)
+    assert closing.settle(grown.wall, lines) is None and not any(line.advance for line in lines)
 
 
 @cache

@@ -22,6 +22,7 @@ from repro.march.state import Compression, InterpolatedState, RestartState, Step
 from repro.march.step_control import StepControl
 from repro.model import contact
 from repro.model.energies.neo_hookean import BIOT, CREASE
+from repro.model.mechanics import Mechanics
 from repro.model.pore import seeded, solve
 from repro.model.surface import surface
 from repro.preflight.simplifications import warn_surface
@@ -96,7 +97,7 @@ def compressed(theta):
     """The plug after uniform growth by theta, with the concentrations in its new shape."""
     scene = plug()
     seed = seeded(scene)
-    pore = contact.expand(contact.Mechanics.of(scene), seed, np.full_like(seed.theta, theta)).pore
+    pore = contact.expand(Mechanics.of(scene), seed, np.full_like(seed.theta, theta)).pore
     pore = replace(pore, active=theta * pore.active, inert=theta * pore.inert, time=1.0)
     return replace(pore, concentrations=solve(scene, pore).concentrations)
 

@@ -9,8 +9,8 @@ from tests.blocks import ROOT
 #: Modules by the part of a scene that switches them on.
 PARTS = {
     "growth": {*(f"repro.model.{name}" for name in (
-        "adhesion", "biomass", "contact", "contact_lines", "contact_newton", "growing", "growth", "mesh_motion",
-        "remeshing", "stages", "support", "surface", "traction")),
+        "adhesion", "biomass", "closing_by_lines", "closing_by_nodes", "contact", "contact_lines", "contact_newton",
+        "growing", "growth", "mechanics", "mesh_motion", "remeshing", "stages", "support", "surface", "traction")),
         "repro.fem.division", "repro.fem.transfer",
         *(f"repro.march.{name}" for name in ("balance", "ends", "folding", "loop"))},
     "midpoint": {"repro.march.midpoint", "repro.march.stepping"},

@@ -17,6 +17,7 @@ from repro.fem import sizing
 from repro.fem.walls import BOTTOM, TOP, channel_walls
 from repro.march.simulation import shaped
 from repro.model import contact, pore
+from repro.model.mechanics import Mechanics
 from repro.preflight import numbers, simplifications
 from tests.strategies import EVERY_ORDER, MIRRORS, outlines
 from tests.test_derived import SHAPE, SPANNING, drawn
@@ -56,7 +57,7 @@ def grown(order, spans, image):
     growth = 1.5 + 0.01 * x + 0.005 * y if spans else 1.02 + 0.001 * x
     seed = replace(seed, theta=growth[:, None] * seed.theta)
     seed = MIRRORS[image](seed) if image else seed
-    return contact.expand(contact.Mechanics.of(scene), seed, seed.theta).pore
+    return contact.expand(Mechanics.of(scene), seed, seed.theta).pore
 
 
 @pytest.mark.parametrize("spans, image", [

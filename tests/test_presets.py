@@ -10,7 +10,7 @@ from repro.fem.walls import TOP
 from repro.march import midpoint, simulation
 from repro.model import pore, remeshing
 from repro.model.biomass import Rates
-from repro.model.contact import Expansion
+from repro.model.mechanics import Expansion
 from repro.scene import PRESETS, Numerics, parse_scene
 from tests.strategies import ORDERS, scene
 from tests.test_scene import EVERYTHING

@@ -17,7 +17,8 @@ from repro.march import midpoint, simulation, step_control, stepping, updates
 from repro.march.ends import PoreEnd
 from repro.march.midpoint import Attempt
 from repro.march.step_control import EXCESS, StepControl, exceeds_tolerance
-from repro.model import contact, grading, pore, remeshing
+from repro.model import grading, pore, remeshing
+from repro.model.contact_lines import PATIENT
 from repro.model.pore import solve
 from repro.model.stages import Stages
 from repro.scene import load_scene
@@ -304,7 +305,7 @@ def test_a_step_grows_as_much_on_a_new_mesh_half_way():
     first = Stages.of(scene).rates(pore, solved)
     numerics = [replace(scene.numerics, refinement=part) for part in (0.3, 0.9)]
     same_mesh, new_mesh = (midpoint.solve_halfway(Stages.of(replace(scene, numerics=each)), pore, solved, first, 4.0,
-                                                  contact.PATIENT) for each in numerics)
+                                                  PATIENT) for each in numerics)
     assert new_mesh.produced == pytest.approx(same_mesh.produced, rel=1e-2)
     assert len(new_mesh.solved.flow.velocity) > 2 * len(same_mesh.solved.flow.velocity)
 

@@ -8,7 +8,8 @@ import pytest
 
 from repro.fem.outline import polygon
 from repro.fem.walls import BOTTOM, FREE, TOP, channel_walls
-from repro.model import contact, growth, pore
+from repro.model import growth, mechanics, pore
+from repro.model.mechanics import Mechanics, equilibrium, strained_from, supports_of
 from repro.model.support import Support
 from tests.strategies import EVERY_ORDER, ORDERS, body_of, coarse_base, meshed
 from tests.strategies import seed as disc
@@ -51,9 +52,9 @@ def test_simple_shear_between_two_walls_is_exact(order):
     fixed = seed.mesh.topology.body_loop[seed.fixed & (seed.wall == TOP)]
     prescribed[fixed, 0] += g * 20.0
     rim = seed.mesh.topology.body_loop
-    constrained = contact.constrained(len(X), rim, seed.wall, seed.fixed)
+    constrained = mechanics.constrained(len(X), rim, seed.wall, seed.fixed)
     forces = on_sides(seed, g)
-    supports = contact._supports(seed.body, seed, forces)
+    supports = supports_of(seed.body, seed, forces)
     shapes = [growth.equilibrium(seed.body, seed.theta, X, np.zeros(seed.body.shape.corners), constrained, prescribed,
                                  forces=forces, supports=each) for each in (supports, [])]
     exact = X + g * X[:, 1:] * [1.0, 0.0]
@@ -116,11 +117,11 @@ def test_without_forces_one_surface_alone_moves_as_without_a_traction(order):
     scene, seed = coarse_base(order)
     slope = seed.body.reference[seed.body.shape.cells, 0] @ seed.body.shape.table.values.T
     grown = replace(seed, theta=seed.theta * (1.2 + 0.02 * slope))
-    mechanics = contact.Mechanics.of(scene)
+    mechanics = Mechanics.of(scene)
     none = np.zeros((len(seed.mesh.body), 2))
-    assert not contact._supports(seed.body, seed, None)
-    assert contact._supports(seed.body, seed, none)
-    shapes = [contact._equilibrium(mechanics, grown, grown, forces)[0].mesh.points for forces in (None, none)]
+    assert not supports_of(seed.body, seed, None)
+    assert supports_of(seed.body, seed, none)
+    shapes = [equilibrium(mechanics, grown, grown, forces)[0].mesh.points for forces in (None, none)]
     assert shapes[1] == pytest.approx(shapes[0], abs=1e-9)
 
 
@@ -131,7 +132,7 @@ def test_a_traction_acts_on_each_surface_that_slides(order, walls, wall):
     scene, seed = block(order, f'growth.wall="{wall}"')
     seed = replace(seed, fixed=seed.fixed & ~seed.boundary.contact_ends)
     position = seed.mesh.points[seed.mesh.body]
-    supports = contact._supports(seed.body, seed, None)
+    supports = supports_of(seed.body, seed, None)
     points = position[[each.point for each in supports]]
     assert points == pytest.approx(np.array([[0.0, 20.0 * (wall == TOP)] for wall in walls]))
     for wall, each in zip(walls, supports):
@@ -149,11 +150,11 @@ def test_the_traction_is_uniform_per_length_of_the_reference(order):
         scene, seed = block(order, *changes)
         X = seed.mesh.points
         grown = seed.moved(X + [0.02, 0.0] * X**2)
-        mechanics = contact.Mechanics.of(scene)
-        body, _ = contact._strained_from(mechanics.keys, grown, grown.theta)
+        mechanics = Mechanics.of(scene)
+        body, _ = strained_from(mechanics.keys, grown, grown.theta)
         position = grown.mesh.points[grown.mesh.body, 0]
         return [(seed.body.reference[:, 0] @ each.load, position @ each.load)
-                for each in contact._supports(body, grown, None)]
+                for each in supports_of(body, grown, None)]
 
     mean_square = 0.02 * 10.0**2 / 3  # of X; the trapezoidal rule of linear edges, 2.5 um long, adds 0.02 * 2.5^2 / 6
     for reference, present in loaded():
@@ -169,5 +170,5 @@ def test_a_surface_of_one_node_bears_its_force_there():
     wall = seed.wall.copy()
     wall[seed.boundary.points[:, 1].argmax()] = TOP
     touching = replace(seed, wall=wall, fixed=seed.fixed | (wall == TOP))
-    supports = contact._supports(seed.body, touching, np.zeros((len(seed.mesh.body), 2)))
+    supports = supports_of(seed.body, touching, np.zeros((len(seed.mesh.body), 2)))
     assert [seed.mesh.points[seed.mesh.body][each.point, 1] for each in supports] == [0.0]

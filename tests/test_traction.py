@@ -6,6 +6,7 @@ import pytest
 from repro.errors import GrowthError, StageError
 from repro.march.stepping import LANDED
 from repro.model import contact, contact_lines, pore, traction
+from repro.model.mechanics import Mechanics
 from tests.strategies import EVERY_ORDER, ORDERS
 from verification.problems.schemes import exchange, load_scene
 
@@ -23,7 +24,7 @@ def test_a_shape_without_equilibrium_under_the_forces_is_refused(order):
     """The pressure of the water is a thousand times the stiffness."""
     scene, seed = dense_base(order, "1e9 mg/cm^3")
     with pytest.raises(StageError, match="try a|crosses itself"):
-        contact.expand(contact.Mechanics.of(scene), seed, 1.1 * seed.theta)
+        contact.expand(Mechanics.of(scene), seed, 1.1 * seed.theta)
 
 
 @pytest.mark.parametrize("noise, agrees", [(1e-2, True), (1.0, False)])
@@ -39,7 +40,7 @@ def test_rounds_that_do_not_reduce_the_move_end(monkeypatch, order, noise, agree
 
     monkeypatch.setattr(traction, "forces", noisy)
     scene, seed = dense_base(order, "1e5 mg/cm^3")
-    mechanics = contact.Mechanics.of(scene)
+    mechanics = Mechanics.of(scene)
     if agrees:
         assert contact.expand(mechanics, seed, 1.1 * seed.theta).iterations > 0
         return
@@ -61,7 +62,7 @@ def test_a_closed_pore_may_have_larger_forces_than_the_open_one(monkeypatch, ord
 
     monkeypatch.setattr(traction, "forces", lifting)
     search = contact_lines.SearchOptions(landing=LANDED)
-    closed = contact.expand(contact.Mechanics.of(scene), seed, 1.02 * seed.theta, search=search)
+    closed = contact.expand(Mechanics.of(scene), seed, 1.02 * seed.theta, search=search)
     assert closed.pore.contact
     assert closed.gap < 1.99 < LANDED * scene.growth.minimum_film
 

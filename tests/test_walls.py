@@ -11,7 +11,9 @@ from repro.fem.sizing import Sizing
 from repro.fem.space import Space
 from repro.fem.walls import FREE, channel_walls, whole_width
 from repro.model import adhesion, contact, flow, pore
+from repro.model.closing_by_nodes import closing_nodes
 from repro.model.contact_lines import Clearance, surface_ends
+from repro.model.mechanics import Mechanics, with_new_surfaces
 from repro.preflight import numbers
 from repro.scene import load_scene
 from tests.strategies import EVERY_ORDER, coarse_base
@@ -78,7 +80,7 @@ def grown_plug(order):
     seed = pore.seeded(scene)
     x = seed.mesh.points[seed.mesh.cells[seed.mesh.biomass, :3], 0].mean(axis=1)
     seed = replace(seed, theta=seed.theta * (1.2 + 0.01 * x)[:, None])
-    return contact.Mechanics.of(scene), seed
+    return Mechanics.of(scene), seed
 
 
 @pytest.mark.parametrize("number", [1, 2])
@@ -97,10 +99,10 @@ def test_a_new_surface_keeps_a_point_unless_its_wall_keeps_none(number):
     _, seed = grown_plug(2)
     lost = replace(seed, fixed=np.zeros_like(seed.fixed))
     on = lost.wall == number
-    kept = contact._with_new_surface(lost.boundary, lost.mesh.walls)
+    kept = with_new_surfaces(lost).fixed
     assert np.count_nonzero(kept & on) == 1 and np.count_nonzero(kept) == 2
     slack = with_wall(lost, number, keeps_point=False)
-    kept = contact._with_new_surface(slack.boundary, slack.mesh.walls)
+    kept = with_new_surfaces(slack).fixed
     assert np.count_nonzero(kept & on) == 0 and np.count_nonzero(kept) == 1
 
 
@@ -126,7 +128,7 @@ def test_a_film_closes_at_a_plane_of_symmetry_at_half_of_the_gap(order):
         scene = load_scene("base", [f"numerics.preset={PRESETS[order]}", "pore.width=20 um", f"pore.upper_wall={upper}",
                                     f"aggregate.radius={20 - gap} um", "numerics.refinement=0.5"])
         seed = pore.seeded(scene)
-        shape = contact.expand(contact.Mechanics.of(scene), seed, seed.theta)
+        shape = contact.expand(Mechanics.of(scene), seed, seed.theta)
         closed[gap, upper] = shape.pore.contact
         assert shape.gap == pytest.approx(gap if upper == "no slip" else 2 * gap, rel=1e-3)
     assert closed == {(1.05, "no slip"): True, (1.05, "symmetry"): False, (0.95, "no slip"): True,
@@ -148,7 +150,7 @@ def test_a_wedge_closes_at_a_plane_of_symmetry_at_half_of_the_tangent(upper, par
     walls, angle = channel_walls(WIDTH, upper=upper), np.radians(16.7)
     for factor in (0.95, 1.05):
         slope = factor * part * np.tan(angle)
-        joins = contact.closing_nodes(wedge(slope, 1), walls, 2.0, angle)
+        joins = closing_nodes(wedge(slope, 1), walls, 2.0, angle)
         assert np.count_nonzero(joins) == (2 if factor < 1 else 0)
         outline = wedge(slope, 2)
         for node, direction in surface_ends(outline, 2):

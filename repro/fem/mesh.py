@@ -374,6 +374,12 @@ class Mesh:
         a, b = self.topology.edges.T
         return np.concatenate([field, 0.5 * (field[a] + field[b])])
 
+    def from_body(self, values: np.ndarray) -> np.ndarray:
+        """(N, 2) values at all nodes, from those (n, 2) at the aggregate's; zero in the fluid."""
+        nodal = np.zeros_like(self.points)
+        nodal[self.body] = values
+        return nodal
+
     def moved(self, points: np.ndarray) -> Mesh:
         """The same triangles with their nodes at ``points`` (N, 2); nodes of walls and ends must
         still be on their lines."""

@@ -26,12 +26,12 @@ from repro.march.ends import refuse_outside
 from repro.march.folding import refuse_density, refuse_fold
 from repro.march.loop import time_before_end
 from repro.march.state import InterpolatedState, StepResult
-from repro.model import biomass, contact, contact_lines, pore, remeshing
+from repro.model import biomass, contact_lines, pore, remeshing
 from repro.model.biomass import Rates
-from repro.model.contact import Expansion
-from repro.model.contact_lines import FirstContact, SearchOptions
+from repro.model.contact_lines import PATIENT, FirstContact, SearchOptions
 from repro.model.grading import solve_graded
 from repro.model.growing import grow
+from repro.model.mechanics import Expansion
 from repro.model.pore import Pore, Solved
 from repro.model.remeshing import GeneratedMesh
 from repro.model.stages import Stages
@@ -74,7 +74,7 @@ class Halfway:
 
 
 def attempt(stages: Stages, previous: Pore, solved: Solved, duration: float,
-            largest_change: float = np.inf, search: SearchOptions = contact.PATIENT) -> Attempt:
+            largest_change: float = np.inf, search: SearchOptions = PATIENT) -> Attempt:
     """Attempt a step of ``duration`` (h).
 
     It succeeds if the rates change by at most ``largest_change`` (1/h) over its first half. Raises
@@ -176,7 +176,7 @@ def interpolate(stages: Stages, previous: Pore, solved: Solved, half: Halfway,
     mean = Rates((1 - part) * half.first.growth + part * half.rates.growth,
                  (1 - part) * half.first.remains + part * half.rates.remains)
     after = replace(grow(previous, mean, part * half.duration), time=time)
-    expanded = _expand(stages, previous, after, half, part, contact.PATIENT).pore
+    expanded = _expand(stages, previous, after, half, part, PATIENT).pore
     expanded = replace(expanded, concentrations=_guess_substrates(solved, half, part))
     nearest = sorted(half.generated, key=lambda each: abs(each.shape.time - time))
     inner, _ = stages.new_mesh(previous, expanded, solved, nearest)

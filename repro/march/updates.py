@@ -21,10 +21,10 @@ from repro.march.state import SAME_TIME, InterpolatedState, StepResult, contiguo
 from repro.march.step_control import StepControl
 from repro.model import biomass, gear, pore, substrates, transport
 from repro.model.biomass import Rates
-from repro.model.contact import Expansion
 from repro.model.contact_lines import FirstContact
 from repro.model.growing import grow
 from repro.model.kinetics import Sink
+from repro.model.mechanics import Expansion
 from repro.model.pore import Pore, Solved
 from repro.model.stages import Stages
 from repro.model.transport import Concentrations, Flows, Fluxes, integrated

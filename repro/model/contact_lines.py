@@ -63,6 +63,15 @@ class SearchOptions:
     patient: bool = True
     advances: Mapping[tuple[int, int], float] = field(default_factory=dict)
 
+    def refuse_late(self, gap: float, film: float) -> None:
+        """Raise FirstContact if the gap (um) at the first contact is much less than the least film
+        (um)."""
+        if gap < self.landing * film:
+            raise FirstContact(gap)
+
+
+PATIENT = SearchOptions()
+
 
 class FirstContact(Exception):
     """The film to the opposite wall is much thinner than the least film at the end of a step.
@@ -186,6 +195,11 @@ class Line:
     def key(self) -> tuple[int, int]:
         """Wall and direction: no two lines share both."""
         return self.wall, self.direction
+
+    def end_on(self, outline: Outline) -> int:
+        """The node of a trial's outline at the line: the end of a contact surface."""
+        ends = surface_ends(outline, self.wall)
+        return next(node for node, direction in ends if direction == self.direction)
 
     def record(self, clearance: float, reach: float) -> None:
         """Update the interval and the trials with the clearance beyond the present trial."""

@@ -80,13 +80,8 @@ class Placed:
         pore = self.pore
         points = position[pore.mesh.topology.body_loop]
         outline = Outline(points, pore.wall, pore.fixed, points, 2)
-        return np.array([self.rule.beyond(outline, self._end(line), line.direction)
+        return np.array([self.rule.beyond(outline, line.end_on(outline), line.direction)
                          for line in lines]).T
-
-    def _end(self, line: Line) -> int:
-        """Node of the outline at a line."""
-        ends = contact_lines.surface_ends(self.pore.boundary, line.wall)
-        return next(node for node, direction in ends if direction == line.direction)
 
     def within_arc(self, line: Line) -> bool:
         """Does a line divide an arc?"""
@@ -121,20 +116,11 @@ class Placed:
                   pressure: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(N, 2) um and (corners,) at the nodes of the grown pore's mesh, from positions (n, 2) and
         pressures of the divided aggregate."""
-        points, pressures = self.on_mesh(position, pressure)
+        shape = self.pore.with_body(position, pressure)
         if self.division is None:
-            return points, pressures
-        return self.division.restricted(points), pressures[: self.grown.mesh.corners]
-
-    def on_mesh(self, position: np.ndarray,
-                pressure: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Positions and pressures at all nodes of the divided mesh."""
-        mesh = self.pore.mesh
-        points = mesh.points.copy()
-        points[mesh.body] = position
-        pressures = self.pore.pressure.copy()
-        pressures[mesh.topology.body_corners] = pressure
-        return points, pressures
+            return shape.mesh.points, shape.pressure
+        points = self.division.restricted(shape.mesh.points)
+        return points, shape.pressure[: self.grown.mesh.corners]
 
     def divided(self, points: np.ndarray,
                 pressures: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -129,6 +129,15 @@ class Pore:
         """The pore with the nodes of its mesh at ``points`` (N, 2) um."""
         return replace(self, space=Space(self.mesh.moved(points)))
 
+    def with_body(self, position: np.ndarray, pressure: np.ndarray) -> Pore:
+        """The pore with its aggregate's nodes at positions (n, 2) um and pressures at its corners;
+        the fluid's nodes stay in place."""
+        points = self.mesh.points.copy()
+        points[self.mesh.body] = position
+        pressures = self.pressure.copy()
+        pressures[self.mesh.topology.body_corners] = pressure
+        return replace(self.moved(points), pressure=pressures)
+
     def composition(self, maximum_density: float) -> tuple[float, float, float]:
         """Share of X_I in the biomass, and the least and the largest (X_A + X_I) / X_m. The
         constraint J = theta keeps both near one."""

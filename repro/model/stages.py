@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from repro.model import biomass, contact, growing, remeshing
 from repro.model.biomass import Rates
-from repro.model.contact import Expansion, Mechanics
-from repro.model.contact_lines import SearchOptions
+from repro.model.contact_lines import PATIENT, SearchOptions
+from repro.model.mechanics import Expansion, Mechanics
 from repro.model.pore import Pore, Solved
 from repro.model.remeshing import GeneratedMesh, Remeshing
 from repro.scene import Growth, Scene
@@ -39,7 +39,7 @@ class Stages:
         return biomass.rates(pore.space, substrates.concentrations, substrates.problem.rate_law)
 
     def expand(self, previous: Pore, grown: Pore, guess: Pore | None = None,
-               search: SearchOptions = contact.PATIENT) -> Expansion:
+               search: SearchOptions = PATIENT) -> Expansion:
         """Expand an aggregate that has grown since ``previous``, by :func:`contact.expand`."""
         theta = growing.compute_theta(previous, grown, self.remeshing.maximum_density)
         return contact.expand(self.mechanics, grown, theta, guess, search)

@@ -117,6 +117,31 @@ def forces(fluid: Fluid, around: Surroundings, shaped: Pore) -> np.ndarray:
     return MPA_PER_UM * drive.density * drive.gravity / fluid.shear_modulus * total
 
 
+class Water:
+    """The flow around one shape after another of a grown pore.
+
+    The mesh moves with the shapes. The first shape after the grown one has its own mesh, and so has
+    each shape with another contact than the last.
+    """
+
+    def __init__(self, fluid: Fluid, grown: Pore):
+        self._fluid = fluid
+        self._grown = grown
+        self._last = grown
+        self._around = surroundings(fluid.meshing, grown, grown)
+
+    def forces(self, shaped: Pore) -> np.ndarray:
+        """:func:`forces` on a shape."""
+        meshing = self._fluid.meshing
+        last = self._last
+        self._last = shaped
+        if shaped is not last and (last is self._grown
+                                   or not shaped.boundary.same_contact(last.boundary)):
+            self._around = surroundings(meshing, self._grown, shaped)
+        self._around = follow(meshing, self._around, shaped)
+        return forces(self._fluid, self._around, shaped)
+
+
 def on_aggregate(space: Space, solution: Flow, drive: Drive, interface: str) -> np.ndarray:
     """(N, 2) um2 of head: forces of the water on the aggregate at all nodes, over rho g; traction
     on its surface, or the drag within a permeable one."""

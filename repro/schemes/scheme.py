@@ -29,7 +29,7 @@ class Scheme:
         Functions on straight triangles (3.2-3.4), or on curved ones. They determine the pair of
         velocity and pressure (:mod:`repro.model.flow`), the integration of uptake and growth
         (:mod:`repro.fem.space`), the stabilisation of growth (:mod:`repro.model.growth`) and the
-        closing of contact surfaces (:mod:`repro.model.contact`).
+        closing of contact surfaces (:data:`repro.model.contact.CLOSINGS`).
     steps : {"updates", "midpoint"}
         Shape updates every ``growth.time_step`` (section 2), or the midpoint rule with error
         control (:mod:`repro.march`).

@@ -12,6 +12,7 @@ from reference import half_cylinder
 from repro.fem.walls import BOTTOM, FREE
 from repro.march.simulation import shaped
 from repro.model import adhesion, contact, flow, growth, pore, traction
+from repro.model.mechanics import Mechanics
 from repro.model.pore import Pore, Solved
 from verification.evidence.cases import parametrize
 from verification.evidence.checks import at_least, at_most, each_at_most, largest, study
@@ -81,7 +82,7 @@ def _at_rest(wall: str, *changes: str) -> tuple:
                      f'flow.density="{998e2} mg/cm^3"', *changes)
     seed = pore.seeded(scene)
     slope = seed.body.reference[seed.body.shape.cells, 0] @ seed.body.shape.table.values.T
-    grown = contact.expand(contact.Mechanics.of(scene), seed, seed.theta * (1.1 - 0.002 * slope)).pore
+    grown = contact.expand(Mechanics.of(scene), seed, seed.theta * (1.1 - 0.002 * slope)).pore
     grown = replace(grown, time=1.0)
     meshing = pore.Meshing.of(scene)
     surroundings = traction.follow(meshing, traction.surroundings(meshing, seed, seed), grown)
@@ -146,7 +147,7 @@ def test_plug(changes, record):
     scene = _plug(30.0, *changes)
     seed = pore.seeded(scene)
     theta = 0.8
-    shape = contact.expand(contact.Mechanics.of(scene), seed, theta * seed.theta).pore
+    shape = contact.expand(Mechanics.of(scene), seed, theta * seed.theta).pore
     expected = scene.growth.shear_modulus * theta ** (-2 / 3) * (1 / theta - theta)
     peaks = {"walls": adhesion.wall_peak(scene, shape, None), "tensile stress": adhesion.tensile_peak(scene, shape)}
     record(each_at_most({name: abs(peak.value / expected - 1) for name, peak in peaks.items()}, 1e-7,
@@ -203,7 +204,7 @@ def test_bonded_slab(changes, record):
     seed = pore.seeded(scene)
     theta = 1.2
     guess = _pushed(seed, 5.0)
-    shape = contact.expand(contact.Mechanics.of(scene), seed, theta * seed.theta, guess).pore
+    shape = contact.expand(Mechanics.of(scene), seed, theta * seed.theta, guess).pore
     x, y = shape.outline.points.T
     free = (shape.wall == FREE) & (np.abs(x) < MIDDLE)
     middles = shape.mesh.points[shape.mesh.triangles[shape.mesh.biomass]].mean(axis=1)
@@ -267,5 +268,5 @@ def _bonded_peaks(refinement: float, *changes: str) -> tuple[float, float]:
     scene = scene_of('growth.wall="bonded"', f"numerics.refinement={refinement}", *changes)
     seed = pore.seeded(scene)
     slope = seed.body.reference[seed.body.shape.cells, 0] @ seed.body.shape.table.values.T
-    shape = contact.expand(contact.Mechanics.of(scene), seed, seed.theta * (1.1 - 0.005 * slope)).pore
+    shape = contact.expand(Mechanics.of(scene), seed, seed.theta * (1.1 - 0.005 * slope)).pore
     return adhesion.wall_peak(scene, shape, None).value, adhesion.tensile_peak(scene, shape).value

@@ -17,8 +17,10 @@ from repro.fem.space import Space
 from repro.fem.walls import FREE
 from repro.march.simulation import simulate
 from repro.march.state import Report
-from repro.model import contact, flow, growth, mesh_motion, pore, traction
+from repro.model import contact, flow, growth, mechanics, mesh_motion, pore, traction
+from repro.model.contact_lines import PATIENT
 from repro.model.flow import Flow
+from repro.model.mechanics import Mechanics, supports_of
 from verification.cases import flow as flow_cases
 from verification.evidence.cases import combined, parametrize
 from verification.evidence.checks import at_least, at_most, between, each_at_most, refine, studies, study
@@ -204,8 +206,8 @@ def test_traction_even(changes, record):
     scene = loaded_scene(*changes)
     seed = pore.seeded(scene)
     theta = _uneven(seed, 0.002)
-    mechanics = contact.Mechanics.of(scene)
-    plain = contact._at_rest(mechanics, seed, theta, seed, None, contact.PATIENT).pore
+    mechanics = Mechanics.of(scene)
+    plain = contact.at_rest(mechanics, seed, theta, seed, None, PATIENT).pore
     space = seed.moved(mesh_motion.move(seed.mesh, plain.mesh.points[seed.mesh.body], 1.0)).space
     mesh = space.mesh
     at_rest = Flow(0.0, np.zeros((space.count, 2)), np.full(mesh.corners, 5.0), None, 0.0, 0.0, 0.0)
@@ -215,7 +217,7 @@ def test_traction_even(changes, record):
     record(at_most("forces", np.abs(difference).max() / np.abs(expected).max(), 1e-12,
                    "the divergence theorem: round-off"))
     for sign in (1.0, -1.0):
-        pushed = contact._at_rest(mechanics, seed, theta, seed, sign * forces[mesh.body], contact.PATIENT).pore
+        pushed = contact.at_rest(mechanics, seed, theta, seed, sign * forces[mesh.body], PATIENT).pore
         difference = np.abs(pushed.mesh.points - plain.mesh.points).max() / 25.0
         change = (pushed.pressure - plain.pressure)[mesh.topology.body_corners] + sign * 5.0
         record(at_most(f"displacement, {sign:+g}", difference, 1e-9, "J = theta: Newton's tolerance"))
@@ -256,7 +258,7 @@ def _moved(factor: float, *changes: str) -> tuple[pore.Pore, pore.Pore, np.ndarr
     scene = _in_denser_water(factor, *changes)
     seed = pore.seeded(scene)
     theta = _uneven(seed, -0.002)
-    return seed, contact.expand(contact.Mechanics.of(scene), seed, theta).pore, theta
+    return seed, contact.expand(Mechanics.of(scene), seed, theta).pore, theta
 
 
 @pytest.mark.slow
@@ -296,14 +298,14 @@ def _defects(*changes: str) -> tuple[float, float]:
     scene = _in_denser_water(FACTORS[-1], *changes)
     seed, grown, theta = _moved(FACTORS[-1], *changes)
     nodes, body = seed.mesh.body, seed.body
-    constrained_dofs = contact.constrained(len(nodes), seed.mesh.topology.body_loop, seed.wall, seed.fixed)
+    constrained_dofs = mechanics.constrained(len(nodes), seed.mesh.topology.body_loop, seed.wall, seed.fixed)
     defects = []
     stabilisation = growth.STABILISATIONS[body.shape.geometry].on(body, seed.mesh.points[nodes])
     place, pressure = grown.mesh.points[nodes], grown.pressure[seed.mesh.topology.body_corners]
     for pore_of_flow in (grown, seed):
         fluid = traction.Fluid.of(scene)
         forces = traction.forces(fluid, traction.surroundings(fluid.meshing, seed, pore_of_flow), pore_of_flow)
-        supports = contact._supports(body, grown, forces)
+        supports = supports_of(body, grown, forces)
         system = growth.System(body, constrained_dofs, stabilisation=stabilisation, forces=forces, supports=supports)
         defects.append(system.under(theta, place, place, pressure).defect)
     return tuple(defects)

@@ -20,6 +20,7 @@ from reference import contact_growth
 from repro.fem.walls import TOP
 from repro.model import contact, pore
 from repro.model.contact_lines import FirstContact
+from repro.model.mechanics import Expansion, Mechanics
 from repro.scene import load_scene
 from verification.cases.growth_codes import FRONT, _uneven
 from verification.evidence.cases import parametrize
@@ -45,12 +46,12 @@ def reference_solution(level: int) -> contact_growth.Touching:
                                before and before.equilibrium)
 
 
-def grown(elements: str, refinement: float) -> contact.Expansion:
+def grown(elements: str, refinement: float) -> Expansion:
     """The package's aggregate in contact."""
     scene = load_scene("wide", [f"numerics.preset={'paper' if elements == 'linear' else 'accurate'}",
                                 f"numerics.refinement={refinement}",
                                 f'pore.width="{HEIGHT} um"', f'aggregate.radius="{bodies.RADIUS} um"'])
-    mechanics, seed = contact.Mechanics.of(scene), pore.seeded(scene)
+    mechanics, seed = Mechanics.of(scene), pore.seeded(scene)
     where, _ = meshes.quadrature_points(seed.body.reference[seed.body.shape.cells], seed.body.shape.table)
     theta = _uneven(*np.moveaxis(where, 2, 0))
     first, expansion = _first_contact(mechanics, seed, theta)
@@ -61,7 +62,7 @@ def grown(elements: str, refinement: float) -> contact.Expansion:
     return expansion
 
 
-def _first_contact(mechanics, seed, theta) -> tuple[float, contact.Expansion]:
+def _first_contact(mechanics, seed, theta) -> tuple[float, Expansion]:
     """The part of the growth, as a power of theta, that leaves half of the least film, and the shape in contact."""
     shapes = [seed]
 
@@ -79,7 +80,7 @@ def _first_contact(mechanics, seed, theta) -> tuple[float, contact.Expansion]:
     return part, contact.expand(mechanics, seed, theta**part, shapes[-1])
 
 
-def _touching(seed: pore.Pore, expansion: contact.Expansion) -> pore.Pore:
+def _touching(seed: pore.Pore, expansion: Expansion) -> pore.Pore:
     """The seed with the opposite wall at the corners, and at the arcs between them, that are in contact under an
     expansion."""
     height = expansion.position[seed.mesh.loop][:, 1]

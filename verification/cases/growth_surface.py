@@ -15,6 +15,7 @@ from repro.march.simulation import simulate
 from repro.march.state import Report
 from repro.model import contact, growth, pore
 from repro.model.energies.neo_hookean import BIOT, CREASE
+from repro.model.mechanics import Mechanics
 from repro.model.surface import surface
 from repro.preflight import numbers
 from repro.scene import Scene
@@ -121,7 +122,7 @@ def test_surface_confined(elements, record):
         state = pore.seeded(scene)
         since = 1.0
         for theta in THETAS:
-            state = contact.expand(contact.Mechanics.of(scene), state, np.full_like(state.theta, theta)).pore
+            state = contact.expand(Mechanics.of(scene), state, np.full_like(state.theta, theta)).pore
             exact = (theta / since) ** -0.5
             record(at_most(f"{rheology}, theta = {theta:.3g}", np.abs(surface(state).stretch - exact).max(), 1e-9,
                            "homogeneous; Newton's tolerance"))

@@ -18,7 +18,8 @@ from repro.fem.space import Space
 from repro.fem.walls import FREE, TOP, channel_walls
 from repro.march import midpoint, simulation, stepping
 from repro.march.state import Report
-from repro.model import contact, flow, growth, pore, remeshing
+from repro.model import flow, growth, pore, remeshing
+from repro.model.closing_by_nodes import closing_nodes
 from repro.model.contact_lines import Clearance, lines_of
 from repro.model.remeshing import Remeshing
 from repro.model.stages import Stages
@@ -134,7 +135,7 @@ def _closing(shape: Outline, width: float, film: float, angle: float) -> int:
     more than the search allows (CLOSE, 0.002 um). The limit was twice CLOSE until this row was seen.
     """
     if shape.geometry == 1:
-        return np.count_nonzero(contact.closing_nodes(shape, channel_walls(width), film, angle))
+        return np.count_nonzero(closing_nodes(shape, channel_walls(width), film, angle))
     limit = film * (1 - np.tan(angle - np.deg2rad(UNDER)) / np.tan(angle))
     return sum(clearance < -limit for clearance in _clearances(shape, width, film, angle).values())
 
@@ -180,7 +181,7 @@ def _sides(shape: Outline) -> list[bool]:
     if shape.geometry == 2:
         values = _clearances(shape, 20.0, 2.0, angle)
         return [values[TOP, direction] < 0 for direction in (1, -1)]
-    joins = contact.closing_nodes(shape, channel_walls(20.0), 2.0, angle) != FREE
+    joins = closing_nodes(shape, channel_walls(20.0), 2.0, angle) != FREE
     x = shape.points[:, 0]
     return [bool(joins[x < 0].any()), bool(joins[x > 0].any())]
 

@@ -19,6 +19,7 @@ from repro.fem.mesh import gradients
 from repro.model import contact, growth
 from repro.model.body import Shape
 from repro.model.flow import MPA_PER_UM
+from repro.model.mechanics import Mechanics
 from verification.claims import FEW, FEW_WORDS, Finding, at_least, at_most, claim
 from verification.claims.levels import ABOUT_WIDE, CONVERGED, PAIRED, Level, at_level
 from verification.claims.runs import (
@@ -275,7 +276,7 @@ def with_fluid_forces(aggregate: Body, fluid_forces: str = "included") -> Body:
     path, because the aggregate is elastic. It leaves out the effect of the forces on growth. Raises GrowthError if
     shape and flow do not agree."""
     scene = replace(aggregate.scene, growth=replace(aggregate.scene.growth, fluid_forces=fluid_forces))
-    pore = contact.expand(contact.Mechanics.of(scene), aggregate.pore, aggregate.pore.theta).pore
+    pore = contact.expand(Mechanics.of(scene), aggregate.pore, aggregate.pore.theta).pore
     return Body(scene, pore, aggregate.solved)
 
 

@@ -25,9 +25,10 @@ from repro.fem.space import Space
 from repro.fem.walls import BOTTOM, TOP
 from repro.march import loop, simulation, updates
 from repro.march.state import Report, RestartState
-from repro.model import contact as mechanics
+from repro.model import contact as closing
 from repro.model import flow, mesh_motion, pore, remeshing, transport
 from repro.model.kinetics import Sink
+from repro.model.mechanics import Expansion, Mechanics, middle_of
 from repro.model.pore import Pore, Solved, solve
 from repro.model.remeshing import Remeshing
 from repro.model.stages import Stages
@@ -142,17 +143,17 @@ def history(*run: Change) -> History:
     return History(scene, tuple(instants), contact, far)
 
 
-_at_rest = mechanics._at_rest
+_at_rest = closing.at_rest
 
 
-def _about_middles(keys: mechanics.Mechanics, grown: Pore, *rest) -> mechanics.Expansion:
+def _about_middles(keys: Mechanics, grown: Pore, *rest) -> Expansion:
     """The equilibrium of RECHOSEN."""
-    middles = [mechanics.middle_of(grown.boundary, wall) for wall in (BOTTOM, TOP)]
+    middles = [middle_of(grown.boundary, wall) for wall in (BOTTOM, TOP)]
     return _at_rest(keys, replace(grown, fixed=np.logical_or(*middles)), *rest)
 
 
 #: What the changes without a key replace: the module, the name and the new value.
-REPLACED = {RECHOSEN: (mechanics, "_at_rest", _about_middles), **CONSTANTS}
+REPLACED = {RECHOSEN: (closing, "at_rest", _about_middles), **CONSTANTS}
 
 
 def _with_a_film(scene: Scene, before: RestartState, contact: RestartState) -> RestartState:

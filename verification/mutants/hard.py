@@ -55,7 +55,7 @@ MUTANTS = (
          "EXCESS * tolerance / duration",
          "np.inf")),
     *changes(
-        "repro/model/contact.py",
+        "repro/model/closing_by_nodes.py",
         ("hard-half-the-angle",
          "Wedges close at half of the least contact angle.",
          "closing_nodes",

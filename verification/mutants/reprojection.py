@@ -42,21 +42,21 @@ MUTANTS = (
          "L = elements.values(1, local)\n"
          "L = 1.0 * (L == L.max(axis=1, keepdims=True))")),
     *changes(
-        "repro/model/contact.py",
+        "repro/model/pore.py",
         ("inverse-ratio",
          "(34) multiplies by the ratio of the areas S' / S, not by S / S'.",
-         "_placed",
-         "return replace(start.moved(points), pressure=pressure)",
-         "moved = start.moved(points)\n"
-         "ratio = moved.space.reaction.dx / start.space.reaction.dx\n"
-         "return replace(moved, pressure=pressure, active=start.active * ratio**2, inert=start.inert * ratio**2)"),
+         "Pore.with_body",
+         "return replace(self.moved(points), pressure=pressures)",
+         "moved = self.moved(points)\n"
+         "ratio = moved.space.reaction.dx / self.space.reaction.dx\n"
+         "return replace(moved, pressure=pressures, active=self.active * ratio**2, inert=self.inert * ratio**2)"),
         ("reprojection-left-out",
          "(34) is left out: densities stay as the aggregate expands.",
-         "_placed",
-         "return replace(start.moved(points), pressure=pressure)",
-         "moved = start.moved(points)\n"
-         "ratio = moved.space.reaction.dx / start.space.reaction.dx\n"
-         "return replace(moved, pressure=pressure, active=start.active * ratio, inert=start.inert * ratio)")),
+         "Pore.with_body",
+         "return replace(self.moved(points), pressure=pressures)",
+         "moved = self.moved(points)\n"
+         "ratio = moved.space.reaction.dx / self.space.reaction.dx\n"
+         "return replace(moved, pressure=pressures, active=self.active * ratio, inert=self.inert * ratio)")),
     *changes(
         "repro/fem/space.py",
         ("fluid-triangles-too",

@@ -16,7 +16,7 @@ from repro.fem.mesh import Mesh
 from repro.fem.outline import Outline
 from repro.fem.space import Space
 from repro.fem.walls import FREE
-from repro.model import contact, growth, pore
+from repro.model import growth, mechanics, pore
 from repro.model.body import Body
 from repro.model.energies import NEO_HOOKEAN
 from verification.evidence.cases import combined
@@ -82,7 +82,7 @@ def on_wall(grid: Mesh, outline: Outline) -> tuple[Supported, np.ndarray]:
     Also return the nodes (M,) of its free rim without the contact lines.
     """
     rim = grid.topology.body_loop
-    supports = contact.constrained(len(grid.body), rim, outline.wall, outline.fixed)
+    supports = mechanics.constrained(len(grid.body), rim, outline.wall, outline.fixed)
     return on_mesh(grid, *supports.T), rim[outline.wall == FREE]
 
 

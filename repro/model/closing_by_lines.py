@@ -1,0 +1,334 @@
+"""Closing by contact lines, which lie anywhere on the arcs of curved elements (2.3.3).
+
+The contact surfaces are the smallest ones that leave no film and no wedge too thin. In contact
+Newton's method (:mod:`repro.model.contact_newton`) solves for shape and lines at once. A search by
+whole equilibria (:class:`repro.model.contact_lines.Line`) begins the first contact, and takes over
+if Newton's method fails.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+
+import numpy as np
+
+from repro.errors import GrowthError, LinearError, failing_as
+from repro.fem.division import Division
+from repro.fem.outline import Outline
+from repro.fem.space import Space
+from repro.fem.walls import FREE, Wall
+from repro.model import contact_lines, growth
+from repro.model.body import Shape
+from repro.model.contact_lines import Clearance, Contact, Line, SearchOptions, contact_with
+from repro.model.contact_newton import BESIDE, Coupled, Placed
+from repro.model.mechanics import (
+    CONTACT_ROUNDS,
+    Closing,
+    Expansion,
+    constraints,
+    equilibrium,
+    strained_from,
+    supports_of,
+    with_new_surfaces,
+)
+from repro.model.pore import Pore, material
+
+#: Largest number of times that contact lines go back after a trial that fails.
+RETREATS = 6
+#: Defect at which each part of theta except the last counts as reached.
+PARTLY = 1e-3
+#: Clearances of the first contact at which Newton's method takes over from the search. Without the
+#: search, members 11 and 29 of the hard family and pores 0, 8 and 15 of the practical ones stop at
+#: their first contact.
+CLOSE_ENOUGH = 0.2
+#: Lengths of the first contact on both sides of the highest point, over the least film.
+FIRST_LENGTHS = np.array([1.0, 0.5, 0.25])
+
+
+@dataclass(eq=False)
+class ByLines(Closing):
+    """The closing on arcs. Each trial is an equilibrium with the lines at given advances, and
+    starts from the last one, extrapolated in the advance of the line that moves most.
+
+    iterations: of Newton's method so far.
+    """
+
+    iterations: int = field(init=False, default=0)
+
+    def __post_init__(self) -> None:
+        keys = self.mechanics.keys
+        walls = self.grown.mesh.walls
+        self._rule = Clearance(walls, keys.minimum_film, keys.minimum_contact_angle)
+        self._start = self.start.mesh.points, self.start.pressure
+        self._shapes = [(np.zeros(0), *self._start)]
+        self._divided: Division | None = None
+        self._shape: Shape | None = None
+
+    def close(self) -> Expansion:
+        grown = self.grown
+        search = self.search
+        film = self._rule.film
+        wall = grown.wall
+        lines = contact_lines.lines_of(grown.boundary)
+        _place_lines(grown.boundary, lines, search)
+        gap = 0.0
+        shape = self.settle(wall, lines) if grown.contact and not search.stationary else None
+        if shape is None:
+            shape = self.solve(wall, lines)
+            gap = shape.pore.boundary.gap(self._rule.walls)
+            if not grown.contact and gap < film:
+                search.refuse_late(gap, film)
+                wall, lines, shape = self._touch(shape)
+            if not search.stationary:
+                shape = self._search(wall, lines, shape)
+        rest = with_new_surfaces(shape.pore)
+        return replace(shape, pore=rest, iterations=self.iterations, gap=gap)
+
+    def _search(self, wall: np.ndarray, lines: Sequence[Line], shape: Expansion) -> Expansion:
+        """Move lines until all are accepted, or until Newton's method settles a first contact."""
+        settles = not self.grown.contact
+        for _ in range(CONTACT_ROUNDS):
+            outline = shape.pore.boundary
+            for line in lines:
+                line.record(*self._rule.beyond(outline, line.end_on(outline), line.direction))
+            if all(line.accepted for line in lines):
+                return shape
+            if settles and all(line.accepted or abs(line.trials[-1][1]) < CLOSE_ENOUGH
+                               for line in lines):
+                settles = False
+                settled = self.settle(wall, lines)
+                if settled is not None:
+                    return settled
+            for line in lines:
+                if not line.accepted:
+                    line.step()
+            shape = self.solve(wall, lines)
+        raise GrowthError(f"the contact lines still move after {CONTACT_ROUNDS} trials")
+
+    def _touch(self, shape: Expansion) -> tuple[np.ndarray, list[Line], Expansion]:
+        """The first contact of a shape with the nearest wall: walls (M,), contact lines, and the
+        equilibrium with them.
+
+        Contact covers at least the least film's thickness on both sides of the nearest point,
+        because a force at a single point would indent an elastic body without limit. If the body
+        is too pointed to be flat over this length, contact covers half of it, or a quarter.
+        """
+        film = self._rule.film
+        outline = replace(self.grown.boundary, points=shape.position[self.grown.mesh.loop])
+        nearest, *_ = outline.untouched(self._rule.walls)
+        lengths = film * FIRST_LENGTHS
+        width = _tip_width(outline, nearest, film * nearest.part)
+        if width < 2 * lengths[-1]:
+            raise GrowthError(f"a tip comes into contact that is {width:.2g} um wide at a depth of "
+                              f"{film:.2g} um, the least film; the rule for films (2.3.3) does not "
+                              "describe so thin a tip, and no setting helps")
+        for length in lengths:
+            wall, lines = _first_contact(outline, nearest, length)
+            _place_lines(replace(self.grown.boundary, wall=wall), lines, self.search)
+            try:
+                return wall, lines, self.solve(wall, lines)
+            except (GrowthError, LinearError) as error:
+                failure = error
+        raise failure
+
+    def solve(self, wall: np.ndarray, lines: Sequence[Line]) -> Expansion:
+        """The equilibrium with walls (M,) of the grown pore's outline and advances of the lines.
+
+        If it fails, the lines retreat half way to an advance that was too short. Raises
+        GrowthError if that does not help.
+        """
+        for _ in range(RETREATS):
+            try:
+                return self._solve(wall, lines)
+            except (GrowthError, LinearError) as error:
+                failure = error
+                moving = [line for line in lines if line.retreat()]
+                if not moving:
+                    break
+        raise failure
+
+    def _solve(self, wall: np.ndarray, lines: Sequence[Line]) -> Expansion:
+        advances = np.array([line.advance for line in lines])
+        locked, division, forces = self._locked(self.grown, contact_with(wall, lines))
+        first = self._first(locked, division, advances)
+        shape, iterations = equilibrium(self.mechanics, locked, first, forces,
+                                        patient=self.search.patient)
+        self.iterations += iterations
+        expansion = Expansion(shape, iterations, 0.0, division, self._lengths(wall, lines))
+        at_rest = advances, expansion.position, shape.pressure[: self.grown.mesh.corners]
+        self._shapes = [*self._shapes[-1:], at_rest]
+        return expansion
+
+    def settle(self, wall: np.ndarray, lines: Sequence[Line]) -> Expansion | None:
+        """Equilibrium with walls (M,) of the grown pore's outline and lines at zero clearance.
+
+        Newton's method solves for shape and lines at once. If it fails, the result is None and the
+        lines stay unchanged. Theta changes to its target in parts, as in
+        :func:`growth.equilibrium`.
+        """
+        start = [line.advance for line in lines]
+        grown = self.grown
+        body, target_J = strained_from(self.mechanics.keys, grown, grown.theta)
+        points, pressures = self._shapes[-1][1:]
+        J = body.strained(points[grown.mesh.body]).J
+        try:
+            for part in _parts(target_J / J):
+                theta = grown.theta * (J / target_J) ** (1 - part)
+                partly = replace(grown, theta=theta)
+                coupled = Coupled(partial(self._place, partly, wall, lines), lines, points,
+                                  pressures)
+                coupled.solve(growth.NEWTON if part == 1 else PARTLY)
+                self.iterations += coupled.iterations
+                points, pressures = coupled.placed.on_parent(coupled.position, coupled.pressure)
+        except (GrowthError, LinearError, np.linalg.LinAlgError):
+            for line, advance in zip(lines, start):
+                line.advance = advance
+            return None
+        placed = coupled.placed
+        shape = placed.pore.with_body(coupled.position, coupled.pressure)
+        return Expansion(shape, self.iterations, 0.0, placed.division, self._lengths(wall, lines))
+
+    def _lengths(self, wall: np.ndarray, lines: Sequence[Line]) -> dict[tuple[int, int], float]:
+        """{(wall, direction): um} by which lines have advanced."""
+        outline = replace(self.grown.boundary, wall=wall)
+        return {line.key: contact_lines.to_length(outline, line) for line in lines}
+
+    def _place(self, grown: Pore, wall: np.ndarray, lines: Sequence[Line]) -> Placed:
+        """A grown pore with lines at their advances."""
+        locked, division, forces = self._locked(grown, contact_with(wall, lines))
+        keys = self.mechanics.keys
+        body, theta = strained_from(keys, locked, locked.theta)
+        reference = grown.origin if keys.new_biomass == "stressed" else grown.mesh.points
+        prescribed, target = constraints(locked, locked)
+        system = growth.System(body, prescribed, forces=forces,
+                               supports=supports_of(body, locked, forces))
+        return Placed(grown, locked, division, reference, system, theta, target, self._rule)
+
+    def _locked(self, grown: Pore, contact: Contact) -> tuple[Pore, Division | None,
+                                                              np.ndarray | None]:
+        """A grown pore with a contact, its division, and the forces on its nodes.
+
+        If the arcs are those of the last contact, its connections serve again.
+        """
+        if not len(contact.arcs):
+            return replace(grown, wall=contact.wall), None, self.forces
+        if self._divided is not None and np.array_equal(self._divided.arcs, contact.arcs):
+            self._divided = self._divided.at(contact.t)
+        else:
+            self._divided = Division(self.grown.mesh, contact.arcs, contact.t)
+            self._shape = None
+        division = self._divided
+        locked = divided(grown, division, contact, self._shape)
+        self._shape = locked.body.shape
+        if self.forces is None:
+            return locked, division, None
+        loads = division.divided_loads(division.parent.from_body(self.forces))
+        return locked, division, loads[division.topology.body]
+
+    def _guesses(self, advances: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """Positions (N, 2) um and pressures from which a trial may start, the best ones first: the
+        last two shapes, extrapolated in the advance of the line that moves most, the last shape,
+        and the start."""
+        last, points, pressure = self._shapes[-1]
+        before, points_before, pressure_before = self._shapes[0]
+        if len(self._shapes) == 2 and len(before) == len(advances):
+            line = np.argmax(np.abs(last - before))
+            if last[line] != before[line]:
+                part = (advances[line] - last[line]) / (last[line] - before[line])
+                part = min(max(part, -1.0), 1.0)
+                yield (points + part * (points - points_before),
+                       pressure + part * (pressure - pressure_before))
+        yield points, pressure
+        yield self._start
+
+    def _first(self, locked: Pore, division: Division | None, advances: np.ndarray) -> Pore:
+        """The pore from which a trial starts: the best guess in which no triangle is turned over.
+
+        A divided arc may have a kink where its contact begins. The undivided arc rounds it off,
+        which can turn a triangle over.
+        """
+        for points, pressure in self._guesses(advances):
+            if division is not None:
+                points = division.nodal(points)
+                pressure = division.at_corners(pressure)
+            if locked.body.strained(points[locked.mesh.body]).J.min() > 0:
+                break
+        return replace(locked.moved(points), pressure=pressure)
+
+
+def _place_lines(outline: Outline, lines: Sequence[Line], search: SearchOptions) -> None:
+    """Start each contact line at its advance in ``search``, or at its least advance if that is
+    larger."""
+    for line in lines:
+        length = search.advances.get(line.key, 0.0)
+        line.advance = max(line.least, contact_lines.to_arcs(outline, line, length))
+        if 0 < line.advance < contact_lines.LEAST_PART:
+            line.advance = BESIDE
+
+
+def _tip_width(outline: Outline, wall: Wall, depth: float) -> float:
+    """The width (um) of the aggregate at a depth (um) behind its point nearest to a wall."""
+    x = outline.points[:, 0]
+    height = -wall.normal * outline.points[:, 1]
+    tip = int(np.argmax(height))
+    sides = []
+    for direction in (1, -1):
+        walk = (tip + direction * np.arange(len(x))) % len(x)
+        behind = int(np.argmax(height[walk] < height[tip] - depth))
+        last = walk[behind - 1 : behind + 1][::-1]
+        sides.append(np.interp(height[tip] - depth, height[last], x[last]))
+    return float(abs(sides[0] - sides[1]))
+
+
+def _first_contact(outline: Outline, nearest: Wall,
+                   length: float) -> tuple[np.ndarray, list[Line]]:
+    """Walls (M,) after the corner next to the nearest point has joined a wall, and the contact
+    lines at a length (um) on both sides of that point."""
+    x = outline.points[:, 0]
+    _, tip = outline.nearest(nearest)
+    arc = int(np.argmin((nearest.normal * outline.arcs(outline.points)[:, :, 1]).min(axis=1)))
+    ends = np.array([2 * arc, (2 * arc + 2) % len(x)])
+    corner = int(ends[np.argmin(np.abs(x[ends] - tip))])
+    wall = outline.wall.copy()
+    wall[corner] = nearest.number
+    touching = replace(outline, wall=wall)
+    lines = contact_lines.lines_of(touching)
+    for line in lines:
+        if line.wall == nearest.number:
+            outwards = np.sign(x[(corner + line.direction) % len(x)] - x[corner])
+            advance = length + outwards * (tip - x[corner])
+            line.start_from(contact_lines.to_arcs(touching, line, max(advance, 0.0)))
+    return wall, lines
+
+
+@failing_as(GrowthError)
+def _parts(growing: np.ndarray) -> np.ndarray:
+    """The parts of a growth theta / J (t, q), up to 1."""
+    count = growth.GradDiv.parts(growing)
+    return np.arange(1, count + 1) / count
+
+
+def divided(grown: Pore, division: Division, contact: Contact,
+            shape: Shape | None = None) -> Pore:
+    """The pore on the divided mesh, with the walls of a contact; shape: the aggregate's connections
+    there, if they are known."""
+    space = Space(division.mesh)
+    table = grown.space.table
+    reference = division.nodal(grown.origin)[space.mesh.body]
+    body = (replace(grown.body, shape=shape, reference=reference) if shape
+            else material(space, reference, grown.body.energy))
+    last = grown.last
+    if last is not None:
+        last = division.nodal(division.parent.from_body(last))[space.mesh.body]
+    expanded = division.amounts(grown.theta * grown.body.at.dx, table)
+    at_line = np.where(contact.first != FREE, contact.first, contact.second)
+    wall = contact.wall.copy()
+    wall[2 * contact.arcs + 1] = contact.first
+    none = np.zeros(len(contact.arcs), bool)
+    return replace(grown, space=space, wall=division.along_loop(wall, at_line, contact.second),
+                   fixed=division.along_loop(grown.fixed, none, none), body=body,
+                   active=division.amounts(grown.active, table),
+                   inert=division.amounts(grown.inert, table), theta=expanded / body.at.dx,
+                   pressure=division.at_corners(grown.pressure), last=last)

@@ -1,0 +1,81 @@
+"""Closing by nodes (2.3.3), the paper's: on straight edges a node joins a wall or stays free.
+
+After each equilibrium, the nodes at a film or a wedge that is too thin join the wall, and so do all
+nodes between them and the contact surface.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from repro.errors import GrowthError
+from repro.fem.outline import Outline
+from repro.fem.walls import FREE, Walls
+from repro.model.contact_lines import surface_ends
+from repro.model.mechanics import CONTACT_ROUNDS, Closing, Expansion, equilibrium, with_new_surfaces
+
+
+class ByNodes(Closing):
+    """The closing on straight edges."""
+
+    def close(self) -> Expansion:
+        grown = self.grown
+        film = self.mechanics.keys.minimum_film
+        angle = self.mechanics.keys.minimum_contact_angle
+        walls = grown.mesh.walls
+        shape = replace(grown, space=self.start.space, pressure=self.start.pressure)
+        iterations = 0
+        gaps: list[float] = []
+        for _ in range(CONTACT_ROUNDS):
+            last = None if gaps else grown.mesh.points[grown.mesh.body]
+            shape, used = equilibrium(self.mechanics, grown, shape, self.forces, last=last)
+            iterations += used
+            gaps.append(shape.boundary.gap(walls))
+            if not shape.contact:
+                self.search.refuse_late(gaps[-1], film)
+            joins = closing_nodes(shape.boundary, walls, film, angle)
+            if not joins.any():
+                return Expansion(with_new_surfaces(shape), iterations, gaps[0])
+            shape = replace(shape, wall=np.where(joins != FREE, joins, shape.wall))
+        raise GrowthError(f"the contact surfaces still change after {CONTACT_ROUNDS} rounds")
+
+
+def closing_nodes(outline: Outline, walls: Walls, film: float, angle: float) -> np.ndarray:
+    """(M,) wall that each node must join next, or FREE (2.3.3).
+
+    A layer of fluid thinner than ``film`` to a wall without contact closes, and so does a wedge of
+    fluid beside a contact surface whose angle is under ``angle``. Beside contact the gap must not
+    be less than the smaller of film and tan(angle) times the distance from the contact line.
+    Nodes between closing nodes close too, so that no fluid is trapped.
+    """
+    joins = np.full(len(outline.points), FREE)
+    for wall in walls:
+        gap = wall.film(outline.points)
+        lines = surface_ends(outline, wall.number)
+        if not lines:
+            joins[(outline.wall == FREE) & (gap < film)] = wall.number
+        for line, step in lines:
+            joins[_closing_run(outline, gap, line, step, film, np.tan(angle))] = wall.number
+    return joins
+
+
+def _closing_run(outline: Outline, gap: np.ndarray, line: int, step: int, film: float,
+                 slope: float) -> np.ndarray:
+    """Free nodes from a contact line outwards, up to the last one too close to the wall."""
+    count = len(gap)
+    walk = (line + step * np.arange(1, count)) % count
+    reach = np.flatnonzero(outline.wall[walk] != FREE)[0]
+    other = walk[reach]
+    walk = walk[:reach]
+    x = outline.points[:, 0]
+    gaps = gap[walk]
+    apart = x[walk] - x[line]
+    # Free nodes end at the other line. If it is on the same wall, nodes belong to the nearer line.
+    nearer = np.abs(apart) <= np.abs(x[walk] - x[other])
+    if outline.wall[other] != outline.wall[line]:
+        nearer = np.ones(len(walk), bool)
+    along = np.sign(x[line] - x[(line - step) % count]) * apart
+    thin = (nearer & (gaps < 0)) | (gaps < np.minimum(film, slope * along))
+    return walk[: np.flatnonzero(thin)[-1] + 1] if thin.any() else walk[:0]

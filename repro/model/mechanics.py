@@ -1,0 +1,208 @@
+"""Equilibrium of a grown aggregate between the walls (2.3, 3.4): its loads and its constraints.
+
+How films and wedges close in an equilibrium (2.3.3) is the part of a :class:`Closing`, by nodes
+(:mod:`repro.model.closing_by_nodes`) or by contact lines (:mod:`repro.model.closing_by_lines`).
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from repro.fem.division import Division
+from repro.fem.outline import Outline
+from repro.fem.walls import FREE
+from repro.model import growth
+from repro.model.body import Body
+from repro.model.contact_lines import SearchOptions
+from repro.model.pore import Pore
+from repro.model.support import Support
+from repro.model.traction import Fluid
+from repro.scene import Growth, Numerics, Scene
+
+#: Largest number of rounds in which closing films change the contact surfaces in one step.
+CONTACT_ROUNDS = 60
+
+
+@dataclass(frozen=True, eq=False)
+class Mechanics:
+    """Data from which the shape of a grown aggregate is computed.
+
+    keys: section [growth] of the scene; numerics: Newton's method; fluid:
+    its forces on the aggregate, None if they are neglected.
+    """
+
+    keys: Growth
+    numerics: Numerics
+    fluid: Fluid | None = None
+
+    @classmethod
+    def of(cls, scene: Scene) -> Mechanics:
+        """The mechanics of a scene with growth."""
+        keys = scene.growing.growth
+        fluid = Fluid.of(scene) if keys.fluid_forces == "included" else None
+        return cls(keys, scene.numerics, fluid)
+
+
+@dataclass(frozen=True, eq=False)
+class Expansion:
+    """The aggregate in its new shape.
+
+    pore: with the fluid's nodes not yet moved, on the divided mesh if a contact line lies
+    within an arc; iterations: of Newton's method; gap: um, the thinnest film at a wall without
+    contact before films closed; division: of the mesh of the grown pore, None if it is not divided;
+    advances: {(wall, direction): um} by which contact lines have advanced along the outline of the
+    grown pore.
+    """
+
+    pore: Pore
+    iterations: int
+    gap: float
+    division: Division | None = None
+    advances: Mapping[tuple[int, int], float] = field(default_factory=dict)
+
+    @property
+    def position(self) -> np.ndarray:
+        """(N, 2) um, new positions of the grown pore's nodes."""
+        points = self.pore.mesh.points
+        return points if self.division is None else self.division.restricted(points)
+
+    def amounts(self, amounts: np.ndarray, grown: Pore) -> np.ndarray:
+        """Carry amounts (r, q) from the points of the grown pore's aggregate to those of the new
+        shape."""
+        if self.division is None:
+            return amounts
+        return self.division.amounts(amounts, grown.space.table)
+
+    def gathered(self, loads: np.ndarray) -> np.ndarray:
+        """(n, 2) loads on the nodes of the grown aggregate, from those on the new shape's nodes."""
+        if self.division is None:
+            return loads
+        division = self.division
+        return division.gathered_loads(division.mesh.from_body(loads))[division.parent.body]
+
+
+@dataclass(eq=False)
+class Closing(ABC):
+    """Closing of the films and wedges that are too thin while an aggregate takes its new shape.
+
+    grown: the pore with its new theta, in the old shape; start: a pore on the same mesh with the
+    shape and pressure from which the search starts; forces: (n, 2) um, constant nodal forces over
+    mu_L, None for no forces; search: its options.
+    """
+
+    mechanics: Mechanics
+    grown: Pore
+    start: Pore
+    forces: np.ndarray | None
+    search: SearchOptions
+
+    @abstractmethod
+    def close(self) -> Expansion:
+        """The shape in which no film and no wedge is too thin. Raises GrowthError, and FirstContact
+        if the first contact comes too late for ``search``."""
+
+
+def equilibrium(mechanics: Mechanics, grown: Pore, start: Pore, forces: np.ndarray | None, *,
+                last: np.ndarray | None = None, patient: bool = True) -> tuple[Pore, int]:
+    """Equilibrium of a grown pore under its theta, and the count of Newton iterations.
+
+    ``start`` has the contact, and the shape and pressure from which Newton's method starts.
+    """
+    body, target_J = strained_from(mechanics.keys, grown, grown.theta)
+    nodes = grown.mesh.body
+    inside = grown.mesh.topology.body_corners
+    locked, target = constraints(grown, start)
+    rest = growth.equilibrium(body, target_J, start.mesh.points[nodes], start.pressure[inside],
+                              locked, target, forces=forces, last=last, patient=patient,
+                              supports=supports_of(body, start, forces),
+                              modified_newton=mechanics.numerics.scheme.modified_newton)
+    shape = grown.with_body(rest.position, rest.pressure)
+    return replace(shape, wall=start.wall), rest.iterations
+
+
+def strained_from(keys: Growth, grown: Pore, theta: np.ndarray) -> tuple[Body, np.ndarray]:
+    """Configuration from which strain counts, and the expansion since then.
+
+    The configuration is that of t = 0 or the present one (section 5). The expansion since the
+    present one is theta / J. This removes the error of J = theta, so the area follows the mass
+    without drift.
+    """
+    if keys.new_biomass == "stressed":
+        return grown.body, theta
+    position = grown.mesh.points[grown.mesh.body]
+    present = replace(grown.body, reference=position)
+    return present, theta / grown.body.strained(position).J
+
+
+def constraints(grown: Pore, shape: Pore) -> tuple[np.ndarray, np.ndarray]:
+    """(n, 2) True where a coordinate is prescribed, and (n, 2) um, its prescribed value.
+
+    x is prescribed at fixed points, y on the walls (2.3.3). Every point that lay on a bonded wall
+    before the step keeps its position.
+    """
+    rim = shape.mesh.topology.body_loop
+    before = grown.mesh.points[grown.mesh.body]
+    fixed = shape.fixed
+    target = shape.mesh.points[shape.mesh.body].copy()
+    for wall in shape.mesh.walls:
+        target[rim[shape.wall == wall.number], 1] = wall.y
+        fixed = fixed | (wall.bonded & wall.holds(before[rim]))
+    target[rim[fixed], 0] = before[rim[fixed], 0]
+    return constrained(len(target), rim, shape.wall, fixed), target
+
+
+def supports_of(body: Body, shape: Pore, forces: np.ndarray | None) -> list[Support]:
+    """The supports of the contact surfaces of ``body`` that slide and have a fixed point.
+
+    A surface of a single node has no length; the node bears its force. Without ``forces`` (n, 2)
+    one surface alone bears none, because the forces of growth along the pore add up to zero.
+    """
+    outline = shape.boundary
+    rim = shape.mesh.topology.body_loop
+    walls = shape.mesh.walls
+    bearing = []
+    for wall in walls:
+        edges = rim[outline.edges_on(wall.number)]
+        points = rim[outline.fixed & (outline.wall == wall.number) & (not wall.bonded)]
+        if len(edges) and len(points):
+            bearing.append(Support.on(int(points[0]), edges, body.reference))
+    alone = len(bearing) == 1 and not any(wall.bonded for wall in walls)
+    return [] if alone and forces is None else bearing
+
+
+def constrained(count: int, rim: np.ndarray, wall: np.ndarray, fixed: np.ndarray) -> np.ndarray:
+    """(count, 2) True where a coordinate is prescribed: x at fixed points, y on the walls (2.3.3).
+
+    rim: (M,) the boundary's nodes among all; wall, fixed: (M,), as in an outline.
+    """
+    prescribed = np.zeros((count, 2), bool)
+    prescribed[rim[fixed], 0] = True
+    prescribed[rim[wall != FREE], 1] = True
+    return prescribed
+
+
+def with_new_surfaces(pore: Pore) -> Pore:
+    """The pore with fixed points in the middles of contact surfaces that have just formed."""
+    outline = pore.boundary
+    fixed = outline.fixed
+    for wall in pore.mesh.walls:
+        if wall.keeps_point and not outline.fixed[outline.wall == wall.number].any():
+            fixed = fixed | middle_of(outline, wall.number)
+    return replace(pore, fixed=fixed)
+
+
+def middle_of(outline: Outline, wall: int) -> np.ndarray:
+    """(M,) True at the node nearest to the middle of the contact surface with a wall; the corner
+    before it if that node is the middle of an arc."""
+    on = outline.wall == wall
+    x = outline.points[:, 0]
+    chosen = np.zeros(len(on), bool)
+    if on.any():
+        middle = 0.5 * (x[on].min() + x[on].max())
+        index = int(np.flatnonzero(on)[np.argmin(np.abs(x[on] - middle))])
+        chosen[index - index % outline.geometry] = True
+    return chosen
