@@ -27,6 +27,11 @@ NEXT = [1, 2, 0]
 ON_EDGE = {1: [0, 1], 2: [0, 3, 1]}
 
 
+def order_of(cells: np.ndarray) -> int:
+    """Order of elements with nodes (T, 3 or 6)."""
+    return 1 if cells.shape[1] == 3 else 2
+
+
 def nodes(order: int) -> np.ndarray:
     """(k, 2) places of the nodes of an element on the unit triangle."""
     return np.asarray(ELEMENTS[order].doflocs)

@@ -96,7 +96,7 @@ class Topology:
     @property
     def geometry(self) -> int:
         """1: straight triangles, 2: curved ones."""
-        return 1 if self.cells.shape[1] == 3 else 2
+        return elements.order_of(self.cells)
 
     @property
     def triangles(self) -> np.ndarray:

@@ -43,9 +43,9 @@ class Located:
     triangle: np.ndarray
     local: np.ndarray
 
-    def field(self, values: np.ndarray, cells: np.ndarray, order: int) -> np.ndarray:
-        """(K, ...) field at these points, from values (N, ...) at nodes (T, k) of an order."""
-        weights = elements.values(order, self.local)
+    def field(self, values: np.ndarray, cells: np.ndarray) -> np.ndarray:
+        """(K, ...) field at these points, from values (N, ...) at the nodes (T, k) of triangles."""
+        weights = elements.values(elements.order_of(cells), self.local)
         return np.einsum("ka,ka...->k...", weights, values[cells[self.triangle]])
 
 
@@ -58,13 +58,12 @@ def located(points: np.ndarray, cells: np.ndarray, where: np.ndarray) -> Located
     in which the point lies deepest is chosen. A point slightly outside moves to the edge of the
     nearest triangle. Raises TransferError if a point is far from all triangles.
     """
-    geometry = 1 if cells.shape[1] == 3 else 2
     nodes = points[cells]
     size = np.ptp(nodes, axis=1).max(axis=1)
     low = nodes.min(axis=1) - 0.1 * size[:, None]
     high = nodes.max(axis=1) + 0.1 * size[:, None]
     place, cell = shapely.STRtree(shapely.box(*low.T, *high.T)).query(shapely.points(where))
-    local = _inverted(nodes[cell], where[place], geometry)
+    local = _inverted(nodes[cell], where[place], elements.order_of(cells))
     depth = elements.values(1, local).min(axis=1)
     best = np.lexsort((-depth, place))
     first = best[np.unique(place[best], return_index=True)[1]]
@@ -128,7 +127,7 @@ def interpolate(points: np.ndarray, cells: np.ndarray, fields: np.ndarray,
 
     This is the paper's transfer; on straight triangles it is bounded.
     """
-    return located(points, cells, where).field(fields, cells, 1 if cells.shape[1] == 3 else 2)
+    return located(points, cells, where).field(fields, cells)
 
 
 def interpolated(points: np.ndarray, triangles: np.ndarray, fields: np.ndarray,

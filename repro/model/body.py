@@ -33,7 +33,7 @@ class Shape:
     @property
     def geometry(self) -> int:
         """1: straight triangles, linear displacements; 2: curved ones, quadratic displacements."""
-        return 1 if self.cells.shape[1] == 3 else 2
+        return elements.order_of(self.cells)
 
     @property
     def triangles(self) -> np.ndarray:

@@ -110,7 +110,7 @@ def _on_generated(rules: Remeshing, generated: GeneratedMesh, expanded: Pore) ->
     if old.topology is not shape.mesh.topology or not _same_contact(expanded, shape):
         return None
     points = start.mesh.points.copy()
-    points[start.mesh.body] = generated.at.field(old.points, old.cells[old.biomass], old.geometry)
+    points[start.mesh.body] = generated.at.field(old.points, old.cells[old.biomass])
     on_wall = start.mesh.loop[start.wall != FREE]
     points[on_wall, 1] = start.mesh.points[on_wall, 1]
     mesh = moved_mesh(rules.meshing, start, start.moved(points))
@@ -194,7 +194,7 @@ def _transferred(rules: Remeshing, expanded: Pore, target: Pore, at: Located,
         (expanded.active, expanded.inert, *amounts), rules.maximum_density)
     last = expanded.last
     if last is not None:
-        last = at.field(last, old.topology.body_cells, old.geometry)
+        last = at.field(last, old.topology.body_cells)
     pore = replace(target, time=expanded.time, active=active, inert=inert,
                    pressure=_pressure(target.mesh, expanded, at), last=last)
     return replace(pore, theta=growing.restart_theta(pore, rules.maximum_density)), tuple(rest)
@@ -204,7 +204,7 @@ def _pressure(mesh: Mesh, expanded: Pore, at: Located) -> np.ndarray:
     """(corners,) P / mu_L on a new mesh, interpolated in the aggregate, zero in the fluid."""
     old = expanded.mesh
     pressure = np.zeros(mesh.corners)
-    inside = at.field(expanded.pressure, old.triangles[old.biomass], 1)[mesh.body < mesh.corners]
+    inside = at.field(expanded.pressure, old.triangles[old.biomass])[mesh.body < mesh.corners]
     pressure[mesh.topology.body_corners] = inside
     return pressure
 
@@ -219,7 +219,7 @@ def _material(new: Space, expanded: Pore, rim: np.ndarray, at: Located) -> tuple
     old = expanded.mesh
     energy = expanded.body.energy
     origin = mesh.points.copy()
-    origin[mesh.body] = at.field(expanded.origin, old.cells[old.biomass], old.geometry)
+    origin[mesh.body] = at.field(expanded.origin, old.cells[old.biomass])
     origin[mesh.loop] = rim
     try:
         unfolded = transfer.unfolded(mesh, origin)[mesh.body]
@@ -244,7 +244,7 @@ def transfer_substrates(supplied: Substrates, old: Space, new: Space, state: Con
     first, last = old.mesh.ends
     clipped = np.column_stack([np.clip(x, first, last), new.points[:, 1]])
     at = transfer.located(old.mesh.points, old.mesh.cells, clipped)
-    fields = at.field(state.fields.T, old.cells, old.order)
+    fields = at.field(state.fields.T, old.cells)
     kinds = supplied.modelled.values()
     new_fields = [_beyond(field, substrate, x, old.mesh.ends, speed)
                   for field, substrate in zip(fields.T, kinds)]

@@ -80,7 +80,7 @@ def surface(pore: Pore) -> Surface:
 def _expansion(nodes: np.ndarray, local: np.ndarray) -> np.ndarray:
     """(edges,) area of triangles with nodes (edges, 3 or 6, 2) um over that of the unit triangle,
     at the middles of their edges ``local`` (edges,)."""
-    derivatives = _map_derivatives(1 if nodes.shape[1] == 3 else 2)
+    derivatives = _map_derivatives(elements.order_of(nodes))
     return elements.determinant(np.einsum("eai,eak->eik", nodes, derivatives[local]))
 
 

@@ -111,8 +111,7 @@ def _as_drawn(grid: Grid) -> Grid:
     cells = grid.cells
     grid_points, triangles = _regular(points.min(axis=0), points.max(axis=0))
     at = located(points, cells, grid_points)
-    order = 1 if cells.shape[1] == 3 else 2
-    nodal = {name: at.field(value, cells, order) for name, value in grid.point_data.items()}
+    nodal = {name: at.field(value, cells) for name, value in grid.point_data.items()}
     inside = located(points, cells, grid_points[triangles].mean(axis=1)).triangle
     values = {name: value[inside] for name, value in grid.cell_data.items()}
     points = np.column_stack([grid_points, np.zeros(len(grid_points))])

@@ -40,7 +40,7 @@ def _located_errors(size: float, seed: int, order: int) -> dict[str, float]:
     """Error of a field of an order, interpolated at random points."""
     where = np.random.default_rng(8).uniform((0.0, 0.0), (pairs.ENDS[1], pairs.WIDTH), (1000, 2))
     mesh = meshes.space_on(meshes.channel(pairs.ENDS, pairs.WIDTH, size, lambda x, y: x < 0, seed=seed), order).mesh
-    computed = transfer.located(mesh.points, mesh.cells, where).field(smooth(*mesh.points.T), mesh.cells, order)
+    computed = transfer.located(mesh.points, mesh.cells, where).field(smooth(*mesh.points.T), mesh.cells)
     return {"located": np.sqrt(np.mean((computed - smooth(*where.T)) ** 2))}
 
 
