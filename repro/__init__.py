@@ -53,8 +53,9 @@ Sections of the paper and their modules, which name the equations that they solv
     5    adhesion, tearing                  repro.model.adhesion
          limits of the surface              repro.model.surface
     3.5  mesh motion           (35)         repro.model.mesh_motion
-    3.1, 3.5  remeshing                     repro.model.remeshing, .grading
+    3.1, 3.5  first mesh, remeshing         repro.model.meshing, .remeshing, .grading
     2    state of the pore                  repro.model.pore, .stages (the parts of a step)
+    2    flow and substrates in it          repro.model.solving
          both schemes, as printed           repro.schemes
     2    coupling, 3.3                      repro.march.updates (the paper's shape updates)
          error control (not the paper's)    repro.march.midpoint, .stepping, .step_control
@@ -67,7 +68,7 @@ Data flow:
     repro.schemes     the paper's scheme and the curved one, side by side
     repro.scene       reads, checks and converts a .toml file to a Scene in um, h, mg/L, or refuses
                       it in one line (.files, .reading, .units, .rules; .text)
-    repro.model.pore  makes the Pore at t = 0 from the Scene: outline, mesh, masses
+    repro.model.meshing  makes the Pore at t = 0 from the Scene: outline, mesh, masses
     repro.march       advances the Pore step by step, and yields Reports: pore, flow, substrates,
                       ledgers
     repro.results     makes rows and fields from Reports, in the units that their names end in

@@ -17,8 +17,10 @@ from repro.fem.outline import half_disc as half_disc_outline
 from repro.fem.sizing import Sizing
 from repro.fem.space import Space
 from repro.fem.walls import BOTTOM, FREE, TOP, channel_walls
-from repro.model import mechanics, pore
+from repro.model import mechanics
+from repro.model.body import material
 from repro.model.energies import NEO_HOOKEAN
+from repro.model.meshing import seeded
 from repro.scene import parse_scene
 from repro.schemes import PAPER
 from verification.problems.schemes import exchange, exchanged, load_scene
@@ -187,7 +189,7 @@ def mirror_image(at, along):
     return replace(at, space=space, wall=np.array([walls[wall] for wall in back(at.wall).tolist()]),
                    fixed=back(at.fixed), active=exchanged(at.active), inert=exchanged(at.inert),
                    theta=exchanged(at.theta),
-                   body=pore.material(space, about + at.body.reference * sign, at.body.energy),
+                   body=material(space, about + at.body.reference * sign, at.body.energy),
                    last=None if at.last is None else about + at.last * sign, line_speeds=None)
 
 
@@ -227,7 +229,7 @@ def boundary_edge_counts(triangles):
 def body_of(grid, around):
     """(Body, constrained (n, 2), rim (M,)): the unstrained aggregate, its constrained dofs (2.3.3: y on the
     walls and x at fixed points) and its boundary nodes."""
-    body = pore.material(Space(grid), grid.points[grid.body], NEO_HOOKEAN)
+    body = material(Space(grid), grid.points[grid.body], NEO_HOOKEAN)
     rim = grid.topology.body_loop
     return body, mechanics.constrained(len(grid.body), rim, around.wall, around.fixed), rim
 
@@ -267,4 +269,4 @@ def coarse_base(order, *changes, unset=()):
     """(scene, its seed): base with coarse elements of an order, and supplies that differ."""
     scene = load_scene("base", ['substrates.acceptor.supply="9 mg/L"', 'substrates.donor.supply="4 mg/L"',
                                 "numerics.refinement=0.3", exchange(elements=ORDERS[order]), *changes], unset=unset)
-    return scene, pore.seeded(scene)
+    return scene, seeded(scene)

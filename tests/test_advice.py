@@ -15,7 +15,8 @@ import pytest
 from repro.cli import main
 from repro.errors import SimulationError
 from repro.march.simulation import simulate
-from repro.model import pore
+from repro.model import meshing, solving
+from repro.model.meshing import seeded
 from repro.preflight import memory, numbers, simplifications
 from repro.runs import machine
 from repro.scene import SceneError, load_scene, parse_scene
@@ -63,8 +64,8 @@ FOLLOWED = {
     "model/gear.py": {"try numerics.transport = ":
                       "tests/test_advice.py::test_profiles_at_rest_help_where_those_in_time_do_not_settle"},
     "model/growth.py": {"try a larger growth.shear_modulus": "members 151 and 171 of the hard family"},
-    "model/pore.py": {
-        "leave [flow] out": "tests/test_transport.py::test_too_slow_a_flow_is_refused",
+    "model/solving.py": {"leave [flow] out": "tests/test_transport.py::test_too_slow_a_flow_is_refused"},
+    "model/meshing.py": {
         "no mesh resolves the boundary layers":
             "tests/test_check.py::test_extreme_peclet_numbers_are_refused_by_their_keys"},
     "preflight/memory.py": {
@@ -268,7 +269,7 @@ def warnings(changes):
     scene = load_scene("base", changes, unset=["flow.head"])
     width = scene.pore.width
     plug = numbers.Sizes(scene.growth.end, 3 * width**2, width, 1.5 * width, True)
-    return simplifications.find_warnings(scene, pore.fastest(scene.flow, scene.pore), plug)
+    return simplifications.find_warnings(scene, meshing.fastest(scene.flow, scene.pore), plug)
 
 
 def setting(warned):
@@ -334,8 +335,8 @@ def test_forces_of_the_fluid_are_advised_and_act_on_a_permeable_aggregate():
                "aggregate.radius=20 um", "flow.permeability=1e-13 m^2"]
     neglected, included = (load_scene("base", [*changes, f"growth.fluid_forces={word}"])
                            for word in ("neglected", "included"))
-    state = pore.seeded(neglected)
-    speed, sizes = pore.solve(neglected, state).flow.mean_velocity, numbers.reached(state)
+    state = seeded(neglected)
+    speed, sizes = solving.solve(neglected, state).flow.mean_velocity, numbers.reached(state)
     computed = numbers.numbers(neglected, speed, sizes)
     keys = [[warning.key for warning in simplifications.find_warnings(scene, speed, sizes)]
             for scene in (neglected, included)]

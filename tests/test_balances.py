@@ -13,7 +13,8 @@ from repro.march import balance
 from repro.march.simulation import simulate
 from repro.model import transport
 from repro.model.kinetics import Sink
-from repro.model.pore import seeded, solve
+from repro.model.meshing import seeded
+from repro.model.solving import solve
 from repro.results import row
 from tests import oracles
 from tests.strategies import EVERY_ORDER, ORDERS, between, scenes, share

@@ -16,7 +16,7 @@ from repro.cli import main
 from repro.errors import GrowthError, SimulationError
 from repro.march import simulation
 from repro.march.simulation import simulate
-from repro.model import pore
+from repro.model.meshing import seeded
 from repro.preflight import checked, cost, modelled, numbers, outlook, simplifications
 from repro.preflight.checked import check
 from repro.preflight.modelled import describe_model
@@ -405,7 +405,7 @@ def test_check_prints_a_report_and_exits_with_zero(capsys):
     output = capsys.readouterr()
     assert output.err == "" and "wide: can be run" in output.out and "WARNING growth.time_step: " in output.out
     assert re.search(r"Thiele, donor +0\.29 +0\.32\n  Damkoehler, acceptor +0\.0053 +0\.0064\n", output.out)
-    mesh = pore.seeded(load_scene("wide")).mesh
+    mesh = seeded(load_scene("wide")).mesh
     assert f"Mesh at t = 0: {len(mesh.points)} nodes, {len(mesh.cells)} triangles" in output.out
     assert all(len(line) <= 120 for line in output.out.splitlines())
 

@@ -22,7 +22,7 @@ from repro.model.closing_by_lines import ByLines, divided
 from repro.model.closing_by_nodes import closing_nodes
 from repro.model.contact_lines import PATIENT, Clearance, Contact, surface_ends
 from repro.model.mechanics import Mechanics
-from repro.model.pore import initial_outline, seeded
+from repro.model.meshing import initial_outline, seeded
 from repro.runs.execution import Watch, resume, run
 from repro.runs.state_arrays import pack_state, unpack_state
 from repro.scene import load_scene

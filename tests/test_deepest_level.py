@@ -8,7 +8,8 @@ import pytest
 from repro import load_scene
 from repro.errors import Unresolved
 from repro.march.simulation import simulate
-from repro.model import grading, pore
+from repro.model import grading, solving
+from repro.model.meshing import seeded
 from repro.preflight import simplifications
 from repro.preflight.numbers import Sizes
 
@@ -44,17 +45,17 @@ def test_elements_are_halved_as_often_as_a_front_needs(half, levels, time):
     """At t = 0 the mesh is that of the seed, later it is a new one. Elements twice as large do not resolve the front.
     Effluents agree with those of elements as small everywhere."""
     scene = fronted(half)
-    first = replace(pore.seeded(scene), time=time)
+    first = replace(seeded(scene), time=time)
     graded, solved = grading.solve_graded(scene, first)
     level = 2 ** round(np.log2(at_rim(first) / at_rim(graded)))
     assert level in levels
     assert within_bounds(graded, solved) and graded.mass == pytest.approx(first.mass, rel=1e-3)
     if level > 1 and time == 0:
         with pytest.raises(Unresolved):
-            pore.solve(scene, pore.seeded(scene, level / 2))
+            solving.solve(scene, seeded(scene, level / 2))
     if half == 0.01 and time == 0:
         fine = fronted(half, "numerics.refinement=0.8")
-        expected = [flux.effluent for flux in pore.solve(fine, pore.seeded(fine)).fluxes]
+        expected = [flux.effluent for flux in solving.solve(fine, seeded(fine)).fluxes]
         assert [flux.effluent for flux in solved.fluxes] == pytest.approx(expected, rel=5e-3)
 
 

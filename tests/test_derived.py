@@ -11,7 +11,7 @@ from skfem.refdom import RefTri
 
 from repro import results
 from repro.march.simulation import simulate
-from repro.model import adhesion, pore
+from repro.model import adhesion, solving
 from repro.report import quantities
 from repro.report.reading import Run
 from repro.results.names import KNOWN
@@ -62,7 +62,7 @@ def instant_in(state, order):
     if state == "late":
         return scene, report
     at = MIRRORS[image](report.pore)
-    return scene, replace(report, pore=at, solved=pore.solve(scene, at))
+    return scene, replace(report, pore=at, solved=solving.solve(scene, at))
 
 
 # Lagrange's functions from their nodes alone.

@@ -18,7 +18,8 @@ from repro.model.closing_by_lines import ByLines
 from repro.model.contact_lines import PATIENT
 from repro.model.kinetics import Sink
 from repro.model.mechanics import Mechanics
-from repro.model.pore import seeded, solve_flow
+from repro.model.meshing import seeded
+from repro.model.solving import solve_flow
 from repro.model.uptake_law import LAWS
 from repro.scene import load_scene
 from tests.strategies import coarse_base, half_disc

@@ -11,7 +11,8 @@ from reference import taylor_hood
 from repro.fem.outline import polygon
 from repro.fem.walls import channel_walls
 from repro.march.simulation import simulate
-from repro.model import flow, pore
+from repro.model import flow, meshing
+from repro.model.meshing import seeded
 from repro.scene import load_scene
 
 
@@ -66,7 +67,7 @@ def test_water_that_must_pass_a_permeable_body_leaves_concentrations_within_thei
     (["flow.permeability=1e-15 m^2", "numerics.contact_elements=4"], 0.5)])
 def test_elements_beside_upper_contact_lines_of_a_permeable_body_are_half_the_least_film_or_less(overrides, expected):
     """Beside an impermeable body fast has elements of the least film, 2 um."""
-    assert pore.sized(load_scene("base", ["numerics.preset=fast", *overrides])).contact == pytest.approx(expected)
+    assert meshing.sized(load_scene("base", ["numerics.preset=fast", *overrides])).contact == pytest.approx(expected)
 
 
 #: Drawn bodies (um) in a pore of 50 um; the last two span it.
@@ -89,7 +90,7 @@ def drawn_body(body, preset, interface):
 
 def meshed_loss(scene):
     """The loss (1/um) over the meshed part, for a mean velocity of one."""
-    space = pore.seeded(scene).space
+    space = seeded(scene).space
     return flow.unit_flow(space, scene.flow.viscosity_ratio, interface=scene.numerics.interface).loss
 
 
@@ -97,7 +98,7 @@ def graded_loss(scene):
     """The loss (1/um) by the independent code on a mesh graded to every corner, with edges of W / 1000 at tips."""
     width = scene.pore.width
     outline = polygon(np.array(scene.aggregate.outline), channel_walls(width), 2, at_tips=width / 1000, bends=True)
-    mesh = pore.seeded(scene, outline=outline).mesh
+    mesh = seeded(scene, outline=outline).mesh
     plane = MeshTri2.from_mesh(MeshTri(mesh.points[: mesh.corners].T.copy(), mesh.triangles.T.copy()))
     channel = taylor_hood.Channel(plane, mesh.biomass, width, mesh.ends)
     return taylor_hood.stokes(channel, scene.flow.viscosity_ratio, scene.numerics.interface).loss

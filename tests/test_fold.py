@@ -23,7 +23,8 @@ from repro.march.step_control import StepControl
 from repro.model import contact
 from repro.model.energies.neo_hookean import BIOT, CREASE
 from repro.model.mechanics import Mechanics
-from repro.model.pore import seeded, solve
+from repro.model.meshing import seeded
+from repro.model.solving import solve
 from repro.model.surface import surface
 from repro.preflight.simplifications import warn_surface
 from repro.results import read_table

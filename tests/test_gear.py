@@ -10,7 +10,8 @@ from repro.errors import TransportError
 from repro.march.simulation import simulate
 from repro.model import gear, transport
 from repro.model.kinetics import Sink
-from repro.model.pore import seeded, solve_flow
+from repro.model.meshing import seeded
+from repro.model.solving import solve_flow
 from repro.model.transport import Concentrations
 from tests import strategies
 from tests.strategies import EVERY_ORDER

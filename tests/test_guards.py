@@ -15,7 +15,8 @@ from repro.march.balance import Ledger, Limits
 from repro.march.simulation import steps
 from repro.model import transport
 from repro.model.kinetics import Sink
-from repro.model.pore import seeded, solve
+from repro.model.meshing import seeded
+from repro.model.solving import solve
 from repro.runs.execution import Recorder
 from tests import oracles
 from tests.shell import read_record

@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from repro import load_scene
-from repro.model import kinetics, pore
+from repro.model import kinetics
+from repro.model.meshing import seeded
 from repro.model.uptake_law import LAWS as LAWS_OF_UPTAKE
 from repro.model.uptake_law import UptakeLaw
 from repro.scene import Substrates
@@ -51,7 +52,7 @@ def test_the_front_of_zero_order_follows_the_mesh_at_a_known_loss(preset, absent
     flux^2 = 2 q X_m D int m dC, a layer takes up less than in the limit by K / (2 C)."""
     scene = load_scene("base", ["kinetics.law=zero order", f"numerics.preset={preset}"])
     kept = Substrates(**{name: kind for name, kind in scene.substrates.modelled.items() if name != absent})
-    space = pore.seeded(scene).space
+    space = seeded(scene).space
     rates = kinetics.rate_law(kept, scene.kinetics).on(space, kept)
     areas = space.reaction.dx.sum(axis=1)
     whole = scene.kinetics.maximum_density * np.array(rates.uptake_at(1.0, 1.0))[rates.modelled]

@@ -12,7 +12,7 @@ from repro.errors import MeshError
 from repro.fem.mesh import Mesh, triangle_areas
 from repro.fem.mesher import unlocked
 from repro.fem.walls import channel_walls
-from repro.model import pore
+from repro.model.meshing import seeded
 from tests import strategies
 from tests.strategies import LENGTH, attached_aggregates, meshed, scene, seed, widths
 
@@ -62,7 +62,7 @@ def test_an_impossible_outline_is_refused_with_its_place(geometry):
 def test_only_triangles_at_the_aggregate_are_bent():
     """The others are straight in a new mesh, as ``acceptable`` assumes. A bent triangle that is turned over is
     refused. The case mesh_motion-criterion tests how far one may be bent."""
-    grid = pore.seeded(scene("20 um", numerics={"preset": "fast"})).mesh
+    grid = seeded(scene("20 um", numerics={"preset": "fast"})).mesh
     straight, unbent = grid.moved(grid.with_middles(grid.points[: grid.corners])), np.ones(len(grid.cells), bool)
     bent = grid.topology.bent
     unbent[bent] = False

@@ -16,8 +16,10 @@ from repro import PoreEnd, simulate
 from repro.fem import sizing
 from repro.fem.walls import BOTTOM, TOP, channel_walls
 from repro.march.simulation import shaped
-from repro.model import contact, pore
+from repro.model import contact, solving
 from repro.model.mechanics import Mechanics
+from repro.model.meshing import seeded
+from repro.model.solving import solve_flow
 from repro.preflight import numbers, simplifications
 from tests.strategies import EVERY_ORDER, MIRRORS, outlines
 from tests.test_derived import SHAPE, SPANNING, drawn
@@ -46,7 +48,7 @@ def test_a_run_ends_at_either_end_of_the_pore_and_names_it(time, from_end, momen
 def seed_of(order, spans):
     """(scene, its pore at t = 0): an asymmetric aggregate between both walls, or one that almost spans the pore."""
     scene = shaped(drawn(order), SPANNING if spans else SHAPE)
-    return scene, pore.seeded(scene)
+    return scene, seeded(scene)
 
 
 @cache
@@ -83,7 +85,7 @@ def test_contact_advances_alike_in_a_pore_and_its_mirror_image(order, spans, ima
 def test_still_water_supplies_a_pore_and_its_mirror_image_alike(order):
     """Without flow both ends hold the supply. Nodes keep their numbers."""
     scene, seed = seed_of(order, True)
-    one, other = (pore.solve(replace(scene, flow=None), at).concentrations for at in (seed, MIRRORS["along"](seed)))
+    one, other = (solving.solve(replace(scene, flow=None), at).concentrations for at in (seed, MIRRORS["along"](seed)))
     assert other.acceptor == pytest.approx(one.acceptor, abs=1e-8) and other.donor == pytest.approx(one.donor, abs=1e-8)
     assert np.ptp(one.donor) > 0.5
 
@@ -99,7 +101,7 @@ def test_a_pore_and_its_mirror_images_conduct_alike(order, permeability, interfa
     scene, seed = seed_of(order, spans)
     drive = replace(scene.flow, permeability=permeability, viscosity_ratio=None if permeability else 20.0)
     numerics = replace(scene.numerics, interface=interface)
-    one, other = (pore.solve_flow(at.space, drive, scene.pore.length, numerics) for at in (seed, MIRRORS[image](seed)))
+    one, other = (solve_flow(at.space, drive, scene.pore.length, numerics) for at in (seed, MIRRORS[image](seed)))
     assert other.conductivity == pytest.approx(one.conductivity, rel=1e-8 if image == "across" else 0.002)
     if image == "across":
         assert other.velocity * [1, -1] == pytest.approx(one.velocity, abs=1e-8 * np.abs(one.velocity).max())

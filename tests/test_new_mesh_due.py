@@ -7,7 +7,7 @@ import pytest
 from repro.fem import sizing
 from repro.fem.walls import TOP
 from repro.model import mesh_motion, remeshing
-from repro.model.pore import Meshing, seeded, sized
+from repro.model.meshing import Meshing, seeded, sized
 from repro.model.remeshing import moved_mesh
 from tests.strategies import EVERY_ORDER, coarse_base
 from verification.problems.schemes import exchange, load_scene

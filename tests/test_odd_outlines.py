@@ -14,7 +14,7 @@ from repro.cli import main
 from repro.errors import SimulationError
 from repro.fem import mesher, sizing
 from repro.march.simulation import simulate
-from repro.model import pore
+from repro.model.meshing import seeded
 from repro.preflight import memory
 from repro.preflight.checked import check
 from repro.scene import SceneError, load_scene, packaged_scenes, parse_scene
@@ -93,7 +93,7 @@ def test_a_hostile_outline_has_a_first_row_or_is_refused_by_its_scene(family, se
         return
     expected = memory.first_nodes(accepted)
     assert expected < MOST_NODES
-    nodes = len(pore.seeded(accepted).mesh.points)
+    nodes = len(seeded(accepted).mesh.points)
     assert expected / 2 < nodes < 2 * expected
     if nodes < 3000:
         assert first_row(accepted).pore.time == 0
@@ -116,14 +116,14 @@ def test_a_sliver_needs_no_more_elements_than_its_length(preset, nodes):
     """A body is 0.1 um thick and 400 um long. Edges of a tenth of its thickness would be 40 000 in paper."""
     thin = scene([(-200, 0), (-199, 0.1), (199, 0.1), (200, 0)], preset)
     assert memory.first_nodes(thin) < 2 * nodes
-    assert len(pore.seeded(thin).mesh.points) < nodes
+    assert len(seeded(thin).mesh.points) < nodes
 
 
 @pytest.mark.parametrize("name", packaged_scenes())
 def test_the_bound_on_elements_leaves_half_discs_as_they_are(name, monkeypatch):
-    mesh = pore.seeded(load_scene(name)).mesh
+    mesh = seeded(load_scene(name)).mesh
     monkeypatch.setattr(sizing, "ALONG_INTERFACE", 1e9)
-    assert np.array_equal(mesh.points, pore.seeded(load_scene(name)).mesh.points)
+    assert np.array_equal(mesh.points, seeded(load_scene(name)).mesh.points)
 
 
 @pytest.mark.parametrize("points, needed", [
@@ -179,6 +179,6 @@ def test_check_estimates_a_large_mesh_instead_of_making_it(monkeypatch):
     assert report.estimated and f"about {report.nodes} nodes" in str(report)
     assert max(counts) < 6000 < report.nodes
     assert not check("initial_mesh").estimated
-    mesh = pore.seeded(fine).mesh
+    mesh = seeded(fine).mesh
     assert report.nodes == pytest.approx(len(mesh.points), rel=0.5)
     assert report.triangles == pytest.approx(len(mesh.biomass), rel=0.5)

@@ -10,8 +10,9 @@ import pytest
 from repro import results
 from repro.march.balance import LARGEST, Limits, accepted_demand, oxygen_demand
 from repro.march.simulation import simulate
-from repro.model import pore, transport
+from repro.model import solving, transport
 from repro.model.kinetics import Sink
+from repro.model.meshing import seeded
 from repro.preflight.modelled import describe_model
 from repro.scene import load_scene
 from repro.schemes import CURVED
@@ -93,8 +94,8 @@ def test_a_solution_of_one_substrate_costs_at_most_0_6_of_two(name):
     both = load_scene("base", ["aggregate.radius=20 um", "numerics.preset=accurate", "numerics.refinement=0.85"],
                       unset=["growth"])
     one = load_scene(both, unset=[f"substrates.{OTHER[name]}"])
-    seed = pore.seeded(both)
-    carried = pore.solve(both, seed).flow
+    seed = seeded(both)
+    carried = solving.solve(both, seed).flow
     assert seed.space.count > 2500
 
     def seconds(scene):

@@ -10,7 +10,8 @@ from itertools import product
 import numpy as np
 import pytest
 
-from repro.model import pore, traction
+from repro.model import solving, traction
+from repro.model.meshing import seeded
 from tests.strategies import ORDERS
 from verification.problems.schemes import exchange, load_scene
 
@@ -30,8 +31,8 @@ def solved(body, interface, order, *changes):
         f"aggregate.outline={POINTS}", exchange(elements=ORDERS[order]), f"numerics.interface={interface}",
         f"numerics.refinement={0.5 if order == 1 else 0.2}",
         "growth.shear_modulus=1e-3 MPa", *BODIES[body], *changes], unset=["aggregate.radius"])
-    state = pore.seeded(scene)
-    return scene, state, pore.solve(scene, state)
+    state = seeded(scene)
+    return scene, state, solving.solve(scene, state)
 
 
 def strain(space, velocity, interface):

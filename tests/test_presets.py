@@ -8,9 +8,10 @@ import pytest
 from repro.fem import sizing
 from repro.fem.walls import TOP
 from repro.march import midpoint, simulation
-from repro.model import pore, remeshing
+from repro.model import remeshing
 from repro.model.biomass import Rates
 from repro.model.mechanics import Expansion
+from repro.model.meshing import seeded
 from repro.scene import PRESETS, Numerics, parse_scene
 from tests.strategies import ORDERS, scene
 from tests.test_scene import EVERYTHING
@@ -47,7 +48,7 @@ def test_rates_are_carried_back_from_a_new_mesh(order, straight):
     Along bent edges the error is at most 1 % of the range (measured 0.5 %), since a function that is linear within a
     triangle is not linear in the coordinates. Constant rates stay constant."""
     scene_of_order = base('aggregate.radius="20 um"', order=order)
-    start = pore.seeded(scene_of_order)
+    start = seeded(scene_of_order)
     points = start.mesh.with_middles(start.mesh.points[: start.mesh.corners]) if straight else start.mesh.points
     half = start.moved(points * [1.1, 1.1])
     remeshed, _ = remeshing.remesh(remeshing.Remeshing.of(scene_of_order), start, half, 0.0)

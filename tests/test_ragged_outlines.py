@@ -11,7 +11,9 @@ from repro.fem import mesher
 from repro.fem.mesh import triangle_areas
 from repro.fem.outline import polygon
 from repro.fem.walls import channel_walls
-from repro.model import pore
+from repro.model import solving
+from repro.model.meshing import seeded
+from repro.preflight import resolved
 from repro.preflight.resolved import find_unresolved_flow
 from repro.scene import SceneError, load_scene, packaged_scenes, parse_scene
 
@@ -46,7 +48,7 @@ def ragged(seed):
 
 
 def head_loss(scene_of_outline):
-    return pore.solve(scene_of_outline, pore.seeded(scene_of_outline)).flow.head_loss
+    return solving.solve(scene_of_outline, seeded(scene_of_outline)).flow.head_loss
 
 
 def test_a_spiked_outline_is_the_same_in_every_preset():
@@ -87,7 +89,7 @@ def test_an_unresolved_flow_gives_a_warning_with_the_expected_head_loss():
 
 @pytest.mark.parametrize("name", packaged_scenes())
 def test_half_discs_are_not_compared_with_finer_meshes(name, monkeypatch):
-    monkeypatch.setattr(pore, "seeded", None)
+    monkeypatch.setattr(resolved, "seeded", None)
     assert not list(find_unresolved_flow(load_scene(name)))
 
 

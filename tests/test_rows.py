@@ -10,7 +10,8 @@ from repro import solve as solve_scene
 from repro.march.balance import Ledger
 from repro.march.state import Report
 from repro.model import transport
-from repro.model.pore import Solved, seeded, solve
+from repro.model.meshing import seeded
+from repro.model.solving import Solved, solve
 from repro.scene import load_scene
 from tests.strategies import EVERY_ORDER, coarse_base
 from tests.test_derived import arcs

@@ -14,7 +14,8 @@ from repro import results
 from repro.march import updates
 from repro.march.simulation import simulate
 from repro.march.state import Report
-from repro.model import pore
+from repro.model import solving
+from repro.model.meshing import seeded
 from repro.preflight.checked import check
 from repro.preflight.modelled import describe_model
 from repro.preflight.numbers import evaluate_at_largest
@@ -80,11 +81,11 @@ def test_the_columns_that_a_table_changes_at_once_are_drawn_with_a_jump(key):
     table = json.dumps([[time, TIMED[key].write(value)] for time, value in (("0 h", size), ("2 h", 2 * size))])
     loaded = load_scene("base", [f"{key}={table}", "growth.tensile_strength=1 MPa", "numerics.refinement=0.3",
                                  "aggregate.radius=20 um"], unset=without)
-    seed = pore.seeded(loaded)
+    seed = seeded(loaded)
     rows = []
     for time in (0.0, 2.0):
         at = replace(seed, time=time)
-        rows.append(results.row(loaded, Report(at, pore.solve(loaded, at), None, (), 0, {})))
+        rows.append(results.row(loaded, Report(at, solving.solve(loaded, at), None, (), 0, {})))
     changed = {column for column, before in rows[0].items()
                if before is not None and not math.isclose(before, rows[1][column], rel_tol=1e-6, abs_tol=1e-9)}
     times, values = np.array([1.0, 3.0]), np.array([1.0, 2.0])
@@ -147,8 +148,8 @@ def test_a_table_is_judged_by_its_extreme():
     """The judgement uses the largest supply and the fastest flow."""
     loaded = load_scene("base", [*SHORT, RISING])
     plain = load_scene("base", [*SHORT[:2], 'flow.head="3e-3 cm"', f"{DONOR}=20 mg/L"])
-    seed = pore.seeded(loaded)
-    speeds = [pore.solve(scene, seed).flow.mean_velocity for scene in (loaded, plain)]
+    seed = seeded(loaded)
+    speeds = [solving.solve(scene, seed).flow.mean_velocity for scene in (loaded, plain)]
     judgement, expected = map(evaluate_at_largest, (loaded, plain), speeds)
     assert judgement[0] == plain and [number.start for number in judgement[1]] == pytest.approx(
         [number.start for number in expected[1]], rel=1e-12)

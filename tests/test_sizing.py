@@ -10,9 +10,9 @@ from repro.fem import sizing as of
 from repro.fem.outline import Outline, polygon
 from repro.fem.sizing import Sizing
 from repro.fem.walls import BOTTOM, FREE, TOP, channel_walls
-from repro.model import pore
+from repro.model import meshing
 from repro.model.contact_lines import surface_ends
-from repro.model.pore import resolution
+from repro.model.meshing import resolution
 from repro.scene import Numerics, load_scene
 from tests import oracles
 from tests.strategies import attached_aggregates, lengths, outlines, refinements, widths
@@ -70,7 +70,7 @@ def test_the_mesher_gets_the_sizes_of_the_scene():
             "numerics.gradation=0.2", "numerics.contact_elements=4"]
     outline = json.dumps([["-5 um", "0 um"], ["0 um", "4 um"], ["5 um", "0 um"]])
     for seed, middle in (('position="3 um"', 3.0), (f"outline={outline}", None)):
-        sizes = replace(pore.sized(load_scene("base", [*changes, f"aggregate={{{seed}}}"])), front=2.0)
+        sizes = replace(meshing.sized(load_scene("base", [*changes, f"aggregate={{{seed}}}"])), front=2.0)
         assert sizes == Sizing(channel_walls(80.0), 0.7, 0.5, 0.2, 2.0, 0.125, middle, 0.7)
 
 
@@ -85,7 +85,7 @@ def test_meshes_are_fine_enough_for_the_fastest_later_flow(key, unit):
 
 def test_boundary_layers_do_not_refine_films():
     """In a fast flow all elements are finer than in a slow flow, except those in a film."""
-    slow, fast = (pore.sized(load_scene("base", ["numerics.preset=fast", f"flow.mean_velocity={speed} m/day"],
+    slow, fast = (meshing.sized(load_scene("base", ["numerics.preset=fast", f"flow.mean_velocity={speed} m/day"],
                                         unset=["flow.head"])) for speed in (2, 160))
     assert slow.refinement == slow.film_refinement == fast.film_refinement == 0.2
     assert fast.refinement > 2 * slow.refinement

@@ -7,7 +7,7 @@ from repro.fem import elements
 from repro.fem.mesh import Mesh, curved
 from repro.fem.space import Space
 from repro.fem.walls import channel_walls
-from repro.model import pore
+from repro.model.meshing import seeded
 from repro.scene import load_scene
 from tests.strategies import bent_inside
 
@@ -17,7 +17,7 @@ def meshes():
     """One triangulation around a half-disc: of linear functions, and of quadratic ones with straight sides, as a scene
     makes it, and with bent inner edges."""
     overrides = ["numerics.preset=accurate", "numerics.refinement=0.5", "aggregate.radius=20 um"]
-    curved_mesh = pore.seeded(load_scene("base", overrides)).mesh
+    curved_mesh = seeded(load_scene("base", overrides)).mesh
     straight = curved_mesh.straight
     return {"linear": straight, "straight sides": curved(straight, None), "made": curved_mesh,
             "bent": bent_inside(curved_mesh)}

@@ -17,9 +17,10 @@ from repro.march import midpoint, simulation, step_control, stepping, updates
 from repro.march.ends import PoreEnd
 from repro.march.midpoint import Attempt
 from repro.march.step_control import EXCESS, StepControl, exceeds_tolerance
-from repro.model import grading, pore, remeshing
+from repro.model import grading, remeshing, solving
 from repro.model.contact_lines import PATIENT
-from repro.model.pore import solve
+from repro.model.meshing import seeded
+from repro.model.solving import solve
 from repro.model.stages import Stages
 from repro.scene import load_scene
 from tests.strategies import EVERY_ORDER, coarse_base, scene
@@ -86,14 +87,14 @@ def test_rows_within_steps_are_of_second_order():
     """At 0.37 of a step, biomass, area, tip and effluent differ from those of a step that ends there by a local error,
     which is proportional to the cube of the step."""
     scene = base()
-    state = pore.seeded(scene)
-    solved = pore.solve(scene, state)
+    state = seeded(scene)
+    solved = solving.solve(scene, state)
     state = replace(state, concentrations=solved.concentrations)
     differences = []
     for hours in (1.0, 0.5, 0.25):
         row = midpoint.attempt(Stages.of(scene), state, solved, hours).step.within(0.37 * hours)
         shorter = midpoint.attempt(Stages.of(scene), state, solved, 0.37 * hours).step.pore
-        differences.append(numbers(row.pore, row.solved) - numbers(shorter, pore.solve(scene, shorter)))
+        differences.append(numbers(row.pore, row.solved) - numbers(shorter, solving.solve(scene, shorter)))
     assert np.abs(np.log2(np.divide(differences[:-1], differences[1:])) - 3).max() < 0.35
 
 
@@ -154,7 +155,7 @@ def numbers(state, solved):
 def test_each_failure_shortens_a_step_by_the_square_of_the_last_factor(error, lengths, monkeypatch):
     """Steps above 0.02 h fail: 0.2, 0.2 / 2, 0.1 / 4 and 0.025 / 16 h are tried. A step past an end is halved."""
     scene, tried = base(), []
-    state = pore.seeded(scene)
+    state = seeded(scene)
 
     def attempt(_, __, ___, duration, *____):
         tried.append(duration)

@@ -8,8 +8,9 @@ import pytest
 
 from repro.fem.outline import polygon
 from repro.fem.walls import BOTTOM, FREE, TOP, channel_walls
-from repro.model import growth, mechanics, pore
+from repro.model import growth, mechanics
 from repro.model.mechanics import Mechanics, equilibrium, strained_from, supports_of
+from repro.model.meshing import seeded
 from repro.model.support import Support
 from tests.strategies import EVERY_ORDER, ORDERS, body_of, coarse_base, meshed
 from tests.strategies import seed as disc
@@ -22,7 +23,7 @@ def block(order, *changes):
     scene = load_scene("base", [f"aggregate.outline=[{text}]", 'pore.width="20 um"', "numerics.refinement=0.3",
                                 exchange(elements=ORDERS[order]), *changes],
                        unset=["aggregate.radius"])
-    return scene, pore.seeded(scene)
+    return scene, seeded(scene)
 
 
 def nodes_of(seed, wall):

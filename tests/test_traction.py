@@ -5,8 +5,9 @@ import pytest
 
 from repro.errors import GrowthError, StageError
 from repro.march.stepping import LANDED
-from repro.model import contact, contact_lines, pore, traction
+from repro.model import contact, contact_lines, traction
 from repro.model.mechanics import Mechanics
+from repro.model.meshing import seeded
 from tests.strategies import EVERY_ORDER, ORDERS
 from verification.problems.schemes import exchange, load_scene
 
@@ -16,7 +17,7 @@ def dense_base(order, density):
     scene = load_scene("base", ["numerics.preset=paper", exchange(elements=ORDERS[order]),
                                f"numerics.refinement={0.6 if order == 1 else 0.3}", "growth.time_step=24 min",
                                "growth.fluid_forces=included", f"flow.density={density}"])
-    return scene, pore.seeded(scene)
+    return scene, seeded(scene)
 
 
 @EVERY_ORDER
@@ -54,7 +55,7 @@ def test_a_closed_pore_may_have_larger_forces_than_the_open_one(monkeypatch, ord
     aggregate without contact by more than 0.01 um. The contact stays nevertheless."""
     scene = load_scene("base", ["numerics.preset=fast", exchange(elements=ORDERS[order]), "pore.width=7.0487 um",
                                 "numerics.contact_elements=0", "growth.fluid_forces=included"])
-    seed = pore.seeded(scene)
+    seed = seeded(scene)
 
     def lifting(_fluid, _around, shaped):
         y = shaped.mesh.points[shaped.mesh.body, 1]

@@ -10,9 +10,10 @@ from hypothesis import strategies as st
 
 from repro.errors import TransferError
 from repro.fem import transfer
-from repro.model import pore, remeshing
-from repro.model.pore import solve
+from repro.model import remeshing, solving
+from repro.model.meshing import seeded
 from repro.model.remeshing import Remeshing
+from repro.model.solving import solve
 from repro.model.transport import OVERSHOOT, UNRESOLVED, Concentrations
 from repro.scene import load_scene
 from tests.strategies import EVERY_ORDER, ORDERS, coarse_base, scene, scenes, share
@@ -36,7 +37,7 @@ def test_a_corner_on_a_side_of_the_window_loses_no_piece():
 @pytest.fixture(scope="module")
 def arcs():
     """A mesh of arcs around a half-disc."""
-    return pore.seeded(scene("20 um", numerics={"preset": "fast", "refinement": 0.5})).mesh
+    return seeded(scene("20 um", numerics={"preset": "fast", "refinement": 0.5})).mesh
 
 
 def test_a_point_far_outside_is_refused(arcs):
@@ -78,8 +79,8 @@ def test_repeated_remeshes_keep_the_biomass(scene, seed, refinements):
     """X_A is uneven and X_I even. The conserving transfer keeps totals to 1e-11, the paper's keeps bounds, and both
     keep X_I even. With order 2 the masses add up to X_m: both totals stay and no share is negative. The area of
     the outline stays, and substrates stay between zero and the supply."""
-    previous = pore.seeded(scene)
-    solved = pore.solve(scene, previous)
+    previous = seeded(scene)
+    solved = solving.solve(scene, previous)
     uneven = np.random.default_rng(seed).uniform(0.5, 1.5, previous.active.shape)
     previous = replace(with_uneven_biomass(scene, previous, uneven), concentrations=solved.concentrations)
     for refinement in refinements:
@@ -140,7 +141,7 @@ def test_water_beyond_the_old_mesh_has_the_supply_of_its_time(speed, expected):
                  "supply": [["0 h", "7 mg/L"], ["1 h", "20 mg/L"], ["4 h", "3 mg/L"]]}},
              "growth": {"end": "9 h"}, "numerics": {"preset": "paper", "transport": "gear", "refinement": 0.5}}
     full_pore = load_scene({**tables, "pore": {"width": "100 um", "length": "400 um"}})
-    old = pore.seeded(load_scene(tables))
+    old = seeded(load_scene(tables))
     along = old.mesh.points[:, 0]
     late = replace(old, time=6.0, concentrations=Concentrations(4 + 0.02 * along, 3 - 0.01 * along))
     new, _ = remeshing.remesh(Remeshing.of(full_pore), late, late, speed)

@@ -14,9 +14,10 @@ from repro.errors import SimulationError, TransportError, Unresolved
 from repro.fem.mesh import Mesh, triangle_areas
 from repro.fem.walls import channel_walls
 from repro.march.simulation import simulate
-from repro.model import pore, transport
+from repro.model import meshing, solving, transport
 from repro.model.kinetics import Sink
-from repro.model.pore import solve
+from repro.model.meshing import seeded
+from repro.model.solving import Solved, solve
 from repro.model.transport import Concentrations
 from repro.schemes import PAPER
 from tests.strategies import EVERY_ORDER, coarse_base, scene
@@ -36,8 +37,8 @@ def solved(radius, supply, velocity, order, inlet="local"):
 
 def at_start(scene):
     """(Pore, Solved) of a scene."""
-    start = pore.seeded(scene)
-    return start, pore.solve(scene, start)
+    start = seeded(scene)
+    return start, solving.solve(scene, start)
 
 
 def everywhere(start, value):
@@ -97,7 +98,7 @@ def test_too_slow_a_flow_is_refused(order):
 def test_concentrations_keep_their_bounds_without_elements_for_boundary_layers(monkeypatch):
     """At u W / D = 4e4 the divergence-free w exceeds the supply by a fourth of the accepted part at most. The mutants
     carried-by-u and carried-by-taylor-hood show that advection by u is detected."""
-    monkeypatch.setattr(pore, "BOUNDARY_LAYER", 0.0)
+    monkeypatch.setattr(meshing, "BOUNDARY_LAYER", 0.0)
     state = at_start(thick("290 m/day", 2, 0.2))[1].concentrations
     assert max(state.acceptor.max(), state.donor.max()) < 10 * (1 + transport.OVERSHOOT / 4)
 
@@ -126,7 +127,7 @@ def test_a_half_saturation_below_round_off_is_solved_or_refused_as_a_front(order
     differs by about 1e-15 from that with a half saturation of 1e-15."""
     solution = outcome(starved(half, order))
     if order == 1 and half == 1e-17:
-        assert isinstance(solution, pore.Solved), solution
+        assert isinstance(solution, Solved), solution
         other = outcome(starved(1e-15, order))
         assert solution.concentrations.acceptor == pytest.approx(other.concentrations.acceptor, abs=1e-10)
         assert solution.concentrations.acceptor.min() < 1e-10 < solution.fluxes[0].consumed

@@ -10,10 +10,11 @@ from repro.fem.outline import half_disc, polygon
 from repro.fem.sizing import Sizing
 from repro.fem.space import Space
 from repro.fem.walls import FREE, channel_walls, whole_width
-from repro.model import adhesion, contact, flow, pore
+from repro.model import adhesion, contact, flow, meshing
 from repro.model.closing_by_nodes import closing_nodes
 from repro.model.contact_lines import Clearance, surface_ends
 from repro.model.mechanics import Mechanics, with_new_surfaces
+from repro.model.meshing import seeded
 from repro.preflight import numbers
 from repro.scene import load_scene
 from tests.strategies import EVERY_ORDER, coarse_base
@@ -77,7 +78,7 @@ def grown_plug(order):
     preset = {1: "paper", 2: "fast"}[order]
     scene = load_scene("base", [f"numerics.preset={preset}", f"aggregate.outline=[{points}]", "pore.width=20 um",
                                 "numerics.refinement=0.3"], unset=["aggregate.radius"])
-    seed = pore.seeded(scene)
+    seed = seeded(scene)
     x = seed.mesh.points[seed.mesh.cells[seed.mesh.biomass, :3], 0].mean(axis=1)
     seed = replace(seed, theta=seed.theta * (1.2 + 0.01 * x)[:, None])
     return Mechanics.of(scene), seed
@@ -127,7 +128,7 @@ def test_a_film_closes_at_a_plane_of_symmetry_at_half_of_the_gap(order):
     for gap, upper in product((1.05, 0.95), ("no slip", "symmetry")):
         scene = load_scene("base", [f"numerics.preset={PRESETS[order]}", "pore.width=20 um", f"pore.upper_wall={upper}",
                                     f"aggregate.radius={20 - gap} um", "numerics.refinement=0.5"])
-        seed = pore.seeded(scene)
+        seed = seeded(scene)
         shape = contact.expand(Mechanics.of(scene), seed, seed.theta)
         closed[gap, upper] = shape.pore.contact
         assert shape.gap == pytest.approx(gap if upper == "no slip" else 2 * gap, rel=1e-3)
@@ -173,7 +174,7 @@ def test_the_mesh_ends_where_that_of_the_pore_with_its_mirror_image_ends(order):
     """The ends (3.1) are 1.5 widths of that pore away, where its flow is developed. A new mesh is due at its distance,
     too."""
     changes = [f"numerics.preset={PRESETS[order]}", "aggregate.radius=20 um", "numerics.refinement=0.3"]
-    meshes = [pore.seeded(load_scene("base", [*changes, *own])).mesh
+    meshes = [seeded(load_scene("base", [*changes, *own])).mesh
               for own in (["pore.upper_wall=symmetry"], ["pore.width=100 um"], [])]
     half, whole, alone = meshes
     assert half.ends == whole.ends == pytest.approx((-170, 170)) and alone.ends == pytest.approx((-95, 95))
@@ -190,15 +191,15 @@ def test_expected_numbers_are_those_of_the_pore_with_its_mirror_image(upper):
     shear = {each: numbers.stresses(each, speed, None)[0] for each in (scene, whole)}
     assert shear[whole] == pytest.approx(shear[scene] * (1.0 if upper == "symmetry" else 0.5))
     alike = numbers.half_length(scene) == pytest.approx(numbers.half_length(whole))
-    assert alike == (upper == "symmetry") and pore.fastest(scene.flow, scene.pore) == speed
+    assert alike == (upper == "symmetry") and meshing.fastest(scene.flow, scene.pore) == speed
     assert numbers.at_start(scene).contact != (upper == "symmetry")
     driven = load_scene("base", [f"pore.upper_wall={upper}"])
     factor = 4.0 if upper == "symmetry" else 1.0
     clean = load_scene("base")
-    assert pore.fastest(driven.flow, driven.pore) == pytest.approx(factor * pore.fastest(clean.flow, clean.pore))
+    assert meshing.fastest(driven.flow, driven.pore) == pytest.approx(factor * meshing.fastest(clean.flow, clean.pore))
 
 
 @pytest.mark.parametrize("wall", ["sliding", "bonded"])
 def test_a_scene_bonds_the_wall_of_its_seed_alone(wall):
-    walls = pore.walls_of(load_scene("base", [f"growth.wall={wall}"]))
+    walls = meshing.walls_of(load_scene("base", [f"growth.wall={wall}"]))
     assert [each.bonded for each in walls] == [wall == "bonded", False]

@@ -21,8 +21,10 @@ from scipy.interpolate import CubicSpline
 from repro.fem.outline import Outline
 from repro.march import updates
 from repro.march.state import Report
-from repro.model import mesh_motion, pore
-from repro.model.pore import Pore, Solved
+from repro.model import mesh_motion, meshing, solving
+from repro.model.meshing import Meshing
+from repro.model.pore import Pore
+from repro.model.solving import Solved
 from repro.model.stages import Stages
 from repro.results import row
 from repro.scene import Scene
@@ -118,7 +120,7 @@ def effect_of_runs(default: Body, alternative: Body) -> dict[str, float]:
     """Effect between two complete runs. Flow and substrates around the other's shape are solved on the default's mesh,
     which removes the effect of two different meshes."""
     pore_on_mesh = reshaped(default.pore, alternative.outline)
-    return effect(default, replace(alternative, solved=pore.solve(alternative.scene, pore_on_mesh)))
+    return effect(default, replace(alternative, solved=solving.solve(alternative.scene, pore_on_mesh)))
 
 
 def converged(switch: Switch) -> tuple[dict[str, float], dict[str, float]]:
@@ -156,7 +158,7 @@ def one_state(aggregate: Body, alternative: Scene) -> dict[str, float]:
     """Effect in one state: flow, substrates and the next shape, computed with both scenes."""
     bodies = []
     for scene in (aggregate.scene, alternative):
-        solved = pore.solve(scene, aggregate.pore)
+        solved = solving.solve(scene, aggregate.pore)
         bodies.append(Body(scene, next_shape(scene, aggregate.pore, solved, UPDATE), solved))
     return effect(*bodies)
 
@@ -201,7 +203,7 @@ def course(run: Run, step: Callable[[Scene, Pore, Solved, float], Pore], bulge: 
     for time in updates.schedule(scene)[0]:
         if reports:
             present = replace(step(scene, present, reports[-1].solved, time - present.time), time=time)
-        solved = pore.solve(scene, present)
+        solved = solving.solve(scene, present)
         present = replace(present, concentrations=solved.concentrations)
         reports.append(Report(present, solved, None, (), 0, {}))
     rows = columns([row(scene, report) for report in reports])
@@ -238,7 +240,7 @@ BULGE = 0.01
 
 def uneven(scene: Scene, bulge: float) -> Pore:
     """The pore at t = 0 with a seed of radius R (1 + bulge cos 3 phi), phi from downstream."""
-    seed = pore.initial_outline(scene)
+    seed = meshing.initial_outline(scene)
     points = seed.points * (1 + bulge * np.cos(3 * np.arctan2(*seed.points.T[::-1])))[:, None]
-    pore_parts = pore.Meshing.of(scene).generate(replace(seed, points=points, origin=points.copy()))
+    pore_parts = Meshing.of(scene).generate(replace(seed, points=points, origin=points.copy()))
     return aggregates.seed_on(*pore_parts)

@@ -29,7 +29,8 @@ from repro.march.folding import Fold, fold_message, most_compressed
 from repro.march.state import Compression, StepResult
 from repro.model import adhesion
 from repro.model.adhesion import Peak
-from repro.model.pore import Pore, Solved
+from repro.model.pore import Pore
+from repro.model.solving import Solved
 from repro.scene import Pore as Channel
 from repro.scene import Scene, scene_tables
 

@@ -39,7 +39,9 @@ from repro.march.state import (
 from repro.march.step_control import StepControl
 from repro.model.contact_lines import SearchOptions
 from repro.model.grading import solve_graded
-from repro.model.pore import Pore, Solved, seeded
+from repro.model.meshing import seeded
+from repro.model.pore import Pore
+from repro.model.solving import Solved
 from repro.model.stages import Stages
 from repro.scene import Growth, Scene
 

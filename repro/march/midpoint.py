@@ -26,14 +26,15 @@ from repro.march.ends import refuse_outside
 from repro.march.folding import refuse_density, refuse_fold
 from repro.march.loop import time_before_end
 from repro.march.state import InterpolatedState, StepResult
-from repro.model import biomass, contact_lines, pore, remeshing
+from repro.model import biomass, contact_lines, remeshing, solving
 from repro.model.biomass import Rates
 from repro.model.contact_lines import PATIENT, FirstContact, SearchOptions
 from repro.model.grading import solve_graded
 from repro.model.growing import grow
 from repro.model.mechanics import Expansion
-from repro.model.pore import Pore, Solved
+from repro.model.pore import Pore
 from repro.model.remeshing import GeneratedMesh
+from repro.model.solving import Solved
 from repro.model.stages import Stages
 from repro.model.transport import Concentrations, Flows, Fluxes, integrated
 
@@ -152,7 +153,7 @@ def solve_halfway(stages: Stages, previous: Pore, solved: Solved, first: Rates, 
         middle, (active, inert) = remeshing.remesh(stages.remeshing, previous, shape,
                                                    solved.mean_velocity, amounts)
         middle = replace(middle, active=active, inert=inert)
-    solution = pore.solve(stages.scene, middle, duration)
+    solution = solving.solve(stages.scene, middle, duration)
     rates = stages.rates(middle, solution)
     after = grow(middle, rates, duration)
     if mesh is None:

@@ -13,7 +13,7 @@ from repro.fem.linear import Method
 from repro.march.state import Report, RestartState, contiguous, initial_report, stopping
 from repro.march.step_control import STRETCH, StepControl
 from repro.model.grading import solve_graded
-from repro.model.pore import seeded
+from repro.model.meshing import seeded
 from repro.scene import Scene, Source, load_scene, parse_scene, scene_tables
 from repro.scene.arguments import typed
 from repro.schemes import Scheme

@@ -14,7 +14,8 @@ from repro.errors import SimulationError, StageError
 from repro.fem.brief import brief
 from repro.march.step_control import StepControl
 from repro.model.advice import with_advice
-from repro.model.pore import Pore, Solved
+from repro.model.pore import Pore
+from repro.model.solving import Solved
 
 if TYPE_CHECKING:
     from repro.march.balance import Ledger

@@ -33,7 +33,8 @@ from repro.march.step_control import (
 )
 from repro.model.contact_lines import SearchOptions
 from repro.model.grading import grade, solve_graded
-from repro.model.pore import Pore, Solved
+from repro.model.pore import Pore
+from repro.model.solving import Solved
 from repro.model.stages import Stages
 from repro.scene import Growth, needed
 

@@ -19,13 +19,14 @@ from repro.march.folding import refuse_fold
 from repro.march.loop import Stepping, before_jump, time_before_end
 from repro.march.state import SAME_TIME, InterpolatedState, StepResult, contiguous
 from repro.march.step_control import StepControl
-from repro.model import biomass, gear, pore, substrates, transport
+from repro.model import biomass, gear, solving, substrates, transport
 from repro.model.biomass import Rates
 from repro.model.contact_lines import FirstContact
 from repro.model.growing import grow
 from repro.model.kinetics import Sink
 from repro.model.mechanics import Expansion
-from repro.model.pore import Pore, Solved
+from repro.model.pore import Pore
+from repro.model.solving import Solved
 from repro.model.stages import Stages
 from repro.model.transport import Concentrations, Flows, Fluxes, integrated
 from repro.scene import Growth, Scene
@@ -82,14 +83,15 @@ def _cut(stages: Stages, previous: Pore, solved: Solved,
     """Make a step to a time (h). The solution after it is that before a jump of the tables."""
     advanced = step(stages, previous, solved, time - previous.time)
     after = contiguous(replace(advanced.pore, time=time))
-    return replace(advanced, pore=after), pore.solve(stages.scene, before_jump(stages.scene, after))
+    solved = solving.solve(stages.scene, before_jump(stages.scene, after))
+    return replace(advanced, pore=after), solved
 
 
 def _interpolate(stages: Stages, previous: Pore, solved: Solved, time: float) -> InterpolatedState:
     """Interpolate to a time (h) within a step, by a shorter step from its start."""
     shorter = step(stages, previous, solved, time - previous.time)
     after = replace(shorter.pore, time=time)
-    return InterpolatedState(after, pore.solve(stages.scene, after), shorter.before)
+    return InterpolatedState(after, solving.solve(stages.scene, after), shorter.before)
 
 
 def step(stages: Stages, previous: Pore, solved: Solved, duration: float) -> StepResult:
@@ -132,7 +134,7 @@ def _solve_midway(scene: Scene, previous: Pore, solved: Solved, duration: float)
     middle = previous.time + duration / 2
     if scene.at(middle) == scene.at(previous.time):
         return solved
-    halfway = pore.solve(scene, replace(previous, time=middle))
+    halfway = solving.solve(scene, replace(previous, time=middle))
     if scene.numerics.transport == "gear":
         return replace(halfway, concentrations=solved.concentrations)
     return halfway

@@ -27,7 +27,8 @@ from repro.fem.outline import edge_functions
 from repro.fem.walls import Wall
 from repro.model import flow, growth, traction
 from repro.model.flow import Flow
-from repro.model.pore import Pore, Solved
+from repro.model.pore import Pore
+from repro.model.solving import Solved
 from repro.scene import Scene, at_time, needed
 
 #: The length of the means, over the pore's width.

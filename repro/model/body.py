@@ -16,6 +16,7 @@ from repro.fem.brief import brief
 from repro.fem.elements import Table
 from repro.fem.forms import Basis, basis
 from repro.fem.linear import DEFAULT, Method
+from repro.fem.space import Space
 from repro.model.energies import NEO_HOOKEAN, Energy
 
 
@@ -87,6 +88,14 @@ class Body:
         the stress."""
         F = self.at.gradient(position)
         return Strained(elements.by_component(F.transpose(1, 3, 0, 2)), self.energy)
+
+
+def material(space: Space, reference: np.ndarray, energy: Energy) -> Body:
+    """The aggregate of a mesh; reference: (n, 2) um, its nodes in the reference configuration."""
+    topology = space.mesh.topology
+    shape = Shape(topology.body_cells, len(topology.body_corners), space.gradient_degree,
+                  topology.method)
+    return Body(shape, reference, energy=energy)
 
 
 @dataclass(frozen=True, eq=False)

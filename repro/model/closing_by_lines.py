@@ -20,7 +20,7 @@ from repro.fem.outline import Outline
 from repro.fem.space import Space
 from repro.fem.walls import FREE, Wall
 from repro.model import contact_lines, growth
-from repro.model.body import Shape
+from repro.model.body import Shape, material
 from repro.model.contact_lines import Clearance, Contact, Line, SearchOptions, contact_with
 from repro.model.contact_newton import BESIDE, Coupled, Placed
 from repro.model.mechanics import (
@@ -33,7 +33,7 @@ from repro.model.mechanics import (
     supports_of,
     with_new_surfaces,
 )
-from repro.model.pore import Pore, material
+from repro.model.pore import Pore
 
 #: Largest number of times that contact lines go back after a trial that fails.
 RETREATS = 6

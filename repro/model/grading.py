@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 from repro.errors import Unresolved
-from repro.model.pore import Pore, Solved, seeded, solve
+from repro.model.meshing import seeded
+from repro.model.pore import Pore
+from repro.model.solving import Solved, solve
 from repro.scene import Scene
 
 #: A front of the substrates divides element sizes at the aggregate by at most this.

@@ -19,8 +19,9 @@ from repro.fem.transfer import Located
 from repro.fem.walls import FREE
 from repro.model import biomass, growing, mesh_motion
 from repro.model.biomass import Amounts
-from repro.model.body import Body
-from repro.model.pore import Meshing, Pore, material
+from repro.model.body import Body, material
+from repro.model.meshing import Meshing
+from repro.model.pore import Pore
 from repro.model.transport import Concentrations, concentrations
 from repro.scene import Scene, Substrate, Substrates, at_time
 

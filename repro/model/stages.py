@@ -9,8 +9,9 @@ from repro.model import biomass, contact, growing, remeshing
 from repro.model.biomass import Rates
 from repro.model.contact_lines import PATIENT, SearchOptions
 from repro.model.mechanics import Expansion, Mechanics
-from repro.model.pore import Pore, Solved
+from repro.model.pore import Pore
 from repro.model.remeshing import GeneratedMesh, Remeshing
+from repro.model.solving import Solved
 from repro.scene import Growth, Scene
 
 

@@ -18,7 +18,7 @@ def solve(scene: Scene, pore: Pore, flow: Flow | None,
           over: float) -> tuple[Problem, Concentrations, tuple[Fluxes, Fluxes]]:
     """Solve the substrates of a scene without tables in a pore.
 
-    The flow and the time ``over`` (h) are those of :func:`repro.model.pore.solve`.
+    The flow and the time ``over`` (h) are those of :func:`repro.model.solving.solve`.
     """
     numerics = scene.numerics
     sections = needed(scene.substrates, "[substrates]")

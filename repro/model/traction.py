@@ -31,9 +31,10 @@ import numpy as np
 from repro.fem import elements, transfer
 from repro.fem.mesh import Mesh
 from repro.fem.space import Space
-from repro.model import mesh_motion, pore, remeshing
+from repro.model import mesh_motion, remeshing, solving
 from repro.model.flow import MPA_PER_UM, Flow
-from repro.model.pore import Meshing, Pore
+from repro.model.meshing import Meshing
+from repro.model.pore import Pore
 from repro.scene import Flow as Drive
 from repro.scene import Scene, at_time, needed
 
@@ -110,7 +111,7 @@ def forces(fluid: Fluid, around: Surroundings, shaped: Pore) -> np.ndarray:
     drive = at_time(fluid.drive, shaped.time)
     numerics = fluid.meshing.numerics
     space = Space(mesh)
-    flow_field = pore.solve_flow(space, drive, fluid.meshing.channel.length, numerics)
+    flow_field = solving.solve_flow(space, drive, fluid.meshing.channel.length, numerics)
     on = on_aggregate(space, flow_field, drive, numerics.interface)[mesh.body]
     total = np.zeros((len(shaped.mesh.body), 2))
     np.add.at(total, around.nodes, around.share[..., None] * on[:, None])

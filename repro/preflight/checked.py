@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 from repro.errors import SimulationError
 from repro.fem.linear import Method
 from repro.march.state import stopping
-from repro.model import pore
+from repro.model.meshing import seeded
 from repro.polling import poll
 from repro.preflight import cost
 from repro.preflight.cost import Cost
@@ -140,7 +140,7 @@ def _mesh_size(scene: Scene, estimated: bool) -> tuple[int, int]:
     if estimated:
         nodes = round(first_nodes(scene))
         return nodes, round(nodes / PER_TRIANGLE[scene.numerics.scheme.order])
-    mesh = pore.seeded(scene).mesh
+    mesh = seeded(scene).mesh
     return len(mesh.points), len(mesh.biomass)
 
 

@@ -28,7 +28,7 @@ from repro.fem.outline import Outline
 from repro.fem.sizing import ACROSS_AGGREGATE, ACROSS_PORE, SPLIT
 from repro.fem.walls import whole_width
 from repro.model.advice import with_advice
-from repro.model.pore import initial_outline, resolution, sized, thin_layers, walls_of
+from repro.model.meshing import initial_outline, resolution, sized, thin_layers, walls_of
 from repro.scene import Scene, SceneError, needed
 
 #: Bytes per node at the peak of a run, measured at 800 to 50 000 nodes.

@@ -15,7 +15,8 @@ from repro.fem.sizing import meshed_extent
 from repro.fem.walls import whole_width
 from repro.model.flow import MPA_PER_UM
 from repro.model.kinetics import rate_law
-from repro.model.pore import Pore, initial_outline, least_gap, sized, walls_of
+from repro.model.meshing import initial_outline, least_gap, sized, walls_of
+from repro.model.pore import Pore
 from repro.model.uptake_law import UptakeLaw
 from repro.scene import Scene, Substrate, at_largest, at_time
 

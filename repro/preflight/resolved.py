@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from repro.errors import StageError
-from repro.model import pore
-from repro.model.pore import MOST_REFINED
+from repro.model import solving
+from repro.model.meshing import MOST_REFINED, seeded
 from repro.polling import poll
 from repro.preflight.memory import first_nodes
 from repro.preflight.simplifications import Caveat
@@ -70,6 +70,6 @@ def _compute_losses(scene: Scene, drive: Flow) -> list[tuple[float, float]]:
 
 def _head_loss(scene: Scene, drive: Flow) -> float:
     """Head loss (um) of the whole pore at t = 0, with the flow at that time."""
-    space = pore.seeded(scene).space
+    space = seeded(scene).space
     poll()
-    return pore.solve_flow(space, drive, scene.pore.length, scene.numerics).head_loss
+    return solving.solve_flow(space, drive, scene.pore.length, scene.numerics).head_loss

@@ -12,7 +12,8 @@ from repro.fem.walls import whole_width
 from repro.march.step_control import SHORTEST
 from repro.model.brinkman import ACROSS
 from repro.model.kinetics import THINNEST
-from repro.model.pore import MOST_REFINED, Pore, film, least_gap, resolution, walls_of
+from repro.model.meshing import MOST_REFINED, film, least_gap, resolution, walls_of
+from repro.model.pore import Pore
 from repro.model.surface import surface
 from repro.preflight import numbers
 from repro.preflight.numbers import Number, Sizes

@@ -9,7 +9,8 @@ from functools import cached_property, partial
 import numpy as np
 
 from repro.model.body import Strained
-from repro.model.pore import Pore, Solved
+from repro.model.pore import Pore
+from repro.model.solving import Solved
 from repro.model.surface import STRETCH, surface
 from repro.results.field_files import Grid
 from repro.results.quantities import Quantity, is_modelled

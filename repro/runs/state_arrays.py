@@ -16,8 +16,10 @@ from repro.fem.space import Space
 from repro.march.balance import Ledger
 from repro.march.state import Compression, RestartState
 from repro.march.step_control import StepControl
+from repro.model.body import material
 from repro.model.energies import energy_of
-from repro.model.pore import Pore, material, walls_of
+from repro.model.meshing import walls_of
+from repro.model.pore import Pore
 from repro.runs.checkpoint import Arrays
 from repro.scene import Scene, scene_hash
 

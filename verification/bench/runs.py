@@ -13,7 +13,10 @@ from scipy.stats import theilslopes
 from reference import whole_run
 from repro import timing
 from repro.march.simulation import simulate
-from repro.model import pore
+from repro.model import solving
+from repro.model.meshing import seeded
+from repro.model.pore import Pore
+from repro.model.solving import Solved
 from repro.scene import Scene
 from verification.bench.record import clock, measured, reference_of
 from verification.claims.runs import until
@@ -226,7 +229,7 @@ def measure(kind: str, nodes: int, steps: int) -> dict:
     factor, power = REFINED[preset]
     scene = load_scene("base", [f"numerics.preset={preset}", f"numerics.refinement={factor * nodes**power}",
                                 f"aggregate.radius={RADIUS} um", exchange(modified_newton=derivative == "reused")])
-    state, solved = _solved(scene, pore.seeded(scene))
+    state, solved = _solved(scene, seeded(scene))
     rows = []
     for _ in range(steps + 1):
         timing.reset()
@@ -241,7 +244,7 @@ def measure(kind: str, nodes: int, steps: int) -> dict:
             "stages": dict(zip((*STAGES, FLOOR), stages)), "ratio": seconds / stages[-1], "repeats": len(usual)}
 
 
-def _solved(scene: Scene, state: pore.Pore) -> tuple[pore.Pore, pore.Solved]:
+def _solved(scene: Scene, state: Pore) -> tuple[Pore, Solved]:
     """The pore with its concentrations, and its solution."""
-    solution = pore.solve(scene, state)
+    solution = solving.solve(scene, state)
     return replace(state, concentrations=solution.concentrations), solution

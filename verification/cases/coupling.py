@@ -23,7 +23,8 @@ from repro.fem.walls import FREE
 from repro.march import midpoint
 from repro.march.simulation import shaped, simulate
 from repro.march.state import Report
-from repro.model import flow, pore
+from repro.model import flow, solving
+from repro.model.meshing import seeded
 from repro.model.stages import Stages
 from repro.scene import Scene
 from verification.evidence.cases import parametrize
@@ -137,7 +138,7 @@ def test_stiffness(changes, record):
     """
     soft, stiff = (runs.last(runs.base("1 h", f'growth.shear_modulus="{value} MPa"', *changes)).pore
                    for value in (0.001, 10))
-    seed = pore.seeded(runs.base("1 h", *changes)).outline.area
+    seed = seeded(runs.base("1 h", *changes)).outline.area
     record(at_most("positions", np.abs(soft.mesh.points - stiff.mesh.points).max(), 0.0,
                    "without tractions mu_L does not occur in the equations"),
            at_least("growth of the area", soft.outline.area / seed, 1.1, "else nothing is tested"))
@@ -155,7 +156,7 @@ LONG = {**{kind: (runs.with_preset("fast"), runs.with_elements(kind), runs.coars
 def uniform_growth(hours: tuple[float, ...], bound: float, origin: str, *changes: str):
     """Checks of a run with rows at some hours, the last of which is its end."""
     scene = runs.supplied_everywhere(runs.base(f"{hours[-1]} h", *changes, times=hours))
-    seed = pore.seeded(scene).outline
+    seed = seeded(scene).outline
     instants = runs.reports_of(scene)
     expected = seed.area * np.array([runs.mass_after(scene, hour) for hour in hours])
     sizes = {"area": [instant.pore.outline.area for instant in instants],
@@ -303,7 +304,7 @@ def _lopsided(sign: float, *changes: str) -> dict[str, float]:
     """Conductivity, and C at the outlet and the inlet, with uptake of first order."""
     scene = load_scene("base", (*changes, *FIRST_ORDER))
     scene = shaped(scene, _outline(sign, 80 * scene.numerics.scheme.order))
-    solved = pore.solve(scene, pore.seeded(scene))
+    solved = solving.solve(scene, seeded(scene))
     donor = solved.fluxes[1]
     return {"conductivity": solved.flow.conductivity, "effluent": donor.effluent, "inlet": donor.inlet}
 
@@ -385,8 +386,8 @@ BOUNDS = {"conductivity": (1e-3, "first order in the mesh: 0.17 % in a clean cha
 def _solved(*changes: str):
     """Conductivity and effluents of base at t = 0, and section means along its central mesh."""
     scene = load_scene("base", changes)
-    seed = pore.seeded(scene)
-    solved = pore.solve(scene, seed)
+    seed = seeded(scene)
+    solved = solving.solve(scene, seed)
     reach = min(10 * scene.aggregate.radius, 1.5 * scene.pore.width) + scene.aggregate.radius
     x = np.linspace(-reach, reach, runs.SECTIONS)
     leaving = {f"effluent {name}": flux.effluent for name, flux in zip(NAMES, solved.fluxes)}
@@ -398,9 +399,9 @@ RULE_STEPS = (1, 2, 4, 8, 16)
 
 def _equal_steps(scene, steps: int) -> np.ndarray:
     """Area and upstream tip after 2 h in equal steps on one mesh. Raises RuntimeError at a remesh."""
-    state = pore.seeded(scene)
+    state = seeded(scene)
     for _ in range(steps):
-        solved = pore.solve(scene, state)
+        solved = solving.solve(scene, state)
         state = replace(state, concentrations=solved.concentrations)
         step = midpoint.attempt(Stages.of(scene), state, solved, 2.0 / steps).step
         if step.remeshed:

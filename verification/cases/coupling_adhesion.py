@@ -11,9 +11,11 @@ import pytest
 from reference import half_cylinder
 from repro.fem.walls import BOTTOM, FREE
 from repro.march.simulation import shaped
-from repro.model import adhesion, contact, flow, growth, pore, traction
+from repro.model import adhesion, contact, flow, growth, solving, traction
 from repro.model.mechanics import Mechanics
-from repro.model.pore import Pore, Solved
+from repro.model.meshing import Meshing, seeded
+from repro.model.pore import Pore
+from repro.model.solving import Solved
 from verification.evidence.cases import parametrize
 from verification.evidence.checks import at_least, at_most, each_at_most, largest, study
 from verification.problems import runs
@@ -30,7 +32,7 @@ def scene_of(*changes: str):
 
 def water(scene, state: Pore) -> Solved:
     """The flow alone."""
-    return Solved(pore.solve_flow(state.space, scene.flow, scene.pore.length, scene.numerics), None, None)
+    return Solved(solving.solve_flow(state.space, scene.flow, scene.pore.length, scene.numerics), None, None)
 
 
 RADII = (10.0, 5.0, 2.5, 1.25)
@@ -63,7 +65,7 @@ def test_half_cylinder(changes, record):
 def _load_errors(radius: float, *changes: str) -> tuple[float, float, float]:
     scene = scene_of(f'aggregate.radius="{radius} um"', "flow.viscosity_ratio=1e7", 'numerics.extent="full"',
                      *changes)
-    seed = pore.seeded(scene)
+    seed = seeded(scene)
     solved = water(scene, seed)
     load = adhesion.fluid_load(scene, seed, solved)
     drive = scene.flow
@@ -80,11 +82,11 @@ def _at_rest(wall: str, *changes: str) -> tuple:
     """Scene, shape and flow of a half-disc after a step of uneven growth, in water 100 times as dense."""
     scene = scene_of('aggregate.radius="25 um"', 'growth.fluid_forces="included"', f'growth.wall="{wall}"',
                      f'flow.density="{998e2} mg/cm^3"', *changes)
-    seed = pore.seeded(scene)
+    seed = seeded(scene)
     slope = seed.body.reference[seed.body.shape.cells, 0] @ seed.body.shape.table.values.T
     grown = contact.expand(Mechanics.of(scene), seed, seed.theta * (1.1 - 0.002 * slope)).pore
     grown = replace(grown, time=1.0)
-    meshing = pore.Meshing.of(scene)
+    meshing = Meshing.of(scene)
     surroundings = traction.follow(meshing, traction.surroundings(meshing, seed, seed), grown)
     placed = replace(grown, space=replace(grown.space, mesh=surroundings.mesh))
     return scene, placed, water(scene, placed)
@@ -145,7 +147,7 @@ def test_plug(changes, record):
     Norm: largest traction of the walls and largest tensile stress over this, less 1.
     """
     scene = _plug(30.0, *changes)
-    seed = pore.seeded(scene)
+    seed = seeded(scene)
     theta = 0.8
     shape = contact.expand(Mechanics.of(scene), seed, theta * seed.theta).pore
     expected = scene.growth.shear_modulus * theta ** (-2 / 3) * (1 / theta - theta)
@@ -166,7 +168,7 @@ def test_seepage(changes, record):
     middle half of the plug; largest displacement over the width.
     """
     scene = _plug(60.0, *changes, 'flow.permeability="1e-14 m^2"')
-    seed = pore.seeded(scene)
+    seed = seeded(scene)
     solved = water(scene, seed)
     drive = scene.flow
     density = drive.kinematic_viscosity / drive.gravity / drive.permeability * solved.flow.mean_velocity
@@ -201,7 +203,7 @@ def test_bonded_slab(changes, record):
     """
     scene = shaped(scene_of('growth.wall="bonded"', *changes),
                    [(-LONG, 0), (-LONG, HIGH), (LONG, HIGH), (LONG, 0)])
-    seed = pore.seeded(scene)
+    seed = seeded(scene)
     theta = 1.2
     guess = _pushed(seed, 5.0)
     shape = contact.expand(Mechanics.of(scene), seed, theta * seed.theta, guess).pore
@@ -266,7 +268,7 @@ def test_bonded_traction(changes, record):
 def _bonded_peaks(refinement: float, *changes: str) -> tuple[float, float]:
     """Largest traction of the walls and largest tensile stress, MPa."""
     scene = scene_of('growth.wall="bonded"', f"numerics.refinement={refinement}", *changes)
-    seed = pore.seeded(scene)
+    seed = seeded(scene)
     slope = seed.body.reference[seed.body.shape.cells, 0] @ seed.body.shape.table.values.T
     shape = contact.expand(Mechanics.of(scene), seed, seed.theta * (1.1 - 0.005 * slope)).pore
     return adhesion.wall_peak(scene, shape, None).value, adhesion.tensile_peak(scene, shape).value

@@ -22,7 +22,8 @@ from repro.fem.outline import polygon
 from repro.fem.sizing import Sizing
 from repro.fem.walls import channel_walls
 from repro.march.simulation import shaped, simulate
-from repro.model import flow, pore
+from repro.model import flow, solving
+from repro.model.meshing import seeded
 from repro.scene import Scene
 from verification.evidence.cases import parametrize
 from verification.evidence.checks import at_least, at_most, between, refine, studies, study
@@ -356,13 +357,13 @@ def test_averaged_uptake(elements, record):
 
 def _around(aspect: float, elements: str) -> dict[str, float]:
     """Largest difference for each Peclet number and density on one mesh, and the least acceptor at the outlet."""
-    seed = pore.seeded(shaped(thin_scene(elements, aspect), half_ellipse(elements, aspect)))
+    seed = seeded(shaped(thin_scene(elements, aspect), half_ellipse(elements, aspect)))
     differences = {"size": aspect, "left": 1.0}
     for peclet, density in product(PECLETS, DENSITIES):
         scene = thin_scene(elements, aspect, peclet * SCENE.substrates.acceptor.diffusivity / THICKNESS, density)
         state = replace(seed, active=scene.kinetics.maximum_density * seed.space.reaction.dx)
         moment = strip_of(scene, state.outline.area, round(16 / aspect)).seed()
-        computed, expected = runs.along(state, pore.solve(scene, state), moment)
+        computed, expected = runs.along(state, solving.solve(scene, state), moment)
         differences[f"Pe = {peclet:g}, X = {density:g} mg/L"] = np.abs(computed - expected).max() / 10.0
         differences["left"] = min(differences["left"], computed[0, -1] / 10.0)
     return differences

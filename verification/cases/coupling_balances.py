@@ -21,8 +21,9 @@ from repro.fem.walls import BOTTOM, FREE, TOP
 from repro.march.balance import Ledger
 from repro.march.simulation import simulate
 from repro.march.state import Report
-from repro.model import pore, remeshing
+from repro.model import meshing, remeshing, solving
 from repro.model.contact_lines import CLOSE
+from repro.model.meshing import seeded
 from repro.model.remeshing import Remeshing
 from repro.scene import Scene, load_scene
 from verification.evidence.cases import parametrize
@@ -110,12 +111,12 @@ def _restored(*changes: str) -> tuple[float, float]:
     """L2 of the density's error, and X_m times the area over the biomass, less 1."""
     scene = runs.base("1 h", 'kinetics.decay_coefficient="0 1/d"', 'kinetics.maximum_utilization_rate="0 1/d"',
                       'aggregate.radius="20 um"', *changes)
-    state = pore.seeded(scene)
+    state = seeded(scene)
     x = aggregates.reaction_points(state.space)[0]
     state = replace(state, active=state.active * (1 + 0.1 * x / scene.aggregate.radius))
-    solved = pore.solve(scene, state)
+    solved = solving.solve(scene, state)
     new_pore = remeshing.remesh(Remeshing.of(scene), state, state, solved.flow.mean_velocity)[0]
-    after = runs.step(scene, new_pore, pore.solve(scene, new_pore), 0.2).pore
+    after = runs.step(scene, new_pore, solving.solve(scene, new_pore), 0.2).pore
     weight, density = after.space.reaction.dx, runs.density(scene, after)
     error = np.sqrt(np.average((density - 1) ** 2, weights=weight))
     return error, abs(np.vdot(weight, density) / after.outline.area - 1)
@@ -296,7 +297,7 @@ def test_contact(changes, record):
                       times=(0.2, 0.4, 0.6))
     instants = list(simulate(runs.at_velocity(scene, runs.SPEED)))
     rows, last = _ledgers(instants), instants[-1].pore
-    peclet = pore.peclet(scene.substrates, scene.pore.width, runs.SPEED)
+    peclet = meshing.peclet(scene.substrates, scene.pore.width, runs.SPEED)
     record(_steps(rows, last.space.count * max(1.0, 1 / peclet)), _area(scene, instants[-1]),
            at_least("narrowest gap over the least allowed", _narrowest(scene, last, TOP), 1 - 1e-9,
                     "2 um, or 16.7 degrees beside contact"),

@@ -17,10 +17,12 @@ from repro.fem.space import Space
 from repro.fem.walls import FREE
 from repro.march.simulation import simulate
 from repro.march.state import Report
-from repro.model import contact, flow, growth, mechanics, mesh_motion, pore, traction
+from repro.model import contact, flow, growth, mechanics, mesh_motion, solving, traction
 from repro.model.contact_lines import PATIENT
 from repro.model.flow import Flow
 from repro.model.mechanics import Mechanics, supports_of
+from repro.model.meshing import Meshing, seeded
+from repro.model.pore import Pore
 from verification.cases import flow as flow_cases
 from verification.evidence.cases import combined, parametrize
 from verification.evidence.checks import at_least, at_most, between, each_at_most, refine, studies, study
@@ -39,7 +41,7 @@ def loaded_scene(*changes: str):
 
 def nodal_forces(scene, space: Space) -> tuple[np.ndarray, Flow]:
     """Nodal forces (N, 2) um2 of head on the nodes of a mesh, and the flow."""
-    solution = pore.solve_flow(space, scene.flow, scene.pore.length, scene.numerics)
+    solution = solving.solve_flow(space, scene.flow, scene.pore.length, scene.numerics)
     viscosity = scene.flow.kinematic_viscosity / scene.flow.gravity
     return traction.nodal(space, solution, viscosity, scene.numerics.interface), solution
 
@@ -59,7 +61,7 @@ def test_traction_balance(changes, record):
     Record the balance at t = 0, and the order of the drag with linear elements and the paper's form.
     """
     scene = loaded_scene(*changes)
-    seed = pore.seeded(scene)
+    seed = seeded(scene)
     forces, solution = nodal_forces(scene, seed.space)
     mesh = seed.mesh
     x, y = mesh.points.T
@@ -75,7 +77,7 @@ def test_traction_balance(changes, record):
                      "shear from the slopes of linear triangles: first order"))
 
 
-def _by_biomass(scene, state: pore.Pore, solution: Flow) -> np.ndarray:
+def _by_biomass(scene, state: Pore, solution: Flow) -> np.ndarray:
     """(N, 2) um2 of head, forces of the triangles of biomass, which are lambda times as viscous.
 
     They are computed on a mesh in which biomass and fluid are exchanged.
@@ -94,7 +96,7 @@ def _drag_error(refinement: float) -> float:
     The shear comes from the velocity gradients beside the walls.
     """
     scene = loaded_scene(f"numerics.refinement={refinement}")
-    seed = pore.seeded(scene)
+    seed = seeded(scene)
     forces, solution = nodal_forces(scene, seed.space)
     viscosity = scene.flow.kinematic_viscosity / scene.flow.gravity
     expected = solution.meshed_loss * seed.mesh.width - viscosity * _wall_shear(seed.mesh, solution.velocity)
@@ -204,7 +206,7 @@ def test_traction_even(changes, record):
     those of a uniform pressure, over the largest.
     """
     scene = loaded_scene(*changes)
-    seed = pore.seeded(scene)
+    seed = seeded(scene)
     theta = _uneven(seed, 0.002)
     mechanics = Mechanics.of(scene)
     plain = contact.at_rest(mechanics, seed, theta, seed, None, PATIENT).pore
@@ -224,7 +226,7 @@ def test_traction_even(changes, record):
         record(at_most(f"P, {sign:+g}", np.abs(change).max(), 1e-8, "Newton's tolerance"))
 
 
-def _uneven(seed: pore.Pore, slope: float) -> np.ndarray:
+def _uneven(seed: Pore, slope: float) -> np.ndarray:
     """(t, q) theta of a seed times 1.1 + slope x."""
     shape = seed.body.shape
     return seed.theta * (1.1 + slope * seed.body.reference[shape.cells, 0] @ shape.table.values.T)
@@ -253,10 +255,10 @@ def _in_denser_water(factor: float, *changes: str):
 
 
 @cache
-def _moved(factor: float, *changes: str) -> tuple[pore.Pore, pore.Pore, np.ndarray]:
+def _moved(factor: float, *changes: str) -> tuple[Pore, Pore, np.ndarray]:
     """A half-disc of 25 um, its shape after a step of uneven growth, and its theta."""
     scene = _in_denser_water(factor, *changes)
-    seed = pore.seeded(scene)
+    seed = seeded(scene)
     theta = _uneven(seed, -0.002)
     return seed, contact.expand(Mechanics.of(scene), seed, theta).pore, theta
 
@@ -326,7 +328,7 @@ def test_traction_remeshed(changes, record):
     seed, grown, _ = _moved(0.0, *changes)
     coarse = loaded_scene(*changes)
     fine = loaded_scene(*changes, f"numerics.refinement={max(REMESHED_FROM, 3 * coarse.numerics.refinement)}")
-    mesh, _ = pore.Meshing.of(fine).generate(grown.outline)
+    mesh, _ = Meshing.of(fine).generate(grown.outline)
     forces = nodal_forces(fine, Space(mesh))[0]
     scale = flow.MPA_PER_UM * fine.flow.density * fine.flow.gravity / fine.growth.shear_modulus
     new = _sums(mesh.points[mesh.loop], scale * forces[mesh.loop])

@@ -23,7 +23,8 @@ import pytest
 from reference import poiseuille, taylor_hood
 from repro.fem.mesh import Mesh
 from repro.fem.space import Space
-from repro.model import flow, pore
+from repro.model import flow
+from repro.model.meshing import seeded
 from verification.cases import flow as flow_cases
 from verification.cases import flow_properties
 from verification.cases.flow import ENDS, ENDS_FIRST, FORMS, RATIO, SECOND, WIDTH
@@ -195,7 +196,7 @@ def test_curved_half_disc(ratio, interface, record):
 def _round(refinement: float) -> Mesh:
     """The mesh of a scene with a refinement."""
     refined = f"numerics.refinement={refinement}"
-    return pore.seeded(flow_properties.scene_around(ROUND, flow_properties.ACCURATE, refined)).mesh
+    return seeded(flow_properties.scene_around(ROUND, flow_properties.ACCURATE, refined)).mesh
 
 
 def _round_errors(refinement: float, draw: int, ratio: float, interface: str) -> dict[str, float]:

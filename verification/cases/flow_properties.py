@@ -13,7 +13,8 @@ from repro.fem import elements
 from repro.fem.mesh import Mesh
 from repro.fem.space import Space
 from repro.march.simulation import simulate
-from repro.model import flow, pore
+from repro.model import flow, solving
+from repro.model.meshing import seeded
 from repro.scene import Scene, load_scene
 from verification.cases.flow import ENDS, FORMS, LENGTH, ORDERS, RATIO, WIDTH, drive
 from verification.evidence.cases import combined, parametrize
@@ -40,7 +41,7 @@ def _around(radius: float, elements: int | str, lean: float = 0.0, reach: float 
     else:
         scene = scene_around(radius, elements)
         if not lean:
-            return pore.seeded(scene).space
+            return seeded(scene).space
         order, refinement = scene.numerics.scheme.order, scene.numerics.refinement
     return Space(meshes.half_disc(radius, refinement, (-reach, reach), WIDTH, geometry=order, lean=lean))
 
@@ -217,8 +218,8 @@ def test_graded(bound, numerics, record):
 def _graded(*numerics: str) -> tuple[float, int]:
     """Loss of the pore and nodes of its mesh."""
     scene = scene_around(10.0, *numerics)
-    seed = pore.seeded(scene)
-    return pore.solve(scene, seed).flow.head_loss, len(seed.mesh.points)
+    seed = seeded(scene)
+    return solving.solve(scene, seed).flow.head_loss, len(seed.mesh.points)
 
 
 #: Flow enters a permeable aggregate in the gussets beside its upper contact lines.

@@ -18,9 +18,11 @@ from scipy.optimize import brentq
 
 from reference import contact_growth
 from repro.fem.walls import TOP
-from repro.model import contact, pore
+from repro.model import contact
 from repro.model.contact_lines import FirstContact
 from repro.model.mechanics import Expansion, Mechanics
+from repro.model.meshing import seeded
+from repro.model.pore import Pore
 from repro.scene import load_scene
 from verification.cases.growth_codes import FRONT, _uneven
 from verification.evidence.cases import parametrize
@@ -51,7 +53,7 @@ def grown(elements: str, refinement: float) -> Expansion:
     scene = load_scene("wide", [f"numerics.preset={'paper' if elements == 'linear' else 'accurate'}",
                                 f"numerics.refinement={refinement}",
                                 f'pore.width="{HEIGHT} um"', f'aggregate.radius="{bodies.RADIUS} um"'])
-    mechanics, seed = Mechanics.of(scene), pore.seeded(scene)
+    mechanics, seed = Mechanics.of(scene), seeded(scene)
     where, _ = meshes.quadrature_points(seed.body.reference[seed.body.shape.cells], seed.body.shape.table)
     theta = _uneven(*np.moveaxis(where, 2, 0))
     first, expansion = _first_contact(mechanics, seed, theta)
@@ -80,7 +82,7 @@ def _first_contact(mechanics, seed, theta) -> tuple[float, Expansion]:
     return part, contact.expand(mechanics, seed, theta**part, shapes[-1])
 
 
-def _touching(seed: pore.Pore, expansion: Expansion) -> pore.Pore:
+def _touching(seed: Pore, expansion: Expansion) -> Pore:
     """The seed with the opposite wall at the corners, and at the arcs between them, that are in contact under an
     expansion."""
     height = expansion.position[seed.mesh.loop][:, 1]

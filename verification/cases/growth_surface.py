@@ -13,9 +13,11 @@ from repro.march.ends import CLOSE
 from repro.march.folding import Fold
 from repro.march.simulation import simulate
 from repro.march.state import Report
-from repro.model import contact, growth, pore
+from repro.model import contact, growth
 from repro.model.energies.neo_hookean import BIOT, CREASE
 from repro.model.mechanics import Mechanics
+from repro.model.meshing import seeded
+from repro.model.pore import Pore
 from repro.model.surface import surface
 from repro.preflight import numbers
 from repro.scene import Scene
@@ -64,7 +66,7 @@ def mapped_errors(refinement: float, elements: str, shape: str) -> dict[str, flo
     """Errors of the stretch on a half-disc deformed by a map."""
     scene = load_scene("base", ["numerics.preset=accurate", with_elements(elements),
                                 f"numerics.refinement={refinement}", f'aggregate.radius="{RADIUS} um"'])
-    seed = pore.seeded(scene)
+    seed = seeded(scene)
     deformed = surface(seed.moved(MAPS[shape](*seed.mesh.points.T)[0]))
     before = surface(seed).middles
     exact = along_the_rim(shape, np.arctan2(before[:, 1], before[:, 0]))
@@ -72,7 +74,7 @@ def mapped_errors(refinement: float, elements: str, shape: str) -> dict[str, flo
             **_independent(seed, shape)}
 
 
-def _independent(seed: pore.Pore, shape: str) -> dict[str, float]:
+def _independent(seed: Pore, shape: str) -> dict[str, float]:
     """Errors of both stretches that the reference computes from the fields of a file."""
     mesh = seed.mesh
     moved = MAPS[shape](*mesh.points.T)[0]
@@ -119,7 +121,7 @@ def test_surface_confined(elements, record):
     """
     for rheology in ("stressed", "stress_free"):
         scene = plugged("fast", with_elements(elements), f"growth.new_biomass={rheology}")
-        state = pore.seeded(scene)
+        state = seeded(scene)
         since = 1.0
         for theta in THETAS:
             state = contact.expand(Mechanics.of(scene), state, np.full_like(state.theta, theta)).pore

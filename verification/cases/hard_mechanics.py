@@ -18,9 +18,10 @@ from repro.fem.space import Space
 from repro.fem.walls import FREE, TOP, channel_walls
 from repro.march import midpoint, simulation, stepping
 from repro.march.state import Report
-from repro.model import flow, growth, pore, remeshing
+from repro.model import flow, growth, remeshing
 from repro.model.closing_by_nodes import closing_nodes
 from repro.model.contact_lines import Clearance, lines_of
+from repro.model.meshing import Meshing, seeded
 from repro.model.remeshing import Remeshing
 from repro.model.stages import Stages
 from repro.scene import Scene
@@ -196,7 +197,7 @@ def in_a_wedge(preset: str) -> list:
 
 def _loss(scene: Scene) -> float:
     """Loss over the meshed part, 1/um."""
-    grid, _ = pore.Meshing.of(scene).generate(wedge(LEAST, scene.numerics.scheme.order, scene.pore.width))
+    grid, _ = Meshing.of(scene).generate(wedge(LEAST, scene.numerics.scheme.order, scene.pore.width))
     return flow.unit_flow(Space(grid), scene.flow.viscosity_ratio).loss
 
 
@@ -307,7 +308,7 @@ UPDATE = {1: 1.25, 2: np.inf}
 
 def seed(preset: str) -> tuple[Supported, np.ndarray]:
     """A half-disc of 20 um on a wall, and the nodes of its free rim."""
-    start = pore.seeded(hard.load("wide", preset, f'aggregate.radius="{RADIUS} um"'))
+    start = seeded(hard.load("wide", preset, f'aggregate.radius="{RADIUS} um"'))
     return bodies.on_wall(start.mesh, start.outline)
 
 

@@ -16,7 +16,8 @@ from repro.fem.space import Space
 from repro.fem.walls import FREE
 from repro.march import midpoint
 from repro.march.state import StepResult
-from repro.model import flow, pore, remeshing
+from repro.model import flow, remeshing, solving
+from repro.model.meshing import Meshing, seeded
 from repro.model.pore import Pore
 from repro.model.remeshing import Remeshing
 from repro.model.stages import Stages
@@ -68,7 +69,7 @@ NAMES = ("area", "thickness", "upstream tip", "conductivity")
 def _numbers(scene: Scene, state: Pore) -> list[float]:
     """Values of NAMES."""
     shape = state.outline
-    solution = pore.solve_flow(state.space, scene.flow, scene.pore.length, scene.numerics)
+    solution = solving.solve_flow(state.space, scene.flow, scene.pore.length, scene.numerics)
     return [shape.area, shape.thickness, shape.upstream, solution.conductivity]
 
 
@@ -102,7 +103,7 @@ def _mesh_and_loss(scene: Scene, noise: float) -> tuple[Mesh, float]:
     free = shape.wall == FREE
     points = shape.points.copy()
     points[free] += 20.0 * noise * np.random.default_rng(7).uniform(-1, 1, (free.sum(), 2))
-    grid, _ = pore.Meshing.of(scene).generate(replace(shape, points=points))
+    grid, _ = Meshing.of(scene).generate(replace(shape, points=points))
     return grid, flow.unit_flow(Space(grid), 2000.0).loss
 
 
@@ -113,7 +114,7 @@ TRANSFER = {1: transfer.project, 2: transfer.interpolated}
 def nearly_same(preset: str) -> list:
     """The transfer between nearly equal meshes, which have pieces without area and nodes on edges."""
     scene = hard.load("base", preset, 'aggregate.radius="20 um"')
-    grid = pore.seeded(scene).mesh
+    grid = seeded(scene).mesh
     places, cells = grid.points[grid.body], grid.topology.body_cells
     field = np.sin(places / 7.0)
     inner = ~np.isin(np.arange(len(places)), grid.topology.body_loop)

@@ -16,8 +16,9 @@ import pytest
 from reference.monod import uptake
 from repro.errors import Unresolved
 from repro.march.simulation import simulate
-from repro.model import biomass, gear, grading, kinetics, pore, transport
+from repro.model import biomass, gear, grading, kinetics, solving, transport
 from repro.model.kinetics import Sink
+from repro.model.meshing import seeded
 from repro.model.transport import Balance, Concentrations
 from repro.scene import Scene
 from verification.cases.transport_codes import box_around
@@ -47,8 +48,8 @@ def _solved(kind: tuple[Change, ...], radius: float, acceptor: float = 10.0, don
     scene = load_scene("base", [f'aggregate.radius="{radius} um"', f'substrates.acceptor.supply="{acceptor} mg/L"',
                                 f'substrates.donor.supply="{donor} mg/L"', *exchanges, *kind])
     scene = runs.without_flow(scene) if speed is None else runs.at_velocity(scene, speed)
-    seed = pore.seeded(scene)
-    return seed, pore.solve(scene, seed)
+    seed = seeded(scene)
+    return seed, solving.solve(scene, seed)
 
 
 def _defect(flux) -> float:
@@ -252,7 +253,7 @@ def _front(half: str, *numerics: str):
 def _resolved(scene: Scene, factor: float):
     """Ledgers with a multiple of the scene's refinement."""
     scene = replace(scene, numerics=replace(scene.numerics, refinement=factor * scene.numerics.refinement))
-    return grading.solve_graded(scene, pore.seeded(scene))[1].fluxes
+    return grading.solve_graded(scene, seeded(scene))[1].fluxes
 
 
 def _half_disc(width: float, radius: float, speed: str, *changes: str) -> Scene:
@@ -265,7 +266,7 @@ def _half_disc(width: float, radius: float, speed: str, *changes: str) -> Scene:
 def _carried(*scene_arguments):
     """Ledgers of a half-disc at t = 0, on the first mesh."""
     scene = _half_disc(*scene_arguments)
-    return pore.solve(scene, pore.seeded(scene)).fluxes
+    return solving.solve(scene, seeded(scene)).fluxes
 
 
 WITHIN = "0.1 %, the error that preset accurate promises"
@@ -330,7 +331,7 @@ def _open(numerics: int | str) -> transport.Problem:
     if isinstance(numerics, int):
         space = box_around(numerics)
     else:
-        space = pore.seeded(_half_disc(50.0, 20.0, "2.9 m/day", numerics)).space
+        space = seeded(_half_disc(50.0, 20.0, "2.9 m/day", numerics)).space
     return transport.problem(space, None, OPEN, SCENE.kinetics)
 
 

@@ -16,7 +16,8 @@ from math import log
 import numpy as np
 
 from repro.model.kinetics import rate_law
-from repro.model.pore import Pore, Solved
+from repro.model.pore import Pore
+from repro.model.solving import Solved
 from verification import sensitivity
 from verification.claims import (
     ARITHMETIC,

@@ -15,7 +15,7 @@ import numpy as np
 from repro.fem.mesh import Mesh, curved
 from repro.fem.mesher import unlocked
 from repro.fem.walls import channel_walls
-from repro.model.pore import sized
+from repro.model.meshing import sized
 from repro.model.uptake_law import Values
 from repro.network.resistance import added_resistance, share_range
 from repro.scene import Scene

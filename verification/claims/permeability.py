@@ -14,7 +14,7 @@ import numpy as np
 from reference import layered_channel
 from repro.fem.mesher import generate
 from repro.model import biomass
-from repro.model.pore import sized
+from repro.model.meshing import sized
 from verification.claims import CLOSED, Finding, PaperCheck, at_least, at_most, claim, near
 from verification.claims.growth_pattern import biomass_rates
 from verification.claims.levels import ABOUT_WIDE, BESIDE_PAIRS, PAIRED

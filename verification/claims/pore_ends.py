@@ -17,7 +17,9 @@ from repro.fem.mesh import Mesh
 from repro.fem.newton import Newton
 from repro.model import transport
 from repro.model.kinetics import Sink
-from repro.model.pore import Pore, Solved, sized
+from repro.model.meshing import sized
+from repro.model.pore import Pore
+from repro.model.solving import Solved
 from repro.model.transport import Concentrations
 from repro.scene import Scene
 from verification.claims import FEW, FEW_WORDS, OF_SCHEME, TRANSPORT, TRANSPORT_WORDS, Finding, at_most, claim, near

@@ -26,11 +26,12 @@ from repro.fem.walls import BOTTOM, TOP
 from repro.march import loop, simulation, updates
 from repro.march.state import Report, RestartState
 from repro.model import contact as closing
-from repro.model import flow, mesh_motion, pore, remeshing, transport
+from repro.model import flow, mesh_motion, meshing, remeshing, solving, transport
 from repro.model.kinetics import Sink
 from repro.model.mechanics import Expansion, Mechanics, middle_of
-from repro.model.pore import Pore, Solved, solve
+from repro.model.pore import Pore
 from repro.model.remeshing import Remeshing
+from repro.model.solving import Solved, solve
 from repro.model.stages import Stages
 from repro.results.arrays import State as Reported
 from repro.scene import Scene
@@ -167,7 +168,7 @@ def _with_a_film(scene: Scene, before: RestartState, contact: RestartState) -> R
 
 def _solved(scene: Scene, state: RestartState) -> Report:
     """A state as the instant of a row."""
-    solved = pore.solve(scene, state.pore)
+    solved = solving.solve(scene, state.pore)
     after = replace(state.pore, concentrations=solved.concentrations)
     return loop.make_report(state, after, solved, None, after.mesh.topology)
 
@@ -355,7 +356,7 @@ def solution(scene, grid: Mesh, active: np.ndarray) -> tuple[flow.Flow, Both]:
 
 def flow_in(scene, grid: Mesh) -> flow.Flow:
     """Flow under the scene's drive."""
-    return pore.solve_flow(Space(grid), scene.flow, scene.pore.length, scene.numerics)
+    return solving.solve_flow(Space(grid), scene.flow, scene.pore.length, scene.numerics)
 
 
 def full_biomass(scene, grid: Mesh) -> np.ndarray:
@@ -370,7 +371,7 @@ def half_disc(scene, radius: float, reach: float) -> Mesh:
     end = min(radius + reach, scene.pore.length / 2)
     numerics = scene.numerics
     outline = seed(radius, ACROSS_AGGREGATE * numerics.refinement, numerics.scheme.order)
-    return mesher.generate(outline, (-end, end), pore.sized(scene), numerics.scheme.order)[0]
+    return mesher.generate(outline, (-end, end), meshing.sized(scene), numerics.scheme.order)[0]
 
 
 def plug(scene, first: float, last: float) -> Mesh:
@@ -378,7 +379,7 @@ def plug(scene, first: float, last: float) -> Mesh:
     width = scene.pore.width
     points = np.array([(first, 0.0), (last, 0.0), (last, width), (first, width)])
     outline = Outline(points, np.repeat([BOTTOM, TOP], 2), np.zeros(4, bool), points)
-    return mesher.generate(outline, (first - 1.5 * width, last + 1.5 * width), pore.sized(scene))[0]
+    return mesher.generate(outline, (first - 1.5 * width, last + 1.5 * width), meshing.sized(scene))[0]
 
 
 def halved(lattice: np.ndarray, falling=False) -> np.ndarray:

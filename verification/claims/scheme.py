@@ -16,7 +16,8 @@ import numpy as np
 from repro.march import updates
 from repro.model import gear
 from repro.model.kinetics import Sink, rate_law
-from repro.model.pore import Pore, solve
+from repro.model.pore import Pore
+from repro.model.solving import solve
 from repro.model.stages import Stages
 from repro.model.transport import Concentrations
 from verification.claims import (

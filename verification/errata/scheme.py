@@ -7,7 +7,7 @@ from repro.fem.assembly import saddle_system
 from repro.fem.mesh import Mesh
 from repro.fem.mesher import generate
 from repro.fem.space import Space
-from repro.model import flow, pore
+from repro.model import flow, meshing
 from verification import switches
 from verification.claims.runs import (
     BASE,
@@ -113,7 +113,7 @@ def outlet() -> Numbers:
     rows = []
     for refinement in (1.0, 2.0):
         scene = load_packaged("flow_only", f"numerics.refinement={refinement}")
-        grid, _ = generate(None, (-75.0, 75.0), pore.sized(scene))
+        grid, _ = generate(None, (-75.0, 75.0), meshing.sized(scene))
         laplacian, traction = in_forms(grid, 1.0)
         cases = {"laplacian (ours)": (laplacian.velocity, laplacian.loss),
                  "traction, u_y = 0 at the outlet": (traction.velocity, traction.loss),

@@ -62,7 +62,7 @@ MUTANTS = (
          "shown = pore.mesh.topology",
          "tests/test_rows.py::test_a_row_with_another_mesh_than_the_last_row_has_a_new_mesh")),
     *changes(
-        "repro/model/pore.py",
+        "repro/model/solving.py",
         ("stale-flow",
          "flow is not solved again after the mesh has moved",
          "solve_flow",
@@ -74,7 +74,9 @@ MUTANTS = (
          "solve_flow",
          "return flow.solve(space, drive, length, interface=numerics.interface)",
          "length = space.mesh.ends[1] - space.mesh.ends[0]\n"
-         "return flow.solve(space, drive, length, interface=numerics.interface)"),
+         "return flow.solve(space, drive, length, interface=numerics.interface)")),
+    *changes(
+        "repro/model/meshing.py",
         ("seed-too-thin",
          "the seed has 99 % of X_m",
          "seeded",
@@ -503,8 +505,8 @@ MUTANTS = (
         ("biomass-of-the-start-takes-up",
          "Half way the biomass at the start of the step takes up substrates, not the mean biomass.",
          "solve_halfway",
-         "solution = pore.solve(stages.scene, middle, duration)",
-         "solution = pore.solve(stages.scene, middle)"),
+         "solution = solving.solve(stages.scene, middle, duration)",
+         "solution = solving.solve(stages.scene, middle)"),
         ("remesh-half-way-unmatched",
          "After a remesh half way the production does not match the uptake there.",
          "attempt",

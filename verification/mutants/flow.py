@@ -171,7 +171,7 @@ MUTANTS = (
          "factor = d / (root * (d - root))",
          "factor = 0 * d")),
     *changes(
-        "repro/model/pore.py",
+        "repro/model/meshing.py",
         ("drag-contact-lines-coarse",
          "Elements beside the upper contact lines of a permeable body are as large as elsewhere.",
          "sized",
@@ -216,7 +216,7 @@ MUTANTS = (
          "(sizes + sizing.gradation * distance).min",
          "(sizes + GRADATION * distance).min")),
     *changes(
-        "repro/model/pore.py",
+        "repro/model/meshing.py",
         ("gradation-not-passed",
          "The scene's gradation does not reach the mesher.",
          "sized",

@@ -39,7 +39,7 @@ READERS = "tests/test_vtk.py::test_every_reader_reads_what_was_computed"
 
 MUTANTS = (
     *changes(
-        "repro/model/pore.py",
+        "repro/model/solving.py",
         ("growth-in-every-scene",
          "A scene without growth imports its mechanics.",
          "",
@@ -490,8 +490,8 @@ MUTANTS = (
          "A check reports nothing between the mesh of a head loss and its flow.",
          "_head_loss",
          "poll()\n"
-         "return pore.solve_flow(space, drive, scene.pore.length, scene.numerics).head_loss",
-         "return pore.solve_flow(space, drive, scene.pore.length, scene.numerics).head_loss",
+         "return solving.solve_flow(space, drive, scene.pore.length, scene.numerics).head_loss",
+         "return solving.solve_flow(space, drive, scene.pore.length, scene.numerics).head_loss",
          "tests/test_progress.py::test_a_check_reports_between_its_stages_without_its_thread")),
     *changes(
         "repro/model/gear.py",
@@ -1172,7 +1172,7 @@ MUTANTS = (
          "supplied = at_time(rules.substrates, 1e9)",
          "tests/test_transfer.py::test_water_beyond_the_old_mesh_has_the_supply_of_its_time[0.0-7.0]")),
     *changes(
-        "repro/model/pore.py",
+        "repro/model/meshing.py",
         ("meshes-for-the-first-velocity",
          "Meshes are fine enough for the flow at t = 0 and ignore a later value of a table.",
          "_largest_peclet",
@@ -1237,8 +1237,8 @@ MUTANTS = (
         ("row-within-an-update-of-the-start-s-supply",
          "A row within an update has the supply and the drive of the update's start.",
          "_interpolate",
-         "return InterpolatedState(after, pore.solve(stages.scene, after), shorter.before)",
-         "return InterpolatedState(after, pore.solve(stages.scene.at(previous.time), after), shorter.before)",
+         "return InterpolatedState(after, solving.solve(stages.scene, after), shorter.before)",
+         "return InterpolatedState(after, solving.solve(stages.scene.at(previous.time), after), shorter.before)",
          f"{COURSE}a_row_within_a_step_has_the_supply_of_its_time[paper]"),
         ("row-within-an-update-from-the-supply",
          "A row within an update starts from the supply: a closed pore is full again.",
@@ -1562,7 +1562,7 @@ MUTANTS = (
          "text = name",
          "tests/test_names.py::test_names_of_any_bytes_pass_through_commands")),
     *changes(
-        "repro/model/pore.py",
+        "repro/model/meshing.py",
         ("layers-without-a-mesh",
          "Boundary layers that no mesh resolves are not refused.",
          "resolution",
@@ -1918,7 +1918,7 @@ MUTANTS = (
          "np.full(len(outline.points), across / sizing.front**0.5)",
          DEEPEST)),
     *changes(
-        "repro/model/pore.py",
+        "repro/model/meshing.py",
         ("films-with-layers",
          "Boundary layers refine films too.",
          "sized",
@@ -2387,7 +2387,7 @@ MUTANTS = (
          "(touched == wall.number).any()",
          f"{WALLS}a_plane_of_symmetry_bears_nothing_as_a_wall[2]")),
     *changes(
-        "repro/model/pore.py",
+        "repro/model/meshing.py",
         ("extent-without-the-mirror-image",
          "The mesh below a plane of symmetry ends too near to the aggregate.",
          "Meshing.generate",

@@ -158,7 +158,7 @@ MUTANTS = (
          "return self.space.at.mass(self.space.at.dx)",
          "return self.space.at.mass(self.space.at.dx) * np.eye(self.space.cells.shape[1])")),
     *changes(
-        "repro/model/pore.py",
+        "repro/model/meshing.py",
         ("layers-ignored",
          "elements are not made smaller for concentration boundary layers",
          "",

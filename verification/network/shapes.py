@@ -7,7 +7,8 @@ import numpy as np
 
 from repro.fem.space import Space
 from repro.march.simulation import simulate
-from repro.model import flow, pore
+from repro.model import flow
+from repro.model.meshing import seeded
 from repro.model.pore import Pore
 from repro.scene import load_scene
 from verification.claims.runs import SUBSTRATES, until
@@ -109,13 +110,13 @@ def added_length(space: Space, ratio: float) -> float:
 def half_disc(thickness: float, width: float = WIDTH, position: float = 0.0, elements=FINE) -> Pore:
     """A half-disc on the lower wall. thickness: over W; position: of its middle (um)."""
     aggregate = {"radius": f"{thickness * width} um", "position": f"{position} um"}
-    return pore.seeded(load_scene(tables(width, aggregate), elements))
+    return seeded(load_scene(tables(width, aggregate), elements))
 
 
 def drawn(points: np.ndarray, width: float = WIDTH) -> Pore:
     """A body with an outline (K, 2), in widths of the pore."""
     text = [[f"{x!r} um", f"{y!r} um"] for x, y in (width * points).tolist()]
-    return pore.seeded(load_scene(tables(width, {"outline": text}), QUICK))
+    return seeded(load_scene(tables(width, {"outline": text}), QUICK))
 
 
 def body(share: float, thicker: float, leaning: float) -> np.ndarray:

@@ -14,7 +14,8 @@ from scipy.optimize import least_squares
 
 from repro.march.ends import PoreEnd
 from repro.march.folding import Fold
-from repro.model import pore
+from repro.model import solving
+from repro.model.meshing import seeded
 from repro.model.pore import Pore
 from repro.network.resistance import is_plug
 from repro.network.uptakes import Throats, Transport
@@ -167,8 +168,8 @@ def solved(body: Pore, velocity: float, supplies: Sequence[float], grown: bool =
     tables["substrates"] = {name: {"supply": f"{supply} mg/L"} for name, supply in zip(SUBSTRATES, supplies)}
     scene = load_scene({**tables, "growth": {"end": "0 h"}}, shapes.QUICK)
     if not grown:
-        body = pore.seeded(scene, outline=body.boundary)
-    acceptor, donor = pore.solve(scene, body).substrates.fluxes
+        body = seeded(scene, outline=body.boundary)
+    acceptor, donor = solving.solve(scene, body).substrates.fluxes
     return State(part, int(grown), int(body.contact), body.boundary.area, width, velocity, *supplies,
                  acceptor.consumed, donor.consumed)
 

@@ -8,8 +8,10 @@ from repro.fem.mesh import Mesh
 from repro.fem.outline import Outline
 from repro.fem.space import Space
 from repro.model import remeshing
+from repro.model.body import material
 from repro.model.energies import NEO_HOOKEAN
-from repro.model.pore import Pore, material, seeded
+from repro.model.meshing import seeded
+from repro.model.pore import Pore
 from repro.model.remeshing import Remeshing
 from repro.model.stages import Stages
 from verification.evidence.cases import combined

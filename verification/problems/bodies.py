@@ -16,8 +16,8 @@ from repro.fem.mesh import Mesh
 from repro.fem.outline import Outline
 from repro.fem.space import Space
 from repro.fem.walls import FREE
-from repro.model import growth, mechanics, pore
-from repro.model.body import Body
+from repro.model import growth, mechanics
+from repro.model.body import Body, material
 from repro.model.energies import NEO_HOOKEAN
 from verification.evidence.cases import combined
 from verification.evidence.checks import largest
@@ -72,7 +72,7 @@ class Supported(Body):
 
 def on_mesh(grid: Mesh, *constrained: np.ndarray) -> Supported:
     """The aggregate of a mesh at t = 0. constrained: (n,) nodes with prescribed x, then nodes with prescribed y."""
-    aggregate = pore.material(Space(grid), grid.points[grid.body], NEO_HOOKEAN)
+    aggregate = material(Space(grid), grid.points[grid.body], NEO_HOOKEAN)
     return Supported(aggregate.shape, aggregate.reference, np.column_stack(constrained))
 
 

@@ -23,7 +23,7 @@ import numpy as np
 from reference import surface_stretch
 from repro.errors import SimulationError
 from repro.march.folding import CREASING
-from repro.model.pore import film
+from repro.model.meshing import film
 from repro.preflight import numbers
 from repro.results import field_files, read_table
 from repro.runs.execution import run

@@ -23,7 +23,9 @@ from reference import poiseuille
 from repro.errors import RunEnd, SimulationError, StageError
 from repro.march.simulation import simulate
 from repro.march.state import Report
-from repro.model.pore import Pore, Solved, peclet, seeded, solve
+from repro.model.meshing import peclet, seeded
+from repro.model.pore import Pore
+from repro.model.solving import Solved, solve
 from repro.results import M_PER_D, row
 from repro.scene import Scene, load_scene
 from repro.scene.units import SceneError

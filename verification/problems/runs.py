@@ -14,7 +14,9 @@ from repro.march import midpoint, updates
 from repro.march.balance import Ledger
 from repro.march.simulation import simulate
 from repro.march.state import Report, StepResult
-from repro.model.pore import Pore, Solved, seeded
+from repro.model.meshing import seeded
+from repro.model.pore import Pore
+from repro.model.solving import Solved
 from repro.model.stages import Stages
 from repro.scene import Kinetics, Scene, Substrates
 from verification.evidence.checks import columns

@@ -38,7 +38,7 @@ from scipy.stats import sobol_indices, uniform
 
 from repro.march import simulation, updates
 from repro.march.state import RestartState
-from repro.model import pore
+from repro.model import solving
 from repro.model.kinetics import rate_law
 from repro.model.stages import Stages
 from repro.results import M_PER_D
@@ -140,7 +140,7 @@ def of_base(scene: Scene) -> Row:
     plotted = END - scene.growth.time_step
     first, shaped, last = simulation.simulate(ending(scene, plotted, END))
     grown, _, _ = updates.make_biomass(Stages.of(scene), shaped.pore, shaped.solved, scene.growth.time_step)
-    solved = pore.solve(scene, grown)
+    solved = solving.solve(scene, grown)
     halves = [substrate.half_saturation for substrate in solved.problem.both]
     acceptor, donor = (flux.effluent / half for flux, half in zip(solved.fluxes, halves))
     supply = [substrate.supply for substrate in solved.problem.both]

@@ -1,0 +1,233 @@
+"""Meshes of a scene (3.1): their element sizes, the first outline, and the pore at t = 0."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import inf
+from typing import overload
+
+import numpy as np
+
+from repro.errors import MeshError
+from repro.fem import mesher, sizing
+from repro.fem.linear import Method
+from repro.fem.mesh import Mesh
+from repro.fem.outline import Outline, half_disc, polygon
+from repro.fem.sizing import Sizing
+from repro.fem.space import Space
+from repro.fem.walls import Walls, channel_walls, whole_width
+from repro.model.body import material
+from repro.model.energies import energy_of
+from repro.model.flow import poiseuille_loss
+from repro.model.pore import Pore
+from repro.scene import Flow as Drive
+from repro.scene import Numerics, Scene, Substrates, at_largest, needed
+from repro.scene import Pore as Channel
+
+#: A permeable aggregate that spans the pore draws the water in at its upper contact lines: elements
+#: beside them are no larger than the least film over this.
+CONTACT_ELEMENTS = 2.0
+#: Thinnest film to resolve (um, Table 1) without [growth], which states when a film closes.
+MINIMUM_FILM = 2.0
+#: The largest refinement that scenes accept.
+MOST_REFINED = 20.0
+#: Refinement of order 2 over Pe^(1/3): the concentration boundary layer is W Pe^(-1/3) thick
+#: (Leveque). With four elements across the pore and this factor, concentrations upstream of an
+#: aggregate exceed the supply by less than 0.01 %.
+BOUNDARY_LAYER = 0.15
+#: A mesh that resolves thinner layers has more nodes than 32-bit indices of sparse matrices count:
+#: more than the square of this.
+FINEST_LAYERS = 2.0**15.5
+#: By order of the elements: edges at the tips of an outline are the pore's width over this and over
+#: the square of the refinement (W / 200 in the presets paper and fast), but no shorter than W over
+#: ``MOST_AT_TIPS``.
+AT_TIPS = {1: 200.0, 2: 5000.0}
+MOST_AT_TIPS = 20_000.0
+
+
+def walls_of(scene: Scene) -> Walls:
+    """The walls of a scene's pore."""
+    bonded = bool(scene.growth and scene.growth.wall == "bonded")
+    return channel_walls(scene.pore.width, bonded, scene.pore.upper_wall)
+
+
+def film(scene: Scene) -> float:
+    """Thickness (um) at which a film closes, and the least that the mesh resolves."""
+    return scene.growth.minimum_film if scene.growth else MINIMUM_FILM
+
+
+def least_gap(scene: Scene) -> float:
+    """Distance (um) of the aggregate from the opposite wall at which the film there closes."""
+    _, opposite = walls_of(scene)
+    return film(scene) * opposite.part
+
+
+def resolution(scene: Scene) -> float:
+    """Divisor of the element sizes outside films: ``numerics.refinement``, or more for layers.
+
+    The speed is the scene's mean velocity, or that of the clean channel under its head. Raises
+    MeshError if no mesh resolves the layers.
+    """
+    if not (scene.numerics.scheme.follows_layers and scene.flow and scene.substrates):
+        return scene.numerics.refinement
+    layers = BOUNDARY_LAYER * _largest_peclet(scene) ** (1 / 3)
+    if layers > FINEST_LAYERS:
+        raise MeshError(f"no mesh resolves the boundary layers: {thin_layers(scene)}")
+    return max(scene.numerics.refinement, layers)
+
+
+def _largest_peclet(scene: Scene) -> float:
+    speed = fastest(needed(scene.flow, "a flow"), scene.pore)
+    return peclet(needed(scene.substrates, "substrates"), scene.pore.width, speed)
+
+
+def peclet(substrates: Substrates, width: float, speed: float) -> float:
+    """u W / D with the smaller diffusivity, for a width (um) and a mean velocity (um/h)."""
+    slowest = min(min(s.diffusivity, s.diffusivity_in_aggregate)
+                  for s in substrates.modelled.values())
+    return speed * width / slowest
+
+
+def thin_layers(scene: Scene) -> str:
+    """Name the Peclet number of a scene with flow and substrates, and the keys that reduce it."""
+    by_head = "flow.head or flow.gravity, a larger flow.kinematic_viscosity"
+    driven = needed(scene.flow, "a flow").head is not None
+    substrates = needed(scene.substrates, "substrates").modelled
+    diffusivities = " and ".join(f"substrates.{name}.diffusivity*" for name in substrates)
+    return (f"the Peclet number u W / D is {_largest_peclet(scene):.2g}; a smaller "
+            f"{by_head if driven else 'flow.mean_velocity'}, or larger {diffusivities} are needed")
+
+
+def fastest(drive: Drive, channel: Channel) -> float:
+    """Largest mean velocity (um/h) of a flow; under a head, that in the clean channel."""
+    largest = at_largest(drive)
+    if largest.mean_velocity is not None:
+        return largest.mean_velocity
+    width = whole_width(channel_walls(channel.width, upper=channel.upper_wall))
+    loss = poiseuille_loss(channel.length, width)
+    return largest.driving_head * drive.gravity / drive.kinematic_viscosity / loss
+
+
+def sized(scene: Scene) -> Sizing:
+    """Element sizes of a scene's meshes, without a front of the substrates.
+
+    Boundary layers refine all elements except those in films: a film is thinner than its layers.
+    """
+    seed = scene.aggregate
+    middle = seed.position if seed and seed.outline is None else None
+    least = film(scene)
+    across = scene.numerics.contact_elements
+    if scene.flow and scene.flow.permeability is not None:
+        across = max(across, CONTACT_ELEMENTS)
+    return Sizing(walls_of(scene), resolution(scene), least, scene.numerics.gradation,
+                  contact=least / across if across else inf, seed=middle,
+                  film_refinement=scene.numerics.refinement)
+
+
+@dataclass(frozen=True, eq=False)
+class Meshing:
+    """How the meshes of a scene are generated and moved.
+
+    channel: section [pore] of the scene; sizes: of the elements, without a front; numerics: extent
+    and elements of a mesh, solver and constants of its motion.
+    """
+
+    channel: Channel
+    sizes: Sizing
+    numerics: Numerics
+
+    @classmethod
+    def of(cls, scene: Scene) -> Meshing:
+        """The meshing of a scene."""
+        return cls(scene.pore, sized(scene), scene.numerics)
+
+    @overload
+    def generate(self, outline: Outline, front: float = 1.0) -> tuple[Mesh, Outline]: ...
+
+    @overload
+    def generate(self, outline: Outline | None,
+                 front: float = 1.0) -> tuple[Mesh, Outline | None]: ...
+
+    def generate(self, outline: Outline | None,
+                 front: float = 1.0) -> tuple[Mesh, Outline | None]:
+        """Generate a mesh around an aggregate, with the extent of 3.1.
+
+        Parameters
+        ----------
+        outline : Outline, optional
+            Boundary of the aggregate; None for a clean channel.
+        front : float
+            As :attr:`Pore.front`.
+
+        Returns
+        -------
+        mesh : Mesh
+        outline : Outline, optional
+            The boundary with its nodes on that mesh.
+
+        Raises
+        ------
+        MeshError
+            If no mesh can be made.
+        """
+        numerics = self.numerics
+        is_full = numerics.extent == "full"
+        width = self.sizes.whole_width
+        ends = sizing.meshed_extent(outline, width, self.channel.length, is_full)
+        method = Method(numerics.solver)
+        sizes = replace(self.sizes, front=front)
+        return mesher.generate(outline, ends, sizes, numerics.scheme.order, method)
+
+
+def initial_outline(scene: Scene, front: float = 1.0) -> Outline | None:
+    """The aggregate's boundary at t = 0, None in a clean channel; front: as :attr:`Pore.front`."""
+    seed = scene.aggregate
+    if seed is None:
+        return None
+    geometry = scene.numerics.scheme.order
+    if seed.radius is None:
+        return polygon(np.array(seed.outline), walls_of(scene), geometry, seed.smooth,
+                       size_at_tips(scene.numerics, scene.pore.width),
+                       bends=scene.numerics.interface == "traction")
+    across = sizing.ACROSS_AGGREGATE * resolution(scene) * front
+    return half_disc(seed.radius, across, geometry, seed.position)
+
+
+def size_at_tips(numerics: Numerics, width: float) -> float:
+    """Length (um) of the edges at an outline's tips, in a pore of a width (um)."""
+    finest = min(AT_TIPS[numerics.scheme.order] * numerics.refinement**2, MOST_AT_TIPS)
+    return width / finest
+
+
+def seeded(scene: Scene, front: float = 1.0, outline: Outline | None = None) -> Pore:
+    """Make the pore at t = 0: X_A + X_I = X_m in the aggregate (Table 1), or a clean channel.
+
+    Parameters
+    ----------
+    scene : Scene
+    front : float
+        As :attr:`Pore.front`.
+    outline : Outline, optional
+        Replaces the scene's outline.
+
+    Returns
+    -------
+    Pore
+
+    Raises
+    ------
+    MeshError
+        If no mesh can be made around the outline.
+    """
+    meshing = Meshing.of(scene)
+    mesh, outline = meshing.generate(outline or initial_outline(scene, front), front)
+    space = Space(mesh)
+    density = scene.kinetics.maximum_density if scene.kinetics else 0.0
+    total = density * space.reaction.dx
+    inert = total * (scene.aggregate.inert_fraction if scene.aggregate else 0.0)
+    wall = outline.wall if outline else np.empty(0, int)
+    fixed = outline.fixed if outline else np.empty(0, bool)
+    body = material(space, mesh.points[mesh.body], energy_of(scene.growth))
+    theta = np.ones((np.count_nonzero(mesh.biomass), len(body.shape.table.weights)))
+    return Pore(0.0, space, wall, fixed, total - inert, inert, theta, body,
+                np.zeros(mesh.corners), front=front)

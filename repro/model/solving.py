@@ -1,0 +1,117 @@
+"""The flow and the substrates in the geometry of a pore."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from repro.errors import TransportError
+from repro.fem.brief import brief
+from repro.fem.space import Space
+from repro.model import flow
+from repro.model.flow import Flow
+from repro.model.meshing import peclet
+from repro.model.pore import Pore
+from repro.scene import Flow as Drive
+from repro.scene import MissingError, Numerics, Scene
+
+if TYPE_CHECKING:
+    from repro.model.transport import Concentrations, Fluxes, Problem
+
+#: Under this Peclet number u W / D the supply of the inlet is round-off.
+SLOWEST = 1e-8
+
+
+@dataclass(frozen=True, eq=False)
+class SolvedSubstrates:
+    """The substrates in the geometry of a pore. No part is optional."""
+
+    problem: Problem
+    concentrations: Concentrations
+    fluxes: tuple[Fluxes, Fluxes]
+
+
+@brief
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """Flow and substrates in the geometry of a pore, and the fluxes of acceptor and donor; None
+    for parts that the scene does not model."""
+
+    flow: Flow | None
+    problem: Problem | None
+    concentrations: Concentrations | None
+    fluxes: tuple[Fluxes, Fluxes] | None = None
+
+    @property
+    def substrates(self) -> SolvedSubstrates:
+        """The substrates. Raises MissingError if the scene does not model them."""
+        if self.problem is None or self.concentrations is None or self.fluxes is None:
+            raise MissingError("a solution for the substrates is needed here")
+        return SolvedSubstrates(self.problem, self.concentrations, self.fluxes)
+
+    @property
+    def mean_velocity(self) -> float:
+        """Mean velocity, um/h; zero without flow."""
+        return self.flow.mean_velocity if self.flow else 0.0
+
+
+def solve(scene: Scene, pore: Pore, over: float = 0.0) -> Solved:
+    """Solve the flow and the substrates that a scene models, in the geometry of a pore.
+
+    Parameters
+    ----------
+    scene : Scene
+        Its tables over time are read at the pore's time.
+    pore : Pore
+    over : float
+        Time (h) in which the biomass of ``pore`` grows at the rates being solved for; its mean
+        takes up the substrates.
+
+    Returns
+    -------
+    Solved
+
+    Raises
+    ------
+    LinearError, TransportError, Unresolved
+        If the flow or the substrates cannot be solved.
+    """
+    scene = scene.at(pore.time)
+    numerics = scene.numerics
+    carried = None
+    if scene.flow:
+        carried = solve_flow(pore.space, scene.flow, scene.pore.length, numerics)
+    if scene.substrates is None:
+        return Solved(carried, None, None)
+    if carried and numerics.transport != "gear":
+        refuse_no_supply(peclet(scene.substrates, scene.pore.width, carried.mean_velocity))
+    from repro.model import substrates  # a scene without [substrates] does not load them
+    return Solved(carried, *substrates.solve(scene, pore, carried, over))
+
+
+def refuse_no_supply(number: float) -> None:
+    """Raise TransportError if the Peclet number u W / D is too small: no state is steady."""
+    if number < SLOWEST:
+        raise TransportError(f"the Peclet number u W / D is {number:.2g}, under {SLOWEST:g}: "
+                             "nothing is supplied through the inlet; leave [flow] out for pure "
+                             "diffusion")
+
+
+def solve_flow(space: Space, drive: Drive, length: float, numerics: Numerics) -> Flow:
+    """Solve the Stokes flow on a space of velocities.
+
+    Parameters
+    ----------
+    space : Space
+    drive : repro.scene.Flow
+        Head or mean velocity at one time, without tables.
+    length : float
+        Length of the whole pore, um.
+    numerics : Numerics
+        Form of the viscous term.
+
+    Returns
+    -------
+    Flow
+    """
+    return flow.solve(space, drive, length, interface=numerics.interface)
