@@ -374,9 +374,10 @@ class Mesh:
         a, b = self.topology.edges.T
         return np.concatenate([field, 0.5 * (field[a] + field[b])])
 
-    def from_body(self, values: np.ndarray) -> np.ndarray:
-        """(N, 2) values at all nodes, from those (n, 2) at the aggregate's; zero in the fluid."""
-        nodal = np.zeros_like(self.points)
+    def from_body(self, values: np.ndarray, outside: np.ndarray | float = 0.0) -> np.ndarray:
+        """(N, k) values at all nodes, from those (n, k) at the aggregate's; ``outside``, (N, k) or
+        a number, in the fluid."""
+        nodal = np.full((len(self.points), values.shape[1]), outside)
         nodal[self.body] = values
         return nodal
 

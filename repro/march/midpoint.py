@@ -187,13 +187,12 @@ def interpolate(stages: Stages, previous: Pore, solved: Solved, half: Halfway,
 def _carry_rates_back(middle: Pore, previous: Pore, half: Expansion, rates: Rates) -> Rates:
     """Interpolate rates at the points of a new mesh back to those of the previous mesh."""
     mesh = middle.mesh
-    body = previous.mesh.body
     nodal = np.column_stack([middle.space.integration.to_nodes(field)
                              for field in (rates.growth, rates.remains)])
-    carried = np.zeros((len(previous.mesh.points), 2))
-    carried[body] = transfer.interpolate(mesh.points, mesh.cells[mesh.biomass], nodal,
-                                         half.position[body])
-    growth, remains = map(previous.space.integration.to_points, carried.T)
+    carried = transfer.interpolate(mesh.points, mesh.cells[mesh.biomass], nodal,
+                                   half.position[previous.mesh.body])
+    growth, remains = map(previous.space.integration.to_points,
+                          previous.mesh.from_body(carried).T)
     return Rates(growth, remains)
 
 
@@ -260,9 +259,6 @@ def _guess_shape(previous: Pore, half: Halfway, part: float) -> Pore:
 
 def _place_body(after: Pore, points: np.ndarray) -> Pore:
     """Move the aggregate's nodes to ``points``, unless this turns a triangle over."""
-    body = after.mesh.body
-    guess = after.mesh.points.copy()
-    guess[body] = points[body]
-    moved = after.moved(guess)
+    moved = after.moved(after.mesh.from_body(points[after.mesh.body], after.mesh.points))
     biomass_cells = np.flatnonzero(moved.mesh.biomass)
     return after if moved.mesh.turned_over(biomass_cells).any() else moved

@@ -88,8 +88,7 @@ def _by_shares(old: Space, new: Space, at: Located, amounts: Amounts, density: f
     total = amounts[0] + amounts[1]
     shares = np.column_stack([old.integration.to_nodes(amount / total)
                               for amount in amounts[1:]])
-    nodal = np.zeros((len(new.mesh.points), shares.shape[1]))
-    nodal[new.mesh.body] = at.field(shares, old.mesh.cells[old.mesh.biomass])
+    nodal = new.mesh.from_body(at.field(shares, old.mesh.cells[old.mesh.biomass]))
     inside = [np.clip(new.integration.to_points(column), 0.0, 1.0) for column in nodal.T]
     masses = density * new.reaction.dx
     inert = _conserved(inside[0], masses, amounts[1].sum())

@@ -144,8 +144,7 @@ class ByLines(Closing):
                 return self._solve(wall, lines)
             except (GrowthError, LinearError) as error:
                 failure = error
-                moving = [line for line in lines if line.retreat()]
-                if not moving:
+                if not [line for line in lines if line.retreat()]:
                     break
         raise failure
 

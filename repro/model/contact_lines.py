@@ -263,21 +263,22 @@ class Line:
         return self.far - FIRST_RETREAT * (self.far - self.short)
 
 
-def arc_lengths(outline: Outline, line: Line) -> np.ndarray:
-    """(K,) um, chords of the free arcs beyond a line, in order."""
+def arc_ends(outline: Outline, line: Line) -> np.ndarray:
+    """(K + 1,) um along the chords of the free arcs beyond a line: where they begin and end."""
     arcs, _ = _free_arcs(outline, line.node, line.direction)
-    return np.linalg.norm(arcs[:, 2] - arcs[:, 0], axis=1)
+    chords = np.linalg.norm(arcs[:, 2] - arcs[:, 0], axis=1)
+    return np.concatenate([[0.0], np.cumsum(chords)])
 
 
 def to_length(outline: Outline, line: Line) -> float:
     """The advance of a line in um along its previous outline."""
-    ends = np.concatenate([[0.0], np.cumsum(arc_lengths(outline, line))])
+    ends = arc_ends(outline, line)
     return float(np.interp(line.advance, np.arange(len(ends)), ends))
 
 
 def to_arcs(outline: Outline, line: Line, length: float) -> float:
     """The advance, in arcs, of a length (um) along a line's previous outline."""
-    ends = np.concatenate([[0.0], np.cumsum(arc_lengths(outline, line))])
+    ends = arc_ends(outline, line)
     return float(np.interp(length, ends, np.arange(len(ends))))
 
 

@@ -64,9 +64,7 @@ class Pore:
     @property
     def origin(self) -> np.ndarray:
         """(N, 2) um, positions at t = 0 of the nodes' material; in the fluid, the present ones."""
-        origin = self.mesh.points.copy()
-        origin[self.mesh.body] = self.body.reference
-        return origin
+        return self.mesh.from_body(self.body.reference, self.mesh.points)
 
     @cached_property
     def outline(self) -> Outline | None:
@@ -99,8 +97,7 @@ class Pore:
     def with_body(self, position: np.ndarray, pressure: np.ndarray) -> Pore:
         """The pore with its aggregate's nodes at positions (n, 2) um and pressures at its corners;
         the fluid's nodes stay in place."""
-        points = self.mesh.points.copy()
-        points[self.mesh.body] = position
+        points = self.mesh.from_body(position, self.mesh.points)
         pressures = self.pressure.copy()
         pressures[self.mesh.topology.body_corners] = pressure
         return replace(self.moved(points), pressure=pressures)

@@ -108,10 +108,11 @@ def _on_generated(rules: Remeshing, generated: GeneratedMesh, expanded: Pore) ->
     material; None if the contact differs or the moved mesh is not acceptable."""
     shape, start = generated.shape, generated.pore
     old = expanded.mesh
-    if old.topology is not shape.mesh.topology or not _same_contact(expanded, shape):
+    same = expanded.boundary.same_contact(shape.boundary)
+    if old.topology is not shape.mesh.topology or not same:
         return None
-    points = start.mesh.points.copy()
-    points[start.mesh.body] = generated.at.field(old.points, old.cells[old.biomass])
+    position = generated.at.field(old.points, old.cells[old.biomass])
+    points = start.mesh.from_body(position, start.mesh.points)
     on_wall = start.mesh.loop[start.wall != FREE]
     points[on_wall, 1] = start.mesh.points[on_wall, 1]
     mesh = moved_mesh(rules.meshing, start, start.moved(points))
@@ -119,10 +120,6 @@ def _on_generated(rules: Remeshing, generated: GeneratedMesh, expanded: Pore) ->
         return None
     target = replace(start, space=Space(mesh))
     return _transferred(rules, expanded, target, generated.at)[0]
-
-
-def _same_contact(first: Pore, second: Pore) -> bool:
-    return first.boundary.same_contact(second.boundary)
 
 
 def _located_in(pore: Pore, mesh: Mesh) -> Located:
@@ -219,8 +216,7 @@ def _material(new: Space, expanded: Pore, rim: np.ndarray, at: Located) -> tuple
     mesh = new.mesh
     old = expanded.mesh
     energy = expanded.body.energy
-    origin = mesh.points.copy()
-    origin[mesh.body] = at.field(expanded.origin, old.cells[old.biomass])
+    origin = mesh.from_body(at.field(expanded.origin, old.cells[old.biomass]), mesh.points)
     origin[mesh.loop] = rim
     try:
         unfolded = transfer.unfolded(mesh, origin)[mesh.body]

@@ -8,7 +8,7 @@ stress by itself. An energy states its limits (:class:`repro.model.energies.Ener
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache, cached_property, lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -80,14 +80,8 @@ def surface(pore: Pore) -> Surface:
 def _expansion(nodes: np.ndarray, local: np.ndarray) -> np.ndarray:
     """(edges,) area of triangles with nodes (edges, 3 or 6, 2) um over that of the unit triangle,
     at the middles of their edges ``local`` (edges,)."""
-    derivatives = _map_derivatives(elements.order_of(nodes))
+    derivatives = elements.derivatives(elements.order_of(nodes), MIDDLES)
     return elements.determinant(np.einsum("eai,eak->eik", nodes, derivatives[local]))
-
-
-@cache
-def _map_derivatives(geometry: int) -> np.ndarray:
-    """(3, k, 2) derivatives of the map's functions at the middles of the edges."""
-    return elements.derivatives(geometry, MIDDLES)
 
 
 def _lengths(nodes: np.ndarray, local: np.ndarray) -> np.ndarray:

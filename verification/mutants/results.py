@@ -1320,7 +1320,7 @@ MUTANTS = (
         ("generated-for-any-contact",
          "A row may use a mesh that its step has generated for another contact.",
          "_on_generated",
-         "old.topology is not shape.mesh.topology or not _same_contact(expanded, shape)",
+         "old.topology is not shape.mesh.topology or not same",
          "old.topology is not shape.mesh.topology",
          f"{STEPPING}a_mesh_generated_for_another_contact_is_not_used")),
     *changes(
