@@ -13,7 +13,7 @@ from repro.fem import transfer
 from repro.fem.walls import channel_walls
 from repro.march import midpoint
 from repro.march.simulation import simulate
-from repro.model import contact, contact_lines, contact_newton, gear, growing, growth, mesh_motion, surface, transport
+from repro.model import biomass, contact, contact_lines, contact_newton, gear, growth, mesh_motion, surface, transport
 from repro.model.biomass import Rates
 from repro.model.contact_lines import Clearance
 from repro.model.kinetics import Sink
@@ -143,7 +143,7 @@ def test_biomass_that_overflows_fails_in_growth(order):
     pore = coarse_base(order)[1]
     rates = Rates(np.full_like(pore.active, 0.3), np.zeros_like(pore.active))
     with pytest.raises(GrowthError, match=OUT_OF_DOMAIN):
-        growing.grow(pore, rates, 1e4)
+        biomass.grow(pore, rates, 1e4)
 
 
 def run(monkeypatch, *changes, unset=()):

@@ -14,6 +14,7 @@ from repro.model.brinkman import ACROSS
 from repro.model.kinetics import THINNEST
 from repro.model.pore import MOST_REFINED, Pore, film, least_gap, resolution, walls_of
 from repro.model.surface import surface
+from repro.model.transport_in_time import transport_in_time
 from repro.preflight import numbers
 from repro.preflight.numbers import Number, Sizes
 from repro.scene import Kinetics, Scene
@@ -138,7 +139,7 @@ def _demand(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
 
 def _lag(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
     lag = computed["transport over growth time"].start
-    if scene.numerics.transport == "quasi_steady" and lag > LAG:
+    if lag > LAG and not transport_in_time(scene.numerics.transport).stores:
         permeable = scene.flow is not None and scene.flow.permeability is not None
         remedy = '; "gear" with numerics.preset = "paper" integrates them in time'
         yield Caveat("numerics.transport", f"transport takes {lag:.2g} of the time of growth, "

@@ -11,6 +11,8 @@ from itertools import pairwise
 
 import numpy as np
 
+from repro.model.transport_in_time import transport_in_time
+
 DRIVEN = ("mean_velocity_m_per_d", "head_loss_cm")
 #: Columns that jump with the flow, and with its forces if the aggregate bears them.
 FORCES = (*(f"fluid_force_{axis}_uN_per_m" for axis in "xy"), "fluid_moment_nN")
@@ -43,12 +45,12 @@ def _jumps(name: str, tables: Mapping[str, dict]) -> list[float]:
     bears_forces = tables.get("growth", {}).get("fluid_forces") == "included"
     if name in (*DRIVEN, *FORCES) or name in STRESSES and bears_forces:
         return flow
-    at_rest = tables.get("numerics", {}).get("transport") == "quasi_steady"
-    if name not in CARRIED or not at_rest:
-        return []
     supplies = [_times(part) for part in tables.get("substrates", {}).values()
                 if isinstance(part, dict)]
-    return sorted({*flow, *(time for times in supplies for time in times)})
+    times = sorted({*flow, *(time for times in supplies for time in times)})
+    if name not in CARRIED or not times:
+        return []
+    return [] if transport_in_time(tables["numerics"]["transport"]).stores else times
 
 
 def _times(section: dict) -> list[float]:
