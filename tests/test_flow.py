@@ -12,6 +12,7 @@ from repro.fem.outline import polygon
 from repro.fem.walls import channel_walls
 from repro.march.simulation import simulate
 from repro.model import flow, pore
+from repro.model.resistance import Viscous
 from repro.scene import load_scene
 
 
@@ -90,7 +91,7 @@ def drawn_body(body, preset, interface):
 def meshed_loss(scene):
     """The loss (1/um) over the meshed part, for a mean velocity of one."""
     space = pore.seeded(scene).space
-    return flow.unit_flow(space, scene.flow.viscosity_ratio, interface=scene.numerics.interface).loss
+    return flow.unit_flow(space, Viscous(scene.flow.viscosity_ratio), interface=scene.numerics.interface).loss
 
 
 def graded_loss(scene):

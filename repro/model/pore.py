@@ -22,6 +22,7 @@ from repro.model import flow
 from repro.model.body import Body, Shape
 from repro.model.energies import Energy, energy_of
 from repro.model.flow import Flow
+from repro.model.resistance import resistance_of
 from repro.model.transport_in_time import transport_in_time
 from repro.scene import Flow as Drive
 from repro.scene import MissingError, Numerics, Scene, Substrates, at_largest, needed
@@ -30,9 +31,6 @@ from repro.scene import Pore as Channel
 if TYPE_CHECKING:
     from repro.model.transport import Concentrations, Fluxes, Problem
 
-#: A permeable aggregate that spans the pore draws the water in at its upper contact lines: elements
-#: beside them are no larger than the least film over this.
-CONTACT_ELEMENTS = 2.0
 #: Thinnest film to resolve (um, Table 1) without [growth], which states when a film closes.
 MINIMUM_FILM = 2.0
 #: Under this Peclet number u W / D the supply of the inlet is round-off.
@@ -235,8 +233,8 @@ def sized(scene: Scene) -> Sizing:
     middle = seed.position if seed and seed.outline is None else None
     least = film(scene)
     across = scene.numerics.contact_elements
-    if scene.flow and scene.flow.permeability is not None:
-        across = max(across, CONTACT_ELEMENTS)
+    if scene.flow:
+        across = max(across, resistance_of(scene.flow).contact_elements)
     return Sizing(walls_of(scene), resolution(scene), least, scene.numerics.gradation,
                   contact=least / across if across else inf, seed=middle,
                   film_refinement=scene.numerics.refinement)

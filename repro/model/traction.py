@@ -34,6 +34,7 @@ from repro.fem.space import Space
 from repro.model import mesh_motion, pore, remeshing
 from repro.model.flow import MPA_PER_UM, Flow
 from repro.model.pore import Meshing, Pore
+from repro.model.resistance import resistance_of
 from repro.scene import Flow as Drive
 from repro.scene import Scene, at_time, needed
 
@@ -121,9 +122,10 @@ def on_aggregate(space: Space, solution: Flow, drive: Drive, interface: str) -> 
     """(N, 2) um2 of head: forces of the water on the aggregate at all nodes, over rho g; traction
     on its surface, or the drag within a permeable one."""
     viscosity = drive.kinematic_viscosity / drive.gravity
-    if drive.permeability is None:
-        return nodal(space, solution, viscosity, interface)
-    return seepage(space, solution, viscosity / drive.permeability)
+    resistance = resistance_of(drive)
+    if resistance.permeable:
+        return seepage(space, solution, viscosity / resistance.permeability)
+    return nodal(space, solution, viscosity, interface)
 
 
 def seepage(space: Space, solution: Flow, drag: float) -> np.ndarray:

@@ -1,13 +1,24 @@
 """How substrates change in time: at rest in each shape (2.2), or by the paper's transient (3.3).
 
-``numerics.transport`` chooses the method; :func:`transport_in_time` alone knows its words.
+``numerics.transport`` chooses the method; :func:`transport_in_time` alone knows its words. Both
+classes have
+
+    stores          does the water keep the substrates of earlier times? Its content is then a part
+                    of the balances, may exceed the present supply, and starts the next step.
+    settled         steady concentrations in a shape, from a guess; see
+                    :func:`repro.model.transport.steady`
+    make_biomass    integrates (9)-(10) over an update (h) in a fixed geometry: grown pore,
+                    concentrations, flows
+    growth_error    bound of the error (um2 mg/L) of the biomass made in an update. part: of
+                    ``biomass``, that turns over at the fastest rate; turnover: of the update, um2
+                    mg/L; steepness: change of m_A + m_D for a change of the concentrations by their
+                    supplies
 """
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from dataclasses import replace
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, TypeAlias
 
 if TYPE_CHECKING:
     from repro.model.kinetics import Sink
@@ -19,37 +30,7 @@ if TYPE_CHECKING:
 GEAR = 1e-3
 
 
-class TransportInTime(ABC):
-    """A method of integrating (7)-(10) in time.
-
-    stores: does the water keep the substrates of earlier times? Its content is then a part of the
-    balances, may exceed the present supply, and starts the next step.
-    """
-
-    stores: ClassVar[bool]
-
-    @abstractmethod
-    def settled(self, problem: Problem, sink: Sink | None,
-                guess: Concentrations | None) -> Concentrations:
-        """Solve for steady concentrations in a shape, from a guess; see
-        :func:`repro.model.transport.steady`."""
-
-    @abstractmethod
-    def make_biomass(self, previous: Pore, solved: Solved,
-                     duration: float) -> tuple[Pore, Concentrations, Flows]:
-        """Integrate (9)-(10) over an update (h) in a fixed geometry: grown pore, concentrations,
-        flows."""
-
-    @abstractmethod
-    def growth_error(self, part: float, biomass: float, turnover: float, steepness: float) -> float:
-        """Bound of the error (um2 mg/L) of the biomass made in an update.
-
-        part: of ``biomass``, that turns over at the fastest rate; turnover: of the update, um2
-        mg/L; steepness: change of m_A + m_D for a change of the concentrations by their supplies.
-        """
-
-
-class AtRest(TransportInTime):
+class AtRest:
     """Quasi-steady substrates; Heun's method for the biomass."""
 
     stores = False
@@ -87,7 +68,7 @@ class AtRest(TransportInTime):
         return part**2 / 12 * turnover
 
 
-class Gear(TransportInTime):
+class Gear:
     """The transient scheme for substrates and biomass, :mod:`repro.model.gear`."""
 
     stores = True
@@ -115,6 +96,9 @@ class Gear(TransportInTime):
         return GEAR * max(1.0, steepness) * part * biomass
 
 
+TransportInTime: TypeAlias = AtRest | Gear
+
+
 def transport_in_time(word: str) -> TransportInTime:
     """The method of a value of ``numerics.transport``."""
-    return {"quasi_steady": AtRest, "gear": Gear}[word]()
+    return Gear() if word == "gear" else AtRest()

@@ -87,7 +87,7 @@ def _apply(scene: Scene, velocity: float | None, end: Sizes | None) -> list[list
 
 
 def _has(scene: Scene, part: str) -> bool:
-    """Whether a scene has a section or a subsection."""
+    """Whether a scene has a section, a subsection or a key."""
     section: object = scene
     for name in part.split("."):
         section = section and getattr(section, name)
@@ -140,7 +140,7 @@ def _demand(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
 def _lag(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
     lag = computed["transport over growth time"].start
     if lag > LAG and not transport_in_time(scene.numerics.transport).stores:
-        permeable = scene.flow is not None and scene.flow.permeability is not None
+        permeable = _has(scene, "flow.permeability")
         remedy = '; "gear" with numerics.preset = "paper" integrates them in time'
         yield Caveat("numerics.transport", f"transport takes {lag:.2g} of the time of growth, "
                      f"above {LAG:g}: quasi-steady substrates err by about this fraction"
@@ -228,8 +228,6 @@ def _interface_size(scene: Scene, thickness: float) -> float:
 
 def _drag_layer(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
     permeability = scene.flow.permeability
-    if permeability is None:
-        return
     root = math.sqrt(permeability)
     size = _interface_size(scene, sizes.thickness)
     thickness = size / ACROSS
@@ -336,7 +334,7 @@ CHECKS: dict[Callable[[Scene, Numbers, Sizes], Iterator[Caveat]], tuple[str, ...
     _diffusivities: ("aggregate", "substrates"),
     _seed_film: ("aggregate", "flow"),
     _ends: ("aggregate",),
-    _drag_layer: ("aggregate", "flow"),
+    _drag_layer: ("aggregate", "flow.permeability"),
     _fronts: ("kinetics",),
     _demand: ("kinetics", "substrates.acceptor"),
     _lag: ("growth",),

@@ -634,15 +634,14 @@ MUTANTS = (
         ("drag-left-to-the-surface",
          "The water pushes a permeable aggregate at its surface, as if the aggregate were impermeable.",
          "on_aggregate",
-         "if drive.permeability is None:\n"
-         "    return nodal(space, solution, viscosity, interface)",
-         "if drive:\n"
-         "    return nodal(space, solution, viscosity, interface)"),
+         "if resistance.permeable:\n"
+         "    return seepage(space, solution, viscosity / resistance.permeability)",
+         "pass"),
         ("drag-over-twice",
          "The drag of a permeable aggregate is half of Darcy's.",
          "on_aggregate",
-         "seepage(space, solution, viscosity / drive.permeability)",
-         "seepage(space, solution, viscosity / (2 * drive.permeability))"),
+         "seepage(space, solution, viscosity / resistance.permeability)",
+         "seepage(space, solution, viscosity / (2 * resistance.permeability))"),
         ("density-squared",
          "The forces go with the square of the fluid's density.",
          "forces",

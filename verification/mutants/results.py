@@ -2009,7 +2009,7 @@ MUTANTS = (
         "repro/model/brinkman.py",
         ("drag-along-alone",
          "A permeable body slows only the velocity along the pore.",
-         "Permeable.matrices",
+         "Layers.matrices",
          "blocks[:, k:, k:] += along\n"
          "return blocks",
          "return blocks",
@@ -2025,8 +2025,9 @@ MUTANTS = (
         ("traction-half-viscosity",
          "In the traction form biomass is half as viscous.",
          "unit_flow",
-         "np.where(mesh.biomass, viscosity_ratio, 1.0)",
-         'np.where(mesh.biomass, viscosity_ratio / (1 + (interface == "traction")), 1.0)',
+         "blocks = stokes(velocity, viscosity, interface, pair.lower, drag)",
+         'viscosity = np.where(mesh.biomass, viscosity / (1 + (interface == "traction")), 1.0)\n'
+         "blocks = stokes(velocity, viscosity, interface, pair.lower, drag)",
          f"{PAIRS}viscosity_and_drag_dissipate_the_work_of_the_head"),
         ("flow-kept-for-either-form",
          "A mesh keeps one system for both forms of the flow.",
