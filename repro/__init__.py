@@ -43,7 +43,7 @@ Sections of the paper and their modules, which name the equations that they solv
     2.2  kinetics              (7)-(10)     repro.model.uptake_law, .kinetics
     2.2  substrates            (7)-(13)     repro.model.transport, .substrates
     2.2, 3.3  in time          (7)-(13)     repro.model.transport_in_time, .gear
-    2.3, 3.4  growth           (14)-(27)    repro.model.growth, .body
+    2.3, 3.4  growth           (14)-(27)    repro.model.growth, .body, .configuration
     2.3  energies              (17)         repro.model.energies
     3.4  biomass               (28)-(34)    repro.model.biomass, .growing
     2.3.2  fluid forces        (20), (22)   repro.model.traction, .support (along a wall)

@@ -18,6 +18,7 @@ from repro.march.simulation import simulate
 from repro.march.state import RestartState
 from repro.march.step_control import StepControl
 from repro.model import contact, contact_lines, contact_newton
+from repro.model.configuration import FromLast
 from repro.model.contact_lines import Clearance, Contact, surface_ends
 from repro.model.pore import initial_outline, seeded
 from repro.runs.execution import Watch, resume, run
@@ -159,7 +160,7 @@ def test_a_division_also_divides_the_reference_of_strain(plugged, division):
     last = 1.01 * pore.mesh.points[pore.mesh.body]
     free = np.full(2, FREE)
     touching = Contact(pore.wall, division.arcs, division.t, free, free)
-    parted = contact.divided(replace(pore, last=last), division, touching)
+    parted = contact.divided(replace(pore, configuration=FromLast(last)), division, touching)
     assert parted.unstrained == pytest.approx(1.01 * division.mesh.points[division.mesh.body], rel=1e-13)
 
 

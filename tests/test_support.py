@@ -149,9 +149,9 @@ def test_the_traction_is_uniform_per_length_of_the_reference(order):
         scene, seed = block(order, *changes)
         X = seed.mesh.points
         grown = seed.moved(X + [0.02, 0.0] * X**2)
-        mechanics = contact.Mechanics.of(scene)
-        body, _ = contact._strained_from(mechanics.keys, grown, grown.theta)
-        position = grown.mesh.points[grown.mesh.body, 0]
+        positions = grown.mesh.points[grown.mesh.body]
+        body, _ = grown.configuration.restarted(positions).strained(grown.body, grown.theta)
+        position = positions[:, 0]
         return [(seed.body.reference[:, 0] @ each.load, position @ each.load)
                 for each in contact._supports(body, grown, None)]
 

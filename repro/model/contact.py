@@ -232,9 +232,8 @@ def _gathered(division: Division, loads: np.ndarray) -> np.ndarray:
 def _at_rest(mechanics: Mechanics, grown: Pore, theta: np.ndarray, start: Pore,
              forces: np.ndarray | None, search: SearchOptions) -> Expansion:
     """The new shape under constant nodal forces (n, 2) um, over mu_L; None for no forces."""
-    stressed = mechanics.keys.new_biomass == "stressed"
-    last = None if stressed else grown.mesh.points[grown.mesh.body]
-    grown = replace(grown, theta=theta, last=last)
+    configuration = grown.configuration.restarted(grown.mesh.points[grown.mesh.body])
+    grown = replace(grown, theta=theta, configuration=configuration)
     return CLOSINGS[grown.boundary.geometry](mechanics, grown, start, forces, search)
 
 
@@ -270,7 +269,7 @@ def _equilibrium(mechanics: Mechanics, grown: Pore, start: Pore, forces: np.ndar
 
     ``start`` has the contact, and the shape and pressure from which Newton's method starts.
     """
-    body, target_J = _strained_from(mechanics.keys, grown, grown.theta)
+    body, target_J = grown.strained_body
     nodes = grown.mesh.body
     inside = grown.mesh.topology.body_corners
     locked, target = _constraints(grown, start)
@@ -454,7 +453,7 @@ class _Trials:
         """
         start = [line.advance for line in lines]
         grown = self._grown
-        body, target_J = _strained_from(self._mechanics.keys, grown, grown.theta)
+        body, target_J = grown.strained_body
         points, pressures = self._shapes[-1][1:]
         J = body.strained(points[grown.mesh.body]).J
         try:
@@ -485,9 +484,8 @@ class _Trials:
                rule: Clearance) -> Placed:
         """A grown pore with lines at their advances."""
         locked, division, forces = self._locked(grown, contact_with(wall, lines))
-        keys = self._mechanics.keys
-        body, theta = _strained_from(keys, locked, locked.theta)
-        reference = grown.origin if keys.new_biomass == "stressed" else grown.mesh.points
+        body, theta = locked.strained_body
+        reference = _on_mesh(grown.mesh, grown.unstrained)
         prescribed, target = _constraints(locked, locked)
         supports = _supports(body, locked, forces)
         system = growth.System(body, prescribed, forces=forces, supports=supports)
@@ -580,9 +578,8 @@ def divided(grown: Pore, division: Division, contact: Contact,
     reference = division.nodal(grown.origin)[space.mesh.body]
     body = (replace(grown.body, shape=shape, reference=reference) if shape
             else material(space, reference, grown.body.energy))
-    last = grown.last
-    if last is not None:
-        last = division.nodal(_on_mesh(division.parent, last))[space.mesh.body]
+    configuration = grown.configuration.carried(
+        lambda positions: division.nodal(_on_mesh(division.parent, positions))[space.mesh.body])
     expanded = division.amounts(grown.theta * grown.body.at.dx, table)
     at_line = np.where(contact.first != FREE, contact.first, contact.second)
     wall = contact.wall.copy()
@@ -592,7 +589,8 @@ def divided(grown: Pore, division: Division, contact: Contact,
                    fixed=division.along_loop(grown.fixed, none, none), body=body,
                    active=division.amounts(grown.active, table),
                    inert=division.amounts(grown.inert, table), theta=expanded / body.at.dx,
-                   pressure=division.at_corners(grown.pressure), last=last)
+                   pressure=division.at_corners(grown.pressure),
+                   configuration=configuration)
 
 
 def _on_mesh(mesh: Mesh, values: np.ndarray) -> np.ndarray:
@@ -606,20 +604,6 @@ def _on_mesh(mesh: Mesh, values: np.ndarray) -> np.ndarray:
 def _divided_loads(division: Division, loads: np.ndarray) -> np.ndarray:
     """Loads on the nodes of the divided aggregate, from those (n, 2) on the parent's."""
     return division.divided_loads(_on_mesh(division.parent, loads))[division.topology.body]
-
-
-def _strained_from(keys: Growth, grown: Pore, theta: np.ndarray) -> tuple[Body, np.ndarray]:
-    """Configuration from which strain counts, and the expansion since then.
-
-    The configuration is that of t = 0 or the present one (section 5). The expansion since the
-    present one is theta / J. This removes the error of J = theta, so the area follows the mass
-    without drift.
-    """
-    if keys.new_biomass == "stressed":
-        return grown.body, theta
-    position = grown.mesh.points[grown.mesh.body]
-    present = replace(grown.body, reference=position)
-    return present, theta / grown.body.strained(position).J
 
 
 def _placed(grown: Pore, start: Pore, rest: growth.Equilibrium) -> Pore:

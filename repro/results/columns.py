@@ -24,14 +24,14 @@ NEEDS: dict[str, Callable[[Scene, Report], bool]] = {
     "aggregate": lambda scene, at: at.pore.outline is not None,
     "biomass": lambda scene, at: at.pore.outline is not None and scene.kinetics is not None,
     "growth": lambda scene, at: at.pore.outline is not None and scene.growth is not None,
-    "adhesion": lambda scene, at: scene.growth is not None and _has_adhesion(scene.growth)}
+    "adhesion": lambda scene, at: (scene.growth is not None and at.pore.configuration.accumulates
+                                   and _has_adhesion(scene.growth))}
 
 
 def _has_adhesion(growth: Growth) -> bool:
-    """Does a scene ask for the columns of adhesion? They need strain that counts from t = 0."""
-    requested = (growth.wall == "bonded", growth.fluid_forces == "included",
-             growth.bonding_strength is not None, growth.tensile_strength is not None)
-    return any(requested) and growth.new_biomass == "stressed"
+    """Does a scene ask for the columns of adhesion?"""
+    return (growth.wall == "bonded" or growth.fluid_forces == "included"
+            or growth.bonding_strength is not None or growth.tensile_strength is not None)
 
 
 def _both(pattern: str, words: str, formula: str, value: Callable,

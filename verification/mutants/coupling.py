@@ -136,8 +136,8 @@ MUTANTS = (
         ("masses-of-the-start-kept",
          "The new shape has the masses of the start of its search, so the growth is lost.",
          "_at_rest",
-         "grown = replace(grown, theta=theta, last=last)",
-         "grown = replace(grown, active=start.active, inert=start.inert, theta=theta, last=last)"),
+         "grown = replace(grown, theta=theta, configuration=configuration)",
+         "grown = replace(grown, active=start.active, inert=start.inert, theta=theta, configuration=configuration)"),
         ("stationary-lines-move",
          "Contact lines that must stay in place are placed anew in every round of fluid forces.",
          "_close_by_lines",
@@ -234,12 +234,12 @@ MUTANTS = (
          "        fixed=division.along_loop(grown.fixed, none, none), body=body,\n"
          "        active=division.amounts(grown.active, table),\n"
          "        inert=division.amounts(grown.inert, table), theta=expanded / body.at.dx,\n"
-         "        pressure=division.at_corners(grown.pressure), last=last)",
+         "        pressure=division.at_corners(grown.pressure), configuration=configuration)",
          "replace(grown, space=space, wall=division.along_loop(wall, at_line, contact.second),\n"
          "        fixed=division.along_loop(grown.fixed, none, none), body=body,\n"
          "        active=division.amounts(grown.active, table),\n"
          "        inert=division.amounts(grown.inert, table), theta=expanded / body.at.dx,\n"
-         "        pressure=division.at_corners(grown.pressure), last=None)",
+         "        pressure=division.at_corners(grown.pressure), configuration=grown.configuration)",
          f"{CONTACT_TESTS}a_division_also_divides_the_reference_of_strain"),
         ("contact-begins-at-a-point",
          "The first contact is a single point.",
@@ -270,12 +270,14 @@ MUTANTS = (
          "_Trials.settle",
          "(GrowthError, LinearError, np.linalg.LinAlgError)",
          "ZeroDivisionError",
-         f"{CONTACT_TESTS}the_search_takes_over_from_newton"),
+         f"{CONTACT_TESTS}the_search_takes_over_from_newton")),
+    *changes(
+        "repro/model/configuration.py",
         ("strain-since-last-drifts",
          "With stress-free new biomass, the difference of J and theta after a step is not corrected.",
-         "_strained_from",
-         "return present, theta / grown.body.strained(position).J",
-         "return present, theta / grown.theta",
+         "FromLast.strained",
+         "theta / body.strained(self.positions).J",
+         "theta / theta",
          "tests/test_balances.py::test_area_and_mass_do_not_drift_apart[stress_free]")),
     *changes(
         "repro/model/contact_lines.py",
@@ -732,7 +734,7 @@ MUTANTS = (
         ("display-stops-runs",
          "Positions at t = 0 that fold stop a run whose strain does not count from them.",
          "_material",
-         "expanded.last is None",
+         "expanded.configuration.accumulates",
          "True",
          "tests/test_origin.py::test_nothing_but_fields_depends_on_positions_at_the_start"),
         ("folded-positions-shown",

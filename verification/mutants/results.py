@@ -85,7 +85,7 @@ MUTANTS = (
         ("buckled-is-smooth",
          "The least stretch is that of the present surface.",
          "most_compressed",
-         "pore.last is None and present.least >= earlier.stretch",
+         "pore.configuration.accumulates and present.least >= earlier.stretch",
          "False",
          f"{FOLD}the_least_stretch_of_a_run_stays"),
         ("thin-biomass-written",
@@ -139,7 +139,7 @@ MUTANTS = (
         ("last-shape-dropped",
          "A checkpoint lacks the last shape.",
          "pack_state",
-         "pore.last is not None",
+         "not pore.configuration.accumulates",
          "False",
          f"{CHECKPOINT}the_shape_from_which_strain_counts_is_kept")),
     *changes(
@@ -271,8 +271,8 @@ MUTANTS = (
         ("stress-of-what-is-born-without",
          "Stress since t = 0 is reported for stress-free biomass.",
          "",
-         'state.scene.growth.new_biomass == "stressed"',
-         'state.scene.growth.new_biomass != ""',
+         "bool(state.scene.growth) and state.pore.configuration.accumulates",
+         "bool(state.scene.growth)",
          "tests/test_rows.py::test_stress_is_reported_only_for_strain_since_the_start[1]")),
     *changes(
         "repro/report/quantities.py",
