@@ -119,7 +119,7 @@ def wall_forces(scene: Scene, pore: Pore, solved: Solved) -> np.ndarray:
     inside = pore.pressure[mesh.topology.body_corners]
     forces = growth.internal_forces(pore.body, pore.theta, mesh.points[mesh.body], inside)
     forces = scene.growing.growth.shear_modulus * forces
-    if scene.growing.growth.fluid_forces == "included":
+    if scene.growing.growth.has_fluid_forces:
         forces = forces - fluid_forces(scene, pore, solved)
     return forces
 

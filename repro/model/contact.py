@@ -79,7 +79,7 @@ class Mechanics:
     def of(cls, scene: Scene) -> Mechanics:
         """The mechanics of a scene with growth."""
         keys = scene.growing.growth
-        fluid = Fluid.of(scene) if keys.fluid_forces == "included" else None
+        fluid = Fluid.of(scene) if keys.has_fluid_forces else None
         return cls(keys, scene.numerics, fluid)
 
 

@@ -176,7 +176,7 @@ class Solved:
 
 def walls_of(scene: Scene) -> Walls:
     """The walls of a scene's pore."""
-    bonded = bool(scene.growth and scene.growth.wall == "bonded")
+    bonded = bool(scene.growth and scene.growth.bonded)
     return channel_walls(scene.pore.width, bonded, scene.pore.upper_wall)
 
 
@@ -293,9 +293,9 @@ class Meshing:
             If no mesh can be made.
         """
         numerics = self.numerics
-        is_full = numerics.extent == "full"
         width = self.sizes.whole_width
-        ends = sizing.meshed_extent(outline, width, self.channel.length, is_full)
+        ends = sizing.meshed_extent(outline, width, self.channel.length,
+                                    numerics.whole_pore)
         method = Method(numerics.solver)
         sizes = replace(self.sizes, front=front)
         return mesher.generate(outline, ends, sizes, numerics.scheme.order, method)

@@ -203,8 +203,8 @@ def _grown(scene: Scene, speed: float | None, end: Sizes | None) -> Iterator[Num
 def half_length(scene: Scene) -> float:
     """Half of the length (um) that is meshed at t = 0."""
     seed = initial_outline(scene)
-    is_full = scene.numerics.extent == "full"
-    first, last = meshed_extent(seed, whole_width(walls_of(scene)), scene.pore.length, is_full)
+    first, last = meshed_extent(seed, whole_width(walls_of(scene)), scene.pore.length,
+                                scene.numerics.whole_pore)
     return (last - first) / 2
 
 

@@ -159,7 +159,7 @@ def _transit(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
 def _forces(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
     stress = computed["fluid stress over modulus"]
     strain = max(stress.start, stress.end or 0.0)
-    if scene.growth.fluid_forces == "neglected" and strain > STRAIN:
+    if not scene.growth.has_fluid_forces and strain > STRAIN:
         stressed = scene.growth.new_biomass == "stressed"
         setting = '"included"' + ("" if stressed else ' with growth.new_biomass = "stressed"')
         yield Caveat("growth.fluid_forces", f"the fluid's stress reaches {strain:.2g} of mu_L, "
@@ -171,7 +171,7 @@ def _strengths(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat
     """Warn if the forces of the flow do not count against a strength."""
     for key in ("bonding_strength", "tensile_strength"):
         is_set = getattr(scene.growth, key) is not None
-        if is_set and scene.growth.fluid_forces == "neglected":
+        if is_set and not scene.growth.has_fluid_forces:
             yield Caveat(f"growth.{key}", "the flow cannot exceed it, since the scene neglects the "
                          "fluid's forces, and only the stress of growth counts; "
                          'growth.fluid_forces = "included" adds the forces')
@@ -179,7 +179,7 @@ def _strengths(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat
 
 def _support(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
     """Warn if the shape depends on how a wall bears the water's force on a sliding aggregate."""
-    if scene.growth.fluid_forces == "neglected" or scene.growth.wall == "bonded":
+    if scene.growth.bonded or not scene.growth.has_fluid_forces:
         return
     stress = computed["fluid stress over modulus"]
     force = DRAG * stress.start + (stress.end or 0.0)

@@ -30,7 +30,7 @@ NEEDS: dict[str, Callable[[Scene, Report], bool]] = {
 
 def _has_adhesion(growth: Growth) -> bool:
     """Does a scene ask for the columns of adhesion?"""
-    return (growth.wall == "bonded" or growth.fluid_forces == "included"
+    return (growth.bonded or growth.has_fluid_forces
             or growth.bonding_strength is not None or growth.tensile_strength is not None)
 
 
