@@ -153,27 +153,17 @@ def accepted_demand(limits: Limits, ledger: Ledger) -> float:
     if limits.scheme.controls_error:
         return LARGEST
     kinetics = limits.kinetics
+    supplies = [kind.supply for kind in limits.substrates.modelled.values()]
+    laws = list(zip(uptake_law(limits.substrates, kinetics), supplies))
+    steepness = sum(law.proportional(supply) for law, supply in laws)
     fastest = (kinetics.maximum_utilization_rate * kinetics.yield_coefficient
-               + kinetics.decay_coefficient) * _largest_fraction(limits.substrates, kinetics)
+               + kinetics.decay_coefficient)
+    for law, supply in laws:
+        fastest *= max(1.0, law.largest(supply))
     part = fastest * (ledger.end - ledger.start)
     error = limits.transport.growth_error(part, ledger.biomass_before,
-                                          _turned_over(kinetics, ledger),
-                                          _steepness(limits.substrates, kinetics))
+                                          _turned_over(kinetics, ledger), steepness)
     return LARGEST + error / demand_scale(kinetics, ledger)
-
-
-def _steepness(both: Substrates, kinetics: Kinetics) -> float:
-    """Change of m_A + m_D for a change of both concentrations by their supplies."""
-    kinds = both.modelled.values()
-    laws = uptake_law(both, kinetics)
-    return sum(law.proportional(kind.supply) for law, kind in zip(laws, kinds))
-
-
-def _largest_fraction(both: Substrates, kinetics: Kinetics) -> float:
-    """Bound of m_A m_D; at least one."""
-    kinds = both.modelled.values()
-    laws = uptake_law(both, kinetics)
-    return float(np.prod([max(1.0, law.largest(kind.supply)) for law, kind in zip(laws, kinds)]))
 
 
 def _turned_over(kinetics: Kinetics, ledger: Ledger) -> float:
