@@ -190,7 +190,7 @@ def mirror_image(at, along):
                    fixed=back(at.fixed), active=exchanged(at.active), inert=exchanged(at.inert),
                    theta=exchanged(at.theta),
                    body=material(space, about + at.body.reference * sign, at.body.energy),
-                   last=None if at.last is None else about + at.last * sign, line_speeds=None)
+                   configuration=at.configuration.carried(lambda positions: about + positions * sign), line_speeds=None)
 
 
 #: Mirror images of a pore: along the flow, and across it.

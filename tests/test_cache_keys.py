@@ -9,6 +9,7 @@ import pytest
 from repro.fem.space import Space
 from repro.model import flow, gear, mesh_motion, transport
 from repro.model.kinetics import Sink
+from repro.model.resistance import Viscous
 from repro.results.files import sealed
 from repro.scene import load_scene, scene_hash
 from tests.strategies import meshed, seed
@@ -95,7 +96,7 @@ def disc():
 
 def velocity(interface, mesh):
     """Velocity of the flow on a mesh."""
-    return flow.unit_flow(Space(mesh), 10.0, interface=interface).velocity
+    return flow.unit_flow(Space(mesh), Viscous(10.0), interface=interface).velocity
 
 
 def concentrations(boundary, flowing, mesh):

@@ -9,7 +9,7 @@ import pytest
 from repro.fem.outline import polygon
 from repro.fem.walls import BOTTOM, FREE, TOP, channel_walls
 from repro.model import growth, mechanics
-from repro.model.mechanics import Mechanics, equilibrium, strained_from, supports_of
+from repro.model.mechanics import Mechanics, equilibrium, supports_of
 from repro.model.meshing import seeded
 from repro.model.support import Support
 from tests.strategies import EVERY_ORDER, ORDERS, body_of, coarse_base, meshed
@@ -151,9 +151,9 @@ def test_the_traction_is_uniform_per_length_of_the_reference(order):
         scene, seed = block(order, *changes)
         X = seed.mesh.points
         grown = seed.moved(X + [0.02, 0.0] * X**2)
-        mechanics = Mechanics.of(scene)
-        body, _ = strained_from(mechanics.keys, grown, grown.theta)
-        position = grown.mesh.points[grown.mesh.body, 0]
+        positions = grown.mesh.points[grown.mesh.body]
+        body, _ = grown.configuration.restarted(positions).strained(grown.body, grown.theta)
+        position = positions[:, 0]
         return [(seed.body.reference[:, 0] @ each.load, position @ each.load)
                 for each in supports_of(body, grown, None)]
 

@@ -15,17 +15,16 @@ import numpy as np
 
 from repro.errors import BalanceError
 from repro.model.pore import Pore
+from repro.model.transport_in_time import TransportInTime, transport_in_time
 from repro.model.uptake_law import uptake_law
-from repro.scene import Kinetics, Numerics, Scene, Substrate, Substrates, at_largest
+from repro.scene import Kinetics, Scene, Substrate, Substrates, at_largest
+from repro.schemes import Scheme
 
 if TYPE_CHECKING:
     from repro.model.transport import Problem
 
 #: Largest accepted defect.
 LARGEST = 1e-6
-#: Largest accepted defect of the oxygen demand with Gear's method, which integrates growth and
-#: uptake separately, over the largest turnover of the biomass in the step.
-GEAR = 1e-3
 #: Bound of the round-off in the difference of two masses, relative to a mass. Pairwise summation in
 #: blocks of 128 in 8 lanes errs by (16 + log2(n / 128)) eps at most, less than 40 eps for any mesh;
 #: a difference has two sums of X_A and two of X_I, and so errs by up to 4e-14.
@@ -59,13 +58,15 @@ class Limits:
     width: float
     substrates: Substrates
     kinetics: Kinetics
-    numerics: Numerics
+    scheme: Scheme
+    transport: TransportInTime
 
     @classmethod
     def of(cls, scene: Scene) -> Limits:
         """The limits of a scene with growth."""
         substrates, kinetics, _ = scene.growing
-        return cls(scene.pore.width, at_largest(substrates), kinetics, scene.numerics)
+        return cls(scene.pore.width, at_largest(substrates), kinetics, scene.numerics.scheme,
+                   transport_in_time(scene.numerics.transport))
 
 
 def defect(supplied: float, out: float, consumed: float, stored: float = 0.0,
@@ -125,13 +126,12 @@ def refuse(limits: Limits, after: Pore, ledger: Ledger) -> None:
     printed inlet [E4] or carrier, and the biomass with interpolation [E8]. The oxygen demand has
     the limit of :func:`accepted_demand`.
     """
-    scheme = limits.numerics.scheme
     defects = {}
-    if scheme.conserves_substrates:
+    if limits.scheme.conserves_substrates:
         for name, kind in limits.substrates.modelled.items():
             exchanged = _exchanged(limits, after, ledger, kind)
             defects[name] = substrate(ledger, ("acceptor", "donor").index(name), exchanged)
-    if scheme.conserves_biomass:
+    if limits.scheme.conserves_biomass:
         defects["biomass"] = biomass(ledger)
     wrong = {name: part for name, part in defects.items() if not abs(part) <= LARGEST}
     demand = oxygen_demand(limits.kinetics, ledger)
@@ -147,38 +147,23 @@ def refuse(limits: Limits, after: Pore, ledger: Ledger) -> None:
 def accepted_demand(limits: Limits, ledger: Ledger) -> float:
     """Largest accepted defect of the oxygen demand in a step.
 
-    The midpoint rule closes to round-off. In the paper's updates the trapezoidal rule errs by (dt
-    times the fastest rate, k Y + b)^2 / 12 of the turnover: 1e-3 in a step of base, where at most
-    2e-4 is measured (a tenth of the bound in the worst of 132 random scenes). Gear's method
-    controls concentrations to GEAR of the supply. Where a substrate runs out, m(C) then errs by at
-    most GEAR supply / K. The accepted defect is this part, and at least GEAR, of the turnover at
-    the fastest rate (away from exhaustion at most 4e-4 is measured).
+    The midpoint rule closes to round-off. The paper's updates err as their transport does in a step
+    of dt times the fastest rate, k Y + b.
     """
-    if limits.numerics.scheme.controls_error:
+    if limits.scheme.controls_error:
         return LARGEST
     kinetics = limits.kinetics
-    scale = demand_scale(kinetics, ledger)
+    supplies = [kind.supply for kind in limits.substrates.modelled.values()]
+    laws = list(zip(uptake_law(limits.substrates, kinetics), supplies))
+    steepness = sum(law.proportional(supply) for law, supply in laws)
     fastest = (kinetics.maximum_utilization_rate * kinetics.yield_coefficient
-               + kinetics.decay_coefficient) * _largest_fraction(limits.substrates, kinetics)
+               + kinetics.decay_coefficient)
+    for law, supply in laws:
+        fastest *= max(1.0, law.largest(supply))
     part = fastest * (ledger.end - ledger.start)
-    if limits.numerics.transport == "gear":
-        steepness = _steepness(limits.substrates, kinetics)
-        return LARGEST + GEAR * steepness * part * ledger.biomass_before / scale
-    return LARGEST + part**2 / 12 * _turned_over(kinetics, ledger) / scale
-
-
-def _steepness(both: Substrates, kinetics: Kinetics) -> float:
-    """Change of m_A + m_D for a change of both concentrations by their supplies; at least one."""
-    kinds = both.modelled.values()
-    laws = uptake_law(both, kinetics)
-    return max(1.0, sum(law.proportional(kind.supply) for law, kind in zip(laws, kinds)))
-
-
-def _largest_fraction(both: Substrates, kinetics: Kinetics) -> float:
-    """Bound of m_A m_D; at least one."""
-    kinds = both.modelled.values()
-    laws = uptake_law(both, kinetics)
-    return float(np.prod([max(1.0, law.largest(kind.supply)) for law, kind in zip(laws, kinds)]))
+    error = limits.transport.growth_error(part, ledger.biomass_before,
+                                          _turned_over(kinetics, ledger), steepness)
+    return LARGEST + error / demand_scale(kinetics, ledger)
 
 
 def _turned_over(kinetics: Kinetics, ledger: Ledger) -> float:
@@ -192,11 +177,11 @@ def _turned_over(kinetics: Kinetics, ledger: Ledger) -> float:
 def _exchanged(limits: Limits, after: Pore, ledger: Ledger, kind: Substrate) -> float:
     """Amount exchanged other than by flow, um2 mg/L, to which the defect is compared.
 
-    It is the diffusion in a step, and with Gear's method at least the content of the mesh.
+    It is the diffusion in a step, and at least the content of the mesh if that is stored.
     """
     fastest = max(kind.diffusivity, kind.diffusivity_in_aggregate)
     exchanged = (ledger.end - ledger.start) * fastest * kind.supply
-    if limits.numerics.transport != "gear":
+    if not limits.transport.stores:
         return exchanged
     first, last = after.mesh.ends
     return max(exchanged, (last - first) * limits.width * kind.supply)

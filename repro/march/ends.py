@@ -119,7 +119,7 @@ def _events(scene: Scene, pore: Pore, solved: Solved) -> Iterator[Event]:
         end = PoreEnd(f"the aggregate reaches the pore's {side} end at t = {pore.time:g} h")
         yield Event(1 - elements_to_end(scene.pore, pore, side), end)
     biot = pore.body.energy.biot
-    if pore.last is None and biot is not None:
+    if pore.configuration.accumulates and biot is not None:
         compression = most_compressed(Compression(), pore)
         fold = Fold(fold_message(f"at t = {pore.time:g} h", compression))
         yield Event(biot / compression.stretch - 1, fold)

@@ -52,7 +52,7 @@ def most_compressed(earlier: Compression, pore: Pore) -> Compression:
     if pore.outline is None or pore.body.energy.crease is None:
         return earlier
     present = surface(pore)
-    if pore.last is None and present.least >= earlier.stretch:
+    if pore.configuration.accumulates and present.least >= earlier.stretch:
         return earlier
     return Compression(present.least, *present.place, pore.time)
 
@@ -64,7 +64,8 @@ def refuse_fold(expanded: Pore) -> None:
     """
     compression = most_compressed(Compression(), expanded)
     biot = expanded.body.energy.biot
-    if expanded.last is not None and biot is not None and compression.stretch < biot:
+    accumulates = expanded.configuration.accumulates
+    if not accumulates and biot is not None and compression.stretch < biot:
         raise GrowthError(f"growth in one step compresses the surface to {compression.stretch:.3f} "
                           f"of its length near x = {compression.x:.4g}, y = {compression.y:.4g} um")
 

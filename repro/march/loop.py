@@ -96,7 +96,7 @@ def settle(stages: Stages, pore: Pore, solved: Solved) -> tuple[Pore, Solved]:
 
     Returns the pore, and flow and substrates in it. Without forces of the fluid nothing changes.
     """
-    if stages.growth.fluid_forces == "neglected":
+    if not stages.growth.has_fluid_forces:
         return pore, solved
     expanded = stages.expand(pore, pore, search=SearchOptions(landing=-np.inf)).pore
     expanded = replace(expanded, concentrations=solved.concentrations)
@@ -113,11 +113,10 @@ def _grow(stages: Stages, stepping: Stepping, state: RestartState,
     requested = scene.requested_times
     rows = row_times(stepping, scene)
     limits = Limits.of(scene)
-    bonded = stages.growth.wall == "bonded"
     shown = pore.mesh.topology
     while event.margin <= 0 and stages.growth.end - pore.time > SAME_TIME:
         try:
-            with stopping(pore.time, bonded), folding(state.compression, state.time):
+            with stopping(pore.time, stages.growth.bonded), folding(state.compression, state.time):
                 reached, control = _advance(stages, stepping, state, pore, solved, event.margin)
                 step = reached.step
                 balance.refuse(limits, step.pore, step.ledger)

@@ -27,16 +27,15 @@ from repro.march.folding import refuse_density, refuse_fold
 from repro.march.loop import time_before_end
 from repro.march.state import InterpolatedState, StepResult
 from repro.model import biomass, contact_lines, remeshing, solving
-from repro.model.biomass import Rates
+from repro.model.biomass import Rates, grow
 from repro.model.contact_lines import PATIENT, FirstContact, SearchOptions
 from repro.model.grading import solve_graded
-from repro.model.growing import grow
 from repro.model.mechanics import Expansion
 from repro.model.pore import Pore
 from repro.model.remeshing import GeneratedMesh
 from repro.model.solving import Solved
 from repro.model.stages import Stages
-from repro.model.transport import Concentrations, Flows, Fluxes, integrated
+from repro.model.transport import Concentrations, integrated
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +105,7 @@ def attempt(stages: Stages, previous: Pore, solved: Solved, duration: float,
     makes_contact = expanded.contact and not previous.contact
     speeds = None if makes_contact else contact_lines.speeds(expansion.advances, duration)
     new = replace(new, line_speeds=speeds)
-    flows = _flows(half.solved.substrates.fluxes, duration)
+    flows = integrated(duration, half.solved.substrates.fluxes)
     ledger = Ledger(previous.time, previous.time + duration, *flows[:4], previous.mass,
                     after.mass - previous.mass, new.mass, flows.unmet)
     complete = replace(half, generated=half.generated + generated, end=expansion)
@@ -124,13 +123,6 @@ def _expand(stages: Stages, previous: Pore, after: Pore, half: Halfway, part: fl
     advances = {key: 2 * part * distance for key, distance in half.expansion.advances.items()}
     guess = _guess_shape(previous, half, part)
     return stages.expand(previous, after, guess, replace(search, advances=advances))
-
-
-def _flows(fluxes: tuple[Fluxes, Fluxes], duration: float) -> Flows:
-    """Integrate the fluxes of acceptor and donor over a step (h)."""
-    acceptor, donor = ((duration * flux.supplied, duration * flux.out, duration * flux.consumed,
-                        duration * flux.unmet) for flux in fluxes)
-    return integrated(acceptor, donor)
 
 
 def solve_halfway(stages: Stages, previous: Pore, solved: Solved, first: Rates, duration: float,

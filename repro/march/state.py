@@ -145,7 +145,8 @@ def contiguous(pore: Pore) -> Pore:
     state = pore.concentrations
     mesh = _contiguous_arrays(pore.mesh)
     body = _contiguous_arrays(pore.body)
-    copied = replace(_contiguous_arrays(pore), concentrations=state and _contiguous_arrays(state))
+    copied = replace(_contiguous_arrays(pore), concentrations=state and _contiguous_arrays(state),
+                     configuration=_contiguous_arrays(pore.configuration))
     if body is not pore.body:
         copied = replace(copied, body=body)
     return copied if mesh is pore.mesh else replace(copied, space=replace(pore.space, mesh=mesh))

@@ -8,7 +8,6 @@ replaces it by the paper's criteria (3.1, 3.5).
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -19,16 +18,12 @@ from repro.march.folding import refuse_fold
 from repro.march.loop import Stepping, before_jump, time_before_end
 from repro.march.state import SAME_TIME, InterpolatedState, StepResult, contiguous
 from repro.march.step_control import StepControl
-from repro.model import biomass, gear, solving, substrates, transport
-from repro.model.biomass import Rates
+from repro.model import solving
 from repro.model.contact_lines import FirstContact
-from repro.model.growing import grow
-from repro.model.kinetics import Sink
 from repro.model.mechanics import Expansion
 from repro.model.pore import Pore
 from repro.model.solving import Solved
 from repro.model.stages import Stages
-from repro.model.transport import Concentrations, Flows, Fluxes, integrated
 from repro.scene import Growth, Scene
 
 #: A time that differs from a multiple of growth.time_step by less than this fraction equals it.
@@ -97,8 +92,8 @@ def _interpolate(stages: Stages, previous: Pore, solved: Solved, time: float) ->
 def step(stages: Stages, previous: Pore, solved: Solved, duration: float) -> StepResult:
     """Make one step of ``duration`` (h): biomass, shape, mesh."""
     within = partial(_interpolate, stages, previous, solved)
-    solved = _solve_midway(stages.scene, previous, solved, duration)
-    grown, end, flows = make_biomass(stages, previous, solved, duration)
+    solved = _solve_midway(stages, previous, solved, duration)
+    grown, end, flows = stages.transport.make_biomass(previous, solved, duration)
     grown = replace(grown, time=time_before_end(previous, duration))
     expansion = _expand(stages, previous, grown)
     expanded = expansion.pore
@@ -126,51 +121,20 @@ def _expand(stages: Stages, previous: Pore, grown: Pore) -> Expansion:
                           "its contact; try a shorter growth.time_step") from None
 
 
-def _solve_midway(scene: Scene, previous: Pore, solved: Solved, duration: float) -> Solved:
+def _solve_midway(stages: Stages, previous: Pore, solved: Solved, duration: float) -> Solved:
     """Solve at the start of a step with the supplies and the drive of its middle.
 
-    If no table of the scene changes in the step, this is ``solved``.
+    If no table of the scene changes in the step, this is ``solved``. Stored substrates stay those
+    of the start.
     """
+    scene = stages.scene
     middle = previous.time + duration / 2
     if scene.at(middle) == scene.at(previous.time):
         return solved
     halfway = solving.solve(scene, replace(previous, time=middle))
-    if scene.numerics.transport == "gear":
+    if stages.transport.stores:
         return replace(halfway, concentrations=solved.concentrations)
     return halfway
-
-
-def make_biomass(stages: Stages, previous: Pore, solved: Solved,
-                 duration: float) -> tuple[Pore, Concentrations, Flows]:
-    """Integrate (9)-(10) over a step (h) in a fixed geometry: grown pore, concentrations, flows.
-
-    Quasi-steady transport uses Heun's method on the rates, and each biomass grows exponentially at
-    its rate. The second rates are those of the steady concentrations over the grown biomass. Gear's
-    method is the paper's transient.
-    """
-    problem = solved.substrates.problem
-    start = solved.substrates.concentrations
-    if stages.scene.numerics.transport == "gear":
-        transient = gear.advance(problem, previous.active, previous.inert, start, duration)
-        after = replace(previous, active=transient.active, inert=transient.inert)
-        return after, transient.concentrations, transient.flows
-    first = biomass.rates(previous.space, start, problem.rate_law)
-    guess = grow(previous, first, duration)
-    end = substrates.steady(problem, Sink(guess.active), start)
-    second = biomass.rates(previous.space, end, problem.rate_law)
-    mean = Rates((first.growth + second.growth) / 2, (first.remains + second.remains) / 2)
-    at_start = transport.fluxes(problem, Sink(previous.active), start)
-    at_end = transport.fluxes(problem, Sink(guess.active), end)
-    return grow(previous, mean, duration), end, _mean_flows(at_start, at_end, duration)
-
-
-def _mean_flows(before: Sequence[Fluxes], after: Sequence[Fluxes], duration: float) -> Flows:
-    """Integrate the fluxes of acceptor and donor over a step (h) by the trapezoidal rule."""
-    acceptor, donor = (
-        (duration * (a.supplied + b.supplied) / 2, duration * (a.out + b.out) / 2,
-         duration * (a.consumed + b.consumed) / 2, duration * (a.unmet + b.unmet) / 2)
-        for a, b in zip(before, after))
-    return integrated(acceptor, donor)
 
 
 #: The paper's updates.

@@ -28,6 +28,7 @@ from repro.fem.walls import Wall
 from repro.model import flow, growth, traction
 from repro.model.flow import Flow
 from repro.model.pore import Pore
+from repro.model.resistance import resistance_of
 from repro.model.solving import Solved
 from repro.scene import Scene, at_time, needed
 
@@ -70,7 +71,7 @@ def fluid_forces(scene: Scene, pore: Pore, solved: Solved) -> np.ndarray:
     drive = at_time(needed(scene.flow, "[flow]"), pore.time)
     water = needed(solved.flow, "a solution of the flow")
     of_head = traction.on_aggregate(pore.space, water, drive, scene.numerics.interface)
-    if drive.permeability is None:
+    if not resistance_of(drive).permeable:
         of_head = of_head + _beside_contact(pore, water)
     return flow.MPA_PER_UM * drive.density * drive.gravity * of_head[pore.mesh.body]
 
@@ -119,7 +120,7 @@ def wall_forces(scene: Scene, pore: Pore, solved: Solved) -> np.ndarray:
     inside = pore.pressure[mesh.topology.body_corners]
     forces = growth.internal_forces(pore.body, pore.theta, mesh.points[mesh.body], inside)
     forces = scene.growing.growth.shear_modulus * forces
-    if scene.growing.growth.fluid_forces == "included":
+    if scene.growing.growth.has_fluid_forces:
         forces = forces - fluid_forces(scene, pore, solved)
     return forces
 

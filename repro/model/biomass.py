@@ -14,17 +14,22 @@ that conserves their sum, or by the paper's interpolation, which does not [E8].
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
+from repro.errors import GrowthError, failing_as
 from repro.fem import transfer
 from repro.fem.space import Space
 from repro.fem.transfer import Located
+from repro.model import kinetics
 from repro.model.kinetics import RateLaw
 from repro.model.transport import Concentrations
+
+if TYPE_CHECKING:
+    from repro.model.pore import Pore
 
 Amounts: TypeAlias = tuple[np.ndarray, ...]
 
@@ -47,6 +52,13 @@ def rates(space: Space, state: Concentrations, law: RateLaw) -> Rates:
     pieces = space.reaction
     concentrations = state.fields[:, pieces.cells] @ pieces.values.T
     return Rates(law.growth_rate(*concentrations), law.inert_rate(*concentrations))
+
+
+@failing_as(GrowthError)
+def grow(pore: Pore, rates: Rates, duration: float) -> Pore:
+    """Integrate (9)-(10) over a duration (h) at constant rates."""
+    active, inert = kinetics.grow(pore.active, pore.inert, rates.growth, rates.remains, duration)
+    return replace(pore, active=active, inert=inert)
 
 
 def change(first: Rates, second: Rates, weight: np.ndarray) -> float:

@@ -29,7 +29,6 @@ from repro.model.mechanics import (
     Expansion,
     constraints,
     equilibrium,
-    strained_from,
     supports_of,
     with_new_surfaces,
 )
@@ -169,7 +168,7 @@ class ByLines(Closing):
         """
         start = [line.advance for line in lines]
         grown = self.grown
-        body, target_J = strained_from(self.mechanics.keys, grown, grown.theta)
+        body, target_J = grown.strained_body
         points, pressures = self._shapes[-1][1:]
         J = body.strained(points[grown.mesh.body]).J
         try:
@@ -197,9 +196,8 @@ class ByLines(Closing):
     def _place(self, grown: Pore, wall: np.ndarray, lines: Sequence[Line]) -> Placed:
         """A grown pore with lines at their advances."""
         locked, division, forces = self._locked(grown, contact_with(wall, lines))
-        keys = self.mechanics.keys
-        body, theta = strained_from(keys, locked, locked.theta)
-        reference = grown.origin if keys.new_biomass == "stressed" else grown.mesh.points
+        body, theta = locked.strained_body
+        reference = grown.mesh.from_body(grown.unstrained)
         prescribed, target = constraints(locked, locked)
         system = growth.System(body, prescribed, forces=forces,
                                supports=supports_of(body, locked, forces))
@@ -318,9 +316,8 @@ def divided(grown: Pore, division: Division, contact: Contact,
     reference = division.nodal(grown.origin)[space.mesh.body]
     body = (replace(grown.body, shape=shape, reference=reference) if shape
             else material(space, reference, grown.body.energy))
-    last = grown.last
-    if last is not None:
-        last = division.nodal(division.parent.from_body(last))[space.mesh.body]
+    configuration = grown.configuration.carried(
+        lambda positions: division.nodal(division.parent.from_body(positions))[space.mesh.body])
     expanded = division.amounts(grown.theta * grown.body.at.dx, table)
     at_line = np.where(contact.first != FREE, contact.first, contact.second)
     wall = contact.wall.copy()
@@ -330,4 +327,5 @@ def divided(grown: Pore, division: Division, contact: Contact,
                    fixed=division.along_loop(grown.fixed, none, none), body=body,
                    active=division.amounts(grown.active, table),
                    inert=division.amounts(grown.inert, table), theta=expanded / body.at.dx,
-                   pressure=division.at_corners(grown.pressure), last=last)
+                   pressure=division.at_corners(grown.pressure),
+                   configuration=configuration)

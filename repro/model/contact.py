@@ -145,7 +145,6 @@ class _Rounds:
 def at_rest(mechanics: Mechanics, grown: Pore, theta: np.ndarray, start: Pore,
             forces: np.ndarray | None, search: SearchOptions) -> Expansion:
     """The new shape under constant nodal forces (n, 2) um, over mu_L; None for no forces."""
-    stressed = mechanics.keys.new_biomass == "stressed"
-    last = None if stressed else grown.mesh.points[grown.mesh.body]
-    grown = replace(grown, theta=theta, last=last)
+    configuration = grown.configuration.restarted(grown.mesh.points[grown.mesh.body])
+    grown = replace(grown, theta=theta, configuration=configuration)
     return CLOSINGS[grown.mesh.geometry](mechanics, grown, start, forces, search).close()

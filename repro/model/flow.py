@@ -11,7 +11,7 @@ phi g / nu_water,
     a(u, v) = (nu_r grad u, grad v)                 "laplacian" [E2]
            or (nu_r (grad u + grad u^T), grad v)    "traction"
 
-with nu_r = 1 or lambda; :mod:`repro.model.brinkman` adds the drag of a permeable aggregate.
+with nu_r = 1 or lambda; :mod:`repro.model.resistance` has permeable aggregates too.
 Quadratic velocities with a linear pressure (Taylor-Hood) need no tau. Where the
 viscosity jumps, the pressure jumps too. Each node of the interface therefore has a pressure of the
 fluid and one of the biomass. With a single pressure the head loss errs by up to 1 % if the
@@ -34,7 +34,7 @@ from repro.fem.brief import brief
 from repro.fem.forms import each, product
 from repro.fem.mesh import Mesh
 from repro.fem.space import Space
-from repro.model.brinkman import Permeable
+from repro.model.resistance import WATER, Resistance, resistance_of
 from repro.scene import Flow as Drive
 from repro.timing import timed
 
@@ -186,25 +186,16 @@ def viscous(velocity: Space, viscosity: np.ndarray, interface: str) -> np.ndarra
 
 
 @timed("flow")
-def unit_flow(velocity: Space, viscosity_ratio: float = 1.0, *, interface: str = "laplacian",
-              permeability: float | None = None) -> UnitFlow:
-    """Stokes flow of mean velocity one through the meshed part, (1)-(5); see :func:`solve`.
-
-    permeability: of the biomass (um2); quadratic velocities then have its drag in place of a
-    viscosity.
-    """
+def unit_flow(velocity: Space, resistance: Resistance = WATER, *,
+              interface: str = "laplacian") -> UnitFlow:
+    """Stokes flow of mean velocity one through the meshed part, (1)-(5); see :func:`solve`."""
     mesh = velocity.mesh
-    viscosity = np.where(mesh.biomass, viscosity_ratio, 1.0)
-    pair = PAIRS[velocity.order].on(velocity, viscosity)
-    splits = velocity.order > 1 and permeability is None and viscosity_ratio != 1
+    splits = velocity.order > 1 and resistance.pressure_jumps
     system = mesh.topology.system(("flow", interface, splits),
                                   lambda: _system(velocity, interface, splits))
-    if permeability is None:
-        blocks = stokes(velocity, viscosity, interface, pair.lower)
-    else:
-        body = Permeable(velocity, permeability)
-        system = system.with_constrained(body.constrained(system.constrained))
-        blocks = stokes(velocity, body.viscosity, interface, None, body.matrices())
+    system, viscosity, drag = resistance.terms(velocity, system)
+    pair = PAIRS[velocity.order].on(velocity, viscosity)
+    blocks = stokes(velocity, viscosity, interface, pair.lower, drag)
     value = np.zeros(len(system.constrained))
     value[: 2 * velocity.count] = pair.prescribed()
     load = system.product(blocks, value)
@@ -316,6 +307,5 @@ def solve(velocity: Space, drive: Drive, length: float, *,
     LinearError
         If the system cannot be solved.
     """
-    unit = unit_flow(velocity, drive.viscosity_ratio or 1.0, interface=interface,
-                     permeability=drive.permeability)
+    unit = unit_flow(velocity, resistance_of(drive), interface=interface)
     return scaled(unit, velocity.mesh, length, drive)

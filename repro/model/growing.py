@@ -1,23 +1,11 @@
-"""Growth of the biomass in a pore (9)-(10), and the resulting expansion theta (28)-(29)."""
+"""The expansion theta that results from the growth of biomass (28)-(29)."""
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
-from repro.errors import GrowthError, failing_as
 from repro.fem.space import Space
-from repro.model import kinetics
-from repro.model.biomass import Rates
 from repro.model.pore import Pore
-
-
-@failing_as(GrowthError)
-def grow(pore: Pore, rates: Rates, duration: float) -> Pore:
-    """Integrate (9)-(10) over a duration (h) at constant rates."""
-    active, inert = kinetics.grow(pore.active, pore.inert, rates.growth, rates.remains, duration)
-    return replace(pore, active=active, inert=inert)
 
 
 def compute_theta(previous: Pore, grown: Pore, maximum_density: float) -> np.ndarray:

@@ -43,7 +43,7 @@ class Mechanics:
     def of(cls, scene: Scene) -> Mechanics:
         """The mechanics of a scene with growth."""
         keys = scene.growing.growth
-        fluid = Fluid.of(scene) if keys.fluid_forces == "included" else None
+        fluid = Fluid.of(scene) if keys.has_fluid_forces else None
         return cls(keys, scene.numerics, fluid)
 
 
@@ -112,7 +112,7 @@ def equilibrium(mechanics: Mechanics, grown: Pore, start: Pore, forces: np.ndarr
 
     ``start`` has the contact, and the shape and pressure from which Newton's method starts.
     """
-    body, target_J = strained_from(mechanics.keys, grown, grown.theta)
+    body, target_J = grown.strained_body
     nodes = grown.mesh.body
     inside = grown.mesh.topology.body_corners
     locked, target = constraints(grown, start)
@@ -122,20 +122,6 @@ def equilibrium(mechanics: Mechanics, grown: Pore, start: Pore, forces: np.ndarr
                               modified_newton=mechanics.numerics.scheme.modified_newton)
     shape = grown.with_body(rest.position, rest.pressure)
     return replace(shape, wall=start.wall), rest.iterations
-
-
-def strained_from(keys: Growth, grown: Pore, theta: np.ndarray) -> tuple[Body, np.ndarray]:
-    """Configuration from which strain counts, and the expansion since then.
-
-    The configuration is that of t = 0 or the present one (section 5). The expansion since the
-    present one is theta / J. This removes the error of J = theta, so the area follows the mass
-    without drift.
-    """
-    if keys.new_biomass == "stressed":
-        return grown.body, theta
-    position = grown.mesh.points[grown.mesh.body]
-    present = replace(grown.body, reference=position)
-    return present, theta / grown.body.strained(position).J
 
 
 def constraints(grown: Pore, shape: Pore) -> tuple[np.ndarray, np.ndarray]:

@@ -17,16 +17,15 @@ from repro.fem.sizing import Sizing
 from repro.fem.space import Space
 from repro.fem.walls import Walls, channel_walls, whole_width
 from repro.model.body import material
+from repro.model.configuration import configuration_of
 from repro.model.energies import energy_of
 from repro.model.flow import poiseuille_loss
 from repro.model.pore import Pore
+from repro.model.resistance import resistance_of
 from repro.scene import Flow as Drive
 from repro.scene import Numerics, Scene, Substrates, at_largest, needed
 from repro.scene import Pore as Channel
 
-#: A permeable aggregate that spans the pore draws the water in at its upper contact lines: elements
-#: beside them are no larger than the least film over this.
-CONTACT_ELEMENTS = 2.0
 #: Thinnest film to resolve (um, Table 1) without [growth], which states when a film closes.
 MINIMUM_FILM = 2.0
 #: The largest refinement that scenes accept.
@@ -47,7 +46,7 @@ MOST_AT_TIPS = 20_000.0
 
 def walls_of(scene: Scene) -> Walls:
     """The walls of a scene's pore."""
-    bonded = bool(scene.growth and scene.growth.wall == "bonded")
+    bonded = bool(scene.growth and scene.growth.bonded)
     return channel_walls(scene.pore.width, bonded, scene.pore.upper_wall)
 
 
@@ -117,8 +116,8 @@ def sized(scene: Scene) -> Sizing:
     middle = seed.position if seed and seed.outline is None else None
     least = film(scene)
     across = scene.numerics.contact_elements
-    if scene.flow and scene.flow.permeability is not None:
-        across = max(across, CONTACT_ELEMENTS)
+    if scene.flow:
+        across = max(across, resistance_of(scene.flow).contact_elements)
     return Sizing(walls_of(scene), resolution(scene), least, scene.numerics.gradation,
                   contact=least / across if across else inf, seed=middle,
                   film_refinement=scene.numerics.refinement)
@@ -171,9 +170,9 @@ class Meshing:
             If no mesh can be made.
         """
         numerics = self.numerics
-        is_full = numerics.extent == "full"
         width = self.sizes.whole_width
-        ends = sizing.meshed_extent(outline, width, self.channel.length, is_full)
+        ends = sizing.meshed_extent(outline, width, self.channel.length,
+                                    numerics.whole_pore)
         method = Method(numerics.solver)
         sizes = replace(self.sizes, front=front)
         return mesher.generate(outline, ends, sizes, numerics.scheme.order, method)
@@ -230,4 +229,5 @@ def seeded(scene: Scene, front: float = 1.0, outline: Outline | None = None) -> 
     body = material(space, mesh.points[mesh.body], energy_of(scene.growth))
     theta = np.ones((np.count_nonzero(mesh.biomass), len(body.shape.table.weights)))
     return Pore(0.0, space, wall, fixed, total - inert, inert, theta, body,
-                np.zeros(mesh.corners), front=front)
+                np.zeros(mesh.corners), front=front,
+                configuration=configuration_of(scene.growth, body.reference))

@@ -13,6 +13,7 @@ from repro.fem.mesh import Mesh
 from repro.fem.outline import Outline
 from repro.fem.space import Space
 from repro.model.body import Body
+from repro.model.configuration import FromStart, ReferenceConfiguration
 from repro.scene import needed
 
 if TYPE_CHECKING:
@@ -29,11 +30,11 @@ class Pore:
     the points of the reaction; theta: (t, q) expansion since t = 0 in the aggregate's triangles;
     body: the aggregate as it was at t = 0; pressure: (corners,) P / mu_L; concentrations: the last
     known ones, None before the first; front: divisor of the element sizes at the aggregate, for a
-    front of the substrates in it; last: (n, 2) um, the aggregate's nodes in the shape from which
-    strain counts, None for the shape of t = 0; origin_known: is ``body`` the aggregate of t = 0, as
-    it is unless its positions have folded where strain counts from ``last``; line_speeds: (2, 2)
-    um/h, speeds of the contact lines, None if unknown. A row has the lines of one wall, the lower
-    wall first: the line where a free surface begins along the loop, then the line where one ends.
+    front of the substrates in it; configuration: from which strain counts; origin_known: is
+    ``body`` the aggregate of t = 0, as it is unless its positions have folded where strain does not
+    count from them; line_speeds: (2, 2) um/h, speeds of the contact lines, None if unknown. A row
+    has the lines of one wall, the lower wall first: the line where a free surface begins along the
+    loop, then the line where one ends.
     """
 
     time: float
@@ -47,14 +48,19 @@ class Pore:
     pressure: np.ndarray
     concentrations: Concentrations | None = None
     front: float = 1.0
-    last: np.ndarray | None = None
+    configuration: ReferenceConfiguration = FromStart()
     line_speeds: np.ndarray | None = None
     origin_known: bool = True
 
     @property
     def unstrained(self) -> np.ndarray:
         """(n, 2) um, the aggregate's nodes in the shape from which strain counts."""
-        return self.body.reference if self.last is None else self.last
+        return self.configuration.unstrained(self.body)
+
+    @property
+    def strained_body(self) -> tuple[Body, np.ndarray]:
+        """The aggregate in that shape, and its expansion (t, q) since then."""
+        return self.configuration.strained(self.body, self.theta)
 
     @property
     def mesh(self) -> Mesh:

@@ -190,11 +190,10 @@ def _transferred(rules: Remeshing, expanded: Pore, target: Pore, at: Located,
     active, inert, *rest = biomass.transfer_amounts(
         rules.transfer, expanded.space, target.space, at,
         (expanded.active, expanded.inert, *amounts), rules.maximum_density)
-    last = expanded.last
-    if last is not None:
-        last = at.field(last, old.topology.body_cells)
+    configuration = expanded.configuration.carried(
+        lambda positions: at.field(positions, old.topology.body_cells))
     pore = replace(target, time=expanded.time, active=active, inert=inert,
-                   pressure=_pressure(target.mesh, expanded, at), last=last)
+                   pressure=_pressure(target.mesh, expanded, at), configuration=configuration)
     return replace(pore, theta=growing.restart_theta(pore, rules.maximum_density)), tuple(rest)
 
 
@@ -222,7 +221,7 @@ def _material(new: Space, expanded: Pore, rim: np.ndarray, at: Located) -> tuple
         unfolded = transfer.unfolded(mesh, origin)[mesh.body]
         return material(new, unfolded, energy), expanded.origin_known
     except OriginFolded:
-        if expanded.last is None:
+        if expanded.configuration.accumulates:
             raise
         return material(new, mesh.points[mesh.body], energy), False
 

@@ -12,6 +12,7 @@ from repro.model import flow
 from repro.model.flow import Flow
 from repro.model.meshing import peclet
 from repro.model.pore import Pore
+from repro.model.transport_in_time import transport_in_time
 from repro.scene import Flow as Drive
 from repro.scene import MissingError, Numerics, Scene
 
@@ -77,13 +78,12 @@ def solve(scene: Scene, pore: Pore, over: float = 0.0) -> Solved:
         If the flow or the substrates cannot be solved.
     """
     scene = scene.at(pore.time)
-    numerics = scene.numerics
     carried = None
     if scene.flow:
-        carried = solve_flow(pore.space, scene.flow, scene.pore.length, numerics)
+        carried = solve_flow(pore.space, scene.flow, scene.pore.length, scene.numerics)
     if scene.substrates is None:
         return Solved(carried, None, None)
-    if carried and numerics.transport != "gear":
+    if carried and not transport_in_time(scene.numerics.transport).stores:
         refuse_no_supply(peclet(scene.substrates, scene.pore.width, carried.mean_velocity))
     from repro.model import substrates  # a scene without [substrates] does not load them
     return Solved(carried, *substrates.solve(scene, pore, carried, over))

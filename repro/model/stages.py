@@ -12,6 +12,7 @@ from repro.model.mechanics import Expansion, Mechanics
 from repro.model.pore import Pore
 from repro.model.remeshing import GeneratedMesh, Remeshing
 from repro.model.solving import Solved
+from repro.model.transport_in_time import TransportInTime, transport_in_time
 from repro.scene import Growth, Scene
 
 
@@ -20,11 +21,13 @@ class Stages:
     """The stages of a step of growth.
 
     scene: for values that depend on the time, and for advice; growth: its section [growth];
-    mechanics: shape of the grown aggregate; remeshing: mesh after a step.
+    transport: substrates in time; mechanics: shape of the grown aggregate; remeshing: mesh after a
+    step.
     """
 
     scene: Scene
     growth: Growth
+    transport: TransportInTime
     mechanics: Mechanics
     remeshing: Remeshing
 
@@ -32,7 +35,8 @@ class Stages:
     def of(cls, scene: Scene) -> Stages:
         """The stages of a scene with growth."""
         _, _, growth = scene.growing
-        return cls(scene, growth, Mechanics.of(scene), Remeshing.of(scene))
+        return cls(scene, growth, transport_in_time(scene.numerics.transport), Mechanics.of(scene),
+                   Remeshing.of(scene))
 
     def rates(self, pore: Pore, solved: Solved) -> Rates:
         """F3 / X_A and F4 / X_A, 1/h, at the points of the reaction."""

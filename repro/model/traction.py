@@ -35,6 +35,7 @@ from repro.model import mesh_motion, remeshing, solving
 from repro.model.flow import MPA_PER_UM, Flow
 from repro.model.meshing import Meshing
 from repro.model.pore import Pore
+from repro.model.resistance import resistance_of
 from repro.scene import Flow as Drive
 from repro.scene import Scene, at_time, needed
 
@@ -147,9 +148,10 @@ def on_aggregate(space: Space, solution: Flow, drive: Drive, interface: str) -> 
     """(N, 2) um2 of head: forces of the water on the aggregate at all nodes, over rho g; traction
     on its surface, or the drag within a permeable one."""
     viscosity = drive.kinematic_viscosity / drive.gravity
-    if drive.permeability is None:
-        return nodal(space, solution, viscosity, interface)
-    return seepage(space, solution, viscosity / drive.permeability)
+    resistance = resistance_of(drive)
+    if resistance.permeable:
+        return seepage(space, solution, viscosity / resistance.permeability)
+    return nodal(space, solution, viscosity, interface)
 
 
 def seepage(space: Space, solution: Flow, drag: float) -> np.ndarray:

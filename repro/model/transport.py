@@ -20,7 +20,6 @@ C_supply, or nothing passes them ("closed"). With u_ave for the inlet's u_x, (11
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -684,10 +683,13 @@ class Flows(NamedTuple):
     unmet: tuple[float, float] = (0.0, 0.0)
 
 
-def integrated(acceptor: Sequence[float], donor: Sequence[float]) -> Flows:
-    """Flows of steady substrates, from the rates of each: supplied, out, consumed and unmet."""
-    supplied, out, consumed, unmet = zip(acceptor, donor)
-    return Flows(supplied, out, consumed, (0.0, 0.0), unmet)
+def integrated(duration: float, *instants: tuple[Fluxes, Fluxes]) -> Flows:
+    """Flows of steady substrates over a duration (h), from the mean of their fluxes."""
+    def total(part: str) -> tuple[float, float]:
+        acceptor, donor = (sum(getattr(flux, part) for flux in fluxes) for fluxes in zip(*instants))
+        return duration * acceptor / len(instants), duration * donor / len(instants)
+
+    return Flows(total("supplied"), total("out"), total("consumed"), (0.0, 0.0), total("unmet"))
 
 
 def fluxes(problem: Problem, sink: Sink | None, state: Concentrations) -> tuple[Fluxes, Fluxes]:

@@ -95,7 +95,7 @@ def _nodes(scene: Scene, thickness: float, extent: float,
     pore = scene.pore
     numerics = scene.numerics
     margin = min(10 * thickness, 1.5 * whole_width(walls_of(scene)))
-    length = pore.length if numerics.extent == "full" else min(pore.length, extent + 2 * margin)
+    length = pore.length if numerics.whole_pore else min(pore.length, extent + 2 * margin)
     largest = pore.width / ACROSS_PORE / resolution(scene)
     if numerics.gradation == 0:
         largest = min([largest, *(size for size, _ in surface)])

@@ -29,7 +29,7 @@ def _pore(scene: Scene) -> Iterator[str]:
     yield f"a channel {scene.pore.width:g} um wide and {scene.pore.length:g} um long"
     if scene.pore.upper_wall != "no slip":
         yield f"its upper wall a plane of {scene.pore.upper_wall}"
-    if scene.numerics.extent == "full":
+    if scene.numerics.whole_pore:
         yield "meshed as a whole"
     elif scene.aggregate:
         yield "meshed around the aggregate (3.1)"

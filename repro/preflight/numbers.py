@@ -17,6 +17,7 @@ from repro.model.flow import MPA_PER_UM
 from repro.model.kinetics import rate_law
 from repro.model.meshing import initial_outline, least_gap, sized, walls_of
 from repro.model.pore import Pore
+from repro.model.resistance import resistance_of
 from repro.model.uptake_law import UptakeLaw
 from repro.scene import Scene, Substrate, at_largest, at_time
 
@@ -203,8 +204,8 @@ def _grown(scene: Scene, speed: float | None, end: Sizes | None) -> Iterator[Num
 def half_length(scene: Scene) -> float:
     """Half of the length (um) that is meshed at t = 0."""
     seed = initial_outline(scene)
-    is_full = scene.numerics.extent == "full"
-    first, last = meshed_extent(seed, whole_width(walls_of(scene)), scene.pore.length, is_full)
+    first, last = meshed_extent(seed, whole_width(walls_of(scene)), scene.pore.length,
+                                scene.numerics.whole_pore)
     return (last - first) / 2
 
 
@@ -225,7 +226,7 @@ def stresses(scene: Scene, speed: float, end: Sizes | None) -> tuple[float, floa
         return shear, None
     gap = max(width - end.thickness, least_gap(scene))
     film_loss = math.inf if end.contact else (width / gap) ** 3
-    body_loss = drive.viscosity_ratio or 1 + whole**2 / 12 / drive.permeability
+    body_loss = resistance_of(drive).loss(whole)
     drop = 12 * viscosity * speed * 2 * end.reach / whole**2 * min(body_loss, film_loss)
     if drive.head is not None:
         drop = min(drop, MPA_PER_UM * drive.density * drive.gravity * drive.head / modulus)

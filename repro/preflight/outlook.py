@@ -10,6 +10,7 @@ from typing import Any
 from repro.errors import RunEnd, SimulationError, StageError
 from repro.march.simulation import steps
 from repro.model.pore import Pore
+from repro.model.transport_in_time import transport_in_time
 from repro.polling import polling
 from repro.preflight.memory import first_nodes
 from repro.preflight.simplifications import Caveat, warn_surface
@@ -107,13 +108,13 @@ class CoarseRun:
 def sketched(scene: Scene) -> Scene:
     """The scene with the numbers of the preset ``sketch`` and a row at its end alone.
 
-    A scene with the paper's scheme is run with the curved one. Gear's scheme needs updates of the
-    shape.
+    A scene with the paper's scheme is run with the curved one. Stored substrates need updates of
+    the shape.
     """
     numerics = scene.numerics
     scheme = numerics.scheme if numerics.scheme.order == CURVED.order else CURVED
-    steady = numerics.transport == "quasi_steady"
-    scheme = replace(scheme, steps="midpoint" if steady else "updates")
+    stores = transport_in_time(numerics.transport).stores
+    scheme = replace(scheme, steps="updates" if stores else "midpoint")
     coarse: dict[str, Any] = {"contact_elements": 0.0, **PRESETS["sketch"]}
     numerics = replace(numerics, preset="sketch", **coarse, exchanged=scheme)
     end = needed(scene.growth, "growth").end

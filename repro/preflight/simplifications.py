@@ -15,6 +15,7 @@ from repro.model.kinetics import THINNEST
 from repro.model.meshing import MOST_REFINED, film, least_gap, resolution, walls_of
 from repro.model.pore import Pore
 from repro.model.surface import surface
+from repro.model.transport_in_time import transport_in_time
 from repro.preflight import numbers
 from repro.preflight.numbers import Number, Sizes
 from repro.scene import Kinetics, Scene
@@ -87,7 +88,7 @@ def _apply(scene: Scene, velocity: float | None, end: Sizes | None) -> list[list
 
 
 def _has(scene: Scene, part: str) -> bool:
-    """Whether a scene has a section or a subsection."""
+    """Whether a scene has a section, a subsection or a key."""
     section: object = scene
     for name in part.split("."):
         section = section and getattr(section, name)
@@ -139,8 +140,8 @@ def _demand(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
 
 def _lag(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
     lag = computed["transport over growth time"].start
-    if scene.numerics.transport == "quasi_steady" and lag > LAG:
-        permeable = scene.flow is not None and scene.flow.permeability is not None
+    if lag > LAG and not transport_in_time(scene.numerics.transport).stores:
+        permeable = _has(scene, "flow.permeability")
         remedy = '; "gear" with numerics.preset = "paper" integrates them in time'
         yield Caveat("numerics.transport", f"transport takes {lag:.2g} of the time of growth, "
                      f"above {LAG:g}: quasi-steady substrates err by about this fraction"
@@ -159,7 +160,7 @@ def _transit(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
 def _forces(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
     stress = computed["fluid stress over modulus"]
     strain = max(stress.start, stress.end or 0.0)
-    if scene.growth.fluid_forces == "neglected" and strain > STRAIN:
+    if not scene.growth.has_fluid_forces and strain > STRAIN:
         stressed = scene.growth.new_biomass == "stressed"
         setting = '"included"' + ("" if stressed else ' with growth.new_biomass = "stressed"')
         yield Caveat("growth.fluid_forces", f"the fluid's stress reaches {strain:.2g} of mu_L, "
@@ -171,7 +172,7 @@ def _strengths(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat
     """Warn if the forces of the flow do not count against a strength."""
     for key in ("bonding_strength", "tensile_strength"):
         is_set = getattr(scene.growth, key) is not None
-        if is_set and scene.growth.fluid_forces == "neglected":
+        if is_set and not scene.growth.has_fluid_forces:
             yield Caveat(f"growth.{key}", "the flow cannot exceed it, since the scene neglects the "
                          "fluid's forces, and only the stress of growth counts; "
                          'growth.fluid_forces = "included" adds the forces')
@@ -179,7 +180,7 @@ def _strengths(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat
 
 def _support(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
     """Warn if the shape depends on how a wall bears the water's force on a sliding aggregate."""
-    if scene.growth.fluid_forces == "neglected" or scene.growth.wall == "bonded":
+    if scene.growth.bonded or not scene.growth.has_fluid_forces:
         return
     stress = computed["fluid stress over modulus"]
     force = DRAG * stress.start + (stress.end or 0.0)
@@ -228,8 +229,6 @@ def _interface_size(scene: Scene, thickness: float) -> float:
 
 def _drag_layer(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
     permeability = scene.flow.permeability
-    if permeability is None:
-        return
     root = math.sqrt(permeability)
     size = _interface_size(scene, sizes.thickness)
     thickness = size / ACROSS
@@ -336,7 +335,7 @@ CHECKS: dict[Callable[[Scene, Numbers, Sizes], Iterator[Caveat]], tuple[str, ...
     _diffusivities: ("aggregate", "substrates"),
     _seed_film: ("aggregate", "flow"),
     _ends: ("aggregate",),
-    _drag_layer: ("aggregate", "flow"),
+    _drag_layer: ("aggregate", "flow.permeability"),
     _fronts: ("kinetics",),
     _demand: ("kinetics", "substrates.acceptor"),
     _lag: ("growth",),

@@ -65,8 +65,7 @@ NEEDS: dict[str, Callable[[State], bool]] = {
     "biomass": lambda state: state.scene.kinetics is not None,
     "growth": lambda state: state.scene.growth is not None,
     ORIGIN: lambda state: state.scene.growth is not None and state.pore.origin_known,
-    "stress": lambda state: bool(state.scene.growth)
-    and state.scene.growth.new_biomass == "stressed"}
+    "stress": lambda state: bool(state.scene.growth) and state.pore.configuration.accumulates}
 
 
 @dataclass(frozen=True)

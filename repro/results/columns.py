@@ -11,6 +11,7 @@ from repro.march.balance import Ledger
 from repro.march.state import Report
 from repro.model.energies.neo_hookean import BIOT, CREASE
 from repro.model.surface import BESIDE, STRETCH, surface
+from repro.model.transport_in_time import transport_in_time
 from repro.results.quantities import Quantity, is_modelled
 from repro.scene import Growth, Scene
 
@@ -23,14 +24,14 @@ NEEDS: dict[str, Callable[[Scene, Report], bool]] = {
     "aggregate": lambda scene, at: at.pore.outline is not None,
     "biomass": lambda scene, at: at.pore.outline is not None and scene.kinetics is not None,
     "growth": lambda scene, at: at.pore.outline is not None and scene.growth is not None,
-    "adhesion": lambda scene, at: scene.growth is not None and _has_adhesion(scene.growth)}
+    "adhesion": lambda scene, at: (scene.growth is not None and at.pore.configuration.accumulates
+                                   and _has_adhesion(scene.growth))}
 
 
 def _has_adhesion(growth: Growth) -> bool:
-    """Does a scene ask for the columns of adhesion? They need strain that counts from t = 0."""
-    requested = (growth.wall == "bonded", growth.fluid_forces == "included",
-             growth.bonding_strength is not None, growth.tensile_strength is not None)
-    return any(requested) and growth.new_biomass == "stressed"
+    """Does a scene ask for the columns of adhesion?"""
+    return (growth.bonded or growth.has_fluid_forces
+            or growth.bonding_strength is not None or growth.tensile_strength is not None)
 
 
 def _both(pattern: str, words: str, formula: str, value: Callable,
@@ -49,9 +50,9 @@ def _least(k: int, scene: Scene, at: Report) -> float:
 
 
 def _overshoot(k: int, scene: Scene, at: Report) -> float:
-    """mg/L; with Gear, over the largest supply: the pore may contain water of earlier supplies."""
+    """mg/L; over the largest supply if the pore may contain water of earlier supplies."""
     supply = getattr(at.solved.problem.substrates, SUBSTRATES[k]).supply
-    if scene.numerics.transport == "gear":
+    if transport_in_time(scene.numerics.transport).stores:
         supply = getattr(scene.largest.substrates, SUBSTRATES[k]).supply
     return max(0.0, float(getattr(at.solved.concentrations, SUBSTRATES[k]).max()) - supply)
 
@@ -62,17 +63,17 @@ def _worst(defects: list[float]) -> float:
 
 
 def _substrate_balance(k: int, scene: Scene, at: Report) -> float:
-    """The worst defect of the steps since the last row and, except with Gear, of the present
-    instant."""
-    gear = scene.numerics.transport == "gear"
+    """The worst defect of the steps since the last row and, unless substrates are stored, of the
+    present instant."""
+    stores = transport_in_time(scene.numerics.transport).stores
     problem = at.solved.problem
     supply = getattr(problem.substrates, SUBSTRATES[k]).supply
-    room = supply * float(problem.space.at.dx.sum()) if gear else 0.0
+    room = supply * float(problem.space.at.dx.sum()) if stores else 0.0
     largest = getattr(scene.largest.substrates, SUBSTRATES[k]).supply
     floor = balance.floor(problem, k, largest)
     defects = [balance.substrate(ledger, k, max(room, floor * (ledger.end - ledger.start)))
                for ledger in at.ledgers]
-    if not gear:
+    if not stores:
         flux = at.solved.fluxes[k]
         defects.append(balance.defect(flux.supplied, flux.out, flux.consumed, room=floor))
     return _worst(defects)

@@ -7,9 +7,11 @@ the row before up to the jump.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from itertools import pairwise
 
 import numpy as np
+
+from repro.model.transport_in_time import transport_in_time
+from repro.scene.time_table import jump_times
 
 DRIVEN = ("mean_velocity_m_per_d", "head_loss_cm")
 #: Columns that jump with the flow, and with its forces if the aggregate bears them.
@@ -39,21 +41,13 @@ def with_jumps(name: str, times: np.ndarray, values: np.ndarray,
 
 def _jumps(name: str, tables: Mapping[str, dict]) -> list[float]:
     """The times (h) at which a column jumps."""
-    flow = _times(tables.get("flow", {}))
+    flow = jump_times(tables.get("flow", {}))
     bears_forces = tables.get("growth", {}).get("fluid_forces") == "included"
     if name in (*DRIVEN, *FORCES) or name in STRESSES and bears_forces:
         return flow
-    at_rest = tables.get("numerics", {}).get("transport") == "quasi_steady"
-    if name not in CARRIED or not at_rest:
-        return []
-    supplies = [_times(part) for part in tables.get("substrates", {}).values()
+    supplies = [jump_times(part) for part in tables.get("substrates", {}).values()
                 if isinstance(part, dict)]
-    return sorted({*flow, *(time for times in supplies for time in times)})
-
-
-def _times(section: dict) -> list[float]:
-    """The times (h) of the jumps in the tables over time of a section, which are lists."""
-    lists = [section[key] for key in ("head", "mean_velocity", "supply")
-             if isinstance(section.get(key), list)]
-    return sorted({float(later[0].split()[0]) for entries in lists
-                   for earlier, later in pairwise(entries) if earlier[1] != later[1]})
+    times = sorted({*flow, *(time for times in supplies for time in times)})
+    if name not in CARRIED or not times:
+        return []
+    return [] if transport_in_time(tables["numerics"]["transport"]).stores else times

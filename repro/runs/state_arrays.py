@@ -17,6 +17,7 @@ from repro.march.balance import Ledger
 from repro.march.state import Compression, RestartState
 from repro.march.step_control import StepControl
 from repro.model.body import material
+from repro.model.configuration import configuration_of
 from repro.model.energies import energy_of
 from repro.model.meshing import walls_of
 from repro.model.pore import Pore
@@ -26,8 +27,6 @@ from repro.scene import Scene, scene_hash
 #: Arrays of the mesh and of the pore, by the names of their fields.
 OF_MESH = ("points", "cells", "biomass", "loop")
 OF_PORE = ("wall", "fixed", "active", "inert", "theta", "pressure")
-#: Arrays of the pore that may be absent.
-OPTIONAL = ("last", "line_speeds")
 #: Arrays of the concentrations from which Newton's method starts.
 OF_GUESS = ("acceptor", "donor")
 
@@ -39,8 +38,8 @@ def pack_state(scene: Scene, state: RestartState) -> tuple[dict, Arrays]:
     arrays = {name: getattr(pore.mesh, name) for name in OF_MESH}
     arrays |= {name: getattr(pore, name) for name in OF_PORE}
     arrays["reference"] = pore.body.reference
-    if pore.last is not None:
-        arrays["last"] = pore.last
+    if not pore.configuration.accumulates:
+        arrays["last"] = pore.unstrained
     if pore.line_speeds is not None:
         arrays["line_speeds"] = pore.line_speeds
     if guess:
@@ -87,5 +86,6 @@ def _pore(scene: Scene, plain: dict, arrays: Arrays) -> Pore:
     return Pore(time=plain["time_h"], space=space, body=body,
                 concentrations=guess, front=plain["front"],
                 origin_known=plain["origin_known"],
-                **{name: arrays[name] for name in OF_PORE},
-                **{name: arrays.get(name) for name in OPTIONAL})
+                line_speeds=arrays.get("line_speeds"),
+                configuration=configuration_of(scene.growth, arrays.get("last", body.reference)),
+                **{name: arrays[name] for name in OF_PORE})

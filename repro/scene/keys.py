@@ -332,6 +332,16 @@ class Growth:
         LIMITING, source=NOT_IN_PAPER + "; about that of rubber (Gent 1996)",
         about="J_m of Gent's energy, with energy = \"Gent\": J^(-2/3) tr C stays below 3 + J_m")
 
+    @property
+    def bonded(self) -> bool:
+        """Whether biomass keeps its place on the lower wall."""
+        return self.wall == "bonded"
+
+    @property
+    def has_fluid_forces(self) -> bool:
+        """Whether the fluid's forces act on the aggregate."""
+        return self.fluid_forces == "included"
+
 
 @dataclass(frozen=True)
 class Numerics:
@@ -369,6 +379,11 @@ class Numerics:
         about="Elements to growth.minimum_film beside the contact lines with the opposite wall, "
               "2 at least with a permeable aggregate; 0: as large as elsewhere on the interface")
     exchanged: Scheme | None = None  # no key: ``repro.simulate(..., scheme=...)``
+
+    @property
+    def whole_pore(self) -> bool:
+        """Whether a mesh covers the whole pore."""
+        return self.extent == "full"
 
     @property
     def scheme(self) -> Scheme:

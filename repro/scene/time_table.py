@@ -7,6 +7,7 @@ end at all of these times, so that no step contains a jump or a kink.
 from bisect import bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass, fields, is_dataclass, replace
+from itertools import pairwise
 from typing import TypeVar
 
 Part = TypeVar("Part")
@@ -74,3 +75,11 @@ def time_tables(part: object) -> list[TimeTable]:
         elif is_dataclass(value):
             tables += time_tables(value)
     return tables
+
+
+def jump_times(section: dict) -> list[float]:
+    """The times (h) of jumps in the text of a section; a table in steps is a list."""
+    lists = [section[key] for key in ("head", "mean_velocity", "supply")
+             if isinstance(section.get(key), list)]
+    return sorted({float(later[0].split()[0]) for entries in lists
+                   for earlier, later in pairwise(entries) if earlier[1] != later[1]})

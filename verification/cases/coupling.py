@@ -25,6 +25,7 @@ from repro.march.simulation import shaped, simulate
 from repro.march.state import Report
 from repro.model import flow, solving
 from repro.model.meshing import seeded
+from repro.model.resistance import Viscous
 from repro.model.stages import Stages
 from repro.scene import Scene
 from verification.evidence.cases import parametrize
@@ -120,7 +121,7 @@ def test_equal_viscosities(changes, record):
     grid = last.pore.mesh
     computed = last.solved.flow
     bare = replace(grid, topology=replace(grid.topology, biomass=np.zeros_like(grid.biomass)))
-    empty = flow.unit_flow(Space(bare), 7.0)
+    empty = flow.unit_flow(Space(bare), Viscous(7.0))
     record(at_most("u", np.abs(computed.velocity / computed.mean_velocity - empty.velocity).max(), 1e-13,
                    runs.ROUND_OFF),
            at_most("mean velocity", abs(computed.mean_velocity / _poiseuille(scene) - 1), 5e-3,

@@ -23,6 +23,7 @@ from repro.model.flow import Flow
 from repro.model.mechanics import Mechanics, supports_of
 from repro.model.meshing import Meshing, seeded
 from repro.model.pore import Pore
+from repro.model.resistance import Viscous
 from verification.cases import flow as flow_cases
 from verification.evidence.cases import combined, parametrize
 from verification.evidence.checks import at_least, at_most, between, each_at_most, refine, studies, study
@@ -146,7 +147,7 @@ def _shear(space: Space) -> float:
     """Relative error of the mean shear on the middle of the layer."""
     mesh = space.mesh
     ratio = 2000.0
-    unit = flow.unit_flow(space, ratio)
+    unit = flow.unit_flow(space, Viscous(ratio))
     as_flow = Flow(1.0, unit.velocity, unit.pressure, unit.correction, 1.0, 1.0, 1.0)
     forces = traction.nodal(space, as_flow, 1.0, "laplacian")
     along, across = mesh.points.T

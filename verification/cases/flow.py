@@ -45,6 +45,7 @@ from repro.fem.space import Space
 from repro.fem.walls import channel_walls
 from repro.model import flow
 from repro.model.brinkman import ACROSS
+from repro.model.resistance import Permeable, Viscous
 from repro.scene import Flow as Drive
 from verification.evidence.cases import combined, parametrize
 from verification.evidence.checks import around, at_least, at_most, each_at_most, refine, studies
@@ -226,7 +227,7 @@ def _layered(half: float, size: float, draw: int) -> Mesh:
 
 
 def _viscous_layer(space: Space, ratio: float, interface: str) -> dict[str, float]:
-    return in_the_middle(space, flow.unit_flow(space, ratio, interface=interface), layered_channel, ratio)
+    return in_the_middle(space, flow.unit_flow(space, Viscous(ratio), interface=interface), layered_channel, ratio)
 
 
 def middle_of(grid: Mesh, half: float) -> np.ndarray:
@@ -308,7 +309,7 @@ def test_permeable_plug(interface, record):
     middle = middle_of(space.mesh, MIDDLE)
     inside = np.unique(space.cells[middle])
     for k in SPAN_PERMEABILITIES:
-        solution = flow.unit_flow(space, interface=interface, permeability=k)
+        solution = flow.unit_flow(space, Permeable(k), interface=interface)
         error = abs(slope(space, solution.pressure, middle)
                     / brinkman_channel.gradient(WIDTH, WIDTH, k) - 1)
         thickness = max(np.sqrt(k), SPAN_SIZE / ACROSS / 2)
@@ -322,7 +323,7 @@ def test_permeable_plug(interface, record):
 
 def _permeable_layer(size: float, draw: int, permeability: float, interface: str) -> dict[str, float]:
     space = meshes.space_on(_layered(PERMEABLE_END, size, draw), 2)
-    solution = flow.unit_flow(space, interface=interface, permeability=permeability)
+    solution = flow.unit_flow(space, Permeable(permeability), interface=interface)
     return in_the_middle(space, solution, brinkman_channel, permeability)
 
 
@@ -356,7 +357,7 @@ def test_first_rise(order, interface, record):
 def _rise_error(refinement: float, draw: int, interface: str, order: int) -> dict[str, float]:
     space = meshes.half_disc_space(RADIUS, refinement * meshes.SPREAD[draw], ENDS, WIDTH, order)
     grid = space.mesh
-    below, above = (flow.unit_flow(space, 1 + step, interface=interface).loss for step in (-STEP, STEP))
+    below, above = (flow.unit_flow(space, Viscous(1 + step), interface=interface).loss for step in (-STEP, STEP))
     where, weight, _ = meshes.fine(space, grid.biomass)
     exact = np.sum(weight * poiseuille.dissipation(where[..., 1], WIDTH)) / WIDTH
     return {"size": meshes.mean_size(grid), "rise": abs((above - below) / (2 * STEP) / exact - 1)}

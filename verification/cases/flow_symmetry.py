@@ -20,6 +20,7 @@ from repro.fem.sizing import Sizing
 from repro.fem.space import Space
 from repro.fem.walls import channel_walls
 from repro.model import flow
+from repro.model.resistance import Permeable, Resistance, Viscous
 from verification.cases import flow as flow_cases
 from verification.cases.flow import ENDS, ENDS_FIRST, FORMS, LENGTH, MEAN, RATIO, SECOND, VISCOSITY, WIDTH, viscous
 from verification.evidence.cases import combined, parametrize
@@ -88,13 +89,13 @@ def test_layers(order, ratio, interface, record):
     if order == 1:
         record(studies(refine(_viscous_layer, SIZES, ratio, interface), LINEAR))
         return
-    errors = _in_the_middle(flow_cases.long_layer(), half_channel.Viscous, ratio, interface, viscosity_ratio=ratio)
+    errors = _in_the_middle(flow_cases.long_layer(), half_channel.Viscous, ratio, interface, Viscous(ratio))
     record(each_at_most(errors, 1e-5, "remainder of the layer's ends"))
 
 
 def _viscous_layer(size: float, draw: int, ratio: float, interface: str) -> dict[str, float]:
     grid = _long(size, draw)
-    return {"size": size, **_in_the_middle(grid, half_channel.Viscous, ratio, interface, viscosity_ratio=ratio)}
+    return {"size": size, **_in_the_middle(grid, half_channel.Viscous, ratio, interface, Viscous(ratio))}
 
 
 @cache
@@ -102,9 +103,10 @@ def _long(size: float, draw: int) -> Mesh:
     return flow_cases._layered(flow_cases.LONG, size, draw)
 
 
-def _in_the_middle(grid: Mesh, layers: type, parameter: float, interface: str, **options) -> dict[str, float]:
+def _in_the_middle(grid: Mesh, layers: type, parameter: float, interface: str,
+                   resistance: Resistance) -> dict[str, float]:
     space = Space(below(grid))
-    solution = flow.unit_flow(space, interface=interface, **options)
+    solution = flow.unit_flow(space, resistance, interface=interface)
     return flow_cases.in_the_middle(space, solution, layers, parameter)
 
 
@@ -124,7 +126,7 @@ def test_permeable_layers(interface, record):
 def _permeable_layer(size: float, draw: int, interface: str) -> dict[str, float]:
     grid = meshes.space_on(_long(size, draw), 2).mesh
     k = flow_cases.RESOLVED
-    return {"size": size, **_in_the_middle(grid, half_channel.Permeable, k, interface, permeability=k)}
+    return {"size": size, **_in_the_middle(grid, half_channel.Permeable, k, interface, Permeable(k))}
 
 
 #: Radius (um) of the half-discs, one with a wide and one with a narrow passage between it and its image,
@@ -151,7 +153,7 @@ def test_mirror_image(order, radius, interface, record):
     """
     refinement, level, bound = REFINEMENTS[order]
     space = Space(below(meshes.half_disc(radius, refinement, FAR, WIDTH, geometry=order)))
-    solution = flow.unit_flow(space, RATIO, interface=interface)
+    solution = flow.unit_flow(space, Viscous(RATIO), interface=interface)
     reference = _two_aggregates(radius, level, interface)
     lower = reference.points[:, 1] <= WIDTH * (1 + 1e-9)
     points, velocity, areas = reference.points[lower], reference.velocity[lower], reference.areas[lower]

@@ -23,6 +23,7 @@ from repro.model.closing_by_nodes import closing_nodes
 from repro.model.contact_lines import Clearance, lines_of
 from repro.model.meshing import Meshing, seeded
 from repro.model.remeshing import Remeshing
+from repro.model.resistance import Viscous
 from repro.model.stages import Stages
 from repro.scene import Scene
 from verification.evidence.checks import Check, at_least, at_most, between, largest
@@ -198,7 +199,7 @@ def in_a_wedge(preset: str) -> list:
 def _loss(scene: Scene) -> float:
     """Loss over the meshed part, 1/um."""
     grid, _ = Meshing.of(scene).generate(wedge(LEAST, scene.numerics.scheme.order, scene.pore.width))
-    return flow.unit_flow(Space(grid), scene.flow.viscosity_ratio).loss
+    return flow.unit_flow(Space(grid), Viscous(scene.flow.viscosity_ratio)).loss
 
 
 def wedges_close(preset: str) -> list:

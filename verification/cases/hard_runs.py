@@ -20,6 +20,7 @@ from repro.model import flow, remeshing, solving
 from repro.model.meshing import Meshing, seeded
 from repro.model.pore import Pore
 from repro.model.remeshing import Remeshing
+from repro.model.resistance import Viscous
 from repro.model.stages import Stages
 from repro.scene import Scene, parse_scene, scene_tables
 from verification.cases.hard_mechanics import CLOSING
@@ -104,7 +105,7 @@ def _mesh_and_loss(scene: Scene, noise: float) -> tuple[Mesh, float]:
     points = shape.points.copy()
     points[free] += 20.0 * noise * np.random.default_rng(7).uniform(-1, 1, (free.sum(), 2))
     grid, _ = Meshing.of(scene).generate(replace(shape, points=points))
-    return grid, flow.unit_flow(Space(grid), 2000.0).loss
+    return grid, flow.unit_flow(Space(grid), Viscous(2000.0)).loss
 
 
 #: Transfer of nodal fields between meshes, by geometry.

@@ -13,6 +13,7 @@ from scipy.optimize import brentq
 from reference import layered_channel, slab
 from repro.model import flow, transport
 from repro.model.kinetics import Sink
+from repro.model.resistance import Viscous
 from repro.results import M_PER_D
 from verification.evidence.checks import Check, at_least, at_most, between, largest
 from verification.problems import channels, hard, meshes, runs
@@ -317,7 +318,7 @@ def plugged(preset: str, size: float) -> Iterator[Check]:
     grid = meshes.plug(ENDS, WIDTH, PLUG, size, seed=3)
     exact = 12 / WIDTH**2 * (ENDS[1] - ENDS[0] + 1999 * 2 * PLUG)
     space = meshes.space_on(grid, hard.load("wide", preset).numerics.scheme.order)
-    solution = flow.unit_flow(space, 2000.0)
+    solution = flow.unit_flow(space, Viscous(2000.0))
     flux = meshes.section_means(space, solution.velocity[:, 0], SECTIONS, 64)
     leak, lost, origin = LEAK[size] if space.order == 1 else EXACT
     if solution.correction is not None:

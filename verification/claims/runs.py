@@ -23,7 +23,7 @@ from repro.fem.outline import half_disc as seed
 from repro.fem.sizing import ACROSS_AGGREGATE
 from repro.fem.space import Space
 from repro.fem.walls import BOTTOM, TOP
-from repro.march import loop, simulation, updates
+from repro.march import loop, simulation
 from repro.march.state import Report, RestartState
 from repro.model import contact as closing
 from repro.model import flow, mesh_motion, meshing, remeshing, solving, transport
@@ -243,7 +243,7 @@ def grown_on_new_mesh(run: Run, time: float) -> tuple[Pore, Solved]:
 
 
 def _grown(scene: Scene, pore: Pore, solved: Solved) -> tuple[Pore, Solved]:
-    before_expansion, _, _ = updates.make_biomass(Stages.of(scene), pore, solved, UPDATE)
+    before_expansion, _, _ = Stages.of(scene).transport.make_biomass(pore, solved, UPDATE)
     return before_expansion, solve(scene, before_expansion)
 
 

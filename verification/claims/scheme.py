@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from repro.march import updates
 from repro.model import gear
 from repro.model.kinetics import Sink, rate_law
 from repro.model.pore import Pore
@@ -254,7 +253,7 @@ def reprojection_conserves() -> Finding:
 def node_defect(time: float) -> float:
     """Largest relative change of a node's mass of X_A or X_I in the update of base that starts at a time (h)."""
     scene, (pore, solved) = load_packaged(*BASE), solved_pore(BASE, time)
-    before_expansion, _, _ = updates.make_biomass(Stages.of(scene), pore, solved, scene.growth.time_step)
+    before_expansion, _, _ = Stages.of(scene).transport.make_biomass(pore, solved, scene.growth.time_step)
     expanded = Stages.of(scene).expand(pore, before_expansion).pore
     pairs = zip(node_masses(before_expansion), node_masses(expanded))
     return max(float(np.abs(after / before - 1).max()) for before, after in pairs)

@@ -8,6 +8,7 @@ from repro.fem.mesh import Mesh
 from repro.fem.mesher import generate
 from repro.fem.space import Space
 from repro.model import flow, meshing
+from repro.model.resistance import Viscous
 from verification import switches
 from verification.claims.runs import (
     BASE,
@@ -79,7 +80,7 @@ def interface_forms() -> Numbers:
 
 def in_forms(grid: Mesh, ratio: float) -> list[flow.UnitFlow]:
     """Unit flow in both forms, laplacian first."""
-    return [flow.unit_flow(Space(grid), ratio, interface=form) for form in ("laplacian", "traction")]
+    return [flow.unit_flow(Space(grid), Viscous(ratio), interface=form) for form in ("laplacian", "traction")]
 
 
 def losses(grid: Mesh) -> list[float]:

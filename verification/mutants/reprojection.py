@@ -70,9 +70,9 @@ MUTANTS = (
          "Active biomass becomes inert at a remesh, and inert active.",
          "_transferred",
          "replace(target, time=expanded.time, active=active, inert=inert,\n"
-         "        pressure=_pressure(target.mesh, expanded, at), last=last)",
+         "        pressure=_pressure(target.mesh, expanded, at), configuration=configuration)",
          "replace(target, time=expanded.time, active=inert, inert=active,\n"
-         "        pressure=_pressure(target.mesh, expanded, at), last=last)"),
+         "        pressure=_pressure(target.mesh, expanded, at), configuration=configuration)"),
         ("upstream-reversed",
          "Beyond the old inlet the deficit of a substrate grows upstream.",
          "_beyond",

@@ -4,11 +4,11 @@ from verification.mutants import changes
 
 MUTANTS = (
     *changes(
-        "repro/model/substrates.py",
+        "repro/model/transport_in_time.py",
         ("haldane-by-newton-alone",
          "by Haldane's law Newton's method starts from the guess, not from a state that is reached in time",
-         "steady",
-         "guess = settle(problem, sink, guess)",
+         "AtRest.settled",
+         "guess = Gear().settled(problem, sink, guess)",
          "pass")),
     *changes(
         "repro/model/transport.py",

@@ -10,6 +10,7 @@ from repro.march.simulation import simulate
 from repro.model import flow
 from repro.model.meshing import seeded
 from repro.model.pore import Pore
+from repro.model.resistance import Viscous
 from repro.scene import load_scene
 from verification.claims.runs import SUBSTRATES, until
 
@@ -103,7 +104,7 @@ def sample(pore: Pore, ratios: tuple[float, ...] = RATIOS, run: Growth | None = 
 def added_length(space: Space, ratio: float) -> float:
     """r: the loss of the meshed part over that of an empty one of length W, less its own length over W."""
     mesh = space.mesh
-    loss = flow.unit_flow(space, ratio).loss
+    loss = flow.unit_flow(space, Viscous(ratio)).loss
     return loss / flow.poiseuille_loss(mesh.width, mesh.width) - (mesh.ends[1] - mesh.ends[0]) / mesh.width
 
 

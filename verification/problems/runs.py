@@ -91,7 +91,7 @@ def shape_of(scene: Scene, pore: Pore, grown: Pore) -> Pore:
 
 def next_shape(scene: Scene, pore: Pore, solved: Solved, hours: float) -> Pore:
     """The shape after an update of so many hours."""
-    grown, _, _ = updates.make_biomass(Stages.of(scene), pore, solved, hours)
+    grown, _, _ = Stages.of(scene).transport.make_biomass(pore, solved, hours)
     return shape_of(scene, pore, grown)
 
 

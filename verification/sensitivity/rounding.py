@@ -36,7 +36,7 @@ from numpy.typing import ArrayLike
 from scipy.optimize import linprog
 from scipy.stats import sobol_indices, uniform
 
-from repro.march import simulation, updates
+from repro.march import simulation
 from repro.march.state import RestartState
 from repro.model import solving
 from repro.model.kinetics import rate_law
@@ -139,7 +139,8 @@ def of_base(scene: Scene) -> Row:
     step before 19.4 h, with the biomass that has grown in it since [E12]."""
     plotted = END - scene.growth.time_step
     first, shaped, last = simulation.simulate(ending(scene, plotted, END))
-    grown, _, _ = updates.make_biomass(Stages.of(scene), shaped.pore, shaped.solved, scene.growth.time_step)
+    grown, _, _ = Stages.of(scene).transport.make_biomass(shaped.pore, shaped.solved,
+                                                            scene.growth.time_step)
     solved = solving.solve(scene, grown)
     halves = [substrate.half_saturation for substrate in solved.problem.both]
     acceptor, donor = (flux.effluent / half for flux, half in zip(solved.fluxes, halves))

@@ -1,0 +1,79 @@
+"""The configuration from which strain counts: that of t = 0 (2.3), or the last shape (section 5).
+
+``growth.new_biomass`` chooses it; :func:`configuration_of` alone knows its words. Both classes have
+
+    accumulates    does strain accumulate, so that surfaces fold and stresses have a meaning?
+    restarted      the configuration of a step from given positions (n, 2) um of the nodes
+    unstrained     (n, 2) um, the nodes of a body in it
+    carried        the same on another mesh, to which a function carries positions (n, 2)
+    strained       the body in it, and its expansion since then, from theta (t, q) since t = 0
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TypeAlias
+
+import numpy as np
+
+from repro.model.body import Body
+from repro.scene import Growth
+
+
+@dataclass(frozen=True)
+class FromStart:
+    """New biomass takes part in the strain since t = 0."""
+
+    accumulates = True
+
+    def restarted(self, positions: np.ndarray) -> FromStart:
+        """The same."""
+        return self
+
+    def unstrained(self, body: Body) -> np.ndarray:
+        """The body's reference."""
+        return body.reference
+
+    def carried(self, carry: Callable[[np.ndarray], np.ndarray]) -> FromStart:
+        """The same, because the body is carried."""
+        return self
+
+    def strained(self, body: Body, theta: np.ndarray) -> tuple[Body, np.ndarray]:
+        """Both are known."""
+        return body, theta
+
+
+@dataclass(frozen=True, eq=False)
+class FromLast:
+    """New biomass has no stress; positions: (n, 2) um, the nodes in the last shape."""
+
+    positions: np.ndarray
+    accumulates = False
+
+    def restarted(self, positions: np.ndarray) -> FromLast:
+        """These positions."""
+        return FromLast(positions)
+
+    def unstrained(self, body: Body) -> np.ndarray:
+        """The positions."""
+        return self.positions
+
+    def carried(self, carry: Callable[[np.ndarray], np.ndarray]) -> FromLast:
+        """Their positions there."""
+        return FromLast(carry(self.positions))
+
+    def strained(self, body: Body, theta: np.ndarray) -> tuple[Body, np.ndarray]:
+        """The expansion is theta / J. This removes the error of J = theta, so the area follows the
+        mass without drift."""
+        return replace(body, reference=self.positions), theta / body.strained(self.positions).J
+
+
+ReferenceConfiguration: TypeAlias = FromStart | FromLast
+
+
+def configuration_of(growth: Growth | None, positions: np.ndarray) -> ReferenceConfiguration:
+    """The configuration of a scene's growth; positions: (n, 2) um, of the last shape."""
+    if growth and growth.new_biomass == "stress_free":
+        return FromLast(positions)
+    return FromStart()
