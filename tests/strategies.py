@@ -5,7 +5,6 @@ from functools import partial
 
 import numpy as np
 import pytest
-from hypothesis import settings
 from hypothesis import strategies as st
 from skfem.quadrature import get_quadrature
 from skfem.refdom import RefTri
@@ -35,11 +34,6 @@ refinements = st.floats(0.4, 2.0)
 #: Orders of velocity and concentrations, and their names in scenes.
 ORDERS = {1: "linear", 2: "quadratic"}
 EVERY_ORDER = pytest.mark.parametrize("order", ORDERS)
-
-
-def share(part):
-    """Settings of an expensive property: this fraction of the profile's examples."""
-    return settings(max_examples=math.ceil(part * settings.default.max_examples))
 
 
 def between(least, most):
