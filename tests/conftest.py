@@ -27,7 +27,7 @@ def run_fixture(name, *arguments):
     return folder
 
 
-fast = run_fixture("fast", "base", pages.FAST, 'growth.end="3 h"')
+fast = run_fixture("fast", "base", pages.FAST, 'growth.end="3 h"', 'output.every="0.5 h"')
 paper = run_fixture("paper", "base", 'growth.end="1 h"')
 flow_only = run_fixture("flow_only", "flow_only")
 

@@ -4,7 +4,6 @@ import io
 import os
 import shutil
 from hashlib import sha256
-from zipfile import BadZipFile
 
 import numpy as np
 import pytest
@@ -22,14 +21,12 @@ from repro.scene import load_scene
 from tests.faults import limit_memory
 
 TIMES = ('growth.end="0.6 h"', 'output.times=["0.2 h", "0.6 h"]')
-LATER = ('growth.end="14 h"', 'output.times=["2 h", "14 h"]')
-PRESETS = {"paper": ('numerics.preset="paper"', *TIMES), "fast": ('numerics.preset="fast"', *LATER)}
 
 
-@pytest.fixture(scope="module", params=PRESETS)
-def saved(request, tmp_path_factory):
+@pytest.fixture(scope="module")
+def saved(tmp_path_factory):
     """Scene, folder and bytes of a checkpoint that holds reported steps and an unreported one."""
-    scene, folder = load_scene("base", PRESETS[request.param]), tmp_path_factory.mktemp("kept") / "run"
+    scene, folder = load_scene("base", TIMES), tmp_path_factory.mktemp("kept") / "run"
     contents = []
 
     def keep(event):
@@ -67,14 +64,6 @@ def test_the_previous_checkpoint_is_kept(tmp_path):
     for content in (b"one", b"two", b"three"):
         checkpoint.write(tmp_path, content)
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == {NEWEST: b"three", PREVIOUS: b"two"}
-
-
-def test_one_changed_bit_is_refused(saved, tmp_path):
-    """The test changes the last bit of the first number of the first array."""
-    content = bytearray(saved[2])
-    content[content.index(b"points.npy") + 200] ^= 1
-    with pytest.raises((CheckpointError, BadZipFile), match="^.*checksum.*$"):
-        restored(saved, bytes(content), tmp_path / "altered")
 
 
 @pytest.mark.parametrize("spoil", [lambda path: path.write_bytes(path.read_bytes()[:-9]), os.unlink,

@@ -15,49 +15,7 @@ from repro.cli.docs import PAGES
 from repro.runs.execution import Watch
 from repro.sweeps.driver import run_plan
 from tests.pages import run
-from tests.shell import read_record, refusal, rows, start
-
-
-def test_flow_only_is_one_row_without_substrates(tmp_path):
-    (row,) = rows(run(tmp_path, "flow_only") / "timeseries.csv")
-    assert list(row) == results.COLUMNS
-    empty = {name for name in results.COLUMNS if "acceptor" in name or "donor" in name}
-    empty |= {name for name in results.COLUMNS if re.match("wall_traction|tensile_stress|fluid_(force|moment)", name)}
-    assert {name for name, value in row.items() if value == ""} == empty | {
-        "surface_stretch_min", "surface_stretch_min_x_um", "surface_stretch_min_y_um",
-            "biomass_balance", "oxygen_demand_balance", "inert_fraction", "biomass_density_min", "biomass_density_max"}
-
-
-def test_ledger_closes_and_adds_up(tmp_path):
-    """Each step starts with the biomass of the previous one, and in = out + consumed + stored."""
-    out = run(tmp_path, "base", 'growth.end="1 h"', 'output.times=["1 h"]')
-    ledger = results.read_table(out / "ledger.csv")
-    assert len(ledger["end_h"]) == 5
-    for name in ("acceptor", "donor"):
-        supplied, *parts = (ledger[f"{name}_{part}_pg_per_m"] for part in ("supplied", "out", "consumed", "stored"))
-        assert (np.abs(supplied - sum(parts)) < 1e-8 * supplied).all()
-    before, produced, after = (ledger[f"biomass_{part}_pg_per_m"] for part in ("before", "made", "after"))
-    assert before + produced == pytest.approx(after, rel=1e-10, abs=0)
-    assert (after[:-1] == before[1:]).all() and (ledger["end_h"][:-1] == ledger["start_h"][1:]).all()
-
-
-def test_run_json_states_the_provenance(tmp_path):
-    record = read_record(run(tmp_path, "flow_only", "flow.viscosity_ratio=500"))
-    assert record["status"] == "completed" and record["tables"]["flow"]["viscosity_ratio"] == 500
-    assert record["origin"].get("set") == ["flow.viscosity_ratio=500"] and record["remeshes"] == 0
-    assert record["versions"]["scikit-fem"] and record["wall_time_by_stage_s"]["flow"] > 0
-
-
-@pytest.mark.parametrize("before, name", [((), "thesis.tex"), ((), "timeseries.csv"),
-                                          (["flow_only"], "fields/mine.vtu")])
-def test_a_folder_with_other_files_is_left_alone(tmp_path, capsys, before, name):
-    """The files may have names of a run's files or stand among them."""
-    for scene in before:
-        run(tmp_path, scene)
-    mine = tmp_path / "run" / name
-    mine.parent.mkdir(exist_ok=True)
-    mine.write_text("years of work")
-    assert mine.name in refusal(tmp_path, capsys, "run", "flow_only", "--out", tmp_path / "run")
+from tests.shell import refusal, rows, start
 
 
 def options_of(command):

@@ -667,11 +667,12 @@ def test_every_column_of_the_ledger_is_its_own():
 
 
 def distinct_run():
-    """A run of three rows and two steps in which all numbers differ."""
+    """A run of three rows and two steps in which all numbers differ. Biomass decays in the second step."""
     series = {name: 1.0 + k + np.array([0.1, 0.2, 0.4]) for k, name in enumerate(results.COLUMNS)}
     series |= {"time_h": np.array([0.0, 1.0, 3.0]), "remeshed": np.array([0.0, 1.0, 0.0])}
     ledger = {name: 50.0 + k + np.array([0.0, 0.5]) for k, name in enumerate(results.LEDGER_COLUMNS)}
     ledger |= {"start_h": np.array([0.0, 1.0]), "end_h": np.array([1.0, 3.0])}
+    ledger["biomass_made_pg_per_m"] *= [1, -1]
     return Run(None, {"tables": {}}, series, ledger)
 
 

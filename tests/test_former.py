@@ -14,7 +14,7 @@ from repro.scene import KEYS, former, load_scene, load_tables, parse_scene, scen
 from tests.pages import cached_run
 from tests.shell import files, flags, read_record, refusal, rewrite
 
-CHANGES = ("growth.end=0.4 h", "numerics.preset=fast")
+CHANGES = ("growth.end=0.4 h", "numerics.preset=fast", "output.every=0.2 h")
 SCENE = load_scene("base", CHANGES)
 
 
@@ -78,7 +78,8 @@ def test_a_run_of_an_earlier_version_loads_plots_and_compares(earlier, tmp_path,
     assert (results["aggregate_area_um2"] == present["aggregate_area_um2"]).all()
     assert results.fields(results.time[-1])["places_um"].shape == present.fields(present.time[-1])["places_um"].shape
     assert [key for key, *_ in comparison.differences([read(cached_run(SCENE)), read(folder)])] == shown
-    for command in (["plot", folder, "--out", tmp_path / "mine.svg"],
+    for command in (["plot", folder, "--out", tmp_path / "mine.svg"], ["check", folder],
+                    ["plot", folder, "velocity", "--time", "0.4 h", "--out", tmp_path / "field.svg"],
                     ["compare", folder, cached_run(SCENE), "--out", tmp_path / "both.html"]):
         assert main([*map(str, command)]) == 0
 

@@ -91,27 +91,27 @@ def test_an_unfinished_run_is_made_longer(tmp_path, after):
 
 def test_a_finished_run_keeps_one_checkpoint(tmp_path):
     """The record lists it. Without it a longer run starts again with a warning."""
-    with_growth = copytree(cached_run(scene("fast", 2.0)), tmp_path / "run")
+    with_growth = copytree(cached_run(scene("donor alone", 0.4)), tmp_path / "run")
     without_growth = cached_run(load_scene("flow_only"))
     assert (with_growth / LAST).exists() and LAST in read_record(with_growth)["files"]
     assert not any((with_growth / name).exists() for name in (NEWEST, PREVIOUS))
     assert not (without_growth / LAST).exists() and LAST not in read_record(without_growth)["files"]
     (with_growth / LAST).unlink()
     with pytest.warns(UserWarning, match="no checkpoint to resume from; the run starts again from t = 0"):
-        resume(with_growth, overrides=["growth.end=3 h"])
-    assert read_record(with_growth)["origin"].get("set") == ["growth.end=3 h"]
-    assert same(with_growth, cached_run(scene("fast")))
+        resume(with_growth, overrides=["growth.end=1 h"])
+    assert read_record(with_growth)["origin"].get("set") == ["growth.end=1 h"]
+    assert same(with_growth, cached_run(scene("donor alone")))
 
 
 @pytest.mark.parametrize("entry, expected", [
-    ("growth.end=1 h", "growth.end = 1 h: the run already has the end 2 h; give a later one"),
+    ("growth.end=12 min", "growth.end = 0.2 h: the run already has the end 0.4 h; give a later one"),
     ("growth.end=2 um", "growth.end = \"2 um\": a time"),
     ("growth.end=1e9 h", "growth.end = \"1e9 h\": at most 100000 times growth.time_step"),
     ("pore.width=3 um", "a run can change growth.end only"),
 ])
 def test_an_entry_without_a_later_end_is_refused(entry, expected):
     """The folder does not change."""
-    shorter = cached_run(scene("fast", 2.0))
+    shorter = cached_run(scene("donor alone", 0.4))
     before = state(shorter)
     with pytest.raises(SceneError) as refused:
         resume(shorter, overrides=[entry])

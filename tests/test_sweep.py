@@ -23,6 +23,7 @@ from repro import results
 from repro.cli import main
 from repro.cli.sweep import SOME_FAILED, _report
 from repro.errors import RunEnd
+from repro.report import charts
 from repro.runs import execution
 from repro.runs.machine import THREADS
 from repro.runs.status import COMPLETED, FAILED, INTERRUPTED, RUN_ENDS, RUNNING
@@ -38,7 +39,7 @@ from tests.test_sweep_cluster import until
 #: The runs of a sweep are processes of their own.
 pytestmark = pytest.mark.exact_lengths
 
-SHORT = ["--set", "numerics.preset=fast", "--set", 'growth.end="0.4 h"']
+SHORT = ["--set", "numerics.preset=fast", "--set", 'growth.end="0.4 h"', "--set", "output.every=0.2 h"]
 #: The second flow is too slow to carry substrates, so that its run fails.
 VARY = ["--vary", "flow.mean_velocity=2.9 m/day, 1e-12 m/day, 5.8 m/day"]
 
@@ -238,7 +239,8 @@ def test_clogging_time_of_an_exponential_fall_is_exact(part):
 
 
 def test_biomass_and_contact_are_read_from_the_rows(finished, tmp_path):
-    """Biomass is the area over that of the pore; contact is at its first row."""
+    """Biomass is the area over that of the pore; contact is at its first row. Conductivity is over that of the start,
+    and not over its largest."""
     source = finished / rows(finished / "runs.csv")[0]["folder"]
     factors = [parse("flow.mean_velocity=2.9 m/day")]
     sets = SHORT[1::2]
@@ -246,7 +248,8 @@ def test_biomass_and_contact_are_read_from_the_rows(finished, tmp_path):
     folder = Path(shutil.copytree(source, swept.runs / swept.points[0].name))
     lines = rows(folder / "timeseries.csv")
     for k, line in enumerate(lines):
-        line.update(contact=int(k >= 1), conductivity_m_per_d=3 * 0.05 ** k, aggregate_area_um2=30.0 * (k + 1))
+        line.update(contact=int(k >= 1), conductivity_m_per_d=(3, 0.15, 6)[min(k, 2)],
+                    aggregate_area_um2=30.0 * (k + 1))
     results.write_table(folder / "timeseries.csv", results.COLUMNS, [list(line.values()) for line in lines])
     rewrite(folder, sha256={})
     (summary,) = table.read_runs(swept, {}, 0.1)
@@ -262,7 +265,8 @@ def test_biomass_and_contact_are_read_from_the_rows(finished, tmp_path):
 def test_a_killed_run_fails_alone(tmp_path):
     """Its status names the signal, and the other runs are made."""
     out = tmp_path / "sweep"
-    process = start("sweep", "base", "--out", out, "--vary", "pore.width=48 um, 50 um, 52 um", "--workers", "1", *SHORT)
+    process = start("sweep", "base", "--out", out, "--vary", "pore.width=48 um, 50 um, 52 um", "--workers", "1",
+                    *SHORT[:4])
     until(lambda: list(out.glob("runs/0001*/fields/*.vtu")))
     (child,) = children(process.pid)
     os.kill(child, signal.SIGKILL)
@@ -486,13 +490,14 @@ def test_a_run_without_rows_has_the_status_of_its_folder_or_attempt(tmp_path):
         assert [run.status for run in table.read_runs(swept, messages, 0.1)] == ["failed: x", second, "not run"]
 
 
-def test_a_sweep_converts_to_tables_and_pictures(tmp_path):
+def test_a_sweep_converts_to_tables_and_pictures(tmp_path, monkeypatch):
     """The columns are those of runs.csv, with the last row of each run. Varied keys are dimensions of a grid, and
     coordinates of a hypercube."""
     pandas, xarray = map(pytest.importorskip, ("pandas", "xarray"))
-    changes = ["growth.end=1 h", "numerics.refinement=0.3"]
+    monkeypatch.setattr(driver, "ready", in_this_process)
+    changes = ["growth.end=0.4 h", "numerics.refinement=0.3"]
     varied = ["pore.width=48 um, 50 um", "flow.viscosity_ratio=100, 2000"]
-    swept = repro.sweep("base", varied, tmp_path, changes, workers=2)
+    swept = repro.sweep("base", varied, tmp_path, changes)
     frame, array = swept.to_pandas(), swept.to_xarray()
     written = pandas.read_csv(tmp_path / "runs.csv", index_col="run")
     pandas.testing.assert_frame_equal(frame, written, check_dtype=False, rtol=1e-15)
@@ -501,7 +506,7 @@ def test_a_sweep_converts_to_tables_and_pictures(tmp_path):
         assert {name: frame.loc[run.point.index, name] for name in last if name != "time_h"} == {
             name: value for name, value in last.items() if name != "time_h"}
         at = array.sel({"pore.width": run.point.values[0], "flow.viscosity_ratio": run.point.values[1]})
-        assert float(at["conductivity_m_per_d"]) == last["conductivity_m_per_d"] and at["end_h"] == 1
+        assert float(at["conductivity_m_per_d"]) == last["conductivity_m_per_d"] and at["end_h"] == 0.4
     assert array.sizes == {"pore.width": 2, "flow.viscosity_ratio": 2} and array["pore.width"].attrs["units"] == "um"
     assert isinstance(array, xarray.Dataset) and array["conductivity_m_per_d"].attrs["units"] == "m/day"
     for run in (swept.runs[3], swept.runs[1]):
@@ -509,7 +514,8 @@ def test_a_sweep_converts_to_tables_and_pictures(tmp_path):
     assert swept.to_xarray().sizes == {"pore.width": 2, "flow.viscosity_ratio": 1}
     swept.runs.extend(3 * swept.runs + swept.runs[:1])
     assert swept.to_xarray().sizes == {"run": 9}
-    assert repr(swept.runs).count("\n") == 8 and repr(swept.runs).startswith("<run 1 (48.0, 100.0): completed, to 1 h>")
+    assert repr(swept.runs).count("\n") == 8
+    assert repr(swept.runs).startswith("<run 1 (48.0, 100.0): completed, to 0.4 h>")
     swept.runs.extend(swept.runs[:2])
     assert repr(swept.runs).splitlines()[9:] == ["... and 2 more"]
     axes = swept.plot("conductivity")
@@ -530,7 +536,7 @@ def test_events_of_a_run():
 
 def test_marks_of_the_page_have_the_colour_of_their_key(tmp_path):
     """Two factors are varied, and each figure has the key of the other one. Dots are runs that clogged, triangles runs
-    that ended before; failed runs have no mark."""
+    that ended before; failed runs have no mark. Lines go up with their values, and stay in the frame."""
     factors = [parse("pore.width=40 um, 50 um"), parse("flow.viscosity_ratio=100, 400, 1000")]
     designed, course = points("flow_only", [], factors, grid(factors)), np.array([1.0, 8.0])
     numbers_of = [dict.fromkeys(table.COLUMNS) | {"clogging_time_h": time} for time in (5.0, 5.0, None, 5.0, 5.0, None)]
@@ -547,6 +553,11 @@ def test_marks_of_the_page_have_the_colour_of_their_key(tmp_path):
         assert {named[level] == value for _, level, _, value, _ in marks} == {True}
         for kind, _, run, _, message in marks:
             assert (kind, message) == (("polygon", "after 8 h") if run == "3" else ("circle", "5 h"))
+    lines = re.findall('<polyline class="line[0-9]" points="([^"]*)"><title>run', text)
+    places = np.array([[pair.split(",") for pair in line.split()] for line in lines], float)
+    assert len(lines) == 12 and (np.diff(places, axis=1) * [1, -1] > 0).all()
+    assert (places >= (charts.LEFT, charts.TOP)).all()
+    assert (places <= (charts.WIDTH - charts.RIGHT, charts.HEIGHT - charts.BOTTOM)).all()
 
 
 def luminance(colour):
