@@ -93,13 +93,6 @@ def test_a_key_that_is_no_text_is_refused(tables):
         repro.solve(tables)
 
 
-@pytest.mark.parametrize("width", ["1e-300 um", "0.9 nm", "1.1 m", "1e160 um"])
-@pytest.mark.parametrize("function", [repro.solve, repro.check])
-def test_a_width_that_no_pore_has_is_refused(function, width):
-    with pytest.raises(SceneError, match="pore.width = .* 1 nm to 1 m"):
-        function({"pore": {"width": width}, "flow": {"head": "1e-3 cm"}})
-
-
 @pytest.mark.parametrize("out", ["none/out{}", "folder{}", "null\0{}"])
 @pytest.mark.parametrize("kind", ["png", "gif", "html"])
 def test_a_file_that_cannot_be_written_is_refused_before_it_is_drawn(tmp_path, monkeypatch, capsys, out, kind):
