@@ -65,7 +65,7 @@ def test_growth_by_uptake_of_zero_order_runs_past_sharp_fronts():
     pore_of = {"pore": {"width": "70.34 um", "length": "1688 um"}, "aggregate": {"radius": "21.23 um"},
                "flow": {"mean_velocity": "0.072 m/day"}, "growth": {"end": "3 h", "new_biomass": "stress_free"},
                "substrates": {"acceptor": {"supply": "0.758 mg/L"}, "donor": {"supply": "3.77 mg/L"}},
-               "kinetics": {"law": "zero order"}, "numerics": {"preset": "fast"}}
+               "kinetics": {"law": "zero order"}, "numerics": {"preset": "fast"}, "output": {"times": ["3 h"]}}
     scene = load_scene(pore_of)
     grown = Sizes(3.0, 32 * np.pi, 25.0, 25.0, False)
     warned = [w.text for w in widened_fronts(scene, grown)]

@@ -12,7 +12,8 @@ from repro.cli import main
 from tests import faults
 from tests.shell import refusal
 
-CONTACT = ['numerics.preset="fast"', 'aggregate.radius="17.98 um"', 'pore.width="20 um"', 'growth.end="0.6 h"']
+CONTACT = ['numerics.preset="fast"', 'aggregate.radius="17.98 um"', 'pore.width="20 um"', 'growth.end="0.6 h"',
+           "output.every=0.2 h"]
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +52,7 @@ def test_axes_are_accepted_and_returned(results):
     "velocity_m_per_d", "J", *(pytest.param(name, marks=pytest.mark.thorough) for name in ("acceptor", "pressure"))])
 def test_a_field_has_its_colours_and_the_outline(preset, name):
     """The outline lies on the interface: ends on the wall, top at the thickness, a chain without gaps."""
-    run = repro.solve("base", [f"numerics.preset={preset}", "growth.end=0.2 h"])
+    run = repro.solve("base", [f"numerics.preset={preset}", "growth.end=0.2 h", 'output.times=["0.2 h"]'])
     ax = run.plot(name, time=0.2)
     fields = run.fields(0.2)
     values = next(fields[each] for each in fields if each.startswith(name))

@@ -13,6 +13,7 @@ import repro
 from repro.cli import main
 from repro.fem import linear
 from repro.march.simulation import simulate
+from repro.model.meshing import seeded
 from repro.preflight import memory
 from repro.preflight.checked import check
 from repro.runs import execution, machine
@@ -55,7 +56,7 @@ def test_the_estimated_nodes_are_those_of_the_mesh(name, sets):
     """At t = 0, within a factor of 1.5."""
     end = [] if name == "flow_only" else ["growth.end=0 h"]
     scene = load_scene(name, [*(f"numerics.{entry}" for entry in sets), *end])
-    nodes = len(next(simulate(scene)).pore.mesh.points)
+    nodes = len(seeded(scene).mesh.points)
     assert nodes / 1.5 < memory.expected_nodes(scene) < 1.5 * nodes
 
 
@@ -295,6 +296,6 @@ def test_the_chosen_solver_reaches_every_system(preset, monkeypatch):
 
     monkeypatch.setattr(linear.Solver, "_first", record_method)
     for _ in simulate(load_scene("base", [f"numerics.preset={preset}", "numerics.solver=pardiso",
-                                          'growth.end="0.5 h"'])):
+                                          'growth.end="0.5 h"', 'output.times=["0.5 h"]'])):
         pass
     assert len(methods) > 10 and set(methods) == {linear.Method("pardiso")}

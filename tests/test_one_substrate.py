@@ -17,7 +17,7 @@ from repro.preflight.modelled import describe_model
 from repro.scene import load_scene
 from repro.schemes import CURVED
 
-SCHEMES = {"midpoint": ["numerics.preset=fast", 'growth.end="2 h"'],
+SCHEMES = {"midpoint": ["numerics.preset=fast", 'growth.end="2 h"', 'output.times=["0 h", "2 h"]'],
            "updates": ["numerics.preset=paper", "numerics.refinement=0.5", 'growth.end="1 h"'],
            "gear": ["numerics.preset=paper", "numerics.refinement=0.5", "numerics.transport=gear",
                     'growth.end="0.4 h"']}

@@ -30,7 +30,7 @@ def test_elements_beside_contact_lines_are_as_small_as_requested(count):
     """Edges beside the upper contact lines of a new mesh have at most the least film over the requested number. If no
     number is set, they are as large as elsewhere."""
     scene_in_contact = scene("17.9 um", "20 um", velocity="2.9 m/day", growth={"end": "0.2 h"},
-                 numerics={"preset": "fast", "contact_elements": count})
+                 numerics={"preset": "fast", "contact_elements": count}, output={"times": ["0.1 h", "0.2 h"]})
     film = scene_in_contact.growth.minimum_film
     last = next(instant.pore for instant in reversed(list(simulation.simulate(scene_in_contact))) if instant.remeshes)
     outline = last.outline.corners

@@ -16,7 +16,7 @@ from repro.scene import SceneError
 from tests import faults
 from tests.strategies import same_arrays
 
-SHORT = ["numerics.preset=fast", "growth.end=0.2 h", "numerics.refinement=0.5"]
+SHORT = ["numerics.preset=fast", "growth.end=0.2 h", "output.every=0.2 h"]
 #: Positional arguments of each function that reads a scene or runs one; all others are given by name.
 ORDER = {**dict.fromkeys(("solve", "check", "simulate", "load_scene"), ["scene", "overrides"]),
          "run": ["scene", "folder", "overrides"], "resume": ["folder", "overrides"],

@@ -47,9 +47,6 @@ from tests.shell import (
 
 CONTACT = ('aggregate.radius="17.98 um"', 'pore.width="20 um"', 'growth.end="0.6 h"')
 SCENES = {
-    "paper, unreported steps": ('growth.end="1 h"', 'output.times=["0.3 h", "1 h"]'),
-    "fast": ('numerics.preset="fast"', "numerics.tolerance=0.0005", 'aggregate.radius="25 um"', 'growth.end="3 h"',
-             'output.times=["0.1 h", "0.7 h", "0.8 h", "2 h"]'),
     "fast, jumps": ('numerics.preset="fast"', 'growth.end="0.8 h"', 'substrates.donor.supply='
                     '[["0 h", "10 mg/L"], ["0.3 h", "0 mg/L"], ["0.5 h", "20 mg/L"]]',
                     'output.times=["0.1 h", "0.3 h", "0.4 h", "0.7 h"]'),

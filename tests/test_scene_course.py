@@ -138,8 +138,8 @@ def test_a_row_within_a_step_has_the_supply_of_its_time(preset):
 @pytest.mark.parametrize("way", ["preset=fast", "preset=paper", "transport=gear"])
 def test_the_supply_of_a_rising_velocity_is_its_integral(way):
     """The mean is 2 m/day, to round-off, for steps of any length."""
-    loaded = load_scene("base", [f"flow.mean_velocity={RISE}", 'growth.end="0.5 h"', f"numerics.{way}"],
-                        unset=["flow.head"])
+    loaded = load_scene("base", [f"flow.mean_velocity={RISE}", 'growth.end="0.5 h"', f"numerics.{way}",
+                                 'output.times=["0.5 h"]'], unset=["flow.head"])
     total_supply = np.sum([step.supplied for instant in simulate(loaded) for step in instant.ledgers], axis=0)
     assert total_supply == pytest.approx(np.full(2, 2e6 / 24 * 0.5 * 50 * 10), rel=1e-9)
 

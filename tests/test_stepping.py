@@ -179,7 +179,7 @@ def test_a_step_ends_at_contact_within_a_thousandth_of_the_film(monkeypatch):
         return attempt(*arguments)
 
     monkeypatch.setattr(midpoint, "attempt", record_search)
-    scene = base('growth.end="1 h"')
+    scene = base('growth.end="1 h"', 'output.times=["1 h"]')
     for _ in simulation.simulate(scene):
         pass
     assert {search.landing for search in searches} == {0.999}
@@ -231,7 +231,7 @@ def test_the_last_step_uses_finer_elements_if_a_front_needs_them(needed, message
         return attempt(scene, state, solved, duration, *most)
 
     monkeypatch.setattr(midpoint, "attempt", cut)
-    scene = simulation.simulate(base('growth.end="0.3 h"'))
+    scene = simulation.simulate(base('growth.end="0.3 h"', 'output.times=["0.3 h"]'))
     if message:
         with pytest.raises(SimulationError, match=message):
             list(scene)

@@ -1,26 +1,29 @@
 """Fields as ParaView, PyVista and this package read them, to the last bit. tests/test_derived.py tests their values.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import pyvista
 from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
 
 from repro import results
+from repro.model import solving
 from repro.results import field_files
 from repro.scene import load_scene
 from tests.pages import cached_run
-from tests.strategies import EVERY_ORDER, arrays_of, same_arrays
-from tests.test_derived import late_instant
+from tests.strategies import EVERY_ORDER, arrays_of, coarse_base, same_arrays
 
 
 @pytest.fixture
 def written(order, tmp_path):
-    """A late pore with elements of an order, its fields, and the file of the fields."""
-    scene, report = late_instant(order)
-    content = results.fields(scene, report.pore, report.solved)
+    """A pore with elements of an order at a time with many digits, its fields, and the file of the fields."""
+    scene, seed = coarse_base(order)
+    state = replace(seed, time=1 / 3)
+    content = results.fields(scene, state, solving.solve(scene, state))
     field_files.write(tmp_path / "fields.vtu", content)
-    return report.pore, content, tmp_path / "fields.vtu"
+    return state, content, tmp_path / "fields.vtu"
 
 
 def read_by_vtk(path):

@@ -1,8 +1,10 @@
 """A run repeats the warnings of `check` on standard error, in run.json, and at the head of its page."""
 
 import html
+import io
 import json
 import re
+from contextlib import redirect_stdout
 from unittest.mock import Mock
 
 import pytest
@@ -21,14 +23,15 @@ from tests.pages import Page, cached_run, text_of
 from tests.shell import flags, interrupt_run, lasting_record, read_record
 
 CHANGES = ("numerics.preset=fast", "growth.time_step=0.6 h", "growth.end=1 h", "pore.length=100 um",
-        "aggregate.radius=16 um")
+           "aggregate.radius=16 um", "output.every=0.5 h")
 
 
-@pytest.fixture
-def checked(capsys):
+@pytest.fixture(scope="module")
+def checked():
     """The warnings of `repro check`."""
-    assert main(["check", "wide", *flags(*CHANGES), "--json"]) == 0
-    warnings = json.loads(capsys.readouterr().out)["warnings"]
+    with redirect_stdout(io.StringIO()) as printed:
+        assert main(["check", "wide", *flags(*CHANGES), "--json"]) == 0
+    warnings = json.loads(printed.getvalue())["warnings"]
     assert warnings, "else nothing is tested"
     return warnings
 
