@@ -12,8 +12,7 @@ from repro.errors import GrowthError, MeshError, TransferError, TransportError
 from repro.fem import transfer
 from repro.march import midpoint
 from repro.march.simulation import simulate
-from repro.model import biomass, contact_lines, contact_newton, gear, growth, mesh_motion, surface, transport
-from repro.model.biomass import Rates
+from repro.model import contact_lines, contact_newton, gear, growth, mesh_motion, surface, transport
 from repro.model.closing_by_lines import ByLines
 from repro.model.contact_lines import PATIENT
 from repro.model.kinetics import Sink
@@ -137,14 +136,6 @@ def test_a_surface_with_a_triangle_that_is_turned_over_fails_in_growth(order):
     pore = coarse_base(order)[1]
     with pytest.raises(GrowthError, match=OUT_OF_DOMAIN):
         surface.surface(pore.moved(turned_over(pore.mesh.points, pore.mesh.body)))
-
-
-@pytest.mark.parametrize("order", [1, 2])
-def test_biomass_that_overflows_fails_in_growth(order):
-    pore = coarse_base(order)[1]
-    rates = Rates(np.full_like(pore.active, 0.3), np.zeros_like(pore.active))
-    with pytest.raises(GrowthError, match=OUT_OF_DOMAIN):
-        biomass.grow(pore, rates, 1e4)
 
 
 def run(monkeypatch, *changes, unset=()):

@@ -15,7 +15,7 @@ from repro.cli import main
 from repro.errors import GrowthError, LinearError, MeshError, SimulationError
 from repro.march import loop
 from repro.march.balance import Ledger
-from repro.march.ends import CLOSE, nearest_end
+from repro.march.ends import nearest_end
 from repro.march.folding import most_compressed, refuse_density
 from repro.march.loop import Stepping
 from repro.march.state import Compression, InterpolatedState, RestartState, StepResult
@@ -54,19 +54,15 @@ def warned(folder):
 
 @pytest.mark.thorough
 def test_a_fold_ends_a_run(tmp_path, capsys):
-    """The last state is written; it lies at Biot's limit, to the accuracy of events. The independent stretches confirm
-    it. The exit status is 0. The warning appears once, when creases begin. The same command and --resume leave
-    the run unchanged."""
+    """The exit status is 0, and the independent stretches confirm the fold; test_ends.py tests its time. The warning
+    appears once, when creases begin. The same command and --resume leave the run unchanged."""
     words = [part for change in SETS for part in ("--set", change)]
     command = ["run", "base", "--unset", "aggregate.radius", *words, "--out", str(tmp_path / "run")]
     assert main(command) == 0
     folder = tmp_path / "run"
     messages = [line for line in capsys.readouterr().err.splitlines() if "growth.new_biomass: " in line]
     table = read_table(folder / "timeseries.csv")
-    last = table["surface_stretch_min"][-1]
-    assert 0 < BIOT / last - 1 <= CLOSE and table["time_h"].tolist()[:3] == [0.0, 1.0, 4.6]
     status = read_record(folder)["status"]
-    assert status.startswith(f"the aggregate's surface folds at t = {table['time_h'][-1]:g} h: growth ")
     assert "a finer mesh does not help" in status and 'growth.new_biomass = "stress_free" does' in status
     assert family.judge(folder, status)["verdict"] == family.FOLD
     texts = warned(folder)

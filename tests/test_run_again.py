@@ -73,7 +73,7 @@ def test_a_forced_run_removes_only_the_listed_files(tmp_path):
     version has written and listed is removed."""
     out = tmp_path / "run"
     reference = cached_run(SCENE)
-    run(load_scene("base", ('numerics.preset="fast"', 'growth.end="6 h"')), out)
+    run(load_scene("base", ('numerics.preset="fast"', 'growth.end="6 h"', "output.every=1 h")), out)
     foreign = {name: b"years of work" for name in ("notes.txt", "fields/mine.vtu", "fields/fields_mine.vtu",
                                                 "timeseries.csv.bak", "../victim", "link.txt")}
     (out / "link.txt").symlink_to(tmp_path / "victim")
