@@ -55,12 +55,17 @@ def run_and_wait(*arguments, **options) -> tuple[int, str, str]:
     return process.returncode, out, err
 
 
-def wait_for(condition, process: subprocess.Popen) -> None:
-    """Wait until a condition is true or the process has ended."""
-    end = time.monotonic() + 120
-    while not condition() and process.poll() is None:
+def until(condition, seconds: float = 60) -> None:
+    """Wait until a condition is true."""
+    end = time.monotonic() + seconds
+    while not condition():
         assert time.monotonic() < end, "it took too long"
         time.sleep(0.01)
+
+
+def wait_for(condition, process: subprocess.Popen) -> None:
+    """Wait until a condition is true or the process has ended."""
+    until(lambda: condition() or process.poll() is not None, 120)
 
 
 def files(folder: Path) -> dict[str, bytes]:

@@ -66,10 +66,8 @@ def instant_in(state, order):
 
 
 # Lagrange's functions from their nodes alone.
-THIRDS = [(1, 0), (2, 0), (2, 1), (1, 2), (0, 1), (0, 2), (1, 1)]
 CORNERS = [(0, 0), (1, 0), (0, 1)]
-NODES = {1: np.array(CORNERS, float), 2: np.array([*CORNERS, (0.5, 0), (0.5, 0.5), (0, 0.5)]),
-         3: np.array([*CORNERS, *(np.array(THIRDS) / 3)])}
+NODES = {1: np.array(CORNERS, float), 2: np.array([*CORNERS, (0.5, 0), (0.5, 0.5), (0, 0.5)])}
 
 
 def powers(order):

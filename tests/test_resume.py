@@ -264,19 +264,6 @@ def test_a_failure_names_the_last_good_state(tmp_path, monkeypatch):
     assert matches_uninterrupted(scene, tmp_path / "run")
 
 
-def test_results_reach_the_disk_while_a_run_goes_on(tmp_path):
-    """Tables and run.json are written at every checkpoint."""
-    states = []
-
-    def observe(event):
-        if event["event"] == "checkpoint":
-            rows = len((tmp_path / "timeseries.csv").read_text().splitlines()) - 1
-            states.append((read_record(tmp_path)["status"], rows, len([*tmp_path.glob("fields/*")])))
-
-    run(load_scene("base", ["growth.end=1 h"]), tmp_path, watch=Watch(tell=observe, interval=0.0))
-    assert states == [("running", count, count) for count in range(1, len(states) + 1)] and len(states) > 4
-
-
 @pytest.mark.exact_lengths
 @pytest.mark.parametrize("number, status", [
     pytest.param(signal.SIGINT, 130, marks=pytest.mark.thorough), (signal.SIGTERM, 143)])

@@ -28,13 +28,13 @@ from repro.runs import execution
 from repro.runs.machine import THREADS
 from repro.runs.status import COMPLETED, FAILED, INTERRUPTED, RUN_ENDS, RUNNING
 from repro.sweeps import driver, page, pool, single_run, table
-from repro.sweeps.design import grid, latin, parse, points
+from repro.sweeps.design import latin, parse
 from repro.sweeps.folder import Sweep
 from tests import shell
 from tests.pages import HOSTILE, check_alone
-from tests.shell import read_record, rewrite, rows, start
+from tests.shell import read_record, rewrite, rows, start, until
 from tests.strategies import number
-from tests.test_sweep_cluster import until
+from tests.test_sweep_design import make_points
 
 #: The runs of a sweep are processes of their own.
 pytestmark = pytest.mark.exact_lengths
@@ -175,8 +175,8 @@ def test_the_page_needs_no_network_and_escapes_its_texts(finished):
     html_page = check_alone(text)
     assert [kind for kind, _, _ in html_page.scripts] == ["style"] and "script-src 'none'" in text
     assert [link.rstrip("/") for link in html_page.outside] == [run["folder"] for run in rows(finished / "runs.csv")]
-    factors = [parse("numerics.preset=fast, paper")]
-    strange = Sweep(finished, HOSTILE, factors, points("base", [], factors, grid(factors)))
+    varied = "numerics.preset=fast, paper"
+    strange = Sweep(finished, HOSTILE, [parse(varied)], make_points(varied))
     escaped = page.page(strange, table.read_runs(strange, {1: f"failed: {HOSTILE}"}, 0.1), 0.1)
     assert "<script" not in escaped and "<img" not in escaped and escaped.count(html.escape(HOSTILE)) == 3
 
@@ -242,9 +242,8 @@ def test_biomass_and_contact_are_read_from_the_rows(finished, tmp_path):
     """Biomass is the area over that of the pore; contact is at its first row. Conductivity is over that of the start,
     and not over its largest."""
     source = finished / rows(finished / "runs.csv")[0]["folder"]
-    factors = [parse("flow.mean_velocity=2.9 m/day")]
-    sets = SHORT[1::2]
-    swept = Sweep(tmp_path, "base", factors, points("base", sets, factors, grid(factors)))
+    varied = "flow.mean_velocity=2.9 m/day"
+    swept = Sweep(tmp_path, "base", [parse(varied)], make_points(varied, sets=SHORT[1::2]))
     folder = Path(shutil.copytree(source, swept.runs / swept.points[0].name))
     lines = rows(folder / "timeseries.csv")
     for k, line in enumerate(lines):
@@ -286,8 +285,7 @@ def children(pid):
 
 
 def two_points():
-    factors = [parse("pore.width=48 um, 50 um")]
-    return points("flow_only", [], factors, grid(factors))
+    return make_points("pore.width=48 um, 50 um", source="flow_only")
 
 
 def test_a_process_killed_between_runs_costs_none(tmp_path):
@@ -386,10 +384,10 @@ def test_output_of_c_code_does_not_reach_the_user(tmp_path, capfd, monkeypatch):
     (lambda out, run: (out / "runs").write_text("mine"), "runs: it is a link, or no folder")])
 def test_foreign_folders_and_links_are_refused(tmp_path, capsys, arrange, why):
     """A foreign folder, and links in place of all runs or of one, are refused before anything is written."""
-    factors = [parse("pore.width=48 um, 50 um")]
+    varied = "pore.width=48 um, 50 um"
     (tmp_path / "sweep").mkdir()
-    arrange(tmp_path / "sweep", tmp_path / "sweep" / "runs" / points("base", [], factors, grid(factors))[0].name)
-    assert why in refused(tmp_path / "sweep", capsys, "--vary", "pore.width=48 um, 50 um")
+    arrange(tmp_path / "sweep", tmp_path / "sweep" / "runs" / make_points(varied)[0].name)
+    assert why in refused(tmp_path / "sweep", capsys, "--vary", varied)
 
 
 def cut_off(out, how, *arguments):
@@ -417,8 +415,8 @@ def test_a_signal_ends_a_sweep_quietly(tmp_path, how, ends, word):
 
 
 def sweep_of(folder, widths):
-    factors = [parse(f"pore.width={widths}")]
-    return Sweep(folder, "flow_only", factors, points("flow_only", [], factors, grid(factors)))
+    varied = f"pore.width={widths}"
+    return Sweep(folder, "flow_only", [parse(varied)], make_points(varied, source="flow_only"))
 
 
 def record_end(swept, point, status, rows=1):
@@ -537,12 +535,12 @@ def test_events_of_a_run():
 def test_marks_of_the_page_have_the_colour_of_their_key(tmp_path):
     """Two factors are varied, and each figure has the key of the other one. Dots are runs that clogged, triangles runs
     that ended before; failed runs have no mark. Lines go up with their values, and stay in the frame."""
-    factors = [parse("pore.width=40 um, 50 um"), parse("flow.viscosity_ratio=100, 400, 1000")]
-    designed, course = points("flow_only", [], factors, grid(factors)), np.array([1.0, 8.0])
+    varied = "pore.width=40 um, 50 um", "flow.viscosity_ratio=100, 400, 1000"
+    designed, course = make_points(*varied, source="flow_only"), np.array([1.0, 8.0])
     numbers_of = [dict.fromkeys(table.COLUMNS) | {"clogging_time_h": time} for time in (5.0, 5.0, None, 5.0, 5.0, None)]
     runs = [table.SweepRun(one, "completed", course, course, course, each) for one, each in zip(designed, numbers_of)]
     runs[5] = replace(runs[5], status="failed: x")
-    text = page.page(Sweep(tmp_path, "flow_only", factors, designed), runs, 0.3)
+    text = page.page(Sweep(tmp_path, "flow_only", [*map(parse, varied)], designed), runs, 0.3)
     times = text.split("<h2>Clogging time")[1].split("<h2>")[0]
     figures = re.findall("<figure>.*?</figure>", times, re.S)
     for figure, key in zip(figures, ("flow.viscosity_ratio", "pore.width"), strict=True):

@@ -14,7 +14,7 @@ import pytest
 
 from repro.cli import main
 from repro.sweeps import cluster, single_run
-from tests.shell import rows
+from tests.shell import rows, until
 from tests.shell import start as start_command
 
 VARY = ["--vary", "pore.width=48:52 um:linear:6", "--set", "numerics.preset=fast"]
@@ -85,13 +85,6 @@ def free_port():
     with socket.socket() as server:
         server.bind(("127.0.0.1", 0))
         return server.getsockname()[1]
-
-
-def until(condition, seconds=60):
-    deadline = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < deadline, "it took too long"
-        time.sleep(0.05)
 
 
 @pytest.fixture
