@@ -126,7 +126,8 @@ def test_there_are_no_more_processes_than_runs(tmp_path, monkeypatch, requested,
     driver.ready.assert_called_once_with(None, started)
 
 
-def test_a_folder_of_another_run_is_refused(copied, capsys):
+def test_a_folder_of_another_run_is_refused(copied, capsys, monkeypatch):
+    monkeypatch.setattr(driver, "ready", in_this_process)
     first, _, last = [copied / row["folder"] for row in rows(copied / "runs.csv")]
     shutil.rmtree(last)
     shutil.copytree(first, last)
@@ -194,8 +195,9 @@ def test_the_table_of_the_page_agrees_with_the_runs(finished):
         assert {name: cells[name] for name in expected} == expected
 
 
-def test_rows_have_the_inputs_of_their_runs(tmp_path):
+def test_rows_have_the_inputs_of_their_runs(tmp_path, monkeypatch):
     """With two factors of other sizes and units, both tables have each run's inputs and its velocity."""
+    monkeypatch.setattr(driver, "ready", in_this_process)
     out = tmp_path / "sweep"
     assert sweep(out, "--vary", "pore.width=40 um, 50 um, 60 um", "--vary", "flow.mean_velocity=1 m/day, 3 m/day",
                  "--quiet", scene="flow_only") == 0

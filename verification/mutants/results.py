@@ -266,7 +266,7 @@ MUTANTS = (
          "fields",
          "Grid(_three(pore.mesh.points), pore.mesh.cells, points, cells, pore.time)",
          "Grid(_three(pore.mesh.points), pore.mesh.cells, points, cells, 0.0)",
-         *(f"{READERS}[1-by_{reader}]" for reader in ("vtk", "this_package", "pyvista"))),
+         *(f"{READERS}[1-by_{reader}]" for reader in ("this_package", "pyvista"))),
         ("stress-of-what-is-born-without",
          "Stress since t = 0 is reported for stress-free biomass.",
          "",
