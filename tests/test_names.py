@@ -51,6 +51,9 @@ def session(folder, monkeypatch, name, terminal, *more):
 @pytest.mark.filterwarnings("ignore:Glyph")
 def test_names_of_any_bytes_pass_through_commands(tmp_path, monkeypatch):
     """Pages, tables, pictures and NetCDF are written, and the file of the scene is still known by its bytes."""
+    file = tmp_path / f"{NAMES['bytes']}.toml"
+    file.write_text("[pore]")
+    assert repro.load_scene(file).name == "\\udcff\\udcfe x"
     record = session(tmp_path, monkeypatch, NAMES["bytes"], "ascii")
     assert record["scene"] == "\\udcff\\udcfe x" and os.path.isfile(record["origin"]["file"])
 
