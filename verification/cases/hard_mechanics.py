@@ -285,13 +285,14 @@ def to_the_end(preset: str) -> list:
     """A pore 90 um long and 30 um wide. The aggregate grows to its upstream end."""
     changes = ('pore.width="30 um"', 'pore.length="90 um"', 'aggregate.radius="25 um"', 'growth.end="60 h"')
     run = hard.run_packaged("wide", preset, *changes, density=CLOSING)
+    half = run.scene.pore.length / 2
     ends = np.array([i.pore.mesh.ends for i in run.instants])
     upstream, downstream = (run.column(name) for name in SHAPE[2:])
-    beyond = max(0.0, largest([upstream, downstream, *ends.T]) - 45)
+    beyond = max(0.0, largest([upstream, downstream, *ends.T]) - half)
     return [run, at_most("runs that did not say that the pore's end is reached", not run.ended, 0, "PoreEnd"),
             at_most("um of mesh or aggregate beyond the pore", beyond, 0, "3.1: capped"),
-            at_most("um of pore left without mesh", 45 - np.abs(ends[-1]).min(), 0, "1.5 W is past both ends"),
-            at_most("um between the aggregate and the end, at the end", 45 - max(-upstream[-1], downstream[-1]),
+            at_most("um of pore left without mesh", half - np.abs(ends[-1]).min(), 0, "1.5 W is past both ends"),
+            at_most("um between the aggregate and the end, at the end", half - max(-upstream[-1], downstream[-1]),
                     30 / 14, "an element of W / 14")]
 
 
