@@ -7,6 +7,7 @@ CRATE := build/crate/.installed
 SITE := build/docs/.installed
 OLDEST := build/oldest/.installed
 NETWORK := build/network/.installed
+GOLD := build/gold/.installed
 OLDEST_TESTS := tests/test_python_calls.py tests/test_drawing.py tests/test_field_files.py tests/test_linear.py \
 	tests/test_scene.py tests/test_progress.py tests/test_folder.py
 PIP := $(BIN) -m pip install -q --disable-pip-version-check
@@ -19,7 +20,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
-.PHONY: help env figures check-manifest claims sensitivity verify verify-fast mutants mutants-sampled test test-thorough oldest lint bench crate network docs clean
+.PHONY: help env figures check-manifest claims sensitivity verify verify-fast mutants mutants-sampled test test-thorough oldest lint bench crate network gold docs clean
 
 help:
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/\1|\2/p' Makefile | awk -F'|' '{ printf "  make %-16s %s\n", $$1, $$2 }'
@@ -81,6 +82,9 @@ network: $(STAMP) $(NETWORK) ## run the example of a network with OpenPNM, and i
 	@$(dir $(NETWORK))bin/python docs/howto/openpnm_network.py
 	@$(dir $(NETWORK))bin/python -m pytest tests/test_openpnm.py
 
+gold: $(GOLD) ## compute the numbers of another code, NGSolve, anew: reference/gold/flow.json
+	@$(dir $(GOLD))bin/python reference/gold/flow.py
+
 docs: $(STAMP) $(SITE) ## build the site into docs/_build/html, without network
 	@$(dir $(SITE))bin/python -m sphinx -q -W --keep-going -b html -c docs . docs/_build/html
 	@echo "docs/_build/html/index.html"
@@ -101,11 +105,11 @@ $(STAMP): requirements.lock pyproject.toml
 	@$(PIP) --no-deps --no-build-isolation -e .
 	@touch $@
 
-# `make crate` installs the validator's packages in a separate environment.
-$(CRATE): .ci/crate.lock
+# The validator of `make crate`, and NGSolve of `make gold`, have separate environments.
+$(CRATE) $(GOLD): build/%/.installed: .ci/%.lock
 	@rm -f $@
 	@"$(PYTHON)" -m venv --clear $(@D)
-	@$(@D)/bin/python -m pip install -q --disable-pip-version-check --require-hashes --only-binary :all: -r .ci/crate.lock
+	@$(@D)/bin/python -m pip install -q --disable-pip-version-check --require-hashes --only-binary :all: -r $<
 	@touch $@
 
 # The site is built in an environment of its own, and OpenPNM runs in one; both also see the packages of .venv.

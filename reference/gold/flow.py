@@ -1,0 +1,130 @@
+"""Flow through pores with an aggregate, by NGSolve: conductivities that no code of this project has computed.
+
+    python reference/gold/flow.py
+
+reads outlines from ``outlines.json`` and writes ``flow.json``. It needs ``requirements.lock`` in this folder and nothing
+of this project. Stokes flow (1)-(5) has fourth-order velocities and third-order pressures, which are continuous in the
+fluid and in the biomass alone: the pressure jumps where the viscosity does. Elements are curved and shrink towards the
+contact lines. The solution on elements of half the size gives the number, and its difference from the first the bar.
+
+A number is the length (um) of clean pore that has the loss that the aggregate adds. It does not depend on the pore's
+length L: the conductivity is L / (L + added) of that of the clean pore.
+"""
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+from netgen.occ import BezierCurve, Face, Glue, OCCGeometry, Pnt, Rectangle, Segment, Wire
+from ngsolve import H1, BilinearForm, CoefficientFunction, GridFunction, Grad, InnerProduct, Integrate, Mesh, VectorH1
+from ngsolve import div, dx, y
+
+FOLDER = Path(__file__).parent
+#: Viscosity of the biomass over that of water (Table 1).
+RATIO = 2000.0
+#: Order of the velocities.
+ORDER = 4
+#: Length of clean pore before and after the aggregate, over the width.
+CLEAN = 2.5
+#: Largest elements over the width, in fluid and biomass, and elements at contact lines.
+SIZE, AT_LINES = 0.3, 0.0005
+
+
+def geometry(outline: dict, size: float) -> OCCGeometry:
+    """Fluid and biomass. An edge of the outline is a parabola through its start, middle and end; edges on a wall are
+    one straight side. Points where an edge of the fluid meets a wall are contact lines."""
+    points, wall, width = np.array(outline["points"]), np.array(outline["wall"]), outline["width"]
+    starts, middles, ends = points[::2], points[1::2], np.roll(points[::2], -1, axis=0)
+    on = wall[1::2]
+    first = next(k for k in range(len(on)) if on[k] and not on[k - 1])
+    order = np.roll(np.arange(len(on)), -first)
+    edges, k = [], 0
+    while k < len(order):
+        last = k
+        while on[order[k]] and last + 1 < len(order) and on[order[last + 1]] == on[order[k]]:
+            last += 1
+        start, middle, end = starts[order[k]], middles[order[k]], ends[order[last]]
+        if on[order[k]]:
+            edges.append(Segment(_point(start), _point(end)))
+        else:
+            edges.append(BezierCurve([_point(start), _point(2 * middle - (start + end) / 2), _point(end)]))
+        k = last + 1
+    body = Face(Wire(edges))
+    body.faces.name = "biomass"
+    low, high = points[:, 0].min() - CLEAN * width, points[:, 0].max() + CLEAN * width
+    channel = Rectangle(high - low, width).Face().Move((low, 0, 0))
+    fluid = channel - body
+    fluid.faces.name = "fluid"
+    parts = Glue([fluid, body])
+    parts.faces.maxh = size * width
+    lines = [starts[k] for k in range(len(on)) if bool(on[k]) != bool(on[k - 1])]
+    for vertex in parts.vertices:
+        if any(math.dist((vertex.p.x, vertex.p.y), line) < 1e-6 * width for line in lines):
+            vertex.maxh = AT_LINES * size / SIZE * width
+    for edge in parts.edges:
+        edge.name = {low: "inlet", high: "outlet"}.get(_at(edge, low, high), "inside")
+        if edge.name == "inside" and any(abs(edge.center.y - level) < 1e-9 * width for level in (0.0, width)):
+            edge.name = "wall"
+    return OCCGeometry(parts, dim=2)
+
+
+def _at(edge, low: float, high: float) -> float:
+    return next((x for x in (low, high) if abs(edge.center.x - x) < 1e-9 * (high - low)), math.nan)
+
+
+def _point(place: np.ndarray) -> Pnt:
+    return Pnt(float(place[0]), float(place[1]), 0.0)
+
+
+def added_length(outline: dict, size: float, interface: str, ratio: float = RATIO) -> tuple[float, int]:
+    """Length (um) of clean pore with the added loss, and the number of unknowns.
+
+    interface: "laplacian" or "traction", the form of the viscous term (E2).
+    """
+    width = outline["width"]
+    mesh = Mesh(geometry(outline, size).GenerateMesh(maxh=size * width, grading=0.25))
+    mesh.Curve(ORDER)
+    velocity = VectorH1(mesh, order=ORDER, dirichletx="wall|inlet",
+                        dirichlety="wall|inlet" + ("|outlet" if interface == "traction" else ""))
+    of_fluid, of_biomass = (H1(mesh, order=ORDER - 1, definedon=name) for name in ("fluid", "biomass"))
+    space = velocity * of_fluid * of_biomass
+    (u, p, r), (v, q, s) = space.TnT()
+    viscosity = CoefficientFunction([{"fluid": 1.0, "biomass": ratio}[name] for name in mesh.GetMaterials()])
+    strain = Grad(u) + (Grad(u).trans if interface == "traction" else 0 * Grad(u))
+    viscous = viscosity * InnerProduct(strain, Grad(v))
+    form = BilinearForm(space, symmetric=True)
+    form += viscous * dx
+    form += (-p * div(v) - q * div(u)) * dx(definedon="fluid")
+    form += (-r * div(v) - s * div(u)) * dx(definedon="biomass")
+    form.Assemble()
+    solution = GridFunction(space)
+    solution.components[0].Set(CoefficientFunction((6 * y / width * (1 - y / width), 0)),
+                               definedon=mesh.Boundaries("inlet"))
+    load = solution.vec.CreateVector()
+    load.data = form.mat * solution.vec
+    free = space.FreeDofs()
+    solution.vec.data -= form.mat.Inverse(free, inverse="umfpack") * load
+    speed = solution.components[0]
+    strain = Grad(speed) + (Grad(speed).trans if interface == "traction" else 0 * Grad(speed))
+    loss = Integrate(viscosity * InnerProduct(strain, Grad(speed)), mesh) / width
+    x = np.array([place[0] for place in outline["points"]])
+    length = x.max() - x.min() + 2 * CLEAN * width
+    return loss * width**2 / 12 - length, space.ndof
+
+
+def main() -> None:
+    """Write the number and the bar of every outline."""
+    outlines = json.loads((FOLDER / "outlines.json").read_text())
+    numbers = {}
+    for name, outline in outlines.items():
+        for interface in ("laplacian", "traction"):
+            coarse, _ = added_length(outline, SIZE, interface)
+            fine, unknowns = added_length(outline, SIZE / 2, interface)
+            numbers[f"{name}, {interface}"] = {"added_um": fine, "bar_um": abs(fine - coarse), "unknowns": unknowns}
+            print(name, interface, fine, fine - coarse, unknowns, flush=True)
+    (FOLDER / "flow.json").write_text(json.dumps(numbers, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main()
