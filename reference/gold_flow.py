@@ -32,7 +32,3 @@ def added(name: str, interface: str) -> Added:
     number = json.loads((FOLDER / "flow.json").read_text(encoding="utf-8"))[f"{name}, {interface}"]
     return Added(number["added_um"], number["bar_um"])
 
-
-def conductivity_ratio(length: float, added_length: float) -> float:
-    """Conductivity of a pore of a length (um) over that without the aggregate."""
-    return length / (length + added_length)

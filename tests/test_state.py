@@ -76,8 +76,8 @@ def test_a_mesh_with_other_points_has_new_caches(geometry):
 
 
 def test_states_are_immutable():
-    """Objects with caches and the definitions of keys are frozen; searches are not. Objects with arrays, whose comparison has no single
-    truth value, are equal only to themselves."""
+    """Objects with caches and the definitions of keys are frozen; searches are not. Objects with arrays, whose
+    comparison has no single truth value, are equal only to themselves."""
     names = [module.name for module in pkgutil.walk_packages(repro.__path__, "repro.") if "__main__" not in module.name]
     every = {each for name in names for each in vars(importlib.import_module(name)).values()
              if "__dataclass_params__" in getattr(each, "__dict__", ()) and each.__module__.startswith("repro.")}

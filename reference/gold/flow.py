@@ -1,11 +1,14 @@
 """Flow through pores with an aggregate, by NGSolve: conductivities that no code of this project has computed.
 
-    python reference/gold/flow.py
+    make gold
 
-reads outlines from ``outlines.json`` and writes ``flow.json``. It needs ``requirements.lock`` in this folder and nothing
-of this project. Stokes flow (1)-(5) has fourth-order velocities and third-order pressures, which are continuous in the
+reads outlines from ``outlines.json`` and writes ``flow.json``. It needs NGSolve (``.ci/gold.lock``) and nothing of this
+project. Stokes flow (1)-(5) has fourth-order velocities and third-order pressures, which are continuous in the
 fluid and in the biomass alone: the pressure jumps where the viscosity does. Elements are curved and shrink towards the
 contact lines. The solution on elements of half the size gives the number, and its difference from the first the bar.
+
+The outlines of wide, in its pore and in narrower ones, are those of the preset exact at the times in their names. The
+half-discs have 64 arcs. Coordinates are rounded to 1e-6 um.
 
 A number is the length (um) of clean pore that has the loss that the aggregate adds. It does not depend on the pore's
 length L: the conductivity is L / (L + added) of that of the clean pore.
@@ -17,8 +20,20 @@ from pathlib import Path
 
 import numpy as np
 from netgen.occ import BezierCurve, Face, Glue, OCCGeometry, Pnt, Rectangle, Segment, Wire
-from ngsolve import H1, BilinearForm, CoefficientFunction, GridFunction, Grad, InnerProduct, Integrate, Mesh, VectorH1
-from ngsolve import div, dx, y
+from ngsolve import (
+    H1,
+    BilinearForm,
+    CoefficientFunction,
+    Grad,
+    GridFunction,
+    InnerProduct,
+    Integrate,
+    Mesh,
+    VectorH1,
+    div,
+    dx,
+    y,
+)
 
 FOLDER = Path(__file__).parent
 #: Viscosity of the biomass over that of water (Table 1).
