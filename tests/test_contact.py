@@ -20,7 +20,7 @@ from repro.march.step_control import StepControl
 from repro.model import closing_by_lines, contact, contact_lines, contact_newton, growth
 from repro.model.closing_by_lines import ByLines, divided
 from repro.model.closing_by_nodes import closing_nodes
-from repro.model.configuration import FromLast
+from repro.model.configuration import FromPrevious
 from repro.model.contact_lines import PATIENT, Clearance, Contact, surface_ends
 from repro.model.mechanics import Mechanics
 from repro.model.meshing import initial_outline, seeded
@@ -163,7 +163,7 @@ def test_a_division_also_divides_the_reference_of_strain(plugged, division):
     last = 1.01 * pore.mesh.points[pore.mesh.body]
     free = np.full(2, FREE)
     touching = Contact(pore.wall, division.arcs, division.t, free, free)
-    parted = divided(replace(pore, configuration=FromLast(last)), division, touching)
+    parted = divided(replace(pore, configuration=FromPrevious(last)), division, touching)
     assert parted.unstrained == pytest.approx(1.01 * division.mesh.points[division.mesh.body], rel=1e-13)
 
 

@@ -21,7 +21,7 @@ from repro.march.loop import Stepping
 from repro.march.state import Compression, InterpolatedState, RestartState, StepResult
 from repro.march.step_control import StepControl
 from repro.model import contact
-from repro.model.configuration import FromLast
+from repro.model.configuration import FromPrevious
 from repro.model.energies.neo_hookean import BIOT, CREASE
 from repro.model.mechanics import Mechanics
 from repro.model.meshing import seeded
@@ -134,7 +134,7 @@ def test_the_least_stretch_of_a_run_stays():
     assert loop.mark_reported(state, 1.0).compression == creased
     later = compressed(1.5)
     assert most_compressed(creased, later) == creased
-    restarted = most_compressed(creased, replace(later, configuration=FromLast(later.body.reference)))
+    restarted = most_compressed(creased, replace(later, configuration=FromPrevious(later.body.reference)))
     assert restarted.stretch == surface(later).least > creased.stretch
 
 

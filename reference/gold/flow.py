@@ -5,7 +5,8 @@
 reads outlines from ``outlines.json`` and writes ``flow.json``. It needs NGSolve (``.ci/gold.lock``) and nothing of this
 project. Stokes flow (1)-(5) has fourth-order velocities and third-order pressures, which are continuous in the
 fluid and in the biomass alone: the pressure jumps where the viscosity does. Elements are curved and shrink towards the
-contact lines. The solution on elements of half the size gives the number, and its difference from the first the bar.
+contact lines. Each outline is solved
+on two meshes. The second has elements of half the size and gives the number. The bar is the difference between the two.
 
 The outlines of wide, in its pore and in narrower ones, are those of the preset exact at the times in their names. The
 half-discs have 64 arcs. Coordinates are rounded to 1e-6 um.

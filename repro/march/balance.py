@@ -147,8 +147,8 @@ def refuse(limits: Limits, after: Pore, ledger: Ledger) -> None:
 def accepted_demand(limits: Limits, ledger: Ledger) -> float:
     """Largest accepted defect of the oxygen demand in a step.
 
-    The midpoint rule closes to round-off. The paper's updates err as their transport does in a step
-    of dt times the fastest rate, k Y + b.
+    The midpoint rule closes to round-off. In the paper's updates the method of transport bounds the
+    error. The bound depends on dt times the fastest rate, k Y + b.
     """
     if limits.scheme.controls_error:
         return LARGEST

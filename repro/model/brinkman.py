@@ -34,7 +34,7 @@ ACROSS = 6.0
 
 
 @dataclass(frozen=True, eq=False)
-class Layers:
+class Drag:
     """The terms that the drag of biomass of a permeability (um2) adds to the flow's system."""
 
     velocity: Space

@@ -38,9 +38,7 @@ from repro.model.pore import Pore
 RETREATS = 6
 #: Defect at which each part of theta except the last counts as reached.
 PARTLY = 1e-3
-#: Clearances of the first contact at which Newton's method takes over from the search. Without the
-#: search, members 11 and 29 of the hard family and pores 0, 8 and 15 of the practical ones stop at
-#: their first contact.
+#: Clearances of the first contact at which Newton's method takes over from the search.
 CLOSE_ENOUGH = 0.2
 #: Lengths of the first contact on both sides of the highest point, over the least film.
 FIRST_LENGTHS = np.array([1.0, 0.5, 0.25])
@@ -155,8 +153,8 @@ class ByLines(Closing):
                                         patient=self.search.patient)
         self.iterations += iterations
         expansion = Expansion(shape, iterations, 0.0, division, self._lengths(wall, lines))
-        at_rest = advances, expansion.position, shape.pressure[: self.grown.mesh.corners]
-        self._shapes = [*self._shapes[-1:], at_rest]
+        trial = advances, expansion.position, shape.pressure[: self.grown.mesh.corners]
+        self._shapes = [*self._shapes[-1:], trial]
         return expansion
 
     def settle(self, wall: np.ndarray, lines: Sequence[Line]) -> Expansion | None:

@@ -28,7 +28,7 @@ class FromStart:
     accumulates = True
 
     def restarted(self, positions: np.ndarray) -> FromStart:
-        """The same."""
+        """This configuration."""
         return self
 
     def unstrained(self, body: Body) -> np.ndarray:
@@ -40,28 +40,28 @@ class FromStart:
         return self
 
     def strained(self, body: Body, theta: np.ndarray) -> tuple[Body, np.ndarray]:
-        """Both are known."""
+        """The body and its theta."""
         return body, theta
 
 
 @dataclass(frozen=True, eq=False)
-class FromLast:
+class FromPrevious:
     """New biomass has no stress; positions: (n, 2) um, the nodes in the last shape."""
 
     positions: np.ndarray
     accumulates = False
 
-    def restarted(self, positions: np.ndarray) -> FromLast:
+    def restarted(self, positions: np.ndarray) -> FromPrevious:
         """These positions."""
-        return FromLast(positions)
+        return FromPrevious(positions)
 
     def unstrained(self, body: Body) -> np.ndarray:
         """The positions."""
         return self.positions
 
-    def carried(self, carry: Callable[[np.ndarray], np.ndarray]) -> FromLast:
-        """Their positions there."""
-        return FromLast(carry(self.positions))
+    def carried(self, carry: Callable[[np.ndarray], np.ndarray]) -> FromPrevious:
+        """The positions on the other mesh."""
+        return FromPrevious(carry(self.positions))
 
     def strained(self, body: Body, theta: np.ndarray) -> tuple[Body, np.ndarray]:
         """The expansion is theta / J. This removes the error of J = theta, so the area follows the
@@ -69,11 +69,11 @@ class FromLast:
         return replace(body, reference=self.positions), theta / body.strained(self.positions).J
 
 
-ReferenceConfiguration: TypeAlias = FromStart | FromLast
+ReferenceConfiguration: TypeAlias = FromStart | FromPrevious
 
 
 def configuration_of(growth: Growth | None, positions: np.ndarray) -> ReferenceConfiguration:
     """The configuration of a scene's growth; positions: (n, 2) um, of the last shape."""
     if growth and growth.new_biomass == "stress_free":
-        return FromLast(positions)
+        return FromPrevious(positions)
     return FromStart()

@@ -74,15 +74,15 @@ def expand(mechanics: Mechanics, grown: Pore, theta: np.ndarray, guess: Pore | N
     """
     start = guess or grown
     if mechanics.fluid is None:
-        return at_rest(mechanics, grown, theta, start, None, search)
-    water = traction.Water(mechanics.fluid, grown)
+        return shape_under(mechanics, grown, theta, start, None, search)
+    water = traction.SurroundingFlow(mechanics.fluid, grown)
     shape = Expansion(grown, 0, 0.0)
     iterations = 0
     rounds = _Rounds()
     while not rounds.stalled:
         last = shape
         forces = rounds.next_forces(last.gathered(water.forces(last.pore)))
-        shape = at_rest(mechanics, grown, theta, start, forces, search)
+        shape = shape_under(mechanics, grown, theta, start, forces, search)
         rounds.moves.append(float(np.abs(shape.position - last.position).max()))
         iterations += shape.iterations
         if rounds.agree(shape.pore.boundary.thickness):
@@ -142,7 +142,7 @@ class _Rounds:
         return move <= FORCE_REST or self.stalled and move <= FORCE_ROUND_OFF
 
 
-def at_rest(mechanics: Mechanics, grown: Pore, theta: np.ndarray, start: Pore,
+def shape_under(mechanics: Mechanics, grown: Pore, theta: np.ndarray, start: Pore,
             forces: np.ndarray | None, search: SearchOptions) -> Expansion:
     """The new shape under constant nodal forces (n, 2) um, over mu_L; None for no forces."""
     configuration = grown.configuration.restarted(grown.mesh.points[grown.mesh.body])

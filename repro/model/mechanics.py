@@ -1,7 +1,8 @@
 """Equilibrium of a grown aggregate between the walls (2.3, 3.4): its loads and its constraints.
 
-How films and wedges close in an equilibrium (2.3.3) is the part of a :class:`Closing`, by nodes
-(:mod:`repro.model.closing_by_nodes`) or by contact lines (:mod:`repro.model.closing_by_lines`).
+A :class:`Closing` closes films and wedges (2.3.3). One subclass moves nodes
+(:mod:`repro.model.closing_by_nodes`), the other contact lines
+(:mod:`repro.model.closing_by_lines`).
 """
 
 from __future__ import annotations

@@ -30,11 +30,11 @@ class Pore:
     the points of the reaction; theta: (t, q) expansion since t = 0 in the aggregate's triangles;
     body: the aggregate as it was at t = 0; pressure: (corners,) P / mu_L; concentrations: the last
     known ones, None before the first; front: divisor of the element sizes at the aggregate, for a
-    front of the substrates in it; configuration: from which strain counts; origin_known: is
-    ``body`` the aggregate of t = 0, as it is unless its positions have folded where strain does not
-    count from them; line_speeds: (2, 2) um/h, speeds of the contact lines, None if unknown. A row
-    has the lines of one wall, the lower wall first: the line where a free surface begins along the
-    loop, then the line where one ends.
+    front of the substrates in it; configuration: from which strain counts; origin_known: False
+    if ``body`` is no longer the aggregate of t = 0: without strain since then, a new mesh replaces
+    places at t = 0 that fold by the present ones; line_speeds: (2, 2) um/h, speeds of the contact
+    lines, None if unknown. A row has the lines of one wall, the lower wall first: the line where a
+    free surface begins along the loop, then the line where one ends.
     """
 
     time: float

@@ -2,8 +2,8 @@
 
 Both classes have
 
-    permeable           does the drag in its volume bear the water's stress, or a traction on its
-                        surface?
+    permeable           True: the water acts on the biomass by a drag in its volume; False: by a
+                        traction on its surface
     contact_elements    least number of elements to the least film, beside upper contact lines
     pressure_jumps      does the pressure jump between water and biomass?
     terms               the system with the conditions within biomass, nu_r (T,), and element
@@ -20,7 +20,7 @@ import numpy as np
 
 from repro.fem.assembly import ElementSystem
 from repro.fem.space import Space
-from repro.model.brinkman import Layers
+from repro.model.brinkman import Drag
 from repro.scene import Flow as Drive
 from repro.scene import needed
 
@@ -64,7 +64,7 @@ class Permeable:
     def terms(self, velocity: Space, system: ElementSystem
               ) -> tuple[ElementSystem, np.ndarray, np.ndarray]:
         """Drag, and layers that elements resolve; for quadratic velocities."""
-        layers = Layers(velocity, self.permeability)
+        layers = Drag(velocity, self.permeability)
         constrained = layers.constrained(system.constrained)
         return system.with_constrained(constrained), layers.viscosity, layers.matrices()
 

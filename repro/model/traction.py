@@ -119,7 +119,7 @@ def forces(fluid: Fluid, around: Surroundings, shaped: Pore) -> np.ndarray:
     return MPA_PER_UM * drive.density * drive.gravity / fluid.shear_modulus * total
 
 
-class Water:
+class SurroundingFlow:
     """The flow around one shape after another of a grown pore.
 
     The mesh moves with the shapes. The first shape after the grown one has its own mesh, and so has

@@ -28,10 +28,10 @@ if TYPE_CHECKING:
 
 #: Largest error of m(C) with Gear's method, over the change of m for a change by the supply: the
 #: tolerance of its concentrations.
-GEAR = 1e-3
+CONCENTRATION_TOLERANCE = 1e-3
 
 
-class AtRest:
+class QuasiSteady:
     """Quasi-steady substrates; Heun's method for the biomass."""
 
     stores = False
@@ -92,14 +92,15 @@ class Gear:
 
     def growth_error(self, part: float, biomass: float, turnover: float, steepness: float) -> float:
         """Growth and uptake are integrated separately. Where a substrate runs out, m(C) errs by at
-        most GEAR supply / K. The bound is this part, and at least GEAR, of the turnover at the
-        fastest rate. Away from exhaustion at most 4e-4 is measured."""
-        return GEAR * max(1.0, steepness) * part * biomass
+        most CONCENTRATION_TOLERANCE supply / K. The bound is this part, and at least
+        CONCENTRATION_TOLERANCE, of the turnover at the fastest rate. Away from exhaustion at most
+        4e-4 is measured."""
+        return CONCENTRATION_TOLERANCE * max(1.0, steepness) * part * biomass
 
 
-TransportInTime: TypeAlias = AtRest | Gear
+TransportInTime: TypeAlias = QuasiSteady | Gear
 
 
 def transport_in_time(word: str) -> TransportInTime:
     """The method of a value of ``numerics.transport``."""
-    return Gear() if word == "gear" else AtRest()
+    return Gear() if word == "gear" else QuasiSteady()

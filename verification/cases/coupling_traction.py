@@ -210,7 +210,7 @@ def test_traction_even(changes, record):
     seed = seeded(scene)
     theta = _uneven(seed, 0.002)
     mechanics = Mechanics.of(scene)
-    plain = contact.at_rest(mechanics, seed, theta, seed, None, PATIENT).pore
+    plain = contact.shape_under(mechanics, seed, theta, seed, None, PATIENT).pore
     space = seed.moved(mesh_motion.move(seed.mesh, plain.mesh.points[seed.mesh.body], 1.0)).space
     mesh = space.mesh
     at_rest = Flow(0.0, np.zeros((space.count, 2)), np.full(mesh.corners, 5.0), None, 0.0, 0.0, 0.0)
@@ -220,7 +220,7 @@ def test_traction_even(changes, record):
     record(at_most("forces", np.abs(difference).max() / np.abs(expected).max(), 1e-12,
                    "the divergence theorem: round-off"))
     for sign in (1.0, -1.0):
-        pushed = contact.at_rest(mechanics, seed, theta, seed, sign * forces[mesh.body], PATIENT).pore
+        pushed = contact.shape_under(mechanics, seed, theta, seed, sign * forces[mesh.body], PATIENT).pore
         difference = np.abs(pushed.mesh.points - plain.mesh.points).max() / 25.0
         change = (pushed.pressure - plain.pressure)[mesh.topology.body_corners] + sign * 5.0
         record(at_most(f"displacement, {sign:+g}", difference, 1e-9, "J = theta: Newton's tolerance"))

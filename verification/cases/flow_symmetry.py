@@ -31,8 +31,8 @@ WALLS = channel_walls(WIDTH, upper="symmetry")
 
 
 def below(grid: Mesh) -> Mesh:
-    """A mesh whose upper wall is a plane of symmetry."""
-    return replace(grid, walls=WALLS)
+    """A mesh whose upper wall is a plane of symmetry. A topology keeps its systems, with their walls, so it is new."""
+    return replace(grid, walls=WALLS, topology=replace(grid.topology))
 
 
 @pytest.mark.case(

@@ -144,17 +144,17 @@ def history(*run: Change) -> History:
     return History(scene, tuple(instants), contact, far)
 
 
-_at_rest = closing.at_rest
+_shape_under = closing.shape_under
 
 
 def _about_middles(keys: Mechanics, grown: Pore, *rest) -> Expansion:
     """The equilibrium of RECHOSEN."""
     middles = [middle_of(grown.boundary, wall) for wall in (BOTTOM, TOP)]
-    return _at_rest(keys, replace(grown, fixed=np.logical_or(*middles)), *rest)
+    return _shape_under(keys, replace(grown, fixed=np.logical_or(*middles)), *rest)
 
 
 #: What the changes without a key replace: the module, the name and the new value.
-REPLACED = {RECHOSEN: (closing, "at_rest", _about_middles), **CONSTANTS}
+REPLACED = {RECHOSEN: (closing, "shape_under", _about_middles), **CONSTANTS}
 
 
 def _with_a_film(scene: Scene, before: RestartState, contact: RestartState) -> RestartState:

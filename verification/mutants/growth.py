@@ -158,7 +158,7 @@ MUTANTS = (
          "strain counts from the last shape for every rheology",
          "FromStart.restarted",
          "return self",
-         "return FromLast(positions)")),
+         "return FromPrevious(positions)")),
     *changes(
         "repro/model/surface.py",
         ("stress-free-stretch-since-t0",

@@ -254,16 +254,16 @@ def recorded() -> dict[str, dict]:
 
 
 def fresh() -> set[str]:
-    """The mutants whose record is of the present code."""
+    """The mutants whose record is of the present code. It does not check that they still apply."""
     known = mutants_by_id()
     return {id for id, entry in recorded().items()
-            if entry["digest"] == digest(known[id], entry["file"], entry["caught_by"])}
+            if entry["digest"] == digest(known[id], entry.get("file", ""), entry["caught_by"])}
 
 
 def digest(mutant: Mutant, file: str, catchers: Iterable[str]) -> str:
     """16 hexadecimal digits of a mutant, of the file that it changes and of the code of some cases or tests."""
     tests = chain.from_iterable(cases()[name].variants.values() if name in cases() else [name] for name in catchers)
-    hashed = hashlib.sha256(repr((mutant.function, mutant.old, mutant.new)).encode() + _code_of_file(file))
+    hashed = hashlib.sha256(repr((mutant.file, mutant.function, mutant.old, mutant.new)).encode() + _code_of_file(file))
     for test in sorted({test.partition("[")[0] for test in tests}):
         in_file, _, function = test.partition("::")
         hashed.update(_code_of_test(function, in_file))

@@ -7,7 +7,7 @@ MUTANTS = (
         "repro/model/transport_in_time.py",
         ("haldane-by-newton-alone",
          "by Haldane's law Newton's method starts from the guess, not from a state that is reached in time",
-         "AtRest.settled",
+         "QuasiSteady.settled",
          "guess = Gear().settled(problem, sink, guess)",
          "pass")),
     *changes(

@@ -22,7 +22,7 @@ from repro.fem.mesh import Mesh
 from repro.fem.space import Space
 from repro.model import flow, transport
 from repro.model.kinetics import Sink
-from repro.model.transport_in_time import AtRest
+from repro.model.transport_in_time import QuasiSteady
 from repro.scene import load_scene
 from verification.problems import meshes
 
@@ -93,7 +93,7 @@ def steady(problem: transport.Problem, density: float, guess=None) -> transport.
     its terms. At Peclet 0.1 and little uptake this may be 1e-8 of the supply, more than the error of the mesh.
     """
     sink = Sink(uniform_masses(problem.space, density))
-    concentrations = AtRest().settled(problem, sink, guess)
+    concentrations = QuasiSteady().settled(problem, sink, guess)
     if problem.space.order == 1:
         return concentrations
     balance = transport.Balance(problem, sink)
