@@ -478,8 +478,10 @@ def test_extreme_peclet_numbers_are_refused_by_their_keys(change):
     """No mesh that sparse matrices can index resolves the layers; a run in memory is refused as well."""
     key = re.match(r"[a-z_.]+?(?=_in_aggregate|=)", change)[0]
     for function, error in ((check, SceneError), (solve, SimulationError)):
-        with pytest.raises(error, match=f"boundary layers: the Peclet number u W / D is .*{re.escape(key)}"):
+        with pytest.raises((error, ValueError)) as refused:
             function(BASE, [change])
+        assert isinstance(refused.value, error)
+        refused.match(f"boundary layers: the Peclet number u W / D is .*{re.escape(key)}")
 
 
 def test_a_peclet_number_that_memory_limits_is_refused_by_its_keys():
