@@ -2,7 +2,8 @@
 
 ``growth.new_biomass`` chooses it; :func:`configuration_of` alone knows its words. Both classes have
 
-    accumulates    does strain accumulate, so that surfaces fold and stresses have a meaning?
+    accumulates    True: strain adds up over the steps. Only then do folds and
+                   stresses have a meaning.
     restarted      the configuration of a step from given positions (n, 2) um of the nodes
     unstrained     (n, 2) um, the nodes of a body in it
     carried        the same on another mesh, to which a function carries positions (n, 2)

@@ -63,10 +63,10 @@ class Permeable:
 
     def terms(self, velocity: Space, system: ElementSystem
               ) -> tuple[ElementSystem, np.ndarray, np.ndarray]:
-        """Drag, and layers that elements resolve; for quadratic velocities."""
-        layers = Drag(velocity, self.permeability)
-        constrained = layers.constrained(system.constrained)
-        return system.with_constrained(constrained), layers.viscosity, layers.matrices()
+        """The terms of :class:`repro.model.brinkman.Drag`, for quadratic velocities."""
+        drag = Drag(velocity, self.permeability)
+        constrained = drag.constrained(system.constrained)
+        return system.with_constrained(constrained), drag.viscosity, drag.matrices()
 
     def loss(self, width: float) -> float:
         """Darcy's loss beside that of Poiseuille's flow."""

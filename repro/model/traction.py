@@ -122,8 +122,8 @@ def forces(fluid: Fluid, around: Surroundings, shaped: Pore) -> np.ndarray:
 class SurroundingFlow:
     """The flow around one shape after another of a grown pore.
 
-    The mesh moves with the shapes. The first shape after the grown one has its own mesh, and so has
-    each shape with another contact than the last.
+    The mesh moves with the shapes. The first shape gets a new mesh, and so does each shape whose
+    contact has changed.
     """
 
     def __init__(self, fluid: Fluid, grown: Pore):

@@ -3,16 +3,16 @@
 ``numerics.transport`` chooses the method; :func:`transport_in_time` alone knows its words. Both
 classes have
 
-    stores          does the water keep the substrates of earlier times? Its content is then a part
-                    of the balances, may exceed the present supply, and starts the next step.
+    stores          True: the water keeps the substrates of earlier times. Balances then include
+                    them, they may exceed the present supply, and the next step starts from them.
     settled         steady concentrations in a shape, from a guess; see
                     :func:`repro.model.transport.steady`
     make_biomass    integrates (9)-(10) over an update (h) in a fixed geometry: grown pore,
                     concentrations, flows
-    growth_error    bound of the error (um2 mg/L) of the biomass made in an update. part: of
-                    ``biomass``, that turns over at the fastest rate; turnover: of the update, um2
-                    mg/L; steepness: change of m_A + m_D for a change of the concentrations by their
-                    supplies
+    growth_error    bound of the error (um2 mg/L) of the biomass made in an update. part: the
+                    fraction of ``biomass`` that turns over at the fastest rate; turnover: of the
+                    update, um2 mg/L; steepness: change of m_A + m_D for a change of the
+                    concentrations by their supplies
 """
 
 from __future__ import annotations

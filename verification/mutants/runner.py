@@ -271,17 +271,21 @@ def digest(mutant: Mutant, file: str, catchers: Iterable[str]) -> str:
 
 
 @cache
+def _text_of(file: str) -> str:
+    """A file of the project; empty if it is gone."""
+    return (ROOT / file).read_text(encoding="utf-8") if (ROOT / file).is_file() else ""
+
+
+@cache
 def _code_of_file(file: str) -> bytes:
-    """A file without comments and docstrings if it is in Python."""
-    text = (ROOT / file).read_text(encoding="utf-8") if (ROOT / file).is_file() else ""
-    return (statements(text) if file.endswith(".py") else text).encode()
+    """A file, without comments and docstrings if it is in Python."""
+    return (statements(_text_of(file)) if file.endswith(".py") else _text_of(file)).encode()
 
 
 @cache
 def _code_of_test(function: str, file: str) -> bytes:
     """The code of a test and of all that it uses, without comments and docstrings."""
-    text = (ROOT / file).read_text(encoding="utf-8") if (ROOT / file).is_file() else ""
-    return statements(code_of(function, text)).encode()
+    return statements(code_of(function, _text_of(file))).encode()
 
 
 @cache
