@@ -15,7 +15,7 @@ from repro import report, results
 from repro.fem.mesh import Mesh, curved
 from repro.fem.walls import channel_walls
 from repro.model import growth
-from repro.report import fields, quantities, run_page
+from repro.report import comparison, fields, quantities, run_page
 from repro.report.reading import Run, read
 from repro.results import field_files, names
 from repro.results.arrays import ARRAYS
@@ -100,6 +100,26 @@ def test_a_page_does_not_exclude_detachment_in_a_run_with_strengths(strengths, d
     assert ("no detachment" in sentence, "detaches or tears" in sentence) == (not detaches, detaches)
 
 
+@pytest.mark.parametrize("stress, shown, unit", [
+    (2.5, 2.5, "MPa"), (1.01, 1.01, "MPa"), (0.99, 990.0, "kPa"), (0.00101, 1.01, "kPa"), (0.00099, 990.0, "Pa"),
+    (-0.0137, -13.7, "kPa"), (1.3e-6, 1.3, "Pa"), (3e-9, 0.003, "Pa"), (0.0, 0.0, "MPa")])
+def test_pages_show_small_stresses_in_a_smaller_unit(stress, shown, unit):
+    """It is the largest unit in which the largest value, of either sign, is at least one. The numbers, the charts and
+    a comparison have it."""
+    series = {"time_h": np.array([0.0, 3.0]), "tensile_stress_max_MPa": np.array([np.nan, stress]),
+              "wall_traction_max_MPa": np.array([0.1 * stress, stress])}
+    record = {"scene": "one", "status": "completed", "tables": {}}
+    one, other = Run(Path("one"), record, series, {}), Run(Path("other"), record, series, {})
+    pattern = f"largest traction that a wall must bear .{unit}.<(.*?)</tr>"
+    first_last = re.findall('class="value">([^<]*)<', first_group(pattern, run_page._numbers(one)))
+    assert list(map(float, first_last)) == pytest.approx([0.1 * shown, shown])
+    compared = re.findall('class="value">([^<]*)<', first_group(pattern, comparison.build([one, other])))
+    assert list(map(float, compared[:2])) == pytest.approx([shown, shown])
+    for chart in (*quantities.charts_of(one), *quantities.overlaid([one, other], ["one", "other"])):
+        assert chart.axis == f"stress ({unit})"
+        assert all(line.values[-1] == pytest.approx(shown) for line in chart.lines)
+
+
 def test_each_frame_is_drawn_on_its_own_mesh(fast, paper):
     """The first mesh has triangles of six nodes, the second of three."""
     packed = fields.packed([*fields.index(fast)[:1], *fields.index(paper)[:1]])
@@ -141,6 +161,7 @@ def test_fields_of_the_page_are_those_of_the_files(request, name):
             value = grid.point_data[field["name"]] if node else grid.cell_data[field["name"]]
             value = np.linalg.norm(value, axis=1) if value.ndim == 2 else value
             value = value[nodes if node else region] if field["body"] else value
+            value = value * {"kPa": 1e3, "Pa": 1e6}.get(field["unit"], 1.0)
             assert (low, high) == (value.min(), value.max())
             assert np.abs(values(packed_array) - value).max() <= 0.51 / 65534 * (high - low)
 

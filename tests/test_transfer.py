@@ -2,13 +2,15 @@
 of the stage reprojection test (34), the orders and bounds of the fields, the biomass through many remeshes, and the
 projection against a dense code."""
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import shapely
 
 from repro.errors import TransferError
-from repro.fem import transfer
+from repro.fem import elements, transfer
+from repro.fem.mesh import checked_map_derivatives
 from repro.model import remeshing
 from repro.model.meshing import seeded
 from repro.model.remeshing import Remeshing
@@ -61,6 +63,31 @@ def test_folded_positions_at_the_start_are_unfolded(arcs):
         with pytest.raises(TransferError, match="the places at t = 0 fold"):
             transfer.unfolded(grid, places)
     assert transfer.unfolded(arcs.straight, arcs.straight.points) is arcs.straight.points
+
+
+def strip(count, shift):
+    """A strip of triangles of six nodes; middles on the edges between two triangles are shifted along it."""
+    corners = np.array([[k / 2, 0.1 * (k % 2)] for k in range(count + 2)])
+    triangles = [(k, k + 2, k + 1)[:: 1 - 2 * (k % 2)] for k in range(count)]
+    edges = sorted({tuple(sorted((a, b))) for t in triangles for a, b in zip(t, (*t[1:], t[0]))})
+    inner = np.array([b - a == 1 and 0 < a < count for a, b in edges])
+    middles = corners[np.array(edges)].mean(axis=1) + inner[:, None] * [shift, 0.0]
+    cells = [(*t, *(len(corners) + edges.index(tuple(sorted(edge))) for edge in zip(t, (*t[1:], t[0]))))
+             for t in triangles]
+    points = np.vstack([corners, middles])
+    return SimpleNamespace(points=points, cells=np.array(cells), biomass=np.ones(count, bool), geometry=2)
+
+
+@pytest.mark.parametrize("shift", [-0.4, 0.4])
+def test_a_corrected_triangle_may_turn_its_neighbour_over(shift):
+    """Two shifted edges of a triangle shear it, one turns it over. So the correction runs along the whole strip, from
+    the end that the sign selects."""
+    mesh = strip(9, shift)
+    derivatives = checked_map_derivatives(2)
+    corrected = transfer.unfolded(mesh, mesh.points)
+    assert np.allclose(corrected, strip(9, 0.0).points)
+    jacobians = elements.jacobian(mesh.points[mesh.cells], derivatives)
+    assert (elements.determinant(jacobians).min(axis=1) < 0).sum() == 1
 
 
 OLD, NEW = pairs.grid(6.0, 1), pairs.grid(5.0, 2)

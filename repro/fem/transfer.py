@@ -139,25 +139,25 @@ def interpolated(points: np.ndarray, triangles: np.ndarray, fields: np.ndarray,
 def unfolded(mesh: Mesh, origin: np.ndarray) -> np.ndarray:
     """Coordinates at t = 0 (N, 2) um for which no triangle of the aggregate is turned over.
 
-    In a triangle that is turned over, middles move half way between their corners. Raises
-    OriginFolded if that does not suffice.
+    In a triangle that is turned over, middles move half way between their corners. Its neighbours
+    have the same middles, so they are tested again. Raises OriginFolded if a triangle with straight
+    edges is turned over.
     """
     cells = mesh.cells[mesh.biomass]
     derivatives = checked_map_derivatives(mesh.geometry)
-    for _ in range(3):
+    while True:
         det = elements.determinant(elements.jacobian(origin[cells], derivatives))
         bad = cells[det.min(axis=1) <= (FOLD * det.max(axis=1) if mesh.geometry == 2 else 0.0)]
         if len(bad) == 0:
             return origin
-        if mesh.geometry == 1:
-            break
-        origin = origin.copy()
-        origin[bad[:, 3:]] = 0.5 * (origin[bad[:, :3]] + origin[bad[:, elements.NEXT]])
-    if det.min() <= 0:
-        x, y = mesh.points[bad[0]].mean(axis=0)
-        raise OriginFolded(f"after a remesh the places at t = 0 fold near x = {x:.4g}, "
-                           f"y = {y:.4g} um")
-    return origin
+        straight = origin.copy()
+        if mesh.geometry == 2:
+            straight[bad[:, 3:]] = 0.5 * (origin[bad[:, :3]] + origin[bad[:, elements.NEXT]])
+        if (straight == origin).all():
+            x, y = mesh.points[bad[0]].mean(axis=0)
+            raise OriginFolded(f"after a remesh the places at t = 0 fold near x = {x:.4g}, "
+                               f"y = {y:.4g} um")
+        origin = straight
 
 
 def supermesh(points: np.ndarray, triangles: np.ndarray, new_points: np.ndarray,

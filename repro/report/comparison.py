@@ -107,8 +107,7 @@ def _values(runs: Sequence[Run], labels: Sequence[str]) -> str:
     if time is None:
         return ""
     head = ["", labels[0], *(text for label in labels[1:] for text in (label, "difference"))]
-    rows = [(names.with_unit(name), *_row(run_values, name in COORDINATES))
-            for name, run_values in values(runs, time).items()
+    rows = [_row(name, run_values) for name, run_values in values(runs, time).items()
             if run_values != [None] * len(runs)]
     note = (f'<p class="note">At t = {time:.6g} h, the last time that every run has reached, '
             "linear between rows. Differences are relative to the first run; those of coordinates "
@@ -116,12 +115,14 @@ def _values(runs: Sequence[Run], labels: Sequence[str]) -> str:
     return page.section("Values at the common last time", note, page.table("", head, rows))
 
 
-def _row(run_values: Sequence[float | None], is_coordinate: bool) -> list[str]:
-    """The value of the first run, then that of each other run with its difference."""
-    first, *other_values = run_values
-    texts = [_text(first)]
-    for value in other_values:
-        texts += [_text(value), _text_difference(first, value, is_coordinate)]
+def _row(name: str, run_values: Sequence[float | None]) -> list[str]:
+    """The words of a column, the value of the first run, then that of each other run with its
+    difference."""
+    symbol, factor = names.readable_unit(name, [np.array(run_values, float)])
+    first, *others = [value if value is None else factor * value for value in run_values]
+    texts = [names.with_unit(name, symbol), _text(first)]
+    for value in others:
+        texts += [_text(value), _text_difference(first, value, name in COORDINATES)]
     return texts
 
 

@@ -68,14 +68,23 @@ def packed(entries: list[tuple[float, Path]],
     last = field_files.read(entries[-1][1])
     chosen = _chosen(entries, dict(before or []), _as_drawn(last), MOST_BYTES - spent)
     grids = [_as_drawn(field_files.read(path)) for _, path, _ in chosen]
+    units = _units(grids)
     low = np.min([grid.points.min(0) for grid in grids], 0)
     high = np.max([grid.points.max(0) for grid in grids], 0)
     meshes: dict[bytes, dict] = {}
-    frames = [_frame(time, grid, low[:2], high[:2], meshes) | ({"note": note} if note else {})
-              for (time, _, note), grid in zip(chosen, grids)]
-    described = [_described(name, grids[0]) for name in FIELDS if _in_any(frames, name)]
+    frames = [_frame(time, grid, low[:2], high[:2], meshes, units)
+              | ({"note": note} if note else {}) for (time, _, note), grid in zip(chosen, grids)]
+    described = [_described(name, grids[0], units[name][0])
+                 for name in FIELDS if _in_any(frames, name)]
     return {"box": [low[0], high[0], low[1], high[1]], "of": len(entries), "frames": frames,
             "nodes": len(last.points), "meshes": list(meshes.values()), "fields": described}
+
+
+def _units(grids: list[Grid]) -> dict[str, tuple[str, float]]:
+    """Symbol and factor of the unit in which each field is shown, the same in all frames."""
+    arrays = [grid.point_data | grid.cell_data for grid in grids]
+    return {name: names.readable_unit(name, [each[name] for each in arrays if name in each])
+            for name in FIELDS}
 
 
 def _in_any(frames: list[dict], name: str) -> bool:
@@ -128,14 +137,15 @@ def _regular(low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     return np.column_stack([x.ravel(), y.ravel()]), (corner[:, None, None] + halves).reshape(-1, 3)
 
 
-def _described(name: str, grid: Grid) -> dict:
+def _described(name: str, grid: Grid, unit: str) -> dict:
     vector = name in grid.point_data and grid.point_data[name].ndim == 2
     words = names.words(name) + (" (magnitude)" if vector else "")
-    return {"name": name, "label": words[0].upper() + words[1:], "unit": names.unit(name),
+    return {"name": name, "label": words[0].upper() + words[1:], "unit": unit,
             "at": "node" if name in grid.point_data else "cell", "body": name in OF_AGGREGATE}
 
 
-def _frame(time: float, grid: Grid, low, high, meshes: dict[bytes, dict]) -> dict:
+def _frame(time: float, grid: Grid, low, high, meshes: dict[bytes, dict],
+           units: dict[str, tuple[str, float]]) -> dict:
     cells = grid.cells
     region = grid.cell_data["region"] > 0.5
     key = cells.tobytes() + region.tobytes()
@@ -145,11 +155,13 @@ def _frame(time: float, grid: Grid, low, high, meshes: dict[bytes, dict]) -> dic
     span = np.where(high > low, high - low, 1.0)
     points = np.round((grid.points[:, :2] - low) / span * LEVELS)
     return {"time": time, "mesh": list(meshes).index(key), "points": _text(points, "<u2"),
-            "values": _values(grid, region)}
+            "values": _values(grid, region, units)}
 
 
-def _values(grid: Grid, region: np.ndarray) -> dict[str, list]:
-    """The values of FIELDS; fields of the aggregate only in its triangles (`region`)."""
+def _values(grid: Grid, region: np.ndarray,
+            units: dict[str, tuple[str, float]]) -> dict[str, list]:
+    """The values of FIELDS in their units; fields of the aggregate only in its triangles
+    (`region`)."""
     nodes = np.unique(grid.cells[region])
     cells = np.flatnonzero(region)
     arrays = grid.point_data | grid.cell_data
@@ -158,7 +170,7 @@ def _values(grid: Grid, region: np.ndarray) -> dict[str, list]:
         value = np.linalg.norm(arrays[name], axis=1) if arrays[name].ndim == 2 else arrays[name]
         if name in OF_AGGREGATE:
             value = value[nodes if name in grid.point_data else cells]
-        values[name] = _levels(value)
+        values[name] = _levels(units[name][1] * value)
     return values
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -33,20 +33,24 @@ class Kind:
 
     Examples
     --------
+    >>> from repro.report.charts import Line
     >>> from repro.report.quantities import Kind
-    >>> Kind("Head loss", "head", ("head_loss_cm",)).axis
-    'head (cm)'
+    >>> kind = Kind("Stress", "stress", ("wall_traction_max_MPa",))
+    >>> chart = kind.chart("Stress", [Line("wall traction", [0.0, 1.0], [0.0, 2e-6])])
+    >>> chart.axis, chart.lines[0].values.tolist()
+    ('stress (Pa)', [0.0, 2.0])
     """
 
     title: str
     axis_name: str
     drawn: tuple[str, ...]
 
-    @property
-    def axis(self) -> str:
-        """The name of the axis with its unit."""
-        unit = names.unit(self.drawn[0])
-        return f"{self.axis_name} ({unit})" if unit else self.axis_name
+    def chart(self, title: str, lines: Sequence[Line], marks: Sequence[float] = ()) -> Chart:
+        """Make the chart of lines in the unit of the columns; it shows a readable unit."""
+        symbol, factor = names.readable_unit(self.drawn[0], [line.values for line in lines])
+        axis = f"{self.axis_name} ({symbol})" if symbol else self.axis_name
+        scaled = [replace(line, values=factor * np.asarray(line.values)) for line in lines]
+        return Chart(title, axis, scaled, marks)
 
 
 def mean_rates(start: np.ndarray, end: np.ndarray, amounts: np.ndarray) -> TimeSeries:
@@ -160,7 +164,7 @@ def charts_of(run: Run) -> list[Chart]:
         lines = [_line(KNOWN[name].label, name, drawable)
                  for name in kind.drawn if name in drawable]
         if lines:
-            drawn_charts.append(Chart(kind.title, kind.axis, lines, marks))
+            drawn_charts.append(kind.chart(kind.title, lines, marks))
     return drawn_charts
 
 
@@ -172,7 +176,7 @@ def overlaid(runs: Sequence[Run], labels: Sequence[str]) -> list[Chart]:
             lines = [_line(label, name, drawable) for label, drawable in zip(labels, by_run)]
             title = kind.title if len(kind.drawn) == 1 else f"{kind.title}: {KNOWN[name].label}"
             if any(name in drawable for drawable in by_run):
-                overlays.append(Chart(title, kind.axis, lines))
+                overlays.append(kind.chart(title, lines))
     return overlays
 
 

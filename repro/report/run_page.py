@@ -204,17 +204,17 @@ def _numbers(run: Run) -> str:
         return page.section("Numbers", "<p>The run has no row: it stopped before the first.</p>")
     ends = [0, -1] if len(run.times) > 1 else [0]
     head = ["", *(f"t = {time:.6g} h" for time in run.times[ends])]
-    rows = [(names.with_unit(name), *_value_texts(name, values[ends]))
-            for name, values in run.series.items()
+    rows = [_number_row(name, values[ends]) for name, values in run.series.items()
             if name != "time_h" and np.isfinite(values[ends]).all()]
     return page.section("Numbers", page.table("", head, rows))
 
 
-def _value_texts(name: str, values: np.ndarray) -> list[str]:
-    """The values of a column as text."""
+def _number_row(name: str, values: np.ndarray) -> tuple[str, ...]:
+    """The words of a column with a unit, and its values in this unit."""
     if name in names.YES_NO:
-        return [page.format_value(value == 1) for value in values.tolist()]
-    return [charts.number(value) for value in values.tolist()]
+        return names.words(name), *(page.format_value(value == 1) for value in values.tolist())
+    symbol, factor = names.readable_unit(name, [values])
+    return names.with_unit(name, symbol), *map(charts.number, (factor * values).tolist())
 
 
 def _modelled(run: Run) -> str:

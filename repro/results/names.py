@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
+import numpy as np
+
 from repro.results.arrays import ARRAYS
 from repro.results.columns import LEDGER, SERIES
-from repro.results.quantities import Quantity, ending, unit_of
+from repro.results.quantities import SMALLER, Quantity, ending, unit_of
 
 #: Every column and array by its name.
 KNOWN: dict[str, Quantity] = {quantity.name: quantity for quantity in (*LEDGER, *SERIES, *ARRAYS)}
@@ -31,6 +35,18 @@ def unit(name: str) -> str:
     return unit_of(name).symbol
 
 
-def with_unit(name: str) -> str:
-    """Words and unit: "mean velocity (m/day)"."""
-    return f"{words(name)} ({unit(name)})" if unit(name) else words(name)
+def with_unit(name: str, symbol: str | None = None) -> str:
+    """Words and unit: "mean velocity (m/day)". symbol: of another unit."""
+    symbol = unit(name) if symbol is None else symbol
+    return f"{words(name)} ({symbol})" if symbol else words(name)
+
+
+def readable_unit(name: str, values: Iterable[np.ndarray]) -> tuple[str, float]:
+    """Symbol of the unit in which a page shows values, and the factor from the unit of the name.
+
+    It is the largest unit in which the largest value is at least one, or else the smallest unit.
+    """
+    largest = max((float(np.nanmax(np.abs(each))) for each in values if np.isfinite(each).any()),
+                  default=0.0)
+    units = ((unit(name), 1.0), *SMALLER.get(ending(name), ()))
+    return next((each for each in units if largest * each[1] >= 1), units[-1] if largest else units[0])

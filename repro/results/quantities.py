@@ -46,6 +46,9 @@ UNITS = {"_m_per_d": Unit("m d-1", "m/day", 24e-6), "_mg_per_L": Unit("mg L-1", 
          "_s": Unit("s", "s"), "_MPa": Unit("MPa", "MPa"),
          "_uN_per_m": Unit("uN m-1", "uN/m", 1e6), "_nN": Unit("nN", "nN", 1e3)}
 PURE = Unit("1", "")
+#: Units in which pages show small values, by the endings of names: symbol and factor, the largest
+#: unit first.
+SMALLER = {"_MPa": (("kPa", 1e3), ("Pa", 1e6))}
 
 
 @dataclass(frozen=True)
