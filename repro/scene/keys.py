@@ -31,7 +31,7 @@ from repro.scene.units import (
     BELOW_1,
     EITHER_SIGN,
     FRACTION,
-    FROM_0_TO_10,
+    FROM_0_TO_100,
     NON_NEGATIVE,
     PORE_WIDTH,
     POSITIVE_FRACTION,
@@ -375,7 +375,7 @@ class Numerics:
         0.25, FRACTION, source="3.1 [E13]",
         about="Growth of element sizes with distance from the aggregate; 0: one size everywhere")
     contact_elements: float = number(
-        0.0, FROM_0_TO_10, source=NOT_IN_PAPER,
+        0.0, FROM_0_TO_100, source=NOT_IN_PAPER,
         about="Elements to growth.minimum_film beside the contact lines with the opposite wall, "
               "2 at least with a permeable aggregate; 0: as large as elsewhere on the interface")
     exchanged: Scheme | None = None  # no key: ``repro.simulate(..., scheme=...)``
@@ -400,7 +400,7 @@ SCHEMES = {"fast": CURVED, "accurate": CURVED, "exact": CURVED, "paper": PAPER,
 PRESETS: dict[str, dict[str, Any]] = {
     "fast": {"refinement": 0.2, "tolerance": 0.0075, "contact_elements": 1.0},
     "accurate": {"refinement": 0.45, "tolerance": 0.001},
-    "exact": {"refinement": 0.7, "tolerance": 0.00025, "contact_elements": 4.0},
+    "exact": {"refinement": 0.7, "tolerance": 0.00025, "contact_elements": 20.0},
     "paper": {},
     "as_printed": {"transport": "gear"},
     "sketch": {"refinement": 0.05, "tolerance": 0.01},

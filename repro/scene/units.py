@@ -71,7 +71,7 @@ FRACTION = Range("from 0 to 1", lambda value: 0 <= value <= 1)
 POSITIVE_FRACTION = Range("greater than 0, at most 1", lambda value: 0 < value <= 1)
 BELOW_1 = Range("zero or more, less than 1", lambda value: 0 <= value < 1)
 UP_TO_1 = Range("greater than zero, at most 1", lambda value: 0 < value <= 1)
-FROM_0_TO_10 = Range("from 0 to 10", lambda value: 0 <= value <= 10)
+FROM_0_TO_100 = Range("from 0 to 100", lambda value: 0 <= value <= 100)
 UP_TO_20 = Range("greater than zero, at most 20", lambda value: 0 < value <= 20)
 #: Of a pore: below it water is no continuum; above it no pore is meant.
 PORE_WIDTH = Range("from 1 nm to 1 m", lambda value: 1e-3 <= value <= 1e6)
