@@ -115,6 +115,17 @@ def test_clearance_sees_a_film_that_runs_along_the_wall(gap, clearance, mirror):
     assert values[TOP, -upstream] > 1
 
 
+@pytest.mark.parametrize("length, clearance", [(3.2, None), (3.5, -0.708), (4.5, -0.708)])
+@pytest.mark.parametrize("mirror", [False, True])
+def test_clearance_ignores_the_angle_close_to_the_line(length, clearance, mirror):
+    """A wedge of 5 degrees beside the line ends in a step. Half of film / tan(angle) is 3.33 um."""
+    low = 20.0 - length * np.tan(np.radians(5.0))
+    rim = [[-60.0, 0.0], [-5.0 - length - 0.01, 16.0], [-5.0 - length, low], [-5.0, 20.0], [5.0, 20.0], [30.0, 0.0]]
+    outline = polygon(np.array(rim), channel_walls(20.0), 2)
+    value = clearances(mirrored(outline) if mirror else outline)[TOP, -1 if mirror else 1]
+    assert value == pytest.approx(clearance, abs=1e-3) if clearance else value > 0.5
+
+
 def test_a_surface_through_the_wall_has_a_negative_clearance():
     """The arc leans back over the contact surface while it lies beyond the wall. Elsewhere it is well below it."""
     outline = wedge(30.0)

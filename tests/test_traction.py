@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from repro.errors import GrowthError, StageError
+from repro.fem.walls import TOP
 from repro.march.stepping import LANDED
 from repro.model import contact, contact_lines, traction
 from repro.model.mechanics import Mechanics
@@ -66,6 +67,25 @@ def test_a_closed_pore_may_have_larger_forces_than_the_open_one(monkeypatch, ord
     closed = contact.expand(Mechanics.of(scene), seed, 1.02 * seed.theta, search=search)
     assert closed.pore.contact
     assert closed.gap < 1.99 < LANDED * scene.growth.minimum_film
+
+
+def test_nodes_stay_on_a_wall_that_they_join_in_every_other_round(monkeypatch):
+    """The forces lift the aggregate while one node at most is on the wall. Two more nodes then join, and the forces
+    vanish. Shape and forces agree once nodes do not leave the wall any more."""
+    scene = load_scene("wide", ["numerics.preset=fast", exchange(elements="linear"), "pore.width=25 um",
+                                "aggregate.radius=23 um", "numerics.contact_elements=0",
+                                "growth.fluid_forces=included"])
+    seed, counts = seeded(scene), []
+
+    def lifting(_fluid, _around, shaped):
+        y = shaped.mesh.points[shaped.mesh.body, 1]
+        counts.append(int((shaped.wall == TOP).sum()))
+        return np.column_stack([np.zeros(len(y)), 0.02 * (y > 0.5 * y.max()) * (counts[-1] < 2)])
+
+    monkeypatch.setattr(traction, "forces", lifting)
+    assert contact.expand(Mechanics.of(scene), seed, 1.03 * seed.theta).pore.contact
+    alternating, settled = counts[1:5], counts[5:]
+    assert alternating == [3, 1, 3, 1] and settled and set(settled) == {1}
 
 
 GAINS = np.array([0.9, -0.8, 0.5])

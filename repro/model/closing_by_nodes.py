@@ -25,7 +25,8 @@ class ByNodes(Closing):
         film = self.mechanics.keys.minimum_film
         angle = self.mechanics.keys.minimum_contact_angle
         walls = grown.mesh.walls
-        shape = replace(grown, space=self.start.space, pressure=self.start.pressure)
+        wall = self.start.wall if self.search.stationary else grown.wall
+        shape = replace(grown, space=self.start.space, pressure=self.start.pressure, wall=wall)
         iterations = 0
         gaps: list[float] = []
         for _ in range(CONTACT_ROUNDS):

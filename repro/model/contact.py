@@ -25,7 +25,7 @@ from repro.model.pore import Pore
 #: By the geometry of the triangles.
 CLOSINGS: dict[int, type[Closing]] = {1: ByNodes, 2: ByLines}
 #: Rounds of shape and fluid forces after which contact lines stay in place, because each new
-#: search may move them by up to its tolerance.
+#: search may move them by up to its tolerance, or by an edge, and nodes on a wall stay there.
 SETTLING_ROUNDS = 4
 #: Shape and flow agree if the last round moves no node by more than this, over the aggregate's
 #: thickness.
@@ -90,6 +90,8 @@ def expand(mechanics: Mechanics, grown: Pore, theta: np.ndarray, guess: Pore | N
         stationary = len(rounds.moves) >= SETTLING_ROUNDS
         landing = -np.inf if shape.pore.contact else search.landing
         search = replace(search, advances=shape.advances, stationary=stationary, landing=landing)
+        if stationary and shape.division is None:
+            start = replace(start, wall=shape.pore.wall)
     raise GrowthError("the fluid's forces and the shape do not agree: after "
                       f"{len(rounds.moves)} rounds a node still moves by {rounds.moves[-1]:.2g} "
                       "um, and more rounds do not reduce this: the aggregate is too soft for this "

@@ -7,6 +7,10 @@ beyond a line is the smallest value on the free surface of
     gap / min(film, tan(angle) d) - 1
 
 at the distance d from the line along the wall. If it is negative, a film or a wedge is too thin.
+Beside the line the surface opens like the root of d, and discretely at an angle that depends on its
+arcs. So the angle is tested at distances of BESIDE film / tan(angle) or more, where a converged
+surface comes nearest to the wall. Closer to the line a part of it suffices, OPENING tan(angle), so
+that no arc passes the wall.
 The contact surface is the smallest one without a negative clearance, so each line advances until
 its clearance vanishes. The secant method, safeguarded by bisection, searches for all lines at once.
 Each trial is an equilibrium of the aggregate.
@@ -25,6 +29,13 @@ from repro.fem.walls import FREE, Walls, numbered
 
 #: A clearance up to this size counts as zero. A line then errs by about CLOSE * film / tan(angle).
 CLOSE = 2e-3
+#: Least distance from a line at which the angle is tested, over film / tan(angle). The converged
+#: surfaces of an independent code come nearest to the wall at 0.51 to 0.99 of this distance.
+BESIDE = 0.5
+#: Error allowed to the interpolated place at this distance, in the same unit.
+NEARLY = 0.005
+#: Tangent of the least angle closer to the line, over tan(angle). A converged surface is steeper.
+OPENING = 0.1
 #: Upper bound of the clearance, and its value if no free surface faces the wall.
 AMPLE = 10.0
 #: If an advance that is too short and one that is far enough are closer than this (arcs), the
@@ -53,9 +64,9 @@ class SearchOptions:
     """How contact lines are searched for.
 
     landing: the search ends if the film at the first contact is thinner than this fraction of the
-    least film; stationary: do lines stay at their first trial; patient: is a failed equilibrium
-    tried again in smaller parts; advances: {(wall, direction): um} of the first trial, along the
-    outline.
+    least film; stationary: do lines stay at their first trial, and nodes on the walls of the start;
+    patient: is a failed equilibrium tried again in smaller parts; advances: {(wall, direction): um}
+    of the first trial, along the outline.
     """
 
     landing: float = 0.0
@@ -118,6 +129,8 @@ class Clearance:
         wall = numbered(self.walls, outline.wall[node])
         gap = wall.film(points)
         needs = np.minimum(self.film, np.tan(self.angle) * distance)
+        beside_line = distance < (BESIDE - NEARLY) * self.film / np.tan(self.angle)
+        needs[beside_line] *= OPENING
         facing = place > 0
         if outline.wall[last] == wall.number:
             # Free surface between two lines of one wall belongs to the nearer line.
@@ -131,16 +144,19 @@ class Clearance:
 
     def _places(self, arcs: np.ndarray, outwards: float) -> tuple[np.ndarray, np.ndarray]:
         """(K,) arcs from the line, and (K, 2) um the points there: PLACES of each arc, and the
-        points where the rule changes from the angle to the film."""
+        points where the rule begins, and where it changes from the angle to the film."""
         points = AT_PLACES @ arcs
         place = np.arange(len(arcs))[:, None] + PLACES
-        beyond = outwards * (points[..., 0] - arcs[0, 0, 0]) - self.film / np.tan(self.angle)
-        arc, k = np.nonzero(beyond[:, :-1] * beyond[:, 1:] < 0)
-        part = beyond[arc, k] / (beyond[arc, k] - beyond[arc, k + 1])
-        t = PLACES[k] + part * np.diff(PLACES)[k]
-        crossing = np.einsum("ka,kai->ki", parabola(t), arcs[arc])
-        return (np.concatenate([place.ravel(), arc + t]),
-                np.vstack([points.reshape(-1, 2), crossing]))
+        places, all_points = [place.ravel()], [points.reshape(-1, 2)]
+        distance = outwards * (points[..., 0] - arcs[0, 0, 0]) * np.tan(self.angle) / self.film
+        for change in (BESIDE, 1.0):
+            beyond = distance - change
+            arc, k = np.nonzero(beyond[:, :-1] * beyond[:, 1:] < 0)
+            part = beyond[arc, k] / (beyond[arc, k] - beyond[arc, k + 1])
+            t = PLACES[k] + part * np.diff(PLACES)[k]
+            places.append(arc + t)
+            all_points.append(np.einsum("ka,kai->ki", parabola(t), arcs[arc]))
+        return np.concatenate(places), np.vstack(all_points)
 
 
 def _free_arcs(outline: Outline, node: int, direction: int) -> tuple[np.ndarray, int]:
