@@ -8,6 +8,7 @@ import pytest
 
 from repro.fem.space import Space
 from repro.model import flow, gear, mesh_motion, transport
+from repro.model.interface import interface_of
 from repro.model.kinetics import Sink
 from repro.model.resistance import Viscous
 from repro.results.files import sealed
@@ -96,7 +97,7 @@ def disc():
 
 def velocity(interface, mesh):
     """Velocity of the flow on a mesh."""
-    return flow.unit_flow(Space(mesh), Viscous(10.0), interface=interface).velocity
+    return flow.unit_flow(Space(mesh), Viscous(10.0), interface=interface_of(interface)).velocity
 
 
 def concentrations(boundary, flowing, mesh):

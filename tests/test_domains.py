@@ -18,7 +18,7 @@ from repro.model.contact_lines import PATIENT
 from repro.model.kinetics import Sink
 from repro.model.mechanics import Mechanics
 from repro.model.meshing import seeded
-from repro.model.solving import solve_flow
+from repro.model.solving import Solver
 from repro.model.uptake_law import LAWS
 from repro.scene import load_scene
 from tests.strategies import coarse_base, half_disc
@@ -85,7 +85,7 @@ def stirred(law, substrates):
     unset = {"both": [], "acceptor": ["substrates.donor"], "donor": ["substrates.acceptor"]}[substrates]
     scene = load_scene("base", [*FAST, f"kinetics.law={law}"], unset=unset)
     pore = seeded(scene)
-    carried = solve_flow(pore.space, scene.flow, scene.pore.length, scene.numerics)
+    carried = Solver.of(scene).solve_flow(pore.space, scene.flow)
     return pore, transport.problem(pore.space, carried, scene.substrates, scene.kinetics)
 
 

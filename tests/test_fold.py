@@ -15,7 +15,7 @@ from repro.cli import main
 from repro.errors import GrowthError, LinearError, MeshError, SimulationError
 from repro.march import loop
 from repro.march.balance import Ledger
-from repro.march.ends import nearest_end
+from repro.march.ends import Ends, nearest_end
 from repro.march.folding import most_compressed, refuse_density
 from repro.march.loop import Stepping
 from repro.march.state import Compression, InterpolatedState, RestartState, StepResult
@@ -166,7 +166,7 @@ def test_the_warning_of_creases_begins_at_their_stretch(theta):
 @pytest.mark.parametrize("theta", [3.35, 3.41])
 def test_the_surface_folds_below_biots_limit_and_not_above(theta):
     """The stretches are 0.4 % above and 0.5 % below 0.544."""
-    assert (nearest_end(plug(), compressed(theta), None).margin > 0) == (theta**-0.5 < BIOT)
+    assert (nearest_end(Ends.of(plug()), compressed(theta), None).margin > 0) == (theta**-0.5 < BIOT)
 
 
 @pytest.mark.parametrize("factor", [0.52, 1.94])

@@ -11,7 +11,7 @@ from repro.march.simulation import simulate
 from repro.model import gear, transport
 from repro.model.kinetics import Sink
 from repro.model.meshing import seeded
-from repro.model.solving import solve_flow
+from repro.model.solving import Solver
 from repro.model.transport import Concentrations
 from tests import strategies
 from tests.strategies import EVERY_ORDER
@@ -32,7 +32,7 @@ def case(radius="20 um", velocity="2.9 m/day", boundary="open", order=1, **secti
     scene = strategies.scene(radius, velocity=velocity, numerics=coarse(order), order=order,
                              **{**sections, "substrates": {"acceptor": {}, "donor": {}, **substrates}})
     pore = seeded(scene)
-    carried = solve_flow(pore.space, scene.flow, scene.pore.length, scene.numerics) if scene.flow else None
+    carried = Solver.of(scene).solve_flow(pore.space, scene.flow) if scene.flow else None
     return pore, transport.problem(pore.space, carried, scene.substrates, scene.kinetics)
 
 

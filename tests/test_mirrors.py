@@ -19,7 +19,7 @@ from repro.march.simulation import shaped
 from repro.model import contact, solving
 from repro.model.mechanics import Mechanics
 from repro.model.meshing import seeded
-from repro.model.solving import solve_flow
+from repro.model.solving import Solver
 from repro.preflight import numbers, simplifications
 from tests.strategies import EVERY_ORDER, MIRRORS, outlines
 from tests.test_derived import SHAPE, SPANNING, drawn
@@ -100,8 +100,8 @@ def test_a_pore_and_its_mirror_images_conduct_alike(order, permeability, interfa
     downstream, by less than exp(-4.2 1.5) = 0.002."""
     scene, seed = seed_of(order, spans)
     drive = replace(scene.flow, permeability=permeability, viscosity_ratio=None if permeability else 20.0)
-    numerics = replace(scene.numerics, interface=interface)
-    one, other = (solve_flow(at.space, drive, scene.pore.length, numerics) for at in (seed, MIRRORS[image](seed)))
+    solver = Solver.of(replace(scene, numerics=replace(scene.numerics, interface=interface)))
+    one, other = (solver.solve_flow(at.space, drive) for at in (seed, MIRRORS[image](seed)))
     assert other.conductivity == pytest.approx(one.conductivity, rel=1e-8 if image == "across" else 0.002)
     if image == "across":
         assert other.velocity * [1, -1] == pytest.approx(one.velocity, abs=1e-8 * np.abs(one.velocity).max())

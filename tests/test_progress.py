@@ -214,7 +214,7 @@ def test_a_check_reports_between_its_stages_without_its_thread(tmp_path, capsys,
     monkeypatch.setattr(progress, "monotonic", lambda: clock[0])
     monkeypatch.setattr(progress, "_call_regularly", lambda tick: nullcontext())
     monkeypatch.setattr(resolved, "seeded", slow(resolved.seeded))
-    monkeypatch.setattr(resolved.solving, "solve_flow", slow(resolved.solving.solve_flow))
+    monkeypatch.setattr(resolved.solving.Solver, "solve_flow", slow(resolved.solving.Solver.solve_flow))
     scene = tmp_path / "scene.toml"
     scene.write_text(str(load_scene(OUTLINE)))
     main(["check", "--no-run", str(scene)])

@@ -17,6 +17,7 @@ from repro.cli import main
 from repro.errors import Interrupted, SimulationError
 from repro.march.simulation import steps
 from repro.model import flow, growth, traction
+from repro.model.interface import LAPLACIAN
 from repro.results import columns
 from repro.results.quantities import Quantity
 from repro.runs import execution
@@ -101,7 +102,7 @@ def drag(scene, result):
     """The force (MPa um) of the aggregate on the water along the pore. It is directed against the flow."""
     drive = scene.flow
     head_per_rate = drive.kinematic_viscosity / drive.gravity
-    forces = traction.nodal(result.pore.space, result.solved.flow, head_per_rate, "laplacian")
+    forces = traction.nodal(result.pore.space, result.solved.flow, head_per_rate, LAPLACIAN)
     return -flow.MPA_PER_UM * drive.density * drive.gravity * forces[result.pore.mesh.body, 0].sum()
 
 

@@ -165,7 +165,7 @@ def test_a_plane_of_symmetry_bears_nothing_as_a_wall(number):
     mechanics, seed = grown_plug(2)
     shape = contact.expand(mechanics, seed, seed.theta).pore
     scene = load_scene("base", ["numerics.preset=fast"])
-    peak = adhesion.wall_peak(scene, with_wall(shape, number, mirrors=True), None)
+    peak = adhesion.wall_peak(adhesion.Loading.of(scene), with_wall(shape, number, mirrors=True), None)
     assert peak.value > 0 and peak.y == (20.0 if number == 1 else 0.0)
 
 

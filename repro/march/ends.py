@@ -28,11 +28,11 @@ from repro.fem.sizing import ACROSS_PORE
 from repro.march.folding import Fold, fold_message, most_compressed
 from repro.march.state import Compression, StepResult
 from repro.model import adhesion
-from repro.model.adhesion import Peak
+from repro.model.adhesion import Loading, Peak
 from repro.model.pore import Pore
 from repro.model.solving import Solved
 from repro.scene import Pore as Channel
-from repro.scene import Scene, scene_tables
+from repro.scene import Scene, Stated
 
 #: An end is located if its margin is positive and at most this. The relative error of its time is
 #: this over d ln(stress) / d ln(t). The least numerics.tolerance of a preset is 2.5e-4.
@@ -108,39 +108,68 @@ class Reached:
         return self.step.pore.time
 
 
-def nearest_end(scene: Scene, pore: Pore, solved: Solved) -> Event:
-    """The end with the largest margin in a state of a scene with growth."""
-    return max(_events(scene, pore, solved), key=lambda event: event.margin)
+@dataclass(frozen=True, eq=False)
+class Strength:
+    """A stress (MPa) that an aggregate withstands: its key of [growth], and the key's value as the
+    scene states it."""
+
+    key: str
+    stress: float
+    stated: Stated
+
+    @classmethod
+    def of(cls, scene: Scene, key: str) -> Strength | None:
+        """The strength of a key; None if the scene does not have it."""
+        stress = getattr(scene.growing.growth, key)
+        return None if stress is None else cls(key, stress, scene.stated("growth", key))
 
 
-def _events(scene: Scene, pore: Pore, solved: Solved) -> Iterator[Event]:
+@dataclass(frozen=True, eq=False)
+class Ends:
+    """Data from which the ends of a run follow; None for strengths that the scene leaves out."""
+
+    channel: Channel
+    loading: Loading
+    bonding: Strength | None
+    tensile: Strength | None
+
+    @classmethod
+    def of(cls, scene: Scene) -> Ends:
+        """The ends of a scene with growth."""
+        return cls(scene.pore, Loading.of(scene), Strength.of(scene, "bonding_strength"),
+                   Strength.of(scene, "tensile_strength"))
+
+
+def nearest_end(ends: Ends, pore: Pore, solved: Solved) -> Event:
+    """The end with the largest margin in a state."""
+    return max(_events(ends, pore, solved), key=lambda event: event.margin)
+
+
+def _events(ends: Ends, pore: Pore, solved: Solved) -> Iterator[Event]:
     """All ends that the scene models."""
     for side in ("upstream", "downstream"):
         end = PoreEnd(f"the aggregate reaches the pore's {side} end at t = {pore.time:g} h")
-        yield Event(1 - elements_to_end(scene.pore, pore, side), end)
+        yield Event(1 - elements_to_end(ends.channel, pore, side), end)
     biot = pore.body.energy.biot
     if pore.configuration.accumulates and biot is not None:
         compression = most_compressed(Compression(), pore)
         fold = Fold(fold_message(f"at t = {pore.time:g} h", compression))
         yield Event(biot / compression.stretch - 1, fold)
-    growth = scene.growing.growth
-    if growth.bonding_strength is not None:
-        peak = adhesion.wall_peak(scene, pore, solved)
-        yield _detachment(scene, pore, peak, "bonding_strength", "detaches", "its wall must bear")
-    if growth.tensile_strength is not None:
-        peak = adhesion.tensile_peak(scene, pore)
-        yield _detachment(scene, pore, peak, "tensile_strength", "tears", "its tensile stress is")
+    if ends.bonding is not None:
+        peak = adhesion.wall_peak(ends.loading, pore, solved)
+        yield _detachment(ends.bonding, pore, peak, "detaches", "its wall must bear")
+    if ends.tensile is not None:
+        peak = adhesion.tensile_peak(ends.loading, pore)
+        yield _detachment(ends.tensile, pore, peak, "tears", "its tensile stress is")
 
 
-def _detachment(scene: Scene, pore: Pore, peak: Peak, key: str, verb: str,
-                subject: str) -> Event:
+def _detachment(strength: Strength, pore: Pore, peak: Peak, verb: str, subject: str) -> Event:
     """The event of a strength; its message has the stress in the unit that the scene gives."""
-    strength = scene_tables(scene)["growth"][key]
-    number, _, unit = strength.partition(" ")
-    ratio = peak.value / getattr(scene.growing.growth, key)
+    stated = strength.stated
+    ratio = peak.value / strength.stress
     end = Detachment(f"the aggregate {verb} at t = {pore.time:g} h: near x = {peak.x:.4g}, y = "
-                     f"{peak.y:.4g} um {subject} {ratio * float(number):.3g} {unit}, in the mean "
-                     f"over pore.width / 20; growth.{key} is {strength}")
+                     f"{peak.y:.4g} um {subject} {ratio * stated.number:.3g} {stated.unit}, in "
+                     f"the mean over pore.width / 20; growth.{strength.key} is {stated.text}")
     return Event(ratio - 1, end)
 
 

@@ -22,7 +22,7 @@ from repro.errors import RunEnd, StageError
 from repro.fem.mesh import Topology
 from repro.march import balance
 from repro.march.balance import Limits
-from repro.march.ends import Reached, locate, nearest_end
+from repro.march.ends import Ends, Reached, locate, nearest_end
 from repro.march.folding import folding, most_compressed, refuse_density
 from repro.march.state import (
     SAME_TIME,
@@ -38,12 +38,11 @@ from repro.march.state import (
 )
 from repro.march.step_control import StepControl
 from repro.model.contact_lines import SearchOptions
-from repro.model.grading import solve_graded
 from repro.model.meshing import seeded
 from repro.model.pore import Pore
 from repro.model.solving import Solved
 from repro.model.stages import Stages
-from repro.scene import Growth, Scene
+from repro.scene import Growth, Scene, TimeTables
 
 
 @dataclass(frozen=True)
@@ -68,6 +67,28 @@ class Stepping:
     ends: Callable[[Scene], Iterable[float]] = lambda _: ()
 
 
+@dataclass(frozen=True, eq=False)
+class Course:
+    """What the loop takes from a scene with growth.
+
+    limits: of balances; rows: times (h) of rows after t = 0; every_step: does each step have a row,
+    too?
+    """
+
+    stages: Stages
+    stepping: Stepping
+    ends: Ends
+    limits: Limits
+    rows: tuple[float, ...]
+    every_step: bool
+
+    @classmethod
+    def of(cls, scene: Scene, stepping: Stepping) -> Course:
+        """Take the parts of a scene."""
+        return cls(Stages.of(scene), stepping, Ends.of(scene), Limits.of(scene),
+                   row_times(stepping, scene), scene.requested_times is None)
+
+
 def steps(scene: Scene, stepping: Stepping,
           state: RestartState | None = None) -> Iterator[tuple[RestartState, Report | None]]:
     """Yield the state after every step from t = 0 or ``state`` on, with a Report if one is due.
@@ -78,17 +99,18 @@ def steps(scene: Scene, stepping: Stepping,
     """
     first = state is None
     with stopping(state.pore.time if state else 0.0):
-        stages = Stages.of(scene)
+        course = Course.of(scene, stepping)
+        stages = course.stages
         first_step = StepControl(stepping.first * stages.growth.time_step)
         state = state or RestartState(contiguous(seeded(scene)), first_step)
-        pore, solved = solve_graded(scene, state.pore)
+        pore, solved = stages.grading.solve(state.pore)
         if first:
             pore, solved = settle(stages, pore, solved)
         if pore is not state.pore:
             state = replace(state, pore=contiguous(pore))
     if first:
         yield state, initial_report(state, solved)
-    yield from _grow(stages, stepping, state, solved)
+    yield from _grow(course, state, solved)
 
 
 def settle(stages: Stages, pore: Pore, solved: Solved) -> tuple[Pore, Solved]:
@@ -101,25 +123,22 @@ def settle(stages: Stages, pore: Pore, solved: Solved) -> tuple[Pore, Solved]:
     expanded = stages.expand(pore, pore, search=SearchOptions(landing=-np.inf)).pore
     expanded = replace(expanded, concentrations=solved.concentrations)
     settled, _ = stages.new_mesh(pore, expanded, solved)
-    return solve_graded(stages.scene, contiguous(settled))
+    return stages.grading.solve(contiguous(settled))
 
 
-def _grow(stages: Stages, stepping: Stepping, state: RestartState,
+def _grow(course: Course, state: RestartState,
           solved: Solved) -> Iterator[tuple[RestartState, Report | None]]:
     """Yield the state after every step from ``state`` on, whose solution is ``solved``."""
-    scene = stages.scene
+    stages = course.stages
     pore = replace(state.pore, concentrations=solved.concentrations)
-    event = nearest_end(scene, pore, solved)
-    requested = scene.requested_times
-    rows = row_times(stepping, scene)
-    limits = Limits.of(scene)
+    event = nearest_end(course.ends, pore, solved)
     shown = pore.mesh.topology
     while event.margin <= 0 and stages.growth.end - pore.time > SAME_TIME:
         try:
             with stopping(pore.time, stages.growth.bonded), folding(state.compression, state.time):
-                reached, control = _advance(stages, stepping, state, pore, solved, event.margin)
+                reached, control = _advance(course, state, pore, solved, event.margin)
                 step = reached.step
-                balance.refuse(limits, step.pore, step.ledger)
+                balance.refuse(course.limits, step.pore, step.ledger)
                 refuse_density(step.pore, stages.remeshing.maximum_density)
         except RunEnd:
             if state.ledgers:  # steps that are not reported yet
@@ -128,7 +147,7 @@ def _grow(stages: Stages, stepping: Stepping, state: RestartState,
             raise
         if state.row > pore.time + SAME_TIME:  # resumed within the step
             shown = step.within(state.row).pore.mesh.topology
-        for time in rows:
+        for time in course.rows:
             if state.time + SAME_TIME < time < step.pore.time - SAME_TIME:
                 inner, reason = _row_within(stages, step, time)
                 if inner:
@@ -142,8 +161,8 @@ def _grow(stages: Stages, stepping: Stepping, state: RestartState,
         event = reached.event
         state = _after_step(state, step, solved, control)
         pore = replace(state.pore, concentrations=solved.concentrations)
-        row = _row_time_at(rows, pore.time)
-        if requested is None or row is not None or event.margin > 0:
+        row = _row_time_at(course.rows, pore.time)
+        if course.every_step or row is not None or event.margin > 0:
             reported = pore if row is None else replace(pore, time=row)
             report = make_report(state, reported, solved, step.before, shown)
             shown = pore.mesh.topology
@@ -155,14 +174,17 @@ def _grow(stages: Stages, stepping: Stepping, state: RestartState,
         raise event.end
 
 
-def _advance(stages: Stages, stepping: Stepping, state: RestartState, pore: Pore, solved: Solved,
+def _advance(course: Course, state: RestartState, pore: Pore, solved: Solved,
              margin: float) -> tuple[Reached, StepControl]:
     """Make one step, or a shorter one to the first end of the model within it.
 
     margin: at the start of the step (see :mod:`repro.march.ends`).
     """
+    stages = course.stages
+    stepping = course.stepping
+
     def reached(step: StepResult, after: Solved) -> Reached:
-        return Reached(step, after, nearest_end(stages.scene, step.pore, after))
+        return Reached(step, after, nearest_end(course.ends, step.pore, after))
 
     step, after, control = stepping.advance(stages, pore, solved, state.step_control)
     full = reached(step, after)
@@ -170,14 +192,14 @@ def _advance(stages: Stages, stepping: Stepping, state: RestartState, pore: Pore
         located = locate(lambda time: reached(*stepping.cut(stages, pore, solved, time)), pore.time,
                          margin, full)
         return replace(located, step=replace(located.step, within=step.within)), control
-    if stages.scene.jumps(step.pore.time):
+    if stages.tables.jumps(step.pore.time):
         full = reached(*_after_jump(stages, step, after))
     return full, control
 
 
 def _after_jump(stages: Stages, step: StepResult, solved: Solved) -> tuple[StepResult, Solved]:
     """Return the state just after a jump of the scene's tables at the end of a step."""
-    after, jumped = settle(stages, *solve_graded(stages.scene, step.pore))
+    after, jumped = settle(stages, *stages.grading.solve(step.pore))
     remeshed = step.remeshed or after.mesh.topology is not step.pore.mesh.topology
     return replace(step, pore=contiguous(after), remeshed=remeshed), jumped
 
@@ -234,6 +256,6 @@ def time_before_end(previous: Pore, duration: float) -> float:
     return max(previous.time, previous.time + duration - SAME_TIME)
 
 
-def before_jump(scene: Scene, pore: Pore) -> Pore:
+def before_jump(tables: TimeTables, pore: Pore) -> Pore:
     """Return the pore at its time, or just before it if the scene's tables jump there."""
-    return replace(pore, time=pore.time - SAME_TIME) if scene.jumps(pore.time) else pore
+    return replace(pore, time=pore.time - SAME_TIME) if tables.jumps(pore.time) else pore

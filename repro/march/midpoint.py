@@ -26,10 +26,9 @@ from repro.march.ends import refuse_outside
 from repro.march.folding import refuse_density, refuse_fold
 from repro.march.loop import time_before_end
 from repro.march.state import InterpolatedState, StepResult
-from repro.model import biomass, contact_lines, remeshing, solving
+from repro.model import biomass, contact_lines, remeshing
 from repro.model.biomass import Rates, grow
 from repro.model.contact_lines import PATIENT, FirstContact, SearchOptions
-from repro.model.grading import solve_graded
 from repro.model.mechanics import Expansion
 from repro.model.pore import Pore
 from repro.model.remeshing import GeneratedMesh
@@ -96,7 +95,7 @@ def attempt(stages: Stages, previous: Pore, solved: Solved, duration: float,
     except FirstContact as early:
         return Attempt(None, 0.0, (gap, early.gap))
     expanded = expansion.pore
-    refuse_outside(stages.scene.pore, previous, expanded)
+    refuse_outside(stages.channel, previous, expanded)
     refuse_fold(expanded)
     expanded = replace(expanded, concentrations=_guess_substrates(solved, half, 1.0))
     new, remeshed = stages.new_mesh(previous, expanded, solved)
@@ -145,7 +144,7 @@ def solve_halfway(stages: Stages, previous: Pore, solved: Solved, first: Rates, 
         middle, (active, inert) = remeshing.remesh(stages.remeshing, previous, shape,
                                                    solved.mean_velocity, amounts)
         middle = replace(middle, active=active, inert=inert)
-    solution = solving.solve(stages.scene, middle, duration)
+    solution = stages.solver.solve(middle, duration)
     rates = stages.rates(middle, solution)
     after = grow(middle, rates, duration)
     if mesh is None:
@@ -173,7 +172,7 @@ def interpolate(stages: Stages, previous: Pore, solved: Solved, half: Halfway,
     expanded = replace(expanded, concentrations=_guess_substrates(solved, half, part))
     nearest = sorted(half.generated, key=lambda each: abs(each.shape.time - time))
     inner, _ = stages.new_mesh(previous, expanded, solved, nearest)
-    return InterpolatedState(*solve_graded(stages.scene, inner))
+    return InterpolatedState(*stages.grading.solve(inner))
 
 
 def _carry_rates_back(middle: Pore, previous: Pore, half: Expansion, rates: Rates) -> Rates:

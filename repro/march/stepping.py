@@ -32,7 +32,6 @@ from repro.march.step_control import (
     next_step_size,
 )
 from repro.model.contact_lines import SearchOptions
-from repro.model.grading import grade, solve_graded
 from repro.model.pore import Pore
 from repro.model.solving import Solved
 from repro.model.stages import Stages
@@ -66,7 +65,7 @@ def _advance(stages: Stages, previous: Pore, solved: Solved,
 
     The length of the full step does not depend on growth.end or on the requested rows.
     """
-    corner = stages.scene.corner(previous.time)
+    corner = stages.tables.corner(previous.time)
     step, after, control = _find_step(stages, previous, solved, planned, corner)
     within = partial(_row, stages, previous, solved, planned, step.within)
     if step.pore.time - stages.growth.end > SAME_TIME:
@@ -113,7 +112,7 @@ def _find_step(stages: Stages, previous: Pore, solved: Solved, control: StepCont
 
     Returns the step, the solution after it, and the next step control.
     """
-    tolerance = stages.scene.numerics.tolerance
+    tolerance = stages.tolerance
     time_step = stages.growth.time_step
     shortest = SHORTEST * time_step
     length = control.length
@@ -166,17 +165,17 @@ def _halve_elements(stages: Stages, previous: Pore) -> tuple[Pore, Solved] | Non
 
     None if they have been halved as often as allowed.
     """
-    finer = grade(stages.scene, previous)
+    finer = stages.grading.finer(previous)
     if finer is None:
         return None
-    graded, solved = solve_graded(stages.scene, finer)
+    graded, solved = stages.grading.solve(finer)
     return replace(graded, concentrations=solved.concentrations), solved
 
 
 def _solve_after(stages: Stages, step: StepResult) -> tuple[StepResult, Solved]:
     """Solve after a step, before a jump. A sharp front gets a graded mesh if it needs one."""
-    before = before_jump(stages.scene, step.pore)
-    after, solved = solve_graded(stages.scene, before)
+    before = before_jump(stages.tables, step.pore)
+    after, solved = stages.grading.solve(before)
     if after is not before:
         after = replace(after, time=step.pore.time)
         step = replace(step, pore=contiguous(after), remeshed=True)

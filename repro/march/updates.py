@@ -18,7 +18,6 @@ from repro.march.folding import refuse_fold
 from repro.march.loop import Stepping, before_jump, time_before_end
 from repro.march.state import SAME_TIME, InterpolatedState, StepResult, contiguous
 from repro.march.step_control import StepControl
-from repro.model import solving
 from repro.model.contact_lines import FirstContact
 from repro.model.mechanics import Expansion
 from repro.model.pore import Pore
@@ -63,7 +62,7 @@ def next_time(growth: Growth, time: float, corner: float) -> float:
 def _advance(stages: Stages, previous: Pore, solved: Solved,
              control: StepControl) -> tuple[StepResult, Solved, StepControl]:
     """Make the step to the next update, or to growth.end; half of it while it passes an end."""
-    time = next_time(stages.growth, previous.time, stages.scene.corner(previous.time))
+    time = next_time(stages.growth, previous.time, stages.tables.corner(previous.time))
     while True:
         try:
             return *_cut(stages, previous, solved, time), control
@@ -78,7 +77,7 @@ def _cut(stages: Stages, previous: Pore, solved: Solved,
     """Make a step to a time (h). The solution after it is that before a jump of the tables."""
     advanced = step(stages, previous, solved, time - previous.time)
     after = contiguous(replace(advanced.pore, time=time))
-    solved = solving.solve(stages.scene, before_jump(stages.scene, after))
+    solved = stages.solver.solve(before_jump(stages.tables, after))
     return replace(advanced, pore=after), solved
 
 
@@ -86,7 +85,7 @@ def _interpolate(stages: Stages, previous: Pore, solved: Solved, time: float) ->
     """Interpolate to a time (h) within a step, by a shorter step from its start."""
     shorter = step(stages, previous, solved, time - previous.time)
     after = replace(shorter.pore, time=time)
-    return InterpolatedState(after, solving.solve(stages.scene, after), shorter.before)
+    return InterpolatedState(after, stages.solver.solve(after), shorter.before)
 
 
 def step(stages: Stages, previous: Pore, solved: Solved, duration: float) -> StepResult:
@@ -97,7 +96,7 @@ def step(stages: Stages, previous: Pore, solved: Solved, duration: float) -> Ste
     grown = replace(grown, time=time_before_end(previous, duration))
     expansion = _expand(stages, previous, grown)
     expanded = expansion.pore
-    refuse_outside(stages.scene.pore, previous, expanded)
+    refuse_outside(stages.channel, previous, expanded)
     refuse_fold(expanded)
     expanded = replace(expanded, concentrations=end)
     after, remeshed = stages.new_mesh(previous, expanded, solved)
@@ -127,11 +126,10 @@ def _solve_midway(stages: Stages, previous: Pore, solved: Solved, duration: floa
     If no table of the scene changes in the step, this is ``solved``. Stored substrates stay those
     of the start.
     """
-    scene = stages.scene
     middle = previous.time + duration / 2
-    if scene.at(middle) == scene.at(previous.time):
+    if stages.tables.same(previous.time, middle):
         return solved
-    halfway = solving.solve(scene, replace(previous, time=middle))
+    halfway = stages.solver.solve(replace(previous, time=middle))
     if stages.transport.stores:
         return replace(halfway, concentrations=solved.concentrations)
     return halfway

@@ -27,15 +27,34 @@ from repro.fem.outline import edge_functions
 from repro.fem.walls import Wall
 from repro.model import flow, growth, traction
 from repro.model.flow import Flow
+from repro.model.interface import Interface, interface_of
 from repro.model.pore import Pore
 from repro.model.resistance import resistance_of
 from repro.model.solving import Solved
-from repro.scene import Scene, at_time, needed
+from repro.scene import Flow as Drive
+from repro.scene import Growth, Scene, at_time, needed
 
 #: The length of the means, over the pore's width.
 LENGTH = 1 / 20
 #: Parts of an arc on a wall, for the means of its traction.
 PARTS = 64
+
+
+@dataclass(frozen=True, eq=False)
+class Loading:
+    """Data from which stresses and forces are computed.
+
+    growth: section [growth]; drive: section [flow], None without flow; interface: form of the flow.
+    """
+
+    growth: Growth
+    drive: Drive | None
+    interface: Interface
+
+    @classmethod
+    def of(cls, scene: Scene) -> Loading:
+        """The loading of a scene with growth."""
+        return cls(scene.growing.growth, scene.flow, interface_of(scene.numerics.interface))
 
 
 @dataclass(frozen=True)
@@ -57,20 +76,20 @@ class Load:
     moment: float
 
 
-def stress(scene: Scene, pore: Pore) -> np.ndarray:
+def stress(loading: Loading, pore: Pore) -> np.ndarray:
     """(t, q, 4) MPa, Cauchy stress xx, yy, zz, xy at the points where growth is integrated."""
     mesh = pore.mesh
     strained = pore.body.strained(mesh.points[mesh.body])
     pressure = pore.pressure[mesh.triangles[mesh.biomass]] @ pore.body.shape.table.linear.T
-    return scene.growing.growth.shear_modulus * growth.cauchy(strained, pressure)
+    return loading.growth.shear_modulus * growth.cauchy(strained, pressure)
 
 
-def fluid_forces(scene: Scene, pore: Pore, solved: Solved) -> np.ndarray:
+def fluid_forces(loading: Loading, pore: Pore, solved: Solved) -> np.ndarray:
     """(n, 2) MPa um, forces of the water on the aggregate's nodes, without those on the wall beside
     a contact line."""
-    drive = at_time(needed(scene.flow, "[flow]"), pore.time)
+    drive = at_time(needed(loading.drive, "[flow]"), pore.time)
     water = needed(solved.flow, "a solution of the flow")
-    of_head = traction.on_aggregate(pore.space, water, drive, scene.numerics.interface)
+    of_head = traction.on_aggregate(pore.space, water, drive, loading.interface)
     if not resistance_of(drive).permeable:
         of_head = of_head + _beside_contact(pore, water)
     return flow.MPA_PER_UM * drive.density * drive.gravity * of_head[pore.mesh.body]
@@ -100,9 +119,9 @@ def _beside_contact(pore: Pore, water: Flow) -> np.ndarray:
     return forces
 
 
-def fluid_load(scene: Scene, pore: Pore, solved: Solved) -> Load:
+def fluid_load(loading: Loading, pore: Pore, solved: Solved) -> Load:
     """The force and the moment of the water on the aggregate."""
-    forces = fluid_forces(scene, pore, solved)
+    forces = fluid_forces(loading, pore, solved)
     outline = pore.boundary
     seeded, *_ = pore.mesh.walls
     on = outline.points[outline.wall == seeded.number, 0]
@@ -111,7 +130,7 @@ def fluid_load(scene: Scene, pore: Pore, solved: Solved) -> Load:
     return Load(float(forces[:, 0].sum()), float(forces[:, 1].sum()), moment)
 
 
-def wall_forces(scene: Scene, pore: Pore, solved: Solved) -> np.ndarray:
+def wall_forces(loading: Loading, pore: Pore, solved: Solved) -> np.ndarray:
     """(n, 2) MPa um, forces of the walls on the aggregate's nodes.
 
     At the other nodes they are the defect of the equilibrium.
@@ -119,16 +138,16 @@ def wall_forces(scene: Scene, pore: Pore, solved: Solved) -> np.ndarray:
     mesh = pore.mesh
     inside = pore.pressure[mesh.topology.body_corners]
     forces = growth.internal_forces(pore.body, pore.theta, mesh.points[mesh.body], inside)
-    forces = scene.growing.growth.shear_modulus * forces
-    if scene.growing.growth.has_fluid_forces:
-        forces = forces - fluid_forces(scene, pore, solved)
+    forces = loading.growth.shear_modulus * forces
+    if loading.growth.has_fluid_forces:
+        forces = forces - fluid_forces(loading, pore, solved)
     return forces
 
 
-def wall_peak(scene: Scene, pore: Pore, solved: Solved) -> Peak:
+def wall_peak(loading: Loading, pore: Pore, solved: Solved) -> Peak:
     """Largest mean stress that a wall bears, with its coordinates."""
     forces = np.zeros_like(pore.mesh.points)
-    forces[pore.mesh.body] = wall_forces(scene, pore, solved)
+    forces[pore.mesh.body] = wall_forces(loading, pore, solved)
     touched = pore.boundary.edge_wall
     peaks = [_peak_on(pore, wall, forces) for wall in pore.mesh.walls
              if not wall.mirrors and (touched == wall.number).any()]
@@ -207,7 +226,7 @@ class _Surface:
         return (ahead - np.interp(starts, places, total)) / length
 
 
-def tensile_peak(scene: Scene, pore: Pore) -> Peak:
+def tensile_peak(loading: Loading, pore: Pore) -> Peak:
     """Largest principal value of the mean stress around a node.
 
     The mean has the weight 1 - (d / L)^2 at a distance d < L = W / 20 from the node. It is taken
@@ -226,7 +245,7 @@ def tensile_peak(scene: Scene, pore: Pore) -> Peak:
     total = np.bincount(near.row, weights, len(nodes))
     has_points = total > 0
     sums = [np.bincount(near.row, weights * component[near.col], len(nodes))
-            for component in stress(scene, pore).reshape(-1, 4).T]
+            for component in stress(loading, pore).reshape(-1, 4).T]
     means = np.column_stack(sums)[has_points] / total[has_points, None]
     largest = growth.largest_principal(means)
     worst = int(largest.argmax())

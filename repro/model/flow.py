@@ -8,10 +8,8 @@ phi g / nu_water,
     a(u, v) - (p, div v) = 0
     (q, div u) + sum_tau (tau grad p, grad q) = 0
 
-    a(u, v) = (nu_r grad u, grad v)                 "laplacian" [E2]
-           or (nu_r (grad u + grad u^T), grad v)    "traction"
-
-with nu_r = 1 or lambda; :mod:`repro.model.resistance` has permeable aggregates too.
+with nu_r = 1 or lambda and a of :mod:`repro.model.interface` [E2];
+:mod:`repro.model.resistance` has permeable aggregates too.
 Quadratic velocities with a linear pressure (Taylor-Hood) need no tau. Where the
 viscosity jumps, the pressure jumps too. Each node of the interface therefore has a pressure of the
 fluid and one of the biomass. With a single pressure the head loss errs by up to 1 % if the
@@ -34,6 +32,7 @@ from repro.fem.brief import brief
 from repro.fem.forms import each, product
 from repro.fem.mesh import Mesh
 from repro.fem.space import Space
+from repro.model.interface import LAPLACIAN, Interface
 from repro.model.resistance import WATER, Resistance, resistance_of
 from repro.scene import Flow as Drive
 from repro.timing import timed
@@ -169,25 +168,9 @@ def divergence(velocity: Space) -> np.ndarray:
     return product(q, at.dx, at.div)
 
 
-def viscous(velocity: Space, viscosity: np.ndarray, interface: str) -> np.ndarray:
-    """(T, 2k, 2k) element matrices of a(u, v), x before y in rows and columns; (T, k, k) for each
-    component if the two are not coupled. viscosity: (T,) nu_r."""
-    laplace = each(viscosity, velocity.stiffness)
-    if interface == "laplacian":
-        return laplace
-    at = velocity.gradients_at
-    k = velocity.cells.shape[1]
-    matrices = product(at.div, viscosity[:, None] * at.dx, at.div).reshape(-1, 2, k, 2, k)
-    # nu u_j,i v_i,j is nu u_i,i v_j,j with its functions exchanged: (T, i, a, j, b).
-    matrices = np.swapaxes(matrices, 2, 4).copy()
-    for i in (0, 1):
-        matrices[:, i, :, i] += laplace
-    return matrices.reshape(-1, 2 * k, 2 * k)
-
-
 @timed("flow")
 def unit_flow(velocity: Space, resistance: Resistance = WATER, *,
-              interface: str = "laplacian") -> UnitFlow:
+              interface: Interface = LAPLACIAN) -> UnitFlow:
     """Stokes flow of mean velocity one through the meshed part, (1)-(5); see :func:`solve`."""
     mesh = velocity.mesh
     splits = velocity.order > 1 and resistance.pressure_jumps
@@ -211,21 +194,21 @@ def unit_flow(velocity: Space, resistance: Resistance = WATER, *,
     return replace(unit, biomass_pressure=of_biomass)
 
 
-def stokes(velocity: Space, viscosity: np.ndarray, interface: str,
+def stokes(velocity: Space, viscosity: np.ndarray, interface: Interface,
            lower: np.ndarray | None, more: np.ndarray | None = None) -> np.ndarray:
     """(T, 2k + 3, 2k + 3) element matrices of velocity and pressure.
 
     viscosity: (T,) nu_r; lower: (T, 3, 3) of (tau grad p, grad q), None without tau; more: (T, 2k,
     2k) added to a(u, v).
     """
-    blocks = saddle_blocks(viscous(velocity, viscosity, interface), divergence(velocity), lower)
+    blocks = saddle_blocks(interface.a(velocity, viscosity), divergence(velocity), lower)
     if more is not None:
         size = more.shape[1]
         blocks[:, :size, :size] += more
     return blocks
 
 
-def _system(velocity: Space, interface: str, splits: bool) -> ElementSystem:
+def _system(velocity: Space, interface: Interface, splits: bool) -> ElementSystem:
     """The system with u = 0 on the walls, a parabola at the inlet, and u_y = 0 at the outlet in the
     traction form [E10]; splits: may the pressure jump across the interface?"""
     dofs = velocity.dofs
@@ -234,7 +217,7 @@ def _system(velocity: Space, interface: str, splits: bool) -> ElementSystem:
     constrained[velocity.inlet.nodes] = True
     for wall in mesh.walls:
         constrained[mesh.nodes_on(wall)] |= [wall.no_slip, True]
-    if interface == "traction":
+    if interface.straight_outlet:
         constrained[velocity.outlet.nodes, 1] = True
     corners = interface_corners(mesh) if splits else np.empty(0, int)
     return saddle_system(velocity.cells, doubled(mesh, corners), constrained, dofs.elimination,
@@ -284,7 +267,7 @@ def scaled(unit: UnitFlow, mesh: Mesh, length: float, drive: Drive) -> Flow:
 
 
 def solve(velocity: Space, drive: Drive, length: float, *,
-          interface: str = "laplacian") -> Flow:
+          interface: Interface = LAPLACIAN) -> Flow:
     """Solve the Stokes flow through a pore, (1)-(6).
 
     Parameters
@@ -295,7 +278,7 @@ def solve(velocity: Space, drive: Drive, length: float, *,
         Head or mean velocity, viscosities, and the permeability of the biomass.
     length : float
         Length of the whole pore, um; the part without mesh is a clean channel.
-    interface : {"laplacian", "traction"}
+    interface : Interface
         Form of the viscous term [E2].
 
     Returns

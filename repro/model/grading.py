@@ -2,16 +2,65 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 from repro.errors import Unresolved
-from repro.model.meshing import seeded
+from repro.model.meshing import Seeding
 from repro.model.pore import Pore
-from repro.model.solving import Solved, solve
-from repro.scene import Scene
+from repro.model.solving import Solved, Solver
+from repro.scene import Scene, needed
+
+if TYPE_CHECKING:
+    from repro.model.remeshing import Remeshing
 
 #: A front of the substrates divides element sizes at the aggregate by at most this.
 MOST_GRADED = 4.0
+
+
+@dataclass(frozen=True, eq=False)
+class Grading:
+    """How a pore is solved, and how it gets finer elements at its aggregate.
+
+    seeding: makes the pore anew at t = 0; remeshing: at later times, None without growth, whose
+    times they are.
+    """
+
+    solver: Solver
+    seeding: Seeding
+    remeshing: Remeshing | None
+
+    @classmethod
+    def of(cls, scene: Scene) -> Grading:
+        """The grading of a scene."""
+        remeshing = None
+        if scene.growth:
+            from repro.model.remeshing import Remeshing  # a scene without growth does not load it
+            remeshing = Remeshing.of(scene)
+        return cls(Solver.of(scene), Seeding.of(scene), remeshing)
+
+    def solve(self, pore: Pore) -> tuple[Pore, Solved]:
+        """Solve flow and substrates, by :func:`solve_graded`."""
+        while True:
+            try:
+                return pore, self.solver.solve(pore)
+            except Unresolved:
+                finer = self.finer(pore)
+                if finer is None:
+                    raise
+                pore = finer
+
+    def finer(self, pore: Pore) -> Pore | None:
+        """The same pore on elements half as large at the aggregate; None if they may not be halved
+        again."""
+        front = 2 * pore.front
+        if not self.solver.scheme.follows_layers or front > MOST_GRADED:
+            return None
+        if pore.time == 0:
+            return self.seeding.pore(front)
+        from repro.model.remeshing import remesh
+        rules = needed(self.remeshing, "[growth]")
+        return remesh(rules, pore, replace(pore, front=front), 0.0)[0]
 
 
 def solve_graded(scene: Scene, pore: Pore) -> tuple[Pore, Solved]:
@@ -20,23 +69,4 @@ def solve_graded(scene: Scene, pore: Pore) -> tuple[Pore, Solved]:
 
     Raises Unresolved if no graded mesh resolves the front.
     """
-    while True:
-        try:
-            return pore, solve(scene, pore)
-        except Unresolved:
-            finer = grade(scene, pore)
-            if finer is None:
-                raise
-            pore = finer
-
-
-def grade(scene: Scene, pore: Pore) -> Pore | None:
-    """The same pore on elements half as large at the aggregate; None if they may not be halved
-    again."""
-    front = 2 * pore.front
-    if not scene.numerics.scheme.follows_layers or front > MOST_GRADED:
-        return None
-    if pore.time == 0:
-        return seeded(scene, front)
-    from repro.model.remeshing import Remeshing, remesh  # later times are those of growth
-    return remesh(Remeshing.of(scene), pore, replace(pore, front=front), 0.0)[0]
+    return Grading.of(scene).solve(pore)

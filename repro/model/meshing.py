@@ -20,10 +20,11 @@ from repro.model.body import material
 from repro.model.configuration import configuration_of
 from repro.model.energies import energy_of
 from repro.model.flow import poiseuille_loss
+from repro.model.interface import interface_of
 from repro.model.pore import Pore
 from repro.model.resistance import resistance_of
+from repro.scene import Aggregate, Growth, Numerics, Scene, Substrates, at_largest, needed
 from repro.scene import Flow as Drive
-from repro.scene import Numerics, Scene, Substrates, at_largest, needed
 from repro.scene import Pore as Channel
 
 #: Thinnest film to resolve (um, Table 1) without [growth], which states when a film closes.
@@ -178,24 +179,64 @@ class Meshing:
         return mesher.generate(outline, ends, sizes, numerics.scheme.order, method)
 
 
-def initial_outline(scene: Scene, front: float = 1.0) -> Outline | None:
-    """The aggregate's boundary at t = 0, None in a clean channel; front: as :attr:`Pore.front`."""
-    seed = scene.aggregate
-    if seed is None:
-        return None
-    geometry = scene.numerics.scheme.order
-    if seed.radius is None:
-        return polygon(np.array(seed.outline), walls_of(scene), geometry, seed.smooth,
-                       size_at_tips(scene.numerics, scene.pore.width),
-                       bends=scene.numerics.interface == "traction")
-    across = sizing.ACROSS_AGGREGATE * resolution(scene) * front
-    return half_disc(seed.radius, across, geometry, seed.position)
-
-
 def size_at_tips(numerics: Numerics, width: float) -> float:
     """Length (um) of the edges at an outline's tips, in a pore of a width (um)."""
     finest = min(AT_TIPS[numerics.scheme.order] * numerics.refinement**2, MOST_AT_TIPS)
     return width / finest
+
+
+@dataclass(frozen=True, eq=False)
+class Seeding:
+    """Data from which the pore at t = 0 is made.
+
+    seed: section [aggregate], None in a clean channel; maximum_density: X_m, mg/L, zero without
+    kinetics; growth: section [growth], None if nothing grows.
+    """
+
+    meshing: Meshing
+    seed: Aggregate | None
+    maximum_density: float
+    growth: Growth | None
+
+    @classmethod
+    def of(cls, scene: Scene) -> Seeding:
+        """The seeding of a scene."""
+        density = scene.kinetics.maximum_density if scene.kinetics else 0.0
+        return cls(Meshing.of(scene), scene.aggregate, density, scene.growth)
+
+    def outline(self, front: float) -> Outline | None:
+        """The aggregate's boundary, None in a clean channel; front: as :attr:`Pore.front`."""
+        seed = self.seed
+        if seed is None:
+            return None
+        numerics = self.meshing.numerics
+        sizes = self.meshing.sizes
+        geometry = numerics.scheme.order
+        if seed.radius is None:
+            return polygon(np.array(seed.outline), sizes.walls, geometry, seed.smooth,
+                           size_at_tips(numerics, self.meshing.channel.width),
+                           bends=interface_of(numerics.interface).bends)
+        across = sizing.ACROSS_AGGREGATE * sizes.refinement * front
+        return half_disc(seed.radius, across, geometry, seed.position)
+
+    def pore(self, front: float, outline: Outline | None = None) -> Pore:
+        """The pore at t = 0, as :func:`seeded` makes it."""
+        mesh, outline = self.meshing.generate(outline or self.outline(front), front)
+        space = Space(mesh)
+        total = self.maximum_density * space.reaction.dx
+        inert = total * (self.seed.inert_fraction if self.seed else 0.0)
+        wall = outline.wall if outline else np.empty(0, int)
+        fixed = outline.fixed if outline else np.empty(0, bool)
+        body = material(space, mesh.points[mesh.body], energy_of(self.growth))
+        theta = np.ones((np.count_nonzero(mesh.biomass), len(body.shape.table.weights)))
+        return Pore(0.0, space, wall, fixed, total - inert, inert, theta, body,
+                    np.zeros(mesh.corners), front=front,
+                    configuration=configuration_of(self.growth, body.reference))
+
+
+def initial_outline(scene: Scene, front: float = 1.0) -> Outline | None:
+    """The aggregate's boundary at t = 0, None in a clean channel; front: as :attr:`Pore.front`."""
+    return Seeding.of(scene).outline(front)
 
 
 def seeded(scene: Scene, front: float = 1.0, outline: Outline | None = None) -> Pore:
@@ -218,16 +259,4 @@ def seeded(scene: Scene, front: float = 1.0, outline: Outline | None = None) -> 
     MeshError
         If no mesh can be made around the outline.
     """
-    meshing = Meshing.of(scene)
-    mesh, outline = meshing.generate(outline or initial_outline(scene, front), front)
-    space = Space(mesh)
-    density = scene.kinetics.maximum_density if scene.kinetics else 0.0
-    total = density * space.reaction.dx
-    inert = total * (scene.aggregate.inert_fraction if scene.aggregate else 0.0)
-    wall = outline.wall if outline else np.empty(0, int)
-    fixed = outline.fixed if outline else np.empty(0, bool)
-    body = material(space, mesh.points[mesh.body], energy_of(scene.growth))
-    theta = np.ones((np.count_nonzero(mesh.biomass), len(body.shape.table.weights)))
-    return Pore(0.0, space, wall, fixed, total - inert, inert, theta, body,
-                np.zeros(mesh.corners), front=front,
-                configuration=configuration_of(scene.growth, body.reference))
+    return Seeding.of(scene).pore(front, outline)

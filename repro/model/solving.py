@@ -10,11 +10,14 @@ from repro.fem.brief import brief
 from repro.fem.space import Space
 from repro.model import flow
 from repro.model.flow import Flow
+from repro.model.interface import Interface, interface_of
 from repro.model.meshing import peclet
 from repro.model.pore import Pore
-from repro.model.transport_in_time import transport_in_time
+from repro.model.transport_in_time import TransportInTime, transport_in_time
 from repro.scene import Flow as Drive
-from repro.scene import MissingError, Numerics, Scene
+from repro.scene import Kinetics, MissingError, Scene, Substrates, at_time
+from repro.scene import Pore as Channel
+from repro.schemes import Scheme
 
 if TYPE_CHECKING:
     from repro.model.transport import Concentrations, Fluxes, Problem
@@ -56,6 +59,49 @@ class Solved:
         return self.flow.mean_velocity if self.flow else 0.0
 
 
+@dataclass(frozen=True, eq=False)
+class Solver:
+    """Data from which flow and substrates are solved.
+
+    channel: section [pore]; drive, substrates, kinetics: their sections, None if the scene leaves
+    them out, with tables over time; interface, scheme, transport: how they are solved.
+    """
+
+    channel: Channel
+    drive: Drive | None
+    substrates: Substrates | None
+    kinetics: Kinetics | None
+    interface: Interface
+    scheme: Scheme
+    transport: TransportInTime
+
+    @classmethod
+    def of(cls, scene: Scene) -> Solver:
+        """The solver of a scene."""
+        numerics = scene.numerics
+        return cls(scene.pore, scene.flow, scene.substrates, scene.kinetics,
+                   interface_of(numerics.interface), numerics.scheme,
+                   transport_in_time(numerics.transport))
+
+    def solve_flow(self, space: Space, drive: Drive) -> Flow:
+        """Stokes flow on a space of velocities; drive: without tables."""
+        return flow.solve(space, drive, self.channel.length, interface=self.interface)
+
+    def solve(self, pore: Pore, over: float = 0.0) -> Solved:
+        """Solve in the geometry of a pore, at its time, by :func:`solve`."""
+        carried = None
+        if self.drive:
+            carried = self.solve_flow(pore.space, at_time(self.drive, pore.time))
+        if self.substrates is None:
+            return Solved(carried, None, None)
+        supplied = at_time(self.substrates, pore.time)
+        if carried and not self.transport.stores:
+            refuse_no_supply(peclet(supplied, self.channel.width, carried.mean_velocity))
+        from repro.model import substrates  # a scene without [substrates] does not load them
+        return Solved(carried, *substrates.solve(supplied, self.kinetics, self.scheme,
+                                                 self.transport, pore, carried, over))
+
+
 def solve(scene: Scene, pore: Pore, over: float = 0.0) -> Solved:
     """Solve the flow and the substrates that a scene models, in the geometry of a pore.
 
@@ -77,16 +123,7 @@ def solve(scene: Scene, pore: Pore, over: float = 0.0) -> Solved:
     LinearError, TransportError, Unresolved
         If the flow or the substrates cannot be solved.
     """
-    scene = scene.at(pore.time)
-    carried = None
-    if scene.flow:
-        carried = solve_flow(pore.space, scene.flow, scene.pore.length, scene.numerics)
-    if scene.substrates is None:
-        return Solved(carried, None, None)
-    if carried and not transport_in_time(scene.numerics.transport).stores:
-        refuse_no_supply(peclet(scene.substrates, scene.pore.width, carried.mean_velocity))
-    from repro.model import substrates  # a scene without [substrates] does not load them
-    return Solved(carried, *substrates.solve(scene, pore, carried, over))
+    return Solver.of(scene).solve(pore, over)
 
 
 def refuse_no_supply(number: float) -> None:
@@ -95,23 +132,3 @@ def refuse_no_supply(number: float) -> None:
         raise TransportError(f"the Peclet number u W / D is {number:.2g}, under {SLOWEST:g}: "
                              "nothing is supplied through the inlet; leave [flow] out for pure "
                              "diffusion")
-
-
-def solve_flow(space: Space, drive: Drive, length: float, numerics: Numerics) -> Flow:
-    """Solve the Stokes flow on a space of velocities.
-
-    Parameters
-    ----------
-    space : Space
-    drive : repro.scene.Flow
-        Head or mean velocity at one time, without tables.
-    length : float
-        Length of the whole pore, um.
-    numerics : Numerics
-        Form of the viscous term.
-
-    Returns
-    -------
-    Flow
-    """
-    return flow.solve(space, drive, length, interface=numerics.interface)

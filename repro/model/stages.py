@@ -8,26 +8,29 @@ from dataclasses import dataclass
 from repro.model import biomass, contact, growing, remeshing
 from repro.model.biomass import Rates
 from repro.model.contact_lines import PATIENT, SearchOptions
+from repro.model.grading import Grading
 from repro.model.mechanics import Expansion, Mechanics
 from repro.model.pore import Pore
 from repro.model.remeshing import GeneratedMesh, Remeshing
-from repro.model.solving import Solved
-from repro.model.transport_in_time import TransportInTime, transport_in_time
-from repro.scene import Growth, Scene
+from repro.model.solving import Solved, Solver
+from repro.model.transport_in_time import TransportInTime
+from repro.scene import Growth, Scene, TimeTables
+from repro.scene import Pore as Channel
 
 
 @dataclass(frozen=True, eq=False)
 class Stages:
     """The stages of a step of growth.
 
-    scene: for values that depend on the time, and for advice; growth: its section [growth];
-    transport: substrates in time; mechanics: shape of the grown aggregate; remeshing: mesh after a
-    step.
+    growth: section [growth] of the scene; tables: times at which steps end, and jumps; tolerance:
+    of a step; grading: flow and substrates, on a mesh that resolves them; mechanics: shape of the
+    grown aggregate; remeshing: mesh after a step.
     """
 
-    scene: Scene
     growth: Growth
-    transport: TransportInTime
+    tables: TimeTables
+    tolerance: float
+    grading: Grading
     mechanics: Mechanics
     remeshing: Remeshing
 
@@ -35,8 +38,23 @@ class Stages:
     def of(cls, scene: Scene) -> Stages:
         """The stages of a scene with growth."""
         _, _, growth = scene.growing
-        return cls(scene, growth, transport_in_time(scene.numerics.transport), Mechanics.of(scene),
-                   Remeshing.of(scene))
+        return cls(growth, scene.time_tables, scene.numerics.tolerance, Grading.of(scene),
+                   Mechanics.of(scene), Remeshing.of(scene))
+
+    @property
+    def solver(self) -> Solver:
+        """Of flow and substrates on the mesh of a pore."""
+        return self.grading.solver
+
+    @property
+    def transport(self) -> TransportInTime:
+        """Substrates in time."""
+        return self.solver.transport
+
+    @property
+    def channel(self) -> Channel:
+        """Section [pore] of the scene."""
+        return self.solver.channel
 
     def rates(self, pore: Pore, solved: Solved) -> Rates:
         """F3 / X_A and F4 / X_A, 1/h, at the points of the reaction."""

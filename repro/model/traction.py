@@ -31,8 +31,9 @@ import numpy as np
 from repro.fem import elements, transfer
 from repro.fem.mesh import Mesh
 from repro.fem.space import Space
-from repro.model import mesh_motion, remeshing, solving
+from repro.model import flow, mesh_motion, remeshing
 from repro.model.flow import MPA_PER_UM, Flow
+from repro.model.interface import Interface, interface_of
 from repro.model.meshing import Meshing
 from repro.model.pore import Pore
 from repro.model.resistance import resistance_of
@@ -62,18 +63,20 @@ class Fluid:
     """Data from which the fluid's forces on an aggregate are computed.
 
     meshing: of the scene; drive: section [flow], whose head or mean velocity may be a table over
-    time; shear_modulus: mu_L, MPa.
+    time; interface: form of the flow; shear_modulus: mu_L, MPa.
     """
 
     meshing: Meshing
     drive: Drive
+    interface: Interface
     shear_modulus: float
 
     @classmethod
     def of(cls, scene: Scene) -> Fluid:
         """The fluid of a scene with flow and growth."""
         drive = needed(scene.flow, "[flow]")
-        return cls(Meshing.of(scene), drive, scene.growing.growth.shear_modulus)
+        return cls(Meshing.of(scene), drive, interface_of(scene.numerics.interface),
+                   scene.growing.growth.shear_modulus)
 
 
 def surroundings(meshing: Meshing, before: Pore, shaped: Pore) -> Surroundings:
@@ -110,10 +113,9 @@ def forces(fluid: Fluid, around: Surroundings, shaped: Pore) -> np.ndarray:
     """(n, 2) um: nodal forces over mu_L on ``shaped.mesh.body`` by the flow around that shape."""
     mesh = around.mesh
     drive = at_time(fluid.drive, shaped.time)
-    numerics = fluid.meshing.numerics
     space = Space(mesh)
-    flow_field = solving.solve_flow(space, drive, fluid.meshing.channel.length, numerics)
-    on = on_aggregate(space, flow_field, drive, numerics.interface)[mesh.body]
+    flow_field = flow.solve(space, drive, fluid.meshing.channel.length, interface=fluid.interface)
+    on = on_aggregate(space, flow_field, drive, fluid.interface)[mesh.body]
     total = np.zeros((len(shaped.mesh.body), 2))
     np.add.at(total, around.nodes, around.share[..., None] * on[:, None])
     return MPA_PER_UM * drive.density * drive.gravity / fluid.shear_modulus * total
@@ -144,7 +146,8 @@ class SurroundingFlow:
         return forces(self._fluid, self._around, shaped)
 
 
-def on_aggregate(space: Space, solution: Flow, drive: Drive, interface: str) -> np.ndarray:
+def on_aggregate(space: Space, solution: Flow, drive: Drive,
+                 interface: Interface) -> np.ndarray:
     """(N, 2) um2 of head: forces of the water on the aggregate at all nodes, over rho g; traction
     on its surface, or the drag within a permeable one."""
     viscosity = drive.kinematic_viscosity / drive.gravity
@@ -169,20 +172,19 @@ def seepage(space: Space, solution: Flow, drag: float) -> np.ndarray:
                             for i in (0, 1)])
 
 
-def nodal(space: Space, solution: Flow, viscosity: float, interface: str) -> np.ndarray:
+def nodal(space: Space, solution: Flow, viscosity: float,
+          interface: Interface) -> np.ndarray:
     """(N, 2) um2 of head: forces of the fluid's triangles on all nodes of the mesh, over rho g.
 
-    viscosity: nu_water / g, um h; interface: "laplacian" or "traction".
+    viscosity: nu_water / g, um h.
     """
     mesh = space.mesh
     wet = ~mesh.biomass
     at = space.gradients_at
     gradients = at.gradients[wet]
     grad = np.einsum("tai,tqka->tqik", solution.velocity[space.cells[wet]], gradients)
-    if interface == "traction":
-        grad = grad + np.swapaxes(grad, 2, 3)
     head = solution.head[mesh.triangles[wet]] @ space.gradient_table.linear.T
-    stress = viscosity * grad - head[..., None, None] * np.eye(2)
+    stress = viscosity * interface.rate(grad) - head[..., None, None] * np.eye(2)
     local = -np.einsum("tq,tqik,tqka->tai", at.dx[wet], stress, gradients)
     nodes = mesh.cells[wet].ravel()
     return np.column_stack([np.bincount(nodes, local[..., i].ravel(), len(mesh.points))

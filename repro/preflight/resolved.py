@@ -72,4 +72,4 @@ def _head_loss(scene: Scene, drive: Flow) -> float:
     """Head loss (um) of the whole pore at t = 0, with the flow at that time."""
     space = seeded(scene).space
     poll()
-    return solving.solve_flow(space, drive, scene.pore.length, scene.numerics).head_loss
+    return solving.Solver.of(scene).solve_flow(space, drive).head_loss

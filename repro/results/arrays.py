@@ -38,7 +38,7 @@ class State:
     def stress(self) -> np.ndarray:
         """(t, q, 4) MPa, components xx, yy, zz, xy at the same points."""
         from repro.model import adhesion
-        return adhesion.stress(self.scene, self.pore)
+        return adhesion.stress(adhesion.Loading.of(self.scene), self.pore)
 
     @property
     def largest_principal(self) -> np.ndarray:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 from types import ModuleType
+from typing import TYPE_CHECKING
 
 from repro.march import balance
 from repro.march.balance import Ledger
@@ -14,6 +15,9 @@ from repro.model.surface import BESIDE, STRETCH, surface
 from repro.model.transport_in_time import transport_in_time
 from repro.results.quantities import Quantity, is_modelled
 from repro.scene import Growth, Scene
+
+if TYPE_CHECKING:
+    from repro.model.adhesion import Loading
 
 SUBSTRATES = ("acceptor", "donor")
 #: Parts that a quantity may need: does a report have them?
@@ -100,8 +104,12 @@ def _adhesion() -> ModuleType:
     return adhesion
 
 
+def _loading(scene: Scene) -> Loading:
+    return _adhesion().Loading.of(scene)
+
+
 def _load(part: str, scene: Scene, at: Report) -> float:
-    return getattr(_adhesion().fluid_load(scene, at.pore, at.solved), part)
+    return getattr(_adhesion().fluid_load(_loading(scene), at.pore, at.solved), part)
 
 
 def _composition(index: int, scene: Scene, at: Report) -> float:
@@ -182,11 +190,11 @@ SERIES = (
     *_peak("wall_traction_max", "largest traction that a wall must bear",
            "largest (max(pull, 0)^2 + shear^2)^(1/2), means over W / 20 along the contact surface",
            "wall traction",
-           lambda scene, at: _adhesion().wall_peak(scene, at.pore, at.solved)),
+           lambda scene, at: _adhesion().wall_peak(_loading(scene), at.pore, at.solved)),
     *_peak("tensile_stress_max", "largest tensile stress of the aggregate",
            "largest eigenvalue of the Cauchy stress, in a mean around a node with the weight 1 - "
            "(d / L)^2 at a distance d < L = W / 20", "tensile stress",
-           lambda scene, at: _adhesion().tensile_peak(scene, at.pore)),
+           lambda scene, at: _adhesion().tensile_peak(_loading(scene), at.pore)),
     *(Quantity(f"fluid_force_{axis}_uN_per_m", f"force of the fluid on the aggregate, {axis}",
                "integral of the water's stress over the interface, or of its drag over a permeable "
                "aggregate; the head is zero at the outlet of the meshed part",

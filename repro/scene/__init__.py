@@ -40,11 +40,11 @@ from repro.scene.keys import (
     scene_tables,
 )
 from repro.scene.needed import MissingError, needed
-from repro.scene.time_table import at_largest, at_time
-from repro.scene.units import SceneError
+from repro.scene.time_table import TimeTables, at_largest, at_time
+from repro.scene.units import SceneError, Stated
 
 __all__ = ["KEYS", "NOT_IN_PAPER", "PRESETS", "Acceptor", "Aggregate", "Donor", "Flow", "Growth",
            "Kinetics", "MissingError", "Numerics", "Output", "Pore", "Scene", "SceneError",
-           "Source", "Substrate", "Substrates", "at_largest", "at_time", "label", "load_scene",
-           "load_tables", "needed", "packaged_scenes", "parse_scene", "scene_hash",
-           "scene_tables", "without_former"]
+           "Source", "Stated", "Substrate", "Substrates", "TimeTables", "at_largest", "at_time",
+           "label", "load_scene", "load_tables", "needed", "packaged_scenes", "parse_scene",
+           "scene_hash", "scene_tables", "without_former"]

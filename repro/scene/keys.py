@@ -15,7 +15,7 @@ from copy import deepcopy
 from dataclasses import MISSING, asdict, dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
-from math import ceil, inf
+from math import ceil
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -25,7 +25,7 @@ from repro.scene.former import with_former
 from repro.scene.needed import MissingError, needed
 from repro.scene.reading import Place, dotted, entries, read_table, toml, write_table
 from repro.scene.rules import LIMITING, rules
-from repro.scene.time_table import TimeTable, at_largest, at_time, time_tables
+from repro.scene.time_table import TimeTable, TimeTables, at_largest, at_time, time_tables
 from repro.scene.units import (
     ACUTE,
     BELOW_1,
@@ -40,6 +40,7 @@ from repro.scene.units import (
     Flag,
     Points,
     SceneError,
+    Stated,
     Times,
     choice,
     number,
@@ -528,13 +529,13 @@ class Scene:
         return 0 in velocity.values if isinstance(velocity, TimeTable) else velocity == 0
 
     @cached_property
-    def time_tables(self) -> list[TimeTable]:
+    def time_tables(self) -> TimeTables:
         """All tables over time."""
-        return time_tables(self)
+        return TimeTables(time_tables(self))
 
     def at(self, time: float) -> "Scene":
         """Return the scene with the values of its tables at a time (h), after a jump then."""
-        return at_time(self, time) if self.time_tables else self
+        return at_time(self, time) if self.time_tables.tables else self
 
     @cached_property
     def largest(self) -> "Scene":
@@ -548,12 +549,17 @@ class Scene:
 
     def corner(self, time: float) -> float:
         """Return the next time (h) of its tables after ``time``; infinite if there is none."""
-        later = [corner for table in self.time_tables for corner in table.times if corner > time]
-        return min(later, default=inf)
+        return self.time_tables.corner(time)
 
     def jumps(self, time: float) -> bool:
         """Return whether a value of its tables jumps at a time (h)."""
-        return any(table.jumps(time) for table in self.time_tables)
+        return self.time_tables.jumps(time)
+
+    def stated(self, section: str, key: str) -> Stated:
+        """Return the value of a key of a section, a quantity, in the unit of the scene's text."""
+        kind = entries(type(getattr(self, section)))[key].metadata["kind"]
+        value = getattr(getattr(self, section), key)
+        return kind.stated(value, self.units.get(f"{section}.{key}", kind.usual_unit))
 
     def __str__(self) -> str:
         """TOML text with all keys and units; it parses to an equal scene."""

@@ -8,6 +8,7 @@ from bisect import bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass, fields, is_dataclass, replace
 from itertools import pairwise
+from math import inf
 from typing import TypeVar
 
 Part = TypeVar("Part")
@@ -43,6 +44,26 @@ class TimeTable:
         return max(self.values)
 
 
+@dataclass(frozen=True)
+class TimeTables:
+    """All tables of a scene."""
+
+    tables: tuple[TimeTable, ...]
+
+    def corner(self, time: float) -> float:
+        """Next time (h) of a table after ``time``; infinite if there is none."""
+        later = [corner for table in self.tables for corner in table.times if corner > time]
+        return min(later, default=inf)
+
+    def jumps(self, time: float) -> bool:
+        """Does a value jump at a time (h)?"""
+        return any(table.jumps(time) for table in self.tables)
+
+    def same(self, time: float, other: float) -> bool:
+        """Are all values at two times (h) the same?"""
+        return all(table.at(time) == table.at(other) for table in self.tables)
+
+
 def at_time(part: Part, time: float) -> Part:
     """A scene or a section with the values of its tables at a time (h), after a jump there."""
     return constant(part, lambda table: table.at(time))
@@ -65,13 +86,13 @@ def constant(part: Part, value: Callable[[TimeTable], float]) -> Part:
     return replace(part, **changed) if changed else part  # type: ignore[type-var]  # a dataclass
 
 
-def time_tables(part: object) -> list[TimeTable]:
+def time_tables(part: object) -> tuple[TimeTable, ...]:
     """All tables of a scene or a section."""
-    tables = []
+    tables: tuple[TimeTable, ...] = ()
     for entry in fields(part):  # type: ignore[arg-type]  # a dataclass
         value = getattr(part, entry.name)
         if isinstance(value, TimeTable):
-            tables.append(value)
+            tables += (value,)
         elif is_dataclass(value):
             tables += time_tables(value)
     return tables

@@ -79,6 +79,14 @@ ACUTE = Range("between 0 and 90 deg", lambda value: 0 < value < math.pi / 2)
 EITHER_SIGN = Range("of either sign", math.isfinite)
 
 
+class Stated(NamedTuple):
+    """A quantity as a scene's text writes it, and its parts."""
+
+    text: str
+    number: float
+    unit: str
+
+
 @dataclass(frozen=True)
 class Quantity:
     """A number with a unit, such as "50 um", that can be converted to the internal `unit`."""
@@ -115,6 +123,11 @@ class Quantity:
     def write(self, value: float, unit: str = "") -> str:
         """Write a value in the internal unit, or in another one."""
         return in_unit(value, self.unit, unit) if unit else f"{float(value)!r} {self.unit}"
+
+    def stated(self, value: float, unit: str) -> Stated:
+        """Write a value in the internal unit as a text in another one, with its parts."""
+        text = self.write(value, unit)
+        return Stated(text, float(_parts(text)[0]), unit)
 
     @property
     def usual_unit(self) -> str:

@@ -12,6 +12,7 @@ from reference import half_cylinder
 from repro.fem.walls import BOTTOM, FREE
 from repro.march.simulation import shaped
 from repro.model import adhesion, contact, flow, growth, solving, traction
+from repro.model.adhesion import Loading
 from repro.model.mechanics import Mechanics
 from repro.model.meshing import Meshing, seeded
 from repro.model.pore import Pore
@@ -32,7 +33,7 @@ def scene_of(*changes: str):
 
 def water(scene, state: Pore) -> Solved:
     """The flow alone."""
-    return Solved(solving.solve_flow(state.space, scene.flow, scene.pore.length, scene.numerics), None, None)
+    return Solved(solving.Solver.of(scene).solve_flow(state.space, scene.flow), None, None)
 
 
 RADII = (10.0, 5.0, 2.5, 1.25)
@@ -67,7 +68,7 @@ def _load_errors(radius: float, *changes: str) -> tuple[float, float, float]:
                      *changes)
     seed = seeded(scene)
     solved = water(scene, seed)
-    load = adhesion.fluid_load(scene, seed, solved)
+    load = adhesion.fluid_load(Loading.of(scene), seed, solved)
     drive = scene.flow
     shear = 6 * solved.flow.mean_velocity / WIDTH
     scale = flow.MPA_PER_UM * drive.density * drive.kinematic_viscosity * shear * radius
@@ -106,8 +107,8 @@ def test_balance(wall, changes, record):
     length of t = 0 along a wall, over its mean.
     """
     scene, state, solved = _at_rest(wall, *changes)
-    fluid_force = adhesion.fluid_forces(scene, state, solved)
-    wall_force = adhesion.wall_forces(scene, state, solved)
+    fluid_force = adhesion.fluid_forces(Loading.of(scene), state, solved)
+    wall_force = adhesion.wall_forces(Loading.of(scene), state, solved)
     rim = state.mesh.topology.body_loop
     touching = np.zeros(len(wall_force), bool)
     touching[rim[state.wall == BOTTOM]] = True
@@ -151,7 +152,8 @@ def test_plug(changes, record):
     theta = 0.8
     shape = contact.expand(Mechanics.of(scene), seed, theta * seed.theta).pore
     expected = scene.growth.shear_modulus * theta ** (-2 / 3) * (1 / theta - theta)
-    peaks = {"walls": adhesion.wall_peak(scene, shape, None), "tensile stress": adhesion.tensile_peak(scene, shape)}
+    loading = Loading.of(scene)
+    peaks = {"walls": adhesion.wall_peak(loading, shape, None), "tensile stress": adhesion.tensile_peak(loading, shape)}
     record(each_at_most({name: abs(peak.value / expected - 1) for name, peak in peaks.items()}, 1e-7,
                         "F is constant: Newton's tolerance"))
 
@@ -211,7 +213,7 @@ def test_bonded_slab(changes, record):
     free = (shape.wall == FREE) & (np.abs(x) < MIDDLE)
     middles = shape.mesh.points[shape.mesh.triangles[shape.mesh.biomass]].mean(axis=1)
     near = np.abs(middles[:, 0]) < MIDDLE
-    sigma = adhesion.stress(scene, shape)[near] / scene.growth.shear_modulus
+    sigma = adhesion.stress(Loading.of(scene), shape)[near] / scene.growth.shear_modulus
     expected = theta ** (-2 / 3) * (1 / theta - theta)
     size = abs(expected)
     if shape.mesh.geometry == 1:
@@ -271,4 +273,5 @@ def _bonded_peaks(refinement: float, *changes: str) -> tuple[float, float]:
     seed = seeded(scene)
     slope = seed.body.reference[seed.body.shape.cells, 0] @ seed.body.shape.table.values.T
     shape = contact.expand(Mechanics.of(scene), seed, seed.theta * (1.1 - 0.005 * slope)).pore
-    return adhesion.wall_peak(scene, shape, None).value, adhesion.tensile_peak(scene, shape).value
+    loading = Loading.of(scene)
+    return adhesion.wall_peak(loading, shape, None).value, adhesion.tensile_peak(loading, shape).value

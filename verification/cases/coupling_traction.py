@@ -20,6 +20,7 @@ from repro.march.state import Report
 from repro.model import contact, flow, growth, mechanics, mesh_motion, solving, traction
 from repro.model.contact_lines import PATIENT
 from repro.model.flow import Flow
+from repro.model.interface import LAPLACIAN
 from repro.model.mechanics import Mechanics, supports_of
 from repro.model.meshing import Meshing, seeded
 from repro.model.pore import Pore
@@ -42,7 +43,7 @@ def loaded_scene(*changes: str):
 
 def nodal_forces(scene, space: Space) -> tuple[np.ndarray, Flow]:
     """Nodal forces (N, 2) um2 of head on the nodes of a mesh, and the flow."""
-    solution = solving.solve_flow(space, scene.flow, scene.pore.length, scene.numerics)
+    solution = solving.Solver.of(scene).solve_flow(space, scene.flow)
     viscosity = scene.flow.kinematic_viscosity / scene.flow.gravity
     return traction.nodal(space, solution, viscosity, scene.numerics.interface), solution
 
@@ -149,7 +150,7 @@ def _shear(space: Space) -> float:
     ratio = 2000.0
     unit = flow.unit_flow(space, Viscous(ratio))
     as_flow = Flow(1.0, unit.velocity, unit.pressure, unit.correction, 1.0, 1.0, 1.0)
-    forces = traction.nodal(space, as_flow, 1.0, "laplacian")
+    forces = traction.nodal(space, as_flow, 1.0, LAPLACIAN)
     along, across = mesh.points.T
     line = np.flatnonzero((across == flow_cases.LAYER) & (np.abs(along) < flow_cases.LAYER_END))
     x, shear = mesh.points[line, 0], forces[line, 0]
@@ -214,7 +215,7 @@ def test_traction_even(changes, record):
     space = seed.moved(mesh_motion.move(seed.mesh, plain.mesh.points[seed.mesh.body], 1.0)).space
     mesh = space.mesh
     at_rest = Flow(0.0, np.zeros((space.count, 2)), np.full(mesh.corners, 5.0), None, 0.0, 0.0, 0.0)
-    forces = traction.nodal(space, at_rest, 1.0, "laplacian")
+    forces = traction.nodal(space, at_rest, 1.0, LAPLACIAN)
     expected = -5.0 * _normals(plain.outline)
     difference = (forces[mesh.loop] - expected)[plain.wall == FREE]
     record(at_most("forces", np.abs(difference).max() / np.abs(expected).max(), 1e-12,

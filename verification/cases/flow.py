@@ -45,6 +45,7 @@ from repro.fem.space import Space
 from repro.fem.walls import channel_walls
 from repro.model import flow
 from repro.model.brinkman import ACROSS
+from repro.model.interface import interface_of
 from repro.model.resistance import Permeable, Viscous
 from repro.scene import Flow as Drive
 from verification.evidence.cases import combined, parametrize
@@ -98,7 +99,8 @@ def _clean(refinement: float, interface: str) -> dict[str, float]:
 
 def _poiseuille_errors(space: Space, half: float, interface: str = "laplacian") -> dict[str, float]:
     """Errors in a channel with a plug of a half length (um), or none. The conductivity is that of a clean pore."""
-    solution = flow.solve(space, drive(mean_velocity=MEAN, viscosity_ratio=RATIO), LENGTH, interface=interface)
+    driven = drive(mean_velocity=MEAN, viscosity_ratio=RATIO)
+    solution = flow.solve(space, driven, LENGTH, interface=interface_of(interface))
     exact = poiseuille.head_loss(np.ptp(ENDS) + 2 * half * (RATIO - 1), WIDTH, MEAN, VISCOSITY)
     return {"velocity": meshes.field_error(space, solution.velocity / MEAN, _velocity),
             "head loss": abs(solution.meshed_loss / exact - 1),
@@ -152,7 +154,8 @@ def test_curved_poiseuille(ratio, interface, record):
     Norm: largest difference over the largest velocity; relative difference of losses.
     """
     space = meshes.space_on(meshes.plug(CURVED_ENDS, WIDTH, HALF, 8.0, seed=3), 2)
-    solution = flow.solve(space, drive(mean_velocity=MEAN, viscosity_ratio=ratio), LENGTH, interface=interface)
+    driven = drive(mean_velocity=MEAN, viscosity_ratio=ratio)
+    solution = flow.solve(space, driven, LENGTH, interface=interface_of(interface))
     ends = space.mesh.topology
     u = poiseuille.velocity(space.points[:, 1], WIDTH, MEAN)
     plugged = 2 * HALF * (ratio - 1)  # additional length of water with the same loss
@@ -227,7 +230,8 @@ def _layered(half: float, size: float, draw: int) -> Mesh:
 
 
 def _viscous_layer(space: Space, ratio: float, interface: str) -> dict[str, float]:
-    return in_the_middle(space, flow.unit_flow(space, Viscous(ratio), interface=interface), layered_channel, ratio)
+    solution = flow.unit_flow(space, Viscous(ratio), interface=interface_of(interface))
+    return in_the_middle(space, solution, layered_channel, ratio)
 
 
 def middle_of(grid: Mesh, half: float) -> np.ndarray:
@@ -309,7 +313,7 @@ def test_permeable_plug(interface, record):
     middle = middle_of(space.mesh, MIDDLE)
     inside = np.unique(space.cells[middle])
     for k in SPAN_PERMEABILITIES:
-        solution = flow.unit_flow(space, Permeable(k), interface=interface)
+        solution = flow.unit_flow(space, Permeable(k), interface=interface_of(interface))
         error = abs(slope(space, solution.pressure, middle)
                     / brinkman_channel.gradient(WIDTH, WIDTH, k) - 1)
         thickness = max(np.sqrt(k), SPAN_SIZE / ACROSS / 2)
@@ -323,7 +327,7 @@ def test_permeable_plug(interface, record):
 
 def _permeable_layer(size: float, draw: int, permeability: float, interface: str) -> dict[str, float]:
     space = meshes.space_on(_layered(PERMEABLE_END, size, draw), 2)
-    solution = flow.unit_flow(space, Permeable(permeability), interface=interface)
+    solution = flow.unit_flow(space, Permeable(permeability), interface=interface_of(interface))
     return in_the_middle(space, solution, brinkman_channel, permeability)
 
 
@@ -357,7 +361,8 @@ def test_first_rise(order, interface, record):
 def _rise_error(refinement: float, draw: int, interface: str, order: int) -> dict[str, float]:
     space = meshes.half_disc_space(RADIUS, refinement * meshes.SPREAD[draw], ENDS, WIDTH, order)
     grid = space.mesh
-    below, above = (flow.unit_flow(space, Viscous(1 + step), interface=interface).loss for step in (-STEP, STEP))
+    below, above = (flow.unit_flow(space, Viscous(1 + step), interface=interface_of(interface)).loss
+                    for step in (-STEP, STEP))
     where, weight, _ = meshes.fine(space, grid.biomass)
     exact = np.sum(weight * poiseuille.dissipation(where[..., 1], WIDTH)) / WIDTH
     return {"size": meshes.mean_size(grid), "rise": abs((above - below) / (2 * STEP) / exact - 1)}

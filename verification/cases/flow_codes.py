@@ -24,6 +24,7 @@ from reference import poiseuille, taylor_hood
 from repro.fem.mesh import Mesh
 from repro.fem.space import Space
 from repro.model import flow
+from repro.model.interface import interface_of
 from repro.model.meshing import seeded
 from repro.model.resistance import Viscous
 from verification.cases import flow as flow_cases
@@ -106,7 +107,7 @@ def test_film(order, interface, record):
     """
     if order > 1:
         space = meshes.half_disc_space(FILM, FILM_CURVED, ENDS, WIDTH, order)
-        solution = flow.unit_flow(space, Viscous(RATIO), interface=interface)
+        solution = flow.unit_flow(space, Viscous(RATIO), interface=interface_of(interface))
         differences = _differences(space, solution, _reference_flow(FILM, RATIO, interface, [*DRAWS][-1]))
         record(each_at_most({name: differences[name] for name in IN_THE_FILM}, 1e-3, CODES))
         return
@@ -135,7 +136,7 @@ def _level(level: int, draw: int, refinements, radius: float, ratio: float, inte
     """
     space = _space(radius, refinements[level] * meshes.SPREAD[draw])
     reference = _reference_flow(radius, ratio, interface, level)
-    solution, clean = (flow.unit_flow(space, Viscous(each), interface=interface) for each in (ratio, 1.0))
+    solution, clean = (flow.unit_flow(space, Viscous(each), interface=interface_of(interface)) for each in (ratio, 1.0))
     error_of_ends = clean.loss - poiseuille.head_loss(np.ptp(ENDS), WIDTH, 1.0, 1.0)
     excess = abs((solution.loss - error_of_ends) / reference.loss - 1)
     return {**_differences(space, solution, reference), "excess of the head loss": excess}
@@ -202,5 +203,5 @@ def _round(refinement: float) -> Mesh:
 
 def _round_errors(refinement: float, draw: int, ratio: float, interface: str) -> dict[str, float]:
     space = Space(_round(refinement * meshes.SPREAD[draw]))
-    solution = flow.unit_flow(space, Viscous(ratio), interface=interface)
+    solution = flow.unit_flow(space, Viscous(ratio), interface=interface_of(interface))
     return _differences(space, solution, _reference_flow(ROUND, ratio, interface, 2, space.mesh.ends, 6))

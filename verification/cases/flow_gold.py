@@ -10,6 +10,7 @@ import pytest
 from reference import gold_flow
 from repro.fem.outline import Outline
 from repro.model import flow
+from repro.model.interface import interface_of
 from repro.model.meshing import seeded
 from repro.scene import load_scene
 from verification.cases.flow import FORMS
@@ -58,6 +59,6 @@ def added_length(name: str, preset: str, interface: str) -> tuple[float, float]:
                                 f'numerics.interface="{interface}"'])
     shape = Outline(points, wall, np.zeros(len(wall), bool), points, 2)
     space = seeded(scene, outline=shape).space
-    solution = flow.solve(space, scene.flow, scene.pore.length, interface=interface)
+    solution = flow.solve(space, scene.flow, scene.pore.length, interface=interface_of(interface))
     loss = solution.head_loss / solution.mean_velocity * scene.flow.gravity / scene.flow.kinematic_viscosity
     return scene.pore.length, loss * outline["width"]**2 / 12 - scene.pore.length

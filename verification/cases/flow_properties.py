@@ -14,6 +14,7 @@ from repro.fem.mesh import Mesh
 from repro.fem.space import Space
 from repro.march.simulation import simulate
 from repro.model import flow, solving
+from repro.model.interface import interface_of
 from repro.model.meshing import seeded
 from repro.model.resistance import Viscous
 from repro.scene import Scene, load_scene
@@ -70,7 +71,7 @@ def test_sections(numerics, interface, record):
 
 def _carried(space: Space, interface: str, name: str, drop: float):
     """Checks of the flux of the velocity that carries the substrates, and of u with linear elements."""
-    solution = flow.unit_flow(space, Viscous(RATIO), interface=interface)
+    solution = flow.unit_flow(space, Viscous(RATIO), interface=interface_of(interface))
     _, _, shape = meshes.fine(space)
     u = shape @ solution.velocity[space.cells]
     why = "(2) tested with linear ramps, round-off"
@@ -108,7 +109,7 @@ def test_energy(numerics, interface, record):
     Norm: relative difference.
     """
     space = _around(25.0, numerics)
-    unit = flow.unit_flow(space, Viscous(RATIO), interface=interface)
+    unit = flow.unit_flow(space, Viscous(RATIO), interface=interface_of(interface))
     work, dissipated = _power(space, unit, interface)
     driven = [flow.scaled(unit, space.mesh, LENGTH, drive(head=head)) for head in (10.0, 20.0)]
     record(at_most("work less dissipation", abs(work / dissipated - 1), 1e-9, "symmetry of the weak form, round-off"))
@@ -154,7 +155,8 @@ def test_reversed(numerics, interface, record):
     """
     space = _around(25.0, numerics, 0.6, 150.0)
     mirror = Space(_mirrored(space.mesh))
-    forward, mirrored = (flow.unit_flow(each, Viscous(RATIO), interface=interface).velocity for each in (space, mirror))
+    forward, mirrored = (flow.unit_flow(each, Viscous(RATIO), interface=interface_of(interface)).velocity
+                         for each in (space, mirror))
     _, weight, shape = meshes.fine(space)
     difference, total = (np.einsum("tq,tqi->t", weight, (shape @ field[space.cells]) ** 2)
                          for field in (forward - mirrored * [1.0, -1.0], forward))
@@ -182,7 +184,7 @@ def test_obstacle(numerics, interface, record):
     Norm: head losses for six lambda, over that of the clean channel.
     """
     spaces = [_around(radius, numerics) for radius in (5.0, 25.0, 40.0, 46.0)]
-    losses = np.array([flow.unit_flow(space, Viscous(ratio), interface=interface).loss
+    losses = np.array([flow.unit_flow(space, Viscous(ratio), interface=interface_of(interface)).loss
                        for space, ratio in product(spaces, RATIOS)]).reshape(len(spaces), -1)
     rises = np.diff(losses, axis=1)
     slopes = rises / np.diff(RATIOS)

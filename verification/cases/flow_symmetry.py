@@ -20,6 +20,7 @@ from repro.fem.sizing import Sizing
 from repro.fem.space import Space
 from repro.fem.walls import channel_walls
 from repro.model import flow
+from repro.model.interface import interface_of
 from repro.model.resistance import Permeable, Resistance, Viscous
 from verification.cases import flow as flow_cases
 from verification.cases.flow import ENDS, ENDS_FIRST, FORMS, LENGTH, MEAN, RATIO, SECOND, VISCOSITY, WIDTH, viscous
@@ -58,7 +59,7 @@ def test_poiseuille(order, interface, record):
 def _poiseuille(refinement: float, order: int, interface: str) -> dict[str, float]:
     grid, _ = mesher.generate(None, ENDS, Sizing(WALLS, refinement, 2.0), order)
     space = Space(grid)
-    solution = flow.solve(space, flow_cases.drive(mean_velocity=MEAN), LENGTH, interface=interface)
+    solution = flow.solve(space, flow_cases.drive(mean_velocity=MEAN), LENGTH, interface=interface_of(interface))
     exact = poiseuille.head_loss(np.ptp(ENDS), 2 * WIDTH, MEAN, VISCOSITY)
     return {"size": meshes.mean_size(grid), "velocity": meshes.field_error(space, solution.velocity / MEAN, _velocity),
             "head loss": abs(solution.meshed_loss / exact - 1),
@@ -106,7 +107,7 @@ def _long(size: float, draw: int) -> Mesh:
 def _in_the_middle(grid: Mesh, layers: type, parameter: float, interface: str,
                    resistance: Resistance) -> dict[str, float]:
     space = Space(below(grid))
-    solution = flow.unit_flow(space, resistance, interface=interface)
+    solution = flow.unit_flow(space, resistance, interface=interface_of(interface))
     return flow_cases.in_the_middle(space, solution, layers, parameter)
 
 
@@ -153,7 +154,7 @@ def test_mirror_image(order, radius, interface, record):
     """
     refinement, level, bound = REFINEMENTS[order]
     space = Space(below(meshes.half_disc(radius, refinement, FAR, WIDTH, geometry=order)))
-    solution = flow.unit_flow(space, Viscous(RATIO), interface=interface)
+    solution = flow.unit_flow(space, Viscous(RATIO), interface=interface_of(interface))
     reference = _two_aggregates(radius, level, interface)
     lower = reference.points[:, 1] <= WIDTH * (1 + 1e-9)
     points, velocity, areas = reference.points[lower], reference.velocity[lower], reference.areas[lower]

@@ -70,7 +70,7 @@ NAMES = ("area", "thickness", "upstream tip", "conductivity")
 def _numbers(scene: Scene, state: Pore) -> list[float]:
     """Values of NAMES."""
     shape = state.outline
-    solution = solving.solve_flow(state.space, scene.flow, scene.pore.length, scene.numerics)
+    solution = solving.Solver.of(scene).solve_flow(state.space, scene.flow)
     return [shape.area, shape.thickness, shape.upstream, solution.conductivity]
 
 

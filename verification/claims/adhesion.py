@@ -66,7 +66,7 @@ def remeshing_loses() -> Finding:
 
 def wall_traction(aggregate: Body) -> float:
     """Largest traction on a wall (MPa)."""
-    return adhesion.wall_peak(aggregate.scene, aggregate.pore, aggregate.solved).value
+    return adhesion.wall_peak(adhesion.Loading.of(aggregate.scene), aggregate.pore, aggregate.solved).value
 
 
 @claim("C52", "5", "the adhesion that an aggregate requires stems from fluid flow and from its displacement boundary "

@@ -356,7 +356,7 @@ def solution(scene, grid: Mesh, active: np.ndarray) -> tuple[flow.Flow, Both]:
 
 def flow_in(scene, grid: Mesh) -> flow.Flow:
     """Flow under the scene's drive."""
-    return solving.solve_flow(Space(grid), scene.flow, scene.pore.length, scene.numerics)
+    return solving.Solver.of(scene).solve_flow(Space(grid), scene.flow)
 
 
 def full_biomass(scene, grid: Mesh) -> np.ndarray:

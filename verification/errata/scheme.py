@@ -8,6 +8,7 @@ from repro.fem.mesh import Mesh
 from repro.fem.mesher import generate
 from repro.fem.space import Space
 from repro.model import flow, meshing
+from repro.model.interface import interface_of
 from repro.model.resistance import Viscous
 from verification import switches
 from verification.claims.runs import (
@@ -80,7 +81,8 @@ def interface_forms() -> Numbers:
 
 def in_forms(grid: Mesh, ratio: float) -> list[flow.UnitFlow]:
     """Unit flow in both forms, laplacian first."""
-    return [flow.unit_flow(Space(grid), Viscous(ratio), interface=form) for form in ("laplacian", "traction")]
+    return [flow.unit_flow(Space(grid), Viscous(ratio), interface=interface_of(form))
+            for form in ("laplacian", "traction")]
 
 
 def losses(grid: Mesh) -> list[float]:
@@ -133,7 +135,7 @@ def free_outlet(grid: Mesh) -> tuple[np.ndarray, float]:
     constrained[topology.walls] = constrained[topology.inlet] = True
     viscosity = np.ones(len(grid.triangles))
     pair = flow.Linear.on(space, viscosity)
-    elements = flow.stokes(space, viscosity, "traction", pair.lower)
+    elements = flow.stokes(space, viscosity, interface_of("traction"), pair.lower)
     system = saddle_system(space.cells, space.cells, constrained)
     value = np.append(pair.prescribed(), np.zeros(count))
     solution = system.solve(elements, np.zeros(3 * count), value)

@@ -489,8 +489,8 @@ MUTANTS = (
          "A check reports nothing between the mesh of a head loss and its flow.",
          "_head_loss",
          "poll()\n"
-         "return solving.solve_flow(space, drive, scene.pore.length, scene.numerics).head_loss",
-         "return solving.solve_flow(space, drive, scene.pore.length, scene.numerics).head_loss",
+         "return solving.Solver.of(scene).solve_flow(space, drive).head_loss",
+         "return solving.Solver.of(scene).solve_flow(space, drive).head_loss",
          "tests/test_progress.py::test_a_check_reports_between_its_stages_without_its_thread")),
     *changes(
         "repro/model/gear.py",
@@ -1206,8 +1206,8 @@ MUTANTS = (
         ("row-within-of-the-start-s-supply",
          "A row within a step of the midpoint rule has the supply and the drive of the step's start.",
          "interpolate",
-         "return InterpolatedState(*solve_graded(stages.scene, inner))",
-         "return InterpolatedState(*solve_graded(stages.scene.at(previous.time), inner))",
+         "return InterpolatedState(*stages.grading.solve(inner))",
+         "return InterpolatedState(inner, stages.solver.solve(replace(inner, time=previous.time)))",
          f"{COURSE}a_row_within_a_step_has_the_supply_of_its_time[fast]"),
         ("midpoint-forces-of-the-start",
          "The fluid pushes the aggregate as its drive does at the start of the step.",
@@ -1236,8 +1236,8 @@ MUTANTS = (
         ("row-within-an-update-of-the-start-s-supply",
          "A row within an update has the supply and the drive of the update's start.",
          "_interpolate",
-         "return InterpolatedState(after, solving.solve(stages.scene, after), shorter.before)",
-         "return InterpolatedState(after, solving.solve(stages.scene.at(previous.time), after), shorter.before)",
+         "return InterpolatedState(after, stages.solver.solve(after), shorter.before)",
+         "return InterpolatedState(after, stages.solver.solve(replace(after, time=previous.time)), shorter.before)",
          f"{COURSE}a_row_within_a_step_has_the_supply_of_its_time[paper]"),
         ("row-within-an-update-from-the-supply",
          "A row within an update starts from the supply: a closed pore is full again.",
@@ -1255,8 +1255,12 @@ MUTANTS = (
         ("drive-of-the-start",
          "In an update a linear head or velocity has its value at the start; supplies are those half way.",
          "_solve_midway",
-         "scene.at(middle) == scene.at(previous.time)",
-         "scene.at(middle).substrates == scene.at(previous.time).substrates",
+         "if stages.tables.same(previous.time, middle):\n"
+         "    return solved",
+         "from repro.scene import at_time\n"
+         "supplied = stages.solver.substrates\n"
+         "if at_time(supplied, middle) == at_time(supplied, previous.time):\n"
+         "    return solved",
          f"{COURSE}the_supply_of_a_rising_velocity_is_its_integral[preset=paper]",
          f"{COURSE}the_supply_of_a_rising_velocity_is_its_integral[transport=gear]")),
     *changes(
@@ -2033,8 +2037,8 @@ MUTANTS = (
         ("forces-laplacian",
          "Forces on the aggregate have the Laplacian form for any form of the flow.",
          "forces",
-         "on_aggregate(space, flow_field, drive, numerics.interface)",
-         'on_aggregate(space, flow_field, drive, "laplacian")',
+         "on_aggregate(space, flow_field, drive, fluid.interface)",
+         'on_aggregate(space, flow_field, drive, interface_of("laplacian"))',
          f"{PAIRS}the_force_on_the_aggregate_comes_through_every_section_of_the_fluid")),
     *changes(
         "repro/model/brinkman.py",
@@ -2057,7 +2061,7 @@ MUTANTS = (
          "In the traction form biomass is half as viscous.",
          "unit_flow",
          "blocks = stokes(velocity, viscosity, interface, pair.lower, drag)",
-         'viscosity = np.where(mesh.biomass, viscosity / (1 + (interface == "traction")), 1.0)\n'
+         'viscosity = np.where(mesh.biomass, viscosity / (1 + interface.bends), 1.0)\n'
          "blocks = stokes(velocity, viscosity, interface, pair.lower, drag)",
          f"{PAIRS}viscosity_and_drag_dissipate_the_work_of_the_head"),
         ("flow-kept-for-either-form",
