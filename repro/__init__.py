@@ -43,7 +43,7 @@ Sections of the paper and their modules, which name the equations that they solv
     2.2  kinetics              (7)-(10)     repro.model.uptake_law, .kinetics
     2.2  substrates            (7)-(13)     repro.model.transport, .substrates
     2.2, 3.3  in time          (7)-(13)     repro.model.transport_in_time, .gear
-    2.3, 3.4  growth           (14)-(27)    repro.model.growth, .body, .configuration
+    2.3, 3.4  growth           (14)-(27)    repro.model.growth, .solid, .configuration
     2.3  energies              (17)         repro.model.energies
     3.4  biomass               (28)-(34)    repro.model.biomass, .growing
     2.3.2  fluid forces        (20), (22)   repro.model.traction, .support (along a wall)
@@ -54,7 +54,7 @@ Sections of the paper and their modules, which name the equations that they solv
          limits of the surface              repro.model.surface
     3.5  mesh motion           (35)         repro.model.mesh_motion
     3.1, 3.5  first mesh, remeshing         repro.model.meshing, .remeshing, .grading
-    2    state of the pore                  repro.model.pore, .stages (the parts of a step)
+    2    state of the pore                  repro.model.pore, .body, .stages (the parts of a step)
     2    flow and substrates in it          repro.model.solving
          both schemes, as printed           repro.schemes
     2    coupling, 3.3                      repro.march.updates (the paper's shape updates)

@@ -17,9 +17,9 @@ from repro.fem.sizing import Sizing
 from repro.fem.space import Space
 from repro.fem.walls import BOTTOM, FREE, TOP, channel_walls
 from repro.model import mechanics
-from repro.model.body import material
 from repro.model.energies import NEO_HOOKEAN
 from repro.model.meshing import seeded
+from repro.model.solid import material
 from repro.scene import parse_scene
 from repro.schemes import PAPER
 from verification.problems.schemes import exchange, exchanged, load_scene
@@ -176,15 +176,17 @@ def mirror_image(at, along):
         points = next((rule for rule in rules if len(rule) == values.shape[1]), np.zeros((1, 2)))
         return values[:, [int(np.abs(points - point[::-1]).sum(axis=1).argmin()) for point in points]]
 
-    image = Mesh.of(about + mesh.points * sign, mesh.cells[:, turned], mesh.biomass, back(mesh.loop), mesh.walls, ends,
-                    mesh.topology.method)
+    image = Mesh.of(about + mesh.points * sign, mesh.cells[:, turned], mesh.biomass, (back(mesh.loop),), mesh.walls,
+                    ends, mesh.topology.method)
     space = Space(image)
     walls = {FREE: FREE, BOTTOM: BOTTOM if along else TOP, TOP: TOP if along else BOTTOM}
-    return replace(at, space=space, wall=np.array([walls[wall] for wall in back(at.wall).tolist()]),
-                   fixed=back(at.fixed), active=exchanged(at.active), inert=exchanged(at.inert),
-                   theta=exchanged(at.theta),
-                   body=material(space, about + at.body.reference * sign, at.body.energy),
-                   configuration=at.configuration.carried(lambda positions: about + positions * sign), line_speeds=None)
+    body, (region,) = at.body, image.regions
+    body = replace(body, wall=np.array([walls[wall] for wall in back(body.wall).tolist()]), fixed=back(body.fixed),
+                   active=exchanged(body.active), inert=exchanged(body.inert), theta=exchanged(body.theta),
+                   solid=material(space, region, about + body.reference * sign, body.solid.energy),
+                   configuration=body.configuration.carried(lambda positions: about + positions * sign),
+                   line_speeds=None)
+    return replace(at, space=space, bodies=(body,))
 
 
 #: Mirror images of a pore: along the flow, and across it.
@@ -221,15 +223,15 @@ def boundary_edge_counts(triangles):
 
 
 def body_of(grid, around):
-    """(Body, constrained (n, 2), rim (M,)): the unstrained aggregate, its constrained dofs (2.3.3: y on the
+    """(Solid, constrained (n, 2), rim (M,)): the unstrained aggregate, its constrained dofs (2.3.3: y on the
     walls and x at fixed points) and its boundary nodes."""
-    body = material(Space(grid), grid.points[grid.body], NEO_HOOKEAN)
-    rim = grid.topology.body_loop
+    body = material(Space(grid), grid.regions[0], grid.points[grid.body], NEO_HOOKEAN)
+    rim = grid.regions[0].own_loop
     return body, mechanics.constrained(len(grid.body), rim, around.wall, around.fixed), rim
 
 
 def half_disc(radius, refinement=1.0, width=50.0, geometry=1):
-    """(Body, constrained, rim, outline) of a half-disc on the lower wall."""
+    """(Solid, constrained, rim, outline) of a half-disc on the lower wall."""
     grid, around = meshed(seed(radius, refinement, geometry), width, refinement)
     return *body_of(grid, around), around
 

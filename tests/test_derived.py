@@ -303,7 +303,7 @@ def stresses(scene, pore):
     """
     mesh = pore.mesh
     cells = mesh.cells[mesh.biomass]
-    places, weights = rule_with(pore.theta.shape[1])
+    places, weights = rule_with(pore.body.theta.shape[1])
     before = jacobians(pore.body.reference, np.searchsorted(mesh.body, cells), places)
     F = np.zeros((*before.shape[:2], 3, 3))
     F[..., :2, :2], F[..., 2, 2] = jacobians(mesh.points, cells, places) @ np.linalg.inv(before), 1.0
@@ -358,7 +358,7 @@ def derived_adhesion(scene, instant):
     sigma, J, initial_areas = stresses(scene, pore)
     areas = J * initial_areas
     cells = mesh.cells[mesh.biomass]
-    shapes = functions(mesh.geometry, rule_with(pore.theta.shape[1])[0])[0]
+    shapes = functions(mesh.geometry, rule_with(pore.body.theta.shape[1])[0])[0]
     places = np.einsum("qk,tki->tqi", shapes, mesh.points[cells]).reshape(-1, 2)
     of_body = mesh.points[mesh.body]
     distances = np.linalg.norm(of_body[:, None] - places, axis=-1)
@@ -451,7 +451,7 @@ def derived_wall_traction(scene, instant):
     tested with the nodal functions, less the forces of the water if the growth problem has them."""
     mesh = instant.pore.mesh
     cells = mesh.cells[mesh.biomass]
-    places, _ = rule_with(instant.pore.theta.shape[1])
+    places, _ = rule_with(instant.pore.body.theta.shape[1])
     sigma, J, areas = stresses(scene, instant.pore)
     forces = nodal_loads(mesh, cells, places, sigma[..., :2, :2], J * areas)
     if scene.growth.fluid_forces == "included":
@@ -531,7 +531,7 @@ def derived_arrays(scene, instant):
     pressure = scene.growth.shear_modulus * at_nodes(pore.pressure, 1, mesh.cells[:, :3])
     derived["pressure_MPa"] = only(pressure[inside], inside, len(mesh.points))
     sigma, J, areas = stresses(scene, pore)
-    means = {"theta": pore.theta, "J": J,
+    means = {"theta": pore.body.theta, "J": J,
              "largest_principal_stress_MPa": np.linalg.eigvalsh(sigma)[..., -1]}
     for name, (i, j) in {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1)}.items():
         means[f"stress_{name}_MPa"] = sigma[..., i, j]
@@ -587,7 +587,7 @@ def test_every_array_is_what_its_name_says(order, state):
 def test_a_density_above_the_maximum_is_reported_unchanged():
     scene, instant = late_instant(2)
     full = scene.kinetics.maximum_density * areas_at_points(instant.pore)
-    instant = replace(instant, pore=replace(instant.pore, active=1.2 * full, inert=0 * full))
+    instant = replace(instant, pore=instant.pore.with_masses(1.2 * full, 0 * full))
     assert results.row(scene, instant)["biomass_density_max"] == pytest.approx(1.2, rel=1e-12)
     density = results.fields(scene, instant.pore, instant.solved).point_data["active_biomass"]
     assert density.max() == pytest.approx(1.2, rel=1e-12)

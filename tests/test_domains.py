@@ -2,7 +2,6 @@
 
 A power, root, logarithm or quotient does not exist there: of J < 0, of an area of zero, of a number that overflows.
 """
-from dataclasses import replace
 from functools import cache, partial
 
 import numpy as np
@@ -59,7 +58,7 @@ def tower():
     """The closing of a tower from wall to wall that has grown by 5 %, the tower, and its contact lines."""
     scene = load_scene("base", [TOWER, *FAST], unset=["aggregate.radius"])
     start = seeded(scene)
-    grown = replace(start, theta=1.05 * start.theta)
+    grown = start.with_body(theta=1.05 * start.body.theta)
     lines = contact_lines.lines_of(grown.boundary)
     return ByLines(Mechanics.of(scene), grown, start, None, PATIENT), grown, lines
 
@@ -68,12 +67,12 @@ def test_contact_lines_from_a_triangle_that_is_turned_over_fail_in_growth():
     """The search with whole equilibria then takes over."""
     closing, grown, lines = tower()
     bad = turned_over(grown.mesh.points, grown.mesh.body)
-    place = partial(closing._place, grown, grown.wall, lines)
+    place = partial(closing._place, grown, grown.body.wall, lines)
     with pytest.raises(GrowthError, match=OUT_OF_DOMAIN):
         contact_newton.Coupled(place, lines, bad, grown.pressure).solve()
     closing._shapes[-1] = (np.zeros(0), bad, grown.pressure)
     try:
-        settled = closing.settle(grown.wall, lines)
+        settled = closing.settle(grown.body.wall, lines)
     except FloatingPointError as error:
         pytest.fail(f"an error that no search handles: {error}")
     assert settled is None and not any(line.advance for line in lines)

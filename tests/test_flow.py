@@ -12,6 +12,7 @@ from repro.fem.outline import polygon
 from repro.fem.walls import channel_walls
 from repro.march.simulation import simulate
 from repro.model import flow, meshing
+from repro.model.interface import interface_of
 from repro.model.meshing import seeded
 from repro.model.resistance import Viscous
 from repro.scene import load_scene
@@ -92,7 +93,8 @@ def drawn_body(body, preset, interface):
 def meshed_loss(scene):
     """The loss (1/um) over the meshed part, for a mean velocity of one."""
     space = seeded(scene).space
-    return flow.unit_flow(space, Viscous(scene.flow.viscosity_ratio), interface=scene.numerics.interface).loss
+    interface = interface_of(scene.numerics.interface)
+    return flow.unit_flow(space, Viscous(scene.flow.viscosity_ratio), interface=interface).loss
 
 
 def graded_loss(scene):

@@ -95,8 +95,8 @@ def compressed(theta):
     """The plug after uniform growth by theta, with the concentrations in its new shape."""
     scene = plug()
     seed = seeded(scene)
-    pore = contact.expand(Mechanics.of(scene), seed, np.full_like(seed.theta, theta)).pore
-    pore = replace(pore, active=theta * pore.active, inert=theta * pore.inert, time=1.0)
+    pore = contact.expand(Mechanics.of(scene), seed, [np.full_like(seed.body.theta, theta)]).pore
+    pore = replace(pore.with_masses(theta * pore.active, theta * pore.inert), time=1.0)
     return replace(pore, concentrations=solve(scene, pore).concentrations)
 
 
@@ -134,7 +134,7 @@ def test_the_least_stretch_of_a_run_stays():
     assert loop.mark_reported(state, 1.0).compression == creased
     later = compressed(1.5)
     assert most_compressed(creased, later) == creased
-    restarted = most_compressed(creased, replace(later, configuration=FromPrevious(later.body.reference)))
+    restarted = most_compressed(creased, later.with_body(configuration=FromPrevious(later.body.reference)))
     assert restarted.stretch == surface(later).least > creased.stretch
 
 
@@ -151,7 +151,7 @@ def test_a_failed_step_of_a_buckled_surface_is_a_fold():
 
 def multiplied(factor, pore, within):
     """A step to the run's end with ``factor`` times the biomass in the same shape, which no balance notices."""
-    after = replace(pore, time=6.0, active=factor * pore.active, inert=factor * pore.inert)
+    after = replace(pore.with_masses(factor * pore.active, factor * pore.inert), time=6.0)
     none = (0.0, 0.0)
     ledger = Ledger(1.0, 6.0, none, none, none, none, after.mass, 0.0, after.mass)
     return StepResult(after, None, ledger, False, 0, within)

@@ -143,7 +143,7 @@ def starved():
                                 "aggregate.radius=20 um", *substrates])
     seed = seeded(scene)
     x = seed.space.reaction.evaluate(seed.space.points[:, 0])
-    uneven = replace(seed, active=(1 + 0.02 * x) * seed.active)
+    uneven = seed.with_body(active=(1 + 0.02 * x) * seed.active)
     return scene, uneven, solve(scene, uneven)
 
 

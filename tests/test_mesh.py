@@ -84,7 +84,7 @@ def test_cornered_triangles_are_freed_in_either_region_for_any_first_node(biomas
     points = np.array([[x, y] for y in range(3) for x in range(3)], float)
     corner = np.array([0, 1, 3, 4])[:, None]
     triangles = np.roll(np.vstack([corner + [0, 1, 4], corner + [0, 4, 3]]), first, axis=1)
-    grid = Mesh.of(points, triangles, np.full(8, biomass), np.empty(0, int), channel_walls(2.0), (0.0, 2.0))
+    grid = Mesh.of(points, triangles, np.full(8, biomass), (), channel_walls(2.0), (0.0, 2.0))
     assert strategies.boundary_edge_counts(grid.triangles) == [0, 0, 1, 1, 1, 1, 2, 2]
     freed = unlocked(grid)
     assert strategies.boundary_edge_counts(freed.triangles) == [1] * 8

@@ -57,9 +57,9 @@ def grown(order, spans, image):
     scene, seed = seed_of(order, spans)
     x, y = seed.mesh.points[seed.mesh.cells[seed.mesh.biomass, :3]].mean(axis=1).T
     growth = 1.5 + 0.01 * x + 0.005 * y if spans else 1.02 + 0.001 * x
-    seed = replace(seed, theta=growth[:, None] * seed.theta)
+    seed = seed.with_body(theta=growth[:, None] * seed.body.theta)
     seed = MIRRORS[image](seed) if image else seed
-    return contact.expand(Mechanics.of(scene), seed, seed.theta).pore
+    return contact.expand(Mechanics.of(scene), seed, [seed.body.theta]).pore
 
 
 @pytest.mark.parametrize("spans, image", [
@@ -70,14 +70,15 @@ def test_contact_advances_alike_in_a_pore_and_its_mirror_image(order, spans, ima
     """Contact by nodes and by lines, the first contact included: each rule holds on either side and either wall, to the
     defect of Newton's method."""
     expected, computed = MIRRORS[image](grown(order, spans, None)), grown(order, spans, image)
-    assert np.array_equal(computed.wall, expected.wall) and np.array_equal(computed.fixed, expected.fixed)
+    assert np.array_equal(computed.body.wall, expected.body.wall)
+    assert np.array_equal(computed.body.fixed, expected.body.fixed)
     assert computed.boundary.points == pytest.approx(expected.boundary.points, abs=1e-6)
     _, seed = seed_of(order, spans)
     assert expected.contact
     if not spans:
         return
     before, after = (np.array([[x[at.wall == wall].min(), x[at.wall == wall].max()] for wall in (BOTTOM, TOP)])
-                     for at in (seed, grown(order, True, None)) for x in [at.boundary.points[:, 0]])
+                     for at in (seed.boundary, grown(order, True, None).boundary) for x in [at.points[:, 0]])
     assert (np.abs(after - before) > 0.1).all(), "each line has moved"
 
 

@@ -26,9 +26,9 @@ def shifted(scene, pore):
 
 def touching(scene, pore):
     """A node at the top is on the opposite wall."""
-    wall = pore.wall.copy()
+    wall = pore.body.wall.copy()
     wall[pore.boundary.points[:, 1].argmax()] = TOP
-    return scene, replace(pore, wall=wall)
+    return scene, pore.with_body(wall=wall)
 
 
 def coarse(scene, pore):
@@ -70,7 +70,7 @@ def criteria(scene, pore, expanded):
     reach = min(7 * outline.thickness, 1.3 * scene.pore.width)
     required = sizing.interface_sizes(outline.corners, sized(scene)).max()
     return {"extent": min(outline.upstream - ends[0], ends[1] - outline.downstream) < reach,
-            "contact": bool((expanded.wall != pore.wall).any()),
+            "contact": bool((expanded.body.wall != pore.body.wall).any()),
             "size": outline.corners.edge_lengths()[outline.corners.interface_edges()].max() > 2.8 * required,
             "poor": np.count_nonzero(body.quality[body.biomass] < 0.6) > 6,
             "turned": bool((body.areas <= 0).any())}

@@ -51,13 +51,13 @@ def test_nothing_but_fields_depends_on_positions_at_the_start(preset, folded):
         for name in (name for name in compared if not name.endswith(("_balance", "_x_um", "_y_um"))):
             assert columns[name] == pytest.approx(row[name], rel=1e-6, abs=1e-9), name
     (_, first), *_, (last, end) = states
-    assert first.pore.origin_known and not end.pore.origin_known
+    assert first.pore.body.origin_known and not end.pore.body.origin_known
     before, after = (fields(stress_free, report.pore, report.solved) for report in (first, end))
     names = [set(grid.point_data) | set(grid.cell_data) for grid in (before, after)]
     assert names[0] - names[1] == SINCE_START and names[1] < names[0]
     nodal = [value for name, value in after.point_data.items() if name != "surface_stretch"]
     assert all(np.isfinite(value).all() for value in nodal)
-    assert not unpack_state(stress_free, *pack_state(stress_free, last)).pore.origin_known
+    assert not unpack_state(stress_free, *pack_state(stress_free, last)).pore.body.origin_known
 
 
 @pytest.mark.parametrize("preset", [pytest.param("fast", marks=pytest.mark.thorough), "paper"])

@@ -49,7 +49,7 @@ def test_ends_and_walls_of_a_minimal_mesh_have_their_nodes():
     """A channel of two triangles, whose ends join both walls and whose walls join both ends."""
     corners = np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 1.0], [0.0, 1.0]])
     none = np.zeros(2, bool)
-    mesh = Mesh.of(corners, np.array([[0, 1, 2], [0, 2, 3]]), none, np.empty(0, int), channel_walls(1.0), (0.0, 3.0))
+    mesh = Mesh.of(corners, np.array([[0, 1, 2], [0, 2, 3]]), none, (), channel_walls(1.0), (0.0, 3.0))
     for grid in (mesh, curved(mesh, None)):
         space = Space(grid)
         y = space.points[:, 1]

@@ -55,7 +55,7 @@ def disc(geometry, refinement=0.4):
 
 def rebuild(mesh, **changes):
     """Make a mesh from the arrays of another, with changes."""
-    parts = {"points": mesh.points, "cells": mesh.cells, "biomass": mesh.biomass, "loop": mesh.loop,
+    parts = {"points": mesh.points, "cells": mesh.cells, "region": mesh.topology.region, "loops": mesh.topology.loops,
              "walls": mesh.walls, "ends": mesh.ends} | changes
     return Mesh.of(**parts)
 

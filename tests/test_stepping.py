@@ -130,7 +130,8 @@ def test_a_mesh_generated_for_another_contact_is_not_used(long_step):
     """The contact of a mesh's own shape decides."""
     stages, previous, _, half = long_step.within.args
     generated = half.generated[0]
-    touching = replace(generated.shape, wall=np.where(generated.shape.wall == FREE, TOP, generated.shape.wall))
+    wall = generated.shape.body.wall
+    touching = generated.shape.with_body(wall=np.where(wall == FREE, TOP, wall))
     other = replace(generated, shape=touching)
     on_mesh = [remeshing._on_generated(stages.remeshing, each, generated.shape) for each in (generated, other)]
     assert on_mesh[0] is not None and on_mesh[1] is None

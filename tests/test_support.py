@@ -1,6 +1,5 @@
 """The traction that keeps a sliding contact surface in place: a closed form on both walls, its limit as the
 mesh is refined, and where it acts. `test_derived.py` tests the traction that a run reports."""
-from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -28,12 +27,12 @@ def block(order, *changes):
 
 def nodes_of(seed, wall):
     """Nodes of the aggregate on a wall."""
-    return seed.mesh.topology.body_loop[seed.wall == wall]
+    return seed.region.own_loop[seed.body.wall == wall]
 
 
 def on_sides(seed, traction):
     """(n, 2) nodal forces of a traction upwards on the downstream side, and downwards on the upstream one."""
-    outline, rim = seed.boundary, seed.mesh.topology.body_loop
+    outline, rim = seed.boundary, seed.region.own_loop
     forces = np.zeros((len(seed.mesh.body), 2))
     weights = {1: [1 / 2, 1 / 2], 2: [1 / 6, 4 / 6, 1 / 6]}[outline.geometry]
     for edge in outline.edges_on(FREE):
@@ -50,17 +49,18 @@ def test_simple_shear_between_two_walls_is_exact(order):
     g, X = 0.3, seed.body.reference
     prescribed = X.copy()
     upper = nodes_of(seed, TOP)
-    fixed = seed.mesh.topology.body_loop[seed.fixed & (seed.wall == TOP)]
+    fixed = seed.region.own_loop[seed.body.fixed & (seed.body.wall == TOP)]
     prescribed[fixed, 0] += g * 20.0
-    rim = seed.mesh.topology.body_loop
-    constrained = mechanics.constrained(len(X), rim, seed.wall, seed.fixed)
+    rim = seed.region.own_loop
+    constrained = mechanics.constrained(len(X), rim, seed.body.wall, seed.body.fixed)
     forces = on_sides(seed, g)
-    supports = supports_of(seed.body, seed, forces)
-    shapes = [growth.equilibrium(seed.body, seed.theta, X, np.zeros(seed.body.shape.corners), constrained, prescribed,
+    supports = supports_of(seed.body.solid, seed, forces)
+    solid, theta = seed.body.solid, seed.body.theta
+    shapes = [growth.equilibrium(solid, theta, X, np.zeros(solid.shape.corners), constrained, prescribed,
                                  forces=forces, supports=each) for each in (supports, [])]
     exact = X + g * X[:, 1:] * [1.0, 0.0]
     assert shapes[0].position == pytest.approx(exact, abs=1e-8)
-    assert shapes[0].pressure == pytest.approx(np.full(seed.body.shape.corners, g**2 / 3), abs=1e-8)
+    assert shapes[0].pressure == pytest.approx(np.full(seed.body.solid.shape.corners, g**2 / 3), abs=1e-8)
     assert np.abs(shapes[1].position - exact)[upper].max() > 0.1
 
 
@@ -116,12 +116,12 @@ def test_each_wall_bears_half_of_the_force_on_a_block(wall):
 def test_without_forces_one_surface_alone_moves_as_without_a_traction(order):
     """The forces of growth along the pore add up to zero, so the traction is zero."""
     scene, seed = coarse_base(order)
-    slope = seed.body.reference[seed.body.shape.cells, 0] @ seed.body.shape.table.values.T
-    grown = replace(seed, theta=seed.theta * (1.2 + 0.02 * slope))
+    slope = seed.body.reference[seed.body.solid.shape.cells, 0] @ seed.body.solid.shape.table.values.T
+    grown = seed.with_body(theta=seed.body.theta * (1.2 + 0.02 * slope))
     mechanics = Mechanics.of(scene)
     none = np.zeros((len(seed.mesh.body), 2))
-    assert not supports_of(seed.body, seed, None)
-    assert supports_of(seed.body, seed, none)
+    assert not supports_of(seed.body.solid, seed, None)
+    assert supports_of(seed.body.solid, seed, none)
     shapes = [equilibrium(mechanics, grown, grown, forces)[0].mesh.points for forces in (None, none)]
     assert shapes[1] == pytest.approx(shapes[0], abs=1e-9)
 
@@ -131,9 +131,9 @@ def test_without_forces_one_surface_alone_moves_as_without_a_traction(order):
 def test_a_traction_acts_on_each_surface_that_slides(order, walls, wall):
     """On its own nodes alone, with the resultant 1. A bonded surface has none: each of its points bears its force."""
     scene, seed = block(order, f'growth.wall="{wall}"')
-    seed = replace(seed, fixed=seed.fixed & ~seed.boundary.contact_ends)
+    seed = seed.with_body(fixed=seed.body.fixed & ~seed.boundary.contact_ends)
     position = seed.mesh.points[seed.mesh.body]
-    supports = supports_of(seed.body, seed, None)
+    supports = supports_of(seed.body.solid, seed, None)
     points = position[[each.point for each in supports]]
     assert points == pytest.approx(np.array([[0.0, 20.0 * (wall == TOP)] for wall in walls]))
     for wall, each in zip(walls, supports):
@@ -152,7 +152,7 @@ def test_the_traction_is_uniform_per_length_of_the_reference(order):
         X = seed.mesh.points
         grown = seed.moved(X + [0.02, 0.0] * X**2)
         positions = grown.mesh.points[grown.mesh.body]
-        body, _ = grown.configuration.restarted(positions).strained(grown.body, grown.theta)
+        body, _ = grown.body.configuration.restarted(positions).strained(grown.body.solid, grown.body.theta)
         position = positions[:, 0]
         return [(seed.body.reference[:, 0] @ each.load, position @ each.load)
                 for each in supports_of(body, grown, None)]
@@ -168,8 +168,8 @@ def test_the_traction_is_uniform_per_length_of_the_reference(order):
 def test_a_surface_of_one_node_bears_its_force_there():
     """It has no length. On straight edges a film may close at one node."""
     scene, seed = coarse_base(1)
-    wall = seed.wall.copy()
+    wall = seed.body.wall.copy()
     wall[seed.boundary.points[:, 1].argmax()] = TOP
-    touching = replace(seed, wall=wall, fixed=seed.fixed | (wall == TOP))
-    supports = supports_of(seed.body, touching, np.zeros((len(seed.mesh.body), 2)))
+    touching = seed.with_body(wall=wall, fixed=seed.body.fixed | (wall == TOP))
+    supports = supports_of(seed.body.solid, touching, np.zeros((len(seed.mesh.body), 2)))
     assert [seed.mesh.points[seed.mesh.body][each.point, 1] for each in supports] == [0.0]

@@ -26,7 +26,7 @@ def test_a_shape_without_equilibrium_under_the_forces_is_refused(order):
     """The pressure of the water is a thousand times the stiffness."""
     scene, seed = dense_base(order, "1e9 mg/cm^3")
     with pytest.raises(StageError, match="try a|crosses itself"):
-        contact.expand(Mechanics.of(scene), seed, 1.1 * seed.theta)
+        contact.expand(Mechanics.of(scene), seed, [1.1 * seed.body.theta])
 
 
 @pytest.mark.parametrize("noise, agrees", [(1e-2, True), (1.0, False)])
@@ -44,10 +44,10 @@ def test_rounds_that_do_not_reduce_the_move_end(monkeypatch, order, noise, agree
     scene, seed = dense_base(order, "1e5 mg/cm^3")
     mechanics = Mechanics.of(scene)
     if agrees:
-        assert contact.expand(mechanics, seed, 1.1 * seed.theta).iterations > 0
+        assert contact.expand(mechanics, seed, [1.1 * seed.body.theta]).iterations > 0
         return
     with pytest.raises(GrowthError, match="do not agree: after .* rounds a node still moves by .* um, .*try a larger"):
-        contact.expand(mechanics, seed, 1.1 * seed.theta)
+        contact.expand(mechanics, seed, [1.1 * seed.body.theta])
 
 
 @EVERY_ORDER
@@ -64,7 +64,7 @@ def test_a_closed_pore_may_have_larger_forces_than_the_open_one(monkeypatch, ord
 
     monkeypatch.setattr(traction, "forces", lifting)
     search = contact_lines.SearchOptions(landing=LANDED)
-    closed = contact.expand(Mechanics.of(scene), seed, 1.02 * seed.theta, search=search)
+    closed = contact.expand(Mechanics.of(scene), seed, [1.02 * seed.body.theta], search=search)
     assert closed.pore.contact
     assert closed.gap < 1.99 < LANDED * scene.growth.minimum_film
 
@@ -79,11 +79,11 @@ def test_nodes_stay_on_a_wall_that_they_join_in_every_other_round(monkeypatch):
 
     def lifting(_fluid, _around, shaped):
         y = shaped.mesh.points[shaped.mesh.body, 1]
-        counts.append(int((shaped.wall == TOP).sum()))
+        counts.append(int((shaped.body.wall == TOP).sum()))
         return np.column_stack([np.zeros(len(y)), 0.02 * (y > 0.5 * y.max()) * (counts[-1] < 2)])
 
     monkeypatch.setattr(traction, "forces", lifting)
-    assert contact.expand(Mechanics.of(scene), seed, 1.03 * seed.theta).pore.contact
+    assert contact.expand(Mechanics.of(scene), seed, [1.03 * seed.body.theta]).pore.contact
     alternating, settled = counts[1:5], counts[5:]
     assert alternating == [3, 1, 3, 1] and settled and set(settled) == {1}
 

@@ -126,7 +126,7 @@ def uneven(order):
     """(scene, pore, its solution) with masses that differ from X_m from point to point."""
     scene, pore = coarse_base(order)
     part = np.random.default_rng(order).uniform(0.7, 1.2, pore.active.shape)
-    pore = replace(pore, active=0.6 * part * pore.active, inert=0.3 * pore.active, theta=1.5 * pore.theta)
+    pore = pore.with_body(active=0.6 * part * pore.active, inert=0.3 * pore.active, theta=1.5 * pore.body.theta)
     return scene, pore, solve(scene, pore)
 
 
@@ -141,7 +141,7 @@ def test_every_transferred_amount_keeps_its_sum(order):
     patchy = full * (np.arange(len(full)) % 2)[:, None]
     pressure = pore.mesh.points[: pore.mesh.corners] @ [0.02, 0.03] + 1
     for inert, *amounts in (rough, [patchy, patchy])[:order]:
-        before = replace(pore, active=full - inert, inert=inert, pressure=pressure)
+        before = replace(pore.with_masses(full - inert, inert), pressure=pressure)
         after, carried = remeshing.remesh(remeshing.Remeshing.of(finer), pore, before, 0.0, tuple(amounts))
         inside = after.mesh.topology.body_corners
         assert after.pressure[inside] == pytest.approx(after.mesh.points[inside] @ [0.02, 0.03] + 1, abs=1e-2)

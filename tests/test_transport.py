@@ -66,7 +66,7 @@ def right_triangles():
     wrong = triangle_areas(points, triangles) < 0
     triangles[wrong] = triangles[wrong][:, ::-1]
     x = points[triangles, 0].mean(axis=1)
-    return Mesh.of(points, triangles, (x > 10) & (x < 20), np.empty(0, int), channel_walls(20.0), (0.0, 40.0))
+    return Mesh.of(points, triangles, (x > 10) & (x < 20), (), channel_walls(20.0), (0.0, 40.0))
 
 
 @EVERY_ORDER

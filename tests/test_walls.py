@@ -80,7 +80,7 @@ def grown_plug(order):
                                 "numerics.refinement=0.3"], unset=["aggregate.radius"])
     seed = seeded(scene)
     x = seed.mesh.points[seed.mesh.cells[seed.mesh.biomass, :3], 0].mean(axis=1)
-    seed = replace(seed, theta=seed.theta * (1.2 + 0.01 * x)[:, None])
+    seed = seed.with_body(theta=seed.body.theta * (1.2 + 0.01 * x)[:, None])
     return Mechanics.of(scene), seed
 
 
@@ -89,21 +89,21 @@ def grown_plug(order):
 def test_a_surface_keeps_its_place_on_a_bonded_wall_alone(order, number):
     mechanics, seed = grown_plug(order)
     seed = with_wall(seed, number, bonded=True)
-    moved = contact.expand(mechanics, seed, seed.theta).position[seed.mesh.loop] - seed.boundary.points
+    moved = contact.expand(mechanics, seed, [seed.body.theta]).position[seed.mesh.loop] - seed.boundary.points
     for wall in seed.mesh.walls:
-        along = np.abs(moved[seed.wall == wall.number, 0]).max()
+        along = np.abs(moved[seed.body.wall == wall.number, 0]).max()
         assert along == 0.0 if wall.number == number else along > 0.1
 
 
 @pytest.mark.parametrize("number", [1, 2])
 def test_a_new_surface_keeps_a_point_unless_its_wall_keeps_none(number):
     _, seed = grown_plug(2)
-    lost = replace(seed, fixed=np.zeros_like(seed.fixed))
-    on = lost.wall == number
-    kept = with_new_surfaces(lost).fixed
+    lost = seed.with_body(fixed=np.zeros_like(seed.body.fixed))
+    on = lost.body.wall == number
+    kept = with_new_surfaces(lost).body.fixed
     assert np.count_nonzero(kept & on) == 1 and np.count_nonzero(kept) == 2
     slack = with_wall(lost, number, keeps_point=False)
-    kept = with_new_surfaces(slack).fixed
+    kept = with_new_surfaces(slack).body.fixed
     assert np.count_nonzero(kept & on) == 0 and np.count_nonzero(kept) == 1
 
 
@@ -129,7 +129,7 @@ def test_a_film_closes_at_a_plane_of_symmetry_at_half_of_the_gap(order):
         scene = load_scene("base", [f"numerics.preset={PRESETS[order]}", "pore.width=20 um", f"pore.upper_wall={upper}",
                                     f"aggregate.radius={20 - gap} um", "numerics.refinement=0.5"])
         seed = seeded(scene)
-        shape = contact.expand(Mechanics.of(scene), seed, seed.theta)
+        shape = contact.expand(Mechanics.of(scene), seed, [seed.body.theta])
         closed[gap, upper] = shape.pore.contact
         assert shape.gap == pytest.approx(gap if upper == "no slip" else 2 * gap, rel=1e-3)
     assert closed == {(1.05, "no slip"): True, (1.05, "symmetry"): False, (0.95, "no slip"): True,
@@ -163,7 +163,7 @@ def test_a_wedge_closes_at_a_plane_of_symmetry_at_half_of_the_tangent(upper, par
 def test_a_plane_of_symmetry_bears_nothing_as_a_wall(number):
     """The traction that walls must bear is that of the other wall, on either side."""
     mechanics, seed = grown_plug(2)
-    shape = contact.expand(mechanics, seed, seed.theta).pore
+    shape = contact.expand(mechanics, seed, [seed.body.theta]).pore
     scene = load_scene("base", ["numerics.preset=fast"])
     peak = adhesion.wall_peak(adhesion.Loading.of(scene), with_wall(shape, number, mirrors=True), None)
     assert peak.value > 0 and peak.y == (20.0 if number == 1 else 0.0)

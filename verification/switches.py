@@ -221,15 +221,15 @@ def restarting_as_j(scene: Scene, previous: Pore, solved: Solved, hours: float) 
     update = updates.step(Stages.of(scene), previous, solved, hours)
     after = update.pore
     if update.remeshed:
-        return replace(after, theta=after.body.strained(after.mesh.points[after.mesh.body]).J)
+        return after.with_body(theta=after.body.solid.strained(after.mesh.points[after.mesh.body]).J)
     return after
 
 
 def explicit(scene: Scene, previous: Pore, solved: Solved, hours: float) -> Pore:
     """The pore after one step with dX_A = dt F_3 and dX_I = dt F_4 at the rates of its beginning, (28)-(29) [E16]."""
     rates = Stages.of(scene).rates(previous, solved)
-    grown = replace(previous, active=previous.active + previous.active * hours * rates.growth,
-                    inert=previous.inert + previous.active * hours * rates.remains)
+    grown = previous.with_masses(previous.active + previous.active * hours * rates.growth,
+                                 previous.inert + previous.active * hours * rates.remains)
     return Stages.of(scene).new_mesh(previous, shape_of(scene, previous, grown), solved)[0]
 
 

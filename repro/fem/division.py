@@ -73,7 +73,7 @@ class DividedTriangle:
 
 @dataclass(frozen=True, eq=False)
 class Division:
-    """A mesh of curved triangles with some arcs of its loop divided.
+    """A mesh of curved triangles with some arcs of an aggregate's loop divided.
 
     Parameters
     ----------
@@ -83,16 +83,34 @@ class Division:
         Numbers of the divided arcs, ascending; no two of them bound one triangle.
     t : (d,) float
         Where each arc is divided, in (0, 1) along the loop.
+    number : int
+        Place, in the list of aggregates, of the one whose loop is divided.
     """
 
     parent: Mesh
     arcs: np.ndarray
     t: np.ndarray
+    number: int = 0
+
+    @property
+    def loop(self) -> np.ndarray:
+        """(M,) loop of the aggregate in the parent."""
+        return self.parent.topology.loops[self.number]
+
+    @property
+    def divided_loop(self) -> np.ndarray:
+        """(M + 2 d,) loop of the aggregate in the divided mesh."""
+        return self.topology.loops[self.number]
+
+    @property
+    def region(self) -> np.ndarray:
+        """(T,) True in the parent's triangles of the aggregate."""
+        return self.parent.topology.region == self.number + 1
 
     @property
     def _middles(self) -> np.ndarray:
         """(d,) nodes of the parent in the middle of the divided arcs."""
-        return self.parent.loop[2 * self.arcs + 1]
+        return self.loop[2 * self.arcs + 1]
 
     @cached_property
     def triangles(self) -> list[DividedTriangle]:
@@ -100,7 +118,7 @@ class Division:
         cells = self.parent.cells
         divided = []
         for arc, (middle, t) in enumerate(zip(self._middles, self.t)):
-            start = self.parent.loop[2 * self.arcs[arc]]
+            start = self.loop[2 * self.arcs[arc]]
             for cell, edge in np.argwhere(cells[:, 3:] == middle):
                 forward = bool(cells[cell, edge] == start)
                 divided.append(DividedTriangle(cell, edge, arc, forward, t if forward else 1 - t))
@@ -139,11 +157,12 @@ class Division:
             ps, sq = (pq, half[triangle.arc]) if triangle.forward else (half[triangle.arc], pq)
             cells[triangle.cell] = p, s, v, ps, sv, vp
             second_parts.append([s, q, v, sq, qv, sv])
-        biomass = [topology.biomass[triangle.cell] for triangle in self.triangles]
+        region = [topology.region[triangle.cell] for triangle in self.triangles]
+        loops = [self._renumbered(loop) for loop in topology.loops]
+        loops[self.number] = self.along_loop(loops[self.number], corner, half)
         return replace(topology, cells=np.vstack([cells, second_parts]),
                        corners=topology.corners + count,
-                       biomass=np.concatenate([topology.biomass, biomass]),
-                       loop=self.along_loop(self._renumbered(topology.loop), corner, half))
+                       region=np.concatenate([topology.region, region]), loops=tuple(loops))
 
     def _renumbered(self, nodes: np.ndarray) -> np.ndarray:
         """Numbers of the parent's nodes in the divided mesh."""
@@ -180,7 +199,7 @@ class Division:
     def at_corners(self, values: np.ndarray) -> np.ndarray:
         """(corners + d,) values at all corners, from a linear field (corners,) at the parent's
         corners."""
-        loop = self.parent.loop
+        loop = self.loop
         start = loop[2 * self.arcs]
         end = loop[(2 * self.arcs + 2) % len(loop)]
         return np.concatenate([values, (1 - self.t) * values[start] + self.t * values[end]])
@@ -191,7 +210,7 @@ class Division:
         first_middle = corners + len(self.arcs)
         last_middle = first_middle + len(self.parent.points) - corners
         restricted = np.concatenate([values[:corners], values[first_middle:last_middle]])
-        loop = self.topology.loop
+        loop = self.divided_loop
         for number, (arc, t) in enumerate(zip(self.arcs, self.t)):
             nodes = loop[(2 * (arc + number) + np.arange(5)) % len(loop)]
             half, s = (nodes[:3], 0.5 / t) if t >= 0.5 else (nodes[2:], (0.5 - t) / (1 - t))
@@ -204,7 +223,7 @@ class Division:
         The load at the middle of an arc counts as that of a uniform traction on the arc.
         """
         corners = self.parent.corners
-        loop = self.parent.loop
+        loop = self.loop
         start = loop[2 * self.arcs]
         end = loop[(2 * self.arcs + 2) % len(loop)]
         middle = loads[self._middles]
@@ -227,8 +246,8 @@ class Division:
         last_middle = first_middle + len(self.parent.points) - corners
         gathered = np.concatenate([loads[:corners], loads[first_middle:last_middle]])
         gathered[self._middles] = 0.0
-        loop = self.topology.loop
-        ends = self.parent.loop
+        loop = self.divided_loop
+        ends = self.loop
         for number, (arc, t) in enumerate(zip(self.arcs, self.t)):
             nodes = loop[(2 * (arc + number) + np.arange(1, 4)) % len(loop)]
             weights = parabola(np.array([t / 2, t, (1 + t) / 2]))
@@ -238,10 +257,11 @@ class Division:
 
     def halves(self, arc: int) -> tuple[np.ndarray, DividedTriangle]:
         """(2,) rows of both parts of the triangle at the divided arc ``arc``, and the triangle."""
-        inside = [triangle for triangle in self.triangles if self.parent.biomass[triangle.cell]]
+        region = self.region
+        inside = [triangle for triangle in self.triangles if region[triangle.cell]]
         number = next(k for k, triangle in enumerate(inside) if triangle.arc == arc)
-        first = np.count_nonzero(self.parent.biomass[: inside[number].cell])
-        return np.array([first, np.count_nonzero(self.parent.biomass) + number]), inside[number]
+        first = np.count_nonzero(region[: inside[number].cell])
+        return np.array([first, np.count_nonzero(region) + number]), inside[number]
 
     def amounts(self, amounts: np.ndarray, table: Table) -> np.ndarray:
         """(r + d, q) amounts at the quadrature points of the divided aggregate.
@@ -257,11 +277,12 @@ class Division:
         table : Table
             Functions at the quadrature points.
         """
-        rows = np.cumsum(self.parent.biomass) - 1
+        region = self.region
+        rows = np.cumsum(region) - 1
         divided = amounts.copy()
         second_parts = []
         for triangle in self.triangles:
-            if self.parent.biomass[triangle.cell]:
+            if region[triangle.cell]:
                 row = rows[triangle.cell]
                 divided[row], second = split(amounts[row], triangle, table)
                 second_parts.append(second)

@@ -8,7 +8,7 @@ nodes once, because its nodes never change.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 
@@ -73,20 +73,62 @@ def _beside(cells: np.ndarray, edges: np.ndarray) -> tuple[np.ndarray, np.ndarra
 
 
 @dataclass(frozen=True, eq=False)
+class Region:
+    """One aggregate among the triangles of a mesh.
+
+    triangles: (t,) their numbers; cells: (t, 3 or 6) their nodes; corners: number of the mesh's
+    corners; loop: (M,) nodes of the aggregate's boundary, counterclockwise, corner and middle in
+    turn where there are middles.
+    """
+
+    triangles: np.ndarray
+    cells: np.ndarray
+    corners: int
+    loop: np.ndarray
+
+    @cached_property
+    def nodes(self) -> np.ndarray:
+        """(n,) its nodes, its boundary included, ascending: corners first."""
+        return np.unique(self.cells)
+
+    @cached_property
+    def own_cells(self) -> np.ndarray:
+        """(t, 3 or 6) its triangles in the numbering of ``nodes``."""
+        return np.searchsorted(self.nodes, self.cells)
+
+    @cached_property
+    def own_loop(self) -> np.ndarray:
+        """(M,) ``loop`` in the numbering of ``nodes``."""
+        return np.searchsorted(self.nodes, self.loop)
+
+    @cached_property
+    def corner_nodes(self) -> np.ndarray:
+        """Its corners."""
+        return self.nodes[self.nodes < self.corners]
+
+    @cached_property
+    def beside_loop(self) -> tuple[np.ndarray, np.ndarray]:
+        """(edges,) its triangle beside each edge of ``loop``, and the number of this edge among the
+        triangle's edges 01, 12 and 20."""
+        line = self.loop[:: elements.order_of(self.cells)]
+        owner, places = _beside(self.cells, np.column_stack([line, np.roll(line, -1)]))
+        return owner, places[:, 0]
+
+
+@dataclass(frozen=True, eq=False)
 class Topology:
     """Connections of a mesh.
 
     cells: (T, 3 or 6) nodes, corners counterclockwise, then middles; corners: number of
-    corners; biomass: (T,) True in the aggregate; loop: (M,) nodes of the aggregate's boundary,
-    counterclockwise, corner and middle in turn where there are middles, empty in a clean channel;
-    inlet, outlet: corners from the lower wall up; walls: corners of both walls; method: of the
-    linear systems.
+    corners; region: (T,) number of each triangle's aggregate, from one, zero in the fluid; loops:
+    (M,) nodes of the boundary of each aggregate, as in :class:`Region`; inlet, outlet: corners from
+    the lower wall up; walls: corners of both walls; method: of the linear systems.
     """
 
     cells: np.ndarray
     corners: int
-    biomass: np.ndarray
-    loop: np.ndarray
+    region: np.ndarray
+    loops: tuple[np.ndarray, ...]
     inlet: np.ndarray
     outlet: np.ndarray
     walls: np.ndarray
@@ -108,11 +150,26 @@ class Topology:
         """Topology of the straight triangles between the corners."""
         if self.geometry == 1:
             return self
-        return replace(self, cells=np.ascontiguousarray(self.triangles), loop=self.loop[::2].copy())
+        return replace(self, cells=np.ascontiguousarray(self.triangles),
+                       loops=tuple(loop[::2].copy() for loop in self.loops))
+
+    @cached_property
+    def biomass(self) -> np.ndarray:
+        """(T,) True in the aggregates."""
+        return self.region > 0
+
+    @cached_property
+    def regions(self) -> tuple[Region, ...]:
+        """The aggregates."""
+        regions = []
+        for number, loop in enumerate(self.loops, 1):
+            triangles = np.flatnonzero(self.region == number)
+            regions.append(Region(triangles, self.cells[triangles], self.corners, loop))
+        return tuple(regions)
 
     @cached_property
     def body(self) -> np.ndarray:
-        """Nodes of the aggregate, its boundary included, ascending: corners first."""
+        """Nodes of the aggregates, their boundaries included, ascending: corners first."""
         return np.unique(self.cells[self.biomass])
 
     @cached_property
@@ -121,22 +178,8 @@ class Topology:
         return np.searchsorted(self.body, self.cells[self.biomass])
 
     @cached_property
-    def body_loop(self) -> np.ndarray:
-        """(M,) ``loop`` in the numbering of ``body``."""
-        return np.searchsorted(self.body, self.loop)
-
-    @cached_property
-    def beside_loop(self) -> tuple[np.ndarray, np.ndarray]:
-        """(edges,) triangle of the aggregate beside each edge of ``loop``, and the number of this
-        edge among the triangle's edges 01, 12 and 20."""
-        corners = self.straight.loop
-        line = np.column_stack([corners, np.roll(corners, -1)])
-        owner, places = _beside(self.cells[self.biomass], line)
-        return owner, places[:, 0]
-
-    @cached_property
     def body_corners(self) -> np.ndarray:
-        """Corners of the aggregate."""
+        """Corners of the aggregates."""
         return self.body[self.body < self.corners]
 
     @cached_property
@@ -146,7 +189,7 @@ class Topology:
 
     @cached_property
     def bent(self) -> np.ndarray:
-        """Triangles with a node of the aggregate; the others of a mesh that has moved with it are
+        """Triangles with a node of an aggregate; the others of a mesh that has moved with it are
         straight."""
         return np.flatnonzero(np.isin(self.cells, self.body).any(axis=1))
 
@@ -251,11 +294,12 @@ class Mesh:
     ends: tuple[float, float]
 
     @staticmethod
-    def of(points: np.ndarray, cells: np.ndarray, biomass: np.ndarray, loop: np.ndarray,
-           walls: Walls, ends: tuple[float, float], method: Method = DEFAULT) -> Mesh:
+    def of(points: np.ndarray, cells: np.ndarray, region: np.ndarray,
+           loops: tuple[np.ndarray, ...], walls: Walls, ends: tuple[float, float],
+           method: Method = DEFAULT) -> Mesh:
         """Build the mesh of triangles with nodes (T, 3 or 6), corners numbered first.
 
-        loop: as in :class:`Topology`.
+        region, loops: as in :class:`Topology`; region may be True in the one aggregate.
         """
         count = len(points) if cells.shape[1] == 3 else int(cells[:, 3:].min())
         x, y = points[:count].T
@@ -265,8 +309,8 @@ class Mesh:
             nodes = np.flatnonzero(x == level)
             return nodes[np.argsort(y[nodes])]
 
-        topology = Topology(cells, count, biomass, loop, line(ends[0]), line(ends[1]), on_walls,
-                            method)
+        topology = Topology(cells, count, region.astype(int), loops, line(ends[0]), line(ends[1]),
+                            on_walls, method)
         return Mesh(points, topology, walls, ends)
 
     @property
@@ -301,17 +345,22 @@ class Mesh:
 
     @property
     def biomass(self) -> np.ndarray:
-        """(T,) True in the aggregate."""
+        """(T,) True in the aggregates."""
         return self.topology.biomass
 
     @property
+    def regions(self) -> tuple[Region, ...]:
+        """The aggregates."""
+        return self.topology.regions
+
+    @property
     def loop(self) -> np.ndarray:
-        """(M,) nodes of the aggregate's boundary."""
-        return self.topology.loop
+        """(M,) nodes of the boundaries of the aggregates, one after the other."""
+        return np.concatenate([np.empty(0, int), *self.topology.loops])
 
     @property
     def body(self) -> np.ndarray:
-        """Nodes of the aggregate."""
+        """Nodes of the aggregates."""
         return self.topology.body
 
     @cached_property
@@ -363,7 +412,7 @@ class Mesh:
         return nodes[wall.gap(self.points[nodes]) < self.width / 2]
 
     def area(self) -> float:
-        """Area of the aggregate, um2."""
+        """Area of the aggregates, um2."""
         of = elements.table(self.geometry, elements.DEGREES[self.geometry])
         return float(elements.weights(self.points[self.cells[self.biomass]], of).sum())
 
@@ -381,6 +430,18 @@ class Mesh:
         nodal[self.body] = values
         return nodal
 
+    def from_region(self, region: Region, values: np.ndarray) -> np.ndarray:
+        """(N, k) values at all nodes, from those (n, k) at one aggregate's; zero elsewhere."""
+        nodal = np.zeros((len(self.points), values.shape[1]))
+        nodal[region.nodes] = values
+        return nodal
+
+    def by_triangle(self, values: Sequence[np.ndarray]) -> np.ndarray:
+        """(T, ...) values in the triangles of biomass, in their order, from those (t, ...) of each
+        aggregate."""
+        triangles = np.concatenate([region.triangles for region in self.regions])
+        return np.concatenate(values)[np.argsort(triangles)]
+
     def moved(self, points: np.ndarray) -> Mesh:
         """The same triangles with their nodes at ``points`` (N, 2); nodes of walls and ends must
         still be on their lines."""
@@ -395,11 +456,11 @@ class Mesh:
         J = elements.jacobian(corners, checked_map_derivatives(self.geometry))
         return elements.determinant(J).min(axis=1) <= 0
 
-    def strained_arcs(self) -> np.ndarray:
-        """(M,) True where the curved triangle beside an edge of the boundary is turned over."""
-        if self.geometry == 1:
-            return np.zeros(len(self.loop), bool)
-        return np.isin(self.loop[1::2], self.cells[self.turned_over(), 3:])
+    def strained_arcs(self) -> tuple[np.ndarray, ...]:
+        """For each aggregate of a curved mesh, (M,) True where the triangle beside an arc of its
+        boundary is turned over."""
+        bad = self.cells[self.turned_over(), 3:]
+        return tuple(np.isin(loop[1::2], bad) for loop in self.topology.loops)
 
     def checked(self) -> Mesh:
         """The mesh itself. Raises MeshError if a triangle is turned over."""
@@ -446,19 +507,20 @@ def gradients(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     return np.stack([-side[:, :, 1] / double, side[:, :, 0] / double], axis=2)
 
 
-def curved(straight: Mesh, middles: np.ndarray | None) -> Mesh:
+def curved(straight: Mesh, middles: Sequence[np.ndarray] | None) -> Mesh:
     """The mesh with a node in the middle of every edge.
 
-    middles: (M, 2) um, those on the aggregate's boundary, in the order of the loop's edges; None:
-    middles of the straight edges.
+    middles: (M, 2) um, those on the boundary of each aggregate, in the order of its loop's edges;
+    None: middles of the straight edges.
     """
     topology = straight.topology
     count = straight.corners
     points = np.vstack([straight.points, straight.points[topology.edges].mean(axis=1)])
     cells = np.column_stack([topology.triangles, count + topology.cell_edges])
-    loop = np.empty(0, int)
-    if len(topology.loop):
-        between = count + topology.edge_numbers(topology.loop, np.roll(topology.loop, -1))
-        points[between] = points[between] if middles is None else middles
-        loop = np.column_stack([topology.loop, between]).ravel()
-    return replace(straight, points=points, topology=replace(topology, cells=cells, loop=loop))
+    loops = []
+    for number, loop in enumerate(topology.loops):
+        between = count + topology.edge_numbers(loop, np.roll(loop, -1))
+        points[between] = points[between] if middles is None else middles[number]
+        loops.append(np.column_stack([loop, between]).ravel())
+    return replace(straight, points=points,
+                   topology=replace(topology, cells=cells, loops=tuple(loops)))

@@ -11,6 +11,7 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from itertools import combinations
 from typing import TypeAlias
 
 import numpy as np
@@ -35,37 +36,51 @@ SLIVER = 1e-12
 #: Rounds in which arcs that bend too much for the triangles beside them are halved.
 HALVINGS = 6
 
-#: Nodes of a polygon, and whether it encloses biomass.
-Polygon: TypeAlias = tuple[np.ndarray, bool]
-#: Points, triangles, and region of each triangle: 1 fluid, 2 biomass.
+#: Nodes of a polygon, and the number of the aggregate that it encloses; zero for the fluid.
+Polygon: TypeAlias = tuple[np.ndarray, int]
+#: Points, triangles, and region of each triangle: 1 fluid, 2 the first aggregate, 3 the next.
 Regions: TypeAlias = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
-@timed("meshing")
 def generate(outline: Outline | None, ends: tuple[float, float], sizing: Sizing,
              geometry: int = 1, method: Method = DEFAULT) -> tuple[Mesh, Outline | None]:
-    """Generate a mesh around the aggregate; also returns the outline with the mesh's nodes.
+    """Generate a mesh around one aggregate, or of a clean channel, by :func:`generate_around`.
 
-    outline: None for a clean channel; ends: x of inlet and outlet (um); geometry: 1 for straight
-    triangles, 2 for curved ones, as in the outline; method: of the linear systems on the
-    mesh. Raises MeshError if the outline crosses itself or the channel's ends, or if a curved
-    triangle is turned over.
+    outline: None for a clean channel.
     """
-    if outline is None:
-        straight = around(None, ends, sizing, method)
-        return (straight if geometry == 1 else curved(straight, None)), None
+    mesh, outlines = generate_around([] if outline is None else [outline], ends, sizing, geometry,
+                                     method)
+    return mesh, next(iter(outlines), None)
+
+
+@timed("meshing")
+def generate_around(outlines: Sequence[Outline], ends: tuple[float, float], sizing: Sizing,
+                    geometry: int = 1, method: Method = DEFAULT) -> tuple[Mesh, list[Outline]]:
+    """Generate a mesh around aggregates; also returns the outlines with the mesh's nodes.
+
+    ends: x of inlet and outlet (um); geometry: 1 for straight triangles, 2 for curved ones, as in
+    the outlines; method: of the linear systems on the mesh. Raises MeshError if an outline crosses
+    itself, another one or the channel's ends, or if a curved triangle is turned over.
+    """
+    outlines = list(outlines)
     for _ in range(HALVINGS):
-        outline = sizes_of.split(outline, sizing)
-        check_outline(outline.corners, ends, sizing.walls)
-        mesh = around(outline.corners, ends, sizing, method)
+        outlines = [sizes_of.split(outline, sizing) for outline in outlines]
+        corners = [outline.corners for outline in outlines]
+        for polygon in corners:
+            check_outline(polygon, ends, sizing.walls)
+        check_apart(corners)
+        mesh = around(corners, ends, sizing, method)
         if geometry == 1:
-            return mesh, outline
-        mesh = curved(unlocked(mesh), outline.points[1::2])
+            return mesh, outlines
+        if not outlines:
+            return curved(mesh, None), outlines
+        mesh = curved(unlocked(mesh), [outline.points[1::2] for outline in outlines])
         strained = mesh.strained_arcs()
-        if not strained.any():
+        if not any(arcs.any() for arcs in strained):
             break
-        outline = sizes_of.halved(outline, strained)
-    return mesh.checked(), outline
+        outlines = [sizes_of.halved(outline, arcs) if arcs.any() else outline
+                    for outline, arcs in zip(outlines, strained)]
+    return mesh.checked(), outlines
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,11 +92,15 @@ class ElementSizes:
     sizing: Sizing
 
     @staticmethod
-    def around(outline: Outline | None, sizing: Sizing) -> ElementSizes:
-        """Sizes for an outline, or the largest everywhere without one."""
-        if outline is None:
-            return ElementSizes(np.empty((0, 2)), np.empty(0), sizing)
-        return ElementSizes(*sizes_of.size_sources(outline, sizing), sizing)
+    def around(outlines: Sequence[Outline], sizing: Sizing) -> ElementSizes:
+        """Sizes for outlines, or the largest everywhere without any."""
+        sources = [np.empty((0, 2))]
+        sizes = [np.empty(0)]
+        for outline in outlines:
+            near, size = sizes_of.size_sources(outline, sizing)
+            sources.append(near)
+            sizes.append(size)
+        return ElementSizes(np.concatenate(sources), np.concatenate(sizes), sizing)
 
     def at(self, where: np.ndarray) -> np.ndarray:
         """(N,) um at points (N, 2) um."""
@@ -94,18 +113,24 @@ class ElementSizes:
         return np.vstack([line[:-1] for line in lines])
 
 
-def around(outline: Outline | None, ends: tuple[float, float], sizing: Sizing,
+def around(outlines: Sequence[Outline], ends: tuple[float, float], sizing: Sizing,
            method: Method = DEFAULT) -> Mesh:
-    """Generate a straight mesh around a polygon, whose nodes stay unchanged.
+    """Generate a straight mesh around polygons, whose nodes stay unchanged.
 
-    Arguments are those of :func:`generate`.
+    Arguments are those of :func:`generate_around`.
     """
-    element_sizes = ElementSizes.around(outline, sizing)
-    points, polygons = _boundaries(outline, ends, element_sizes)
+    element_sizes = ElementSizes.around(outlines, sizing)
+    points, polygons = _boundaries(outlines, ends, element_sizes)
     (points, triangles, region), places = _fill(points, polygons, element_sizes.at)
-    # The outline's points come first among the prescribed ones.
-    loop = places[: 0 if outline is None else len(outline.points)]
-    return Mesh.of(points, triangles, region == 2, loop, sizing.walls, ends, method)
+    # The outlines' points come first among the prescribed ones.
+    loops = tuple(places[own] for own in _own_points(outlines))
+    return Mesh.of(points, triangles, region - 1, loops, sizing.walls, ends, method)
+
+
+def _own_points(outlines: Sequence[Outline]) -> list[np.ndarray]:
+    """Numbers of the points of each outline among those of all."""
+    first = np.cumsum([0, *(len(outline.points) for outline in outlines)])
+    return [np.arange(start, end) for start, end in zip(first, first[1:])]
 
 
 def check_outline(outline: Outline, ends: tuple[float, float], walls: Walls) -> None:
@@ -126,20 +151,33 @@ def check_outline(outline: Outline, ends: tuple[float, float], walls: Walls) -> 
                         f"x from {ends[0]:.4g} to {ends[1]:.4g} um")
 
 
-def _boundaries(outline: Outline | None, ends: tuple[float, float],
+def check_apart(outlines: Sequence[Outline]) -> None:
+    """Raise MeshError if two outlines touch."""
+    for outline, other in combinations(outlines, 2):
+        if shapely.Polygon(outline.points).intersects(shapely.Polygon(other.points)):
+            raise MeshError("two aggregates touch, and contact is modelled with the walls alone")
+
+
+def _boundaries(outlines: Sequence[Outline], ends: tuple[float, float],
                 element_sizes: ElementSizes) -> tuple[np.ndarray, list[Polygon]]:
     """All prescribed points (K, 2) and the polygons that they bound."""
     walls = element_sizes.sizing.walls
-    if outline is None:
+    if not outlines:
         corners = _around(walls, ends)
         rim = element_sizes.path(*corners, corners[0])
-        return rim, [(np.arange(len(rim)), False)]
-    store = _PointStore(outline.points)
-    free = outline.untouched(walls)
+        return rim, [(np.arange(len(rim)), 0)]
+    store = _PointStore(np.concatenate([outline.points for outline in outlines]))
+    free = [wall for wall in walls if all(wall in outline.untouched(walls) for outline in outlines)]
     touched = [wall for wall in walls if wall not in free]
-    bounds = _on_both_sides if not free else _over_the_top
-    fluid = bounds(outline, [*touched, *free], ends, element_sizes, store)
-    return store.points, [*fluid, (np.arange(len(outline.points)), True)]
+    own = _own_points(outlines)
+    if free:
+        fluid = _over_the_top(outlines, own, [*touched, *free], ends, element_sizes, store)
+    elif len(outlines) == 1:
+        fluid = _on_both_sides(outlines[0], touched, ends, element_sizes, store)
+    else:
+        raise MeshError("no mesh is generated around several aggregates that touch both walls")
+    bodies = [(points, number) for number, points in enumerate(own, 1)]
+    return store.points, [*fluid, *bodies]
 
 
 def _around(walls: Sequence[Wall], ends: tuple[float, float]) -> np.ndarray:
@@ -149,16 +187,28 @@ def _around(walls: Sequence[Wall], ends: tuple[float, float]) -> np.ndarray:
     return np.array([(start, first.y), (end, first.y), (end, second.y), (start, second.y)])
 
 
-def _over_the_top(outline: Outline, walls: Sequence[Wall], ends: tuple[float, float],
-                  element_sizes: ElementSizes, store: _PointStore) -> list[Polygon]:
-    """The fluid around an aggregate that touches only the first of two walls."""
+def _over_the_top(outlines: Sequence[Outline], own: Sequence[np.ndarray], walls: Sequence[Wall],
+                  ends: tuple[float, float], element_sizes: ElementSizes,
+                  store: _PointStore) -> list[Polygon]:
+    """The fluid around aggregates that touch only the first of two walls.
+
+    own: numbers of the points of each outline.
+    """
     before, after, opposite_after, opposite_before = _around(walls, ends)
-    first, last = _contact(outline, walls[0])
-    start = store.add(element_sizes.path(before, outline.points[first]))
+    contacts = [_contact(outline, walls[0]) for outline in outlines]
+    along = np.argsort([walls[0].normal * outline.points[first, 0]
+                        for outline, (first, _) in zip(outlines, contacts)])
+    first, _ = contacts[along[0]]
+    start = store.add(element_sizes.path(before, outlines[along[0]].points[first]))
     over = store.add(element_sizes.path(after, opposite_after, opposite_before, before))
-    end = store.add(element_sizes.path(outline.points[last], after)[1:])
-    top = _backwards(first, last, len(outline.points))
-    return [(np.concatenate([start, top, end, over]), False)]
+    rim = [start]
+    for number, following in zip(along, [*along[1:], None]):
+        outline = outlines[number]
+        first, last = contacts[number]
+        end = after if following is None else outlines[following].points[contacts[following][0]]
+        rim.append(own[number][_backwards(first, last, len(outline.points))])
+        rim.append(store.add(element_sizes.path(outline.points[last], end)[1:]))
+    return [(np.concatenate([*rim, over]), 0)]
 
 
 def _on_both_sides(outline: Outline, walls: Sequence[Wall], ends: tuple[float, float],
@@ -175,7 +225,7 @@ def _on_both_sides(outline: Outline, walls: Sequence[Wall], ends: tuple[float, f
     out = store.add(out)
     one_side = [start, _backwards(first, opposite_last, len(points)), close]
     other_side = [_backwards(opposite_first, last, len(points)), out]
-    return [(np.concatenate(one_side), False), (np.concatenate(other_side), False)]
+    return [(np.concatenate(one_side), 0), (np.concatenate(other_side), 0)]
 
 
 def _contact(outline: Outline, wall: Wall) -> tuple[int, int]:
@@ -211,7 +261,7 @@ def _fill(points: np.ndarray, polygons: list[Polygon],
     the first.
     """
     triangles = [_constrained_delaunay(points, nodes) for nodes, _ in polygons]
-    region = np.repeat([1 + biomass for _, biomass in polygons], [len(t) for t in triangles])
+    region = np.repeat([1 + number for _, number in polygons], [len(t) for t in triangles])
     rim = np.vstack([np.column_stack([nodes, np.roll(nodes, -1)]) for nodes, _ in polygons])
     rim = np.unique(np.sort(rim, axis=1), axis=0)
     sizes = FIRST_PASS * size_at(points)

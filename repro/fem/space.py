@@ -16,7 +16,7 @@ from repro.fem import elements
 from repro.fem.brief import brief
 from repro.fem.elements import Table
 from repro.fem.forms import Basis, basis, each
-from repro.fem.mesh import Dofs, Mesh
+from repro.fem.mesh import Dofs, Mesh, Region
 
 
 @brief
@@ -203,10 +203,13 @@ class Lumped:
         """(r, 1) values at the points, from a field (N,) at the mesh's nodes."""
         return nodal[self.space.reaction.cells]
 
-    def to_growth_points(self, field: np.ndarray) -> np.ndarray:
-        """Return (t, 1) means of a field (r, 1) over the nodes of the triangles (29)."""
-        cells = self.space.mesh.straight.topology.body_cells
-        return field[cells, 0].mean(axis=1, keepdims=True)
+    def rows(self, region: Region) -> np.ndarray:
+        """Return the (r,) points of one aggregate among those of all."""
+        return np.searchsorted(self.space.mesh.topology.body_corners, region.corner_nodes)
+
+    def to_growth_points(self, region: Region, field: np.ndarray) -> np.ndarray:
+        """Return (t, 1) means of a field (r, 1) over the nodes of an aggregate's triangles (29)."""
+        return field[region.own_cells, 0].mean(axis=1, keepdims=True)
 
     def finer(self, degrees: int) -> tuple[Basis, np.ndarray]:
         """Return the same points for every degree, and the identity (1, 1) for densities."""
@@ -249,8 +252,12 @@ class Quadrature:
         mesh = self.space.mesh
         return nodal[mesh.cells[mesh.biomass]] @ self.space.table.values.T
 
-    def to_growth_points(self, field: np.ndarray) -> np.ndarray:
-        """Return the field (r, q) itself: growth is integrated at the same points."""
+    def rows(self, region: Region) -> np.ndarray:
+        """Return the (r,) triangles of one aggregate among those of all."""
+        return np.searchsorted(np.flatnonzero(self.space.mesh.biomass), region.triangles)
+
+    def to_growth_points(self, region: Region, field: np.ndarray) -> np.ndarray:
+        """Return an aggregate's field (r, q) itself: growth is integrated at the same points."""
         return field
 
     def finer(self, degrees: int) -> tuple[Basis, np.ndarray]:

@@ -150,8 +150,8 @@ def _events(ends: Ends, pore: Pore, solved: Solved) -> Iterator[Event]:
     for side in ("upstream", "downstream"):
         end = PoreEnd(f"the aggregate reaches the pore's {side} end at t = {pore.time:g} h")
         yield Event(1 - elements_to_end(ends.channel, pore, side), end)
-    biot = pore.body.energy.biot
-    if pore.configuration.accumulates and biot is not None:
+    biot = max((body.solid.energy.biot or 0.0 for body in pore.bodies), default=0.0)
+    if pore.accumulates and biot > 0:
         compression = most_compressed(Compression(), pore)
         fold = Fold(fold_message(f"at t = {pore.time:g} h", compression))
         yield Event(biot / compression.stretch - 1, fold)
@@ -174,9 +174,9 @@ def _detachment(strength: Strength, pore: Pore, peak: Peak, verb: str, subject: 
 
 
 def elements_to_end(channel: Channel, pore: Pore, side: str) -> float:
-    """Distance of the aggregate from an end of the pore, in elements of the fluid."""
-    outline = pore.boundary
-    tip = -outline.upstream if side == "upstream" else outline.downstream
+    """Distance of the nearest aggregate from an end of the pore, in elements of the fluid."""
+    tip = max(-outline.upstream if side == "upstream" else outline.downstream
+              for outline in pore.outlines)
     return (channel.length / 2 - tip) * ACROSS_PORE / channel.width
 
 

@@ -16,7 +16,7 @@ from repro.errors import GrowthError, MeshError, RunEnd
 from repro.march.state import Compression
 from repro.model.energies.neo_hookean import BIOT, CREASE
 from repro.model.pore import Pore
-from repro.model.surface import surface
+from repro.model.surface import surfaces
 
 #: The surface folds if no equilibrium exists and its stretch has been below this, 5 % above CREASE:
 #: the stretch varies by up to 6 % within an edge, and runs stop at up to 0.677 (docs/design.md).
@@ -49,10 +49,10 @@ def most_compressed(earlier: Compression, pore: Pore) -> Compression:
     An energy without limits of the stretch leaves the earlier one. Where strain counts from the
     last shape, compression does not accumulate: that of the later pore is returned.
     """
-    if pore.outline is None or pore.body.energy.crease is None:
+    if not any(body.solid.energy.crease for body in pore.bodies):
         return earlier
-    present = surface(pore)
-    if pore.configuration.accumulates and present.least >= earlier.stretch:
+    present = min(surfaces(pore), key=lambda surface: surface.least)
+    if pore.accumulates and present.least >= earlier.stretch:
         return earlier
     return Compression(present.least, *present.place, pore.time)
 
@@ -63,9 +63,8 @@ def refuse_fold(expanded: Pore) -> None:
     It applies where strain counts from the last shape: a shorter step compresses the surface less.
     """
     compression = most_compressed(Compression(), expanded)
-    biot = expanded.body.energy.biot
-    accumulates = expanded.configuration.accumulates
-    if not accumulates and biot is not None and compression.stretch < biot:
+    biot = max((body.solid.energy.biot or 0.0 for body in expanded.bodies), default=0.0)
+    if not expanded.accumulates and compression.stretch < biot:
         raise GrowthError(f"growth in one step compresses the surface to {compression.stretch:.3f} "
                           f"of its length near x = {compression.x:.4g}, y = {compression.y:.4g} um")
 

@@ -80,7 +80,7 @@ def attempt(stages: Stages, previous: Pore, solved: Solved, duration: float,
     StageError if a stage fails.
     """
     first = stages.rates(previous, solved)
-    gap = previous.boundary.gap(previous.mesh.walls)
+    gap = min(outline.gap(previous.mesh.walls) for outline in previous.outlines)
     try:
         half = solve_halfway(stages, previous, solved, first, duration, search)
     except FirstContact as early:
@@ -101,9 +101,8 @@ def attempt(stages: Stages, previous: Pore, solved: Solved, duration: float,
     new, remeshed = stages.new_mesh(previous, expanded, solved)
     generated = (GeneratedMesh(expanded, new),) if remeshed else ()
     refuse_density(new, stages.remeshing.maximum_density)
-    makes_contact = expanded.contact and not previous.contact
-    speeds = None if makes_contact else contact_lines.speeds(expansion.advances, duration)
-    new = replace(new, line_speeds=speeds)
+    makes_contact = expanded.spanning > previous.spanning
+    new = _with_line_speeds(new, previous, expansion, duration)
     flows = integrated(duration, half.solved.substrates.fluxes)
     ledger = Ledger(previous.time, previous.time + duration, *flows[:4], previous.mass,
                     after.mass - previous.mass, new.mass, flows.unmet)
@@ -111,6 +110,17 @@ def attempt(stages: Stages, previous: Pore, solved: Solved, duration: float,
     inner = partial(interpolate, stages, previous, solved, complete)
     step = StepResult(new, None, ledger, remeshed, expansion.iterations, inner)
     return Attempt(step, change, (gap, expansion.gap) if makes_contact else None)
+
+
+def _with_line_speeds(new: Pore, previous: Pore, expansion: Expansion, duration: float) -> Pore:
+    """The pore with the speeds of contact lines in a step; unknown after a first contact."""
+    walls = previous.mesh.walls
+    bodies = []
+    for number, (before, after) in enumerate(zip(previous.bodies, new.bodies)):
+        makes_contact = after.touches_all(walls) and not before.touches_all(walls)
+        speeds = contact_lines.speeds(expansion.advances, number, duration)
+        bodies.append(replace(after, line_speeds=None if makes_contact else speeds))
+    return replace(new, bodies=tuple(bodies))
 
 
 def _expand(stages: Stages, previous: Pore, after: Pore, half: Halfway, part: float,
@@ -132,7 +142,10 @@ def solve_halfway(stages: Stages, previous: Pore, solved: Solved, first: Rates, 
     and rates back to the points of the material.
     """
     ahead = replace(grow(previous, first, duration / 2), time=previous.time + duration / 2)
-    search = replace(search, advances=contact_lines.advances_at(previous.line_speeds, duration / 2))
+    advances: dict[tuple[int, int, int], float] = {}
+    for number, body in enumerate(previous.bodies):
+        advances |= contact_lines.advances_at(body.line_speeds, number, duration / 2)
+    search = replace(search, advances=advances)
     expansion = stages.expand(previous, ahead, _scale_shape(previous, ahead), search)
     shape = expansion.pore
     mesh = remeshing.moved_mesh(stages.remeshing.meshing, previous, shape)
@@ -143,7 +156,7 @@ def solve_halfway(stages: Stages, previous: Pore, solved: Solved, first: Rates, 
                         for amount in (previous.active, previous.inert))
         middle, (active, inert) = remeshing.remesh(stages.remeshing, previous, shape,
                                                    solved.mean_velocity, amounts)
-        middle = replace(middle, active=active, inert=inert)
+        middle = middle.with_masses(active, inert)
     solution = stages.solver.solve(middle, duration)
     rates = stages.rates(middle, solution)
     after = grow(middle, rates, duration)
@@ -196,8 +209,7 @@ def _match_production(previous: Pore, after: Pore, produced: tuple[float, float]
     share = previous.active / previous.active.sum()
     missing = [expected - float((new - old).sum()) for expected, new, old in
                zip(produced, (after.active, after.inert), (previous.active, previous.inert))]
-    return replace(after, active=after.active + missing[0] * share,
-                   inert=after.inert + missing[1] * share)
+    return after.with_masses(after.active + missing[0] * share, after.inert + missing[1] * share)
 
 
 def _guess_substrates(start: Solved, half: Halfway, part: float) -> Concentrations:
@@ -225,9 +237,13 @@ def _scale_shape(previous: Pore, after: Pore) -> Pore:
     """Initial guess of the shape: a free aggregate is scaled by the root of its growth."""
     if previous.contact:
         return after
-    fixed = previous.boundary.points[previous.fixed][:1]
-    scale = np.sqrt(after.mass / previous.mass)
-    return _place_body(after, fixed + (previous.mesh.points - fixed) * scale)
+    points = previous.mesh.points.copy()
+    for before, grown, region, outline in zip(previous.bodies, after.bodies, previous.mesh.regions,
+                                              previous.outlines):
+        fixed = outline.points[outline.fixed][:1]
+        scale = np.sqrt(grown.mass / before.mass)
+        points[region.nodes] = fixed + (points[region.nodes] - fixed) * scale
+    return _place_bodies(after, points)
 
 
 def _guess_shape(previous: Pore, half: Halfway, part: float) -> Pore:
@@ -245,11 +261,11 @@ def _guess_shape(previous: Pore, half: Halfway, part: float) -> Pore:
     for weight, shape in terms:
         push = push + weight * (shape.pore.pressure[:corners] - previous.pressure)
         points = points + weight * (shape.position - previous.mesh.points)
-    return _place_body(replace(previous, pressure=push), points)
+    return _place_bodies(replace(previous, pressure=push), points)
 
 
-def _place_body(after: Pore, points: np.ndarray) -> Pore:
-    """Move the aggregate's nodes to ``points``, unless this turns a triangle over."""
+def _place_bodies(after: Pore, points: np.ndarray) -> Pore:
+    """Move the aggregates' nodes to ``points``, unless this turns a triangle over."""
     moved = after.moved(after.mesh.from_body(points[after.mesh.body], after.mesh.points))
     biomass_cells = np.flatnonzero(moved.mesh.biomass)
     return after if moved.mesh.turned_over(biomass_cells).any() else moved

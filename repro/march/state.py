@@ -14,6 +14,7 @@ from repro.errors import SimulationError, StageError
 from repro.fem.brief import brief
 from repro.march.step_control import StepControl
 from repro.model.advice import with_advice
+from repro.model.body import Body
 from repro.model.pore import Pore
 from repro.model.solving import Solved
 
@@ -144,12 +145,15 @@ def contiguous(pore: Pore) -> Pore:
     """
     state = pore.concentrations
     mesh = _contiguous_arrays(pore.mesh)
-    body = _contiguous_arrays(pore.body)
     copied = replace(_contiguous_arrays(pore), concentrations=state and _contiguous_arrays(state),
-                     configuration=_contiguous_arrays(pore.configuration))
-    if body is not pore.body:
-        copied = replace(copied, body=body)
+                     bodies=tuple(map(_contiguous_body, pore.bodies)))
     return copied if mesh is pore.mesh else replace(copied, space=replace(pore.space, mesh=mesh))
+
+
+def _contiguous_body(body: Body) -> Body:
+    """Return the same aggregate with contiguous arrays."""
+    return replace(_contiguous_arrays(body), solid=_contiguous_arrays(body.solid),
+                   configuration=_contiguous_arrays(body.configuration))
 
 
 def _contiguous_arrays(data: Data) -> Data:

@@ -23,13 +23,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from repro.fem import elements
-from repro.fem.outline import edge_functions
+from repro.fem.mesh import Region
+from repro.fem.outline import Outline, edge_functions
 from repro.fem.walls import Wall
 from repro.model import flow, growth, traction
 from repro.model.flow import Flow
 from repro.model.interface import Interface, interface_of
 from repro.model.pore import Pore
 from repro.model.resistance import resistance_of
+from repro.model.solid import Solid
 from repro.model.solving import Solved
 from repro.scene import Flow as Drive
 from repro.scene import Growth, Scene, at_time, needed
@@ -77,15 +79,21 @@ class Load:
 
 
 def stress(loading: Loading, pore: Pore) -> np.ndarray:
-    """(t, q, 4) MPa, Cauchy stress xx, yy, zz, xy at the points where growth is integrated."""
-    mesh = pore.mesh
-    strained = pore.body.strained(mesh.points[mesh.body])
-    pressure = pore.pressure[mesh.triangles[mesh.biomass]] @ pore.body.shape.table.linear.T
+    """(t, q, 4) MPa, Cauchy stress xx, yy, zz, xy at the points where growth is integrated, in the
+    order of the mesh's triangles."""
+    return pore.mesh.by_triangle([_stress(loading, pore, body.solid, region)
+                                  for body, region in zip(pore.bodies, pore.mesh.regions)])
+
+
+def _stress(loading: Loading, pore: Pore, solid: Solid, region: Region) -> np.ndarray:
+    """(t, q, 4) MPa in one aggregate."""
+    strained = solid.strained(pore.mesh.points[region.nodes])
+    pressure = pore.pressure[region.cells[:, :3]] @ solid.shape.table.linear.T
     return loading.growth.shear_modulus * growth.cauchy(strained, pressure)
 
 
 def fluid_forces(loading: Loading, pore: Pore, solved: Solved) -> np.ndarray:
-    """(n, 2) MPa um, forces of the water on the aggregate's nodes, without those on the wall beside
+    """(n, 2) MPa um, forces of the water on the aggregates' nodes, without those on the wall beside
     a contact line."""
     drive = at_time(needed(loading.drive, "[flow]"), pore.time)
     water = needed(solved.flow, "a solution of the flow")
@@ -103,9 +111,9 @@ def _beside_contact(pore: Pore, water: Flow) -> np.ndarray:
     """
     mesh = pore.mesh
     forces = np.zeros_like(mesh.points)
-    outline = pore.boundary
     ends = np.zeros(len(mesh.points), bool)
-    ends[mesh.loop[outline.contact_ends]] = True
+    for outline, region in zip(pore.outlines, mesh.regions):
+        ends[region.loop[outline.contact_ends]] = True
     head = mesh.with_middles(water.head)
     beside = ~mesh.biomass & ends[mesh.triangles].any(axis=1)
     for side in range(3):
@@ -120,25 +128,28 @@ def _beside_contact(pore: Pore, water: Flow) -> np.ndarray:
 
 
 def fluid_load(loading: Loading, pore: Pore, solved: Solved) -> Load:
-    """The force and the moment of the water on the aggregate."""
-    forces = fluid_forces(loading, pore, solved)
+    """The force and the moment of the water on the aggregate from which the pore is seen."""
+    nodes = pore.region.nodes
+    forces = fluid_forces(loading, pore, solved)[np.searchsorted(pore.mesh.body, nodes)]
     outline = pore.boundary
     seeded, *_ = pore.mesh.walls
     on = outline.points[outline.wall == seeded.number, 0]
-    x, y = (pore.mesh.points[pore.mesh.body] - [(on.min() + on.max()) / 2, seeded.y]).T
+    x, y = (pore.mesh.points[nodes] - [(on.min() + on.max()) / 2, seeded.y]).T
     moment = float(x @ forces[:, 1] - y @ forces[:, 0])
     return Load(float(forces[:, 0].sum()), float(forces[:, 1].sum()), moment)
 
 
 def wall_forces(loading: Loading, pore: Pore, solved: Solved) -> np.ndarray:
-    """(n, 2) MPa um, forces of the walls on the aggregate's nodes.
+    """(n, 2) MPa um, forces of the walls on the aggregates' nodes.
 
     At the other nodes they are the defect of the equilibrium.
     """
     mesh = pore.mesh
-    inside = pore.pressure[mesh.topology.body_corners]
-    forces = growth.internal_forces(pore.body, pore.theta, mesh.points[mesh.body], inside)
-    forces = loading.growth.shear_modulus * forces
+    nodal = np.zeros_like(mesh.points)
+    for body, region in zip(pore.bodies, mesh.regions):
+        nodal[region.nodes] = growth.internal_forces(
+            body.solid, body.theta, mesh.points[region.nodes], pore.pressure[region.corner_nodes])
+    forces = loading.growth.shear_modulus * nodal[mesh.body]
     if loading.growth.has_fluid_forces:
         forces = forces - fluid_forces(loading, pore, solved)
     return forces
@@ -148,17 +159,18 @@ def wall_peak(loading: Loading, pore: Pore, solved: Solved) -> Peak:
     """Largest mean stress that a wall bears, with its coordinates."""
     forces = np.zeros_like(pore.mesh.points)
     forces[pore.mesh.body] = wall_forces(loading, pore, solved)
-    touched = pore.boundary.edge_wall
-    peaks = [_peak_on(pore, wall, forces) for wall in pore.mesh.walls
-             if not wall.mirrors and (touched == wall.number).any()]
+    peaks = []
+    for outline, region in zip(pore.outlines, pore.mesh.regions):
+        touched = outline.edge_wall
+        peaks += [_peak_on(pore, outline, region, wall, forces) for wall in pore.mesh.walls
+                  if not wall.mirrors and (touched == wall.number).any()]
     return max(peaks, key=lambda peak: peak.value)
 
 
-def _peak_on(pore: Pore, wall: Wall, forces: np.ndarray) -> Peak:
-    """Largest mean stress that one wall bears, with its coordinates."""
-    outline = pore.boundary
+def _peak_on(pore: Pore, outline: Outline, region: Region, wall: Wall, forces: np.ndarray) -> Peak:
+    """Largest mean stress that one wall bears from one aggregate, with its coordinates."""
     x = pore.mesh.points[:, 0]
-    nodes = pore.mesh.loop[outline.edges_on(wall.number)]
+    nodes = region.loop[outline.edges_on(wall.number)]
     nodes = nodes[np.argsort(x[nodes].min(axis=1))]
     nodes = nodes[:, :: int(wall.normal)]
     surface = _Surface(x, nodes)
@@ -233,19 +245,25 @@ def tensile_peak(loading: Loading, pore: Pore) -> Peak:
     over the points where growth is integrated. On a mesh without a point so near to a node, L is
     twice the least distance.
     """
+    peaks = [_tensile_peak(loading, pore, body.solid, region)
+             for body, region in zip(pore.bodies, pore.mesh.regions)]
+    return max(peaks, key=lambda peak: peak.value)
+
+
+def _tensile_peak(loading: Loading, pore: Pore, solid: Solid, region: Region) -> Peak:
+    """Largest principal value of the mean stress around a node of one aggregate."""
     from scipy.spatial import KDTree  # few scenes need it
 
-    nodes = pore.mesh.points[pore.mesh.body]
-    cells = pore.body.shape.cells
-    places = KDTree((pore.body.shape.table.values @ nodes[cells]).reshape(-1, 2))
-    dx = pore.body.at.dx * pore.body.strained(nodes).J
+    nodes = pore.mesh.points[region.nodes]
+    places = KDTree((solid.shape.table.values @ nodes[solid.shape.cells]).reshape(-1, 2))
+    dx = solid.at.dx * solid.strained(nodes).J
     reach = max(LENGTH * pore.mesh.width, 2 * places.query(nodes)[0].min())
     near = KDTree(nodes).sparse_distance_matrix(places, reach, output_type="coo_matrix")
     weights = (1 - (near.data / reach) ** 2) * dx.ravel()[near.col]
     total = np.bincount(near.row, weights, len(nodes))
     has_points = total > 0
     sums = [np.bincount(near.row, weights * component[near.col], len(nodes))
-            for component in stress(loading, pore).reshape(-1, 4).T]
+            for component in _stress(loading, pore, solid, region).reshape(-1, 4).T]
     means = np.column_stack(sums)[has_points] / total[has_points, None]
     largest = growth.largest_principal(means)
     worst = int(largest.argmax())

@@ -14,7 +14,7 @@ that conserves their sum, or by the paper's interpolation, which does not [E8].
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -58,7 +58,7 @@ def rates(space: Space, state: Concentrations, law: RateLaw) -> Rates:
 def grow(pore: Pore, rates: Rates, duration: float) -> Pore:
     """Integrate (9)-(10) over a duration (h) at constant rates."""
     active, inert = kinetics.grow(pore.active, pore.inert, rates.growth, rates.remains, duration)
-    return replace(pore, active=active, inert=inert)
+    return pore.with_masses(active, inert)
 
 
 def change(first: Rates, second: Rates, weight: np.ndarray) -> float:
@@ -90,7 +90,7 @@ def transfer_amounts(method: str, old: Space, new: Space, at: Located, amounts: 
     Notes
     -----
     With shares the new mesh has the density X_m everywhere, which removes the error of J = theta
-    within a triangle. Each amount keeps its share of the biomass and its sum.
+    within a triangle. Each amount keeps its share of the biomass, and its sum in each aggregate.
     """
     return TRANSFERS[method](old, new, at, amounts, density)
 
@@ -103,9 +103,17 @@ def _by_shares(old: Space, new: Space, at: Located, amounts: Amounts, density: f
     nodal = new.mesh.from_body(at.field(shares, old.mesh.cells[old.mesh.biomass]))
     inside = [np.clip(new.integration.to_points(column), 0.0, 1.0) for column in nodal.T]
     masses = density * new.reaction.dx
-    inert = _conserved(inside[0], masses, amounts[1].sum())
-    rest = [_scaled(share * masses, amount.sum()) for share, amount in zip(inside[1:], amounts[2:])]
-    return (masses * (1 - inert), masses * inert, *rest)
+    transferred = [np.zeros_like(masses) for _ in amounts]
+    for before, after in zip(old.mesh.regions, new.mesh.regions):
+        were = old.integration.rows(before)
+        rows = new.integration.rows(after)
+        inert, *rest = [share[rows] for share in inside]
+        inert = _conserved(inert, masses[rows], amounts[1][were].sum())
+        transferred[0][rows] = masses[rows] * (1 - inert)
+        transferred[1][rows] = masses[rows] * inert
+        for new_amount, share, amount in zip(transferred[2:], rest, amounts[2:]):
+            new_amount[rows] = _scaled(share * masses[rows], amount[were].sum())
+    return tuple(transferred)
 
 
 def _by_densities(carried: Callable[..., np.ndarray], old: Space, new: Space, at: Located,

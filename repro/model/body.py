@@ -1,154 +1,66 @@
-"""The aggregate in its reference configuration, and its deformation.
+"""One aggregate of a pore: its contact, its biomass, its expansion and its reference.
 
-:mod:`repro.model.growth` solves for the deformation.
+Places of nodes and pressures are fields of the mesh, which a pore has once. The aggregate's nodes,
+triangles and loop are those of its region in the mesh (:class:`repro.fem.mesh.Region`). Both lists
+have the same order.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from functools import cached_property
+from dataclasses import dataclass
 
 import numpy as np
 
-from repro.fem import elements
-from repro.fem.assembly import ElementSystem, saddle_system
 from repro.fem.brief import brief
-from repro.fem.elements import Table
-from repro.fem.forms import Basis, basis
-from repro.fem.linear import DEFAULT, Method
-from repro.fem.space import Space
-from repro.model.energies import NEO_HOOKEAN, Energy
-
-
-@dataclass(frozen=True, eq=False)
-class Shape:
-    """Connections of the aggregate's own mesh. cells: (t, 3 or 6), corners numbered first; corners:
-    their number; degree: of the quadrature; method: of the linear systems."""
-
-    cells: np.ndarray
-    corners: int
-    degree: int
-    method: Method = DEFAULT
-    _constrained: dict[str, ElementSystem] = field(init=False, repr=False, default_factory=dict)
-
-    @property
-    def geometry(self) -> int:
-        """1: straight triangles, linear displacements; 2: curved ones, quadratic displacements."""
-        return elements.order_of(self.cells)
-
-    @property
-    def triangles(self) -> np.ndarray:
-        """(t, 3) corners."""
-        return self.cells[:, :3]
-
-    @property
-    def table(self) -> Table:
-        """The displacements' functions where they are integrated."""
-        return elements.table(self.geometry, self.degree)
-
-    @cached_property
-    def unconstrained(self) -> ElementSystem:
-        """The sparse system of positions and pressure, nothing prescribed."""
-        constrained = np.zeros((int(self.cells.max()) + 1, 2), bool)
-        return saddle_system(self.cells, self.triangles, constrained, method=self.method)
-
-    def constrained(self, rows: np.ndarray) -> ElementSystem:
-        """The system with prescribed unknowns ``rows`` (2n + corners,). The last one is kept."""
-        last = self._constrained.get("last")
-        if last is None or not np.array_equal(last.constrained, rows):
-            last = self.unconstrained.with_constrained(rows)
-            self._constrained["last"] = last
-        return last
+from repro.fem.walls import Walls
+from repro.model.configuration import FromStart, ReferenceConfiguration
+from repro.model.solid import Solid
 
 
 @brief
 @dataclass(frozen=True, eq=False)
 class Body:
-    """The aggregate in its reference configuration: positions (n, 2) um of its nodes, on the mesh
-    of ``shape``, and its elastic energy."""
+    """One aggregate at one time.
 
-    shape: Shape
-    reference: np.ndarray
-    energy: Energy = field(default=NEO_HOOKEAN, kw_only=True)
+    wall: (M,) contact of each node of its loop; fixed: (M,) its x is constrained; active, inert:
+    X_A, X_I, (r, q) um2 mg/L at its points of the reaction; theta: (t, q) expansion since t = 0 in
+    its triangles; solid: the aggregate as it was at t = 0; configuration: from which strain counts;
+    line_speeds: (2, 2) um/h, speeds of the contact lines, None if unknown. A row has the lines of
+    one wall, the lower wall first: the line where a free surface begins along the loop, then the
+    line where one ends. origin_known: False if ``solid`` is no longer the aggregate of t = 0:
+    without strain since then, a new mesh replaces places at t = 0 that fold by the present ones.
+    """
 
-    @cached_property
-    def at(self) -> Basis:
-        """The displacements' functions in the reference configuration."""
-        cells = self.shape.cells
-        return basis(cells, len(self.reference), self.reference[cells], self.shape.table)
-
-    @cached_property
-    def pressures(self) -> Basis:
-        """The linear functions of the pressure."""
-        linear = self.shape.table.linear
-        return Basis(self.shape.triangles, self.shape.corners, linear, self.at.dx)
-
-    def strained(self, position: np.ndarray) -> Strained:
-        """The deformation (t, q, 2, 2) from the reference to positions (n, 2) um, with its terms in
-        the stress."""
-        F = self.at.gradient(position)
-        return Strained(elements.by_component(F.transpose(1, 3, 0, 2)), self.energy)
-
-
-def material(space: Space, reference: np.ndarray, energy: Energy) -> Body:
-    """The aggregate of a mesh; reference: (n, 2) um, its nodes in the reference configuration."""
-    topology = space.mesh.topology
-    shape = Shape(topology.body_cells, len(topology.body_corners), space.gradient_degree,
-                  topology.method)
-    return Body(shape, reference, energy=energy)
-
-
-@dataclass(frozen=True, eq=False)
-class Strained:
-    """Plane deformations F (..., 2, 2) and their terms in the stress, each computed once, on first
-    use, so that J can be tested before a division by it."""
-
-    F: np.ndarray
-    energy: Energy = NEO_HOOKEAN
-
-    @cached_property
-    def J(self) -> np.ndarray:
-        """(...) det F."""
-        return elements.determinant(self.F)
-
-    @cached_property
-    def H(self) -> np.ndarray:
-        """(..., 2, 2) F^-T."""
-        return elements.inverse_transpose(self.F, self.J)
-
-    @cached_property
-    def isochoric(self) -> np.ndarray:
-        """(...) J^(-2/3)."""
-        return self.J ** (-2 / 3)
-
-    @cached_property
-    def invariant(self) -> np.ndarray:
-        """(...) I = J^(-2/3) tr C."""
-        return self.isochoric * self.trace
+    wall: np.ndarray
+    fixed: np.ndarray
+    active: np.ndarray
+    inert: np.ndarray
+    theta: np.ndarray
+    solid: Solid
+    configuration: ReferenceConfiguration = FromStart()
+    line_speeds: np.ndarray | None = None
+    origin_known: bool = True
 
     @property
-    def admissible(self) -> bool:
-        """Is J positive, and I below the limit of the energy?"""
-        return bool(self.J.min() > 0 and (self.invariant < self.energy.invariant_limit).all())
+    def reference(self) -> np.ndarray:
+        """(n, 2) um, positions of its nodes at t = 0."""
+        return self.solid.reference
 
-    @cached_property
-    def A(self) -> np.ndarray:
-        """(...) a J^(-2/3), see :class:`Energy`."""
-        return self.isochoric * self.energy.stiffness(self.invariant)
+    @property
+    def unstrained(self) -> np.ndarray:
+        """(n, 2) um, its nodes in the shape from which strain counts."""
+        return self.configuration.unstrained(self.solid)
 
-    @cached_property
-    def trace(self) -> np.ndarray:
-        """(...) tr C."""
-        return np.sum(self.F**2, axis=(-2, -1)) + 1
+    @property
+    def strained(self) -> tuple[Solid, np.ndarray]:
+        """The aggregate in that shape, and its expansion (t, q) since then."""
+        return self.configuration.strained(self.solid, self.theta)
 
-    @cached_property
-    def G(self) -> np.ndarray:
-        """(..., 2, 2) J^(-2/3) (F - tr C / 3 H), half of the derivative of I by F."""
-        return self.isochoric[..., None, None] * (
-            self.F - self.trace[..., None, None] / 3 * self.H)
+    @property
+    def mass(self) -> float:
+        """X_A + X_I, integrated over the aggregate, um2 mg/L."""
+        return float(self.active.sum() + self.inert.sum())
 
-    def piola(self, P: np.ndarray) -> np.ndarray:
-        """First Piola-Kirchhoff stress (..., 2, 2) at a pressure P (...), both over mu_L: the
-        derivative of (21) by F."""
-        volumetric = P * self.J - self.A * self.trace / 3
-        return self.A[..., None, None] * self.F + volumetric[..., None, None] * self.H
+    def touches_all(self, walls: Walls) -> bool:
+        """Does it touch all walls?"""
+        return all((self.wall == wall.number).any() for wall in walls)

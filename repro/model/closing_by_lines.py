@@ -8,7 +8,7 @@ if Newton's method fails.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -20,8 +20,7 @@ from repro.fem.outline import Outline
 from repro.fem.space import Space
 from repro.fem.walls import FREE, Wall
 from repro.model import contact_lines, growth
-from repro.model.body import Shape, material
-from repro.model.contact_lines import Clearance, Contact, Line, SearchOptions, contact_with
+from repro.model.contact_lines import Advances, Clearance, Contact, Line, contact_with
 from repro.model.contact_newton import BESIDE, Coupled, Placed
 from repro.model.mechanics import (
     CONTACT_ROUNDS,
@@ -33,6 +32,7 @@ from repro.model.mechanics import (
     with_new_surfaces,
 )
 from repro.model.pore import Pore
+from repro.model.solid import Shape, material
 
 #: Largest number of times that contact lines go back after a trial that fails.
 RETREATS = 6
@@ -63,19 +63,25 @@ class ByLines(Closing):
         self._divided: Division | None = None
         self._shape: Shape | None = None
 
+    @property
+    def _advances(self) -> dict[tuple[int, int], float]:
+        """{(wall, direction): um} of the first trial of the aggregate's lines."""
+        number = self.grown.number
+        return {key[1:]: length for key, length in self.search.advances.items() if key[0] == number}
+
     def close(self) -> Expansion:
         grown = self.grown
         search = self.search
         film = self._rule.film
-        wall = grown.wall
+        wall = grown.body.wall
         lines = contact_lines.lines_of(grown.boundary)
-        _place_lines(grown.boundary, lines, search)
+        _place_lines(grown.boundary, lines, self._advances)
         gap = 0.0
-        shape = self.settle(wall, lines) if grown.contact and not search.stationary else None
+        shape = self.settle(wall, lines) if grown.spans and not search.stationary else None
         if shape is None:
             shape = self.solve(wall, lines)
             gap = shape.pore.boundary.gap(self._rule.walls)
-            if not grown.contact and gap < film:
+            if not grown.spans and gap < film:
                 search.refuse_late(gap, film)
                 wall, lines, shape = self._touch(shape)
             if not search.stationary:
@@ -85,7 +91,7 @@ class ByLines(Closing):
 
     def _search(self, wall: np.ndarray, lines: Sequence[Line], shape: Expansion) -> Expansion:
         """Move lines until all are accepted, or until Newton's method settles a first contact."""
-        settles = not self.grown.contact
+        settles = not self.grown.spans
         for _ in range(CONTACT_ROUNDS):
             outline = shape.pore.boundary
             for line in lines:
@@ -113,7 +119,7 @@ class ByLines(Closing):
         is too pointed to be flat over this length, contact covers half of it, or a quarter.
         """
         film = self._rule.film
-        outline = replace(self.grown.boundary, points=shape.position[self.grown.mesh.loop])
+        outline = replace(self.grown.boundary, points=shape.position[self.grown.region.loop])
         nearest, *_ = outline.untouched(self._rule.walls)
         lengths = film * FIRST_LENGTHS
         width = _tip_width(outline, nearest, film * nearest.part)
@@ -123,7 +129,7 @@ class ByLines(Closing):
                               "describe so thin a tip, and no setting helps")
         for length in lengths:
             wall, lines = _first_contact(outline, nearest, length)
-            _place_lines(replace(self.grown.boundary, wall=wall), lines, self.search)
+            _place_lines(replace(self.grown.boundary, wall=wall), lines, self._advances)
             try:
                 return wall, lines, self.solve(wall, lines)
             except (GrowthError, LinearError) as error:
@@ -152,7 +158,8 @@ class ByLines(Closing):
         shape, iterations = equilibrium(self.mechanics, locked, first, forces,
                                         patient=self.search.patient)
         self.iterations += iterations
-        expansion = Expansion(shape, iterations, 0.0, division, self._lengths(wall, lines))
+        divisions = () if division is None else (division,)
+        expansion = Expansion(shape, iterations, 0.0, divisions, self._lengths(wall, lines))
         trial = advances, expansion.position, shape.pressure[: self.grown.mesh.corners]
         self._shapes = [*self._shapes[-1:], trial]
         return expansion
@@ -166,13 +173,13 @@ class ByLines(Closing):
         """
         start = [line.advance for line in lines]
         grown = self.grown
-        body, target_J = grown.strained_body
+        solid, target_J = grown.body.strained
         points, pressures = self._shapes[-1][1:]
-        J = body.strained(points[grown.mesh.body]).J
+        J = solid.strained(points[grown.region.nodes]).J
         try:
             for part in _parts(target_J / J):
-                theta = grown.theta * (J / target_J) ** (1 - part)
-                partly = replace(grown, theta=theta)
+                theta = grown.body.theta * (J / target_J) ** (1 - part)
+                partly = grown.with_body(theta=theta)
                 coupled = Coupled(partial(self._place, partly, wall, lines), lines, points,
                                   pressures)
                 coupled.solve(growth.NEWTON if part == 1 else PARTLY)
@@ -183,22 +190,24 @@ class ByLines(Closing):
                 line.advance = advance
             return None
         placed = coupled.placed
-        shape = placed.pore.with_body(coupled.position, coupled.pressure)
-        return Expansion(shape, self.iterations, 0.0, placed.division, self._lengths(wall, lines))
+        shape = placed.pore.placed(coupled.position, coupled.pressure)
+        divisions = () if placed.division is None else (placed.division,)
+        return Expansion(shape, self.iterations, 0.0, divisions, self._lengths(wall, lines))
 
-    def _lengths(self, wall: np.ndarray, lines: Sequence[Line]) -> dict[tuple[int, int], float]:
-        """{(wall, direction): um} by which lines have advanced."""
+    def _lengths(self, wall: np.ndarray, lines: Sequence[Line]) -> Advances:
+        """{(number, wall, direction): um} by which lines have advanced."""
         outline = replace(self.grown.boundary, wall=wall)
-        return {line.key: contact_lines.to_length(outline, line) for line in lines}
+        return {(self.grown.number, *line.key): contact_lines.to_length(outline, line)
+                for line in lines}
 
     def _place(self, grown: Pore, wall: np.ndarray, lines: Sequence[Line]) -> Placed:
         """A grown pore with lines at their advances."""
         locked, division, forces = self._locked(grown, contact_with(wall, lines))
-        body, theta = locked.strained_body
-        reference = grown.mesh.from_body(grown.unstrained)
+        solid, theta = locked.body.strained
+        reference = grown.mesh.from_region(grown.region, grown.body.unstrained)
         prescribed, target = constraints(locked, locked)
-        system = growth.System(body, prescribed, forces=forces,
-                               supports=supports_of(body, locked, forces))
+        system = growth.System(solid, prescribed, forces=forces,
+                               supports=supports_of(solid, locked, forces))
         return Placed(grown, locked, division, reference, system, theta, target, self._rule)
 
     def _locked(self, grown: Pore, contact: Contact) -> tuple[Pore, Division | None,
@@ -208,19 +217,19 @@ class ByLines(Closing):
         If the arcs are those of the last contact, its connections serve again.
         """
         if not len(contact.arcs):
-            return replace(grown, wall=contact.wall), None, self.forces
+            return grown.with_body(wall=contact.wall), None, self.forces
         if self._divided is not None and np.array_equal(self._divided.arcs, contact.arcs):
             self._divided = self._divided.at(contact.t)
         else:
-            self._divided = Division(self.grown.mesh, contact.arcs, contact.t)
+            self._divided = Division(self.grown.mesh, contact.arcs, contact.t, self.grown.number)
             self._shape = None
         division = self._divided
         locked = divided(grown, division, contact, self._shape)
-        self._shape = locked.body.shape
+        self._shape = locked.body.solid.shape
         if self.forces is None:
             return locked, division, None
-        loads = division.divided_loads(division.parent.from_body(self.forces))
-        return locked, division, loads[division.topology.body]
+        loads = division.divided_loads(grown.mesh.from_region(grown.region, self.forces))
+        return locked, division, loads[locked.region.nodes]
 
     def _guesses(self, advances: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Positions (N, 2) um and pressures from which a trial may start, the best ones first: the
@@ -248,16 +257,17 @@ class ByLines(Closing):
             if division is not None:
                 points = division.nodal(points)
                 pressure = division.at_corners(pressure)
-            if locked.body.strained(points[locked.mesh.body]).J.min() > 0:
+            if locked.body.solid.strained(points[locked.region.nodes]).J.min() > 0:
                 break
         return replace(locked.moved(points), pressure=pressure)
 
 
-def _place_lines(outline: Outline, lines: Sequence[Line], search: SearchOptions) -> None:
-    """Start each contact line at its advance in ``search``, or at its least advance if that is
-    larger."""
+def _place_lines(outline: Outline, lines: Sequence[Line],
+                 advances: Mapping[tuple[int, int], float]) -> None:
+    """Start each contact line at its advance in {(wall, direction): um}, or at its least advance if
+    that is larger."""
     for line in lines:
-        length = search.advances.get(line.key, 0.0)
+        length = advances.get(line.key, 0.0)
         line.advance = max(line.least, contact_lines.to_arcs(outline, line, length))
         if 0 < line.advance < contact_lines.LEAST_PART:
             line.advance = BESIDE
@@ -311,19 +321,21 @@ def divided(grown: Pore, division: Division, contact: Contact,
     there, if they are known."""
     space = Space(division.mesh)
     table = grown.space.table
-    reference = division.nodal(grown.origin)[space.mesh.body]
-    body = (replace(grown.body, shape=shape, reference=reference) if shape
-            else material(space, reference, grown.body.energy))
-    configuration = grown.configuration.carried(
-        lambda positions: division.nodal(division.parent.from_body(positions))[space.mesh.body])
-    expanded = division.amounts(grown.theta * grown.body.at.dx, table)
+    body = grown.body
+    region = space.mesh.regions[division.number]
+    reference = division.nodal(grown.origin)[region.nodes]
+    solid = (replace(body.solid, shape=shape, reference=reference) if shape
+             else material(space, region, reference, body.solid.energy))
+    configuration = body.configuration.carried(lambda positions: division.nodal(
+        grown.mesh.from_region(grown.region, positions))[region.nodes])
+    expanded = division.amounts(body.theta * body.solid.at.dx, table)
     at_line = np.where(contact.first != FREE, contact.first, contact.second)
     wall = contact.wall.copy()
     wall[2 * contact.arcs + 1] = contact.first
     none = np.zeros(len(contact.arcs), bool)
-    return replace(grown, space=space, wall=division.along_loop(wall, at_line, contact.second),
-                   fixed=division.along_loop(grown.fixed, none, none), body=body,
-                   active=division.amounts(grown.active, table),
-                   inert=division.amounts(grown.inert, table), theta=expanded / body.at.dx,
-                   pressure=division.at_corners(grown.pressure),
-                   configuration=configuration)
+    locked = grown.with_body(wall=division.along_loop(wall, at_line, contact.second),
+                             fixed=division.along_loop(body.fixed, none, none), solid=solid,
+                             active=division.amounts(body.active, table),
+                             inert=division.amounts(body.inert, table),
+                             theta=expanded / solid.at.dx, configuration=configuration)
+    return replace(locked, space=space, pressure=division.at_corners(grown.pressure))

@@ -5,9 +5,9 @@
     accumulates    True: strain adds up over the steps. Only then do folds and
                    stresses have a meaning.
     restarted      the configuration of a step from given positions (n, 2) um of the nodes
-    unstrained     (n, 2) um, the nodes of a body in it
+    unstrained     (n, 2) um, the nodes of a solid in it
     carried        the same on another mesh, to which a function carries positions (n, 2)
-    strained       the body in it, and its expansion since then, from theta (t, q) since t = 0
+    strained       the solid in it, and its expansion since then, from theta (t, q) since t = 0
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from repro.model.body import Body
+from repro.model.solid import Solid
 from repro.scene import Growth
 
 
@@ -32,17 +32,17 @@ class FromStart:
         """This configuration."""
         return self
 
-    def unstrained(self, body: Body) -> np.ndarray:
-        """The body's reference."""
-        return body.reference
+    def unstrained(self, solid: Solid) -> np.ndarray:
+        """The solid's reference."""
+        return solid.reference
 
     def carried(self, carry: Callable[[np.ndarray], np.ndarray]) -> FromStart:
-        """The same, because the body is carried."""
+        """The same, because the solid is carried."""
         return self
 
-    def strained(self, body: Body, theta: np.ndarray) -> tuple[Body, np.ndarray]:
-        """The body and its theta."""
-        return body, theta
+    def strained(self, solid: Solid, theta: np.ndarray) -> tuple[Solid, np.ndarray]:
+        """The solid and its theta."""
+        return solid, theta
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +56,7 @@ class FromPrevious:
         """These positions."""
         return FromPrevious(positions)
 
-    def unstrained(self, body: Body) -> np.ndarray:
+    def unstrained(self, solid: Solid) -> np.ndarray:
         """The positions."""
         return self.positions
 
@@ -64,10 +64,10 @@ class FromPrevious:
         """The positions on the other mesh."""
         return FromPrevious(carry(self.positions))
 
-    def strained(self, body: Body, theta: np.ndarray) -> tuple[Body, np.ndarray]:
+    def strained(self, solid: Solid, theta: np.ndarray) -> tuple[Solid, np.ndarray]:
         """The expansion is theta / J. This removes the error of J = theta, so the area follows the
         mass without drift."""
-        return replace(body, reference=self.positions), theta / body.strained(self.positions).J
+        return replace(solid, reference=self.positions), theta / solid.strained(self.positions).J
 
 
 ReferenceConfiguration: TypeAlias = FromStart | FromPrevious

@@ -10,11 +10,13 @@ contact lines lie anywhere on an arc (:mod:`repro.model.closing_by_lines`).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from repro.errors import GrowthError, failing_as
+from repro.fem.division import Division
 from repro.model import traction
 from repro.model.closing_by_lines import ByLines
 from repro.model.closing_by_nodes import ByNodes
@@ -39,17 +41,17 @@ FORCE_REDUCTION = 0.5
 
 
 @failing_as(GrowthError)
-def expand(mechanics: Mechanics, grown: Pore, theta: np.ndarray, guess: Pore | None = None,
-           search: SearchOptions = PATIENT) -> Expansion:
-    """Expand the aggregate to its new shape under theta (t, q).
+def expand(mechanics: Mechanics, grown: Pore, theta: Sequence[np.ndarray],
+           guess: Pore | None = None, search: SearchOptions = PATIENT) -> Expansion:
+    """Expand the aggregates to their new shapes under theta.
 
     Parameters
     ----------
     mechanics : Mechanics
     grown : Pore
         Biomass as it has grown, in the old shape.
-    theta : (t, q) float
-        Expansion since t = 0.
+    theta : sequence of (t, q) float
+        Expansion of each aggregate since t = 0.
     guess : Pore, optional
         A pore on the same mesh with the shape and pressure from which the search starts; ``grown``
         by default.
@@ -85,13 +87,15 @@ def expand(mechanics: Mechanics, grown: Pore, theta: np.ndarray, guess: Pore | N
         shape = shape_under(mechanics, grown, theta, start, forces, search)
         rounds.moves.append(float(np.abs(shape.position - last.position).max()))
         iterations += shape.iterations
-        if rounds.agree(shape.pore.boundary.thickness):
+        if rounds.agree(min(outline.thickness for outline in shape.pore.outlines)):
             return replace(shape, iterations=iterations)
         stationary = len(rounds.moves) >= SETTLING_ROUNDS
         landing = -np.inf if shape.pore.contact else search.landing
         search = replace(search, advances=shape.advances, stationary=stationary, landing=landing)
-        if stationary and shape.division is None:
-            start = replace(start, wall=shape.pore.wall)
+        if stationary and not shape.divisions:
+            start = replace(start, bodies=tuple(
+                replace(body, wall=rest.wall)
+                for body, rest in zip(start.bodies, shape.pore.bodies)))
     raise GrowthError("the fluid's forces and the shape do not agree: after "
                       f"{len(rounds.moves)} rounds a node still moves by {rounds.moves[-1]:.2g} "
                       "um, and more rounds do not reduce this: the aggregate is too soft for this "
@@ -144,9 +148,29 @@ class _Rounds:
         return move <= FORCE_REST or self.stalled and move <= FORCE_ROUND_OFF
 
 
-def shape_under(mechanics: Mechanics, grown: Pore, theta: np.ndarray, start: Pore,
-            forces: np.ndarray | None, search: SearchOptions) -> Expansion:
-    """The new shape under constant nodal forces (n, 2) um, over mu_L; None for no forces."""
-    configuration = grown.configuration.restarted(grown.mesh.points[grown.mesh.body])
-    grown = replace(grown, theta=theta, configuration=configuration)
-    return CLOSINGS[grown.mesh.geometry](mechanics, grown, start, forces, search).close()
+def shape_under(mechanics: Mechanics, grown: Pore, theta: Sequence[np.ndarray], start: Pore,
+                forces: np.ndarray | None, search: SearchOptions) -> Expansion:
+    """The new shapes under constant nodal forces (n, 2) um, over mu_L; None for no forces.
+
+    One aggregate after the other takes its shape. None of them touches another one.
+    """
+    mesh = grown.mesh
+    bodies = [replace(body, theta=expansion,
+                      configuration=body.configuration.restarted(mesh.points[region.nodes]))
+              for body, expansion, region in zip(grown.bodies, theta, mesh.regions, strict=True)]
+    shape = Expansion(replace(grown, bodies=tuple(bodies)), 0, np.inf)
+    for number, region in enumerate(mesh.regions):
+        own = None if forces is None else forces[np.searchsorted(mesh.body, region.nodes)]
+        closing = CLOSINGS[mesh.geometry](mechanics, shape.pore.focused(number),
+                                          start.focused(number), own, search)
+        closed = closing.close()
+        for division in closed.divisions:
+            start = divided_start(start, closed.pore, division)
+        shape = shape.joined(closed)
+    return replace(shape, pore=shape.pore.focused(None))
+
+
+def divided_start(start: Pore, shape: Pore, division: Division) -> Pore:
+    """The pore from which further searches start, on the mesh of a shape that divides an arc."""
+    divided = shape.moved(division.nodal(start.mesh.points))
+    return replace(divided, pressure=division.at_corners(start.pressure))

@@ -20,6 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import TypeAlias
 
 import numpy as np
 
@@ -59,20 +60,24 @@ PLACES = np.append([0.0, 1e-3], np.linspace(0.0, 1.0, 9)[1:])
 AT_PLACES = parabola(PLACES)
 
 
+#: {(number, wall, direction): um} of the contact lines of all aggregates.
+Advances: TypeAlias = Mapping[tuple[int, int, int], float]
+
+
 @dataclass(frozen=True)
 class SearchOptions:
     """How contact lines are searched for.
 
     landing: the search ends if the film at the first contact is thinner than this fraction of the
     least film; stationary: do lines stay at their first trial, and nodes on the walls of the start;
-    patient: is a failed equilibrium tried again in smaller parts; advances: {(wall, direction): um}
-    of the first trial, along the outline.
+    patient: is a failed equilibrium tried again in smaller parts; advances: {(number, wall,
+    direction): um} of the first trial, along the outline of an aggregate, by its place in the list.
     """
 
     landing: float = 0.0
     stationary: bool = False
     patient: bool = True
-    advances: Mapping[tuple[int, int], float] = field(default_factory=dict)
+    advances: Advances = field(default_factory=dict)
 
     def refuse_late(self, gap: float, film: float) -> None:
         """Raise FirstContact if the gap (um) at the first contact is much less than the least film
@@ -298,23 +303,26 @@ def to_arcs(outline: Outline, line: Line, length: float) -> float:
     return float(np.interp(length, ends, np.arange(len(ends))))
 
 
-def speeds(advances: Mapping[tuple[int, int], float], duration: float) -> np.ndarray | None:
-    """(2, 2) um/h, speeds of lines that have advanced (um) in a duration (h), by wall and
-    direction; None with lines of one wall only."""
-    walls = {wall for wall, _ in advances}
+def speeds(advances: Advances, number: int, duration: float) -> np.ndarray | None:
+    """(2, 2) um/h, speeds of an aggregate's lines that have advanced (um) in a duration (h), by
+    wall and direction; None with lines of one wall only."""
+    own = {key[1:]: length for key, length in advances.items() if key[0] == number}
+    walls = {wall for wall, _ in own}
     if len(walls) < 2:
         return None
     by_line = np.zeros((max(walls), 2))
-    for (wall, direction), length in advances.items():
+    for (wall, direction), length in own.items():
         by_line[wall - 1, (1 - direction) // 2] = length / duration
     return by_line
 
 
-def advances_at(by_line: np.ndarray | None, duration: float) -> dict[tuple[int, int], float]:
-    """{(wall, direction): um} by which lines advance in a duration (h) at their :func:`speeds`."""
+def advances_at(by_line: np.ndarray | None, number: int,
+                duration: float) -> dict[tuple[int, int, int], float]:
+    """{(number, wall, direction): um} by which an aggregate's lines advance in a duration (h) at
+    their :func:`speeds`."""
     if by_line is None:
         return {}
-    return {(wall, direction): float(by_line[wall - 1, (1 - direction) // 2] * duration)
+    return {(number, wall, direction): float(by_line[wall - 1, (1 - direction) // 2] * duration)
             for wall in range(1, len(by_line) + 1) for direction in (1, -1)}
 
 

@@ -25,9 +25,9 @@ from repro.fem.division import Division
 from repro.fem.newton import REQUIRED_REDUCTION, STALLED
 from repro.fem.outline import Outline
 from repro.model import contact_lines, growth
-from repro.model.body import Shape
 from repro.model.contact_lines import CLOSE, FIRST_TRIAL, LEAST_PART, Clearance, Line
 from repro.model.pore import Pore
+from repro.model.solid import Shape
 from repro.polling import poll
 from repro.scene import needed
 
@@ -78,8 +78,8 @@ class Placed:
     def clearances(self, position: np.ndarray, lines: Sequence[Line]) -> np.ndarray:
         """(2, L) clearance and reach beyond lines, at positions (n, 2) um."""
         pore = self.pore
-        points = position[pore.mesh.topology.body_loop]
-        outline = Outline(points, pore.wall, pore.fixed, points, 2)
+        points = position[pore.region.own_loop]
+        outline = Outline(points, pore.body.wall, pore.body.fixed, points, 2)
         return np.array([self.rule.beyond(outline, line.end_on(outline), line.direction)
                          for line in lines]).T
 
@@ -88,7 +88,7 @@ class Placed:
         return self.division is not None and self._arc(line) in self.division.arcs
 
     def _arc(self, line: Line) -> int:
-        return contact_lines.divided_arc(len(self.grown.wall), line)
+        return contact_lines.divided_arc(len(self.grown.body.wall), line)
 
     def slope(self, line: Line, position: np.ndarray, pressure: np.ndarray) -> np.ndarray:
         """(2n + corners,) derivative of the residual by the advance (arcs) of a line within an
@@ -97,18 +97,18 @@ class Placed:
         division = needed(self.division, "a divided arc")
         number = int(np.searchsorted(division.arcs, self._arc(line)))
         rows, triangle = division.halves(number)
-        body = self.system.body
-        shape = Shape(body.shape.cells[rows], body.shape.corners, body.shape.degree)
+        solid = self.system.solid
+        shape = Shape(solid.shape.cells[rows], solid.shape.corners, solid.shape.degree)
         moved = triangle.divided_at(division.t[number] + SMALL * line.direction)
         nodes = self.reference[self.grown.mesh.cells[triangle.cell]]
-        reference = body.reference.copy()
+        reference = solid.reference.copy()
         reference[shape.cells] = moved.nodes(nodes)
-        after = replace(body, shape=shape, reference=reference)
-        amount = (self.grown.theta * self.grown.body.at.dx)[rows[0]]
+        after = replace(solid, shape=shape, reference=reference)
+        amount = (self.grown.body.theta * self.grown.body.solid.at.dx)[rows[0]]
         parts = dividing.split(amount, moved, self.grown.space.table)
         change = (self.system.partial_residual(after, np.stack(parts) / after.at.dx, position,
                                                pressure)
-                  - self.system.partial_residual(replace(body, shape=shape), self.theta[rows],
+                  - self.system.partial_residual(replace(solid, shape=shape), self.theta[rows],
                                                  position, pressure))
         return change / SMALL
 
@@ -116,7 +116,7 @@ class Placed:
                   pressure: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(N, 2) um and (corners,) at the nodes of the grown pore's mesh, from positions (n, 2) and
         pressures of the divided aggregate."""
-        shape = self.pore.with_body(position, pressure)
+        shape = self.pore.placed(position, pressure)
         if self.division is None:
             return shape.mesh.points, shape.pressure
         points = self.division.restricted(shape.mesh.points)
@@ -128,8 +128,8 @@ class Placed:
         if self.division is not None:
             points = self.division.nodal(points)
             pressures = self.division.at_corners(pressures)
-        mesh = self.pore.mesh
-        return points[mesh.body], pressures[mesh.topology.body_corners]
+        region = self.pore.region
+        return points[region.nodes], pressures[region.corner_nodes]
 
     def same_arcs(self, other: Placed) -> bool:
         """Are the same arcs divided?"""

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
+from repro.fem.mesh import Region
 from repro.fem.space import Space
 from repro.model.pore import Pore
 
 
-def compute_theta(previous: Pore, grown: Pore, maximum_density: float) -> np.ndarray:
+def compute_theta(previous: Pore, grown: Pore, maximum_density: float) -> tuple[np.ndarray, ...]:
     """Compute theta after growth: (28)-(29), from the increase of X_A + X_I over X_m.
 
     Parameters
@@ -20,35 +23,48 @@ def compute_theta(previous: Pore, grown: Pore, maximum_density: float) -> np.nda
 
     Returns
     -------
-    (t, q) float
-        Expansion since t = 0. On curved triangles it grows with the mass at each point.
+    tuple of (t, q) float
+        Expansion of each aggregate since t = 0. On curved triangles it grows with the mass at each
+        point.
     """
-    before = previous.active + previous.inert
-    total = grown.active + grown.inert
-    return previous.theta * GAINS[previous.space.order](previous.space, before, total,
-                                                        maximum_density)
+    gain = GAINS[previous.space.order]
+    expansions = []
+    for body, after, region in zip(previous.bodies, grown.bodies, previous.mesh.regions):
+        before = body.active + body.inert
+        total = after.active + after.inert
+        factor = gain(previous.space, region, before, total, maximum_density)
+        expansions.append(body.theta * factor)
+    return tuple(expansions)
 
 
-def _gain_of_mass(space: Space, before: np.ndarray, total: np.ndarray,
+def _gain_of_mass(space: Space, region: Region, before: np.ndarray, total: np.ndarray,
                   maximum_density: float) -> np.ndarray:
     """(t, q) factor on theta: that of the mass at each point."""
     return total / before
 
 
-def _gain_of_area(space: Space, before: np.ndarray, total: np.ndarray,
+def _gain_of_area(space: Space, region: Region, before: np.ndarray, total: np.ndarray,
                   maximum_density: float) -> np.ndarray:
     """(t, 1) factor on theta, from the area that the new mass needs at X_m (mg/L)."""
-    more = (total - before) / space.reaction.dx / maximum_density
-    return 1 + space.integration.to_growth_points(more)
+    dx = space.reaction.dx[space.integration.rows(region)]
+    more = (total - before) / dx / maximum_density
+    return 1 + space.integration.to_growth_points(region, more)
 
 
 #: Growth of theta in a step, by the order of the functions.
 GAINS = {1: _gain_of_area, 2: _gain_of_mass}
 
 
-def restart_theta(pore: Pore, maximum_density: float) -> np.ndarray:
-    """(t, q) J times the density over X_m (mg/L), in the points where growth is integrated: on
-    straight triangles the mean density of their nodes (29), on curved ones that of each point."""
-    J = pore.body.strained(pore.mesh.points[pore.mesh.body]).J
-    density = (pore.active + pore.inert) / pore.space.reaction.dx / maximum_density
-    return J * pore.space.integration.to_growth_points(density)
+def with_restarted_theta(pore: Pore, maximum_density: float) -> Pore:
+    """The pore with J times the density over X_m (mg/L) for theta, in the points where growth is
+    integrated: on straight triangles the mean density of their nodes (29), on curved ones that of
+    each point."""
+    space = pore.space
+    bodies = []
+    for body, region in zip(pore.bodies, pore.mesh.regions):
+        J = body.solid.strained(pore.mesh.points[region.nodes]).J
+        dx = pore.of(region, space.reaction.dx)
+        density = (body.active + body.inert) / dx / maximum_density
+        theta = J * space.integration.to_growth_points(region, density)
+        bodies.append(replace(body, theta=theta))
+    return replace(pore, bodies=tuple(bodies))

@@ -39,7 +39,7 @@ from repro.fem.assembly import ElementSystem, Factored, Supported, saddle_blocks
 from repro.fem.forms import Basis, each, product
 from repro.fem.mesh import gradients, triangle_areas
 from repro.fem.newton import Newton, relative
-from repro.model.body import Body, Strained
+from repro.model.solid import Solid, Strained
 from repro.model.support import Support, balanced
 from repro.timing import timed
 
@@ -77,13 +77,13 @@ class Equilibrium:
     iterations: int
 
 
-def internal_forces(body: Body, theta: np.ndarray, position: np.ndarray,
+def internal_forces(solid: Solid, theta: np.ndarray, position: np.ndarray,
                     pressure: np.ndarray) -> np.ndarray:
     """(n, 2) um, nodal forces of the stress over mu_L under theta (t, q), at positions (n, 2) um
     and pressures (corners,). Equal external forces keep the aggregate there."""
-    system = System(body, np.zeros(position.shape, bool))
-    if body.shape.geometry == 1:
-        system.stabilisation = PressureGradient.on(body, position)
+    system = System(solid, np.zeros(position.shape, bool))
+    if solid.shape.geometry == 1:
+        system.stabilisation = PressureGradient.on(solid, position)
     forces = system.under(theta, position, position, pressure).residual
     return forces[: position.size].reshape(2, -1).T
 
@@ -124,11 +124,12 @@ class PressureGradient:
     gamma = 0.0
 
     @staticmethod
-    def on(body: Body, last_shape: np.ndarray) -> PressureGradient:
+    def on(solid: Solid, last_shape: np.ndarray) -> PressureGradient:
         """The stabilisation on the last known shape (n, 2) um [E6]."""
-        expansion = body.strained(last_shape).J[:, 0]
-        matrices = gradient_stabilisation(last_shape, body.shape.triangles, expansion)
-        relative_modulus = np.broadcast_to(body.energy.growth_stiffness(expansion), expansion.shape)
+        expansion = solid.strained(last_shape).J[:, 0]
+        matrices = gradient_stabilisation(last_shape, solid.shape.triangles, expansion)
+        stiffness = solid.energy.growth_stiffness(expansion)
+        relative_modulus = np.broadcast_to(stiffness, expansion.shape)
         return PressureGradient(matrices / relative_modulus[:, None, None])
 
     @staticmethod
@@ -145,7 +146,7 @@ class GradDiv:
     matrices = np.zeros((1, 3, 3))
 
     @staticmethod
-    def on(body: Body, last_shape: np.ndarray) -> GradDiv:
+    def on(solid: Solid, last_shape: np.ndarray) -> GradDiv:
         """The stabilisation, which does not depend on the shape."""
         return GradDiv()
 
@@ -207,9 +208,9 @@ class Iterate:
 
 
 class System:
-    """Residual and tangent of Pi for one body at one theta and prescribed coordinates."""
+    """Residual and tangent of Pi for one solid at one theta and prescribed coordinates."""
 
-    def __init__(self, body: Body, constrained: np.ndarray, *,
+    def __init__(self, solid: Solid, constrained: np.ndarray, *,
                  stabilisation: PressureGradient | GradDiv = GradDiv(),
                  forces: np.ndarray | None = None, supports: Sequence[Support] = (),
                  system: ElementSystem | None = None):
@@ -217,19 +218,19 @@ class System:
         forces over mu_L that do not depend on the shape (the t0 of (20)), none by default;
         supports: of the contact surfaces, at points with prescribed x; system: the sparse system
         without constraints, if it is known."""
-        self.body = body
+        self.solid = solid
         self.constrained = constrained
         self.supports = supports
         self.stabilisation = stabilisation
-        none = np.zeros(body.shape.corners, bool)
+        none = np.zeros(solid.shape.corners, bool)
         rows = np.concatenate([constrained[:, 0], constrained[:, 1], none])
-        self.sparse = (body.shape.constrained(rows) if system is None
+        self.sparse = (solid.shape.constrained(rows) if system is None
                        else system.with_constrained(rows))
         self.free = self.sparse.free
         self.pull = np.zeros(len(rows))
         if forces is not None:
             self.pull[: constrained.size] = forces.T.ravel()
-        self.strained = LastResult(body.strained)
+        self.strained = LastResult(solid.strained)
         self.theta = self.target = np.empty(0)
         self.sizes = np.empty(0)
 
@@ -248,41 +249,42 @@ class System:
 
     def _stiffening(self, theta: np.ndarray) -> np.ndarray:
         """gamma a theta^(-5/3)."""
-        grown = self.body.energy.growth_stiffness(theta)
+        grown = self.solid.energy.growth_stiffness(theta)
         return self.stabilisation.gamma * theta ** (-5 / 3) * grown
 
     def _pressed(self, position: np.ndarray, pressure: np.ndarray) -> tuple[Strained, np.ndarray]:
         """The deformation, and P with its stabilisation (t, q)."""
         at = self.strained(position)
-        linear = self.body.pressures.evaluate(pressure)
+        linear = self.solid.pressures.evaluate(pressure)
         return at, linear + self._stiffening(self.theta) * (at.J - self.theta)
 
     def residual(self, position: np.ndarray, pressure: np.ndarray) -> np.ndarray:
         """(2n + corners,): x of all nodes, y, then P of the corners. The caller ensures det F > 0.
         """
         at, P = self._pressed(position, pressure)
-        gap = self.body.pressures.load(self.body.at.dx * (at.J - self.theta))
-        local = pressure[self.body.shape.triangles]
+        gap = self.solid.pressures.load(self.solid.at.dx * (at.J - self.theta))
+        local = pressure[self.solid.shape.triangles]
         gap -= np.einsum("tab,tb->ta", self.stabilisation.matrices, local)
-        return self._summed(self._forces(at.piola(P), self.body.at.weighted), gap) - self.pull
+        return self._summed(self._forces(at.piola(P), self.solid.at.weighted), gap) - self.pull
 
-    def partial_residual(self, body: Body, theta: np.ndarray, position: np.ndarray,
+    def partial_residual(self, solid: Solid, theta: np.ndarray, position: np.ndarray,
                          pressure: np.ndarray) -> np.ndarray:
-        """(2n + corners,) residual of a few curved triangles, ``body``, under theta (r, q)."""
-        at = body.strained(position)
-        P = body.pressures.evaluate(pressure)
+        """(2n + corners,) residual of a few curved triangles, ``solid``, under theta (r, q)."""
+        at = solid.strained(position)
+        P = solid.pressures.evaluate(pressure)
         P += self._stiffening(theta) * (at.J - theta)
         stress = at.piola(P)
-        forces = self._forces(stress, body.at.weighted)
-        gap = body.pressures.load(body.at.dx * (at.J - theta))
-        return np.concatenate([body.at.assemble(forces), body.pressures.assemble(gap)])
+        forces = self._forces(stress, solid.at.weighted)
+        gap = solid.pressures.load(solid.at.dx * (at.J - theta))
+        return np.concatenate([solid.at.assemble(forces), solid.pressures.assemble(gap)])
 
     def _sizes(self, position: np.ndarray) -> np.ndarray:
         """Sizes of the terms of the residual."""
         at = self.strained(position)
-        positive = replace(self.body.at.weighted, gradients=np.abs(self.body.at.weighted.gradients))
+        weighted = self.solid.at.weighted
+        positive = replace(weighted, gradients=np.abs(weighted.gradients))
         terms = self._forces(at.A[..., None, None] * np.abs(at.F), positive)
-        gap = self.body.pressures.load(self.body.at.dx * self.theta)
+        gap = self.solid.pressures.load(self.solid.at.dx * self.theta)
         return self._summed(terms, gap) + np.abs(self.pull)
 
     def _forces(self, stress: np.ndarray, weighted: Basis) -> np.ndarray:
@@ -296,8 +298,8 @@ class System:
     def tangent(self, position: np.ndarray, pressure: np.ndarray) -> np.ndarray:
         """(t, 2k + 3, 2k + 3) symmetric element matrices of the residual's derivative."""
         at, P = self._pressed(position, pressure)
-        k = self.body.shape.cells.shape[1]
-        dx = self.body.at.dx
+        k = self.solid.shape.cells.shape[1]
+        dx = self.solid.at.dx
         PJ = P * at.J
         h = self._pulled(at.H)
         f = self._pulled(at.F)
@@ -306,21 +308,21 @@ class System:
         swap = each(dx * (at.A * at.trace / 3 - PJ), h)
         blocks = np.swapaxes(h, 1, 2) @ np.concatenate([half, swap], axis=2)
         K = blocks[:, :, : 2 * k] + np.swapaxes(blocks[:, :, : 2 * k], 1, 2)
-        curvature = self.body.energy.curvature(at.invariant)
+        curvature = self.solid.energy.curvature(at.invariant)
         if curvature is not None:
             g = self._pulled(at.G)
             K += np.swapaxes(g, 1, 2) @ each(dx * curvature, g)
         exchanged = K.reshape(-1, 2, k, 2, k)  # the same memory
         exchanged += np.swapaxes(blocks[:, :, 2 * k:].reshape(exchanged.shape), 1, 3)
-        plain = self.body.at.stiffness(at.A, self.body.at.weighted)
+        plain = self.solid.at.stiffness(at.A, self.solid.at.weighted)
         exchanged[:, 0, :, 0] += plain
         exchanged[:, 1, :, 1] += plain
-        volume = product(self.body.pressures.values, dx * at.J, h)
+        volume = product(self.solid.pressures.values, dx * at.J, h)
         return saddle_blocks(K, -volume, self.stabilisation.matrices)
 
     def _pulled(self, tensor: np.ndarray) -> np.ndarray:
         """(t, q, 2k) a tensor (t, q, 2, 2) times grad N_a: component x for every node a, then y."""
-        return (tensor @ self.body.at.gradients).reshape(*self.body.at.dx.shape, -1)
+        return (tensor @ self.solid.at.gradients).reshape(*self.solid.at.dx.shape, -1)
 
     def factored(self, iterate: Iterate) -> Factored:
         """The derivative, factorised."""
@@ -356,7 +358,7 @@ class System:
 
 
 @timed("growth")
-def equilibrium(body: Body, theta: np.ndarray, position: np.ndarray, pressure: np.ndarray,
+def equilibrium(solid: Solid, theta: np.ndarray, position: np.ndarray, pressure: np.ndarray,
                 constrained: np.ndarray, prescribed: np.ndarray, *, last: np.ndarray | None = None,
                 forces: np.ndarray | None = None, supports: Sequence[Support] = (),
                 modified_newton: bool = False, patient: bool = True) -> Equilibrium:
@@ -364,7 +366,7 @@ def equilibrium(body: Body, theta: np.ndarray, position: np.ndarray, pressure: n
 
     Parameters
     ----------
-    body : Body
+    solid : Solid
     theta : (t, q) float
         Expansion since the reference configuration.
     position : (n, 2) float
@@ -400,13 +402,13 @@ def equilibrium(body: Body, theta: np.ndarray, position: np.ndarray, pressure: n
     The line search of Newton's method rejects det F <= 0. Where the method fails, theta and the
     prescribed coordinates go to their targets in geometric sub-steps.
     """
-    start = body.strained(position).J
+    start = solid.strained(position).J
     if start.min() <= 0 or theta.min() <= 0:
         raise GrowthError("growth starts from a triangle that is turned over or from theta <= 0")
-    method = STABILISATIONS[body.shape.geometry]
+    method = STABILISATIONS[solid.shape.geometry]
     last_shape = position if last is None else last
     parts = method.parts(theta / start)
-    system = System(body, constrained, stabilisation=method.on(body, last_shape), forces=forces,
+    system = System(solid, constrained, stabilisation=method.on(solid, last_shape), forces=forces,
                     supports=supports)
     first = Equilibrium(position, pressure, 0)
     return reach(system, start, theta, first, prescribed, parts, modified_newton, patient)

@@ -8,8 +8,7 @@ A :class:`Closing` closes films and wedges (2.3.3). One subclass moves nodes
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -17,9 +16,9 @@ from repro.fem.division import Division
 from repro.fem.outline import Outline
 from repro.fem.walls import FREE
 from repro.model import growth
-from repro.model.body import Body
-from repro.model.contact_lines import SearchOptions
+from repro.model.contact_lines import Advances, SearchOptions
 from repro.model.pore import Pore
+from repro.model.solid import Solid
 from repro.model.support import Support
 from repro.model.traction import Fluid
 from repro.scene import Growth, Numerics, Scene
@@ -50,49 +49,63 @@ class Mechanics:
 
 @dataclass(frozen=True, eq=False)
 class Expansion:
-    """The aggregate in its new shape.
+    """Aggregates in their new shapes.
 
     pore: with the fluid's nodes not yet moved, on the divided mesh if a contact line lies
     within an arc; iterations: of Newton's method; gap: um, the thinnest film at a wall without
-    contact before films closed; division: of the mesh of the grown pore, None if it is not divided;
-    advances: {(wall, direction): um} by which contact lines have advanced along the outline of the
-    grown pore.
+    contact before films closed; divisions: of the mesh of the grown pore, one after the other, for
+    each aggregate with lines within arcs; advances: {(number, wall, direction): um} by which
+    contact lines of an aggregate, by its place in the list, have advanced along its grown outline.
     """
 
     pore: Pore
     iterations: int
     gap: float
-    division: Division | None = None
-    advances: Mapping[tuple[int, int], float] = field(default_factory=dict)
+    divisions: tuple[Division, ...] = ()
+    advances: Advances = field(default_factory=dict)
 
     @property
     def position(self) -> np.ndarray:
         """(N, 2) um, new positions of the grown pore's nodes."""
-        points = self.pore.mesh.points
-        return points if self.division is None else self.division.restricted(points)
+        return self.on_grown(self.pore.mesh.points)
+
+    def on_grown(self, points: np.ndarray) -> np.ndarray:
+        """(N, 2) um at the nodes of the grown pore, from places of all nodes."""
+        for division in self.divisions[::-1]:
+            points = division.restricted(points)
+        return points
+
+    def joined(self, other: Expansion) -> Expansion:
+        """This expansion and then that of another aggregate in its pore."""
+        return Expansion(other.pore, self.iterations + other.iterations, min(self.gap, other.gap),
+                         self.divisions + other.divisions, {**self.advances, **other.advances})
 
     def amounts(self, amounts: np.ndarray, grown: Pore) -> np.ndarray:
-        """Carry amounts (r, q) from the points of the grown pore's aggregate to those of the new
-        shape."""
-        if self.division is None:
-            return amounts
-        return self.division.amounts(amounts, grown.space.table)
+        """Carry amounts (r, q) from the points of the grown pore's aggregates to those of the new
+        shapes."""
+        parts = [grown.of(region, amounts) for region in grown.mesh.regions]
+        for division in self.divisions:
+            parts[division.number] = division.amounts(parts[division.number], grown.space.table)
+        return self.pore.joined(parts)
 
     def gathered(self, loads: np.ndarray) -> np.ndarray:
-        """(n, 2) loads on the nodes of the grown aggregate, from those on the new shape's nodes."""
-        if self.division is None:
-            return loads
-        division = self.division
-        return division.gathered_loads(division.mesh.from_body(loads))[division.parent.body]
+        """(n, 2) loads on the nodes of the grown aggregates, from those on the new shapes' nodes.
+        """
+        mesh = self.pore.mesh
+        nodal = mesh.from_body(loads)
+        for division in self.divisions[::-1]:
+            nodal = division.gathered_loads(nodal)
+            mesh = division.parent
+        return nodal[mesh.body]
 
 
 @dataclass(eq=False)
 class Closing(ABC):
     """Closing of the films and wedges that are too thin while an aggregate takes its new shape.
 
-    grown: the pore with its new theta, in the old shape; start: a pore on the same mesh with the
-    shape and pressure from which the search starts; forces: (n, 2) um, constant nodal forces over
-    mu_L, None for no forces; search: its options.
+    grown: the pore with its new theta, in the old shape, seen from the aggregate; start: a pore on
+    the same mesh with the shape and pressure from which the search starts; forces: (n, 2) um,
+    constant nodal forces on the aggregate over mu_L, None for no forces; search: its options.
     """
 
     mechanics: Mechanics
@@ -113,16 +126,16 @@ def equilibrium(mechanics: Mechanics, grown: Pore, start: Pore, forces: np.ndarr
 
     ``start`` has the contact, and the shape and pressure from which Newton's method starts.
     """
-    body, target_J = grown.strained_body
-    nodes = grown.mesh.body
-    inside = grown.mesh.topology.body_corners
+    solid, target_J = grown.body.strained
+    nodes = grown.region.nodes
+    inside = grown.region.corner_nodes
     locked, target = constraints(grown, start)
-    rest = growth.equilibrium(body, target_J, start.mesh.points[nodes], start.pressure[inside],
+    rest = growth.equilibrium(solid, target_J, start.mesh.points[nodes], start.pressure[inside],
                               locked, target, forces=forces, last=last, patient=patient,
-                              supports=supports_of(body, start, forces),
+                              supports=supports_of(solid, start, forces),
                               modified_newton=mechanics.numerics.scheme.modified_newton)
-    shape = grown.with_body(rest.position, rest.pressure)
-    return replace(shape, wall=start.wall), rest.iterations
+    shape = grown.placed(rest.position, rest.pressure)
+    return shape.with_body(wall=start.body.wall), rest.iterations
 
 
 def constraints(grown: Pore, shape: Pore) -> tuple[np.ndarray, np.ndarray]:
@@ -131,32 +144,33 @@ def constraints(grown: Pore, shape: Pore) -> tuple[np.ndarray, np.ndarray]:
     x is prescribed at fixed points, y on the walls (2.3.3). Every point that lay on a bonded wall
     before the step keeps its position.
     """
-    rim = shape.mesh.topology.body_loop
-    before = grown.mesh.points[grown.mesh.body]
-    fixed = shape.fixed
-    target = shape.mesh.points[shape.mesh.body].copy()
+    rim = shape.region.own_loop
+    before = grown.mesh.points[grown.region.nodes]
+    touched = shape.body.wall
+    fixed = shape.body.fixed
+    target = shape.mesh.points[shape.region.nodes].copy()
     for wall in shape.mesh.walls:
-        target[rim[shape.wall == wall.number], 1] = wall.y
+        target[rim[touched == wall.number], 1] = wall.y
         fixed = fixed | (wall.bonded & wall.holds(before[rim]))
     target[rim[fixed], 0] = before[rim[fixed], 0]
-    return constrained(len(target), rim, shape.wall, fixed), target
+    return constrained(len(target), rim, touched, fixed), target
 
 
-def supports_of(body: Body, shape: Pore, forces: np.ndarray | None) -> list[Support]:
-    """The supports of the contact surfaces of ``body`` that slide and have a fixed point.
+def supports_of(solid: Solid, shape: Pore, forces: np.ndarray | None) -> list[Support]:
+    """The supports of the contact surfaces of ``solid`` that slide and have a fixed point.
 
     A surface of a single node has no length; the node bears its force. Without ``forces`` (n, 2)
     one surface alone bears none, because the forces of growth along the pore add up to zero.
     """
     outline = shape.boundary
-    rim = shape.mesh.topology.body_loop
+    rim = shape.region.own_loop
     walls = shape.mesh.walls
     bearing = []
     for wall in walls:
         edges = rim[outline.edges_on(wall.number)]
         points = rim[outline.fixed & (outline.wall == wall.number) & (not wall.bonded)]
         if len(edges) and len(points):
-            bearing.append(Support.on(int(points[0]), edges, body.reference))
+            bearing.append(Support.on(int(points[0]), edges, solid.reference))
     alone = len(bearing) == 1 and not any(wall.bonded for wall in walls)
     return [] if alone and forces is None else bearing
 
@@ -179,7 +193,7 @@ def with_new_surfaces(pore: Pore) -> Pore:
     for wall in pore.mesh.walls:
         if wall.keeps_point and not outline.fixed[outline.wall == wall.number].any():
             fixed = fixed | middle_of(outline, wall.number)
-    return replace(pore, fixed=fixed)
+    return pore.with_body(fixed=fixed)
 
 
 def middle_of(outline: Outline, wall: int) -> np.ndarray:

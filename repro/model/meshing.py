@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import inf
 from typing import overload
@@ -11,18 +12,19 @@ import numpy as np
 from repro.errors import MeshError
 from repro.fem import mesher, sizing
 from repro.fem.linear import Method
-from repro.fem.mesh import Mesh
+from repro.fem.mesh import Mesh, Region
 from repro.fem.outline import Outline, half_disc, polygon
 from repro.fem.sizing import Sizing
 from repro.fem.space import Space
 from repro.fem.walls import Walls, channel_walls, whole_width
-from repro.model.body import material
+from repro.model.body import Body
 from repro.model.configuration import configuration_of
 from repro.model.energies import energy_of
 from repro.model.flow import poiseuille_loss
 from repro.model.interface import interface_of
 from repro.model.pore import Pore
 from repro.model.resistance import resistance_of
+from repro.model.solid import material
 from repro.scene import Aggregate, Growth, Numerics, Scene, Substrates, at_largest, needed
 from repro.scene import Flow as Drive
 from repro.scene import Pore as Channel
@@ -170,13 +172,21 @@ class Meshing:
         MeshError
             If no mesh can be made.
         """
+        mesh, outlines = self.around([] if outline is None else [outline], front)
+        return mesh, next(iter(outlines), None)
+
+    def around(self, outlines: Sequence[Outline],
+               front: float = 1.0) -> tuple[Mesh, list[Outline]]:
+        """Generate a mesh around aggregates, by :func:`repro.fem.mesher.generate_around`, with the
+        extent of 3.1; also return the outlines with their nodes on that mesh."""
         numerics = self.numerics
         width = self.sizes.whole_width
-        ends = sizing.meshed_extent(outline, width, self.channel.length,
-                                    numerics.whole_pore)
-        method = Method(numerics.solver)
+        extents = [sizing.meshed_extent(outline, width, self.channel.length, numerics.whole_pore)
+                   for outline in outlines or (None,)]
+        firsts, lasts = zip(*extents)
         sizes = replace(self.sizes, front=front)
-        return mesher.generate(outline, ends, sizes, numerics.scheme.order, method)
+        return mesher.generate_around(outlines, (min(firsts), max(lasts)), sizes,
+                                      numerics.scheme.order, Method(numerics.solver))
 
 
 def size_at_tips(numerics: Numerics, width: float) -> float:
@@ -221,17 +231,24 @@ class Seeding:
 
     def pore(self, front: float, outline: Outline | None = None) -> Pore:
         """The pore at t = 0, as :func:`seeded` makes it."""
-        mesh, outline = self.meshing.generate(outline or self.outline(front), front)
+        outline = outline or self.outline(front)
+        return self.around([] if outline is None else [outline], front)
+
+    def around(self, outlines: Sequence[Outline], front: float = 1.0) -> Pore:
+        """The pore at t = 0 with aggregates in outlines."""
+        mesh, outlines = self.meshing.around(outlines, front)
         space = Space(mesh)
-        total = self.maximum_density * space.reaction.dx
+        bodies = [self._body(space, *each) for each in zip(mesh.regions, outlines)]
+        return Pore(0.0, space, tuple(bodies), np.zeros(mesh.corners), front=front)
+
+    def _body(self, space: Space, region: Region, outline: Outline) -> Body:
+        """The aggregate of a region."""
+        total = self.maximum_density * space.reaction.dx[space.integration.rows(region)]
         inert = total * (self.seed.inert_fraction if self.seed else 0.0)
-        wall = outline.wall if outline else np.empty(0, int)
-        fixed = outline.fixed if outline else np.empty(0, bool)
-        body = material(space, mesh.points[mesh.body], energy_of(self.growth))
-        theta = np.ones((np.count_nonzero(mesh.biomass), len(body.shape.table.weights)))
-        return Pore(0.0, space, wall, fixed, total - inert, inert, theta, body,
-                    np.zeros(mesh.corners), front=front,
-                    configuration=configuration_of(self.growth, body.reference))
+        solid = material(space, region, space.mesh.points[region.nodes], energy_of(self.growth))
+        theta = np.ones((len(region.triangles), len(solid.shape.table.weights)))
+        return Body(outline.wall, outline.fixed, total - inert, inert, theta, solid,
+                    configuration_of(self.growth, solid.reference))
 
 
 def initial_outline(scene: Scene, front: float = 1.0) -> Outline | None:

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from repro.fem.brief import brief
-from repro.fem.mesh import Mesh
+from repro.fem.mesh import Mesh, Region
 from repro.fem.outline import Outline
 from repro.fem.space import Space
 from repro.model.body import Body
-from repro.model.configuration import FromStart, ReferenceConfiguration
 from repro.scene import needed
 
 if TYPE_CHECKING:
@@ -25,42 +25,20 @@ if TYPE_CHECKING:
 class Pore:
     """Geometry and biomass at one time.
 
-    time: h; space: of velocity and concentrations, on the mesh; wall: (M,) contact of each node of
-    the mesh's loop; fixed: (M,) its x is constrained; active, inert: X_A, X_I, (r, q) um2 mg/L at
-    the points of the reaction; theta: (t, q) expansion since t = 0 in the aggregate's triangles;
-    body: the aggregate as it was at t = 0; pressure: (corners,) P / mu_L; concentrations: the last
-    known ones, None before the first; front: divisor of the element sizes at the aggregate, for a
-    front of the substrates in it; configuration: from which strain counts; origin_known: False
-    if ``body`` is no longer the aggregate of t = 0: without strain since then, a new mesh replaces
-    places at t = 0 that fold by the present ones; line_speeds: (2, 2) um/h, speeds of the contact
-    lines, None if unknown. A row has the lines of one wall, the lower wall first: the line where a
-    free surface begins along the loop, then the line where one ends.
+    time: h; space: of velocity and concentrations, on the mesh; bodies: the aggregates, in the
+    order of the mesh's regions, none in a clean channel; pressure: (corners,) P / mu_L of the
+    aggregate at each corner of the mesh, zero in the fluid; concentrations: the last known ones,
+    None before the first; front: divisor of the element sizes at the aggregates, for a front of the
+    substrates in them; focus: place in the list of the aggregate from which the pore is seen.
     """
 
     time: float
     space: Space
-    wall: np.ndarray
-    fixed: np.ndarray
-    active: np.ndarray
-    inert: np.ndarray
-    theta: np.ndarray
-    body: Body
+    bodies: tuple[Body, ...]
     pressure: np.ndarray
     concentrations: Concentrations | None = None
     front: float = 1.0
-    configuration: ReferenceConfiguration = FromStart()
-    line_speeds: np.ndarray | None = None
-    origin_known: bool = True
-
-    @property
-    def unstrained(self) -> np.ndarray:
-        """(n, 2) um, the aggregate's nodes in the shape from which strain counts."""
-        return self.configuration.unstrained(self.body)
-
-    @property
-    def strained_body(self) -> tuple[Body, np.ndarray]:
-        """The aggregate in that shape, and its expansion (t, q) since then."""
-        return self.configuration.strained(self.body, self.theta)
+    focus: int | None = None
 
     @property
     def mesh(self) -> Mesh:
@@ -68,48 +46,130 @@ class Pore:
         return self.space.mesh
 
     @property
-    def origin(self) -> np.ndarray:
-        """(N, 2) um, positions at t = 0 of the nodes' material; in the fluid, the present ones."""
-        return self.mesh.from_body(self.body.reference, self.mesh.points)
-
-    @cached_property
-    def outline(self) -> Outline | None:
-        """Boundary of the aggregate, None in a clean channel."""
-        loop = self.mesh.loop
-        if len(loop) == 0:
-            return None
-        origin = self.body.reference[self.mesh.topology.body_loop]
-        return Outline(self.mesh.points[loop], self.wall, self.fixed, origin, self.mesh.geometry)
+    def active(self) -> np.ndarray:
+        """X_A of all aggregates, (r, q) um2 mg/L at the points of the reaction."""
+        return self.joined([body.active for body in self.bodies])
 
     @property
-    def boundary(self) -> Outline:
-        """The outline of the aggregate. Raises MissingError in a clean channel."""
-        return needed(self.outline, "an aggregate")
-
-    @property
-    def contact(self) -> bool:
-        """Does the aggregate touch all walls?"""
-        return all((self.wall == wall.number).any() for wall in self.mesh.walls)
+    def inert(self) -> np.ndarray:
+        """X_I of all aggregates, (r, q) um2 mg/L at the points of the reaction."""
+        return self.joined([body.inert for body in self.bodies])
 
     @property
     def mass(self) -> float:
-        """X_A + X_I, integrated over the aggregate, um2 mg/L."""
-        return float(self.active.sum() + self.inert.sum())
+        """X_A + X_I of all aggregates, um2 mg/L."""
+        return sum((body.mass for body in self.bodies), 0.0)
+
+    @property
+    def contact(self) -> bool:
+        """Does an aggregate touch all walls?"""
+        return self.spanning > 0
+
+    @property
+    def spanning(self) -> int:
+        """Number of aggregates that touch all walls."""
+        return sum(body.touches_all(self.mesh.walls) for body in self.bodies)
+
+    @property
+    def accumulates(self) -> bool:
+        """Does strain add up over the steps? Only then do folds and stresses have a meaning."""
+        return all(body.configuration.accumulates for body in self.bodies)
+
+    @cached_property
+    def outlines(self) -> tuple[Outline, ...]:
+        """Boundaries of the aggregates."""
+        mesh = self.mesh
+        return tuple(Outline(mesh.points[region.loop], body.wall, body.fixed,
+                             body.reference[region.own_loop], mesh.geometry)
+                     for body, region in zip(self.bodies, mesh.regions))
+
+    @property
+    def origin(self) -> np.ndarray:
+        """(N, 2) um, positions at t = 0 of the nodes' material; in the fluid, the present ones."""
+        origin = self.mesh.points.copy()
+        for body, region in zip(self.bodies, self.mesh.regions):
+            origin[region.nodes] = body.reference
+        return origin
+
+    def with_masses(self, active: np.ndarray, inert: np.ndarray) -> Pore:
+        """The pore with X_A and X_I (r, q) um2 mg/L at the points of the reaction."""
+        bodies = [replace(body, active=self.of(region, active), inert=self.of(region, inert))
+                  for body, region in zip(self.bodies, self.mesh.regions)]
+        return replace(self, bodies=tuple(bodies))
+
+    def of(self, region: Region, values: np.ndarray) -> np.ndarray:
+        """(r, q) values at the points of the reaction in one aggregate, from those in all."""
+        return values[self.space.integration.rows(region)]
+
+    def joined(self, amounts: Iterable[np.ndarray]) -> np.ndarray:
+        """(r, q) amounts of all aggregates, from those of each."""
+        total = np.zeros_like(self.space.reaction.dx)
+        for amount, region in zip(amounts, self.mesh.regions):
+            total[self.space.integration.rows(region)] = amount
+        total.setflags(write=False)  # a change would not reach the aggregates
+        return total
 
     def moved(self, points: np.ndarray) -> Pore:
         """The pore with the nodes of its mesh at ``points`` (N, 2) um."""
         return replace(self, space=Space(self.mesh.moved(points)))
 
-    def with_body(self, position: np.ndarray, pressure: np.ndarray) -> Pore:
-        """The pore with its aggregate's nodes at positions (n, 2) um and pressures at its corners;
-        the fluid's nodes stay in place."""
-        points = self.mesh.from_body(position, self.mesh.points)
-        pressures = self.pressure.copy()
-        pressures[self.mesh.topology.body_corners] = pressure
-        return replace(self.moved(points), pressure=pressures)
-
     def composition(self, maximum_density: float) -> tuple[float, float, float]:
         """Share of X_I in the biomass, and the least and the largest (X_A + X_I) / X_m. The
         constraint J = theta keeps both near one."""
-        density = (self.active + self.inert) / self.space.reaction.dx / maximum_density
-        return float(self.inert.sum() / self.mass), float(density.min()), float(density.max())
+        inert = self.inert
+        density = (self.active + inert) / self.space.reaction.dx / maximum_density
+        return float(inert.sum() / self.mass), float(density.min()), float(density.max())
+
+    def focused(self, number: int | None) -> Pore:
+        """The pore seen from one aggregate, by its place in the list; None: from none."""
+        return replace(self, focus=number)
+
+    # The aggregate from which the pore is seen, or the only one.
+
+    @property
+    def number(self) -> int:
+        """Its place in the lists. Raises MissingError in a clean channel."""
+        if self.focus is not None:
+            return self.focus
+        number, = range(len(self.bodies)) or (needed(None, "an aggregate"),)
+        return number
+
+    @property
+    def body(self) -> Body:
+        """The aggregate."""
+        return self.bodies[self.number]
+
+    @property
+    def region(self) -> Region:
+        """Its region of the mesh."""
+        return self.mesh.regions[self.number]
+
+    @property
+    def outline(self) -> Outline | None:
+        """Its boundary, None in a clean channel."""
+        return self.outlines[self.number] if self.bodies else None
+
+    @property
+    def boundary(self) -> Outline:
+        """Its boundary. Raises MissingError in a clean channel."""
+        return needed(self.outline, "an aggregate")
+
+    @property
+    def spans(self) -> bool:
+        """Does it touch all walls?"""
+        return self.body.touches_all(self.mesh.walls)
+
+    def with_body(self, **changes: Any) -> Pore:
+        """The pore with changes of its aggregate."""
+        bodies = list(self.bodies)
+        bodies[self.number] = replace(self.body, **changes)
+        return replace(self, bodies=tuple(bodies))
+
+    def placed(self, position: np.ndarray, pressure: np.ndarray) -> Pore:
+        """The pore with its aggregate's nodes at positions (n, 2) um and pressures at its corners;
+        the other nodes stay in place."""
+        points = self.mesh.points.copy()
+        points[self.region.nodes] = position
+        pressures = self.pressure.copy()
+        pressures[self.region.corner_nodes] = pressure
+        return replace(self.moved(points), pressure=pressures)

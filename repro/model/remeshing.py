@@ -13,15 +13,17 @@ import numpy as np
 
 from repro.errors import OriginFolded
 from repro.fem import sizing, transfer
-from repro.fem.mesh import Mesh
+from repro.fem.mesh import Mesh, Region
+from repro.fem.outline import Outline
 from repro.fem.space import Space
 from repro.fem.transfer import Located
 from repro.fem.walls import FREE
 from repro.model import biomass, growing, mesh_motion
 from repro.model.biomass import Amounts
-from repro.model.body import Body, material
+from repro.model.body import Body
 from repro.model.meshing import Meshing
 from repro.model.pore import Pore
+from repro.model.solid import material
 from repro.model.transport import Concentrations, concentrations
 from repro.scene import Scene, Substrate, Substrates, at_time
 
@@ -108,13 +110,13 @@ def _on_generated(rules: Remeshing, generated: GeneratedMesh, expanded: Pore) ->
     material; None if the contact differs or the moved mesh is not acceptable."""
     shape, start = generated.shape, generated.pore
     old = expanded.mesh
-    same = expanded.boundary.same_contact(shape.boundary)
-    if old.topology is not shape.mesh.topology or not same:
+    if old.topology is not shape.mesh.topology or not same_contact(expanded, shape):
         return None
     position = generated.at.field(old.points, old.cells[old.biomass])
     points = start.mesh.from_body(position, start.mesh.points)
-    on_wall = start.mesh.loop[start.wall != FREE]
-    points[on_wall, 1] = start.mesh.points[on_wall, 1]
+    for body, region in zip(start.bodies, start.mesh.regions):
+        on_wall = region.loop[body.wall != FREE]
+        points[on_wall, 1] = start.mesh.points[on_wall, 1]
     mesh = moved_mesh(rules.meshing, start, start.moved(points))
     if mesh is None:
         return None
@@ -122,28 +124,35 @@ def _on_generated(rules: Remeshing, generated: GeneratedMesh, expanded: Pore) ->
     return _transferred(rules, expanded, target, generated.at)[0]
 
 
+def same_contact(pore: Pore, other: Pore) -> bool:
+    """Do the aggregates of two pores with the same nodes touch the walls with the same ones?"""
+    return all(outline.same_contact(earlier)
+               for outline, earlier in zip(pore.outlines, other.outlines))
+
+
 def _located_in(pore: Pore, mesh: Mesh) -> Located:
-    """The aggregate's nodes of a mesh in the biomass triangles of a pore of the same shape."""
+    """The aggregates' nodes of a mesh in the biomass triangles of a pore of the same shape."""
     old = pore.mesh
     return transfer.located(old.points, old.cells[old.biomass], mesh.points[mesh.body])
 
 
 def moved_mesh(meshing: Meshing, previous: Pore, expanded: Pore) -> Mesh | None:
-    """The mesh, moved with the aggregate; None if a new mesh is needed."""
-    outline = expanded.boundary
+    """The mesh, moved with the aggregates; None if a new mesh is needed."""
     mesh = previous.mesh
-    channel = meshing.channel
-    if (sizing.extent_too_short(outline, mesh.ends, mesh.whole_width, channel.length)
-            or not outline.same_contact(previous.boundary)
-            or sizing.too_coarse(outline.corners, meshing.sizes)):
+    length = meshing.channel.length
+    if not same_contact(expanded, previous):
         return None
+    for outline in expanded.outlines:
+        if (sizing.extent_too_short(outline, mesh.ends, mesh.whole_width, length)
+                or sizing.too_coarse(outline.corners, meshing.sizes)):
+            return None
     moved = mesh_motion.moved(mesh, expanded.mesh.points[mesh.body])
     return moved if moved.acceptable() else None
 
 
 def remesh(rules: Remeshing, previous: Pore, expanded: Pore, speed: float,
            amounts: Amounts = ()) -> tuple[Pore, Amounts]:
-    """Make a new mesh around the aggregate, with the extent of 3.1, and transfer all fields to it.
+    """Make a new mesh around the aggregates, with the extent of 3.1, and transfer all fields to it.
 
     Parameters
     ----------
@@ -169,14 +178,13 @@ def remesh(rules: Remeshing, previous: Pore, expanded: Pore, speed: float,
     theta restarts as J times the density over X_m. This expansion brings each density back to X_m,
     so that the next update removes the error of the constraint and it does not accumulate [E7].
     """
-    mesh, outline = rules.meshing.generate(expanded.boundary, expanded.front)
+    mesh, outlines = rules.meshing.around(expanded.outlines, expanded.front)
     new = Space(mesh)
     at = _located_in(expanded, mesh)
-    body, origin_known = _material(new, expanded, outline.origin, at)
+    bodies = _on_new_mesh(new, expanded, outlines, at)
     supplied = at_time(rules.substrates, expanded.time if speed else 0.0)
     substrates = transfer_substrates(supplied, previous.space, new, expanded.concentrations, speed)
-    target = replace(expanded, space=new, wall=outline.wall, fixed=outline.fixed, body=body,
-                     concentrations=substrates, origin_known=origin_known)
+    target = replace(expanded, space=new, bodies=bodies, concentrations=substrates)
     return _transferred(rules, expanded, target, at, amounts)
 
 
@@ -190,11 +198,19 @@ def _transferred(rules: Remeshing, expanded: Pore, target: Pore, at: Located,
     active, inert, *rest = biomass.transfer_amounts(
         rules.transfer, expanded.space, target.space, at,
         (expanded.active, expanded.inert, *amounts), rules.maximum_density)
-    configuration = expanded.configuration.carried(
-        lambda positions: at.field(positions, old.topology.body_cells))
-    pore = replace(target, time=expanded.time, active=active, inert=inert,
-                   pressure=_pressure(target.mesh, expanded, at), configuration=configuration)
-    return replace(pore, theta=growing.restart_theta(pore, rules.maximum_density)), tuple(rest)
+    bodies = []
+    for number, body in enumerate(target.bodies):
+        def carry(positions: np.ndarray, before: Region = expanded.mesh.regions[number],
+                  after: Region = target.mesh.regions[number]) -> np.ndarray:
+            nodal = np.zeros_like(old.points)
+            nodal[before.nodes] = positions
+            carried = target.mesh.from_body(at.field(nodal, old.cells[old.biomass]))
+            return carried[after.nodes]
+        configuration = expanded.bodies[number].configuration.carried(carry)
+        bodies.append(replace(body, configuration=configuration))
+    pore = replace(target, time=expanded.time, bodies=tuple(bodies),
+                   pressure=_pressure(target.mesh, expanded, at)).with_masses(active, inert)
+    return growing.with_restarted_theta(pore, rules.maximum_density), tuple(rest)
 
 
 def _pressure(mesh: Mesh, expanded: Pore, at: Located) -> np.ndarray:
@@ -206,24 +222,30 @@ def _pressure(mesh: Mesh, expanded: Pore, at: Located) -> np.ndarray:
     return pressure
 
 
-def _material(new: Space, expanded: Pore, rim: np.ndarray, at: Located) -> tuple[Body, bool]:
-    """The aggregate at t = 0 on a new mesh: interpolated positions inside, and those of the
-    outline, ``rim`` (M, 2) um, on its boundary; and whether it is that of t = 0.
+def _on_new_mesh(new: Space, expanded: Pore, outlines: Sequence[Outline],
+                 at: Located) -> tuple[Body, ...]:
+    """The aggregates on a new mesh, with the contact of their outlines there, and their positions
+    at t = 0: interpolated inside, those of the outline on its boundary.
 
     If these positions fold, and strain does not count from them, the present shape replaces them.
     """
     mesh = new.mesh
     old = expanded.mesh
-    energy = expanded.body.energy
     origin = mesh.from_body(at.field(expanded.origin, old.cells[old.biomass]), mesh.points)
-    origin[mesh.loop] = rim
+    for region, outline in zip(mesh.regions, outlines):
+        origin[region.loop] = outline.origin
     try:
-        unfolded = transfer.unfolded(mesh, origin)[mesh.body]
-        return material(new, unfolded, energy), expanded.origin_known
+        origin = transfer.unfolded(mesh, origin)
+        known = True
     except OriginFolded:
-        if expanded.configuration.accumulates:
+        if any(body.configuration.accumulates for body in expanded.bodies):
             raise
-        return material(new, mesh.points[mesh.body], energy), False
+        origin = mesh.points
+        known = False
+    return tuple(replace(body, wall=outline.wall, fixed=outline.fixed,
+                         solid=material(new, region, origin[region.nodes], body.solid.energy),
+                         origin_known=known and body.origin_known)
+                 for body, outline, region in zip(expanded.bodies, outlines, mesh.regions))
 
 
 def transfer_substrates(supplied: Substrates, old: Space, new: Space, state: Concentrations | None,

@@ -63,7 +63,7 @@ class Stages:
 
     def expand(self, previous: Pore, grown: Pore, guess: Pore | None = None,
                search: SearchOptions = PATIENT) -> Expansion:
-        """Expand an aggregate that has grown since ``previous``, by :func:`contact.expand`."""
+        """Expand aggregates that have grown since ``previous``, by :func:`contact.expand`."""
         theta = growing.compute_theta(previous, grown, self.remeshing.maximum_density)
         return contact.expand(self.mechanics, grown, theta, guess, search)
 

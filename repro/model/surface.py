@@ -15,7 +15,10 @@ import numpy as np
 from repro.errors import GrowthError, failing_as
 from repro.fem import elements
 from repro.fem.brief import brief
+from repro.fem.mesh import Mesh, Region
+from repro.fem.outline import Outline
 from repro.fem.walls import FREE
+from repro.model.body import Body
 from repro.model.pore import Pore
 
 #: Stretches closer to a contact line than this fraction of the free surface's length do not count:
@@ -59,21 +62,31 @@ class Surface:
         return x, y
 
 
-@lru_cache(maxsize=2)  # a row uses that of its own pore and that of the last step's
+@lru_cache(maxsize=2)  # a row uses those of its own pore and those of the last step's
 @failing_as(GrowthError)
+def surfaces(pore: Pore) -> tuple[Surface, ...]:
+    """The free surfaces of a pore's aggregates, with their stretch since the configuration from
+    which strain counts."""
+    return tuple(_surface(pore.mesh, *each)
+                 for each in zip(pore.bodies, pore.mesh.regions, pore.outlines))
+
+
 def surface(pore: Pore) -> Surface:
-    """The free surface of a pore's aggregate, with its stretch since the configuration from which
-    strain counts."""
-    topology = pore.mesh.topology
-    cells, local = topology.beside_loop
-    nodes = topology.body_cells[cells]
-    present = pore.mesh.points[pore.mesh.body][nodes]
-    before = pore.unstrained[nodes]
+    """The free surface of the aggregate from which the pore is seen, or of the only one."""
+    return surfaces(pore)[pore.number]
+
+
+def _surface(mesh: Mesh, body: Body, region: Region, outline: Outline) -> Surface:
+    """The free surface of an aggregate."""
+    cells, local = region.beside_loop
+    nodes = region.own_cells[cells]
+    present = mesh.points[region.nodes][nodes]
+    before = body.unstrained[nodes]
     J = _expansion(present, local) / _expansion(before, local)
     lengths = _lengths(present, local)
     stretch = lengths / _lengths(before, local) / np.sqrt(J)
-    free = pore.boundary.edge_wall == FREE
-    arcs = pore.boundary.arcs(pore.boundary.points)
+    free = outline.edge_wall == FREE
+    arcs = outline.arcs(outline.points)
     return Surface(stretch[free], arcs[free, 1], _distances(lengths, free)[free], cells[free])
 
 

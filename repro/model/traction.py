@@ -90,7 +90,7 @@ def surroundings(meshing: Meshing, before: Pore, shaped: Pore) -> Surroundings:
 
 def _generated(meshing: Meshing, shaped: Pore) -> Surroundings:
     """A new mesh around a shape."""
-    mesh, _ = meshing.generate(shaped.outline)
+    mesh, _ = meshing.around(shaped.outlines)
     cells = shaped.mesh.topology.body_cells
     at = transfer.located(shaped.mesh.points[shaped.mesh.body], cells, mesh.points[mesh.body])
     return Surroundings(mesh, cells[at.triangle], elements.values(mesh.geometry, at.local))
@@ -140,7 +140,7 @@ class SurroundingFlow:
         last = self._last
         self._last = shaped
         if shaped is not last and (last is self._grown
-                                   or not shaped.boundary.same_contact(last.boundary)):
+                                   or not remeshing.same_contact(shaped, last)):
             self._around = surroundings(meshing, self._grown, shaped)
         self._around = follow(meshing, self._around, shaped)
         return forces(self._fluid, self._around, shaped)

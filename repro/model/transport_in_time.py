@@ -17,7 +17,6 @@ classes have
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, TypeAlias
 
 if TYPE_CHECKING:
@@ -87,7 +86,7 @@ class Gear:
         start = solved.substrates
         end = gear.advance(start.problem, previous.active, previous.inert, start.concentrations,
                            duration)
-        after = replace(previous, active=end.active, inert=end.inert)
+        after = previous.with_masses(end.active, end.inert)
         return after, end.concentrations, end.flows
 
     def growth_error(self, part: float, biomass: float, turnover: float, steepness: float) -> float:

@@ -310,12 +310,14 @@ def warn_missing_rows(rows: list[tuple[float, str]]) -> Iterator[Caveat]:
 
 def warn_surface(pore: Pore) -> Iterator[Caveat]:
     """Warn if creases begin to lower the energy of the surface, or if positions at t = 0 fold."""
-    if not pore.origin_known:
+    if not pore.bodies:
+        return
+    if not pore.body.origin_known:
         yield Caveat(ORIGIN, f"from t = {pore.time:.4g} h on the positions at t = 0 fold: fields "
                      "have no displacement, position at t = 0, theta and J; nothing else depends "
                      'on them with growth.new_biomass = "stress_free"')
-    limit = pore.body.energy.crease
-    if pore.outline is None or limit is None:
+    limit = pore.body.solid.energy.crease
+    if limit is None:
         return
     crease = surface(pore)
     if crease.least >= limit:

@@ -8,8 +8,8 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from repro.model.body import Strained
 from repro.model.pore import Pore
+from repro.model.solid import Strained
 from repro.model.solving import Solved
 from repro.model.surface import STRETCH, surface
 from repro.results.field_files import Grid
@@ -32,7 +32,7 @@ class State:
     def strained(self) -> Strained:
         """Deformation of the aggregate since t = 0, at the quadrature points (t, q) of growth."""
         mesh = self.pore.mesh
-        return self.pore.body.strained(mesh.points[mesh.body])
+        return self.pore.body.solid.strained(mesh.points[mesh.body])
 
     @cached_property
     def stress(self) -> np.ndarray:
@@ -48,7 +48,7 @@ class State:
 
     def mean(self, value: np.ndarray) -> np.ndarray:
         """(t,) means of values (t, q) over each of the aggregate's triangles at t = 0."""
-        dx = self.pore.body.at.dx
+        dx = self.pore.body.solid.at.dx
         return (value * dx).sum(axis=1) / dx.sum(axis=1)
 
 
@@ -64,8 +64,8 @@ NEEDS: dict[str, Callable[[State], bool]] = {
     "donor": lambda state: _has("donor", state),
     "biomass": lambda state: state.scene.kinetics is not None,
     "growth": lambda state: state.scene.growth is not None,
-    ORIGIN: lambda state: state.scene.growth is not None and state.pore.origin_known,
-    "stress": lambda state: bool(state.scene.growth) and state.pore.configuration.accumulates}
+    ORIGIN: lambda state: state.scene.growth is not None and state.pore.body.origin_known,
+    "stress": lambda state: bool(state.scene.growth) and state.pore.accumulates}
 
 
 @dataclass(frozen=True)
@@ -143,7 +143,7 @@ def _pressure(state: State) -> np.ndarray:
 
 def _stretch(state: State) -> np.ndarray:
     free_surface = surface(state.pore)
-    stretch = np.full(len(state.pore.theta), np.inf)
+    stretch = np.full(len(state.pore.body.theta), np.inf)
     np.minimum.at(stretch, free_surface.cells, free_surface.stretch)
     return np.where(np.isinf(stretch), np.nan, stretch)
 
@@ -176,7 +176,7 @@ ARRAYS = (
     Array("region", "aggregate (1) or fluid (0)", "1 in the aggregate's triangles",
           lambda state: state.pore.mesh.biomass.astype(float), cells=True),
     Array("theta", "expansion theta", "(28)-(29), the mean over the triangle at t = 0",
-          lambda state: state.mean(state.pore.theta), needs=ORIGIN, cells=True, body=True),
+          lambda state: state.mean(state.pore.body.theta), needs=ORIGIN, cells=True, body=True),
     Array("J", "volume ratio J", "det dx/dX, the mean over the triangle at t = 0",
           lambda state: state.mean(state.strained.J), needs=ORIGIN, cells=True, body=True),
     Array("surface_stretch", "elastic stretch along the free surface",

@@ -28,7 +28,7 @@ NEEDS: dict[str, Callable[[Scene, Report], bool]] = {
     "aggregate": lambda scene, at: at.pore.outline is not None,
     "biomass": lambda scene, at: at.pore.outline is not None and scene.kinetics is not None,
     "growth": lambda scene, at: at.pore.outline is not None and scene.growth is not None,
-    "adhesion": lambda scene, at: (scene.growth is not None and at.pore.configuration.accumulates
+    "adhesion": lambda scene, at: (scene.growth is not None and at.pore.accumulates
                                    and _has_adhesion(scene.growth))}
 
 

@@ -11,22 +11,23 @@ from typing import Any
 
 from repro.errors import CheckpointError
 from repro.fem.linear import Method
-from repro.fem.mesh import Mesh
+from repro.fem.mesh import Mesh, Region
 from repro.fem.space import Space
 from repro.march.balance import Ledger
 from repro.march.state import Compression, RestartState
 from repro.march.step_control import StepControl
-from repro.model.body import material
+from repro.model.body import Body
 from repro.model.configuration import configuration_of
 from repro.model.energies import energy_of
 from repro.model.meshing import walls_of
 from repro.model.pore import Pore
+from repro.model.solid import material
 from repro.runs.checkpoint import Arrays
 from repro.scene import Scene, scene_hash
 
-#: Arrays of the mesh and of the pore, by the names of their fields.
+#: Arrays of the mesh and of the aggregate, by the names of their fields.
 OF_MESH = ("points", "cells", "biomass", "loop")
-OF_PORE = ("wall", "fixed", "active", "inert", "theta", "pressure")
+OF_BODY = ("wall", "fixed", "active", "inert", "theta")
 #: Arrays of the concentrations from which Newton's method starts.
 OF_GUESS = ("acceptor", "donor")
 
@@ -36,12 +37,9 @@ def pack_state(scene: Scene, state: RestartState) -> tuple[dict, Arrays]:
     pore = state.pore
     guess = pore.concentrations
     arrays = {name: getattr(pore.mesh, name) for name in OF_MESH}
-    arrays |= {name: getattr(pore, name) for name in OF_PORE}
-    arrays["reference"] = pore.body.reference
-    if not pore.configuration.accumulates:
-        arrays["last"] = pore.unstrained
-    if pore.line_speeds is not None:
-        arrays["line_speeds"] = pore.line_speeds
+    arrays["pressure"] = pore.pressure
+    if pore.bodies:
+        arrays |= _body_arrays(pore.body)
     if guess:
         fields = {name: getattr(guess, name) for name in OF_GUESS}
         arrays |= {name: field for name, field in fields.items() if field is not None}
@@ -50,8 +48,20 @@ def pack_state(scene: Scene, state: RestartState) -> tuple[dict, Arrays]:
              "guess": guess.iterations if guess else None, "remeshes": int(state.remeshes),
              "iterations": state.iterations, "row_h": float(state.row),
              "ledgers": list(map(astuple, state.ledgers)),
-             "origin_known": pore.origin_known, "compression": astuple(state.compression)}
+             "origin_known": all(body.origin_known for body in pore.bodies),
+             "compression": astuple(state.compression)}
     return plain, arrays
+
+
+def _body_arrays(body: Body) -> Arrays:
+    """Arrays of the aggregate; a scene has one at most."""
+    arrays = {name: getattr(body, name) for name in OF_BODY}
+    arrays["reference"] = body.reference
+    if not body.configuration.accumulates:
+        arrays["last"] = body.unstrained
+    if body.line_speeds is not None:
+        arrays["line_speeds"] = body.line_speeds
+    return arrays
 
 
 def unpack_state(scene: Scene, plain: dict, arrays: Arrays) -> RestartState:
@@ -74,18 +84,21 @@ def _pore(scene: Scene, plain: dict, arrays: Arrays) -> Pore:
     numerics = scene.numerics
     method = Method(numerics.solver)
     first, last = plain["ends_um"]
-    mesh = Mesh.of(arrays["points"], arrays["cells"], arrays["biomass"], arrays["loop"],
-                   walls_of(scene), (first, last), method)
+    loops = (arrays["loop"],) if len(arrays["loop"]) else ()
+    mesh = Mesh.of(arrays["points"], arrays["cells"], arrays["biomass"], loops, walls_of(scene),
+                   (first, last), method)
     space = Space(mesh)
     guess = None
     if plain["guess"] is not None:
         from repro.model.transport import Concentrations  # a scene without [substrates] has none
         acceptor, donor = map(arrays.get, OF_GUESS)
         guess = Concentrations(acceptor, donor, plain["guess"])
-    body = material(space, arrays["reference"], energy_of(scene.growth))
-    return Pore(time=plain["time_h"], space=space, body=body,
-                concentrations=guess, front=plain["front"],
-                origin_known=plain["origin_known"],
-                line_speeds=arrays.get("line_speeds"),
-                configuration=configuration_of(scene.growth, arrays.get("last", body.reference)),
-                **{name: arrays[name] for name in OF_PORE})
+    bodies = tuple(_body(scene, space, region, plain, arrays) for region in mesh.regions)
+    return Pore(plain["time_h"], space, bodies, arrays["pressure"], guess, plain["front"])
+
+
+def _body(scene: Scene, space: Space, region: Region, plain: dict, arrays: Arrays) -> Body:
+    solid = material(space, region, arrays["reference"], energy_of(scene.growth))
+    configuration = configuration_of(scene.growth, arrays.get("last", solid.reference))
+    return Body(solid=solid, configuration=configuration, origin_known=plain["origin_known"],
+                line_speeds=arrays.get("line_speeds"), **{name: arrays[name] for name in OF_BODY})

@@ -197,7 +197,7 @@ def solve_with_repro(problem: Problem, across: int, order: int) -> list[float]:
     halved = MeshTri.init_tensor(np.linspace(*ends, along + 1), np.linspace(0.0, width, rows[0] + 1))
     points, triangles = upright(halved.p.T, halved.t.T)
     biomass = problem.inside(*points[triangles].mean(axis=1).T)
-    space = meshes.space_on(Mesh.of(points, triangles, biomass, np.empty(0, int), channel_walls(width), ends), order)
+    space = meshes.space_on(Mesh.of(points, triangles, biomass, (), channel_walls(width), ends), order)
     solved = channels.problem(space, problem.speed or None, SCENE.substrates, SCENE.kinetics)
     sink = Sink(DENSITY * space.reaction.dx)
     fluxes = transport.fluxes(solved, sink, transport.steady(solved, sink))

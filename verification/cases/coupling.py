@@ -45,7 +45,7 @@ def test_no_growth(changes, record):
     scene = runs.base("1 h", 'kinetics.decay_coefficient="0 1/d"', 'kinetics.maximum_utilization_rate="0 1/d"',
                       *changes)
     first, last = list(simulate(scene))
-    pairs = [(report.pore.mesh.points, report.pore.theta, report.pore.inert, report.solved.flow.velocity,
+    pairs = [(report.pore.mesh.points, report.pore.body.theta, report.pore.inert, report.solved.flow.velocity,
               report.solved.flow.head, report.solved.concentrations.acceptor, report.solved.concentrations.donor)
              for report in (first, last)]
     differing = sum(not np.array_equal(a, b) for a, b in zip(*pairs))
@@ -120,7 +120,7 @@ def test_equal_viscosities(changes, record):
     first, last = list(simulate(scene))
     grid = last.pore.mesh
     computed = last.solved.flow
-    bare = replace(grid, topology=replace(grid.topology, biomass=np.zeros_like(grid.biomass)))
+    bare = replace(grid, topology=replace(grid.topology, region=0 * grid.topology.region))
     empty = flow.unit_flow(Space(bare), Viscous(7.0))
     record(at_most("u", np.abs(computed.velocity / computed.mean_velocity - empty.velocity).max(), 1e-13,
                    runs.ROUND_OFF),

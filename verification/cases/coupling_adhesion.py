@@ -84,8 +84,8 @@ def _at_rest(wall: str, *changes: str) -> tuple:
     scene = scene_of('aggregate.radius="25 um"', 'growth.fluid_forces="included"', f'growth.wall="{wall}"',
                      f'flow.density="{998e2} mg/cm^3"', *changes)
     seed = seeded(scene)
-    slope = seed.body.reference[seed.body.shape.cells, 0] @ seed.body.shape.table.values.T
-    grown = contact.expand(Mechanics.of(scene), seed, seed.theta * (1.1 - 0.002 * slope)).pore
+    slope = seed.body.reference[seed.body.solid.shape.cells, 0] @ seed.body.solid.shape.table.values.T
+    grown = contact.expand(Mechanics.of(scene), seed, [seed.body.theta * (1.1 - 0.002 * slope)]).pore
     grown = replace(grown, time=1.0)
     meshing = Meshing.of(scene)
     surroundings = traction.follow(meshing, traction.surroundings(meshing, seed, seed), grown)
@@ -109,9 +109,9 @@ def test_balance(wall, changes, record):
     scene, state, solved = _at_rest(wall, *changes)
     fluid_force = adhesion.fluid_forces(Loading.of(scene), state, solved)
     wall_force = adhesion.wall_forces(Loading.of(scene), state, solved)
-    rim = state.mesh.topology.body_loop
+    rim = state.region.own_loop
     touching = np.zeros(len(wall_force), bool)
-    touching[rim[state.wall == BOTTOM]] = True
+    touching[rim[state.body.wall == BOTTOM]] = True
     x, y = state.mesh.points[state.mesh.body].T
     total = (wall_force * touching[:, None]).sum(axis=0) + fluid_force.sum(axis=0)
     moments = [x @ forces[:, 1] - y @ forces[:, 0] for forces in (wall_force * touching[:, None], fluid_force)]
@@ -121,13 +121,13 @@ def test_balance(wall, changes, record):
                          "free nodes": largest(wall_force[~touching]) / largest_force}, 1e-5,
                         "the last round moves nodes by 1e-8, and the stress is 1e3 times the water's"))
     if wall == "sliding":
-        nodes = state.mesh.topology.body_loop[state.boundary.edges_on(BOTTOM)]
+        nodes = state.region.own_loop[state.boundary.edges_on(BOTTOM)]
         surface = adhesion._Surface(state.body.reference[:, 0], nodes)
         along = surface.density(wall_force[:, 0])[np.unique(nodes)]
         record(at_most("range of the traction per length of t = 0", np.ptp(along) / np.abs(along.mean()), 1e-3,
                        "uniform, to the balance of forces: 1e-5 of the water's force, at one node of a hundred"))
     else:
-        along = np.abs(wall_force[rim[state.wall == BOTTOM], 0])
+        along = np.abs(wall_force[rim[state.body.wall == BOTTOM], 0])
         record(at_least("share of points with a force along the wall", np.mean(along > 1e-3 * along.max()), 0.5,
                         "every point is bonded; the shear may vanish at some"))
 
@@ -150,7 +150,7 @@ def test_plug(changes, record):
     scene = _plug(30.0, *changes)
     seed = seeded(scene)
     theta = 0.8
-    shape = contact.expand(Mechanics.of(scene), seed, theta * seed.theta).pore
+    shape = contact.expand(Mechanics.of(scene), seed, [theta * seed.body.theta]).pore
     expected = scene.growth.shear_modulus * theta ** (-2 / 3) * (1 / theta - theta)
     loading = Loading.of(scene)
     peaks = {"walls": adhesion.wall_peak(loading, shape, None), "tensile stress": adhesion.tensile_peak(loading, shape)}
@@ -174,12 +174,13 @@ def test_seepage(changes, record):
     solved = water(scene, seed)
     drive = scene.flow
     density = drive.kinematic_viscosity / drive.gravity / drive.permeability * solved.flow.mean_velocity
-    drag = traction.on_aggregate(seed.space, solved.flow, drive, scene.numerics.interface)[seed.mesh.body]
+    drag = traction.on_aggregate(seed.space, solved.flow, drive, Loading.of(scene).interface)[seed.mesh.body]
     total = abs(drag[:, 0].sum() / density / (120.0 * WIDTH) - 1)
     place = seed.mesh.points[seed.mesh.body]
     prescribed = np.column_stack([place[:, 0] < -60.0 + 1e-9, (place[:, 1] == 0.0) | (place[:, 1] == seed.mesh.width)])
     inside = seed.mesh.topology.body_corners
-    equilibrium = growth.equilibrium(seed.body, seed.theta, place, 0 * seed.pressure[inside], prescribed, place,
+    body = seed.body
+    equilibrium = growth.equilibrium(body.solid, body.theta, place, 0 * seed.pressure[inside], prescribed, place,
                               forces=0.1 * drag / (density * 120.0))
     x = seed.mesh.points[inside, 0]
     linear = (60.0 - x) / 120.0
@@ -208,16 +209,16 @@ def test_bonded_slab(changes, record):
     seed = seeded(scene)
     theta = 1.2
     guess = _pushed(seed, 5.0)
-    shape = contact.expand(Mechanics.of(scene), seed, theta * seed.theta, guess).pore
+    shape = contact.expand(Mechanics.of(scene), seed, [theta * seed.body.theta], guess).pore
     x, y = shape.outline.points.T
-    free = (shape.wall == FREE) & (np.abs(x) < MIDDLE)
+    free = (shape.body.wall == FREE) & (np.abs(x) < MIDDLE)
     middles = shape.mesh.points[shape.mesh.triangles[shape.mesh.biomass]].mean(axis=1)
     near = np.abs(middles[:, 0]) < MIDDLE
     sigma = adhesion.stress(Loading.of(scene), shape)[near] / scene.growth.shear_modulus
     expected = theta ** (-2 / 3) * (1 / theta - theta)
     size = abs(expected)
     if shape.mesh.geometry == 1:
-        on_wall = seed.wall == BOTTOM
+        on_wall = seed.body.wall == BOTTOM
         moved = x[: len(on_wall)][on_wall] - seed.outline.points[on_wall, 0]
     else:
         moved = _moves(seed, shape)
@@ -230,8 +231,8 @@ def test_bonded_slab(changes, record):
 
 def _moves(seed: Pore, shape: Pore) -> np.ndarray:
     """Displacements along the wall (um) of the nodes that lay on it, matched by their positions at t = 0."""
-    before = seed.outline.points[seed.wall == BOTTOM, 0]
-    on_wall = shape.wall == BOTTOM
+    before = seed.outline.points[seed.body.wall == BOTTOM, 0]
+    on_wall = shape.body.wall == BOTTOM
     origin, present = shape.outline.origin[on_wall], shape.outline.points[on_wall, 0]
     rows = [np.flatnonzero((origin[:, 1] == 0.0) & (np.abs(origin[:, 0] - x) < 1e-9))[0] for x in before]
     return present[rows] - before
@@ -271,7 +272,7 @@ def _bonded_peaks(refinement: float, *changes: str) -> tuple[float, float]:
     """Largest traction of the walls and largest tensile stress, MPa."""
     scene = scene_of('growth.wall="bonded"', f"numerics.refinement={refinement}", *changes)
     seed = seeded(scene)
-    slope = seed.body.reference[seed.body.shape.cells, 0] @ seed.body.shape.table.values.T
-    shape = contact.expand(Mechanics.of(scene), seed, seed.theta * (1.1 - 0.005 * slope)).pore
+    slope = seed.body.reference[seed.body.solid.shape.cells, 0] @ seed.body.solid.shape.table.values.T
+    shape = contact.expand(Mechanics.of(scene), seed, [seed.body.theta * (1.1 - 0.005 * slope)]).pore
     loading = Loading.of(scene)
     return adhesion.wall_peak(loading, shape, None).value, adhesion.tensile_peak(loading, shape).value

@@ -361,7 +361,7 @@ def _around(aspect: float, elements: str) -> dict[str, float]:
     differences = {"size": aspect, "left": 1.0}
     for peclet, density in product(PECLETS, DENSITIES):
         scene = thin_scene(elements, aspect, peclet * SCENE.substrates.acceptor.diffusivity / THICKNESS, density)
-        state = replace(seed, active=scene.kinetics.maximum_density * seed.space.reaction.dx)
+        state = seed.with_body(active=scene.kinetics.maximum_density * seed.space.reaction.dx)
         moment = strip_of(scene, state.outline.area, round(16 / aspect)).seed()
         computed, expected = runs.along(state, solving.solve(scene, state), moment)
         differences[f"Pe = {peclet:g}, X = {density:g} mg/L"] = np.abs(computed - expected).max() / 10.0

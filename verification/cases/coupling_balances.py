@@ -7,7 +7,6 @@ Short runs cover contact with the opposite wall and a wedge that closes (2.3.3).
 """
 
 from collections.abc import Iterable
-from dataclasses import replace
 from functools import cache
 from itertools import pairwise
 
@@ -113,7 +112,7 @@ def _restored(*changes: str) -> tuple[float, float]:
                       'aggregate.radius="20 um"', *changes)
     state = seeded(scene)
     x = aggregates.reaction_points(state.space)[0]
-    state = replace(state, active=state.active * (1 + 0.1 * x / scene.aggregate.radius))
+    state = state.with_body(active=state.active * (1 + 0.1 * x / scene.aggregate.radius))
     solved = solving.solve(scene, state)
     new_pore = remeshing.remesh(Remeshing.of(scene), state, state, solved.flow.mean_velocity)[0]
     after = runs.step(scene, new_pore, solving.solve(scene, new_pore), 0.2).pore

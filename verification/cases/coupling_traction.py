@@ -20,7 +20,7 @@ from repro.march.state import Report
 from repro.model import contact, flow, growth, mechanics, mesh_motion, solving, traction
 from repro.model.contact_lines import PATIENT
 from repro.model.flow import Flow
-from repro.model.interface import LAPLACIAN
+from repro.model.interface import LAPLACIAN, interface_of
 from repro.model.mechanics import Mechanics, supports_of
 from repro.model.meshing import Meshing, seeded
 from repro.model.pore import Pore
@@ -45,7 +45,7 @@ def nodal_forces(scene, space: Space) -> tuple[np.ndarray, Flow]:
     """Nodal forces (N, 2) um2 of head on the nodes of a mesh, and the flow."""
     solution = solving.Solver.of(scene).solve_flow(space, scene.flow)
     viscosity = scene.flow.kinematic_viscosity / scene.flow.gravity
-    return traction.nodal(space, solution, viscosity, scene.numerics.interface), solution
+    return traction.nodal(space, solution, viscosity, interface_of(scene.numerics.interface)), solution
 
 
 @pytest.mark.case(
@@ -69,7 +69,7 @@ def test_traction_balance(changes, record):
     x, y = mesh.points.T
     rim = np.isin(x, mesh.ends) | np.isin(y, (0.0, mesh.width))
     rim[mesh.body] = True
-    free = mesh.loop[seed.wall == FREE]
+    free = mesh.loop[seed.body.wall == FREE]
     largest = np.abs(forces[free]).max()
     imbalance = forces[free] + _by_biomass(scene, seed, solution)[free]
     record(each_at_most({"force within the fluid": np.abs(forces[~rim]).max() / largest,
@@ -85,11 +85,11 @@ def _by_biomass(scene, state: Pore, solution: Flow) -> np.ndarray:
     They are computed on a mesh in which biomass and fluid are exchanged.
     """
     mesh = state.mesh
-    exchanged = replace(mesh, topology=replace(mesh.topology, biomass=~mesh.biomass))
+    exchanged = replace(mesh, topology=replace(mesh.topology, region=1 - mesh.topology.region))
     viscosity = scene.flow.viscosity_ratio * scene.flow.kinematic_viscosity / scene.flow.gravity
     if solution.biomass_head is not None:
         solution = replace(solution, head=solution.biomass_head)
-    return traction.nodal(Space(exchanged), solution, viscosity, scene.numerics.interface)
+    return traction.nodal(Space(exchanged), solution, viscosity, interface_of(scene.numerics.interface))
 
 
 def _drag_error(refinement: float) -> float:
@@ -211,17 +211,17 @@ def test_traction_even(changes, record):
     seed = seeded(scene)
     theta = _uneven(seed, 0.002)
     mechanics = Mechanics.of(scene)
-    plain = contact.shape_under(mechanics, seed, theta, seed, None, PATIENT).pore
+    plain = contact.shape_under(mechanics, seed, [theta], seed, None, PATIENT).pore
     space = seed.moved(mesh_motion.move(seed.mesh, plain.mesh.points[seed.mesh.body], 1.0)).space
     mesh = space.mesh
     at_rest = Flow(0.0, np.zeros((space.count, 2)), np.full(mesh.corners, 5.0), None, 0.0, 0.0, 0.0)
     forces = traction.nodal(space, at_rest, 1.0, LAPLACIAN)
     expected = -5.0 * _normals(plain.outline)
-    difference = (forces[mesh.loop] - expected)[plain.wall == FREE]
+    difference = (forces[mesh.loop] - expected)[plain.body.wall == FREE]
     record(at_most("forces", np.abs(difference).max() / np.abs(expected).max(), 1e-12,
                    "the divergence theorem: round-off"))
     for sign in (1.0, -1.0):
-        pushed = contact.shape_under(mechanics, seed, theta, seed, sign * forces[mesh.body], PATIENT).pore
+        pushed = contact.shape_under(mechanics, seed, [theta], seed, sign * forces[mesh.body], PATIENT).pore
         difference = np.abs(pushed.mesh.points - plain.mesh.points).max() / 25.0
         change = (pushed.pressure - plain.pressure)[mesh.topology.body_corners] + sign * 5.0
         record(at_most(f"displacement, {sign:+g}", difference, 1e-9, "J = theta: Newton's tolerance"))
@@ -230,8 +230,8 @@ def test_traction_even(changes, record):
 
 def _uneven(seed: Pore, slope: float) -> np.ndarray:
     """(t, q) theta of a seed times 1.1 + slope x."""
-    shape = seed.body.shape
-    return seed.theta * (1.1 + slope * seed.body.reference[shape.cells, 0] @ shape.table.values.T)
+    shape = seed.body.solid.shape
+    return seed.body.theta * (1.1 + slope * seed.body.reference[shape.cells, 0] @ shape.table.values.T)
 
 
 def _normals(outline: Outline) -> np.ndarray:
@@ -262,7 +262,7 @@ def _moved(factor: float, *changes: str) -> tuple[Pore, Pore, np.ndarray]:
     scene = _in_denser_water(factor, *changes)
     seed = seeded(scene)
     theta = _uneven(seed, -0.002)
-    return seed, contact.expand(Mechanics.of(scene), seed, theta).pore, theta
+    return seed, contact.expand(Mechanics.of(scene), seed, [theta]).pore, theta
 
 
 @pytest.mark.slow
@@ -302,7 +302,7 @@ def _defects(*changes: str) -> tuple[float, float]:
     scene = _in_denser_water(FACTORS[-1], *changes)
     seed, grown, theta = _moved(FACTORS[-1], *changes)
     nodes, body = seed.mesh.body, seed.body
-    constrained_dofs = mechanics.constrained(len(nodes), seed.mesh.topology.body_loop, seed.wall, seed.fixed)
+    constrained_dofs = mechanics.constrained(len(nodes), seed.region.own_loop, seed.body.wall, seed.body.fixed)
     defects = []
     stabilisation = growth.STABILISATIONS[body.shape.geometry].on(body, seed.mesh.points[nodes])
     place, pressure = grown.mesh.points[nodes], grown.pressure[seed.mesh.topology.body_corners]

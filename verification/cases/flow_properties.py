@@ -131,7 +131,7 @@ def _power(space: Space, unit: flow.UnitFlow, interface: str) -> tuple[float, fl
     """Work of the inlet's forces on the unit flow, and a(u, u) + (tau grad p, grad p)."""
     grid, cells = space.mesh, space.cells
     viscosity, count = np.where(grid.biomass, RATIO, 1.0), cells.shape[1]
-    blocks = flow.stokes(space, viscosity, interface, None)
+    blocks = flow.stokes(space, viscosity, interface_of(interface), None)
     moving, pressure = np.hstack([*unit.velocity.T[:, cells]]), unit.pressure[grid.triangles]
     upper = np.einsum("tab,ta,tb->", blocks[:, : 2 * count, : 2 * count], moving, moving)
     forces = np.einsum("tij,tj->ti", blocks, np.hstack([moving, pressure]))
@@ -170,7 +170,7 @@ def test_reversed(numerics, interface, record):
 def _mirrored(grid: Mesh) -> Mesh:
     """The mesh with inlet and outlet exchanged, nodes numbered as before."""
     cells = grid.cells[:, [2, 1, 0, 4, 3, 5][: grid.cells.shape[1]]]
-    return Mesh.of(grid.points * [-1.0, 1.0], cells, grid.biomass, grid.loop, grid.walls, grid.ends)
+    return Mesh.of(grid.points * [-1.0, 1.0], cells, grid.topology.region, grid.topology.loops, grid.walls, grid.ends)
 
 
 RATIOS = np.array([1.0, 2.0, 10.0, 100.0, 2000.0, 1e5])

@@ -21,7 +21,7 @@ import pytest
 from reference import neo_hookean
 from repro.fem import elements
 from repro.model import growth
-from repro.model.body import Shape, Strained
+from repro.model.solid import Shape, Strained
 from verification.evidence.cases import parametrize
 from verification.evidence.checks import Check, around, at_most, each_at_most, largest, refine, studies, study
 from verification.problems import bodies

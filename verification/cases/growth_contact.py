@@ -54,13 +54,13 @@ def grown(elements: str, refinement: float) -> Expansion:
                                 f"numerics.refinement={refinement}",
                                 f'pore.width="{HEIGHT} um"', f'aggregate.radius="{bodies.RADIUS} um"'])
     mechanics, seed = Mechanics.of(scene), seeded(scene)
-    where, _ = meshes.quadrature_points(seed.body.reference[seed.body.shape.cells], seed.body.shape.table)
+    where, _ = meshes.quadrature_points(seed.body.reference[seed.body.solid.shape.cells], seed.body.solid.shape.table)
     theta = _uneven(*np.moveaxis(where, 2, 0))
     first, expansion = _first_contact(mechanics, seed, theta)
     for part in first + (1 - first) * np.arange(1, STEPS + 1) / STEPS:
         before = _touching(seed, expansion)
         shape = replace(before.moved(expansion.position), pressure=expansion.pore.pressure[: seed.mesh.corners])
-        expansion = contact.expand(mechanics, before, theta**part, shape)
+        expansion = contact.expand(mechanics, before, [theta**part], shape)
     return expansion
 
 
@@ -70,7 +70,7 @@ def _first_contact(mechanics, seed, theta) -> tuple[float, Expansion]:
 
     def gap(part: float) -> float:
         try:
-            shape = contact.expand(mechanics, seed, theta**part, shapes[-1])
+            shape = contact.expand(mechanics, seed, [theta**part], shapes[-1])
         except FirstContact as contact_made:
             return contact_made.gap - WALLS.film / 2
         if not shape.pore.contact:
@@ -79,7 +79,7 @@ def _first_contact(mechanics, seed, theta) -> tuple[float, Expansion]:
 
     part = next(part for part in np.arange(0.05, 1.0, 0.05) if gap(part) < WALLS.film / 2)
     part = brentq(gap, part - 0.05, part, xtol=1e-3)
-    return part, contact.expand(mechanics, seed, theta**part, shapes[-1])
+    return part, contact.expand(mechanics, seed, [theta**part], shapes[-1])
 
 
 def _touching(seed: Pore, expansion: Expansion) -> Pore:
@@ -89,7 +89,7 @@ def _touching(seed: Pore, expansion: Expansion) -> Pore:
     in_contact = np.isclose(height, HEIGHT, rtol=1e-9)
     if seed.mesh.geometry == 2:
         in_contact[1::2] = in_contact[::2] & np.roll(in_contact[::2], -1)
-    return replace(seed, wall=np.where(in_contact, TOP, seed.wall))
+    return seed.with_body(wall=np.where(in_contact, TOP, seed.body.wall))
 
 
 def differences(refinement: float, elements: str) -> dict[str, float]:

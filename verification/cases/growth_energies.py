@@ -9,8 +9,8 @@ from scipy.optimize import brentq
 from reference import gent, neo_hookean
 from repro.errors import GrowthError
 from repro.model import growth
-from repro.model.body import Strained
 from repro.model.energies import Gent
+from repro.model.solid import Strained
 from verification.cases.growth import COMPONENTS, NORM, REFINEMENTS, REPRODUCED, SECOND, STEPS
 from verification.evidence.cases import parametrize
 from verification.evidence.checks import around, at_least, at_most, each_at_most, largest, refine, studies, study

@@ -124,7 +124,7 @@ def test_surface_confined(elements, record):
         state = seeded(scene)
         since = 1.0
         for theta in THETAS:
-            state = contact.expand(Mechanics.of(scene), state, np.full_like(state.theta, theta)).pore
+            state = contact.expand(Mechanics.of(scene), state, [np.full_like(state.body.theta, theta)]).pore
             exact = (theta / since) ** -0.5
             record(at_most(f"{rheology}, theta = {theta:.3g}", np.abs(surface(state).stretch - exact).max(), 1e-9,
                            "homogeneous; Newton's tolerance"))

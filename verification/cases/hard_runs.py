@@ -101,7 +101,7 @@ def _mesh_and_loss(scene: Scene, noise: float) -> tuple[Mesh, float]:
     """(mesh, head loss) around a half-disc of 20 um with noise on its nodes."""
     numerics = scene.numerics
     shape = half_disc(20.0, sizing.ACROSS_AGGREGATE * numerics.refinement, numerics.scheme.order)
-    free = shape.wall == FREE
+    free = shape.body.wall == FREE
     points = shape.points.copy()
     points[free] += 20.0 * noise * np.random.default_rng(7).uniform(-1, 1, (free.sum(), 2))
     grid, _ = Meshing.of(scene).generate(replace(shape, points=points))
@@ -118,7 +118,7 @@ def nearly_same(preset: str) -> list:
     grid = seeded(scene).mesh
     places, cells = grid.points[grid.body], grid.topology.body_cells
     field = np.sin(places / 7.0)
-    inner = ~np.isin(np.arange(len(places)), grid.topology.body_loop)
+    inner = ~np.isin(np.arange(len(places)), grid.regions[0].own_loop)
     checks, random = [], np.random.default_rng(8)
     for noise in (0.0, 1e-14, 1e-11, 1e-8):
         moved_places = places.copy()

@@ -358,4 +358,4 @@ def _triangles(stretch: np.ndarray, biomass: bool = False) -> Mesh:
     turned = (np.outer(stretch, x) + 1j * y) * np.exp(1j * np.linspace(0.0, 3.0, count))[:, None]
     points = np.column_stack([turned.real.ravel(), turned.imag.ravel()])
     triangles = np.arange(3 * count).reshape(-1, 3)
-    return Mesh.of(points, triangles, np.full(count, biomass), np.empty(0, int), channel_walls(PORE), REACH)
+    return Mesh.of(points, triangles, np.full(count, biomass), (np.empty(0, int),), channel_walls(PORE), REACH)

@@ -41,7 +41,7 @@ def test_mass(order, record):
     initial = aggregates.seed_around(meshes.seed(20.0, 1.0, order), 1.0, density, order=order)
     x, y = aggregates.reaction_points(initial.space)
     weight, increase = aggregates.areas(initial), 0.05 * (1 + np.sin(0.2 * x))
-    initial.inert[:] = (50 + y) * weight
+    initial = initial.with_body(inert=(50 + y) * weight)
     after = aggregates.expand(aggregates.base_scene(order=order), initial, increase)
     ratio = aggregates.areas(after) / weight
     dx = after.space.reaction.dx
@@ -83,10 +83,10 @@ def test_half_disc(order, record):
 
 def _errors(state, theta: float, first: float) -> dict[str, float]:
     """Relative errors against the closed form. The nodes of the outline are on the arc."""
-    distance = np.hypot(*state.outline.points[state.wall == FREE].T)
+    distance = np.hypot(*state.outline.points[state.body.wall == FREE].T)
     active, _ = aggregates.densities(state)
     return {"radius": largest(distance / (RADIUS * np.sqrt(theta)) - 1),
-            "density": largest(active / aggregates.DENSITY - 1), "theta": largest(state.theta / theta - 1),
+            "density": largest(active / aggregates.DENSITY - 1), "theta": largest(state.body.theta / theta - 1),
             "mass": abs(state.mass / first / theta - 1)}
 
 
@@ -148,7 +148,7 @@ def _restart(state) -> float:
     else:
         J = aggregates.areas(state) / aggregates.areas(first)
     density = sum(aggregates.densities(state)) / aggregates.DENSITY
-    return largest(state.theta / (J * _at_theta_points(state, density)) - 1)
+    return largest(state.body.theta / (J * _at_theta_points(state, density)) - 1)
 
 
 def _at_theta_points(state, field: np.ndarray) -> np.ndarray:
@@ -220,7 +220,7 @@ def test_remesh_linear(order, transfer, record):
     theta = np.linalg.det(MOTION) * _at_theta_points(new, sum(exact) / aggregates.DENSITY)
     record(each_at_most({**errors, "pressure": largest(new.pressure[inside] / pressure - 1),
                          "positions at t = 0": largest(new.body.reference @ MOTION.T - positions) / largest(positions),
-                         "theta": largest(new.theta / theta - 1)}, 1e-12, "linear fields: round-off"))
+                         "theta": largest(new.body.theta / theta - 1)}, 1e-12, "linear fields: round-off"))
 
 
 def _moved_linearly(order: int, kinds: dict):
@@ -241,7 +241,7 @@ def _moved_linearly(order: int, kinds: dict):
     inside = moved.mesh.topology.body_corners
     pressure = np.zeros(moved.mesh.corners)
     pressure[inside] = _plane(PRESSURE, *moved.mesh.points[inside].T)
-    return replace(moved, pressure=pressure, **masses)
+    return replace(moved.with_body(**masses), pressure=pressure)
 
 
 @pytest.mark.slow
@@ -282,7 +282,8 @@ def _share_errors(refinement: float, number: int, order: int) -> dict[str, float
     """Errors of a pair of meshes at the points of the reaction."""
     before = _round(refinement, OLD[number], lambda x, y: aggregates.DENSITY * (1 - _share(x, y)), order)
     weight = before.space.reaction.dx
-    before.inert[:] = aggregates.DENSITY * _share(*aggregates.reaction_points(before.space)) * weight
+    inert = aggregates.DENSITY * _share(*aggregates.reaction_points(before.space)) * weight
+    before = before.with_body(inert=inert)
     after = _remeshed(refinement, before)
     weight, exact = after.space.reaction.dx, _share(*aggregates.reaction_points(after.space))
     computed = after.inert / weight / aggregates.DENSITY
@@ -337,8 +338,8 @@ def test_remesh_arc(record):
     grown = aggregates.expand(coarse, aggregates.seed(10.0, 0.5), 3.0)
     new = aggregates.remesh(fine, grown)
     after = aggregates.expand(fine, new, 0.0)
-    free = new.wall == FREE
-    node_ratio = np.count_nonzero(free) / np.count_nonzero(grown.wall == FREE)
+    free = new.body.wall == FREE
+    node_ratio = np.count_nonzero(free) / np.count_nonzero(grown.body.wall == FREE)
     off_arc = largest(np.hypot(*new.outline.origin[free].T) / fine.aggregate.radius - 1)
     record(at_most("beside the arc at t = 0", off_arc, 1e-12, "the seed's arc: round-off"),
            at_most("area of the polygon", abs(new.outline.area / grown.outline.area - 1), 1e-12, "round-off"),
@@ -349,7 +350,7 @@ def test_remesh_arc(record):
 
 def _unround(state) -> float:
     """Spread of the distances of the interface's nodes from the origin, um."""
-    return np.ptp(np.hypot(*state.outline.points[state.wall == FREE].T))
+    return np.ptp(np.hypot(*state.outline.points[state.body.wall == FREE].T))
 
 
 #: um/h, of the order of the base scene's; ends of the old mesh, um.

@@ -51,7 +51,7 @@ def tightly_bound() -> Finding:
 def distortion(aggregate: Body) -> float:
     """Mean over the area of the larger principal stretch of F / J^(1/2)."""
     stretch = np.linalg.svd(aggregate.strained.F, compute_uv=False)[..., 0] / np.sqrt(aggregate.strained.J)
-    weight = aggregate.pore.body.at.dx * aggregate.strained.J
+    weight = aggregate.pore.body.solid.at.dx * aggregate.strained.J
     return float(np.sum(weight * stretch) / weight.sum())
 
 

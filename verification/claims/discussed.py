@@ -207,7 +207,7 @@ def layered(scene: Scene, part: float, walls: int) -> Mesh:
     cells = halved(np.arange(len(points)).reshape(len(x), len(y)))
     middle_x, middle_y = points[cells].mean(axis=1).T
     biomass = (np.abs(middle_x) < end - MARGIN) & ((middle_y < height) | (middle_y > width - (walls - 1) * height))
-    grid = unlocked(Mesh.of(points, cells, biomass, np.empty(0, int), channel_walls(width), (-end, end)))
+    grid = unlocked(Mesh.of(points, cells, biomass, (), channel_walls(width), (-end, end)))
     return grid if scene.numerics.scheme.order == 1 else curved(grid, None)
 
 

@@ -17,9 +17,9 @@ from scipy.spatial import KDTree
 
 from repro.fem.mesh import gradients
 from repro.model import contact, growth
-from repro.model.body import Shape
 from repro.model.flow import MPA_PER_UM
 from repro.model.mechanics import Mechanics
+from repro.model.solid import Shape
 from verification.claims import FEW, FEW_WORDS, Finding, at_least, at_most, claim
 from verification.claims.levels import ABOUT_WIDE, CONVERGED, PAIRED, Level, at_level
 from verification.claims.runs import (
@@ -186,9 +186,9 @@ class Peak:
 
 def averaged(aggregate: Body, distance: float, places: np.ndarray) -> np.ndarray:
     """(p, 4) Cauchy stress over mu_L, means over the part of the aggregate within a distance (um) of places (p, 2)."""
-    body = aggregate.pore.body
-    shape = Shape(body.shape.cells, body.shape.corners, DEGREE)
-    finer = replace(aggregate, pore=replace(aggregate.pore, body=replace(body, shape=shape)))
+    solid = aggregate.pore.body.solid
+    shape = Shape(solid.shape.cells, solid.shape.corners, DEGREE)
+    finer = replace(aggregate, pore=aggregate.pore.with_body(solid=replace(solid, shape=shape)))
     where, areas = meshes.quadrature_points(aggregate.grid.points[aggregate.triangles], shape.table)
     within = KDTree(places).sparse_distance_matrix(KDTree(where.reshape(-1, 2)), distance, output_type="coo_matrix")
     weights = sp.csr_array((areas.ravel()[within.col], (within.row, within.col)), shape=within.shape)
@@ -276,7 +276,7 @@ def with_fluid_forces(aggregate: Body, fluid_forces: str = "included") -> Body:
     path, because the aggregate is elastic. It leaves out the effect of the forces on growth. Raises GrowthError if
     shape and flow do not agree."""
     scene = replace(aggregate.scene, growth=replace(aggregate.scene.growth, fluid_forces=fluid_forces))
-    pore = contact.expand(Mechanics.of(scene), aggregate.pore, aggregate.pore.theta).pore
+    pore = contact.expand(Mechanics.of(scene), aggregate.pore, [aggregate.pore.body.theta]).pore
     return Body(scene, pore, aggregate.solved)
 
 

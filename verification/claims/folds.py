@@ -57,7 +57,7 @@ def stretch_history(*run: str) -> StretchHistory:
     except RunEnd as end:
         ended = str(end)
     stretch = np.array([surface(report.pore).least for report in reports])
-    means = [body_of(scene, report).mean(report.pore.theta) for report in reports]
+    means = [body_of(scene, report).mean(report.pore.body.theta) for report in reports]
     return StretchHistory(np.array([report.pore.time for report in reports]), stretch,
                           np.array([m.max() for m in means]), float(means[-1].max() / means[-1].min()), ended)
 

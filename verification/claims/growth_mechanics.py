@@ -16,7 +16,7 @@ from repro.fem.outline import half_disc as seed
 from repro.fem.sizing import ACROSS_AGGREGATE, GRADATION, Sizing
 from repro.fem.walls import channel_walls
 from repro.model import growth
-from repro.model.body import Shape, Strained
+from repro.model.solid import Shape, Strained
 from verification import sensitivity
 from verification.claims import CLOSED, OF_SCHEME, Finding, at_least, at_most, between, claim, near, without_limit
 from verification.claims.levels import ABOUT_WIDE, ALONE, BESIDE, current
@@ -161,7 +161,7 @@ def expansion() -> Finding:
     R = np.hypot(*body.reference.T)
     radii = [np.hypot(*solution.position[R > (1 - 1e-9) * RADIUS].T).mean() for solution in (uniform, radial)]
     free, rim = RADIUS * np.sqrt(TOTAL), float(neo_hookean.cylinder_radius(RADIUS, inner, increase, RADIUS))
-    largest = np.array([aggregate.mean(aggregate.pore.theta).max() for aggregate in bodies(WIDE)])
+    largest = np.array([aggregate.mean(aggregate.pore.body.theta).max() for aggregate in bodies(WIDE)])
     hours = series(*WIDE)["time_h"]
     reached = float(np.interp(np.log(TOTAL), np.log(np.maximum.accumulate(largest)), hours, right=np.inf))
     checks = (at_most("uniform: error of the area", "handled", abs(area / TOTAL - 1), 1e-9,
@@ -174,7 +174,7 @@ def expansion() -> Finding:
               between("wide: time at which it is 2000 (h)", "a couple of days", reached, 24, 72,
                       "one to three days"))
     last, wide = bodies(WIDE)[-1], series(*WIDE)["aggregate_area_um2"]
-    note = (f"165 updates, no remesh. Wide at its end: theta from {last.mean(last.pore.theta).min():.0f} to "
+    note = (f"165 updates, no remesh. Wide at its end: theta from {last.mean(last.pore.body.theta).min():.0f} to "
             f"{largest[-1]:.0f}, area {wide[-1] / wide[0]:.0f} times the seed's, with remeshes of the grown body.")
     change = (f"\"up to 2000\" is judged as reaching 2000, which is no upper bound: at {hours[-1]:g} h it is "
               f"{largest[-1]:.0f}; {sensitivity.holds_for_supplies('C25')}")

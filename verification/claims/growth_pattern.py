@@ -87,9 +87,10 @@ def asymmetry() -> Finding:
     row, after = at(BASE, END), body(BASE, END)
     before = Body(load_packaged(*BASE), *grown(BASE, PLOTTED))
     rate = growth_rates(before)
+    before_growth = after.pore.body.solid.at.dx.sum(axis=1)
     compared = {"extent": (-row["upstream_um"], row["downstream_um"]),
                 "growth rate": biomass_rates(before) / halves(before, before.areas),
-                "expansion since t = 0": halves(after, after.areas) / halves(after, after.pore.body.at.dx.sum(axis=1))}
+                "expansion since t = 0": halves(after, after.areas) / halves(after, before_growth)}
     checks = tuple(at_most(f"{name}, upstream over downstream half (%)", "a few", 100 * abs(up / down - 1), 100 * FEW,
                            FEW_WORDS) for name, (up, down) in compared.items())
     fastest, slowest = (f(rate[before.grid.body]) for f in (max, min))

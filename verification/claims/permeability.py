@@ -100,7 +100,7 @@ def filled() -> Finding:
     scene = load_packaged("flow_only")
     half = scene.pore.length / 2
     empty, _ = generate(None, (-half, half), sized(scene))
-    full = replace(empty, topology=replace(empty.topology, biomass=~empty.biomass))
+    full = replace(empty, topology=replace(empty.topology, region=1 - empty.topology.region))
     open_, closed = (flow_in(scene, grid).conductivity for grid in (empty, full))
     check = near("reduction of the conductivity (times)", "up to 2000", open_ / closed, scene.flow.viscosity_ratio,
                  0.001 * scene.flow.viscosity_ratio,

@@ -196,7 +196,7 @@ def _numbers(scene, grid: Mesh) -> list[float]:
 
 def emptied(grid: Mesh) -> Mesh:
     """The same mesh without biomass."""
-    topology = replace(grid.topology, biomass=np.zeros(len(grid.cells), bool), loop=np.empty(0, int))
+    topology = replace(grid.topology, region=np.zeros(len(grid.cells), int), loops=())
     return replace(grid, topology=topology)
 
 
@@ -214,7 +214,7 @@ def lengthened(mesh: Mesh, end: float, size: float) -> Mesh:
     for line, start in zip((mesh.topology.inlet, mesh.topology.outlet), mesh.ends):
         places = np.linspace(start, np.copysign(end, start), 1 + int(np.ceil((end - abs(start)) / size)))
         mesh = _with_columns(mesh, line, places[1:])
-    return Mesh.of(mesh.points, mesh.cells, mesh.biomass, mesh.loop, mesh.walls, (-end, end))
+    return Mesh.of(mesh.points, mesh.cells, mesh.topology.region, mesh.topology.loops, mesh.walls, (-end, end))
 
 
 def _with_columns(mesh: Mesh, line: np.ndarray, places: np.ndarray) -> Mesh:
@@ -227,5 +227,5 @@ def _with_columns(mesh: Mesh, line: np.ndarray, places: np.ndarray) -> Mesh:
     if places[0] < mesh.points[line[0], 0]:
         cells = cells[:, ::-1]
     topology = replace(mesh.topology, cells=np.vstack([mesh.cells, cells]),
-                       biomass=np.append(mesh.biomass, np.zeros(len(cells), bool)))
+                       region=np.append(mesh.topology.region, np.zeros(len(cells), int)))
     return replace(mesh, points=np.vstack([mesh.points, new]), topology=topology)

@@ -150,7 +150,7 @@ _shape_under = closing.shape_under
 def _about_middles(keys: Mechanics, grown: Pore, *rest) -> Expansion:
     """The equilibrium of RECHOSEN."""
     middles = [middle_of(grown.boundary, wall) for wall in (BOTTOM, TOP)]
-    return _shape_under(keys, replace(grown, fixed=np.logical_or(*middles)), *rest)
+    return _shape_under(keys, grown.with_body(fixed=np.logical_or(*middles)), *rest)
 
 
 #: What the changes without a key replace: the module, the name and the new value.

@@ -80,8 +80,8 @@ MUTANTS = (
         ("hard-inert-degraded-at-a-remesh",
          "One percent of X_I becomes active again at every remesh.",
          "_by_shares",
-         "_conserved(inside[0], masses, amounts[1].sum())",
-         "_conserved(inside[0], masses, 0.99 * amounts[1].sum())")),
+         "_conserved(inert, masses[rows], amounts[1][were].sum())",
+         "_conserved(inert, masses[rows], 0.99 * amounts[1][were].sum())")),
     *changes(
         "repro/fem/sizing.py",
         ("hard-film-without-elements",

@@ -51,18 +51,20 @@ MUTANTS = (
         "repro/model/pore.py",
         ("inverse-ratio",
          "(34) multiplies by the ratio of the areas S' / S, not by S / S'.",
-         "Pore.with_body",
+         "Pore.placed",
          "return replace(self.moved(points), pressure=pressures)",
          "moved = self.moved(points)\n"
          "ratio = moved.space.reaction.dx / self.space.reaction.dx\n"
-         "return replace(moved, pressure=pressures, active=self.active * ratio**2, inert=self.inert * ratio**2)"),
+         "moved = moved.with_masses(self.active * ratio**2, self.inert * ratio**2)\n"
+         "return replace(moved, pressure=pressures)"),
         ("reprojection-left-out",
          "(34) is left out: densities stay as the aggregate expands.",
-         "Pore.with_body",
+         "Pore.placed",
          "return replace(self.moved(points), pressure=pressures)",
          "moved = self.moved(points)\n"
          "ratio = moved.space.reaction.dx / self.space.reaction.dx\n"
-         "return replace(moved, pressure=pressures, active=self.active * ratio, inert=self.inert * ratio)")),
+         "moved = moved.with_masses(self.active * ratio, self.inert * ratio)\n"
+         "return replace(moved, pressure=pressures)")),
     *changes(
         "repro/fem/space.py",
         ("fluid-triangles-too",
@@ -75,10 +77,10 @@ MUTANTS = (
         ("kinds-exchanged",
          "Active biomass becomes inert at a remesh, and inert active.",
          "_transferred",
-         "replace(target, time=expanded.time, active=active, inert=inert,\n"
-         "        pressure=_pressure(target.mesh, expanded, at), configuration=configuration)",
-         "replace(target, time=expanded.time, active=inert, inert=active,\n"
-         "        pressure=_pressure(target.mesh, expanded, at), configuration=configuration)"),
+         "replace(target, time=expanded.time, bodies=tuple(bodies),\n"
+         "        pressure=_pressure(target.mesh, expanded, at)).with_masses(active, inert)",
+         "replace(target, time=expanded.time, bodies=tuple(bodies),\n"
+         "        pressure=_pressure(target.mesh, expanded, at)).with_masses(inert, active)"),
         ("upstream-reversed",
          "Beyond the old inlet the deficit of a substrate grows upstream.",
          "_beyond",
@@ -110,26 +112,32 @@ MUTANTS = (
          "POOR = 0.3")),
     *changes(
         "repro/model/biomass.py",
+        ("mass-kept-in-the-sum",
+         "A transfer keeps the inert biomass of all aggregates, not that of each.",
+         "_by_shares",
+         "amounts[1][were].sum()",
+         "amounts[1].sum() * len(rows) / len(masses)",
+         "tests/test_bodies.py::test_a_transfer_keeps_the_masses_of_each_aggregate[2]"),
         ("curved-mass-lost",
          "A remesh on curved triangles loses one percent of the active biomass.",
          "_by_shares",
-         "return (masses * (1 - inert), masses * inert, *rest)",
-         "return (masses * (0.99 - inert), masses * inert, *rest)")),
+         "transferred[0][rows] = masses[rows] * (1 - inert)",
+         "transferred[0][rows] = masses[rows] * (0.99 - inert)")),
     *changes(
         "repro/model/growing.py",
         ("theta-without-density",
          "At a remesh theta restarts as J alone, and the error of the density stays for good.",
-         "restart_theta",
-         "return J * pore.space.integration.to_growth_points(density)",
-         "return J"),
+         "with_restarted_theta",
+         "theta = J * space.integration.to_growth_points(region, density)",
+         "theta = J"),
         ("theta-forgotten",
          "At a remesh theta restarts as the density over X_m, without the expansion J since t = 0.",
-         "restart_theta",
-         "return J * pore.space.integration.to_growth_points(density)",
-         "return pore.space.integration.to_growth_points(density)"),
+         "with_restarted_theta",
+         "theta = J * space.integration.to_growth_points(region, density)",
+         "theta = space.integration.to_growth_points(region, density)"),
         ("jacobian-inverted",
          "The expansion at a remesh is the area at t = 0 over the present one.",
-         "restart_theta",
-         "J = pore.body.strained(pore.mesh.points[pore.mesh.body]).J",
-         "J = 1 / pore.body.strained(pore.mesh.points[pore.mesh.body]).J")),
+         "with_restarted_theta",
+         "J = body.solid.strained(pore.mesh.points[region.nodes]).J",
+         "J = 1 / body.solid.strained(pore.mesh.points[region.nodes]).J")),
 )

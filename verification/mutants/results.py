@@ -68,6 +68,14 @@ MUTANTS = (
          "front >= MOST_GRADED",
          DEEPEST)),
     *changes(
+        "repro/fem/mesher.py",
+        ("aggregates-may-touch",
+         "A mesh is generated around aggregates that touch.",
+         "check_apart",
+         "shapely.Polygon(outline.points).intersects(shapely.Polygon(other.points))",
+         "False",
+         "tests/test_bodies.py::test_a_mesh_is_refused_if_two_aggregates_touch[15.0-True]")),
+    *changes(
         "repro/march/folding.py",
         ("fold-an-error",
          "A failure on a surface that creases is reported as an error.",
@@ -84,7 +92,7 @@ MUTANTS = (
         ("buckled-is-smooth",
          "The least stretch is that of the present surface.",
          "most_compressed",
-         "pore.configuration.accumulates and present.least >= earlier.stretch",
+         "pore.accumulates and present.least >= earlier.stretch",
          "False",
          f"{FOLD}the_least_stretch_of_a_run_stays"),
         ("thin-biomass-written",
@@ -137,8 +145,8 @@ MUTANTS = (
          f"{CHECKPOINT}the_least_stretch_is_kept"),
         ("last-shape-dropped",
          "A checkpoint lacks the last shape.",
-         "pack_state",
-         "not pore.configuration.accumulates",
+         "_body_arrays",
+         "not body.configuration.accumulates",
          "False",
          f"{CHECKPOINT}the_shape_from_which_strain_counts_is_kept")),
     *changes(
@@ -270,7 +278,7 @@ MUTANTS = (
         ("stress-of-what-is-born-without",
          "Stress since t = 0 is reported for stress-free biomass.",
          "",
-         "bool(state.scene.growth) and state.pore.configuration.accumulates",
+         "bool(state.scene.growth) and state.pore.accumulates",
          "bool(state.scene.growth)",
          "tests/test_rows.py::test_stress_is_reported_only_for_strain_since_the_start[1]")),
     *changes(
@@ -1227,7 +1235,7 @@ MUTANTS = (
          "solve_halfway",
          "middle, (active, inert) = remeshing.remesh(stages.remeshing, previous, shape,\n"
          "                                           solved.mean_velocity, amounts)\n"
-         "middle = replace(middle, active=active, inert=inert)",
+         "middle = middle.with_masses(active, inert)",
          "middle, (active, inert) = remeshing.remesh(stages.remeshing, previous, shape,\n"
          "                                           solved.mean_velocity, amounts)",
          f"{STEPPING}a_step_grows_as_much_on_a_new_mesh_half_way")),
@@ -1323,7 +1331,7 @@ MUTANTS = (
         ("generated-for-any-contact",
          "A row may use a mesh that its step has generated for another contact.",
          "_on_generated",
-         "old.topology is not shape.mesh.topology or not same",
+         "old.topology is not shape.mesh.topology or not same_contact(expanded, shape)",
          "old.topology is not shape.mesh.topology",
          f"{STEPPING}a_mesh_generated_for_another_contact_is_not_used")),
     *changes(
@@ -1907,8 +1915,8 @@ MUTANTS = (
         ("end-upstream-alone",
          "A run ends only at the upstream end of the pore.",
          "elements_to_end",
-         'tip = -outline.upstream if side == "upstream" else outline.downstream',
-         "tip = -outline.upstream",
+         '-outline.upstream if side == "upstream" else outline.downstream',
+         "-outline.upstream",
          f"{MIRRORS}a_run_ends_at_either_end_of_the_pore_and_names_it"),
         ("every-end-upstream",
          "Either end of the pore is named the upstream one.",
@@ -2157,17 +2165,15 @@ MUTANTS = (
         ("contact-on-the-old-mesh",
          "A change of contact requires no new mesh.",
          "moved_mesh",
-         "not outline.same_contact(previous.boundary)",
+         "not same_contact(expanded, previous)",
          "False",
          f"{NEW_MESH}a_new_mesh_is_due_if_one_criterion_requires_it"),
         ("coarse-mesh-kept",
          "Edges that are too long require no new mesh.",
          "moved_mesh",
-         "sizing.extent_too_short(outline, mesh.ends, mesh.whole_width, channel.length)\n"
-         "    or not outline.same_contact(previous.boundary)\n"
+         "sizing.extent_too_short(outline, mesh.ends, mesh.whole_width, length)\n"
          "    or sizing.too_coarse(outline.corners, meshing.sizes)",
-         "sizing.extent_too_short(outline, mesh.ends, mesh.whole_width, channel.length)\n"
-         "    or not outline.same_contact(previous.boundary)",
+         "sizing.extent_too_short(outline, mesh.ends, mesh.whole_width, length)",
          f"{NEW_MESH}a_new_mesh_is_due_if_one_criterion_requires_it"),
         ("poor-mesh-kept",
          "Poor triangles require no new mesh.",
@@ -2178,8 +2184,8 @@ MUTANTS = (
         ("front-coarser-later",
          "After t = 0 elements at a front are halved only once.",
          "remesh",
-         "rules.meshing.generate(expanded.boundary, expanded.front)",
-         "rules.meshing.generate(expanded.boundary, min(expanded.front, 2.0))",
+         "rules.meshing.around(expanded.outlines, expanded.front)",
+         "rules.meshing.around(expanded.outlines, min(expanded.front, 2.0))",
          DEEPEST)),
     *changes(
         "repro/sweeps/table.py",
@@ -2426,7 +2432,7 @@ MUTANTS = (
         "repro/model/meshing.py",
         ("extent-without-the-mirror-image",
          "The mesh below a plane of symmetry ends too near to the aggregate.",
-         "Meshing.generate",
+         "Meshing.around",
          "width = self.sizes.whole_width",
          "width = self.sizes.width",
          f"{WALLS}the_mesh_ends_where_that_of_the_pore_with_its_mirror_image_ends[1]"),

@@ -1,6 +1,5 @@
 """Aggregates in known states, and one update of an aggregate without flow and substrates."""
 
-from dataclasses import replace
 
 import numpy as np
 
@@ -8,11 +7,12 @@ from repro.fem.mesh import Mesh
 from repro.fem.outline import Outline
 from repro.fem.space import Space
 from repro.model import remeshing
-from repro.model.body import material
+from repro.model.body import Body
 from repro.model.energies import NEO_HOOKEAN
 from repro.model.meshing import seeded
 from repro.model.pore import Pore
 from repro.model.remeshing import Remeshing
+from repro.model.solid import material
 from repro.model.stages import Stages
 from verification.evidence.cases import combined
 from verification.problems import channels, meshes, pairs, runs
@@ -44,9 +44,9 @@ def seed_on(grid: Mesh, around: Outline, density=uniform) -> Pore:
     """An aggregate at t = 0 with X_A = density(x, y), on an existing mesh."""
     space = Space(grid)
     active = density(*reaction_points(space)) * space.reaction.dx
-    body = material(space, grid.points[grid.body], NEO_HOOKEAN)
-    return Pore(0.0, space, around.wall, around.fixed, active, 0 * active, np.ones_like(body.at.dx), body,
-                np.zeros(grid.corners))
+    solid = material(space, grid.regions[0], grid.points[grid.body], NEO_HOOKEAN)
+    body = Body(around.wall, around.fixed, active, 0 * active, np.ones_like(solid.at.dx), solid)
+    return Pore(0.0, space, (body,), np.zeros(grid.corners))
 
 
 def reaction_points(space: Space) -> np.ndarray:
@@ -62,7 +62,7 @@ def remesh(scene, pore: Pore, speed: float = 0.0) -> Pore:
 
 def expand(scene, pore: Pore, increase) -> Pore:
     """The shape after X_A has grown by the factors 1 + increase (r, q), (28)-(34), on the old mesh."""
-    grown = replace(pore, active=pore.active * (1 + increase))
+    grown = pore.with_body(active=pore.active * (1 + increase))
     return Stages.of(scene).expand(pore, grown).pore
 
 

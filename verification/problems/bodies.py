@@ -17,8 +17,8 @@ from repro.fem.outline import Outline
 from repro.fem.space import Space
 from repro.fem.walls import FREE
 from repro.model import growth, mechanics
-from repro.model.body import Body, material
 from repro.model.energies import NEO_HOOKEAN
+from repro.model.solid import Solid, material
 from verification.evidence.cases import combined
 from verification.evidence.checks import largest
 from verification.problems import meshes
@@ -35,7 +35,7 @@ DEGREE, BENT = 6, 0.075
 
 
 @dataclass(frozen=True, eq=False)
-class Supported(Body):
+class Supported(Solid):
     """A body in its reference configuration; constrained (n, 2) is True where a coordinate is prescribed."""
 
     constrained: np.ndarray
@@ -72,7 +72,7 @@ class Supported(Body):
 
 def on_mesh(grid: Mesh, *constrained: np.ndarray) -> Supported:
     """The aggregate of a mesh at t = 0. constrained: (n,) nodes with prescribed x, then nodes with prescribed y."""
-    aggregate = material(Space(grid), grid.points[grid.body], NEO_HOOKEAN)
+    aggregate = material(Space(grid), grid.regions[0], grid.points[grid.body], NEO_HOOKEAN)
     return Supported(aggregate.shape, aggregate.reference, np.column_stack(constrained))
 
 
@@ -81,7 +81,7 @@ def on_wall(grid: Mesh, outline: Outline) -> tuple[Supported, np.ndarray]:
 
     Also return the nodes (M,) of its free rim without the contact lines.
     """
-    rim = grid.topology.body_loop
+    rim = grid.regions[0].own_loop
     supports = mechanics.constrained(len(grid.body), rim, outline.wall, outline.fixed)
     return on_mesh(grid, *supports.T), rim[outline.wall == FREE]
 

@@ -21,6 +21,7 @@ from repro.fem.assembly import ElementSystem, saddle_system
 from repro.fem.mesh import Mesh
 from repro.fem.space import Space
 from repro.model import flow, transport
+from repro.model.interface import interface_of
 from repro.model.kinetics import Sink
 from repro.model.transport_in_time import QuasiSteady
 from repro.scene import load_scene
@@ -183,7 +184,7 @@ def _box_flow(space: Space, ratio: float, interface: str, exact: Callable) -> tu
     grid = space.mesh
     viscosity = np.where(grid.biomass, ratio, 1.0)
     lower = flow.PAIRS[space.order].on(space, viscosity).lower
-    blocks = flow.stokes(space, viscosity, interface, lower)
+    blocks = flow.stokes(space, viscosity, interface_of(interface), lower)
     system = grid.topology.system("box", lambda: _constrained_rim(space))
     fields = _load(space, exact), _without_flux(space, exact(*space.points.T)[0])
     right, value = (np.append(field.T, np.zeros(grid.corners)) for field in fields)

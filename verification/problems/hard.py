@@ -203,7 +203,7 @@ def unreal(run: Run) -> int:
 
 def _fields(instant: Report) -> Iterator[np.ndarray]:
     pore, solved = instant.pore, instant.solved
-    for part in filter(None, (pore, pore.mesh, pore.body, solved.flow, solved.concentrations)):
+    for part in filter(None, (pore, pore.mesh, pore.body, pore.body.solid, solved.flow, solved.concentrations)):
         yield from (values for values in vars(part).values() if isinstance(values, np.ndarray))
 
 

@@ -151,7 +151,7 @@ def round_disc(ends, width: float, size: float, centre, radius: float, seed: int
     straight = disc(ends, width, size, centre, radius, seed)
     start = straight.points[straight.loop] - centre
     middle = start + np.roll(start, -1, axis=0)
-    return curved(straight, centre + radius * middle / np.hypot(*middle.T)[:, None]).checked()
+    return curved(straight, [centre + radius * middle / np.hypot(*middle.T)[:, None]]).checked()
 
 
 def _delaunay(points, signed_distances, size: float, is_biomass, ends, width: float, loop=()) -> Mesh:
@@ -168,7 +168,7 @@ def _delaunay(points, signed_distances, size: float, is_biomass, ends, width: fl
 
 def _mesh(points, triangles, is_biomass, ends, width: float, loop=()) -> Mesh:
     biomass = is_biomass(*points[triangles].mean(axis=1).T)
-    return Mesh.of(points, triangles, biomass, np.array(loop, int), channel_walls(width), tuple(map(float, ends)))
+    return Mesh.of(points, triangles, biomass, (np.array(loop, int),), channel_walls(width), tuple(map(float, ends)))
 
 
 #: Degree of the quadrature for fields of any order on curved triangles, and for fields of order 1.
