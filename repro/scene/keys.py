@@ -400,7 +400,7 @@ SCHEMES = {"fast": CURVED, "accurate": CURVED, "exact": CURVED, "paper": PAPER,
 #: substrates (3.3); the coarse run of `repro check`.
 PRESETS: dict[str, dict[str, Any]] = {
     "fast": {"refinement": 0.2, "tolerance": 0.0075, "contact_elements": 1.0},
-    "accurate": {"refinement": 0.45, "tolerance": 0.001},
+    "accurate": {"refinement": 0.45, "tolerance": 0.001, "contact_elements": 2.0},
     "exact": {"refinement": 0.7, "tolerance": 0.00025, "contact_elements": 20.0},
     "paper": {},
     "as_printed": {"transport": "gear"},
