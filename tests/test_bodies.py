@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from repro.errors import MeshError
-from repro.fem import transfer
+from repro.fem import mesher, transfer
 from repro.fem.mesh import Mesh
 from repro.fem.outline import half_disc
 from repro.fem.space import Space
@@ -166,6 +166,8 @@ def test_a_mesh_is_refused_if_two_aggregates_touch(position, refused):
     scene, one = one_pore(1)
     outlines = [one.boundary, half_disc(5.0, 2.0, 1, position)]
     if refused:
+        with pytest.raises(MeshError, match="two aggregates touch"):
+            mesher.check_apart(outlines)
         with pytest.raises(MeshError, match="two aggregates touch"):
             Seeding.of(scene).around(outlines)
     else:
