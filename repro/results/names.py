@@ -49,4 +49,6 @@ def readable_unit(name: str, values: Iterable[np.ndarray]) -> tuple[str, float]:
     largest = max((float(np.nanmax(np.abs(each))) for each in values if np.isfinite(each).any()),
                   default=0.0)
     units = ((unit(name), 1.0), *SMALLER.get(ending(name), ()))
-    return next((each for each in units if largest * each[1] >= 1), units[-1] if largest else units[0])
+    if not largest:
+        return units[0]
+    return next((each for each in units if largest * each[1] >= 1), units[-1])

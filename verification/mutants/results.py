@@ -1786,7 +1786,7 @@ MUTANTS = (
         ("units-of-extremes",
          "Pages know the largest and the smallest unit alone.",
          "readable_unit",
-         "next((each for each in units if largest * each[1] >= 1), units[-1] if largest else units[0])",
+         "next((each for each in units if largest * each[1] >= 1), units[-1])",
          "units[0] if largest >= 1 else units[-1]",
          "tests/test_report.py::test_pages_show_small_stresses_in_a_smaller_unit")),
     *changes(
