@@ -1870,7 +1870,7 @@ MUTANTS = (
          "constraints",
          "fixed = fixed | (wall.bonded & wall.holds(before[rim]))",
          "fixed = fixed | (wall.bonded & (shape.wall != FREE))",
-         "tests/test_contact.py::test_a_bonded_lower_wall_leaves_the_upper_wall_sliding")),
+         "tests/test_walls.py::test_a_surface_keeps_its_place_on_a_bonded_wall_alone")),
     *changes(
         "repro/model/closing_by_lines.py",
         ("search-for-lines-not-reached",
