@@ -142,13 +142,13 @@ MUTANTS = (
          "unpack_state",
          'Compression(*plain["compression"])',
          "Compression()",
-         f"{CHECKPOINT}the_least_stretch_is_kept"),
+         f"{CHECKPOINT}a_state_is_packed_and_unpacked_to_the_last_bit"),
         ("last-shape-dropped",
          "A checkpoint lacks the last shape.",
          "_body_arrays",
          "not body.configuration.accumulates",
          "False",
-         f"{CHECKPOINT}the_shape_from_which_strain_counts_is_kept")),
+         f"{CHECKPOINT}a_state_is_packed_and_unpacked_to_the_last_bit")),
     *changes(
         "repro/model/surface.py",
         ("stretch-beside-the-line",
@@ -1660,7 +1660,7 @@ MUTANTS = (
          'Interrupted(f"interrupted by signal {number} at t = {recorder.end:g} h; the "\n'
          '            "results so far are written, and "\n'
          '            f"--resume {shell_word(recorder.folder)} continues the run", number)',
-         "tests/test_resume.py::test_a_run_ended_by_a_signal_resumes[2-130]"),
+         "tests/test_names.py::test_every_signal_stops_every_command_and_saves[SIGTERM-run]"),
         ("contact-event-when",
          "A run is in contact before it has a state.",
          "Recorder.contact",
