@@ -87,7 +87,7 @@ def test_arrays_of_pores_and_numbers():
     """Each pore has its own result, whatever the unit of length."""
     width, spanned = np.array([[50.0], [100.0]]), np.array([[0], [1]])
     area = np.array([[500.0, 2000.0, 3500.0], [17000.0, 25000.0, 44000.0]])
-    computed = repro.added_resistance(area, width, spanned)
+    computed = repro.added_resistance(area, width, spanned, outside="nan")
     for index, share in np.ndenumerate(area / width**2):
         expected = repro.added_resistance(1e-8 * share * 9, 3e-4, bool(spanned[index[0], 0]), LAMBDA)
         assert np.shape(expected.length) == ()
