@@ -6,6 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from skfem import ElementTriP1, ElementTriP2
 from skfem.quadrature import get_quadrature
 from skfem.refdom import RefTri
 
@@ -65,24 +66,17 @@ def instant_in(state, order):
     return scene, replace(report, pore=at, solved=solving.solve(scene, at))
 
 
-# Lagrange's functions from their nodes alone.
+#: Nodes of the functions of an order on the unit triangle.
 CORNERS = [(0, 0), (1, 0), (0, 1)]
 NODES = {1: np.array(CORNERS, float), 2: np.array([*CORNERS, (0.5, 0), (0.5, 0.5), (0, 0.5)])}
-
-
-def powers(order):
-    return [(i, j) for i in range(order + 1) for j in range(order + 1 - i)]
+ELEMENTS = {1: ElementTriP1(), 2: ElementTriP2()}
 
 
 def functions(order, places):
-    """(q, k) values and (q, k, 2) derivatives at points (q, 2) of the unit triangle."""
-    x, y = np.asarray(places, float).T
-    vandermonde = np.column_stack([NODES[order][:, 0] ** i * NODES[order][:, 1] ** j for i, j in powers(order)])
-    coefficients = np.linalg.inv(vandermonde)
-    value = np.column_stack([x**i * y**j for i, j in powers(order)])
-    along = np.column_stack([i * x ** max(i - 1, 0) * y**j for i, j in powers(order)])
-    up = np.column_stack([j * x**i * y ** max(j - 1, 0) for i, j in powers(order)])
-    return value @ coefficients, np.stack([along @ coefficients, up @ coefficients], axis=-1)
+    """(q, k) values and (q, k, 2) derivatives at points (q, 2) of the unit triangle, by scikit-fem."""
+    at = np.asarray(places, float).T
+    values, slopes = zip(*(ELEMENTS[order].lbasis(at, k) for k in range(len(NODES[order]))))
+    return np.stack(values, axis=-1), np.moveaxis(slopes, 0, 1).T
 
 
 def jacobians(points, cells, places):
@@ -606,7 +600,7 @@ def leaky(column, leak):
 @pytest.mark.parametrize("leak", [0.01, -0.01])
 @pytest.mark.parametrize("column", BALANCES)
 def test_a_leak_in_the_middle_of_three_steps_is_reported_with_its_sign(column, leak):
-    """timeseries.csv and the page report it; ledger.csv also reports the oxygen demand."""
+    """timeseries.csv reports it; ledger.csv also reports the oxygen demand."""
     scene, instant = leaky(column, leak)
     row = results.row(scene, instant)
     assert row[column] == pytest.approx(leak, rel=1e-9)
@@ -614,12 +608,6 @@ def test_a_leak_in_the_middle_of_three_steps_is_reported_with_its_sign(column, l
     steps = [dict(zip(results.LEDGER_COLUMNS, results.ledger_row(scene, ledger))) for ledger in instant.ledgers]
     expected = [0.0, leak if column == "oxygen_demand_balance" else 0.0, 0.0]
     assert [step["oxygen_demand_balance"] for step in steps] == pytest.approx(expected, rel=1e-9, abs=1e-12)
-    table = {name: np.array([0.0, value], float) for name, value in row.items()}
-    run = Run(None, {"tables": {}}, table, {})
-    (chart,) = [chart for chart in quantities.charts_of(run) if "balances" in chart.title]
-    label = column.removesuffix("_balance").replace("_", " ")
-    (line,) = [line for line in chart.lines if line.label == label]
-    assert line.values[-1] == pytest.approx(leak, rel=1e-9) and "relative defect" in chart.axis
 
 
 @pytest.mark.parametrize("time", ["updates", "midpoint"])

@@ -6,7 +6,7 @@ import pytest
 
 from repro.fem.walls import BOTTOM, FREE, TOP
 from repro.model import growth, mechanics
-from repro.model.mechanics import Mechanics, equilibrium, supports_of
+from repro.model.mechanics import supports_of
 from repro.model.meshing import seeded
 from tests.strategies import EVERY_ORDER, ORDERS, coarse_base
 from verification.problems.schemes import exchange, load_scene
@@ -60,20 +60,6 @@ def test_simple_shear_between_two_walls_is_exact(order):
     assert shapes[0].pressure == pytest.approx(np.full(seed.body.solid.shape.corners, g**2 / 3), abs=1e-8)
     assert shapes[0].iterations <= 3
     assert np.abs(shapes[1].position - exact)[upper].max() > 0.1
-
-
-@EVERY_ORDER
-def test_without_forces_one_surface_alone_moves_as_without_a_traction(order):
-    """The forces of growth along the pore add up to zero, so the traction is zero."""
-    scene, seed = coarse_base(order)
-    slope = seed.body.reference[seed.body.solid.shape.cells, 0] @ seed.body.solid.shape.table.values.T
-    grown = seed.with_body(theta=seed.body.theta * (1.2 + 0.02 * slope))
-    mechanics = Mechanics.of(scene)
-    none = np.zeros((len(seed.mesh.body), 2))
-    assert not supports_of(seed.body.solid, seed, None)
-    assert supports_of(seed.body.solid, seed, none)
-    shapes = [equilibrium(mechanics, grown, grown, forces)[0].mesh.points for forces in (None, none)]
-    assert shapes[1] == pytest.approx(shapes[0], abs=1e-9)
 
 
 @pytest.mark.parametrize("wall, walls", [("sliding", [BOTTOM, TOP]), ("bonded", [TOP])])
