@@ -12,7 +12,7 @@ from skfem.refdom import RefTri
 
 from repro import results
 from repro.march.simulation import simulate
-from repro.model import adhesion, solving
+from repro.model import adhesion, solving, traction
 from repro.report import quantities
 from repro.report.reading import Run
 from repro.results.names import KNOWN
@@ -370,6 +370,16 @@ def derived_adhesion(scene, instant):
             "fluid_moment_nN": 1e3 * (arm[:, 0] * loads[:, 1] - arm[:, 1] * loads[:, 0]).sum()}
 
 
+#: Keys of [growth]: the walls bear the stress alone, or the forces of the water, too.
+BEARING = {"stress": {}, "water": {"fluid_forces": "included"}}
+
+
+def bearing(scene, changes):
+    """The scene with columns of adhesion, in water that is 1e5 times as dense, so that its forces count."""
+    drive = replace(scene.flow, density=1e5 * scene.flow.density)
+    return replace(scene, flow=drive, growth=replace(scene.growth, tensile_strength=1e3, **changes))
+
+
 @EVERY_STATE
 @EVERY_ORDER
 def test_the_columns_of_adhesion_are_what_their_names_say(order, state):
@@ -386,6 +396,21 @@ def test_the_columns_of_adhesion_are_what_their_names_say(order, state):
     largest = max(abs(value) for name, value in expected.items() if name.startswith("fluid"))
     for name, value in expected.items():
         assert row[name] == pytest.approx(value, rel=1e-6, abs=1e-9 * largest), name
+
+
+@pytest.mark.parametrize("state", ["first", "late", "upside down"])
+@EVERY_ORDER
+def test_the_water_pushes_a_shape_by_its_stress(order, state):
+    """In both forms of the interface, at all nodes beside the walls. At contact lines the columns alone take off the
+    force on the wall."""
+    scene, instant = instant_in(state, order)
+    scene, pore = bearing(scene, BEARING["water"]), instant.pore
+    fluid = traction.Fluid.of(scene)
+    forces = traction.forces(fluid, traction.surroundings(fluid.meshing, pore, pore), pore)
+    expected = water_loads(scene, instant)[pore.mesh.body] / scene.growth.shear_modulus
+    y = pore.mesh.points[pore.mesh.body, 1]
+    free = (y > 0.0) & (y < pore.mesh.width)
+    assert forces[free] == pytest.approx(expected[free], abs=1e-7 * np.abs(expected).max())
 
 
 def edges_on_wall(mesh, height):
@@ -451,16 +476,6 @@ def derived_wall_traction(scene, instant):
     if scene.growth.fluid_forces == "included":
         forces = forces - water_loads(scene, instant)
     return max((*traction_peak(mesh, height, forces), height) for height in (0.0, mesh.width))
-
-
-#: Keys of [growth]: the walls bear the stress alone, or the forces of the water, too.
-BEARING = {"stress": {}, "water": {"fluid_forces": "included"}}
-
-
-def bearing(scene, changes):
-    """The scene with columns of adhesion, in water that is 1e5 times as dense, so that its forces count."""
-    drive = replace(scene.flow, density=1e5 * scene.flow.density)
-    return replace(scene, flow=drive, growth=replace(scene.growth, tensile_strength=1e3, **changes))
 
 
 @pytest.mark.parametrize("state, parts, bears", [

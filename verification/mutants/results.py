@@ -2047,7 +2047,7 @@ MUTANTS = (
          "forces",
          "on_aggregate(space, flow_field, drive, fluid.interface)",
          'on_aggregate(space, flow_field, drive, interface_of("laplacian"))',
-         f"{PAIRS}the_force_on_the_aggregate_comes_through_every_section_of_the_fluid")),
+         f"{DERIVED}the_water_pushes_a_shape_by_its_stress")),
     *changes(
         "repro/model/brinkman.py",
         ("drag-along-alone",
@@ -2336,8 +2336,7 @@ MUTANTS = (
          "quadrature_error",
          "masses = sink.active / reaction.dx @ fit * finer.dx",
          "masses = sink.active.sum() / reaction.dx.sum() * finer.dx",
-         f"{GUARDS}two_quadratures_of_the_uptake_may_differ_by_five_percent",
-         f"{GUARDS}the_difference_of_two_quadratures_in_a_solution_decides")),
+         f"{GUARDS}two_quadratures_of_the_uptake_may_differ_by_five_percent")),
     *changes(
         "repro/model/transport_in_time.py",
         ("demand-of-updates-loose",
