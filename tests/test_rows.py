@@ -9,7 +9,7 @@ from repro import results
 from repro import solve as solve_scene
 from repro.march.balance import Ledger
 from repro.march.state import Report
-from repro.model import adhesion, transport
+from repro.model import transport
 from repro.model.meshing import seeded
 from repro.model.solving import Solved, solve
 from repro.scene import load_scene
@@ -87,14 +87,6 @@ def test_stress_is_reported_only_for_strain_since_the_start(order):
     grids = [results.fields(*coarse_base(order, f"growth.new_biomass={kind}"), NOTHING) for kind in kinds]
     stressed, free = ({*grid.point_data, *grid.cell_data} for grid in grids)
     assert len(stressed - free) == 6 and free == {name for name in stressed if not name.endswith("_MPa")}
-
-
-def test_stresses_on_walls_are_computed_only_for_a_scene_with_a_strength(monkeypatch):
-    for name in ("wall_peak", "tensile_peak", "fluid_load"):
-        monkeypatch.setattr(adhesion, name, lambda *_: pytest.fail("a stress was computed"))
-    scene, pore = coarse_base(1)
-    row = row_of(scene, pore, solve(scene, pore))
-    assert row["wall_traction_max_MPa"] is None and row["fluid_force_x_uN_per_m"] is None
 
 
 @pytest.mark.parametrize("preset", ["fast", pytest.param("paper", marks=pytest.mark.thorough)])
